@@ -1,0 +1,2 @@
+//! Bench drivers, an independent auditor and example readers for tetdb.
+#![forbid(unsafe_code)]
