@@ -66,7 +66,9 @@ pub fn orient(a: Point, b: Point, c: Point, d: Point) -> f64 {
 /// The sign of [`orient`] as an ordering against zero.
 #[inline]
 pub fn orient_sign(a: Point, b: Point, c: Point, d: Point) -> Ordering {
-    orient(a, b, c, d).partial_cmp(&0.0).expect("coordinates are finite")
+    orient(a, b, c, d)
+        .partial_cmp(&0.0)
+        .expect("coordinates are finite")
 }
 
 /// Sphere determinant of the positive tetrahedron `a b c d` and `e`: positive when `e` is inside.

@@ -1,0 +1,53 @@
+use std::path::PathBuf;
+
+use tetdb_schema::page::PageError;
+use thiserror::Error;
+
+/// What can go wrong between memory and disk.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum StoreError {
+    /// The operating system or redb refused a read or write.
+    #[error("{path}: {source}")]
+    Database {
+        path: PathBuf,
+        #[source]
+        source: Box<redb::Error>,
+    },
+    /// The file is open for writing elsewhere.
+    #[error("{path} is being written by another process")]
+    Busy { path: PathBuf },
+    /// The disk has no room for what must be written.
+    #[error("no space left to write {path}")]
+    Full { path: PathBuf },
+    /// redb could not follow its own tree.
+    #[error("{path} is damaged: {reason}")]
+    Damaged { path: PathBuf, reason: String },
+    /// A page is not what its address says.
+    #[error("{path} is damaged: {source}")]
+    Page {
+        path: PathBuf,
+        #[source]
+        source: PageError,
+    },
+    /// A page that must exist does not.
+    #[error("{path} is damaged: {what} is missing")]
+    Missing { path: PathBuf, what: String },
+    /// A file operation outside redb failed.
+    #[error("{path}: {source}")]
+    Io {
+        path: PathBuf,
+        #[source]
+        source: std::io::Error,
+    },
+    /// The ledger has no bytes left for a demand.
+    #[error("{what} needs {needed} bytes, the memory budget has {available} left")]
+    Budget {
+        what: &'static str,
+        needed: u64,
+        available: u64,
+    },
+    /// More records than 30-bit ids can name.
+    #[error("a sub-domain cannot hold more than 2^30 {what}")]
+    TooMany { what: &'static str },
+}

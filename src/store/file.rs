@@ -1,0 +1,243 @@
+//! One redb file of keyed values: a sub-domain in one generation.
+
+use std::path::{Path, PathBuf};
+
+use redb::{
+    Database, DatabaseError, Durability, ReadOnlyDatabase, ReadOnlyTable, ReadableDatabase,
+    StorageError, TableDefinition,
+};
+
+use super::StoreError;
+
+/// The only table of a file; see the schema's page on keys.
+const PAGES: TableDefinition<u64, &[u8]> = TableDefinition::new("pages");
+
+enum Handle {
+    Writer(Box<Database>),
+    Reader(Box<ReadOnlyDatabase>),
+}
+
+/// Values by key in one redb file.
+///
+/// Invariant: every write is one durable commit. Is not: a cache of its own; redb's is bounded by the
+/// `cache_bytes` given at opening, which the caller has leased.
+pub struct StoreFile {
+    path: PathBuf,
+    handle: Handle,
+    /// Kept between reads; dropped at each commit, because it shows the state before it.
+    table: Option<ReadOnlyTable<u64, &'static [u8]>>,
+}
+
+impl StoreFile {
+    /// Creates a file that must not exist.
+    ///
+    /// Errors: [`StoreError::Io`] when it exists or its folder cannot be written.
+    pub fn create(path: &Path, cache_bytes: usize) -> Result<Self, StoreError> {
+        if path.exists() {
+            return Err(StoreError::Io {
+                path: path.to_owned(),
+                source: std::io::ErrorKind::AlreadyExists.into(),
+            });
+        }
+        let db = Database::builder()
+            .set_cache_size(cache_bytes)
+            .create(path)
+            .map_err(|e| database_error(path, e))?;
+        let mut file = Self {
+            path: path.to_owned(),
+            handle: Handle::Writer(Box::new(db)),
+            table: None,
+        };
+        file.write(std::iter::empty())?;
+        Ok(file)
+    }
+
+    /// Opens an existing file; read-only opening lets other readers in and creates nothing.
+    ///
+    /// Errors: [`StoreError::Busy`] while another process writes it, [`StoreError::Damaged`] when redb cannot read it.
+    pub fn open(path: &Path, cache_bytes: usize, writable: bool) -> Result<Self, StoreError> {
+        let mut builder = Database::builder();
+        builder.set_cache_size(cache_bytes);
+        let handle = if writable {
+            builder.open(path).map(|db| Handle::Writer(Box::new(db)))
+        } else {
+            builder
+                .open_read_only(path)
+                .map(|db| Handle::Reader(Box::new(db)))
+        };
+        Ok(Self {
+            path: path.to_owned(),
+            handle: handle.map_err(|e| database_error(path, e))?,
+            table: None,
+        })
+    }
+
+    /// Where the file is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Calls `use_bytes` with the value of `key`, or returns `None` when there is none.
+    ///
+    /// Effects: none on the file. Errors: reads that fail, and damage redb notices.
+    pub fn read<T>(
+        &mut self,
+        key: u64,
+        use_bytes: impl FnOnce(&[u8]) -> T,
+    ) -> Result<Option<T>, StoreError> {
+        let table = self.table()?;
+        let found = guarded(|| table.get(key).map(|v| v.map(|v| use_bytes(v.value()))));
+        found.map_err(|e| e.at(&self.path))
+    }
+
+    /// Calls `visit` with every key and value of `keys`, ascending, until it returns `false`.
+    pub fn scan(
+        &mut self,
+        keys: std::ops::Range<u64>,
+        mut visit: impl FnMut(u64, &[u8]) -> bool,
+    ) -> Result<(), StoreError> {
+        let table = self.table()?;
+        let done = guarded(|| -> Result<(), redb::Error> {
+            for entry in table.range(keys)? {
+                let (key, value) = entry?;
+                if !visit(key.value(), value.value()) {
+                    break;
+                }
+            }
+            Ok(())
+        });
+        done.map_err(|e| e.at(&self.path))
+    }
+
+    /// Writes `values` in one durable commit. Ascending keys are fastest.
+    ///
+    /// Errors: [`StoreError::Full`] when the disk is; the file then stands at its last commit.
+    pub fn write<'a>(
+        &mut self,
+        values: impl Iterator<Item = (u64, &'a [u8])>,
+    ) -> Result<(), StoreError> {
+        let Handle::Writer(db) = &self.handle else {
+            unreachable!("{} is open for reading only", self.path.display());
+        };
+        self.table = None;
+        let committed = guarded(|| -> Result<(), redb::Error> {
+            let mut txn = db.begin_write()?;
+            txn.set_durability(Durability::Immediate)?;
+            txn.set_quick_repair(true);
+            {
+                let mut table = txn.open_table(PAGES)?;
+                for (key, value) in values {
+                    table.insert(key, value)?;
+                }
+            }
+            txn.commit()?;
+            Ok(())
+        });
+        committed.map_err(|e| e.at(&self.path))
+    }
+
+    /// Shrinks the file to what it holds, and closes it.
+    pub fn compact(mut self) -> Result<(), StoreError> {
+        self.table = None;
+        if let Handle::Writer(db) = &mut self.handle {
+            let done = guarded(|| db.compact().map_err(redb::Error::from));
+            done.map_err(|e| e.at(&self.path))?;
+        }
+        Ok(())
+    }
+
+    fn table(&mut self) -> Result<&ReadOnlyTable<u64, &'static [u8]>, StoreError> {
+        if self.table.is_none() {
+            let opened = guarded(|| -> Result<_, redb::Error> {
+                let txn = match &self.handle {
+                    Handle::Writer(db) => db.begin_read()?,
+                    Handle::Reader(db) => db.begin_read()?,
+                };
+                Ok(txn.open_table(PAGES)?)
+            });
+            self.table = Some(opened.map_err(|e| e.at(&self.path))?);
+        }
+        Ok(self.table.as_ref().expect("just opened"))
+    }
+}
+
+/// A failure inside redb: an error it returned, or a panic on a tree it could not follow.
+enum Failure {
+    Error(redb::Error),
+    Panic(String),
+}
+
+impl Failure {
+    fn at(self, path: &Path) -> StoreError {
+        let path = path.to_owned();
+        match self {
+            Self::Panic(reason) => StoreError::Damaged { path, reason },
+            Self::Error(redb::Error::Corrupted(reason)) => StoreError::Damaged { path, reason },
+            Self::Error(redb::Error::Io(e)) if e.kind() == std::io::ErrorKind::StorageFull => {
+                StoreError::Full { path }
+            }
+            Self::Error(source) => StoreError::Database {
+                path,
+                source: Box::new(source),
+            },
+        }
+    }
+}
+
+/// Runs a call into redb; on a damaged tree redb may panic, which is damage and not our bug.
+fn guarded<T, E: Into<redb::Error>>(call: impl FnOnce() -> Result<T, E>) -> Result<T, Failure> {
+    match std::panic::catch_unwind(std::panic::AssertUnwindSafe(call)) {
+        Ok(result) => result.map_err(|e| Failure::Error(e.into())),
+        Err(payload) => Err(Failure::Panic(
+            payload
+                .downcast_ref::<String>()
+                .cloned()
+                .or_else(|| payload.downcast_ref::<&str>().map(|s| (*s).to_owned()))
+                .unwrap_or_else(|| "unreadable tree".to_owned()),
+        )),
+    }
+}
+
+fn database_error(path: &Path, error: DatabaseError) -> StoreError {
+    match error {
+        DatabaseError::DatabaseAlreadyOpen => StoreError::Busy {
+            path: path.to_owned(),
+        },
+        DatabaseError::Storage(StorageError::Corrupted(reason)) => StoreError::Damaged {
+            path: path.to_owned(),
+            reason,
+        },
+        other => Failure::Error(other.into()).at(path),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_come_back_from_a_closed_file() -> Result<(), Box<dyn std::error::Error>> {
+        let dir = tempfile::tempdir()?;
+        let path = dir.path().join("a.redb");
+        let mut file = StoreFile::create(&path, 1 << 20)?;
+        let value = vec![5u8; 1000];
+        file.write([(3, &value[..]), (9, &value[..10])].into_iter())?;
+        assert_eq!(file.read(9, <[u8]>::len)?, Some(10));
+        assert!(matches!(
+            StoreFile::open(&path, 0, true),
+            Err(StoreError::Busy { .. })
+        ));
+        file.compact()?;
+        let mut file = StoreFile::open(&path, 1 << 20, false)?;
+        assert_eq!(file.read(3, <[u8]>::to_vec)?, Some(value));
+        assert_eq!(file.read(4, <[u8]>::len)?, None);
+        let mut keys = Vec::new();
+        file.scan(0..u64::MAX, |key, _| {
+            keys.push(key);
+            true
+        })?;
+        assert_eq!(keys, [3, 9]);
+        assert!(StoreFile::create(&path, 0).is_err());
+        Ok(())
+    }
+}
