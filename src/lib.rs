@@ -5,3 +5,7 @@
 pub mod geom;
 // Floor 1.
 pub mod store;
+// Floor 2.
+pub mod mesh;
+// Floor 3.
+pub mod delaunay;

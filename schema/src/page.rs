@@ -1,6 +1,6 @@
 //! Working pages: 64 KiB frames of 32-byte records, checksummed when they leave memory.
 
-use rend::u32_le;
+pub use rend::u32_le;
 use thiserror::Error;
 use xxhash_rust::xxh3::Xxh3;
 

@@ -50,4 +50,7 @@ pub enum StoreError {
     /// More records than 30-bit ids can name.
     #[error("a sub-domain cannot hold more than 2^30 {what}")]
     TooMany { what: &'static str },
+    /// The user asked to stop; the step in flight is lost, everything before it is kept.
+    #[error("stopped")]
+    Stopped,
 }

@@ -1,7 +1,63 @@
 //! Pages, cache, budget, transactions. This room knows bytes and records, not geometry.
+//!
+//! # How failure travels
+//! A record is read some twenty million times a second, and nearly always from a resident frame. The
+//! accessors of [`Pages`] therefore return records, not results: when a page cannot be loaded, the
+//! pager unwinds with the [`StoreError`] as its payload, and [`attempt`], which surrounds each step,
+//! turns that back into a value. A step is atomic, so what it leaves half-done in memory is dropped
+//! with it. Nothing but [`attempt`] may catch such an unwinding. A request to stop travels the same way.
 
+mod budget;
 mod error;
 mod file;
+mod flat;
+mod pager;
+mod stop;
 
+pub use budget::{Budget, Lease};
 pub use error::StoreError;
 pub use file::StoreFile;
+pub use flat::FlatPages;
+pub use pager::{Backing, Pager, PagerStats};
+pub use stop::{attempt, fail, request_stop, stop_if_requested};
+
+use tetdb_schema::page::Slot;
+
+/// Kinds of working pages an accessor may name, as positions in a page table.
+pub mod kind {
+    use tetdb_schema::page::PageKind;
+
+    pub const TETS: usize = 0;
+    pub const TET_ATTRIBUTES: usize = 1;
+    pub const VERTICES: usize = 2;
+    pub const VERTEX_ATTRIBUTES: usize = 3;
+    pub const FACETS: usize = 4;
+    pub const INTERFACE_FACES: usize = 5;
+    pub const SCRATCH: usize = 6;
+    /// The page kinds in that order.
+    pub const ALL: [PageKind; 7] = [
+        PageKind::Tets,
+        PageKind::TetAttributes,
+        PageKind::Vertices,
+        PageKind::VertexAttributes,
+        PageKind::Facets,
+        PageKind::InterfaceFaces,
+        PageKind::Scratch,
+    ];
+}
+
+/// Random access to records by id, whatever holds them.
+///
+/// The borrow ends before the next access: no reference into a page survives it.
+pub trait Pages {
+    /// Reads record `id` of kind `K` (one of [`kind`]).
+    fn read<const K: usize>(&mut self, id: u32) -> &Slot;
+    /// Opens record `id` of kind `K` for change; its page is dirty from then on.
+    fn write<const K: usize>(&mut self, id: u32) -> &mut Slot;
+    /// Number of pages of kind `K`.
+    fn n_pages<const K: usize>(&self) -> u32;
+    /// Appends a zeroed page of kind `K` and returns its number.
+    fn append_page<const K: usize>(&mut self) -> u32;
+    /// Forgets all pages of kind `K`, as if there had never been one.
+    fn clear<const K: usize>(&mut self);
+}

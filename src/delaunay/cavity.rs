@@ -1,0 +1,404 @@
+//! The cavity of a point and its replacement by the ball of insertion.
+//!
+//! Gathering only marks; [`Kernel::discard`] takes the marks back and [`Kernel::fill`] makes the
+//! change. Between the two a caller may look at the outer faces and decide.
+
+use super::links::Links;
+use super::locate::Located;
+use crate::geom::{Point, in_sphere_perturbed, orient};
+use crate::mesh::anatomy::{FACES, MARK, REQUIRED, VERTEX_MASK};
+use crate::mesh::{FaceRef, Mesh, Tet};
+use crate::store::{Pages, stop_if_requested};
+
+/// A larger cavity is refused: nothing a size field asks for is so large.
+const CAVITY_MAX: usize = 1 << 20;
+
+/// Why a point was not inserted; the mesh is as before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rejected {
+    /// The walk left the mesh or started nowhere.
+    Outside,
+    /// The point is this vertex, bit by bit.
+    Duplicate(u32),
+    /// No star-shaped cavity keeps the required faces.
+    Blocked,
+    /// A vertex would lose its last tetrahedron.
+    Buries,
+    /// The cavity has more than a million tetrahedra.
+    TooLarge,
+}
+
+/// An outer face of the cavity.
+#[derive(Clone, Copy, Debug)]
+pub struct CavityFace {
+    /// Vertex ids, counter-clockwise seen from outside the cavity.
+    pub vertices: [u32; 3],
+    /// The face from the other side.
+    pub outside: FaceRef,
+    /// The face from the inside: a tetrahedron of the cavity.
+    pub inside: FaceRef,
+    pub required: bool,
+}
+
+/// Work done so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct KernelStats {
+    pub inserted: u64,
+    pub walk_steps: u64,
+    pub cavity_tets: u64,
+    pub cavity_largest: u64,
+    pub sphere_tests: u64,
+    pub shrunk: u64,
+}
+
+/// Scratch of the insertion kernel; one per worker.
+pub struct Kernel {
+    cavity: Vec<u32>,
+    faces: Vec<CavityFace>,
+    links: Links,
+    new_tets: Vec<u32>,
+    pub(super) turn: u32,
+    pub stats: KernelStats,
+}
+
+impl Default for Kernel {
+    fn default() -> Self {
+        Self {
+            cavity: Vec::new(),
+            faces: Vec::new(),
+            links: Links::new(),
+            new_tets: Vec::new(),
+            turn: 1,
+            stats: KernelStats::default(),
+        }
+    }
+}
+
+impl Kernel {
+    /// Inserts `p` as vertex `v` into a mesh without required faces; returns one of its tetrahedra.
+    ///
+    /// `v` must already hold the position `p`. Errors: see [`Rejected`]; `v` is then in no tetrahedron.
+    pub fn insert<P: Pages>(
+        &mut self,
+        mesh: &mut Mesh<P>,
+        v: u32,
+        p: Point,
+        hint: u32,
+    ) -> Result<u32, Rejected> {
+        let start = self.locate(mesh, p, hint)?;
+        self.gather::<P, false>(mesh, p, &start)?;
+        Ok(self.fill(mesh, v))
+    }
+
+    /// Marks the cavity of `p` and lists its outer faces; required faces are kept.
+    ///
+    /// The cavity is made star-shaped around `p` exactly, and refused when a vertex would be left without
+    /// tetrahedra. On errors nothing stays marked. After success either [`Kernel::fill`] or [`Kernel::discard`] must follow.
+    pub fn gather_constrained<P: Pages>(
+        &mut self,
+        mesh: &mut Mesh<P>,
+        p: Point,
+        start: &Located,
+    ) -> Result<(), Rejected> {
+        self.gather::<P, true>(mesh, p, start)?;
+        if let Err(rejected) = self.correct(mesh, p, start.tet) {
+            self.discard(mesh);
+            return Err(rejected);
+        }
+        Ok(())
+    }
+
+    /// Outer faces of the gathered cavity.
+    pub fn faces(&self) -> &[CavityFace] {
+        &self.faces
+    }
+
+    /// Tetrahedra of the gathered cavity.
+    pub fn cavity(&self) -> &[u32] {
+        &self.cavity
+    }
+
+    /// Tetrahedra made by the last [`Kernel::fill`].
+    pub fn new_tets(&self) -> &[u32] {
+        &self.new_tets
+    }
+
+    fn gather<P: Pages, const CONSTRAINED: bool>(
+        &mut self,
+        mesh: &mut Mesh<P>,
+        p: Point,
+        start: &Located,
+    ) -> Result<(), Rejected> {
+        if let Some(i) = start.points.iter().position(|&q| q == p) {
+            return Err(Rejected::Duplicate(start.record.vertex(i)));
+        }
+        self.cavity.clear();
+        self.faces.clear();
+        mesh.set_mark(start.tet, 0, true);
+        self.cavity.push(start.tet);
+        let mut next = 0;
+        while next < self.cavity.len() {
+            let t = self.cavity[next];
+            next += 1;
+            let tet = mesh.tet(t);
+            for i in 0..4 {
+                let across = tet.neighbor[i];
+                let required = CONSTRAINED && tet.is_required(i);
+                if across.exists() && !required {
+                    let other = mesh.tet(across.tet());
+                    if other.node[0] & MARK != 0 {
+                        continue;
+                    }
+                    self.stats.sphere_tests += 1;
+                    let [a, b, c, d] = mesh.points(&other);
+                    if in_sphere_perturbed(a, b, c, d, p) {
+                        mesh.set_mark(across.tet(), 0, true);
+                        self.cavity.push(across.tet());
+                        continue;
+                    }
+                }
+                self.faces.push(CavityFace {
+                    vertices: tet.face(i),
+                    outside: across,
+                    inside: FaceRef::new(t, i),
+                    required,
+                });
+            }
+            if self.cavity.len() > CAVITY_MAX {
+                self.discard(mesh);
+                return Err(Rejected::TooLarge);
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes tetrahedra out of the cavity until `p` sees all its faces from inside.
+    ///
+    /// The one with a blind face goes, and what it alone connected goes with it; the cavity strictly shrinks.
+    fn correct<P: Pages>(
+        &mut self,
+        mesh: &mut Mesh<P>,
+        p: Point,
+        seed: u32,
+    ) -> Result<(), Rejected> {
+        loop {
+            let mut blind = false;
+            for k in 0..self.faces.len() {
+                let face = self.faces[k];
+                let [a, b, c] = face.vertices.map(|v| mesh.point(v));
+                if orient(p, a, b, c) <= 0.0 {
+                    blind = true;
+                    mesh.set_mark(face.inside.tet(), 0, false);
+                }
+            }
+            if !blind {
+                break;
+            }
+            self.stats.shrunk += 1;
+            if mesh.tet(seed).node[0] & MARK == 0 {
+                return Err(Rejected::Blocked);
+            }
+            self.reflood(mesh, seed);
+        }
+        self.links.begin();
+        let mut buried = false;
+        if self.faces.len() < 2 * (CAVITY_SMALL - 2) {
+            for face in &self.faces {
+                for v in face.vertices {
+                    self.links.local(v);
+                }
+            }
+            // A ball has 2 n - 4 faces on n vertices; anything else is pinched or has a hole.
+            if self.faces.len() + 4 != 2 * self.links.n_local() {
+                return Err(Rejected::Blocked);
+            }
+            for &t in &self.cavity {
+                buried |= mesh
+                    .tet(t)
+                    .vertices()
+                    .into_iter()
+                    .any(|v| !self.links.knows(v));
+            }
+        } else {
+            let mut outer: Vec<u32> = self.faces.iter().flat_map(|f| f.vertices).collect();
+            outer.sort_unstable();
+            outer.dedup();
+            if self.faces.len() + 4 != 2 * outer.len() {
+                return Err(Rejected::Blocked);
+            }
+            for &t in &self.cavity {
+                let vertices = mesh.tet(t).vertices();
+                buried |= vertices.iter().any(|v| outer.binary_search(v).is_err());
+            }
+        }
+        if buried {
+            Err(Rejected::Buries)
+        } else {
+            Ok(())
+        }
+    }
+
+    /// Keeps what is still connected to `seed` through marked tetrahedra; lists the outer faces anew.
+    fn reflood<P: Pages>(&mut self, mesh: &mut Mesh<P>, seed: u32) {
+        let before = std::mem::take(&mut self.cavity);
+        self.faces.clear();
+        // The mark moves to node 2 while a tetrahedron is known to stay.
+        let settle = |mesh: &mut Mesh<P>, t: u32| {
+            mesh.set_mark(t, 0, false);
+            mesh.set_mark(t, 2, true);
+        };
+        settle(mesh, seed);
+        self.cavity.push(seed);
+        let mut next = 0;
+        while next < self.cavity.len() {
+            let tet = mesh.tet(self.cavity[next]);
+            next += 1;
+            for i in 0..4 {
+                let across = tet.neighbor[i];
+                if across.exists()
+                    && !tet.is_required(i)
+                    && mesh.tet(across.tet()).node[0] & MARK != 0
+                {
+                    settle(mesh, across.tet());
+                    self.cavity.push(across.tet());
+                }
+            }
+        }
+        for &t in &before {
+            mesh.set_mark(t, 0, false);
+        }
+        for &t in &self.cavity {
+            let tet = mesh.tet(t);
+            for i in 0..4 {
+                let across = tet.neighbor[i];
+                let required = tet.is_required(i);
+                if required || !across.exists() || mesh.tet(across.tet()).node[2] & MARK == 0 {
+                    self.faces.push(CavityFace {
+                        vertices: tet.face(i),
+                        outside: across,
+                        inside: FaceRef::new(t, i),
+                        required,
+                    });
+                }
+            }
+        }
+        for &t in &self.cavity {
+            mesh.set_mark(t, 2, false);
+            mesh.set_mark(t, 0, true);
+        }
+    }
+
+    /// Takes the marks back; the mesh is as before gathering.
+    pub fn discard<P: Pages>(&mut self, mesh: &mut Mesh<P>) {
+        for &t in &self.cavity {
+            mesh.set_mark(t, 0, false);
+        }
+        self.cavity.clear();
+        self.faces.clear();
+    }
+
+    /// Replaces the gathered cavity by the tetrahedra that join vertex `v` to its outer faces.
+    ///
+    /// Returns one of them. Effects: ids of the cavity are used again first; attributes and `tet_of` are not written.
+    pub fn fill<P: Pages>(&mut self, mesh: &mut Mesh<P>, v: u32) -> u32 {
+        stop_if_requested();
+        self.stats.inserted += 1;
+        self.stats.cavity_tets += self.cavity.len() as u64;
+        self.stats.cavity_largest = self.stats.cavity_largest.max(self.cavity.len() as u64);
+        let n_new = self.faces.len();
+        self.new_tets.clear();
+        self.new_tets
+            .extend(self.cavity.iter().copied().take(n_new));
+        while self.new_tets.len() < n_new {
+            self.new_tets.push(mesh.take_tet());
+        }
+        self.links.begin();
+        if !self.link_by_matrix(mesh, v) {
+            self.link_by_sorting(mesh, v);
+        }
+        for k in n_new..self.cavity.len() {
+            mesh.free_tet(self.cavity[k]);
+        }
+        self.cavity.clear();
+        self.new_tets[0]
+    }
+
+    /// Writes the new tetrahedra; `false` (with nothing written) when there are too many vertices.
+    fn link_by_matrix<P: Pages>(&mut self, mesh: &mut Mesh<P>, v: u32) -> bool {
+        let mut locals = [[0u8; 3]; 2 * CAVITY_SMALL];
+        if self.faces.len() > locals.len() {
+            return false;
+        }
+        for (k, face) in self.faces.iter().enumerate() {
+            for (i, w) in face.vertices.into_iter().enumerate() {
+                let Some(local) = self.links.local(w) else {
+                    return false;
+                };
+                locals[k][i] = local;
+            }
+            let [a, b, c] = locals[k];
+            let t = self.new_tets[k] << 2;
+            // Face j of (v, f0, f1, f2) is opposite f_{j-1}; it holds the edge f_j → f_{j+1}.
+            self.links.set(b, c, t | 1);
+            self.links.set(c, a, t | 2);
+            self.links.set(a, b, t | 3);
+        }
+        for (k, face) in self.faces.iter().enumerate() {
+            let [a, b, c] = locals[k];
+            let inner = [
+                self.links.get(c, b),
+                self.links.get(a, c),
+                self.links.get(b, a),
+            ];
+            write_new(mesh, v, self.new_tets[k], face, inner);
+        }
+        true
+    }
+
+    #[cold]
+    fn link_by_sorting<P: Pages>(&mut self, mesh: &mut Mesh<P>, v: u32) {
+        for (k, face) in self.faces.iter().enumerate() {
+            let [a, b, c] = face.vertices;
+            let t = self.new_tets[k] << 2;
+            self.links.push_sorted(b, c, t | 1);
+            self.links.push_sorted(c, a, t | 2);
+            self.links.push_sorted(a, b, t | 3);
+        }
+        self.links.sort();
+        for (k, face) in self.faces.iter().enumerate() {
+            let [a, b, c] = face.vertices;
+            let inner = [(c, b), (a, c), (b, a)].map(|(a, b)| {
+                let found = self.links.find_sorted(a, b);
+                found
+                    .unwrap_or_else(|| panic!("cavity of vertex {v} is not closed at edge {a} {b}"))
+            });
+            write_new(mesh, v, self.new_tets[k], face, inner);
+        }
+    }
+}
+
+/// Vertices of a cavity the matrix of links can number.
+const CAVITY_SMALL: usize = 64;
+
+/// Writes the tetrahedron of `v` and an outer face, and tells the tetrahedron beyond.
+#[inline]
+fn write_new<P: Pages>(mesh: &mut Mesh<P>, v: u32, t: u32, face: &CavityFace, inner: [u32; 3]) {
+    let [a, b, c] = face.vertices;
+    debug_assert!([a, b, c, v].iter().all(|&w| w <= VERTEX_MASK));
+    let required = if face.required { REQUIRED } else { 0 };
+    let tet = Tet {
+        node: [v | required, a, b, c],
+        neighbor: [
+            face.outside,
+            FaceRef(inner[0]),
+            FaceRef(inner[1]),
+            FaceRef(inner[2]),
+        ],
+    };
+    mesh.set_tet(t, tet);
+    if face.outside.exists() {
+        mesh.set_neighbor(face.outside, FaceRef::new(t, 0));
+    }
+}
+
+const _: () = assert!(FACES[0][0] == 1 && FACES[0][1] == 2 && FACES[0][2] == 3);

@@ -1,0 +1,121 @@
+//! Joins the new tetrahedra of one insertion to each other in constant time per edge.
+//!
+//! The outer faces of a cavity form a closed surface in which each directed edge occurs once, its
+//! reverse in the face next to it. The few vertices of that surface get small local numbers, and a
+//! matrix over pairs of them answers "which face has the edge b → a". A cavity with more vertices
+//! than the matrix holds (long edges in a coarse mesh) sorts its edges instead.
+
+/// Vertices the matrix can number: 0.8 % of cavities exceed 64 in the worst insertion order, none in the usual one.
+const LOCAL_MAX: usize = 64;
+const TABLE: usize = 256;
+
+/// Scratch for the edges of one cavity surface.
+pub(super) struct Links {
+    /// `epoch << 32 | vertex` of each occupied place; older epochs are empty places.
+    keys: [u64; TABLE],
+    locals: [u8; TABLE],
+    epoch: u32,
+    n_local: usize,
+    /// `matrix[a * LOCAL_MAX + b]` = half-face of the directed edge a → b.
+    matrix: Vec<u32>,
+    /// Used instead of the matrix by large cavities.
+    sorted: Vec<(u32, u32, u32)>,
+}
+
+impl Links {
+    pub(super) fn new() -> Self {
+        Self {
+            keys: [0; TABLE],
+            locals: [0; TABLE],
+            epoch: 0,
+            n_local: 0,
+            matrix: vec![0; LOCAL_MAX * LOCAL_MAX],
+            sorted: Vec::new(),
+        }
+    }
+
+    /// Starts a new surface.
+    pub(super) fn begin(&mut self) {
+        self.n_local = 0;
+        self.sorted.clear();
+        self.epoch = self.epoch.wrapping_add(1);
+        if self.epoch == 0 {
+            self.keys = [0; TABLE];
+            self.epoch = 1;
+        }
+    }
+
+    /// The local number of vertex `v`, given at its first call; `None` when there are too many.
+    #[inline]
+    pub(super) fn local(&mut self, v: u32) -> Option<u8> {
+        let key = u64::from(self.epoch) << 32 | u64::from(v);
+        let mut at = (v.wrapping_mul(0x9E37_79B1) >> 24) as usize;
+        loop {
+            let found = self.keys[at % TABLE];
+            if found == key {
+                return Some(self.locals[at % TABLE]);
+            }
+            if (found >> 32) as u32 != self.epoch {
+                break;
+            }
+            at += 1;
+        }
+        if self.n_local == LOCAL_MAX {
+            return None;
+        }
+        self.keys[at % TABLE] = key;
+        self.locals[at % TABLE] = self.n_local as u8;
+        self.n_local += 1;
+        Some(self.n_local as u8 - 1)
+    }
+
+    /// Whether `v` has a local number in this surface.
+    #[inline]
+    pub(super) fn knows(&self, v: u32) -> bool {
+        let key = u64::from(self.epoch) << 32 | u64::from(v);
+        let mut at = (v.wrapping_mul(0x9E37_79B1) >> 24) as usize;
+        loop {
+            let found = self.keys[at % TABLE];
+            if found == key || (found >> 32) as u32 != self.epoch {
+                return found == key;
+            }
+            at += 1;
+        }
+    }
+
+    /// Vertices numbered so far.
+    pub(super) fn n_local(&self) -> usize {
+        self.n_local
+    }
+
+    /// Enters the half-face of the edge between two local numbers.
+    #[inline]
+    pub(super) fn set(&mut self, a: u8, b: u8, half_face: u32) {
+        self.matrix[(usize::from(a) % LOCAL_MAX) * LOCAL_MAX + usize::from(b) % LOCAL_MAX] =
+            half_face;
+    }
+
+    /// The half-face of the edge a → b.
+    #[inline]
+    pub(super) fn get(&self, a: u8, b: u8) -> u32 {
+        self.matrix[(usize::from(a) % LOCAL_MAX) * LOCAL_MAX + usize::from(b) % LOCAL_MAX]
+    }
+
+    /// Enters an edge of a surface too large for the matrix.
+    pub(super) fn push_sorted(&mut self, a: u32, b: u32, half_face: u32) {
+        self.sorted.push((a, b, half_face));
+    }
+
+    /// Ends entering; [`Links::find_sorted`] may follow.
+    pub(super) fn sort(&mut self) {
+        self.sorted.sort_unstable();
+    }
+
+    /// The half-face of the edge a → b of a large surface.
+    pub(super) fn find_sorted(&self, a: u32, b: u32) -> Option<u32> {
+        let at = self
+            .sorted
+            .binary_search_by_key(&(a, b), |&(a, b, _)| (a, b));
+        at.ok().map(|i| self.sorted[i].2)
+    }
+}

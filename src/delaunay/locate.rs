@@ -1,0 +1,77 @@
+//! Find the tetrahedron of a point by walking through faces.
+
+use super::cavity::{Kernel, Rejected};
+use crate::geom::{Point, orient};
+use crate::mesh::anatomy::FACES;
+use crate::mesh::{Mesh, Tet};
+use crate::store::Pages;
+
+/// A walk longer than this is lost: a mesh of 2^30 tetrahedra has about 1000 along an axis.
+const STEPS_MAX: u32 = 100_000;
+
+/// Where a walk ended.
+#[derive(Clone, Copy, Debug)]
+pub struct Located {
+    pub tet: u32,
+    pub record: Tet,
+    pub points: [Point; 4],
+}
+
+impl Kernel {
+    /// The tetrahedron that holds `p` (in its interior or on its boundary), walking from `hint`.
+    ///
+    /// Each step leaves through a face that strictly separates the tetrahedron from `p`, the first
+    /// one found in an order that changes from step to step, so that no cycle is walked for ever.
+    ///
+    /// Errors: [`Rejected::Outside`] when the walk leaves the mesh, or `hint` is not in use.
+    pub fn locate<P: Pages>(
+        &mut self,
+        mesh: &mut Mesh<P>,
+        p: Point,
+        hint: u32,
+    ) -> Result<Located, Rejected> {
+        let mut tet = hint;
+        let mut from = u32::MAX;
+        for step in 0..STEPS_MAX {
+            let record = mesh.tet(tet);
+            if !record.is_live() {
+                return Err(Rejected::Outside);
+            }
+            let points = mesh.points(&record);
+            self.stats.walk_steps += 1;
+            let mut next = None;
+            for k in 0..4 {
+                let i = ((self.turn as usize) + k) & 3;
+                let across = record.neighbor[i];
+                if across.tet() == from && across.exists() {
+                    continue;
+                }
+                let [a, b, c] = FACES[i];
+                if orient(p, points[a], points[b], points[c]) < 0.0 {
+                    next = Some(across);
+                    break;
+                }
+            }
+            self.turn = self
+                .turn
+                .wrapping_mul(1_664_525)
+                .wrapping_add(1_013_904_223)
+                ^ (step >> 3);
+            match next {
+                None => {
+                    return Ok(Located {
+                        tet,
+                        record,
+                        points,
+                    });
+                }
+                Some(across) if across.exists() => {
+                    from = tet;
+                    tet = across.tet();
+                }
+                Some(_) => return Err(Rejected::Outside),
+            }
+        }
+        Err(Rejected::Outside)
+    }
+}

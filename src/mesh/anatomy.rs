@@ -1,0 +1,137 @@
+//! The one convention of tetrahedra, and their record.
+//!
+//! ```text
+//!            v3              positive: det(v1-v0, v2-v0, v3-v0) > 0
+//!           /|\
+//!          / | \             face i is opposite vertex i, counter-clockwise seen from outside:
+//!         /  |  \              0: (1 2 3)   1: (0 3 2)   2: (0 1 3)   3: (0 2 1)
+//!       v0 --+-- v2
+//!         \  |  /            edges 0..6 = 01 02 03 12 13 23; the edge opposite e is 5 - e
+//!          \ | /
+//!           \|/              a face reference is 4 * tetrahedron + face
+//!            v1
+//! ```
+
+use tetdb_schema::page::{NONE, Slot, u32_le};
+
+/// Local vertices of face `i`, counter-clockwise seen from outside.
+pub const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
+/// Local vertices of edge `e`.
+pub const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
+/// `EDGE_OF[i][j]`: the edge between local vertices `i` and `j` (unused on the diagonal).
+pub const EDGE_OF: [[usize; 4]; 4] = [[6, 0, 1, 2], [0, 6, 3, 4], [1, 3, 6, 5], [2, 4, 5, 6]];
+
+/// Bit of a node: the face opposite it is required.
+pub const REQUIRED: u32 = 1 << 31;
+/// Bit of a node: see the byte page; node 0 marks the cavity, node 1 "examined", 2 and 3 are free.
+pub const MARK: u32 = 1 << 30;
+/// The vertex id of a node.
+pub const VERTEX_MASK: u32 = MARK - 1;
+
+/// A face of a tetrahedron, `4 * tet + face`, or [`FaceRef::NONE`].
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+pub struct FaceRef(pub u32);
+
+impl FaceRef {
+    /// No face: beyond the hull of the mesh.
+    pub const NONE: Self = Self(NONE);
+
+    /// Face `face` of tetrahedron `tet`.
+    #[inline]
+    pub const fn new(tet: u32, face: usize) -> Self {
+        Self(tet << 2 | face as u32)
+    }
+    /// The tetrahedron.
+    #[inline]
+    pub const fn tet(self) -> u32 {
+        self.0 >> 2
+    }
+    /// The face's number in it.
+    #[inline]
+    pub const fn face(self) -> usize {
+        (self.0 & 3) as usize
+    }
+    /// Whether there is a tetrahedron.
+    #[inline]
+    pub const fn exists(self) -> bool {
+        self.0 != NONE
+    }
+}
+
+/// A tetrahedron's record, copied out of its page.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Tet {
+    /// Vertex ids with flag bits.
+    pub node: [u32; 4],
+    /// The face on the other side of each face.
+    pub neighbor: [FaceRef; 4],
+}
+
+impl Tet {
+    /// The four vertex ids, flags removed.
+    #[inline]
+    pub fn vertices(&self) -> [u32; 4] {
+        self.node.map(|n| n & VERTEX_MASK)
+    }
+    /// Vertex id `i`.
+    #[inline]
+    pub fn vertex(&self, i: usize) -> u32 {
+        self.node[i] & VERTEX_MASK
+    }
+    /// Whether face `i` is required.
+    #[inline]
+    pub fn is_required(&self, i: usize) -> bool {
+        self.node[i] & REQUIRED != 0
+    }
+    /// The vertices of face `i`, counter-clockwise seen from outside.
+    #[inline]
+    pub fn face(&self, i: usize) -> [u32; 3] {
+        FACES[i].map(|k| self.vertex(k))
+    }
+    /// The local number of vertex `v`, if it has it.
+    #[inline]
+    pub fn local(&self, v: u32) -> Option<usize> {
+        (0..4).find(|&i| self.vertex(i) == v)
+    }
+    /// Whether the slot is in use.
+    #[inline]
+    pub fn is_live(&self) -> bool {
+        self.node[0] != NONE
+    }
+
+    /// Opens a record.
+    #[inline(always)]
+    pub fn from_slot(slot: &Slot) -> Self {
+        let w = slot.map(u32_le::to_native);
+        Self {
+            node: [w[0], w[1], w[2], w[3]],
+            neighbor: [FaceRef(w[4]), FaceRef(w[5]), FaceRef(w[6]), FaceRef(w[7])],
+        }
+    }
+    /// Makes a record.
+    #[inline(always)]
+    pub fn to_slot(self) -> Slot {
+        let (n, m) = (self.node, self.neighbor);
+        [n[0], n[1], n[2], n[3], m[0].0, m[1].0, m[2].0, m[3].0].map(u32_le::from_native)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::{Point, orient};
+
+    #[test]
+    fn faces_are_seen_from_outside_and_edges_agree() {
+        let v = [Point::ZERO, Point::X, Point::Y, Point::Z];
+        for (i, f) in FACES.iter().enumerate() {
+            // Seen from outside counter-clockwise: the opposite vertex makes it positive with the face leading.
+            assert!(orient(v[f[0]], v[f[1]], v[f[2]], v[i]) < 0.0);
+        }
+        for (e, [a, b]) in EDGES.into_iter().enumerate() {
+            assert_eq!((EDGE_OF[a][b], EDGE_OF[b][a]), (e, e));
+            let [c, d] = EDGES[5 - e];
+            assert_eq!(a + b + c + d, 6);
+        }
+    }
+}

@@ -1,0 +1,463 @@
+//! The working mesh of one sub-domain, read and changed record by record through its pages.
+
+use tetdb_schema::page::{NONE, RECORDS, SLOT_BITS, SLOT_MASK, SLOTS, u32_le};
+
+use super::anatomy::{FaceRef, MARK, REQUIRED, Tet, VERTEX_MASK};
+use crate::geom::Point;
+use crate::store::{Pager, Pages, StoreError, fail, kind};
+
+/// Where a vertex comes from; the numbers are stored.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u32)]
+pub enum VertexTag {
+    Free = 0,
+    Surface = 1,
+    Interface = 2,
+    Steiner = 3,
+    EnclosingBox = 4,
+}
+
+/// A triangle of the input (or of an interface) and what lies on its two sides.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Facet {
+    pub vertices: [u32; 3],
+    pub label: u32,
+    /// Number of the triangle in the input.
+    pub input: u64,
+    /// Region on the side the normal points to, then on the other; 0 is outside or empty.
+    pub regions: [u32; 2],
+}
+
+/// Records of one kind: ids handed out in order, freed slots used again, last freed first.
+#[derive(Clone, Copy, Debug)]
+struct Arena {
+    /// The next id never used.
+    fresh: u32,
+    free_head: u32,
+    n_live: u32,
+}
+
+impl Default for Arena {
+    fn default() -> Self {
+        Self {
+            fresh: 0,
+            free_head: NONE,
+            n_live: 0,
+        }
+    }
+}
+
+/// Counts that, with the pages, are the whole state of a working mesh.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct MeshState {
+    tets: Arena,
+    vertices: Arena,
+    facets: Arena,
+}
+
+/// Cursor over one sub-domain's paged arrays: tetrahedra, vertices, their attributes, facets.
+///
+/// Every access may load a page and evict another; records are copied out, so nothing dangles.
+/// Ids depend only on the order of calls, never on which pages are resident.
+pub struct Mesh<P: Pages = Pager> {
+    pages: P,
+    state: MeshState,
+}
+
+/// The id after `id` within pages whose last two slots hold no record.
+#[inline]
+fn next_id(id: u32) -> u32 {
+    if (id & SLOT_MASK) as usize == RECORDS - 1 {
+        id + 3
+    } else {
+        id + 1
+    }
+}
+
+/// Position of record `id` when the unused slots are left out.
+#[inline]
+pub fn dense(id: u32) -> u32 {
+    (id >> SLOT_BITS) * RECORDS as u32 + (id & SLOT_MASK)
+}
+
+/// The id at position `n`; inverse of [`dense`].
+#[inline]
+pub fn sparse(n: u32) -> u32 {
+    (n / RECORDS as u32) << SLOT_BITS | n % RECORDS as u32
+}
+
+/// Record and word pair of the attribute of `id`: four to a record.
+#[inline]
+fn attribute_place(id: u32) -> (u32, usize) {
+    let n = dense(id);
+    (sparse(n >> 2), (n as usize & 3) * 2)
+}
+
+const WORD_ZERO: u32_le = u32_le::from_native(0);
+
+impl<P: Pages> Mesh<P> {
+    /// An empty mesh over `pages`, which must hold none.
+    pub fn new(pages: P) -> Self {
+        Self {
+            pages,
+            state: MeshState::default(),
+        }
+    }
+
+    /// Continues a mesh whose pages were stored with `state`.
+    pub fn with_state(pages: P, state: MeshState) -> Self {
+        Self { pages, state }
+    }
+
+    /// The counts to keep beside the pages.
+    pub fn state(&self) -> MeshState {
+        self.state
+    }
+
+    /// The pages themselves.
+    pub fn pages(&self) -> &P {
+        &self.pages
+    }
+
+    /// The pages themselves, for what is not tetrahedra, vertices or facets.
+    pub fn pages_mut(&mut self) -> &mut P {
+        &mut self.pages
+    }
+
+    /// Ends the cursor.
+    pub fn into_pages(self) -> P {
+        self.pages
+    }
+
+    fn take<const K: usize>(pages: &mut P, arena: &mut Arena, what: &'static str) -> u32 {
+        arena.n_live += 1;
+        if arena.free_head != NONE {
+            let id = arena.free_head;
+            arena.free_head = pages.read::<K>(id)[1].to_native();
+            return id;
+        }
+        let id = arena.fresh;
+        if id >= VERTEX_MASK - SLOTS as u32 {
+            fail(StoreError::TooMany { what });
+        }
+        if id >> SLOT_BITS == pages.n_pages::<K>() {
+            pages.append_page::<K>();
+        }
+        arena.fresh = next_id(id);
+        id
+    }
+
+    // ----- tetrahedra -------------------------------------------------------------------------
+
+    /// Tetrahedra in use.
+    pub fn n_tets(&self) -> u32 {
+        self.state.tets.n_live
+    }
+
+    /// Every tetrahedron id in use is below this.
+    pub fn tet_ids_end(&self) -> u32 {
+        self.state.tets.fresh
+    }
+
+    /// The record of `t`, in use or not.
+    #[inline(always)]
+    pub fn tet(&mut self, t: u32) -> Tet {
+        Tet::from_slot(self.pages.read::<{ kind::TETS }>(t))
+    }
+
+    /// Replaces the record of `t`.
+    #[inline(always)]
+    pub fn set_tet(&mut self, t: u32, tet: Tet) {
+        *self.pages.write::<{ kind::TETS }>(t) = tet.to_slot();
+    }
+
+    /// Replaces one node word, flags included.
+    #[inline(always)]
+    pub fn set_node(&mut self, t: u32, i: usize, node: u32) {
+        self.pages.write::<{ kind::TETS }>(t)[i] = u32_le::from_native(node);
+    }
+
+    /// Replaces one neighbor.
+    #[inline(always)]
+    pub fn set_neighbor(&mut self, face: FaceRef, to: FaceRef) {
+        self.pages.write::<{ kind::TETS }>(face.tet())[4 + face.face()] = u32_le::from_native(to.0);
+    }
+
+    /// Makes two faces neighbors of each other; either may be [`FaceRef::NONE`].
+    #[inline]
+    pub fn link(&mut self, a: FaceRef, b: FaceRef) {
+        if a.exists() {
+            self.set_neighbor(a, b);
+        }
+        if b.exists() {
+            self.set_neighbor(b, a);
+        }
+    }
+
+    /// Marks or unmarks a face as required, on both sides.
+    pub fn set_required(&mut self, face: FaceRef, required: bool) {
+        let other = self.tet(face.tet()).neighbor[face.face()];
+        for f in [face, other] {
+            if f.exists() {
+                let word = &mut self.pages.write::<{ kind::TETS }>(f.tet())[f.face()];
+                let bits = word.to_native();
+                *word = u32_le::from_native(if required {
+                    bits | REQUIRED
+                } else {
+                    bits & !REQUIRED
+                });
+            }
+        }
+    }
+
+    /// Sets or clears the mark bit of node `i`.
+    #[inline]
+    pub fn set_mark(&mut self, t: u32, i: usize, marked: bool) {
+        let word = &mut self.pages.write::<{ kind::TETS }>(t)[i];
+        let bits = word.to_native();
+        *word = u32_le::from_native(if marked { bits | MARK } else { bits & !MARK });
+    }
+
+    /// An unused tetrahedron id; its record is whatever was there, its attribute too.
+    #[inline]
+    pub fn take_tet(&mut self) -> u32 {
+        Self::take::<{ kind::TETS }>(&mut self.pages, &mut self.state.tets, "tetrahedra")
+    }
+
+    /// Gives the id of `t` back. Effects: references to `t` dangle until relinked.
+    pub fn free_tet(&mut self, t: u32) {
+        let slot = self.pages.write::<{ kind::TETS }>(t);
+        *slot = [WORD_ZERO; 8];
+        slot[0] = u32_le::from_native(NONE);
+        slot[1] = u32_le::from_native(self.state.tets.free_head);
+        self.state.tets.free_head = t;
+        self.state.tets.n_live -= 1;
+    }
+
+    /// The first tetrahedron in use with an id of at least `from`, in id (and page) order.
+    pub fn next_tet(&mut self, mut from: u32) -> Option<(u32, Tet)> {
+        if (from & SLOT_MASK) as usize >= RECORDS {
+            from = ((from >> SLOT_BITS) + 1) << SLOT_BITS;
+        }
+        while from < self.state.tets.fresh {
+            let tet = self.tet(from);
+            if tet.is_live() {
+                return Some((from, tet));
+            }
+            from = next_id(from);
+        }
+        None
+    }
+
+    /// Region and flags of `t`.
+    pub fn tet_attribute(&mut self, t: u32) -> (u32, u32) {
+        self.attribute::<{ kind::TET_ATTRIBUTES }>(t)
+    }
+
+    /// Sets region and flags of `t`.
+    pub fn set_tet_attribute(&mut self, t: u32, region: u32, flags: u32) {
+        self.set_attribute::<{ kind::TET_ATTRIBUTES }>(t, region, flags);
+    }
+
+    fn attribute<const K: usize>(&mut self, id: u32) -> (u32, u32) {
+        let (record, word) = attribute_place(id);
+        if record >> SLOT_BITS >= self.pages.n_pages::<K>() {
+            return (0, 0);
+        }
+        let slot = self.pages.read::<K>(record);
+        (slot[word].to_native(), slot[word + 1].to_native())
+    }
+
+    fn set_attribute<const K: usize>(&mut self, id: u32, first: u32, second: u32) {
+        let (record, word) = attribute_place(id);
+        while record >> SLOT_BITS >= self.pages.n_pages::<K>() {
+            self.pages.append_page::<K>();
+        }
+        let slot = self.pages.write::<K>(record);
+        slot[word] = u32_le::from_native(first);
+        slot[word + 1] = u32_le::from_native(second);
+    }
+
+    // ----- vertices ---------------------------------------------------------------------------
+
+    /// Vertices in use.
+    pub fn n_vertices(&self) -> u32 {
+        self.state.vertices.n_live
+    }
+
+    /// Every vertex id in use is below this.
+    pub fn vertex_ids_end(&self) -> u32 {
+        self.state.vertices.fresh
+    }
+
+    /// Position of `v`.
+    #[inline(always)]
+    pub fn point(&mut self, v: u32) -> Point {
+        let w = self.pages.read::<{ kind::VERTICES }>(v);
+        let f = |i: usize| {
+            f64::from_bits(u64::from(w[i].to_native()) | u64::from(w[i + 1].to_native()) << 32)
+        };
+        Point::new(f(0), f(2), f(4))
+    }
+
+    /// Positions of the four vertices of `tet`.
+    #[inline(always)]
+    pub fn points(&mut self, tet: &Tet) -> [Point; 4] {
+        [0, 1, 2, 3].map(|i| self.point(tet.vertex(i)))
+    }
+
+    /// Moves `v`.
+    #[inline]
+    pub fn set_point(&mut self, v: u32, p: Point) {
+        let w = self.pages.write::<{ kind::VERTICES }>(v);
+        for (i, c) in p.to_array().into_iter().enumerate() {
+            let bits = c.to_bits();
+            w[2 * i] = u32_le::from_native(bits as u32);
+            w[2 * i + 1] = u32_le::from_native((bits >> 32) as u32);
+        }
+    }
+
+    /// Wanted edge length at `v`; 0 when it was never set.
+    #[inline]
+    pub fn size(&mut self, v: u32) -> f32 {
+        f32::from_bits(self.pages.read::<{ kind::VERTICES }>(v)[6].to_native())
+    }
+
+    /// Sets the wanted edge length at `v`.
+    #[inline]
+    pub fn set_size(&mut self, v: u32, h: f32) {
+        self.pages.write::<{ kind::VERTICES }>(v)[6] = u32_le::from_native(h.to_bits());
+    }
+
+    /// A tetrahedron that has `v`, as last told; see [`Mesh::set_tet_of`].
+    #[inline]
+    pub fn tet_of(&mut self, v: u32) -> u32 {
+        self.pages.read::<{ kind::VERTICES }>(v)[7].to_native()
+    }
+
+    /// Tells a tetrahedron that has `v`. Insertion does not keep this up; flips do.
+    #[inline]
+    pub fn set_tet_of(&mut self, v: u32, t: u32) {
+        self.pages.write::<{ kind::VERTICES }>(v)[7] = u32_le::from_native(t);
+    }
+
+    /// Adds a vertex.
+    pub fn add_vertex(&mut self, p: Point, h: f32) -> u32 {
+        let v =
+            Self::take::<{ kind::VERTICES }>(&mut self.pages, &mut self.state.vertices, "vertices");
+        self.set_point(v, p);
+        self.set_size(v, h);
+        self.set_tet_of(v, NONE);
+        v
+    }
+
+    /// Takes back a vertex no tetrahedron has.
+    pub fn free_vertex(&mut self, v: u32) {
+        let slot = self.pages.write::<{ kind::VERTICES }>(v);
+        *slot = [WORD_ZERO; 8];
+        slot[0] = u32_le::from_native(NONE);
+        slot[1] = u32_le::from_native(self.state.vertices.free_head);
+        slot[7] = u32_le::from_native(NONE);
+        self.state.vertices.free_head = v;
+        self.state.vertices.n_live -= 1;
+    }
+
+    /// Tag and owner index of `v`; free vertices need none.
+    pub fn vertex_attribute(&mut self, v: u32) -> (VertexTag, u32) {
+        let (tag, owner) = self.attribute::<{ kind::VERTEX_ATTRIBUTES }>(v);
+        let tag = match tag {
+            1 => VertexTag::Surface,
+            2 => VertexTag::Interface,
+            3 => VertexTag::Steiner,
+            4 => VertexTag::EnclosingBox,
+            _ => VertexTag::Free,
+        };
+        (tag, owner)
+    }
+
+    /// Sets tag and owner index of `v`.
+    pub fn set_vertex_attribute(&mut self, v: u32, tag: VertexTag, owner: u32) {
+        self.set_attribute::<{ kind::VERTEX_ATTRIBUTES }>(v, tag as u32, owner);
+    }
+
+    /// Points `tet_of` of every vertex to its tetrahedron of smallest id: one pass in page order.
+    pub fn refresh_tet_of(&mut self) {
+        let mut from = self.state.tets.fresh;
+        while from > 0 {
+            from -= 1;
+            if (from & SLOT_MASK) as usize >= RECORDS {
+                continue;
+            }
+            let tet = self.tet(from);
+            if tet.is_live() {
+                for v in tet.vertices() {
+                    self.set_tet_of(v, from);
+                }
+            }
+        }
+    }
+
+    // ----- facets -----------------------------------------------------------------------------
+
+    /// Facets, numbered densely through [`sparse`].
+    pub fn n_facets(&self) -> u32 {
+        self.state.facets.n_live
+    }
+
+    /// Facet `n`, counted from 0.
+    pub fn facet(&mut self, n: u32) -> Facet {
+        let w = self
+            .pages
+            .read::<{ kind::FACETS }>(sparse(n))
+            .map(u32_le::to_native);
+        Facet {
+            vertices: [w[0], w[1], w[2]],
+            label: w[3],
+            input: u64::from(w[4]) | u64::from(w[5]) << 32,
+            regions: [w[6], w[7]],
+        }
+    }
+
+    /// Replaces facet `n`.
+    pub fn set_facet(&mut self, n: u32, f: Facet) {
+        let [a, b, c] = f.vertices;
+        let input = f.input as u32;
+        let words = [
+            a,
+            b,
+            c,
+            f.label,
+            input,
+            (f.input >> 32) as u32,
+            f.regions[0],
+            f.regions[1],
+        ];
+        *self.pages.write::<{ kind::FACETS }>(sparse(n)) = words.map(u32_le::from_native);
+    }
+
+    /// Adds a facet after the others.
+    pub fn add_facet(&mut self, f: Facet) -> u32 {
+        let n = self.state.facets.n_live;
+        Self::take::<{ kind::FACETS }>(&mut self.pages, &mut self.state.facets, "facets");
+        self.set_facet(n, f);
+        n
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn unused_slots_are_never_ids() {
+        for n in [0, 1, 2045, 2046, 4091, 4092, 100_000] {
+            assert_eq!(dense(sparse(n)), n);
+            assert!((sparse(n) & SLOT_MASK) < RECORDS as u32);
+        }
+        let mut id = 0;
+        for n in 0..10_000 {
+            assert_eq!(id, sparse(n));
+            id = next_id(id);
+        }
+    }
+}

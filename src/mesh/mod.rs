@@ -1,0 +1,7 @@
+//! The working mesh: cursors over one sub-domain's pages; balls, shells, checks.
+
+pub mod anatomy;
+mod cursor;
+
+pub use anatomy::{FaceRef, Tet};
+pub use cursor::{Facet, Mesh, MeshState, VertexTag, dense, sparse};
