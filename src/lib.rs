@@ -9,3 +9,4 @@ pub mod store;
 pub mod mesh;
 // Floor 3.
 pub mod delaunay;
+pub mod samples;

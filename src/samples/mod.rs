@@ -1,0 +1,28 @@
+//! Seeded makers of closed surfaces, the paper's cases among them.
+//!
+//! A sample is named in one word without characters special to a shell, such as
+//! `balls,count=1000,seed=1,h=0.02`. The same word gives the same bits on every machine: only IEEE
+//! basic operations and square roots are used, and the random numbers are our own.
+//!
+//! Every surface is closed, without duplicate points, and oriented so that normals point out of the
+//! parts that an odd number of shells separates from the outside: its signed volume is the volume
+//! that the parity rule fills.
+
+mod balls;
+mod boxes;
+mod build;
+mod error;
+mod knot;
+mod random;
+mod sample;
+mod shells;
+mod spec;
+mod sphere;
+mod trig;
+
+#[cfg(test)]
+mod tests;
+
+pub use error::SampleError;
+pub use sample::Sample;
+pub use spec::{PREFIX, SAMPLES, SampleKind, SampleSpec};

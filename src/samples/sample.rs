@@ -1,0 +1,29 @@
+//! The surface that a maker returns.
+
+use crate::geom::Point;
+
+/// A closed labeled surface in memory.
+///
+/// Shape: `labels` runs parallel to `triangles` and indexes `label_names`. Invariant: every point is
+/// used, no two points are equal, each edge is shared by two triangles in opposite directions.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sample {
+    pub points: Vec<Point>,
+    /// Counter-clockwise seen from outside the filled part.
+    pub triangles: Vec<[u32; 3]>,
+    pub labels: Vec<u32>,
+    pub label_names: Vec<String>,
+}
+
+impl Sample {
+    /// Volume enclosed, by the divergence theorem; positive for the orientation promised here.
+    pub fn signed_volume(&self) -> f64 {
+        let corner = |v: u32| self.points[v as usize];
+        let six: f64 = self
+            .triangles
+            .iter()
+            .map(|t| corner(t[0]).dot(corner(t[1]).cross(corner(t[2]))))
+            .sum();
+        six / 6.0
+    }
+}

@@ -1,0 +1,259 @@
+//! From a word such as `balls,count=1000,h=0.02` to what it asks for.
+
+use super::balls::Balls;
+use super::shells::{ShellKind, make_shells};
+use super::{Sample, SampleError, boxes, knot, sphere};
+use crate::geom::Point;
+use std::fmt::Display;
+use std::str::FromStr;
+
+/// What a surface argument begins with when it names a sample.
+pub const PREFIX: &str = "sample:";
+/// The samples there are.
+pub const SAMPLES: &[&str] = &["balls", "box", "knot", "shells", "sphere"];
+/// Above this a sample is refused: it is made in memory, about 40 bytes per triangle.
+const TRIANGLES_MAX: u64 = 100_000_000;
+
+/// A sample that can be made.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SampleSpec {
+    kind: SampleKind,
+}
+
+/// The makers and what they are given; lengths in the sample's own units.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum SampleKind {
+    Balls(Balls),
+    Box {
+        sides: Point,
+        h: f64,
+    },
+    Knot {
+        tube: f64,
+        h: f64,
+    },
+    Shells {
+        count: usize,
+        kind: ShellKind,
+        h: f64,
+    },
+    Sphere {
+        radius: f64,
+        h: f64,
+    },
+}
+
+impl SampleSpec {
+    /// Reads `NAME,key=value,…`, with or without `sample:` before it.
+    ///
+    /// # Errors
+    /// Names the word that is wrong and those that would do.
+    pub fn parse(text: &str) -> Result<Self, SampleError> {
+        let text = text.strip_prefix(PREFIX).unwrap_or(text);
+        let (name, rest) = text.split_once(',').unwrap_or((text, ""));
+        let kind = match name {
+            "balls" => parse_balls(rest)?,
+            "box" => parse_box(rest)?,
+            "knot" => {
+                let keys = Keys::new("knot", &["tube", "h"], rest)?;
+                let tube = keys.number("tube", 0.2, 0.001, 0.3)?;
+                let h = keys.length("h", tube / 4.0)?;
+                SampleKind::Knot { tube, h }
+            }
+            "shells" => parse_shells(rest)?,
+            "sphere" => {
+                let keys = Keys::new("sphere", &["radius", "h"], rest)?;
+                let radius = keys.length("radius", 1.0)?;
+                let h = keys.length("h", radius / 10.0)?;
+                SampleKind::Sphere { radius, h }
+            }
+            _ => {
+                return Err(SampleError::UnknownName {
+                    found: name.to_owned(),
+                    expected: SAMPLES,
+                });
+            }
+        };
+        Ok(Self { kind })
+    }
+
+    /// What was asked for, defaults filled in.
+    pub fn kind(&self) -> &SampleKind {
+        &self.kind
+    }
+
+    /// The sample's name, which also names a store when no other name is given.
+    pub fn name(&self) -> &'static str {
+        match self.kind {
+            SampleKind::Balls(_) => "balls",
+            SampleKind::Box { .. } => "box",
+            SampleKind::Knot { .. } => "knot",
+            SampleKind::Shells { .. } => "shells",
+            SampleKind::Sphere { .. } => "sphere",
+        }
+    }
+
+    /// The word with every key spelled out: equal words make equal surfaces.
+    pub fn canonical(&self) -> String {
+        match &self.kind {
+            SampleKind::Balls(Balls { count, seed, h }) => {
+                format!("{PREFIX}balls,count={count},seed={seed},h={h}")
+            }
+            SampleKind::Box { sides, h } => {
+                format!(
+                    "{PREFIX}box,x={},y={},z={},h={h}",
+                    sides.x, sides.y, sides.z
+                )
+            }
+            SampleKind::Knot { tube, h } => format!("{PREFIX}knot,tube={tube},h={h}"),
+            SampleKind::Shells { count, kind, h } => {
+                let kind = match kind {
+                    ShellKind::Spheres => "spheres",
+                    ShellKind::Boxes => "boxes",
+                };
+                format!("{PREFIX}shells,count={count},kind={kind},h={h}")
+            }
+            SampleKind::Sphere { radius, h } => format!("{PREFIX}sphere,radius={radius},h={h}"),
+        }
+    }
+
+    /// Makes the surface in memory.
+    ///
+    /// # Errors
+    /// [`SampleError::TooMany`] before anything large is allocated; [`SampleError::NoRoom`] when
+    /// balls find no place.
+    pub fn make(&self) -> Result<Sample, SampleError> {
+        match &self.kind {
+            SampleKind::Balls(balls) => balls.make(),
+            SampleKind::Box { sides, h } => boxes::make_box(*sides, *h),
+            SampleKind::Knot { tube, h } => knot::make_knot(*tube, *h),
+            SampleKind::Shells { count, kind, h } => make_shells(*count, *kind, *h),
+            SampleKind::Sphere { radius, h } => sphere::make_sphere(*radius, *h),
+        }
+    }
+}
+
+fn parse_balls(rest: &str) -> Result<SampleKind, SampleError> {
+    let keys = Keys::new("balls", &["count", "seed", "h"], rest)?;
+    let count = keys.number("count", 100, 1, 10_000_000)?;
+    let seed = keys.number("seed", 1, 0, u64::MAX)?;
+    let h = keys.length("h", Balls::h_default(count))?;
+    Ok(SampleKind::Balls(Balls { count, seed, h }))
+}
+
+fn parse_box(rest: &str) -> Result<SampleKind, SampleError> {
+    let keys = Keys::new("box", &["x", "y", "z", "h"], rest)?;
+    let x = keys.length("x", 1.0)?;
+    let y = keys.length("y", 1.0)?;
+    let sides = Point::new(x, y, keys.length("z", 1.0)?);
+    let h = keys.length("h", sides.max_element() / 20.0)?;
+    Ok(SampleKind::Box { sides, h })
+}
+
+fn parse_shells(rest: &str) -> Result<SampleKind, SampleError> {
+    let keys = Keys::new("shells", &["count", "kind", "h"], rest)?;
+    let count = keys.number("count", 3, 1, 1000)?;
+    let kind = match keys.get("kind") {
+        None | Some("spheres") => ShellKind::Spheres,
+        Some("boxes") => ShellKind::Boxes,
+        Some(_) => return Err(keys.bad("kind", "`spheres` or `boxes`")),
+    };
+    let h = keys.length("h", 0.4 / count as f64)?;
+    Ok(SampleKind::Shells { count, kind, h })
+}
+
+/// Refuses a surface too large to be made in memory.
+pub(super) fn triangles_checked(name: &'static str, n_triangles: f64) -> Result<(), SampleError> {
+    // Written so that a NaN is refused too.
+    if n_triangles <= TRIANGLES_MAX as f64 {
+        return Ok(());
+    }
+    Err(SampleError::TooMany {
+        name,
+        found: n_triangles,
+        expected: TRIANGLES_MAX,
+    })
+}
+
+/// The `key=value` pairs of one sample, keys known and given once.
+struct Keys<'a> {
+    name: &'static str,
+    pairs: Vec<(&'a str, &'a str)>,
+}
+
+impl<'a> Keys<'a> {
+    fn new(
+        name: &'static str,
+        expected: &'static [&'static str],
+        rest: &'a str,
+    ) -> Result<Self, SampleError> {
+        let mut pairs: Vec<(&str, &str)> = Vec::new();
+        for word in rest.split(',').filter(|word| !word.is_empty()) {
+            let found = word.to_owned();
+            let Some((key, value)) = word.split_once('=') else {
+                return Err(SampleError::NotAPair {
+                    name,
+                    found,
+                    expected,
+                });
+            };
+            if !expected.contains(&key) {
+                let found = key.to_owned();
+                return Err(SampleError::UnknownKey {
+                    name,
+                    found,
+                    expected,
+                });
+            }
+            if pairs.iter().any(|(other, _)| *other == key) {
+                let key = key.to_owned();
+                return Err(SampleError::Twice { name, key });
+            }
+            pairs.push((key, value));
+        }
+        Ok(Self { name, pairs })
+    }
+
+    fn get(&self, key: &str) -> Option<&'a str> {
+        let pair = self.pairs.iter().find(|(other, _)| *other == key);
+        pair.map(|(_, value)| *value)
+    }
+
+    fn bad(&self, key: &'static str, expected: impl Into<String>) -> SampleError {
+        SampleError::BadValue {
+            name: self.name,
+            key,
+            found: self.get(key).unwrap_or_default().to_owned(),
+            expected: expected.into(),
+        }
+    }
+
+    /// A number within `low..=high`.
+    fn number<T: FromStr + PartialOrd + Display>(
+        &self,
+        key: &'static str,
+        default: T,
+        low: T,
+        high: T,
+    ) -> Result<T, SampleError> {
+        let Some(text) = self.get(key) else {
+            return Ok(default);
+        };
+        match text.parse() {
+            Ok(value) if low <= value && value <= high => Ok(value),
+            _ => Err(self.bad(key, format!("a number from {low} to {high}"))),
+        }
+    }
+
+    /// A length from 1e-100 to 1e100, which keeps squares and volumes representable.
+    fn length(&self, key: &'static str, default: f64) -> Result<f64, SampleError> {
+        let Some(text) = self.get(key) else {
+            return Ok(default);
+        };
+        match text.parse::<f64>() {
+            Ok(value) if (1e-100..=1e100).contains(&value) => Ok(value),
+            _ => Err(self.bad(key, "a length above zero")),
+        }
+    }
+}
