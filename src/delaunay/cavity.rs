@@ -5,7 +5,7 @@
 
 use super::links::Links;
 use super::locate::Located;
-use crate::geom::{Point, in_sphere_perturbed, orient};
+use crate::geom::{Point, Seen, in_sphere_perturbed, insphere_filtered, orient};
 use crate::mesh::anatomy::{FACES, MARK, REQUIRED, VERTEX_MASK};
 use crate::mesh::{FaceRef, Mesh, Tet};
 use crate::store::{Pages, stop_if_requested};
@@ -141,6 +141,13 @@ impl Kernel {
             let t = self.cavity[next];
             next += 1;
             let tet = mesh.tet(t);
+            let [a, b, c, d] = mesh.points(&tet);
+            let seen = [
+                Seen::new(a, p),
+                Seen::new(b, p),
+                Seen::new(c, p),
+                Seen::new(d, p),
+            ];
             for i in 0..4 {
                 let across = tet.neighbor[i];
                 let required = CONSTRAINED && tet.is_required(i);
@@ -150,8 +157,11 @@ impl Kernel {
                         continue;
                     }
                     self.stats.sphere_tests += 1;
-                    let [a, b, c, d] = mesh.points(&other);
-                    if in_sphere_perturbed(a, b, c, d, p) {
+                    // The neighbor shares this face; only its apex is new.
+                    let apex = Seen::new(mesh.point(other.vertex(across.face())), p);
+                    let [f, g, h] = FACES[i];
+                    let det = insphere_filtered(&apex, &seen[f], &seen[h], &seen[g]);
+                    if det > 0.0 || (det == 0.0 && in_conflict(mesh, &other, p)) {
                         mesh.set_mark(across.tet(), 0, true);
                         self.cavity.push(across.tet());
                         continue;
@@ -375,6 +385,14 @@ impl Kernel {
             write_new(mesh, v, self.new_tets[k], face, inner);
         }
     }
+}
+
+/// The sphere test of one tetrahedron where doubles did not decide.
+#[cold]
+#[inline(never)]
+fn in_conflict<P: Pages>(mesh: &mut Mesh<P>, tet: &Tet, p: Point) -> bool {
+    let [a, b, c, d] = mesh.points(tet);
+    in_sphere_perturbed(a, b, c, d, p)
 }
 
 /// Vertices of a cavity the matrix of links can number.

@@ -7,7 +7,9 @@ mod hilbert;
 mod sign;
 
 pub use hilbert::{HilbertFrame, hilbert_index};
-pub use sign::{in_sphere_perturbed, insphere, lex_cmp, orient, orient_sign};
+pub use sign::{
+    Seen, in_sphere_perturbed, insphere, insphere_filtered, lex_cmp, orient, orient_sign,
+};
 
 /// A position in space, in input units.
 pub type Point = glam::DVec3;

@@ -24,6 +24,13 @@ const INSPHERE_BOUND: f64 = 1.246_613_653_102_729_8e-13;
 const DIFFERENCE_MIN: f64 = 1e-58;
 /// Above this difference a product can overflow.
 const DIFFERENCE_MAX: f64 = 1e61;
+/// Squares of lengths within which the first, coarser filter neither underflows nor overflows: it bounds
+/// every difference by the longest one and compares squares, which needs three comparisons instead of twelve.
+const SQUARE_MIN: f64 = 1e-50;
+/// See [`SQUARE_MIN`].
+const SQUARE_MAX: f64 = 1e50;
+/// Covers the rounding of the squares themselves.
+const SLACK: f64 = 1.000_001;
 
 fn coord(p: Point) -> Coord3D<f64> {
     Coord3D {
@@ -33,24 +40,28 @@ fn coord(p: Point) -> Coord3D<f64> {
     }
 }
 
-#[cold]
-#[inline(never)]
-fn orient_exact(a: Point, b: Point, c: Point, d: Point) -> f64 {
-    -robust::orient3d(coord(a), coord(b), coord(c), coord(d))
-}
-
-#[cold]
-#[inline(never)]
-fn insphere_exact(a: Point, b: Point, c: Point, d: Point, e: Point) -> f64 {
-    -robust::insphere(coord(a), coord(b), coord(c), coord(d), coord(e))
-}
-
 /// Six times the signed volume of `a b c d`; the sign is exact, the magnitude is not.
 ///
 /// Positive when `d` lies on the side of the plane `a b c` from which `a b c` turn clockwise, that is
 /// when `det(b-a, c-a, d-a) > 0`.
-#[inline]
+#[inline(always)]
 pub fn orient(a: Point, b: Point, c: Point, d: Point) -> f64 {
+    let (u, v, w) = (b - a, c - a, d - a);
+    let det = u.dot(v.cross(w));
+    let square = larger(larger(u.dot(u), v.dot(v)), w.dot(w));
+    if square > SQUARE_MIN
+        && square < SQUARE_MAX
+        && det * det > (ORIENT_BOUND * ORIENT_BOUND * SLACK) * (square * square * square)
+    {
+        return det;
+    }
+    orient_slow(a, b, c, d)
+}
+
+/// The finer filter, for flat boxes of differences, and then the exact sign.
+#[cold]
+#[inline(never)]
+fn orient_slow(a: Point, b: Point, c: Point, d: Point) -> f64 {
     let (u, v, w) = (b - a, c - a, d - a);
     let det = u.dot(v.cross(w));
     let m = u.abs().max(v.abs()).max(w.abs());
@@ -60,7 +71,13 @@ pub fn orient(a: Point, b: Point, c: Point, d: Point) -> f64 {
     {
         return det;
     }
-    orient_exact(a, b, c, d)
+    -robust::orient3d(coord(a), coord(b), coord(c), coord(d))
+}
+
+/// The larger of two numbers that are not NaN: one instruction, where `f64::max` takes five.
+#[inline(always)]
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
 }
 
 /// The sign of [`orient`] as an ordering against zero.
@@ -71,12 +88,29 @@ pub fn orient_sign(a: Point, b: Point, c: Point, d: Point) -> Ordering {
         .expect("coordinates are finite")
 }
 
-/// Sphere determinant of the positive tetrahedron `a b c d` and `e`: positive when `e` is inside.
-///
-/// The sign is exact, the magnitude is not; zero means that the five points lie on one sphere.
-#[inline]
-pub fn insphere(a: Point, b: Point, c: Point, d: Point, e: Point) -> f64 {
-    let (a1, b1, c1, d1) = (a - e, b - e, c - e, d - e);
+/// A point as seen from another: the difference and its square.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen {
+    d: Point,
+    square: f64,
+}
+
+impl Seen {
+    /// `a` as seen from `e`.
+    #[inline(always)]
+    pub fn new(a: Point, e: Point) -> Self {
+        let d = a - e;
+        Self {
+            d,
+            square: d.dot(d),
+        }
+    }
+}
+
+/// Sphere determinant of four points seen from a fifth; positive when the fifth is inside.
+#[inline(always)]
+fn seen_determinant(a: &Seen, b: &Seen, c: &Seen, d: &Seen) -> f64 {
+    let (a1, b1, c1, d1) = (a.d, b.d, c.d, d.d);
     let ab = a1.x * b1.y - b1.x * a1.y;
     let bc = b1.x * c1.y - c1.x * b1.y;
     let cd = c1.x * d1.y - d1.x * c1.y;
@@ -87,9 +121,55 @@ pub fn insphere(a: Point, b: Point, c: Point, d: Point, e: Point) -> f64 {
     let bcd = b1.z * cd - c1.z * bd + d1.z * bc;
     let cda = c1.z * da + d1.z * ac + a1.z * cd;
     let dab = d1.z * ab + a1.z * bd + b1.z * da;
-    let (al, bl, cl, dl) = (a1.dot(a1), b1.dot(b1), c1.dot(c1), d1.dot(d1));
-    let det = -((dl * abc - cl * dab) + (bl * cda - al * bcd));
-    let m = a1.abs().max(b1.abs()).max(c1.abs()).max(d1.abs());
+    (c.square * dab - d.square * abc) + (a.square * bcd - b.square * cda)
+}
+
+/// [`insphere`] of four points already seen from the fifth; zero also when the doubles cannot decide.
+#[inline(always)]
+pub fn insphere_filtered(a: &Seen, b: &Seen, c: &Seen, d: &Seen) -> f64 {
+    let det = seen_determinant(a, b, c, d);
+    let square = larger(larger(a.square, b.square), larger(c.square, d.square));
+    let fourth = (square * square) * (square * square);
+    if square > SQUARE_MIN
+        && square < SQUARE_MAX
+        && det * det > (INSPHERE_BOUND * INSPHERE_BOUND * SLACK) * (fourth * square)
+    {
+        return det;
+    }
+    0.0
+}
+
+/// Sphere determinant of the positive tetrahedron `a b c d` and `e`: positive when `e` is inside.
+///
+/// The sign is exact, the magnitude is not; zero means that the five points lie on one sphere.
+#[inline(always)]
+pub fn insphere(a: Point, b: Point, c: Point, d: Point, e: Point) -> f64 {
+    let [s, t, u, v] = [
+        Seen::new(a, e),
+        Seen::new(b, e),
+        Seen::new(c, e),
+        Seen::new(d, e),
+    ];
+    let det = insphere_filtered(&s, &t, &u, &v);
+    if det != 0.0 {
+        det
+    } else {
+        insphere_slow(a, b, c, d, e)
+    }
+}
+
+/// The finer filter, for flat boxes of differences, and then the exact sign.
+#[cold]
+#[inline(never)]
+fn insphere_slow(a: Point, b: Point, c: Point, d: Point, e: Point) -> f64 {
+    let [s, t, u, v] = [
+        Seen::new(a, e),
+        Seen::new(b, e),
+        Seen::new(c, e),
+        Seen::new(d, e),
+    ];
+    let det = seen_determinant(&s, &t, &u, &v);
+    let m = s.d.abs().max(t.d.abs()).max(u.d.abs()).max(v.d.abs());
     let largest = m.max_element();
     if det.abs() > INSPHERE_BOUND * (m.x * m.y * m.z) * (largest * largest)
         && m.min_element() > DIFFERENCE_MIN
@@ -97,7 +177,7 @@ pub fn insphere(a: Point, b: Point, c: Point, d: Point, e: Point) -> f64 {
     {
         return det;
     }
-    insphere_exact(a, b, c, d, e)
+    -robust::insphere(coord(a), coord(b), coord(c), coord(d), coord(e))
 }
 
 /// Lexicographic order of coordinates, the rank that decides all ties.
@@ -111,7 +191,7 @@ pub fn lex_cmp(a: Point, b: Point) -> Ordering {
 /// Whether `e` is strictly inside the perturbed sphere of the positive tetrahedron `a b c d`.
 ///
 /// The five points must be pairwise different. Never undecided.
-#[inline]
+#[inline(always)]
 pub fn in_sphere_perturbed(a: Point, b: Point, c: Point, d: Point, e: Point) -> bool {
     let det = insphere(a, b, c, d, e);
     if det != 0.0 {
@@ -154,7 +234,9 @@ mod tests {
         assert!(insphere(o, x, y, z, Point::splat(0.3)) > 0.0);
         assert!(insphere(o, x, y, z, Point::splat(2.0)) < 0.0);
         assert_eq!(insphere(o, x, y, z, Point::ONE), 0.0);
-        assert!(insphere_exact(o, x, y, z, Point::splat(0.3)) > 0.0);
-        assert!(orient_exact(o, x, y, z) > 0.0);
+        // Differences far below the filters' range.
+        let (x, y, z) = (x * 1e-70, y * 1e-70, z * 1e-70);
+        assert!(insphere(o, x, y, z, Point::splat(0.3e-70)) > 0.0);
+        assert!(orient(o, x, y, z) > 0.0);
     }
 }

@@ -71,12 +71,18 @@ impl Tet {
     /// The four vertex ids, flags removed.
     #[inline]
     pub fn vertices(&self) -> [u32; 4] {
-        self.node.map(|n| n & VERTEX_MASK)
+        let [a, b, c, d] = self.node;
+        [
+            a & VERTEX_MASK,
+            b & VERTEX_MASK,
+            c & VERTEX_MASK,
+            d & VERTEX_MASK,
+        ]
     }
     /// Vertex id `i`.
     #[inline]
     pub fn vertex(&self, i: usize) -> u32 {
-        self.node[i] & VERTEX_MASK
+        self.node[i & 3] & VERTEX_MASK
     }
     /// Whether face `i` is required.
     #[inline]
@@ -86,7 +92,8 @@ impl Tet {
     /// The vertices of face `i`, counter-clockwise seen from outside.
     #[inline]
     pub fn face(&self, i: usize) -> [u32; 3] {
-        FACES[i].map(|k| self.vertex(k))
+        let [a, b, c] = FACES[i & 3];
+        [self.vertex(a), self.vertex(b), self.vertex(c)]
     }
     /// The local number of vertex `v`, if it has it.
     #[inline]
@@ -102,17 +109,26 @@ impl Tet {
     /// Opens a record.
     #[inline(always)]
     pub fn from_slot(slot: &Slot) -> Self {
-        let w = slot.map(u32_le::to_native);
+        let w = |i: usize| slot[i].to_native();
         Self {
-            node: [w[0], w[1], w[2], w[3]],
-            neighbor: [FaceRef(w[4]), FaceRef(w[5]), FaceRef(w[6]), FaceRef(w[7])],
+            node: [w(0), w(1), w(2), w(3)],
+            neighbor: [FaceRef(w(4)), FaceRef(w(5)), FaceRef(w(6)), FaceRef(w(7))],
         }
     }
     /// Makes a record.
     #[inline(always)]
     pub fn to_slot(self) -> Slot {
         let (n, m) = (self.node, self.neighbor);
-        [n[0], n[1], n[2], n[3], m[0].0, m[1].0, m[2].0, m[3].0].map(u32_le::from_native)
+        [
+            u32_le::from_native(n[0]),
+            u32_le::from_native(n[1]),
+            u32_le::from_native(n[2]),
+            u32_le::from_native(n[3]),
+            u32_le::from_native(m[0].0),
+            u32_le::from_native(m[1].0),
+            u32_le::from_native(m[2].0),
+            u32_le::from_native(m[3].0),
+        ]
     }
 }
 

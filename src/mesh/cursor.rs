@@ -295,7 +295,8 @@ impl<P: Pages> Mesh<P> {
     pub fn point(&mut self, v: u32) -> Point {
         let w = self.pages.read::<{ kind::VERTICES }>(v);
         let f = |i: usize| {
-            f64::from_bits(u64::from(w[i].to_native()) | u64::from(w[i + 1].to_native()) << 32)
+            let (low, high) = (w[i].to_native(), w[i + 1].to_native());
+            f64::from_bits(u64::from(low) | u64::from(high) << 32)
         };
         Point::new(f(0), f(2), f(4))
     }
@@ -303,7 +304,12 @@ impl<P: Pages> Mesh<P> {
     /// Positions of the four vertices of `tet`.
     #[inline(always)]
     pub fn points(&mut self, tet: &Tet) -> [Point; 4] {
-        [0, 1, 2, 3].map(|i| self.point(tet.vertex(i)))
+        [
+            self.point(tet.vertex(0)),
+            self.point(tet.vertex(1)),
+            self.point(tet.vertex(2)),
+            self.point(tet.vertex(3)),
+        ]
     }
 
     /// Moves `v`.
