@@ -1,0 +1,512 @@
+//! Bytes of a file as words, lines or little blocks, with the place always known.
+
+use std::io::{BufRead, Cursor, Read};
+
+use super::error::{Place, ReadError, Spot};
+use crate::geom::Point;
+use crate::surface::{SurfaceBuilder, SurfaceError};
+
+/// Longest word accepted in text: numbers and keywords are far shorter.
+const WORD_MAX: usize = 4096;
+/// Longest line accepted where lines matter; a polygon of a million corners still fits.
+const LINE_MAX: usize = 16 << 20;
+/// Coordinates at and above this overflow in the exact sphere test (fifth powers of differences).
+const COORDINATE_MAX: f64 = 1e60;
+
+/// Result of everything that reads.
+pub(super) type Result<T> = std::result::Result<T, ReadError>;
+
+/// A reader over a file's bytes that counts bytes and lines.
+///
+/// Memory: the reader's buffer, one word and one line. Nothing is allocated from a declared count.
+pub(super) struct Feed<R> {
+    reader: R,
+    file: String,
+    /// Length of the whole file.
+    pub len: u64,
+    /// Bytes taken so far.
+    pub offset: u64,
+    /// Line of the next byte, from 1; counted by the text functions only.
+    pub line: u64,
+    /// Whether places are told as bytes.
+    pub binary: bool,
+    /// A comment runs from this byte to the end of its line.
+    pub comment: Option<u8>,
+    word: Vec<u8>,
+}
+
+impl<R: BufRead> Feed<R> {
+    pub fn new(file: &str, reader: R, len: u64) -> Self {
+        Self {
+            reader,
+            file: file.to_owned(),
+            len,
+            offset: 0,
+            line: 1,
+            binary: false,
+            comment: None,
+            word: Vec::new(),
+        }
+    }
+
+    /// Looks at up to `N` first bytes without taking them.
+    pub fn with_head<const N: usize>(mut self) -> Result<([u8; N], usize, Feed<impl BufRead>)> {
+        let mut head = [0; N];
+        let mut n = 0;
+        while n < N {
+            match self.reader.read(&mut head[n..]) {
+                Ok(0) => break,
+                Ok(k) => n += k,
+                Err(e) if e.kind() == std::io::ErrorKind::Interrupted => {}
+                Err(e) => return Err(broken(self.place(), &e)),
+            }
+        }
+        let reader = Cursor::new(head).take(n as u64).chain(self.reader);
+        Ok((head, n, Feed::new(&self.file, reader, self.len)))
+    }
+
+    pub fn file(&self) -> &str {
+        &self.file
+    }
+
+    pub fn place(&self) -> Place {
+        place(&self.file, self.binary, self.offset, self.line)
+    }
+
+    pub fn truncated(&self, expected: impl Into<String>) -> ReadError {
+        ReadError::Truncated {
+            place: self.place(),
+            expected: expected.into(),
+            found: "the end of the file".to_owned(),
+        }
+    }
+
+    pub fn unexpected(&self, expected: impl Into<String>, found: &[u8]) -> ReadError {
+        ReadError::Unexpected {
+            place: self.place(),
+            expected: expected.into(),
+            found: quote(found),
+        }
+    }
+
+    pub fn unsupported(&self, what: impl Into<String>) -> ReadError {
+        ReadError::Unsupported {
+            place: self.place(),
+            what: what.into(),
+        }
+    }
+
+    pub fn out_of_range(&self, index: i64, low: i64, high: i64) -> ReadError {
+        ReadError::IndexOutOfRange {
+            place: self.place(),
+            index,
+            low,
+            high,
+        }
+    }
+
+    /// Gives a builder's refusal this place.
+    pub fn placed<T>(&self, result: std::result::Result<T, SurfaceError>) -> Result<T> {
+        result.map_err(|source| ReadError::Surface {
+            place: self.place(),
+            source,
+        })
+    }
+
+    /// Refuses a declared count that the rest of the file cannot hold at `bytes_min` each.
+    pub fn check_count(&self, what: &'static str, declared: i64, bytes_min: u64) -> Result<u64> {
+        let left = self.len.saturating_sub(self.offset);
+        // The last text record may lack its line end.
+        let fits = u64::try_from(declared)
+            .ok()
+            .filter(|&n| n.saturating_mul(bytes_min) <= left + 1);
+        fits.ok_or_else(|| ReadError::CountMismatch {
+            place: self.place(),
+            what,
+            declared: declared.to_string(),
+            found: format!("{left} bytes left in the file"),
+        })
+    }
+
+    /// The error of a text that ended after `found` of `declared` things.
+    pub fn too_few(&self, what: &'static str, declared: u64, found: u64) -> ReadError {
+        ReadError::CountMismatch {
+            place: self.place(),
+            what,
+            declared: declared.to_string(),
+            found: format!("{found} found before the end of the file"),
+        }
+    }
+
+    // --- text ---------------------------------------------------------------------------------
+
+    /// The next byte, not taken; `None` at the end.
+    pub fn peek(&mut self) -> Result<Option<u8>> {
+        let buffer = self
+            .reader
+            .fill_buf()
+            .map_err(|e| broken(place(&self.file, self.binary, self.offset, self.line), &e))?;
+        Ok(buffer.first().copied())
+    }
+
+    fn take(&mut self, n: usize) {
+        self.reader.consume(n);
+        self.offset += n as u64;
+    }
+
+    /// Skips white space and comments, over line ends only when `lines`; true when a word follows.
+    fn skip_blank(&mut self, lines: bool) -> Result<bool> {
+        let mut in_comment = false;
+        loop {
+            let buffer = self
+                .reader
+                .fill_buf()
+                .map_err(|e| broken(place(&self.file, self.binary, self.offset, self.line), &e))?;
+            if buffer.is_empty() {
+                return Ok(false);
+            }
+            let mut n = 0;
+            let mut stop = None;
+            for &b in buffer {
+                if b == b'\n' {
+                    if !lines {
+                        stop = Some(false);
+                        break;
+                    }
+                    in_comment = false;
+                    self.line += 1;
+                } else if !in_comment {
+                    if Some(b) == self.comment {
+                        in_comment = true;
+                    } else if !b.is_ascii_whitespace() {
+                        stop = Some(true);
+                        break;
+                    }
+                }
+                n += 1;
+            }
+            self.take(n);
+            if let Some(found) = stop {
+                return Ok(found);
+            }
+        }
+    }
+
+    /// The next word on this or a later line; false at the end of the file. See [`Self::word`].
+    pub fn next_word(&mut self) -> Result<bool> {
+        if !self.skip_blank(true)? {
+            return Ok(false);
+        }
+        self.take_word()?;
+        Ok(true)
+    }
+
+    /// The next word on this line; false at its end.
+    pub fn next_word_in_line(&mut self) -> Result<bool> {
+        if !self.skip_blank(false)? {
+            return Ok(false);
+        }
+        self.take_word()?;
+        Ok(true)
+    }
+
+    /// Whether nothing but white space and comments is left.
+    pub fn at_end(&mut self) -> Result<bool> {
+        Ok(!self.skip_blank(true)?)
+    }
+
+    /// The word taken last.
+    pub fn word(&self) -> &[u8] {
+        &self.word
+    }
+
+    fn take_word(&mut self) -> Result<()> {
+        self.word.clear();
+        loop {
+            let buffer = self
+                .reader
+                .fill_buf()
+                .map_err(|e| broken(place(&self.file, self.binary, self.offset, self.line), &e))?;
+            let comment = self.comment;
+            let end = buffer
+                .iter()
+                .position(|&b| b.is_ascii_whitespace() || Some(b) == comment);
+            let n = end.unwrap_or(buffer.len());
+            let done = end.is_some() || buffer.is_empty();
+            self.word.extend_from_slice(&buffer[..n]);
+            self.take(n);
+            if self.word.len() > WORD_MAX {
+                self.word.truncate(40);
+                return Err(self.unexpected("text", &self.word));
+            }
+            if done {
+                return Ok(());
+            }
+        }
+    }
+
+    /// Takes a word that must be there.
+    pub fn need_word(&mut self, expected: &'static str) -> Result<()> {
+        if self.next_word()? {
+            Ok(())
+        } else {
+            Err(self.truncated(expected))
+        }
+    }
+
+    /// Takes the word `expected` (any case).
+    pub fn need_keyword(&mut self, expected: &'static str) -> Result<()> {
+        self.need_word(expected)?;
+        if self.word.eq_ignore_ascii_case(expected.as_bytes()) {
+            Ok(())
+        } else {
+            Err(self.unexpected(format!("`{expected}`"), &self.word))
+        }
+    }
+
+    /// The last word as a number of type `T`.
+    pub fn parse<T: std::str::FromStr>(&self, what: &'static str) -> Result<T> {
+        parse(&self.word).ok_or_else(|| ReadError::NotANumber {
+            place: self.place(),
+            what,
+            found: quote(&self.word),
+        })
+    }
+
+    /// Takes an integer.
+    pub fn integer(&mut self, what: &'static str) -> Result<i64> {
+        self.need_word(what)?;
+        self.parse(what)
+    }
+
+    /// Takes a count and checks it against the bytes left.
+    pub fn count(&mut self, what: &'static str, bytes_min: u64) -> Result<u64> {
+        let declared = self.integer(what)?;
+        self.check_count(what, declared, bytes_min)
+    }
+
+    /// Takes a finite coordinate.
+    pub fn coordinate(&mut self) -> Result<f64> {
+        self.need_word("a coordinate")?;
+        self.word_coordinate()
+    }
+
+    /// The last word as a finite coordinate.
+    pub fn word_coordinate(&self) -> Result<f64> {
+        let x: f64 = self.parse("a coordinate")?;
+        self.checked(x)
+    }
+
+    /// Refuses coordinates that are not finite or too large.
+    pub fn checked(&self, x: f64) -> Result<f64> {
+        if x.abs() < COORDINATE_MAX {
+            Ok(x)
+        } else if x.is_finite() {
+            Err(ReadError::CoordinateRange {
+                place: self.place(),
+                found: x,
+            })
+        } else {
+            let found = if self.binary {
+                x.to_string()
+            } else {
+                quote(&self.word)
+            };
+            Err(ReadError::NotANumber {
+                place: self.place(),
+                what: "a coordinate",
+                found,
+            })
+        }
+    }
+
+    /// Takes three coordinates.
+    pub fn point(&mut self) -> Result<Point> {
+        Ok(Point::new(
+            self.coordinate()?,
+            self.coordinate()?,
+            self.coordinate()?,
+        ))
+    }
+
+    /// Takes an index of 1 ..= n and returns it 0-based.
+    pub fn index(&mut self, base: i64, n: u64) -> Result<u32> {
+        let index = self.integer("a vertex number")?;
+        self.check_index(index, base, n)
+    }
+
+    /// Checks an index of `base ..` against `n` and returns it 0-based.
+    pub fn check_index(&self, index: i64, base: i64, n: u64) -> Result<u32> {
+        match index.checked_sub(base).map(u64::try_from) {
+            Some(Ok(i)) if i < n && i < u64::from(u32::MAX) => Ok(i as u32),
+            _ => Err(self.out_of_range(index, base, base.saturating_add_unsigned(n) - 1)),
+        }
+    }
+
+    /// Skips to just after the end of this line.
+    pub fn skip_line(&mut self) -> Result<()> {
+        loop {
+            let buffer = self
+                .reader
+                .fill_buf()
+                .map_err(|e| broken(place(&self.file, self.binary, self.offset, self.line), &e))?;
+            if buffer.is_empty() {
+                return Ok(());
+            }
+            if let Some(i) = buffer.iter().position(|&b| b == b'\n') {
+                self.take(i + 1);
+                self.line += 1;
+                return Ok(());
+            }
+            let n = buffer.len();
+            self.take(n);
+        }
+    }
+
+    /// Skips to just after the next occurrence of `pattern`, whose first byte is nowhere else in it.
+    pub fn skip_past(&mut self, pattern: &[u8]) -> Result<()> {
+        let mut matched = 0;
+        loop {
+            let buffer = self
+                .reader
+                .fill_buf()
+                .map_err(|e| broken(place(&self.file, self.binary, self.offset, self.line), &e))?;
+            if buffer.is_empty() {
+                return Err(self.truncated(quote(pattern)));
+            }
+            let mut n = 0;
+            while n < buffer.len() && matched < pattern.len() {
+                let b = buffer[n];
+                self.line += u64::from(b == b'\n');
+                matched = if b == pattern[matched] {
+                    matched + 1
+                } else {
+                    usize::from(b == pattern[0])
+                };
+                n += 1;
+            }
+            self.take(n);
+            if matched == pattern.len() {
+                return Ok(());
+            }
+        }
+    }
+
+    /// Appends the rest of this line to `out` and takes its end; false at the end of the file.
+    pub fn read_line(&mut self, out: &mut Vec<u8>) -> Result<bool> {
+        let start = out.len();
+        loop {
+            let buffer = self
+                .reader
+                .fill_buf()
+                .map_err(|e| broken(place(&self.file, self.binary, self.offset, self.line), &e))?;
+            if buffer.is_empty() {
+                return Ok(out.len() > start);
+            }
+            let end = buffer.iter().position(|&b| b == b'\n');
+            let n = end.unwrap_or(buffer.len());
+            out.extend_from_slice(&buffer[..n]);
+            self.take(n + usize::from(end.is_some()));
+            if out.len() > LINE_MAX {
+                return Err(self.unsupported(format!("a line longer than {LINE_MAX} bytes")));
+            }
+            if end.is_some() {
+                self.line += 1;
+                return Ok(true);
+            }
+        }
+    }
+
+    /// Ends the file of `builder`, which must have got triangles.
+    pub fn finish(&self, builder: &mut SurfaceBuilder) -> Result<()> {
+        if builder.n_file_triangles() == 0 {
+            return Err(ReadError::Empty {
+                place: Place {
+                    file: self.file.clone(),
+                    spot: Spot::Whole,
+                },
+            });
+        }
+        self.placed(builder.end_file())
+    }
+
+    // --- binary -------------------------------------------------------------------------------
+
+    /// Takes exactly `N` bytes.
+    #[inline]
+    pub fn bytes<const N: usize>(&mut self) -> Result<[u8; N]> {
+        let mut block = [0; N];
+        match self.reader.read_exact(&mut block) {
+            Ok(()) => {
+                self.offset += N as u64;
+                Ok(block)
+            }
+            Err(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => {
+                Err(self.truncated(format!("{N} more bytes")))
+            }
+            Err(e) => Err(broken(self.place(), &e)),
+        }
+    }
+
+    /// Skips `n` bytes.
+    pub fn skip_bytes(&mut self, mut n: u64) -> Result<()> {
+        while n > 0 {
+            let buffer = self
+                .reader
+                .fill_buf()
+                .map_err(|e| broken(place(&self.file, self.binary, self.offset, self.line), &e))?;
+            let got = buffer.len();
+            if got == 0 {
+                return Err(self.truncated(format!("{n} more bytes")));
+            }
+            let step = n.min(got as u64);
+            self.take(step as usize);
+            n -= step;
+        }
+        Ok(())
+    }
+}
+
+fn place(file: &str, binary: bool, offset: u64, line: u64) -> Place {
+    let spot = if binary {
+        Spot::Byte(offset)
+    } else {
+        Spot::Line(line)
+    };
+    Place {
+        file: file.to_owned(),
+        spot,
+    }
+}
+
+fn broken(place: Place, error: &std::io::Error) -> ReadError {
+    ReadError::Unreadable {
+        place,
+        reason: error.to_string(),
+    }
+}
+
+/// `bytes` as a number in plain decimal text.
+pub(super) fn parse<T: std::str::FromStr>(bytes: &[u8]) -> Option<T> {
+    std::str::from_utf8(bytes).ok()?.parse().ok()
+}
+
+/// A short printable form of bytes from a file.
+pub(super) fn quote(bytes: &[u8]) -> String {
+    let text = String::from_utf8_lossy(&bytes[..bytes.len().min(40)]);
+    let clean: String = text
+        .chars()
+        .map(|c| if c.is_control() { '?' } else { c })
+        .collect();
+    format!("`{clean}`")
+}
+
+/// A name from a file: trimmed, printable.
+pub(super) fn name(bytes: &[u8]) -> String {
+    let text = String::from_utf8_lossy(bytes);
+    text.trim()
+        .chars()
+        .filter(|c| !c.is_control())
+        .take(200)
+        .collect()
+}

@@ -1,0 +1,388 @@
+//! Gmsh `.msh` 2.2 and 4.1, text and binary: triangles and quadrilaterals, physical groups as labels.
+//!
+//! Sections this reader does not need are passed over. An element in several physical groups is
+//! given to the first (4.1); 2.2 repeats such elements, and validation reports the repetition.
+
+use std::collections::HashMap;
+use std::io::BufRead;
+
+use super::feed::{Feed, name};
+use super::gmsh_numbers::{NodeTags, Numbers, Role, need_element_type};
+use super::{ReadError, Result, Target};
+use crate::geom::Point;
+use crate::surface::NoteKind;
+
+/// What the sections of one file build up together.
+struct Mesh<'a, 'b, R> {
+    numbers: Numbers<R>,
+    target: &'a mut Target<'b>,
+    nodes: NodeTags,
+    /// Names of the surface groups.
+    names: HashMap<i64, String>,
+    /// Surface entity -> its first physical group (4.1).
+    groups: HashMap<i64, i64>,
+    /// The label used last and the group it came from.
+    last: Option<(i64, u32)>,
+    n_solids: u64,
+}
+
+pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut Target) -> Result<()> {
+    feed.need_keyword("$MeshFormat")?;
+    feed.need_word("the format's version")?;
+    let version = match feed.word() {
+        b"2" | b"2.0" | b"2.1" | b"2.2" => 2,
+        b"4.1" => 4,
+        other => {
+            let found = super::feed::quote(other);
+            return Err(feed.unsupported(format!("version {found} of .msh (2.2 and 4.1 can)")));
+        }
+    };
+    let binary = match feed.integer("0 for text or 1 for binary")? {
+        0 => false,
+        1 => true,
+        _ => return Err(feed.unexpected("0 for text or 1 for binary", feed.word())),
+    };
+    if feed.integer("the size of numbers")? != 8 {
+        return Err(feed.unsupported("a .msh file with other than 8-byte numbers"));
+    }
+    feed.skip_line()?;
+    let mut big = false;
+    if binary {
+        feed.binary = true;
+        big = match i32::from_le_bytes(feed.bytes::<4>()?) {
+            1 => false,
+            0x0100_0000 => true,
+            _ => return Err(feed.unexpected("the number 1 in either byte order", b"another")),
+        };
+    }
+    feed.need_keyword("$EndMeshFormat")?;
+    feed.skip_line()?;
+    let mut mesh = Mesh {
+        numbers: Numbers { feed, binary, big },
+        target,
+        nodes: NodeTags::default(),
+        names: HashMap::new(),
+        groups: HashMap::new(),
+        last: None,
+        n_solids: 0,
+    };
+    mesh.read_sections(version)?;
+    if mesh.n_solids > 0 {
+        let n = mesh.n_solids;
+        mesh.target.builder.note(NoteKind::SkippedElements {
+            what: "solid elements",
+            n,
+        });
+    }
+    mesh.numbers.feed.finish(mesh.target.builder)
+}
+
+impl<R: BufRead> Mesh<'_, '_, R> {
+    fn read_sections(&mut self, version: u32) -> Result<()> {
+        while self.numbers.feed.next_word()? {
+            let section = self.numbers.feed.word().to_vec();
+            if section.first() != Some(&b'$') {
+                return Err(self
+                    .numbers
+                    .feed
+                    .unexpected("a section beginning with `$`", &section));
+            }
+            self.numbers.feed.skip_line()?;
+            match (section.as_slice(), version) {
+                (b"$PhysicalNames", _) => self.read_names()?,
+                (b"$Entities", 4) => self.read_entities()?,
+                (b"$Nodes", 2) => self.read_nodes_2()?,
+                (b"$Nodes", _) => self.read_nodes_4()?,
+                (b"$Elements", 2) if self.numbers.binary => self.read_elements_2_binary()?,
+                (b"$Elements", 2) => self.read_elements_2_text()?,
+                (b"$Elements", _) => self.read_elements_4()?,
+                _ => {
+                    let end = [b"$End", &section[1..]].concat();
+                    self.numbers.feed.skip_past(&end)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// `dimension tag "name"`, always text.
+    fn read_names(&mut self) -> Result<()> {
+        let feed = &mut self.numbers.feed;
+        let n = feed.count("physical names", 6)?;
+        let mut line = Vec::new();
+        for _ in 0..n {
+            let dimension = feed.integer("a dimension")?;
+            let tag = feed.integer("a physical tag")?;
+            line.clear();
+            feed.read_line(&mut line)?;
+            let text = name(&line);
+            if dimension == 2 {
+                self.names.insert(tag, text.trim_matches('"').to_owned());
+            }
+        }
+        self.numbers.end("$EndPhysicalNames")
+    }
+
+    /// The label of a physical group; 0 is none.
+    fn label(&mut self, group: i64) -> u32 {
+        if let Some((known, label)) = self.last
+            && known == group
+        {
+            return label;
+        }
+        let label = match self.names.get(&group) {
+            _ if group == 0 => self.target.label(""),
+            Some(name) => self.target.label(name),
+            None => self.target.label(&group.to_string()),
+        };
+        self.last = Some((group, label));
+        label
+    }
+
+    fn node(&mut self, tag: i64, p: Point) -> Result<()> {
+        if !self.nodes.push(tag) {
+            let found = format!("node {tag} a second time");
+            let expected = "nodes of different tags".to_owned();
+            return Err(ReadError::Unexpected {
+                place: self.numbers.feed.place(),
+                expected,
+                found,
+            });
+        }
+        self.numbers.feed.placed(self.target.builder.vertex(p))
+    }
+
+    fn point(&mut self) -> Result<Point> {
+        Ok(Point::new(
+            self.numbers.double()?,
+            self.numbers.double()?,
+            self.numbers.double()?,
+        ))
+    }
+
+    fn face(&mut self, tags: &[i64], group: i64) -> Result<()> {
+        let mut corners = [0; 4];
+        for (corner, tag) in corners.iter_mut().zip(tags) {
+            *corner = self.nodes.find(*tag, &self.numbers.feed)?;
+        }
+        let label = self.label(group);
+        self.numbers
+            .feed
+            .placed(self.target.builder.polygon(&corners[..tags.len()], label))
+    }
+
+    // --- 2.2 ----------------------------------------------------------------------------------
+
+    /// The count of a section of 2.2, which is text in binary files too.
+    fn text_count(&mut self, what: &'static str, words: u64, bytes: u64) -> Result<u64> {
+        let declared = self.numbers.feed.integer(what)?;
+        if self.numbers.binary {
+            self.numbers.feed.skip_line()?;
+        }
+        self.numbers.check_count(what, declared, words, bytes)
+    }
+
+    fn read_nodes_2(&mut self) -> Result<()> {
+        let n = self.text_count("nodes", 4, 7)?;
+        for i in 0..n {
+            self.numbers.need_record("nodes", n, i)?;
+            let tag = self.numbers.int()?;
+            let p = self.point()?;
+            self.node(tag, p)?;
+        }
+        self.numbers.end("$EndNodes")
+    }
+
+    fn read_elements_2_text(&mut self) -> Result<()> {
+        let n = self.text_count("elements", 4, 2)?;
+        for i in 0..n {
+            self.numbers.need_record("elements", n, i)?;
+            self.numbers.int()?;
+            let kind = self.numbers.int()?;
+            let n_tags = self.numbers.int()?;
+            self.read_element_2(kind, n_tags)?;
+        }
+        self.numbers.end("$EndElements")
+    }
+
+    fn read_elements_2_binary(&mut self) -> Result<()> {
+        let n = self.text_count("elements", 1, 4)?;
+        let mut done = 0;
+        while done < n {
+            let kind = self.numbers.int()?;
+            let in_block = self.numbers.int()?;
+            let in_block = self.numbers.check_count("elements", in_block, 1, 4)?;
+            let n_tags = self.numbers.int()?;
+            if in_block == 0 || in_block > n - done {
+                let feed = &self.numbers.feed;
+                return Err(feed.unexpected(
+                    format!("a block of 1 to {} elements", n - done),
+                    in_block.to_string().as_bytes(),
+                ));
+            }
+            for _ in 0..in_block {
+                self.numbers.int()?;
+                self.read_element_2(kind, n_tags)?;
+            }
+            done += in_block;
+        }
+        self.numbers.end("$EndElements")
+    }
+
+    /// The tags and nodes of one element.
+    fn read_element_2(&mut self, kind: i64, n_tags: i64) -> Result<()> {
+        let n_tags = self.numbers.check_count("element tags", n_tags, 1, 4)?;
+        let mut group = 0;
+        for i in 0..n_tags {
+            let tag = self.numbers.int()?;
+            if i == 0 {
+                group = tag;
+            }
+        }
+        let (n_nodes, role) = need_element_type(kind, &self.numbers.feed)?;
+        let mut tags = [0; 4];
+        for i in 0..n_nodes {
+            let tag = self.numbers.int()?;
+            if role == Role::Face {
+                tags[i] = tag;
+            }
+        }
+        self.n_solids += u64::from(role == Role::Solid);
+        if role == Role::Face {
+            self.face(&tags[..n_nodes], group)
+        } else {
+            Ok(())
+        }
+    }
+
+    // --- 4.1 ----------------------------------------------------------------------------------
+
+    fn read_entities(&mut self) -> Result<()> {
+        let mut counts = [0; 4];
+        for count in &mut counts {
+            let declared = self.numbers.size()?;
+            *count = self.numbers.check_count("entities", declared, 5, 4)?;
+        }
+        for (dimension, &n) in counts.iter().enumerate() {
+            for i in 0..n {
+                self.numbers.need_record("entities", n, i)?;
+                let entity = self.numbers.int()?;
+                for _ in 0..if dimension == 0 { 3 } else { 6 } {
+                    self.numbers.double()?;
+                }
+                let groups = self.int_list()?;
+                if let (2, Some(&group)) = (dimension, groups.first()) {
+                    self.groups.insert(entity, group.saturating_abs());
+                }
+                if dimension > 0 {
+                    self.int_list()?;
+                }
+            }
+        }
+        self.numbers.end("$EndEntities")
+    }
+
+    fn int_list(&mut self) -> Result<Vec<i64>> {
+        let n = self.numbers.size()?;
+        let n = self.numbers.check_count("tags", n, 1, 4)?;
+        (0..n).map(|_| self.numbers.int()).collect()
+    }
+
+    /// The four numbers before the blocks of a section: blocks, entries, lowest and highest tag.
+    fn block_header(&mut self, what: &'static str, words: u64) -> Result<(u64, u64)> {
+        let (n_blocks, n) = (self.numbers.size()?, self.numbers.size()?);
+        let n_blocks = self.numbers.check_count("blocks", n_blocks, 4, 5)?;
+        let n = self.numbers.check_count(what, n, words, 8)?;
+        self.numbers.size()?;
+        self.numbers.size()?;
+        Ok((n_blocks, n))
+    }
+
+    /// The numbers before one block: entity dimension, entity, a third and the number of entries.
+    fn block(&mut self, what: &'static str, words: u64) -> Result<(i64, i64, i64, u64)> {
+        let (dimension, entity, third) = (
+            self.numbers.int()?,
+            self.numbers.int()?,
+            self.numbers.int()?,
+        );
+        let n = self.numbers.size()?;
+        let n = self.numbers.check_count(what, n, words, 8)?;
+        Ok((dimension, entity, third, n))
+    }
+
+    fn check_total(&self, what: &'static str, declared: u64, found: u64) -> Result<()> {
+        if declared == found {
+            return Ok(());
+        }
+        Err(ReadError::CountMismatch {
+            place: self.numbers.feed.place(),
+            what,
+            declared: declared.to_string(),
+            found: format!("{found} found in the blocks"),
+        })
+    }
+
+    fn read_nodes_4(&mut self) -> Result<()> {
+        let (n_blocks, n_total) = self.block_header("nodes", 4)?;
+        let mut found = 0;
+        let mut tags = Vec::new();
+        for i in 0..n_blocks {
+            self.numbers.need_record("blocks", n_blocks, i)?;
+            let (dimension, _, parametric, n) = self.block("nodes", 4)?;
+            let n_parameters = if parametric != 0 {
+                dimension.clamp(0, 3)
+            } else {
+                0
+            };
+            tags.clear();
+            for k in 0..n {
+                self.numbers.need_record("nodes", n, k)?;
+                tags.push(self.numbers.size()?);
+            }
+            for (k, &tag) in (0..).zip(&tags) {
+                self.numbers.need_record("nodes", n, k)?;
+                let p = self.point()?;
+                for _ in 0..n_parameters {
+                    self.numbers.double()?;
+                }
+                self.node(tag, p)?;
+            }
+            found += n;
+        }
+        self.check_total("nodes", n_total, found)?;
+        self.numbers.end("$EndNodes")
+    }
+
+    fn read_elements_4(&mut self) -> Result<()> {
+        let (n_blocks, n_total) = self.block_header("elements", 2)?;
+        let mut found = 0;
+        for i in 0..n_blocks {
+            self.numbers.need_record("blocks", n_blocks, i)?;
+            let (dimension, entity, kind, n) = self.block("elements", 2)?;
+            let (n_nodes, role) = need_element_type(kind, &self.numbers.feed)?;
+            let group = if dimension == 2 {
+                self.groups.get(&entity).copied().unwrap_or(0)
+            } else {
+                0
+            };
+            for k in 0..n {
+                self.numbers.need_record("elements", n, k)?;
+                self.numbers.size()?;
+                let mut tags = [0; 4];
+                for j in 0..n_nodes {
+                    let tag = self.numbers.size()?;
+                    if role == Role::Face {
+                        tags[j] = tag;
+                    }
+                }
+                self.n_solids += u64::from(role == Role::Solid);
+                if role == Role::Face {
+                    self.face(&tags[..n_nodes], group)?;
+                }
+            }
+            found += n;
+        }
+        self.check_total("elements", n_total, found)?;
+        self.numbers.end("$EndElements")
+    }
+}

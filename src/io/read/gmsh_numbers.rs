@@ -1,0 +1,203 @@
+//! What Gmsh files of all versions are made of: numbers in text or binary, node tags, element types.
+
+use std::collections::HashMap;
+use std::io::BufRead;
+
+use super::feed::Feed;
+use super::{ReadError, Result};
+
+/// Numbers of a section, in text or in binary of either byte order.
+pub(super) struct Numbers<R> {
+    pub feed: Feed<R>,
+    pub binary: bool,
+    pub big: bool,
+}
+
+impl<R: BufRead> Numbers<R> {
+    /// An `int` of the format.
+    pub fn int(&mut self) -> Result<i64> {
+        if !self.binary {
+            return self.feed.integer("a whole number");
+        }
+        let bytes = self.feed.bytes::<4>()?;
+        Ok(i64::from(if self.big {
+            i32::from_be_bytes(bytes)
+        } else {
+            i32::from_le_bytes(bytes)
+        }))
+    }
+
+    /// A `size_t` of the format, of 8 bytes.
+    pub fn size(&mut self) -> Result<i64> {
+        if !self.binary {
+            return self.feed.integer("a whole number");
+        }
+        let bytes = self.feed.bytes::<8>()?;
+        Ok(if self.big {
+            i64::from_be_bytes(bytes)
+        } else {
+            i64::from_le_bytes(bytes)
+        })
+    }
+
+    /// A coordinate.
+    pub fn double(&mut self) -> Result<f64> {
+        if !self.binary {
+            return self.feed.coordinate();
+        }
+        let bytes = self.feed.bytes::<8>()?;
+        self.feed.checked(if self.big {
+            f64::from_be_bytes(bytes)
+        } else {
+            f64::from_le_bytes(bytes)
+        })
+    }
+
+    /// Compares a declared count with the bytes left, at `words` numbers of `bytes` each.
+    pub fn check_count(
+        &self,
+        what: &'static str,
+        declared: i64,
+        words: u64,
+        bytes: u64,
+    ) -> Result<u64> {
+        let bytes_min = if self.binary {
+            words * bytes
+        } else {
+            words * 2
+        };
+        self.feed.check_count(what, declared, bytes_min)
+    }
+
+    /// In text, whether a record is left before the section ends.
+    pub fn need_record(&mut self, what: &'static str, declared: u64, found: u64) -> Result<()> {
+        if !self.binary && (self.feed.at_end()? || self.feed.peek()? == Some(b'$')) {
+            return Err(self.feed.too_few(what, declared, found));
+        }
+        Ok(())
+    }
+
+    /// Takes the word that ends a section.
+    pub fn end(&mut self, keyword: &'static str) -> Result<()> {
+        self.feed.need_keyword(keyword)?;
+        self.feed.skip_line()
+    }
+}
+
+/// From the tags of nodes to their positions in the file.
+#[derive(Default)]
+pub(super) struct NodeTags {
+    first: i64,
+    n: u32,
+    /// Used once the tags turn out not to count up by one.
+    sparse: Option<HashMap<i64, u32>>,
+}
+
+impl NodeTags {
+    /// The next node of the file has this tag; false when another had it before.
+    pub fn push(&mut self, tag: i64) -> bool {
+        if self.n == 0 {
+            self.first = tag;
+        }
+        let dense = self.first.checked_add(i64::from(self.n)) == Some(tag);
+        if self.sparse.is_none() && !dense {
+            let known = (0..self.n).map(|i| (self.first + i64::from(i), i));
+            self.sparse = Some(known.collect());
+        }
+        let new = match &mut self.sparse {
+            Some(map) => map.insert(tag, self.n).is_none(),
+            None => true,
+        };
+        self.n += 1;
+        new
+    }
+
+    /// The position of the node with this tag.
+    pub fn get(&self, tag: i64) -> Option<u32> {
+        match &self.sparse {
+            Some(map) => map.get(&tag).copied(),
+            None => {
+                let i = u32::try_from(tag.checked_sub(self.first)?).ok()?;
+                (i < self.n).then_some(i)
+            }
+        }
+    }
+
+    /// The position of a node an element names.
+    pub fn find<R: BufRead>(&self, tag: i64, feed: &Feed<R>) -> Result<u32> {
+        self.get(tag).ok_or_else(|| {
+            let low = if self.sparse.is_some() { 1 } else { self.first };
+            let high = match &self.sparse {
+                Some(map) => map.keys().copied().max().unwrap_or(0),
+                None => self.first + i64::from(self.n) - 1,
+            };
+            feed.out_of_range(tag, low, high)
+        })
+    }
+}
+
+/// What an element is to a surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Role {
+    /// Flat triangles and quadrilaterals.
+    Face,
+    /// Curved faces, which no flat triangle can stand for.
+    CurvedFace,
+    Solid,
+    /// Points and lines.
+    Thin,
+}
+
+/// Number of nodes and role of an element type of the format.
+pub(super) fn element_type(kind: i64) -> Option<(usize, Role)> {
+    use Role::{CurvedFace, Face, Solid, Thin};
+    Some(match kind {
+        1 => (2, Thin),
+        2 => (3, Face),
+        3 => (4, Face),
+        4 => (4, Solid),
+        5 => (8, Solid),
+        6 => (6, Solid),
+        7 => (5, Solid),
+        8 => (3, Thin),
+        9 => (6, CurvedFace),
+        10 => (9, CurvedFace),
+        11 => (10, Solid),
+        12 => (27, Solid),
+        13 => (18, Solid),
+        14 => (14, Solid),
+        15 => (1, Thin),
+        16 => (8, CurvedFace),
+        17 => (20, Solid),
+        18 => (15, Solid),
+        19 => (13, Solid),
+        20 => (9, CurvedFace),
+        21 => (10, CurvedFace),
+        22 => (12, CurvedFace),
+        23 | 24 => (15, CurvedFace),
+        25 => (21, CurvedFace),
+        26 => (4, Thin),
+        27 => (5, Thin),
+        28 => (6, Thin),
+        29 => (20, Solid),
+        30 => (35, Solid),
+        31 => (56, Solid),
+        92 => (64, Solid),
+        93 => (125, Solid),
+        _ => return None,
+    })
+}
+
+/// As [`element_type`], or the error that says so.
+pub(super) fn need_element_type<R: BufRead>(kind: i64, feed: &Feed<R>) -> Result<(usize, Role)> {
+    match element_type(kind) {
+        Some((_, Role::CurvedFace)) => {
+            Err(feed.unsupported(format!("a curved face (element type {kind})")))
+        }
+        Some(found) => Ok(found),
+        None => Err(ReadError::Unsupported {
+            place: feed.place(),
+            what: format!("element type {kind}"),
+        }),
+    }
+}

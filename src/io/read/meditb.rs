@@ -1,0 +1,215 @@
+//! MEDIT `.meshb` binary, versions 1 to 4, both byte orders.
+//!
+//! | field | v1 | v2 | v3 | v4 |
+//! |---|---|---|---|---|
+//! | position of the next keyword | i32 | i32 | i64 | i64 |
+//! | counts, vertex numbers, references | i32 | i32 | i32 | i64 |
+//! | coordinates | f32 | f64 | f64 | f64 |
+//!
+//! The file begins with 1 (its bytes tell the order) and the version; each section with its keyword
+//! and the position after it. Source: the libMeshb documentation of the GMF format.
+
+use std::io::BufRead;
+
+use super::feed::Feed;
+use super::medit::RefLabels;
+use super::{ReadError, Result, Target};
+use crate::geom::Point;
+use crate::surface::NoteKind;
+
+const DIMENSION: i64 = 3;
+const VERTICES: i64 = 4;
+const TRIANGLES: i64 = 6;
+const QUADRILATERALS: i64 = 7;
+const TETRAHEDRA: i64 = 8;
+const PRISMS: i64 = 9;
+const HEXAHEDRA: i64 = 10;
+const TRIANGLES_P2: i64 = 24;
+const PYRAMIDS: i64 = 49;
+const END: i64 = 54;
+
+struct Numbers<R> {
+    feed: Feed<R>,
+    big: bool,
+    version: i32,
+}
+
+impl<R: BufRead> Numbers<R> {
+    fn i32(&mut self) -> Result<i32> {
+        let bytes = self.feed.bytes::<4>()?;
+        Ok(if self.big {
+            i32::from_be_bytes(bytes)
+        } else {
+            i32::from_le_bytes(bytes)
+        })
+    }
+
+    fn i64(&mut self) -> Result<i64> {
+        let bytes = self.feed.bytes::<8>()?;
+        Ok(if self.big {
+            i64::from_be_bytes(bytes)
+        } else {
+            i64::from_le_bytes(bytes)
+        })
+    }
+
+    /// A count, vertex number or reference.
+    fn integer(&mut self) -> Result<i64> {
+        if self.version >= 4 {
+            self.i64()
+        } else {
+            Ok(i64::from(self.i32()?))
+        }
+    }
+
+    /// A position in the file.
+    fn position(&mut self) -> Result<i64> {
+        if self.version >= 3 {
+            self.i64()
+        } else {
+            Ok(i64::from(self.i32()?))
+        }
+    }
+
+    fn coordinate(&mut self) -> Result<f64> {
+        let x = if self.version == 1 {
+            f64::from(f32::from_bits(self.i32()? as u32))
+        } else {
+            f64::from_bits(self.i64()? as u64)
+        };
+        self.feed.checked(x)
+    }
+
+    fn integer_bytes(&self) -> u64 {
+        if self.version >= 4 { 8 } else { 4 }
+    }
+
+    fn count(&mut self, what: &'static str, bytes_min: u64) -> Result<u64> {
+        let declared = self.integer()?;
+        self.feed.check_count(what, declared, bytes_min)
+    }
+}
+
+pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut Target) -> Result<()> {
+    feed.binary = true;
+    let magic = feed.bytes::<4>()?;
+    let big = match i32::from_le_bytes(magic) {
+        1 => false,
+        0x0100_0000 => true,
+        _ => return Err(feed.unexpected("1 as the first number of a .meshb file", &magic)),
+    };
+    let mut numbers = Numbers {
+        feed,
+        big,
+        version: 0,
+    };
+    numbers.version = numbers.i32()?;
+    if !(1..=4).contains(&numbers.version) {
+        let version = numbers.version;
+        return Err(numbers
+            .feed
+            .unsupported(format!("version {version} of .meshb")));
+    }
+    let mut n_vertices = 0;
+    while numbers.feed.offset < numbers.feed.len {
+        let keyword = i64::from(numbers.i32()?);
+        if keyword == END {
+            break;
+        }
+        let next = numbers.position()?;
+        read_section(&mut numbers, keyword, &mut n_vertices, target)?;
+        if next == 0 {
+            break;
+        }
+        skip_to(&mut numbers.feed, next)?;
+    }
+    numbers.feed.finish(target.builder)
+}
+
+fn skip_to<R: BufRead>(feed: &mut Feed<R>, next: i64) -> Result<()> {
+    match u64::try_from(next) {
+        Ok(next) if (feed.offset..=feed.len).contains(&next) => feed.skip_bytes(next - feed.offset),
+        _ => Err(ReadError::Unexpected {
+            place: feed.place(),
+            expected: format!(
+                "the next section between byte {} and {}",
+                feed.offset, feed.len
+            ),
+            found: format!("byte {next}"),
+        }),
+    }
+}
+
+fn read_section<R: BufRead>(
+    numbers: &mut Numbers<R>,
+    keyword: i64,
+    n_vertices: &mut u64,
+    target: &mut Target,
+) -> Result<()> {
+    let int = numbers.integer_bytes();
+    match keyword {
+        DIMENSION => {
+            let dimension = numbers.i32()?;
+            if dimension != 3 {
+                return Err(numbers
+                    .feed
+                    .unsupported(format!("a mesh of dimension {dimension}")));
+            }
+        }
+        VERTICES => {
+            let coordinate = if numbers.version == 1 { 4 } else { 8 };
+            let n = numbers.count("vertices", 3 * coordinate + int)?;
+            for _ in 0..n {
+                let p = Point::new(
+                    numbers.coordinate()?,
+                    numbers.coordinate()?,
+                    numbers.coordinate()?,
+                );
+                numbers.integer()?;
+                numbers.feed.placed(target.builder.vertex(p))?;
+            }
+            *n_vertices += n;
+        }
+        TRIANGLES => read_faces(numbers, "triangles", 3, *n_vertices, target)?,
+        QUADRILATERALS => read_faces(numbers, "quadrilaterals", 4, *n_vertices, target)?,
+        TRIANGLES_P2 => return Err(numbers.feed.unsupported("curved triangles")),
+        TETRAHEDRA | PRISMS | HEXAHEDRA | PYRAMIDS => {
+            let n = numbers.count("solid elements", 5 * int)?;
+            let what = match keyword {
+                PRISMS => "prisms",
+                HEXAHEDRA => "hexahedra",
+                PYRAMIDS => "pyramids",
+                _ => "tetrahedra",
+            };
+            if n > 0 {
+                target.builder.note(NoteKind::SkippedElements { what, n });
+            }
+        }
+        _ => {}
+    }
+    Ok(())
+}
+
+fn read_faces<R: BufRead>(
+    numbers: &mut Numbers<R>,
+    what: &'static str,
+    n_corners: usize,
+    n_vertices: u64,
+    target: &mut Target,
+) -> Result<()> {
+    let bytes = numbers.integer_bytes() * (n_corners as u64 + 1);
+    let n = numbers.count(what, bytes)?;
+    let mut labels = RefLabels::default();
+    for _ in 0..n {
+        let mut corners = [0; 4];
+        for corner in &mut corners[..n_corners] {
+            let index = numbers.integer()?;
+            *corner = numbers.feed.check_index(index, 1, n_vertices)?;
+        }
+        let label = labels.of(numbers.integer()?, target);
+        numbers
+            .feed
+            .placed(target.builder.polygon(&corners[..n_corners], label))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,242 @@
+//! Surface files read as streams: STL, OFF, OBJ, PLY, MEDIT, Gmsh, TetGen.
+//!
+//! A declared count is believed only after it was compared with the length of the file; every error
+//! tells its line (text) or byte (binary). Decimal text becomes the nearest double, binary floats
+//! become doubles exactly. Polygons are fanned, vertices with identical bits are one.
+
+mod error;
+mod feed;
+mod gmsh;
+mod gmsh_numbers;
+mod medit;
+mod meditb;
+mod obj;
+mod off;
+mod ply;
+mod stl;
+mod tetgen;
+
+#[cfg(test)]
+mod tests;
+
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+
+pub use error::{Place, ReadError, Spot};
+use feed::{Feed, Result};
+
+use crate::surface::{Surface, SurfaceBuilder};
+
+/// Bytes of the read buffer of one file.
+const BUFFER_BYTES: usize = 256 << 10;
+
+/// A kind of surface file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Format {
+    Stl,
+    Off,
+    Obj,
+    Ply,
+    Medit,
+    MeditBinary,
+    Gmsh,
+    TetgenSmesh,
+    TetgenPoly,
+}
+
+impl Format {
+    /// The format a file name's extension tells.
+    pub fn of_extension(path: &Path) -> Option<Self> {
+        let extension = path.extension()?.to_str()?.to_ascii_lowercase();
+        Some(match extension.as_str() {
+            "stl" | "stla" | "stlb" => Self::Stl,
+            "off" => Self::Off,
+            "obj" => Self::Obj,
+            "ply" => Self::Ply,
+            "mesh" => Self::Medit,
+            "meshb" => Self::MeditBinary,
+            "msh" => Self::Gmsh,
+            "smesh" => Self::TetgenSmesh,
+            "poly" => Self::TetgenPoly,
+            _ => return None,
+        })
+    }
+
+    /// The format the first bytes of a file tell, for names that do not.
+    fn of_head(head: &[u8]) -> Option<Self> {
+        let starts = |word: &str| {
+            head.get(..word.len())
+                .is_some_and(|h| h.eq_ignore_ascii_case(word.as_bytes()))
+        };
+        if starts("ply\n") || starts("ply\r") {
+            Some(Self::Ply)
+        } else if starts("$MeshFormat") {
+            Some(Self::Gmsh)
+        } else if starts("MeshVersionFormatted") {
+            Some(Self::Medit)
+        } else if starts("OFF") || starts("COFF") || starts("NOFF") {
+            Some(Self::Off)
+        } else if starts("solid") {
+            Some(Self::Stl)
+        } else {
+            None
+        }
+    }
+}
+
+/// What the readers share: the surface being built and how this file's labels are called.
+pub(crate) struct Target<'a> {
+    builder: &'a mut SurfaceBuilder,
+    /// The file's name without folder and extension: the label of triangles that have none.
+    stem: String,
+    /// Put before each label when several files make one surface.
+    prefix: Option<String>,
+}
+
+impl Target<'_> {
+    /// The id of label `name`, or of the file's own label when it is empty.
+    fn label(&mut self, name: &str) -> u32 {
+        match (&self.prefix, name.is_empty()) {
+            (None, true) => self.builder.label(&self.stem),
+            (None, false) => self.builder.label(name),
+            (Some(prefix), true) => self.builder.label(prefix),
+            (Some(prefix), false) if prefix == name => self.builder.label(prefix),
+            (Some(prefix), false) => self.builder.label(&format!("{prefix}:{name}")),
+        }
+    }
+}
+
+/// Reads files as one surface, each with its name before its labels when there are several.
+///
+/// # Errors
+/// The first [`ReadError`], with its file and place; nothing is repaired beyond welding and fanning.
+pub fn read_surface(paths: &[PathBuf]) -> Result<Surface> {
+    let mut builder = SurfaceBuilder::new();
+    let mut prefixes: Vec<String> = Vec::new();
+    for path in paths {
+        let stem = stem(path);
+        let prefix = (paths.len() > 1).then(|| unique(&stem, &prefixes));
+        prefixes.extend(prefix.clone());
+        let mut target = Target {
+            builder: &mut builder,
+            stem,
+            prefix,
+        };
+        read_file(path, &mut target)?;
+    }
+    Ok(builder.finish())
+}
+
+/// Reads a file that is in memory, called `file` in messages; for tests and fuzzing.
+///
+/// TetGen files that refer to a separate `.node` file are refused.
+///
+/// # Errors
+/// As [`read_surface`].
+pub fn read_memory(format: Format, file: &str, bytes: &[u8]) -> Result<Surface> {
+    let mut builder = SurfaceBuilder::new();
+    let mut target = Target {
+        builder: &mut builder,
+        stem: stem(Path::new(file)),
+        prefix: None,
+    };
+    target.builder.begin_file(file);
+    let feed = Feed::new(file, bytes, bytes.len() as u64);
+    read_feed(format, feed, None, &mut target)?;
+    Ok(builder.finish())
+}
+
+fn stem(path: &Path) -> String {
+    let text = path.file_stem().unwrap_or_default().to_string_lossy();
+    let name = feed::name(text.as_bytes());
+    if name.is_empty() {
+        "surface".to_owned()
+    } else {
+        name
+    }
+}
+
+fn unique(stem: &str, taken: &[String]) -> String {
+    let mut name = stem.to_owned();
+    let mut n = 1;
+    while taken.contains(&name) {
+        n += 1;
+        name = format!("{stem}~{n}");
+    }
+    name
+}
+
+fn open(path: &Path) -> Result<Feed<BufReader<File>>> {
+    let name = path.to_string_lossy();
+    let unreadable = |reason: String| ReadError::Unreadable {
+        place: Place {
+            file: name.to_string(),
+            spot: Spot::Whole,
+        },
+        reason,
+    };
+    let file = File::open(path).map_err(|e| unreadable(e.to_string()))?;
+    let meta = file.metadata().map_err(|e| unreadable(e.to_string()))?;
+    if !meta.is_file() {
+        return Err(unreadable("it is not a regular file".to_owned()));
+    }
+    Ok(Feed::new(
+        &name,
+        BufReader::with_capacity(BUFFER_BYTES, file),
+        meta.len(),
+    ))
+}
+
+fn read_file(path: &Path, target: &mut Target) -> Result<()> {
+    let feed = open(path)?;
+    let format = match Format::of_extension(path) {
+        Some(format) => format,
+        None => {
+            let mut head = Vec::new();
+            let place = Place {
+                file: feed.file().to_owned(),
+                spot: Spot::Whole,
+            };
+            // A second look at the file, because the first bytes are still needed by the reader.
+            let sniff = File::open(path).and_then(|f| f.take(64).read_to_end(&mut head));
+            sniff.map_err(|e| ReadError::Unreadable {
+                place: place.clone(),
+                reason: e.to_string(),
+            })?;
+            Format::of_head(&head).ok_or(ReadError::UnknownFormat { place })?
+        }
+    };
+    target.builder.begin_file(feed.file());
+    let nodes = matches!(format, Format::TetgenSmesh | Format::TetgenPoly)
+        .then(|| path.with_extension("node"));
+    read_feed(format, feed, nodes.as_deref(), target)
+}
+
+fn read_feed<R: BufRead>(
+    format: Format,
+    feed: Feed<R>,
+    nodes: Option<&Path>,
+    target: &mut Target,
+) -> Result<()> {
+    if feed.len == 0 {
+        return Err(ReadError::Empty {
+            place: Place {
+                file: feed.file().to_owned(),
+                spot: Spot::Whole,
+            },
+        });
+    }
+    match format {
+        Format::Stl => stl::read(feed, target),
+        Format::Off => off::read(feed, target),
+        Format::Obj => obj::read(feed, target),
+        Format::Ply => ply::read(feed, target),
+        Format::Medit => medit::read(feed, target),
+        Format::MeditBinary => meditb::read(feed, target),
+        Format::Gmsh => gmsh::read(feed, target),
+        Format::TetgenSmesh => tetgen::read(feed, tetgen::Kind::Smesh, nodes, target),
+        Format::TetgenPoly => tetgen::read(feed, tetgen::Kind::Poly, nodes, target),
+    }
+}

@@ -1,0 +1,179 @@
+//! Wavefront OBJ: `v` and `f` lines; groups, objects or materials as labels.
+//!
+//! A face names vertices from 1, or backwards from the last one as −1, with texture and normal
+//! numbers after slashes, which are passed over. A backslash continues a line.
+
+use std::io::BufRead;
+
+use super::feed::{Feed, parse, quote};
+use super::{ReadError, Result, Target};
+use crate::geom::Point;
+use crate::surface::NoteKind;
+
+/// Names in force; the most telling one is the label of a face.
+#[derive(Default)]
+struct Names {
+    group: String,
+    object: String,
+    material: String,
+}
+
+impl Names {
+    fn best(&self) -> &str {
+        let all = [&self.group, &self.object, &self.material];
+        all.into_iter()
+            .find(|n| !n.is_empty())
+            .map_or("", |n| n.as_str())
+    }
+}
+
+pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut Target) -> Result<()> {
+    let mut names = Names::default();
+    let mut label = None;
+    let mut line = Vec::new();
+    let mut corners = Vec::new();
+    // Vertex numbers beyond those known when they were named, each larger than the one before.
+    let mut ahead: Vec<(u32, super::Place)> = Vec::new();
+    let mut n_lines_points = 0;
+    loop {
+        let place = feed.place();
+        line.clear();
+        if !read_logical_line(&mut feed, &mut line)? {
+            break;
+        }
+        let mut words = line
+            .split(u8::is_ascii_whitespace)
+            .filter(|w| !w.is_empty());
+        match words.next().unwrap_or_default() {
+            b"v" => {
+                let mut p = [0.0; 3];
+                for x in &mut p {
+                    let word = words
+                        .next()
+                        .ok_or_else(|| unexpected(&place, "three coordinates", b"fewer"))?;
+                    let value =
+                        parse(word).ok_or_else(|| not_a_number(&place, "a coordinate", word))?;
+                    *x = match feed.checked(value) {
+                        Ok(value) => value,
+                        Err(ReadError::CoordinateRange { found, .. }) => {
+                            return Err(ReadError::CoordinateRange { place, found });
+                        }
+                        Err(_) => return Err(not_a_number(&place, "a coordinate", word)),
+                    };
+                }
+                feed.placed(target.builder.vertex(Point::from_array(p)))?;
+            }
+            b"f" | b"fo" => {
+                corners.clear();
+                let known = target.builder.n_file_vertices() as u32;
+                for word in words {
+                    let index = corner(word, known, &place)?;
+                    if index >= known && ahead.last().is_none_or(|(last, _)| index > *last) {
+                        ahead.push((index, place.clone()));
+                    }
+                    corners.push(index);
+                }
+                if corners.len() < 3 {
+                    return Err(unexpected(&place, "a face of at least 3 corners", &line));
+                }
+                let label = *label.get_or_insert_with(|| target.label(names.best()));
+                feed.placed(target.builder.polygon(&corners, label))?;
+            }
+            b"l" | b"p" => n_lines_points += 1,
+            b"g" => {
+                names.group = super::feed::name(&line[1..]);
+                label = None;
+            }
+            b"o" => {
+                names.object = super::feed::name(&line[1..]);
+                names.group.clear();
+                label = None;
+            }
+            b"usemtl" => {
+                names.material = super::feed::name(&line[6..]);
+                label = None;
+            }
+            b"curv" | b"curv2" | b"surf" => {
+                return Err(ReadError::Unsupported {
+                    place,
+                    what: "a free-form curve or surface".to_owned(),
+                });
+            }
+            _ => {}
+        }
+    }
+    let known = target.builder.n_file_vertices() as u32;
+    if let Some((index, place)) = ahead.into_iter().find(|(index, _)| *index >= known) {
+        let (index, high) = (i64::from(index) + 1, i64::from(known));
+        return Err(ReadError::IndexOutOfRange {
+            place,
+            index,
+            low: 1,
+            high,
+        });
+    }
+    if n_lines_points > 0 {
+        target.builder.note(NoteKind::SkippedElements {
+            what: "lines and points",
+            n: n_lines_points,
+        });
+    }
+    feed.finish(target.builder)
+}
+
+/// A line with its continuations, leading white space removed.
+fn read_logical_line<R: BufRead>(feed: &mut Feed<R>, line: &mut Vec<u8>) -> Result<bool> {
+    let mut any = false;
+    loop {
+        any |= feed.read_line(line)?;
+        if line.last() == Some(&b'\r') {
+            line.pop();
+        }
+        if line.last() == Some(&b'\\') {
+            line.pop();
+            line.push(b' ');
+            if feed.peek()?.is_some() {
+                continue;
+            }
+        }
+        let start = line.len() - line.trim_ascii_start().len();
+        line.drain(..start);
+        return Ok(any);
+    }
+}
+
+/// The 0-based vertex of one corner, `known` being the number of vertices so far.
+fn corner(word: &[u8], known: u32, place: &super::Place) -> Result<u32> {
+    let number = word.split(|&b| b == b'/').next().unwrap_or_default();
+    let index: i64 = parse(number).ok_or_else(|| not_a_number(place, "a vertex number", word))?;
+    let zero_based = if index > 0 {
+        index - 1
+    } else {
+        i64::from(known).saturating_add(index)
+    };
+    match u32::try_from(zero_based) {
+        Ok(i) if index != 0 && i < u32::MAX => Ok(i),
+        _ => Err(ReadError::IndexOutOfRange {
+            place: place.clone(),
+            index,
+            low: 1,
+            high: i64::from(known),
+        }),
+    }
+}
+
+fn unexpected(place: &super::Place, expected: &str, found: &[u8]) -> ReadError {
+    ReadError::Unexpected {
+        place: place.clone(),
+        expected: expected.to_owned(),
+        found: quote(found),
+    }
+}
+
+fn not_a_number(place: &super::Place, what: &'static str, found: &[u8]) -> ReadError {
+    ReadError::NotANumber {
+        place: place.clone(),
+        what,
+        found: quote(found),
+    }
+}

@@ -1,0 +1,203 @@
+//! TetGen `.smesh` and `.poly`, with the points in the file or in the `.node` file beside it.
+//!
+//! Each polygon is taken for itself and fanned; a facet of several polygons or with holes is noted,
+//! and overlapping polygons are found by validation. Holes and regions of the volume are not read:
+//! what is filled is decided by the surface alone.
+
+use std::io::BufRead;
+use std::path::Path;
+
+use super::feed::{Feed, parse};
+use super::{ReadError, Result, Target, open};
+use crate::surface::NoteKind;
+
+/// The two layouts of the facet part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// One polygon per facet, the boundary marker after it.
+    Smesh,
+    /// Facets of several polygons and holes, the marker before them.
+    Poly,
+}
+
+/// The numbering of points: the first one's number and how many.
+#[derive(Clone, Copy)]
+struct Numbering {
+    first: i64,
+    n: u64,
+}
+
+pub(super) fn read<R: BufRead>(
+    mut feed: Feed<R>,
+    kind: Kind,
+    nodes: Option<&Path>,
+    target: &mut Target,
+) -> Result<()> {
+    feed.comment = Some(b'#');
+    let numbering = match read_points(&mut feed, target)? {
+        Some(numbering) => numbering,
+        None => read_node_file(&feed, nodes, target)?,
+    };
+    let n_facets = feed.count("facets", 4)?;
+    feed.skip_line()?;
+    let mut n_split = 0;
+    for i in 0..n_facets {
+        if feed.at_end()? {
+            return Err(feed.too_few("facets", n_facets, i));
+        }
+        match kind {
+            Kind::Smesh => {
+                let corners = read_polygon(&mut feed, numbering)?;
+                let marker = rest_of_line(&mut feed)?.pop().unwrap_or(0);
+                add(&feed, &corners, marker, target)?;
+            }
+            Kind::Poly => n_split += u64::from(read_facet(&mut feed, numbering, target)?),
+        }
+    }
+    if n_split > 0 {
+        target.builder.note(NoteKind::SplitFacets { n: n_split });
+    }
+    // The volume's holes and regions.
+    if !feed.at_end()? {
+        let n_holes = feed.integer("the number of holes")?;
+        if let Ok(n) = u64::try_from(n_holes)
+            && n > 0
+        {
+            target.builder.note(NoteKind::SkippedElements {
+                what: "hole points",
+                n,
+            });
+        }
+    }
+    feed.finish(target.builder)
+}
+
+fn read_node_file<R: BufRead>(
+    feed: &Feed<R>,
+    nodes: Option<&Path>,
+    target: &mut Target,
+) -> Result<Numbering> {
+    let Some(path) = nodes else {
+        return Err(feed.unsupported("points in a separate .node file"));
+    };
+    let mut feed = open(path)?;
+    feed.comment = Some(b'#');
+    match read_points(&mut feed, target)? {
+        Some(numbering) => Ok(numbering),
+        None => Err(feed.unexpected("points in the .node file", b"0")),
+    }
+}
+
+/// The point part; `None` when it says that the points are elsewhere.
+fn read_points<R: BufRead>(feed: &mut Feed<R>, target: &mut Target) -> Result<Option<Numbering>> {
+    let n = feed.integer("the number of points")?;
+    if n == 0 {
+        feed.skip_line()?;
+        return Ok(None);
+    }
+    let n = feed.check_count("points", n, 8)?;
+    if feed.next_word_in_line()? {
+        let dimension: i64 = feed.parse("the dimension")?;
+        if dimension != 3 {
+            return Err(feed.unsupported(format!("points of dimension {dimension}")));
+        }
+    }
+    feed.skip_line()?;
+    let mut first = 0;
+    for i in 0..n {
+        if !feed.next_word()? {
+            return Err(feed.too_few("points", n, i));
+        }
+        let number: i64 = feed.parse("a point number")?;
+        if i == 0 {
+            first = number;
+        }
+        if !(0..=1).contains(&first) || number != first + i as i64 {
+            let expected = if i == 0 {
+                "point number 0 or 1".to_owned()
+            } else {
+                format!("point number {}", first + i as i64)
+            };
+            return Err(feed.unexpected(expected, feed.word()));
+        }
+        let p = feed.point()?;
+        feed.skip_line()?;
+        feed.placed(target.builder.vertex(p))?;
+    }
+    Ok(Some(Numbering { first, n }))
+}
+
+/// A polygon: the number of corners and the corners.
+fn read_polygon<R: BufRead>(feed: &mut Feed<R>, numbering: Numbering) -> Result<Vec<u32>> {
+    let n = feed.count("corners", 2)?;
+    if n < 3 {
+        return Err(feed.unsupported(format!("a polygon of {n} corners")));
+    }
+    (0..n)
+        .map(|_| feed.index(numbering.first, numbering.n))
+        .collect()
+}
+
+/// The whole numbers left on this line.
+fn rest_of_line<R: BufRead>(feed: &mut Feed<R>) -> Result<Vec<i64>> {
+    let mut numbers = Vec::new();
+    while feed.next_word_in_line()? {
+        match parse(feed.word()) {
+            Some(n) if numbers.len() < 8 => numbers.push(n),
+            _ => return Err(feed.unexpected("a whole number or the end of the line", feed.word())),
+        }
+    }
+    Ok(numbers)
+}
+
+fn add<R: BufRead>(
+    feed: &Feed<R>,
+    corners: &[u32],
+    marker: i64,
+    target: &mut Target,
+) -> Result<()> {
+    let label = if marker == 0 {
+        target.label("")
+    } else {
+        target.label(&marker.to_string())
+    };
+    feed.placed(target.builder.polygon(corners, label))
+}
+
+/// One facet of a `.poly`; true when it is more than one polygon.
+fn read_facet<R: BufRead>(
+    feed: &mut Feed<R>,
+    numbering: Numbering,
+    target: &mut Target,
+) -> Result<bool> {
+    let n_polygons = feed.count("polygons", 4)?;
+    let rest = rest_of_line(feed)?;
+    let (n_holes, marker) = (
+        rest.first().copied().unwrap_or(0),
+        rest.get(1).copied().unwrap_or(0),
+    );
+    let n_holes = feed.check_count("holes of a facet", n_holes, 6)?;
+    for i in 0..n_polygons {
+        if feed.at_end()? {
+            return Err(feed.too_few("polygons", n_polygons, i));
+        }
+        let corners = read_polygon(feed, numbering)?;
+        rest_of_line(feed)?;
+        add(feed, &corners, marker, target)?;
+    }
+    for _ in 0..n_holes {
+        feed.need_word("a hole of the facet")?;
+        let _: i64 = feed.parse("a hole number")?;
+        feed.point()?;
+        feed.skip_line()?;
+    }
+    if n_polygons == 0 {
+        let place = feed.place();
+        return Err(ReadError::Unexpected {
+            place,
+            expected: "at least one polygon".to_owned(),
+            found: "none".to_owned(),
+        });
+    }
+    Ok(n_polygons > 1 || n_holes > 0)
+}

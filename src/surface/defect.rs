@@ -1,0 +1,147 @@
+//! What can be wrong with a surface, in words, with the place and the way out.
+
+use super::contact::ContactKind;
+use crate::geom::Point;
+
+/// A surface that cannot be built or meshed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SurfaceError {
+    #[error("the surface has more than {limit} {what}")]
+    TooLarge { what: &'static str, limit: usize },
+    #[error("triangle {triangle} names vertex {vertex}, but there are {n_vertices}")]
+    NoSuchVertex {
+        triangle: u32,
+        vertex: u32,
+        n_vertices: usize,
+    },
+    /// Validation found defects; the first of the worst kind is told.
+    #[error("{defect}")]
+    Invalid { defect: Box<Defect>, n_defects: u64 },
+}
+
+impl SurfaceError {
+    /// The word for this error.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::TooLarge { .. } => "surface-too-large",
+            Self::NoSuchVertex { .. } => "index-out-of-range",
+            Self::Invalid { defect, .. } => defect.code(),
+        }
+    }
+
+    /// What to do about it.
+    pub fn help(&self) -> &'static str {
+        match self {
+            Self::TooLarge { .. } => "split the surface into parts and mesh them one by one",
+            Self::NoSuchVertex { .. } => "write the file again from the program that made it",
+            Self::Invalid { defect, .. } => defect.help(),
+        }
+    }
+}
+
+/// One thing that makes a surface unfit to bound volumes, with the triangles (input ids) it is about.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Defect {
+    /// The surface has no triangle.
+    #[error("the surface has no triangles")]
+    Empty,
+    /// Two corners are one vertex, or the corners lie exactly on a line.
+    #[error("triangle {triangle} has no area: {}", if *repeated { "a corner is repeated" } else { "its corners are exactly in line" })]
+    Degenerate {
+        triangle: u32,
+        repeated: bool,
+        corners: [Point; 3],
+    },
+    /// The same three vertices twice in the same cyclic order.
+    #[error("triangle {} repeats triangle {}", triangles[1], triangles[0])]
+    Duplicate {
+        triangles: [u32; 2],
+        corners: [Point; 3],
+    },
+    /// An edge with one triangle only: the surface has a hole there.
+    #[error("the surface is open: the edge of triangle {triangle} from {} to {} has no second triangle", show(*from), show(*to))]
+    OpenEdge {
+        triangle: u32,
+        vertices: [u32; 2],
+        from: Point,
+        to: Point,
+    },
+    /// Two triangles touch elsewhere than in the vertices and edges they share.
+    #[error("triangles {} and {} meet where they should not: {kind}", triangles[0], triangles[1])]
+    SelfIntersection {
+        triangles: [u32; 2],
+        kind: ContactKind,
+        at: Point,
+    },
+}
+
+/// A position as three short numbers, for messages.
+pub(super) fn show(p: Point) -> String {
+    format!("({}, {}, {})", p.x, p.y, p.z)
+}
+
+impl Defect {
+    /// The word for this kind of defect.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::Empty => "empty-surface",
+            Self::Degenerate { .. } => "degenerate-triangle",
+            Self::Duplicate { .. } => "duplicate-triangle",
+            Self::OpenEdge { .. } => "open-surface",
+            Self::SelfIntersection { .. } => "self-intersection",
+        }
+    }
+
+    /// The triangles concerned, as input ids.
+    pub fn triangles(&self) -> &[u32] {
+        match self {
+            Self::Empty => &[],
+            Self::Degenerate { triangle, .. } | Self::OpenEdge { triangle, .. } => {
+                std::slice::from_ref(triangle)
+            }
+            Self::Duplicate { triangles, .. } | Self::SelfIntersection { triangles, .. } => {
+                triangles
+            }
+        }
+    }
+
+    /// A position where it can be seen.
+    pub fn at(&self) -> Option<Point> {
+        match self {
+            Self::Empty => None,
+            Self::Degenerate { corners, .. } | Self::Duplicate { corners, .. } => {
+                Some((corners[0] + corners[1] + corners[2]) / 3.0)
+            }
+            Self::OpenEdge { from, to, .. } => Some((*from + *to) * 0.5),
+            Self::SelfIntersection { at, .. } => Some(*at),
+        }
+    }
+
+    /// Ids and coordinates on one line.
+    pub fn place(&self) -> String {
+        let ids: Vec<String> = self.triangles().iter().map(u32::to_string).collect();
+        match (self.at(), ids.len()) {
+            (None, _) => "nowhere: there is nothing to show".to_owned(),
+            (Some(p), 1) => format!("triangle {} near {}", ids[0], show(p)),
+            (Some(p), _) => format!("triangles {} near {}", ids.join(" and "), show(p)),
+        }
+    }
+
+    /// What to do about it.
+    pub fn help(&self) -> &'static str {
+        match self {
+            Self::Empty => "choose a file that holds triangles",
+            Self::Degenerate { .. } | Self::Duplicate { .. } => {
+                "`tetdb check SURFACE --repair --write OUT` drops collapsed and repeated triangles"
+            }
+            Self::OpenEdge { .. } => {
+                "`tetdb check SURFACE --write-bad bad.vtu` shows the holes; `--repair --weld 1e-6 --write OUT` joins points that nearly meet"
+            }
+            Self::SelfIntersection { .. } => {
+                "`tetdb check SURFACE --write-bad bad.vtu` shows the places; unite or separate the parts where the surface was made"
+            }
+        }
+    }
+}

@@ -1,0 +1,18 @@
+//! The input: a closed surface of triangles with labels, welded and validated exactly.
+//!
+//! Reading order: [`triangles`](Surface) (what a surface is), `weld` (how readers build one),
+//! `edges` (which triangles meet where), `orientation` (turning triangles the same way), `contact`
+//! (how two triangles touch), `broad` (which pairs to look at), `validate` (all of it together),
+//! `defect` (what can be wrong and what to do about it).
+//!
+//! Is not: file formats (`io`), volumes and regions (`boundary`).
+
+mod contact;
+mod defect;
+mod triangles;
+mod weld;
+
+pub use contact::ContactKind;
+pub use defect::{Defect, SurfaceError};
+pub use triangles::{Note, NoteKind, SourceFile, Surface};
+pub use weld::SurfaceBuilder;

@@ -1,0 +1,300 @@
+//! Building a surface while files are read: welding, labels, fans.
+
+use std::collections::HashMap;
+
+use super::{Note, NoteKind, SourceFile, Surface, SurfaceError};
+use crate::geom::Point;
+
+/// Vertices and triangles of a surface at most: ids keep two bits free in the mesh.
+const COUNT_MAX: usize = 1 << 30;
+
+/// Collects triangles from one file after the other and welds vertices with identical bits.
+///
+/// Between [`begin_file`](Self::begin_file) and [`end_file`](Self::end_file) triangles name the
+/// file's own vertices, 0-based, in the order given to [`vertex`](Self::vertex); they may come before
+/// their vertices. Same calls, same surface: nothing depends on hash order.
+#[derive(Default)]
+pub struct SurfaceBuilder {
+    surface: Surface,
+    table: PointTable,
+    label_ids: HashMap<String, u32>,
+    file: String,
+    triangle_first: usize,
+    /// Vertex of the file -> welded vertex.
+    file2vert: Vec<u32>,
+    /// Vertices of this file that repeated an earlier position.
+    n_welded: u64,
+    /// Polygons of this file with more than three corners.
+    n_fanned: u64,
+    /// Triangles of this file are given by position, not by the file's vertex numbers.
+    by_position: bool,
+}
+
+impl SurfaceBuilder {
+    /// A builder without files.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Starts a file whose triangles will name its own vertices.
+    pub fn begin_file(&mut self, name: &str) {
+        self.file = name.to_owned();
+        self.triangle_first = self.surface.triangles.len();
+        self.file2vert.clear();
+        (self.n_welded, self.n_fanned, self.by_position) = (0, 0, false);
+        self.surface.files.push(SourceFile {
+            name: name.to_owned(),
+            triangle_first: self.triangle_first as u32,
+        });
+    }
+
+    /// Number of vertices the current file has given so far.
+    pub fn n_file_vertices(&self) -> usize {
+        self.file2vert.len()
+    }
+
+    /// Number of triangles the current file has given so far.
+    pub fn n_file_triangles(&self) -> usize {
+        self.surface.triangles.len() - self.triangle_first
+    }
+
+    /// Adds the next vertex of the file; the coordinates must be finite.
+    ///
+    /// # Errors
+    /// [`SurfaceError::TooLarge`] beyond 2^30 vertices.
+    pub fn vertex(&mut self, p: Point) -> Result<(), SurfaceError> {
+        if self.file2vert.len() >= COUNT_MAX {
+            return Err(SurfaceError::TooLarge {
+                what: "vertices",
+                limit: COUNT_MAX,
+            });
+        }
+        let before = self.surface.points.len();
+        let vert = self.weld(p)?;
+        self.n_welded += u64::from((vert as usize) < before);
+        self.file2vert.push(vert);
+        Ok(())
+    }
+
+    fn weld(&mut self, p: Point) -> Result<u32, SurfaceError> {
+        debug_assert!(p.is_finite(), "{p:?}");
+        let p = p + Point::ZERO; // -0.0 becomes +0.0
+        if self.surface.points.len() >= COUNT_MAX {
+            return Err(SurfaceError::TooLarge {
+                what: "vertices",
+                limit: COUNT_MAX,
+            });
+        }
+        Ok(self.table.find_or_add(p, &mut self.surface.points))
+    }
+
+    /// The id of the label called `name`, made when it is new.
+    pub fn label(&mut self, name: &str) -> u32 {
+        if let Some(&id) = self.label_ids.get(name) {
+            return id;
+        }
+        let id = self.surface.label_names.len() as u32;
+        self.surface.label_names.push(name.to_owned());
+        self.label_ids.insert(name.to_owned(), id);
+        id
+    }
+
+    /// Adds a triangle of vertices of the file.
+    ///
+    /// # Errors
+    /// [`SurfaceError::TooLarge`] beyond 2^30 triangles.
+    pub fn triangle(&mut self, corners: [u32; 3], label: u32) -> Result<(), SurfaceError> {
+        if self.surface.triangles.len() >= COUNT_MAX {
+            return Err(SurfaceError::TooLarge {
+                what: "triangles",
+                limit: COUNT_MAX,
+            });
+        }
+        self.surface.triangles.push(corners);
+        self.surface.labels.push(label);
+        Ok(())
+    }
+
+    /// Adds a polygon of at least three vertices of the file as a fan from its first one.
+    ///
+    /// # Errors
+    /// [`SurfaceError::TooLarge`] beyond 2^30 triangles.
+    pub fn polygon(&mut self, corners: &[u32], label: u32) -> Result<(), SurfaceError> {
+        debug_assert!(corners.len() >= 3);
+        self.n_fanned += u64::from(corners.len() > 3);
+        for pair in corners[1..].windows(2) {
+            self.triangle([corners[0], pair[0], pair[1]], label)?;
+        }
+        Ok(())
+    }
+
+    /// Adds a triangle by the positions of its corners, for files without vertex numbers.
+    ///
+    /// A file uses this for all its triangles or for none.
+    ///
+    /// # Errors
+    /// [`SurfaceError::TooLarge`] beyond 2^30 vertices or triangles.
+    pub fn triangle_at(&mut self, corners: [Point; 3], label: u32) -> Result<(), SurfaceError> {
+        self.by_position = true;
+        let [a, b, c] = corners;
+        let ids = [self.weld(a)?, self.weld(b)?, self.weld(c)?];
+        self.triangle(ids, label)
+    }
+
+    /// Adds a note about the current file.
+    pub fn note(&mut self, kind: NoteKind) {
+        let file = self.file.clone();
+        self.surface.notes.push(Note { file, kind });
+    }
+
+    /// Ends the file: its triangles now name welded vertices.
+    ///
+    /// # Errors
+    /// The first triangle and vertex number without a vertex, as [`SurfaceError::NoSuchVertex`].
+    pub fn end_file(&mut self) -> Result<(), SurfaceError> {
+        if !self.by_position {
+            let map = &self.file2vert;
+            for (i, triangle) in self.surface.triangles[self.triangle_first..]
+                .iter_mut()
+                .enumerate()
+            {
+                for v in triangle {
+                    *v = *map.get(*v as usize).ok_or(SurfaceError::NoSuchVertex {
+                        triangle: i as u32,
+                        vertex: *v,
+                        n_vertices: map.len(),
+                    })?;
+                }
+            }
+        }
+        if self.n_welded > 0 {
+            self.note(NoteKind::WeldedVertices { n: self.n_welded });
+        }
+        if self.n_fanned > 0 {
+            self.note(NoteKind::FannedPolygons { n: self.n_fanned });
+        }
+        self.file2vert = Vec::new();
+        Ok(())
+    }
+
+    /// The surface, without the vertices no triangle uses and the labels none carries.
+    pub fn finish(self) -> Surface {
+        let mut surface = self.surface;
+        drop(self.table);
+        let n_unused = drop_unused_points(&mut surface);
+        if n_unused > 0 {
+            let file = surface
+                .files
+                .first()
+                .map_or(String::new(), |f| f.name.clone());
+            surface.notes.push(Note {
+                file,
+                kind: NoteKind::UnusedVertices { n: n_unused },
+            });
+        }
+        drop_unused_labels(&mut surface);
+        surface
+    }
+}
+
+/// Keeps the points that triangles use, in their order; returns how many went.
+fn drop_unused_points(surface: &mut Surface) -> u64 {
+    const UNUSED: u32 = u32::MAX;
+    let mut new_ids = vec![UNUSED; surface.points.len()];
+    for v in surface.triangles.iter().flatten() {
+        new_ids[*v as usize] = 0;
+    }
+    let mut n_used = 0u32;
+    for (old, id) in new_ids.iter_mut().enumerate() {
+        if *id != UNUSED {
+            *id = n_used;
+            surface.points[n_used as usize] = surface.points[old];
+            n_used += 1;
+        }
+    }
+    let n_unused = surface.points.len() - n_used as usize;
+    if n_unused > 0 {
+        surface.points.truncate(n_used as usize);
+        for v in surface.triangles.iter_mut().flatten() {
+            *v = new_ids[*v as usize];
+        }
+    }
+    n_unused as u64
+}
+
+/// Keeps the labels that triangles carry, in their order.
+fn drop_unused_labels(surface: &mut Surface) {
+    let mut used = vec![false; surface.label_names.len()];
+    for &label in &surface.labels {
+        used[label as usize] = true;
+    }
+    if used.iter().all(|&u| u) {
+        return;
+    }
+    let mut next = 0;
+    let new_ids: Vec<u32> = used
+        .iter()
+        .map(|&u| {
+            let id = next;
+            next += u32::from(u);
+            id
+        })
+        .collect();
+    let mut keep = used.iter();
+    surface
+        .label_names
+        .retain(|_| *keep.next().expect("one flag per label"));
+    for label in &mut surface.labels {
+        *label = new_ids[*label as usize];
+    }
+}
+
+/// Open-addressing table from coordinate bits to vertex ids; at most half full.
+#[derive(Default)]
+struct PointTable {
+    /// Vertex id + 1; 0 is free. The length is a power of two.
+    slots: Vec<u32>,
+}
+
+impl PointTable {
+    fn find_or_add(&mut self, p: Point, points: &mut Vec<Point>) -> u32 {
+        if points.len() * 2 >= self.slots.len() {
+            self.grow(points);
+        }
+        let mask = self.slots.len() - 1;
+        let mut slot = point_hash(p) as usize & mask;
+        loop {
+            match self.slots[slot] {
+                0 => {
+                    points.push(p);
+                    self.slots[slot] = points.len() as u32;
+                    return points.len() as u32 - 1;
+                }
+                id if points[id as usize - 1] == p => return id - 1,
+                _ => slot = (slot + 1) & mask,
+            }
+        }
+    }
+
+    fn grow(&mut self, points: &[Point]) {
+        let len = (self.slots.len() * 2).max(1024);
+        self.slots = vec![0; len];
+        for (i, &p) in points.iter().enumerate() {
+            let mut slot = point_hash(p) as usize & (len - 1);
+            while self.slots[slot] != 0 {
+                slot = (slot + 1) & (len - 1);
+            }
+            self.slots[slot] = i as u32 + 1;
+        }
+    }
+}
+
+/// Mixes the 192 coordinate bits; the same on every machine.
+fn point_hash(p: Point) -> u64 {
+    let mut h = 0x9e37_79b9_7f4a_7c15u64;
+    for x in p.to_array() {
+        h = (h ^ x.to_bits()).wrapping_mul(0xff51_afd7_ed55_8ccd);
+        h ^= h >> 32;
+    }
+    h.wrapping_mul(0xc4ce_b9fe_1a85_ec53) >> 20
+}
