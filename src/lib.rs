@@ -7,6 +7,9 @@ pub mod geom;
 pub mod store;
 // Floor 2.
 pub mod mesh;
+pub mod surface;
 // Floor 3.
 pub mod delaunay;
 pub mod samples;
+// Floor 7.
+pub mod io;
