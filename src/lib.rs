@@ -13,3 +13,5 @@ pub mod delaunay;
 pub mod samples;
 // Floor 7.
 pub mod io;
+// Floor 4.
+pub mod refine;

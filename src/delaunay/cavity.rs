@@ -57,6 +57,7 @@ pub struct Kernel {
     faces: Vec<CavityFace>,
     links: Links,
     new_tets: Vec<u32>,
+    outer: Vec<u32>,
     pub(super) turn: u32,
     pub stats: KernelStats,
 }
@@ -68,6 +69,7 @@ impl Default for Kernel {
             faces: Vec::new(),
             links: Links::new(),
             new_tets: Vec::new(),
+            outer: Vec::new(),
             turn: 1,
             stats: KernelStats::default(),
         }
@@ -111,6 +113,11 @@ impl Kernel {
     /// Outer faces of the gathered cavity.
     pub fn faces(&self) -> &[CavityFace] {
         &self.faces
+    }
+
+    /// Vertices of the outer faces, once each, after [`Kernel::gather_constrained`].
+    pub fn outer_vertices(&self) -> &[u32] {
+        &self.outer
     }
 
     /// Tetrahedra of the gathered cavity.
@@ -210,41 +217,49 @@ impl Kernel {
             }
             self.reflood(mesh, seed);
         }
-        self.links.begin();
+        self.list_outer();
+        // A ball has 2 n - 4 faces on n vertices; anything else is pinched or has a hole.
+        if self.faces.len() + 4 != 2 * self.outer.len() {
+            return Err(Rejected::Blocked);
+        }
+        let small = self.outer.len() < CAVITY_SMALL;
         let mut buried = false;
-        if self.faces.len() < 2 * (CAVITY_SMALL - 2) {
-            for face in &self.faces {
-                for v in face.vertices {
-                    self.links.local(v);
-                }
-            }
-            // A ball has 2 n - 4 faces on n vertices; anything else is pinched or has a hole.
-            if self.faces.len() + 4 != 2 * self.links.n_local() {
-                return Err(Rejected::Blocked);
-            }
-            for &t in &self.cavity {
-                buried |= mesh
-                    .tet(t)
-                    .vertices()
-                    .into_iter()
-                    .any(|v| !self.links.knows(v));
-            }
-        } else {
-            let mut outer: Vec<u32> = self.faces.iter().flat_map(|f| f.vertices).collect();
-            outer.sort_unstable();
-            outer.dedup();
-            if self.faces.len() + 4 != 2 * outer.len() {
-                return Err(Rejected::Blocked);
-            }
-            for &t in &self.cavity {
-                let vertices = mesh.tet(t).vertices();
-                buried |= vertices.iter().any(|v| outer.binary_search(v).is_err());
-            }
+        for &t in &self.cavity {
+            buried |= mesh.tet(t).vertices().into_iter().any(|v| {
+                let outer = if small {
+                    self.links.knows(v)
+                } else {
+                    self.outer.binary_search(&v).is_ok()
+                };
+                !outer
+            });
         }
         if buried {
             Err(Rejected::Buries)
         } else {
             Ok(())
+        }
+    }
+
+    /// Lists the vertices of the outer faces: in order of appearance, or sorted when there are many.
+    fn list_outer(&mut self) {
+        self.links.begin();
+        self.outer.clear();
+        for v in self.faces.iter().flat_map(|face| face.vertices) {
+            let before = self.links.n_local();
+            if self.links.local(v).is_none() {
+                break;
+            }
+            if self.links.n_local() > before {
+                self.outer.push(v);
+            }
+        }
+        if self.outer.len() == CAVITY_SMALL {
+            self.outer.clear();
+            self.outer
+                .extend(self.faces.iter().flat_map(|face| face.vertices));
+            self.outer.sort_unstable();
+            self.outer.dedup();
         }
     }
 

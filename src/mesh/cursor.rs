@@ -55,6 +55,38 @@ pub struct MeshState {
     facets: Arena,
 }
 
+impl MeshState {
+    /// The counts as numbers, for storing beside the pages.
+    pub fn to_words(self) -> [u32; 9] {
+        let [t, v, f] = [self.tets, self.vertices, self.facets];
+        [
+            t.fresh,
+            t.free_head,
+            t.n_live,
+            v.fresh,
+            v.free_head,
+            v.n_live,
+            f.fresh,
+            f.free_head,
+            f.n_live,
+        ]
+    }
+
+    /// The inverse of [`MeshState::to_words`].
+    pub fn from_words(w: [u32; 9]) -> Self {
+        let arena = |i: usize| Arena {
+            fresh: w[i],
+            free_head: w[i + 1],
+            n_live: w[i + 2],
+        };
+        Self {
+            tets: arena(0),
+            vertices: arena(3),
+            facets: arena(6),
+        }
+    }
+}
+
 /// Cursor over one sub-domain's paged arrays: tetrahedra, vertices, their attributes, facets.
 ///
 /// Every access may load a page and evict another; records are copied out, so nothing dangles.
@@ -93,6 +125,8 @@ fn attribute_place(id: u32) -> (u32, usize) {
     (sparse(n >> 2), (n as usize & 3) * 2)
 }
 
+/// The sign bit of a vertex's size: the vertex never moves.
+const FIXED: u32 = 1 << 31;
 const WORD_ZERO: u32_le = u32_le::from_native(0);
 
 impl<P: Pages> Mesh<P> {
@@ -301,6 +335,13 @@ impl<P: Pages> Mesh<P> {
         Point::new(f(0), f(2), f(4))
     }
 
+    /// Position and wanted edge length of `v` in one access.
+    #[inline(always)]
+    pub fn point_and_size(&mut self, v: u32) -> (Point, f32) {
+        let p = self.point(v);
+        (p, self.size(v))
+    }
+
     /// Positions of the four vertices of `tet`.
     #[inline(always)]
     pub fn points(&mut self, tet: &Tet) -> [Point; 4] {
@@ -324,15 +365,23 @@ impl<P: Pages> Mesh<P> {
     }
 
     /// Wanted edge length at `v`; 0 when it was never set.
-    #[inline]
+    #[inline(always)]
     pub fn size(&mut self, v: u32) -> f32 {
-        f32::from_bits(self.pages.read::<{ kind::VERTICES }>(v)[6].to_native())
+        let bits = self.pages.read::<{ kind::VERTICES }>(v)[6].to_native();
+        f32::from_bits(bits & !FIXED)
     }
 
-    /// Sets the wanted edge length at `v`.
+    /// Sets the wanted edge length at `v`; whether it is fixed stays.
     #[inline]
     pub fn set_size(&mut self, v: u32, h: f32) {
-        self.pages.write::<{ kind::VERTICES }>(v)[6] = u32_le::from_native(h.to_bits());
+        let word = &mut self.pages.write::<{ kind::VERTICES }>(v)[6];
+        *word = u32_le::from_native(word.to_native() & FIXED | h.to_bits() & !FIXED);
+    }
+
+    /// Whether `v` may never move: it belongs to a facet, an interface or the enclosing box.
+    #[inline(always)]
+    pub fn is_fixed(&mut self, v: u32) -> bool {
+        self.pages.read::<{ kind::VERTICES }>(v)[6].to_native() & FIXED != 0
     }
 
     /// A tetrahedron that has `v`, as last told; see [`Mesh::set_tet_of`].
@@ -381,8 +430,12 @@ impl<P: Pages> Mesh<P> {
         (tag, owner)
     }
 
-    /// Sets tag and owner index of `v`.
+    /// Sets tag and owner index of `v`; any tag but free and Steiner fixes it.
     pub fn set_vertex_attribute(&mut self, v: u32, tag: VertexTag, owner: u32) {
+        let fixed = !matches!(tag, VertexTag::Free | VertexTag::Steiner);
+        let word = &mut self.pages.write::<{ kind::VERTICES }>(v)[6];
+        let size = word.to_native() & !FIXED;
+        *word = u32_le::from_native(size | if fixed { FIXED } else { 0 });
         self.set_attribute::<{ kind::VERTEX_ATTRIBUTES }>(v, tag as u32, owner);
     }
 
@@ -401,6 +454,34 @@ impl<P: Pages> Mesh<P> {
                 }
             }
         }
+    }
+
+    /// Every vertex id that was ever given out, in id order; freed ones among them.
+    pub fn vertex_ids(&self) -> impl Iterator<Item = u32> + use<P> {
+        (0..dense(self.state.vertices.fresh)).map(sparse)
+    }
+
+    // ----- scratch ----------------------------------------------------------------------------
+
+    /// Word `n` of the scratch map; it must have been set.
+    #[inline]
+    pub fn scratch(&mut self, n: u32) -> u32 {
+        self.pages.read::<{ kind::SCRATCH }>(sparse(n >> 3))[n as usize & 7].to_native()
+    }
+
+    /// Sets word `n` of the scratch map, which grows as needed.
+    #[inline]
+    pub fn set_scratch(&mut self, n: u32, word: u32) {
+        let slot = sparse(n >> 3);
+        while slot >> SLOT_BITS >= self.pages.n_pages::<{ kind::SCRATCH }>() {
+            self.pages.append_page::<{ kind::SCRATCH }>();
+        }
+        self.pages.write::<{ kind::SCRATCH }>(slot)[n as usize & 7] = u32_le::from_native(word);
+    }
+
+    /// Forgets the scratch map.
+    pub fn clear_scratch(&mut self) {
+        self.pages.clear::<{ kind::SCRATCH }>();
     }
 
     // ----- facets -----------------------------------------------------------------------------

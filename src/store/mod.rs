@@ -12,6 +12,7 @@ mod error;
 mod file;
 mod flat;
 mod pager;
+mod sort;
 mod stop;
 
 pub use budget::{Budget, Lease};
@@ -19,6 +20,7 @@ pub use error::StoreError;
 pub use file::StoreFile;
 pub use flat::FlatPages;
 pub use pager::{Backing, Pager, PagerStats};
+pub use sort::{Sorted, Sorter};
 pub use stop::{attempt, fail, request_stop, stop_if_requested};
 
 use tetdb_schema::page::Slot;

@@ -124,10 +124,30 @@ impl Pager {
         }
     }
 
-    /// Flushes and gives the file of this generation back, if any page ever left memory.
-    pub fn into_file(mut self) -> Option<StoreFile> {
-        self.flush();
-        self.work
+    /// Ends a generation: all pages are in its file, which becomes the base of the next one, written to `path`.
+    ///
+    /// The caller must have flushed, and the generation before must have had no base of its own.
+    pub fn next_generation(&mut self, generation: u32, path: PathBuf) {
+        let backing = self.backing.as_mut().expect("a pool with a store");
+        assert!(backing.base.is_none(), "pages would be in three files");
+        backing.base = self.work.take();
+        backing.generation = generation;
+        backing.work_path = path;
+        for entry in self.tables.iter_mut().flatten() {
+            if *entry & RESIDENT == 0 {
+                *entry = IN_BASE;
+            } else {
+                assert_eq!(*entry & DIRTY, 0, "flushed before");
+            }
+        }
+        for frame in 0..self.owners.len() as u32 {
+            self.set_place(frame, IN_BASE);
+        }
+    }
+
+    /// Closes the files without writing what is dirty; returns the path of this generation's file, if it was made.
+    pub fn discard(self) -> Option<PathBuf> {
+        self.work.map(|file| file.path().to_owned())
     }
 
     fn entry(&mut self, frame: u32) -> &mut u32 {

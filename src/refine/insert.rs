@@ -1,0 +1,101 @@
+//! Insert one candidate, or leave the mesh as it is.
+
+use super::candidates::Candidate;
+use super::{RefineReport, Worker};
+use crate::delaunay::{Located, Rejected};
+use crate::geom::Point;
+use crate::mesh::Mesh;
+use crate::store::Pages;
+
+/// Least distance to a vertex, in units of the mean of both wanted lengths.
+const FILTER: f64 = std::f64::consts::FRAC_1_SQRT_2;
+/// Least height above a required face of the cavity, in units of h: a flatter tetrahedron on it could not be mended,
+/// because neither the face nor its vertices move.
+const HEIGHT: f64 = 0.25;
+
+impl Worker {
+    pub(super) fn try_insert<P: Pages>(
+        &mut self,
+        mesh: &mut Mesh<P>,
+        c: &Candidate,
+        report: &mut RefineReport,
+    ) {
+        let start = match self.find(mesh, c) {
+            Ok(start) => start,
+            Err(_) => {
+                report.blocked += 1;
+                return;
+            }
+        };
+        let too_near = (start.record.vertices().into_iter()).any(|v| is_near(mesh, v, c));
+        if too_near {
+            report.near += 1;
+            return;
+        }
+        let (region, _) = mesh.tet_attribute(start.tet);
+        if self
+            .kernel
+            .gather_constrained(mesh, c.point, &start)
+            .is_err()
+        {
+            report.blocked += 1;
+            return;
+        }
+        if self.is_crowded(mesh, c) {
+            self.kernel.discard(mesh);
+            report.near += 1;
+            return;
+        }
+        let v = mesh.add_vertex(c.point, c.h);
+        let recycled = self.kernel.cavity().len();
+        self.last = self.kernel.fill(mesh, v);
+        for (k, &t) in self.kernel.new_tets().iter().enumerate() {
+            self.active.touch(t);
+            // Recycled ids lie in the same region and carry its attribute already.
+            if k >= recycled {
+                mesh.set_tet_attribute(t, region, 0);
+            }
+        }
+        report.inserted += 1;
+    }
+
+    fn find<P: Pages>(&mut self, mesh: &mut Mesh<P>, c: &Candidate) -> Result<Located, Rejected> {
+        self.kernel
+            .locate(mesh, c.point, c.tet)
+            .or_else(|_| self.kernel.locate(mesh, c.point, self.last))
+    }
+
+    /// Whether the gathered cavity has a vertex or a required face too near.
+    ///
+    /// In a Delaunay mesh the nearest vertex is on the cavity, so nothing nearer is missed.
+    fn is_crowded<P: Pages>(&mut self, mesh: &mut Mesh<P>, c: &Candidate) -> bool {
+        if self
+            .kernel
+            .outer_vertices()
+            .iter()
+            .any(|&v| is_near(mesh, v, c))
+        {
+            return true;
+        }
+        self.kernel.faces().iter().filter(|f| f.required).any(|f| {
+            let [p, q, r] = [
+                mesh.point(f.vertices[0]),
+                mesh.point(f.vertices[1]),
+                mesh.point(f.vertices[2]),
+            ];
+            height(c.point, p, q, r) < HEIGHT * f64::from(c.h)
+        })
+    }
+}
+
+#[inline]
+fn is_near<P: Pages>(mesh: &mut Mesh<P>, v: u32, c: &Candidate) -> bool {
+    let (q, h) = mesh.point_and_size(v);
+    let least = FILTER * 0.5 * (f64::from(h) + f64::from(c.h));
+    (q - c.point).length_squared() < least * least
+}
+
+fn height(p: Point, a: Point, b: Point, c: Point) -> f64 {
+    let normal = (b - a).cross(c - a);
+    (p - a).dot(normal).abs() / normal.length()
+}

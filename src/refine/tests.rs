@@ -1,0 +1,86 @@
+use super::*;
+use crate::delaunay::enclose;
+use crate::geom::orient;
+use crate::mesh::VertexTag;
+use crate::store::{Pager, kind};
+
+/// A cube of fixed corners, divided until edges have length `h`.
+fn cube(h: f64, frames: u64) -> (Mesh<Pager>, RefineReport) {
+    let mut mesh = Mesh::new(Pager::new(frames << 16, None));
+    let bounds = Aabb::around([Point::ZERO, Point::ONE]);
+    enclose(&mut mesh, &bounds);
+    for v in 0..8 {
+        mesh.set_size(v, h as f32);
+        assert_eq!(mesh.vertex_attribute(v).0, VertexTag::EnclosingBox);
+    }
+    let field = Field { h: &|_| h, bounds };
+    let report = saturate(&mut mesh, &field, &mut |_| ());
+    (mesh, report)
+}
+
+#[test]
+fn edges_end_near_the_wanted_length() {
+    let (mut mesh, report) = cube(0.5, 4096);
+    assert!(report.inserted > 1000, "{report:?}");
+    let (mut n, mut sum, mut long) = (0u32, 0.0, 0u32);
+    let mut from = 0;
+    while let Some((t, tet)) = mesh.next_tet(from) {
+        from = t + 1;
+        let p = mesh.points(&tet);
+        assert!(orient(p[0], p[1], p[2], p[3]) > 0.0);
+        for [i, j] in crate::mesh::anatomy::EDGES {
+            // The cube's own faces are two triangles each, so only what is inside can be saturated.
+            let middle = (p[i] + p[j]) * 0.5 - Point::splat(0.5);
+            if middle.abs().max_element() > 2.0 {
+                continue;
+            }
+            let l = p[i].distance(p[j]) / 0.5;
+            assert!(l > 0.7, "an edge of length {l}");
+            n += 1;
+            sum += l;
+            long += u32::from(l > 1.5);
+        }
+    }
+    let mean = sum / f64::from(n);
+    assert!((0.95..1.1).contains(&mean), "mean {mean}");
+    assert!(
+        f64::from(long) < 0.02 * f64::from(n),
+        "{long} of {n} edges are long"
+    );
+    assert!(mesh.pages().n_pages::<{ kind::TETS }>() > 1);
+}
+
+#[test]
+fn the_same_points_whatever_the_pool() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let (mut all, report) = cube(0.45, 4096);
+    let mut mesh = Mesh::new(Pager::new(
+        16 << 16,
+        Some(crate::store::Backing {
+            subdomain: 0,
+            generation: 1,
+            work_path: dir.path().join("work.redb"),
+            base: None,
+            cache_bytes: 1 << 20,
+        }),
+    ));
+    let bounds = Aabb::around([Point::ZERO, Point::ONE]);
+    enclose(&mut mesh, &bounds);
+    for v in 0..8 {
+        mesh.set_size(v, 0.45);
+    }
+    let field = Field {
+        h: &|_| 0.6,
+        bounds,
+    };
+    assert_eq!(saturate(&mut mesh, &field, &mut |_| ()), report);
+    assert!(
+        mesh.pages().stats().pages_read > 0,
+        "the small pool must have missed"
+    );
+    let mut from = 0;
+    while let Some((t, tet)) = all.next_tet(from) {
+        from = t + 1;
+        assert_eq!(mesh.tet(t), tet);
+    }
+}
