@@ -2,11 +2,11 @@ use super::*;
 use crate::delaunay::enclose;
 use crate::geom::orient;
 use crate::mesh::VertexTag;
-use crate::store::{Pager, kind};
+use crate::store::{Backing, Pager, kind};
 
 /// A cube of fixed corners, divided until edges have length `h`.
-fn cube(h: f64, frames: u64) -> (Mesh<Pager>, RefineReport) {
-    let mut mesh = Mesh::new(Pager::new(frames << 16, None));
+fn cube(h: f64, pager: Pager) -> (Mesh<Pager>, RefineReport) {
+    let mut mesh = Mesh::new(pager);
     let bounds = Aabb::around([Point::ZERO, Point::ONE]);
     enclose(&mut mesh, &bounds);
     for v in 0..8 {
@@ -20,7 +20,7 @@ fn cube(h: f64, frames: u64) -> (Mesh<Pager>, RefineReport) {
 
 #[test]
 fn edges_end_near_the_wanted_length() {
-    let (mut mesh, report) = cube(0.5, 4096);
+    let (mut mesh, report) = cube(0.5, Pager::new(1 << 28, None));
     assert!(report.inserted > 1000, "{report:?}");
     let (mut n, mut sum, mut long) = (0u32, 0.0, 0u32);
     let mut from = 0;
@@ -53,34 +53,23 @@ fn edges_end_near_the_wanted_length() {
 #[test]
 fn the_same_points_whatever_the_pool() {
     let dir = tempfile::tempdir().expect("a temporary directory");
-    let (mut all, report) = cube(0.45, 4096);
-    let mut mesh = Mesh::new(Pager::new(
-        16 << 16,
-        Some(crate::store::Backing {
-            subdomain: 0,
-            generation: 1,
-            work_path: dir.path().join("work.redb"),
-            base: None,
-            cache_bytes: 1 << 20,
-        }),
-    ));
-    let bounds = Aabb::around([Point::ZERO, Point::ONE]);
-    enclose(&mut mesh, &bounds);
-    for v in 0..8 {
-        mesh.set_size(v, 0.45);
-    }
-    let field = Field {
-        h: &|_| 0.6,
-        bounds,
+    let (mut all, report) = cube(0.45, Pager::new(1 << 28, None));
+    let backing = Backing {
+        subdomain: 0,
+        generation: 1,
+        work_path: dir.path().join("work.redb"),
+        base: None,
+        cache_bytes: 1 << 20,
     };
-    assert_eq!(saturate(&mut mesh, &field, &mut |_| ()), report);
+    let (mut few, same) = cube(0.45, Pager::new(16 << 16, Some(backing)));
+    assert_eq!(same, report);
     assert!(
-        mesh.pages().stats().pages_read > 0,
+        few.pages().stats().pages_read > 0,
         "the small pool must have missed"
     );
     let mut from = 0;
     while let Some((t, tet)) = all.next_tet(from) {
         from = t + 1;
-        assert_eq!(mesh.tet(t), tet);
+        assert_eq!(few.tet(t), tet);
     }
 }

@@ -106,9 +106,16 @@ impl Pager {
         self.owners.len()
     }
 
-    /// Declares that the base file holds `n` pages of kind `K`.
-    pub fn adopt<const K: usize>(&mut self, n: u32) {
-        self.tables[K] = vec![IN_BASE; n as usize];
+    /// Declares how many pages of each kind the base file holds.
+    pub fn adopt(&mut self, counts: [u32; kind::ALL.len()]) {
+        for (table, n) in self.tables.iter_mut().zip(counts) {
+            *table = vec![IN_BASE; n as usize];
+        }
+    }
+
+    /// Pages of each kind.
+    pub fn counts(&self) -> [u32; kind::ALL.len()] {
+        std::array::from_fn(|kind| self.tables[kind].len() as u32)
     }
 
     /// Writes every dirty page to the file of this generation; afterwards it and the base hold all.
