@@ -15,3 +15,4 @@ pub mod samples;
 pub mod io;
 // Floor 4.
 pub mod refine;
+pub mod sizing;

@@ -1,0 +1,27 @@
+//! What can be wrong with wanted sizes.
+
+/// Why there is no size field.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SizingError {
+    #[error("{option} {found}: expected {expected}")]
+    BadValue {
+        option: &'static str,
+        found: String,
+        expected: &'static str,
+    },
+    #[error("the smallest size {hmin} is above the largest size {hmax}; change --hmin or --hmax")]
+    Crossed { hmin: f64, hmax: f64 },
+    #[error("the surface has no edge of positive length, so it gives no size")]
+    NoEdges,
+    #[error(
+        "the size field would need {found} leaves, more than {expected}; the surface's edge lengths differ too much"
+    )]
+    TooLarge { found: usize, expected: usize },
+    #[error("the stored size field is damaged: {what} is {found}, expected {expected}")]
+    Damaged {
+        what: &'static str,
+        found: String,
+        expected: String,
+    },
+}

@@ -1,0 +1,309 @@
+//! The size field: built once, read from every thread.
+
+use super::closed::{TETS_PER_LOAD, divide_parameters, metric_length};
+use super::corners::Corners;
+use super::options::SizeOptions;
+use super::seeds::{Frame, seeds_of};
+use super::summary::SizeSummary;
+use super::tree::{DEPTH, LATTICE, LEAF, Leaf, Tree, octant_of};
+use super::values::corner_values;
+use super::{SizingError, summary};
+use crate::geom::{Aabb, Point, lex_cmp};
+use std::cmp::Ordering;
+
+/// Levels that one look into the jump table replaces: 32,768 entries of 8 bytes stay in cache.
+const JUMP: u32 = 5;
+
+/// Inverse widths of cells by level, in lattice units.
+const WIDTHS_INVERSE: [f64; DEPTH as usize + 1] = {
+    let mut list = [0.0; DEPTH as usize + 1];
+    let mut level = 0;
+    while level <= DEPTH as usize {
+        list[level] = 1.0 / (LATTICE >> level) as f64;
+        level += 1;
+    }
+    list
+};
+
+/// Wanted edge length as a function of position.
+///
+/// Continuous (up to the rounding of f32 values, 1e-7 of h), positive, with `beta = ln(hgrad)` bounding its
+/// slope: `|h(x) - h(y)| <= beta · |x - y|` between corners of a leaf. Inside a leaf each partial
+/// derivative is at most `beta`, so that the slope is below `√3 · beta`; 1.52 is the most seen
+/// between random points.
+/// Outside the surface's box the value of the nearest point of a slightly larger cube.
+#[derive(Clone, Debug)]
+pub struct SizeField {
+    pub(super) frame: Frame,
+    pub(super) beta: f64,
+    pub(super) tree: Tree,
+    /// Values at the corners of each leaf, in units of the cube's side: one half cache line.
+    pub(super) values: Vec<[f32; 8]>,
+    jump: Jump,
+    /// Lattice cells per input unit.
+    per_lattice: f64,
+}
+
+/// Where the descent begins: the entry and its level, for each cell of a regular grid.
+#[derive(Clone, Debug, PartialEq)]
+struct Jump {
+    level: u32,
+    cells: Vec<(u32, u32)>,
+}
+
+impl SizeField {
+    /// Builds the field of a surface: triangles index points.
+    ///
+    /// # Errors
+    /// Options that make no sense for this surface; a surface without edges.
+    pub fn build(
+        points: &[Point],
+        triangles: &[[u32; 3]],
+        options: &SizeOptions,
+    ) -> Result<Self, SizingError> {
+        Ok(Self::build_with_summary(points, triangles, options)?.0)
+    }
+
+    /// Builds the field and says where its sizes came from.
+    ///
+    /// # Errors
+    /// As [`SizeField::build`].
+    pub fn build_with_summary(
+        points: &[Point],
+        triangles: &[[u32; 3]],
+        options: &SizeOptions,
+    ) -> Result<(Self, SizeSummary), SizingError> {
+        let (frame, bounds, seeds) = seeds_of(points, triangles)?;
+        let targets = options.resolve(bounds.diagonal())?;
+        let scaled = targets.scaled(1.0 / frame.side);
+        let tree = Tree::build(&seeds, &scaled)?;
+        let values = {
+            let leaves = tree.leaves();
+            let corners = Corners::of(&tree, &leaves);
+            let h = corner_values(&tree, &leaves, &corners, &seeds, &scaled);
+            let of_leaf = corners.of_leaf.iter();
+            of_leaf.map(|ids| ids.map(|c| h[c as usize])).collect()
+        };
+        let field = Self::from_parts(frame, targets.beta, tree, values);
+        let summary = summary::of(&field, &seeds, &targets, options);
+        Ok((field, summary))
+    }
+
+    pub(super) fn from_parts(frame: Frame, beta: f64, tree: Tree, values: Vec<[f32; 8]>) -> Self {
+        let jump = Jump::new(&tree);
+        Self {
+            frame,
+            beta,
+            tree,
+            values,
+            jump,
+            per_lattice: f64::from(LATTICE) / frame.side,
+        }
+    }
+
+    /// The wanted edge length at a position, in input units.
+    #[inline]
+    pub fn h(&self, p: Point) -> f64 {
+        let at = self.on_lattice(p);
+        let cell = at.map(|x| (x as u32).min(LATTICE - 1));
+        let (mut entry, mut level) = self.jump.at(cell);
+        while entry & LEAF == 0 {
+            entry = self.tree.blocks[entry as usize][octant_of(cell, level)];
+            level += 1;
+        }
+        let mask = !((LATTICE >> level) - 1);
+        let per_width = WIDTHS_INVERSE[level as usize];
+        let local = std::array::from_fn(|i| (at[i] - f64::from(cell[i] & mask)) * per_width);
+        trilinear(&self.values[(entry & !LEAF) as usize], local) * self.frame.side
+    }
+
+    /// Position in lattice units; points outside are moved to the cube's wall.
+    #[inline]
+    fn on_lattice(&self, p: Point) -> [f64; 3] {
+        let at = (p - self.frame.low) * self.per_lattice;
+        at.to_array().map(|x| x.clamp(0.0, f64::from(LATTICE)))
+    }
+
+    /// Length of the edge `a b` in the metric of the sizes at its ends, taken as linear between them.
+    #[inline]
+    pub fn edge_length_metric(&self, a: Point, b: Point) -> f64 {
+        metric_length(a.distance(b), self.h(a), self.h(b))
+    }
+
+    /// The points that divide `a b` into `n` pieces of equal metric length, from `a` to `b`.
+    ///
+    /// The same points, bit by bit, in reverse for `b a`.
+    pub fn divide(&self, a: Point, b: Point, n: u32) -> Vec<Point> {
+        let swapped = lex_cmp(a, b) == Ordering::Greater;
+        let (low, high) = if swapped { (b, a) } else { (a, b) };
+        let parameters = divide_parameters(self.h(low), self.h(high), n);
+        let mut points: Vec<Point> = parameters.map(|u| low + (high - low) * u).collect();
+        if swapped {
+            points.reverse();
+        }
+        points
+    }
+
+    /// Slope that the gradation allows, `ln(hgrad)`.
+    pub fn beta(&self) -> f64 {
+        self.beta
+    }
+
+    /// Number of leaves of the octree.
+    pub fn n_leaves(&self) -> usize {
+        self.values.len()
+    }
+
+    /// Smallest and largest value at any corner, in input units: no value of the field is beyond.
+    pub fn range(&self) -> (f64, f64) {
+        let all = self.values.iter().flatten();
+        let (low, high) = all.fold((f32::INFINITY, 0f32), |(low, high), &h| {
+            (low.min(h), high.max(h))
+        });
+        (
+            f64::from(low) * self.frame.side,
+            f64::from(high) * self.frame.side,
+        )
+    }
+
+    /// Memory held, in bytes.
+    pub fn bytes(&self) -> usize {
+        size_of::<Self>()
+            + self.tree.blocks.capacity() * size_of::<[u32; 8]>()
+            + self.values.capacity() * size_of::<[f32; 8]>()
+            + self.jump.cells.capacity() * size_of::<(u32, u32)>()
+    }
+
+    /// Load ∫ h⁻³ over the domain; `inside` says what share of a box the domain covers.
+    ///
+    /// Boxes are at most `width_max` wide and small enough for h to vary by at most 1.4 in them.
+    pub fn load(&self, width_max: f64, inside: impl Fn(&Aabb) -> f64) -> f64 {
+        let mut sum = 0.0;
+        for (leaf, values) in self.tree.leaves().iter().zip(&self.values) {
+            let low = self.frame.low + leaf.low() * self.frame.side;
+            let values = values.map(|h| f64::from(h) * self.frame.side);
+            let part = Part {
+                low,
+                width: leaf.side() * self.frame.side,
+                values,
+            };
+            sum += part.load(width_max, &inside, DEPTH - leaf.level);
+        }
+        sum
+    }
+
+    /// Predicted number of tetrahedra: [`TETS_PER_LOAD`] times the load.
+    pub fn predicted_tets(&self, width_max: f64, inside: impl Fn(&Aabb) -> f64) -> f64 {
+        TETS_PER_LOAD * self.load(width_max, inside)
+    }
+}
+
+/// Value at `local`, each coordinate from 0 to 1.
+#[inline]
+fn trilinear(values: &[f32; 8], [x, y, z]: [f64; 3]) -> f64 {
+    let v = values.map(f64::from);
+    let mix = |a: f64, b: f64, t: f64| a + (b - a) * t;
+    let low = mix(mix(v[0], v[1], x), mix(v[2], v[3], x), y);
+    let high = mix(mix(v[4], v[5], x), mix(v[6], v[7], x), y);
+    mix(low, high, z)
+}
+
+impl Jump {
+    fn new(tree: &Tree) -> Self {
+        // A tree of few blocks fits in cache itself.
+        let level = if tree.blocks.len() < 512 { 0 } else { JUMP };
+        let mut cells = vec![(tree.root, 0); 1 << (3 * level)];
+        if level > 0 {
+            let mut stack = vec![(tree.root, Leaf::ROOT)];
+            while let Some((entry, leaf)) = stack.pop() {
+                if entry & LEAF != 0 || leaf.level == level {
+                    Self::fill(&mut cells, level, &leaf, entry);
+                    continue;
+                }
+                let block = &tree.blocks[entry as usize];
+                stack.extend((0..8).map(|o| (block[o], leaf.child(o))));
+            }
+        }
+        Self { level, cells }
+    }
+
+    fn fill(cells: &mut [(u32, u32)], level: u32, leaf: &Leaf, entry: u32) {
+        let n = 1u32 << (level - leaf.level);
+        let [x, y, z] = leaf.anchor.map(|c| c >> (DEPTH - level));
+        for k in 0..n * n * n {
+            let cell = [x + k % n, y + k / n % n, z + k / n / n];
+            cells[Self::index(cell, level)] = (entry, leaf.level);
+        }
+    }
+
+    #[inline]
+    fn index([x, y, z]: [u32; 3], level: u32) -> usize {
+        (((z << level | y) << level) | x) as usize
+    }
+
+    #[inline]
+    fn at(&self, cell: [u32; 3]) -> (u32, u32) {
+        let coarse = cell.map(|c| c >> (DEPTH - self.level));
+        self.cells[Self::index(coarse, self.level)]
+    }
+}
+
+/// A box with the sizes at its corners, all in input units.
+struct Part {
+    low: Point,
+    width: f64,
+    values: [f64; 8],
+}
+
+impl Part {
+    fn load(&self, width_max: f64, inside: &impl Fn(&Aabb) -> f64, divisions: u32) -> f64 {
+        let low = self.values.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = self.values.iter().copied().fold(0.0, f64::max);
+        if divisions > 0 && (self.width > width_max || high > 1.4 * low) {
+            let parts = (0..8).map(|octant| self.part(octant));
+            return parts
+                .map(|part| part.load(width_max, inside, divisions - 1))
+                .sum();
+        }
+        let share = inside(&Aabb {
+            low: self.low,
+            high: self.low + Point::splat(self.width),
+        });
+        if share == 0.0 {
+            return 0.0;
+        }
+        share * self.width * self.width * self.width * self.mean_inverse_cube()
+    }
+
+    /// Mean of h⁻³ by the eight points of Gauss.
+    fn mean_inverse_cube(&self) -> f64 {
+        let near = 0.5 - 0.5 / 3f64.sqrt();
+        let at = |upper: usize| if upper == 1 { 1.0 - near } else { near };
+        let sum: f64 = (0..8)
+            .map(|i| {
+                let h = self.value(Point::new(at(i & 1), at(i >> 1 & 1), at(i >> 2)));
+                1.0 / (h * h * h)
+            })
+            .sum();
+        sum / 8.0
+    }
+
+    fn value(&self, local: Point) -> f64 {
+        (0..8).fold(0.0, |sum, c| {
+            let weight = |axis: usize| {
+                let x = local[axis];
+                if c >> axis & 1 == 1 { x } else { 1.0 - x }
+            };
+            sum + self.values[c] * weight(0) * weight(1) * weight(2)
+        })
+    }
+
+    fn part(&self, octant: usize) -> Self {
+        let offset = |i: usize| Point::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2) as f64);
+        Self {
+            low: self.low + offset(octant) * (0.5 * self.width),
+            width: 0.5 * self.width,
+            values: std::array::from_fn(|c| self.value((offset(octant) + offset(c)) * 0.5)),
+        }
+    }
+}

@@ -1,0 +1,179 @@
+//! What the user asks of sizes.
+
+use super::SizingError;
+use super::closed::slope_of_gradation;
+
+/// A length, or a share of the diagonal of the surface's box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Length {
+    /// In input units.
+    Absolute(f64),
+    /// In percent of the box diagonal.
+    Percent(f64),
+}
+
+impl Length {
+    /// Reads `0.25` or `1%`; `option` names the value in errors.
+    ///
+    /// # Errors
+    /// [`SizingError::BadValue`] for what is not a number above zero.
+    pub fn parse(option: &'static str, text: &str) -> Result<Self, SizingError> {
+        let trimmed = text.trim();
+        let (digits, percent) = match trimmed.strip_suffix('%') {
+            Some(digits) => (digits.trim_end(), true),
+            None => (trimmed, false),
+        };
+        match digits.parse::<f64>() {
+            Ok(x) if x.is_normal() && x > 0.0 => Ok(if percent {
+                Self::Percent(x)
+            } else {
+                Self::Absolute(x)
+            }),
+            _ => Err(SizingError::BadValue {
+                option,
+                found: text.to_owned(),
+                expected: "a length above zero, such as 0.25, or a share of the box diagonal, such as 1%",
+            }),
+        }
+    }
+
+    /// The length for a surface whose box has that diagonal.
+    pub fn resolve(self, diagonal: f64) -> f64 {
+        match self {
+            Self::Absolute(x) => x,
+            Self::Percent(x) => x * 0.01 * diagonal,
+        }
+    }
+}
+
+/// Wanted sizes. By default they come from the surface's own edges.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SizeOptions {
+    /// One size for the whole interior, joined to the surface's edges by the gradation.
+    pub hsiz: Option<Length>,
+    /// Smallest and largest size of the interior; the surface's own edges may be beyond.
+    pub hmin: Option<Length>,
+    pub hmax: Option<Length>,
+    /// Largest ratio of the lengths of two edges that follow each other. The field's slope is at
+    /// most `beta = ln(hgrad)`: in a field of that slope, steps of one h grow by `exp(beta)` each.
+    pub hgrad: f64,
+}
+
+impl Default for SizeOptions {
+    /// Gradation 1.3, slope 0.262. At 1.1 meshes of solids have three times as many tetrahedra as the
+    /// surface needs; at 2 neighbors differ so much that their quality suffers.
+    fn default() -> Self {
+        Self {
+            hsiz: None,
+            hmin: None,
+            hmax: None,
+            hgrad: 1.3,
+        }
+    }
+}
+
+impl SizeOptions {
+    /// Reads the texts of `--hsiz`, `--hmin`, `--hmax` and `--hgrad`; absent ones keep their default.
+    ///
+    /// # Errors
+    /// Names the option and the value.
+    pub fn parse(
+        hsiz: Option<&str>,
+        hmin: Option<&str>,
+        hmax: Option<&str>,
+        hgrad: Option<&str>,
+    ) -> Result<Self, SizingError> {
+        let length =
+            |option, text: Option<&str>| text.map(|t| Length::parse(option, t)).transpose();
+        let mut options = Self {
+            hsiz: length("--hsiz", hsiz)?,
+            hmin: length("--hmin", hmin)?,
+            hmax: length("--hmax", hmax)?,
+            ..Self::default()
+        };
+        if let Some(text) = hgrad {
+            let value = text.trim().parse().ok().filter(|&x| gradation_is_good(x));
+            options.hgrad = value.ok_or_else(|| bad_gradation(text))?;
+        }
+        Ok(options)
+    }
+
+    /// Lengths for a box of that diagonal, checked together.
+    pub(super) fn resolve(&self, diagonal: f64) -> Result<Targets, SizingError> {
+        if !gradation_is_good(self.hgrad) {
+            return Err(bad_gradation(&self.hgrad.to_string()));
+        }
+        let resolve = |option: &'static str, length: Option<Length>| {
+            let Some(length) = length else {
+                return Ok(None);
+            };
+            let x = length.resolve(diagonal);
+            if x.is_normal() && x > 0.0 {
+                return Ok(Some(x));
+            }
+            Err(SizingError::BadValue {
+                option,
+                found: format!("{length:?}"),
+                expected: "a length above zero",
+            })
+        };
+        let targets = Targets {
+            hsiz: resolve("--hsiz", self.hsiz)?,
+            hmin: resolve("--hmin", self.hmin)?,
+            hmax: resolve("--hmax", self.hmax)?,
+            beta: slope_of_gradation(self.hgrad),
+        };
+        match (targets.hmin, targets.hmax) {
+            (Some(hmin), Some(hmax)) if hmin > hmax => Err(SizingError::Crossed { hmin, hmax }),
+            _ => Ok(targets),
+        }
+    }
+}
+
+/// Below 1.02 the field would be nearly one constant, its smallest value.
+fn gradation_is_good(x: f64) -> bool {
+    (1.02..=10.0).contains(&x)
+}
+
+fn bad_gradation(found: &str) -> SizingError {
+    SizingError::BadValue {
+        option: "--hgrad",
+        found: found.to_owned(),
+        expected: "a ratio from 1.02 to 10, such as 1.3",
+    }
+}
+
+/// Wanted lengths of one surface, in one unit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Targets {
+    pub(super) hsiz: Option<f64>,
+    pub(super) hmin: Option<f64>,
+    pub(super) hmax: Option<f64>,
+    /// Slope bound of the field.
+    pub(super) beta: f64,
+}
+
+impl Targets {
+    /// The same lengths in another unit.
+    pub(super) fn scaled(self, factor: f64) -> Self {
+        let scale = |x: Option<f64>| x.map(|x| x * factor);
+        Self {
+            hsiz: scale(self.hsiz),
+            hmin: scale(self.hmin),
+            hmax: scale(self.hmax),
+            beta: self.beta,
+        }
+    }
+
+    /// Whether anything but the surface's edges was asked for.
+    pub(super) fn any(&self) -> bool {
+        self.hsiz.is_some() || self.hmin.is_some() || self.hmax.is_some()
+    }
+
+    /// The size wanted in the interior where the surface alone would give `h`.
+    pub(super) fn interior(&self, h: f64) -> f64 {
+        let h = self.hsiz.unwrap_or(h);
+        h.max(self.hmin.unwrap_or(0.0))
+            .min(self.hmax.unwrap_or(f64::INFINITY))
+    }
+}

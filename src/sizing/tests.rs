@@ -1,0 +1,361 @@
+//! The field is continuous, graded, near the surface's edges, and the same for any number of threads.
+
+use super::*;
+use crate::geom::{Aabb, Point};
+
+/// A small generator for test points; the seed is printed by what fails.
+struct Dice(u64);
+
+impl Dice {
+    fn unit(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn point(&mut self) -> Point {
+        Point::new(self.unit(), self.unit(), self.unit())
+    }
+}
+
+/// Walls of the unit cube, each a grid whose lines stand at `at(0) = 0, …, at(n) = 1`.
+fn cube(n: usize, at: impl Fn(usize) -> f64) -> (Vec<Point>, Vec<[u32; 3]>) {
+    let (mut points, mut triangles) = (Vec::new(), Vec::new());
+    for axis in 0..3 {
+        for wall in [0.0, 1.0] {
+            let first = points.len() as u32;
+            let m = n as u32 + 1;
+            for j in 0..=n {
+                for i in 0..=n {
+                    let mut p = Point::splat(wall);
+                    p[(axis + 1) % 3] = at(i);
+                    p[(axis + 2) % 3] = at(j);
+                    points.push(p);
+                }
+            }
+            for j in 0..n as u32 {
+                for i in 0..n as u32 {
+                    let a = first + j * m + i;
+                    triangles.push([a, a + 1, a + m]);
+                    triangles.push([a + 1, a + m + 1, a + m]);
+                }
+            }
+        }
+    }
+    (points, triangles)
+}
+
+/// Edges from `1` to `ratio` times the smallest, growing from the corner at the origin.
+fn graded(ratio: f64, n: usize) -> (Vec<Point>, Vec<[u32; 3]>) {
+    let step = |i: usize| ratio.powf(i as f64 / (n - 1) as f64);
+    let total: f64 = (0..n).map(step).sum();
+    cube(n, |i| (0..i).map(step).sum::<f64>() / total)
+}
+
+fn options(hsiz: Option<&str>, hmin: Option<&str>, hmax: Option<&str>) -> SizeOptions {
+    SizeOptions::parse(hsiz, hmin, hmax, None).unwrap()
+}
+
+fn build(surface: &(Vec<Point>, Vec<[u32; 3]>), options: &SizeOptions) -> SizeField {
+    SizeField::build(&surface.0, &surface.1, options).unwrap()
+}
+
+/// Fields of several kinds on surfaces of several kinds.
+fn fields() -> Vec<(&'static str, SizeField)> {
+    let even = cube(20, |i| i as f64 / 20.0);
+    let steep = graded(50.0, 60);
+    vec![
+        ("even", build(&even, &SizeOptions::default())),
+        (
+            "even, small inside",
+            build(&even, &options(Some("0.02"), None, None)),
+        ),
+        (
+            "even, large inside",
+            build(&even, &options(Some("0.3"), None, None)),
+        ),
+        ("steep", build(&steep, &SizeOptions::default())),
+        (
+            "steep, hmax",
+            build(&steep, &options(None, None, Some("0.02"))),
+        ),
+        (
+            "steep, hmin",
+            build(&steep, &options(None, Some("2%"), None)),
+        ),
+        (
+            "steep, hsiz",
+            build(&steep, &options(Some("0.04"), None, None)),
+        ),
+    ]
+}
+
+#[test]
+fn slopes_stay_within_the_gradation() {
+    for (name, field) in fields() {
+        let mut dice = Dice(1);
+        let mut worst = 0.0f64;
+        for i in 0..200_000 {
+            let a = dice.point();
+            let reach = 0.5f64.powi(i % 14);
+            let b = a + (dice.point() - Point::splat(0.5)) * reach;
+            let b = b.clamp(Point::ZERO, Point::ONE);
+            let slope = (field.h(a) - field.h(b)).abs() / a.distance(b).max(1e-300);
+            worst = worst.max(slope / field.beta());
+        }
+        println!(
+            "{name}: worst slope {worst:.3} of beta, {} leaves",
+            field.n_leaves()
+        );
+        assert!(worst < 3f64.sqrt(), "{name}: {worst}");
+    }
+}
+
+#[test]
+fn no_jump_across_leaves() {
+    for (name, field) in fields() {
+        let mut dice = Dice(2);
+        for _ in 0..100_000 {
+            // Points on lattice planes, where leaves meet, seen from both sides.
+            let mut p = dice.point();
+            let (axis, level) = ((dice.unit() * 3.0) as usize, 1 + (dice.unit() * 9.0) as i32);
+            let lattice = 2f64.powi(level);
+            let frame = field.frame;
+            p[axis] = ((p[axis] * lattice).floor() / lattice) * frame.side + frame.low[axis];
+            let mut q = p;
+            p[axis] -= 1e-9;
+            q[axis] += 1e-9;
+            let (a, b) = (field.h(p), field.h(q));
+            assert!((a - b).abs() < 1e-6 * a + 1e-8, "{name}: {p} {a} {b}");
+        }
+    }
+}
+
+#[test]
+fn even_surfaces_give_one_size() {
+    for scale in [1e-9, 1.0, 1e9] {
+        let (mut points, triangles) = cube(20, |i| i as f64 / 20.0);
+        points.iter_mut().for_each(|p| *p *= scale);
+        let field = SizeField::build(&points, &triangles, &SizeOptions::default()).unwrap();
+        let mut dice = Dice(3);
+        let mean = 0.05 * (2.0 + 2f64.sqrt()) / 3.0;
+        for _ in 0..1000 {
+            let h = field.h(dice.point() * scale) / scale;
+            assert!((h / mean - 1.0).abs() < 0.1, "{h} {mean}");
+        }
+        assert!(field.n_leaves() < 100, "{}", field.n_leaves());
+    }
+}
+
+#[test]
+fn interior_size_is_joined_to_the_surface() {
+    let even = cube(40, |i| i as f64 / 40.0);
+    let surface_h = build(&even, &SizeOptions::default()).h(Point::splat(0.5));
+    for (text, inside) in [("0.01", 0.01), ("0.06", 0.06)] {
+        let field = build(&even, &options(Some(text), None, None));
+        let center = field.h(Point::splat(0.5));
+        assert!((center / inside - 1.0).abs() < 0.02, "{center}");
+        let wall = field.h(Point::new(0.0, 0.5, 0.5));
+        assert!((wall / surface_h - 1.0).abs() < 0.2, "{wall} {surface_h}");
+        // Half way of the ramp, within what one cell can smear.
+        let depth = 0.5 * (inside - surface_h).abs() / field.beta();
+        let ramp = field.h(Point::new(depth, 0.5, 0.5));
+        let wanted = 0.5 * (inside + surface_h);
+        assert!((ramp / wanted - 1.0).abs() < 0.25, "{ramp} {wanted}");
+    }
+}
+
+#[test]
+fn steep_surfaces_are_followed() {
+    let steep = graded(50.0, 60);
+    let field = build(&steep, &SizeOptions::default());
+    let (_, _, seeds) = seeds::seeds_of(&steep.0, &steep.1).unwrap();
+    let side = field.frame.side;
+    let (mut near, mut ratio_low, mut ratio_high) = (0, f64::INFINITY, 0.0f64);
+    for seed in &seeds {
+        let ratio = field.h(field.frame.low + seed.at * side) / (seed.h * side);
+        ratio_low = ratio_low.min(ratio);
+        ratio_high = ratio_high.max(ratio);
+        near += usize::from((0.7..1.4).contains(&ratio));
+    }
+    println!(
+        "ratio {ratio_low:.3} to {ratio_high:.3}, {near} of {}",
+        seeds.len()
+    );
+    // Grid lines give long thin triangles, whose vertices differ in size more than any gradation allows.
+    assert!(near * 10 > seeds.len() * 9);
+    assert!(ratio_low > 0.08 && ratio_high < 2.5);
+    let (low, high) = field.range();
+    let smallest = seeds
+        .iter()
+        .fold(f64::INFINITY, |low, seed| low.min(seed.h * side));
+    assert!(
+        low > 0.95 * smallest && low < 1.5 * smallest && high > 0.03,
+        "{low} {high}"
+    );
+}
+
+#[test]
+fn equal_bits_for_any_number_of_threads() {
+    let steep = graded(20.0, 120);
+    let bytes = [1, 2, 3].map(|n| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(n)
+            .build()
+            .unwrap();
+        pool.install(|| build(&steep, &options(None, None, Some("0.05"))).to_bytes())
+    });
+    assert!(bytes[0] == bytes[1] && bytes[0] == bytes[2]);
+}
+
+#[test]
+fn bytes_are_read_back_and_damage_is_named() {
+    let field = build(&graded(10.0, 20), &SizeOptions::default());
+    let bytes = field.to_bytes();
+    let read = SizeField::from_bytes(&bytes).unwrap();
+    let mut dice = Dice(4);
+    for _ in 0..1000 {
+        let p = dice.point();
+        assert_eq!(field.h(p).to_bits(), read.h(p).to_bits());
+    }
+    assert!(SizeField::from_bytes(&bytes[..63]).is_err());
+    assert!(SizeField::from_bytes(&bytes[..bytes.len() - 1]).is_err());
+    for at in 0..bytes.len().min(4000) {
+        let mut damaged = bytes.clone();
+        damaged[at] ^= 0x80;
+        // A flip may leave a valid field, but never a panic, here or later.
+        if let Ok(field) = SizeField::from_bytes(&damaged) {
+            field.h(Point::splat(0.3));
+        }
+    }
+}
+
+#[test]
+fn edges_are_divided_the_same_from_both_ends() {
+    let field = build(&graded(50.0, 60), &SizeOptions::default());
+    let mut dice = Dice(5);
+    for _ in 0..100 {
+        let (a, b) = (dice.point(), dice.point());
+        let mut back = field.divide(b, a, 5);
+        back.reverse();
+        assert_eq!(field.divide(a, b, 5), back);
+        assert_eq!(
+            field.edge_length_metric(a, b),
+            field.edge_length_metric(b, a)
+        );
+    }
+}
+
+#[test]
+fn loads_are_integrals() {
+    let even = cube(20, |i| i as f64 / 20.0);
+    let field = build(&even, &SizeOptions::default());
+    let h = field.h(Point::splat(0.5));
+    // The unit cube inside the field's slightly larger one.
+    let share = |b: &Aabb| {
+        let (low, high) = (b.low.max(Point::ZERO), b.high.min(Point::ONE));
+        let cut = (high - low).max(Point::ZERO);
+        let whole = b.high - b.low;
+        cut.x * cut.y * cut.z / (whole.x * whole.y * whole.z)
+    };
+    let load = field.load(0.1, share);
+    assert!((load * h * h * h - 1.0).abs() < 0.1, "{load}");
+    let steep = build(&graded(20.0, 60), &SizeOptions::default());
+    let load = steep.load(0.1, share);
+    let n = 100;
+    let middle = |i: usize| (i as f64 + 0.5) / n as f64;
+    let mut sum = 0.0;
+    for i in 0..n * n * n {
+        let h = steep.h(Point::new(
+            middle(i % n),
+            middle(i / n % n),
+            middle(i / n / n),
+        ));
+        sum += 1.0 / (h * h * h * (n * n * n) as f64);
+    }
+    assert!((load / sum - 1.0).abs() < 0.05, "{load} {sum}");
+}
+
+#[test]
+fn bad_values_are_named() {
+    for (result, parts) in [
+        (Length::parse("--hsiz", "0"), ["--hsiz 0", "above zero"]),
+        (Length::parse("--hmin", "-1%"), ["--hmin -1%", "above zero"]),
+        (Length::parse("--hmax", "big"), ["--hmax big", "1%"]),
+        (Length::parse("--hsiz", "inf"), ["--hsiz inf", "above zero"]),
+    ] {
+        let message = result.unwrap_err().to_string();
+        assert!(parts.iter().all(|part| message.contains(part)), "{message}");
+    }
+    let error = SizeOptions::parse(None, None, None, Some("1")).unwrap_err();
+    assert!(error.to_string().contains("--hgrad 1:"), "{error}");
+    let (points, triangles) = cube(2, |i| i as f64 / 2.0);
+    let crossed = options(None, Some("2"), Some("1"));
+    let error = SizeField::build(&points, &triangles, &crossed).unwrap_err();
+    assert!(matches!(error, SizingError::Crossed { .. }));
+    let error = SizeField::build(&points, &[], &SizeOptions::default()).unwrap_err();
+    assert_eq!(error, SizingError::NoEdges);
+}
+
+#[test]
+fn summaries_say_where_sizes_came_from() {
+    let (points, triangles) = cube(20, |i| i as f64 / 20.0);
+    let asked = options(Some("1%"), None, None);
+    let (_, summary) = SizeField::build_with_summary(&points, &triangles, &asked).unwrap();
+    let text = summary.to_string();
+    assert!(
+        text.contains("--hsiz 1% = 0.0173") && text.contains("--hgrad 1.3"),
+        "{text}"
+    );
+    assert_eq!(summary.warnings.len(), 1);
+    assert!(summary.warnings[0].to_string().contains("--hsiz 0.0173"));
+    assert!(
+        (summary.surface.median / 0.0557 - 1.0).abs() < 0.05,
+        "{summary:?}"
+    );
+}
+
+/// `cargo test --release --lib sizing -- --ignored --nocapture`
+#[test]
+#[ignore = "prints a table for people"]
+fn table_of_costs() {
+    let surfaces = [
+        ("even 0.7 M triangles", cube(240, |i| i as f64 / 240.0)),
+        ("steep 50:1, 0.7 M triangles", graded(50.0, 240)),
+    ];
+    for (name, surface) in &surfaces {
+        for asked in [SizeOptions::default(), options(Some("0.02"), None, None)] {
+            let start = std::time::Instant::now();
+            let field = build(surface, &asked);
+            let seconds = start.elapsed().as_secs_f64();
+            println!(
+                "{name}, hsiz {:?}: {} leaves, {:.1} MB, built in {seconds:.2} s",
+                asked.hsiz,
+                field.n_leaves(),
+                field.bytes() as f64 * 1e-6
+            );
+            time_reads(&field);
+        }
+    }
+}
+
+fn time_reads(field: &SizeField) {
+    let mut dice = Dice(6);
+    let scattered: Vec<Point> = (0..1_000_000).map(|_| dice.point()).collect();
+    let mut at = Point::splat(0.5);
+    let walk = (0..1_000_000).map(|_| {
+        at = (at + (dice.point() - Point::splat(0.5)) * 0.02).clamp(Point::ZERO, Point::ONE);
+        at
+    });
+    for (name, points) in [("scattered", scattered), ("walking", walk.collect())] {
+        let start = std::time::Instant::now();
+        let sum: f64 = points.iter().map(|&p| field.h(p)).sum();
+        let ns = start.elapsed().as_secs_f64() * 1e9 / points.len() as f64;
+        println!(
+            "    h(p), {name}: {ns:.1} ns (mean {:.4})",
+            sum / points.len() as f64
+        );
+    }
+}

@@ -1,0 +1,318 @@
+//! The octree: where sizes differ, cells of about the local size; elsewhere, cells as large as may be.
+//!
+//! Two leaves that share as much as a corner differ by one level at most. Cells are addressed on an
+//! integer lattice of 2^20 per axis; octants and corners are numbered x + 2y + 4z.
+
+use super::SizingError;
+use super::options::Targets;
+use super::seeds::Seed;
+use crate::geom::Point;
+use rayon::prelude::*;
+
+/// Levels below the root: sizes from 1 to 1e-6 of the surface's extent.
+pub(super) const DEPTH: u32 = 20;
+/// Lattice cells along an axis.
+pub(super) const LATTICE: u32 = 1 << DEPTH;
+/// Marks an entry as a leaf.
+pub(super) const LEAF: u32 = 1 << 31;
+/// Corners are numbered by u32 and a leaf has eight.
+const LEAVES_MAX: usize = 1 << 28;
+/// Leaves stay wider than this many of their smallest size. With 2, leaves where sizes vary are one to
+/// two sizes wide, over which the gradation lets the size change by half; with 1, eight times as many.
+const CELLS_PER_SIZE: f64 = 2.0;
+/// Sizes in a cell may spread this much without a trend: irregular surfaces do.
+const SPREAD_MAX: f64 = 2.0;
+/// The means of its eight parts may differ this much, if each has at least `TREND_SEEDS`.
+const TREND_MAX: f64 = 1.2;
+const TREND_SEEDS: u32 = 4;
+/// Interior sizes within this ratio of the surface's need no transition.
+const TARGET_MAX: f64 = 1.15;
+/// Lists at least this long are divided in parallel.
+const PARALLEL_SEEDS: usize = 8192;
+
+/// Where a leaf is on the lattice; its side is `2^(DEPTH - level)`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Leaf {
+    pub(super) anchor: [u32; 3],
+    pub(super) level: u32,
+}
+
+impl Leaf {
+    pub(super) const ROOT: Self = Self {
+        anchor: [0; 3],
+        level: 0,
+    };
+
+    /// Side in lattice units.
+    pub(super) fn width(&self) -> u32 {
+        LATTICE >> self.level
+    }
+
+    /// Side in units of the root's.
+    pub(super) fn side(&self) -> f64 {
+        1.0 / f64::from(1u32 << self.level)
+    }
+
+    pub(super) fn low(&self) -> Point {
+        let [x, y, z] = self.anchor.map(f64::from);
+        Point::new(x, y, z) * (1.0 / f64::from(LATTICE))
+    }
+
+    pub(super) fn child(&self, octant: usize) -> Self {
+        let level = self.level + 1;
+        Self {
+            anchor: shift(self.anchor, octant, LATTICE >> level),
+            level,
+        }
+    }
+
+    /// Lattice position of a corner.
+    pub(super) fn corner(&self, corner: usize) -> [u32; 3] {
+        shift(self.anchor, corner, self.width())
+    }
+}
+
+fn shift(p: [u32; 3], octant: usize, by: u32) -> [u32; 3] {
+    std::array::from_fn(|axis| p[axis] + (octant >> axis & 1) as u32 * by)
+}
+
+/// Cells as blocks of eight entries: `LEAF | leaf number`, or the number of the block of children.
+///
+/// Invariant once numbered: blocks and leaves in depth-first order, so that near cells are near in memory.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Tree {
+    pub(super) root: u32,
+    pub(super) blocks: Vec<[u32; 8]>,
+}
+
+impl Tree {
+    /// The balanced octree for these seeds and wanted sizes (all in units of the root's side).
+    pub(super) fn build(seeds: &[Seed], targets: &Targets) -> Result<Self, SizingError> {
+        let all: Vec<u32> = (0..seeds.len() as u32).collect();
+        let shape = shape_of(Leaf::ROOT, &all, seeds, targets);
+        let mut tree = Self::from_shape(&shape);
+        tree.balance()?;
+        Ok(tree.numbered())
+    }
+
+    /// From the depth-first list of "is divided".
+    fn from_shape(shape: &[bool]) -> Self {
+        fn entry(shape: &mut impl Iterator<Item = bool>, blocks: &mut Vec<[u32; 8]>) -> u32 {
+            if shape.next() != Some(true) {
+                return LEAF;
+            }
+            let block = blocks.len();
+            blocks.push([LEAF; 8]);
+            for octant in 0..8 {
+                blocks[block][octant] = entry(shape, blocks);
+            }
+            block as u32
+        }
+        let mut blocks = Vec::new();
+        let root = entry(&mut shape.iter().copied(), &mut blocks);
+        Self { root, blocks }
+    }
+
+    /// The entry of the leaf that holds a lattice cell: block and octant (none for the root), level.
+    fn find(&self, cell: [u32; 3]) -> (Option<(usize, usize)>, u32) {
+        let (mut place, mut entry, mut level) = (None, self.root, 0);
+        while entry & LEAF == 0 {
+            let octant = octant_of(cell, level);
+            place = Some((entry as usize, octant));
+            entry = self.blocks[entry as usize][octant];
+            level += 1;
+        }
+        (place, level)
+    }
+
+    /// Number and level of the leaf that holds a lattice cell.
+    pub(super) fn leaf_at(&self, cell: [u32; 3]) -> (u32, u32) {
+        let (mut entry, mut level) = (self.root, 0);
+        while entry & LEAF == 0 {
+            entry = self.blocks[entry as usize][octant_of(cell, level)];
+            level += 1;
+        }
+        (entry & !LEAF, level)
+    }
+
+    /// All leaves, depth first.
+    pub(super) fn leaves(&self) -> Vec<Leaf> {
+        let mut leaves = Vec::with_capacity(self.blocks.len() * 7 + 1);
+        let mut stack = vec![(self.root, Leaf::ROOT)];
+        while let Some((entry, leaf)) = stack.pop() {
+            if entry & LEAF != 0 {
+                leaves.push(leaf);
+                continue;
+            }
+            let block = &self.blocks[entry as usize];
+            stack.extend((0..8).rev().map(|o| (block[o], leaf.child(o))));
+        }
+        leaves
+    }
+
+    /// Divides leaves until neighbors differ by one level at most, from the deepest level up.
+    fn balance(&mut self) -> Result<(), SizingError> {
+        let mut levels: Vec<Vec<[u32; 3]>> = vec![Vec::new(); DEPTH as usize + 1];
+        for leaf in self.leaves() {
+            levels[leaf.level as usize].push(leaf.anchor);
+        }
+        for level in (2..=DEPTH).rev() {
+            for anchor in std::mem::take(&mut levels[level as usize]) {
+                // Deeper levels may have divided it since.
+                if self.find(anchor).1 != level {
+                    continue;
+                }
+                for cell in (Leaf { anchor, level }).outer_neighbors() {
+                    while let (Some((block, octant)), found) = self.find(cell) {
+                        if found + 1 >= level {
+                            break;
+                        }
+                        self.divide(block, octant)?;
+                        let width = LATTICE >> found;
+                        let parent = Leaf {
+                            anchor: cell.map(|x| x & !(width - 1)),
+                            level: found,
+                        };
+                        let children = (0..8).map(|o| parent.child(o).anchor);
+                        levels[found as usize + 1].extend(children);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn divide(&mut self, block: usize, octant: usize) -> Result<(), SizingError> {
+        let found = self.blocks.len() * 7;
+        if found > LEAVES_MAX {
+            return Err(SizingError::TooLarge {
+                found,
+                expected: LEAVES_MAX,
+            });
+        }
+        self.blocks[block][octant] = self.blocks.len() as u32;
+        self.blocks.push([LEAF; 8]);
+        Ok(())
+    }
+
+    /// The same tree with blocks and leaves numbered depth first.
+    fn numbered(&self) -> Self {
+        fn copy(from: &Tree, entry: u32, to: &mut Tree, n_leaves: &mut u32) -> u32 {
+            if entry & LEAF != 0 {
+                *n_leaves += 1;
+                return LEAF | (*n_leaves - 1);
+            }
+            let block = to.blocks.len();
+            to.blocks.push([LEAF; 8]);
+            for octant in 0..8 {
+                let child = from.blocks[entry as usize][octant];
+                to.blocks[block][octant] = copy(from, child, to, n_leaves);
+            }
+            block as u32
+        }
+        let mut tree = Self {
+            root: LEAF,
+            blocks: Vec::with_capacity(self.blocks.len()),
+        };
+        tree.root = copy(self, self.root, &mut tree, &mut 0);
+        tree
+    }
+}
+
+/// The octant of a lattice cell in its ancestor at `level`.
+#[inline]
+pub(super) fn octant_of(cell: [u32; 3], level: u32) -> usize {
+    let bit = DEPTH - 1 - level;
+    let [x, y, z] = cell.map(|c| c >> bit & 1);
+    (x | y << 1 | z << 2) as usize
+}
+
+impl Leaf {
+    /// Lattice cells next to this leaf outside its parent: up to seven, across the faces, edges and
+    /// corner that it shares with its parent.
+    pub(super) fn outer_neighbors(&self) -> impl Iterator<Item = [u32; 3]> + use<> {
+        let (anchor, width) = (self.anchor, self.width());
+        (1..8usize).filter_map(move |across| {
+            let mut cell = anchor;
+            for (axis, x) in cell.iter_mut().enumerate() {
+                if across >> axis & 1 == 1 {
+                    let upper = *x & width != 0;
+                    *x = if upper {
+                        Some(*x + width).filter(|&x| x < LATTICE)?
+                    } else {
+                        x.checked_sub(1)?
+                    };
+                }
+            }
+            Some(cell)
+        })
+    }
+}
+
+/// Which cells are divided, depth first, `near` being the seeds in the cell or half its side around it.
+fn shape_of(cell: Leaf, near: &[u32], seeds: &[Seed], targets: &Targets) -> Vec<bool> {
+    if !is_divided(cell, near, seeds, targets) {
+        return vec![false];
+    }
+    let part = |octant: usize| {
+        let child = cell.child(octant);
+        let near = near_child(child, near, seeds);
+        shape_of(child, &near, seeds, targets)
+    };
+    let parts: Vec<Vec<bool>> = if near.len() >= PARALLEL_SEEDS {
+        (0..8).into_par_iter().map(part).collect()
+    } else {
+        (0..8).map(part).collect()
+    };
+    let mut shape = vec![true];
+    parts.iter().for_each(|part| shape.extend(part));
+    shape
+}
+
+/// Seeds in a cell or half its side around it.
+fn near_child(cell: Leaf, near: &[u32], seeds: &[Seed]) -> Vec<u32> {
+    let side = cell.side();
+    let low = cell.low() - Point::splat(0.5 * side);
+    let high = low + Point::splat(2.0 * side);
+    near.iter()
+        .copied()
+        .filter(|&s| {
+            let p = seeds[s as usize].at;
+            p.cmpge(low).all() && p.cmple(high).all()
+        })
+        .collect()
+}
+
+/// Whether sizes in and around a cell ask for smaller cells.
+fn is_divided(cell: Leaf, near: &[u32], seeds: &[Seed], targets: &Targets) -> bool {
+    if cell.level == DEPTH || near.is_empty() {
+        return false;
+    }
+    let middle = cell.low() + Point::splat(0.5 * cell.side());
+    let (mut low, mut high) = (f64::INFINITY, 0.0f64);
+    let mut parts = [(0u32, 0.0f64); 8];
+    for &s in near {
+        let seed = &seeds[s as usize];
+        low = low.min(seed.h);
+        high = high.max(seed.h);
+        let part = &mut parts[seed.at.cmpge(middle).bitmask() as usize];
+        *part = (part.0 + 1, part.1 + seed.h);
+    }
+    if cell.side() <= CELLS_PER_SIZE * low {
+        return false;
+    }
+    let targets_differ = targets.any()
+        && (targets.interior(low) > low * TARGET_MAX || targets.interior(high) * TARGET_MAX < high);
+    if targets_differ || high > low * SPREAD_MAX {
+        return true;
+    }
+    let (mut low, mut high) = (f64::INFINITY, 0.0f64);
+    for (count, sum) in parts {
+        if count >= TREND_SEEDS {
+            let mean = sum / f64::from(count);
+            low = low.min(mean);
+            high = high.max(mean);
+        }
+    }
+    high > low * TREND_MAX
+}
