@@ -88,7 +88,10 @@ fn cubes_that_share_a_matching_side_are_valid() {
     let found = validate(&build(cube(|p| p).into_iter().chain(turned)));
     assert!(found.is_valid(), "{:?}", found.defects);
     assert_eq!(found.closedness.two_sided, [[10, 22], [11, 23]]);
-    assert_eq!((found.closedness.n_nonmanifold, found.closedness.n_odd), (4, 4));
+    assert_eq!(
+        (found.closedness.n_nonmanifold, found.closedness.n_odd),
+        (4, 4)
+    );
     let inside_out = build(cube(|p| p).into_iter().chain(mirrored));
     assert_eq!(codes(&inside_out), ["duplicate-triangle"]);
 }
