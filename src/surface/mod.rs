@@ -7,12 +7,22 @@
 //!
 //! Is not: file formats (`io`), volumes and regions (`boundary`).
 
+mod broad;
 mod contact;
 mod defect;
+mod edges;
+mod orientation;
 mod triangles;
+mod validate;
 mod weld;
 
-pub use contact::ContactKind;
+#[cfg(test)]
+mod tests;
+
+pub use contact::{Contact, ContactKind, contact};
 pub use defect::{Defect, SurfaceError};
+pub use edges::{Closedness, closedness};
+pub use orientation::{Orientation, orient_alike};
 pub use triangles::{Note, NoteKind, SourceFile, Surface};
+pub use validate::{Validation, validate};
 pub use weld::SurfaceBuilder;

@@ -243,8 +243,8 @@ impl<R: BufRead> Mesh<'_, '_, R> {
         let mut tags = [0; 4];
         for i in 0..n_nodes {
             let tag = self.numbers.int()?;
-            if role == Role::Face {
-                tags[i] = tag;
+            if let Some(slot) = tags.get_mut(i) {
+                *slot = tag;
             }
         }
         self.n_solids += u64::from(role == Role::Solid);
@@ -371,8 +371,8 @@ impl<R: BufRead> Mesh<'_, '_, R> {
                 let mut tags = [0; 4];
                 for j in 0..n_nodes {
                     let tag = self.numbers.size()?;
-                    if role == Role::Face {
-                        tags[j] = tag;
+                    if let Some(slot) = tags.get_mut(j) {
+                        *slot = tag;
                     }
                 }
                 self.n_solids += u64::from(role == Role::Solid);

@@ -17,6 +17,8 @@ mod stl;
 mod tetgen;
 
 #[cfg(test)]
+mod collection;
+#[cfg(test)]
 mod tests;
 
 use std::fs::File;

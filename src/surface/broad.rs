@@ -1,0 +1,167 @@
+//! Which pairs of triangles are near enough to look at: a tree of boxes over the Hilbert order.
+
+use rayon::prelude::*;
+
+use super::Surface;
+use crate::geom::{Aabb, HilbertFrame};
+
+/// Triangles in one leaf.
+const LEAF: usize = 4;
+/// Children of one node.
+const ARITY: usize = 4;
+/// Leaves one task handles.
+const BLOCK: usize = 256;
+/// Leaves between two looks at how much was found.
+const ROUND: usize = 1 << 14;
+/// Results one task keeps at most: with `ROUND / BLOCK` tasks this bounds the memory on hopeless input.
+const BLOCK_LISTED_MAX: usize = 8192;
+/// Results after which the search ends: the input is hopeless and its pairs may be quadratic.
+const FOUND_MAX: u64 = 10_000_000;
+
+/// Boxes of triangles in Hilbert order of their centers, and of groups of groups of them.
+///
+/// Memory: about 52 bytes per triangle and a third of that for the tree.
+pub(super) struct BoxTree {
+    /// Triangle ids in curve order.
+    order: Vec<u32>,
+    /// Their boxes, in the same order.
+    boxes: Vec<Aabb>,
+    /// `levels[0]` are the leaves; a node of level k + 1 holds `ARITY` nodes of level k.
+    levels: Vec<Vec<Aabb>>,
+}
+
+impl BoxTree {
+    /// A tree over the triangles that `keep` accepts.
+    pub fn new(surface: &Surface, keep: impl Fn(u32) -> bool + Sync) -> Self {
+        let frame = HilbertFrame::new(&surface.bounds());
+        let mut keys: Vec<(u64, u32)> = (0..surface.n_triangles() as u32)
+            .into_par_iter()
+            .filter(|&t| keep(t))
+            .map(|t| {
+                let [a, b, c] = surface.corners(t);
+                (frame.index((a + b + c) / 3.0), t)
+            })
+            .collect();
+        keys.par_sort_unstable();
+        let order: Vec<u32> = keys.into_iter().map(|(_, t)| t).collect();
+        let boxes: Vec<Aabb> = order
+            .par_iter()
+            .map(|&t| Aabb::around(surface.corners(t)))
+            .collect();
+        let mut levels = vec![enclose(&boxes, LEAF)];
+        while let Some(last) = levels.last()
+            && last.len() > 1
+        {
+            levels.push(enclose(last, ARITY));
+        }
+        Self {
+            order,
+            boxes,
+            levels,
+        }
+    }
+
+    /// Calls `test` on each pair of triangles whose boxes share a point and collects what it returns.
+    ///
+    /// At most `listed_max` results are kept, of all that are counted; which ones does not depend on
+    /// the number of threads. The search ends after a round with more than ten million in all.
+    pub fn pairs<T: Send>(
+        &self,
+        listed_max: usize,
+        test: impl Fn(u32, u32) -> Option<T> + Sync,
+    ) -> (Vec<T>, u64) {
+        let n_leaves = self.levels[0].len();
+        let (mut listed, mut n_found) = (Vec::new(), 0);
+        for round in (0..n_leaves).step_by(ROUND) {
+            let end = (round + ROUND).min(n_leaves);
+            let starts: Vec<usize> = (round..end).step_by(BLOCK).collect();
+            let found: Vec<(Vec<T>, u64)> = starts
+                .into_par_iter()
+                .map(|start| {
+                    let (mut out, mut n) = (Vec::new(), 0);
+                    let mut keep = |a, b| {
+                        if let Some(result) = test(a, b) {
+                            n += 1;
+                            if out.len() < BLOCK_LISTED_MAX {
+                                out.push(result);
+                            }
+                        }
+                    };
+                    let mut stack = Vec::new();
+                    for leaf in start..(start + BLOCK).min(end) {
+                        self.pairs_of_leaf(leaf, &mut stack, &mut keep);
+                    }
+                    (out, n)
+                })
+                .collect();
+            for (block, n) in found {
+                n_found += n;
+                let room = listed_max - listed.len();
+                listed.extend(block.into_iter().take(room));
+            }
+            if n_found > FOUND_MAX {
+                break;
+            }
+        }
+        (listed, n_found)
+    }
+
+    /// Pairs of the triangles of `leaf` among themselves and with those of later leaves.
+    fn pairs_of_leaf(
+        &self,
+        leaf: usize,
+        stack: &mut Vec<(usize, usize)>,
+        pair: &mut impl FnMut(u32, u32),
+    ) {
+        let own = self.members(leaf);
+        for i in own.clone() {
+            for j in i + 1..own.end {
+                self.try_pair(i, j, pair);
+            }
+        }
+        let bounds = self.levels[0][leaf];
+        stack.push((self.levels.len() - 1, 0));
+        while let Some((level, node)) = stack.pop() {
+            // The last leaf below the node.
+            let last = (node + 1) * ARITY.pow(level as u32) - 1;
+            if last <= leaf || !self.levels[level][node].meets(&bounds) {
+                continue;
+            }
+            if level > 0 {
+                let children = node * ARITY..((node + 1) * ARITY).min(self.levels[level - 1].len());
+                stack.extend(children.map(|child| (level - 1, child)));
+                continue;
+            }
+            for i in own
+                .clone()
+                .filter(|&i| self.boxes[i].meets(&self.levels[0][node]))
+            {
+                for j in self.members(node) {
+                    self.try_pair(i, j, pair);
+                }
+            }
+        }
+    }
+
+    fn members(&self, leaf: usize) -> std::ops::Range<usize> {
+        leaf * LEAF..((leaf + 1) * LEAF).min(self.boxes.len())
+    }
+
+    fn try_pair(&self, i: usize, j: usize, pair: &mut impl FnMut(u32, u32)) {
+        if self.boxes[i].meets(&self.boxes[j]) {
+            let (a, b) = (self.order[i], self.order[j]);
+            pair(a.min(b), a.max(b));
+        }
+    }
+}
+
+fn enclose(boxes: &[Aabb], group: usize) -> Vec<Aabb> {
+    let join = |a: Aabb, b: &Aabb| Aabb {
+        low: a.low.min(b.low),
+        high: a.high.max(b.high),
+    };
+    boxes
+        .par_chunks(group)
+        .map(|g| g.iter().fold(Aabb::EMPTY, join))
+        .collect()
+}

@@ -1,0 +1,310 @@
+//! Cubes that touch, cross, lack a face: what is accepted and what is not.
+
+use super::*;
+use crate::geom::Point;
+
+/// Corners of the unit cube as bits x, y, z; two triangles for each side, seen from outside.
+const CUBE: [[u32; 3]; 12] = [
+    [0, 2, 3],
+    [0, 3, 1],
+    [4, 5, 7],
+    [4, 7, 6],
+    [0, 1, 5],
+    [0, 5, 4],
+    [2, 6, 7],
+    [2, 7, 3],
+    [0, 4, 6],
+    [0, 6, 2],
+    [1, 3, 7],
+    [1, 7, 5],
+];
+
+fn corner(i: u32) -> Point {
+    Point::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2))
+}
+
+fn build(triangles: impl IntoIterator<Item = [Point; 3]>) -> Surface {
+    let mut builder = SurfaceBuilder::new();
+    builder.begin_file("made");
+    let label = builder.label("made");
+    for triangle in triangles {
+        builder.triangle_at(triangle, label).unwrap();
+    }
+    builder.end_file().unwrap();
+    builder.finish()
+}
+
+fn cube(map: impl Fn(Point) -> Point) -> Vec<[Point; 3]> {
+    CUBE.iter().map(|t| t.map(|i| map(corner(i)))).collect()
+}
+
+fn two_cubes(map: impl Fn(Point) -> Point) -> Surface {
+    build(cube(|p| p).into_iter().chain(cube(map)))
+}
+
+fn codes(surface: &Surface) -> Vec<&'static str> {
+    let mut codes: Vec<_> = validate(surface).defects.iter().map(Defect::code).collect();
+    codes.dedup();
+    codes
+}
+
+fn kinds(surface: &Surface) -> Vec<ContactKind> {
+    let found = validate(surface);
+    let mut kinds: Vec<_> = found
+        .defects
+        .iter()
+        .map(|d| match d {
+            Defect::SelfIntersection { kind, .. } => *kind,
+            other => panic!("{other}"),
+        })
+        .collect();
+    kinds.sort_unstable();
+    kinds.dedup();
+    kinds
+}
+
+#[test]
+fn a_cube_is_valid_at_every_scale_and_place() {
+    for scale in [1e-9, 1.0, 1e9] {
+        for away in [0.0, 1e6 * scale] {
+            let surface = build(cube(|p| p * scale + Point::splat(away)));
+            let found = validate(&surface);
+            assert!(found.is_valid(), "{:?}", found.defects);
+            let c = &found.closedness;
+            assert_eq!(
+                (c.n_edges, c.n_components, c.n_inconsistent, c.n_nonmanifold),
+                (18, 1, 0, 0)
+            );
+            assert_eq!((surface.n_vertices(), surface.n_triangles()), (8, 12));
+        }
+    }
+}
+
+#[test]
+fn cubes_that_share_a_matching_side_are_valid() {
+    // The mirrored cube has the same diagonal on the shared side, and inside out until turned round.
+    let mirrored = cube(|p| Point::new(2.0 - p.x, p.y, p.z));
+    let turned = mirrored.iter().map(|[a, b, c]| [*a, *c, *b]);
+    let found = validate(&build(cube(|p| p).into_iter().chain(turned)));
+    assert!(found.is_valid(), "{:?}", found.defects);
+    assert_eq!(found.closedness.two_sided, [[10, 22], [11, 23]]);
+    assert_eq!(
+        (found.closedness.n_nonmanifold, found.closedness.n_odd),
+        (4, 4)
+    );
+    let inside_out = build(cube(|p| p).into_iter().chain(mirrored));
+    assert_eq!(codes(&inside_out), ["duplicate-triangle"]);
+}
+
+#[test]
+fn touching_at_an_edge_or_a_vertex_is_valid() {
+    for shift in [Point::new(1.0, 1.0, 0.0), Point::ONE] {
+        let found = validate(&two_cubes(|p| p + shift));
+        assert!(found.is_valid(), "{:?}", found.defects);
+        assert_eq!(found.closedness.n_nonmanifold, usize::from(shift.z == 0.0));
+    }
+}
+
+#[test]
+fn an_open_cube_tells_its_rim() {
+    let surface = build(cube(|p| p).into_iter().take(10));
+    let found = validate(&surface);
+    assert_eq!(
+        (found.closedness.open.len(), found.closedness.n_open_loops),
+        (4, 1)
+    );
+    assert_eq!(codes(&surface), ["open-surface"]);
+    assert_eq!(found.accept().unwrap_err().code(), "open-surface");
+    let two_holes = build(cube(|p| p).into_iter().skip(1).take(10));
+    assert_eq!(validate(&two_holes).closedness.n_open_loops, 2);
+}
+
+#[test]
+fn bad_triangles_are_named() {
+    let whole = cube(|p| p);
+    let repeated = build(whole.iter().copied().chain([whole[3]]));
+    let found = validate(&repeated);
+    assert_eq!(found.closedness.duplicates, [[3, 12]]);
+    assert_eq!(codes(&repeated), ["duplicate-triangle"]);
+    let [a, b, _] = whole[0];
+    let collapsed = build(
+        whole
+            .iter()
+            .copied()
+            .chain([[a, b, b], [a, a.midpoint(b), b]]),
+    );
+    assert_eq!(
+        validate(&collapsed).closedness.degenerate,
+        [(12, true), (13, false)]
+    );
+    assert_eq!(validate(&build([])).defects, [Defect::Empty]);
+}
+
+#[test]
+fn a_wall_inside_is_valid_and_a_fin_is_open() {
+    let wall = [[0, 3, 7], [0, 7, 4]].map(|t: [u32; 3]| t.map(corner));
+    let surface = build(cube(|p| p).into_iter().chain(wall));
+    // The wall's corners use edges 0-3 and 4-7, which are diagonals of two sides.
+    let found = validate(&surface);
+    assert!(found.is_valid(), "{:?}", found.defects);
+    assert_eq!(
+        (found.closedness.n_nonmanifold, found.closedness.n_odd),
+        (4, 4)
+    );
+    let fin = build(cube(|p| p).into_iter().chain([wall[0]]));
+    assert_eq!(codes(&fin), ["open-surface"]);
+}
+
+#[test]
+fn crossing_and_overlapping_cubes_are_refused_by_kind() {
+    let crossing = two_cubes(|p| p + Point::new(0.3, 0.4, 0.5));
+    assert!(kinds(&crossing).contains(&ContactKind::Crossing));
+    let overlap = two_cubes(|p| p + Point::new(1.0, 0.25, 0.25));
+    assert!(kinds(&overlap).contains(&ContactKind::CoplanarOverlap));
+    // Same corners, other diagonal: the shared side does not match.
+    let other_diagonal = two_cubes(|p| Point::new(1.0 + p.x, 1.0 - p.y, p.z));
+    assert_eq!(kinds(&other_diagonal), [ContactKind::CoplanarOverlap]);
+    let inside = two_cubes(|p| p * 0.5 + Point::splat(0.25));
+    assert!(validate(&inside).is_valid());
+    // A corner of one cube just reaches a side of the other.
+    let tip = |p: Point| {
+        Point::new(
+            1.0 + p.x + p.y + p.z,
+            0.4 + 0.01 * (p.y - p.z),
+            0.6 + 0.01 * (p.x - p.y),
+        )
+    };
+    assert_eq!(kinds(&two_cubes(tip)), [ContactKind::VertexOnFace]);
+}
+
+#[test]
+fn a_t_junction_is_named() {
+    // One triangle is split at the middle of an edge that its neighbor keeps whole.
+    let mut triangles = cube(|p| p);
+    let [a, b, c] = triangles[0];
+    let m = b.midpoint(c);
+    triangles[0] = [a, b, m];
+    triangles.push([a, m, c]);
+    let surface = build(triangles);
+    let found = validate(&surface);
+    assert_eq!(found.closedness.open.len(), 3);
+    assert_eq!(found.n_of_kind(ContactKind::VertexOnEdge), 2);
+}
+
+#[test]
+fn inverted_triangles_turn_back() {
+    for wrong in [vec![4], vec![0, 1, 7], (0..9).collect()] {
+        let mut triangles = cube(|p| p);
+        for &t in &wrong {
+            triangles[t].swap(1, 2);
+        }
+        let mut surface = build(triangles);
+        assert!(closedness(&surface).n_inconsistent > 0);
+        let done = orient_alike(&mut surface);
+        assert_eq!((done.n_patches, done.n_unorientable), (1, 0));
+        assert_eq!(done.flipped.len(), wrong.len().min(12 - wrong.len()));
+        assert_eq!(closedness(&surface).n_inconsistent, 0);
+    }
+    // A Möbius strip of three quadrilaterals.
+    let ring = |i: u32, up: f64| {
+        let angle = f64::from(i) * std::f64::consts::TAU / 3.0;
+        Point::new(angle.cos(), angle.sin(), up)
+    };
+    let mut strip = Vec::new();
+    for i in 0..3 {
+        let (low, high) = if i == 2 { (1.0, 0.0) } else { (0.0, 1.0) };
+        let (a, b, c, d) = (
+            ring(i, 0.0),
+            ring((i + 1) % 3, low),
+            ring((i + 1) % 3, high),
+            ring(i, 1.0),
+        );
+        strip.extend([[a, b, c], [a, c, d]]);
+    }
+    let mut strip = build(strip);
+    let before = strip.clone();
+    assert_eq!(orient_alike(&mut strip).n_unorientable, 1);
+    assert_eq!(strip, before);
+}
+
+#[test]
+fn contact_by_number_of_shared_vertices() {
+    let p = [Point::ZERO, Point::X * 4.0, Point::Y * 4.0];
+    let ids = [0, 1, 2];
+    let at = |x: f64, y: f64, z: f64| Point::new(x, y, z);
+    let kind = |q: [Point; 3], q_ids: [u32; 3]| contact(p, ids, q, q_ids).map(|c| c.kind);
+    let apart = [3, 4, 5];
+    use ContactKind::*;
+    for (q, expected) in [
+        (
+            [at(1., 1., -1.), at(1., 1., 1.), at(9., 9., 0.5)],
+            Some(Crossing),
+        ),
+        (
+            [at(1., 1., 0.), at(1., 1., 1.), at(1., 2., 1.)],
+            Some(VertexOnFace),
+        ),
+        (
+            [at(2., 0., 0.), at(1., 1., 1.), at(1., 2., 1.)],
+            Some(VertexOnEdge),
+        ),
+        (
+            [at(2., 0., -1.), at(2., 0., 1.), at(2., -1., 0.)],
+            Some(EdgeOnEdge),
+        ),
+        (
+            [at(0., 0., -1.), at(0., 0., 1.), at(-1., -1., 0.)],
+            Some(VertexOnEdge),
+        ),
+        ([at(1., 1., 1e-300), at(1., 1., 1.), at(1., 2., 1.)], None),
+        (
+            [at(1., 1., 0.), at(2., 1., 0.), at(1., 2., 0.)],
+            Some(CoplanarOverlap),
+        ),
+        (
+            [at(-9., -9., 0.), at(90., -9., 0.), at(-9., 90., 0.)],
+            Some(CoplanarOverlap),
+        ),
+        (
+            [at(3., 3., 0.), at(2., 2., 0.), at(3., 2.5, 0.)],
+            Some(VertexOnEdge),
+        ),
+        ([at(3., 3., 0.), at(2.5, 2., 0.), at(3., 2.5, 0.)], None),
+        (
+            [at(-1., 1., 0.), at(5., 2., 0.), at(2., 3., 9.)],
+            Some(EdgeOnEdge),
+        ),
+    ] {
+        assert_eq!(kind(q, apart), expected, "{q:?}");
+        assert_eq!(contact(q, apart, p, ids).map(|c| c.kind), expected, "{q:?}");
+        let turned = [q[1], q[0], q[2]];
+        assert_eq!(kind(turned, apart), expected, "{q:?}");
+    }
+    for (q, expected) in [
+        ([p[0], at(-1., 0., 0.), at(0., -1., 0.)], None),
+        ([p[0], at(1., 1., 0.), at(-1., -1., 3.)], Some(VertexOnFace)),
+        ([p[0], at(9., 9., 0.), at(-1., -1., 3.)], Some(EdgeOnEdge)),
+        ([p[0], at(9., 0., 0.), at(0., -1., 3.)], Some(VertexOnEdge)),
+        ([p[0], at(1., 1., 1.), at(1., 1., -1.)], Some(Crossing)),
+        (
+            [p[0], at(1., 1., 0.), at(-1., 1., 0.)],
+            Some(CoplanarOverlap),
+        ),
+        ([p[0], at(1., 0., 0.), at(1., -1., 0.)], Some(VertexOnEdge)),
+        ([p[0], at(9., 0., 0.), at(1., -1., 0.)], Some(VertexOnEdge)),
+        ([p[0], at(1., 2., 3.), at(2., 1., 3.)], None),
+    ] {
+        assert_eq!(kind(q, [0, 4, 5]), expected, "{q:?}");
+        assert_eq!(kind([q[2], q[0], q[1]], [5, 0, 4]), expected, "{q:?}");
+    }
+    for (y, expected) in [
+        (at(1., 1., 0.), Some(CoplanarOverlap)),
+        (at(0., 1., 0.), Some(CoplanarOverlap)),
+        (at(1., -1., 0.), None),
+        (at(1., 1., 1e-12), None),
+    ] {
+        assert_eq!(kind([p[1], p[0], y], [1, 0, 9]), expected, "{y:?}");
+        assert_eq!(kind([y, p[0], p[1]], [9, 0, 1]), expected, "{y:?}");
+    }
+    assert_eq!(kind([p[1], p[0], p[2]], [1, 0, 2]), None);
+}

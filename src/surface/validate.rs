@@ -1,0 +1,126 @@
+//! Exact validation: everything that keeps a surface from bounding volumes, found and listed.
+
+use super::broad::BoxTree;
+use super::contact::{ContactKind, contact};
+use super::edges::{Closedness, Facets};
+use super::{Defect, Surface, SurfaceError};
+
+/// Self-intersections listed at most; all are counted.
+const LISTED_MAX: usize = 100_000;
+
+/// What validation found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Validation {
+    /// Edges, parts, two-sided facets.
+    pub closedness: Closedness,
+    /// Kind by kind (no area, repeated, open, intersecting), each sorted by triangle.
+    pub defects: Vec<Defect>,
+    /// Pairs of triangles that touch where they should not, listed or not; counting ends beyond ten million.
+    pub n_intersections: u64,
+    /// Defects in all, listed or not.
+    pub n_defects: u64,
+}
+
+impl Validation {
+    /// Whether the surface may be meshed.
+    pub fn is_valid(&self) -> bool {
+        self.n_defects == 0
+    }
+
+    /// The first defect as an error, when there is one.
+    ///
+    /// # Errors
+    /// [`SurfaceError::Invalid`].
+    pub fn accept(&self) -> Result<(), SurfaceError> {
+        match self.defects.first() {
+            None => Ok(()),
+            Some(defect) => Err(SurfaceError::Invalid {
+                defect: Box::new(defect.clone()),
+                n_defects: self.n_defects,
+            }),
+        }
+    }
+
+    /// How many listed defects have this code.
+    pub fn n_with_code(&self, code: &str) -> usize {
+        self.defects.iter().filter(|d| d.code() == code).count()
+    }
+
+    /// How many listed self-intersections are of this kind.
+    pub fn n_of_kind(&self, kind: ContactKind) -> usize {
+        let is_kind =
+            |d: &&Defect| matches!(d, Defect::SelfIntersection { kind: k, .. } if *k == kind);
+        self.defects.iter().filter(is_kind).count()
+    }
+}
+
+/// Checks a surface completely and exactly.
+///
+/// Near-linear time where boxes of triangles overlap few others; about 150 bytes per triangle. Same
+/// result for any number of threads. Orientation is no defect: see [`Closedness::n_inconsistent`].
+pub fn validate(surface: &Surface) -> Validation {
+    let facets = Facets::of(surface);
+    let closedness = facets.closedness(surface);
+    let mut defects = edge_defects(surface, &closedness);
+    let mut skip = facets.is_left_out;
+    for &(t, _) in &facets.degenerate {
+        skip[t as usize] = true;
+    }
+    drop(facets.uses);
+    let tree = BoxTree::new(surface, |t| !skip[t as usize]);
+    let (mut touching, n_intersections) = tree.pairs(LISTED_MAX, |a, b| {
+        let ids = [a, b].map(|t| surface.triangles[t as usize]);
+        let found = contact(surface.corners(a), ids[0], surface.corners(b), ids[1])?;
+        Some(([a, b], found))
+    });
+    touching.sort_unstable_by_key(|(triangles, _)| *triangles);
+    let n_defects = defects.len() as u64 + n_intersections;
+    defects.extend(
+        touching
+            .into_iter()
+            .map(|(triangles, found)| Defect::SelfIntersection {
+                triangles,
+                kind: found.kind,
+                at: found.at,
+            }),
+    );
+    Validation {
+        closedness,
+        defects,
+        n_intersections,
+        n_defects,
+    }
+}
+
+/// The defects that edges and vertices alone show.
+fn edge_defects(surface: &Surface, closedness: &Closedness) -> Vec<Defect> {
+    let mut defects = Vec::new();
+    if surface.n_triangles() == 0 {
+        defects.push(Defect::Empty);
+    }
+    let degenerate = closedness.degenerate.iter();
+    defects.extend(degenerate.map(|&(triangle, repeated)| Defect::Degenerate {
+        triangle,
+        repeated,
+        corners: surface.corners(triangle),
+    }));
+    defects.extend(
+        closedness
+            .duplicates
+            .iter()
+            .map(|&triangles| Defect::Duplicate {
+                triangles,
+                corners: surface.corners(triangles[0]),
+            }),
+    );
+    defects.extend(closedness.open.iter().map(|&(triangle, vertices)| {
+        let [from, to] = vertices.map(|v| surface.points[v as usize]);
+        Defect::OpenEdge {
+            triangle,
+            vertices,
+            from,
+            to,
+        }
+    }));
+    defects
+}
