@@ -10,6 +10,7 @@ pub mod mesh;
 pub mod surface;
 // Floor 3.
 pub mod delaunay;
+pub mod reconnect;
 pub mod samples;
 // Floor 7.
 pub mod io;
