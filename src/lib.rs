@@ -12,5 +12,7 @@ pub mod surface;
 pub mod delaunay;
 pub mod reconnect;
 pub mod samples;
+// Floor 4.
+pub mod optimize;
 // Floor 7.
 pub mod io;

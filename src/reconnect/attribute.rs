@@ -9,7 +9,7 @@ pub(super) const EDGE_FLAGS: u32 = 0x3F;
 
 /// Required edges found among the old tetrahedra, and what all of them share.
 #[derive(Default)]
-pub(super) struct Inherited {
+pub struct Inherited {
     region: u32,
     /// Flags other than those of edges.
     flags: u32,
@@ -19,10 +19,7 @@ pub(super) struct Inherited {
 
 impl Inherited {
     /// Reads the attributes of the old tetrahedra, given with their vertices; region and flags are those of the first.
-    pub(super) fn read<P: Pages>(
-        mesh: &mut Mesh<P>,
-        old: impl Iterator<Item = (u32, [u32; 4])>,
-    ) -> Self {
+    pub fn read<P: Pages>(mesh: &mut Mesh<P>, old: impl Iterator<Item = (u32, [u32; 4])>) -> Self {
         let mut found = Self::default();
         for (n, (t, vertices)) in old.enumerate() {
             let (region, flags) = mesh.tet_attribute(t);
@@ -45,7 +42,7 @@ impl Inherited {
     }
 
     /// Writes the attribute of a new tetrahedron where it differs from what is there.
-    pub(super) fn write<P: Pages>(&self, mesh: &mut Mesh<P>, t: u32, vertices: [u32; 4]) {
+    pub fn write<P: Pages>(&self, mesh: &mut Mesh<P>, t: u32, vertices: [u32; 4]) {
         let mut flags = self.flags;
         if !self.edges.is_empty() {
             for (e, [i, j]) in EDGES.into_iter().enumerate() {

@@ -23,6 +23,7 @@ mod swap;
 #[cfg(test)]
 mod tests;
 
+pub use attribute::Inherited;
 pub use ball::Ball;
 pub use removal::remove_edge;
 pub use replace::Replacement;
