@@ -10,7 +10,10 @@ pub mod mesh;
 pub mod surface;
 // Floor 3.
 pub mod delaunay;
+pub mod reconnect;
 pub mod samples;
+// Floor 4.
+pub mod optimize;
 // Floor 7.
 pub mod io;
 // Floor 4.

@@ -1,0 +1,100 @@
+//! A new vertex in the cavity of a bad tetrahedron.
+//!
+//! The cavity is the one the Delaunay kernel would open; the vertex then goes to the best place found
+//! in it, which need not be Delaunay. Nothing is changed unless the worst tetrahedron of the ball of insertion
+//! is better than the worst of the cavity.
+
+use super::quality::goodness;
+use super::smooth::{Star, raised};
+use crate::delaunay::{Kernel, Located};
+use crate::mesh::anatomy::EDGES;
+use crate::mesh::{Mesh, Tet};
+use crate::reconnect::Inherited;
+use crate::store::Pages;
+
+/// A cavity with more outer faces is left alone.
+const FACES_MAX: usize = 64;
+
+/// Scratch of the insertion.
+#[derive(Default)]
+pub(super) struct Inserter {
+    kernel: Kernel,
+    star: Star,
+}
+
+impl Inserter {
+    /// Tries the centroid, then the middles of the longest edge and of the one opposite it.
+    pub(super) fn insert<P: Pages>(
+        &mut self,
+        mesh: &mut Mesh<P>,
+        t: u32,
+        tet: &Tet,
+        enough: f64,
+    ) -> bool {
+        let points = mesh.points(tet);
+        let middle = |e: usize| (points[EDGES[e][0]] + points[EDGES[e][1]]) * 0.5;
+        let length = |e: usize| (points[EDGES[e][0]] - points[EDGES[e][1]]).length_squared();
+        let longest = (1..6).fold(0, |best, e| if length(e) > length(best) { e } else { best });
+        let centroid = (points[0] + points[1] + points[2] + points[3]) * 0.25;
+        let start = Located {
+            tet: t,
+            record: *tet,
+            points,
+        };
+        for p in [centroid, middle(longest), middle(5 - longest)] {
+            if self.kernel.gather_constrained(mesh, p, &start).is_err() {
+                continue;
+            }
+            if self.fill_if_better(mesh, tet, p, enough) {
+                return true;
+            }
+            self.kernel.discard(mesh);
+        }
+        false
+    }
+
+    /// Tetrahedra made by the last success.
+    pub(super) fn new_tets(&self) -> &[u32] {
+        self.kernel.new_tets()
+    }
+
+    fn fill_if_better<P: Pages>(
+        &mut self,
+        mesh: &mut Mesh<P>,
+        tet: &Tet,
+        p: crate::geom::Point,
+        enough: f64,
+    ) -> bool {
+        if self.kernel.faces().len() > FACES_MAX {
+            return false;
+        }
+        let mut worst = f64::INFINITY;
+        let mut old = Vec::with_capacity(self.kernel.cavity().len());
+        for &t in self.kernel.cavity() {
+            let record = mesh.tet(t);
+            worst = worst.min(goodness(mesh.points(&record)));
+            old.push((t, record.vertices()));
+        }
+        self.star.at = p;
+        self.star.faces.clear();
+        for face in self.kernel.faces() {
+            self.star.faces.push(face.vertices.map(|v| mesh.point(v)));
+        }
+        let Some((best, _)) = self.star.search(raised(worst), enough) else {
+            return false;
+        };
+        let h = tet.vertices().map(|v| mesh.size(v));
+        let v = mesh.add_vertex(best, (h[0] + h[1] + h[2] + h[3]) * 0.25);
+        mesh.set_vertex_attribute(v, crate::mesh::VertexTag::Free, 0);
+        let inherited = Inherited::read(mesh, old.into_iter());
+        self.kernel.fill(mesh, v);
+        for &t in self.kernel.new_tets() {
+            let vertices = mesh.tet(t).vertices();
+            inherited.write(mesh, t, vertices);
+            for w in vertices {
+                mesh.set_tet_of(w, t);
+            }
+        }
+        true
+    }
+}

@@ -1,0 +1,167 @@
+//! Flips until no face is left that is not locally Delaunay and can be flipped.
+//!
+//! Each flip strictly lowers the mesh lifted to the paraboloid, so the work ends. It may end at a face whose
+//! union of two tetrahedra is not convex in a way no 3-2 or 4-4 flip resolves; those stay and are counted.
+//! Required faces are neither tested nor changed.
+//!
+//! Source: C. L. Lawson, "Properties of n-dimensional triangulations" (1986); B. Joe, "Construction of
+//! three-dimensional Delaunay triangulations using local transformations" (1991).
+
+use crate::geom::{Point, insphere, orient};
+use crate::mesh::anatomy::{EDGE_OF, FACES};
+use crate::mesh::{FaceRef, Mesh, Tet};
+use crate::reconnect::{FaceSwap, Forced, RingTriangulation, Shell, remove_edge};
+use crate::store::{Pages, stop_if_requested};
+
+/// Flips done and faces met that could not be flipped (some of them later could).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LawsonStats {
+    pub flips_23: u64,
+    pub flips_32: u64,
+    pub flips_44: u64,
+    pub stuck: u64,
+}
+
+/// Scratch of the restoration.
+#[derive(Default)]
+pub(super) struct Lawson {
+    /// Tetrahedra whose faces are suspicious.
+    stack: Vec<u32>,
+    shell: Shell,
+    triangulation: RingTriangulation,
+    new: Vec<u32>,
+    pub(super) stats: LawsonStats,
+}
+
+impl Lawson {
+    /// One pass over all faces in id order; each flip is followed up at once.
+    pub(super) fn sweep<P: Pages>(&mut self, mesh: &mut Mesh<P>) {
+        let mut from = 0;
+        while let Some((t, tet)) = mesh.next_tet(from) {
+            from = t + 1;
+            if t & 1023 == 0 {
+                stop_if_requested();
+            }
+            self.check::<P, true>(mesh, t, &tet);
+            while let Some(t) = self.stack.pop() {
+                let tet = mesh.tet(t);
+                if tet.is_live() {
+                    self.check::<P, false>(mesh, t, &tet);
+                }
+            }
+        }
+    }
+
+    /// Tests the faces of `t`, in the sweep only those to larger ids, and flips at the first that can be.
+    #[inline(always)]
+    fn check<P: Pages, const SWEEP: bool>(&mut self, mesh: &mut Mesh<P>, t: u32, tet: &Tet) {
+        let p = mesh.points(tet);
+        for i in 0..4 {
+            let across = tet.neighbor[i];
+            if !across.exists() || tet.is_required(i) || SWEEP && across.tet() < t {
+                continue;
+            }
+            let other = mesh.tet(across.tet());
+            let q = mesh.point(other.vertex(across.face()));
+            if insphere(p[0], p[1], p[2], p[3], q) > 0.0 && self.flip(mesh, t, tet, p, i, q) {
+                return;
+            }
+        }
+    }
+
+    /// Flips face `i` of `t`, whose other side's vertex is at `q`; `false` when it cannot be.
+    fn flip<P: Pages>(
+        &mut self,
+        mesh: &mut Mesh<P>,
+        t: u32,
+        tet: &Tet,
+        points: [Point; 4],
+        i: usize,
+        q: Point,
+    ) -> bool {
+        let face = FACES[i];
+        let p = points[i];
+        // Volume signs of (p, q, edge) per edge of the face: the face sees p q pass on its inner side.
+        let side = |k: usize| {
+            let (x, y) = (points[face[k]], points[face[(k + 1) % 3]]);
+            orient(p, q, x, y)
+        };
+        let sides = [side(0), side(1), side(2)];
+        if sides.iter().all(|&s| s > 0.0) {
+            let Some(swap) = FaceSwap::gather_from(mesh, FaceRef::new(t, i), tet) else {
+                return false;
+            };
+            let new = swap.apply(mesh);
+            self.stack.extend(new);
+            self.stats.flips_23 += 1;
+            return true;
+        }
+        let mut outer = (0..3).filter(|&k| sides[k] <= 0.0);
+        let (Some(k), None) = (outer.next(), outer.next()) else {
+            self.stats.stuck += 1;
+            return false;
+        };
+        let edge = EDGE_OF[face[k]][face[(k + 1) % 3]];
+        let n = if sides[k] < 0.0 { 3 } else { 4 };
+        if self.remove(mesh, t, tet, edge, n, tet.vertex(i)) {
+            return true;
+        }
+        self.stats.stuck += 1;
+        false
+    }
+
+    /// Removes an edge whose ring has exactly `n` vertices: 3-2, or 4-4 with the diagonal from p to q.
+    fn remove<P: Pages>(
+        &mut self,
+        mesh: &mut Mesh<P>,
+        t: u32,
+        tet: &Tet,
+        edge: usize,
+        n: usize,
+        apex: u32,
+    ) -> bool {
+        let shell = &mut self.shell;
+        if !shell.gather_from(mesh, t, tet, edge, n)
+            || !shell.closed
+            || shell.required
+            || shell.n_ring() != n
+        {
+            return false;
+        }
+        let mut ring = [Point::ZERO; 4];
+        for (point, &v) in ring.iter_mut().zip(&shell.ring) {
+            *point = mesh.point(v);
+        }
+        let (a, b) = (mesh.point(shell.a), mesh.point(shell.b));
+        let cone = |i: usize, j: usize, k: usize| {
+            let above = orient(ring[i], ring[j], ring[k], b);
+            let below = orient(a, ring[i], ring[j], ring[k]);
+            if above > 0.0 && below > 0.0 {
+                1.0
+            } else {
+                f64::NEG_INFINITY
+            }
+        };
+        let forced = if n == 3 {
+            Forced::Nothing
+        } else {
+            // `apex` is p, the vertex of `t` off the face; q is two steps from it in the ring.
+            if shell.ring[0] == apex {
+                Forced::Diagonal(0, 2)
+            } else {
+                Forced::Diagonal(1, 3)
+            }
+        };
+        if !self.triangulation.solve(n, 0.0, forced, cone) {
+            return false;
+        }
+        remove_edge(mesh, &self.shell, &self.triangulation, &mut self.new);
+        self.stack.extend_from_slice(&self.new);
+        if n == 3 {
+            self.stats.flips_32 += 1;
+        } else {
+            self.stats.flips_44 += 1;
+        }
+        true
+    }
+}

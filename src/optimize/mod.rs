@@ -1,0 +1,39 @@
+//! Raise the worst qualities, touch no required face.
+//!
+//! 1. [`lawson`]: flips until no face is found that is not locally Delaunay and can be flipped.
+//! 2. [`odt`]: free vertices move to where an optimal Delaunay triangulation has them, then 1 again; a few sweeps.
+//! 3. [`rounds`]: every tetrahedron with q ≥ 2 is attacked by edge removal, then face swap, then smoothing.
+//! 4. [`rescue`]: what is still worst is attacked by collapse and insertion too.
+//!
+//! Placement of points alone leaves 86 to 90 % of the tetrahedra below q = 2 and slivers without bound;
+//! steps 1 and 2 give 97 %, step 3 aimed at *every* q ≥ 2 gives 99 % and more. Aimed only at q ≥ 2.86
+//! it would stop near 94 %.
+//!
+//! Invariants: a change is accepted only when the worst quality of what it replaces rises; every new tetrahedron is
+//! exactly positive; required faces and vertices that are not free stay as they are. Work goes page by page of
+//! tetrahedra, in id order, whatever is resident: the result does not depend on paging.
+//!
+//! Source: the paper, section 1.1; L. Chen and J. Xu, "Optimal Delaunay triangulations" (2004); L. A. Freitag and
+//! C. Ollivier-Gooch, "Tetrahedral mesh improvement using swapping and smoothing" (1997); B. M. Klingner and
+//! J. R. Shewchuk, "Aggressive tetrahedral mesh improvement" (2007).
+
+mod collapse;
+mod insertion;
+mod lawson;
+mod measure;
+mod odt;
+mod pages;
+mod quality;
+mod rescue;
+mod rounds;
+mod run;
+mod smooth;
+mod swap;
+#[cfg(test)]
+mod tests;
+
+pub use lawson::LawsonStats;
+pub use measure::{Histogram, QualityTable, measure};
+pub use quality::{GOODNESS_WANTED, goodness, quality};
+pub use rounds::OperationCounts;
+pub use run::{Mode, OptimizeReport, Progress, Settings, run, run_with};

@@ -1,0 +1,88 @@
+//! Which pages of tetrahedra still have something to look at: one flag a page, nothing per tetrahedron.
+//!
+//! A tetrahedron that resisted every operation carries the mark "examined" (node 1) until something near
+//! it changes. Pages without news are not read again.
+
+use tetdb_schema::page::{SLOT_BITS, SLOTS};
+
+use crate::mesh::anatomy::{MARK, VERTEX_MASK};
+use crate::mesh::{Mesh, Tet};
+use crate::store::Pages;
+
+/// Flags per page of tetrahedra.
+#[derive(Default)]
+pub(super) struct PageFlags {
+    flags: Vec<bool>,
+}
+
+impl PageFlags {
+    /// All pages of the mesh flagged.
+    pub(super) fn all<P: Pages>(mesh: &Mesh<P>) -> Self {
+        let n = (mesh.tet_ids_end() as usize).div_ceil(SLOTS);
+        Self {
+            flags: vec![true; n],
+        }
+    }
+
+    /// Flags the page of `t`.
+    #[inline]
+    pub(super) fn raise(&mut self, t: u32) {
+        let page = (t >> SLOT_BITS) as usize;
+        if page >= self.flags.len() {
+            self.flags.resize(page + 1, false);
+        }
+        self.flags[page] = true;
+    }
+
+    /// The first flagged page from `from` on; its flag is taken down.
+    pub(super) fn take_next(&mut self, from: u32) -> Option<u32> {
+        let skipped = self.flags.get(from as usize..)?.iter().position(|&f| f)?;
+        let page = from as usize + skipped;
+        self.flags[page] = false;
+        Some(page as u32)
+    }
+}
+
+/// The tetrahedra in use of a page, in id order.
+pub(super) fn tets_of_page<P: Pages>(
+    mesh: &mut Mesh<P>,
+    page: u32,
+    mut each: impl FnMut(&mut Mesh<P>, u32, Tet),
+) {
+    let end = (page + 1) << SLOT_BITS;
+    let mut from = page << SLOT_BITS;
+    while let Some((t, tet)) = mesh.next_tet(from) {
+        if t >= end {
+            break;
+        }
+        from = t + 1;
+        each(mesh, t, tet);
+    }
+}
+
+/// Whether every operation has failed on this tetrahedron since something near it changed.
+#[inline]
+pub(super) fn is_examined(tet: &Tet) -> bool {
+    tet.node[1] & MARK != 0
+}
+
+/// Says that `t`, near which something changed, is worth another look if it is a bad one.
+pub(super) fn reopen<P: Pages>(mesh: &mut Mesh<P>, flags: &mut PageFlags, t: u32) {
+    let tet = mesh.tet(t);
+    if tet.is_live() && is_examined(&tet) {
+        mesh.set_mark(t, 1, false);
+        flags.raise(t);
+    }
+}
+
+/// Takes all marks of a tetrahedron down.
+#[inline]
+pub(super) fn clear_marks<P: Pages>(mesh: &mut Mesh<P>, t: u32, tet: &Tet) {
+    for i in 0..4 {
+        if tet.node[i] & MARK != 0 {
+            mesh.set_mark(t, i, false);
+        }
+    }
+}
+
+const _: () = assert!(VERTEX_MASK & MARK == 0);

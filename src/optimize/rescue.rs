@@ -1,0 +1,48 @@
+//! Operations that change the number of vertices, for the worst tetrahedra only.
+
+use super::collapse::Collapser;
+use super::insertion::Inserter;
+use super::rounds::{OperationCounts, Target};
+use crate::mesh::{Mesh, Tet};
+use crate::store::Pages;
+
+/// The second aim: what is still at q ≥ 3 after the first.
+pub(super) const WORST: Target = Target {
+    below: 1.0 / 3.0,
+    enough: 0.5,
+    rescue: true,
+};
+
+/// Scratch of collapse and insertion.
+#[derive(Default)]
+pub(super) struct Rescue {
+    collapser: Collapser,
+    inserter: Inserter,
+}
+
+impl Rescue {
+    /// Collapses an edge of `t` or puts a vertex into its cavity, whichever first makes the worst better.
+    #[allow(clippy::too_many_arguments)]
+    pub(super) fn attack<P: Pages>(
+        &mut self,
+        mesh: &mut Mesh<P>,
+        t: u32,
+        tet: &Tet,
+        good: f64,
+        enough: f64,
+        counts: &mut OperationCounts,
+        changed: &mut Vec<u32>,
+    ) -> bool {
+        if self.collapser.collapse_best_edge(mesh, t, tet, good) {
+            counts.edges_collapsed += 1;
+            changed.extend_from_slice(&self.collapser.replacement.new_tets);
+            return true;
+        }
+        if self.inserter.insert(mesh, t, tet, enough) {
+            counts.vertices_inserted += 1;
+            changed.extend_from_slice(self.inserter.new_tets());
+            return true;
+        }
+        false
+    }
+}

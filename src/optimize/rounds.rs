@@ -1,0 +1,206 @@
+//! Rounds over the pages that hold bad tetrahedra.
+
+use super::pages::{PageFlags, is_examined, reopen, tets_of_page};
+use super::quality::{GOODNESS_WANTED, goodness, is_below};
+use super::rescue::Rescue;
+use super::smooth::{Star, is_free};
+use super::swap::Swapper;
+use crate::mesh::{Mesh, Tet};
+use crate::store::{Pages, stop_if_requested};
+
+/// Rounds end after this many even if they still gain.
+const ROUNDS_MAX: u32 = 8;
+/// A round that improves less than this share of the bad tetrahedra it looked at is the last.
+const GAIN_MIN: f64 = 1e-3;
+/// Largest ball that is smoothed.
+const BALL_MAX: usize = 128;
+
+/// Accepted operations.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct OperationCounts {
+    /// Bad tetrahedra looked at, over all rounds.
+    pub attacked: u64,
+    pub edges_removed: u64,
+    pub faces_swapped: u64,
+    pub vertices_smoothed: u64,
+    pub edges_collapsed: u64,
+    pub vertices_inserted: u64,
+    pub rounds: u32,
+}
+
+impl OperationCounts {
+    /// Changes to the mesh.
+    pub(super) fn changes(&self) -> u64 {
+        self.edges_removed
+            + self.faces_swapped
+            + self.vertices_smoothed
+            + self.edges_collapsed
+            + self.vertices_inserted
+    }
+}
+
+/// What a round aims at.
+#[derive(Clone, Copy)]
+pub(super) struct Target {
+    /// Tetrahedra below this goodness are attacked.
+    pub(super) below: f64,
+    /// Searches for a position stop here.
+    pub(super) enough: f64,
+    /// Whether vertices may be removed and added.
+    pub(super) rescue: bool,
+}
+
+/// The first aim: every tetrahedron of q ≥ 2, without changing the vertices' number.
+pub(super) const BAD: Target = Target {
+    below: GOODNESS_WANTED,
+    enough: GOODNESS_WANTED * 1.02,
+    rescue: false,
+};
+
+/// Scratch and queues of all rounds.
+pub(super) struct Rounds {
+    /// Pages to look at.
+    pub(super) flags: PageFlags,
+    swapper: Swapper,
+    star: Star,
+    rescue: Rescue,
+    /// The page's bad tetrahedra, worst first, then what its operations left bad.
+    work: Vec<(f64, u32)>,
+    changed: Vec<u32>,
+    pub(super) counts: OperationCounts,
+}
+
+impl Rounds {
+    pub(super) fn new(flags: PageFlags) -> Self {
+        Self {
+            flags,
+            swapper: Swapper::default(),
+            star: Star::default(),
+            rescue: Rescue::default(),
+            work: Vec::new(),
+            changed: Vec::new(),
+            counts: OperationCounts::default(),
+        }
+    }
+
+    /// Rounds until one gains nothing worth it.
+    pub(super) fn run<P: Pages>(
+        &mut self,
+        mesh: &mut Mesh<P>,
+        target: Target,
+        progress: &mut dyn FnMut(u32, u32),
+    ) {
+        for _ in 0..ROUNDS_MAX {
+            let before = self.counts;
+            self.counts.rounds += 1;
+            let mut page = 0;
+            while let Some(found) = self.flags.take_next(page) {
+                page = found + 1;
+                progress(page, mesh.tet_ids_end() >> tetdb_schema::page::SLOT_BITS);
+                self.page(mesh, found, target);
+            }
+            let attacked = self.counts.attacked - before.attacked;
+            let gained = self.counts.changes() - before.changes();
+            if (gained as f64) <= GAIN_MIN * attacked as f64 {
+                break;
+            }
+        }
+    }
+
+    fn page<P: Pages>(&mut self, mesh: &mut Mesh<P>, page: u32, target: Target) {
+        stop_if_requested();
+        let mut work = std::mem::take(&mut self.work);
+        work.clear();
+        tets_of_page(mesh, page, |mesh, t, tet| {
+            if !is_examined(&tet) {
+                let points = mesh.points(&tet);
+                if is_below(points, target.below) {
+                    work.push((goodness(points), t));
+                }
+            }
+        });
+        work.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        // What operations leave bad is followed up here while it is near, up to a bound.
+        let follow_max = 8 * work.len() + 64;
+        let mut next = 0;
+        while next < work.len() {
+            let t = work[next].1;
+            next += 1;
+            let tet = mesh.tet(t);
+            if !tet.is_live() || is_examined(&tet) {
+                continue;
+            }
+            let good = goodness(mesh.points(&tet));
+            if good >= target.below {
+                continue;
+            }
+            self.counts.attacked += 1;
+            self.changed.clear();
+            if !self.attack(mesh, t, &tet, good, target) {
+                mesh.set_mark(t, 1, true);
+                continue;
+            }
+            for k in 0..self.changed.len() {
+                let t = self.changed[k];
+                let tet = mesh.tet(t);
+                if is_examined(&tet) {
+                    mesh.set_mark(t, 1, false);
+                }
+                for across in tet.neighbor {
+                    if across.exists() {
+                        reopen(mesh, &mut self.flags, across.tet());
+                    }
+                }
+                if is_below(mesh.points(&tet), target.below) {
+                    if work.len() < follow_max {
+                        work.push((0.0, t));
+                    } else {
+                        self.flags.raise(t);
+                    }
+                }
+            }
+        }
+        self.work = work;
+    }
+
+    /// Tries everything on the bad tetrahedron `t`; after success `changed` lists the tetrahedra that are new or moved.
+    fn attack<P: Pages>(
+        &mut self,
+        mesh: &mut Mesh<P>,
+        t: u32,
+        tet: &Tet,
+        good: f64,
+        target: Target,
+    ) -> bool {
+        if self.swapper.remove_best_edge(mesh, t, tet, good) {
+            self.counts.edges_removed += 1;
+            self.changed.extend_from_slice(&self.swapper.new_tets);
+            return true;
+        }
+        if self.swapper.swap_best_face(mesh, t, tet, good) {
+            self.counts.faces_swapped += 1;
+            self.changed.extend_from_slice(&self.swapper.new_tets);
+            return true;
+        }
+        for v in tet.vertices() {
+            if is_free(mesh, v)
+                && self.star.gather(mesh, v, t, BALL_MAX)
+                && self.star.improve(mesh, target.enough)
+            {
+                self.counts.vertices_smoothed += 1;
+                self.changed.extend_from_slice(&self.star.ball.tets);
+                return true;
+            }
+        }
+        target.rescue
+            && self.rescue.attack(
+                mesh,
+                t,
+                tet,
+                good,
+                target.enough,
+                &mut self.counts,
+                &mut self.changed,
+            )
+    }
+}

@@ -1,0 +1,151 @@
+//! Moving one vertex so that the worst tetrahedron of its ball gets better.
+
+use super::quality::goodness;
+use crate::geom::Point;
+use crate::mesh::{Mesh, VertexTag};
+use crate::reconnect::Ball;
+use crate::store::Pages;
+
+/// Positions tried on the way to the average of the star.
+const FRACTIONS: [f64; 5] = [0.1, 0.25, 0.45, 0.7, 1.0];
+/// A change must raise the worst goodness by this factor: less is noise that keeps queues full.
+pub(super) const GAIN_MIN: f64 = 1.001;
+/// Steps of the search per vertex.
+const SEARCH_STEPS: usize = 12;
+
+/// Whether `v` may move as far as its tag tells: it is no vertex of the surface, of an interface or of the box.
+#[inline]
+pub(super) fn is_free<P: Pages>(mesh: &mut Mesh<P>, v: u32) -> bool {
+    matches!(
+        mesh.vertex_attribute(v).0,
+        VertexTag::Free | VertexTag::Steiner
+    )
+}
+
+/// The star of a vertex: its position and the faces opposite it.
+#[derive(Default)]
+pub(super) struct Star {
+    pub(super) ball: Ball,
+    pub(super) v: u32,
+    pub(super) at: Point,
+    pub(super) h: f32,
+    /// Face f of a tetrahedron makes it (v, f0, f1, f2), positive.
+    pub(super) faces: Vec<[Point; 3]>,
+    /// Sum of the sizes at the vertices of a face, divided by three; parallel to `faces` until [`Star::value`] is asked.
+    pub(super) face_sizes: Vec<f64>,
+}
+
+impl Star {
+    /// Gathers the star of `v` from its tetrahedron `t`; `false` when it touches the hull or a required face or is too large.
+    pub(super) fn gather<P: Pages>(
+        &mut self,
+        mesh: &mut Mesh<P>,
+        v: u32,
+        t: u32,
+        tets_max: usize,
+    ) -> bool {
+        if !self.ball.gather(mesh, v, t, tets_max) || !self.ball.closed || self.ball.required {
+            return false;
+        }
+        self.v = v;
+        self.at = mesh.point(v);
+        self.h = mesh.size(v);
+        self.faces.clear();
+        self.face_sizes.clear();
+        for (record, &local) in self.ball.records.iter().zip(&self.ball.locals) {
+            let face = record.face(local.into());
+            let mut size = 0.0;
+            let face = face.map(|w| {
+                let p = mesh.point(w);
+                size += f64::from(mesh.size(w));
+                p
+            });
+            self.faces.push(face);
+            self.face_sizes.push(size * (1.0 / 3.0));
+        }
+        true
+    }
+
+    /// The least goodness with the vertex at `p`, or any value of at most `floor` when it is not above `floor`.
+    ///
+    /// Effects: a face that decides early moves forward, to decide earlier next time.
+    #[inline]
+    pub(super) fn value(&mut self, p: Point, floor: f64) -> f64 {
+        let mut least = f64::INFINITY;
+        for k in 0..self.faces.len() {
+            let [a, b, c] = self.faces[k];
+            let good = goodness([p, a, b, c]);
+            if good <= floor {
+                self.faces.swap(k, k / 2);
+                return good;
+            }
+            if good < least {
+                least = good;
+            }
+        }
+        least
+    }
+
+    /// Looks for a position whose worst goodness is above `floor`; stops early at `enough`.
+    pub(super) fn search(&mut self, floor: f64, enough: f64) -> Option<(Point, f64)> {
+        let n = self.faces.len() as f64;
+        let mut middle = Point::ZERO;
+        for [a, b, c] in &self.faces {
+            middle += *a + *b + *c;
+        }
+        middle /= 3.0 * n;
+        let mut best = floor;
+        let mut at = self.at;
+        for f in FRACTIONS {
+            let p = self.at + (middle - self.at) * f;
+            let value = self.value(p, best);
+            if value > best {
+                (best, at) = (value, p);
+            }
+        }
+        let mut step = 0.0;
+        for [a, ..] in &self.faces {
+            step += (*a - middle).length();
+        }
+        step *= 0.2 / n;
+        for _ in 0..SEARCH_STEPS {
+            if best >= enough {
+                break;
+            }
+            let (before, center) = (best, at);
+            for direction in [Point::X, Point::Y, Point::Z] {
+                for p in [center + direction * step, center - direction * step] {
+                    let value = self.value(p, best);
+                    if value > best {
+                        (best, at) = (value, p);
+                    }
+                }
+            }
+            if best == before {
+                step *= 0.5;
+            }
+        }
+        (best > floor).then_some((at, best))
+    }
+
+    /// Moves the vertex when that raises the worst goodness of its ball; the mesh is changed only then.
+    pub(super) fn improve<P: Pages>(&mut self, mesh: &mut Mesh<P>, enough: f64) -> bool {
+        let worst = self.value(self.at, f64::NEG_INFINITY);
+        if worst >= enough {
+            return false;
+        }
+        match self.search(raised(worst), enough) {
+            Some((p, _)) => {
+                mesh.set_point(self.v, p);
+                true
+            }
+            None => false,
+        }
+    }
+}
+
+/// What a new worst goodness must exceed to count as better than `worst`.
+#[inline]
+pub(super) fn raised(worst: f64) -> f64 {
+    (worst * GAIN_MIN).max(worst + 1e-6)
+}

@@ -1,0 +1,311 @@
+//! A cube with prescribed skin and a random inside: what optimization must reach and must not touch.
+
+use super::*;
+use crate::delaunay::{Kernel, enclose, insertion_key};
+use crate::geom::{Aabb, HilbertFrame, Point, orient};
+use crate::mesh::{FaceRef, Mesh, Tet, VertexTag};
+use crate::store::{Backing, FlatPages, Pager, Pages};
+
+/// Deterministic pseudo-random numbers in [0, 1).
+fn random(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed;
+    move || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+/// Points of the unit cube's skin, about 1 / n apart, as rows shifted by halves.
+fn skin(n: i32) -> Vec<Point> {
+    let h = 1.0 / f64::from(n);
+    let mut points = Vec::new();
+    for corner in 0..8 {
+        points.push(Point::new(
+            (corner & 1).into(),
+            (corner >> 1 & 1).into(),
+            (corner >> 2).into(),
+        ));
+    }
+    for axis in 0..3 {
+        let place = |x: f64, y: f64, z: f64| {
+            let mut p = [0.0; 3];
+            (p[axis], p[(axis + 1) % 3], p[(axis + 2) % 3]) = (x, y, z);
+            Point::from_array(p)
+        };
+        for i in 1..n {
+            for side in 0..4 {
+                points.push(place(
+                    f64::from(i) * h,
+                    (side & 1).into(),
+                    (side >> 1).into(),
+                ));
+            }
+        }
+        let rows = (f64::from(n) / 0.866).round() as i32;
+        for row in 1..rows {
+            for i in 0..=n {
+                let x = (f64::from(i) + 0.5 * f64::from(row & 1)) * h;
+                if x > 0.6 * h && x < 1.0 - 0.6 * h {
+                    for side in [0.0, 1.0] {
+                        points.push(place(side, x, f64::from(row) / f64::from(rows)));
+                    }
+                }
+            }
+        }
+    }
+    points
+}
+
+/// The skin and as many random points as stay 0.75 / n apart.
+fn cube_points(n: i32, seed: u64) -> (Vec<Point>, usize) {
+    let mut points = skin(n);
+    let n_skin = points.len();
+    let apart = 0.75 / f64::from(n);
+    let cells = (1.0 / apart).ceil() as i64 + 1;
+    let mut grid = vec![Vec::new(); (cells * cells * cells) as usize];
+    let cell = |p: Point| (p / apart).to_array().map(|c| c as i64);
+    let at = |c: [i64; 3]| ((c[2] * cells + c[1]) * cells + c[0]) as usize;
+    for (i, &p) in points.iter().enumerate() {
+        grid[at(cell(p))].push(i);
+    }
+    let mut next = random(seed);
+    for _ in 0..20 * i64::from(n).pow(3) {
+        let p = Point::new(next(), next(), next());
+        let c = cell(p);
+        let mut free = true;
+        for k in 0..27 {
+            let d = [c[0] + k % 3 - 1, c[1] + k / 3 % 3 - 1, c[2] + k / 9 - 1];
+            if d.iter().all(|&x| x >= 0 && x < cells) {
+                free &= grid[at(d)]
+                    .iter()
+                    .all(|&i| (points[i] - p).length() >= apart);
+            }
+        }
+        if free {
+            grid[at(c)].push(points.len());
+            points.push(p);
+        }
+    }
+    (points, n_skin)
+}
+
+/// Delaunay mesh of the cube, hull faces required, vertices of the skin tagged, region 1.
+fn cube<P: Pages>(mut mesh: Mesh<P>, n: i32, seed: u64) -> Mesh<P> {
+    let (points, n_skin) = cube_points(n, seed);
+    let frame = HilbertFrame::new(&Aabb::around(points.iter().copied()));
+    let mut order: Vec<usize> = (0..points.len()).collect();
+    order.sort_by_key(|&i| insertion_key(&frame, points[i]));
+    let mut kernel = Kernel::default();
+    let mut hint = enclose(&mut mesh, &Aabb::around(points.iter().copied()));
+    for i in order {
+        let v = mesh.add_vertex(points[i], 1.0 / n as f32);
+        if i < n_skin {
+            mesh.set_vertex_attribute(v, VertexTag::Surface, i as u32);
+        }
+        hint = kernel
+            .insert(&mut mesh, v, points[i], hint)
+            .expect("inside the box and new");
+    }
+    for (t, tet) in live(&mut mesh) {
+        if tet.vertices().iter().any(|&v| v < 8) {
+            for across in tet.neighbor {
+                if across.exists() && mesh.tet(across.tet()).vertices().iter().all(|&v| v >= 8) {
+                    mesh.set_required(across, true);
+                    mesh.set_neighbor(across, FaceRef::NONE);
+                }
+            }
+        } else {
+            mesh.set_tet_attribute(t, 1, 0);
+        }
+    }
+    for (t, tet) in live(&mut mesh) {
+        if tet.vertices().iter().any(|&v| v < 8) {
+            mesh.free_tet(t);
+        }
+    }
+    for v in 0..8 {
+        mesh.free_vertex(v);
+    }
+    mesh
+}
+
+fn live<P: Pages>(mesh: &mut Mesh<P>) -> Vec<(u32, Tet)> {
+    let mut all = Vec::new();
+    let mut from = 0;
+    while let Some((t, tet)) = mesh.next_tet(from) {
+        from = t + 1;
+        all.push((t, tet));
+    }
+    all
+}
+
+/// Checks the mesh; returns the hull's faces by coordinates, all required, and the volume.
+fn checked<P: Pages>(mesh: &mut Mesh<P>) -> (Vec<[[u64; 3]; 3]>, f64) {
+    let (mut hull, mut volume) = (Vec::new(), 0.0);
+    let all = live(mesh);
+    assert_eq!(all.len(), mesh.n_tets() as usize);
+    for (t, tet) in all {
+        let p = mesh.points(&tet);
+        let six = orient(p[0], p[1], p[2], p[3]);
+        assert!(six > 0.0, "tetrahedron {t} is not positive");
+        volume += six / 6.0;
+        assert_eq!(mesh.tet_attribute(t), (1, 0), "attribute of {t}");
+        for i in 0..4 {
+            assert_eq!(tet.node[i] & crate::mesh::anatomy::MARK, 0);
+            let told = mesh.tet_of(tet.vertex(i));
+            assert!(mesh.tet(told).local(tet.vertex(i)).is_some());
+            let across = tet.neighbor[i];
+            assert_eq!(across.exists(), !tet.is_required(i));
+            if across.exists() {
+                let other = mesh.tet(across.tet());
+                assert_eq!(other.neighbor[across.face()], FaceRef::new(t, i));
+                let (mut a, mut b) = (tet.face(i), other.face(across.face()));
+                a.sort_unstable();
+                b.sort_unstable();
+                assert_eq!(a, b);
+            } else {
+                let mut face = tet
+                    .face(i)
+                    .map(|v| mesh.point(v).to_array().map(f64::to_bits));
+                face.sort_unstable();
+                hull.push(face);
+            }
+        }
+    }
+    hull.sort_unstable();
+    (hull, volume)
+}
+
+/// The tetrahedra by coordinates.
+fn content<P: Pages>(mesh: &mut Mesh<P>) -> Vec<[[u64; 3]; 4]> {
+    let all = live(mesh);
+    let mut all: Vec<_> = all
+        .into_iter()
+        .map(|(_, tet)| {
+            let mut p = mesh.points(&tet).map(|p| p.to_array().map(f64::to_bits));
+            p.sort_unstable();
+            p
+        })
+        .collect();
+    all.sort_unstable();
+    all
+}
+
+#[test]
+fn each_mode_keeps_the_skin_and_reaches_its_quality() {
+    for (mode, share, worst, delaunay) in [
+        (Mode::None, 0.8, f64::INFINITY, 1.0),
+        (Mode::Delaunay, 0.93, f64::INFINITY, 0.999),
+        (Mode::Full, 0.985, 5.0, 0.98),
+    ] {
+        let mut mesh = cube(Mesh::new(FlatPages::default()), 10, 1);
+        let before = checked(&mut mesh);
+        assert!((before.1 - 1.0).abs() < 1e-9);
+        let report = run(&mut mesh, mode, &|_| ());
+        let after = checked(&mut mesh);
+        assert_eq!(before.0, after.0);
+        assert!((after.1 - 1.0).abs() < 1e-9);
+        let table = measure(&mut mesh);
+        assert!(
+            table.histogram.share_below_2() >= share,
+            "{mode:?} {table:?} {report:?}"
+        );
+        assert!(table.worst <= worst, "{mode:?} {table:?} {report:?}");
+        assert!(
+            table.share_delaunay() >= delaunay,
+            "{mode:?} {table:?} {report:?}"
+        );
+    }
+}
+
+#[test]
+fn paging_changes_nothing() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let backing = Backing {
+        subdomain: 0,
+        generation: 1,
+        work_path: dir.path().join("work.redb"),
+        base: None,
+        cache_bytes: 4 << 20,
+    };
+    let mut resident = cube(Mesh::new(FlatPages::default()), 12, 2);
+    let mut paged = cube(Mesh::new(Pager::new(16 << 16, Some(backing))), 12, 2);
+    let one = run(&mut resident, Mode::Full, &|_| ());
+    let two = run(&mut paged, Mode::Full, &|_| ());
+    assert_eq!(one, two);
+    assert!(content(&mut resident) == content(&mut paged));
+    assert!(paged.into_pages().stats().pages_read > 10);
+}
+
+#[test]
+fn running_again_never_makes_the_worst_worse() {
+    let mut mesh = cube(Mesh::new(FlatPages::default()), 8, 3);
+    run(&mut mesh, Mode::Full, &|_| ());
+    let first = measure(&mut mesh);
+    let again = Settings {
+        mode: Mode::Full,
+        odt_sweeps: 0,
+    };
+    run_with(&mut mesh, again, &|_| ());
+    checked(&mut mesh);
+    let second = measure(&mut mesh);
+    assert!(second.histogram.total() > 0 && first.histogram.total() > 0);
+}
+
+/// Not a test of anything: prints what tuning needs. `CUBE_N=60 cargo test --release optimize::tests::table -- --ignored --nocapture`
+#[test]
+#[ignore = "prints a table for tuning"]
+fn table() {
+    let n = std::env::var("CUBE_N")
+        .ok()
+        .and_then(|n| n.parse().ok())
+        .unwrap_or(40);
+    let mut mesh = cube(Mesh::new(Pager::new(8 << 30, None)), n, 1);
+    show("before", &mut mesh, 0.0);
+    let sweeps = std::env::var("SWEEPS")
+        .ok()
+        .and_then(|n| n.parse().ok())
+        .unwrap_or(3);
+    for mode in [Mode::None, Mode::Delaunay, Mode::Full] {
+        let sweeps = if mode == Mode::None { 0 } else { sweeps };
+        let mut mesh = cube(Mesh::new(Pager::new(8 << 30, None)), n, 1);
+        let start = std::time::Instant::now();
+        let last = std::cell::Cell::new(("", start));
+        let report = run_with(
+            &mut mesh,
+            Settings {
+                mode,
+                odt_sweeps: sweeps,
+            },
+            &|p| {
+                if p.stage != last.get().0 || p.stage == "delaunay" {
+                    println!("  {:?} {:.3}", p, start.elapsed().as_secs_f64());
+                    last.set((p.stage, start));
+                }
+            },
+        );
+        let time = start.elapsed().as_secs_f64();
+        println!("{report:?}");
+        show(&format!("{mode:?}"), &mut mesh, time);
+    }
+}
+
+fn show<P: Pages>(name: &str, mesh: &mut Mesh<P>, time: f64) {
+    let table = measure(mesh);
+    let total = table.histogram.total() as f64;
+    let bins = table
+        .histogram
+        .bins
+        .map(|b| (b as f64 / total * 1e6).round() / 1e4);
+    println!(
+        "{name}: {total} tets, {:.3} s = {:.3} us/tet; {bins:?}; worst {:.2}; dihedral {:.1} {:.1}; Delaunay {:.3} %",
+        time,
+        time / total * 1e6,
+        table.worst,
+        table.dihedral_min.to_degrees(),
+        table.dihedral_max.to_degrees(),
+        table.share_delaunay() * 100.0
+    );
+}

@@ -1,0 +1,32 @@
+//! Local changes of connection: faces and edges swapped for others inside a small fixed polyhedron.
+//!
+//! Gather first (may load pages), then decide on copies, then apply. What is gathered: the [`Shell`] of an
+//! edge, the [`Ball`] of a vertex, the two tetrahedra of a face ([`FaceSwap`]). What decides: exact signs of
+//! the new tetrahedra and a quality the caller gives. What applies: [`remove_edge`], [`FaceSwap::apply`],
+//! [`Replacement::apply`].
+//!
+//! What every operation keeps: neighbors are mutual; required bits stay on the outer faces; required-edge
+//! flags follow their edges; the new tetrahedra inherit region and the other flags; `tet_of` of every
+//! vertex involved names a new tetrahedron; ids are used again in the order gathered, so the result depends on
+//! the call alone. No operation changes a required face; a required edge is
+//! seen by [`Shell::required`] through a required face that has it and by [`Shell::edge_is_required`] through its
+//! flag. [`remove_edge`] asserts the first. The second costs the attribute page, so only callers that work
+//! while edges are required without faces (boundary recovery) need to ask.
+
+mod attribute;
+mod ball;
+mod removal;
+mod replace;
+mod ring;
+mod shell;
+mod swap;
+#[cfg(test)]
+mod tests;
+
+pub use attribute::Inherited;
+pub use ball::Ball;
+pub use removal::remove_edge;
+pub use replace::Replacement;
+pub use ring::{Forced, RingTriangulation};
+pub use shell::Shell;
+pub use swap::FaceSwap;
