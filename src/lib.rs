@@ -11,5 +11,7 @@ pub mod surface;
 // Floor 3.
 pub mod delaunay;
 pub mod samples;
+// Floor 4.
+pub mod boundary;
 // Floor 7.
 pub mod io;
