@@ -10,9 +10,10 @@
 //! When no triangulation of a ring is valid, an edge that joins it to `c` or `d` and stands in the way is
 //! removed first, down to a given level; what does not lead to success is undone.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 
-use super::space::{Space, edge_key};
+use super::polygon::triangulate;
+use super::space::Space;
 use super::target::Target;
 use super::walk::{Shell, find_edge, shell};
 use crate::mesh::FaceRef;
@@ -31,8 +32,6 @@ struct Done {
 /// A surgeon for one target after another.
 pub(super) struct Flipper<'a, S: Space> {
     pub s: &'a mut S,
-    /// Edges that may not be removed although no required face has them.
-    pub protected: &'a HashSet<u64>,
     pub target: Target,
     log: Vec<Done>,
     /// Ring searches left for this target.
@@ -42,10 +41,9 @@ pub(super) struct Flipper<'a, S: Space> {
 }
 
 impl<'a, S: Space> Flipper<'a, S> {
-    pub(super) fn new(s: &'a mut S, protected: &'a HashSet<u64>, target: Target) -> Self {
+    pub(super) fn new(s: &'a mut S, target: Target) -> Self {
         Self {
             s,
-            protected,
             target,
             log: Vec::new(),
             work: 0,
@@ -106,7 +104,7 @@ impl<'a, S: Space> Flipper<'a, S> {
 
     /// Removes the edge `c d` of `t`, with help from edges around it down to `level`.
     pub(super) fn remove_edge(&mut self, t: u32, c: u32, d: u32, level: u32) -> bool {
-        if self.work == 0 || self.protected.contains(&edge_key(c, d)) {
+        if self.work == 0 || self.s.protects(c, d) {
             return false;
         }
         self.work -= 1;
@@ -116,7 +114,7 @@ impl<'a, S: Space> Flipper<'a, S> {
         if around.required {
             return false;
         }
-        if self.triangulate(&around, c, d) {
+        if self.triangulate_ring(&around, c, d) {
             return true;
         }
         if level == 0 {
@@ -136,7 +134,7 @@ impl<'a, S: Space> Flipper<'a, S> {
                     return true;
                 };
                 match shell(self.s, t, c, d) {
-                    Some(now) if self.triangulate(&now, c, d) => return true,
+                    Some(now) if self.triangulate_ring(&now, c, d) => return true,
                     Some(now) if now.ring.len() < around.ring.len() => {
                         around = now;
                         continue 'smaller;
@@ -179,68 +177,44 @@ impl<'a, S: Space> Flipper<'a, S> {
     }
 
     /// Replaces the shell by the best valid, allowed triangulation of its ring.
-    fn triangulate(&mut self, around: &Shell, c: u32, d: u32) -> bool {
+    fn triangulate_ring(&mut self, around: &Shell, c: u32, d: u32) -> bool {
         let ring = &around.ring;
         let n = ring.len();
         if !(3..=RING_MAX).contains(&n) {
             return false;
         }
-        // best[i][j]: worst shape in the best triangulation of ring[i..=j], and its middle vertex.
-        let mut best = vec![(0.0f64, 0usize); n * n];
-        for i in 0..n - 1 {
-            best[i * n + i + 1] = (f64::INFINITY, 0);
-        }
-        for len in 2..n {
-            for i in 0..n - len {
-                let j = i + len;
-                if len < n - 1 && !self.target.allows_edge(self.s, ring[i], ring[j], [c, d]) {
-                    continue;
-                }
-                let mut top = (0.0, 0);
-                for k in i + 1..j {
-                    let bound = best[i * n + k].0.min(best[k * n + j].0);
-                    if bound > top.0 {
-                        let shape = self.shape(ring[i], ring[k], ring[j], c, d).min(bound);
-                        if shape > top.0 {
-                            top = (shape, k);
-                        }
-                    }
-                }
-                best[i * n + j] = top;
-            }
-        }
-        if best[n - 1].0 <= 0.0 {
+        let target = self.target;
+        let s = std::cell::RefCell::new(&mut *self.s);
+        let found = triangulate(
+            n,
+            |i, j| target.allows_edge(*s.borrow_mut(), ring[i], ring[j], [c, d]),
+            |i, k, j| shape(*s.borrow_mut(), target, [ring[i], ring[k], ring[j]], c, d),
+        );
+        let Some(triangles) = found else {
             return false;
-        }
-        let mut new = Vec::with_capacity(2 * (n - 2));
-        let mut open = vec![(0, n - 1)];
-        while let Some((i, j)) = open.pop() {
-            if j - i < 2 {
-                continue;
-            }
-            let k = best[i * n + j].1;
-            new.push([ring[i], ring[k], ring[j], d]);
-            new.push([ring[k], ring[i], ring[j], c]);
-            open.push((i, k));
-            open.push((k, j));
-        }
+        };
+        let new: Vec<[u32; 4]> = triangles
+            .into_iter()
+            .map(|t| t.map(|i| ring[i]))
+            .flat_map(|[x, y, z]| [[x, y, z, d], [y, x, z, c]])
+            .collect();
         self.apply(around.tets.clone(), &new);
         true
     }
+}
 
-    /// The worse of the two tetrahedra over a ring triangle: volume over cubed edge; 0 when it may not be.
-    fn shape(&mut self, x: u32, y: u32, z: u32, c: u32, d: u32) -> f64 {
-        let (up, down) = (self.s.orient([x, y, z, d]), self.s.orient([y, x, z, c]));
-        if up <= 0.0 || down <= 0.0 || !self.target.allows_face(self.s, [x, y, z]) {
-            return 0.0;
-        }
-        let p = [x, y, z, c, d].map(|v| self.s.position(v));
-        let longest = EDGES
-            .iter()
-            .map(|&[i, j]| p[i].distance_squared(p[j]))
-            .fold(p[4].distance_squared(p[0]), f64::max);
-        let scale = longest * longest.sqrt();
-        // A positive volume counts however small it is.
-        (up.min(down) / scale).max(f64::MIN_POSITIVE)
+/// The worse of the two tetrahedra over a ring triangle: volume over cubed edge; 0 when it may not be.
+fn shape<S: Space>(s: &mut S, target: Target, [x, y, z]: [u32; 3], c: u32, d: u32) -> f64 {
+    let (up, down) = (s.orient([x, y, z, d]), s.orient([y, x, z, c]));
+    if up <= 0.0 || down <= 0.0 || !target.allows_face(s, [x, y, z]) {
+        return 0.0;
     }
+    let p = [x, y, z, c, d].map(|v| s.position(v));
+    let longest = EDGES
+        .iter()
+        .map(|&[i, j]| p[i].distance_squared(p[j]))
+        .fold(p[4].distance_squared(p[0]), f64::max);
+    let scale = longest * longest.sqrt();
+    // A positive volume counts however small it is.
+    (up.min(down) / scale).max(f64::MIN_POSITIVE)
 }

@@ -23,12 +23,13 @@ pub(super) struct Missing {
 pub(super) fn map<P: Pages>(mesh: &mut Mesh<P>) -> Missing {
     let mut missing = Missing::default();
     let mut known: HashSet<u64> = HashSet::new();
+    let none = HashSet::new();
     for n in 0..mesh.n_facets() {
         if n & 1023 == 0 {
             stop_if_requested();
         }
         let f = mesh.facet(n).vertices;
-        let mut s = Paged(mesh);
+        let mut s = Paged(mesh, &none);
         if let Found::Face(face) = find_face(&mut s, f) {
             s.require(face);
             continue;

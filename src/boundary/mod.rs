@@ -11,18 +11,30 @@
 //! Sources: P.-L. George, H. Borouchaki and E. Saltel, "'Ultimate' robustness in meshing an arbitrary polyhedron"
 //! (2003); N. P. Weatherill and O. Hassan (1994); M. Attene and others for points kept implicit (2020-2023).
 
+mod chain;
+mod cover;
 mod error;
+mod exact;
 mod find;
 mod flips;
+mod flood;
+mod kernel;
 mod map;
+mod patch;
+mod points;
+mod polygon;
 mod recover;
+mod regions;
 mod report;
 mod space;
+mod star;
+mod suppress;
 mod target;
 mod walk;
 
 pub use error::{BoundaryError, FacetPlace};
 pub use recover::recover;
+pub use regions::{RegionPolicy, RegionSummary, Regions, fill_regions};
 pub use report::RecoveryReport;
 
 #[cfg(test)]

@@ -2,10 +2,12 @@
 
 use std::time::Instant;
 
+use super::chain::Trouble;
 use super::error::{BoundaryError, FacetPlace};
 use super::find::{Found, Outcome, find_face};
 use super::flips::Flipper;
 use super::map::{Missing, map};
+use super::points::recover_by_points;
 use super::report::RecoveryReport;
 use super::space::{Paged, Space, edge_key};
 use super::target::Target;
@@ -35,13 +37,38 @@ pub fn recover<P: Pages>(mesh: &mut Mesh<P>) -> Result<RecoveryReport, BoundaryE
     flip_segments(mesh, &mut missing, &mut report);
     flip_facets(mesh, &mut missing, &mut report);
     report.flip_time = clock.elapsed();
-    if missing.facets.is_empty() {
-        return Ok(report);
+    let clock = Instant::now();
+    let troubles = recover_by_points(mesh, &mut missing, &mut report);
+    report.point_time = clock.elapsed();
+    match troubles.first() {
+        None => Ok(report),
+        Some(&(n, trouble)) => Err(explain(mesh, n, trouble, &troubles)),
     }
-    Err(BoundaryError::NotRecovered {
-        facets: missing.facets.iter().map(|&n| place(mesh, n)).collect(),
-        reason: "flips are stuck",
-    })
+}
+
+fn explain<P: Pages>(
+    mesh: &mut Mesh<P>,
+    n: u32,
+    trouble: Trouble,
+    troubles: &[(u32, Trouble)],
+) -> BoundaryError {
+    let reason = match trouble {
+        Trouble::Vertex(v) => {
+            return BoundaryError::VertexOnFacet {
+                owner: mesh.vertex_attribute(v).1,
+                point: mesh.point(v),
+                facet: place(mesh, n),
+            };
+        }
+        Trouble::Crossed(_) => "another triangle crosses it",
+        Trouble::Precision => "no double-precision point lies in the room beside it",
+        Trouble::TooMuch => "it crosses too many edges",
+        Trouble::Broken(what) => what,
+    };
+    BoundaryError::NotRecovered {
+        facets: troubles.iter().map(|&(n, _)| place(mesh, n)).collect(),
+        reason,
+    }
 }
 
 /// Facet `n` for a message.
@@ -60,8 +87,8 @@ fn flip_segments<P: Pages>(mesh: &mut Mesh<P>, missing: &mut Missing, report: &m
             let mut left = Vec::new();
             for (a, b) in std::mem::take(&mut missing.segments) {
                 stop_if_requested();
-                let mut s = Paged(mesh);
-                let mut flipper = Flipper::new(&mut s, &missing.protected, Target::Edge(a, b));
+                let mut s = Paged(mesh, &missing.protected);
+                let mut flipper = Flipper::new(&mut s, Target::Edge(a, b));
                 let mut outcome = Outcome::Stuck;
                 for (from, to) in [(a, b), (b, a)] {
                     flipper.work = work;
@@ -98,8 +125,8 @@ fn flip_facets<P: Pages>(mesh: &mut Mesh<P>, missing: &mut Missing, report: &mut
             for n in std::mem::take(&mut missing.facets) {
                 stop_if_requested();
                 let f = mesh.facet(n).vertices;
-                let mut s = Paged(mesh);
-                let mut flipper = Flipper::new(&mut s, &missing.protected, Target::Face(f));
+                let mut s = Paged(mesh, &missing.protected);
+                let mut flipper = Flipper::new(&mut s, Target::Face(f));
                 flipper.work = work;
                 let outcome = flipper.recover_face(f, level);
                 report.flips += flipper.flips;

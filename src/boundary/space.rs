@@ -1,5 +1,7 @@
 //! One face for the two places where recovery works: the paged mesh, and a patch held in memory.
 
+use std::collections::HashSet;
+
 use crate::geom::{Point, orient};
 use crate::mesh::anatomy::{FACES, REQUIRED};
 use crate::mesh::{FaceRef, Mesh, Tet};
@@ -26,6 +28,8 @@ pub(super) trait Space {
     /// Tells `face` its neighbor.
     fn set_across(&mut self, face: FaceRef, to: FaceRef);
     fn set_tet_of(&mut self, v: u32, t: u32);
+    /// Whether the edge `a b` must stay although no required face may have it yet.
+    fn protects(&self, a: u32, b: u32) -> bool;
 
     /// Replaces the tetrahedra `old` by tetrahedra with the vertices `new`, which fill the same room.
     ///
@@ -144,7 +148,11 @@ pub(super) fn edge_key(a: u32, b: u32) -> u64 {
 }
 
 /// The paged mesh as a space; all vertices are where their coordinates say.
-pub(super) struct Paged<'m, P: Pages>(pub &'m mut Mesh<P>);
+pub(super) struct Paged<'m, P: Pages>(
+    pub &'m mut Mesh<P>,
+    /// Edges that must stay.
+    pub &'m HashSet<u64>,
+);
 
 impl<P: Pages> Space for Paged<'_, P> {
     #[inline]
@@ -181,5 +189,8 @@ impl<P: Pages> Space for Paged<'_, P> {
     }
     fn set_tet_of(&mut self, v: u32, t: u32) {
         self.0.set_tet_of(v, t);
+    }
+    fn protects(&self, a: u32, b: u32) -> bool {
+        self.1.contains(&edge_key(a, b))
     }
 }

@@ -16,7 +16,14 @@ impl Target {
             Self::Edge(a, b) => {
                 !edge_meets_face(s, a, b, [x, y, c]) && !edge_meets_face(s, a, b, [x, y, d])
             }
-            Self::Face(f) => f.contains(&x) || f.contains(&y) || !edge_meets_face(s, x, y, f),
+            Self::Face(f) => {
+                // An edge with an end in the plane, which is on the facet or beside it, stays on its side.
+                let (sx, sy) = (
+                    s.orient([f[0], f[1], f[2], x]),
+                    s.orient([f[0], f[1], f[2], y]),
+                );
+                sx == 0.0 || sy == 0.0 || (sx > 0.0) == (sy > 0.0) || !edge_meets_face(s, x, y, f)
+            }
         }
     }
 
