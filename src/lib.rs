@@ -12,10 +12,10 @@ pub mod surface;
 pub mod delaunay;
 pub mod reconnect;
 pub mod samples;
+pub mod sizing;
 // Floor 4.
+pub mod boundary;
 pub mod optimize;
+pub mod refine;
 // Floor 7.
 pub mod io;
-// Floor 4.
-pub mod refine;
-pub mod sizing;

@@ -1,0 +1,51 @@
+use std::fmt;
+
+use thiserror::Error;
+
+use crate::geom::Point;
+
+/// A facet, as a user can find it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FacetPlace {
+    /// Number of the triangle in the input.
+    pub input: u64,
+    /// Its corners, in input units.
+    pub corners: [Point; 3],
+}
+
+impl fmt::Display for FacetPlace {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [a, b, c] = self.corners.map(|p| p.to_array());
+        write!(f, "triangle {} {a:?} {b:?} {c:?}", self.input)
+    }
+}
+
+/// Why a surface did not become the boundary of volumes.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum BoundaryError {
+    /// These triangles could not be made faces of the mesh.
+    #[error("{} triangles could not be recovered, the first is {}: {reason}", facets.len(), facets[0])]
+    NotRecovered {
+        /// Never empty.
+        facets: Vec<FacetPlace>,
+        reason: &'static str,
+    },
+    /// A vertex of the surface lies on an edge or a triangle it does not belong to.
+    #[error("vertex {owner} at {point:?} lies on {facet}; check the surface for contacts")]
+    VertexOnFacet {
+        /// Index of the vertex in the surface.
+        owner: u32,
+        point: Point,
+        facet: FacetPlace,
+    },
+    /// Two parts of the surface cross.
+    #[error("{first} is crossed by {second}; check the surface for self-intersections")]
+    Crossing {
+        first: FacetPlace,
+        second: FacetPlace,
+    },
+    /// The volume outside is not separated from this seed or region.
+    #[error("the surface does not close: {what}")]
+    Leak { what: String },
+}

@@ -1,0 +1,182 @@
+//! Which segments and facets the mesh has, and recovery of one that is missing.
+
+use std::collections::HashSet;
+
+use super::flips::Flipper;
+use super::space::Space;
+use super::walk::{Exit, crossings, find_edge, opposite, shell};
+use crate::mesh::FaceRef;
+
+/// A line that crosses more than this is not worth flipping for.
+const CROSSINGS_MAX: usize = 400;
+
+/// Where facet `a b c` stands.
+#[derive(Clone, Debug)]
+pub(super) enum Found {
+    /// It is this face.
+    Face(FaceRef),
+    /// Edge `a b` is there, the face is not; the tetrahedron whose inside it enters from that edge, if one.
+    Edge(Option<u32>),
+    Nothing,
+}
+
+/// Looks for the face `a b c` around its edge `a b`.
+pub(super) fn find_face<S: Space>(s: &mut S, [a, b, c]: [u32; 3]) -> Found {
+    let Some(t) = find_edge(s, a, b) else {
+        return Found::Nothing;
+    };
+    let mut at = t;
+    loop {
+        let tet = s.tet(at);
+        let Some((x, y)) = opposite(&tet, a, b) else {
+            return Found::Nothing;
+        };
+        if tet.vertex(x) == c {
+            return Found::Face(FaceRef::new(at, y));
+        }
+        if tet.vertex(y) == c {
+            return Found::Face(FaceRef::new(at, x));
+        }
+        let across = s.across(at, x);
+        at = across.tet();
+        if at == t || !across.exists() {
+            break;
+        }
+    }
+    let Some(around) = shell(s, t, a, b) else {
+        return Found::Edge(None);
+    };
+    let n = around.ring.len();
+    let entered = (0..n).find(|&i| {
+        let (x, y) = (around.ring[i], around.ring[(i + 1) % n]);
+        s.orient([a, b, x, c]) > 0.0 && s.orient([a, b, c, y]) > 0.0
+    });
+    Found::Edge(entered.map(|i| around.tets[i]))
+}
+
+/// The edges that cross facet `f`, whose own edges all exist; starts in `t`, which it cuts.
+pub(super) fn crossing_edges<S: Space>(
+    s: &mut S,
+    f: [u32; 3],
+    t: u32,
+    n_max: usize,
+) -> Option<Vec<(u32, u32, u32)>> {
+    let mut seen: HashSet<u32> = HashSet::from([t]);
+    let mut cut = vec![t];
+    let mut edges: Vec<(u32, u32, u32)> = Vec::new();
+    let mut next = 0;
+    while next < cut.len() {
+        let at = cut[next];
+        next += 1;
+        let tet = s.tet(at);
+        let v = tet.vertices();
+        let side = v.map(|v| {
+            if f.contains(&v) {
+                0.0
+            } else {
+                s.orient([f[0], f[1], f[2], v])
+            }
+        });
+        for i in 0..4 {
+            for j in 0..4 {
+                if side[i] > 0.0
+                    && side[j] < 0.0
+                    && !edges.iter().any(|e| (e.1, e.2) == (v[i], v[j]))
+                {
+                    edges.push((at, v[i], v[j]));
+                }
+            }
+            let others = [1, 2, 3].map(|k| side[(i + k) & 3]);
+            if others.iter().any(|&x| x > 0.0) && others.iter().any(|&x| x < 0.0) {
+                let across = s.across(at, i);
+                if across.exists() && seen.insert(across.tet()) {
+                    cut.push(across.tet());
+                }
+            }
+        }
+        if edges.len() > n_max {
+            return None;
+        }
+    }
+    Some(edges)
+}
+
+/// How an attempt to recover one part ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Outcome {
+    Recovered,
+    Stuck,
+    /// A vertex lies on it.
+    Touches(u32),
+}
+
+impl<S: Space> Flipper<'_, S> {
+    /// Flips until the edge `a b` exists. The number of parts it crosses falls with each step kept.
+    pub(super) fn recover_edge(&mut self, a: u32, b: u32, level: u32) -> Outcome {
+        'fewer: loop {
+            self.keep();
+            let met = match crossings(self.s, a, b, CROSSINGS_MAX) {
+                Ok(met) if met.is_empty() => return Outcome::Recovered,
+                Ok(met) => met,
+                Err(Exit::Vertex(v)) => return Outcome::Touches(v),
+                Err(_) => return Outcome::Stuck,
+            };
+            // Attempts that are undone rename tetrahedra: keep what is crossed by its vertices.
+            let mut edges: Vec<(u32, u32)> = Vec::new();
+            for &exit in &met {
+                match exit {
+                    Exit::Face(face) => {
+                        let tet = self.s.tet(face.tet());
+                        if tet.is_required(face.face()) {
+                            return Outcome::Stuck;
+                        }
+                        let [p, q, r] = tet.face(face.face());
+                        edges.extend([(p, q), (q, r), (r, p)]);
+                        if self.flip_face(face) {
+                            continue 'fewer;
+                        }
+                    }
+                    Exit::Edge { c, d, .. } => edges.push((c, d)),
+                    _ => {}
+                }
+            }
+            for k in 0..edges.len() {
+                let (c, d) = edges[k];
+                if edges[..k].iter().any(|&e| e == (c, d) || e == (d, c)) {
+                    continue;
+                }
+                let Some(t) = find_edge(self.s, c, d) else {
+                    continue;
+                };
+                if self.remove_edge(t, c, d, level) {
+                    continue 'fewer;
+                }
+            }
+            return Outcome::Stuck;
+        }
+    }
+
+    /// Flips until the face `f`, whose edges exist, is there.
+    pub(super) fn recover_face(&mut self, f: [u32; 3], level: u32) -> Outcome {
+        'fewer: loop {
+            self.keep();
+            let t = match find_face(self.s, f) {
+                Found::Face(_) => return Outcome::Recovered,
+                Found::Edge(Some(t)) => t,
+                _ => return Outcome::Stuck,
+            };
+            let Some(edges) = crossing_edges(self.s, f, t, CROSSINGS_MAX) else {
+                return Outcome::Stuck;
+            };
+            for (_, c, d) in edges {
+                let Some(t) = find_edge(self.s, c, d) else {
+                    continue;
+                };
+                if self.remove_edge(t, c, d, level) {
+                    continue 'fewer;
+                }
+            }
+            return Outcome::Stuck;
+        }
+    }
+}

@@ -1,0 +1,220 @@
+//! Flips that make room for a target: 2-3 flips and edge removal, one inside the other.
+//!
+//! ```text
+//!         d                   Edge removal: the tetrahedra around c d are replaced by the triangles of
+//!        /|\                  a triangulation of the ring r0 r1 ... joined to c and to d. All
+//!     r0--+--r2   ring        triangulations are searched by dynamic programming (G. T. Klincsek,
+//!        \|/                  "Minimal triangulations of polygonal domains", 1980) over the exact
+//!         c                   condition that every new tetrahedron is positive.
+//! ```
+//! When no triangulation of a ring is valid, an edge that joins it to `c` or `d` and stands in the way is
+//! removed first, down to a given level; what does not lead to success is undone.
+
+use std::collections::HashMap;
+
+use super::polygon::triangulate;
+use super::space::Space;
+use super::target::Target;
+use super::walk::{Shell, find_edge, shell};
+use crate::mesh::FaceRef;
+use crate::mesh::anatomy::EDGES;
+
+/// Larger rings are left alone: the search is cubic.
+const RING_MAX: usize = 40;
+
+/// One replacement, with what undoing needs.
+struct Done {
+    old: Vec<u32>,
+    quads: Vec<[u32; 4]>,
+    made: Vec<u32>,
+}
+
+/// A surgeon for one target after another.
+pub(super) struct Flipper<'a, S: Space> {
+    pub s: &'a mut S,
+    pub target: Target,
+    log: Vec<Done>,
+    /// Ring searches left for this target.
+    pub work: u32,
+    /// Replacements that lasted.
+    pub flips: u64,
+}
+
+impl<'a, S: Space> Flipper<'a, S> {
+    pub(super) fn new(s: &'a mut S, target: Target) -> Self {
+        Self {
+            s,
+            target,
+            log: Vec::new(),
+            work: 0,
+            flips: 0,
+        }
+    }
+
+    /// Makes everything done so far final.
+    pub(super) fn keep(&mut self) {
+        self.flips += self.log.len() as u64;
+        self.log.clear();
+    }
+
+    fn apply(&mut self, old: Vec<u32>, new: &[[u32; 4]]) {
+        let quads = old.iter().map(|&t| self.s.tet(t).vertices()).collect();
+        let made = self.s.replace(&old, new);
+        self.log.push(Done { old, quads, made });
+    }
+
+    /// Takes back what was done after `mark`; ids may differ from before.
+    fn undo(&mut self, mark: usize) {
+        let mut now: HashMap<u32, u32> = HashMap::new();
+        while self.log.len() > mark {
+            let done = self.log.pop().expect("longer than the mark");
+            let made: Vec<u32> = done
+                .made
+                .iter()
+                .map(|t| now.get(t).copied().unwrap_or(*t))
+                .collect();
+            let back = self.s.replace(&made, &done.quads);
+            now.extend(done.old.iter().copied().zip(back));
+        }
+    }
+
+    /// Replaces a face by the edge between its two apexes, where that is valid and allowed.
+    pub(super) fn flip_face(&mut self, face: FaceRef) -> bool {
+        let (t, across) = (face.tet(), self.s.across(face.tet(), face.face()));
+        let tet = self.s.tet(t);
+        if !across.exists() || tet.is_required(face.face()) {
+            return false;
+        }
+        let [p, q, r] = tet.face(face.face());
+        let h = tet.vertex(face.face());
+        let e = self.s.tet(across.tet()).vertex(across.face());
+        let new = [[p, q, e, h], [q, r, e, h], [r, p, e, h]];
+        if new.iter().any(|&n| self.s.orient(n) <= 0.0) {
+            return false;
+        }
+        let target = self.target;
+        let clear = [p, q, r]
+            .into_iter()
+            .all(|x| target.allows_edge(self.s, h, e, [x, x]));
+        if clear {
+            self.apply(vec![t, across.tet()], &new);
+        }
+        clear
+    }
+
+    /// Removes the edge `c d` of `t`, with help from edges around it down to `level`.
+    pub(super) fn remove_edge(&mut self, t: u32, c: u32, d: u32, level: u32) -> bool {
+        if self.work == 0 || self.s.protects(c, d) {
+            return false;
+        }
+        self.work -= 1;
+        let Some(mut around) = shell(self.s, t, c, d) else {
+            return false;
+        };
+        if around.required {
+            return false;
+        }
+        if self.triangulate_ring(&around, c, d) {
+            return true;
+        }
+        if level == 0 {
+            return false;
+        }
+        let mark = self.log.len();
+        'smaller: loop {
+            for (u, r) in self.in_the_way(&around, c, d) {
+                let before = self.log.len();
+                let Some(t) = find_edge(self.s, u, r) else {
+                    continue;
+                };
+                if !self.remove_edge(t, u, r, level - 1) {
+                    continue;
+                }
+                let Some(t) = find_edge(self.s, c, d) else {
+                    return true;
+                };
+                match shell(self.s, t, c, d) {
+                    Some(now) if self.triangulate_ring(&now, c, d) => return true,
+                    Some(now) if now.ring.len() < around.ring.len() => {
+                        around = now;
+                        continue 'smaller;
+                    }
+                    _ => self.undo(before),
+                }
+                let Some(now) = find_edge(self.s, c, d).and_then(|t| shell(self.s, t, c, d)) else {
+                    return false;
+                };
+                around = now;
+            }
+            break;
+        }
+        self.undo(mark);
+        false
+    }
+
+    /// Edges from `c` or `d` to the ring beyond which the neighbors on the ring see each other.
+    fn in_the_way(&mut self, around: &Shell, c: u32, d: u32) -> Vec<(u32, u32)> {
+        let n = around.ring.len();
+        let mut found = Vec::new();
+        for i in 0..n {
+            let (x, r, y) = (
+                around.ring[(i + n - 1) % n],
+                around.ring[i],
+                around.ring[(i + 1) % n],
+            );
+            if x == y {
+                continue;
+            }
+            // Positive on all three means that x y crosses the face c d r.
+            if self.s.orient([r, d, y, x]) <= 0.0 {
+                found.push((d, r));
+            }
+            if self.s.orient([c, r, y, x]) <= 0.0 {
+                found.push((c, r));
+            }
+        }
+        found
+    }
+
+    /// Replaces the shell by the best valid, allowed triangulation of its ring.
+    fn triangulate_ring(&mut self, around: &Shell, c: u32, d: u32) -> bool {
+        let ring = &around.ring;
+        let n = ring.len();
+        if !(3..=RING_MAX).contains(&n) {
+            return false;
+        }
+        let target = self.target;
+        let s = std::cell::RefCell::new(&mut *self.s);
+        let found = triangulate(
+            n,
+            |i, j| target.allows_edge(*s.borrow_mut(), ring[i], ring[j], [c, d]),
+            |i, k, j| shape(*s.borrow_mut(), target, [ring[i], ring[k], ring[j]], c, d),
+        );
+        let Some(triangles) = found else {
+            return false;
+        };
+        let new: Vec<[u32; 4]> = triangles
+            .into_iter()
+            .map(|t| t.map(|i| ring[i]))
+            .flat_map(|[x, y, z]| [[x, y, z, d], [y, x, z, c]])
+            .collect();
+        self.apply(around.tets.clone(), &new);
+        true
+    }
+}
+
+/// The worse of the two tetrahedra over a ring triangle: volume over cubed edge; 0 when it may not be.
+fn shape<S: Space>(s: &mut S, target: Target, [x, y, z]: [u32; 3], c: u32, d: u32) -> f64 {
+    let (up, down) = (s.orient([x, y, z, d]), s.orient([y, x, z, c]));
+    if up <= 0.0 || down <= 0.0 || !target.allows_face(s, [x, y, z]) {
+        return 0.0;
+    }
+    let p = [x, y, z, c, d].map(|v| s.position(v));
+    let longest = EDGES
+        .iter()
+        .map(|&[i, j]| p[i].distance_squared(p[j]))
+        .fold(p[4].distance_squared(p[0]), f64::max);
+    let scale = longest * longest.sqrt();
+    // A positive volume counts however small it is.
+    (up.min(down) / scale).max(f64::MIN_POSITIVE)
+}

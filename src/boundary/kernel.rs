@@ -1,0 +1,122 @@
+//! The center of the largest ball inside half-spaces: where a vertex sees everything best.
+//!
+//! Source: R. Seidel, "Small-dimensional linear programming and convex hulls made easy" (1991), on four unknowns: the
+//! center and the radius. Doubles are enough: the answer is a proposal that exact signs accept or refuse.
+
+use crate::geom::Point;
+
+/// `normal · x + radius <= offset`, `normal` of length one pointing out.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct HalfSpace {
+    pub normal: Point,
+    pub offset: f64,
+}
+
+/// The center of the largest ball inside all half-spaces and the cube of half side `reach` around the origin.
+pub(super) fn center(half_spaces: &[HalfSpace], reach: f64) -> Option<Point> {
+    let mut rows: Vec<Vec<f64>> = half_spaces
+        .iter()
+        .filter(|h| h.normal.is_finite() && h.offset.is_finite())
+        .map(|h| {
+            let n = h.normal;
+            vec![n.x, n.y, n.z, 1.0, h.offset / reach]
+        })
+        .collect();
+    // A fixed shuffle: neighbors in the list are neighbors in space, the worst order.
+    let n = rows.len();
+    for i in (1..n).rev() {
+        let h = (i as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 33;
+        rows.swap(i, (h % (i as u64 + 1)) as usize);
+    }
+    let x = solve(&rows, &[0.0, 0.0, 0.0, 1.0])?;
+    Some(Point::new(x[0], x[1], x[2]) * reach)
+}
+
+/// Maximizes `goal · x` under `row · x <= last of row` and `-1 <= x <= 1`.
+fn solve(rows: &[Vec<f64>], goal: &[f64]) -> Option<Vec<f64>> {
+    let d = goal.len();
+    if d == 1 {
+        let (mut low, mut high) = (-1.0f64, 1.0f64);
+        for row in rows {
+            if row[0] > 1e-14 {
+                high = high.min(row[1] / row[0]);
+            } else if row[0] < -1e-14 {
+                low = low.max(row[1] / row[0]);
+            } else if row[1] < -1e-12 {
+                return None;
+            }
+        }
+        return (low <= high + 1e-13).then(|| vec![if goal[0] >= 0.0 { high } else { low }]);
+    }
+    let mut x: Vec<f64> = goal
+        .iter()
+        .map(|&g| if g >= 0.0 { 1.0 } else { -1.0 })
+        .collect();
+    for (m, row) in rows.iter().enumerate() {
+        let value: f64 = (0..d).map(|i| row[i] * x[i]).sum();
+        if value <= row[d] + 1e-13 {
+            continue;
+        }
+        // The optimum lies on this row: put x[k] out by it.
+        let k = (0..d).max_by(|&i, &j| row[i].abs().total_cmp(&row[j].abs()))?;
+        if row[k].abs() < 1e-14 {
+            return None;
+        }
+        let drop = |r: &[f64]| -> Vec<f64> {
+            let share = r[k] / row[k];
+            (0..=d)
+                .filter(|&i| i != k)
+                .map(|i| r[i] - share * row[i])
+                .collect()
+        };
+        let mut below: Vec<Vec<f64>> = rows[..m].iter().map(|r| drop(r)).collect();
+        for sign in [1.0, -1.0] {
+            let mut bound = vec![0.0; d + 1];
+            bound[k] = sign;
+            bound[d] = 1.0;
+            below.push(drop(&bound));
+        }
+        let share = goal[k] / row[k];
+        let goal_below: Vec<f64> = (0..d)
+            .filter(|&i| i != k)
+            .map(|i| goal[i] - share * row[i])
+            .collect();
+        let y = solve(&below, &goal_below)?;
+        let mut rest = y.into_iter();
+        for (i, x) in x.iter_mut().enumerate() {
+            if i != k {
+                *x = rest.next()?;
+            }
+        }
+        let others: f64 = (0..d).filter(|&i| i != k).map(|i| row[i] * x[i]).sum();
+        x[k] = (row[d] - others) / row[k];
+    }
+    Some(x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_center_of_a_corner_is_as_far_as_the_cube_allows() {
+        let walls = [Point::X, Point::Y, Point::Z].map(|n| HalfSpace {
+            normal: -n,
+            offset: 0.0,
+        });
+        let p = center(&walls, 2.0).expect("a corner has room");
+        assert!(p.min_element() > 0.5, "{p}");
+        let slab = [
+            HalfSpace {
+                normal: Point::X,
+                offset: 1e-6,
+            },
+            HalfSpace {
+                normal: -Point::X,
+                offset: 0.0,
+            },
+        ];
+        let p = center(&slab, 1.0).expect("a slab has room");
+        assert!((p.x - 5e-7).abs() < 1e-12, "{p}");
+    }
+}

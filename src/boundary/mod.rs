@@ -1,0 +1,41 @@
+//! Make every input segment and facet appear; color the volumes.
+//!
+//! The Delaunay mesh of the surface's vertices has most of the surface's triangles as faces, not all. What is
+//! missing is recovered in this order, each step exact, none adding a vertex to the surface:
+//! 1. flips (`find`, `flips`): 2-3 flips and edge removal that let nothing new cross what is missing;
+//! 2. points on the missing part (`patch`, `chain`, `cover`): where flips are stuck, the crossings are given vertices
+//!    that lie on the input exactly, as combinations of its corners kept without rounding;
+//! 3. suppression (`suppress`): each such vertex is replaced by one vertex inside each volume around it, so that
+//!    the input triangle is whole again. Exists always in exact arithmetic; accepted only by exact signs.
+//!
+//! Sources: P.-L. George, H. Borouchaki and E. Saltel, "'Ultimate' robustness in meshing an arbitrary polyhedron"
+//! (2003); N. P. Weatherill and O. Hassan (1994); M. Attene and others for points kept implicit (2020-2023).
+
+mod chain;
+mod cover;
+mod error;
+mod exact;
+mod find;
+mod flips;
+mod flood;
+mod kernel;
+mod map;
+mod patch;
+mod points;
+mod polygon;
+mod recover;
+mod regions;
+mod report;
+mod space;
+mod star;
+mod suppress;
+mod target;
+mod walk;
+
+pub use error::{BoundaryError, FacetPlace};
+pub use recover::recover;
+pub use regions::{RegionPolicy, RegionSummary, Regions, fill_regions};
+pub use report::RecoveryReport;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,197 @@
+//! The exact path: patches around facets that flips cannot recover.
+
+use std::collections::{HashMap, HashSet};
+
+use super::chain::Trouble;
+use super::find::{Found, find_face};
+use super::map::Missing;
+use super::patch::Patch;
+use super::report::RecoveryReport;
+use super::space::{Paged, Space, edge_key, sorted};
+use super::suppress::Skin;
+use super::walk::{find_edge, shell};
+use crate::mesh::{FaceRef, Mesh};
+use crate::store::{Pages, stop_if_requested};
+
+/// Times the facets left are tried again after others succeeded.
+const ROUNDS_MAX: usize = 4;
+
+/// Recovers the missing facets, patch by patch; returns those left with their trouble.
+pub(super) fn recover_by_points<P: Pages>(
+    mesh: &mut Mesh<P>,
+    missing: &mut Missing,
+    report: &mut RecoveryReport,
+) -> Vec<(u32, Trouble)> {
+    let mut troubles = Vec::new();
+    for _ in 0..ROUNDS_MAX {
+        let before = missing.facets.len();
+        troubles.clear();
+        let mut left = Vec::new();
+        for group in groups(mesh, &missing.facets) {
+            stop_if_requested();
+            report.patches += 1;
+            match recover_group(mesh, &missing.protected, &group, report) {
+                Ok(()) => report.facets_by_points += group.len() as u32,
+                Err(trouble) => {
+                    troubles.extend(group.iter().map(|&n| (n, trouble)));
+                    left.extend(group);
+                }
+            }
+        }
+        missing.facets = left;
+        if missing.facets.is_empty() || missing.facets.len() == before {
+            break;
+        }
+    }
+    troubles
+}
+
+/// Facets that share missing segments belong together: a point on a segment needs all facets around it.
+fn groups<P: Pages>(mesh: &mut Mesh<P>, facets: &[u32]) -> Vec<Vec<u32>> {
+    let none = HashSet::new();
+    let mut by_segment: HashMap<u64, usize> = HashMap::new();
+    let mut parent: Vec<usize> = (0..facets.len()).collect();
+    fn root(parent: &mut [usize], mut i: usize) -> usize {
+        while parent[i] != i {
+            parent[i] = parent[parent[i]];
+            i = parent[i];
+        }
+        i
+    }
+    for (i, &n) in facets.iter().enumerate() {
+        let [a, b, c] = mesh.facet(n).vertices;
+        for (p, q) in [(a, b), (b, c), (c, a)] {
+            if find_edge(&mut Paged(mesh, &none), p, q).is_some() {
+                continue;
+            }
+            let j = *by_segment.entry(edge_key(p, q)).or_insert(i);
+            let (x, y) = (root(&mut parent, i), root(&mut parent, j));
+            parent[x.max(y)] = x.min(y);
+        }
+    }
+    let mut groups: Vec<Vec<u32>> = vec![Vec::new(); facets.len()];
+    for (i, &n) in facets.iter().enumerate() {
+        groups[root(&mut parent, i)].push(n);
+    }
+    groups.retain(|g| !g.is_empty());
+    groups
+}
+
+fn recover_group<P: Pages>(
+    mesh: &mut Mesh<P>,
+    protected: &HashSet<u64>,
+    group: &[u32],
+    report: &mut RecoveryReport,
+) -> Result<(), Trouble> {
+    let corners: Vec<[u32; 3]> = group.iter().map(|&n| mesh.facet(n).vertices).collect();
+    // A triangle given twice is one face.
+    let mut once = corners.clone();
+    let mut seen = HashSet::new();
+    once.retain(|&f| seen.insert(sorted(f)));
+    let mut patch = Patch::new(mesh, protected);
+    let mut skin = Skin {
+        facets: once.iter().map(|f| f.map(|v| patch.vertex(v))).collect(),
+        ..Skin::default()
+    };
+    let outcome = build(&mut patch, &mut skin);
+    let named = |trouble| match trouble {
+        Trouble::Vertex(v) => Trouble::Vertex(patch.mesh_id(v)),
+        Trouble::Crossed(f) => Trouble::Crossed(f.map(|v| patch.mesh_id(v))),
+        other => other,
+    };
+    let points = outcome.map_err(named)?;
+    if !patch.is_sound() {
+        return Err(Trouble::Precision);
+    }
+    let whole = skin
+        .facets
+        .iter()
+        .all(|&f| skin.faces.contains_key(&sorted(f)));
+    if !whole || skin.faces.len() != skin.facets.len() {
+        return Err(Trouble::Broken("a facet is not whole"));
+    }
+    report.points_on_surface += points;
+    let added = patch.commit();
+    report.steiner = report.steiner.saturating_add_signed(added as i32);
+    let none = HashSet::new();
+    for f in corners {
+        let mut s = Paged(mesh, &none);
+        match find_face(&mut s, f) {
+            Found::Face(face) => s.require(face),
+            _ => panic!("facet {f:?} was recovered and is not there"),
+        }
+    }
+    Ok(())
+}
+
+/// Chains, faces, suppression; returns how many vertices were on the surface for a while.
+fn build<P: Pages>(patch: &mut Patch<'_, P>, skin: &mut Skin) -> Result<u32, Trouble> {
+    let mut chains: HashMap<(u32, u32), Vec<u32>> = HashMap::new();
+    let facets = skin.facets.clone();
+    let mut on_segments: Vec<u32> = Vec::new();
+    for f in &facets {
+        for (a, b) in sides(*f) {
+            if chains.contains_key(&(a, b)) {
+                continue;
+            }
+            let chain = patch.chain(a, b)?;
+            on_segments.extend(&chain[1..chain.len() - 1]);
+            chains.insert((b, a), chain.iter().rev().copied().collect());
+            chains.insert((a, b), chain);
+        }
+    }
+    let mut points = on_segments.len() as u32;
+    for (k, &f) in facets.iter().enumerate() {
+        let rim: Vec<u32> = sides(f)
+            .into_iter()
+            .flat_map(|side| {
+                let chain = &chains[&side];
+                chain[..chain.len() - 1].to_vec()
+            })
+            .collect();
+        let faces = patch.cover(f, &rim)?;
+        let mut inside: Vec<u32> = faces
+            .iter()
+            .flatten()
+            .copied()
+            .filter(|v| !rim.contains(v))
+            .collect();
+        inside.sort_unstable();
+        inside.dedup();
+        for &face in &faces {
+            skin.faces.insert(sorted(face), (k, face));
+        }
+        for &face in &faces {
+            let [p, q, r] = face;
+            let t = find_edge(patch, p, q).ok_or(Trouble::Broken("a face was lost"))?;
+            let around = shell(patch, t, p, q).ok_or(Trouble::Broken("a facet on the hull"))?;
+            let i = around
+                .ring
+                .iter()
+                .position(|&v| v == r)
+                .ok_or(Trouble::Broken("a face was lost"))?;
+            // tets[i] has p, q, r and the next of the ring: the face is opposite that one.
+            let t = around.tets[i];
+            let next = around.ring[(i + 1) % around.ring.len()];
+            let l = patch.tet(t).local(next).expect("a vertex of the shell");
+            patch.require(FaceRef::new(t, l));
+        }
+        points += inside.len() as u32;
+        for v in inside {
+            patch.suppress(skin, v)?;
+        }
+    }
+    for v in on_segments {
+        patch.suppress(skin, v)?;
+    }
+    for v in 0..patch.n_vertices() {
+        if patch.is_new(v) && patch.is_in_use(v) {
+            patch.remove_free(v);
+        }
+    }
+    Ok(points)
+}
+
+fn sides([a, b, c]: [u32; 3]) -> [(u32, u32); 3] {
+    [(a, b), (b, c), (c, a)]
+}

@@ -1,0 +1,151 @@
+//! The order of recovery: map, flips for segments, flips for facets, points for the rest.
+
+use std::time::Instant;
+
+use super::chain::Trouble;
+use super::error::{BoundaryError, FacetPlace};
+use super::find::{Found, Outcome, find_face};
+use super::flips::Flipper;
+use super::map::{Missing, map};
+use super::points::recover_by_points;
+use super::report::RecoveryReport;
+use super::space::{Paged, Space, edge_key};
+use super::target::Target;
+use crate::mesh::Mesh;
+use crate::store::{Pages, stop_if_requested};
+
+/// How deep edge removals may nest, pass after pass, and the ring searches a target may cost then.
+const LEVELS: [(u32, u32); 4] = [(0, 200), (1, 400), (2, 1500), (3, 4000)];
+
+/// Makes every facet of `mesh` a required face on both sides.
+///
+/// The mesh must be the Delaunay mesh of the facets' vertices inside the enclosing box, with `tet_of` refreshed.
+/// Vertices are added only inside volumes, tagged as Steiner points. Bounded work; ids and order depend on the mesh alone.
+///
+/// Errors: [`BoundaryError`] names the facets; the mesh is then valid but without them.
+pub fn recover<P: Pages>(mesh: &mut Mesh<P>) -> Result<RecoveryReport, BoundaryError> {
+    let clock = Instant::now();
+    let mut missing = map(mesh);
+    let mut report = RecoveryReport {
+        facets: mesh.n_facets(),
+        missing_facets: missing.facets.len() as u32,
+        missing_segments: missing.segments.len() as u32,
+        map_time: clock.elapsed(),
+        ..RecoveryReport::default()
+    };
+    let clock = Instant::now();
+    flip_segments(mesh, &mut missing, &mut report);
+    flip_facets(mesh, &mut missing, &mut report);
+    report.flip_time = clock.elapsed();
+    let clock = Instant::now();
+    let troubles = recover_by_points(mesh, &mut missing, &mut report);
+    report.point_time = clock.elapsed();
+    match troubles.first() {
+        None => Ok(report),
+        Some(&(n, trouble)) => Err(explain(mesh, n, trouble, &troubles)),
+    }
+}
+
+fn explain<P: Pages>(
+    mesh: &mut Mesh<P>,
+    n: u32,
+    trouble: Trouble,
+    troubles: &[(u32, Trouble)],
+) -> BoundaryError {
+    let reason = match trouble {
+        Trouble::Vertex(v) => {
+            return BoundaryError::VertexOnFacet {
+                owner: mesh.vertex_attribute(v).1,
+                point: mesh.point(v),
+                facet: place(mesh, n),
+            };
+        }
+        Trouble::Crossed(_) => "another triangle crosses it",
+        Trouble::Precision => "no double-precision point lies in the room beside it",
+        Trouble::TooMuch => "it crosses too many edges",
+        Trouble::Broken(what) => what,
+    };
+    BoundaryError::NotRecovered {
+        facets: troubles.iter().map(|&(n, _)| place(mesh, n)).collect(),
+        reason,
+    }
+}
+
+/// Facet `n` for a message.
+pub(super) fn place<P: Pages>(mesh: &mut Mesh<P>, n: u32) -> FacetPlace {
+    let facet = mesh.facet(n);
+    FacetPlace {
+        input: facet.input,
+        corners: facet.vertices.map(|v| mesh.point(v)),
+    }
+}
+
+fn flip_segments<P: Pages>(mesh: &mut Mesh<P>, missing: &mut Missing, report: &mut RecoveryReport) {
+    for (level, work) in LEVELS {
+        loop {
+            let before = missing.segments.len();
+            let mut left = Vec::new();
+            for (a, b) in std::mem::take(&mut missing.segments) {
+                stop_if_requested();
+                let mut s = Paged(mesh, &missing.protected);
+                let mut flipper = Flipper::new(&mut s, Target::Edge(a, b));
+                let mut outcome = Outcome::Stuck;
+                for (from, to) in [(a, b), (b, a)] {
+                    flipper.work = work;
+                    outcome = flipper.recover_edge(from, to, level);
+                    if outcome == Outcome::Recovered {
+                        break;
+                    }
+                }
+                report.flips += flipper.flips;
+                if outcome == Outcome::Recovered {
+                    report.segments_by_flips += 1;
+                    missing.protected.insert(edge_key(a, b));
+                } else {
+                    left.push((a, b));
+                }
+            }
+            missing.segments = left;
+            let after = missing.segments.len();
+            if after == 0 {
+                return;
+            }
+            if after == before {
+                break;
+            }
+        }
+    }
+}
+
+fn flip_facets<P: Pages>(mesh: &mut Mesh<P>, missing: &mut Missing, report: &mut RecoveryReport) {
+    for (level, work) in LEVELS {
+        loop {
+            let before = missing.facets.len();
+            let mut left = Vec::new();
+            for n in std::mem::take(&mut missing.facets) {
+                stop_if_requested();
+                let f = mesh.facet(n).vertices;
+                let mut s = Paged(mesh, &missing.protected);
+                let mut flipper = Flipper::new(&mut s, Target::Face(f));
+                flipper.work = work;
+                let outcome = flipper.recover_face(f, level);
+                report.flips += flipper.flips;
+                match find_face(&mut s, f) {
+                    Found::Face(face) if outcome == Outcome::Recovered => {
+                        s.require(face);
+                        report.facets_by_flips += 1;
+                    }
+                    _ => left.push(n),
+                }
+            }
+            missing.facets = left;
+            let after = missing.facets.len();
+            if after == 0 {
+                return;
+            }
+            if after == before {
+                break;
+            }
+        }
+    }
+}

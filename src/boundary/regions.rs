@@ -1,0 +1,297 @@
+//! Which volumes are filled: components between required faces, and the policy that chooses among them.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+
+use super::error::BoundaryError;
+use super::find::{Found, find_face};
+use super::flood::{Flood, OUTSIDE};
+use super::recover::place;
+use super::space::Paged;
+use crate::delaunay::Kernel;
+use crate::geom::Point;
+use crate::mesh::{Mesh, VertexTag};
+use crate::store::{Pages, stop_if_requested};
+use tetdb_schema::page::NONE;
+
+/// Which bounded volumes get tetrahedra.
+#[derive(Clone, Debug, PartialEq)]
+pub enum RegionPolicy {
+    /// What an odd number of shells separates from the outside; all where that is contradictory.
+    Parity,
+    /// Every bounded volume.
+    All,
+    /// What lies directly behind the outside.
+    Outer,
+    /// What the normals point out of.
+    ByOrientation,
+    /// The volumes of these points.
+    Seeds(Vec<Point>),
+}
+
+/// A volume enclosed by facets.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RegionSummary {
+    /// Number of the region, from 1; 0 for one that stays empty.
+    pub region: u32,
+    /// In cubed input units.
+    pub volume: f64,
+    pub tets: u32,
+    /// Facets around it.
+    pub facets: u32,
+    /// Labels of those facets, ascending.
+    pub labels: Vec<u32>,
+}
+
+/// The bounded volumes of a surface.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Regions {
+    /// Ordered by the smallest facet around each.
+    pub list: Vec<RegionSummary>,
+    /// Parity was contradictory (shared walls), so all were filled.
+    pub all_instead_of_parity: bool,
+    /// Input numbers of facets with no filled region on either side, at most a thousand.
+    pub loose_facets: Vec<u64>,
+}
+
+/// How two components meet: facets seen from the lower-numbered one in front, from behind, and faces.
+#[derive(Clone, Copy, Debug, Default)]
+struct Wall {
+    front: u64,
+    back: u64,
+}
+
+/// Colors the volumes, deletes everything that is not filled, and the enclosing box.
+///
+/// Every facet must be a required face. Effects: faces to the outside have no neighbor, required bits stay; filled
+/// tetrahedra carry their region as attribute; facets carry the regions in front and behind; `tet_of` is refreshed; vertices
+/// without tetrahedra are removed unless they are the surface's.
+///
+/// Errors: [`BoundaryError::Leak`] when orientation is contradictory or a seed is outside.
+pub fn fill_regions<P: Pages>(
+    mesh: &mut Mesh<P>,
+    policy: &RegionPolicy,
+) -> Result<Regions, BoundaryError> {
+    let mut flood = Flood::run(mesh);
+    let walls = survey(mesh, &mut flood)?;
+    let mut regions = Regions::default();
+    let filled = choose(mesh, &flood, &walls, policy, &mut regions)?;
+    let mut order: Vec<u32> = (OUTSIDE + 1..flood.components.len() as u32).collect();
+    order.sort_by_key(|&c| flood.components[c as usize].facet_first);
+    let mut number = vec![0u32; flood.components.len()];
+    let mut n = 0;
+    for &c in &order {
+        if filled.contains(&c) {
+            n += 1;
+            number[c as usize] = n;
+        }
+        let component = &flood.components[c as usize];
+        regions.list.push(RegionSummary {
+            region: number[c as usize],
+            volume: component.volume,
+            tets: component.tets,
+            facets: component.facets,
+            labels: component.labels.iter().copied().collect(),
+        });
+    }
+    apply(mesh, &number, &mut regions);
+    Ok(regions)
+}
+
+/// Notes on both sides of every facet which component lies there.
+fn survey<P: Pages>(
+    mesh: &mut Mesh<P>,
+    flood: &mut Flood,
+) -> Result<BTreeMap<(u32, u32), Wall>, BoundaryError> {
+    let mut walls: BTreeMap<(u32, u32), Wall> = BTreeMap::new();
+    let none = std::collections::HashSet::new();
+    for n in 0..mesh.n_facets() {
+        if n & 1023 == 0 {
+            stop_if_requested();
+        }
+        let mut facet = mesh.facet(n);
+        let Found::Face(face) = find_face(&mut Paged(mesh, &none), facet.vertices) else {
+            return Err(BoundaryError::NotRecovered {
+                facets: vec![place(mesh, n)],
+                reason: "it is not a face of the mesh",
+            });
+        };
+        let tet = mesh.tet(face.tet());
+        let here = mesh.tet_attribute(face.tet()).0;
+        let there = mesh.tet_attribute(tet.neighbor[face.face()].tet()).0;
+        // The normal of a face points out of its tetrahedron, which is then behind the facet.
+        let [a, b, c] = facet.vertices;
+        let f = tet.face(face.face());
+        let behind = f == [a, b, c] || f == [b, c, a] || f == [c, a, b];
+        facet.regions = if behind { [there, here] } else { [here, there] };
+        mesh.set_facet(n, facet);
+        let [front, back] = facet.regions;
+        flood.touch(front, n, facet.label);
+        if front != back {
+            flood.touch(back, n, facet.label);
+            let wall = walls.entry((front.min(back), front.max(back))).or_default();
+            if front < back {
+                wall.front += 1;
+            } else {
+                wall.back += 1;
+            }
+        }
+    }
+    Ok(walls)
+}
+
+fn choose<P: Pages>(
+    mesh: &mut Mesh<P>,
+    flood: &Flood,
+    walls: &BTreeMap<(u32, u32), Wall>,
+    policy: &RegionPolicy,
+    regions: &mut Regions,
+) -> Result<BTreeSet<u32>, BoundaryError> {
+    let all: BTreeSet<u32> = (OUTSIDE + 1..flood.components.len() as u32).collect();
+    match policy {
+        RegionPolicy::All => Ok(all),
+        RegionPolicy::Outer => Ok(walls
+            .keys()
+            .filter(|&&(low, _)| low == OUTSIDE)
+            .map(|&(_, high)| high)
+            .collect()),
+        RegionPolicy::Parity => {
+            // A wall given once from each side, as two touching solids do, is crossed twice.
+            let depth = spread(flood, walls, |w| i64::from(w.front != w.back), 2);
+            Ok(match depth {
+                Some(depth) => all
+                    .into_iter()
+                    .filter(|&c| depth[c as usize].rem_euclid(2) == 1)
+                    .collect(),
+                None => {
+                    regions.all_instead_of_parity = true;
+                    all
+                }
+            })
+        }
+        RegionPolicy::ByOrientation => {
+            if let Some((_, w)) = walls
+                .iter()
+                .find(|(_, w)| w.front != 0 && w.back != 0 && w.front != w.back)
+            {
+                return Err(BoundaryError::Leak {
+                    what: format!(
+                        "of the triangles between two volumes {} point one way and {} the other; orient the surface",
+                        w.front, w.back
+                    ),
+                });
+            }
+            let sign = |w: &Wall| i64::from(w.front > w.back) - i64::from(w.back > w.front);
+            let winding = spread(flood, walls, sign, 0).ok_or(BoundaryError::Leak {
+                what: "the orientations around its volumes contradict each other".into(),
+            })?;
+            Ok(all
+                .into_iter()
+                .filter(|&c| winding[c as usize] > 0)
+                .collect())
+        }
+        RegionPolicy::Seeds(seeds) => {
+            let mut filled = BTreeSet::new();
+            let mut kernel = Kernel::default();
+            for &p in seeds {
+                let start = mesh.tet_of(0);
+                let component = match kernel.locate(mesh, p, start) {
+                    Ok(found) => mesh.tet_attribute(found.tet).0,
+                    Err(_) => OUTSIDE,
+                };
+                if component == OUTSIDE {
+                    return Err(BoundaryError::Leak {
+                        what: format!("the seed {:?} is outside", p.to_array()),
+                    });
+                }
+                filled.insert(component);
+            }
+            Ok(filled)
+        }
+    }
+}
+
+/// Carries a value from the outside through the walls; `None` when two ways disagree (modulo `modulus`, if not 0).
+fn spread(
+    flood: &Flood,
+    walls: &BTreeMap<(u32, u32), Wall>,
+    step: impl Fn(&Wall) -> i64,
+    modulus: i64,
+) -> Option<Vec<i64>> {
+    let mut next: Vec<Vec<(u32, i64)>> = vec![Vec::new(); flood.components.len()];
+    for (&(low, high), wall) in walls {
+        let step = step(wall);
+        next[low as usize].push((high, step));
+        next[high as usize].push((low, -step));
+    }
+    let mut value: Vec<Option<i64>> = vec![None; flood.components.len()];
+    value[OUTSIDE as usize] = Some(0);
+    let mut queue = VecDeque::from([OUTSIDE]);
+    while let Some(c) = queue.pop_front() {
+        let here = value[c as usize].expect("queued with a value");
+        for &(other, step) in &next[c as usize] {
+            match value[other as usize] {
+                None => {
+                    value[other as usize] = Some(here + step);
+                    queue.push_back(other);
+                }
+                Some(known) => {
+                    let gap = known - here - step;
+                    if gap != 0 && (modulus == 0 || gap.rem_euclid(modulus) != 0) {
+                        return None;
+                    }
+                }
+            }
+        }
+    }
+    Some(value.into_iter().map(|v| v.unwrap_or(0)).collect())
+}
+
+/// Deletes what is not filled and writes the numbers of what is.
+fn apply<P: Pages>(mesh: &mut Mesh<P>, number: &[u32], regions: &mut Regions) {
+    use crate::mesh::FaceRef;
+    let mut from = 0;
+    while let Some((t, tet)) = mesh.next_tet(from) {
+        from = t + 1;
+        if number[mesh.tet_attribute(t).0 as usize] != 0 {
+            continue;
+        }
+        for across in tet.neighbor.into_iter().filter(|n| n.exists()) {
+            if number[mesh.tet_attribute(across.tet()).0 as usize] != 0 {
+                mesh.set_neighbor(across, FaceRef::NONE);
+            }
+        }
+        mesh.free_tet(t);
+    }
+    let mut from = 0;
+    while let Some((t, _)) = mesh.next_tet(from) {
+        from = t + 1;
+        let (component, flags) = mesh.tet_attribute(t);
+        mesh.set_tet_attribute(t, number[component as usize], flags);
+    }
+    for n in 0..mesh.n_facets() {
+        let mut facet = mesh.facet(n);
+        facet.regions = facet.regions.map(|c| number[c as usize]);
+        mesh.set_facet(n, facet);
+        if facet.regions == [0, 0] && regions.loose_facets.len() < 1000 {
+            regions.loose_facets.push(facet.input);
+        }
+    }
+    let mut n = 0;
+    let mut v = 0;
+    while v < mesh.vertex_ids_end() {
+        mesh.set_tet_of(v, NONE);
+        n += 1;
+        v = crate::mesh::sparse(n);
+    }
+    mesh.refresh_tet_of();
+    for k in 0..n {
+        let v = crate::mesh::sparse(k);
+        if mesh.tet_of(v) == NONE {
+            let (tag, _) = mesh.vertex_attribute(v);
+            if matches!(tag, VertexTag::Steiner | VertexTag::EnclosingBox) {
+                mesh.free_vertex(v);
+                mesh.set_vertex_attribute(v, VertexTag::Free, 0);
+            }
+        }
+    }
+}

@@ -1,0 +1,27 @@
+use std::time::Duration;
+
+/// What recovery found and did.
+#[derive(Clone, Debug, Default)]
+pub struct RecoveryReport {
+    pub facets: u32,
+    /// Facets the Delaunay mesh does not have.
+    pub missing_facets: u32,
+    /// Segments the Delaunay mesh does not have.
+    pub missing_segments: u32,
+    /// Segments recovered by flips.
+    pub segments_by_flips: u32,
+    /// Facets that flips recovered, or that were there once their segments were.
+    pub facets_by_flips: u32,
+    /// Facets recovered with vertices that were moved into the volumes afterwards.
+    pub facets_by_points: u32,
+    /// Patches in which that was done.
+    pub patches: u32,
+    /// Vertices put on the input for a while.
+    pub points_on_surface: u32,
+    /// Steiner points left, all inside volumes.
+    pub steiner: u32,
+    pub flips: u64,
+    pub map_time: Duration,
+    pub flip_time: Duration,
+    pub point_time: Duration,
+}

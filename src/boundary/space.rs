@@ -1,0 +1,196 @@
+//! One face for the two places where recovery works: the paged mesh, and a patch held in memory.
+
+use std::collections::HashSet;
+
+use crate::geom::{Point, orient};
+use crate::mesh::anatomy::{FACES, REQUIRED};
+use crate::mesh::{FaceRef, Mesh, Tet};
+use crate::store::Pages;
+
+/// A tetrahedral complex whose parts can be replaced.
+///
+/// Invariant kept by [`Space::replace`]: neighbors are mutual, and outer required faces stay required.
+/// The caller answers for the volumes.
+pub(super) trait Space {
+    /// The record of `t`.
+    fn tet(&mut self, t: u32) -> Tet;
+    /// What lies across face `i` of `t`; loads it if need be.
+    fn across(&mut self, t: u32, i: usize) -> FaceRef;
+    /// A tetrahedron that has `v`.
+    fn tet_of(&mut self, v: u32) -> u32;
+    /// Six times the signed volume of four vertices; the sign is exact.
+    fn orient(&mut self, v: [u32; 4]) -> f64;
+    /// Position of `v`, rounded.
+    fn position(&mut self, v: u32) -> Point;
+    fn take_tet(&mut self) -> u32;
+    fn free_tet(&mut self, t: u32);
+    fn set_tet(&mut self, t: u32, tet: Tet);
+    /// Tells `face` its neighbor.
+    fn set_across(&mut self, face: FaceRef, to: FaceRef);
+    fn set_tet_of(&mut self, v: u32, t: u32);
+    /// Whether the edge `a b` must stay although no required face may have it yet.
+    fn protects(&self, a: u32, b: u32) -> bool;
+
+    /// Replaces the tetrahedra `old` by tetrahedra with the vertices `new`, which fill the same room.
+    ///
+    /// Returns the ids of the new ones, parallel to `new`. Effects: ids of `old` are used again first;
+    /// required faces strictly inside are lost unless the caller marks them again.
+    fn replace(&mut self, old: &[u32], new: &[[u32; 4]]) -> Vec<u32> {
+        let mut sides: Vec<Side> = Vec::with_capacity(4 * new.len() + 2 * old.len() + 4);
+        for &t in old {
+            let tet = self.tet(t);
+            for i in 0..4 {
+                let across = tet.neighbor[i];
+                if !(across.exists() && old.contains(&across.tet())) {
+                    sides.push(Side {
+                        key: sorted(tet.face(i)),
+                        made: u32::MAX,
+                        outside: across,
+                        required: tet.is_required(i),
+                    });
+                }
+            }
+        }
+        let mut ids: Vec<u32> = old.iter().copied().take(new.len()).collect();
+        while ids.len() < new.len() {
+            let t = self.take_tet();
+            ids.push(t);
+        }
+        for (k, quad) in new.iter().enumerate() {
+            for (i, f) in FACES.iter().enumerate() {
+                sides.push(Side {
+                    key: sorted(f.map(|j| quad[j])),
+                    made: (k * 4 + i) as u32,
+                    outside: FaceRef::NONE,
+                    required: false,
+                });
+            }
+        }
+        sides.sort_unstable_by_key(|s| (s.key, s.made));
+        let mut records: Vec<Tet> = new
+            .iter()
+            .map(|&node| Tet {
+                node,
+                neighbor: [FaceRef::NONE; 4],
+            })
+            .collect();
+        let place = |made: u32| (made as usize / 4, made as usize % 4);
+        let name = |made: u32| FaceRef::new(ids[made as usize / 4], made as usize % 4);
+        for pair in sides.chunks(2) {
+            let [a, b] = pair else {
+                panic!("face {:?} of a replaced cavity has one side", pair[0].key)
+            };
+            assert!(
+                a.key == b.key && a.made != u32::MAX,
+                "a replaced cavity does not fill its room: {:?} {:?}",
+                a.key,
+                b.key
+            );
+            let (k, i) = place(a.made);
+            if b.made == u32::MAX {
+                records[k].neighbor[i] = b.outside;
+                if b.required {
+                    records[k].node[i] |= REQUIRED;
+                }
+                if b.outside.exists() {
+                    self.set_across(b.outside, name(a.made));
+                }
+            } else {
+                let (l, j) = place(b.made);
+                records[k].neighbor[i] = name(b.made);
+                records[l].neighbor[j] = name(a.made);
+            }
+        }
+        for (record, &t) in records.iter().zip(&ids) {
+            self.set_tet(t, *record);
+            for v in record.vertices() {
+                self.set_tet_of(v, t);
+            }
+        }
+        for &t in old.iter().skip(new.len()) {
+            self.free_tet(t);
+        }
+        ids
+    }
+
+    /// Marks a face as required on both sides.
+    fn require(&mut self, face: FaceRef) {
+        let other = self.across(face.tet(), face.face());
+        for f in [face, other] {
+            if f.exists() {
+                let mut tet = self.tet(f.tet());
+                tet.node[f.face()] |= REQUIRED;
+                self.set_tet(f.tet(), tet);
+            }
+        }
+    }
+}
+
+/// A face of a replaced cavity, seen from outside (`made == MAX`) or from a new tetrahedron.
+struct Side {
+    key: [u32; 3],
+    made: u32,
+    outside: FaceRef,
+    required: bool,
+}
+
+/// The same three vertices, ascending.
+#[inline]
+pub(super) fn sorted(mut face: [u32; 3]) -> [u32; 3] {
+    face.sort_unstable();
+    face
+}
+
+/// Key of an edge, whatever its direction.
+#[inline]
+pub(super) fn edge_key(a: u32, b: u32) -> u64 {
+    u64::from(a.min(b)) << 32 | u64::from(a.max(b))
+}
+
+/// The paged mesh as a space; all vertices are where their coordinates say.
+pub(super) struct Paged<'m, P: Pages>(
+    pub &'m mut Mesh<P>,
+    /// Edges that must stay.
+    pub &'m HashSet<u64>,
+);
+
+impl<P: Pages> Space for Paged<'_, P> {
+    #[inline]
+    fn tet(&mut self, t: u32) -> Tet {
+        self.0.tet(t)
+    }
+    #[inline]
+    fn across(&mut self, t: u32, i: usize) -> FaceRef {
+        self.0.tet(t).neighbor[i]
+    }
+    #[inline]
+    fn tet_of(&mut self, v: u32) -> u32 {
+        self.0.tet_of(v)
+    }
+    #[inline]
+    fn orient(&mut self, v: [u32; 4]) -> f64 {
+        let [a, b, c, d] = v.map(|v| self.0.point(v));
+        orient(a, b, c, d)
+    }
+    fn position(&mut self, v: u32) -> Point {
+        self.0.point(v)
+    }
+    fn take_tet(&mut self) -> u32 {
+        self.0.take_tet()
+    }
+    fn free_tet(&mut self, t: u32) {
+        self.0.free_tet(t);
+    }
+    fn set_tet(&mut self, t: u32, tet: Tet) {
+        self.0.set_tet(t, tet);
+    }
+    fn set_across(&mut self, face: FaceRef, to: FaceRef) {
+        self.0.set_neighbor(face, to);
+    }
+    fn set_tet_of(&mut self, v: u32, t: u32) {
+        self.0.set_tet_of(v, t);
+    }
+    fn protects(&self, a: u32, b: u32) -> bool {
+        self.1.contains(&edge_key(a, b))
+    }
+}

@@ -1,0 +1,43 @@
+//! Puts an exact point into a small cavity that sees it whole.
+
+use super::exact::ExactPoint;
+use super::patch::Patch;
+use super::space::Space;
+use super::walk::swapped;
+use crate::mesh::Tet;
+use crate::store::Pages;
+
+/// An outer face of a cavity, as a tetrahedron of the cavity and the vertex opposite the face.
+pub(super) type Outer = (Tet, usize);
+
+impl<P: Pages> Patch<'_, P> {
+    /// The outer faces of a cavity.
+    pub(super) fn outer_faces(&mut self, cavity: &[u32]) -> Vec<Outer> {
+        let mut outer = Vec::new();
+        for &t in cavity {
+            for i in 0..4 {
+                if !cavity.contains(&self.across(t, i).tet()) {
+                    outer.push((self.tet(t), i));
+                }
+            }
+        }
+        outer
+    }
+
+    /// Replaces the cavity by the point joined to its outer faces, if the point sees them all from inside.
+    pub(super) fn star(
+        &mut self,
+        cavity: &[u32],
+        outer: &[Outer],
+        exact: ExactPoint,
+    ) -> Option<u32> {
+        let x = self.add_vertex(exact.rounded(), Some(exact));
+        let new: Vec<[u32; 4]> = outer.iter().map(|(tet, i)| swapped(tet, *i, x)).collect();
+        if new.iter().any(|&q| self.orient(q) <= 0.0) {
+            self.drop_vertex();
+            return None;
+        }
+        self.replace(cavity, &new);
+        Some(x)
+    }
+}

@@ -1,0 +1,477 @@
+//! A vertex on the surface is replaced by one vertex inside each volume around it.
+//!
+//! ```text
+//!        c1--c2                      The faces of each facet at X form a fan. Without X the fan's outline is a
+//!       / \  / \                     polygon in the facet's plane (for X on a segment, a' b' closes it), which has a
+//!      a'--X---b'    facet 1         triangulation. The facets divide the ball of X into wedges. A point of a
+//!       \ /  \ /                     wedge near X sees all outer faces of the wedge, as X does, and the polygons of
+//!        d1--d2      facet 2         its two facets if it is inside their planes: an open cone at X, never empty.
+//! ```
+//! So in exact arithmetic there is always a place. It is taken as far from all planes as possible, rounded,
+//! and accepted only if every exact sign is right. Before that, vertices that exist already are tried.
+//!
+//! Source: P.-L. George, H. Borouchaki and E. Saltel, "'Ultimate' robustness in meshing an arbitrary polyhedron",
+//! International Journal for Numerical Methods in Engineering 58 (2003).
+
+use std::collections::{BTreeMap, HashMap, HashSet};
+
+use super::chain::Trouble;
+use super::kernel::{HalfSpace, center};
+use super::patch::Patch;
+use super::polygon::triangulate;
+use super::space::{Space, sorted};
+use super::walk::{ball, swapped};
+use crate::geom::Point;
+use crate::mesh::FaceRef;
+use crate::mesh::anatomy::FACES;
+use crate::store::Pages;
+
+/// The facets of a patch and the faces that make them up.
+#[derive(Default)]
+pub(super) struct Skin {
+    /// Corners of each facet.
+    pub facets: Vec<[u32; 3]>,
+    /// Sorted face to its facet and itself in the facet's direction.
+    pub faces: HashMap<[u32; 3], (usize, [u32; 3])>,
+}
+
+/// The fan of one facet around the vertex.
+struct Fan {
+    facet: usize,
+    /// In the facet's direction; open at the vertex if it lies on a segment.
+    polygon: Vec<u32>,
+    closed: bool,
+}
+
+/// Tetrahedra of the ball between the same facets.
+struct Wedge {
+    tets: Vec<u32>,
+    /// Fans that bound it, and the sign of the side it is on.
+    walls: Vec<(usize, bool)>,
+}
+
+impl<P: Pages> Patch<'_, P> {
+    /// Takes vertex `x` off the surface. Returns the number of vertices that replace it.
+    pub(super) fn suppress(&mut self, skin: &mut Skin, x: u32) -> Result<u32, Trouble> {
+        let ball = ball(self, x);
+        let fans = self.fans(skin, x, &ball)?;
+        if fans.is_empty() {
+            return Ok(0);
+        }
+        if fans.len() == 1 && !fans[0].closed {
+            return Err(Trouble::Broken("a segment with one facet"));
+        }
+        if self.collapse_on_surface(skin, x, &ball, &fans) {
+            return Ok(0);
+        }
+        let mut faces = Vec::new();
+        for fan in &fans {
+            faces.push(self.fill_polygon(skin.facets[fan.facet], &fan.polygon, &ball)?);
+        }
+        let wedges = self.wedges(skin, x, &ball, &fans)?;
+        let mut new = Vec::new();
+        let mut added = 0;
+        for wedge in &wedges {
+            let walls: Vec<[u32; 3]> = wedge
+                .walls
+                .iter()
+                .flat_map(|&(fan, above)| {
+                    let turn =
+                        move |&[p, q, r]: &[u32; 3]| if above { [p, q, r] } else { [q, p, r] };
+                    faces[fan].iter().map(turn)
+                })
+                .collect();
+            if let Some(mut quads) = self.from_link(x, wedge, &walls, &fans) {
+                new.append(&mut quads);
+                continue;
+            }
+            new.append(&mut self.from_inside(x, wedge, &walls)?);
+            added += 1;
+        }
+        let ids = self.replace(&ball, &new);
+        self.renew_skin(skin, x, &fans, &faces, &ids);
+        Ok(added)
+    }
+
+    /// Takes free vertex `x` away if one of its neighbors can stand for it.
+    pub(super) fn remove_free(&mut self, x: u32) -> bool {
+        let ball = ball(self, x);
+        let link: HashSet<u32> = ball
+            .iter()
+            .flat_map(|&t| self.tets_vertices(t))
+            .filter(|&v| v != x)
+            .collect();
+        let mut link: Vec<u32> = link.into_iter().collect();
+        link.sort_unstable();
+        let mut best: Option<(f64, Vec<[u32; 4]>)> = None;
+        for u in link {
+            let Some(quads) = self.moved(x, u, &ball) else {
+                continue;
+            };
+            let worst = quads
+                .iter()
+                .map(|&q| self.flatness(q))
+                .fold(f64::INFINITY, f64::min);
+            if best.as_ref().is_none_or(|b| worst > b.0) {
+                best = Some((worst, quads));
+            }
+        }
+        match best {
+            Some((worst, quads)) if worst > 0.0 => {
+                self.replace(&ball, &quads);
+                true
+            }
+            _ => false,
+        }
+    }
+
+    fn tets_vertices(&mut self, t: u32) -> [u32; 4] {
+        self.tet(t).vertices()
+    }
+
+    fn flatness(&mut self, q: [u32; 4]) -> f64 {
+        let volume = self.orient(q);
+        let p = q.map(|v| self.position(v));
+        let longest = (0..4)
+            .flat_map(|i| (0..i).map(move |j| (i, j)))
+            .map(|(i, j)| p[i].distance(p[j]))
+            .fold(0.0, f64::max);
+        volume / (longest * longest * longest)
+    }
+
+    /// The ball with `x` moved to its neighbor `u`, if all volumes stay positive.
+    fn moved(&mut self, x: u32, u: u32, ball: &[u32]) -> Option<Vec<[u32; 4]>> {
+        let mut quads = Vec::new();
+        for &t in ball {
+            let tet = self.tet(t);
+            if tet.local(u).is_none() {
+                let q = swapped(&tet, tet.local(x)?, u);
+                if self.orient(q) <= 0.0 {
+                    return None;
+                }
+                quads.push(q);
+            }
+        }
+        Some(quads)
+    }
+
+    /// The fans of the facets around `x`.
+    fn fans(&mut self, skin: &Skin, x: u32, ball: &[u32]) -> Result<Vec<Fan>, Trouble> {
+        let mut edges: BTreeMap<usize, BTreeMap<u32, u32>> = BTreeMap::new();
+        for &t in ball {
+            let tet = self.tet(t);
+            for i in (0..4).filter(|&i| tet.vertex(i) != x && tet.is_required(i)) {
+                let Some(&(facet, face)) = skin.faces.get(&sorted(tet.face(i))) else {
+                    return Err(Trouble::Broken("a facet of another patch at a new vertex"));
+                };
+                let k = face
+                    .iter()
+                    .position(|&v| v == x)
+                    .expect("a face of the ball");
+                edges
+                    .entry(facet)
+                    .or_default()
+                    .insert(face[(k + 1) % 3], face[(k + 2) % 3]);
+            }
+        }
+        let mut fans = Vec::new();
+        for (facet, next) in edges {
+            let ends: HashSet<u32> = next.values().copied().collect();
+            let start = next.keys().copied().find(|p| !ends.contains(p));
+            let closed = start.is_none();
+            let first = start.unwrap_or_else(|| *next.keys().next().expect("not empty"));
+            let mut polygon = vec![first];
+            let mut at = first;
+            while let Some(&q) = next.get(&at) {
+                if q == first || polygon.len() > next.len() {
+                    break;
+                }
+                polygon.push(q);
+                at = q;
+            }
+            if polygon.len() != next.len() + usize::from(!closed) {
+                return Err(Trouble::Broken("a facet meets a vertex twice"));
+            }
+            fans.push(Fan {
+                facet,
+                polygon,
+                closed,
+            });
+        }
+        Ok(fans)
+    }
+
+    /// Moves `x` along the surface onto a vertex all fans share.
+    fn collapse_on_surface(&mut self, skin: &mut Skin, x: u32, ball: &[u32], fans: &[Fan]) -> bool {
+        let candidates: Vec<u32> = match fans {
+            [fan] => fan.polygon.clone(),
+            _ => vec![
+                fans[0].polygon[0],
+                *fans[0].polygon.last().expect("not empty"),
+            ],
+        };
+        for u in candidates {
+            let Some(quads) = self.moved(x, u, ball) else {
+                continue;
+            };
+            let faces: Vec<Vec<[u32; 3]>> = fans
+                .iter()
+                .map(|fan| {
+                    let n = fan.polygon.len();
+                    let last = if fan.closed { n } else { n - 1 };
+                    (0..last)
+                        .map(|i| [u, fan.polygon[i], fan.polygon[(i + 1) % n]])
+                        .filter(|f| f[1] != u && f[2] != u)
+                        .collect()
+                })
+                .collect();
+            let ids = self.replace(ball, &quads);
+            self.renew_skin(skin, x, fans, &faces, &ids);
+            return true;
+        }
+        false
+    }
+
+    /// The best triangulation of a polygon in the plane of a facet, in its direction.
+    fn fill_polygon(
+        &mut self,
+        f: [u32; 3],
+        polygon: &[u32],
+        ball: &[u32],
+    ) -> Result<Vec<[u32; 3]>, Trouble> {
+        let mut off_plane = None;
+        'search: for &t in ball {
+            for v in self.tets_vertices(t) {
+                let side = self.orient([f[0], f[1], f[2], v]);
+                if side != 0.0 {
+                    off_plane = Some((v, side.signum()));
+                    break 'search;
+                }
+            }
+        }
+        let (w, side) = off_plane.ok_or(Trouble::Broken("a flat ball"))?;
+        let n = polygon.len();
+        let found = triangulate(
+            n,
+            |_, _| true,
+            |i, k, j| {
+                let [a, b, c] = [polygon[i], polygon[k], polygon[j]];
+                let turn = self.orient([a, b, c, w]) * side;
+                if turn <= 0.0 {
+                    return 0.0;
+                }
+                let [p, q, r] = [a, b, c].map(|v| self.position(v));
+                let longest = p
+                    .distance_squared(q)
+                    .max(q.distance_squared(r))
+                    .max(r.distance_squared(p));
+                ((q - p).cross(r - p).length() / longest).max(f64::MIN_POSITIVE)
+            },
+        );
+        let triangles = found.ok_or(Trouble::Broken("a fan without outline"))?;
+        Ok(triangles
+            .into_iter()
+            .map(|t| t.map(|i| polygon[i]))
+            .collect())
+    }
+
+    fn wedges(
+        &mut self,
+        skin: &Skin,
+        x: u32,
+        ball: &[u32],
+        fans: &[Fan],
+    ) -> Result<Vec<Wedge>, Trouble> {
+        let mut seen: HashSet<u32> = HashSet::new();
+        let mut wedges = Vec::new();
+        for &first in ball {
+            if !seen.insert(first) {
+                continue;
+            }
+            let mut wedge = Wedge {
+                tets: vec![first],
+                walls: Vec::new(),
+            };
+            let mut next = 0;
+            while next < wedge.tets.len() {
+                let t = wedge.tets[next];
+                next += 1;
+                let tet = self.tet(t);
+                for i in (0..4).filter(|&i| tet.vertex(i) != x) {
+                    if !tet.is_required(i) {
+                        let across = self.across(t, i);
+                        if seen.insert(across.tet()) {
+                            wedge.tets.push(across.tet());
+                        }
+                        continue;
+                    }
+                    let facet = skin.faces[&sorted(tet.face(i))].0;
+                    let f = skin.facets[facet];
+                    let above = self.orient([f[0], f[1], f[2], tet.vertex(i)]) > 0.0;
+                    let fan = fans
+                        .iter()
+                        .position(|fan| fan.facet == facet)
+                        .expect("fans were made from these faces");
+                    if !wedge.walls.contains(&(fan, above)) {
+                        wedge.walls.push((fan, above));
+                    }
+                }
+            }
+            let both = |&(fan, above): &(usize, bool)| wedge.walls.contains(&(fan, !above));
+            if wedge.walls.iter().any(both) {
+                return Err(Trouble::Broken("a facet does not separate its sides"));
+            }
+            wedges.push(wedge);
+        }
+        Ok(wedges)
+    }
+
+    /// The wedge and its walls joined to one of its own vertices.
+    fn from_link(
+        &mut self,
+        x: u32,
+        wedge: &Wedge,
+        walls: &[[u32; 3]],
+        fans: &[Fan],
+    ) -> Option<Vec<[u32; 4]>> {
+        let on_wall: HashSet<u32> = fans
+            .iter()
+            .flat_map(|f| f.polygon.iter().copied())
+            .collect();
+        let mut candidates: Vec<u32> = wedge
+            .tets
+            .iter()
+            .flat_map(|&t| self.tets_vertices(t))
+            .filter(|v| *v != x && !on_wall.contains(v))
+            .collect();
+        candidates.sort_unstable();
+        candidates.dedup();
+        'next: for u in candidates {
+            let mut quads = Vec::new();
+            for &t in &wedge.tets {
+                let tet = self.tet(t);
+                if tet.local(u).is_none() {
+                    quads.push(swapped(&tet, tet.local(x)?, u));
+                }
+            }
+            quads.extend(walls.iter().map(|&[p, q, r]| [p, q, r, u]));
+            for &q in &quads {
+                if self.orient(q) <= 0.0 {
+                    continue 'next;
+                }
+            }
+            return Some(quads);
+        }
+        None
+    }
+
+    /// The wedge and its walls joined to a new vertex inside.
+    fn from_inside(
+        &mut self,
+        x: u32,
+        wedge: &Wedge,
+        walls: &[[u32; 3]],
+    ) -> Result<Vec<[u32; 4]>, Trouble> {
+        // Slot of the vertex to be placed in each future tetrahedron.
+        let mut quads: Vec<([u32; 4], usize)> = Vec::new();
+        for &t in &wedge.tets {
+            let tet = self.tet(t);
+            let i = tet.local(x).expect("a tetrahedron of the ball");
+            quads.push((tet.vertices(), i));
+        }
+        quads.extend(walls.iter().map(|&[p, q, r]| ([p, q, r, x], 3)));
+        let origin = self.position(x);
+        let mut reach = 0.0f64;
+        let mut planes = Vec::new();
+        for &(q, i) in &quads {
+            let [a, b, c] = FACES[i].map(|k| self.position(q[k]) - origin);
+            reach = reach.max(a.length()).max(b.length()).max(c.length());
+            let normal = (b - a).cross(c - a).normalize_or_zero();
+            if normal == Point::ZERO {
+                continue;
+            }
+            planes.push(HalfSpace {
+                normal,
+                offset: normal.dot(a),
+            });
+        }
+        let best = center(&planes, reach);
+        let mut proposals: Vec<Point> = Vec::new();
+        if let Some(d) = best {
+            proposals.extend((0..45).map(|k| d * 0.5f64.powi(k)));
+        }
+        let heart = self.heart(x, wedge) - origin;
+        proposals.extend((0..45).map(|k| heart * 0.5f64.powi(k)));
+        for d in proposals {
+            let p = self.add_vertex(origin + d, None);
+            let fits = quads.iter().all(|&(q, i)| {
+                let mut q = q;
+                q[i] = p;
+                self.orient(q) > 0.0
+            });
+            if fits {
+                return Ok(quads
+                    .into_iter()
+                    .map(|(mut q, i)| {
+                        q[i] = p;
+                        q
+                    })
+                    .collect());
+            }
+            self.drop_vertex();
+        }
+        Err(Trouble::Precision)
+    }
+
+    /// Mean of the wedge's other vertices: a direction to try when the planes give none.
+    fn heart(&mut self, x: u32, wedge: &Wedge) -> Point {
+        let mut sum = Point::ZERO;
+        let mut n = 0.0;
+        for &t in &wedge.tets {
+            for v in self.tets_vertices(t) {
+                if v != x {
+                    sum += self.position(v);
+                    n += 1.0;
+                }
+            }
+        }
+        sum / n
+    }
+
+    /// Forgets the faces at `x`, marks the new ones.
+    fn renew_skin(
+        &mut self,
+        skin: &mut Skin,
+        x: u32,
+        fans: &[Fan],
+        faces: &[Vec<[u32; 3]>],
+        ids: &[u32],
+    ) {
+        for fan in fans {
+            let n = fan.polygon.len();
+            let last = if fan.closed { n } else { n - 1 };
+            for i in 0..last {
+                let old = sorted([x, fan.polygon[i], fan.polygon[(i + 1) % n]]);
+                skin.faces.remove(&old);
+            }
+        }
+        for (fan, faces) in fans.iter().zip(faces) {
+            for &face in faces {
+                skin.faces.insert(sorted(face), (fan.facet, face));
+            }
+        }
+        self.require_known(skin, ids);
+    }
+
+    /// Marks the faces of `tets` that are in the skin.
+    pub(super) fn require_known(&mut self, skin: &Skin, tets: &[u32]) {
+        for &t in tets {
+            let tet = self.tet(t);
+            for i in 0..4 {
+                if !tet.is_required(i) && skin.faces.contains_key(&sorted(tet.face(i))) {
+                    self.require(FaceRef::new(t, i));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,5 @@
+//! Made surfaces with known difficulties, and the real ones when they are at hand.
+
+mod build;
+mod made;
+mod real;
