@@ -1,4 +1,8 @@
 #![forbid(unsafe_code)]
 #![doc = include_str!("../README.md")]
 
+pub mod chunk;
+pub mod digest;
+pub mod ids;
 pub mod page;
+pub mod record;

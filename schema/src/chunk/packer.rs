@@ -1,0 +1,141 @@
+//! Cuts a stream of records into chunks that fill their place in the database.
+//!
+//! redb stores a large value in a room of 4096 * 2^k bytes, so a chunk of half the size costs as much
+//! as a full one. How many records fit is only known after compressing; the packer guesses from the
+//! chunk before and tries again when it missed. The result depends on the records alone.
+
+use super::{CHUNK_BYTES_MAX, ChunkAddress, ChunkRecord, Encoder};
+
+/// What the guess aims at. Higher: one in five chunks overflows and is encoded again; lower: room is wasted.
+const FILL_AIM: f64 = 0.98;
+/// A chunk below this is tried again with more records, when there are some.
+const FILL_LEAST: f64 = 0.95;
+/// Attempts to fill a chunk better; attempts to make it fit are not limited.
+const GROWTH_ATTEMPTS: u32 = 2;
+/// First guess of the bytes a record takes.
+const RECORD_BYTES_GUESS: usize = 8;
+
+/// A chunk ready to be stored, and the records in it.
+pub struct Packed<R> {
+    pub address: ChunkAddress,
+    pub first: u32,
+    pub value: Vec<u8>,
+    pub records: Vec<R>,
+}
+
+/// Collects records and cuts them into chunks.
+pub struct Packer<R> {
+    address: ChunkAddress,
+    first: u32,
+    guess: usize,
+    pending: Vec<R>,
+    encoder: Encoder<R>,
+}
+
+impl<R: ChunkRecord> Packer<R> {
+    /// A packer for the records of one sub-domain in one generation.
+    ///
+    /// Errors: zstd cannot allocate its context.
+    pub fn new(subdomain: u32, generation: u32) -> std::io::Result<Self> {
+        Ok(Self {
+            address: ChunkAddress {
+                kind: R::KIND,
+                subdomain,
+                generation,
+                chunk: 0,
+            },
+            first: 0,
+            guess: (CHUNK_BYTES_MAX / RECORD_BYTES_GUESS).min(R::COUNT_MAX),
+            pending: Vec::new(),
+            encoder: Encoder::new()?,
+        })
+    }
+
+    /// Records taken so far.
+    pub fn count(&self) -> u64 {
+        u64::from(self.first) + self.pending.len() as u64
+    }
+
+    /// Chunks cut so far.
+    pub fn chunks(&self) -> u32 {
+        self.address.chunk
+    }
+
+    /// Takes a record; returns a chunk when there is enough for one.
+    ///
+    /// Errors: those of zstd.
+    pub fn push(&mut self, record: R) -> std::io::Result<Option<Packed<R>>> {
+        self.pending.push(record);
+        // More than the guess, so that a chunk that came out short can grow.
+        if self.pending.len() < (self.guess + self.guess / 8).min(R::COUNT_MAX) {
+            return Ok(None);
+        }
+        self.cut_some(false)
+    }
+
+    /// Cuts the next chunk from what is left; `None` when nothing is.
+    ///
+    /// Errors: those of zstd.
+    pub fn cut(&mut self) -> std::io::Result<Option<Packed<R>>> {
+        self.cut_some(true)
+    }
+
+    fn cut_some(&mut self, last: bool) -> std::io::Result<Option<Packed<R>>> {
+        let most = self.pending.len().min(R::COUNT_MAX);
+        if most == 0 {
+            return Ok(None);
+        }
+        let mut n = if most <= self.guess + self.guess / 16 {
+            most
+        } else {
+            self.guess.clamp(1, most)
+        };
+        // `fits` is known to fit, `bursts` not to.
+        let (mut fits, mut bursts) = (0, most + 1);
+        let mut growths = 0;
+        loop {
+            let records = &self.pending[..n];
+            let length = self
+                .encoder
+                .encode(self.address, self.first, records)?
+                .len();
+            let aim = (n as f64 * FILL_AIM * CHUNK_BYTES_MAX as f64 / length as f64) as usize;
+            if length > CHUNK_BYTES_MAX {
+                bursts = n;
+                n = aim.clamp(fits.max(1), (bursts - 1).max(1));
+                if bursts == 1 {
+                    return Err(std::io::Error::other("one record exceeds a chunk"));
+                }
+                continue;
+            }
+            fits = n;
+            let full = length as f64 >= FILL_LEAST * CHUNK_BYTES_MAX as f64;
+            let larger = aim.min(bursts - 1);
+            if !last && !full && n == most && most < R::COUNT_MAX {
+                self.guess = aim.clamp(1, R::COUNT_MAX);
+                return Ok(None);
+            }
+            if full || larger <= fits || growths == GROWTH_ATTEMPTS {
+                self.guess = aim.clamp(1, R::COUNT_MAX);
+                return Ok(Some(self.take(n)));
+            }
+            growths += 1;
+            n = larger;
+        }
+    }
+
+    /// Takes the first `n` records, whose value the encoder made last.
+    fn take(&mut self, n: usize) -> Packed<R> {
+        let records: Vec<R> = self.pending.drain(..n).collect();
+        let value = self.encoder.last_value().to_vec();
+        let packed = Packed {
+            address: self.address,
+            first: self.first,
+            value,
+            records,
+        };
+        self.first += n as u32;
+        self.address.chunk += 1;
+        packed
+    }
+}

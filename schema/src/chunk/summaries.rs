@@ -1,0 +1,212 @@
+//! Summaries: what a reader wants to know of a chunk before it decodes it.
+
+use super::columns::{Columns, Malformed, Reader};
+use super::{ChunkKind, ChunkRecord};
+
+/// Of a chunk of tetrahedra; 128 bytes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TetSummary {
+    /// Box of its vertices: low corner, high corner.
+    pub bounds: [[f64; 3]; 2],
+    /// Sum of the volumes in order.
+    pub volume: f64,
+    /// Least and greatest quality q.
+    pub quality: [f32; 2],
+    /// Least and greatest region.
+    pub regions: [u32; 2],
+    /// Least and greatest vertex number.
+    pub vertices: [u32; 2],
+    pub first: u32,
+    pub count: u32,
+    /// Faces without a partner in the chunk: shared with other chunks or on the boundary.
+    pub open_faces: u32,
+    /// Bytes of the stored value.
+    pub bytes: u32,
+}
+
+/// Of a chunk of vertices; 64 bytes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VertexSummary {
+    pub bounds: [[f64; 3]; 2],
+    pub first: u32,
+    pub count: u32,
+}
+
+/// Of a chunk of facets or interface faces; 16 bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RangeSummary<const INTERFACE: bool> {
+    pub first: u32,
+    pub count: u32,
+}
+
+/// Takes fixed-width numbers from the front.
+struct Fields<'a>(&'a [u8]);
+
+impl Fields<'_> {
+    fn take<const N: usize>(&mut self) -> [u8; N] {
+        let (head, rest) = self.0.split_at(N);
+        self.0 = rest;
+        head.try_into().expect("N bytes were split off")
+    }
+    fn u32(&mut self) -> u32 {
+        u32::from_le_bytes(self.take())
+    }
+    fn f32(&mut self) -> f32 {
+        f32::from_le_bytes(self.take())
+    }
+    fn f64(&mut self) -> f64 {
+        f64::from_le_bytes(self.take())
+    }
+    fn bounds(&mut self) -> [[f64; 3]; 2] {
+        [(); 2].map(|()| [(); 3].map(|()| self.f64()))
+    }
+    /// The rest is reserved and zero.
+    fn finish(self) -> Result<(), Malformed> {
+        if self.0.iter().all(|&b| b == 0) {
+            Ok(())
+        } else {
+            Err(Malformed("a reserved byte is not zero"))
+        }
+    }
+}
+
+fn pad(columns: &mut Columns, start: usize, width: usize) {
+    columns.bytes.resize(start + width, 0);
+}
+
+fn put_bounds(columns: &mut Columns, bounds: &[[f64; 3]; 2]) {
+    for c in bounds.as_flattened() {
+        columns.raw(&c.to_le_bytes());
+    }
+}
+
+impl TetSummary {
+    /// Bytes of a summary.
+    pub const BYTES: usize = 128;
+}
+
+impl ChunkRecord for TetSummary {
+    const KIND: ChunkKind = ChunkKind::TetSummaries;
+    const COUNT_MAX: usize = 2048;
+    const RAW_BYTES_MAX: usize = Self::BYTES;
+
+    fn encode(records: &[Self], _first: u32, columns: &mut Columns) {
+        for s in records {
+            let start = columns.bytes.len();
+            put_bounds(columns, &s.bounds);
+            columns.raw(&s.volume.to_le_bytes());
+            for q in s.quality {
+                columns.raw(&q.to_le_bytes());
+            }
+            let [[r0, r1], [v0, v1]] = [s.regions, s.vertices];
+            for word in [r0, r1, v0, v1, s.first, s.count, s.open_faces, s.bytes] {
+                columns.raw(&word.to_le_bytes());
+            }
+            pad(columns, start, Self::BYTES);
+        }
+    }
+
+    fn decode(
+        columns: &mut Reader<'_>,
+        _first: u32,
+        count: usize,
+        records: &mut Vec<Self>,
+    ) -> Result<(), Malformed> {
+        for _ in 0..count {
+            let mut f = Fields(columns.raw(Self::BYTES)?);
+            records.push(Self {
+                bounds: f.bounds(),
+                volume: f.f64(),
+                quality: [f.f32(), f.f32()],
+                regions: [f.u32(), f.u32()],
+                vertices: [f.u32(), f.u32()],
+                first: f.u32(),
+                count: f.u32(),
+                open_faces: f.u32(),
+                bytes: f.u32(),
+            });
+            f.finish()?;
+        }
+        Ok(())
+    }
+}
+
+impl VertexSummary {
+    /// Bytes of a summary.
+    pub const BYTES: usize = 64;
+}
+
+impl ChunkRecord for VertexSummary {
+    const KIND: ChunkKind = ChunkKind::VertexSummaries;
+    const COUNT_MAX: usize = 4096;
+    const RAW_BYTES_MAX: usize = Self::BYTES;
+
+    fn encode(records: &[Self], _first: u32, columns: &mut Columns) {
+        for s in records {
+            let start = columns.bytes.len();
+            put_bounds(columns, &s.bounds);
+            columns.raw(&s.first.to_le_bytes());
+            columns.raw(&s.count.to_le_bytes());
+            pad(columns, start, Self::BYTES);
+        }
+    }
+
+    fn decode(
+        columns: &mut Reader<'_>,
+        _first: u32,
+        count: usize,
+        records: &mut Vec<Self>,
+    ) -> Result<(), Malformed> {
+        for _ in 0..count {
+            let mut f = Fields(columns.raw(Self::BYTES)?);
+            records.push(Self {
+                bounds: f.bounds(),
+                first: f.u32(),
+                count: f.u32(),
+            });
+            f.finish()?;
+        }
+        Ok(())
+    }
+}
+
+impl<const INTERFACE: bool> RangeSummary<INTERFACE> {
+    /// Bytes of a summary.
+    pub const BYTES: usize = 16;
+}
+
+impl<const INTERFACE: bool> ChunkRecord for RangeSummary<INTERFACE> {
+    const KIND: ChunkKind = if INTERFACE {
+        ChunkKind::InterfaceSummaries
+    } else {
+        ChunkKind::FacetSummaries
+    };
+    const COUNT_MAX: usize = 16_384;
+    const RAW_BYTES_MAX: usize = Self::BYTES;
+
+    fn encode(records: &[Self], _first: u32, columns: &mut Columns) {
+        for s in records {
+            let start = columns.bytes.len();
+            columns.raw(&s.first.to_le_bytes());
+            columns.raw(&s.count.to_le_bytes());
+            pad(columns, start, Self::BYTES);
+        }
+    }
+
+    fn decode(
+        columns: &mut Reader<'_>,
+        _first: u32,
+        count: usize,
+        records: &mut Vec<Self>,
+    ) -> Result<(), Malformed> {
+        for _ in 0..count {
+            let mut f = Fields(columns.raw(Self::BYTES)?);
+            records.push(Self {
+                first: f.u32(),
+                count: f.u32(),
+            });
+            f.finish()?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,208 @@
+//! Chunks come back; damage is an error, never a panic.
+
+use super::*;
+use crate::record::{InterfaceFace, SealedFacet, SealedTet, SealedVertex};
+
+/// Deterministic pseudo-random numbers.
+fn random(seed: u64) -> impl FnMut() -> u64 {
+    let mut state = seed;
+    move || {
+        state = state.wrapping_add(1);
+        crate::digest::mix(seed, state)
+    }
+}
+
+fn tets(n: u32) -> Vec<SealedTet> {
+    let mut next = random(1);
+    (0..n)
+        .map(|i| {
+            let a = i / 6;
+            let step = |r: u64| 1 + (r % 40) as u32;
+            let nodes = [a, a + step(next()), a + step(next()), a + step(next())];
+            let region = if i % 1000 == 0 { u32::MAX - i } else { 3 };
+            SealedTet { nodes, region }
+        })
+        .collect()
+}
+
+fn vertices(n: u32) -> Vec<SealedVertex> {
+    let mut next = random(2);
+    (0..n)
+        .map(|i| {
+            let noise = (next() % 4096) as f64 * 1e-6;
+            let surface = next() % 3 == 0;
+            let owner = if surface { 0 } else { (1 << 20) + 5 };
+            let index = if surface { next() as u32 } else { i };
+            SealedVertex {
+                point: [noise - f64::from(i), noise * 3.0, 1.0 / (noise + 0.1)],
+                h: noise as f32,
+                tag: u32::from(surface),
+                id: owner << 32 | u64::from(index),
+            }
+        })
+        .collect()
+}
+
+fn facets(n: u32) -> Vec<SealedFacet> {
+    (0..n)
+        .map(|i| SealedFacet {
+            vertices: [i, i + 7, i.wrapping_sub(3)],
+            label: i / 100,
+            triangle: u64::from(i) << (i % 33),
+            regions: [1, i % 7 * u32::MAX / 7],
+            tets: [if i % 2 == 0 { u32::MAX } else { i * 3 }, u32::MAX - 1 - i],
+        })
+        .collect()
+}
+
+fn faces(n: u32) -> Vec<InterfaceFace> {
+    (0..n)
+        .map(|i| InterfaceFace {
+            vertices: [i, i + 1, i + 9],
+            cut: 1 + i % 3,
+            index: i.wrapping_mul(77_777),
+            other: 8,
+            tet: i * 4,
+        })
+        .collect()
+}
+
+fn pack<R: ChunkRecord>(records: &[R]) -> Vec<Packed<R>> {
+    let mut packer = Packer::new(5, 2).expect("a zstd context");
+    let mut chunks = Vec::new();
+    for &r in records {
+        chunks.extend(packer.push(r).expect("zstd"));
+    }
+    while let Some(chunk) = packer.cut().expect("zstd") {
+        chunks.push(chunk);
+    }
+    assert_eq!(packer.count(), records.len() as u64);
+    chunks
+}
+
+fn come_back<R: ChunkRecord + PartialEq + std::fmt::Debug>(records: &[R]) {
+    let mut decoder = Decoder::<R>::new().expect("a zstd context");
+    let (mut all, mut some) = (Vec::new(), Vec::new());
+    for chunk in pack(records) {
+        assert!(chunk.value.len() <= CHUNK_BYTES_MAX);
+        let first = decoder.decode(&chunk.value, chunk.address, &mut some);
+        assert_eq!(first, Ok(all.len() as u32));
+        all.extend_from_slice(&some);
+    }
+    assert!(all == records, "{} of {}", all.len(), records.len());
+}
+
+#[test]
+fn every_kind_comes_back() {
+    for n in [0, 1, 2, 50_000] {
+        come_back(&tets(n));
+        come_back(&vertices(n));
+        come_back(&facets(n));
+        come_back(&faces(n));
+    }
+    let summary = TetSummary {
+        bounds: [[0.1; 3], [0.9; 3]],
+        volume: 2.0,
+        quality: [1.0, 3.5],
+        regions: [1, 70_000],
+        vertices: [4, 9],
+        first: 2,
+        count: 3,
+        open_faces: 5,
+        bytes: 65_000,
+    };
+    come_back(&vec![summary; 3000]);
+    let bounds = [[0.5; 3]; 2];
+    come_back(&vec![
+        VertexSummary {
+            bounds,
+            first: 0,
+            count: 9
+        };
+        5000
+    ]);
+    come_back(&vec![RangeSummary::<true> { first: 0, count: 9 }; 50]);
+}
+
+#[test]
+fn chunks_are_well_filled() {
+    for chunks in [
+        pack(&tets(400_000))
+            .iter()
+            .map(|c| c.value.len())
+            .collect::<Vec<_>>(),
+        pack(&vertices(60_000))
+            .iter()
+            .map(|c| c.value.len())
+            .collect(),
+    ] {
+        let full = &chunks[..chunks.len() - 1];
+        let mean = full.iter().sum::<usize>() as f64 / full.len() as f64;
+        assert!(mean > 0.94 * CHUNK_BYTES_MAX as f64, "{chunks:?}");
+    }
+}
+
+/// Puts the checksum right again, so that what lies behind it is tested too.
+fn mend(value: &mut [u8]) {
+    let sum = xxhash_rust::xxh3::xxh3_64(&value[8..]);
+    value[..8].copy_from_slice(&sum.to_le_bytes());
+}
+
+fn damage<R: ChunkRecord>(records: &[R]) {
+    let mut next = random(3);
+    let mut decoder = Decoder::<R>::new().expect("a zstd context");
+    let mut some = Vec::new();
+    let chunk = &pack(records)[0];
+    for _ in 0..400 {
+        let mut value = chunk.value.clone();
+        let bit = next() as usize % (value.len() * 8);
+        value[bit / 8] ^= 1 << (bit % 8);
+        assert!(
+            decoder
+                .decode(&value, chunk.address, &mut some)
+                .is_err_and(|e| matches!(e.reason, ChunkDamage::Checksum { .. }))
+        );
+        mend(&mut value);
+        let _ = decoder.decode(&value, chunk.address, &mut some);
+        assert!(some.capacity() <= 2 * R::COUNT_MAX);
+        let short = next() as usize % value.len();
+        assert!(
+            decoder
+                .decode(&value[..short], chunk.address, &mut some)
+                .is_err()
+        );
+    }
+    // Random columns behind an honest head.
+    for round in 0..400 {
+        let mut raw: Vec<u8> = (0..next() % 3000).map(|_| next() as u8).collect();
+        if round % 2 == 0 {
+            raw.iter_mut().for_each(|b| *b &= 0x81);
+        }
+        let mut columns = columns::Reader::new(&raw);
+        some.clear();
+        let count = next() as usize % 500;
+        let _ = R::decode(&mut columns, u32::MAX - 400, count, &mut some);
+    }
+    let other = ChunkAddress {
+        generation: 9,
+        ..chunk.address
+    };
+    let found = decoder.decode(&chunk.value, other, &mut some);
+    assert!(found.is_err_and(|e| e.to_string().contains("sub-domain 5")));
+}
+
+#[test]
+fn damage_is_an_error() {
+    damage(&tets(3000));
+    damage(&vertices(500));
+    damage(&facets(500));
+    damage(&faces(500));
+    let bounds = [[0.5; 3]; 2];
+    damage(
+        &[VertexSummary {
+            bounds,
+            first: 0,
+            count: 9,
+        }; 40],
+    );
+}

@@ -1,0 +1,255 @@
+//! Records as plain values: what a working slot or a line of a sealed chunk means.
+
+use crate::ids::{SubdomainId, VertexId};
+use crate::page::{NONE, Slot, u32_le};
+
+/// A tetrahedron of a working page, as stored: marks and required bits are still in the nodes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Tet {
+    pub node: [u32; 4],
+    pub neighbor: [u32; 4],
+}
+
+/// Region and flags of a working tetrahedron.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct TetAttribute {
+    pub region: u32,
+    pub flags: u32,
+}
+
+/// A vertex of a working page.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Vertex {
+    pub point: [f64; 3],
+    /// Wanted edge length; 0 where it is not yet known.
+    pub h: f32,
+    /// A tetrahedron that has the vertex, or [`NONE`].
+    pub v2t: u32,
+}
+
+/// A facet of a working page.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Facet {
+    pub vertices: [u32; 3],
+    pub label: u32,
+    /// Number of the input triangle.
+    pub triangle: u64,
+    /// In front (where the normal points to) and behind.
+    pub regions: [u32; 2],
+}
+
+impl Tet {
+    /// The words of a slot.
+    pub fn from_slot(slot: &Slot) -> Self {
+        let [a, b, c, d, e, f, g, h] = slot.map(u32_le::to_native);
+        Self {
+            node: [a, b, c, d],
+            neighbor: [e, f, g, h],
+        }
+    }
+
+    /// The inverse of [`Tet::from_slot`].
+    pub fn to_slot(self) -> Slot {
+        let ([a, b, c, d], [e, f, g, h]) = (self.node, self.neighbor);
+        [a, b, c, d, e, f, g, h].map(u32_le::from_native)
+    }
+}
+
+impl TetAttribute {
+    /// Attribute `place`, 0..4, of a slot.
+    pub fn from_slot(slot: &Slot, place: usize) -> Self {
+        Self {
+            region: slot[2 * place].to_native(),
+            flags: slot[2 * place + 1].to_native(),
+        }
+    }
+}
+
+impl Vertex {
+    /// The words of a slot.
+    pub fn from_slot(slot: &Slot) -> Self {
+        let w = slot.map(u32_le::to_native);
+        let axis = |i: usize| f64::from_bits(u64::from(w[i]) | u64::from(w[i + 1]) << 32);
+        Self {
+            point: [axis(0), axis(2), axis(4)],
+            h: f32::from_bits(w[6]),
+            v2t: w[7],
+        }
+    }
+
+    /// The inverse of [`Vertex::from_slot`].
+    pub fn to_slot(self) -> Slot {
+        let [x, y, z] = self
+            .point
+            .map(|c| [c.to_bits() as u32, (c.to_bits() >> 32) as u32]);
+        [
+            x[0],
+            x[1],
+            y[0],
+            y[1],
+            z[0],
+            z[1],
+            self.h.to_bits(),
+            self.v2t,
+        ]
+        .map(u32_le::from_native)
+    }
+}
+
+impl Facet {
+    /// The words of a slot.
+    pub fn from_slot(slot: &Slot) -> Self {
+        let w = slot.map(u32_le::to_native);
+        Self {
+            vertices: [w[0], w[1], w[2]],
+            label: w[3],
+            triangle: u64::from(w[4]) | u64::from(w[5]) << 32,
+            regions: [w[6], w[7]],
+        }
+    }
+
+    /// The inverse of [`Facet::from_slot`].
+    pub fn to_slot(self) -> Slot {
+        let [a, b, c] = self.vertices;
+        let triangle = [self.triangle as u32, (self.triangle >> 32) as u32];
+        let [front, behind] = self.regions;
+        [a, b, c, self.label, triangle[0], triangle[1], front, behind].map(u32_le::from_native)
+    }
+}
+
+/// A tetrahedron of a sealed sub-domain; its number is its place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct SealedTet {
+    /// Vertex numbers in the sub-domain; positive volume in this order.
+    pub nodes: [u32; 4],
+    pub region: u32,
+}
+
+impl SealedTet {
+    /// The same tetrahedron turned so that its smallest vertex leads and the next smallest of the even turns follows.
+    #[must_use]
+    pub fn rotated(self) -> Self {
+        // For each leading vertex, an even permutation that brings it to the front.
+        const LEAD: [[usize; 4]; 4] = [[0, 1, 2, 3], [1, 0, 3, 2], [2, 0, 1, 3], [3, 0, 2, 1]];
+        let n = self.nodes;
+        let mut lead = 0;
+        for i in 1..4 {
+            if n[i] < n[lead] {
+                lead = i;
+            }
+        }
+        let [a, b, c, d] = LEAD[lead].map(|i| n[i]);
+        let nodes = if b < c && b < d {
+            [a, b, c, d]
+        } else if c < d {
+            [a, c, d, b]
+        } else {
+            [a, d, b, c]
+        };
+        Self { nodes, ..self }
+    }
+}
+
+/// What a vertex is to the mesh.
+pub mod tag {
+    pub const FREE: u32 = 0;
+    pub const SURFACE: u32 = 1;
+    pub const INTERFACE: u32 = 2;
+    pub const STEINER: u32 = 3;
+    pub const ENCLOSING: u32 = 4;
+}
+
+/// A vertex of a sealed sub-domain; its number is its place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SealedVertex {
+    pub point: [f64; 3],
+    /// Wanted edge length.
+    pub h: f32,
+    /// One of [`tag`].
+    pub tag: u32,
+    /// Its name for ever, as [`VertexId::number`].
+    pub id: u64,
+}
+
+impl SealedVertex {
+    /// The id of a vertex of `subdomain`'s own at place `local`.
+    pub fn own_id(subdomain: SubdomainId, local: u32) -> u64 {
+        VertexId {
+            owner: crate::ids::Owner::Subdomain(subdomain),
+            index: local,
+        }
+        .number()
+    }
+}
+
+/// An input triangle that appears in a sealed sub-domain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SealedFacet {
+    /// Vertex numbers in the sub-domain, in the order of the input triangle.
+    pub vertices: [u32; 3],
+    pub label: u32,
+    /// Number of the input triangle.
+    pub triangle: u64,
+    /// In front (where the normal points to) and behind.
+    pub regions: [u32; 2],
+    /// The tetrahedron on each side, or [`NONE`] where that side is not filled or is another's.
+    pub tets: [u32; 2],
+}
+
+/// A face of a sealed sub-domain shared with another one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct InterfaceFace {
+    /// Vertex numbers in this sub-domain, counter-clockwise seen from outside it.
+    pub vertices: [u32; 3],
+    /// Number of the cut, 1.., and of the face in it: the same in both sub-domains.
+    pub cut: u32,
+    pub index: u32,
+    /// The sub-domain on the other side.
+    pub other: u32,
+    /// The tetrahedron on this side.
+    pub tet: u32,
+}
+
+/// A place that holds no tetrahedron.
+pub const NO_TET: u32 = NONE;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slots_and_records_are_the_same_thing() {
+        let slot: Slot = std::array::from_fn(|i| u32_le::from_native(0x4100_0000 + 77 * i as u32));
+        assert_eq!(Tet::from_slot(&slot).to_slot(), slot);
+        assert_eq!(Vertex::from_slot(&slot).to_slot(), slot);
+        assert_eq!(Facet::from_slot(&slot).to_slot(), slot);
+        assert_eq!(
+            TetAttribute::from_slot(&slot, 1).region,
+            slot[2].to_native()
+        );
+    }
+
+    #[test]
+    fn rotations_are_even() {
+        let parity = |p: [u32; 4]| {
+            let mut odd = false;
+            for i in 0..4 {
+                for j in 0..i {
+                    odd ^= p[j] > p[i];
+                }
+            }
+            odd
+        };
+        for code in 0..256u32 {
+            let nodes = [code & 3, code >> 2 & 3, code >> 4 & 3, code >> 6 & 3];
+            let mut sorted = nodes;
+            sorted.sort_unstable();
+            if sorted != [0, 1, 2, 3] {
+                continue;
+            }
+            let turned = SealedTet { nodes, region: 0 }.rotated().nodes;
+            assert_eq!(turned[..2], [0, 1]);
+            assert_eq!(parity(turned), parity(nodes));
+        }
+    }
+}
