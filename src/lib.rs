@@ -17,5 +17,7 @@ pub mod sizing;
 pub mod boundary;
 pub mod optimize;
 pub mod refine;
+// Floor 6.
+pub mod pipeline;
 // Floor 7.
 pub mod io;

@@ -1,6 +1,7 @@
 //! The surface that a maker returns.
 
 use crate::geom::Point;
+use crate::surface::Surface;
 
 /// A closed labeled surface in memory.
 ///
@@ -13,6 +14,18 @@ pub struct Sample {
     pub triangles: Vec<[u32; 3]>,
     pub labels: Vec<u32>,
     pub label_names: Vec<String>,
+}
+
+impl From<Sample> for Surface {
+    fn from(sample: Sample) -> Self {
+        Self {
+            points: sample.points,
+            triangles: sample.triangles,
+            labels: sample.labels,
+            label_names: sample.label_names,
+            ..Self::default()
+        }
+    }
 }
 
 impl Sample {

@@ -1,0 +1,26 @@
+use thiserror::Error;
+
+use crate::boundary::BoundaryError;
+use crate::sizing::SizingError;
+use crate::store::StoreError;
+use crate::surface::SurfaceError;
+
+/// Why a run ended without a mesh. What the store held before is still there.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum PipelineError {
+    #[error(transparent)]
+    Surface(#[from] SurfaceError),
+    #[error(transparent)]
+    Boundary(#[from] BoundaryError),
+    #[error(transparent)]
+    Sizing(#[from] SizingError),
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// An option that was checked before has no meaning any more.
+    #[error("option {option}: '{value}' is not known")]
+    Option { option: &'static str, value: String },
+    /// Nothing is enclosed by the surface under the chosen rule for regions.
+    #[error("no region is filled: the surface encloses nothing under --regions {policy}")]
+    NothingFilled { policy: String },
+}

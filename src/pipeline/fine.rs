@@ -1,0 +1,56 @@
+//! The fine mesh of one sub-domain: sizes, saturation, optimization.
+
+use super::watch::{Event, Watcher};
+use super::{Options, PipelineError};
+use crate::geom::Aabb;
+use crate::mesh::Mesh;
+use crate::optimize::{self, OptimizeReport};
+use crate::refine::{Field, RefineReport, saturate};
+use crate::sizing::SizeField;
+use crate::store::Pages;
+
+/// What the fine step did.
+#[derive(Clone, Debug)]
+pub struct FineReport {
+    pub refine: RefineReport,
+    pub optimize: OptimizeReport,
+}
+
+/// Divides and optimizes a coarse mesh.
+pub fn fine<P: Pages>(
+    mesh: &mut Mesh<P>,
+    field: &SizeField,
+    bounds: Aabb,
+    options: &Options,
+    watch: &Watcher,
+) -> Result<FineReport, PipelineError> {
+    let mode = options.optimize_mode().ok_or_else(|| PipelineError::Option {
+        option: "--optimize",
+        value: options.optimize.clone().unwrap_or_default(),
+    })?;
+    for v in mesh.vertex_ids() {
+        let p = mesh.point(v);
+        mesh.set_size(v, field.h(p) as f32);
+    }
+    let wanted = Field {
+        h: &|p| field.h(p),
+        bounds,
+    };
+    let refine = saturate(mesh, &wanted, &mut |inserted| {
+        watch(Event {
+            stage: "divide edges",
+            done: inserted,
+            total: None,
+            unit: "vertices",
+        });
+    });
+    let optimize = optimize::run(mesh, mode, &|p: optimize::Progress| {
+        watch(Event {
+            stage: p.stage,
+            done: u64::from(p.done),
+            total: Some(u64::from(p.total)),
+            unit: "pages",
+        });
+    });
+    Ok(FineReport { refine, optimize })
+}

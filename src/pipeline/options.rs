@@ -1,0 +1,52 @@
+use serde::{Deserialize, Serialize};
+
+use crate::boundary::RegionPolicy;
+use crate::optimize::Mode;
+use crate::sizing::{SizeOptions, SizingError};
+
+/// What decides the mesh, besides the surface; stored with the job. Memory and threads are not here: they do not.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Options {
+    /// Wanted sizes as typed: lengths, or `1%` of the box diagonal.
+    pub hsiz: Option<String>,
+    pub hmin: Option<String>,
+    pub hmax: Option<String>,
+    pub hgrad: Option<String>,
+    /// `parity`, `all`, `outer`, `by-orientation`.
+    pub regions: Option<String>,
+    /// `none`, `delaunay`, `full`.
+    pub optimize: Option<String>,
+}
+
+impl Options {
+    /// Sizes, parsed.
+    ///
+    /// Errors: the option and the value that make no sense.
+    pub fn sizes(&self) -> Result<SizeOptions, SizingError> {
+        let text = |o: &'_ Option<String>| o.clone();
+        let [hsiz, hmin, hmax, hgrad] = [&self.hsiz, &self.hmin, &self.hmax, &self.hgrad].map(text);
+        SizeOptions::parse(hsiz.as_deref(), hmin.as_deref(), hmax.as_deref(), hgrad.as_deref())
+    }
+
+    /// Which regions are filled; `None` when the word is not known.
+    pub fn region_policy(&self) -> Option<RegionPolicy> {
+        Some(match self.regions.as_deref().unwrap_or("parity") {
+            "parity" => RegionPolicy::Parity,
+            "all" => RegionPolicy::All,
+            "outer" => RegionPolicy::Outer,
+            "by-orientation" => RegionPolicy::ByOrientation,
+            _ => return None,
+        })
+    }
+
+    /// How far to optimize; `None` when the word is not known.
+    pub fn optimize_mode(&self) -> Option<Mode> {
+        Some(match self.optimize.as_deref().unwrap_or("full") {
+            "none" => Mode::None,
+            "delaunay" => Mode::Delaunay,
+            "full" => Mode::Full,
+            _ => return None,
+        })
+    }
+}

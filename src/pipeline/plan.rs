@@ -1,0 +1,63 @@
+//! How the cap is shared out before the first byte is read.
+
+use crate::store::StoreError;
+
+/// No run fits less: fewer frames than this thrash.
+pub const MEMORY_MIN: u64 = 64 << 20;
+/// redb's cache beyond this brings nothing: three batches of 16 MiB.
+const REDB_MAX: u64 = 48 << 20;
+/// The catalog's cache and what small things the catalog holds.
+const CATALOG: u64 = 3 << 20;
+/// Scratch of a phase (candidates, sort runs, chunks being encoded) beyond this brings nothing.
+const BUFFERS_MAX: u64 = 384 << 20;
+
+/// Bytes for each use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Plan {
+    /// Frames of the working mesh.
+    pub frames: u64,
+    /// redb's cache of the file being written; half as much again is leased for the one being read.
+    pub redb: u64,
+    /// Everything else a phase holds.
+    pub buffers: u64,
+}
+
+impl Plan {
+    /// Shares out `cap` bytes beside `held` bytes that stay (surface, size field).
+    ///
+    /// Errors: [`StoreError::Budget`] when less than half of [`MEMORY_MIN`] would be left for frames.
+    pub fn new(cap: u64, held: u64) -> Result<Self, StoreError> {
+        let redb = (cap / 8).min(REDB_MAX);
+        let buffers = (cap / 4).min(BUFFERS_MAX);
+        let rest = cap.saturating_sub(redb + redb / 2 + buffers + CATALOG);
+        let least = MEMORY_MIN / 4;
+        if rest < held + least {
+            return Err(StoreError::Budget {
+                what: "the surface, its size field and the least number of frames",
+                needed: held + least,
+                available: rest,
+            });
+        }
+        Ok(Self {
+            frames: rest - held,
+            redb,
+            buffers,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_parts_never_exceed_the_cap() {
+        for cap in [MEMORY_MIN, 96 << 20, 1 << 30, 64 << 30] {
+            let plan = Plan::new(cap, 1 << 20).expect("room for a small surface");
+            let sum = plan.frames + plan.redb + plan.redb / 2 + plan.buffers + CATALOG + (1 << 20);
+            assert!(sum <= cap, "{plan:?} of {cap}");
+            assert!(plan.redb + plan.redb / 2 + CATALOG <= cap / 4, "{plan:?} of {cap}");
+        }
+        assert!(Plan::new(MEMORY_MIN, MEMORY_MIN).is_err());
+    }
+}

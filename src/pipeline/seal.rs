@@ -1,0 +1,207 @@
+//! Seal a finished working mesh: renumber along the Hilbert curve, drop neighbors, compress.
+//!
+//! Everything is a stream or an external sort, so a mesh of any size passes through a small lease:
+//! 1. vertices sorted along the curve; their places become their numbers (a scratch map holds old → new);
+//! 2. tetrahedra sorted by their new numbers, smallest vertex first, which follows the curve too;
+//! 3. their required faces sorted by vertices and joined with the facets, which so learn their tetrahedra.
+
+use std::path::Path;
+
+use tetdb_schema::ids::{Owner, SubdomainId, VertexId};
+use tetdb_schema::page::NONE;
+use tetdb_schema::record::{SealedFacet, SealedTet, SealedVertex, tag};
+
+use super::PipelineError;
+use super::watch::{Event, Watcher};
+use crate::catalog::{Sealed, SealedWriter, sorted_face};
+use crate::geom::{Aabb, HilbertFrame};
+use crate::mesh::anatomy::FACES;
+use crate::mesh::{Mesh, VertexTag, dense};
+use crate::store::{Pages, Sorted, Sorter, stop_if_requested};
+
+/// Where and how to seal.
+pub(super) struct Target<'a> {
+    pub path: &'a Path,
+    pub scratch: &'a Path,
+    pub subdomain: SubdomainId,
+    pub generation: u32,
+    /// Bytes for sort runs and for the writer together.
+    pub memory: u64,
+    pub bounds: Aabb,
+}
+
+/// Writes `mesh` to `target`. Effects: the mesh's scratch map is used up; `tet_of` must be right for all vertices.
+pub(super) fn seal<P: Pages>(mesh: &mut Mesh<P>, target: &Target, watch: &Watcher) -> Result<Sealed, PipelineError> {
+    let mut writer = SealedWriter::create(
+        target.path,
+        target.subdomain,
+        target.generation,
+        (target.memory / 2) as usize,
+    )?;
+    mesh.clear_scratch();
+    vertices(mesh, target, &mut writer, watch)?;
+    let order = sort_tets(mesh, target)?;
+    let faces = tets(order, mesh.n_tets(), target, &mut writer, watch)?;
+    facets(mesh, faces, target, &mut writer)?;
+    mesh.clear_scratch();
+    Ok(writer.finish()?)
+}
+
+fn tell(watch: &Watcher, stage: &str, done: u64, total: u32) {
+    if done % 65_536 == 0 {
+        stop_if_requested();
+        watch(Event {
+            stage,
+            done,
+            total: Some(u64::from(total)),
+            unit: "records",
+        });
+    }
+}
+
+fn vertices<P: Pages>(
+    mesh: &mut Mesh<P>,
+    target: &Target,
+    writer: &mut SealedWriter,
+    watch: &Watcher,
+) -> Result<(), PipelineError> {
+    let frame = HilbertFrame::new(&target.bounds);
+    let mut sorter = Sorter::<12>::new(target.scratch, target.memory / 4);
+    for v in mesh.vertex_ids() {
+        if mesh.tet_of(v) == NONE {
+            continue;
+        }
+        let mut record = [0; 12];
+        record[..8].copy_from_slice(&frame.index(mesh.point(v)).to_be_bytes());
+        record[8..].copy_from_slice(&v.to_be_bytes());
+        sorter.push(record)?;
+    }
+    for (local, record) in sorter.finish()?.enumerate() {
+        let v = word(&record?, 8);
+        let local = local as u32;
+        mesh.set_scratch(dense(v), local);
+        let (point, h) = mesh.point_and_size(v);
+        let (vertex_tag, owner_index) = mesh.vertex_attribute(v);
+        let (tag, id) = match vertex_tag {
+            VertexTag::Surface => {
+                let id = VertexId {
+                    owner: Owner::Surface,
+                    index: owner_index,
+                };
+                (tag::SURFACE, id.number())
+            }
+            VertexTag::Steiner => (tag::STEINER, SealedVertex::own_id(target.subdomain, local)),
+            _ => (tag::FREE, SealedVertex::own_id(target.subdomain, local)),
+        };
+        writer.push_vertex(SealedVertex {
+            point: point.to_array(),
+            h,
+            tag,
+            id,
+        })?;
+        tell(watch, "seal vertices", u64::from(local), mesh.n_vertices());
+    }
+    Ok(())
+}
+
+/// Nodes, region and required faces of a tetrahedron: 4 + 1 big-endian words and a mask.
+type TetRecord = [u8; 21];
+
+fn sort_tets<P: Pages>(mesh: &mut Mesh<P>, target: &Target) -> Result<Sorted<21>, PipelineError> {
+    let mut sorter = Sorter::<21>::new(target.scratch, target.memory / 4);
+    let mut from = 0;
+    while let Some((t, tet)) = mesh.next_tet(from) {
+        from = t + 1;
+        let [a, b, c, d] = tet.vertices();
+        let nodes = [a, b, c, d].map(|v| mesh.scratch(dense(v)));
+        let (region, _) = mesh.tet_attribute(t);
+        let rotated = SealedTet { nodes, region }.rotated();
+        let mut record: TetRecord = [0; 21];
+        for (i, node) in rotated.nodes.into_iter().enumerate() {
+            record[4 * i..4 * i + 4].copy_from_slice(&node.to_be_bytes());
+            let old = nodes.iter().position(|&n| n == node).unwrap_or(0);
+            record[20] |= u8::from(tet.is_required(old)) << i;
+        }
+        record[16..20].copy_from_slice(&region.to_be_bytes());
+        sorter.push(record)?;
+    }
+    Ok(sorter.finish()?)
+}
+
+/// A required face: its vertices ascending, the tetrahedron, and whether ascending order is odd in it.
+type FaceRecord = [u8; 17];
+
+fn tets(
+    order: Sorted<21>,
+    n_tets: u32,
+    target: &Target,
+    writer: &mut SealedWriter,
+    watch: &Watcher,
+) -> Result<Sorted<17>, PipelineError> {
+    let mut faces = Sorter::<17>::new(target.scratch, target.memory / 4);
+    for (t, record) in order.enumerate() {
+        let record = record?;
+        let nodes = [word(&record, 0), word(&record, 4), word(&record, 8), word(&record, 12)];
+        writer.push_tet(nodes, word(&record, 16))?;
+        for i in (0..4).filter(|i| record[20] >> i & 1 != 0) {
+            let (face, odd) = sorted_face(FACES[i].map(|k| nodes[k]));
+            faces.push(face_record(face, t as u32, odd))?;
+        }
+        tell(watch, "seal tetrahedra", t as u64, n_tets);
+    }
+    Ok(faces.finish()?)
+}
+
+fn face_record(face: [u32; 3], number: u32, odd: bool) -> FaceRecord {
+    let mut record: FaceRecord = [0; 17];
+    for (i, v) in face.into_iter().enumerate() {
+        record[4 * i..4 * i + 4].copy_from_slice(&v.to_be_bytes());
+    }
+    record[12..16].copy_from_slice(&number.to_be_bytes());
+    record[16] = u8::from(odd);
+    record
+}
+
+/// Joins facets with the faces of tetrahedra; both ascend by their sorted vertices.
+fn facets<P: Pages>(
+    mesh: &mut Mesh<P>,
+    faces: Sorted<17>,
+    target: &Target,
+    writer: &mut SealedWriter,
+) -> Result<(), PipelineError> {
+    let mut sorter = Sorter::<17>::new(target.scratch, target.memory / 4);
+    for n in 0..mesh.n_facets() {
+        let facet = mesh.facet(n);
+        if facet.regions == [0, 0] {
+            continue;
+        }
+        let (face, odd) = sorted_face(facet.vertices.map(|v| mesh.scratch(dense(v))));
+        sorter.push(face_record(face, n, odd))?;
+    }
+    let mut faces = faces.peekable();
+    for record in sorter.finish()? {
+        let record = record?;
+        let facet = mesh.facet(word(&record, 12));
+        let mut sides = [NONE; 2];
+        while let Some(face) = faces.next_if(|f| f.as_ref().map_or(true, |f| f[..12] <= record[..12])) {
+            let face = face?;
+            if face[..12] == record[..12] {
+                // A tetrahedron sees its face from inside turn as the facet does when it lies behind it.
+                sides[usize::from(face[16] == record[16])] = word(&face, 12);
+            }
+        }
+        writer.push_facet(SealedFacet {
+            vertices: facet.vertices.map(|v| mesh.scratch(dense(v))),
+            label: facet.label,
+            triangle: facet.input,
+            regions: facet.regions,
+            tets: sides,
+        })?;
+    }
+    Ok(())
+}
+
+fn word(record: &[u8], at: usize) -> u32 {
+    let bytes = [record[at], record[at + 1], record[at + 2], record[at + 3]];
+    u32::from_be_bytes(bytes)
+}

@@ -1,0 +1,17 @@
+/// What a long run says while it works.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Event<'a> {
+    /// Name of the stage: one or two words, always the same for the same work.
+    pub stage: &'a str,
+    /// Work done so far, in `unit`.
+    pub done: u64,
+    /// Work there is in all, where that is known.
+    pub total: Option<u64>,
+    pub unit: &'a str,
+}
+
+/// Is told [`Event`]s, often; it must be quick.
+pub type Watcher<'a> = dyn Fn(Event) + 'a;
+
+/// The watcher that does nothing.
+pub fn silent(_: Event) {}
