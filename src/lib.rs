@@ -6,6 +6,7 @@ pub mod geom;
 // Floor 1.
 pub mod store;
 // Floor 2.
+pub mod catalog;
 pub mod mesh;
 pub mod surface;
 // Floor 3.

@@ -117,6 +117,9 @@ impl Facet {
     }
 }
 
+/// Places of the vertices of face `i`, which lies opposite vertex `i`, counter-clockwise seen from outside.
+pub const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
+
 /// A tetrahedron of a sealed sub-domain; its number is its place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct SealedTet {

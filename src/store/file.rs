@@ -116,6 +116,16 @@ impl StoreFile {
         &mut self,
         values: impl Iterator<Item = (u64, &'a [u8])>,
     ) -> Result<(), StoreError> {
+        self.change(values.map(|(key, value)| (key, Some(value))))
+    }
+
+    /// Writes the values that are there and removes the keys that have none, in one durable commit.
+    ///
+    /// Errors: as [`StoreFile::write`].
+    pub fn change<'a>(
+        &mut self,
+        changes: impl Iterator<Item = (u64, Option<&'a [u8]>)>,
+    ) -> Result<(), StoreError> {
         let Handle::Writer(db) = &self.handle else {
             unreachable!("{} is open for reading only", self.path.display());
         };
@@ -126,8 +136,11 @@ impl StoreFile {
             txn.set_quick_repair(true);
             {
                 let mut table = txn.open_table(PAGES)?;
-                for (key, value) in values {
-                    table.insert(key, value)?;
+                for (key, value) in changes {
+                    match value {
+                        Some(value) => drop(table.insert(key, value)?),
+                        None => drop(table.remove(key)?),
+                    }
                 }
             }
             txn.commit()?;

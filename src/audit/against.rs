@@ -1,0 +1,122 @@
+//! The mesh against its input: every triangle there, bit for bit, and nothing added on it.
+
+use tetdb_schema::ids::{Owner, VertexId};
+use tetdb_schema::record::{NO_TET, SealedFacet};
+
+use super::{Finding, Offender, Report};
+use crate::catalog::Corner;
+use crate::surface::Surface;
+
+/// The input and what of it has been seen. Memory: three bits a triangle.
+pub(super) struct Input<'a> {
+    surface: &'a Surface,
+    /// Seen with a filled front, with a filled back, at all.
+    seen: [Vec<u64>; 3],
+}
+
+/// Sets a bit; says whether it was set before.
+fn set(bits: &mut [u64], at: usize) -> bool {
+    let word = &mut bits[at / 64];
+    let was = *word >> (at % 64) & 1 != 0;
+    *word |= 1 << (at % 64);
+    was
+}
+
+fn get(bits: &[u64], at: usize) -> bool {
+    bits[at / 64] >> (at % 64) & 1 != 0
+}
+
+/// The surface vertices of a facet's corners, where they are the input's.
+fn input_vertices(corners: &[Corner; 3]) -> [Option<u32>; 3] {
+    corners.map(|c| {
+        let id = VertexId::from_number(c.id)?;
+        (id.owner == Owner::Surface).then_some(id.index)
+    })
+}
+
+/// Every vertex of a facet is the input's, whether the input is at hand or not.
+pub(super) fn check_owners(subdomain: u32, corners: &[Corner; 3], report: &mut Report) {
+    if input_vertices(corners).contains(&None) {
+        let finding = Finding::AddedVertex;
+        report.find(finding, || {
+            let what = "a facet has a vertex that is not the input's";
+            Offender::new(finding, Some(subdomain), what).with_corners(corners)
+        });
+    }
+}
+
+impl<'a> Input<'a> {
+    pub(super) fn new(surface: &'a Surface) -> Self {
+        let words = surface.triangles.len().div_ceil(64);
+        Self {
+            surface,
+            seen: [(); 3].map(|()| vec![0; words]),
+        }
+    }
+
+    /// Compares a facet with the triangle it names.
+    pub(super) fn check(
+        &mut self,
+        subdomain: u32,
+        facet: &SealedFacet,
+        corners: &[Corner; 3],
+        report: &mut Report,
+    ) {
+        let wrong = self.difference(facet, corners);
+        if let Some(what) = wrong {
+            let finding = Finding::NotAnInputTriangle;
+            report.find(finding, || {
+                let what = format!("the facet of input triangle {} {what}", facet.triangle);
+                Offender::new(finding, Some(subdomain), what).with_corners(corners)
+            });
+        }
+    }
+
+    fn difference(&mut self, facet: &SealedFacet, corners: &[Corner; 3]) -> Option<&'static str> {
+        let number = usize::try_from(facet.triangle).unwrap_or(usize::MAX);
+        let Some(triangle) = self.surface.triangles.get(number) else {
+            return Some("names a triangle the input does not have");
+        };
+        let found = input_vertices(corners);
+        let same = (0..3).any(|turn| (0..3).all(|i| found[(i + turn) % 3] == Some(triangle[i])));
+        if !same {
+            return Some("has other vertices");
+        }
+        let bits = |p: crate::geom::Point| p.to_array().map(f64::to_bits);
+        let moved = corners.iter().zip(found).any(|(c, v)| {
+            let input = v.and_then(|v| self.surface.points.get(v as usize));
+            input.is_none_or(|&p| bits(p) != bits(c.point))
+        });
+        if moved {
+            return Some("has a vertex at another place");
+        }
+        set(&mut self.seen[2], number);
+        for side in 0..2 {
+            if facet.tets[side] != NO_TET && set(&mut self.seen[side], number) {
+                return Some("is there twice");
+            }
+        }
+        None
+    }
+
+    /// Counts what was seen; names what is missing.
+    pub(super) fn finish(self, report: &mut Report) {
+        for number in 0..self.surface.triangles.len() {
+            if get(&self.seen[0], number) || get(&self.seen[1], number) {
+                report.triangles_present += 1;
+            } else if get(&self.seen[2], number) {
+                report.triangles_unfilled += 1;
+            } else {
+                report.triangles_missing += 1;
+                let finding = Finding::MissingTriangle;
+                report.find(finding, || {
+                    let what = format!("input triangle {number} is not in the mesh");
+                    let mut offender = Offender::new(finding, None, what);
+                    let points = self.surface.corners(number as u32);
+                    offender.points = points.map(|p| p.to_array()).to_vec();
+                    offender
+                });
+            }
+        }
+    }
+}

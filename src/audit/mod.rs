@@ -1,0 +1,112 @@
+//! The certificate of a finished store, from what is on disk alone.
+//!
+//! # What is proved
+//! Let every tetrahedron have an exactly positive orientation, and let the faces cancel in pairs of
+//! opposite orientation but for those that are input triangles, each with the orientation of its
+//! filled side. Then the sum of the tetrahedra, as a chain, has the filled sides of the input as its
+//! boundary, and the number of tetrahedra over a generic point is the winding number of that boundary
+//! there: one inside, zero outside. So there is no overlap, no gap and no inverted tetrahedron, and
+//! local tests have shown it. It does not matter which of several equal faces cancels which, therefore
+//! faces are first matched inside each chunk, and only the open ones are sorted externally.
+//!
+//! Reading order: [`Report`] (what is found), `claims` (facets say which tetrahedra they touch),
+//! `pass` (once through a sub-domain), `pairing` (faces across chunks), `interface` (faces across
+//! sub-domains), `against` (the input).
+
+mod against;
+mod claims;
+mod interface;
+mod pairing;
+mod pass;
+mod report;
+#[cfg(test)]
+mod tests;
+
+use std::path::{Path, PathBuf};
+
+pub use report::{Finding, Level, Offender, Report};
+
+use tetdb_schema::digest::Digest;
+
+use crate::catalog::{CatalogError, Store, Subdomain};
+use crate::surface::Surface;
+
+/// How to verify.
+#[derive(Clone, Debug)]
+pub struct VerifyOptions {
+    /// The last of the levels to check; those before it are checked too.
+    pub level: Level,
+    /// Bytes for caches, sort buffers and tables together; the tables alone take some 8 MiB.
+    pub memory_bytes: usize,
+    /// Folder for sorted runs; made and removed again below it.
+    pub temp_dir: PathBuf,
+}
+
+/// Checks a sealed store, against its input when that is given.
+///
+/// Errors: damage, and failures of the disk; an invalid mesh is a [`Report`] that says so.
+pub fn verify(
+    store: &mut Store,
+    surface: Option<&Surface>,
+    options: &VerifyOptions,
+) -> Result<Report, CatalogError> {
+    let scratch = Scratch::new(&options.temp_dir)?;
+    let mut audit = pass::Audit::new(surface, options, &scratch.path);
+    let rows = store.catalog().subdomains()?;
+    for row in &rows {
+        let memory = options.memory_bytes / 4;
+        let mut part = Subdomain::open(store.catalog(), row.rank, memory)?;
+        audit.subdomain(&mut part)?;
+    }
+    let interfaces = store.catalog().interfaces()?;
+    let regions = store.catalog().regions()?;
+    audit.finish(&interfaces, &regions)
+}
+
+/// The digests of all tetrahedra and of all interface faces, recomputed from the chunks.
+///
+/// Errors: damage, and failures of the disk.
+pub fn digest(store: &mut Store, memory_bytes: usize) -> Result<[Digest; 2], CatalogError> {
+    let mut both = [Digest::default(); 2];
+    for row in store.catalog().subdomains()? {
+        let mut part = Subdomain::open(store.catalog(), row.rank, memory_bytes)?;
+        for chunk in 0..part.tet_summaries().len() {
+            for tet in part.tet_chunk(chunk as u32)?.records {
+                let corners = part.corners(tet.nodes)?;
+                both[0].add_tet(corners.map(|c| c.mix), tet.region, row.rank);
+            }
+        }
+        let faces = part.interfaces().collect::<Result<Vec<_>, _>>()?;
+        for face in faces {
+            let corners = part.corners(face.vertices)?;
+            both[1].add_face(corners.map(|c| c.mix), face.cut);
+        }
+    }
+    Ok(both)
+}
+
+/// A folder that goes when it is dropped.
+struct Scratch {
+    path: PathBuf,
+}
+
+impl Scratch {
+    fn new(parent: &Path) -> Result<Self, CatalogError> {
+        use std::sync::atomic::{AtomicU32, Ordering};
+        static NUMBER: AtomicU32 = AtomicU32::new(0);
+        let number = NUMBER.fetch_add(1, Ordering::Relaxed);
+        let path = parent.join(format!("verify-{}-{number}", std::process::id()));
+        std::fs::create_dir_all(&path).map_err(|source| CatalogError::Io {
+            path: path.clone(),
+            source,
+        })?;
+        Ok(Self { path })
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        // Nothing depends on it; a folder that stays is only untidy.
+        let _ = std::fs::remove_dir_all(&self.path);
+    }
+}

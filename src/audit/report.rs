@@ -1,0 +1,192 @@
+//! What a verification found.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use tetdb_schema::ids::VertexId;
+
+use crate::catalog::Corner;
+
+/// Offenders kept for each kind of finding; all are counted.
+const OFFENDERS_KEPT: u64 = 10;
+
+/// The levels of checking, each with those before it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Level {
+    /// Every record can be read and counts agree; nodes exist and differ; digests are right.
+    Element,
+    /// Every face has two sides, or one and is required.
+    Adjacency,
+    /// Facets and interface faces are faces of their tetrahedra; regions change only there.
+    Topology,
+    /// Orientations are exactly positive; facets are the input's triangles, all of them; volumes agree.
+    Geometry,
+    /// How many inner faces are locally Delaunay. Informs; decides nothing.
+    Delaunay,
+}
+
+/// Kinds of things that make a mesh invalid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum Finding {
+    /// Two nodes of a tetrahedron are the same.
+    RepeatedNode,
+    /// A vertex that no tetrahedron and no facet has.
+    UnusedVertex,
+    /// A digest or count of the catalog is not that of the records.
+    CatalogDiffers,
+    /// More than one tetrahedron on one side of a face.
+    CrowdedFace,
+    /// A face with one side that is neither a facet nor an interface face.
+    OpenFace,
+    /// A facet or interface face that is no face of the tetrahedron it names.
+    StrayFacet,
+    /// The two sides of a face do not agree whether it is a facet.
+    OneSidedFacet,
+    /// The region changes across a face that is no facet.
+    RegionLeak,
+    /// An interface face without its equal in the other sub-domain.
+    UnmatchedInterface,
+    /// A tetrahedron whose exact orientation is not positive.
+    NotPositive,
+    /// A facet that is not the input triangle it names.
+    NotAnInputTriangle,
+    /// An input triangle that is nowhere in the mesh.
+    MissingTriangle,
+    /// A vertex of a facet that is no vertex of the input.
+    AddedVertex,
+    /// The volume of the tetrahedra is not the volume within their boundary.
+    VolumeDiffers,
+}
+
+/// One example of a finding.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Offender {
+    pub finding: Finding,
+    pub subdomain: Option<u32>,
+    /// Its tetrahedron, `7:1048211`.
+    pub tet: Option<String>,
+    /// Ids of the vertices, parallel to `points`.
+    pub vertices: Vec<String>,
+    pub points: Vec<[f64; 3]>,
+    pub what: String,
+}
+
+/// The result of a verification.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Report {
+    pub level: Level,
+    /// Whether nothing was found.
+    pub valid: bool,
+    /// Whether the mesh was compared with its input.
+    pub against_input: bool,
+    pub subdomains: u64,
+    pub tets: u64,
+    pub vertices: u64,
+    pub facets: u64,
+    pub interface_faces: u64,
+    /// Faces between two tetrahedra of one sub-domain.
+    pub inner_faces: u64,
+    /// Faces with one tetrahedron that are facets.
+    pub boundary_faces: u64,
+    /// Input triangles that are in the mesh with a filled side, without one, and not at all.
+    pub triangles_present: u64,
+    pub triangles_unfilled: u64,
+    pub triangles_missing: u64,
+    /// Sum over the tetrahedra in order, and over the boundary.
+    pub volume: f64,
+    pub volume_within_boundary: f64,
+    /// Inner faces that are no facets: tested, and with an empty sphere.
+    pub delaunay_tested: u64,
+    pub delaunay_faces: u64,
+    pub digest: String,
+    pub interface_digest: String,
+    /// How often each kind was found.
+    pub findings: BTreeMap<Finding, u64>,
+    /// The first of each kind.
+    pub offenders: Vec<Offender>,
+}
+
+impl Report {
+    pub(super) fn new(level: Level) -> Self {
+        Self {
+            level,
+            valid: true,
+            against_input: false,
+            subdomains: 0,
+            tets: 0,
+            vertices: 0,
+            facets: 0,
+            interface_faces: 0,
+            inner_faces: 0,
+            boundary_faces: 0,
+            triangles_present: 0,
+            triangles_unfilled: 0,
+            triangles_missing: 0,
+            volume: 0.0,
+            volume_within_boundary: 0.0,
+            delaunay_tested: 0,
+            delaunay_faces: 0,
+            digest: String::new(),
+            interface_digest: String::new(),
+            findings: BTreeMap::new(),
+            offenders: Vec::new(),
+        }
+    }
+
+    /// Share of the tested inner faces that are locally Delaunay; 1 when none was tested.
+    pub fn delaunay_share(&self) -> f64 {
+        if self.delaunay_tested == 0 {
+            return 1.0;
+        }
+        self.delaunay_faces as f64 / self.delaunay_tested as f64
+    }
+
+    /// Number of findings of a kind.
+    pub fn count(&self, finding: Finding) -> u64 {
+        self.findings.get(&finding).copied().unwrap_or(0)
+    }
+
+    /// Counts a finding; `describe` is called for the first few of its kind.
+    pub(super) fn find(&mut self, finding: Finding, describe: impl FnOnce() -> Offender) {
+        self.valid = false;
+        let count = self.findings.entry(finding).or_default();
+        *count += 1;
+        if *count <= OFFENDERS_KEPT {
+            self.offenders.push(describe());
+        }
+    }
+}
+
+impl Offender {
+    pub(super) fn new(finding: Finding, subdomain: Option<u32>, what: impl Into<String>) -> Self {
+        Self {
+            finding,
+            subdomain,
+            tet: None,
+            vertices: Vec::new(),
+            points: Vec::new(),
+            what: what.into(),
+        }
+    }
+
+    pub(super) fn with_tet(mut self, local: u32) -> Self {
+        let subdomain = self.subdomain.unwrap_or_default();
+        self.tet = Some(format!("{subdomain}:{local}"));
+        self
+    }
+
+    pub(super) fn with_corners(mut self, corners: &[Corner]) -> Self {
+        self.vertices = corners
+            .iter()
+            .map(|c| match VertexId::from_number(c.id) {
+                Some(id) => id.to_string(),
+                None => format!("{:#x}", c.id),
+            })
+            .collect();
+        self.points = corners.iter().map(|c| c.point.to_array()).collect();
+        self
+    }
+}

@@ -1,0 +1,142 @@
+//! Faces of a set of tetrahedra, matched in pairs.
+
+/// A face as its vertices ascending, and whether an odd number of exchanges sorted them.
+///
+/// The two tetrahedra of a face see it from both sides: their parities differ.
+#[inline]
+pub fn sorted_face([mut a, mut b, mut c]: [u32; 3]) -> ([u32; 3], bool) {
+    let mut odd = false;
+    if a > b {
+        (a, b) = (b, a);
+        odd = !odd;
+    }
+    if b > c {
+        (b, c) = (c, b);
+        odd = !odd;
+    }
+    if a > b {
+        (a, b) = (b, a);
+        odd = !odd;
+    }
+    ([a, b, c], odd)
+}
+
+/// What became of a face that was added.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Paired {
+    /// It is the first of its vertices.
+    Open,
+    /// It closes the face with this reference.
+    With(u32),
+    /// The same side was already there, in the face with this reference.
+    Same(u32),
+    /// Both sides were already there.
+    Third,
+}
+
+#[derive(Clone, Copy)]
+struct Entry {
+    face: [u32; 3],
+    /// `reference << 1 | parity`, or one of the two markers.
+    reference: u32,
+}
+
+const VACANT: u32 = u32::MAX;
+const CLOSED: u32 = u32::MAX - 1;
+
+/// An open table of faces, for up to some hundred thousand at a time.
+///
+/// Invariant: at most half full. Order: what it returns depends on the faces alone.
+pub struct FacePairs {
+    entries: Vec<Entry>,
+    used: usize,
+}
+
+impl FacePairs {
+    /// A table for the faces of `tets` tetrahedra.
+    pub fn new(tets: usize) -> Self {
+        let slots = (tets * 8).next_power_of_two().max(16);
+        let vacant = Entry {
+            face: [0; 3],
+            reference: VACANT,
+        };
+        Self {
+            entries: vec![vacant; slots],
+            used: 0,
+        }
+    }
+
+    /// Bytes of the table.
+    pub fn bytes(&self) -> usize {
+        self.entries.len() * size_of::<Entry>()
+    }
+
+    /// Empties the table.
+    pub fn clear(&mut self) {
+        self.entries.iter_mut().for_each(|e| e.reference = VACANT);
+        self.used = 0;
+    }
+
+    /// Adds one side of a face; `reference` is below 2^31 - 1.
+    pub fn add(&mut self, face: [u32; 3], odd: bool, reference: u32) -> Paired {
+        let mask = self.entries.len() - 1;
+        let mut hash = u64::from(face[0]).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        hash = (hash ^ u64::from(face[1])).wrapping_mul(0xD6E8_FEB8_6659_FD93);
+        hash = (hash ^ hash >> 32 ^ u64::from(face[2])).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        let mut at = (hash >> 32) as usize & mask;
+        loop {
+            let entry = &mut self.entries[at];
+            if entry.reference == VACANT {
+                *entry = Entry {
+                    face,
+                    reference: reference << 1 | u32::from(odd),
+                };
+                self.used += 1;
+                assert!(self.used * 2 <= mask + 1, "the table is for fewer faces");
+                return Paired::Open;
+            }
+            if entry.face == face {
+                if entry.reference == CLOSED {
+                    return Paired::Third;
+                }
+                let other = entry.reference >> 1;
+                if (entry.reference & 1 == 1) == odd {
+                    return Paired::Same(other);
+                }
+                entry.reference = CLOSED;
+                return Paired::With(other);
+            }
+            at = (at + 1) & mask;
+        }
+    }
+
+    /// The faces with one side only: vertices ascending, parity, reference.
+    pub fn open(&self) -> impl Iterator<Item = ([u32; 3], bool, u32)> + '_ {
+        self.entries
+            .iter()
+            .filter(|e| e.reference < CLOSED)
+            .map(|e| (e.face, e.reference & 1 == 1, e.reference >> 1))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_sides_close_a_face() {
+        let mut pairs = FacePairs::new(4);
+        let (face, odd) = sorted_face([7, 3, 5]);
+        assert_eq!(face, [3, 5, 7]);
+        assert_eq!(pairs.add(face, odd, 1), Paired::Open);
+        assert_eq!(pairs.open().count(), 1);
+        assert_eq!(pairs.add(face, odd, 2), Paired::Same(1));
+        let (face, odd) = sorted_face([3, 7, 5]);
+        assert_eq!(pairs.add(face, odd, 3), Paired::With(1));
+        assert_eq!(pairs.add(face, odd, 4), Paired::Third);
+        assert_eq!(pairs.open().count(), 0);
+        for turn in [[1, 2, 3], [2, 3, 1], [3, 1, 2]] {
+            assert_eq!(sorted_face(turn), ([1, 2, 3], false));
+        }
+    }
+}

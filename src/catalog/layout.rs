@@ -1,0 +1,398 @@
+//! The directory of a store: made, opened, its files named and, when nobody lists them, removed.
+
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+
+use rkyv::api::high::{HighDeserializer, HighValidator};
+use rkyv::bytecheck::CheckBytes;
+use rkyv::rancor;
+use rkyv::{Archive, Deserialize};
+use tetdb_schema::page::FORMAT_VERSION;
+
+use super::records::{
+    FileRow, InterfaceRow, Job, JournalRow, RegionRow, StoreState, SubdomainRow, TopologyRow,
+};
+use super::rows::{self, RowKind};
+use super::{CatalogError, Step};
+use crate::store::{StoreError, StoreFile};
+
+/// First bytes of the format row; the version follows as two bytes.
+const MAGIC: &[u8; 8] = b"TETDBCAT";
+/// The catalog is small: its redb cache need not be large.
+const CACHE_BYTES: usize = 2 << 20;
+const CATALOG: &str = "catalog.redb";
+/// Folder of sorted runs; everything in it is scratch.
+const SCRATCH: &str = "scratch";
+
+/// The catalog of a store, open for reading or for writing.
+///
+/// Many processes may read, or one may write. Changes happen in [`Catalog::commit`] only.
+pub struct Catalog {
+    dir: PathBuf,
+    file: StoreFile,
+    writable: bool,
+    journal_rows: u32,
+}
+
+impl Catalog {
+    /// Makes a new store: the directory, the catalog, the job.
+    ///
+    /// An empty directory is taken over. Errors: [`CatalogError::Finished`], [`CatalogError::Unfinished`],
+    /// [`CatalogError::NotOurs`] or [`CatalogError::Busy`] say what is already there.
+    pub fn create(dir: &Path, job: &Job) -> Result<Self, CatalogError> {
+        refuse_existing(dir)?;
+        fs::create_dir_all(dir).map_err(|e| CatalogError::io(dir, e))?;
+        let file = StoreFile::create(&dir.join(CATALOG), CACHE_BYTES)?;
+        let mut catalog = Self {
+            dir: dir.to_owned(),
+            file,
+            writable: true,
+            journal_rows: 0,
+        };
+        catalog.commit(|step| {
+            let mut format = MAGIC.to_vec();
+            format.extend_from_slice(&FORMAT_VERSION.to_le_bytes());
+            step.put_bytes(RowKind::Format.key(0, 0), &format);
+            step.set_state(StoreState::New);
+            step.set_job(job);
+            Ok(())
+        })?;
+        if let Some(parent) = dir.parent().filter(|p| !p.as_os_str().is_empty()) {
+            sync_dir(parent)?;
+        }
+        Ok(catalog)
+    }
+
+    /// Opens a store for reading; other processes may read it as well.
+    ///
+    /// Errors: [`CatalogError::NotFound`], [`CatalogError::NotOurs`], [`CatalogError::Busy`] while it is written, [`CatalogError::Format`].
+    pub fn open(dir: &Path) -> Result<Self, CatalogError> {
+        Self::open_as(dir, false)
+    }
+
+    /// Opens a store for writing, alone, and removes files that an interrupted step left.
+    ///
+    /// Errors: as [`Catalog::open`]; [`CatalogError::Busy`] also while another process reads it.
+    pub fn open_writable(dir: &Path) -> Result<Self, CatalogError> {
+        let mut catalog = Self::open_as(dir, true)?;
+        catalog.purge()?;
+        Ok(catalog)
+    }
+
+    fn open_as(dir: &Path, writable: bool) -> Result<Self, CatalogError> {
+        let path = dir.join(CATALOG);
+        if !dir.exists() {
+            return Err(CatalogError::NotFound {
+                path: dir.to_owned(),
+            });
+        }
+        if !path.is_file() {
+            return Err(CatalogError::NotOurs {
+                path: dir.to_owned(),
+                reason: "it has no catalog",
+            });
+        }
+        let mut catalog = Self {
+            dir: dir.to_owned(),
+            file: open_repairing(&path, CACHE_BYTES, writable)?,
+            writable,
+            journal_rows: 0,
+        };
+        catalog.check_format()?;
+        let file = &mut catalog.file;
+        let mut journal_rows = 0;
+        file.scan(RowKind::Journal.keys(), |_, _| {
+            journal_rows += 1;
+            true
+        })?;
+        catalog.journal_rows = journal_rows;
+        Ok(catalog)
+    }
+
+    fn check_format(&mut self) -> Result<(), CatalogError> {
+        let key = RowKind::Format.key(0, 0);
+        let Some(format) = self.bytes(key)? else {
+            // Killed before the first commit.
+            return Err(CatalogError::Unfinished {
+                path: self.dir.clone(),
+            });
+        };
+        let version = format.strip_prefix(MAGIC).and_then(|v| v.try_into().ok());
+        let Some(version) = version.map(u16::from_le_bytes) else {
+            return Err(CatalogError::NotOurs {
+                path: self.dir.clone(),
+                reason: "its catalog is another program's",
+            });
+        };
+        if version != FORMAT_VERSION {
+            return Err(CatalogError::Format {
+                path: self.dir.clone(),
+                expected: FORMAT_VERSION,
+                found: version,
+            });
+        }
+        Ok(())
+    }
+
+    /// The directory of the store.
+    pub fn dir(&self) -> &Path {
+        &self.dir
+    }
+
+    /// Where the file of a sub-domain in a generation is, whether it exists or not.
+    pub fn file_path(&self, subdomain: u32, generation: u32) -> PathBuf {
+        self.dir.join(file_name(FileRow {
+            subdomain,
+            generation,
+        }))
+    }
+
+    /// A folder for sorted runs, made when it is not there; removed when the store is next opened for writing.
+    ///
+    /// Errors: the folder cannot be made.
+    pub fn scratch_dir(&self) -> Result<PathBuf, CatalogError> {
+        let path = self.dir.join(SCRATCH);
+        fs::create_dir_all(&path).map_err(|e| CatalogError::io(&path, e))?;
+        Ok(path)
+    }
+
+    /// One atomic step: files first, then the rows `describe` sets, in one commit; then files no longer listed go.
+    ///
+    /// Errors: what `describe` returns, before anything is written; failures of the commit, after which the
+    /// store is as it was before the step.
+    pub fn commit(
+        &mut self,
+        describe: impl FnOnce(&mut Step) -> Result<(), CatalogError>,
+    ) -> Result<(), CatalogError> {
+        assert!(
+            self.writable,
+            "{} is open for reading only",
+            self.dir.display()
+        );
+        let mut step = Step::new(self.journal_rows);
+        describe(&mut step)?;
+        for file in &step.listed {
+            let path = self.file_path(file.subdomain, file.generation);
+            let synced = File::open(&path).and_then(|f| f.sync_all());
+            synced.map_err(|e| CatalogError::io(&path, e))?;
+        }
+        sync_dir(&self.dir)?;
+        let changes = step.changes.iter();
+        self.file.change(changes.map(|(&k, v)| (k, v.as_deref())))?;
+        self.journal_rows = step.journal_rows;
+        for file in &step.unlisted {
+            remove(&self.file_path(file.subdomain, file.generation))?;
+        }
+        Ok(())
+    }
+
+    /// Removes sub-domain files the catalog does not list, and scratch.
+    fn purge(&mut self) -> Result<(), CatalogError> {
+        let listed = self.files()?;
+        let dir = &self.dir;
+        let entries = fs::read_dir(dir).map_err(|e| CatalogError::io(dir, e))?;
+        for entry in entries {
+            let entry = entry.map_err(|e| CatalogError::io(dir, e))?;
+            let name = entry.file_name();
+            let file = name.to_str().and_then(parse_file_name);
+            if file.is_some_and(|f| !listed.contains(&f)) {
+                remove(&entry.path())?;
+            } else if name == SCRATCH {
+                let path = entry.path();
+                fs::remove_dir_all(&path).map_err(|e| CatalogError::io(&path, e))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// How far the store is.
+    pub fn state(&mut self) -> Result<StoreState, CatalogError> {
+        let state = self.row(RowKind::State.key(0, 0))?;
+        state.ok_or_else(|| self.missing(RowKind::State.key(0, 0)))
+    }
+
+    /// What was asked for.
+    pub fn job(&mut self) -> Result<Job, CatalogError> {
+        let job = self.row(RowKind::Job.key(0, 0))?;
+        job.ok_or_else(|| self.missing(RowKind::Job.key(0, 0)))
+    }
+
+    /// Names of the labels; a facet's label is a position here.
+    pub fn labels(&mut self) -> Result<Vec<String>, CatalogError> {
+        Ok(self.row(RowKind::Labels.key(0, 0))?.unwrap_or_default())
+    }
+
+    /// The regions, as they were set.
+    pub fn regions(&mut self) -> Result<Vec<RegionRow>, CatalogError> {
+        Ok(self.row(RowKind::Regions.key(0, 0))?.unwrap_or_default())
+    }
+
+    /// All sub-domains by rank.
+    pub fn subdomains(&mut self) -> Result<Vec<SubdomainRow>, CatalogError> {
+        self.rows(RowKind::Subdomain)
+    }
+
+    /// One sub-domain.
+    ///
+    /// Errors: [`CatalogError::NoSubdomain`].
+    pub fn subdomain(&mut self, rank: u32) -> Result<SubdomainRow, CatalogError> {
+        let row = self.row(RowKind::Subdomain.key(0, rank))?;
+        row.ok_or_else(|| CatalogError::NoSubdomain {
+            path: self.dir.clone(),
+            subdomain: rank,
+        })
+    }
+
+    /// The files that count, by sub-domain and generation.
+    pub fn files(&mut self) -> Result<Vec<FileRow>, CatalogError> {
+        self.rows(RowKind::File)
+    }
+
+    /// The interfaces by cut, then by ranks.
+    pub fn interfaces(&mut self) -> Result<Vec<InterfaceRow>, CatalogError> {
+        let rows: Vec<Vec<InterfaceRow>> = self.rows(RowKind::Interface)?;
+        Ok(rows.into_iter().flatten().collect())
+    }
+
+    /// Who neighbors whom, by sub-domain.
+    pub fn topology(&mut self) -> Result<Vec<TopologyRow>, CatalogError> {
+        self.rows(RowKind::Topology)
+    }
+
+    /// All steps done so far, in order.
+    pub fn journal(&mut self) -> Result<Vec<JournalRow>, CatalogError> {
+        self.rows(RowKind::Journal)
+    }
+
+    /// Bytes kept under a number with [`Step::set_blob`], or `None`.
+    pub fn blob(&mut self, number: u32) -> Result<Option<Vec<u8>>, CatalogError> {
+        let mut whole = None::<Vec<u8>>;
+        for piece in 0.. {
+            let Some(bytes) = self.bytes(RowKind::Blob.key(number, piece))? else {
+                break;
+            };
+            whole.get_or_insert_default().extend_from_slice(&bytes);
+        }
+        Ok(whole)
+    }
+
+    /// Shrinks the catalog to what it holds, and closes it.
+    pub fn close(self) -> Result<(), CatalogError> {
+        Ok(self.file.compact()?)
+    }
+
+    fn missing(&self, key: u64) -> CatalogError {
+        self.damaged_row(key, "is missing".to_owned())
+    }
+
+    fn damaged_row(&self, key: u64, reason: String) -> CatalogError {
+        CatalogError::Row {
+            path: self.file.path().to_owned(),
+            key,
+            reason,
+        }
+    }
+
+    fn bytes(&mut self, key: u64) -> Result<Option<Vec<u8>>, CatalogError> {
+        let read = self.file.read(key, |value| {
+            rows::checked_bytes(key, value).map(<[u8]>::to_vec)
+        })?;
+        read.transpose().map_err(|e| self.damaged_row(key, e))
+    }
+
+    fn row<T>(&mut self, key: u64) -> Result<Option<T>, CatalogError>
+    where
+        T: Archive,
+        T::Archived: for<'a> CheckBytes<HighValidator<'a, rancor::Error>>
+            + Deserialize<T, HighDeserializer<rancor::Error>>,
+    {
+        let read = self.file.read(key, |value| rows::decode(key, value))?;
+        read.transpose().map_err(|e| self.damaged_row(key, e))
+    }
+
+    fn rows<T>(&mut self, kind: RowKind) -> Result<Vec<T>, CatalogError>
+    where
+        T: Archive,
+        T::Archived: for<'a> CheckBytes<HighValidator<'a, rancor::Error>>
+            + Deserialize<T, HighDeserializer<rancor::Error>>,
+    {
+        let mut all = Vec::new();
+        let mut wrong = None;
+        self.file.scan(kind.keys(), |key, value| {
+            match rows::decode(key, value) {
+                Ok(row) => all.push(row),
+                Err(reason) => wrong = Some((key, reason)),
+            }
+            wrong.is_none()
+        })?;
+        match wrong {
+            Some((key, reason)) => Err(self.damaged_row(key, reason)),
+            None => Ok(all),
+        }
+    }
+}
+
+/// Opens a redb file; one whose writer was killed is first opened for writing, which repairs it.
+pub(super) fn open_repairing(
+    path: &Path,
+    cache_bytes: usize,
+    writable: bool,
+) -> Result<StoreFile, CatalogError> {
+    match StoreFile::open(path, cache_bytes, writable) {
+        Err(StoreError::Database { source, .. })
+            if !writable && matches!(*source, redb::Error::RepairAborted) =>
+        {
+            drop(StoreFile::open(path, cache_bytes, true)?);
+            Ok(StoreFile::open(path, cache_bytes, false)?)
+        }
+        other => Ok(other?),
+    }
+}
+
+/// Says what is in the way of a new store, if anything is.
+fn refuse_existing(dir: &Path) -> Result<(), CatalogError> {
+    let path = dir.to_owned();
+    if !dir.exists() {
+        return Ok(());
+    }
+    if !dir.is_dir() {
+        let reason = "it is a file";
+        return Err(CatalogError::NotOurs { path, reason });
+    }
+    let mut entries = fs::read_dir(dir).map_err(|e| CatalogError::io(dir, e))?;
+    if entries.next().is_none() {
+        return Ok(());
+    }
+    match Catalog::open(dir)?.state()?.is_finished() {
+        true => Err(CatalogError::Finished { path }),
+        false => Err(CatalogError::Unfinished { path }),
+    }
+}
+
+fn file_name(file: FileRow) -> String {
+    format!("subdomain-{:05}-g{}.redb", file.subdomain, file.generation)
+}
+
+fn parse_file_name(name: &str) -> Option<FileRow> {
+    let (subdomain, generation) = name
+        .strip_prefix("subdomain-")?
+        .strip_suffix(".redb")?
+        .split_once("-g")?;
+    let file = FileRow {
+        subdomain: subdomain.parse().ok()?,
+        generation: generation.parse().ok()?,
+    };
+    (file_name(file) == name).then_some(file)
+}
+
+fn remove(path: &Path) -> Result<(), CatalogError> {
+    match fs::remove_file(path) {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(CatalogError::io(path, e)),
+        _ => Ok(()),
+    }
+}
+
+fn sync_dir(dir: &Path) -> Result<(), CatalogError> {
+    let synced = File::open(dir).and_then(|d| d.sync_all());
+    synced.map_err(|e| CatalogError::io(dir, e))
+}
