@@ -19,6 +19,7 @@ pub mod boundary;
 pub mod optimize;
 pub mod refine;
 // Floor 6.
+pub mod audit;
 pub mod pipeline;
 // Floor 7.
 pub mod io;

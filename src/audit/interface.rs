@@ -55,7 +55,10 @@ impl Interfaces {
         for (bytes, word) in record[..16].chunks_exact_mut(4).zip(words) {
             bytes.copy_from_slice(&word.to_be_bytes());
         }
-        for (bytes, v) in record[16..].chunks_exact_mut(8).zip([ids[0], ids[1], ids[2], sum]) {
+        for (bytes, v) in record[16..]
+            .chunks_exact_mut(8)
+            .zip([ids[0], ids[1], ids[2], sum])
+        {
             bytes.copy_from_slice(&v.to_be_bytes());
         }
         self.sorter.push(record)
@@ -81,7 +84,12 @@ impl Interfaces {
         }
         let mut expected: BTreeMap<_, _> = rows
             .iter()
-            .map(|r| ((r.cut, r.low, r.high), (r.faces, Digest { lanes: r.digest })))
+            .map(|r| {
+                (
+                    (r.cut, r.low, r.high),
+                    (r.faces, Digest { lanes: r.digest }),
+                )
+            })
             .collect();
         for (key, sides) in self.sides {
             let row = expected.remove(&key);
@@ -111,7 +119,11 @@ fn judge(group: &[[u8; BYTES]], report: &mut Report) {
 fn unmatched(record: &[u8; BYTES], what: String, report: &mut Report) {
     let finding = Finding::UnmatchedInterface;
     report.find(finding, || {
-        let what = format!("face {} of cut {}: {what}", word(record, 1), word(record, 0));
+        let what = format!(
+            "face {} of cut {}: {what}",
+            word(record, 1),
+            word(record, 0)
+        );
         Offender::new(finding, Some(word(record, 2)), what)
     });
 }
@@ -119,7 +131,9 @@ fn unmatched(record: &[u8; BYTES], what: String, report: &mut Report) {
 fn differs((cut, low, high): (u32, u32, u32), report: &mut Report) {
     let finding = Finding::CatalogDiffers;
     report.find(finding, || {
-        let what = format!("the interface of sub-domains {low} and {high} by cut {cut} is not what its row says");
+        let what = format!(
+            "the interface of sub-domains {low} and {high} by cut {cut} is not what its row says"
+        );
         Offender::new(finding, Some(low), what)
     });
 }

@@ -229,9 +229,8 @@ impl<'a> Audit<'a> {
         while let Some(claim) = claims.next_below(first + tets.len() as u32)? {
             let place = (claim.tet - first) as usize;
             let nodes = tets[place].nodes;
-            let face = (0..4).find(|&i| {
-                sorted_face(FACES[i].map(|k| nodes[k])) == (claim.face, claim.odd)
-            });
+            let face = (0..4)
+                .find(|&i| sorted_face(FACES[i].map(|k| nodes[k])) == (claim.face, claim.odd));
             match face {
                 Some(i) if marks[place][i] & claim.kind == 0 => marks[place][i] |= claim.kind,
                 _ => self.stray(part, claim.tet, &claim.face)?,
@@ -401,8 +400,7 @@ impl<'a> Audit<'a> {
                     let corners = part.corners(one.face)?;
                     let finding = Finding::OpenFace;
                     self.report.find(finding, || {
-                        let what =
-                            "a face with one side is neither a facet nor an interface face";
+                        let what = "a face with one side is neither a facet nor an interface face";
                         Offender::new(finding, Some(rank), what)
                             .with_tet(tet)
                             .with_corners(&corners)
@@ -471,7 +469,9 @@ impl<'a> Audit<'a> {
             if (found - expected).abs() > VOLUME_TOLERANCE * self.volume_scale.max(found) {
                 let finding = Finding::VolumeDiffers;
                 self.report.find(finding, || {
-                    let what = format!("the tetrahedra have volume {found}, their boundary encloses {expected}");
+                    let what = format!(
+                        "the tetrahedra have volume {found}, their boundary encloses {expected}"
+                    );
                     Offender::new(finding, None, what)
                 });
             }
