@@ -23,7 +23,7 @@ pub struct CoarseReport {
 const TELL_EVERY: usize = 4096;
 
 /// Builds the coarse mesh of a valid surface into an empty mesh.
-pub fn coarse<P: Pages>(
+pub(super) fn coarse<P: Pages>(
     mesh: &mut Mesh<P>,
     surface: &Surface,
     options: &Options,

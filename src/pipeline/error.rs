@@ -1,6 +1,7 @@
 use thiserror::Error;
 
 use crate::boundary::BoundaryError;
+use crate::catalog::CatalogError;
 use crate::sizing::SizingError;
 use crate::store::StoreError;
 use crate::surface::SurfaceError;
@@ -15,6 +16,8 @@ pub enum PipelineError {
     Boundary(#[from] BoundaryError),
     #[error(transparent)]
     Sizing(#[from] SizingError),
+    #[error(transparent)]
+    Catalog(#[from] CatalogError),
     #[error(transparent)]
     Store(#[from] StoreError),
     /// An option that was checked before has no meaning any more.

@@ -17,7 +17,7 @@ pub struct FineReport {
 }
 
 /// Divides and optimizes a coarse mesh.
-pub fn fine<P: Pages>(
+pub(super) fn fine<P: Pages>(
     mesh: &mut Mesh<P>,
     field: &SizeField,
     bounds: Aabb,

@@ -8,14 +8,16 @@
 //! It receives a surface, not a path, and prints nothing: it tells a [`Watcher`] what goes on.
 
 mod coarse;
+mod error;
 mod fine;
 mod options;
-mod error;
 mod plan;
+mod run;
+mod seal;
 mod watch;
 
 pub use error::PipelineError;
 pub use options::Options;
 pub use plan::{MEMORY_MIN, Plan};
-pub use coarse::coarse;pub use fine::fine;
+pub use run::{Summary, mesh};
 pub use watch::{Event, Watcher, silent};
