@@ -23,3 +23,5 @@ pub mod audit;
 pub mod pipeline;
 // Floor 7.
 pub mod io;
+// Floor 8.
+pub mod cli;

@@ -68,7 +68,8 @@ fn vertices<P: Pages>(
     let frame = HilbertFrame::new(&target.bounds);
     let mut sorter = Sorter::<12>::new(target.scratch, target.memory / 4);
     for v in mesh.vertex_ids() {
-        if mesh.tet_of(v) == NONE {
+        // A surface vertex between two empty regions has no tetrahedron, but its facets are listed.
+        if mesh.tet_of(v) == NONE && mesh.vertex_attribute(v).0 != VertexTag::Surface {
             continue;
         }
         let mut record = [0; 12];
@@ -172,9 +173,6 @@ fn facets<P: Pages>(
     let mut sorter = Sorter::<17>::new(target.scratch, target.memory / 4);
     for n in 0..mesh.n_facets() {
         let facet = mesh.facet(n);
-        if facet.regions == [0, 0] {
-            continue;
-        }
         let (face, odd) = sorted_face(facet.vertices.map(|v| mesh.scratch(dense(v))));
         sorter.push(face_record(face, n, odd))?;
     }

@@ -1,0 +1,198 @@
+//! What can be typed.
+
+use std::path::PathBuf;
+
+use clap::{Parser, Subcommand, ValueEnum};
+
+/// Tetrahedral meshes of any size in a database, every input triangle kept.
+#[derive(Debug, Parser)]
+#[command(name = "tetdb", version, about, max_term_width = 110)]
+#[command(after_help = "Examples:\n  tetdb mesh part.stl --export part.vtu\n  tetdb mesh sample:balls,count=100 -o balls.tetdb\n  \
+    tetdb info balls.tetdb\n  tetdb check part.stl\n\nExit codes: 0 done, 1 internal error, 2 usage, 3 bad input, 4 store damaged, 5 store busy,\n\
+    6 memory or disk, 7 the answer is no, 8 store unusable as it is, 130/143 stopped.")]
+pub struct Args {
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Mesh a closed surface into a store, and verify it
+    Mesh(MeshArgs),
+    /// Go on with an unfinished store
+    Resume(ResumeArgs),
+    /// Say whether a surface can be meshed, and where it cannot
+    Check(CheckArgs),
+    /// Say what a store holds
+    Info(StoreArgs),
+    /// Prove that a store holds a valid mesh
+    Verify(VerifyArgs),
+    /// Print the digest of a store's mesh
+    Digest(StoreArgs),
+    /// Write a mesh file for other programs
+    Export(ExportArgs),
+    /// Write a made surface to a file
+    Sample(SampleArgs),
+}
+
+impl Command {
+    /// Whether output is for programs.
+    pub fn is_json(&self) -> bool {
+        match self {
+            Self::Mesh(a) => a.run.json,
+            Self::Resume(a) => a.run.json,
+            Self::Check(a) => a.json,
+            Self::Info(a) | Self::Digest(a) => a.json,
+            Self::Verify(a) => a.json,
+            Self::Export(a) => a.json,
+            Self::Sample(a) => a.json,
+        }
+    }
+}
+
+/// How to run; none of this changes the mesh.
+#[derive(Debug, clap::Args)]
+pub struct RunArgs {
+    /// Most memory to hold, such as 512MiB or 8GiB [default: 60 % of what is free]
+    #[arg(long, value_name = "SIZE")]
+    pub memory: Option<String>,
+    /// Threads to use [default: all cores]
+    #[arg(long, value_name = "N")]
+    pub threads: Option<usize>,
+    /// Skip the verification at the end
+    #[arg(long)]
+    pub no_verify: bool,
+    /// Also write these mesh files (.vtu, .mesh, .msh)
+    #[arg(long, value_name = "FILE")]
+    pub export: Vec<PathBuf>,
+    /// Answer with one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Regions {
+    Parity,
+    All,
+    Outer,
+    ByOrientation,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Optimize {
+    None,
+    Delaunay,
+    Full,
+}
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  tetdb mesh part.stl\n  tetdb mesh part.stl -o part.tetdb --hsiz 2% --memory 2GiB --export part.vtu\n  \
+    tetdb mesh sample:balls,count=100 -o balls.tetdb")]
+pub struct MeshArgs {
+    /// Surface files (STL, PLY, OBJ, OFF, MEDIT, Gmsh, TetGen), or a sample such as sample:balls,count=100
+    #[arg(required = true, value_name = "SURFACE")]
+    pub surfaces: Vec<String>,
+    /// The store to make [default: the surface's name with .tetdb, here]
+    #[arg(short, long, value_name = "STORE")]
+    pub output: Option<PathBuf>,
+    /// Edge length inside: a length, or 1% of the box diagonal [default: from the surface's edges]
+    #[arg(long, value_name = "H")]
+    pub hsiz: Option<String>,
+    /// Least edge length inside
+    #[arg(long, value_name = "H")]
+    pub hmin: Option<String>,
+    /// Greatest edge length inside
+    #[arg(long, value_name = "H")]
+    pub hmax: Option<String>,
+    /// Greatest ratio of neighboring edge lengths [default: 1.3]
+    #[arg(long, value_name = "RATIO")]
+    pub hgrad: Option<String>,
+    /// Which regions to fill
+    #[arg(long, value_enum, default_value = "parity")]
+    pub regions: Regions,
+    /// How far to optimize
+    #[arg(long, value_enum, default_value = "full")]
+    pub optimize: Optimize,
+    /// Replace the store if it is there
+    #[arg(long)]
+    pub force: bool,
+    #[command(flatten)]
+    pub run: RunArgs,
+}
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  tetdb resume part.tetdb --memory 2GiB")]
+pub struct ResumeArgs {
+    #[arg(value_name = "STORE")]
+    pub store: PathBuf,
+    #[command(flatten)]
+    pub run: RunArgs,
+}
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  tetdb check part.stl --json")]
+pub struct CheckArgs {
+    #[arg(required = true, value_name = "SURFACE")]
+    pub surfaces: Vec<String>,
+    /// Answer with one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, clap::Args)]
+pub struct StoreArgs {
+    #[arg(value_name = "STORE")]
+    pub store: PathBuf,
+    /// Answer with one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  tetdb verify part.tetdb --full --against part.stl")]
+pub struct VerifyArgs {
+    #[arg(value_name = "STORE")]
+    pub store: PathBuf,
+    /// All levels, the Delaunay share among them
+    #[arg(long)]
+    pub full: bool,
+    /// The surface whose triangles must all be there [default: what the store was made from]
+    #[arg(long, value_name = "SURFACE")]
+    pub against: Vec<String>,
+    /// Most memory to hold
+    #[arg(long, value_name = "SIZE")]
+    pub memory: Option<String>,
+    /// Answer with one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  tetdb export part.tetdb part.vtu part.msh")]
+pub struct ExportArgs {
+    #[arg(value_name = "STORE")]
+    pub store: PathBuf,
+    /// Files to write; the extension tells the format: .vtu, .mesh, .msh
+    #[arg(required = true, value_name = "OUT")]
+    pub out: Vec<PathBuf>,
+    /// Most memory to hold
+    #[arg(long, value_name = "SIZE")]
+    pub memory: Option<String>,
+    /// Answer with one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  tetdb sample balls,count=1000,h=0.0093 -o balls.stl\n  tetdb sample box,h=0.1 -o box.off")]
+pub struct SampleArgs {
+    /// NAME,key=value,... with the names balls, box, knot, shells, sphere
+    #[arg(value_name = "SAMPLE")]
+    pub sample: String,
+    /// The file to write: .stl or .off
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Answer with one JSON object
+    #[arg(long)]
+    pub json: bool,
+}

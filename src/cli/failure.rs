@@ -1,0 +1,216 @@
+//! Errors as the user sees them: a word, an exit code, what happened, where, what to do.
+
+use std::sync::Mutex;
+
+use crate::boundary::BoundaryError;
+use crate::catalog::CatalogError;
+use crate::io::read::ReadError;
+use crate::pipeline::PipelineError;
+use crate::sizing::SizingError;
+use crate::store::StoreError;
+use crate::surface::SurfaceError;
+
+/// One row of the table of errors.
+pub struct CodeRow {
+    pub code: &'static str,
+    pub exit: u8,
+    pub meaning: &'static str,
+}
+
+const fn row(code: &'static str, exit: u8, meaning: &'static str) -> CodeRow {
+    CodeRow { code, exit, meaning }
+}
+
+/// Every error word, its exit code, and what it means; README carries the same table.
+pub const CODES: &[CodeRow] = &[
+    row("internal", 1, "a bug: please report it with the command and the message"),
+    row("usage", 2, "the command line makes no sense"),
+    row("bad-size", 2, "a size option has no meaning, or contradicts another"),
+    row("bad-memory", 2, "a memory size has no unit or no meaning"),
+    row("bad-sample", 2, "there is no such sample, or a key of it is wrong"),
+    row("unreadable-file", 3, "an input file is missing or may not be read"),
+    row("unknown-format", 3, "the format of a file cannot be told from its name"),
+    row("truncated-file", 3, "an input file ends too early"),
+    row("unexpected-text", 3, "an input file has something else than its format asks for"),
+    row("not-a-number", 3, "a coordinate is not a finite number"),
+    row("index-out-of-range", 3, "a triangle names a vertex that is not there"),
+    row("count-mismatch", 3, "a declared count cannot be right"),
+    row("coordinate-range", 3, "a coordinate is too large to compute with exactly"),
+    row("unsupported-content", 3, "a file has elements that do not make a triangle surface"),
+    row("surface-too-large", 3, "more triangles or vertices than 32-bit numbers can name"),
+    row("empty-surface", 3, "there are no triangles"),
+    row("degenerate-triangle", 3, "a triangle has no area"),
+    row("duplicate-triangle", 3, "a triangle occurs twice"),
+    row("open-surface", 3, "an edge has only one triangle"),
+    row("self-intersection", 3, "triangles meet where they should not"),
+    row("unrecovered-triangles", 3, "input triangles that could not be made faces of the mesh"),
+    row("nothing-filled", 3, "the surface encloses no region to fill"),
+    row("no-such-store", 3, "there is no store at this path"),
+    row("damaged", 4, "the store is not what was written"),
+    row("busy", 5, "another process writes the store"),
+    row("memory", 6, "the memory cap is too small for this work"),
+    row("disk-full", 6, "the disk is full"),
+    row("io", 6, "the system refused to read or write a file"),
+    row("invalid-mesh", 7, "verification found the mesh invalid"),
+    row("store-exists", 8, "a finished store is already there"),
+    row("store-unfinished", 8, "the store is not finished"),
+    row("not-a-store", 8, "what is there is not a store"),
+    row("store-format", 8, "the store has another format version"),
+    row("surface-changed", 8, "the surface is not the one the store was begun with"),
+    row("stopped", 130, "stopped by a signal; `tetdb resume` goes on"),
+];
+
+/// An error on its way to the user.
+#[derive(Debug)]
+pub struct Failure {
+    pub code: &'static str,
+    pub message: String,
+    pub place: Option<String>,
+    pub help: Option<String>,
+}
+
+impl Failure {
+    pub fn new(code: &'static str, message: impl ToString) -> Self {
+        Self {
+            code,
+            message: message.to_string(),
+            place: None,
+            help: None,
+        }
+    }
+
+    pub fn at(mut self, place: impl ToString) -> Self {
+        self.place = Some(place.to_string());
+        self
+    }
+
+    pub fn help(mut self, help: impl ToString) -> Self {
+        self.help = Some(help.to_string());
+        self
+    }
+
+    pub fn internal(message: String) -> Self {
+        Self::new("internal", message).help("this is a bug; please report the command and this message")
+    }
+
+    /// The exit code of its word.
+    pub fn exit(&self) -> u8 {
+        if self.code == "stopped" {
+            return super::signals::exit_code();
+        }
+        let row = CODES.iter().find(|row| row.code == self.code);
+        row.map_or(1, |row| row.exit)
+    }
+}
+
+static PANIC: Mutex<String> = Mutex::new(String::new());
+
+/// Keeps the message of a panic for [`last_panic`].
+pub fn remember_panic(info: &std::panic::PanicHookInfo) {
+    if let Ok(mut text) = PANIC.lock() {
+        *text = info.to_string();
+    }
+}
+
+/// The message of the last panic.
+pub fn last_panic() -> String {
+    PANIC.lock().map(|text| text.clone()).unwrap_or_default()
+}
+
+impl From<ReadError> for Failure {
+    fn from(e: ReadError) -> Self {
+        Self::new(e.code(), &e).at(e.place()).help(e.help())
+    }
+}
+
+impl From<SurfaceError> for Failure {
+    fn from(e: SurfaceError) -> Self {
+        let failure = Self::new(e.code(), &e).help(e.help());
+        match &e {
+            SurfaceError::Invalid { defect, n_defects } => {
+                let more = match n_defects.saturating_sub(1) {
+                    0 => String::new(),
+                    n => format!(" (and {n} more defects)"),
+                };
+                failure.at(defect.place() + &more)
+            }
+            _ => failure,
+        }
+    }
+}
+
+impl From<StoreError> for Failure {
+    fn from(e: StoreError) -> Self {
+        let code = match &e {
+            StoreError::Busy { .. } => "busy",
+            StoreError::Full { .. } => "disk-full",
+            StoreError::Damaged { .. } | StoreError::Page { .. } | StoreError::Missing { .. } => "damaged",
+            StoreError::Budget { .. } | StoreError::TooMany { .. } => "memory",
+            StoreError::Stopped => "stopped",
+            _ => "io",
+        };
+        Self::new(code, &e).help(help_of(code))
+    }
+}
+
+impl From<CatalogError> for Failure {
+    fn from(e: CatalogError) -> Self {
+        let code = match e {
+            CatalogError::Store(inner) => return inner.into(),
+            CatalogError::Busy { .. } => "busy",
+            CatalogError::NotFound { .. } | CatalogError::NoSubdomain { .. } => "no-such-store",
+            CatalogError::NotOurs { .. } => "not-a-store",
+            CatalogError::Finished { .. } => "store-exists",
+            CatalogError::Unfinished { .. } | CatalogError::NotSealed { .. } => "store-unfinished",
+            CatalogError::Format { .. } => "store-format",
+            CatalogError::Row { .. } | CatalogError::Chunk { .. } | CatalogError::Content { .. } => "damaged",
+            _ => "io",
+        };
+        Self::new(code, &e).help(help_of(code))
+    }
+}
+
+impl From<SizingError> for Failure {
+    fn from(e: SizingError) -> Self {
+        Self::new("bad-size", e).help("a size is a length in the surface's units, such as 0.5, or a share of its box diagonal, such as 1%")
+    }
+}
+
+impl From<BoundaryError> for Failure {
+    fn from(e: BoundaryError) -> Self {
+        Self::new("unrecovered-triangles", &e)
+            .help("look at these triangles with `tetdb check SURFACE`; a finer or better shaped surface there helps")
+    }
+}
+
+impl From<PipelineError> for Failure {
+    fn from(e: PipelineError) -> Self {
+        match e {
+            PipelineError::Surface(e) => e.into(),
+            PipelineError::Boundary(e) => e.into(),
+            PipelineError::Sizing(e) => e.into(),
+            PipelineError::Catalog(e) => e.into(),
+            PipelineError::Store(e) => e.into(),
+            PipelineError::NothingFilled { .. } => {
+                Self::new("nothing-filled", &e).help("try --regions all, and look at the surface with `tetdb check SURFACE`")
+            }
+            other => Self::new("usage", other),
+        }
+    }
+}
+
+fn help_of(code: &str) -> &'static str {
+    match code {
+        "busy" => "wait for the other process, or stop it",
+        "disk-full" => "free some space, then `tetdb resume STORE`",
+        "damaged" => "`tetdb verify STORE` lists all damage; mesh the surface again if there is no copy",
+        "memory" => "give more with --memory, or mesh a coarser surface",
+        "stopped" => "`tetdb resume STORE` goes on from the last finished step",
+        "no-such-store" => "check the path; `tetdb mesh SURFACE -o STORE` makes a store",
+        "not-a-store" => "choose another path; what is there was not made by this program",
+        "store-exists" => "choose another path, or replace it with --force",
+        "store-unfinished" => "`tetdb resume STORE` goes on with it",
+        "store-format" => "use the version of this program that made the store, or mesh again",
+        _ => "check the path and its permissions",
+    }
+}

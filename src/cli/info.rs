@@ -1,0 +1,150 @@
+//! `info`: what a store holds.
+
+use std::path::Path;
+
+use serde_json::{Value, json};
+
+use super::args::StoreArgs;
+use super::failure::Failure;
+use super::memory;
+use super::talk::Talk;
+use crate::catalog::{QualityRow, Store, StoreState};
+
+/// Regions listed for people.
+const REGIONS_LISTED: usize = 12;
+
+pub fn run(args: &StoreArgs, talk: &Talk) -> Result<u8, Failure> {
+    if talk.is_json() {
+        talk.answer(&object(&args.store)?);
+    } else {
+        print(&args.store, talk)?;
+    }
+    Ok(0)
+}
+
+/// Everything, for programs.
+pub fn object(path: &Path) -> Result<Value, Failure> {
+    let mut store = Store::open(path)?;
+    let catalog = store.catalog();
+    let (state, job) = (catalog.state()?, catalog.job()?);
+    let rows = catalog.subdomains()?;
+    let topology = catalog.topology()?;
+    let subdomains: Vec<Value> = rows
+        .iter()
+        .map(|row| {
+            let neighbors = topology.iter().find(|t| t.subdomain == row.rank);
+            json!({
+                "id": row.rank, "state": row.state, "tets": row.tets, "vertices": row.vertices, "facets": row.facets,
+                "interface_faces": row.interface_faces, "digest": hex(row.digest), "interface_digest": hex(row.interface_digest),
+                "neighbors": neighbors.map(|t| &t.neighbors), "quality": row.quality, "worst_q": row.quality.worst,
+                "volume": row.volume, "bounds": row.bounds, "bytes": row.bytes,
+            })
+        })
+        .collect();
+    Ok(json!({
+        "schema": 1, "store": path.display().to_string(), "state": state, "finished": state.is_finished(),
+        "surfaces": job.surfaces, "options": serde_json::from_str::<Value>(&job.options).unwrap_or(Value::Null),
+        "tool_version": job.tool_version, "labels": catalog.labels()?, "regions": catalog.regions()?,
+        "tets": rows.iter().map(|r| r.tets).sum::<u64>(),
+        "vertices": rows.iter().map(|r| r.vertices).sum::<u64>(),
+        "bytes": rows.iter().map(|r| r.bytes).sum::<u64>(),
+        "digest": hex(sum(rows.iter().map(|r| r.digest))),
+        "subdomains": subdomains, "interfaces": catalog.interfaces()?, "journal": catalog.journal()?,
+    }))
+}
+
+fn sum(digests: impl Iterator<Item = [u64; 2]>) -> [u64; 2] {
+    digests.fold([0; 2], |s, d| [s[0].wrapping_add(d[0]), s[1].wrapping_add(d[1])])
+}
+
+fn hex(digest: [u64; 2]) -> String {
+    tetdb_schema::digest::Digest { lanes: digest }.to_string()
+}
+
+/// The same for people.
+pub fn print(path: &Path, talk: &Talk) -> Result<(), Failure> {
+    let mut store = Store::open(path)?;
+    let catalog = store.catalog();
+    let (state, job) = (catalog.state()?, catalog.job()?);
+    let surfaces: Vec<&str> = job.surfaces.iter().map(|s| s.path.as_str()).collect();
+    talk.line(&format!("{}: {}, from {}", path.display(), words(state), surfaces.join(", ")));
+    for row in catalog.journal()? {
+        talk.line(&format!("  {:<28} {:>9.2} s", row.step, row.seconds));
+    }
+    if !state.is_finished() {
+        talk.line(&format!("`tetdb resume {}` goes on with it", path.display()));
+        return Ok(());
+    }
+    let rows = catalog.subdomains()?;
+    let regions = catalog.regions()?;
+    let (tets, bytes) = (rows.iter().map(|r| r.tets).sum::<u64>(), rows.iter().map(|r| r.bytes).sum::<u64>());
+    talk.line(&format!(
+        "{tets} tetrahedra, {} vertices, {} input triangles in {} sub-domain(s); {} on disk, {:.2} bytes per tetrahedron",
+        rows.iter().map(|r| r.vertices).sum::<u64>(),
+        rows.iter().map(|r| r.facets).sum::<u64>(),
+        rows.len(),
+        memory::show(bytes),
+        bytes as f64 / tets.max(1) as f64
+    ));
+    for region in regions.iter().take(REGIONS_LISTED) {
+        let (name, what) = if region.filled {
+            (region.region.to_string(), format!("{} coarse tetrahedra", region.tets))
+        } else {
+            ("-".to_owned(), "empty".to_owned())
+        };
+        talk.line(&format!("  region {name:>4}: volume {:.6e}, {what}, {} label(s) around it", region.volume, region.labels.len()));
+    }
+    if regions.len() > REGIONS_LISTED {
+        talk.line(&format!("  ... {} regions in all", regions.len()));
+    }
+    for line in quality_lines(&merged(rows.iter().map(|r| &r.quality))) {
+        talk.line(&line);
+    }
+    talk.line(&format!("digest {}", hex(sum(rows.iter().map(|r| r.digest)))));
+    Ok(())
+}
+
+fn words(state: StoreState) -> &'static str {
+    match state {
+        StoreState::Verified => "finished and verified",
+        StoreState::Sealed => "finished, not verified",
+        StoreState::New => "unfinished (nothing imported yet)",
+        StoreState::Imported => "unfinished (surface imported)",
+        StoreState::Coarse => "unfinished (coarse mesh done)",
+        StoreState::Bisected => "unfinished (cut into sub-domains)",
+    }
+}
+
+fn merged<'a>(rows: impl Iterator<Item = &'a QualityRow>) -> QualityRow {
+    let mut all = QualityRow {
+        bins: Default::default(),
+        worst: 0.0,
+        worst_tet: 0,
+        dihedral: [f64::INFINITY, 0.0],
+    };
+    for row in rows {
+        for (sum, n) in all.bins.iter_mut().zip(row.bins) {
+            *sum += n;
+        }
+        all.worst = all.worst.max(row.worst);
+        all.dihedral = [all.dihedral[0].min(row.dihedral[0]), all.dihedral[1].max(row.dihedral[1])];
+    }
+    all
+}
+
+/// The paper's table: share and number of tetrahedra by quality.
+fn quality_lines(q: &QualityRow) -> Vec<String> {
+    let total: u64 = q.bins.iter().sum();
+    let mut lines = vec!["quality (longest edge over inradius, 1 is regular):".to_owned()];
+    for (i, &n) in q.bins.iter().enumerate().filter(|(_, n)| **n > 0) {
+        let to = if i + 1 == q.bins.len() { "inf".to_owned() } else { (i + 2).to_string() };
+        lines.push(format!("  [{:>2}, {to:>3}[ {:>9.4} %  {n:>12}", i + 1, 100.0 * n as f64 / total.max(1) as f64));
+    }
+    lines.push(format!(
+        "  worst {:.3}; dihedral angles {:.2} to {:.2} degrees",
+        q.worst,
+        q.dihedral[0].to_degrees(),
+        q.dihedral[1].to_degrees()
+    ));
+    lines
+}

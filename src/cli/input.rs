@@ -1,0 +1,114 @@
+//! Surfaces as arguments: files, or samples made on the spot.
+
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use xxhash_rust::xxh3::Xxh3;
+
+use super::failure::Failure;
+use super::talk::Talk;
+use crate::catalog::SurfaceSource;
+use crate::io::read::read_surface;
+use crate::samples::{PREFIX, SampleSpec};
+use crate::surface::{Surface, Validation, orient_alike, validate};
+
+/// A surface, read and turned one way, and where it came from.
+pub struct Input {
+    pub surface: Surface,
+    pub sources: Vec<SurfaceSource>,
+    /// Name for a store when none is given.
+    pub stem: String,
+    /// Triangles that were turned round.
+    pub turned: usize,
+}
+
+/// Reads files or makes a sample.
+pub fn load(arguments: &[String], talk: &Talk) -> Result<Input, Failure> {
+    let samples = arguments.iter().filter(|a| a.starts_with(PREFIX)).count();
+    let mut input = match (samples, arguments) {
+        (1, [word]) => made(word)?,
+        (0, _) => from_files(arguments)?,
+        _ => {
+            return Err(Failure::new("usage", "a sample cannot be joined with other surfaces")
+                .help("write it to a file first: `tetdb sample balls,count=10 -o balls.stl`"));
+        }
+    };
+    for note in &input.surface.notes {
+        talk.note(&format!("note: {note}"));
+    }
+    let orientation = orient_alike(&mut input.surface);
+    input.turned = orientation.flipped.len();
+    if input.turned > 0 {
+        talk.note(&format!("note: {} triangles were turned to run like their neighbors", input.turned));
+    }
+    Ok(input)
+}
+
+/// [`load`], and refuse a surface with defects.
+pub fn load_valid(arguments: &[String], talk: &Talk) -> Result<Input, Failure> {
+    let input = load(arguments, talk)?;
+    validated(&input.surface)?;
+    Ok(input)
+}
+
+/// Validates completely.
+pub fn validated(surface: &Surface) -> Result<Validation, Failure> {
+    let validation = validate(surface);
+    validation.accept()?;
+    Ok(validation)
+}
+
+fn made(word: &str) -> Result<Input, Failure> {
+    let bad = |e: crate::samples::SampleError| {
+        Failure::new("bad-sample", e).help("for example sample:balls,count=100 or sample:box,h=0.1; see `tetdb sample --help`")
+    };
+    let spec = SampleSpec::parse(word).map_err(bad)?;
+    Ok(Input {
+        surface: spec.make().map_err(bad)?.into(),
+        sources: vec![SurfaceSource {
+            path: spec.canonical(),
+            bytes: 0,
+            hash: [0; 2],
+        }],
+        stem: spec.name().to_owned(),
+        turned: 0,
+    })
+}
+
+fn from_files(arguments: &[String]) -> Result<Input, Failure> {
+    let paths: Vec<PathBuf> = arguments.iter().map(PathBuf::from).collect();
+    let surface = read_surface(&paths)?;
+    let sources: Result<Vec<_>, Failure> = paths.iter().map(|p| source(p)).collect();
+    let stem = paths.first().and_then(|p| p.file_stem());
+    Ok(Input {
+        surface,
+        sources: sources?,
+        stem: stem.map_or_else(|| "mesh".to_owned(), |s| s.to_string_lossy().into_owned()),
+        turned: 0,
+    })
+}
+
+/// What identifies a file later: absolute path, length, hash.
+fn source(path: &Path) -> Result<SurfaceSource, Failure> {
+    let io = |e: std::io::Error| {
+        Failure::new("unreadable-file", format!("the file cannot be read: {e}")).at(path.display())
+    };
+    let absolute = std::path::absolute(path).map_err(io)?;
+    let mut file = std::fs::File::open(path).map_err(io)?;
+    let mut hash = Xxh3::new();
+    let (mut buffer, mut bytes) = (vec![0; 1 << 16], 0);
+    loop {
+        let n = file.read(&mut buffer).map_err(io)?;
+        if n == 0 {
+            break;
+        }
+        bytes += n as u64;
+        hash.update(&buffer[..n]);
+    }
+    let digest = hash.digest128();
+    Ok(SurfaceSource {
+        path: absolute.to_string_lossy().into_owned(),
+        bytes,
+        hash: [digest as u64, (digest >> 64) as u64],
+    })
+}

@@ -1,0 +1,238 @@
+//! `mesh` and `resume`.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use clap::ValueEnum;
+use serde_json::json;
+
+use super::args::{MeshArgs, ResumeArgs, RunArgs};
+use super::failure::Failure;
+use super::input::{self, Input};
+use super::talk::Talk;
+use super::{export, info, memory, signals, store, verify};
+use crate::catalog::{Catalog, CatalogError, Job, Store, StoreState};
+use crate::pipeline::{self, Options, Summary};
+use crate::store::Budget;
+
+pub fn run(args: &MeshArgs, talk: &Talk) -> Result<u8, Failure> {
+    let options = options(args);
+    // Sizes are checked before anything is read.
+    options.sizes()?;
+    let (cap, whence) = begin(&args.run, talk)?;
+    let path = output(args);
+    if let Some(exit) = already_there(&path, args, &options, talk)? {
+        return Ok(exit);
+    }
+    let clock = Instant::now();
+    let input = input::load_valid(&args.surfaces, talk)?;
+    talk.note(&format!(
+        "{} triangles and {} vertices, closed and free of defects ({:.1} s)",
+        input.surface.n_triangles(),
+        input.surface.n_vertices(),
+        clock.elapsed().as_secs_f64()
+    ));
+    talk.note(&format!("memory: {} ({whence})", memory::show(cap)));
+    // With --force the old store is only replaced once the new one is sealed.
+    let replaced = path.exists().then(|| path.with_extension("tetdb-new"));
+    let place = replaced.clone().unwrap_or_else(|| path.clone());
+    if replaced.is_some() && place.exists() {
+        remove_store(&place)?;
+    }
+    let job = Job {
+        options: serde_json::to_string(&options).unwrap_or_default(),
+        surfaces: input.sources.clone(),
+        tool_version: env!("CARGO_PKG_VERSION").to_owned(),
+    };
+    let mut catalog = Catalog::create(&place, &job)?;
+    let summary = work(&mut catalog, &input, &options, cap, talk);
+    let summary = match summary {
+        // A refused surface leaves nothing to resume.
+        Err(failure) if failure.exit() == 3 => {
+            drop(catalog);
+            remove_store(&place)?;
+            return Err(failure);
+        }
+        other => other?,
+    };
+    catalog.close()?;
+    if replaced.is_some() {
+        remove_store(&path)?;
+        rename(&place, &path)?;
+    }
+    finish(&path, &input, &args.run, cap, Some(&summary), talk)
+}
+
+pub fn resume(args: &ResumeArgs, talk: &Talk) -> Result<u8, Failure> {
+    let (cap, _) = begin(&args.run, talk)?;
+    let mut reader = Store::open(&args.store)?;
+    let state = reader.catalog().state()?;
+    let input = store::surface_of(&mut reader, &[], talk)?;
+    let job = reader.catalog().job()?;
+    drop(reader);
+    if state.is_finished() {
+        talk.note(&format!("{} is already finished", args.store.display()));
+        return finish(&args.store, &input, &args.run, cap, None, talk);
+    }
+    let options: Options = serde_json::from_str(&job.options)
+        .map_err(|e| Failure::new("damaged", format!("the job's options cannot be read: {e}")).at(args.store.display()))?;
+    let mut catalog = Catalog::open_writable(&args.store)?;
+    let summary = work(&mut catalog, &input, &options, cap, talk)?;
+    catalog.close()?;
+    finish(&args.store, &input, &args.run, cap, Some(&summary), talk)
+}
+
+fn options(args: &MeshArgs) -> Options {
+    let word = |v: &dyn Fn() -> Option<clap::builder::PossibleValue>| v().map(|p| p.get_name().to_owned());
+    Options {
+        hsiz: args.hsiz.clone(),
+        hmin: args.hmin.clone(),
+        hmax: args.hmax.clone(),
+        hgrad: args.hgrad.clone(),
+        regions: word(&|| args.regions.to_possible_value()),
+        optimize: word(&|| args.optimize.to_possible_value()),
+    }
+}
+
+/// Threads, signals, and the cap.
+fn begin(args: &RunArgs, talk: &Talk) -> Result<(u64, String), Failure> {
+    if let Some(threads) = args.threads {
+        if threads == 0 {
+            return Err(Failure::new("usage", "--threads 0 leaves nobody to work").help("give 1 or more"));
+        }
+        let built = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+        if built.is_err() {
+            talk.note("note: the thread pool was already running");
+        }
+    }
+    for out in &args.export {
+        export::check_format(out)?;
+    }
+    signals::listen();
+    memory::cap(args.memory.as_deref())
+}
+
+fn output(args: &MeshArgs) -> PathBuf {
+    args.output.clone().unwrap_or_else(|| {
+        let first = args.surfaces.first().map_or("mesh", String::as_str);
+        let stem = match first.strip_prefix(crate::samples::PREFIX) {
+            Some(sample) => sample.split(',').next().map(Into::into),
+            None => Path::new(first).file_stem().map(PathBuf::from),
+        };
+        stem.unwrap_or_else(|| PathBuf::from("mesh")).with_extension("tetdb")
+    })
+}
+
+/// What is at the place of the new store: nothing, the same mesh already, or something in the way.
+fn already_there(path: &Path, args: &MeshArgs, options: &Options, talk: &Talk) -> Result<Option<u8>, Failure> {
+    if !path.exists() {
+        return Ok(None);
+    }
+    let mut store = match Store::open(path) {
+        Ok(store) => store,
+        Err(CatalogError::NotOurs { .. }) if is_empty_dir(path) => return Ok(None),
+        Err(error) => return Err(error.into()),
+    };
+    let catalog = store.catalog();
+    let (state, job) = (catalog.state()?, catalog.job()?);
+    drop(store);
+    if args.force {
+        return Ok(None);
+    }
+    if !state.is_finished() {
+        return Err(CatalogError::Unfinished { path: path.to_owned() }.into());
+    }
+    let same_options = serde_json::from_str::<Options>(&job.options).is_ok_and(|o| o == *options);
+    let input = input::load(&args.surfaces, talk)?;
+    if !same_options || job.surfaces != input.sources {
+        return Err(CatalogError::Finished { path: path.to_owned() }.into());
+    }
+    talk.note(&format!(
+        "{} already holds the finished mesh of this surface with these options",
+        path.display()
+    ));
+    let cap = memory::cap(args.run.memory.as_deref())?.0;
+    write_exports(path, &args.run, cap, talk)?;
+    info::print(path, talk)?;
+    Ok(Some(0))
+}
+
+fn is_empty_dir(path: &Path) -> bool {
+    std::fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none())
+}
+
+fn work(catalog: &mut Catalog, input: &Input, options: &Options, cap: u64, talk: &Talk) -> Result<Summary, Failure> {
+    let budget = Budget::new(cap);
+    let summary = pipeline::mesh(catalog, &input.surface, options, &budget, &|event| talk.progress(event))?;
+    talk.done();
+    if let Some(sizes) = &summary.sizes {
+        talk.note(&sizes.to_string());
+        for warning in &sizes.warnings {
+            talk.note(&format!("warning: {warning}"));
+        }
+    }
+    Ok(summary)
+}
+
+/// Verify, export, tell.
+fn finish(
+    path: &Path,
+    input: &Input,
+    args: &RunArgs,
+    cap: u64,
+    summary: Option<&Summary>,
+    talk: &Talk,
+) -> Result<u8, Failure> {
+    if !args.no_verify {
+        let report = {
+            let mut store = store::open_finished(path)?;
+            verify::check(&mut store, path, Some(&input.surface), cap, crate::audit::Level::Delaunay)?
+        };
+        if !report.valid {
+            return Err(verify::invalid(&report, path));
+        }
+        talk.note(&verify::sentence(&report));
+        let mut catalog = Catalog::open_writable(path)?;
+        if catalog.state()? < StoreState::Verified {
+            catalog.commit(|step| {
+                step.set_state(StoreState::Verified);
+                Ok(())
+            })?;
+        }
+        catalog.close()?;
+    }
+    write_exports(path, args, cap, talk)?;
+    if talk.is_json() {
+        let mut answer = info::object(path)?;
+        answer["memory_cap_bytes"] = json!(cap);
+        answer["peak_bytes"] = json!(memory::peak());
+        if let Some(s) = summary {
+            answer["pages_read"] = json!(s.pages.pages_read);
+            answer["pages_written"] = json!(s.pages.pages_written);
+            answer["frames_used"] = json!(s.frames_used);
+        }
+        talk.answer(&answer);
+    } else {
+        info::print(path, talk)?;
+        if let Some(peak) = memory::peak() {
+            talk.line(&format!("peak memory {} of {}", memory::show(peak), memory::show(cap)));
+        }
+    }
+    Ok(0)
+}
+
+fn write_exports(path: &Path, args: &RunArgs, cap: u64, talk: &Talk) -> Result<(), Failure> {
+    for out in &args.export {
+        export::write(path, out, cap, talk)?;
+    }
+    Ok(())
+}
+
+fn remove_store(path: &Path) -> Result<(), Failure> {
+    // Only ever called on a directory whose catalog carried our magic, or that this run made.
+    std::fs::remove_dir_all(path).map_err(|e| Failure::new("io", e).at(path.display()))
+}
+
+fn rename(from: &Path, to: &Path) -> Result<(), Failure> {
+    std::fs::rename(from, to).map_err(|e| Failure::new("io", e).at(to.display()))
+}

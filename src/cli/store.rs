@@ -1,0 +1,42 @@
+//! Stores as arguments.
+
+use std::path::Path;
+
+use super::failure::Failure;
+use super::input::{self, Input};
+use super::talk::Talk;
+use crate::catalog::Store;
+
+/// Opens a store that is finished. Errors: `store-unfinished` says how to go on.
+pub fn open_finished(path: &Path) -> Result<Store, Failure> {
+    let mut store = Store::open(path)?;
+    let state = store.catalog().state()?;
+    if !state.is_finished() {
+        return Err(Failure::new("store-unfinished", format!("{} is not finished", path.display()))
+            .help(format!("`tetdb resume {}` goes on with it", path.display())));
+    }
+    Ok(store)
+}
+
+/// Reads the surface a store was made from again, or another one when it is given.
+///
+/// Errors: `surface-changed` when a file is not what it was.
+pub fn surface_of(store: &mut Store, given: &[String], talk: &Talk) -> Result<Input, Failure> {
+    let job = store.catalog().job()?;
+    let arguments: Vec<String> = if given.is_empty() {
+        job.surfaces.iter().map(|s| s.path.clone()).collect()
+    } else {
+        given.to_vec()
+    };
+    let input = input::load(&arguments, talk)?;
+    if given.is_empty() {
+        for (then, now) in job.surfaces.iter().zip(&input.sources) {
+            if (then.bytes, then.hash) != (now.bytes, now.hash) {
+                return Err(Failure::new("surface-changed", "the surface is not the one the store was begun with")
+                    .at(&now.path)
+                    .help("put the old file back, or give the surface with --against"));
+            }
+        }
+    }
+    Ok(input)
+}
