@@ -66,8 +66,8 @@ pub struct Contact {
 pub fn contact(p: [Point; 3], p_ids: [u32; 3], q: [Point; 3], q_ids: [u32; 3]) -> Option<Contact> {
     let mut shared = [(0, 0); 3];
     let mut n = 0;
-    for i in 0..3 {
-        if let Some(j) = (0..3).find(|&j| q_ids[j] == p_ids[i]) {
+    for (i, id) in p_ids.iter().enumerate() {
+        if let Some(j) = q_ids.iter().position(|other| other == id) {
             shared[n] = (i, j);
             n += 1;
         }
