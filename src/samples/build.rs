@@ -21,19 +21,19 @@ impl Builder {
 
     /// A new point; the caller knows that it is not there yet.
     pub(super) fn point(&mut self, p: Point) -> u32 {
-        self.sample.points.push(p);
+        // Adding zero turns -0.0 into 0.0.
+        self.sample.points.push(p + Point::ZERO);
         // Makers refuse surfaces of more triangles than u32 can number before they begin.
         (self.sample.points.len() - 1) as u32
     }
 
     /// The point on a seam with these very coordinates, made when it is not there yet.
     pub(super) fn seam_point(&mut self, p: Point) -> u32 {
-        // Adding zero makes -0.0 and 0.0 one key.
         let key = (p + Point::ZERO).to_array().map(f64::to_bits);
         if let Some(&id) = self.seam.get(&key) {
             return id;
         }
-        let id = self.point(p + Point::ZERO);
+        let id = self.point(p);
         self.seam.insert(key, id);
         id
     }
@@ -50,7 +50,21 @@ impl Builder {
         self.seam.clear();
     }
 
-    pub(super) fn finish(self) -> Sample {
+    /// The surface, points numbered in the order in which triangles first name them: as reading a
+    /// file of it would.
+    pub(super) fn finish(mut self) -> Sample {
+        const UNNAMED: u32 = u32::MAX;
+        let mut old2new = vec![UNNAMED; self.sample.points.len()];
+        let mut points = Vec::with_capacity(self.sample.points.len());
+        for v in self.sample.triangles.iter_mut().flatten() {
+            let new = &mut old2new[*v as usize];
+            if *new == UNNAMED {
+                *new = points.len() as u32;
+                points.push(self.sample.points[*v as usize]);
+            }
+            *v = *new;
+        }
+        self.sample.points = points;
         self.sample
     }
 }

@@ -6,7 +6,8 @@ use crate::surface::Surface;
 /// A closed labeled surface in memory.
 ///
 /// Shape: `labels` runs parallel to `triangles` and indexes `label_names`. Invariant: every point is
-/// used, no two points are equal, each edge is shared by two triangles in opposite directions.
+/// used, no two points are equal, none has a −0.0, each edge is shared by two triangles in opposite
+/// directions; points are numbered in the order in which triangles first name them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sample {
     pub points: Vec<Point>,
@@ -17,6 +18,7 @@ pub struct Sample {
 }
 
 impl From<Sample> for Surface {
+    /// The same surface, from no file.
     fn from(sample: Sample) -> Self {
         Self {
             points: sample.points,

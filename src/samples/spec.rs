@@ -4,6 +4,7 @@ use super::balls::Balls;
 use super::shells::{ShellKind, make_shells};
 use super::{Sample, SampleError, boxes, knot, sphere};
 use crate::geom::Point;
+use crate::surface::{SourceFile, Surface};
 use std::fmt::Display;
 use std::str::FromStr;
 
@@ -131,6 +132,19 @@ impl SampleSpec {
             SampleKind::Shells { count, kind, h } => make_shells(*count, *kind, *h),
             SampleKind::Sphere { radius, h } => sphere::make_sphere(*radius, *h),
         }
+    }
+
+    /// Makes the surface as if read from a file called by the canonical word.
+    ///
+    /// # Errors
+    /// As [`SampleSpec::make`].
+    pub fn make_surface(&self) -> Result<Surface, SampleError> {
+        let mut surface = Surface::from(self.make()?);
+        surface.files.push(SourceFile {
+            name: self.canonical(),
+            triangle_first: 0,
+        });
+        Ok(surface)
     }
 }
 
