@@ -7,9 +7,11 @@ use clap::{Parser, Subcommand, ValueEnum};
 /// Tetrahedral meshes of any size in a database, every input triangle kept.
 #[derive(Debug, Parser)]
 #[command(name = "tetdb", version, about, max_term_width = 110)]
-#[command(after_help = "Examples:\n  tetdb mesh part.stl --export part.vtu\n  tetdb mesh sample:balls,count=100 -o balls.tetdb\n  \
+#[command(
+    after_help = "Examples:\n  tetdb mesh part.stl --export part.vtu\n  tetdb mesh sample:balls,count=100 -o balls.tetdb\n  \
     tetdb info balls.tetdb\n  tetdb check part.stl\n\nExit codes: 0 done, 1 internal error, 2 usage, 3 bad input, 4 store damaged, 5 store busy,\n\
-    6 memory or disk, 7 the answer is no, 8 store unusable as it is, 130/143 stopped.")]
+    6 memory or disk, 7 the answer is no, 8 store unusable as it is, 130/143 stopped."
+)]
 pub struct Args {
     #[command(subcommand)]
     pub command: Command,
@@ -86,8 +88,10 @@ pub enum Optimize {
 }
 
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:\n  tetdb mesh part.stl\n  tetdb mesh part.stl -o part.tetdb --hsiz 2% --memory 2GiB --export part.vtu\n  \
-    tetdb mesh sample:balls,count=100 -o balls.tetdb")]
+#[command(
+    after_help = "Examples:\n  tetdb mesh part.stl\n  tetdb mesh part.stl -o part.tetdb --hsiz 2% --memory 2GiB --export part.vtu\n  \
+    tetdb mesh sample:balls,count=100 -o balls.tetdb"
+)]
 pub struct MeshArgs {
     /// Surface files (STL, PLY, OBJ, OFF, MEDIT, Gmsh, TetGen), or a sample such as sample:balls,count=100
     #[arg(required = true, value_name = "SURFACE")]
@@ -184,7 +188,9 @@ pub struct ExportArgs {
 }
 
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:\n  tetdb sample balls,count=1000,h=0.0093 -o balls.stl\n  tetdb sample box,h=0.1 -o box.off")]
+#[command(
+    after_help = "Examples:\n  tetdb sample balls,count=1000,h=0.0093 -o balls.stl\n  tetdb sample box,h=0.1 -o box.off"
+)]
 pub struct SampleArgs {
     /// NAME,key=value,... with the names balls, box, knot, shells, sphere
     #[arg(value_name = "SAMPLE")]

@@ -29,12 +29,19 @@ pub fn run(args: &CheckArgs, talk: &Talk) -> Result<u8, Failure> {
             "n_defects": validation.n_defects, "defects": defects,
         }));
     } else {
-        talk.line(&format!("{} triangles, {} vertices", surface.n_triangles(), surface.n_vertices()));
+        talk.line(&format!(
+            "{} triangles, {} vertices",
+            surface.n_triangles(),
+            surface.n_vertices()
+        ));
         for defect in validation.defects.iter().take(LISTED) {
             talk.line(&format!("{}: {defect} ({})", defect.code(), defect.place()));
         }
         if validation.n_defects as usize > LISTED {
-            talk.line(&format!("... {} defects in all; --json lists them", validation.n_defects));
+            talk.line(&format!(
+                "... {} defects in all; --json lists them",
+                validation.n_defects
+            ));
         }
         if validation.is_valid() {
             talk.line("closed and free of defects: it can be meshed");

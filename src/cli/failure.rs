@@ -18,33 +18,89 @@ pub struct CodeRow {
 }
 
 const fn row(code: &'static str, exit: u8, meaning: &'static str) -> CodeRow {
-    CodeRow { code, exit, meaning }
+    CodeRow {
+        code,
+        exit,
+        meaning,
+    }
 }
 
 /// Every error word, its exit code, and what it means; README carries the same table.
 pub const CODES: &[CodeRow] = &[
-    row("internal", 1, "a bug: please report it with the command and the message"),
+    row(
+        "internal",
+        1,
+        "a bug: please report it with the command and the message",
+    ),
     row("usage", 2, "the command line makes no sense"),
-    row("bad-size", 2, "a size option has no meaning, or contradicts another"),
+    row(
+        "bad-size",
+        2,
+        "a size option has no meaning, or contradicts another",
+    ),
     row("bad-memory", 2, "a memory size has no unit or no meaning"),
-    row("bad-sample", 2, "there is no such sample, or a key of it is wrong"),
-    row("unreadable-file", 3, "an input file is missing or may not be read"),
-    row("unknown-format", 3, "the format of a file cannot be told from its name"),
+    row(
+        "bad-sample",
+        2,
+        "there is no such sample, or a key of it is wrong",
+    ),
+    row(
+        "unreadable-file",
+        3,
+        "an input file is missing or may not be read",
+    ),
+    row(
+        "unknown-format",
+        3,
+        "the format of a file cannot be told from its name",
+    ),
     row("truncated-file", 3, "an input file ends too early"),
-    row("unexpected-text", 3, "an input file has something else than its format asks for"),
+    row(
+        "unexpected-text",
+        3,
+        "an input file has something else than its format asks for",
+    ),
     row("not-a-number", 3, "a coordinate is not a finite number"),
-    row("index-out-of-range", 3, "a triangle names a vertex that is not there"),
+    row(
+        "index-out-of-range",
+        3,
+        "a triangle names a vertex that is not there",
+    ),
     row("count-mismatch", 3, "a declared count cannot be right"),
-    row("coordinate-range", 3, "a coordinate is too large to compute with exactly"),
-    row("unsupported-content", 3, "a file has elements that do not make a triangle surface"),
-    row("surface-too-large", 3, "more triangles or vertices than 32-bit numbers can name"),
+    row(
+        "coordinate-range",
+        3,
+        "a coordinate is too large to compute with exactly",
+    ),
+    row(
+        "unsupported-content",
+        3,
+        "a file has elements that do not make a triangle surface",
+    ),
+    row(
+        "surface-too-large",
+        3,
+        "more triangles or vertices than 32-bit numbers can name",
+    ),
     row("empty-surface", 3, "there are no triangles"),
     row("degenerate-triangle", 3, "a triangle has no area"),
     row("duplicate-triangle", 3, "a triangle occurs twice"),
     row("open-surface", 3, "an edge has only one triangle"),
-    row("self-intersection", 3, "triangles meet where they should not"),
-    row("unrecovered-triangles", 3, "input triangles that could not be made faces of the mesh"),
-    row("nothing-filled", 3, "the surface encloses no region to fill"),
+    row(
+        "self-intersection",
+        3,
+        "triangles meet where they should not",
+    ),
+    row(
+        "unrecovered-triangles",
+        3,
+        "input triangles that could not be made faces of the mesh",
+    ),
+    row(
+        "nothing-filled",
+        3,
+        "the surface encloses no region to fill",
+    ),
     row("no-such-store", 3, "there is no store at this path"),
     row("damaged", 4, "the store is not what was written"),
     row("busy", 5, "another process writes the store"),
@@ -56,8 +112,16 @@ pub const CODES: &[CodeRow] = &[
     row("store-unfinished", 8, "the store is not finished"),
     row("not-a-store", 8, "what is there is not a store"),
     row("store-format", 8, "the store has another format version"),
-    row("surface-changed", 8, "the surface is not the one the store was begun with"),
-    row("stopped", 130, "stopped by a signal; `tetdb resume` goes on"),
+    row(
+        "surface-changed",
+        8,
+        "the surface is not the one the store was begun with",
+    ),
+    row(
+        "stopped",
+        130,
+        "stopped by a signal; `tetdb resume` goes on",
+    ),
 ];
 
 /// An error on its way to the user.
@@ -90,7 +154,8 @@ impl Failure {
     }
 
     pub fn internal(message: String) -> Self {
-        Self::new("internal", message).help("this is a bug; please report the command and this message")
+        Self::new("internal", message)
+            .help("this is a bug; please report the command and this message")
     }
 
     /// The exit code of its word.
@@ -144,7 +209,9 @@ impl From<StoreError> for Failure {
         let code = match &e {
             StoreError::Busy { .. } => "busy",
             StoreError::Full { .. } => "disk-full",
-            StoreError::Damaged { .. } | StoreError::Page { .. } | StoreError::Missing { .. } => "damaged",
+            StoreError::Damaged { .. } | StoreError::Page { .. } | StoreError::Missing { .. } => {
+                "damaged"
+            }
             StoreError::Budget { .. } | StoreError::TooMany { .. } => "memory",
             StoreError::Stopped => "stopped",
             _ => "io",
@@ -163,7 +230,9 @@ impl From<CatalogError> for Failure {
             CatalogError::Finished { .. } => "store-exists",
             CatalogError::Unfinished { .. } | CatalogError::NotSealed { .. } => "store-unfinished",
             CatalogError::Format { .. } => "store-format",
-            CatalogError::Row { .. } | CatalogError::Chunk { .. } | CatalogError::Content { .. } => "damaged",
+            CatalogError::Row { .. }
+            | CatalogError::Chunk { .. }
+            | CatalogError::Content { .. } => "damaged",
             _ => "io",
         };
         Self::new(code, &e).help(help_of(code))
@@ -191,9 +260,8 @@ impl From<PipelineError> for Failure {
             PipelineError::Sizing(e) => e.into(),
             PipelineError::Catalog(e) => e.into(),
             PipelineError::Store(e) => e.into(),
-            PipelineError::NothingFilled { .. } => {
-                Self::new("nothing-filled", &e).help("try --regions all, and look at the surface with `tetdb check SURFACE`")
-            }
+            PipelineError::NothingFilled { .. } => Self::new("nothing-filled", &e)
+                .help("try --regions all, and look at the surface with `tetdb check SURFACE`"),
             other => Self::new("usage", other),
         }
     }
@@ -203,7 +271,9 @@ fn help_of(code: &str) -> &'static str {
     match code {
         "busy" => "wait for the other process, or stop it",
         "disk-full" => "free some space, then `tetdb resume STORE`",
-        "damaged" => "`tetdb verify STORE` lists all damage; mesh the surface again if there is no copy",
+        "damaged" => {
+            "`tetdb verify STORE` lists all damage; mesh the surface again if there is no copy"
+        }
         "memory" => "give more with --memory, or mesh a coarser surface",
         "stopped" => "`tetdb resume STORE` goes on from the last finished step",
         "no-such-store" => "check the path; `tetdb mesh SURFACE -o STORE` makes a store",

@@ -54,7 +54,9 @@ pub fn object(path: &Path) -> Result<Value, Failure> {
 }
 
 fn sum(digests: impl Iterator<Item = [u64; 2]>) -> [u64; 2] {
-    digests.fold([0; 2], |s, d| [s[0].wrapping_add(d[0]), s[1].wrapping_add(d[1])])
+    digests.fold([0; 2], |s, d| {
+        [s[0].wrapping_add(d[0]), s[1].wrapping_add(d[1])]
+    })
 }
 
 fn hex(digest: [u64; 2]) -> String {
@@ -67,17 +69,28 @@ pub fn print(path: &Path, talk: &Talk) -> Result<(), Failure> {
     let catalog = store.catalog();
     let (state, job) = (catalog.state()?, catalog.job()?);
     let surfaces: Vec<&str> = job.surfaces.iter().map(|s| s.path.as_str()).collect();
-    talk.line(&format!("{}: {}, from {}", path.display(), words(state), surfaces.join(", ")));
+    talk.line(&format!(
+        "{}: {}, from {}",
+        path.display(),
+        words(state),
+        surfaces.join(", ")
+    ));
     for row in catalog.journal()? {
         talk.line(&format!("  {:<28} {:>9.2} s", row.step, row.seconds));
     }
     if !state.is_finished() {
-        talk.line(&format!("`tetdb resume {}` goes on with it", path.display()));
+        talk.line(&format!(
+            "`tetdb resume {}` goes on with it",
+            path.display()
+        ));
         return Ok(());
     }
     let rows = catalog.subdomains()?;
     let regions = catalog.regions()?;
-    let (tets, bytes) = (rows.iter().map(|r| r.tets).sum::<u64>(), rows.iter().map(|r| r.bytes).sum::<u64>());
+    let (tets, bytes) = (
+        rows.iter().map(|r| r.tets).sum::<u64>(),
+        rows.iter().map(|r| r.bytes).sum::<u64>(),
+    );
     talk.line(&format!(
         "{tets} tetrahedra, {} vertices, {} input triangles in {} sub-domain(s); {} on disk, {:.2} bytes per tetrahedron",
         rows.iter().map(|r| r.vertices).sum::<u64>(),
@@ -88,11 +101,18 @@ pub fn print(path: &Path, talk: &Talk) -> Result<(), Failure> {
     ));
     for region in regions.iter().take(REGIONS_LISTED) {
         let (name, what) = if region.filled {
-            (region.region.to_string(), format!("{} coarse tetrahedra", region.tets))
+            (
+                region.region.to_string(),
+                format!("{} coarse tetrahedra", region.tets),
+            )
         } else {
             ("-".to_owned(), "empty".to_owned())
         };
-        talk.line(&format!("  region {name:>4}: volume {:.6e}, {what}, {} label(s) around it", region.volume, region.labels.len()));
+        talk.line(&format!(
+            "  region {name:>4}: volume {:.6e}, {what}, {} label(s) around it",
+            region.volume,
+            region.labels.len()
+        ));
     }
     if regions.len() > REGIONS_LISTED {
         talk.line(&format!("  ... {} regions in all", regions.len()));
@@ -100,7 +120,10 @@ pub fn print(path: &Path, talk: &Talk) -> Result<(), Failure> {
     for line in quality_lines(&merged(rows.iter().map(|r| &r.quality))) {
         talk.line(&line);
     }
-    talk.line(&format!("digest {}", hex(sum(rows.iter().map(|r| r.digest)))));
+    talk.line(&format!(
+        "digest {}",
+        hex(sum(rows.iter().map(|r| r.digest)))
+    ));
     Ok(())
 }
 
@@ -127,7 +150,10 @@ fn merged<'a>(rows: impl Iterator<Item = &'a QualityRow>) -> QualityRow {
             *sum += n;
         }
         all.worst = all.worst.max(row.worst);
-        all.dihedral = [all.dihedral[0].min(row.dihedral[0]), all.dihedral[1].max(row.dihedral[1])];
+        all.dihedral = [
+            all.dihedral[0].min(row.dihedral[0]),
+            all.dihedral[1].max(row.dihedral[1]),
+        ];
     }
     all
 }
@@ -137,8 +163,16 @@ fn quality_lines(q: &QualityRow) -> Vec<String> {
     let total: u64 = q.bins.iter().sum();
     let mut lines = vec!["quality (longest edge over inradius, 1 is regular):".to_owned()];
     for (i, &n) in q.bins.iter().enumerate().filter(|(_, n)| **n > 0) {
-        let to = if i + 1 == q.bins.len() { "inf".to_owned() } else { (i + 2).to_string() };
-        lines.push(format!("  [{:>2}, {to:>3}[ {:>9.4} %  {n:>12}", i + 1, 100.0 * n as f64 / total.max(1) as f64));
+        let to = if i + 1 == q.bins.len() {
+            "inf".to_owned()
+        } else {
+            (i + 2).to_string()
+        };
+        lines.push(format!(
+            "  [{:>2}, {to:>3}[ {:>9.4} %  {n:>12}",
+            i + 1,
+            100.0 * n as f64 / total.max(1) as f64
+        ));
     }
     lines.push(format!(
         "  worst {:.3}; dihedral angles {:.2} to {:.2} degrees",

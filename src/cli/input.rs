@@ -29,8 +29,10 @@ pub fn load(arguments: &[String], talk: &Talk) -> Result<Input, Failure> {
         (1, [word]) => made(word)?,
         (0, _) => from_files(arguments)?,
         _ => {
-            return Err(Failure::new("usage", "a sample cannot be joined with other surfaces")
-                .help("write it to a file first: `tetdb sample balls,count=10 -o balls.stl`"));
+            return Err(
+                Failure::new("usage", "a sample cannot be joined with other surfaces")
+                    .help("write it to a file first: `tetdb sample balls,count=10 -o balls.stl`"),
+            );
         }
     };
     for note in &input.surface.notes {
@@ -39,7 +41,10 @@ pub fn load(arguments: &[String], talk: &Talk) -> Result<Input, Failure> {
     let orientation = orient_alike(&mut input.surface);
     input.turned = orientation.flipped.len();
     if input.turned > 0 {
-        talk.note(&format!("note: {} triangles were turned to run like their neighbors", input.turned));
+        talk.note(&format!(
+            "note: {} triangles were turned to run like their neighbors",
+            input.turned
+        ));
     }
     Ok(input)
 }
@@ -60,7 +65,9 @@ pub fn validated(surface: &Surface) -> Result<Validation, Failure> {
 
 fn made(word: &str) -> Result<Input, Failure> {
     let bad = |e: crate::samples::SampleError| {
-        Failure::new("bad-sample", e).help("for example sample:balls,count=100 or sample:box,h=0.1; see `tetdb sample --help`")
+        Failure::new("bad-sample", e).help(
+            "for example sample:balls,count=100 or sample:box,h=0.1; see `tetdb sample --help`",
+        )
     };
     let spec = SampleSpec::parse(word).map_err(bad)?;
     Ok(Input {

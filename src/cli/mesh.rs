@@ -74,8 +74,10 @@ pub fn resume(args: &ResumeArgs, talk: &Talk) -> Result<u8, Failure> {
         talk.note(&format!("{} is already finished", args.store.display()));
         return finish(&args.store, &input, &args.run, cap, None, talk);
     }
-    let options: Options = serde_json::from_str(&job.options)
-        .map_err(|e| Failure::new("damaged", format!("the job's options cannot be read: {e}")).at(args.store.display()))?;
+    let options: Options = serde_json::from_str(&job.options).map_err(|e| {
+        Failure::new("damaged", format!("the job's options cannot be read: {e}"))
+            .at(args.store.display())
+    })?;
     let mut catalog = Catalog::open_writable(&args.store)?;
     let summary = work(&mut catalog, &input, &options, cap, talk)?;
     catalog.close()?;
@@ -83,7 +85,8 @@ pub fn resume(args: &ResumeArgs, talk: &Talk) -> Result<u8, Failure> {
 }
 
 fn options(args: &MeshArgs) -> Options {
-    let word = |v: &dyn Fn() -> Option<clap::builder::PossibleValue>| v().map(|p| p.get_name().to_owned());
+    let word =
+        |v: &dyn Fn() -> Option<clap::builder::PossibleValue>| v().map(|p| p.get_name().to_owned());
     Options {
         hsiz: args.hsiz.clone(),
         hmin: args.hmin.clone(),
@@ -98,9 +101,13 @@ fn options(args: &MeshArgs) -> Options {
 fn begin(args: &RunArgs, talk: &Talk) -> Result<(u64, String), Failure> {
     if let Some(threads) = args.threads {
         if threads == 0 {
-            return Err(Failure::new("usage", "--threads 0 leaves nobody to work").help("give 1 or more"));
+            return Err(
+                Failure::new("usage", "--threads 0 leaves nobody to work").help("give 1 or more")
+            );
         }
-        let built = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+        let built = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build_global();
         if built.is_err() {
             talk.note("note: the thread pool was already running");
         }
@@ -119,12 +126,18 @@ fn output(args: &MeshArgs) -> PathBuf {
             Some(sample) => sample.split(',').next().map(Into::into),
             None => Path::new(first).file_stem().map(PathBuf::from),
         };
-        stem.unwrap_or_else(|| PathBuf::from("mesh")).with_extension("tetdb")
+        stem.unwrap_or_else(|| PathBuf::from("mesh"))
+            .with_extension("tetdb")
     })
 }
 
 /// What is at the place of the new store: nothing, the same mesh already, or something in the way.
-fn already_there(path: &Path, args: &MeshArgs, options: &Options, talk: &Talk) -> Result<Option<u8>, Failure> {
+fn already_there(
+    path: &Path,
+    args: &MeshArgs,
+    options: &Options,
+    talk: &Talk,
+) -> Result<Option<u8>, Failure> {
     if !path.exists() {
         return Ok(None);
     }
@@ -140,12 +153,18 @@ fn already_there(path: &Path, args: &MeshArgs, options: &Options, talk: &Talk) -
         return Ok(None);
     }
     if !state.is_finished() {
-        return Err(CatalogError::Unfinished { path: path.to_owned() }.into());
+        return Err(CatalogError::Unfinished {
+            path: path.to_owned(),
+        }
+        .into());
     }
     let same_options = serde_json::from_str::<Options>(&job.options).is_ok_and(|o| o == *options);
     let input = input::load(&args.surfaces, talk)?;
     if !same_options || job.surfaces != input.sources {
-        return Err(CatalogError::Finished { path: path.to_owned() }.into());
+        return Err(CatalogError::Finished {
+            path: path.to_owned(),
+        }
+        .into());
     }
     talk.note(&format!(
         "{} already holds the finished mesh of this surface with these options",
@@ -161,9 +180,17 @@ fn is_empty_dir(path: &Path) -> bool {
     std::fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none())
 }
 
-fn work(catalog: &mut Catalog, input: &Input, options: &Options, cap: u64, talk: &Talk) -> Result<Summary, Failure> {
+fn work(
+    catalog: &mut Catalog,
+    input: &Input,
+    options: &Options,
+    cap: u64,
+    talk: &Talk,
+) -> Result<Summary, Failure> {
     let budget = Budget::new(cap);
-    let summary = pipeline::mesh(catalog, &input.surface, options, &budget, &|event| talk.progress(event))?;
+    let summary = pipeline::mesh(catalog, &input.surface, options, &budget, &|event| {
+        talk.progress(event)
+    })?;
     talk.done();
     if let Some(sizes) = &summary.sizes {
         talk.note(&sizes.to_string());
@@ -186,7 +213,13 @@ fn finish(
     if !args.no_verify {
         let report = {
             let mut store = store::open_finished(path)?;
-            verify::check(&mut store, path, Some(&input.surface), cap, crate::audit::Level::Delaunay)?
+            verify::check(
+                &mut store,
+                path,
+                Some(&input.surface),
+                cap,
+                crate::audit::Level::Delaunay,
+            )?
         };
         if !report.valid {
             return Err(verify::invalid(&report, path));
@@ -215,7 +248,11 @@ fn finish(
     } else {
         info::print(path, talk)?;
         if let Some(peak) = memory::peak() {
-            talk.line(&format!("peak memory {} of {}", memory::show(peak), memory::show(cap)));
+            talk.line(&format!(
+                "peak memory {} of {}",
+                memory::show(peak),
+                memory::show(cap)
+            ));
         }
     }
     Ok(0)

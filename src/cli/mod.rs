@@ -39,7 +39,9 @@ pub fn run() -> ExitCode {
     let talk = Talk::new(args.command.is_json());
     // redb may panic on a damaged tree, which is caught and told as damage; its own message would only confuse.
     std::panic::set_hook(Box::new(failure::remember_panic));
-    let done = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| dispatch(&args.command, &talk)));
+    let done = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+        dispatch(&args.command, &talk)
+    }));
     let exit = match done {
         Ok(Ok(exit)) => exit,
         Ok(Err(failure)) => talk.fail(&failure),

@@ -16,5 +16,7 @@ pub fn run(args: &SampleArgs, talk: &Talk) -> Result<u8, Failure> {
     };
     let input = input::load(&[word], talk)?;
     let _ = json!({});
-    Err(Failure::new("unknown-format", "no writer yet").at(args.output.display()).help(format!("{}", input.stem)))
+    Err(Failure::new("unknown-format", "no writer yet")
+        .at(args.output.display())
+        .help(format!("{}", input.stem)))
 }

@@ -12,8 +12,11 @@ pub fn open_finished(path: &Path) -> Result<Store, Failure> {
     let mut store = Store::open(path)?;
     let state = store.catalog().state()?;
     if !state.is_finished() {
-        return Err(Failure::new("store-unfinished", format!("{} is not finished", path.display()))
-            .help(format!("`tetdb resume {}` goes on with it", path.display())));
+        return Err(Failure::new(
+            "store-unfinished",
+            format!("{} is not finished", path.display()),
+        )
+        .help(format!("`tetdb resume {}` goes on with it", path.display())));
     }
     Ok(store)
 }
@@ -32,9 +35,12 @@ pub fn surface_of(store: &mut Store, given: &[String], talk: &Talk) -> Result<In
     if given.is_empty() {
         for (then, now) in job.surfaces.iter().zip(&input.sources) {
             if (then.bytes, then.hash) != (now.bytes, now.hash) {
-                return Err(Failure::new("surface-changed", "the surface is not the one the store was begun with")
-                    .at(&now.path)
-                    .help("put the old file back, or give the surface with --against"));
+                return Err(Failure::new(
+                    "surface-changed",
+                    "the surface is not the one the store was begun with",
+                )
+                .at(&now.path)
+                .help("put the old file back, or give the surface with --against"));
             }
         }
     }

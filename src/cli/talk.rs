@@ -99,7 +99,10 @@ impl Talk {
             state.told = now;
             let seconds = (now - state.since).as_secs_f64();
             let rate = event.done as f64 / seconds.max(1e-9);
-            let eta = event.total.filter(|_| event.done > 0).map(|t| t.saturating_sub(event.done) as f64 / rate);
+            let eta = event
+                .total
+                .filter(|_| event.done > 0)
+                .map(|t| t.saturating_sub(event.done) as f64 / rate);
             if self.json {
                 self.stderr_json(&serde_json::json!({
                     "progress": { "stage": event.stage, "done": event.done, "total": event.total,
@@ -108,7 +111,10 @@ impl Talk {
             } else {
                 let of = event.total.map_or(String::new(), |t| format!(" of {t}"));
                 let eta = eta.map_or(String::new(), |s| format!(", {s:.0} s to go"));
-                eprintln!("{}: {}{of} {}, {rate:.0} per second{eta}", event.stage, event.done, event.unit);
+                eprintln!(
+                    "{}: {}{of} {}, {rate:.0} per second{eta}",
+                    event.stage, event.done, event.unit
+                );
             }
         }
     }

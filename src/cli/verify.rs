@@ -23,7 +23,11 @@ pub fn run(args: &VerifyArgs, talk: &Talk) -> Result<u8, Failure> {
         }
         Err(failure) => return Err(failure),
     };
-    let level = if args.full { Level::Delaunay } else { Level::Geometry };
+    let level = if args.full {
+        Level::Delaunay
+    } else {
+        Level::Geometry
+    };
     let report = check(&mut open, &args.store, surface.as_ref(), cap, level)?;
     if talk.is_json() {
         let mut answer = serde_json::to_value(&report).unwrap_or_default();
@@ -54,7 +58,9 @@ pub fn check(
         temp_dir: std::env::temp_dir(),
     };
     let _ = path;
-    Ok(crate::store::attempt(|| crate::audit::verify(store, surface, &options))??)
+    Ok(crate::store::attempt(|| {
+        crate::audit::verify(store, surface, &options)
+    })??)
 }
 
 /// A valid report in one line.
@@ -70,18 +76,40 @@ pub fn sentence(report: &Report) -> String {
         );
     }
     if report.delaunay_tested > 0 {
-        text += &format!("; {:.3} % of free faces locally Delaunay", 100.0 * report.delaunay_share());
+        text += &format!(
+            "; {:.3} % of free faces locally Delaunay",
+            100.0 * report.delaunay_share()
+        );
     }
     text
 }
 
 /// The error for an invalid mesh.
 pub fn invalid(report: &Report, path: &Path) -> Failure {
-    let findings: Vec<String> = report.findings.iter().map(|(f, n)| format!("{n} x {f:?}")).collect();
+    let findings: Vec<String> = report
+        .findings
+        .iter()
+        .map(|(f, n)| format!("{n} x {f:?}"))
+        .collect();
     let first = report.offenders.first();
-    Failure::new("invalid-mesh", format!("{} is not a valid mesh: {}", path.display(), findings.join(", ")))
-        .at(first.map_or_else(String::new, |o| {
-            format!("{} {} {:?}", o.tet.as_deref().unwrap_or("-"), o.what, o.points)
-        }))
-        .help(format!("`tetdb verify {} --full --json` lists examples of each kind", path.display()))
+    Failure::new(
+        "invalid-mesh",
+        format!(
+            "{} is not a valid mesh: {}",
+            path.display(),
+            findings.join(", ")
+        ),
+    )
+    .at(first.map_or_else(String::new, |o| {
+        format!(
+            "{} {} {:?}",
+            o.tet.as_deref().unwrap_or("-"),
+            o.what,
+            o.points
+        )
+    }))
+    .help(format!(
+        "`tetdb verify {} --full --json` lists examples of each kind",
+        path.display()
+    ))
 }

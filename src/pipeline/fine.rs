@@ -24,10 +24,12 @@ pub(super) fn fine<P: Pages>(
     options: &Options,
     watch: &Watcher,
 ) -> Result<FineReport, PipelineError> {
-    let mode = options.optimize_mode().ok_or_else(|| PipelineError::Option {
-        option: "--optimize",
-        value: options.optimize.clone().unwrap_or_default(),
-    })?;
+    let mode = options
+        .optimize_mode()
+        .ok_or_else(|| PipelineError::Option {
+            option: "--optimize",
+            value: options.optimize.clone().unwrap_or_default(),
+        })?;
     for v in mesh.vertex_ids() {
         let p = mesh.point(v);
         mesh.set_size(v, field.h(p) as f32);

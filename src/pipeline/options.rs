@@ -26,7 +26,12 @@ impl Options {
     pub fn sizes(&self) -> Result<SizeOptions, SizingError> {
         let text = |o: &'_ Option<String>| o.clone();
         let [hsiz, hmin, hmax, hgrad] = [&self.hsiz, &self.hmin, &self.hmax, &self.hgrad].map(text);
-        SizeOptions::parse(hsiz.as_deref(), hmin.as_deref(), hmax.as_deref(), hgrad.as_deref())
+        SizeOptions::parse(
+            hsiz.as_deref(),
+            hmin.as_deref(),
+            hmax.as_deref(),
+            hgrad.as_deref(),
+        )
     }
 
     /// Which regions are filled; `None` when the word is not known.

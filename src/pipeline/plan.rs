@@ -56,7 +56,10 @@ mod tests {
             let plan = Plan::new(cap, 1 << 20).expect("room for a small surface");
             let sum = plan.frames + plan.redb + plan.redb / 2 + plan.buffers + CATALOG + (1 << 20);
             assert!(sum <= cap, "{plan:?} of {cap}");
-            assert!(plan.redb + plan.redb / 2 + CATALOG <= cap / 4, "{plan:?} of {cap}");
+            assert!(
+                plan.redb + plan.redb / 2 + CATALOG <= cap / 4,
+                "{plan:?} of {cap}"
+            );
         }
         assert!(Plan::new(MEMORY_MIN, MEMORY_MIN).is_err());
     }

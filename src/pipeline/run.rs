@@ -53,14 +53,21 @@ pub fn mesh(
     let field = match catalog.blob(BLOB_SIZE_FIELD)? {
         Some(bytes) => SizeField::from_bytes(&bytes)?,
         None => {
-            let built = SizeField::build_with_summary(&surface.points, &surface.triangles, &options.sizes()?)?;
+            let built = SizeField::build_with_summary(
+                &surface.points,
+                &surface.triangles,
+                &options.sizes()?,
+            )?;
             sizes = Some(built.1);
             built.0
         }
     };
     let field_lease = budget.lease(field.bytes() as u64, "the size field")?;
     let plan = Plan::new(budget.cap(), surface_lease.bytes() + field_lease.bytes())?;
-    let _lease = budget.lease(plan.frames + plan.redb + plan.redb / 2 + plan.buffers, "the working mesh")?;
+    let _lease = budget.lease(
+        plan.frames + plan.redb + plan.redb / 2 + plan.buffers,
+        "the working mesh",
+    )?;
     // Unwinding from a failed page access ends here; a step's commit is its last act, so nothing is half done.
     attempt(|| {
         let run = Run {
@@ -156,8 +163,18 @@ impl Run<'_> {
         let mut mesh = Mesh::new(pager);
         let report = coarse(&mut mesh, self.surface, self.options, self.watch)?;
         mesh.pages_mut().flush();
-        let state: Vec<u8> = mesh.state().to_words().into_iter().flat_map(u32::to_le_bytes).collect();
-        let counts: Vec<u8> = mesh.pages().counts().into_iter().flat_map(u32::to_le_bytes).collect();
+        let state: Vec<u8> = mesh
+            .state()
+            .to_words()
+            .into_iter()
+            .flat_map(u32::to_le_bytes)
+            .collect();
+        let counts: Vec<u8> = mesh
+            .pages()
+            .counts()
+            .into_iter()
+            .flat_map(u32::to_le_bytes)
+            .collect();
         let (field, surface) = (self.field.to_bytes(), self.surface);
         self.catalog.commit(|step| {
             step.list_file(0, COARSE);
@@ -171,7 +188,10 @@ impl Run<'_> {
                 "coarse mesh",
                 clock,
                 &[
-                    ("missing_segments", f64::from(report.recovery.missing_segments)),
+                    (
+                        "missing_segments",
+                        f64::from(report.recovery.missing_segments),
+                    ),
                     ("missing_facets", f64::from(report.recovery.missing_facets)),
                 ],
             ));
@@ -183,7 +203,11 @@ impl Run<'_> {
     }
 
     fn reopen_coarse(&mut self) -> Result<Mesh, PipelineError> {
-        let base = StoreFile::open(&self.catalog.file_path(0, COARSE), self.plan.redb as usize / 2, false)?;
+        let base = StoreFile::open(
+            &self.catalog.file_path(0, COARSE),
+            self.plan.redb as usize / 2,
+            false,
+        )?;
         let bytes = self.catalog.blob(BLOB_MESH_STATE)?.unwrap_or_default();
         let mut words = bytes
             .chunks_exact(4)

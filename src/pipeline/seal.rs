@@ -31,7 +31,11 @@ pub(super) struct Target<'a> {
 }
 
 /// Writes `mesh` to `target`. Effects: the mesh's scratch map is used up; `tet_of` must be right for all vertices.
-pub(super) fn seal<P: Pages>(mesh: &mut Mesh<P>, target: &Target, watch: &Watcher) -> Result<Sealed, PipelineError> {
+pub(super) fn seal<P: Pages>(
+    mesh: &mut Mesh<P>,
+    target: &Target,
+    watch: &Watcher,
+) -> Result<Sealed, PipelineError> {
     let mut writer = SealedWriter::create(
         target.path,
         target.subdomain,
@@ -142,7 +146,12 @@ fn tets(
     let mut faces = Sorter::<17>::new(target.scratch, target.memory / 4);
     for (t, record) in order.enumerate() {
         let record = record?;
-        let nodes = [word(&record, 0), word(&record, 4), word(&record, 8), word(&record, 12)];
+        let nodes = [
+            word(&record, 0),
+            word(&record, 4),
+            word(&record, 8),
+            word(&record, 12),
+        ];
         writer.push_tet(nodes, word(&record, 16))?;
         for i in (0..4).filter(|i| record[20] >> i & 1 != 0) {
             let (face, odd) = sorted_face(FACES[i].map(|k| nodes[k]));
@@ -181,7 +190,9 @@ fn facets<P: Pages>(
         let record = record?;
         let facet = mesh.facet(word(&record, 12));
         let mut sides = [NONE; 2];
-        while let Some(face) = faces.next_if(|f| f.as_ref().map_or(true, |f| f[..12] <= record[..12])) {
+        while let Some(face) =
+            faces.next_if(|f| f.as_ref().map_or(true, |f| f[..12] <= record[..12]))
+        {
             let face = face?;
             if face[..12] == record[..12] {
                 // A tetrahedron sees its face from inside turn as the facet does when it lies behind it.

@@ -29,6 +29,8 @@ const IN_WORK: u32 = 1;
 
 /// Dirty pages written in one commit; a quarter of what redb's cache should hold.
 const BATCH_PAGES_MAX: usize = 256;
+/// Owner of a frame that holds no page.
+const NOBODY: (u8, u32) = (u8::MAX, u32::MAX);
 const FRAMES_MIN: usize = 16;
 /// Slot positions in the pool are 32-bit: 128 GiB of frames.
 const FRAMES_LIMIT: usize = (1 << 21) - 1;
@@ -64,7 +66,7 @@ pub struct Pager {
     free: Vec<u32>,
     /// `tables[kind][page]`: resident frame with flags, or where the page is.
     tables: [Vec<u32>; kind::ALL.len()],
-    /// Kind and page of each frame.
+    /// Kind and page of each frame, or [`NOBODY`].
     owners: Vec<(u8, u32)>,
     order: LruCache<u32, ()>,
     backing: Option<Backing>,
@@ -123,7 +125,9 @@ impl Pager {
     /// Unwinds on errors, as every access does.
     pub fn flush(&mut self) {
         let mut dirty: Vec<u32> = (0..self.owners.len() as u32)
-            .filter(|&frame| *self.entry(frame) & (RESIDENT | DIRTY) == RESIDENT | DIRTY)
+            .filter(|&frame| {
+                self.owners[frame as usize] != NOBODY && *self.entry(frame) & DIRTY != 0
+            })
             .collect();
         dirty.sort_unstable_by_key(|&frame| self.owners[frame as usize]);
         for batch in dirty.chunks(BATCH_PAGES_MAX) {
@@ -227,7 +231,7 @@ impl Pager {
         }
         if self.owners.len() < self.frames_max {
             let frame = self.owners.len() as u32;
-            self.owners.push((0, 0));
+            self.owners.push(NOBODY);
             let len = self.owners.len() * SLOTS;
             self.frames.resize(len, [u32_le::from_native(0); 8]);
             return frame;
@@ -362,6 +366,7 @@ impl Pages for Pager {
             if entry & RESIDENT != 0 {
                 let frame = entry & FRAME_MASK;
                 self.order.pop(&frame);
+                self.owners[frame as usize] = NOBODY;
                 self.free.push(frame);
             }
         }
