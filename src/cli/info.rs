@@ -103,7 +103,7 @@ pub fn print(path: &Path, talk: &Talk) -> Result<(), Failure> {
         let (name, what) = if region.filled {
             (
                 region.region.to_string(),
-                format!("{} coarse tetrahedra", region.tets),
+                format!("{} tetrahedra", region.tets),
             )
         } else {
             ("-".to_owned(), "empty".to_owned())

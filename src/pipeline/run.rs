@@ -117,7 +117,9 @@ impl Run<'_> {
         let pager = mesh.into_pages();
         let (pages, frames_used) = (pager.stats(), pager.frames_used());
         let work = pager.discard();
+        let regions = final_regions(self.catalog.regions()?, &sealed);
         self.catalog.commit(|step| {
+            step.set_regions(&regions);
             step.set_subdomain(&sealed.row);
             step.list_file(0, SEALED);
             step.unlist_file(0, COARSE);
@@ -225,10 +227,19 @@ fn region_row(region: &RegionSummary) -> RegionRow {
     RegionRow {
         region: region.region,
         volume: region.volume,
-        tets: u64::from(region.tets),
+        tets: 0,
         filled: region.region != 0,
         labels: region.labels.clone(),
     }
+}
+
+/// The regions with the numbers of the sealed mesh; until then they count no tetrahedra.
+fn final_regions(mut rows: Vec<RegionRow>, sealed: &Sealed) -> Vec<RegionRow> {
+    for row in rows.iter_mut().filter(|row| row.filled) {
+        let totals = sealed.regions.get(&row.region).copied().unwrap_or_default();
+        (row.tets, row.volume) = (totals.tets, totals.volume);
+    }
+    rows
 }
 
 fn journal(state: StoreState, step: &str, clock: Instant, measures: &[(&str, f64)]) -> JournalRow {
