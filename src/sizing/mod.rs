@@ -3,7 +3,7 @@
 //! The field is a pure function of position, so that no order of insertion, no decomposition and no
 //! number of threads can change what it says. It is built once from the surface: an octree,
 //! fine only where sizes differ (`tree`); values on its corners, interpolated from the surface's edges,
-//! joined to the wanted interior size and graded (`values`); trilinear between them ([`field`]).
+//! joined to the wanted interior size and graded (`values`); trilinear between them (`field`).
 //!
 //! Lengths along edges and loads of tetrahedra are closed forms for h linear between vertices (`closed`).
 //! Only IEEE basic operations and square roots are used: results are equal on every machine.
