@@ -1,58 +1,101 @@
 //! Delaunay meshes of random points: the kernel through resident cursors, on flat arrays, and with
 //! frame pools smaller than the mesh. One thread; CPU seconds of the thread.
 //!
-//! `cargo bench --bench delaunay -- [points] [runs]`; without arguments a smoke size.
+//! `cargo bench --bench delaunay -- [points] [runs] [all|flat|resident|balls]`; without arguments a smoke size.
+//! `balls` takes the vertices of a balls surface instead of random points.
 
 use tetdb::delaunay::{Kernel, enclose, insertion_key};
 use tetdb::geom::{Aabb, HilbertFrame, Point};
 use tetdb::mesh::Mesh;
+use tetdb::samples::SampleSpec;
 use tetdb::store::{Backing, FlatPages, Pager, Pages};
 
 fn main() {
-    let args: Vec<usize> = std::env::args()
+    let words: Vec<String> = std::env::args()
         .skip(1)
-        .filter_map(|a| a.parse().ok())
+        .filter(|a| !a.starts_with("--"))
         .collect();
-    let n = args.first().copied().unwrap_or(20_000);
-    let runs = args.get(1).copied().unwrap_or(1);
-    let points = random_points(n);
-    let mut flat = Vec::new();
-    let mut resident = Vec::new();
+    let numbers: Vec<usize> = words.iter().filter_map(|a| a.parse().ok()).collect();
+    let n = numbers.first().copied().unwrap_or(20_000);
+    let runs = numbers.get(1).copied().unwrap_or(1);
+    let only = words
+        .iter()
+        .find(|w| w.parse::<usize>().is_err())
+        .map_or("all", String::as_str);
+    let points = if only == "balls" {
+        ball_points(n)
+    } else {
+        random_points(n)
+    };
+    println!("{} points ({only})", points.len());
+    let mut cases: Vec<(String, Vec<f64>)> = Vec::new();
     let mut frames = 0;
-    for _ in 0..runs {
-        let (rate, _) = mesh_points(Mesh::new(FlatPages::default()), &points);
-        flat.push(rate);
-        let (rate, mesh) = mesh_points(Mesh::new(Pager::new(8 << 30, None)), &points);
-        resident.push(rate);
-        frames = mesh.pages().frames_used();
-    }
-    println!("{n} points, {frames} pages");
-    report("flat arrays", &mut flat);
-    report("resident cursors", &mut resident);
-    println!("cursor overhead {:.3}", flat[runs / 2] / resident[runs / 2]);
     let dir = tempfile::tempdir().expect("a temporary directory");
-    for percent in [25, 10, 5] {
-        let mut rates = Vec::new();
-        let mut stats = Default::default();
-        for run in 0..runs {
-            let backing = Backing {
-                subdomain: 0,
-                generation: 1,
-                work_path: dir.path().join(format!("{percent}-{run}.redb")),
-                base: None,
-                cache_bytes: 16 << 20,
-            };
-            let bytes = (frames * percent / 100 * 65_536) as u64;
-            let (rate, mesh) = mesh_points(Mesh::new(Pager::new(bytes, Some(backing))), &points);
-            stats = mesh.pages().stats();
-            rates.push(rate);
+    // The cases take turns, so that a noisy machine disturbs them alike.
+    for run in 0..runs {
+        let mut k = 0;
+        let mut keep = |name: String, rate: f64| {
+            if run == 0 {
+                cases.push((name, Vec::new()));
+            }
+            cases[k].1.push(rate);
+            k += 1;
+        };
+        if matches!(only, "all" | "flat") {
+            let (rate, _) = mesh_points(Mesh::new(FlatPages::default()), &points);
+            keep("flat arrays".to_owned(), rate);
         }
-        report(&format!("pool of {percent} %"), &mut rates);
-        println!(
-            "  ratio to resident {:.3}, {stats:?}",
-            rates[runs / 2] / resident[runs / 2]
-        );
+        if only != "flat" {
+            let (rate, mesh) = mesh_points(Mesh::new(Pager::new(8 << 30, None)), &points);
+            frames = mesh.pages().frames_used();
+            keep("resident cursors".to_owned(), rate);
+        }
+        if matches!(only, "all" | "balls") {
+            for percent in [25, 5] {
+                let backing = Backing {
+                    subdomain: 0,
+                    generation: 1,
+                    work_path: dir.path().join(format!("{percent}-{run}.redb")),
+                    base: None,
+                    cache_bytes: 16 << 20,
+                };
+                let bytes = (frames * percent / 100 * 65_536) as u64;
+                let (rate, mesh) =
+                    mesh_points(Mesh::new(Pager::new(bytes, Some(backing))), &points);
+                let stats = mesh.pages().stats();
+                let per_point = stats.pages_read as f64 / points.len() as f64;
+                eprintln!("  {stats:?}, {per_point:.4} page reads per point");
+                keep(format!("pool of {percent} %"), rate);
+            }
+        }
     }
+    println!("{frames} pages");
+    for (name, rates) in &mut cases {
+        report(name, rates);
+    }
+    for pair in [
+        ("resident cursors", "flat arrays"),
+        ("pool of 25 %", "resident cursors"),
+        ("pool of 5 %", "resident cursors"),
+    ] {
+        let find = |name: &str| {
+            cases
+                .iter()
+                .find(|(n, _)| n == name)
+                .map(|(_, r)| r[r.len() / 2])
+        };
+        if let (Some(a), Some(b)) = (find(pair.0), find(pair.1)) {
+            println!("{} / {}: {:.3}", pair.0, pair.1, a / b);
+        }
+    }
+}
+
+/// Vertices of a balls sample of about `n` vertices: cospherical groups and empty space, as a mesher meets them.
+fn ball_points(n: usize) -> Vec<Point> {
+    let h = 0.0093 * (341_000.0 / n as f64).sqrt();
+    let count = if n > 100_000 { 1000 } else { 50 };
+    let spec = SampleSpec::parse(&format!("balls,count={count},h={h}")).expect("a sample");
+    spec.make().expect("balls fit").points
 }
 
 fn report(name: &str, rates: &mut [f64]) {
@@ -66,6 +109,7 @@ fn report(name: &str, rates: &mut [f64]) {
     );
 }
 
+/// Uniform in the unit cube; the same for every run.
 fn random_points(n: usize) -> Vec<Point> {
     let mut state = 1u64;
     let mut next = || {
