@@ -69,6 +69,17 @@ impl Columns {
         }
     }
 
+    /// A column of 32 bits as planes, without the high planes in which every byte is zero.
+    pub fn planes32(&mut self, values: &[u32]) {
+        let all = values.iter().fold(0, |all, v| all | v);
+        let width = (39 - (all | 1).leading_zeros()) / 8;
+        self.bytes.push(width as u8);
+        for plane in 0..width {
+            let bytes = values.iter().map(|v| (v >> (8 * plane)) as u8);
+            self.bytes.extend(bytes);
+        }
+    }
+
     /// A column of mostly few different values: a dictionary and for each record a place in it, or differences.
     pub fn dictionary(&mut self, values: impl Iterator<Item = u64> + Clone) {
         let mut words: Vec<u64> = Vec::new();
@@ -182,6 +193,24 @@ impl<'a> Reader<'a> {
             }
         }
         Ok(values)
+    }
+
+    /// The inverse of [`Columns::planes32`]; fills `values`.
+    pub fn planes32(&mut self, values: &mut [u32]) -> Result<(), Malformed> {
+        let width = self.raw(1)?[0];
+        if !(1..=4).contains(&width) {
+            return Err(Malformed("a column of no known width"));
+        }
+        let count = values.len();
+        for (v, &byte) in values.iter_mut().zip(self.raw(count)?) {
+            *v = u32::from(byte);
+        }
+        for plane in 1..width {
+            for (v, &byte) in values.iter_mut().zip(self.raw(count)?) {
+                *v |= u32::from(byte) << (8 * plane);
+            }
+        }
+        Ok(())
     }
 
     /// The inverse of [`Columns::dictionary`]: calls `set` with each record's place and value.

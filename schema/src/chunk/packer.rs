@@ -64,6 +64,7 @@ impl<R: ChunkRecord> Packer<R> {
     /// Takes a record; returns a chunk when there is enough for one.
     ///
     /// Errors: those of zstd.
+    #[inline]
     pub fn push(&mut self, record: R) -> std::io::Result<Option<Packed<R>>> {
         self.pending.push(record);
         // More than the guess, so that a chunk that came out short can grow.
@@ -80,6 +81,7 @@ impl<R: ChunkRecord> Packer<R> {
         self.cut_some(true)
     }
 
+    #[inline(never)]
     fn cut_some(&mut self, last: bool) -> std::io::Result<Option<Packed<R>>> {
         let most = self.pending.len().min(R::COUNT_MAX);
         if most == 0 {

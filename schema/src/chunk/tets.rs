@@ -4,33 +4,55 @@ use super::columns::{Columns, Malformed, Reader, unzigzag32, zigzag32};
 use super::{ChunkKind, ChunkRecord};
 use crate::record::SealedTet;
 
-/// Column `i` of a tetrahedron, given the one before: a difference to the nearest number already known.
+/// What node `I` of a tetrahedron is compared with: the nearest number already known.
 ///
 /// The tetrahedra that share their first vertex, or their first edge, follow each other; there the
 /// difference to the predecessor is smaller than the difference inside the tetrahedron.
 #[inline]
-fn base(i: usize, nodes: &[u32; 4], before: &[u32; 4]) -> u32 {
-    if i == 0 || (i < 3 && nodes[..i] == before[..i]) {
-        before[i]
-    } else {
-        nodes[i - 1]
+fn base<const I: usize>(nodes: &[u32; 4], before: &[u32; 4]) -> u32 {
+    let like_before = match I {
+        0 => true,
+        1 => nodes[0] == before[0],
+        2 => nodes[0] == before[0] && nodes[1] == before[1],
+        _ => false,
+    };
+    if like_before { before[I] } else { nodes[I - 1] }
+}
+
+fn encode_node<const I: usize>(records: &[SealedTet], scratch: &mut [u32], columns: &mut Columns) {
+    let mut before = [0; 4];
+    for (z, t) in scratch.iter_mut().zip(records) {
+        *z = zigzag32(t.nodes[I], base::<I>(&t.nodes, &before));
+        before = t.nodes;
     }
+    columns.planes32(scratch);
+}
+
+fn decode_node<const I: usize>(
+    columns: &mut Reader<'_>,
+    scratch: &mut [u32],
+    records: &mut [SealedTet],
+) -> Result<(), Malformed> {
+    columns.planes32(scratch)?;
+    let mut before = [0; 4];
+    for (t, &z) in records.iter_mut().zip(scratch.iter()) {
+        t.nodes[I] = unzigzag32(z, base::<I>(&t.nodes, &before));
+        before = t.nodes;
+    }
+    Ok(())
 }
 
 impl ChunkRecord for SealedTet {
     const KIND: ChunkKind = ChunkKind::Tets;
     const COUNT_MAX: usize = 32_768;
-    const RAW_BYTES_MAX: usize = 4 * 5 + 10;
+    const RAW_BYTES_MAX: usize = 4 * 4 + 10;
 
     fn encode(records: &[Self], _first: u32, columns: &mut Columns) {
-        for i in 0..4 {
-            let mut before = [0; 4];
-            columns.varints32(records.iter().map(|t| {
-                let z = zigzag32(t.nodes[i], base(i, &t.nodes, &before));
-                before = t.nodes;
-                z
-            }));
-        }
+        let mut scratch = vec![0; records.len()];
+        encode_node::<0>(records, &mut scratch, columns);
+        encode_node::<1>(records, &mut scratch, columns);
+        encode_node::<2>(records, &mut scratch, columns);
+        encode_node::<3>(records, &mut scratch, columns);
         columns.dictionary(records.iter().map(|t| u64::from(t.region)));
     }
 
@@ -43,13 +65,11 @@ impl ChunkRecord for SealedTet {
         let start = records.len();
         records.resize(start + count, Self::default());
         let records = &mut records[start..];
-        for i in 0..4 {
-            let mut before = [0; 4];
-            for t in records.iter_mut() {
-                t.nodes[i] = unzigzag32(columns.varint32()?, base(i, &t.nodes, &before));
-                before = t.nodes;
-            }
-        }
+        let mut scratch = vec![0; count];
+        decode_node::<0>(columns, &mut scratch, records)?;
+        decode_node::<1>(columns, &mut scratch, records)?;
+        decode_node::<2>(columns, &mut scratch, records)?;
+        decode_node::<3>(columns, &mut scratch, records)?;
         columns.dictionary(count, |i, region| records[i].region = region as u32)
     }
 }
