@@ -106,9 +106,11 @@ impl<'a> Audit<'a> {
     ) -> Result<SortedClaims, CatalogError> {
         let rank = part.id().rank();
         let mut claims = Claims::new(self.scratch, self.options.memory_bytes / 8);
-        let facets = part.row().chunks[2];
-        for chunk in 0..facets {
+        let (chunks, total) = (part.row().chunks[2], part.row().facets);
+        let mut n = 0;
+        for chunk in 0..chunks {
             for facet in part.facet_chunk(chunk)?.records {
+                n += 1;
                 let corners = part.corners(facet.vertices)?;
                 mark(used, &facet.vertices);
                 for (side, tet) in facet.tets.into_iter().enumerate() {
@@ -125,6 +127,7 @@ impl<'a> Audit<'a> {
                 }
             }
         }
+        counted(part, "facets", n, total)?;
         self.interface_faces(part, &mut claims)?;
         Ok(claims.finish()?)
     }
@@ -135,14 +138,17 @@ impl<'a> Audit<'a> {
         claims: &mut Claims,
     ) -> Result<(), CatalogError> {
         let rank = part.id().rank();
-        for chunk in 0..part.row().chunks[3] {
+        let (chunks, total) = (part.row().chunks[3], part.row().interface_faces);
+        let mut n = 0;
+        for chunk in 0..chunks {
             for face in part.interface_chunk(chunk)?.records {
+                n += 1;
                 let corners = part.corners(face.vertices)?;
                 claims.push(face.tet, face.vertices, false, INTERFACE)?;
                 self.interfaces.push(rank, &face, &corners)?;
             }
         }
-        Ok(())
+        counted(part, "interface faces", n, total)
     }
 
     /// Adds a facet's share of the volume within the boundary: a cone to the origin for each filled side.
@@ -195,6 +201,8 @@ impl<'a> Audit<'a> {
                 self.pair(rank, chunk.first, tets, &corners, &marks, &mut open)?;
             }
         }
+        let total = part.row().tets;
+        counted(part, "tetrahedra", u64::from(expected), total)?;
         for chunk in 0..part.row().chunks[3] {
             for face in part.interface_chunk(chunk)?.records {
                 let mixes = part.corners(face.vertices)?.map(|c| c.mix);
@@ -483,6 +491,18 @@ impl<'a> Audit<'a> {
         self.report.interface_digest = self.digests[1].to_string();
         Ok(self.report)
     }
+}
+
+/// The chunks hold as many records as the catalog counts.
+fn counted(part: &Subdomain, what: &str, found: u64, total: u64) -> Result<(), CatalogError> {
+    if found == total {
+        return Ok(());
+    }
+    Err(CatalogError::Content {
+        path: part.path().to_owned(),
+        subdomain: part.id().rank(),
+        what: format!("its chunks hold {found} {what}, the catalog counts {total}"),
+    })
 }
 
 fn mark(used: &mut [u64], vertices: &[u32]) {

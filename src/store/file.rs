@@ -58,13 +58,16 @@ impl StoreFile {
     pub fn open(path: &Path, cache_bytes: usize, writable: bool) -> Result<Self, StoreError> {
         let mut builder = Database::builder();
         builder.set_cache_size(cache_bytes);
-        let handle = if writable {
-            builder.open(path).map(|db| Handle::Writer(Box::new(db)))
-        } else {
-            builder
-                .open_read_only(path)
-                .map(|db| Handle::Reader(Box::new(db)))
-        };
+        let opened = caught(|| {
+            if writable {
+                builder.open(path).map(|db| Handle::Writer(Box::new(db)))
+            } else {
+                builder
+                    .open_read_only(path)
+                    .map(|db| Handle::Reader(Box::new(db)))
+            }
+        });
+        let handle = opened.map_err(|reason| Failure::Panic(reason).at(path))?;
         Ok(Self {
             path: path.to_owned(),
             handle: handle.map_err(|e| database_error(path, e))?,
@@ -197,18 +200,23 @@ impl Failure {
     }
 }
 
-/// Runs a call into redb; on a damaged tree redb may panic, which is damage and not our bug.
+/// Runs a call into redb and makes what it returns one kind of failure.
 fn guarded<T, E: Into<redb::Error>>(call: impl FnOnce() -> Result<T, E>) -> Result<T, Failure> {
-    match std::panic::catch_unwind(std::panic::AssertUnwindSafe(call)) {
+    match caught(call) {
         Ok(result) => result.map_err(|e| Failure::Error(e.into())),
-        Err(payload) => Err(Failure::Panic(
-            payload
-                .downcast_ref::<String>()
-                .cloned()
-                .or_else(|| payload.downcast_ref::<&str>().map(|s| (*s).to_owned()))
-                .unwrap_or_else(|| "unreadable tree".to_owned()),
-        )),
+        Err(reason) => Err(Failure::Panic(reason)),
     }
+}
+
+/// Runs a call into redb; on a damaged tree redb may panic, which is damage and not our bug.
+fn caught<T>(call: impl FnOnce() -> T) -> Result<T, String> {
+    std::panic::catch_unwind(std::panic::AssertUnwindSafe(call)).map_err(|payload| {
+        payload
+            .downcast_ref::<String>()
+            .cloned()
+            .or_else(|| payload.downcast_ref::<&str>().map(|s| (*s).to_owned()))
+            .unwrap_or_else(|| "unreadable tree".to_owned())
+    })
 }
 
 fn database_error(path: &Path, error: DatabaseError) -> StoreError {

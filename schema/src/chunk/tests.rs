@@ -30,7 +30,7 @@ fn vertices(n: u32) -> Vec<SealedVertex> {
     (0..n)
         .map(|i| {
             let noise = (next() % 4096) as f64 * 1e-6;
-            let surface = next() % 3 == 0;
+            let surface = next().is_multiple_of(3);
             let owner = if surface { 0 } else { (1 << 20) + 5 };
             let index = if surface { next() as u32 } else { i };
             SealedVertex {
