@@ -6,7 +6,8 @@
 
 use super::{CHUNK_BYTES_MAX, ChunkAddress, ChunkRecord, Encoder};
 
-/// What the guess aims at. Higher: one in five chunks overflows and is encoded again; lower: room is wasted.
+/// What the guess aims at. Higher: more chunks overflow and are encoded again; lower: room is wasted.
+/// With 0.98 the chunks of a random Delaunay mesh come out 0.976 to 0.978 full.
 const FILL_AIM: f64 = 0.98;
 /// A chunk below this is tried again with more records, when there are some.
 const FILL_LEAST: f64 = 0.95;
