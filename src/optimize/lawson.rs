@@ -7,7 +7,8 @@
 //! Source: C. L. Lawson, "Properties of n-dimensional triangulations" (1986); B. Joe, "Construction of
 //! three-dimensional Delaunay triangulations using local transformations" (1991).
 
-use crate::geom::{Point, insphere, orient};
+use super::sphere::Sphere;
+use crate::geom::{Point, orient};
 use crate::mesh::anatomy::{EDGE_OF, FACES};
 use crate::mesh::{FaceRef, Mesh, Tet};
 use crate::reconnect::{FaceSwap, Forced, RingTriangulation, Shell, remove_edge};
@@ -56,6 +57,7 @@ impl Lawson {
     #[inline(always)]
     fn check<P: Pages, const SWEEP: bool>(&mut self, mesh: &mut Mesh<P>, t: u32, tet: &Tet) {
         let p = mesh.points(tet);
+        let sphere = Sphere::new(p);
         for i in 0..4 {
             let across = tet.neighbor[i];
             if !across.exists() || tet.is_required(i) || SWEEP && across.tet() < t {
@@ -63,7 +65,7 @@ impl Lawson {
             }
             let other = mesh.tet(across.tet());
             let q = mesh.point(other.vertex(across.face()));
-            if insphere(p[0], p[1], p[2], p[3], q) > 0.0 && self.flip(mesh, t, tet, p, i, q) {
+            if sphere.has_inside(q) && self.flip(mesh, t, tet, p, i, q) {
                 return;
             }
         }

@@ -1,6 +1,7 @@
 //! The quality table of a mesh: bins of q, extremes, and how Delaunay it is.
 
-use crate::geom::{Point, insphere};
+use super::sphere::Sphere;
+use crate::geom::Point;
 use crate::mesh::anatomy::EDGES;
 use crate::mesh::{Mesh, Tet};
 use crate::store::{Pages, stop_if_requested};
@@ -105,6 +106,7 @@ fn count_faces<P: Pages>(
     p: [Point; 4],
     table: &mut QualityTable,
 ) {
+    let sphere = Sphere::new(p);
     for i in 0..4 {
         let across = tet.neighbor[i];
         if !across.exists() || across.tet() < t || tet.is_required(i) {
@@ -113,7 +115,7 @@ fn count_faces<P: Pages>(
         let apex = mesh.tet(across.tet()).vertex(across.face());
         let apex = mesh.point(apex);
         table.faces += 1;
-        table.faces_delaunay += u64::from(insphere(p[0], p[1], p[2], p[3], apex) <= 0.0);
+        table.faces_delaunay += u64::from(!sphere.has_inside(apex));
     }
 }
 

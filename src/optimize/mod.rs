@@ -28,6 +28,7 @@ mod rescue;
 mod rounds;
 mod run;
 mod smooth;
+mod sphere;
 mod swap;
 #[cfg(test)]
 mod tests;

@@ -5,7 +5,6 @@ use super::odt;
 use super::pages::{PageFlags, clear_marks};
 use super::rescue::WORST;
 use super::rounds::{BAD, OperationCounts, Rounds};
-use super::smooth::Star;
 use crate::mesh::Mesh;
 use crate::store::Pages;
 
@@ -25,7 +24,8 @@ pub enum Mode {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
     pub mode: Mode,
-    /// Sweeps of smoothing; 0 in mode `None`. Three take 90 % to 97 %; each further one gains less than half of the one before.
+    /// Sweeps of smoothing; 0 in mode `None`. From 86 % of q < 2, two take it to 94, three to 95.6, six to 97 %; what is
+    /// still bad then costs one face that is not locally Delaunay each: 2.95, 2.2 and 1.5 % of the faces after `Full`.
     pub odt_sweeps: u32,
 }
 
@@ -35,7 +35,7 @@ impl Settings {
         let odt_sweeps = match mode {
             Mode::None => 0,
             Mode::Delaunay => 6,
-            Mode::Full => 3,
+            Mode::Full => 6,
         };
         Self { mode, odt_sweeps }
     }
@@ -83,9 +83,8 @@ pub fn run_with<P: Pages>(
     let mut lawson = Lawson::default();
     tell("delaunay", 0, settings.odt_sweeps + 1);
     lawson.sweep(mesh);
-    let mut star = Star::default();
     for sweep in 0..settings.odt_sweeps {
-        let moves = odt::sweep(mesh, &mut star);
+        let moves = odt::sweep(mesh);
         report.odt_moves += moves.moved;
         report.odt_held += moves.held;
         lawson.sweep(mesh);

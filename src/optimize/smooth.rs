@@ -28,11 +28,8 @@ pub(super) struct Star {
     pub(super) ball: Ball,
     pub(super) v: u32,
     pub(super) at: Point,
-    pub(super) h: f32,
     /// Face f of a tetrahedron makes it (v, f0, f1, f2), positive.
     pub(super) faces: Vec<[Point; 3]>,
-    /// Sum of the sizes at the vertices of a face, divided by three; parallel to `faces` until [`Star::value`] is asked.
-    pub(super) face_sizes: Vec<f64>,
 }
 
 impl Star {
@@ -49,19 +46,11 @@ impl Star {
         }
         self.v = v;
         self.at = mesh.point(v);
-        self.h = mesh.size(v);
         self.faces.clear();
-        self.face_sizes.clear();
-        for (record, &local) in self.ball.records.iter().zip(&self.ball.locals) {
-            let face = record.face(local.into());
-            let mut size = 0.0;
-            let face = face.map(|w| {
-                let p = mesh.point(w);
-                size += f64::from(mesh.size(w));
-                p
-            });
+        for k in 0..self.ball.tets.len() {
+            let [a, b, c] = self.ball.records[k].face(self.ball.locals[k].into());
+            let face = [mesh.point(a), mesh.point(b), mesh.point(c)];
             self.faces.push(face);
-            self.face_sizes.push(size * (1.0 / 3.0));
         }
         true
     }

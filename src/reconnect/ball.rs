@@ -92,6 +92,7 @@ impl Ball {
         self.records.iter().position(|r| r.local(w).is_some())
     }
 
+    #[inline]
     fn push(&mut self, t: u32, record: Tet, local: usize) {
         self.tets.push(t);
         self.records.push(record);
@@ -126,6 +127,7 @@ impl Ball {
         at
     }
 
+    #[inline]
     fn has(&self, t: u32) -> bool {
         if self.tets.len() <= LISTED_MAX {
             self.tets.contains(&t)

@@ -177,12 +177,14 @@ impl Shell {
         (mesh.point(self.a), mesh.point(self.b))
     }
 
+    #[inline]
     fn push(&mut self, t: u32, record: &Tet, locals: [u8; 4]) {
         self.tets.push(t);
         self.records.push(*record);
         self.locals.push(locals);
     }
 
+    #[inline]
     fn ends(&self, at: &Tet, t: u32) -> (usize, usize) {
         match (at.local(self.a), at.local(self.b)) {
             (Some(a), Some(b)) => (a, b),
