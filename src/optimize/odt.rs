@@ -89,9 +89,9 @@ fn gather<P: Pages>(mesh: &mut Mesh<P>) {
         let det = u.dot(vw) * weight;
         let sum = (vw * u.dot(u) + wu * v.dot(v) + uv * w.dot(w)) * weight;
         let at = [Point::ZERO, u, v, w];
-        for i in 0..4 {
-            // Seen from corner i, the center is nearer by that corner's position.
-            let own = sum - at[i] * (2.0 * det);
+        for (i, corner) in at.into_iter().enumerate() {
+            // Seen from another corner, the center is nearer by that corner's position.
+            let own = sum - corner * (2.0 * det);
             let slot = mesh.pages_mut().write::<{ kind::SCRATCH }>(tet.vertex(i));
             let [x, y, z, volume] = four(slot);
             set_four(slot, [x + own.x, y + own.y, z + own.z, volume + det]);
@@ -103,9 +103,9 @@ fn gather<P: Pages>(mesh: &mut Mesh<P>) {
 /// Pins the vertices of required and hull faces.
 #[inline(always)]
 fn pin<P: Pages>(mesh: &mut Mesh<P>, tet: &Tet) {
-    for i in 0..4 {
+    for (i, face) in FACES.into_iter().enumerate() {
         if tet.is_required(i) || !tet.neighbor[i].exists() {
-            for k in FACES[i] {
+            for k in face {
                 let slot = mesh.pages_mut().write::<{ kind::SCRATCH }>(tet.vertex(k));
                 set_four(slot, [f64::NAN; 4]);
             }

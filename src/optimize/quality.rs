@@ -70,7 +70,9 @@ pub(super) fn is_below(points: [Point; 4], wanted: f64) -> bool {
     if p.det > 0.0 && p.det * p.det > most {
         return false;
     }
-    !(ratio(&p) >= wanted)
+    // A ratio that is not a number counts as bad.
+    let ratio = ratio(&p);
+    ratio < wanted || ratio.is_nan()
 }
 
 /// Quality q of a tetrahedron: at least 1, infinite when it is not positive.

@@ -98,7 +98,7 @@ impl Replacement {
             }
         }
         self.faces.sort_unstable();
-        self.faces.len() % 2 == 0
+        self.faces.len().is_multiple_of(2)
             && self
                 .faces
                 .chunks_exact(2)
