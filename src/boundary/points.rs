@@ -27,7 +27,7 @@ pub(super) fn recover_by_points<P: Pages>(
         let before = missing.facets.len();
         troubles.clear();
         let mut left = Vec::new();
-        for group in groups(mesh, &missing.facets) {
+        for group in groups(mesh, &missing.facets, &mut missing.protected) {
             stop_if_requested();
             report.patches += 1;
             match recover_group(mesh, &missing.protected, &group, report) {
@@ -47,7 +47,11 @@ pub(super) fn recover_by_points<P: Pages>(
 }
 
 /// Facets that share missing segments belong together: a point on a segment needs all facets around it.
-fn groups<P: Pages>(mesh: &mut Mesh<P>, facets: &[u32]) -> Vec<Vec<u32>> {
+fn groups<P: Pages>(
+    mesh: &mut Mesh<P>,
+    facets: &[u32],
+    protected: &mut HashSet<u64>,
+) -> Vec<Vec<u32>> {
     let none = HashSet::new();
     let mut by_segment: HashMap<u64, usize> = HashMap::new();
     let mut parent: Vec<usize> = (0..facets.len()).collect();
@@ -62,6 +66,7 @@ fn groups<P: Pages>(mesh: &mut Mesh<P>, facets: &[u32]) -> Vec<Vec<u32>> {
         let [a, b, c] = mesh.facet(n).vertices;
         for (p, q) in [(a, b), (b, c), (c, a)] {
             if find_edge(&mut Paged(mesh, &none), p, q).is_some() {
+                protected.insert(edge_key(p, q));
                 continue;
             }
             let j = *by_segment.entry(edge_key(p, q)).or_insert(i);

@@ -15,11 +15,12 @@ impl<P: Pages> Patch<'_, P> {
     pub(super) fn outer_faces(&mut self, cavity: &[u32]) -> Vec<Outer> {
         let mut outer = Vec::new();
         for &t in cavity {
-            for i in 0..4 {
-                if !cavity.contains(&self.across(t, i).tet()) {
-                    outer.push((self.tet(t), i));
-                }
-            }
+            let tet = self.tet(t);
+            outer.extend(
+                (0..4)
+                    .filter(|&i| !cavity.contains(&tet.neighbor[i].tet()))
+                    .map(|i| (tet, i)),
+            );
         }
         outer
     }

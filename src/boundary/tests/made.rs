@@ -90,3 +90,247 @@ fn grids_on_a_cube_need_no_points_whichever_way_they_are_cut() {
         }
     }
 }
+
+/// A prism over a regular polygon of `n` corners whose top is turned by `twist` against the bottom.
+///
+/// The sides are cut along the diagonal that the twist pushes inward: for three corners and a large
+/// twist this is Schönhardt's polyhedron, which has no tetrahedra without further points.
+pub fn twisted(n: u32, twist: f64, height: f64) -> (Vec<Point>, Vec<[u32; 3]>) {
+    let corner = |i: u32, turn: f64, z: f64| {
+        let t = f64::from(i) / f64::from(n) * std::f64::consts::TAU + turn;
+        Point::new(t.cos(), t.sin(), z)
+    };
+    let mut points: Vec<Point> = (0..n).map(|i| corner(i, 0.0, 0.0)).collect();
+    points.extend((0..n).map(|i| corner(i, twist, height)));
+    let mut triangles = Vec::new();
+    for i in 1..n - 1 {
+        triangles.push([0, i + 1, i]);
+        triangles.push([n, n + i, n + i + 1]);
+    }
+    for i in 0..n {
+        let j = (i + 1) % n;
+        triangles.push([i, j, n + i]);
+        triangles.push([j, n + j, n + i]);
+    }
+    (points, triangles)
+}
+
+#[test]
+fn twisted_prisms_get_points_inside_only() {
+    for n in 3..9 {
+        for k in 0..6 {
+            let twist = -0.1 - 0.15 * f64::from(k) * 3.0 / f64::from(n);
+            let (points, triangles) = twisted(n, twist, 1.0);
+            recovered(&format!("prism {n} by {twist}"), &points, &triangles);
+            recovered(
+                &format!("turned prism {n} by {twist}"),
+                &turned(&points),
+                &triangles,
+            );
+        }
+    }
+}
+
+/// Joins solids into one surface, each scaled and moved.
+fn joined(parts: &[(Vec<Point>, Vec<[u32; 3]>)]) -> (Vec<Point>, Vec<[u32; 3]>) {
+    let (mut points, mut triangles) = (Vec::new(), Vec::new());
+    for (p, t) in parts {
+        let base = points.len() as u32;
+        points.extend_from_slice(p);
+        triangles.extend(t.iter().map(|t| t.map(|v| v + base)));
+    }
+    (points, triangles)
+}
+
+fn placed(
+    part: &(Vec<Point>, Vec<[u32; 3]>),
+    scale: Point,
+    by: Point,
+) -> (Vec<Point>, Vec<[u32; 3]>) {
+    (
+        part.0.iter().map(|&p| p * scale + by).collect(),
+        part.1.clone(),
+    )
+}
+
+#[test]
+fn a_stack_of_twisted_prisms_close_together_is_recovered() {
+    let prism = twisted(3, -0.5, 1.0);
+    let parts: Vec<_> = (0..6)
+        .map(|i| {
+            placed(
+                &prism,
+                Point::ONE,
+                Point::new(0.0, 0.0, 1.01 * f64::from(i)),
+            )
+        })
+        .collect();
+    let (points, triangles) = joined(&parts);
+    recovered("stack", &points, &triangles);
+    recovered("turned stack", &turned(&points), &triangles);
+}
+
+#[test]
+fn thin_plates_with_different_cuts_are_recovered() {
+    for thickness in [0.1, 1e-2, 1e-4, 1e-6] {
+        let (points, triangles) = cube(5, |x, y, face| (x * 3 + y + face as u32) % 2 == 0);
+        let plate = placed(
+            &(points, triangles),
+            Point::new(1.0, 1.0, thickness),
+            Point::ZERO,
+        );
+        recovered(&format!("plate {thickness}"), &plate.0, &plate.1);
+        recovered(
+            &format!("turned plate {thickness}"),
+            &turned(&plate.0),
+            &plate.1,
+        );
+    }
+}
+
+#[test]
+fn nested_shells_are_told_apart() {
+    use crate::boundary::{RegionPolicy, fill_regions};
+    let make = || {
+        let parts: Vec<_> = (0..3)
+            .map(|i| {
+                let side = 10.0 - 3.0 * f64::from(i);
+                let solid = cube(3, |x, y, _| (x + y) % 2 == 0);
+                placed(
+                    &solid,
+                    Point::splat(side / 3.0),
+                    Point::splat(1.5 * f64::from(i)),
+                )
+            })
+            .collect();
+        let (points, triangles) = joined(&parts);
+        let mut mesh = delaunay(&points, &triangles);
+        recover(&mut mesh).expect("nested cubes");
+        mesh
+    };
+    for (policy, filled, volume) in [
+        (RegionPolicy::Parity, vec![1, 0, 2], 1000.0 - 343.0 + 64.0),
+        (RegionPolicy::All, vec![1, 2, 3], 1000.0),
+        (RegionPolicy::Outer, vec![1, 0, 0], 657.0),
+        (
+            RegionPolicy::Seeds(vec![Point::splat(5.0)]),
+            vec![0, 0, 1],
+            64.0,
+        ),
+    ] {
+        let mut mesh = make();
+        let regions = fill_regions(&mut mesh, &policy).expect("closed");
+        let numbers: Vec<u32> = regions.list.iter().map(|r| r.region).collect();
+        assert_eq!(numbers, filled, "{policy:?}");
+        let sum: f64 = regions
+            .list
+            .iter()
+            .filter(|r| r.region > 0)
+            .map(|r| r.volume)
+            .sum();
+        assert!((sum - volume).abs() < 1e-9, "{policy:?} {sum}");
+        check(&mut mesh);
+        let n: u32 = regions
+            .list
+            .iter()
+            .filter(|r| r.region > 0)
+            .map(|r| r.tets)
+            .sum();
+        assert_eq!(n, mesh.n_tets());
+    }
+    let seed = RegionPolicy::Seeds(vec![Point::splat(-5.0)]);
+    assert!(fill_regions(&mut make(), &seed).is_err());
+    // All normals point outward: the middle shell is inside two of them.
+    let regions = fill_regions(&mut make(), &RegionPolicy::ByOrientation).expect("oriented");
+    assert!(regions.list.iter().all(|r| r.region > 0));
+}
+
+#[test]
+fn two_cubes_that_share_a_wall_are_both_filled() {
+    use crate::boundary::{RegionPolicy, fill_regions};
+    let (points, triangles) = cube(2, |_, _, _| true);
+    // The second cube is the mirror image across x = 0, so the wall's triangles match.
+    let mirrored: Vec<Point> = points.iter().map(|p| Point::new(-p.x, p.y, p.z)).collect();
+    let mut all = points.clone();
+    let mut twin = vec![0u32; points.len()];
+    for (i, p) in mirrored.iter().enumerate() {
+        twin[i] = all.iter().position(|q| q == p).unwrap_or_else(|| {
+            all.push(*p);
+            all.len() - 1
+        }) as u32;
+    }
+    let mut both = triangles.clone();
+    both.extend(
+        triangles
+            .iter()
+            .map(|&[a, b, c]| [a, c, b].map(|v| twin[v as usize])),
+    );
+    let mut mesh = delaunay(&all, &both);
+    recover(&mut mesh).expect("two cubes");
+    let regions = fill_regions(&mut mesh, &RegionPolicy::Parity).expect("closed");
+    assert!(!regions.all_instead_of_parity);
+    assert_eq!(
+        regions.list.iter().map(|r| r.region).collect::<Vec<_>>(),
+        [1, 2]
+    );
+    // Given once, the wall makes parity contradictory.
+    both.truncate(triangles.len());
+    both.extend(
+        triangles
+            .iter()
+            .map(|&[a, b, c]| [a, c, b].map(|v| twin[v as usize]))
+            .filter(|t| !t.iter().all(|&v| all[v as usize].x == 0.0)),
+    );
+    let mut mesh = delaunay(&all, &both);
+    recover(&mut mesh).expect("two cubes and a wall");
+    let regions = fill_regions(&mut mesh, &RegionPolicy::Parity).expect("closed");
+    assert!(regions.all_instead_of_parity);
+    assert_eq!(regions.list.len(), 2);
+}
+
+#[test]
+fn random_cuts_of_cospherical_and_random_hulls_are_recovered() {
+    // Rings of latitude: many cocircular and cospherical points, quads cut at random.
+    let mut next = random(11);
+    for (n_rings, n_around) in [(3u32, 5u32), (6, 12), (10, 20)] {
+        for round in 0..6 {
+            let squash = [1.0, 0.3, 0.02][round % 3];
+            let mut points = vec![Point::new(0.0, 0.0, -squash), Point::new(0.0, 0.0, squash)];
+            for r in 1..=n_rings {
+                let t = std::f64::consts::PI * (f64::from(r) / f64::from(n_rings + 1) - 0.5);
+                for k in 0..n_around {
+                    let u = std::f64::consts::TAU * f64::from(k) / f64::from(n_around);
+                    points.push(Point::new(
+                        t.cos() * u.cos(),
+                        t.cos() * u.sin(),
+                        t.sin() * squash,
+                    ));
+                }
+            }
+            let id = |r: u32, k: u32| 2 + r * n_around + k % n_around;
+            let mut triangles = Vec::new();
+            for k in 0..n_around {
+                triangles.push([0, id(0, k + 1), id(0, k)]);
+                triangles.push([1, id(n_rings - 1, k), id(n_rings - 1, k + 1)]);
+                for r in 0..n_rings - 1 {
+                    let [a, b, c, d] = [id(r, k), id(r, k + 1), id(r + 1, k + 1), id(r + 1, k)];
+                    if next() < 0.5 {
+                        triangles.extend([[a, b, c], [a, c, d]]);
+                    } else {
+                        triangles.extend([[a, b, d], [b, c, d]]);
+                    }
+                }
+            }
+            recovered(
+                &format!("rings {n_rings} {n_around} {round}"),
+                &points,
+                &triangles,
+            );
+            recovered(
+                &format!("turned rings {n_rings} {n_around} {round}"),
+                &turned(&points),
+                &triangles,
+            );
+        }
+    }
+}
