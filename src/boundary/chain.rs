@@ -31,7 +31,7 @@ pub(super) enum Trouble {
     /// A required face is crossed.
     Crossed([u32; 3]),
     /// No double (or exact combination) lies in the room left.
-    Precision,
+    Precision(&'static str),
     /// More points or steps than allowed.
     TooMuch,
     /// A case that valid input cannot produce.
@@ -108,7 +108,7 @@ impl<P: Pages> Patch<'_, P> {
                 }
             }
         }
-        Err(Trouble::Precision)
+        Err(Trouble::Precision("on a segment"))
     }
 }
 

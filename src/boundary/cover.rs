@@ -157,6 +157,6 @@ impl<P: Pages> Patch<'_, P> {
                 return Ok(());
             }
         }
-        Err(Trouble::Precision)
+        Err(Trouble::Precision("in a facet"))
     }
 }

@@ -4,6 +4,7 @@ use std::collections::HashSet;
 
 use super::flips::Flipper;
 use super::space::Space;
+use super::target::Target;
 use super::walk::{Exit, crossings, find_edge, opposite, shell};
 use crate::mesh::FaceRef;
 
@@ -110,10 +111,18 @@ pub(super) enum Outcome {
     Touches(u32),
 }
 
+/// Neutral steps a target may take, beyond this many per part it crosses.
+const NEUTRAL_MAX: usize = 3;
+
 impl<S: Space> Flipper<'_, S> {
-    /// Flips until the edge `a b` exists. The number of parts it crosses falls with each step kept.
+    /// Flips until the edge `a b` exists.
+    ///
+    /// The number of parts it crosses falls with each step kept, except for a bounded number of neutral ones: in the
+    /// plane of a facet, where the edge crosses a fan of others, each of those has to turn a few times.
+    /// (S. W. Sloan, "A fast algorithm for generating constrained Delaunay triangulations", 1993.)
     pub(super) fn recover_edge(&mut self, a: u32, b: u32, level: u32) -> Outcome {
-        'fewer: loop {
+        let mut neutral = 0;
+        loop {
             self.keep();
             let met = match crossings(self.s, a, b, CROSSINGS_MAX) {
                 Ok(met) if met.is_empty() => return Outcome::Recovered,
@@ -121,8 +130,10 @@ impl<S: Space> Flipper<'_, S> {
                 Err(Exit::Vertex(v)) => return Outcome::Touches(v),
                 Err(_) => return Outcome::Stuck,
             };
-            // Attempts that are undone rename tetrahedra: keep what is crossed by its vertices.
+            // Attempts that are undone leave everything as it was, ids included.
             let mut edges: Vec<(u32, u32)> = Vec::new();
+            let mut turning: Vec<(u32, u32)> = Vec::new();
+            let mut flipped = false;
             for &exit in &met {
                 match exit {
                     Exit::Face(face) => {
@@ -131,34 +142,51 @@ impl<S: Space> Flipper<'_, S> {
                             return Outcome::Stuck;
                         }
                         let [p, q, r] = tet.face(face.face());
-                        edges.extend([(p, q), (q, r), (r, p)]);
+                        edges.extend([(p, q), (q, r), (r, p)].map(|(p, q)| (p.min(q), p.max(q))));
                         if self.flip_face(face) {
-                            continue 'fewer;
+                            flipped = true;
+                            break;
                         }
                     }
-                    Exit::Edge { c, d, .. } => edges.push((c, d)),
+                    Exit::Edge { c, d, .. } => {
+                        edges.push((c.min(d), c.max(d)));
+                        turning.push((c, d));
+                    }
                     _ => {}
                 }
             }
-            for k in 0..edges.len() {
-                let (c, d) = edges[k];
-                if edges[..k].iter().any(|&e| e == (c, d) || e == (d, c)) {
+            let mut tried: Vec<(u32, u32)> = Vec::new();
+            for &(c, d) in &edges {
+                if flipped || tried.contains(&(c, d)) {
                     continue;
                 }
-                let Some(t) = find_edge(self.s, c, d) else {
-                    continue;
-                };
-                if self.remove_edge(t, c, d, level) {
-                    continue 'fewer;
-                }
+                tried.push((c, d));
+                flipped = find_edge(self.s, c, d).is_some_and(|t| self.remove_edge(t, c, d, level));
             }
-            return Outcome::Stuck;
+            if flipped {
+                continue;
+            }
+            let n = turning.len();
+            let steps_max = NEUTRAL_MAX * n;
+            let before = met.len();
+            let turned = (0..n).any(|k| {
+                let (c, d) = turning[(neutral + k) % n];
+                neutral < steps_max
+                    && self.try_neutral(c, d, |s| {
+                        crossings(s, a, b, CROSSINGS_MAX).is_ok_and(|met| met.len() <= before)
+                    })
+            });
+            if !turned {
+                return Outcome::Stuck;
+            }
+            neutral += 1;
         }
     }
 
     /// Flips until the face `f`, whose edges exist, is there.
     pub(super) fn recover_face(&mut self, f: [u32; 3], level: u32) -> Outcome {
-        'fewer: loop {
+        let mut neutral = 0;
+        loop {
             self.keep();
             let t = match find_face(self.s, f) {
                 Found::Face(_) => return Outcome::Recovered,
@@ -168,15 +196,44 @@ impl<S: Space> Flipper<'_, S> {
             let Some(edges) = crossing_edges(self.s, f, t, CROSSINGS_MAX) else {
                 return Outcome::Stuck;
             };
-            for (_, c, d) in edges {
-                let Some(t) = find_edge(self.s, c, d) else {
-                    continue;
-                };
-                if self.remove_edge(t, c, d, level) {
-                    continue 'fewer;
-                }
+            let flipped = edges.iter().any(|&(_, c, d)| {
+                find_edge(self.s, c, d).is_some_and(|t| self.remove_edge(t, c, d, level))
+            });
+            if flipped {
+                continue;
             }
-            return Outcome::Stuck;
+            let n = edges.len();
+            let turned = (0..n).any(|k| {
+                let (_, c, d) = edges[(neutral + k) % n];
+                neutral < NEUTRAL_MAX * n
+                    && self.try_neutral(c, d, |s| match find_face(s, f) {
+                        Found::Face(_) => true,
+                        Found::Edge(Some(t)) => {
+                            crossing_edges(s, f, t, n).is_some_and(|now| now.len() <= n)
+                        }
+                        _ => false,
+                    })
+            });
+            if !turned {
+                return Outcome::Stuck;
+            }
+            neutral += 1;
         }
+    }
+
+    /// Removes the edge `c d` whatever is crossed afterwards, if `good` then says so.
+    fn try_neutral(&mut self, c: u32, d: u32, good: impl Fn(&mut S) -> bool) -> bool {
+        let Some(t) = find_edge(self.s, c, d) else {
+            return false;
+        };
+        let mark = self.mark();
+        let target = std::mem::replace(&mut self.target, Target::Free);
+        let removed = self.remove_edge(t, c, d, 0);
+        self.target = target;
+        if removed && !good(self.s) {
+            self.undo(mark);
+            return false;
+        }
+        removed
     }
 }

@@ -10,8 +10,6 @@
 //! When no triangulation of a ring is valid, an edge that joins it to `c` or `d` and stands in the way is
 //! removed first, down to a given level; what does not lead to success is undone.
 
-use std::collections::HashMap;
-
 use super::polygon::triangulate;
 use super::space::Space;
 use super::target::Target;
@@ -20,7 +18,7 @@ use crate::mesh::FaceRef;
 use crate::mesh::anatomy::EDGES;
 
 /// Larger rings are left alone: the search is cubic.
-const RING_MAX: usize = 40;
+const RING_MAX: usize = 20;
 
 /// One replacement, with what undoing needs.
 struct Done {
@@ -57,24 +55,23 @@ impl<'a, S: Space> Flipper<'a, S> {
         self.log.clear();
     }
 
+    /// A mark for [`Flipper::undo`].
+    pub(super) fn mark(&self) -> usize {
+        self.log.len()
+    }
+
     fn apply(&mut self, old: Vec<u32>, new: &[[u32; 4]]) {
         let quads = old.iter().map(|&t| self.s.tet(t).vertices()).collect();
         let made = self.s.replace(&old, new);
         self.log.push(Done { old, quads, made });
     }
 
-    /// Takes back what was done after `mark`; ids may differ from before.
-    fn undo(&mut self, mark: usize) {
-        let mut now: HashMap<u32, u32> = HashMap::new();
+    /// Takes back what was done after `mark`, ids included.
+    pub(super) fn undo(&mut self, mark: usize) {
         while self.log.len() > mark {
             let done = self.log.pop().expect("longer than the mark");
-            let made: Vec<u32> = done
-                .made
-                .iter()
-                .map(|t| now.get(t).copied().unwrap_or(*t))
-                .collect();
-            let back = self.s.replace(&made, &done.quads);
-            now.extend(done.old.iter().copied().zip(back));
+            let back = self.s.replace(&done.made, &done.quads);
+            assert_eq!(back, done.old, "ids are reused last freed first");
         }
     }
 

@@ -106,7 +106,7 @@ fn recover_group<P: Pages>(
     };
     let points = outcome.map_err(named)?;
     if !patch.is_sound() {
-        return Err(Trouble::Precision);
+        return Err(Trouble::Precision("a volume is not positive once rounded"));
     }
     let whole = skin
         .facets
@@ -146,6 +146,7 @@ fn build<P: Pages>(patch: &mut Patch<'_, P>, skin: &mut Skin) -> Result<u32, Tro
         }
     }
     let mut points = on_segments.len() as u32;
+    let mut late: Vec<u32> = Vec::new();
     for (k, &f) in facets.iter().enumerate() {
         let rim: Vec<u32> = sides(f)
             .into_iter()
@@ -182,12 +183,29 @@ fn build<P: Pages>(patch: &mut Patch<'_, P>, skin: &mut Skin) -> Result<u32, Tro
             patch.require(FaceRef::new(t, l));
         }
         points += inside.len() as u32;
+        // What has no room now may have some when others are gone.
         for v in inside {
-            patch.suppress(skin, v)?;
+            if patch.suppress(skin, v).is_err() {
+                late.push(v);
+            }
         }
     }
-    for v in on_segments {
-        patch.suppress(skin, v)?;
+    late.extend(on_segments);
+    while !late.is_empty() {
+        let before = late.len();
+        let mut trouble = None;
+        let mut left = Vec::new();
+        for v in late {
+            if let Err(why) = patch.suppress(skin, v) {
+                trouble = Some(why);
+                left.push(v);
+            }
+        }
+        late = left;
+        match trouble {
+            Some(trouble) if late.len() == before => return Err(trouble),
+            _ => {}
+        }
     }
     for v in 0..patch.n_vertices() {
         if patch.is_new(v) && patch.is_in_use(v) {

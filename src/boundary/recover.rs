@@ -15,7 +15,7 @@ use crate::mesh::Mesh;
 use crate::store::{Pages, stop_if_requested};
 
 /// How deep edge removals may nest, pass after pass, and the ring searches a target may cost then.
-const LEVELS: [(u32, u32); 4] = [(0, 200), (1, 400), (2, 1500), (3, 4000)];
+const LEVELS: [(u32, u32); 3] = [(0, 40), (1, 80), (2, 160)];
 
 /// Makes every facet of `mesh` a required face on both sides.
 ///
@@ -61,7 +61,7 @@ fn explain<P: Pages>(
             };
         }
         Trouble::Crossed(_) => "another triangle crosses it",
-        Trouble::Precision => "no double-precision point lies in the room beside it",
+        Trouble::Precision(what) => what,
         Trouble::TooMuch => "it crosses too many edges",
         Trouble::Broken(what) => what,
     };
@@ -89,14 +89,8 @@ fn flip_segments<P: Pages>(mesh: &mut Mesh<P>, missing: &mut Missing, report: &m
                 stop_if_requested();
                 let mut s = Paged(mesh, &missing.protected);
                 let mut flipper = Flipper::new(&mut s, Target::Edge(a, b));
-                let mut outcome = Outcome::Stuck;
-                for (from, to) in [(a, b), (b, a)] {
-                    flipper.work = work;
-                    outcome = flipper.recover_edge(from, to, level);
-                    if outcome == Outcome::Recovered {
-                        break;
-                    }
-                }
+                flipper.work = work;
+                let outcome = flipper.recover_edge(a, b, level);
                 report.flips += flipper.flips;
                 if outcome == Outcome::Recovered {
                     report.segments_by_flips += 1;
@@ -110,7 +104,7 @@ fn flip_segments<P: Pages>(mesh: &mut Mesh<P>, missing: &mut Missing, report: &m
             if after == 0 {
                 return;
             }
-            if after == before {
+            if after + after / 16 >= before {
                 break;
             }
         }
@@ -143,7 +137,7 @@ fn flip_facets<P: Pages>(mesh: &mut Mesh<P>, missing: &mut Missing, report: &mut
             if after == 0 {
                 return;
             }
-            if after == before {
+            if after + after / 16 >= before {
                 break;
             }
         }

@@ -33,8 +33,9 @@ pub(super) trait Space {
 
     /// Replaces the tetrahedra `old` by tetrahedra with the vertices `new`, which fill the same room.
     ///
-    /// Returns the ids of the new ones, parallel to `new`. Effects: ids of `old` are used again first;
-    /// required faces strictly inside are lost unless the caller marks them again.
+    /// Returns the ids of the new ones, parallel to `new`. Effects: ids of `old` are used again first, in order, and
+    /// what is left of them is freed last to first: replacing back restores the very ids. Required faces
+    /// strictly inside are lost unless the caller marks them again.
     fn replace(&mut self, old: &[u32], new: &[[u32; 4]]) -> Vec<u32> {
         let mut sides: Vec<Side> = Vec::with_capacity(4 * new.len() + 2 * old.len() + 4);
         for &t in old {
@@ -107,7 +108,7 @@ pub(super) trait Space {
                 self.set_tet_of(v, t);
             }
         }
-        for &t in old.iter().skip(new.len()) {
+        for &t in old.iter().skip(new.len()).rev() {
             self.free_tet(t);
         }
         ids

@@ -16,11 +16,13 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 use super::chain::Trouble;
+use super::flips::Flipper;
 use super::kernel::{HalfSpace, center};
 use super::patch::Patch;
 use super::polygon::triangulate;
 use super::space::{Space, sorted};
-use super::walk::{ball, swapped};
+use super::target::Target;
+use super::walk::{ball, find_edge, swapped};
 use crate::geom::Point;
 use crate::mesh::FaceRef;
 use crate::mesh::anatomy::FACES;
@@ -51,8 +53,39 @@ struct Wedge {
 }
 
 impl<P: Pages> Patch<'_, P> {
+    /// Removes edges of `x` that are on no facet, as far as that goes: fewer faces to be seen.
+    fn thin_out(&mut self, x: u32) {
+        loop {
+            let ball = ball(self, x);
+            let mut link: Vec<(u32, u32)> = Vec::new();
+            for &t in &ball {
+                link.extend(
+                    self.tets_vertices(t)
+                        .into_iter()
+                        .filter(|&v| v != x)
+                        .map(|v| (v, t)),
+                );
+            }
+            link.sort_unstable();
+            link.dedup_by_key(|l| l.0);
+            let mut thinner = false;
+            for (v, _) in link {
+                let Some(t) = find_edge(self, x, v) else {
+                    continue;
+                };
+                let mut flipper = Flipper::new(self, Target::Free);
+                flipper.work = 1;
+                thinner |= flipper.remove_edge(t, x, v, 0);
+            }
+            if !thinner {
+                return;
+            }
+        }
+    }
+
     /// Takes vertex `x` off the surface. Returns the number of vertices that replace it.
     pub(super) fn suppress(&mut self, skin: &mut Skin, x: u32) -> Result<u32, Trouble> {
+        self.thin_out(x);
         let ball = ball(self, x);
         let fans = self.fans(skin, x, &ball)?;
         if fans.is_empty() {
@@ -420,7 +453,7 @@ impl<P: Pages> Patch<'_, P> {
             }
             self.drop_vertex();
         }
-        Err(Trouble::Precision)
+        Err(Trouble::Precision("inside a wedge"))
     }
 
     /// Mean of the wedge's other vertices: a direction to try when the planes give none.

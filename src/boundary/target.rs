@@ -7,6 +7,8 @@ use super::space::Space;
 pub(super) enum Target {
     Edge(u32, u32),
     Face([u32; 3]),
+    /// Nothing is in the way of anything.
+    Free,
 }
 
 impl Target {
@@ -16,6 +18,7 @@ impl Target {
             Self::Edge(a, b) => {
                 !edge_meets_face(s, a, b, [x, y, c]) && !edge_meets_face(s, a, b, [x, y, d])
             }
+            Self::Free => true,
             Self::Face(f) => {
                 // An edge with an end in the plane, which is on the facet or beside it, stays on its side.
                 let (sx, sy) = (
@@ -31,7 +34,7 @@ impl Target {
     pub(super) fn allows_face<S: Space>(self, s: &mut S, face: [u32; 3]) -> bool {
         match self {
             Self::Edge(a, b) => !edge_meets_face(s, a, b, face),
-            Self::Face(_) => true,
+            Self::Face(_) | Self::Free => true,
         }
     }
 }
