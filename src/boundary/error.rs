@@ -37,13 +37,7 @@ pub enum BoundaryError {
         /// Index of the vertex in the surface.
         owner: u32,
         point: Point,
-        facet: FacetPlace,
-    },
-    /// Two parts of the surface cross.
-    #[error("{first} is crossed by {second}; check the surface for self-intersections")]
-    Crossing {
-        first: FacetPlace,
-        second: FacetPlace,
+        facet: Box<FacetPlace>,
     },
     /// The volume outside is not separated from this seed or region.
     #[error("the surface does not close: {what}")]

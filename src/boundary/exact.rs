@@ -163,10 +163,10 @@ fn orient_exact(p: [Placed<'_>; 4]) -> f64 {
     });
     let [u, v, w] = [b, c, d].map(|q| [0, 1, 2].map(|i| q.0[i].minus(&a.0[i])));
     let mut det = Expansion::default();
-    for i in 0..3 {
+    for (i, u) in u.iter().enumerate() {
         let (j, k) = ((i + 1) % 3, (i + 2) % 3);
         let minor = v[j].times(&w[k]).minus(&v[k].times(&w[j]));
-        det.add(&u[i].times(&minor));
+        det.add(&u.times(&minor));
     }
     det.estimate()
 }

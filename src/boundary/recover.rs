@@ -57,7 +57,7 @@ fn explain<P: Pages>(
             return BoundaryError::VertexOnFacet {
                 owner: mesh.vertex_attribute(v).1,
                 point: mesh.point(v),
-                facet: place(mesh, n),
+                facet: Box::new(place(mesh, n)),
             };
         }
         Trouble::Crossed(_) => "another triangle crosses it",

@@ -114,11 +114,11 @@ impl<P: Pages> Patch<'_, P> {
                     faces[fan].iter().map(turn)
                 })
                 .collect();
-            if let Some(mut quads) = self.from_link(x, wedge, &walls, &fans) {
+            if let Some(mut quads) = self.join_to_link(x, wedge, &walls, &fans) {
                 new.append(&mut quads);
                 continue;
             }
-            new.append(&mut self.from_inside(x, wedge, &walls)?);
+            new.append(&mut self.join_to_new(x, wedge, &walls)?);
             added += 1;
         }
         let ids = self.replace(&ball, &new);
@@ -360,7 +360,7 @@ impl<P: Pages> Patch<'_, P> {
     }
 
     /// The wedge and its walls joined to one of its own vertices.
-    fn from_link(
+    fn join_to_link(
         &mut self,
         x: u32,
         wedge: &Wedge,
@@ -399,7 +399,7 @@ impl<P: Pages> Patch<'_, P> {
     }
 
     /// The wedge and its walls joined to a new vertex inside.
-    fn from_inside(
+    fn join_to_new(
         &mut self,
         x: u32,
         wedge: &Wedge,
