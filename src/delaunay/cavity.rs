@@ -54,6 +54,7 @@ pub struct KernelStats {
 /// Scratch of the insertion kernel; one per worker.
 pub struct Kernel {
     cavity: Vec<u32>,
+    locals: Vec<[u8; 3]>,
     faces: Vec<CavityFace>,
     links: Links,
     new_tets: Vec<u32>,
@@ -66,6 +67,7 @@ impl Default for Kernel {
     fn default() -> Self {
         Self {
             cavity: Vec::new(),
+            locals: Vec::new(),
             faces: Vec::new(),
             links: Links::new(),
             new_tets: Vec::new(),
@@ -350,32 +352,33 @@ impl Kernel {
 
     /// Writes the new tetrahedra; `false` (with nothing written) when there are too many vertices.
     fn link_by_matrix<P: Pages>(&mut self, mesh: &mut Mesh<P>, v: u32) -> bool {
-        let mut locals = [[0u8; 3]; 2 * CAVITY_SMALL];
-        if self.faces.len() > locals.len() {
+        if self.faces.len() > 2 * CAVITY_SMALL {
             return false;
         }
-        for (k, face) in self.faces.iter().enumerate() {
-            for (i, w) in face.vertices.into_iter().enumerate() {
-                let Some(local) = self.links.local(w) else {
-                    return false;
-                };
-                locals[k][i] = local;
-            }
-            let [a, b, c] = locals[k];
-            let t = self.new_tets[k] << 2;
+        self.locals.clear();
+        for (face, &t) in self.faces.iter().zip(&self.new_tets) {
+            let [a, b, c] = face.vertices;
+            let (Some(a), Some(b), Some(c)) = (
+                self.links.local(a),
+                self.links.local(b),
+                self.links.local(c),
+            ) else {
+                return false;
+            };
+            self.locals.push([a, b, c]);
+            let t = t << 2;
             // Face j of (v, f0, f1, f2) is opposite f_{j-1}; it holds the edge f_j → f_{j+1}.
             self.links.set(b, c, t | 1);
             self.links.set(c, a, t | 2);
             self.links.set(a, b, t | 3);
         }
-        for (k, face) in self.faces.iter().enumerate() {
-            let [a, b, c] = locals[k];
+        for ((face, &t), &[a, b, c]) in self.faces.iter().zip(&self.new_tets).zip(&self.locals) {
             let inner = [
                 self.links.get(c, b),
                 self.links.get(a, c),
                 self.links.get(b, a),
             ];
-            write_new(mesh, v, self.new_tets[k], face, inner);
+            write_new(mesh, v, t, face, inner);
         }
         true
     }

@@ -11,10 +11,9 @@ const TABLE: usize = 256;
 
 /// Scratch for the edges of one cavity surface.
 pub(super) struct Links {
-    /// `epoch << 32 | vertex` of each occupied place; older epochs are empty places.
-    keys: [u64; TABLE],
-    locals: [u8; TABLE],
-    epoch: u32,
+    /// `epoch << 40 | vertex << 8 | local` of each occupied place; older epochs are empty places.
+    places: [u64; TABLE],
+    epoch: u64,
     n_local: usize,
     /// `matrix[a * LOCAL_MAX + b]` = half-face of the directed edge a → b.
     matrix: Vec<u32>,
@@ -25,8 +24,7 @@ pub(super) struct Links {
 impl Links {
     pub(super) fn new() -> Self {
         Self {
-            keys: [0; TABLE],
-            locals: [0; TABLE],
+            places: [0; TABLE],
             epoch: 0,
             n_local: 0,
             matrix: vec![0; LOCAL_MAX * LOCAL_MAX],
@@ -38,33 +36,41 @@ impl Links {
     pub(super) fn begin(&mut self) {
         self.n_local = 0;
         self.sorted.clear();
-        self.epoch = self.epoch.wrapping_add(1);
-        if self.epoch == 0 {
-            self.keys = [0; TABLE];
+        self.epoch += 1;
+        if self.epoch == 1 << 24 {
+            self.places = [0; TABLE];
             self.epoch = 1;
         }
     }
 
-    /// The local number of vertex `v`, given at its first call; `None` when there are too many.
-    #[inline]
-    pub(super) fn local(&mut self, v: u32) -> Option<u8> {
-        let key = u64::from(self.epoch) << 32 | u64::from(v);
+    /// Where `v` is, or the empty place where it would be put; and what is there.
+    #[inline(always)]
+    fn find(&self, v: u32) -> (usize, u64, bool) {
+        let key = self.epoch << 32 | u64::from(v);
         let mut at = (v.wrapping_mul(0x9E37_79B1) >> 24) as usize;
         loop {
-            let found = self.keys[at % TABLE];
-            if found == key {
-                return Some(self.locals[at % TABLE]);
+            let found = self.places[at % TABLE];
+            if found >> 8 == key {
+                return (at % TABLE, found, true);
             }
-            if (found >> 32) as u32 != self.epoch {
-                break;
+            if found >> 40 != self.epoch {
+                return (at % TABLE, key << 8, false);
             }
             at += 1;
+        }
+    }
+
+    /// The local number of vertex `v`, given at its first call; `None` when there are too many.
+    #[inline(always)]
+    pub(super) fn local(&mut self, v: u32) -> Option<u8> {
+        let (at, found, is_there) = self.find(v);
+        if is_there {
+            return Some(found as u8);
         }
         if self.n_local == LOCAL_MAX {
             return None;
         }
-        self.keys[at % TABLE] = key;
-        self.locals[at % TABLE] = self.n_local as u8;
+        self.places[at] = found | self.n_local as u64;
         self.n_local += 1;
         Some(self.n_local as u8 - 1)
     }
@@ -72,15 +78,7 @@ impl Links {
     /// Whether `v` has a local number in this surface.
     #[inline]
     pub(super) fn knows(&self, v: u32) -> bool {
-        let key = u64::from(self.epoch) << 32 | u64::from(v);
-        let mut at = (v.wrapping_mul(0x9E37_79B1) >> 24) as usize;
-        loop {
-            let found = self.keys[at % TABLE];
-            if found == key || (found >> 32) as u32 != self.epoch {
-                return found == key;
-            }
-            at += 1;
-        }
+        self.find(v).2
     }
 
     /// Vertices numbered so far.

@@ -56,6 +56,20 @@ pub struct MeshState {
 }
 
 impl MeshState {
+    /// Counts of records numbered without gaps.
+    pub(super) fn dense(n_tets: u32, n_vertices: u32, n_facets: u32) -> Self {
+        let arena = |n: u32| Arena {
+            fresh: sparse(n),
+            free_head: NONE,
+            n_live: n,
+        };
+        Self {
+            tets: arena(n_tets),
+            vertices: arena(n_vertices),
+            facets: arena(n_facets),
+        }
+    }
+
     /// The counts as numbers, for storing beside the pages.
     pub fn to_words(self) -> [u32; 9] {
         let [t, v, f] = [self.tets, self.vertices, self.facets];
@@ -146,6 +160,36 @@ impl<P: Pages> Mesh<P> {
     /// The counts to keep beside the pages.
     pub fn state(&self) -> MeshState {
         self.state
+    }
+
+    /// Replaces the counts, after all records were numbered anew.
+    pub(super) fn set_state(&mut self, state: MeshState) {
+        self.state = state;
+    }
+
+    /// Copies a record to an id that may lie in the next page not yet there.
+    pub(super) fn copy_record<const K: usize>(&mut self, from: u32, to: u32) {
+        let record = *self.pages.read::<K>(from);
+        if to >> SLOT_BITS == self.pages.n_pages::<K>() {
+            self.pages.append_page::<K>();
+        }
+        *self.pages.write::<K>(to) = record;
+    }
+
+    /// Copies the attribute of id `from` to that of id `to` of an array that begins at page `first`.
+    pub(super) fn copy_attribute<const K: usize>(&mut self, from: u32, to: u32, first: u32) {
+        let (a, b) = self.attribute::<K>(from);
+        if a | b == 0 {
+            return;
+        }
+        let (record, word) = attribute_place(to);
+        let record = record + (first << SLOT_BITS);
+        while record >> SLOT_BITS >= self.pages.n_pages::<K>() {
+            self.pages.append_page::<K>();
+        }
+        let slot = self.pages.write::<K>(record);
+        slot[word] = u32_le::from_native(a);
+        slot[word + 1] = u32_le::from_native(b);
     }
 
     /// The pages themselves.

@@ -2,6 +2,8 @@
 
 pub mod anatomy;
 mod cursor;
+mod renumber;
 
 pub use anatomy::{FaceRef, Tet};
 pub use cursor::{Facet, Mesh, MeshState, VertexTag, dense, sparse};
+pub use renumber::{Workspace, renumber};

@@ -3,7 +3,7 @@
 use super::watch::{Event, Watcher};
 use super::{Options, PipelineError};
 use crate::geom::Aabb;
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, Workspace};
 use crate::optimize::{self, OptimizeReport};
 use crate::refine::{Field, RefineReport, saturate};
 use crate::sizing::SizeField;
@@ -22,6 +22,7 @@ pub(super) fn fine<P: Pages>(
     field: &SizeField,
     bounds: Aabb,
     options: &Options,
+    space: &Workspace,
     watch: &Watcher,
 ) -> Result<FineReport, PipelineError> {
     let mode = options
@@ -38,14 +39,14 @@ pub(super) fn fine<P: Pages>(
         h: &|p| field.h(p),
         bounds,
     };
-    let refine = saturate(mesh, &wanted, &mut |inserted| {
+    let refine = saturate(mesh, &wanted, space, &mut |inserted| {
         watch(Event {
             stage: "divide edges",
             done: inserted,
             total: None,
             unit: "vertices",
         });
-    });
+    })?;
     let optimize = optimize::run(mesh, mode, &|p: optimize::Progress| {
         watch(Event {
             stage: p.stage,

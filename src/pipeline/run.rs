@@ -12,8 +12,8 @@ use super::watch::Watcher;
 use super::{Options, PipelineError, Plan};
 use crate::boundary::RegionSummary;
 use crate::catalog::{Catalog, JournalRow, Measure, RegionRow, Sealed, StoreState};
-use crate::geom::Aabb;
-use crate::mesh::{Mesh, MeshState};
+use crate::geom::{Aabb, HilbertFrame};
+use crate::mesh::{Mesh, MeshState, Workspace, renumber};
 use crate::sizing::{SizeField, SizeSummary};
 use crate::store::{Backing, Budget, Pager, PagerStats, StoreFile, attempt};
 use crate::surface::Surface;
@@ -101,10 +101,21 @@ impl Run<'_> {
         } else {
             (self.reopen_coarse()?, None)
         };
-        let fine = fine(&mut mesh, self.field, self.bounds, self.options, self.watch)?;
         let clock = Instant::now();
-        let subdomain = SubdomainId::new(0).expect("zero is a rank");
         let scratch = self.catalog.scratch_dir()?;
+        let space = Workspace {
+            dir: &scratch,
+            memory: self.plan.buffers / 2,
+        };
+        let fine = fine(
+            &mut mesh,
+            self.field,
+            self.bounds,
+            self.options,
+            &space,
+            self.watch,
+        )?;
+        let subdomain = SubdomainId::new(0).expect("zero is a rank");
         let target = Target {
             path: &self.catalog.file_path(0, SEALED),
             scratch: &scratch,
@@ -164,6 +175,12 @@ impl Run<'_> {
         let pager = Pager::new(self.plan.frames, Some(self.backing(COARSE, None)));
         let mut mesh = Mesh::new(pager);
         let report = coarse(&mut mesh, self.surface, self.options, self.watch)?;
+        let scratch = self.catalog.scratch_dir()?;
+        let space = Workspace {
+            dir: &scratch,
+            memory: self.plan.buffers / 2,
+        };
+        renumber(&mut mesh, &HilbertFrame::new(&self.bounds), &space)?;
         mesh.pages_mut().flush();
         let state: Vec<u8> = mesh
             .state()
@@ -171,12 +188,8 @@ impl Run<'_> {
             .into_iter()
             .flat_map(u32::to_le_bytes)
             .collect();
-        let counts: Vec<u8> = mesh
-            .pages()
-            .counts()
-            .into_iter()
-            .flat_map(u32::to_le_bytes)
-            .collect();
+        let extents = mesh.pages().extents().into_iter().flatten();
+        let counts: Vec<u8> = extents.flat_map(u32::to_le_bytes).collect();
         let (field, surface) = (self.field.to_bytes(), self.surface);
         self.catalog.commit(|step| {
             step.list_file(0, COARSE);
@@ -216,9 +229,9 @@ impl Run<'_> {
             .map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
         let mut next = || words.next().unwrap_or(0);
         let state = MeshState::from_words(std::array::from_fn(|_| next()));
-        let counts = std::array::from_fn(|_| next());
+        let extents = std::array::from_fn(|_| [next(), next()]);
         let mut pager = Pager::new(self.plan.frames, Some(self.backing(WORK, Some(base))));
-        pager.adopt(counts);
+        pager.adopt(extents);
         Ok(Mesh::with_state(pager, state))
     }
 }

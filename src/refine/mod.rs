@@ -13,8 +13,8 @@ mod insert;
 
 use crate::delaunay::Kernel;
 use crate::geom::{Aabb, HilbertFrame, Point};
-use crate::mesh::{Mesh, dense, sparse};
-use crate::store::{Pages, stop_if_requested};
+use crate::mesh::{Mesh, Workspace, dense, renumber, sparse};
+use crate::store::{Pages, StoreError, stop_if_requested};
 
 use candidates::Candidate;
 
@@ -23,6 +23,10 @@ use candidates::Candidate;
 const BLOCK_TETS: u32 = 32 * 2046;
 /// Passes over the mesh; six suffice for a uniform field, graded ones take a few more.
 const PASSES_MAX: u32 = 40;
+
+/// A mesh that has grown so much since it was numbered along the curve is numbered again: below, a sweep over its pages
+/// jumps between layers made in different passes; above, sorting costs more than it saves.
+const GROWTH: f64 = 1.5;
 
 /// What is wanted where, and where points may go.
 pub struct Field<'a> {
@@ -49,12 +53,13 @@ pub struct RefineReport {
 /// Divides edges until none is left to divide.
 ///
 /// The mesh must hold filled regions only, sizes set at all its vertices. `progress` is told the number of vertices
-/// inserted so far. Effects: new vertices and tetrahedra; `tet_of` is not kept up.
+/// inserted so far. Effects: new vertices and tetrahedra; all ids may change; `tet_of` is not kept up. Errors: the disk.
 pub fn saturate<P: Pages>(
     mesh: &mut Mesh<P>,
     field: &Field,
+    space: &Workspace,
     progress: &mut dyn FnMut(u64),
-) -> RefineReport {
+) -> Result<RefineReport, StoreError> {
     let mut report = RefineReport::default();
     let mut worker = Worker {
         kernel: Kernel::default(),
@@ -64,6 +69,7 @@ pub fn saturate<P: Pages>(
         active: Activity::all(mesh),
         last: 0,
     };
+    let mut numbered = mesh.n_tets();
     for _ in 0..PASSES_MAX {
         let before = report.inserted;
         report.passes += 1;
@@ -78,11 +84,17 @@ pub fn saturate<P: Pages>(
             }
             from = to;
         }
+        if f64::from(mesh.n_tets()) > GROWTH * f64::from(numbered) {
+            renumber(mesh, &worker.order, space)?;
+            numbered = mesh.n_tets();
+            worker.active = Activity::all(mesh);
+            worker.last = 0;
+        }
         if report.inserted == before {
             break;
         }
     }
-    report
+    Ok(report)
 }
 
 struct Worker {

@@ -14,7 +14,12 @@ fn cube(h: f64, pager: Pager) -> (Mesh<Pager>, RefineReport) {
         assert_eq!(mesh.vertex_attribute(v).0, VertexTag::EnclosingBox);
     }
     let field = Field { h: &|_| h, bounds };
-    let report = saturate(&mut mesh, &field, &mut |_| ());
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let space = Workspace {
+        dir: dir.path(),
+        memory: 1 << 20,
+    };
+    let report = saturate(&mut mesh, &field, &space, &mut |_| ()).expect("room for runs");
     (mesh, report)
 }
 

@@ -30,6 +30,10 @@ impl Pages for FlatPages {
         page
     }
 
+    fn drop_front<const K: usize>(&mut self, n: u32) {
+        self.arrays[K].drain(..n as usize * SLOTS);
+    }
+
     fn clear<const K: usize>(&mut self) {
         self.arrays[K] = Vec::new();
     }

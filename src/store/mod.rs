@@ -60,6 +60,8 @@ pub trait Pages {
     fn n_pages<const K: usize>(&self) -> u32;
     /// Appends a zeroed page of kind `K` and returns its number.
     fn append_page<const K: usize>(&mut self) -> u32;
+    /// Forgets the first `n` pages of kind `K`; the others move up to take their numbers.
+    fn drop_front<const K: usize>(&mut self, n: u32);
     /// Forgets all pages of kind `K`, as if there had never been one.
     fn clear<const K: usize>(&mut self);
 }

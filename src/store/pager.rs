@@ -66,6 +66,8 @@ pub struct Pager {
     free: Vec<u32>,
     /// `tables[kind][page]`: resident frame with flags, or where the page is.
     tables: [Vec<u32>; kind::ALL.len()],
+    /// Number in the file of each kind's first page; grows when pages are dropped from the front.
+    first: [u32; kind::ALL.len()],
     /// Kind and page of each frame, or [`NOBODY`].
     owners: Vec<(u8, u32)>,
     order: LruCache<u32, ()>,
@@ -85,6 +87,7 @@ impl Pager {
             frames_max,
             free: Vec::new(),
             tables: Default::default(),
+            first: Default::default(),
             owners: Vec::new(),
             order: LruCache::unbounded(),
             backing,
@@ -108,16 +111,26 @@ impl Pager {
         self.owners.len()
     }
 
-    /// Declares how many pages of each kind the base file holds.
-    pub fn adopt(&mut self, counts: [u32; kind::ALL.len()]) {
-        for (table, n) in self.tables.iter_mut().zip(counts) {
-            *table = vec![IN_BASE; n as usize];
+    /// Declares what the base file holds: [`Pager::extents`] of the pager that wrote it.
+    pub fn adopt(&mut self, extents: [[u32; 2]; kind::ALL.len()]) {
+        for (kind, [first, n]) in extents.into_iter().enumerate() {
+            self.first[kind] = first;
+            self.tables[kind] = vec![IN_BASE; n as usize];
         }
     }
 
-    /// Pages of each kind.
-    pub fn counts(&self) -> [u32; kind::ALL.len()] {
-        std::array::from_fn(|kind| self.tables[kind].len() as u32)
+    /// Number in the file of the first page of each kind, and how many there are.
+    pub fn extents(&self) -> [[u32; 2]; kind::ALL.len()] {
+        std::array::from_fn(|kind| [self.first[kind], self.tables[kind].len() as u32])
+    }
+
+    /// Where a page is stored.
+    fn address(&self, kind: usize, page: u32) -> PageAddress {
+        PageAddress {
+            kind: kind::ALL[kind],
+            subdomain: self.backing.as_ref().map_or(0, |b| b.subdomain),
+            page: self.first[kind] + page,
+        }
     }
 
     /// Writes every dirty page to the file of this generation; afterwards it and the base hold all.
@@ -189,11 +202,7 @@ impl Pager {
     fn load<const K: usize>(&mut self, page: u32, place: u32) -> u32 {
         stop_if_requested();
         let frame = self.take_frame();
-        let address = PageAddress {
-            kind: kind::ALL[K],
-            subdomain: self.backing.as_ref().map_or(0, |b| b.subdomain),
-            page,
-        };
+        let address = self.address(K, page);
         let file = match place {
             IN_WORK => self.work.as_mut(),
             _ => self.backing.as_mut().and_then(|b| b.base.as_mut()),
@@ -201,7 +210,7 @@ impl Pager {
         let file = file.expect("a page that is not resident is in a file");
         let at = frame as usize * SLOTS;
         let slots = &mut self.frames[at..at + SLOTS];
-        let read = file.read(page_key(address.kind, page), |bytes| {
+        let read = file.read(page_key(address.kind, address.page), |bytes| {
             open_page(bytes, address, slots)
         });
         let path = || file.path().to_owned();
@@ -287,21 +296,17 @@ impl Pager {
                 Err(error) => fail(error),
             }
         }
-        let (subdomain, generation) = (backing.subdomain, backing.generation);
+        let generation = backing.generation;
+        let mut keys = Vec::with_capacity(batch.len());
         for &frame in batch {
             let (kind, page) = self.owners[frame as usize];
-            let address = PageAddress {
-                kind: kind::ALL[usize::from(kind)],
-                subdomain,
-                page,
-            };
+            let address = self.address(usize::from(kind), page);
+            keys.push(page_key(address.kind, address.page));
             seal_page(self.frame(frame), address, generation);
         }
-        let (frames, owners) = (&self.frames, &self.owners);
-        let values = batch.iter().map(|&frame| {
-            let (kind, page) = owners[frame as usize];
+        let frames = &self.frames;
+        let values = batch.iter().zip(keys).map(|(&frame, key)| {
             let at = frame as usize * SLOTS;
-            let key = page_key(kind::ALL[usize::from(kind)], page);
             (key, stored_bytes(&frames[at..at + SLOTS]))
         });
         let work = self.work.as_mut().expect("created above");
@@ -361,8 +366,30 @@ impl Pages for Pager {
         page
     }
 
+    fn drop_front<const K: usize>(&mut self, n: u32) {
+        let rest = self.tables[K].split_off(n as usize);
+        let dropped = std::mem::replace(&mut self.tables[K], rest);
+        self.release(dropped);
+        self.first[K] += n;
+        for (_, page) in self
+            .owners
+            .iter_mut()
+            .filter(|(kind, _)| usize::from(*kind) == K)
+        {
+            *page -= n;
+        }
+    }
+
     fn clear<const K: usize>(&mut self) {
-        for entry in std::mem::take(&mut self.tables[K]) {
+        let dropped = std::mem::take(&mut self.tables[K]);
+        self.release(dropped);
+    }
+}
+
+impl Pager {
+    /// Gives the frames of forgotten pages back.
+    fn release(&mut self, entries: Vec<u32>) {
+        for entry in entries {
             if entry & RESIDENT != 0 {
                 let frame = entry & FRAME_MASK;
                 self.order.pop(&frame);

@@ -1,0 +1,213 @@
+//! Renumber along the Hilbert curve, so that what is near in space is near in pages.
+//!
+//! Insertion numbers tetrahedra as they come: after a mesh has grown by half, neighbors lie in pages far apart, and a
+//! sweep in id order touches every page again and again. New records are written behind the old ones in sorted order, then
+//! the old pages are dropped from the front.
+
+use std::path::Path;
+
+use super::cursor::{Mesh, VertexTag, dense, sparse};
+use super::{FaceRef, MeshState};
+use crate::geom::HilbertFrame;
+use crate::store::{Pages, Sorter, StoreError, kind};
+use tetdb_schema::page::{NONE, SLOT_BITS};
+
+/// Where sorting may put its runs, and how many bytes it may hold.
+#[derive(Clone, Copy, Debug)]
+pub struct Workspace<'a> {
+    pub dir: &'a Path,
+    pub memory: u64,
+}
+
+/// Renumbers vertices, tetrahedra and the facets' references to them; frees every unused id.
+///
+/// The order is a function of positions alone. Effects: all ids change, the scratch map is used up, and `tet_of` is no longer
+/// right. Errors: the disk, while sorting.
+pub fn renumber<P: Pages>(
+    mesh: &mut Mesh<P>,
+    order: &HilbertFrame,
+    space: &Workspace,
+) -> Result<(), StoreError> {
+    mesh.clear_scratch();
+    let n_vertices = renumber_vertices(mesh, order, space)?;
+    let n_tets = renumber_tets(mesh, order, space)?;
+    for n in 0..mesh.n_facets() {
+        let mut facet = mesh.facet(n);
+        facet.vertices = facet.vertices.map(|v| mesh.scratch(dense(v)));
+        mesh.set_facet(n, facet);
+    }
+    mesh.clear_scratch();
+    mesh.set_state(MeshState::dense(n_tets, n_vertices, mesh.n_facets()));
+    Ok(())
+}
+
+fn record(key: u64, id: u32) -> [u8; 12] {
+    let mut record = [0; 12];
+    record[..8].copy_from_slice(&key.to_be_bytes());
+    record[8..].copy_from_slice(&id.to_be_bytes());
+    record
+}
+
+fn id_of(record: [u8; 12]) -> u32 {
+    u32::from_be_bytes([record[8], record[9], record[10], record[11]])
+}
+
+/// Leaves the new number of each vertex in the scratch map, at its old dense number.
+fn renumber_vertices<P: Pages>(
+    mesh: &mut Mesh<P>,
+    order: &HilbertFrame,
+    space: &Workspace,
+) -> Result<u32, StoreError> {
+    let end = dense(mesh.vertex_ids_end());
+    for n in 0..end {
+        mesh.set_scratch(n, NONE);
+    }
+    let mut from = 0;
+    while let Some((t, tet)) = mesh.next_tet(from) {
+        from = t + 1;
+        for v in tet.vertices() {
+            mesh.set_scratch(dense(v), 0);
+        }
+    }
+    let mut sorter = Sorter::<12>::new(space.dir, space.memory);
+    for n in 0..end {
+        let v = sparse(n);
+        // A surface vertex may have no tetrahedron, when its facets lie between empty regions.
+        if mesh.scratch(n) == NONE && mesh.vertex_attribute(v).0 != VertexTag::Surface {
+            continue;
+        }
+        sorter.push(record(order.index(mesh.point(v)), v))?;
+    }
+    let old_pages = mesh.pages().n_pages::<{ kind::VERTICES }>();
+    let old_attributes = mesh.pages().n_pages::<{ kind::VERTEX_ATTRIBUTES }>();
+    let mut n_new = 0;
+    for sorted in sorter.finish()? {
+        let v = id_of(sorted?);
+        let to = sparse(n_new);
+        mesh.copy_record::<{ kind::VERTICES }>(v, (old_pages << SLOT_BITS) + to);
+        mesh.copy_attribute::<{ kind::VERTEX_ATTRIBUTES }>(v, to, old_attributes);
+        mesh.set_scratch(dense(v), to);
+        n_new += 1;
+    }
+    mesh.pages_mut().drop_front::<{ kind::VERTICES }>(old_pages);
+    mesh.pages_mut()
+        .drop_front::<{ kind::VERTEX_ATTRIBUTES }>(old_attributes);
+    Ok(n_new)
+}
+
+fn renumber_tets<P: Pages>(
+    mesh: &mut Mesh<P>,
+    order: &HilbertFrame,
+    space: &Workspace,
+) -> Result<u32, StoreError> {
+    // The map of tetrahedra lies behind that of vertices.
+    let base = dense(mesh.vertex_ids_end());
+    let mut sorter = Sorter::<12>::new(space.dir, space.memory);
+    let mut from = 0;
+    while let Some((t, mut tet)) = mesh.next_tet(from) {
+        from = t + 1;
+        for (i, v) in tet.vertices().into_iter().enumerate() {
+            tet.node[i] = tet.node[i] - v + mesh.scratch(dense(v));
+        }
+        mesh.set_tet(t, tet);
+        let [a, b, c, d] = mesh.points(&tet);
+        sorter.push(record(order.index((a + b + c + d) * 0.25), t))?;
+    }
+    let old_pages = mesh.pages().n_pages::<{ kind::TETS }>();
+    let old_attributes = mesh.pages().n_pages::<{ kind::TET_ATTRIBUTES }>();
+    let mut n_new = 0;
+    for sorted in sorter.finish()? {
+        let t = id_of(sorted?);
+        let to = sparse(n_new);
+        mesh.copy_record::<{ kind::TETS }>(t, (old_pages << SLOT_BITS) + to);
+        mesh.copy_attribute::<{ kind::TET_ATTRIBUTES }>(t, to, old_attributes);
+        mesh.set_scratch(base + dense(t), to);
+        n_new += 1;
+    }
+    mesh.pages_mut().drop_front::<{ kind::TETS }>(old_pages);
+    mesh.pages_mut()
+        .drop_front::<{ kind::TET_ATTRIBUTES }>(old_attributes);
+    for n in 0..n_new {
+        let t = sparse(n);
+        let mut tet = mesh.tet(t);
+        for face in &mut tet.neighbor {
+            if face.exists() {
+                *face = FaceRef::new(mesh.scratch(base + dense(face.tet())), face.face());
+            }
+        }
+        mesh.set_tet(t, tet);
+    }
+    Ok(n_new)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::delaunay::{Kernel, enclose};
+    use crate::geom::{Aabb, Point};
+    use crate::store::{FlatPages, Pager};
+
+    /// The mesh as a set: sorted coordinates, neighbors' apexes, attribute.
+    fn shape<P: Pages>(mesh: &mut Mesh<P>) -> Vec<String> {
+        let mut all = Vec::new();
+        let mut from = 0;
+        while let Some((t, tet)) = mesh.next_tet(from) {
+            from = t + 1;
+            let mut corners: Vec<String> = (0..4)
+                .map(|i| {
+                    let v = tet.vertex(i);
+                    let apex = tet.neighbor[i];
+                    let apex = apex.exists().then(|| {
+                        let other = mesh.tet(apex.tet());
+                        assert_eq!(other.neighbor[apex.face()], FaceRef::new(t, i));
+                        mesh.point(other.vertex(apex.face()))
+                    });
+                    format!(
+                        "{} {:?} {apex:?} {}",
+                        mesh.point(v),
+                        mesh.vertex_attribute(v),
+                        tet.is_required(i)
+                    )
+                })
+                .collect();
+            corners.sort_unstable();
+            all.push(format!("{corners:?} {:?}", mesh.tet_attribute(t)));
+        }
+        all.sort_unstable();
+        all
+    }
+
+    fn check<P: Pages>(pages: P) {
+        let mut mesh = Mesh::new(pages);
+        let bounds = Aabb::around([Point::ZERO, Point::ONE]);
+        let mut hint = enclose(&mut mesh, &bounds);
+        let mut kernel = Kernel::default();
+        for i in 0..3000u32 {
+            let f = |k: u32| {
+                f64::from(i.wrapping_mul(2_654_435_761).wrapping_mul(k) >> 8) / f64::from(1 << 24)
+            };
+            let p = Point::new(f(1), f(3), f(7));
+            let v = mesh.add_vertex(p, 1.0);
+            mesh.set_vertex_attribute(v, VertexTag::Surface, i);
+            hint = kernel.insert(&mut mesh, v, p, hint).unwrap_or(hint);
+            mesh.set_tet_attribute(hint, i % 5, 0);
+        }
+        mesh.set_required(FaceRef::new(hint, 2), true);
+        let before = shape(&mut mesh);
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let space = Workspace {
+            dir: dir.path(),
+            memory: 1 << 20,
+        };
+        for _ in 0..2 {
+            renumber(&mut mesh, &HilbertFrame::new(&bounds), &space).expect("room for runs");
+            assert_eq!(shape(&mut mesh), before);
+        }
+    }
+
+    #[test]
+    fn the_mesh_stays_the_same_under_other_numbers() {
+        check(FlatPages::default());
+        check(Pager::new(1 << 24, None));
+    }
+}
