@@ -1,0 +1,137 @@
+//! Why a file could not be written.
+
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+
+use crate::catalog::CatalogError;
+use crate::store::StoreError;
+
+/// Errors of writing meshes and surfaces.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum WriteError {
+    /// The name does not end as a format does.
+    #[error("{path}: its ending names no known format, expected {known}")]
+    UnknownFormat { path: PathBuf, known: &'static str },
+    /// The format has only single precision, the surface needs double.
+    #[error("{path}: this format would round the coordinates of vertex {vertex}")]
+    Lossy { path: PathBuf, vertex: u32 },
+    /// The format's numbers are too small.
+    #[error("{path}: this format holds at most {limit} {what}, found {found}")]
+    TooLarge {
+        path: PathBuf,
+        what: &'static str,
+        limit: u64,
+        found: u64,
+    },
+    /// The file will not fit. Units: bytes.
+    #[error("{path}: no space for it, {needed} bytes are needed and {available} are free")]
+    NoSpace {
+        path: PathBuf,
+        needed: u64,
+        available: u64,
+    },
+    /// The disk filled up while the file was written.
+    #[error("{path}: no space left to write it")]
+    DiskFull { path: PathBuf },
+    /// A file operation failed.
+    #[error("{path}: {source}")]
+    Io {
+        path: PathBuf,
+        #[source]
+        source: std::io::Error,
+    },
+    /// The store cannot be read as it is: damaged, unfinished, busy.
+    #[error(transparent)]
+    Store(CatalogError),
+}
+
+impl WriteError {
+    /// The word for this error.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::UnknownFormat { .. } => "unknown-format",
+            Self::Lossy { .. } => "lossy-format",
+            Self::TooLarge { .. } => "format-limit",
+            Self::NoSpace { .. } | Self::DiskFull { .. } => "disk-full",
+            Self::Io { .. } => "io",
+            Self::Store(CatalogError::Store(StoreError::Stopped)) => "stopped",
+            Self::Store(error) => match error.exit_code() {
+                4 => "damaged",
+                5 => "busy",
+                8 => "unusable-store",
+                3 => "not-found",
+                _ => "io",
+            },
+        }
+    }
+
+    /// The process exit code of this class of error.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::UnknownFormat { .. } | Self::Lossy { .. } | Self::TooLarge { .. } => 2,
+            Self::NoSpace { .. } | Self::DiskFull { .. } | Self::Io { .. } => 6,
+            Self::Store(error) => error.exit_code(),
+        }
+    }
+
+    /// The file it is about, unless it is about the store, whose errors name their file.
+    pub fn place(&self) -> Option<&Path> {
+        match self {
+            Self::UnknownFormat { path, .. }
+            | Self::Lossy { path, .. }
+            | Self::TooLarge { path, .. }
+            | Self::NoSpace { path, .. }
+            | Self::DiskFull { path }
+            | Self::Io { path, .. } => Some(path),
+            Self::Store(_) => None,
+        }
+    }
+
+    /// What to do about it.
+    pub fn help(&self) -> &'static str {
+        match self {
+            Self::UnknownFormat { .. } => {
+                "end the name of a mesh with .vtu, .mesh, .meshb, .msh or .inp, of a surface with .stl, .off, .obj or .ply"
+            }
+            Self::Lossy { .. } => "choose .ply, .obj, .off or .stl (text), which keep doubles",
+            Self::TooLarge { .. } => "export to .vtu or .meshb, whose numbers have 64 bits",
+            Self::NoSpace { .. } | Self::DiskFull { .. } => {
+                "free some space, or export to another disk; compare with `df -h`"
+            }
+            Self::Io { .. } => "check that the folder exists and may be written: `ls -ld FOLDER`",
+            Self::Store(error) if error.is_damage() => {
+                "see what is left with `tetdb verify`; copy the store again or mesh the surface again"
+            }
+            Self::Store(CatalogError::Store(StoreError::Stopped)) => "run the command again",
+            Self::Store(_) => "look at the store with `tetdb info`",
+        }
+    }
+
+    /// Wraps a failed operation on `path`.
+    pub(super) fn io(path: &Path, source: std::io::Error) -> Self {
+        let path = path.to_owned();
+        if source.kind() == std::io::ErrorKind::StorageFull {
+            return Self::DiskFull { path };
+        }
+        Self::Io { path, source }
+    }
+}
+
+impl From<CatalogError> for WriteError {
+    fn from(error: CatalogError) -> Self {
+        match error {
+            CatalogError::Store(StoreError::Full { path }) => Self::DiskFull { path },
+            CatalogError::Store(StoreError::Io { path, source })
+            | CatalogError::Io { path, source } => Self::Io { path, source },
+            other => Self::Store(other),
+        }
+    }
+}
+
+impl From<StoreError> for WriteError {
+    fn from(error: StoreError) -> Self {
+        Self::from(CatalogError::from(error))
+    }
+}

@@ -1,0 +1,92 @@
+//! Gmsh 2.2, binary: physical surfaces are labels, physical volumes regions.
+//!
+//! Physical and elementary tags are the same: label + 1 on triangles, the region on tetrahedra.
+//! Elements are numbered from 1, triangles first. Source: the Gmsh reference manual, "MSH file format version 2".
+
+use std::path::Path;
+
+use super::Result;
+use super::draft::Draft;
+use super::merged::Merged;
+use super::stream::Stream;
+
+/// Gmsh's numbers of the two types of elements.
+const TRIANGLE: u32 = 2;
+const TETRAHEDRON: u32 = 4;
+/// Tags of an element: physical, elementary.
+const N_TAGS: u32 = 2;
+
+pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<()> {
+    mesh.check_limits(out, i32::MAX as u64)?;
+    mesh.expect_passes(1, 1);
+    let bytes = 200 + 28 * mesh.n_vertices() + 24 * mesh.n_faces() + 28 * mesh.n_tets();
+    let names = physical_names(mesh)?;
+    let path = draft.create(out, bytes + names.len() as u64)?;
+    let mut stream = Stream::open(&path)?;
+    stream.text("$MeshFormat\n2.2 1 8\n");
+    put(&mut stream, &[1]);
+    stream.text("\n$EndMeshFormat\n");
+    stream.text(&names);
+    stream.text(&format!("$Nodes\n{}\n", mesh.n_vertices()));
+    mesh.vertices(|number, vertex| {
+        put(&mut stream, &[number as u32 + 1]);
+        for x in vertex.point {
+            stream.bytes(&x.to_le_bytes());
+        }
+        stream.end()
+    })?;
+    let (n_faces, n_tets) = (mesh.n_faces(), mesh.n_tets());
+    stream.text(&format!(
+        "\n$EndNodes\n$Elements\n{}\n",
+        n_faces + n_tets
+    ));
+    elements(mesh, &mut stream)?;
+    stream.text("\n$EndElements\n");
+    stream.finish()
+}
+
+fn put(stream: &mut Stream, words: &[u32]) {
+    for word in words {
+        stream.bytes(&word.to_le_bytes());
+    }
+}
+
+fn elements(mesh: &mut Merged, stream: &mut Stream) -> Result<()> {
+    let mut number = 0;
+    if mesh.n_faces() > 0 {
+        put(stream, &[TRIANGLE, mesh.n_faces() as u32, N_TAGS]);
+        mesh.faces().each(|face| {
+            number += 1;
+            let tag = face.label + 1;
+            let [a, b, c] = face.vertices.map(|v| v as u32 + 1);
+            put(stream, &[number, tag, tag, a, b, c]);
+            stream.end()
+        })?;
+    }
+    if mesh.n_tets() > 0 {
+        put(stream, &[TETRAHEDRON, mesh.n_tets() as u32, N_TAGS]);
+        mesh.tets(|tet| {
+            number += 1;
+            let [a, b, c, d] = tet.nodes.map(|v| v as u32 + 1);
+            put(stream, &[number, tet.region, tet.region, a, b, c, d]);
+            stream.end()
+        })?;
+    }
+    Ok(())
+}
+
+/// The section that names labels (dimension 2) and regions (dimension 3).
+fn physical_names(mesh: &mut Merged) -> Result<String> {
+    let labels = mesh.labels();
+    let regions = mesh.regions()?;
+    let mut text = format!("$PhysicalNames\n{}\n", labels.len() + regions.len());
+    for (label, name) in labels {
+        // A name ends at the next quote or line.
+        let name = name.replace('"', "'").replace(['\n', '\r'], " ");
+        text += &format!("2 {} \"{name}\"\n", label + 1);
+    }
+    for region in regions {
+        text += &format!("3 {region} \"region_{region}\"\n");
+    }
+    Ok(text + "$EndPhysicalNames\n")
+}

@@ -1,0 +1,290 @@
+//! The sub-domains of a store as one mesh, streamed.
+
+use std::cell::Cell;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use tetdb_schema::ids::TetId;
+use tetdb_schema::record::SealedVertex;
+
+use super::faces::{FaceSorter, Faces};
+use super::numbering::Numbering;
+use super::{Result, WriteError};
+use crate::catalog::{Catalog, CatalogError, Shape, Store, Subdomain, SubdomainRow};
+use crate::store::stop_if_requested;
+
+/// Counts records and tells.
+pub(super) struct Progress<'a> {
+    tell: &'a dyn Fn(u64, u64),
+    done: Cell<u64>,
+    total: Cell<u64>,
+}
+
+impl<'a> Progress<'a> {
+    pub fn new(tell: &'a dyn Fn(u64, u64)) -> Self {
+        let (done, total) = (Cell::new(0), Cell::new(0));
+        Self { tell, done, total }
+    }
+
+    /// Counts `n` more records; the place where a request to stop is heard.
+    fn advance(&self, n: usize) {
+        stop_if_requested();
+        let done = self.done.get() + n as u64;
+        self.done.set(done);
+        (self.tell)(done, self.total.get().max(done));
+    }
+}
+
+/// A tetrahedron of the merged mesh.
+pub(super) struct Tet {
+    /// Numbers of its vertices; positive volume in this order.
+    pub nodes: [u64; 4],
+    pub region: u32,
+    pub subdomain: u32,
+    /// Its name for ever.
+    pub id: TetId,
+    /// NaN in a pass that does not ask for it.
+    pub quality: f64,
+}
+
+/// A finished store as one conforming mesh.
+///
+/// Shape: `parts` by rank. Each pass reads every chunk once and holds a quarter of the memory.
+pub(super) struct Merged<'a> {
+    store: &'a mut Store,
+    parts: Vec<SubdomainRow>,
+    numbering: Numbering,
+    faces: Faces,
+    label_names: Vec<String>,
+    memory: usize,
+    progress: Progress<'a>,
+}
+
+impl<'a> Merged<'a> {
+    /// Numbers the vertices and sorts the boundary faces, with scratch in `dir`.
+    ///
+    /// Errors: a store that is not finished, damage, the disk.
+    pub fn open(
+        store: &'a mut Store,
+        dir: &Path,
+        memory: usize,
+        progress: Progress<'a>,
+    ) -> Result<Self> {
+        let catalog = store.catalog();
+        let path = catalog.dir().to_owned();
+        if !catalog.state()?.is_finished() {
+            return Err(CatalogError::Unfinished { path }.into());
+        }
+        let parts = catalog.subdomains()?;
+        let label_names = catalog.labels()?;
+        let counts: Vec<_> = parts.iter().map(|row| (row.rank, row.vertices)).collect();
+        let numbering = Numbering::new(store, &counts, dir, memory)?;
+        let faces = collect_faces(store, &parts, &numbering, dir, memory)?;
+        Ok(Self {
+            store,
+            parts,
+            numbering,
+            faces,
+            label_names,
+            memory,
+            progress,
+        })
+    }
+
+    pub fn n_vertices(&self) -> u64 {
+        self.numbering.n_vertices()
+    }
+
+    pub fn n_tets(&self) -> u64 {
+        self.parts.iter().map(|row| row.tets).sum()
+    }
+
+    pub fn n_faces(&self) -> u64 {
+        self.faces.n
+    }
+
+    pub fn faces(&self) -> &Faces {
+        &self.faces
+    }
+
+    /// Bytes for a sorter beside a pass.
+    pub fn sorter_bytes(&self) -> u64 {
+        self.memory as u64 / 4
+    }
+
+    /// Names of the labels the faces have, ascending by label.
+    pub fn labels(&self) -> BTreeMap<u32, String> {
+        let name = |&label: &u32| {
+            let known = self.label_names.get(label as usize);
+            (label, known.cloned().unwrap_or(format!("label_{label}")))
+        };
+        self.faces.labels.keys().map(name).collect()
+    }
+
+    /// Announces how many passes will come, for progress.
+    pub fn expect_passes(&self, vertices: u64, tets: u64) {
+        let v: u64 = self.parts.iter().map(|row| row.vertices).sum();
+        let total = vertices * v + tets * self.n_tets();
+        self.progress.total.set(total);
+    }
+
+    /// Tells that all is done.
+    pub fn tell_end(&self) {
+        let total = self.progress.total.get().max(self.progress.done.get());
+        (self.progress.tell)(total, total);
+    }
+
+    /// Refuses what does not fit the format's numbers.
+    pub fn check_limits(&self, out: &Path, limit: u64) -> Result<()> {
+        let elements = self.n_tets() + self.n_faces();
+        for (what, found) in [("vertices", self.n_vertices()), ("elements", elements)] {
+            if found > limit {
+                let path = out.to_owned();
+                return Err(WriteError::TooLarge {
+                    path,
+                    what,
+                    limit,
+                    found,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Every vertex with its number, ascending. Errors: damage, those of `each`.
+    pub fn vertices(
+        &mut self,
+        mut each: impl FnMut(u64, &SealedVertex) -> Result<()>,
+    ) -> Result<()> {
+        for (p, row) in self.parts.iter().enumerate() {
+            let numbers = self.numbering.part(p)?;
+            let mut part = Subdomain::open(self.store.catalog(), row.rank, self.memory / 4)?;
+            for chunk in part.vertex_chunks() {
+                let chunk = chunk?;
+                let end = u64::from(chunk.first) + chunk.records.len() as u64;
+                if end > row.vertices {
+                    return Err(too_many_vertices(self.store.catalog(), row, end).into());
+                }
+                for (local, vertex) in (chunk.first..).zip(&chunk.records) {
+                    if let Some(number) = numbers.own(local) {
+                        each(number, vertex)?;
+                    }
+                }
+                self.progress.advance(chunk.records.len());
+            }
+        }
+        Ok(())
+    }
+
+    /// Every tetrahedron in the order of its number. Errors: damage, those of `each`.
+    pub fn tets(&mut self, each: impl FnMut(&Tet) -> Result<()>) -> Result<()> {
+        self.pass(false, each)
+    }
+
+    /// As [`Merged::tets`], with qualities.
+    pub fn tets_with_quality(&mut self, each: impl FnMut(&Tet) -> Result<()>) -> Result<()> {
+        self.pass(true, each)
+    }
+
+    fn pass(&mut self, quality: bool, mut each: impl FnMut(&Tet) -> Result<()>) -> Result<()> {
+        for (p, row) in self.parts.iter().enumerate() {
+            let numbers = self.numbering.part(p)?;
+            let mut part = Subdomain::open(self.store.catalog(), row.rank, self.memory / 4)?;
+            let mut expected = 0;
+            for chunk in 0..part.tet_summaries().len() {
+                let chunk = part.tet_chunk(chunk as u32)?;
+                for (local, tet) in (chunk.first..).zip(&chunk.records) {
+                    let id = TetId::new(part.id(), local)
+                        .filter(|_| local == expected && u64::from(local) < row.tets);
+                    let id = id.ok_or_else(|| damaged(&part, local, expected))?;
+                    expected += 1;
+                    if let Some(&v) = tet.nodes.iter().find(|&&v| u64::from(v) >= row.vertices) {
+                        part.corner(v)?;
+                    }
+                    let quality = if quality {
+                        Shape::of(part.corners(tet.nodes)?.map(|c| c.point)).quality
+                    } else {
+                        f64::NAN
+                    };
+                    each(&Tet {
+                        nodes: tet.nodes.map(|v| numbers.of(v)),
+                        region: tet.region,
+                        subdomain: row.rank,
+                        id,
+                        quality,
+                    })?;
+                }
+                self.progress.advance(chunk.records.len());
+            }
+            if u64::from(expected) != row.tets {
+                return Err(damaged(&part, row.tets as u32, expected).into());
+            }
+        }
+        Ok(())
+    }
+
+    /// The regions that have tetrahedra; decodes only chunks with several.
+    ///
+    /// Errors: damage.
+    pub fn regions(&mut self) -> Result<BTreeSet<u32>> {
+        let mut regions = BTreeSet::new();
+        for row in &self.parts {
+            let mut part = Subdomain::open(self.store.catalog(), row.rank, self.memory / 4)?;
+            for chunk in 0..part.tet_summaries().len() {
+                let [least, greatest] = part.tet_summaries()[chunk].regions;
+                regions.extend([least, greatest]);
+                if greatest.saturating_sub(least) > 1 {
+                    let chunk = part.tet_chunk(chunk as u32)?;
+                    regions.extend(chunk.records.iter().map(|t| t.region));
+                }
+            }
+        }
+        Ok(regions)
+    }
+}
+
+fn damaged(part: &Subdomain, found: u32, expected: u32) -> CatalogError {
+    CatalogError::Content {
+        path: part.path().to_owned(),
+        subdomain: part.id().rank(),
+        what: format!("tetrahedron {found} stands where {expected} was expected"),
+    }
+}
+
+fn too_many_vertices(catalog: &Catalog, row: &SubdomainRow, end: u64) -> CatalogError {
+    CatalogError::Content {
+        path: catalog.file_path(row.rank, row.generation),
+        subdomain: row.rank,
+        what: format!("a chunk ends at vertex {end}, the catalog counts {}", row.vertices),
+    }
+}
+
+fn collect_faces(
+    store: &mut Store,
+    parts: &[SubdomainRow],
+    numbering: &Numbering,
+    dir: &Path,
+    memory: usize,
+) -> Result<Faces> {
+    let mut sorter = FaceSorter::new(dir, memory as u64 / 4);
+    let mut tet_first = 0;
+    for (p, row) in parts.iter().enumerate() {
+        let numbers = numbering.part(p)?;
+        let mut part = Subdomain::open(store.catalog(), row.rank, memory / 4)?;
+        let path = part.path().to_owned();
+        for facet in part.facets() {
+            let facet = facet?;
+            if facet.vertices.iter().any(|&v| u64::from(v) >= row.vertices) {
+                return Err(CatalogError::Content {
+                    path,
+                    subdomain: row.rank,
+                    what: format!("a facet names vertices {:?}", facet.vertices),
+                }
+                .into());
+            }
+            sorter.push(&facet, &numbers, tet_first)?;
+        }
+        tet_first += row.tets;
+    }
+    sorter.finish()
+}

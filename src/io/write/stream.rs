@@ -1,0 +1,158 @@
+//! One file written front to back, and one array written into its place in a file.
+
+use std::fs::{File, OpenOptions};
+use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+use super::{Result, WriteError};
+
+/// Bytes gathered before a write.
+const BUFFER_BYTES: usize = 256 << 10;
+
+/// A file being written as text or bytes.
+pub(super) struct Stream {
+    path: PathBuf,
+    file: File,
+    buffer: Vec<u8>,
+    integers: itoa::Buffer,
+    doubles: zmij::Buffer,
+}
+
+impl Stream {
+    /// Writes `path`, which exists, from its beginning.
+    pub fn open(path: &Path) -> Result<Self> {
+        let file = OpenOptions::new().write(true).open(path);
+        Ok(Self {
+            path: path.to_owned(),
+            file: file.map_err(|e| WriteError::io(path, e))?,
+            buffer: Vec::with_capacity(BUFFER_BYTES + 4096),
+            integers: itoa::Buffer::new(),
+            doubles: zmij::Buffer::new(),
+        })
+    }
+
+    pub fn bytes(&mut self, bytes: &[u8]) {
+        self.buffer.extend_from_slice(bytes);
+    }
+
+    pub fn text(&mut self, text: &str) {
+        self.bytes(text.as_bytes());
+    }
+
+    /// A number in decimal and the byte after it.
+    pub fn integer(&mut self, value: u64, after: u8) {
+        let text = self.integers.format(value);
+        self.buffer.extend_from_slice(text.as_bytes());
+        self.buffer.push(after);
+    }
+
+    /// The shortest decimal that reads back as the same bits, and the byte after it. Coordinates are finite.
+    pub fn double(&mut self, value: f64, after: u8) {
+        let text = self.doubles.format(value);
+        self.buffer.extend_from_slice(text.as_bytes());
+        self.buffer.push(after);
+    }
+
+    /// Ends a record: what was gathered is written when it is enough.
+    #[inline]
+    pub fn end(&mut self) -> Result<()> {
+        if self.buffer.len() < BUFFER_BYTES {
+            return Ok(());
+        }
+        self.flush()
+    }
+
+    fn flush(&mut self) -> Result<()> {
+        let written = self.file.write_all(&self.buffer);
+        self.buffer.clear();
+        written.map_err(|e| WriteError::io(&self.path, e))
+    }
+
+    /// Writes the rest.
+    pub fn finish(mut self) -> Result<()> {
+        self.flush()
+    }
+}
+
+/// An array of known length being written at its place in a file that others write too.
+pub(super) struct Strip {
+    path: PathBuf,
+    out: BufWriter<File>,
+    left: u64,
+}
+
+impl Strip {
+    /// The `bytes` bytes of `path` from `start` on; the file exists.
+    pub fn open(path: &Path, start: u64, bytes: u64) -> Result<Self> {
+        let io = |e| WriteError::io(path, e);
+        let mut file = OpenOptions::new().write(true).open(path).map_err(io)?;
+        file.seek(SeekFrom::Start(start)).map_err(io)?;
+        Ok(Self {
+            path: path.to_owned(),
+            out: BufWriter::with_capacity(BUFFER_BYTES, file),
+            left: bytes,
+        })
+    }
+
+    #[inline]
+    pub fn put(&mut self, bytes: &[u8]) -> Result<()> {
+        let left = self.left.checked_sub(bytes.len() as u64);
+        self.left = left.expect("arrays were measured by the same counts");
+        let written = self.out.write_all(bytes);
+        written.map_err(|e| WriteError::io(&self.path, e))
+    }
+
+    /// Ends the array, which must be full.
+    pub fn finish(mut self) -> Result<()> {
+        assert_eq!(self.left, 0, "bytes missing in {}", self.path.display());
+        self.out.flush().map_err(|e| WriteError::io(&self.path, e))
+    }
+}
+
+/// Reads records of `N` bytes from a scratch file, from record `first` on; `None` at its end.
+pub(super) struct Records<const N: usize> {
+    path: PathBuf,
+    file: std::io::BufReader<File>,
+}
+
+impl<const N: usize> Records<N> {
+    pub fn open(path: &Path, first: u64) -> Result<Self> {
+        let io = |e| WriteError::io(path, e);
+        let mut file = File::open(path).map_err(io)?;
+        file.seek(SeekFrom::Start(first * N as u64)).map_err(io)?;
+        Ok(Self {
+            path: path.to_owned(),
+            file: std::io::BufReader::with_capacity(BUFFER_BYTES, file),
+        })
+    }
+
+    pub fn next(&mut self) -> Result<Option<[u8; N]>> {
+        let mut record = [0; N];
+        match self.file.read_exact(&mut record) {
+            Ok(()) => Ok(Some(record)),
+            Err(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => Ok(None),
+            Err(e) => Err(WriteError::io(&self.path, e)),
+        }
+    }
+}
+
+/// A scratch file that does not exist yet.
+pub(super) fn scratch(path: &Path) -> Result<Stream> {
+    File::create_new(path).map_err(|e| WriteError::io(path, e))?;
+    Stream::open(path)
+}
+
+/// Number of `N` big-endian bytes at `at`.
+pub(super) fn word<const N: usize>(record: &[u8], at: usize) -> [u8; N] {
+    record[at..at + N].try_into().expect("N bytes were taken")
+}
+
+/// The u32 at `at`.
+pub(super) fn word32(record: &[u8], at: usize) -> u32 {
+    u32::from_be_bytes(word(record, at))
+}
+
+/// The u64 at `at`.
+pub(super) fn word64(record: &[u8], at: usize) -> u64 {
+    u64::from_be_bytes(word(record, at))
+}

@@ -1,0 +1,196 @@
+//! Surfaces as files, exactly: a format that would round is refused.
+
+use std::path::Path;
+
+use super::draft::Draft;
+use super::stream::Stream;
+use super::{Result, WriteError};
+use crate::surface::Surface;
+
+/// What was written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct SurfaceReport {
+    pub bytes: u64,
+    /// Whether the format has a place for the labels there are.
+    pub labels_kept: bool,
+}
+
+/// Writes `surface` to `out` in the format its extension tells, replacing what is there.
+///
+/// `.stl` is text, because binary STL has single precision; `.stlb` is binary when nothing is rounded.
+/// `.ply` is binary with doubles. Errors: [`WriteError`]; `out` is not touched then.
+pub fn surface(surface: &Surface, out: &Path) -> Result<SurfaceReport> {
+    let extension = out.extension().and_then(|e| e.to_str()).unwrap_or_default();
+    let (write, labels): (fn(&Surface, &mut Stream) -> Result<()>, bool) =
+        match extension.to_ascii_lowercase().as_str() {
+            "stl" | "stla" => (stl, true),
+            "stlb" => {
+                refuse_rounding(surface, out)?;
+                (stl_binary, false)
+            }
+            "off" => (off, false),
+            "obj" => (obj, true),
+            "ply" => (ply, true),
+            _ => {
+                return Err(WriteError::UnknownFormat {
+                    path: out.to_owned(),
+                    known: ".stl, .off, .obj or .ply",
+                });
+            }
+        };
+    let mut draft = Draft::new(out)?;
+    let path = draft.create(out, 0)?;
+    let mut stream = Stream::open(&path)?;
+    write(surface, &mut stream)?;
+    stream.finish()?;
+    let files = draft.publish()?;
+    Ok(SurfaceReport {
+        bytes: files.iter().map(|f| f.1).sum(),
+        labels_kept: labels || surface.label_names.len() <= 1,
+    })
+}
+
+fn refuse_rounding(surface: &Surface, out: &Path) -> Result<()> {
+    let rounds = |x: f64| f64::from(x as f32) != x;
+    let vertex = surface
+        .points
+        .iter()
+        .position(|p| p.to_array().into_iter().any(rounds));
+    vertex.map_or(Ok(()), |vertex| {
+        Err(WriteError::Lossy {
+            path: out.to_owned(),
+            vertex: vertex as u32,
+        })
+    })
+}
+
+/// Unit normal of triangle `t`, or zero where it has none.
+fn normal(surface: &Surface, t: usize) -> [f64; 3] {
+    let [a, b, c] = surface.corners(t as u32);
+    (b - a).cross(c - a).normalize_or_zero().to_array()
+}
+
+/// A name on one line.
+fn label<'a>(surface: &'a Surface, t: usize) -> std::borrow::Cow<'a, str> {
+    let name = surface.label_name(t as u32);
+    if name.contains(['\n', '\r']) {
+        return name.replace(['\n', '\r'], " ").into();
+    }
+    name.into()
+}
+
+fn doubles(stream: &mut Stream, before: &str, [x, y, z]: [f64; 3]) {
+    stream.text(before);
+    stream.double(x, b' ');
+    stream.double(y, b' ');
+    stream.double(z, b'\n');
+}
+
+/// Whether triangle `t` begins a run of its label.
+fn begins_run(surface: &Surface, t: usize) -> bool {
+    t == 0 || surface.labels[t] != surface.labels[t - 1]
+}
+
+fn stl(surface: &Surface, stream: &mut Stream) -> Result<()> {
+    for t in 0..surface.n_triangles() {
+        if begins_run(surface, t) {
+            if t > 0 {
+                stream.text(&format!("endsolid {}\n", label(surface, t - 1)));
+            }
+            stream.text(&format!("solid {}\n", label(surface, t)));
+        }
+        doubles(stream, " facet normal ", normal(surface, t));
+        stream.text("  outer loop\n");
+        for p in surface.corners(t as u32) {
+            doubles(stream, "   vertex ", p.to_array());
+        }
+        stream.text("  endloop\n endfacet\n");
+        stream.end()?;
+    }
+    match surface.n_triangles() {
+        0 => stream.text("solid\nendsolid\n"),
+        n => stream.text(&format!("endsolid {}\n", label(surface, n - 1))),
+    }
+    Ok(())
+}
+
+fn stl_binary(surface: &Surface, stream: &mut Stream) -> Result<()> {
+    stream.bytes(&[b' '; 80]);
+    stream.bytes(&(surface.n_triangles() as u32).to_le_bytes());
+    for t in 0..surface.n_triangles() {
+        let corners = surface.corners(t as u32).map(|p| p.to_array());
+        let numbers = normal(surface, t).into_iter().chain(corners.into_iter().flatten());
+        for x in numbers {
+            stream.bytes(&(x as f32).to_le_bytes());
+        }
+        stream.bytes(&[0, 0]);
+        stream.end()?;
+    }
+    Ok(())
+}
+
+fn off(surface: &Surface, stream: &mut Stream) -> Result<()> {
+    let (n, m) = (surface.n_vertices(), surface.n_triangles());
+    stream.text(&format!("OFF\n{n} {m} 0\n"));
+    for p in &surface.points {
+        doubles(stream, "", p.to_array());
+        stream.end()?;
+    }
+    for triangle in &surface.triangles {
+        stream.text("3");
+        for v in triangle {
+            stream.text(" ");
+            stream.text(&v.to_string());
+        }
+        stream.text("\n");
+        stream.end()?;
+    }
+    Ok(())
+}
+
+fn obj(surface: &Surface, stream: &mut Stream) -> Result<()> {
+    for p in &surface.points {
+        doubles(stream, "v ", p.to_array());
+        stream.end()?;
+    }
+    for (t, triangle) in surface.triangles.iter().enumerate() {
+        if begins_run(surface, t) {
+            stream.text(&format!("g {}\n", label(surface, t)));
+        }
+        let [a, b, c] = triangle.map(|v| u64::from(v) + 1);
+        stream.text("f ");
+        stream.integer(a, b' ');
+        stream.integer(b, b' ');
+        stream.integer(c, b'\n');
+        stream.end()?;
+    }
+    Ok(())
+}
+
+fn ply(surface: &Surface, stream: &mut Stream) -> Result<()> {
+    stream.text("ply\nformat binary_little_endian 1.0\n");
+    for (number, name) in surface.label_names.iter().enumerate() {
+        let name = name.replace(['\n', '\r'], " ");
+        stream.text(&format!("comment label {number} {name}\n"));
+    }
+    stream.text(&format!(
+        "element vertex {}\nproperty double x\nproperty double y\nproperty double z\n\
+         element face {}\nproperty list uchar int vertex_indices\nproperty int label\nend_header\n",
+        surface.n_vertices(),
+        surface.n_triangles()
+    ));
+    for p in &surface.points {
+        for x in p.to_array() {
+            stream.bytes(&x.to_le_bytes());
+        }
+        stream.end()?;
+    }
+    for (triangle, label) in surface.triangles.iter().zip(&surface.labels) {
+        stream.bytes(&[3]);
+        for v in triangle.iter().chain([label]) {
+            stream.bytes(&v.to_le_bytes());
+        }
+        stream.end()?;
+    }
+    Ok(())
+}

@@ -1,0 +1,143 @@
+//! The input triangles as a VTK file with vertices of their own.
+//!
+//! Its vertices are those of the faces, in the order of the mesh; `mesh_vertex` tells where each is in
+//! the file of the tetrahedra. Label names stand in the field array `label_names`: bytes of UTF-8, a zero
+//! after each name, because arrays of text are not read by every program.
+
+use std::path::{Path, PathBuf};
+
+use super::Result;
+use super::draft::Draft;
+use super::merged::Merged;
+use super::stream::{Records, scratch, word64};
+use super::vtu_layout::{Array, Group, Index, Layout};
+use crate::store::{Sorted, Sorter};
+
+/// VTK's number of a triangle.
+const TRIANGLE: u8 = 5;
+
+/// The vertices of the faces, numbered densely.
+struct Corners {
+    n_vertices: u64,
+    /// Their numbers in the mesh, ascending; 8 bytes each.
+    used: PathBuf,
+    /// (3 · face + corner, its dense number), ascending.
+    dense: Sorted<16>,
+}
+
+pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<()> {
+    let corners = corners(mesh, draft.dir())?;
+    let n_faces = mesh.n_faces();
+    let index = Index::new(corners.n_vertices, 3 * n_faces);
+    let arrays = vec![
+        Array::new(Group::PointData, "mesh_vertex", "Int64"),
+        Array::new(Group::PointData, "global_id", "Int64"),
+        Array::new(Group::CellData, "label", "UInt32"),
+        Array::new(Group::CellData, "input_id", "Int64"),
+        Array::new(Group::CellData, "region_front", "UInt32"),
+        Array::new(Group::CellData, "region_back", "UInt32"),
+        Array::new(Group::Points, "Points", "Float64").vectors(),
+        Array::new(Group::Cells, "connectivity", index.kind()),
+        Array::new(Group::Cells, "offsets", index.kind()),
+        Array::new(Group::Cells, "types", "UInt8"),
+    ];
+    let layout = Layout::new(
+        arrays,
+        [corners.n_vertices, n_faces, 3],
+        &label_names(mesh),
+    );
+    let path = draft.create(out, layout.file_bytes())?;
+    let [mut numbers, mut ids, mut labels, mut triangles, mut fronts, mut backs, mut points, mut nodes, mut ends, mut types] =
+        layout.open(&path)?;
+    let mut used = Records::<8>::open(&corners.used, 0)?;
+    let mut next = used.next()?;
+    mesh.vertices(|number, vertex| {
+        if next != Some(number.to_be_bytes()) {
+            return Ok(());
+        }
+        next = used.next()?;
+        numbers.put(&number.to_le_bytes())?;
+        ids.put(&vertex.id.to_le_bytes())?;
+        vertex
+            .point
+            .iter()
+            .try_for_each(|x| points.put(&x.to_le_bytes()))
+    })?;
+    for corner in corners.dense {
+        index.put(&mut nodes, word64(&corner?, 8))?;
+    }
+    let mut end = 0;
+    mesh.faces().each(|face| {
+        end += 3;
+        labels.put(&face.label.to_le_bytes())?;
+        triangles.put(&face.triangle.to_le_bytes())?;
+        fronts.put(&face.regions[0].to_le_bytes())?;
+        backs.put(&face.regions[1].to_le_bytes())?;
+        index.put(&mut ends, end)?;
+        types.put(&[TRIANGLE])
+    })?;
+    for strip in [
+        numbers, ids, labels, triangles, fronts, backs, points, nodes, ends, types,
+    ] {
+        strip.finish()?;
+    }
+    Ok(())
+}
+
+fn corners(mesh: &Merged, dir: &Path) -> Result<Corners> {
+    let mut by_vertex = Sorter::<16>::new(dir, mesh.sorter_bytes());
+    let mut place = 0u64;
+    mesh.faces().each(|face| {
+        for v in face.vertices {
+            by_vertex.push(pair(v, place))?;
+            place += 1;
+        }
+        Ok(())
+    })?;
+    let mut by_place = Sorter::<16>::new(dir, mesh.sorter_bytes());
+    let used = dir.join("corners");
+    let mut stream = scratch(&used)?;
+    let (mut n_vertices, mut last) = (0, None);
+    for record in by_vertex.finish()? {
+        let record = record?;
+        let vertex = word64(&record, 0);
+        if last != Some(vertex) {
+            last = Some(vertex);
+            n_vertices += 1;
+            stream.bytes(&record[..8]);
+            stream.end()?;
+        }
+        by_place.push(pair(word64(&record, 8), n_vertices - 1))?;
+    }
+    stream.finish()?;
+    Ok(Corners {
+        n_vertices,
+        used,
+        dense: by_place.finish()?,
+    })
+}
+
+fn pair(a: u64, b: u64) -> [u8; 16] {
+    let mut record = [0; 16];
+    record[..8].copy_from_slice(&a.to_be_bytes());
+    record[8..].copy_from_slice(&b.to_be_bytes());
+    record
+}
+
+/// Names of labels 0, 1, .., up to the last one a face has.
+fn label_names(mesh: &Merged) -> String {
+    let labels = mesh.labels();
+    let mut bytes = String::new();
+    let mut n = 0;
+    for label in 0..=labels.keys().next_back().copied().unwrap_or_default() {
+        let name = labels.get(&label).map_or("", String::as_str);
+        for byte in name.bytes().chain([0]) {
+            bytes += &format!("{byte} ");
+            n += 1;
+        }
+    }
+    format!(
+        "    <FieldData>\n      <DataArray type=\"UInt8\" Name=\"label_names\" NumberOfTuples=\"{n}\" format=\"ascii\">\n        \
+         {bytes}\n      </DataArray>\n    </FieldData>\n"
+    )
+}
