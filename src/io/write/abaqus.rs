@@ -59,7 +59,9 @@ fn elements(
     let mut faces = faces_by_tet(mesh, dir)?.peekable();
     let mut number = 0u64;
     mesh.tets(|tet| {
-        while let Some(face) = faces.next_if(|f| f.as_ref().map_or(true, |f| word64(f, 0) <= number)) {
+        while let Some(face) =
+            faces.next_if(|f| f.as_ref().map_or(true, |f| word64(f, 0) <= number))
+        {
             let face = face?;
             let mut side = [0; 13];
             side[..4].copy_from_slice(&face[8..12]);
@@ -110,11 +112,7 @@ fn opposite(tet: &Tet, face: &[u8; 36]) -> usize {
 }
 
 /// Writes sorted (set, number) as sets, each after its head; equal records count once.
-fn sets(
-    sorted: Sorted<12>,
-    head: impl Fn(u32) -> String,
-    stream: &mut Stream,
-) -> Result<()> {
+fn sets(sorted: Sorted<12>, head: impl Fn(u32) -> String, stream: &mut Stream) -> Result<()> {
     let mut last: Option<[u8; 12]> = None;
     let mut on_line = 0;
     for record in sorted {
@@ -186,7 +184,10 @@ fn set_names(labels: &BTreeMap<u32, String>) -> BTreeMap<u32, String> {
     let mut names = BTreeMap::new();
     for (&label, name) in labels {
         let letter = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-        let mut clean: String = name.chars().map(|c| if letter(c) { c } else { '_' }).collect();
+        let mut clean: String = name
+            .chars()
+            .map(|c| if letter(c) { c } else { '_' })
+            .collect();
         if !clean.starts_with(|c: char| c.is_ascii_alphabetic()) {
             clean.insert_str(0, "label_");
         }

@@ -56,23 +56,7 @@ impl WriteError {
             Self::TooLarge { .. } => "format-limit",
             Self::NoSpace { .. } | Self::DiskFull { .. } => "disk-full",
             Self::Io { .. } => "io",
-            Self::Store(CatalogError::Store(StoreError::Stopped)) => "stopped",
-            Self::Store(error) => match error.exit_code() {
-                4 => "damaged",
-                5 => "busy",
-                8 => "unusable-store",
-                3 => "not-found",
-                _ => "io",
-            },
-        }
-    }
-
-    /// The process exit code of this class of error.
-    pub fn exit_code(&self) -> u8 {
-        match self {
-            Self::UnknownFormat { .. } | Self::Lossy { .. } | Self::TooLarge { .. } => 2,
-            Self::NoSpace { .. } | Self::DiskFull { .. } | Self::Io { .. } => 6,
-            Self::Store(error) => error.exit_code(),
+            Self::Store(error) => word_of(error),
         }
     }
 
@@ -116,6 +100,20 @@ impl WriteError {
             return Self::DiskFull { path };
         }
         Self::Io { path, source }
+    }
+}
+
+/// The word for a store that cannot be read.
+fn word_of(error: &CatalogError) -> &'static str {
+    match error {
+        CatalogError::Store(StoreError::Stopped) => "stopped",
+        CatalogError::NotFound { .. } | CatalogError::NoSubdomain { .. } => "no-such-store",
+        CatalogError::NotOurs { .. } => "not-a-store",
+        CatalogError::Unfinished { .. } | CatalogError::NotSealed { .. } => "store-unfinished",
+        CatalogError::Format { .. } => "store-format",
+        _ if error.is_damage() => "damaged",
+        _ if error.exit_code() == 5 => "busy",
+        _ => "io",
     }
 }
 

@@ -36,10 +36,7 @@ pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
         stream.end()
     })?;
     let (n_faces, n_tets) = (mesh.n_faces(), mesh.n_tets());
-    stream.text(&format!(
-        "\n$EndNodes\n$Elements\n{}\n",
-        n_faces + n_tets
-    ));
+    stream.text(&format!("\n$EndNodes\n$Elements\n{}\n", n_faces + n_tets));
     elements(mesh, &mut stream)?;
     stream.text("\n$EndElements\n");
     stream.finish()

@@ -255,7 +255,10 @@ fn too_many_vertices(catalog: &Catalog, row: &SubdomainRow, end: u64) -> Catalog
     CatalogError::Content {
         path: catalog.file_path(row.rank, row.generation),
         subdomain: row.rank,
-        what: format!("a chunk ends at vertex {end}, the catalog counts {}", row.vertices),
+        what: format!(
+            "a chunk ends at vertex {end}, the catalog counts {}",
+            row.vertices
+        ),
     }
 }
 

@@ -61,12 +61,7 @@ impl Numbering {
     /// Numbers the vertices of all sub-domains; `parts` are their ranks and numbers of vertices.
     ///
     /// Holds about `memory` bytes. Errors: damage, the disk.
-    pub fn new(
-        store: &mut Store,
-        parts: &[(u32, u64)],
-        dir: &Path,
-        memory: usize,
-    ) -> Result<Self> {
+    pub fn new(store: &mut Store, parts: &[(u32, u64)], dir: &Path, memory: usize) -> Result<Self> {
         let mut numbering = Self {
             firsts: Vec::with_capacity(parts.len()),
             shared: vec![0; parts.len()],

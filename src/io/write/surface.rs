@@ -119,7 +119,9 @@ fn stl_binary(surface: &Surface, stream: &mut Stream) -> Result<()> {
     stream.bytes(&(surface.n_triangles() as u32).to_le_bytes());
     for t in 0..surface.n_triangles() {
         let corners = surface.corners(t as u32).map(|p| p.to_array());
-        let numbers = normal(surface, t).into_iter().chain(corners.into_iter().flatten());
+        let numbers = normal(surface, t)
+            .into_iter()
+            .chain(corners.into_iter().flatten());
         for x in numbers {
             stream.bytes(&(x as f32).to_le_bytes());
         }

@@ -29,8 +29,17 @@ pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
     ];
     let layout = Layout::new(arrays, [mesh.n_vertices(), mesh.n_tets(), 4], "");
     let path = draft.create(out, layout.file_bytes())?;
-    let [mut vertex_ids, mut ranks, mut regions, mut qualities, mut ids, mut points, mut nodes, mut ends, mut types] =
-        layout.open(&path)?;
+    let [
+        mut vertex_ids,
+        mut ranks,
+        mut regions,
+        mut qualities,
+        mut ids,
+        mut points,
+        mut nodes,
+        mut ends,
+        mut types,
+    ] = layout.open(&path)?;
     mesh.vertices(|_, vertex| {
         vertex_ids.put(&vertex.id.to_le_bytes())?;
         vertex

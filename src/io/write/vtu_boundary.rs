@@ -41,14 +41,20 @@ pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
         Array::new(Group::Cells, "offsets", index.kind()),
         Array::new(Group::Cells, "types", "UInt8"),
     ];
-    let layout = Layout::new(
-        arrays,
-        [corners.n_vertices, n_faces, 3],
-        &label_names(mesh),
-    );
+    let layout = Layout::new(arrays, [corners.n_vertices, n_faces, 3], &label_names(mesh));
     let path = draft.create(out, layout.file_bytes())?;
-    let [mut numbers, mut ids, mut labels, mut triangles, mut fronts, mut backs, mut points, mut nodes, mut ends, mut types] =
-        layout.open(&path)?;
+    let [
+        mut numbers,
+        mut ids,
+        mut labels,
+        mut triangles,
+        mut fronts,
+        mut backs,
+        mut points,
+        mut nodes,
+        mut ends,
+        mut types,
+    ] = layout.open(&path)?;
     let mut used = Records::<8>::open(&corners.used, 0)?;
     let mut next = used.next()?;
     mesh.vertices(|number, vertex| {

@@ -123,7 +123,12 @@ impl Layout {
             self.n_points, self.n_cells
         );
         let mut offset = 0;
-        for group in [Group::PointData, Group::CellData, Group::Points, Group::Cells] {
+        for group in [
+            Group::PointData,
+            Group::CellData,
+            Group::Points,
+            Group::Cells,
+        ] {
             text += &format!("      <{group:?}>\n");
             for array in self.arrays.iter().filter(|a| a.group == group) {
                 text += &format!(
