@@ -47,8 +47,8 @@ pub fn run(args: &MeshArgs, talk: &Talk) -> Result<u8, Failure> {
     let mut catalog = Catalog::create(&place, &job)?;
     let summary = work(&mut catalog, &input, &options, cap, talk);
     let summary = match summary {
-        // A refused surface leaves nothing to resume.
-        Err(failure) if failure.exit() == 3 => {
+        // A refused surface or option leaves nothing to resume.
+        Err(failure) if matches!(failure.exit(), 2 | 3) => {
             drop(catalog);
             remove_store(&place)?;
             return Err(failure);
