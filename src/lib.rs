@@ -1,5 +1,5 @@
 #![forbid(unsafe_code)]
-//! Embedded, database-backed, out-of-core tetrahedral mesher and mesh store.
+#![doc = include_str!("README.md")]
 
 // Floor 0.
 pub mod geom;

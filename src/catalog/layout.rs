@@ -14,13 +14,15 @@ use super::records::{
 };
 use super::rows::{self, RowKind};
 use super::{CatalogError, Step};
-use crate::store::{StoreError, StoreFile};
+use crate::store::StoreFile;
 
 /// First bytes of the format row; the version follows as two bytes.
 const MAGIC: &[u8; 8] = b"TETDBCAT";
 /// The catalog is small: its redb cache need not be large.
 const CACHE_BYTES: usize = 2 << 20;
 const CATALOG: &str = "catalog.redb";
+/// The catalog until its first commit: a catalog that can be seen has its job.
+const CATALOG_NEW: &str = "catalog.redb-new";
 /// Folder of sorted runs; everything in it is scratch.
 const SCRATCH: &str = "scratch";
 
@@ -42,7 +44,9 @@ impl Catalog {
     pub fn create(dir: &Path, job: &Job) -> Result<Self, CatalogError> {
         refuse_existing(dir)?;
         fs::create_dir_all(dir).map_err(|e| CatalogError::io(dir, e))?;
-        let file = StoreFile::create(&dir.join(CATALOG), CACHE_BYTES)?;
+        let draft = dir.join(CATALOG_NEW);
+        remove(&draft)?;
+        let file = StoreFile::create(&draft, CACHE_BYTES)?;
         let mut catalog = Self {
             dir: dir.to_owned(),
             file,
@@ -57,10 +61,19 @@ impl Catalog {
             step.set_job(job);
             Ok(())
         })?;
+        catalog.file.rename(&dir.join(CATALOG))?;
+        sync_dir(dir)?;
         if let Some(parent) = dir.parent().filter(|p| !p.as_os_str().is_empty()) {
             sync_dir(parent)?;
         }
         Ok(catalog)
+    }
+
+    /// Whether `dir` is a directory where a store can be made: empty, or left by a run that was killed before its first commit.
+    pub fn is_vacant(dir: &Path) -> bool {
+        fs::read_dir(dir).is_ok_and(|mut entries| {
+            entries.all(|entry| entry.is_ok_and(|entry| entry.file_name() == CATALOG_NEW))
+        })
     }
 
     /// Opens a store for reading; other processes may read it as well.
@@ -87,14 +100,18 @@ impl Catalog {
             });
         }
         if !path.is_file() {
+            let reason = match dir.join(CATALOG_NEW).exists() {
+                true => "its making was interrupted at the start; `tetdb mesh` begins it again",
+                false => "it has no catalog",
+            };
             return Err(CatalogError::NotOurs {
                 path: dir.to_owned(),
-                reason: "it has no catalog",
+                reason,
             });
         }
         let mut catalog = Self {
             dir: dir.to_owned(),
-            file: open_repairing(&path, CACHE_BYTES, writable)?,
+            file: StoreFile::open_repaired(&path, CACHE_BYTES, writable)?,
             writable,
             journal_rows: 0,
         };
@@ -112,9 +129,9 @@ impl Catalog {
     fn check_format(&mut self) -> Result<(), CatalogError> {
         let key = RowKind::Format.key(0, 0);
         let Some(format) = self.bytes(key)? else {
-            // Killed before the first commit.
-            return Err(CatalogError::Unfinished {
+            return Err(CatalogError::NotOurs {
                 path: self.dir.clone(),
+                reason: "its catalog has no format row",
             });
         };
         let version = format.strip_prefix(MAGIC).and_then(|v| v.try_into().ok());
@@ -332,23 +349,6 @@ impl Catalog {
     }
 }
 
-/// Opens a redb file; one whose writer was killed is first opened for writing, which repairs it.
-pub(super) fn open_repairing(
-    path: &Path,
-    cache_bytes: usize,
-    writable: bool,
-) -> Result<StoreFile, CatalogError> {
-    match StoreFile::open(path, cache_bytes, writable) {
-        Err(StoreError::Database { source, .. })
-            if !writable && matches!(*source, redb::Error::RepairAborted) =>
-        {
-            drop(StoreFile::open(path, cache_bytes, true)?);
-            Ok(StoreFile::open(path, cache_bytes, false)?)
-        }
-        other => Ok(other?),
-    }
-}
-
 /// Says what is in the way of a new store, if anything is.
 fn refuse_existing(dir: &Path) -> Result<(), CatalogError> {
     let path = dir.to_owned();
@@ -359,8 +359,7 @@ fn refuse_existing(dir: &Path) -> Result<(), CatalogError> {
         let reason = "it is a file";
         return Err(CatalogError::NotOurs { path, reason });
     }
-    let mut entries = fs::read_dir(dir).map_err(|e| CatalogError::io(dir, e))?;
-    if entries.next().is_none() {
+    if Catalog::is_vacant(dir) {
         return Ok(());
     }
     match Catalog::open(dir)?.state()?.is_finished() {

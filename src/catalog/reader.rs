@@ -4,12 +4,13 @@
 
 use std::path::Path;
 
-use tetdb_schema::chunk::{ChunkAddress, ChunkRecord, Decoder, TetSummary, VertexSummary};
+use tetdb_schema::chunk::{
+    ChunkAddress, ChunkRecord, Decoder, RangeSummary, TetSummary, VertexSummary,
+};
 use tetdb_schema::digest::Digest;
 use tetdb_schema::ids::{SubdomainId, TetId};
 use tetdb_schema::record::{InterfaceFace, SealedFacet, SealedTet, SealedVertex};
 
-use super::layout::open_repairing;
 use super::records::{SubdomainRow, SubdomainState};
 use super::vertex_cache::load_chunk;
 use super::writer::CHUNK_KINDS;
@@ -119,9 +120,12 @@ impl Subdomain {
         if !path.is_file() {
             return Err(damaged("its file is missing".into()));
         }
-        let mut file = open_repairing(&path, memory_bytes / 2, false)?;
+        let mut file = StoreFile::open_repaired(&path, memory_bytes / 2, false)?;
         let tet_chunks = summaries::<TetSummary>(&mut file, &row)?;
         let vertex_chunks = summaries::<VertexSummary>(&mut file, &row)?;
+        // Nobody asks these yet, but damage in them is damage too.
+        summaries::<RangeSummary<false>>(&mut file, &row)?;
+        summaries::<RangeSummary<true>>(&mut file, &row)?;
         let tets: u64 = tet_chunks.iter().map(|s| u64::from(s.count)).sum();
         let vertices: u64 = vertex_chunks.iter().map(|s| u64::from(s.count)).sum();
         if tets != row.tets || vertices != row.vertices || vertices > u64::from(u32::MAX) {

@@ -168,18 +168,39 @@ impl Failure {
     }
 }
 
-static PANIC: Mutex<String> = Mutex::new(String::new());
+static PANIC: Mutex<Panic> = Mutex::new(Panic {
+    message: String::new(),
+    is_in_redb: false,
+});
 
-/// Keeps the message of a panic for [`last_panic`].
+struct Panic {
+    message: String,
+    /// redb asserts what it reads; a damaged tree ends there.
+    is_in_redb: bool,
+}
+
+/// Keeps what is known of a panic for [`last_panic`].
 pub fn remember_panic(info: &std::panic::PanicHookInfo) {
-    if let Ok(mut text) = PANIC.lock() {
-        *text = info.to_string();
+    let file = info.location().map_or("", std::panic::Location::file);
+    if let Ok(mut panic) = PANIC.lock() {
+        panic.message = info.to_string();
+        panic.is_in_redb = std::path::Path::new(file)
+            .iter()
+            .any(|part| part.to_string_lossy().starts_with("redb-"));
     }
 }
 
-/// The message of the last panic.
-pub fn last_panic() -> String {
-    PANIC.lock().map(|text| text.clone()).unwrap_or_default()
+/// The last panic: damage when it came from redb, otherwise a bug of ours.
+pub fn last_panic() -> Failure {
+    let Ok(panic) = PANIC.lock() else {
+        return Failure::internal(String::new());
+    };
+    if panic.is_in_redb {
+        return Failure::new("damaged", "a database file of the store cannot be followed")
+            .at(panic.message.replace('\n', " "))
+            .help(help_of("damaged"));
+    }
+    Failure::internal(panic.message.clone())
 }
 
 impl From<ReadError> for Failure {

@@ -47,8 +47,8 @@ pub fn run(args: &MeshArgs, talk: &Talk) -> Result<u8, Failure> {
     let mut catalog = Catalog::create(&place, &job)?;
     let summary = work(&mut catalog, &input, &options, cap, talk);
     let summary = match summary {
-        // A refused surface leaves nothing to resume.
-        Err(failure) if failure.exit() == 3 => {
+        // A refused surface or option leaves nothing to resume.
+        Err(failure) if matches!(failure.exit(), 2 | 3) => {
             drop(catalog);
             remove_store(&place)?;
             return Err(failure);
@@ -143,7 +143,7 @@ fn already_there(
     }
     let mut store = match Store::open(path) {
         Ok(store) => store,
-        Err(CatalogError::NotOurs { .. }) if is_empty_dir(path) => return Ok(None),
+        Err(CatalogError::NotOurs { .. }) if Catalog::is_vacant(path) => return Ok(None),
         Err(error) => return Err(error.into()),
     };
     let catalog = store.catalog();
@@ -174,10 +174,6 @@ fn already_there(
     write_exports(path, &args.run, cap, talk)?;
     info::print(path, talk)?;
     Ok(Some(0))
-}
-
-fn is_empty_dir(path: &Path) -> bool {
-    std::fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none())
 }
 
 fn work(

@@ -17,7 +17,8 @@ mod verify;
 
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser};
 
 use args::{Args, Command};
 use failure::Failure;
@@ -29,12 +30,7 @@ pub use failure::{CODES, CodeRow};
 pub fn run() -> ExitCode {
     let args = match Args::try_parse() {
         Ok(args) => args,
-        Err(error) => {
-            // Help and version go to stdout and are no errors.
-            let exit = if error.use_stderr() { 2 } else { 0 };
-            let _ = error.print();
-            return ExitCode::from(exit);
-        }
+        Err(error) => return unparsed(&error),
     };
     let talk = Talk::new(args.command.is_json());
     // redb may panic on a damaged tree, which is caught and told as damage; its own message would only confuse.
@@ -45,9 +41,29 @@ pub fn run() -> ExitCode {
     let exit = match done {
         Ok(Ok(exit)) => exit,
         Ok(Err(failure)) => talk.fail(&failure),
-        Err(_) => talk.fail(&Failure::internal(failure::last_panic())),
+        Err(_) => talk.fail(&failure::last_panic()),
     };
     ExitCode::from(exit)
+}
+
+/// Tells what is wrong with the command line; help and version are no errors and go to stdout.
+fn unparsed(error: &clap::Error) -> ExitCode {
+    let is_help = error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand;
+    if is_help || !error.use_stderr() {
+        let _ = error.print();
+        return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
+    }
+    let is_json = std::env::args_os().any(|word| word == "--json");
+    let text = error.render().to_string();
+    let text = text.split("\n\nUsage:").next().unwrap_or(&text);
+    let message = text.strip_prefix("error: ").unwrap_or(text).trim_end();
+    let command = std::env::args().nth(1).filter(|c| is_command(c));
+    let help = format!("`tetdb {} --help`", command.unwrap_or_default()).replace("  ", " ");
+    ExitCode::from(Talk::new(is_json).fail(&Failure::new("usage", message).help(help)))
+}
+
+fn is_command(word: &str) -> bool {
+    Args::command().find_subcommand(word).is_some()
 }
 
 fn dispatch(command: &Command, talk: &Talk) -> Result<u8, Failure> {

@@ -218,7 +218,7 @@ impl Run<'_> {
     }
 
     fn reopen_coarse(&mut self) -> Result<Mesh, PipelineError> {
-        let base = StoreFile::open(
+        let base = StoreFile::open_repaired(
             &self.catalog.file_path(0, COARSE),
             self.plan.redb as usize / 2,
             false,

@@ -1,10 +1,10 @@
 //! One redb file of keyed values: a sub-domain in one generation.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use redb::{
-    Database, DatabaseError, Durability, ReadOnlyDatabase, ReadOnlyTable, ReadableDatabase,
-    StorageError, TableDefinition,
+    Database, Durability, ReadOnlyDatabase, ReadOnlyTable, ReadableDatabase, TableDefinition,
 };
 
 use super::StoreError;
@@ -36,13 +36,13 @@ impl StoreFile {
         if path.exists() {
             return Err(StoreError::Io {
                 path: path.to_owned(),
-                source: std::io::ErrorKind::AlreadyExists.into(),
+                source: ErrorKind::AlreadyExists.into(),
             });
         }
         let db = Database::builder()
             .set_cache_size(cache_bytes)
             .create(path)
-            .map_err(|e| database_error(path, e))?;
+            .map_err(|e| Failure::Error(e.into()).at(path))?;
         let mut file = Self {
             path: path.to_owned(),
             handle: Handle::Writer(Box::new(db)),
@@ -58,21 +58,50 @@ impl StoreFile {
     pub fn open(path: &Path, cache_bytes: usize, writable: bool) -> Result<Self, StoreError> {
         let mut builder = Database::builder();
         builder.set_cache_size(cache_bytes);
-        let opened = caught(|| {
-            if writable {
-                builder.open(path).map(|db| Handle::Writer(Box::new(db)))
-            } else {
-                builder
-                    .open_read_only(path)
-                    .map(|db| Handle::Reader(Box::new(db)))
-            }
+        // redb follows its tree of free pages while it opens.
+        let handle = guarded(|| match writable {
+            true => builder.open(path).map(|db| Handle::Writer(Box::new(db))),
+            false => builder
+                .open_read_only(path)
+                .map(|db| Handle::Reader(Box::new(db))),
         });
-        let handle = opened.map_err(|reason| Failure::Panic(reason).at(path))?;
         Ok(Self {
             path: path.to_owned(),
-            handle: handle.map_err(|e| database_error(path, e))?,
+            handle: handle.map_err(|e| e.at(path))?,
             table: None,
         })
+    }
+
+    /// Opens an existing file as [`StoreFile::open`] does, also one whose writer was killed: that is first opened for
+    /// writing, which repairs it.
+    ///
+    /// Errors: as [`StoreFile::open`].
+    pub fn open_repaired(
+        path: &Path,
+        cache_bytes: usize,
+        writable: bool,
+    ) -> Result<Self, StoreError> {
+        match Self::open(path, cache_bytes, writable) {
+            Err(StoreError::Database { source, .. })
+                if !writable && matches!(*source, redb::Error::RepairAborted) =>
+            {
+                drop(Self::open(path, cache_bytes, true)?);
+                Self::open(path, cache_bytes, false)
+            }
+            other => other,
+        }
+    }
+
+    /// Gives the file another name in its folder, replacing what had it; readers see the old name or the new.
+    ///
+    /// Errors: the system refuses.
+    pub fn rename(&mut self, to: &Path) -> Result<(), StoreError> {
+        std::fs::rename(&self.path, to).map_err(|source| StoreError::Io {
+            path: to.to_owned(),
+            source,
+        })?;
+        self.path = to.to_owned();
+        Ok(())
     }
 
     /// Where the file is.
@@ -189,8 +218,24 @@ impl Failure {
         match self {
             Self::Panic(reason) => StoreError::Damaged { path, reason },
             Self::Error(redb::Error::Corrupted(reason)) => StoreError::Damaged { path, reason },
-            Self::Error(redb::Error::Io(e)) if e.kind() == std::io::ErrorKind::StorageFull => {
+            Self::Error(redb::Error::Io(e)) if e.kind() == ErrorKind::StorageFull => {
                 StoreError::Full { path }
+            }
+            Self::Error(redb::Error::DatabaseAlreadyOpen) => StoreError::Busy { path },
+            Self::Error(redb::Error::Io(e)) if e.kind() == ErrorKind::NotFound => {
+                StoreError::Missing {
+                    path,
+                    what: "the file".to_owned(),
+                }
+            }
+            // A foreign, cut or empty file: redb finds no header of its own, or not the pages it names.
+            Self::Error(redb::Error::Io(e))
+                if matches!(e.kind(), ErrorKind::InvalidData | ErrorKind::UnexpectedEof) =>
+            {
+                StoreError::Damaged {
+                    path,
+                    reason: e.to_string(),
+                }
             }
             Self::Error(source) => StoreError::Database {
                 path,
@@ -217,19 +262,6 @@ fn caught<T>(call: impl FnOnce() -> T) -> Result<T, String> {
             .or_else(|| payload.downcast_ref::<&str>().map(|s| (*s).to_owned()))
             .unwrap_or_else(|| "unreadable tree".to_owned())
     })
-}
-
-fn database_error(path: &Path, error: DatabaseError) -> StoreError {
-    match error {
-        DatabaseError::DatabaseAlreadyOpen => StoreError::Busy {
-            path: path.to_owned(),
-        },
-        DatabaseError::Storage(StorageError::Corrupted(reason)) => StoreError::Damaged {
-            path: path.to_owned(),
-            reason,
-        },
-        other => Failure::Error(other.into()).at(path),
-    }
 }
 
 #[cfg(test)]

@@ -134,13 +134,13 @@ impl Defect {
         match self {
             Self::Empty => "choose a file that holds triangles",
             Self::Degenerate { .. } | Self::Duplicate { .. } => {
-                "`tetdb check SURFACE --repair --write OUT` drops collapsed and repeated triangles"
+                "`tetdb check SURFACE` lists all such triangles; take them out where the surface was made"
             }
             Self::OpenEdge { .. } => {
-                "`tetdb check SURFACE --write-bad bad.vtu` shows the holes; `--repair --weld 1e-6 --write OUT` joins points that nearly meet"
+                "`tetdb check SURFACE` lists the open edges; close the holes, and let points that should meet have equal coordinates"
             }
             Self::SelfIntersection { .. } => {
-                "`tetdb check SURFACE --write-bad bad.vtu` shows the places; unite or separate the parts where the surface was made"
+                "`tetdb check SURFACE` lists the places; unite or separate the parts where the surface was made"
             }
         }
     }

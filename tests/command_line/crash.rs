@@ -1,0 +1,145 @@
+//! A run may end at any moment and loses no more than its current step.
+//!
+//! Why: long runs meet power cuts, full disks and impatient people.
+//! How: the process is killed or asked to stop as soon as its store can be seen, and again later; `resume` must
+//! arrive at the mesh of an undisturbed run.
+
+use std::io::Read;
+use std::process::{Child, Command};
+use std::time::Duration;
+
+use super::place::{Done, Place};
+
+const SAMPLE: &str = "sample:balls,count=12";
+
+/// Starts a run and waits until its catalog is there.
+fn started(place: &Place) -> Child {
+    let child = place
+        .command(&["mesh", SAMPLE, "-o", "a.tetdb", "--threads", "1", "--json"])
+        .spawn();
+    let mut child = child.expect("the program starts");
+    while !place.path("a.tetdb/catalog.redb").exists() {
+        let ended = child.try_wait().expect("the child can be asked");
+        assert!(ended.is_none(), "the run ended before its store was seen");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    child
+}
+
+fn undisturbed(place: &Place) -> String {
+    place.run(&["mesh", SAMPLE, "-o", "whole.tetdb"]).succeeds();
+    place.digest("whole.tetdb")
+}
+
+#[test]
+fn a_killed_run_is_resumed_to_the_same_mesh() {
+    let place = Place::new();
+    let expected = undisturbed(&place);
+    let mut n_unfinished = 0;
+    for millis in [0, 100, 300, 900] {
+        let mut child = started(&place);
+        std::thread::sleep(Duration::from_millis(millis));
+        // Which step it was in does not matter: the same must hold for all.
+        child.kill().expect("the child can be killed");
+        child.wait().expect("the child can be waited for");
+        if !is_finished(&place) {
+            n_unfinished += 1;
+            refuses_to_be_read(&place);
+        }
+        place.run_line("resume a.tetdb").succeeds();
+        assert_eq!(
+            place.digest("a.tetdb"),
+            expected,
+            "killed {millis} ms after the store was made"
+        );
+        assert!(is_finished(&place));
+        std::fs::remove_dir_all(place.path("a.tetdb")).expect("the store can be removed");
+    }
+    assert!(
+        n_unfinished > 0,
+        "every run had finished before it was killed: give this test a larger sample"
+    );
+}
+
+fn is_finished(place: &Place) -> bool {
+    let info = place.run_line("info a.tetdb --json").succeeds().json();
+    let finished = info["finished"]
+        .as_bool()
+        .expect("info says whether it is finished");
+    let text = place.run_line("info a.tetdb").succeeds().stdout();
+    assert_eq!(
+        text.contains("unfinished") && text.contains("tetdb resume"),
+        !finished,
+        "{text}"
+    );
+    finished
+}
+
+fn refuses_to_be_read(place: &Place) {
+    let line = format!("mesh {SAMPLE} -o a.tetdb --json");
+    for line in [
+        "verify a.tetdb --json",
+        "digest a.tetdb --json",
+        line.as_str(),
+    ] {
+        let done = place.run_line(line);
+        assert_eq!(
+            (done.error()["code"].as_str(), done.exit()),
+            (Some("store-unfinished"), Some(8)),
+            "{line}"
+        );
+    }
+}
+
+#[test]
+fn a_store_being_written_is_busy() {
+    let place = Place::new();
+    let mut child = started(&place);
+    let still_running =
+        |child: &mut Child| child.try_wait().expect("the child can be asked").is_none();
+    let done = place.run_line("info a.tetdb --json");
+    if still_running(&mut child) {
+        assert_eq!(
+            (done.error()["code"].as_str(), done.exit()),
+            (Some("busy"), Some(5))
+        );
+    }
+    child.kill().expect("the child can be killed");
+    child.wait().expect("the child can be waited for");
+}
+
+#[test]
+#[cfg(unix)]
+fn a_stopped_run_says_so_and_can_be_resumed() {
+    let place = Place::new();
+    let expected = undisturbed(&place);
+    for (signal, exit) in [("-INT", 130), ("-TERM", 143)] {
+        let mut child = started(&place);
+        std::thread::sleep(Duration::from_millis(30));
+        let id = child.id().to_string();
+        let sent = Command::new("kill")
+            .args([signal, &id])
+            .status()
+            .expect("kill is there");
+        assert!(sent.success());
+        let status = child.wait().expect("the child can be waited for");
+        let mut stderr = String::new();
+        child
+            .stderr
+            .take()
+            .expect("stderr was piped")
+            .read_to_string(&mut stderr)
+            .expect("stderr is UTF-8");
+        // A run that ended on its own before the signal came is no failure of stopping.
+        if status.code() != Some(0) {
+            assert_eq!(status.code(), Some(exit), "{stderr}");
+            assert!(
+                stderr.contains("\"stopped\"") && stderr.contains("resume"),
+                "{stderr}"
+            );
+        }
+        let resumed: Done = place.run_line("resume a.tetdb").succeeds();
+        assert!(resumed.stdout().contains(&expected), "{}", resumed.stdout());
+        std::fs::remove_dir_all(place.path("a.tetdb")).expect("the store can be removed");
+    }
+}

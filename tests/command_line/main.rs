@@ -1,0 +1,8 @@
+//! The program as its users meet it: processes, files, exit codes.
+
+mod crash;
+mod damage;
+mod errors;
+mod place;
+mod readme;
+mod same_mesh;

@@ -1,0 +1,141 @@
+//! A folder to run the program in, and small surfaces to give it.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::PathBuf;
+use std::process::{Command, Output, Stdio};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// A closed surface of four triangles.
+pub const TETRA: &str =
+    "OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n";
+/// The same, every triangle turned round.
+pub const TETRA_INWARD: &str =
+    "OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 2\n3 0 3 1\n3 1 3 2\n3 0 2 3\n";
+
+/// A folder of its own for one test, gone afterwards.
+pub struct Place {
+    dir: TempDir,
+}
+
+impl Place {
+    pub fn new() -> Self {
+        Self {
+            dir: tempfile::tempdir().expect("a temporary folder"),
+        }
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.dir.path().join(name)
+    }
+
+    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) {
+        fs::write(self.path(name), content).expect("the temporary folder takes files");
+    }
+
+    /// Names in the folder, one level deeper too.
+    pub fn names(&self) -> BTreeSet<String> {
+        let mut names = BTreeSet::new();
+        for entry in fs::read_dir(self.dir.path()).expect("the folder is readable") {
+            let entry = entry.expect("an entry is readable");
+            let name = entry.file_name().to_string_lossy().into_owned();
+            for inner in fs::read_dir(entry.path()).into_iter().flatten() {
+                let inner = inner.expect("an entry is readable").file_name();
+                names.insert(format!("{name}/{}", inner.to_string_lossy()));
+            }
+            names.insert(name);
+        }
+        names
+    }
+
+    /// The program with these words, to be run in the folder.
+    pub fn command(&self, words: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_tetdb"));
+        command
+            .args(words)
+            .current_dir(self.dir.path())
+            .stdin(Stdio::null());
+        command.stdout(Stdio::piped()).stderr(Stdio::piped());
+        command
+    }
+
+    pub fn run(&self, words: &[&str]) -> Done {
+        let output = self.command(words).output().expect("the program starts");
+        Done {
+            words: words.join(" "),
+            output,
+        }
+    }
+
+    /// Runs a line as a shell without special characters would.
+    pub fn run_line(&self, line: &str) -> Done {
+        self.run(&line.split_whitespace().collect::<Vec<_>>())
+    }
+
+    /// The digest of a store in the folder.
+    pub fn digest(&self, store: &str) -> String {
+        self.run(&["digest", store])
+            .succeeds()
+            .stdout()
+            .trim()
+            .to_owned()
+    }
+}
+
+/// A run that has ended.
+pub struct Done {
+    words: String,
+    output: Output,
+}
+
+impl Done {
+    pub fn exit(&self) -> Option<i32> {
+        self.output.status.code()
+    }
+
+    pub fn stdout(&self) -> String {
+        String::from_utf8_lossy(&self.output.stdout).into_owned()
+    }
+
+    pub fn stderr(&self) -> String {
+        String::from_utf8_lossy(&self.output.stderr).into_owned()
+    }
+
+    /// Panics with all that was said unless the exit code is 0.
+    pub fn succeeds(self) -> Self {
+        assert_eq!(
+            self.exit(),
+            Some(0),
+            "tetdb {}\n{}",
+            self.words,
+            self.stderr()
+        );
+        self
+    }
+
+    /// stdout as one JSON object.
+    pub fn json(&self) -> Value {
+        serde_json::from_str(&self.stdout()).unwrap_or_else(|e| {
+            panic!(
+                "tetdb {}: {e} in {}\n{}",
+                self.words,
+                self.stdout(),
+                self.stderr()
+            )
+        })
+    }
+
+    /// The error object of a run with `--json`.
+    pub fn error(&self) -> Value {
+        let stderr = self.stderr();
+        let objects = stderr
+            .lines()
+            .filter_map(|line| serde_json::from_str::<Value>(line).ok());
+        let error = objects
+            .filter_map(|mut o| o.get_mut("error").map(Value::take))
+            .last();
+        error.unwrap_or_else(|| panic!("tetdb {}: no error object in {stderr:?}", self.words))
+    }
+}
