@@ -64,7 +64,7 @@ pub struct RunArgs {
     /// Skip the verification at the end
     #[arg(long)]
     pub no_verify: bool,
-    /// Also write these mesh files (.vtu, .mesh, .msh)
+    /// Also write these mesh files (.vtu, .mesh, .meshb, .msh, .inp)
     #[arg(long, value_name = "FILE")]
     pub export: Vec<PathBuf>,
     /// Answer with one JSON object
@@ -176,7 +176,7 @@ pub struct VerifyArgs {
 pub struct ExportArgs {
     #[arg(value_name = "STORE")]
     pub store: PathBuf,
-    /// Files to write; the extension tells the format: .vtu, .mesh, .msh
+    /// Files to write; the extension tells the format: .vtu, .mesh, .meshb, .msh, .inp
     #[arg(required = true, value_name = "OUT")]
     pub out: Vec<PathBuf>,
     /// Most memory to hold
@@ -195,7 +195,7 @@ pub struct SampleArgs {
     /// NAME,key=value,... with the names balls, box, knot, shells, sphere
     #[arg(value_name = "SAMPLE")]
     pub sample: String,
-    /// The file to write: .stl or .off
+    /// The file to write: .stl (text), .off, .obj or .ply, all exact
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
     /// Answer with one JSON object

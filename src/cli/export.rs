@@ -8,31 +8,59 @@ use super::args::ExportArgs;
 use super::failure::Failure;
 use super::talk::Talk;
 use super::{memory, store};
+use crate::io::write::{self, ExportReport, MeshFormat};
+use crate::pipeline::Event;
+
+/// A writer holds no more than this, however large the cap.
+const MEMORY_MAX: u64 = 512 << 20;
 
 pub fn run(args: &ExportArgs, talk: &Talk) -> Result<u8, Failure> {
     let (cap, _) = memory::cap(args.memory.as_deref())?;
     for out in &args.out {
         check_format(out)?;
     }
+    let mut reports = Vec::new();
     for out in &args.out {
-        write(&args.store, out, cap, talk)?;
+        reports.push(write(&args.store, out, cap, talk)?);
     }
     if talk.is_json() {
-        let files: Vec<String> = args.out.iter().map(|p| p.display().to_string()).collect();
-        talk.answer(&json!({ "schema": 1, "files": files }));
+        talk.answer(&json!({ "schema": 1, "exports": reports }));
     }
     Ok(0)
 }
 
 /// Refuses names whose format cannot be told, before any work.
 pub fn check_format(out: &Path) -> Result<(), Failure> {
-    let _ = out;
-    Ok(())
+    match MeshFormat::of_extension(out) {
+        Some(_) => Ok(()),
+        None => Err(Failure::new(
+            "unknown-format",
+            "the format of a mesh file cannot be told from its name",
+        )
+        .at(out.display())
+        .help("end the name with .vtu, .mesh, .meshb, .msh or .inp")),
+    }
 }
 
-/// Writes one file.
-pub fn write(path: &Path, out: &Path, cap: u64, talk: &Talk) -> Result<(), Failure> {
+/// Writes one file, and what belongs to it.
+pub fn write(path: &Path, out: &Path, cap: u64, talk: &Talk) -> Result<ExportReport, Failure> {
     let mut store = store::open_finished(path)?;
-    let _ = (&mut store, out, cap, talk);
-    Err(Failure::new("unknown-format", "no writer yet").at(out.display()))
+    let memory = (cap / 2).min(MEMORY_MAX) as usize;
+    let report = write::export(&mut store, out, memory, &|done, total| {
+        talk.progress(Event {
+            stage: "export",
+            done,
+            total: Some(total),
+            unit: "records",
+        });
+    })?;
+    talk.done();
+    for (file, bytes) in &report.files {
+        talk.note(&format!(
+            "wrote {} ({})",
+            file.display(),
+            memory::show(*bytes)
+        ));
+    }
+    Ok(report)
 }

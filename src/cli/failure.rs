@@ -5,6 +5,7 @@ use std::sync::Mutex;
 use crate::boundary::BoundaryError;
 use crate::catalog::CatalogError;
 use crate::io::read::ReadError;
+use crate::io::write::WriteError;
 use crate::pipeline::PipelineError;
 use crate::sizing::SizingError;
 use crate::store::StoreError;
@@ -81,6 +82,16 @@ pub const CODES: &[CodeRow] = &[
         "surface-too-large",
         3,
         "more triangles or vertices than 32-bit numbers can name",
+    ),
+    row(
+        "lossy-format",
+        3,
+        "the chosen format would round coordinates",
+    ),
+    row(
+        "format-limit",
+        3,
+        "the mesh is larger than the chosen format can number",
     ),
     row("empty-surface", 3, "there are no triangles"),
     row("degenerate-triangle", 3, "a triangle has no area"),
@@ -206,6 +217,16 @@ pub fn last_panic() -> Failure {
 impl From<ReadError> for Failure {
     fn from(e: ReadError) -> Self {
         Self::new(e.code(), &e).at(e.place()).help(e.help())
+    }
+}
+
+impl From<WriteError> for Failure {
+    fn from(e: WriteError) -> Self {
+        let failure = Self::new(e.code(), &e).help(e.help());
+        match e.place() {
+            Some(path) => failure.at(path.display()),
+            None => failure,
+        }
     }
 }
 

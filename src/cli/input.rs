@@ -16,8 +16,6 @@ use crate::surface::{Surface, Validation, orient_alike, validate};
 pub struct Input {
     pub surface: Surface,
     pub sources: Vec<SurfaceSource>,
-    /// Name for a store when none is given.
-    pub stem: String,
     /// Triangles that were turned round.
     pub turned: usize,
 }
@@ -77,7 +75,6 @@ fn made(word: &str) -> Result<Input, Failure> {
             bytes: 0,
             hash: [0; 2],
         }],
-        stem: spec.name().to_owned(),
         turned: 0,
     })
 }
@@ -86,11 +83,9 @@ fn from_files(arguments: &[String]) -> Result<Input, Failure> {
     let paths: Vec<PathBuf> = arguments.iter().map(PathBuf::from).collect();
     let surface = read_surface(&paths)?;
     let sources: Result<Vec<_>, Failure> = paths.iter().map(|p| source(p)).collect();
-    let stem = paths.first().and_then(|p| p.file_stem());
     Ok(Input {
         surface,
         sources: sources?,
-        stem: stem.map_or_else(|| "mesh".to_owned(), |s| s.to_string_lossy().into_owned()),
         turned: 0,
     })
 }

@@ -6,6 +6,7 @@ use super::args::SampleArgs;
 use super::failure::Failure;
 use super::input;
 use super::talk::Talk;
+use crate::io::write;
 use crate::samples::PREFIX;
 
 pub fn run(args: &SampleArgs, talk: &Talk) -> Result<u8, Failure> {
@@ -14,9 +15,19 @@ pub fn run(args: &SampleArgs, talk: &Talk) -> Result<u8, Failure> {
     } else {
         format!("{PREFIX}{}", args.sample)
     };
-    let input = input::load(&[word], talk)?;
-    let _ = json!({});
-    Err(Failure::new("unknown-format", "no writer yet")
-        .at(args.output.display())
-        .help(format!("{}", input.stem)))
+    let surface = input::load(&[word], talk)?.surface;
+    write::surface(&surface, &args.output)?;
+    let (triangles, vertices) = (surface.n_triangles(), surface.n_vertices());
+    if talk.is_json() {
+        let file = args.output.display().to_string();
+        talk.answer(
+            &json!({ "schema": 1, "file": file, "triangles": triangles, "vertices": vertices }),
+        );
+    } else {
+        talk.note(&format!(
+            "wrote {triangles} triangles and {vertices} vertices to {}",
+            args.output.display()
+        ));
+    }
+    Ok(0)
 }
