@@ -157,7 +157,7 @@ impl Kernel {
                 Seen::new(c, p),
                 Seen::new(d, p),
             ];
-            for i in 0..4 {
+            for (i, &[f, g, h]) in FACES.iter().enumerate() {
                 let across = tet.neighbor[i];
                 let required = CONSTRAINED && tet.is_required(i);
                 if across.exists() && !required {
@@ -168,7 +168,6 @@ impl Kernel {
                     self.stats.sphere_tests += 1;
                     // The neighbor shares this face; only its apex is new.
                     let apex = Seen::new(mesh.point(other.vertex(across.face())), p);
-                    let [f, g, h] = FACES[i];
                     let det = insphere_filtered(&apex, &seen[f], &seen[h], &seen[g]);
                     if det > 0.0 || (det == 0.0 && in_conflict(mesh, &other, p)) {
                         mesh.set_mark(across.tet(), 0, true);

@@ -17,7 +17,7 @@ use super::Point;
 
 /// Forward error of the filtered orientation determinant, relative to the product of the largest
 /// differences per axis (Meyer and Pion, "FPG: a code generator for fast and certified geometric predicates").
-const ORIENT_BOUND: f64 = 5.110_712_782_997_329_9e-15;
+const ORIENT_BOUND: f64 = 5.110_712_782_997_33e-15;
 /// The same for the sphere determinant, relative to that product times the largest squared difference.
 const INSPHERE_BOUND: f64 = 1.246_613_653_102_729_8e-13;
 /// Below this difference a product can underflow and the bounds stop being bounds.

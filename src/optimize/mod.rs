@@ -1,9 +1,9 @@
 //! Raise the worst qualities, touch no required face.
 //!
-//! 1. [`lawson`]: flips until no face is found that is not locally Delaunay and can be flipped.
-//! 2. [`odt`]: free vertices move to where an optimal Delaunay triangulation has them, then 1 again; a few sweeps.
-//! 3. [`rounds`]: every tetrahedron with q ≥ 2 is attacked by edge removal, then face swap, then smoothing.
-//! 4. [`rescue`]: what is still worst is attacked by collapse and insertion too.
+//! 1. `lawson`: flips until no face is found that is not locally Delaunay and can be flipped.
+//! 2. `odt`: free vertices move to where an optimal Delaunay triangulation has them, then 1 again; a few sweeps.
+//! 3. `rounds`: every tetrahedron with q ≥ 2 is attacked by edge removal, then face swap, then smoothing.
+//! 4. `rescue`: what is still worst is attacked by collapse and insertion too.
 //!
 //! Placement of points alone leaves 86 to 90 % of the tetrahedra below q = 2 and slivers without bound;
 //! steps 1 and 2 give 97 %, step 3 aimed at *every* q ≥ 2 gives 99 % and more. Aimed only at q ≥ 2.86

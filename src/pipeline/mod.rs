@@ -2,8 +2,8 @@
 //!
 //! | step | state after it | what |
 //! |---|---|---|
-//! | [`coarse`] | coarse | validate; Delaunay mesh of the surface's vertices; recover every triangle; color and empty regions |
-//! | [`fine`] | sealed | size field; divide edges; optimize; sort, compress and seal |
+//! | `coarse` | coarse | validate; Delaunay mesh of the surface's vertices; recover every triangle; color and empty regions |
+//! | `fine` | sealed | size field; divide edges; optimize; sort, compress and seal |
 //!
 //! It receives a surface, not a path, and prints nothing: it tells a [`Watcher`] what goes on.
 

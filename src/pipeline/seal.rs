@@ -52,7 +52,7 @@ pub(super) fn seal<P: Pages>(
 }
 
 fn tell(watch: &Watcher, stage: &str, done: u64, total: u32) {
-    if done % 65_536 == 0 {
+    if done.is_multiple_of(65_536) {
         stop_if_requested();
         watch(Event {
             stage,

@@ -236,6 +236,7 @@ const CASES: &[Case] = &[
         "mesh a.off --regions by-orientation -o x.tetdb",
         "by-orientation",
     ),
+    case("lossy-format", 3, "sample knot,h=0.3 -o a.stlb", "a.stlb"),
     case("no-such-store", 3, "info missing.tetdb", "missing.tetdb"),
     case(
         "memory",

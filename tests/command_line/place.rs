@@ -130,12 +130,14 @@ impl Done {
     /// The error object of a run with `--json`.
     pub fn error(&self) -> Value {
         let stderr = self.stderr();
-        let objects = stderr
+        let mut objects = stderr
             .lines()
+            .rev()
             .filter_map(|line| serde_json::from_str::<Value>(line).ok());
+        // Only the last line of a failed run is an error.
         let error = objects
-            .filter_map(|mut o| o.get_mut("error").map(Value::take))
-            .last();
+            .next()
+            .and_then(|mut object| object.get_mut("error").map(Value::take));
         error.unwrap_or_else(|| panic!("tetdb {}: no error object in {stderr:?}", self.words))
     }
 }

@@ -31,7 +31,6 @@ fn commands() -> Vec<&'static str> {
 }
 
 #[test]
-#[ignore = "until the program writes files"]
 fn its_commands_run() {
     let place = Place::new();
     let commands = commands();
