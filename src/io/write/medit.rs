@@ -111,8 +111,8 @@ pub(super) fn write_binary(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> 
     for value in [1u32, 4, DIMENSION] {
         stream.bytes(&value.to_le_bytes());
     }
-    let begin = 8 + 16;
-    stream.bytes(&(begin as u64).to_le_bytes());
+    let begin: u64 = 8 + 16;
+    stream.bytes(&begin.to_le_bytes());
     stream.bytes(&3u32.to_le_bytes());
     let mut file = Binary(stream, begin);
     sections(mesh, &mut file)?;

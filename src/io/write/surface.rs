@@ -7,6 +7,9 @@ use super::stream::Stream;
 use super::{Result, WriteError};
 use crate::surface::Surface;
 
+/// A writer of one format.
+type Write = fn(&Surface, &mut Stream) -> Result<()>;
+
 /// What was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct SurfaceReport {
@@ -21,23 +24,22 @@ pub struct SurfaceReport {
 /// `.ply` is binary with doubles. Errors: [`WriteError`]; `out` is not touched then.
 pub fn surface(surface: &Surface, out: &Path) -> Result<SurfaceReport> {
     let extension = out.extension().and_then(|e| e.to_str()).unwrap_or_default();
-    let (write, labels): (fn(&Surface, &mut Stream) -> Result<()>, bool) =
-        match extension.to_ascii_lowercase().as_str() {
-            "stl" | "stla" => (stl, true),
-            "stlb" => {
-                refuse_rounding(surface, out)?;
-                (stl_binary, false)
-            }
-            "off" => (off, false),
-            "obj" => (obj, true),
-            "ply" => (ply, true),
-            _ => {
-                return Err(WriteError::UnknownFormat {
-                    path: out.to_owned(),
-                    known: ".stl, .off, .obj or .ply",
-                });
-            }
-        };
+    let (write, labels): (Write, bool) = match extension.to_ascii_lowercase().as_str() {
+        "stl" | "stla" => (stl, true),
+        "stlb" => {
+            refuse_rounding(surface, out)?;
+            (stl_binary, false)
+        }
+        "off" => (off, false),
+        "obj" => (obj, true),
+        "ply" => (ply, true),
+        _ => {
+            return Err(WriteError::UnknownFormat {
+                path: out.to_owned(),
+                known: ".stl, .off, .obj or .ply",
+            });
+        }
+    };
     let mut draft = Draft::new(out)?;
     let path = draft.create(out, 0)?;
     let mut stream = Stream::open(&path)?;
