@@ -178,6 +178,10 @@ impl<P: Pages> Mesh<P> {
 
     /// Copies the attribute of id `from` to that of id `to` of an array that begins at page `first`.
     pub(super) fn copy_attribute<const K: usize>(&mut self, from: u32, to: u32, first: u32) {
+        if attribute_place(from).0 >> SLOT_BITS >= first {
+            // Never set: what is there by now belongs to the new array.
+            return;
+        }
         let (a, b) = self.attribute::<K>(from);
         if a | b == 0 {
             return;

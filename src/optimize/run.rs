@@ -35,7 +35,7 @@ impl Settings {
         let odt_sweeps = match mode {
             Mode::None => 0,
             Mode::Delaunay => 6,
-            Mode::Full => 6,
+            Mode::Full => 7,
         };
         Self { mode, odt_sweeps }
     }
@@ -79,6 +79,8 @@ pub fn run_with<P: Pages>(
 ) -> OptimizeReport {
     let mut report = OptimizeReport::default();
     let tell = |stage, done, total| progress(Progress { stage, done, total });
+    // Refinement leaves its own marks.
+    lower_marks(mesh);
     mesh.refresh_tet_of();
     let mut lawson = Lawson::default();
     tell("delaunay", 0, settings.odt_sweeps + 1);
