@@ -4,7 +4,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::exact::{ExactPoint, Placed, orient_placed};
+use super::exact::{ExactPoint, Placed, orient_exact, orient_placed};
 use super::space::{Space, edge_key};
 use crate::geom::{Point, orient};
 use crate::mesh::{FaceRef, Mesh, Tet, VertexTag};
@@ -176,6 +176,11 @@ impl<'m, P: Pages> Patch<'m, P> {
             point: v.point,
             exact: v.exact.as_ref(),
         }
+    }
+
+    /// Six times the signed volume, correct to the last bits also near zero.
+    pub(super) fn orient_fine(&self, v: [u32; 4]) -> f64 {
+        orient_exact(v.map(|v| self.placed(v)))
     }
 
     /// Live tetrahedra.
