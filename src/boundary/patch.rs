@@ -139,9 +139,11 @@ impl<'m, P: Pages> Patch<'m, P> {
         self.vertices.len() as u32 - 1
     }
 
-    /// Takes the last added vertex back; no tetrahedron has it.
-    pub(super) fn drop_vertex(&mut self) {
-        self.vertices.pop();
+    /// Takes a vertex back that was added and is in no tetrahedron.
+    pub(super) fn drop_vertex(&mut self, v: u32) {
+        if v as usize + 1 == self.vertices.len() {
+            self.vertices.pop();
+        }
     }
 
     /// Number of vertices ever here.

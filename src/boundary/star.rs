@@ -37,7 +37,7 @@ impl<P: Pages> Patch<'_, P> {
         let x = self.add_vertex(exact.rounded(), Some(exact));
         let new: Vec<[u32; 4]> = outer.iter().map(|(tet, i)| swapped(tet, *i, x)).collect();
         if new.iter().any(|&q| self.orient(q) <= 0.0) {
-            self.drop_vertex();
+            self.drop_vertex(x);
             return None;
         }
         self.replace(cavity, &new);
@@ -48,7 +48,7 @@ impl<P: Pages> Patch<'_, P> {
     pub(super) fn star_grown(&mut self, seed: &[u32], exact: ExactPoint) -> Option<u32> {
         let x = self.add_vertex(exact.rounded(), Some(exact));
         let Some(grown) = self.grow(seed, x, None, &[], &HashSet::new()) else {
-            self.drop_vertex();
+            self.drop_vertex(x);
             return None;
         };
         self.replace(&grown.cavity, &grown.quads);

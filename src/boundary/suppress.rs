@@ -108,7 +108,7 @@ impl<P: Pages> Patch<'_, P> {
         let mut old = ball.clone();
         let mut taken: HashSet<u32> = ball.iter().copied().collect();
         let mut new = Vec::new();
-        let n_before = self.n_vertices();
+        let mut added = 0;
         for wedge in &wedges {
             let walls: Vec<[u32; 3]> = wedge
                 .walls
@@ -125,19 +125,14 @@ impl<P: Pages> Patch<'_, P> {
             }
             match self.join_to_new(x, wedge, &walls, &taken) {
                 Some(mut grown) => {
+                    added += 1;
                     new.append(&mut grown.quads);
                     taken.extend(grown.cavity.iter().copied());
                     old.extend(&grown.cavity[wedge.tets.len()..]);
                 }
-                None => {
-                    while self.n_vertices() > n_before {
-                        self.drop_vertex();
-                    }
-                    return Err(Trouble::Precision("inside a wedge"));
-                }
+                None => return Err(Trouble::Precision("inside a wedge")),
             }
         }
-        let added = self.n_vertices() - n_before;
         let ids = self.replace(&old, &new);
         self.renew_skin(skin, x, &fans, &faces, &ids);
         Ok(added)
@@ -487,7 +482,7 @@ impl<P: Pages> Patch<'_, P> {
                     return Some(grown);
                 }
             }
-            self.drop_vertex();
+            self.drop_vertex(p);
         }
         None
     }
