@@ -5,7 +5,7 @@
 use std::collections::{HashMap, HashSet};
 
 use super::exact::{ExactPoint, Placed, orient_exact, orient_placed};
-use super::space::{Space, edge_key};
+use super::space::{Space, edge_key, sorted};
 use crate::geom::{Point, orient};
 use crate::mesh::{FaceRef, Mesh, Tet, VertexTag};
 use crate::store::Pages;
@@ -46,6 +46,8 @@ pub(super) struct Patch<'m, P: Pages> {
     /// Face of a tetrahedron not brought in (as in the mesh) to its border.
     border_of: HashMap<u32, u32>,
     brought_in: Vec<u32>,
+    /// Required faces brought in.
+    required: HashSet<[u32; 3]>,
     /// Edges of the patch that must stay, besides those of `protected`.
     pub kept: HashSet<u64>,
 }
@@ -68,6 +70,7 @@ impl<'m, P: Pages> Patch<'m, P> {
             borders: Vec::new(),
             border_of: HashMap::new(),
             brought_in: Vec::new(),
+            required: HashSet::new(),
             kept: HashSet::new(),
         }
     }
@@ -105,6 +108,8 @@ impl<'m, P: Pages> Patch<'m, P> {
                 tet.neighbor[i] = FaceRef(BORDER | k);
             }
         }
+        let faces = (0..4).filter(|&i| tet.is_required(i));
+        self.required.extend(faces.map(|i| sorted(tet.face(i))));
         self.tets.push(tet);
         self.brought_in.push(id);
     }
@@ -199,6 +204,17 @@ impl<'m, P: Pages> Patch<'m, P> {
             v.iter().all(|v| v.exact.is_none())
                 && orient(v[0].point, v[1].point, v[2].point, v[3].point) > 0.0
         })
+    }
+
+    /// Whether every required face brought in is still there and required.
+    pub(super) fn keeps_required(&self) -> bool {
+        let mut now: HashSet<[u32; 3]> = HashSet::new();
+        for t in self.live() {
+            let tet = &self.tets[t as usize];
+            let faces = (0..4).filter(|&i| tet.is_required(i));
+            now.extend(faces.map(|i| sorted(tet.face(i))));
+        }
+        self.required.is_subset(&now)
     }
 
     /// Writes the patch in place of what was brought in; returns the number of vertices added less those removed.
