@@ -87,9 +87,9 @@ impl<P: Pages> Patch<'_, P> {
         for (tet, i) in &outer {
             let mut q = tet.vertices();
             q[*i] = a;
-            let at_a = self.orient(q);
+            let at_a = self.orient_fine(q);
             q[*i] = b;
-            let at_b = self.orient(q);
+            let at_b = self.orient_fine(q);
             let t = at_a / (at_a - at_b);
             if at_b > at_a {
                 low = low.max(t);
@@ -104,6 +104,20 @@ impl<P: Pages> Patch<'_, P> {
             for t in [shortest(t, width * 0.1), t] {
                 let exact = ExactPoint::combination(pa, &[(pb, t)]);
                 if let Some(x) = self.star(cavity, &outer, exact) {
+                    return Ok(x);
+                }
+            }
+        }
+        // No room in doubles: a point farther on, in a cavity that grows to be seen.
+        let middle = low + width * 0.5;
+        for step in [1e-12, 1e-9, 1e-7, 1e-5, 1e-4, 1e-3, 1e-2, 0.1] {
+            for t in [middle + step, middle - step] {
+                if t <= 0.0 || t >= 1.0 {
+                    continue;
+                }
+                let t = shortest(t, step * 0.1);
+                let exact = ExactPoint::combination(pa, &[(pb, t)]);
+                if let Some(x) = self.star_grown(cavity, exact) {
                     return Ok(x);
                 }
             }

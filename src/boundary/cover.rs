@@ -126,8 +126,8 @@ impl<P: Pages> Patch<'_, P> {
         }
         let outer = self.outer_faces(&around.tets);
         let (up, down) = (
-            self.orient([f[0], f[1], f[2], above]),
-            self.orient([f[0], f[1], f[2], below]),
+            self.orient_fine([f[0], f[1], f[2], above]),
+            self.orient_fine([f[0], f[1], f[2], below]),
         );
         let [a, b, c] = f.map(|v| self.position(v));
         let (x, y) = (self.position(above), self.position(below));
@@ -155,6 +155,18 @@ impl<P: Pages> Patch<'_, P> {
             let exact = ExactPoint::combination(a, &[(b, s), (c, t)]);
             if self.star(&around.tets, &outer, exact).is_some() {
                 return Ok(());
+            }
+        }
+        for slack in [room * 0.1, room * 1e-3, 0.0] {
+            let (s, t) = (
+                super::chain::shortest(s, slack),
+                super::chain::shortest(t, slack),
+            );
+            if s > 0.0 && t > 0.0 && s + t < 1.0 {
+                let exact = ExactPoint::combination(a, &[(b, s), (c, t)]);
+                if self.star_grown(&around.tets, exact).is_some() {
+                    return Ok(());
+                }
             }
         }
         Err(Trouble::Precision("in a facet"))

@@ -156,7 +156,7 @@ pub(super) fn orient_placed(p: [Placed<'_>; 4]) -> f64 {
 }
 
 #[cold]
-fn orient_exact(p: [Placed<'_>; 4]) -> f64 {
+pub(super) fn orient_exact(p: [Placed<'_>; 4]) -> f64 {
     let [a, b, c, d] = p.map(|p| match p.exact {
         Some(exact) => exact.clone(),
         None => ExactPoint::explicit(p.point),

@@ -18,6 +18,7 @@ mod exact;
 mod find;
 mod flips;
 mod flood;
+mod grow;
 mod kernel;
 mod map;
 mod patch;

@@ -4,8 +4,8 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::exact::{ExactPoint, Placed, orient_placed};
-use super::space::{Space, edge_key};
+use super::exact::{ExactPoint, Placed, orient_exact, orient_placed};
+use super::space::{Space, edge_key, sorted};
 use crate::geom::{Point, orient};
 use crate::mesh::{FaceRef, Mesh, Tet, VertexTag};
 use crate::store::Pages;
@@ -46,6 +46,8 @@ pub(super) struct Patch<'m, P: Pages> {
     /// Face of a tetrahedron not brought in (as in the mesh) to its border.
     border_of: HashMap<u32, u32>,
     brought_in: Vec<u32>,
+    /// Required faces brought in.
+    required: HashSet<[u32; 3]>,
     /// Edges of the patch that must stay, besides those of `protected`.
     pub kept: HashSet<u64>,
 }
@@ -68,6 +70,7 @@ impl<'m, P: Pages> Patch<'m, P> {
             borders: Vec::new(),
             border_of: HashMap::new(),
             brought_in: Vec::new(),
+            required: HashSet::new(),
             kept: HashSet::new(),
         }
     }
@@ -105,6 +108,8 @@ impl<'m, P: Pages> Patch<'m, P> {
                 tet.neighbor[i] = FaceRef(BORDER | k);
             }
         }
+        let faces = (0..4).filter(|&i| tet.is_required(i));
+        self.required.extend(faces.map(|i| sorted(tet.face(i))));
         self.tets.push(tet);
         self.brought_in.push(id);
     }
@@ -139,9 +144,11 @@ impl<'m, P: Pages> Patch<'m, P> {
         self.vertices.len() as u32 - 1
     }
 
-    /// Takes the last added vertex back; no tetrahedron has it.
-    pub(super) fn drop_vertex(&mut self) {
-        self.vertices.pop();
+    /// Takes a vertex back that was added and is in no tetrahedron.
+    pub(super) fn drop_vertex(&mut self, v: u32) {
+        if v as usize + 1 == self.vertices.len() {
+            self.vertices.pop();
+        }
     }
 
     /// Number of vertices ever here.
@@ -178,6 +185,11 @@ impl<'m, P: Pages> Patch<'m, P> {
         }
     }
 
+    /// Six times the signed volume, correct to the last bits also near zero.
+    pub(super) fn orient_fine(&self, v: [u32; 4]) -> f64 {
+        orient_exact(v.map(|v| self.placed(v)))
+    }
+
     /// Live tetrahedra.
     fn live(&self) -> impl Iterator<Item = u32> + '_ {
         (0..self.tets.len() as u32).filter(|&t| self.tets[t as usize].is_live())
@@ -192,6 +204,17 @@ impl<'m, P: Pages> Patch<'m, P> {
             v.iter().all(|v| v.exact.is_none())
                 && orient(v[0].point, v[1].point, v[2].point, v[3].point) > 0.0
         })
+    }
+
+    /// Whether every required face brought in is still there and required.
+    pub(super) fn keeps_required(&self) -> bool {
+        let mut now: HashSet<[u32; 3]> = HashSet::new();
+        for t in self.live() {
+            let tet = &self.tets[t as usize];
+            let faces = (0..4).filter(|&i| tet.is_required(i));
+            now.extend(faces.map(|i| sorted(tet.face(i))));
+        }
+        self.required.is_subset(&now)
     }
 
     /// Writes the patch in place of what was brought in; returns the number of vertices added less those removed.

@@ -112,7 +112,7 @@ fn recover_group<P: Pages>(
         .facets
         .iter()
         .all(|&f| skin.faces.contains_key(&sorted(f)));
-    if !whole || skin.faces.len() != skin.facets.len() {
+    if !whole || skin.faces.len() != skin.facets.len() || !patch.keeps_required() {
         return Err(Trouble::Broken("a facet is not whole"));
     }
     report.points_on_surface += points;

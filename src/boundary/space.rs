@@ -35,14 +35,20 @@ pub(super) trait Space {
     ///
     /// Returns the ids of the new ones, parallel to `new`. Effects: ids of `old` are used again first, in order, and
     /// what is left of them is freed last to first: replacing back restores the very ids. Required faces
-    /// strictly inside are lost unless the caller marks them again.
+    /// stay required if they are faces of the new tetrahedra.
     fn replace(&mut self, old: &[u32], new: &[[u32; 4]]) -> Vec<u32> {
         let mut sides: Vec<Side> = Vec::with_capacity(4 * new.len() + 2 * old.len() + 4);
+        // Required faces inside that are faces again afterwards stay required.
+        let mut inner: Vec<[u32; 3]> = Vec::new();
         for &t in old {
             let tet = self.tet(t);
             for i in 0..4 {
                 let across = tet.neighbor[i];
-                if !(across.exists() && old.contains(&across.tet())) {
+                if across.exists() && old.contains(&across.tet()) {
+                    if tet.is_required(i) {
+                        inner.push(sorted(tet.face(i)));
+                    }
+                } else {
                     sides.push(Side {
                         key: sorted(tet.face(i)),
                         made: u32::MAX,
@@ -100,6 +106,10 @@ pub(super) trait Space {
                 let (l, j) = place(b.made);
                 records[k].neighbor[i] = name(b.made);
                 records[l].neighbor[j] = name(a.made);
+                if inner.contains(&a.key) {
+                    records[k].node[i] |= REQUIRED;
+                    records[l].node[j] |= REQUIRED;
+                }
             }
         }
         for (record, &t) in records.iter().zip(&ids) {

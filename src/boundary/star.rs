@@ -1,5 +1,7 @@
 //! Puts an exact point into a small cavity that sees it whole.
 
+use std::collections::HashSet;
+
 use super::exact::ExactPoint;
 use super::patch::Patch;
 use super::space::Space;
@@ -35,10 +37,21 @@ impl<P: Pages> Patch<'_, P> {
         let x = self.add_vertex(exact.rounded(), Some(exact));
         let new: Vec<[u32; 4]> = outer.iter().map(|(tet, i)| swapped(tet, *i, x)).collect();
         if new.iter().any(|&q| self.orient(q) <= 0.0) {
-            self.drop_vertex();
+            self.drop_vertex(x);
             return None;
         }
         self.replace(cavity, &new);
+        Some(x)
+    }
+
+    /// The same, where the cavity may grow to be seen whole.
+    pub(super) fn star_grown(&mut self, seed: &[u32], exact: ExactPoint) -> Option<u32> {
+        let x = self.add_vertex(exact.rounded(), Some(exact));
+        let Some(grown) = self.grow(seed, x, None, &[], &HashSet::new()) else {
+            self.drop_vertex(x);
+            return None;
+        };
+        self.replace(&grown.cavity, &grown.quads);
         Some(x)
     }
 }

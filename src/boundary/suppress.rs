@@ -17,6 +17,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 
 use super::chain::Trouble;
 use super::flips::Flipper;
+use super::grow::Grown;
 use super::kernel::{HalfSpace, center};
 use super::patch::Patch;
 use super::polygon::triangulate;
@@ -25,8 +26,10 @@ use super::target::Target;
 use super::walk::{ball, find_edge, swapped};
 use crate::geom::Point;
 use crate::mesh::FaceRef;
-use crate::mesh::anatomy::FACES;
 use crate::store::Pages;
+
+/// A place nearer than this to the planes around it, in units of the wedge, is second choice.
+const ROOM_MIN: f64 = 1e-3;
 
 /// The facets of a patch and the faces that make them up.
 #[derive(Default)]
@@ -102,6 +105,8 @@ impl<P: Pages> Patch<'_, P> {
             faces.push(self.fill_polygon(skin.facets[fan.facet], &fan.polygon, &ball)?);
         }
         let wedges = self.wedges(skin, x, &ball, &fans)?;
+        let mut old = ball.clone();
+        let mut taken: HashSet<u32> = ball.iter().copied().collect();
         let mut new = Vec::new();
         let mut added = 0;
         for wedge in &wedges {
@@ -118,10 +123,17 @@ impl<P: Pages> Patch<'_, P> {
                 new.append(&mut quads);
                 continue;
             }
-            new.append(&mut self.join_to_new(x, wedge, &walls)?);
-            added += 1;
+            match self.join_to_new(x, wedge, &walls, &taken) {
+                Some(mut grown) => {
+                    added += 1;
+                    new.append(&mut grown.quads);
+                    taken.extend(grown.cavity.iter().copied());
+                    old.extend(&grown.cavity[wedge.tets.len()..]);
+                }
+                None => return Err(Trouble::Precision("inside a wedge")),
+            }
         }
-        let ids = self.replace(&ball, &new);
+        let ids = self.replace(&old, &new);
         self.renew_skin(skin, x, &fans, &faces, &ids);
         Ok(added)
     }
@@ -398,62 +410,90 @@ impl<P: Pages> Patch<'_, P> {
         None
     }
 
-    /// The wedge and its walls joined to a new vertex inside.
+    /// The wedge and its walls joined to a new vertex inside; `taken` holds the ball and what other wedges took.
     fn join_to_new(
         &mut self,
         x: u32,
         wedge: &Wedge,
         walls: &[[u32; 3]],
-    ) -> Result<Vec<[u32; 4]>, Trouble> {
-        // Slot of the vertex to be placed in each future tetrahedron.
-        let mut quads: Vec<([u32; 4], usize)> = Vec::new();
-        for &t in &wedge.tets {
-            let tet = self.tet(t);
-            let i = tet.local(x).expect("a tetrahedron of the ball");
-            quads.push((tet.vertices(), i));
-        }
-        quads.extend(walls.iter().map(|&[p, q, r]| ([p, q, r, x], 3)));
+        taken: &HashSet<u32>,
+    ) -> Option<Grown> {
         let origin = self.position(x);
         let mut reach = 0.0f64;
         let mut planes = Vec::new();
-        for &(q, i) in &quads {
-            let [a, b, c] = FACES[i].map(|k| self.position(q[k]) - origin);
+        // Planes that no growth can pass: the walls and required faces.
+        let mut firm = Vec::new();
+        let mut plane = |[a, b, c]: [Point; 3], is_firm: bool| {
             reach = reach.max(a.length()).max(b.length()).max(c.length());
             let normal = (b - a).cross(c - a).normalize_or_zero();
-            if normal == Point::ZERO {
-                continue;
+            if normal != Point::ZERO {
+                let half = HalfSpace {
+                    normal,
+                    offset: normal.dot(a),
+                };
+                planes.push(half);
+                if is_firm {
+                    firm.push(half);
+                }
             }
-            planes.push(HalfSpace {
-                normal,
-                offset: normal.dot(a),
-            });
+        };
+        for &t in &wedge.tets {
+            let tet = self.tet(t);
+            let i = tet.local(x)?;
+            let corners = tet.face(i).map(|v| self.position(v) - origin);
+            plane(corners, tet.is_required(i));
         }
+        for &[p, q, r] in walls {
+            // Seen from inside counter-clockwise, so the outward normal is reversed.
+            plane([q, p, r].map(|v| self.position(v) - origin), true);
+        }
+        let mut proposals: Vec<(Point, bool)> = Vec::new();
         let best = center(&planes, reach);
-        let mut proposals: Vec<Point> = Vec::new();
-        if let Some(d) = best {
-            proposals.extend((0..45).map(|k| d * 0.5f64.powi(k)));
-        }
+        let roomy = best.is_some_and(|d| {
+            let room = planes.iter().map(|h| h.offset - h.normal.dot(d));
+            room.fold(f64::INFINITY, f64::min) > ROOM_MIN * reach
+        });
         let heart = self.heart(x, wedge) - origin;
-        proposals.extend((0..45).map(|k| heart * 0.5f64.powi(k)));
-        for d in proposals {
-            let p = self.add_vertex(origin + d, None);
-            let fits = quads.iter().all(|&(q, i)| {
-                let mut q = q;
-                q[i] = p;
-                self.orient(q) > 0.0
-            });
-            if fits {
-                return Ok(quads
-                    .into_iter()
-                    .map(|(mut q, i)| {
-                        q[i] = p;
-                        q
-                    })
-                    .collect());
-            }
-            self.drop_vertex();
+        let halves = |d: Point, n: i32| (0..n).map(move |k| d * 0.5f64.powi(k));
+        if let Some(d) = best.filter(|_| roomy) {
+            proposals.push((d, false));
         }
-        Err(Trouble::Precision("inside a wedge"))
+        if let Some(d) = center(&firm, reach) {
+            proposals.extend(halves(d, 24).map(|d| (d, true)));
+        }
+        proposals.extend(halves(heart, 24).map(|d| (d, true)));
+        if let Some(d) = best {
+            proposals.extend(halves(d, 45).map(|d| (d, false)));
+        }
+        proposals.extend(halves(heart, 45).map(|d| (d, false)));
+        for (d, may_grow) in proposals {
+            let p = self.add_vertex(origin + d, None);
+            let quads: Vec<[u32; 4]> = walls.iter().map(|&[a, b, c]| [a, b, c, p]).collect();
+            if quads.iter().all(|&q| self.orient(q) > 0.0) {
+                let mut others = taken.clone();
+                others.retain(|t| !wedge.tets.contains(t));
+                let grown = if may_grow {
+                    self.grow(&wedge.tets, p, Some(x), walls, &others)
+                } else {
+                    self.join_all(x, wedge, p)
+                };
+                if let Some(mut grown) = grown {
+                    grown.quads.extend(quads);
+                    return Some(grown);
+                }
+            }
+            self.drop_vertex(p);
+        }
+        None
+    }
+
+    /// The wedge with `x` moved to `p`, if all volumes stay positive.
+    fn join_all(&mut self, x: u32, wedge: &Wedge, p: u32) -> Option<Grown> {
+        let quads = self.moved(x, p, &wedge.tets)?;
+        Some(Grown {
+            cavity: wedge.tets.clone(),
+            quads,
+        })
     }
 
     /// Mean of the wedge's other vertices: a direction to try when the planes give none.

@@ -1,0 +1,113 @@
+//! A cavity that grows until a given point sees all its outer faces.
+//!
+//! Flat tetrahedra between nearly coplanar input points leave a point no room in doubles. Across a face the point is
+//! behind, the next tetrahedron joins the cavity, until everything is seen: the opposite of shrinking a cavity, and
+//! like it bounded by required faces.
+
+use std::collections::HashSet;
+
+use super::patch::Patch;
+use super::space::{Space, edge_key};
+use super::walk::swapped;
+use crate::mesh::anatomy::EDGES;
+use crate::store::Pages;
+
+/// Larger cavities are not tried.
+const CAVITY_MAX: usize = 300;
+
+/// A cavity and the tetrahedra that join its outer faces to the point.
+pub(super) struct Grown {
+    pub cavity: Vec<u32>,
+    pub quads: Vec<[u32; 4]>,
+}
+
+impl<P: Pages> Patch<'_, P> {
+    /// Grows the cavity `seed` for vertex `x`, which is in no tetrahedron yet.
+    ///
+    /// Faces with vertex `open` are left to the caller, who will close the cavity there with the triangles `walls`.
+    /// `None` when a required face, a kept edge, a vertex or one of the `taken` tetrahedra would be swallowed.
+    pub(super) fn grow(
+        &mut self,
+        seed: &[u32],
+        x: u32,
+        open: Option<u32>,
+        walls: &[[u32; 3]],
+        taken: &HashSet<u32>,
+    ) -> Option<Grown> {
+        let mut cavity = seed.to_vec();
+        let mut inside: HashSet<u32> = seed.iter().copied().collect();
+        let mut next = 0;
+        while next < cavity.len() {
+            let t = cavity[next];
+            next += 1;
+            let tet = self.tet(t);
+            for i in 0..4 {
+                let at_open = (0..4).any(|j| j != i && Some(tet.vertex(j)) == open);
+                if at_open || inside.contains(&tet.neighbor[i].tet()) {
+                    continue;
+                }
+                if self.orient(swapped(&tet, i, x)) > 0.0 {
+                    continue;
+                }
+                if tet.is_required(i) {
+                    return None;
+                }
+                let across = self.across(t, i);
+                if !across.exists() || taken.contains(&across.tet()) {
+                    return None;
+                }
+                if inside.insert(across.tet()) {
+                    cavity.push(across.tet());
+                }
+            }
+            if cavity.len() > CAVITY_MAX {
+                return None;
+            }
+        }
+        let mut quads = Vec::new();
+        let mut rim_edges: HashSet<u64> = HashSet::new();
+        let mut rim: HashSet<u32> = HashSet::new();
+        let mut note = |face: [u32; 3]| {
+            rim.extend(face);
+            for k in 0..3 {
+                rim_edges.insert(edge_key(face[k], face[(k + 1) % 3]));
+            }
+        };
+        walls.iter().for_each(|&w| note(w));
+        for &t in &cavity {
+            let tet = self.tet(t);
+            for i in 0..4 {
+                if (0..4).any(|j| j != i && Some(tet.vertex(j)) == open) {
+                    continue;
+                }
+                if inside.contains(&tet.neighbor[i].tet()) {
+                    if tet.is_required(i) {
+                        return None;
+                    }
+                } else {
+                    note(tet.face(i));
+                    quads.push(swapped(&tet, i, x));
+                }
+            }
+        }
+        for &t in &cavity {
+            let v = self.tet(t).vertices();
+            if v.iter().any(|&v| !rim.contains(&v) && Some(v) != open) {
+                return None;
+            }
+            for [i, j] in EDGES {
+                let (a, b) = (v[i], v[j]);
+                let lost =
+                    Some(a) != open && Some(b) != open && !rim_edges.contains(&edge_key(a, b));
+                if lost && self.protects(a, b) {
+                    return None;
+                }
+            }
+        }
+        // The last growth may have turned a face that was seen before: all must be seen at the end.
+        if quads.iter().any(|&q| self.orient(q) <= 0.0) {
+            return None;
+        }
+        Some(Grown { cavity, quads })
+    }
+}
