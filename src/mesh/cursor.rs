@@ -129,7 +129,7 @@ pub fn dense(id: u32) -> u32 {
 /// The id at position `n`; inverse of [`dense`].
 #[inline]
 pub fn sparse(n: u32) -> u32 {
-    (n / RECORDS as u32) << SLOT_BITS | n % RECORDS as u32
+    ((n / RECORDS as u32) << SLOT_BITS) | (n % RECORDS as u32)
 }
 
 /// Record and word pair of the attribute of `id`: four to a record.
