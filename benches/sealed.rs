@@ -60,8 +60,8 @@ fn delaunay(points: &[Point]) -> Vec<SealedTet> {
     let mut place = vec![u32::MAX; points.len() * 2 + 4096];
     // In rounds, each along the curve: every 64th point, every 8th, all.
     let round = |i: usize| match i {
-        _ if i % 64 == 0 => 0,
-        _ if i % 8 == 0 => 1,
+        _ if i.is_multiple_of(64) => 0,
+        _ if i.is_multiple_of(8) => 1,
         _ => 2,
     };
     for r in 0..3 {
