@@ -26,6 +26,8 @@ pub enum Rejected {
     Buries,
     /// The cavity has more than a million tetrahedra.
     TooLarge,
+    /// The caller refused a vertex of the cavity.
+    Refused,
 }
 
 /// An outer face of the cavity.
@@ -59,6 +61,7 @@ pub struct Kernel {
     links: Links,
     new_tets: Vec<u32>,
     outer: Vec<u32>,
+    suspects: Vec<u32>,
     pub(super) turn: u32,
     pub stats: KernelStats,
 }
@@ -72,6 +75,7 @@ impl Default for Kernel {
             links: Links::new(),
             new_tets: Vec::new(),
             outer: Vec::new(),
+            suspects: Vec::new(),
             turn: 1,
             stats: KernelStats::default(),
         }
@@ -90,21 +94,23 @@ impl Kernel {
         hint: u32,
     ) -> Result<u32, Rejected> {
         let start = self.locate(mesh, p, hint)?;
-        self.gather::<P, false>(mesh, p, &start)?;
+        self.gather::<P, false>(mesh, p, &start, |_, _| false)?;
         Ok(self.fill(mesh, v))
     }
 
     /// Marks the cavity of `p` and lists its outer faces; required faces are kept.
     ///
     /// The cavity is made star-shaped around `p` exactly, and refused when a vertex would be left without
-    /// tetrahedra. On errors nothing stays marked. After success either [`Kernel::fill`] or [`Kernel::discard`] must follow.
+    /// tetrahedra. `refuses` is asked about vertices met on the way, those of `start` excepted; the first refusal ends all.
+    /// On errors nothing stays marked. After success either [`Kernel::fill`] or [`Kernel::discard`] must follow.
     pub fn gather_constrained<P: Pages>(
         &mut self,
         mesh: &mut Mesh<P>,
         p: Point,
         start: &Located,
+        refuses: impl FnMut(&mut Mesh<P>, u32) -> bool,
     ) -> Result<(), Rejected> {
-        self.gather::<P, true>(mesh, p, start)?;
+        self.gather::<P, true>(mesh, p, start, refuses)?;
         if let Err(rejected) = self.correct(mesh, p, start.tet) {
             self.discard(mesh);
             return Err(rejected);
@@ -115,11 +121,6 @@ impl Kernel {
     /// Outer faces of the gathered cavity.
     pub fn faces(&self) -> &[CavityFace] {
         &self.faces
-    }
-
-    /// Vertices of the outer faces, once each, after [`Kernel::gather_constrained`].
-    pub fn outer_vertices(&self) -> &[u32] {
-        &self.outer
     }
 
     /// Tetrahedra of the gathered cavity.
@@ -137,6 +138,7 @@ impl Kernel {
         mesh: &mut Mesh<P>,
         p: Point,
         start: &Located,
+        mut refuses: impl FnMut(&mut Mesh<P>, u32) -> bool,
     ) -> Result<(), Rejected> {
         if let Some(i) = start.points.iter().position(|&q| q == p) {
             return Err(Rejected::Duplicate(start.record.vertex(i)));
@@ -172,6 +174,10 @@ impl Kernel {
                     if det > 0.0 || (det == 0.0 && in_conflict(mesh, &other, p)) {
                         mesh.set_mark(across.tet(), 0, true);
                         self.cavity.push(across.tet());
+                        if CONSTRAINED && refuses(mesh, other.vertex(across.face())) {
+                            self.discard(mesh);
+                            return Err(Rejected::Refused);
+                        }
                         continue;
                     }
                 }
@@ -192,28 +198,44 @@ impl Kernel {
 
     /// Takes tetrahedra out of the cavity until `p` sees all its faces from inside.
     ///
-    /// The one with a blind face goes, and what it alone connected goes with it; the cavity strictly shrinks.
+    /// Those with a blind face go, and what they alone connected goes with them.
     fn correct<P: Pages>(
         &mut self,
         mesh: &mut Mesh<P>,
         p: Point,
         seed: u32,
     ) -> Result<(), Rejected> {
-        loop {
-            let mut blind = false;
-            for k in 0..self.faces.len() {
-                let face = self.faces[k];
-                let [a, b, c] = face.vertices.map(|v| mesh.point(v));
-                if orient(p, a, b, c) <= 0.0 {
-                    blind = true;
-                    mesh.set_mark(face.inside.tet(), 0, false);
+        // What is left in the end is the largest part without a blind outer face, whatever the order.
+        let mut suspects = std::mem::take(&mut self.suspects);
+        suspects.clear();
+        for face in &self.faces {
+            let [a, b, c] = face.vertices;
+            let (a, b, c) = (mesh.point(a), mesh.point(b), mesh.point(c));
+            if orient(p, a, b, c) <= 0.0 && is_marked(mesh, face.inside.tet()) {
+                mesh.set_mark(face.inside.tet(), 0, false);
+                suspects.push(face.inside.tet());
+            }
+        }
+        let shrunk = !suspects.is_empty();
+        while let Some(gone) = suspects.pop() {
+            let tet = mesh.tet(gone);
+            for (i, across) in tet.neighbor.into_iter().enumerate() {
+                if !across.exists() || tet.is_required(i) || !is_marked(mesh, across.tet()) {
+                    continue;
+                }
+                let [a, b, c] = tet.face(i);
+                let (a, b, c) = (mesh.point(a), mesh.point(b), mesh.point(c));
+                // Seen from the other side, where it is an outer face now.
+                if orient(p, a, c, b) <= 0.0 {
+                    mesh.set_mark(across.tet(), 0, false);
+                    suspects.push(across.tet());
                 }
             }
-            if !blind {
-                break;
-            }
+        }
+        self.suspects = suspects;
+        if shrunk {
             self.stats.shrunk += 1;
-            if mesh.tet(seed).node[0] & MARK == 0 {
+            if !is_marked(mesh, seed) {
                 return Err(Rejected::Blocked);
             }
             self.reflood(mesh, seed);
@@ -402,6 +424,11 @@ impl Kernel {
             write_new(mesh, v, self.new_tets[k], face, inner);
         }
     }
+}
+
+#[inline]
+fn is_marked<P: Pages>(mesh: &mut Mesh<P>, t: u32) -> bool {
+    mesh.tet(t).node[0] & MARK != 0
 }
 
 /// The sphere test of one tetrahedron where doubles did not decide.

@@ -12,8 +12,12 @@ use crate::mesh::{Mesh, Tet};
 use crate::reconnect::Inherited;
 use crate::store::Pages;
 
-/// A cavity with more outer faces is left alone.
+/// A cavity that meets more vertices while it grows, the same one more than once, or has more outer faces is left alone.
+const VERTICES_MAX: u32 = 64;
 const FACES_MAX: usize = 64;
+
+/// A new vertex must leave nothing worse than this: q = 10.
+const GOOD_MIN: f64 = 0.1;
 
 /// Scratch of the insertion.
 #[derive(Default)]
@@ -42,7 +46,12 @@ impl Inserter {
             points,
         };
         for p in [centroid, middle(longest), middle(5 - longest)] {
-            if self.kernel.gather_constrained(mesh, p, &start).is_err() {
+            let mut room = VERTICES_MAX;
+            let gathered = self.kernel.gather_constrained(mesh, p, &start, |_, _| {
+                room -= 1;
+                room == 0
+            });
+            if gathered.is_err() {
                 continue;
             }
             if self.fill_if_better(mesh, tet, p, enough) {
@@ -80,7 +89,7 @@ impl Inserter {
         for face in self.kernel.faces() {
             self.star.faces.push(face.vertices.map(|v| mesh.point(v)));
         }
-        let Some((best, _)) = self.star.search(raised(worst), enough) else {
+        let Some((best, _)) = self.star.search(raised(worst).max(GOOD_MIN), enough) else {
             return false;
         };
         let h = tet.vertices().map(|v| mesh.size(v));

@@ -60,6 +60,20 @@ fn ratio(p: &Parts) -> f64 {
     p.det / (ALPHA * p.longest_squared.sqrt() * sum)
 }
 
+/// Share of [`face_bound`] that is taken for the best a face allows: an equilateral one allows 0.71 of it.
+pub(super) const CONTENT: f64 = 0.62;
+
+/// A goodness that no tetrahedron on this face can exceed: its inscribed sphere is smaller than the circle
+/// inscribed in any of its faces, and its longest edge is no shorter than the face's.
+pub(super) fn face_bound([a, b, c]: [Point; 3]) -> f64 {
+    let (u, v) = (b - a, c - a);
+    let (lu, lv, lw) = (u.length(), v.length(), (c - b).length());
+    let longest = lu.max(lv).max(lw);
+    // Radius of the inscribed circle: twice the area over the perimeter.
+    let radius = u.cross(v).length() / (lu + lv + lw);
+    radius / (ALPHA * longest)
+}
+
 /// Whether the goodness is below `wanted` (at most); decides most good ones without a root or a division.
 #[inline(always)]
 pub(super) fn is_below(points: [Point; 4], wanted: f64) -> bool {

@@ -1,10 +1,11 @@
 //! Rounds over the pages that hold bad tetrahedra.
 
 use super::pages::{PageFlags, is_examined, reopen, tets_of_page};
-use super::quality::{GOODNESS_WANTED, goodness, is_below};
+use super::quality::{CONTENT, GOODNESS_WANTED, face_bound, goodness, is_below};
 use super::rescue::Rescue;
 use super::smooth::{Star, is_free};
 use super::swap::Swapper;
+use crate::mesh::anatomy::MARK;
 use crate::mesh::{Mesh, Tet};
 use crate::store::{Pages, stop_if_requested};
 
@@ -12,6 +13,8 @@ use crate::store::{Pages, stop_if_requested};
 const ROUNDS_MAX: u32 = 8;
 /// A round that improves less than this share of the bad tetrahedra it looked at is the last.
 const GAIN_MIN: f64 = 1e-3;
+/// The mark of a tetrahedron on which rescue was tried.
+const RESCUED: usize = 2;
 /// Largest ball that is smoothed.
 const BALL_MAX: usize = 128;
 
@@ -70,6 +73,13 @@ pub(super) struct Rounds {
     pub(super) counts: OperationCounts,
 }
 
+/// Whether a required face keeps the tetrahedron from getting much better.
+fn is_forced<P: Pages>(mesh: &mut Mesh<P>, tet: &Tet, good: f64) -> bool {
+    (0..4).any(|i| {
+        tet.is_required(i) && good >= CONTENT * face_bound(tet.face(i).map(|v| mesh.point(v)))
+    })
+}
+
 impl Rounds {
     pub(super) fn new(flags: PageFlags) -> Self {
         Self {
@@ -121,7 +131,7 @@ impl Rounds {
         });
         work.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         // What operations leave bad is followed up here while it is near, up to a bound.
-        let follow_max = 8 * work.len() + 64;
+        let follow_max = 2 * work.len() + 64;
         let mut next = 0;
         while next < work.len() {
             let t = work[next].1;
@@ -136,7 +146,7 @@ impl Rounds {
             }
             self.counts.attacked += 1;
             self.changed.clear();
-            if !self.attack(mesh, t, &tet, good, target) {
+            if is_forced(mesh, &tet, good) || !self.attack(mesh, t, &tet, good, target) {
                 mesh.set_mark(t, 1, true);
                 continue;
             }
@@ -192,15 +202,19 @@ impl Rounds {
                 return true;
             }
         }
-        target.rescue
-            && self.rescue.attack(
-                mesh,
-                t,
-                tet,
-                good,
-                target.enough,
-                &mut self.counts,
-                &mut self.changed,
-            )
+        // Rescue is dear: once a tetrahedron, whatever changes around it.
+        if !target.rescue || tet.node[RESCUED] & MARK != 0 {
+            return false;
+        }
+        mesh.set_mark(t, RESCUED, true);
+        self.rescue.attack(
+            mesh,
+            t,
+            tet,
+            good,
+            target.enough,
+            &mut self.counts,
+            &mut self.changed,
+        )
     }
 }

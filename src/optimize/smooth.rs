@@ -1,6 +1,6 @@
 //! Moving one vertex so that the worst tetrahedron of its ball gets better.
 
-use super::quality::goodness;
+use super::quality::{CONTENT, face_bound, goodness};
 use crate::geom::Point;
 use crate::mesh::{Mesh, VertexTag};
 use crate::reconnect::Ball;
@@ -8,10 +8,14 @@ use crate::store::Pages;
 
 /// Positions tried on the way to the average of the star.
 const FRACTIONS: [f64; 5] = [0.1, 0.25, 0.45, 0.7, 1.0];
-/// A change must raise the worst goodness by this factor: less is noise that keeps queues full.
-pub(super) const GAIN_MIN: f64 = 1.001;
+/// A change must raise the worst goodness by this factor and as much again in absolute terms, or double it: smaller
+/// steps keep queues full around tetrahedra that the surface spoils, and end lower, for each takes the room of the next.
+const GAIN_MIN: f64 = 1.03;
+const GAIN_LEAST: f64 = 0.003;
 /// Steps of the search per vertex.
 const SEARCH_STEPS: usize = 12;
+/// A search without any gain so far ends after this many halvings of its step: what is nearer gains too little.
+const HALVINGS_MAX: u32 = 3;
 
 /// Whether `v` may move as far as its tag tells: it is no vertex of the surface, of an interface or of the box.
 #[inline]
@@ -97,6 +101,7 @@ impl Star {
             step += (*a - middle).length();
         }
         step *= 0.2 / n;
+        let mut halvings = 0;
         for _ in 0..SEARCH_STEPS {
             if best >= enough {
                 break;
@@ -111,19 +116,30 @@ impl Star {
                 }
             }
             if best == before {
+                halvings += 1;
+                if best == floor && halvings > HALVINGS_MAX {
+                    break;
+                }
                 step *= 0.5;
             }
         }
         (best > floor).then_some((at, best))
     }
 
+    /// What no position of the vertex can exceed, given the faces opposite it.
+    fn bound(&self) -> f64 {
+        let bounds = self.faces.iter().map(|&face| face_bound(face));
+        bounds.fold(f64::INFINITY, f64::min)
+    }
+
     /// Moves the vertex when that raises the worst goodness of its ball; the mesh is changed only then.
     pub(super) fn improve<P: Pages>(&mut self, mesh: &mut Mesh<P>, enough: f64) -> bool {
         let worst = self.value(self.at, f64::NEG_INFINITY);
-        if worst >= enough {
+        let bound = self.bound();
+        if worst >= enough.min(bound / GAIN_MIN) {
             return false;
         }
-        match self.search(raised(worst), enough) {
+        match self.search(raised(worst), enough.min(bound * CONTENT)) {
             Some((p, _)) => {
                 mesh.set_point(self.v, p);
                 true
@@ -136,5 +152,5 @@ impl Star {
 /// What a new worst goodness must exceed to count as better than `worst`.
 #[inline]
 pub(super) fn raised(worst: f64) -> f64 {
-    (worst * GAIN_MIN).max(worst + 1e-6)
+    (worst * GAIN_MIN + GAIN_LEAST).min(worst * 2.0 + 1e-9)
 }

@@ -33,15 +33,21 @@ impl Worker {
             return;
         }
         let (region, _) = mesh.tet_attribute(start.tet);
-        if self
+        let gathered = self
             .kernel
-            .gather_constrained(mesh, c.point, &start)
-            .is_err()
-        {
-            report.blocked += 1;
-            return;
+            .gather_constrained(mesh, c.point, &start, |mesh, v| is_near(mesh, v, c));
+        match gathered {
+            Ok(()) => {}
+            Err(Rejected::Refused) => {
+                report.near += 1;
+                return;
+            }
+            Err(_) => {
+                report.blocked += 1;
+                return;
+            }
         }
-        if self.is_crowded(mesh, c) {
+        if self.is_flat(mesh, c) {
             self.kernel.discard(mesh);
             report.near += 1;
             return;
@@ -65,18 +71,8 @@ impl Worker {
             .or_else(|_| self.kernel.locate(mesh, c.point, self.last))
     }
 
-    /// Whether the gathered cavity has a vertex or a required face too near.
-    ///
-    /// In a Delaunay mesh the nearest vertex is on the cavity, so nothing nearer is missed.
-    fn is_crowded<P: Pages>(&mut self, mesh: &mut Mesh<P>, c: &Candidate) -> bool {
-        if self
-            .kernel
-            .outer_vertices()
-            .iter()
-            .any(|&v| is_near(mesh, v, c))
-        {
-            return true;
-        }
+    /// Whether the gathered cavity has a required face too near.
+    fn is_flat<P: Pages>(&mut self, mesh: &mut Mesh<P>, c: &Candidate) -> bool {
         self.kernel.faces().iter().filter(|f| f.required).any(|f| {
             let [p, q, r] = [
                 mesh.point(f.vertices[0]),
