@@ -56,6 +56,8 @@ pub struct KernelStats {
 /// Scratch of the insertion kernel; one per worker.
 pub struct Kernel {
     cavity: Vec<u32>,
+    /// The face through which each tetrahedron of the cavity was entered.
+    entries: Vec<FaceRef>,
     locals: Vec<[u8; 3]>,
     faces: Vec<CavityFace>,
     links: Links,
@@ -70,6 +72,7 @@ impl Default for Kernel {
     fn default() -> Self {
         Self {
             cavity: Vec::new(),
+            entries: Vec::new(),
             locals: Vec::new(),
             faces: Vec::new(),
             links: Links::new(),
@@ -144,13 +147,15 @@ impl Kernel {
             return Err(Rejected::Duplicate(start.record.vertex(i)));
         }
         self.cavity.clear();
+        self.entries.clear();
         self.faces.clear();
         mesh.set_mark(start.tet, 0, true);
         self.cavity.push(start.tet);
+        self.entries.push(FaceRef::new(start.tet, 0));
         let mut next = 0;
-        while next < self.cavity.len() {
-            let t = self.cavity[next];
-            next += 1;
+        while next < self.entries.len() {
+            let entry = self.entries[next];
+            let t = entry.tet();
             let tet = mesh.tet(t);
             let [a, b, c, d] = mesh.points(&tet);
             let seen = [
@@ -159,22 +164,27 @@ impl Kernel {
                 Seen::new(c, p),
                 Seen::new(d, p),
             ];
-            for (i, &[f, g, h]) in FACES.iter().enumerate() {
+            // What lies across the face of entry is in the cavity; the first tetrahedron was entered from nowhere.
+            let n = if next == 0 { 4 } else { 3 };
+            next += 1;
+            for k in 1..=n {
+                let i = (entry.face() + k) & 3;
+                let [f, g, h] = FACES[i];
                 let across = tet.neighbor[i];
                 let required = CONSTRAINED && tet.is_required(i);
                 if across.exists() && !required {
-                    let other = mesh.tet(across.tet());
-                    if other.node[0] & MARK != 0 {
+                    let Some(v) = mesh.apex_if_unmarked(across) else {
                         continue;
-                    }
+                    };
                     self.stats.sphere_tests += 1;
                     // The neighbor shares this face; only its apex is new.
-                    let apex = Seen::new(mesh.point(other.vertex(across.face())), p);
+                    let apex = Seen::new(mesh.point(v), p);
                     let det = insphere_filtered(&apex, &seen[f], &seen[h], &seen[g]);
-                    if det > 0.0 || (det == 0.0 && in_conflict(mesh, &other, p)) {
+                    if det > 0.0 || (det == 0.0 && in_conflict(mesh, across.tet(), p)) {
                         mesh.set_mark(across.tet(), 0, true);
                         self.cavity.push(across.tet());
-                        if CONSTRAINED && refuses(mesh, other.vertex(across.face())) {
+                        self.entries.push(across);
+                        if CONSTRAINED && refuses(mesh, v) {
                             self.discard(mesh);
                             return Err(Rejected::Refused);
                         }
@@ -434,8 +444,9 @@ fn is_marked<P: Pages>(mesh: &mut Mesh<P>, t: u32) -> bool {
 /// The sphere test of one tetrahedron where doubles did not decide.
 #[cold]
 #[inline(never)]
-fn in_conflict<P: Pages>(mesh: &mut Mesh<P>, tet: &Tet, p: Point) -> bool {
-    let [a, b, c, d] = mesh.points(tet);
+fn in_conflict<P: Pages>(mesh: &mut Mesh<P>, t: u32, p: Point) -> bool {
+    let tet = mesh.tet(t);
+    let [a, b, c, d] = mesh.points(&tet);
     in_sphere_perturbed(a, b, c, d, p)
 }
 

@@ -31,24 +31,24 @@ impl Kernel {
         hint: u32,
     ) -> Result<Located, Rejected> {
         let mut tet = hint;
-        let mut from = u32::MAX;
+        let mut record = mesh.tet(tet);
+        if !record.is_live() {
+            return Err(Rejected::Outside);
+        }
+        let mut points = mesh.points(&record);
+        // The face through which the walk came: `p` is not beyond it.
+        let mut entry = usize::MAX;
         for step in 0..STEPS_MAX {
-            let record = mesh.tet(tet);
-            if !record.is_live() {
-                return Err(Rejected::Outside);
-            }
-            let points = mesh.points(&record);
             self.stats.walk_steps += 1;
-            let mut next = None;
+            let mut exit = None;
             for k in 0..4 {
                 let i = ((self.turn as usize) + k) & 3;
-                let across = record.neighbor[i];
-                if across.tet() == from && across.exists() {
+                if i == entry {
                     continue;
                 }
                 let [a, b, c] = FACES[i];
                 if orient(p, points[a], points[b], points[c]) < 0.0 {
-                    next = Some(across);
+                    exit = Some(i);
                     break;
                 }
             }
@@ -57,20 +57,21 @@ impl Kernel {
                 .wrapping_mul(1_664_525)
                 .wrapping_add(1_013_904_223)
                 ^ (step >> 3);
-            match next {
-                None => {
-                    return Ok(Located {
-                        tet,
-                        record,
-                        points,
-                    });
-                }
-                Some(across) if across.exists() => {
-                    from = tet;
-                    tet = across.tet();
-                }
-                Some(_) => return Err(Rejected::Outside),
+            let Some(i) = exit else {
+                return Ok(Located {
+                    tet,
+                    record,
+                    points,
+                });
+            };
+            let across = record.neighbor[i];
+            if !across.exists() {
+                return Err(Rejected::Outside);
             }
+            tet = across.tet();
+            record = mesh.tet(tet);
+            points = mesh.points(&record);
+            entry = across.face();
         }
         Err(Rejected::Outside)
     }

@@ -1,6 +1,6 @@
 //! The working mesh of one sub-domain, read and changed record by record through its pages.
 
-use tetdb_schema::page::{NONE, RECORDS, SLOT_BITS, SLOT_MASK, SLOTS, u32_le};
+use tetdb_schema::page::{NONE, RECORDS, SLOT_BITS, SLOT_MASK, SLOTS, Slot, u32_le};
 
 use super::anatomy::{FaceRef, MARK, REQUIRED, Tet, VERTEX_MASK};
 use crate::geom::Point;
@@ -143,6 +143,16 @@ fn attribute_place(id: u32) -> (u32, usize) {
 const FIXED: u32 = 1 << 31;
 const WORD_ZERO: u32_le = u32_le::from_native(0);
 
+/// The coordinates in a vertex record.
+#[inline(always)]
+fn position(w: &Slot) -> Point {
+    let f = |i: usize| {
+        let (low, high) = (w[i].to_native(), w[i + 1].to_native());
+        f64::from_bits(u64::from(low) | u64::from(high) << 32)
+    };
+    Point::new(f(0), f(2), f(4))
+}
+
 impl<P: Pages> Mesh<P> {
     /// An empty mesh over `pages`, which must hold none.
     pub fn new(pages: P) -> Self {
@@ -211,6 +221,7 @@ impl<P: Pages> Mesh<P> {
         self.pages
     }
 
+    #[inline]
     fn take<const K: usize>(pages: &mut P, arena: &mut Arena, what: &'static str) -> u32 {
         arena.n_live += 1;
         if arena.free_head != NONE {
@@ -245,6 +256,16 @@ impl<P: Pages> Mesh<P> {
     #[inline(always)]
     pub fn tet(&mut self, t: u32) -> Tet {
         Tet::from_slot(self.pages.read::<{ kind::TETS }>(t))
+    }
+
+    /// The vertex opposite `face`, unless node 0 of its tetrahedron carries the mark.
+    #[inline(always)]
+    pub fn apex_if_unmarked(&mut self, face: FaceRef) -> Option<u32> {
+        let slot = self.pages.read::<{ kind::TETS }>(face.tet());
+        if slot[0].to_native() & MARK != 0 {
+            return None;
+        }
+        Some(slot[face.face()].to_native() & VERTEX_MASK)
     }
 
     /// Replaces the record of `t`.
@@ -375,12 +396,7 @@ impl<P: Pages> Mesh<P> {
     /// Position of `v`.
     #[inline(always)]
     pub fn point(&mut self, v: u32) -> Point {
-        let w = self.pages.read::<{ kind::VERTICES }>(v);
-        let f = |i: usize| {
-            let (low, high) = (w[i].to_native(), w[i + 1].to_native());
-            f64::from_bits(u64::from(low) | u64::from(high) << 32)
-        };
-        Point::new(f(0), f(2), f(4))
+        position(self.pages.read::<{ kind::VERTICES }>(v))
     }
 
     /// Position and wanted edge length of `v` in one access.
@@ -393,12 +409,9 @@ impl<P: Pages> Mesh<P> {
     /// Positions of the four vertices of `tet`.
     #[inline(always)]
     pub fn points(&mut self, tet: &Tet) -> [Point; 4] {
-        [
-            self.point(tet.vertex(0)),
-            self.point(tet.vertex(1)),
-            self.point(tet.vertex(2)),
-            self.point(tet.vertex(3)),
-        ]
+        let ids = [tet.vertex(0), tet.vertex(1), tet.vertex(2), tet.vertex(3)];
+        let [a, b, c, d] = self.pages.read_four::<{ kind::VERTICES }>(ids);
+        [position(a), position(b), position(c), position(d)]
     }
 
     /// Moves `v`.

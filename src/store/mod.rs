@@ -11,6 +11,7 @@ mod budget;
 mod error;
 mod file;
 mod flat;
+mod page_table;
 mod pager;
 mod sort;
 mod stop;
@@ -54,6 +55,8 @@ pub mod kind {
 pub trait Pages {
     /// Reads record `id` of kind `K` (one of [`kind`]).
     fn read<const K: usize>(&mut self, id: u32) -> &Slot;
+    /// Reads four records of kind `K` at once, which is cheaper than one after another.
+    fn read_four<const K: usize>(&mut self, ids: [u32; 4]) -> [&Slot; 4];
     /// Opens record `id` of kind `K` for change; its page is dirty from then on.
     fn write<const K: usize>(&mut self, id: u32) -> &mut Slot;
     /// Number of pages of kind `K`.

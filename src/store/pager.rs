@@ -1,7 +1,8 @@
 //! The frame pool: pages resident in memory, the rest in the sub-domain's file.
 //!
-//! The hot path reads one word of the page table and compares it once; it touches no list. Recency is
-//! one bit in that word, set by the first access after it was cleared. The `lru` crate orders frames
+//! The hot path reads one word, where the page's frame begins, adds the slot, and is within the pool or not: a page
+//! that needs anything first has a beginning beyond it. It touches no list. Recency is one bit of the
+//! page's entry, set by the first access after it was cleared. The `lru` crate orders frames
 //! only when a page is missed: the least recent frame without the bit is evicted, one with the bit is
 //! given a second chance. A list touched at each change of page costs 70 % (measured), a bit a few.
 
@@ -9,31 +10,18 @@ use std::path::PathBuf;
 
 use lru::LruCache;
 use tetdb_schema::page::{
-    FRAME_BYTES, PageAddress, SLOT_BITS, SLOT_MASK, SLOTS, Slot, open_page, page_key, seal_page,
-    stored_bytes, u32_le,
+    FRAME_BYTES, PageAddress, SLOT_BITS, SLOTS, Slot, open_page, page_key, seal_page, stored_bytes,
+    u32_le,
 };
 
+use super::page_table::{DIRTY, FRAMES_LIMIT, IN_BASE, IN_WORK, PageTable, REFERENCED, RESIDENT};
 use super::{Pages, StoreError, StoreFile, fail, kind, stop_if_requested};
-
-const RESIDENT: u32 = 1 << 31;
-const REFERENCED: u32 = 1 << 30;
-const DIRTY: u32 = 1 << 29;
-const FRAME_MASK: u32 = DIRTY - 1;
-/// An entry at or above this can be read at once.
-const READABLE: u32 = RESIDENT | REFERENCED;
-/// An entry at or above this can be changed at once.
-const WRITABLE: u32 = READABLE | DIRTY;
-/// Entries of pages that are not resident.
-const IN_BASE: u32 = 0;
-const IN_WORK: u32 = 1;
 
 /// Dirty pages written in one commit; a quarter of what redb's cache should hold.
 const BATCH_PAGES_MAX: usize = 256;
 /// Owner of a frame that holds no page.
 const NOBODY: (u8, u32) = (u8::MAX, u32::MAX);
 const FRAMES_MIN: usize = 16;
-/// Slot positions in the pool are 32-bit: 128 GiB of frames.
-const FRAMES_LIMIT: usize = (1 << 21) - 1;
 
 /// Where pages go that leave memory, and where pages come from that were there before.
 pub struct Backing {
@@ -64,8 +52,7 @@ pub struct Pager {
     frames: Vec<Slot>,
     frames_max: usize,
     free: Vec<u32>,
-    /// `tables[kind][page]`: resident frame with flags, or where the page is.
-    tables: [Vec<u32>; kind::ALL.len()],
+    tables: [PageTable; kind::ALL.len()],
     /// Number in the file of each kind's first page; grows when pages are dropped from the front.
     first: [u32; kind::ALL.len()],
     /// Kind and page of each frame, or [`NOBODY`].
@@ -115,7 +102,7 @@ impl Pager {
     pub fn adopt(&mut self, extents: [[u32; 2]; kind::ALL.len()]) {
         for (kind, [first, n]) in extents.into_iter().enumerate() {
             self.first[kind] = first;
-            self.tables[kind] = vec![IN_BASE; n as usize];
+            self.tables[kind] = PageTable::in_base(n as usize);
         }
     }
 
@@ -139,7 +126,7 @@ impl Pager {
     pub fn flush(&mut self) {
         let mut dirty: Vec<u32> = (0..self.owners.len() as u32)
             .filter(|&frame| {
-                self.owners[frame as usize] != NOBODY && *self.entry(frame) & DIRTY != 0
+                self.owners[frame as usize] != NOBODY && self.entry(frame) & DIRTY != 0
             })
             .collect();
         dirty.sort_unstable_by_key(|&frame| self.owners[frame as usize]);
@@ -157,11 +144,13 @@ impl Pager {
         backing.base = self.work.take();
         backing.generation = generation;
         backing.work_path = path;
-        for entry in self.tables.iter_mut().flatten() {
-            if *entry & RESIDENT == 0 {
-                *entry = IN_BASE;
-            } else {
-                assert_eq!(*entry & DIRTY, 0, "flushed before");
+        for table in &mut self.tables {
+            for page in 0..table.len() as u32 {
+                if table.entry(page) & RESIDENT == 0 {
+                    table.set(page, IN_BASE);
+                } else {
+                    assert_eq!(table.entry(page) & DIRTY, 0, "flushed before");
+                }
             }
         }
         for frame in 0..self.owners.len() as u32 {
@@ -174,9 +163,15 @@ impl Pager {
         self.work.map(|file| file.path().to_owned())
     }
 
-    fn entry(&mut self, frame: u32) -> &mut u32 {
+    /// The entry of the page in `frame`.
+    fn entry(&self, frame: u32) -> u32 {
         let (kind, page) = self.owners[frame as usize];
-        &mut self.tables[usize::from(kind)][page as usize]
+        self.tables[usize::from(kind)].entry(page)
+    }
+
+    fn set_entry(&mut self, frame: u32, entry: u32) {
+        let (kind, page) = self.owners[frame as usize];
+        self.tables[usize::from(kind)].set(page, entry);
     }
 
     fn frame(&mut self, frame: u32) -> &mut [Slot] {
@@ -184,19 +179,36 @@ impl Pager {
         &mut self.frames[at..at + SLOTS]
     }
 
-    /// Makes the page of `id` readable (or writable) and returns its frame's entry.
+    /// Makes the page of `id` readable (or writable) and returns the position of `id` in the pool.
     #[cold]
     #[inline(never)]
-    fn open_slow<const K: usize>(&mut self, id: u32, flags: u32) -> u32 {
+    fn open_slow<const K: usize>(&mut self, id: u32, flags: u32) -> usize {
         let page = id >> SLOT_BITS;
-        let entry = self.tables[K][page as usize];
+        let entry = self.tables[K].entry(page);
         let opened = if entry & RESIDENT != 0 {
             entry | flags
         } else {
             self.load::<K>(page, entry) | flags
         };
-        self.tables[K][page as usize] = opened;
-        opened
+        self.tables[K].set(page, opened);
+        self.tables[K].to_read(id)
+    }
+
+    /// Makes the pages of four records readable together and returns the positions of the records.
+    #[cold]
+    #[inline(never)]
+    fn open_four_slow<const K: usize>(&mut self, ids: [u32; 4]) -> [usize; 4] {
+        // One may push another out only while the bits of recency are taken down all around, which happens once.
+        for _ in 0..ids.len() {
+            for id in ids {
+                self.open_slow::<K>(id, REFERENCED);
+            }
+            let at = ids.map(|id| self.tables[K].to_read(id));
+            if at.iter().all(|&at| at < self.frames.len()) {
+                return at;
+            }
+        }
+        unreachable!("a pool of {} frames holds four pages", self.frames_max)
     }
 
     fn load<const K: usize>(&mut self, page: u32, place: u32) -> u32 {
@@ -252,20 +264,20 @@ impl Pager {
         let frame = loop {
             let (frame, ()) = self.order.pop_lru().expect("frames in use are ordered");
             let entry = self.entry(frame);
-            if *entry & REFERENCED == 0 {
+            if entry & REFERENCED == 0 {
                 break frame;
             }
-            *entry &= !REFERENCED;
+            self.set_entry(frame, entry & !REFERENCED);
             self.order.put(frame, ());
         };
-        if *self.entry(frame) & DIRTY != 0 {
+        if self.entry(frame) & DIRTY != 0 {
             let mut batch = vec![frame];
             batch.extend(self.cold_dirty_frames());
             batch.sort_unstable_by_key(|&f| self.owners[f as usize]);
             self.write_back(&batch);
         }
         let place = self.place(frame);
-        *self.entry(frame) = place;
+        self.set_entry(frame, place);
         frame
     }
 
@@ -273,13 +285,9 @@ impl Pager {
     fn cold_dirty_frames(&self) -> Vec<u32> {
         let n = (self.frames_max / 8).clamp(1, BATCH_PAGES_MAX - 1);
         let cold = self.order.iter().rev().map(|(&frame, ())| frame);
-        cold.filter(|&frame| {
-            let (kind, page) = self.owners[frame as usize];
-            let entry = self.tables[usize::from(kind)][page as usize];
-            entry & (REFERENCED | DIRTY) == DIRTY
-        })
-        .take(n)
-        .collect()
+        cold.filter(|&frame| self.entry(frame) & (REFERENCED | DIRTY) == DIRTY)
+            .take(n)
+            .collect()
     }
 
     fn write_back(&mut self, batch: &[u32]) {
@@ -316,7 +324,7 @@ impl Pager {
         self.stats.pages_written += batch.len() as u64;
         self.stats.commits += 1;
         for &frame in batch {
-            *self.entry(frame) &= !DIRTY;
+            self.set_entry(frame, self.entry(frame) & !DIRTY);
             self.set_place(frame, IN_WORK);
         }
     }
@@ -335,20 +343,37 @@ impl Pager {
 impl Pages for Pager {
     #[inline(always)]
     fn read<const K: usize>(&mut self, id: u32) -> &Slot {
-        let mut entry = self.tables[K][(id >> SLOT_BITS) as usize];
-        if entry < READABLE {
-            entry = self.open_slow::<K>(id, REFERENCED);
+        let at = self.tables[K].to_read(id);
+        if at < self.frames.len() {
+            return &self.frames[at];
         }
-        &self.frames[((entry & FRAME_MASK) << SLOT_BITS | id & SLOT_MASK) as usize]
+        let at = self.open_slow::<K>(id, REFERENCED);
+        &self.frames[at]
+    }
+
+    #[inline(always)]
+    fn read_four<const K: usize>(&mut self, ids: [u32; 4]) -> [&Slot; 4] {
+        let table = &self.tables[K];
+        let (a, b) = (table.to_read(ids[0]), table.to_read(ids[1]));
+        let (c, d) = (table.to_read(ids[2]), table.to_read(ids[3]));
+        let n = self.frames.len();
+        if a < n && b < n && c < n && d < n {
+            let frames = &self.frames;
+            return [&frames[a], &frames[b], &frames[c], &frames[d]];
+        }
+        let [a, b, c, d] = self.open_four_slow::<K>(ids);
+        let frames = &self.frames;
+        [&frames[a], &frames[b], &frames[c], &frames[d]]
     }
 
     #[inline(always)]
     fn write<const K: usize>(&mut self, id: u32) -> &mut Slot {
-        let mut entry = self.tables[K][(id >> SLOT_BITS) as usize];
-        if entry < WRITABLE {
-            entry = self.open_slow::<K>(id, REFERENCED | DIRTY);
+        let at = self.tables[K].to_write(id);
+        if at < self.frames.len() {
+            return &mut self.frames[at];
         }
-        &mut self.frames[((entry & FRAME_MASK) << SLOT_BITS | id & SLOT_MASK) as usize]
+        let at = self.open_slow::<K>(id, REFERENCED | DIRTY);
+        &mut self.frames[at]
     }
 
     fn n_pages<const K: usize>(&self) -> u32 {
@@ -360,15 +385,14 @@ impl Pages for Pager {
         let frame = self.take_frame();
         self.frame(frame).fill([u32_le::from_native(0); 8]);
         let page = self.tables[K].len() as u32;
-        self.tables[K].push(frame | WRITABLE);
+        self.tables[K].push(frame | RESIDENT | REFERENCED | DIRTY);
         self.owners[frame as usize] = (K as u8, page);
         self.order.put(frame, ());
         page
     }
 
     fn drop_front<const K: usize>(&mut self, n: u32) {
-        let rest = self.tables[K].split_off(n as usize);
-        let dropped = std::mem::replace(&mut self.tables[K], rest);
+        let dropped = self.tables[K].drop_front(n as usize);
         self.release(dropped);
         self.first[K] += n;
         for (_, page) in self
@@ -381,21 +405,18 @@ impl Pages for Pager {
     }
 
     fn clear<const K: usize>(&mut self) {
-        let dropped = std::mem::take(&mut self.tables[K]);
+        let dropped = std::mem::take(&mut self.tables[K]).frames();
         self.release(dropped);
     }
 }
 
 impl Pager {
     /// Gives the frames of forgotten pages back.
-    fn release(&mut self, entries: Vec<u32>) {
-        for entry in entries {
-            if entry & RESIDENT != 0 {
-                let frame = entry & FRAME_MASK;
-                self.order.pop(&frame);
-                self.owners[frame as usize] = NOBODY;
-                self.free.push(frame);
-            }
+    fn release(&mut self, frames: Vec<u32>) {
+        for frame in frames {
+            self.order.pop(&frame);
+            self.owners[frame as usize] = NOBODY;
+            self.free.push(frame);
         }
     }
 }
