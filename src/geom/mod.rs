@@ -5,6 +5,7 @@
 
 mod hilbert;
 mod sign;
+mod wide;
 
 pub use hilbert::{HilbertFrame, hilbert_index};
 pub use sign::{

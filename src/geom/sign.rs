@@ -2,8 +2,8 @@
 //!
 //! Each call first evaluates the determinant in doubles and compares it with a bound made from the
 //! largest coordinate differences of that very call (a semi-static filter: a bound for the whole
-//! bounding box never succeeds on small tetrahedra). What the filter cannot decide goes to the
-//! expansions of the crate `robust`.
+//! bounding box never succeeds on small tetrahedra). What the filter cannot decide goes to whole numbers
+//! (`wide`, spheres only) where they fit, else to the expansions of the crate `robust`.
 //!
 //! Zero sphere determinants are decided by raising the lift of the points symbolically, the
 //! lexicographically smallest point by most (Devillers and Teillaud, "Perturbations for Delaunay and
@@ -14,6 +14,7 @@ use std::cmp::Ordering;
 use robust::Coord3D;
 
 use super::Point;
+use super::wide::insphere_sign;
 
 /// Forward error of the filtered orientation determinant, relative to the product of the largest
 /// differences per axis (Meyer and Pion, "FPG: a code generator for fast and certified geometric predicates").
@@ -177,7 +178,10 @@ fn insphere_slow(a: Point, b: Point, c: Point, d: Point, e: Point) -> f64 {
     {
         return det;
     }
-    -robust::insphere(coord(a), coord(b), coord(c), coord(d), coord(e))
+    match insphere_sign(a, b, c, d, e) {
+        Some(sign) => f64::from(sign as i8),
+        None => -robust::insphere(coord(a), coord(b), coord(c), coord(d), coord(e)),
+    }
 }
 
 /// Lexicographic order of coordinates, the rank that decides all ties.

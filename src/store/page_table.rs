@@ -1,0 +1,99 @@
+//! Where the pages of one kind are: in a frame, or in which file.
+
+use tetdb_schema::page::{SLOT_BITS, SLOT_MASK};
+
+pub(super) const RESIDENT: u32 = 1 << 31;
+pub(super) const REFERENCED: u32 = 1 << 30;
+pub(super) const DIRTY: u32 = 1 << 29;
+const FRAME_MASK: u32 = DIRTY - 1;
+/// An entry with these flags can be read at once, and with [`DIRTY`] changed at once.
+const READABLE: u32 = RESIDENT | REFERENCED;
+/// Entries of pages that are not resident.
+pub(super) const IN_BASE: u32 = 0;
+pub(super) const IN_WORK: u32 = 1;
+/// Where the frame of a page seems to begin that cannot be accessed at once: beyond every pool.
+const BEYOND: u32 = !SLOT_MASK;
+/// Frames whose slots all have a position below [`BEYOND`]: 128 GiB.
+pub(super) const FRAMES_LIMIT: usize = (BEYOND >> SLOT_BITS) as usize;
+
+/// One entry per page, and what the hot path needs of it.
+#[derive(Default)]
+pub(super) struct PageTable {
+    /// Resident frame with flags, or where the page is.
+    entries: Vec<u32>,
+    /// First slot of the page if it may be read at once, else [`BEYOND`].
+    readable: Vec<u32>,
+    /// The same for pages that may be changed at once.
+    writable: Vec<u32>,
+}
+
+impl PageTable {
+    /// `n` pages in the base file.
+    pub(super) fn in_base(n: usize) -> Self {
+        Self {
+            entries: vec![IN_BASE; n],
+            readable: vec![BEYOND; n],
+            writable: vec![BEYOND; n],
+        }
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.entries.len()
+    }
+
+    /// Position in the pool of record `id`, beyond it when its page may not be read at once.
+    #[inline(always)]
+    pub(super) fn to_read(&self, id: u32) -> usize {
+        (self.readable[(id >> SLOT_BITS) as usize] + (id & SLOT_MASK)) as usize
+    }
+
+    /// Position in the pool of record `id`, beyond it when its page may not be changed at once.
+    #[inline(always)]
+    pub(super) fn to_write(&self, id: u32) -> usize {
+        (self.writable[(id >> SLOT_BITS) as usize] + (id & SLOT_MASK)) as usize
+    }
+
+    pub(super) fn entry(&self, page: u32) -> u32 {
+        self.entries[page as usize]
+    }
+
+    pub(super) fn set(&mut self, page: u32, entry: u32) {
+        let page = page as usize;
+        let first = (entry & FRAME_MASK) << SLOT_BITS;
+        let at = |flags: u32| {
+            if entry & flags == flags {
+                first
+            } else {
+                BEYOND
+            }
+        };
+        self.entries[page] = entry;
+        self.readable[page] = at(READABLE);
+        self.writable[page] = at(READABLE | DIRTY);
+    }
+
+    /// Adds a page at the end.
+    pub(super) fn push(&mut self, entry: u32) {
+        self.entries.push(IN_BASE);
+        self.readable.push(BEYOND);
+        self.writable.push(BEYOND);
+        self.set(self.entries.len() as u32 - 1, entry);
+    }
+
+    /// Forgets the first `n` pages; returns their frames.
+    pub(super) fn drop_front(&mut self, n: usize) -> Vec<u32> {
+        self.readable.drain(..n);
+        self.writable.drain(..n);
+        self.entries.drain(..n).filter_map(frame_of).collect()
+    }
+
+    /// The frames of all resident pages.
+    pub(super) fn frames(&self) -> Vec<u32> {
+        self.entries.iter().copied().filter_map(frame_of).collect()
+    }
+}
+
+/// The frame of an entry, if its page is resident.
+pub(super) fn frame_of(entry: u32) -> Option<u32> {
+    (entry & RESIDENT != 0).then_some(entry & FRAME_MASK)
+}
