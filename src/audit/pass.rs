@@ -16,7 +16,7 @@ use super::{Finding, Level, Offender, Report, VerifyOptions};
 use crate::catalog::{
     CatalogError, Corner, FacePairs, InterfaceRow, Paired, RegionRow, Subdomain, sorted_face,
 };
-use crate::geom::{insphere, orient};
+use crate::geom::{Point, insphere, orient};
 
 /// Volumes that agree this well, relative to the sum of what was added, are the same: sums of
 /// millions of terms lose some six of sixteen digits at most.
@@ -34,6 +34,8 @@ pub(super) struct Audit<'a> {
     regions: BTreeMap<u32, u64>,
     /// Sum of the absolute values of what the volume within the boundary is made of.
     volume_scale: f64,
+    /// The first corner of the boundary: seen from near, cones do not cancel.
+    apex: Option<Point>,
 }
 
 /// Two faces of a chunk that are one.
@@ -60,6 +62,7 @@ impl<'a> Audit<'a> {
             digests: [Digest::default(); 2],
             regions: BTreeMap::new(),
             volume_scale: 0.0,
+            apex: None,
         }
     }
 
@@ -151,9 +154,10 @@ impl<'a> Audit<'a> {
         counted(part, "interface faces", n, total)
     }
 
-    /// Adds a facet's share of the volume within the boundary: a cone to the origin for each filled side.
+    /// Adds a facet's share of the volume within the boundary: a cone to one point for each filled side.
     fn boundary_volume(&mut self, tets: &[u32; 2], corners: &[Corner; 3]) {
-        let [a, b, c] = corners.map(|c| c.point);
+        let apex = *self.apex.get_or_insert(corners[0].point);
+        let [a, b, c] = corners.map(|c| c.point - apex);
         let cone = a.dot(b.cross(c)) / 6.0;
         let sides = tets.map(|t| f64::from(u8::from(t != NO_TET)));
         self.report.volume_within_boundary += cone * (sides[1] - sides[0]);

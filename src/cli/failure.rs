@@ -71,7 +71,7 @@ pub const CODES: &[CodeRow] = &[
     row(
         "coordinate-range",
         3,
-        "a coordinate is too large to compute with exactly",
+        "a coordinate, or the whole surface, is too large or too small to compute with exactly",
     ),
     row(
         "unsupported-content",

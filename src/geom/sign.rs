@@ -33,12 +33,19 @@ const SQUARE_MAX: f64 = 1e50;
 /// Covers the rounding of the squares themselves.
 const SLACK: f64 = 1.000_001;
 
-fn coord(p: Point) -> Coord3D<f64> {
-    Coord3D {
-        x: p.x,
-        y: p.y,
-        z: p.z,
-    }
+/// The points times the power of two that brings the largest coordinate near one: expansions have its sign then, where
+/// products of the last parts of very small or large coordinates would leave the range of doubles.
+fn scaled<const N: usize>(points: [Point; N]) -> [Coord3D<f64>; N] {
+    let largest = points
+        .iter()
+        .fold(0.0f64, |m, p| m.max(p.abs().max_element()));
+    let exponent = (largest.to_bits() >> 52) as i32 - 1023;
+    let factor = f64::from_bits(((1023 - exponent.clamp(-1000, 1000)) as u64) << 52);
+    points.map(|p| Coord3D {
+        x: p.x * factor,
+        y: p.y * factor,
+        z: p.z * factor,
+    })
 }
 
 /// Six times the signed volume of `a b c d`; the sign is exact, the magnitude is not.
@@ -72,7 +79,8 @@ fn orient_slow(a: Point, b: Point, c: Point, d: Point) -> f64 {
     {
         return det;
     }
-    -robust::orient3d(coord(a), coord(b), coord(c), coord(d))
+    let [a, b, c, d] = scaled([a, b, c, d]);
+    -robust::orient3d(a, b, c, d)
 }
 
 /// The larger of two numbers that are not NaN: one instruction, where `f64::max` takes five.
@@ -180,7 +188,10 @@ fn insphere_slow(a: Point, b: Point, c: Point, d: Point, e: Point) -> f64 {
     }
     match insphere_sign(a, b, c, d, e) {
         Some(sign) => f64::from(sign as i8),
-        None => -robust::insphere(coord(a), coord(b), coord(c), coord(d), coord(e)),
+        None => {
+            let [a, b, c, d, e] = scaled([a, b, c, d, e]);
+            -robust::insphere(a, b, c, d, e)
+        }
     }
 }
 
@@ -238,9 +249,13 @@ mod tests {
         assert!(insphere(o, x, y, z, Point::splat(0.3)) > 0.0);
         assert!(insphere(o, x, y, z, Point::splat(2.0)) < 0.0);
         assert_eq!(insphere(o, x, y, z, Point::ONE), 0.0);
-        // Differences below the range of the first filter; far below, expansions underflow too.
-        let (x, y, z) = (x * 1e-40, y * 1e-40, z * 1e-40);
-        assert!(insphere(o, x, y, z, Point::splat(0.3e-40)) > 0.0);
-        assert!(orient(o, x, y, z) > 0.0);
+        // Beyond the range of the filters, and of expansions of such numbers.
+        for scale in [1e-150, 1e-60, 1e-40, 1e40, 1e60] {
+            let (x, y, z) = (x * scale, y * scale, z * scale);
+            assert!(insphere(o, x, y, z, Point::splat(0.3) * scale) > 0.0);
+            assert!(orient(o, x, y, z) > 0.0);
+            assert!(orient(x, y, z, Point::splat(0.4) * scale) > 0.0);
+            assert!(orient(x, y, z, Point::splat(0.3) * scale) < 0.0);
+        }
     }
 }

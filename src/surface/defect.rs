@@ -15,6 +15,10 @@ pub enum SurfaceError {
         vertex: u32,
         n_vertices: usize,
     },
+    #[error(
+        "the surface is too small to compute with exactly: its longest extent is {extent:e}, expected above 1e-24"
+    )]
+    TooSmall { extent: f64 },
     /// Validation found defects; the first of the worst kind is told.
     #[error("{defect}")]
     Invalid { defect: Box<Defect>, n_defects: u64 },
@@ -26,6 +30,7 @@ impl SurfaceError {
         match self {
             Self::TooLarge { .. } => "surface-too-large",
             Self::NoSuchVertex { .. } => "index-out-of-range",
+            Self::TooSmall { .. } => "coordinate-range",
             Self::Invalid { defect, .. } => defect.code(),
         }
     }
@@ -35,6 +40,7 @@ impl SurfaceError {
         match self {
             Self::TooLarge { .. } => "split the surface into parts and mesh them one by one",
             Self::NoSuchVertex { .. } => "write the file again from the program that made it",
+            Self::TooSmall { .. } => "scale the surface to ordinary units, for example metres",
             Self::Invalid { defect, .. } => defect.help(),
         }
     }

@@ -70,7 +70,7 @@ pub enum ReadError {
         declared: String,
         found: String,
     },
-    #[error("a coordinate is too large to compute with exactly: {found}, expected below 1e60")]
+    #[error("a coordinate is too large to compute with exactly: {found:e}, expected below 1e30")]
     CoordinateRange { place: Place, found: f64 },
     #[error("{what} cannot be read")]
     Unsupported { place: Place, what: String },

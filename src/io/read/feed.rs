@@ -10,8 +10,8 @@ use crate::surface::{SurfaceBuilder, SurfaceError};
 const WORD_MAX: usize = 4096;
 /// Longest line accepted where lines matter; a polygon of a million corners still fits.
 const LINE_MAX: usize = 16 << 20;
-/// Coordinates at and above this overflow in the exact sphere test (fifth powers of differences).
-const COORDINATE_MAX: f64 = 1e60;
+/// Wanted lengths are kept in single precision, which ends at 3e38; the rest is room for sums and squares.
+const COORDINATE_MAX: f64 = 1e30;
 
 /// Result of everything that reads.
 pub(super) type Result<T> = std::result::Result<T, ReadError>;

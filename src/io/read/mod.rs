@@ -28,7 +28,7 @@ use std::path::{Path, PathBuf};
 pub use error::{Place, ReadError, Spot};
 use feed::{Feed, Result};
 
-use crate::surface::{Surface, SurfaceBuilder};
+use crate::surface::{Surface, SurfaceBuilder, SurfaceError};
 
 /// Bytes of the read buffer of one file.
 const BUFFER_BYTES: usize = 256 << 10;
@@ -110,6 +110,9 @@ impl Target<'_> {
     }
 }
 
+/// Smaller surfaces are refused: single precision, in which wanted lengths are kept, ends at 1e-38.
+const EXTENT_MIN: f64 = 1e-24;
+
 /// Reads files as one surface, each with its name before its labels when there are several.
 ///
 /// # Errors
@@ -128,7 +131,21 @@ pub fn read_surface(paths: &[PathBuf]) -> Result<Surface> {
         };
         read_file(path, &mut target)?;
     }
-    Ok(builder.finish())
+    let surface = builder.finish();
+    let bounds = surface.bounds();
+    let extent = (bounds.high - bounds.low).max_element();
+    // Points and nothing else are a matter of validation.
+    if extent > 0.0 && extent < EXTENT_MIN {
+        let file = paths.first().map(|p| p.display().to_string());
+        return Err(ReadError::Surface {
+            place: Place {
+                file: file.unwrap_or_default(),
+                spot: Spot::Whole,
+            },
+            source: SurfaceError::TooSmall { extent },
+        });
+    }
+    Ok(surface)
 }
 
 /// Reads a file that is in memory, called `file` in messages; for tests and fuzzing.
