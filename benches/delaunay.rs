@@ -2,13 +2,15 @@
 //! frame pools smaller than the mesh. One thread; CPU seconds of the thread.
 //!
 //! `cargo bench --bench delaunay -- [points] [runs] [all|flat|resident|balls]`; without arguments a smoke size.
-//! `balls` takes the vertices of a balls surface instead of random points.
+//! `balls` takes the vertices of a balls surface instead of random points; pools then read the points from disk too.
+
+use std::path::Path;
 
 use tetdb::delaunay::{Kernel, enclose, insertion_key};
 use tetdb::geom::{Aabb, HilbertFrame, Point};
 use tetdb::mesh::Mesh;
 use tetdb::samples::SampleSpec;
-use tetdb::store::{Backing, FlatPages, Pager, Pages};
+use tetdb::store::{Backing, FlatPages, Pager, Pages, Sorter};
 
 fn main() {
     let words: Vec<String> = std::env::args()
@@ -60,8 +62,11 @@ fn main() {
                     cache_bytes: 16 << 20,
                 };
                 let bytes = (frames * percent / 100 * 65_536) as u64;
-                let (rate, mesh) =
-                    mesh_points(Mesh::new(Pager::new(bytes, Some(backing))), &points);
+                let mesh = Mesh::new(Pager::new(bytes, Some(backing)));
+                let (rate, mesh) = match only {
+                    "balls" => mesh_sorted(mesh, &points, dir.path(), bytes),
+                    _ => mesh_points(mesh, &points),
+                };
                 let stats = mesh.pages().stats();
                 let per_point = stats.pages_read as f64 / points.len() as f64;
                 eprintln!("  {stats:?}, {per_point:.4} page reads per point");
@@ -122,7 +127,7 @@ fn random_points(n: usize) -> Vec<Point> {
     points.collect()
 }
 
-fn mesh_points<P: Pages>(mut mesh: Mesh<P>, points: &[Point]) -> (f64, Mesh<P>) {
+fn mesh_points<P: Pages>(mesh: Mesh<P>, points: &[Point]) -> (f64, Mesh<P>) {
     let started = cpu_seconds();
     let bounds = Aabb::around(points.iter().copied());
     let frame = HilbertFrame::new(&bounds);
@@ -132,14 +137,46 @@ fn mesh_points<P: Pages>(mut mesh: Mesh<P>, points: &[Point]) -> (f64, Mesh<P>) 
         .map(|(i, &p)| (insertion_key(&frame, p), i as u32))
         .collect();
     order.sort_unstable();
+    let ordered = order.into_iter().map(|(_, i)| points[i as usize]);
+    insert_all(mesh, &bounds, ordered, started)
+}
+
+/// The same with the points sorted on disk, in an eighth of the pool's memory.
+fn mesh_sorted(mesh: Mesh, points: &[Point], dir: &Path, pool: u64) -> (f64, Mesh) {
+    let started = cpu_seconds();
+    let bounds = Aabb::around(points.iter().copied());
+    let frame = HilbertFrame::new(&bounds);
+    let mut sorter = Sorter::<32>::new(dir, pool / 8);
+    for &p in points {
+        let mut record = [0; 32];
+        record[..8].copy_from_slice(&insertion_key(&frame, p).to_be_bytes());
+        for (place, x) in record[8..].chunks_exact_mut(8).zip(p.to_array()) {
+            place.copy_from_slice(&x.to_be_bytes());
+        }
+        sorter.push(record).expect("the disk has room");
+    }
+    let sorted = sorter.finish().expect("the disk has room");
+    let ordered = sorted.map(|record| {
+        let record = record.expect("runs can be read");
+        let x = |i: usize| f64::from_be_bytes(record[i..i + 8].try_into().expect("eight bytes"));
+        Point::new(x(8), x(16), x(24))
+    });
+    insert_all(mesh, &bounds, ordered, started)
+}
+
+fn insert_all<P: Pages>(
+    mut mesh: Mesh<P>,
+    bounds: &Aabb,
+    points: impl Iterator<Item = Point>,
+    started: f64,
+) -> (f64, Mesh<P>) {
     let mut kernel = Kernel::default();
-    let mut hint = enclose(&mut mesh, &bounds);
-    for (_, i) in order {
-        let p = points[i as usize];
+    let mut hint = enclose(&mut mesh, bounds);
+    for p in points {
         let v = mesh.add_vertex(p, 0.0);
         hint = kernel
             .insert(&mut mesh, v, p, hint)
-            .expect("random points are distinct");
+            .expect("the points are distinct");
     }
     let seconds = cpu_seconds() - started;
     let s = kernel.stats;

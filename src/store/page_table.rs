@@ -16,15 +16,17 @@ const BEYOND: u32 = !SLOT_MASK;
 /// Frames whose slots all have a position below [`BEYOND`]: 128 GiB.
 pub(super) const FRAMES_LIMIT: usize = (BEYOND >> SLOT_BITS) as usize;
 
+/// Low bit of a quick word whose page must not be changed yet.
+const CLEAN: u32 = 1;
+
 /// One entry per page, and what the hot path needs of it.
 #[derive(Default)]
 pub(super) struct PageTable {
     /// Resident frame with flags, or where the page is.
     entries: Vec<u32>,
-    /// First slot of the page if it may be read at once, else [`BEYOND`].
-    readable: Vec<u32>,
-    /// The same for pages that may be changed at once.
-    writable: Vec<u32>,
+    /// First slot of the page if it may be read at once, else [`BEYOND`]; with [`CLEAN`] if it may not be changed at
+    /// once. Four bytes a page: the words of a few thousand pages stay in the fastest cache.
+    quick: Vec<u32>,
 }
 
 impl PageTable {
@@ -32,8 +34,7 @@ impl PageTable {
     pub(super) fn in_base(n: usize) -> Self {
         Self {
             entries: vec![IN_BASE; n],
-            readable: vec![BEYOND; n],
-            writable: vec![BEYOND; n],
+            quick: vec![BEYOND | CLEAN; n],
         }
     }
 
@@ -44,13 +45,18 @@ impl PageTable {
     /// Position in the pool of record `id`, beyond it when its page may not be read at once.
     #[inline(always)]
     pub(super) fn to_read(&self, id: u32) -> usize {
-        (self.readable[(id >> SLOT_BITS) as usize] + (id & SLOT_MASK)) as usize
+        let quick = self.quick[(id >> SLOT_BITS) as usize];
+        (quick & !SLOT_MASK | id & SLOT_MASK) as usize
     }
 
     /// Position in the pool of record `id`, beyond it when its page may not be changed at once.
     #[inline(always)]
     pub(super) fn to_write(&self, id: u32) -> usize {
-        (self.writable[(id >> SLOT_BITS) as usize] + (id & SLOT_MASK)) as usize
+        let quick = self.quick[(id >> SLOT_BITS) as usize];
+        if quick & CLEAN != 0 {
+            return usize::MAX;
+        }
+        (quick | id & SLOT_MASK) as usize
     }
 
     pub(super) fn entry(&self, page: u32) -> u32 {
@@ -58,32 +64,29 @@ impl PageTable {
     }
 
     pub(super) fn set(&mut self, page: u32, entry: u32) {
-        let page = page as usize;
-        let first = (entry & FRAME_MASK) << SLOT_BITS;
-        let at = |flags: u32| {
-            if entry & flags == flags {
-                first
-            } else {
-                BEYOND
-            }
+        let first = match entry & READABLE {
+            READABLE => (entry & FRAME_MASK) << SLOT_BITS,
+            _ => BEYOND,
         };
-        self.entries[page] = entry;
-        self.readable[page] = at(READABLE);
-        self.writable[page] = at(READABLE | DIRTY);
+        let clean = if first == BEYOND || entry & DIRTY == 0 {
+            CLEAN
+        } else {
+            0
+        };
+        self.entries[page as usize] = entry;
+        self.quick[page as usize] = first | clean;
     }
 
     /// Adds a page at the end.
     pub(super) fn push(&mut self, entry: u32) {
         self.entries.push(IN_BASE);
-        self.readable.push(BEYOND);
-        self.writable.push(BEYOND);
+        self.quick.push(BEYOND | CLEAN);
         self.set(self.entries.len() as u32 - 1, entry);
     }
 
     /// Forgets the first `n` pages; returns their frames.
     pub(super) fn drop_front(&mut self, n: usize) -> Vec<u32> {
-        self.readable.drain(..n);
-        self.writable.drain(..n);
+        self.quick.drain(..n);
         self.entries.drain(..n).filter_map(frame_of).collect()
     }
 

@@ -5,4 +5,5 @@ mod damage;
 mod errors;
 mod place;
 mod readme;
+mod regions;
 mod same_mesh;
