@@ -3,6 +3,7 @@
 mod crash;
 mod damage;
 mod errors;
+mod odd_inputs;
 mod place;
 mod readme;
 mod regions;
