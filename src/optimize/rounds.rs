@@ -3,7 +3,7 @@
 use super::pages::{PageFlags, is_examined, reopen, tets_of_page};
 use super::quality::{CONTENT, GOODNESS_WANTED, face_bound, goodness, is_below};
 use super::rescue::Rescue;
-use super::smooth::{Star, is_free};
+use super::smooth::{Star, is_free, raised};
 use super::swap::Swapper;
 use crate::mesh::anatomy::MARK;
 use crate::mesh::{Mesh, Tet};
@@ -192,8 +192,11 @@ impl Rounds {
             self.changed.extend_from_slice(&self.swapper.new_tets);
             return true;
         }
-        for v in tet.vertices() {
+        for (i, v) in tet.vertices().into_iter().enumerate() {
+            // The face opposite the vertex stays, and may forbid what is wanted.
+            let face = tet.face(i).map(|v| mesh.point(v));
             if is_free(mesh, v)
+                && face_bound(face) > raised(good)
                 && self.star.gather(mesh, v, t, BALL_MAX)
                 && self.star.improve(mesh, target.enough)
             {
