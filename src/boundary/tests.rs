@@ -2,4 +2,5 @@
 
 mod build;
 mod made;
+mod oracle;
 mod real;

@@ -7,6 +7,11 @@ mod hilbert;
 mod sign;
 mod wide;
 
+#[cfg(test)]
+pub(crate) mod dyadic;
+#[cfg(test)]
+pub(crate) mod tests;
+
 pub use hilbert::{HilbertFrame, hilbert_index};
 pub use sign::{
     Seen, in_sphere_perturbed, insphere, insphere_filtered, lex_cmp, orient, orient_sign,

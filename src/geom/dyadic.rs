@@ -1,0 +1,128 @@
+//! Numbers `m · 2^e` without rounding: the slow truth that signs are tested against.
+
+use std::cmp::Ordering;
+use std::ops::{Add, Mul, Sub};
+
+use dashu::integer::IBig;
+
+use super::Point;
+
+/// An exact value; every finite double is one, and so are sums and products.
+#[derive(Clone, Debug)]
+pub(crate) struct Dyadic {
+    mantissa: IBig,
+    exponent: i32,
+}
+
+impl From<f64> for Dyadic {
+    fn from(x: f64) -> Self {
+        assert!(x.is_finite());
+        let bits = x.to_bits();
+        let (biased, fraction) = ((bits >> 52 & 0x7ff) as i32, bits & ((1 << 52) - 1));
+        let (whole, exponent) = match biased {
+            0 => (fraction, -1074),
+            _ => (fraction | 1 << 52, biased - 1075),
+        };
+        let mantissa = IBig::from(whole);
+        Self {
+            mantissa: if x < 0.0 { -mantissa } else { mantissa },
+            exponent,
+        }
+    }
+}
+
+impl Dyadic {
+    fn at_exponent(&self, exponent: i32) -> IBig {
+        &self.mantissa << (self.exponent - exponent) as usize
+    }
+
+    pub(crate) fn sign(&self) -> Ordering {
+        self.mantissa.cmp(&IBig::ZERO)
+    }
+}
+
+impl Add for &Dyadic {
+    type Output = Dyadic;
+    fn add(self, other: Self) -> Dyadic {
+        let exponent = self.exponent.min(other.exponent);
+        Dyadic {
+            mantissa: self.at_exponent(exponent) + other.at_exponent(exponent),
+            exponent,
+        }
+    }
+}
+
+impl Sub for &Dyadic {
+    type Output = Dyadic;
+    fn sub(self, other: Self) -> Dyadic {
+        let exponent = self.exponent.min(other.exponent);
+        Dyadic {
+            mantissa: self.at_exponent(exponent) - other.at_exponent(exponent),
+            exponent,
+        }
+    }
+}
+
+impl Mul for &Dyadic {
+    type Output = Dyadic;
+    fn mul(self, other: Self) -> Dyadic {
+        Dyadic {
+            mantissa: &self.mantissa * &other.mantissa,
+            exponent: self.exponent + other.exponent,
+        }
+    }
+}
+
+/// A position without rounding.
+pub(crate) type Exact = [Dyadic; 3];
+
+pub(crate) fn exact(p: Point) -> Exact {
+    p.to_array().map(Dyadic::from)
+}
+
+/// `base + Σ share · (to - base)`.
+pub(crate) fn combination(base: Point, shares: &[(Point, f64)]) -> Exact {
+    let mut at = exact(base);
+    for &(to, share) in shares {
+        let (to, share) = (exact(to), Dyadic::from(share));
+        for axis in 0..3 {
+            let difference = &to[axis] - &Dyadic::from(base[axis]);
+            at[axis] = &at[axis] + &(&share * &difference);
+        }
+    }
+    at
+}
+
+fn from(p: &Exact, origin: &Exact) -> Exact {
+    [0, 1, 2].map(|i| &p[i] - &origin[i])
+}
+
+fn determinant([u, v, w]: [&Exact; 3]) -> Dyadic {
+    let minor = |i: usize, j: usize| &(&v[i] * &w[j]) - &(&v[j] * &w[i]);
+    let sum = &(&u[0] * &minor(1, 2)) + &(&u[1] * &minor(2, 0));
+    &sum + &(&u[2] * &minor(0, 1))
+}
+
+/// Sign of det(b - a, c - a, d - a).
+pub(crate) fn orient_truth([a, b, c, d]: &[Exact; 4]) -> Ordering {
+    determinant([&from(b, a), &from(c, a), &from(d, a)]).sign()
+}
+
+/// Greater when `e` is inside the sphere of the positive tetrahedron `a b c d`.
+pub(crate) fn insphere_truth([a, b, c, d, e]: &[Exact; 5]) -> Ordering {
+    let seen = [a, b, c, d].map(|p| from(p, e));
+    let lift = |p: &Exact| {
+        let sum = &(&p[0] * &p[0]) + &(&p[1] * &p[1]);
+        &sum + &(&p[2] * &p[2])
+    };
+    let [a, b, c, d] = &seen;
+    // Expansion along the column of squares.
+    let terms = [
+        &lift(a) * &determinant([b, c, d]),
+        &lift(b) * &determinant([a, c, d]),
+        &lift(c) * &determinant([a, b, d]),
+        &lift(d) * &determinant([a, b, c]),
+    ];
+    let sum = &(&terms[0] - &terms[1]) + &(&terms[2] - &terms[3]);
+    sum.sign()
+}
