@@ -133,11 +133,29 @@ pub struct ResumeArgs {
     pub run: RunArgs,
 }
 
+/// What is wrong with a surface, and what mesh it allows. Nothing is changed unless --repair is given.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  tetdb check part.stl --json")]
+#[command(
+    after_help = "Examples:\n  tetdb check part.stl\n  tetdb check part.stl --json\n  tetdb check part.stl --write-bad bad.vtu\n  \
+    tetdb check part.stl --repair --write fixed.stl\n  tetdb check part.stl --repair --weld 1e-6 --write fixed.stl\n\n\
+    Exit code 0: the surface can be meshed; 3: it has defects. With --repair this is said of what was written."
+)]
 pub struct CheckArgs {
+    /// Surface files, or a sample such as sample:balls,count=100
     #[arg(required = true, value_name = "SURFACE")]
     pub surfaces: Vec<String>,
+    /// Write the defective triangles to this .vtu file, the kind of defect as cell data
+    #[arg(long, value_name = "FILE")]
+    pub write_bad: Option<PathBuf>,
+    /// Drop triangles without area and repeated ones, divide triangles at T-junctions, turn neighbors alike
+    #[arg(long, requires = "write")]
+    pub repair: bool,
+    /// With --repair: first join points not farther apart than this share of the box diagonal
+    #[arg(long, value_name = "R", requires = "repair")]
+    pub weld: Option<String>,
+    /// With --repair: where to write the repaired surface (.stl, .ply, .obj, .off)
+    #[arg(long, value_name = "OUT", requires = "repair")]
+    pub write: Option<PathBuf>,
     /// Answer with one JSON object
     #[arg(long)]
     pub json: bool,

@@ -1,53 +1,168 @@
-//! `check`: can a surface be meshed?
+//! `check`: can a surface be meshed, what would mend it, what mesh does it allow?
+
+use std::path::Path;
 
 use serde_json::json;
 
 use super::args::CheckArgs;
+use super::check_report::Findings;
 use super::failure::Failure;
-use super::input;
+use super::input::{self, Input};
 use super::talk::Talk;
-use crate::surface::validate;
+use crate::io::write;
+use crate::surface::{Repair, Surface, repair};
 
-/// Defects listed in full.
-const LISTED: usize = 20;
+/// Points are joined up to this share of the box diagonal at most: beyond it a surface loses its shape.
+const WELD_SHARE_MAX: f64 = 0.01;
+
+/// A repair that was made.
+struct Mended {
+    weld_share: Option<f64>,
+    weld_distance: Option<f64>,
+    done: Repair,
+    /// Triangles, vertices and defects before.
+    before: (usize, usize, u64),
+}
 
 pub fn run(args: &CheckArgs, talk: &Talk) -> Result<u8, Failure> {
-    let input = input::load(&args.surfaces, talk)?;
-    let (surface, validation) = (&input.surface, validate(&input.surface));
-    if talk.is_json() {
-        let defects: Vec<_> = validation
-            .defects
-            .iter()
-            .map(|d| {
-                json!({ "code": d.code(), "triangles": d.triangles(), "at": d.at().map(|p| p.to_array()),
-                    "message": d.to_string(), "help": d.help() })
-            })
-            .collect();
-        talk.answer(&json!({
-            "schema": 1, "triangles": surface.n_triangles(), "vertices": surface.n_vertices(),
-            "labels": surface.label_names, "turned_triangles": input.turned, "valid": validation.is_valid(),
-            "n_defects": validation.n_defects, "defects": defects,
-        }));
-    } else {
-        talk.line(&format!(
-            "{} triangles, {} vertices",
-            surface.n_triangles(),
-            surface.n_vertices()
-        ));
-        for defect in validation.defects.iter().take(LISTED) {
-            talk.line(&format!("{}: {defect} ({})", defect.code(), defect.place()));
-        }
-        if validation.n_defects as usize > LISTED {
-            talk.line(&format!(
-                "... {} defects in all; --json lists them",
-                validation.n_defects
-            ));
-        }
-        if validation.is_valid() {
-            talk.line("closed and free of defects: it can be meshed");
-        } else if let Some(first) = validation.defects.first() {
-            talk.line(&format!("help: {}", first.help()));
-        }
+    // Options are checked before anything is read.
+    let weld_share = args.weld.as_deref().map(share).transpose()?;
+    if let Some(out) = &args.write {
+        refuse_input(out, &args.surfaces)?;
     }
-    Ok(if validation.is_valid() { 0 } else { 3 })
+    let mut input = input::load(&args.surfaces, talk)?;
+    let mended = args.repair.then(|| mend(&mut input, weld_share));
+    let findings = Findings::of(&input.surface, input.turned);
+    let written = write_files(args, &input.surface, &findings, talk)?;
+    if talk.is_json() {
+        let mut answer = findings.json();
+        if let Some(mended) = &mended {
+            answer["repair"] = mended.json();
+        }
+        for (field, value) in written {
+            answer[field] = value;
+        }
+        talk.answer(&answer);
+    } else {
+        if let Some(mended) = &mended {
+            mended.print(talk);
+        }
+        findings.print(&args.surfaces, mended.is_some(), talk);
+    }
+    Ok(if findings.is_valid() { 0 } else { 3 })
+}
+
+fn share(text: &str) -> Result<f64, Failure> {
+    match text.parse::<f64>() {
+        Ok(share) if share > 0.0 && share <= WELD_SHARE_MAX => Ok(share),
+        _ => Err(Failure::new(
+            "bad-size",
+            format!(
+                "--weld {text} is not a share of the box diagonal, expected above 0 and at most {WELD_SHARE_MAX}"
+            ),
+        )
+        .help("for example --weld 1e-6; `tetdb check SURFACE` says what would close an open surface")),
+    }
+}
+
+/// The surface that is read is never replaced: what a repair drops would be lost.
+fn refuse_input(out: &Path, surfaces: &[String]) -> Result<(), Failure> {
+    let Ok(out) = out.canonicalize() else {
+        return Ok(());
+    };
+    let same = surfaces
+        .iter()
+        .find(|name| Path::new(name).canonicalize().is_ok_and(|path| path == out));
+    same.map_or(Ok(()), |name| {
+        Err(
+            Failure::new("usage", format!("--write names the surface itself, {name}"))
+                .help("write the repaired surface to another file"),
+        )
+    })
+}
+
+fn mend(input: &mut Input, weld_share: Option<f64>) -> Mended {
+    let surface = &mut input.surface;
+    let n_defects = crate::surface::validate(surface).n_defects;
+    let before = (surface.n_triangles(), surface.n_vertices(), n_defects);
+    let weld_distance = weld_share.map(|share| share * surface.bounds().diagonal());
+    let mut done = repair(surface, weld_distance);
+    // Those turned while reading count too.
+    done.turned += input.turned;
+    input.turned = done.turned;
+    Mended {
+        weld_share,
+        weld_distance,
+        done,
+        before,
+    }
+}
+
+impl Mended {
+    fn json(&self) -> serde_json::Value {
+        let (triangles, vertices, n_defects) = self.before;
+        json!({
+            "weld": self.weld_share, "weld_distance": self.weld_distance, "points_joined": self.done.points_joined,
+            "collapsed_dropped": self.done.collapsed_dropped, "repeated_dropped": self.done.repeated_dropped,
+            "divided": self.done.divided, "turned": self.done.turned,
+            "before": { "triangles": triangles, "vertices": vertices, "n_defects": n_defects },
+        })
+    }
+
+    fn print(&self, talk: &Talk) {
+        let (triangles, vertices, n_defects) = self.before;
+        talk.line(&format!(
+            "before: {triangles} triangles, {vertices} vertices, {n_defects} defects"
+        ));
+        let done = &self.done;
+        let joined = match (self.weld_share, self.weld_distance) {
+            (Some(share), Some(distance)) => format!(
+                "{} points joined (nearer than {share:e} of the box diagonal, {distance:.3e}), ",
+                done.points_joined
+            ),
+            _ => String::new(),
+        };
+        talk.line(&format!(
+            "repair: {joined}{} triangles without area and {} repeated ones dropped, {} divided at T-junctions, {} turned",
+            done.collapsed_dropped, done.repeated_dropped, done.divided, done.turned
+        ));
+    }
+}
+
+/// Writes what was asked for; returns fields of the answer.
+fn write_files(
+    args: &CheckArgs,
+    surface: &Surface,
+    findings: &Findings,
+    talk: &Talk,
+) -> Result<Vec<(&'static str, serde_json::Value)>, Failure> {
+    let mut fields = Vec::new();
+    if let Some(out) = &args.write {
+        let report = write::surface(surface, out)?;
+        let state = match findings.validation.n_defects {
+            0 => "validated again, free of defects".to_owned(),
+            n => format!("validated again, still with {n} defects"),
+        };
+        talk.note(&format!("wrote {}: {state}", out.display()));
+        if !report.labels_kept {
+            talk.note("note: this format has no place for the labels");
+        }
+        fields.push((
+            "written",
+            json!({ "file": out.display().to_string(), "bytes": report.bytes, "labels_kept": report.labels_kept }),
+        ));
+    }
+    if let Some(out) = &args.write_bad {
+        let defects = &findings.validation.defects;
+        let n = write::defects(surface, defects, out)?;
+        talk.note(&format!(
+            "wrote {n} defective triangles to {}",
+            out.display()
+        ));
+        fields.push((
+            "bad_triangles",
+            json!({ "file": out.display().to_string(), "triangles": n }),
+        ));
+    }
+    Ok(fields)
 }

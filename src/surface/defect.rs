@@ -67,12 +67,15 @@ pub enum Defect {
         corners: [Point; 3],
     },
     /// An edge with one triangle only: the surface has a hole there.
-    #[error("the surface is open: the edge of triangle {triangle} from {} to {} has no second triangle", show(*from), show(*to))]
+    #[error("the surface is open: the edge of triangle {triangle} from {} to {} has no second triangle{}", show(*from), show(*to),
+        junction.map(|p| format!("; a vertex lies on it at {} (T-junction)", show(p))).unwrap_or_default())]
     OpenEdge {
         triangle: u32,
         vertices: [u32; 2],
         from: Point,
         to: Point,
+        /// A vertex that lies on the edge, or as good as: a T-junction.
+        junction: Option<Point>,
     },
     /// Two triangles touch elsewhere than in the vertices and edges they share.
     #[error("triangles {} and {} meet where they should not: {kind}", triangles[0], triangles[1])]
@@ -83,9 +86,19 @@ pub enum Defect {
     },
 }
 
-/// A position as three short numbers, for messages.
-pub(super) fn show(p: Point) -> String {
-    format!("({}, {}, {})", p.x, p.y, p.z)
+/// A position, for messages: the numbers as they are, very large and very small ones with a power of ten.
+pub(crate) fn show(p: Point) -> String {
+    let [x, y, z] = p.to_array().map(show_number);
+    format!("({x}, {y}, {z})")
+}
+
+/// A number, with a power of ten when it would be long without.
+pub(crate) fn show_number(x: f64) -> String {
+    if x == 0.0 || (1e-4..1e9).contains(&x.abs()) {
+        format!("{x}")
+    } else {
+        format!("{x:e}")
+    }
 }
 
 impl Defect {
@@ -120,7 +133,9 @@ impl Defect {
             Self::Degenerate { corners, .. } | Self::Duplicate { corners, .. } => {
                 Some((corners[0] + corners[1] + corners[2]) / 3.0)
             }
-            Self::OpenEdge { from, to, .. } => Some((*from + *to) * 0.5),
+            Self::OpenEdge {
+                from, to, junction, ..
+            } => Some(junction.unwrap_or_else(|| from.midpoint(*to))),
             Self::SelfIntersection { at, .. } => Some(*at),
         }
     }
@@ -140,10 +155,15 @@ impl Defect {
         match self {
             Self::Empty => "choose a file that holds triangles",
             Self::Degenerate { .. } | Self::Duplicate { .. } => {
-                "`tetdb check SURFACE` lists all such triangles; take them out where the surface was made"
+                "`tetdb check SURFACE` lists all such triangles; `tetdb check SURFACE --repair --write OUT` drops them"
+            }
+            Self::OpenEdge {
+                junction: Some(_), ..
+            } => {
+                "`tetdb check SURFACE --repair --write OUT` divides triangles where vertices lie exactly on their open edges"
             }
             Self::OpenEdge { .. } => {
-                "`tetdb check SURFACE` lists the open edges; close the holes, and let points that should meet have equal coordinates"
+                "`tetdb check SURFACE` lists the holes and says whether joining near points closes them; otherwise close them where the surface was made"
             }
             Self::SelfIntersection { .. } => {
                 "`tetdb check SURFACE` lists the places; unite or separate the parts where the surface was made"

@@ -1,10 +1,9 @@
 //! Which triangles meet at which edges: holes, repeated and collapsed triangles, parts.
 
 use rayon::prelude::*;
-use robust::Coord;
 
 use super::Surface;
-use crate::geom::Point;
+use super::rims::{in_line, open_groups};
 
 /// What edges alone tell about a surface.
 ///
@@ -159,7 +158,8 @@ impl Facets {
             .filter(|&t| !self.is_left_out[t as usize] && parts.root(t) == t);
         found.n_components = roots.count();
         found.open.sort_unstable();
-        found.n_open_loops = count_loops(&found.open);
+        let groups = open_groups(&found.open);
+        found.n_open_loops = groups.iter().max().map_or(0, |&last| last as usize + 1);
         found
     }
 }
@@ -171,11 +171,7 @@ fn collapse(surface: &Surface, t: u32) -> Option<bool> {
         return Some(true);
     }
     let [a, b, c] = surface.corners(t);
-    let flat = |axis: fn(Point) -> Coord<f64>| robust::orient2d(axis(a), axis(b), axis(c)) == 0.0;
-    let in_line = flat(|p| Coord { x: p.x, y: p.y })
-        && flat(|p| Coord { x: p.y, y: p.z })
-        && flat(|p| Coord { x: p.z, y: p.x });
-    in_line.then_some(false)
+    in_line(a, b, c).then_some(false)
 }
 
 /// Pairs of triangles of the same vertices; all but the first of each set are left out.
@@ -216,25 +212,6 @@ fn repetitions(surface: &Surface, is_left_out: &mut [bool]) -> (Vec<[u32; 2]>, V
 /// Whether sorting the vertices takes an odd number of exchanges.
 fn is_odd([a, b, c]: [u32; 3]) -> bool {
     (a < b) ^ (b < c) ^ (c < a)
-}
-
-/// Connected groups of edges.
-fn count_loops(open: &[(u32, [u32; 2])]) -> usize {
-    let mut vertices: Vec<u32> = open.iter().flat_map(|(_, v)| *v).collect();
-    vertices.sort_unstable();
-    vertices.dedup();
-    let place = |v: u32| {
-        vertices
-            .binary_search(&v)
-            .expect("every end is in the list") as u32
-    };
-    let mut groups = Groups::new(vertices.len());
-    for (_, [a, b]) in open {
-        groups.join(place(*a), place(*b));
-    }
-    (0..vertices.len() as u32)
-        .filter(|&v| groups.root(v) == v)
-        .count()
 }
 
 /// Disjoint sets of 0 .. n; the root of a set is its smallest member.

@@ -3,7 +3,8 @@
 //! Reading order: [`triangles`](Surface) (what a surface is), `weld` (how readers build one),
 //! `edges` (which triangles meet where), `orientation` (turning triangles the same way), `contact`
 //! (how two triangles touch), `broad` (which pairs to look at), `validate` (all of it together),
-//! `defect` (what can be wrong and what to do about it).
+//! `defect` (what can be wrong and what to do about it), `rims` (where it is open), `near` and `repair`
+//! (mending on demand), `fitness` (what mesh its triangles allow).
 //!
 //! Is not: file formats (`io`), volumes and regions (`boundary`).
 
@@ -11,7 +12,11 @@ mod broad;
 mod contact;
 mod defect;
 mod edges;
+mod fitness;
+mod near;
 mod orientation;
+mod repair;
+mod rims;
 mod triangles;
 mod validate;
 mod weld;
@@ -21,8 +26,13 @@ mod tests;
 
 pub use contact::{Contact, ContactKind, contact};
 pub use defect::{Defect, SurfaceError};
+pub(crate) use defect::{show, show_number};
 pub use edges::{Closedness, closedness};
+pub use fitness::{Fitness, fitness};
+pub use near::weld_near;
 pub use orientation::{Orientation, orient_alike};
+pub use repair::{Closing, Repair, closing, repair};
+pub use rims::{Rim, TJunction, rims, t_junctions};
 pub use triangles::{Note, NoteKind, SourceFile, Surface};
 pub use validate::{Validation, validate};
 pub use weld::SurfaceBuilder;

@@ -308,3 +308,166 @@ fn contact_by_number_of_shared_vertices() {
     }
     assert_eq!(kind([p[1], p[0], p[2]], [1, 0, 2]), None);
 }
+
+/// A cube whose sides do not quite meet: each is moved a little further than the one before.
+fn cracked(step: f64) -> Surface {
+    let sides = cube(|p| p).into_iter().enumerate();
+    build(sides.map(|(t, corners)| corners.map(|p| p + Point::X * (step * (t / 2) as f64))))
+}
+
+#[test]
+fn a_cracked_cube_closes_when_points_are_joined() {
+    let surface = cracked(1e-7);
+    let tried = closing(&surface);
+    let last = tried.last().unwrap();
+    assert_eq!(
+        (last.closes, last.share, last.defects_left),
+        (true, 1e-6, Some(0))
+    );
+    assert!(
+        tried
+            .iter()
+            .rev()
+            .skip(1)
+            .all(|t| !t.closes && t.open_edges > 0)
+    );
+    let mut joined = surface;
+    let done = repair(&mut joined, Some(last.distance));
+    assert_eq!(done.points_joined, last.points_joined);
+    assert!(validate(&joined).is_valid());
+    assert_eq!((joined.n_vertices(), joined.n_triangles()), (8, 12));
+    // A side that is missing cannot be joined to anything.
+    let open = build(cube(|p| p).into_iter().take(10));
+    assert!(closing(&open).iter().all(|t| !t.closes));
+}
+
+#[test]
+fn joined_points_do_not_run_together() {
+    let tips = [0.0, 0.9, 1.8].map(|x| {
+        let up = Point::new(x, 0.0, 5.0);
+        [up, Point::new(x, 9.0, 9.0), Point::new(x, -9.0, 20.0)]
+    });
+    let mut surface = build(tips);
+    assert_eq!(weld_near(&mut surface, 1.0), 3);
+    assert_eq!(surface.triangles, [[0, 1, 2], [0, 1, 2], [3, 4, 5]]);
+    assert_eq!(surface.points[3].x, 1.8);
+}
+
+#[test]
+fn a_t_junction_is_divided() {
+    let mut triangles = cube(|p| p);
+    let [a, b, c] = triangles[0];
+    let middles = [b.lerp(c, 0.25), b.lerp(c, 0.75)];
+    triangles[0] = [a, b, middles[0]];
+    triangles.extend([[a, middles[0], middles[1]], [a, middles[1], c]]);
+    let mut surface = build(triangles.clone());
+    let found = validate(&surface);
+    assert_eq!(found.t_junctions.len(), 2);
+    assert!(found.t_junctions.iter().all(|j| j.distance == 0.0));
+    assert!(
+        found
+            .accept()
+            .unwrap_err()
+            .to_string()
+            .contains("T-junction"),
+        "{:?}",
+        found.accept()
+    );
+    let done = repair(&mut surface, None);
+    assert_eq!((done.divided, done.turned), (1, 0));
+    assert!(validate(&surface).is_valid());
+    assert_eq!(surface.n_triangles(), 16);
+    // The same seam closed by triangles without area: dropping them opens it, dividing closes it.
+    triangles.extend([[b, middles[1], middles[0]], [b, c, middles[1]]]);
+    let mut surface = build(triangles);
+    assert_eq!(codes(&surface)[0], "degenerate-triangle");
+    let done = repair(&mut surface, None);
+    assert_eq!((done.collapsed_dropped, done.divided), (2, 1));
+    assert!(validate(&surface).is_valid());
+}
+
+#[test]
+fn near_a_t_junction_is_told_with_its_distance() {
+    let mut triangles = cube(|p| p);
+    let [a, b, c] = triangles[0];
+    let m = b.midpoint(c) + Point::splat(1e-8);
+    triangles[0] = [a, b, m];
+    triangles.push([a, m, c]);
+    let mut surface = build(triangles);
+    let junctions = validate(&surface).t_junctions;
+    assert_eq!(junctions.len(), 1);
+    assert!(junctions[0].distance > 0.0 && junctions[0].distance < 2e-8);
+    assert_eq!(repair(&mut surface.clone(), None).divided, 0);
+    assert_eq!(repair(&mut surface, Some(1e-7)).divided, 1);
+    assert!(validate(&surface).is_valid());
+}
+
+#[test]
+fn files_and_labels_follow_a_repair() {
+    let mut builder = SurfaceBuilder::new();
+    for (name, extra) in [("one", true), ("two", false)] {
+        builder.begin_file(name);
+        let label = builder.label(name);
+        let away = if extra {
+            Point::ZERO
+        } else {
+            Point::splat(3.0)
+        };
+        let triangles = cube(|p| p + away);
+        let repeated = extra.then_some(triangles[4]);
+        for triangle in repeated.into_iter().chain(triangles) {
+            builder.triangle_at(triangle, label).unwrap();
+        }
+        builder.end_file().unwrap();
+    }
+    let mut surface = builder.finish();
+    let done = repair(&mut surface, None);
+    let expected = Repair {
+        repeated_dropped: 1,
+        ..Repair::default()
+    };
+    assert_eq!(done, expected);
+    assert_eq!(surface.source(12), Some(("two", 0)));
+    assert_eq!(surface.source(11), Some(("one", 11)));
+    assert_eq!(
+        (surface.label_name(11), surface.label_name(12)),
+        ("one", "two")
+    );
+    assert!(validate(&surface).is_valid());
+}
+
+#[test]
+fn holes_are_listed_the_longest_first() {
+    let mut triangles = cube(|p| p);
+    triangles.remove(11);
+    triangles.drain(..2);
+    let surface = build(triangles);
+    let rims = rims(&surface, &closedness(&surface));
+    let lengths: Vec<(usize, f64)> = rims.iter().map(|r| (r.n_edges, r.length)).collect();
+    // The hole of two triangles and that of one meet in a corner or not at all.
+    let total: f64 = lengths.iter().map(|l| l.1).sum();
+    assert!(
+        (total - (4.0 + 2.0 + 2f64.sqrt())).abs() < 1e-12,
+        "{lengths:?}"
+    );
+    assert!(lengths.is_sorted_by(|a, b| a.1 >= b.1), "{lengths:?}");
+}
+
+#[test]
+fn fitness_tells_needles_at_every_scale() {
+    for scale in [1e-23, 1.0, 1e29] {
+        let found = fitness(&build(cube(|p| p * scale)));
+        assert_eq!((found.small_angles, found.forcing_triangles), (0, 0));
+        assert!((found.angle_least_degrees - 45.0).abs() < 1e-9);
+        assert!((found.edge_min / scale - 1.0).abs() < 1e-12);
+        assert!(
+            found
+                .tets_expected
+                .is_some_and(|n| (12.0..60.0).contains(&n))
+        );
+        let flat = fitness(&build(cube(|p| p * Point::new(scale, scale, scale / 50.0))));
+        assert_eq!((flat.small_angles, flat.forcing_triangles), (8, 8));
+        assert_eq!(flat.hopeless_triangles, 8);
+    }
+    assert_eq!(fitness(&build([])), Fitness::default());
+}

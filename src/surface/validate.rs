@@ -3,6 +3,7 @@
 use super::broad::BoxTree;
 use super::contact::{ContactKind, contact};
 use super::edges::{Closedness, Facets};
+use super::rims::{JUNCTION_SHARE, TJunction, t_junctions};
 use super::{Defect, Surface, SurfaceError};
 
 /// Self-intersections listed at most; all are counted.
@@ -13,7 +14,9 @@ const LISTED_MAX: usize = 100_000;
 pub struct Validation {
     /// Edges, parts, two-sided facets.
     pub closedness: Closedness,
-    /// Kind by kind (no area, repeated, open, intersecting), each sorted by triangle.
+    /// Vertices on open edges, or nearer to them than 1e-6 of the box diagonal.
+    pub t_junctions: Vec<TJunction>,
+    /// Kind by kind (no area, repeated, open at a T-junction, open, intersecting), each sorted by triangle.
     pub defects: Vec<Defect>,
     /// Pairs of triangles that touch where they should not, listed or not; counting ends beyond ten million.
     pub n_intersections: u64,
@@ -61,7 +64,15 @@ impl Validation {
 pub fn validate(surface: &Surface) -> Validation {
     let facets = Facets::of(surface);
     let closedness = facets.closedness(surface);
-    let mut defects = edge_defects(surface, &closedness);
+    let t_junctions = match closedness.is_closed() {
+        true => Vec::new(),
+        false => t_junctions(
+            surface,
+            &closedness,
+            JUNCTION_SHARE * surface.bounds().diagonal(),
+        ),
+    };
+    let mut defects = edge_defects(surface, &closedness, &t_junctions);
     let mut skip = facets.is_left_out;
     for &(t, _) in &facets.degenerate {
         skip[t as usize] = true;
@@ -86,6 +97,7 @@ pub fn validate(surface: &Surface) -> Validation {
     );
     Validation {
         closedness,
+        t_junctions,
         defects,
         n_intersections,
         n_defects,
@@ -93,7 +105,11 @@ pub fn validate(surface: &Surface) -> Validation {
 }
 
 /// The defects that edges and vertices alone show.
-fn edge_defects(surface: &Surface, closedness: &Closedness) -> Vec<Defect> {
+fn edge_defects(
+    surface: &Surface,
+    closedness: &Closedness,
+    t_junctions: &[TJunction],
+) -> Vec<Defect> {
     let mut defects = Vec::new();
     if surface.n_triangles() == 0 {
         defects.push(Defect::Empty);
@@ -113,14 +129,36 @@ fn edge_defects(surface: &Surface, closedness: &Closedness) -> Vec<Defect> {
                 corners: surface.corners(triangles[0]),
             }),
     );
-    defects.extend(closedness.open.iter().map(|&(triangle, vertices)| {
-        let [from, to] = vertices.map(|v| surface.points[v as usize]);
-        Defect::OpenEdge {
-            triangle,
-            vertices,
-            from,
-            to,
-        }
-    }));
+    let mut open: Vec<Defect> = closedness
+        .open
+        .iter()
+        .map(|&(triangle, vertices)| {
+            let [from, to] = vertices.map(|v| surface.points[v as usize]);
+            let first =
+                t_junctions.partition_point(|j| (j.triangle, j.edge) < (triangle, vertices));
+            let junction = t_junctions[first..]
+                .first()
+                .filter(|j| (j.triangle, j.edge) == (triangle, vertices))
+                .map(|j| j.at);
+            Defect::OpenEdge {
+                triangle,
+                vertices,
+                from,
+                to,
+                junction,
+            }
+        })
+        .collect();
+    // Where the reason is known comes first.
+    open.sort_by_key(|d| {
+        !matches!(
+            d,
+            Defect::OpenEdge {
+                junction: Some(_),
+                ..
+            }
+        )
+    });
+    defects.extend(open);
     defects
 }

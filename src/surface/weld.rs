@@ -198,7 +198,7 @@ impl SurfaceBuilder {
 }
 
 /// Keeps the points that triangles use, in their order; returns how many went.
-fn drop_unused_points(surface: &mut Surface) -> u64 {
+pub(super) fn drop_unused_points(surface: &mut Surface) -> u64 {
     const UNUSED: u32 = u32::MAX;
     let mut new_ids = vec![UNUSED; surface.points.len()];
     for v in surface.triangles.iter().flatten() {

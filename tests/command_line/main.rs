@@ -1,5 +1,6 @@
 //! The program as its users meet it: processes, files, exit codes.
 
+mod check;
 mod crash;
 mod damage;
 mod errors;

@@ -6,8 +6,8 @@
 
 use super::place::Place;
 
-type Point = [f64; 3];
-type Triangles = Vec<[Point; 3]>;
+pub type Point = [f64; 3];
+pub type Triangles = Vec<[Point; 3]>;
 
 /// Corners of the unit cube as bits x, y, z; two triangles for each side, seen from outside.
 const CUBE: [[usize; 3]; 12] = [
@@ -43,7 +43,7 @@ fn cube(map: impl Fn(Point) -> Point) -> Triangles {
 }
 
 /// The unit cube moved.
-fn cube_at(x: f64, y: f64, z: f64) -> Triangles {
+pub fn cube_at(x: f64, y: f64, z: f64) -> Triangles {
     cube(|p| [p[0] + x, p[1] + y, p[2] + z])
 }
 
@@ -54,7 +54,7 @@ fn both(mut a: Triangles, b: Triangles) -> Triangles {
 }
 
 /// OFF with three vertices for each triangle: what is welded is up to the reader.
-fn off(triangles: &[[Point; 3]]) -> String {
+pub fn off(triangles: &[[Point; 3]]) -> String {
     let mut text = format!("OFF\n{} {} 0\n", 3 * triangles.len(), triangles.len());
     for [x, y, z] in triangles.iter().flatten() {
         text += &format!("{x:e} {y:e} {z:e}\n");

@@ -10,6 +10,7 @@
 //! (shared vertices), `faces` (input triangles), `draft` and `stream` (files), then one file per format.
 
 mod abaqus;
+mod defects;
 mod draft;
 mod error;
 mod faces;
@@ -27,6 +28,7 @@ mod vtu_layout;
 
 use std::path::{Path, PathBuf};
 
+pub use defects::defects;
 pub use error::WriteError;
 pub use surface::{SurfaceReport, surface};
 

@@ -1,0 +1,293 @@
+//! What `check` found, for people and for programs.
+
+use serde_json::{Value, json};
+
+use super::talk::Talk;
+use crate::surface::{
+    Closing, Defect, Fitness, Rim, Surface, Validation, closing, fitness, rims, show, show_number,
+    validate,
+};
+
+/// Defects of one kind, holes and junctions listed for people.
+const LISTED: usize = 8;
+/// Above this share of forced tetrahedra, or of triangles with small angles, better triangles are advised.
+const POOR_SHARE: f64 = 0.01;
+/// Above this ratio of edge lengths short edges are pointed at.
+const POOR_RATIO: f64 = 1e5;
+
+/// Everything that is known of a surface.
+pub struct Findings<'a> {
+    surface: &'a Surface,
+    turned: usize,
+    pub validation: Validation,
+    rims: Vec<Rim>,
+    closing: Vec<Closing>,
+    fitness: Fitness,
+}
+
+impl<'a> Findings<'a> {
+    /// Looks at all of it; `turned` triangles were turned while reading.
+    pub fn of(surface: &'a Surface, turned: usize) -> Self {
+        let validation = validate(surface);
+        let is_closed = validation.closedness.is_closed();
+        Self {
+            surface,
+            turned,
+            rims: rims(surface, &validation.closedness),
+            closing: if is_closed {
+                Vec::new()
+            } else {
+                closing(surface)
+            },
+            fitness: fitness(surface),
+            validation,
+        }
+    }
+
+    pub fn is_valid(&self) -> bool {
+        self.validation.is_valid()
+    }
+
+    /// The least distance that closes the surface.
+    fn closes(&self) -> Option<&Closing> {
+        self.closing.last().filter(|tried| tried.closes)
+    }
+
+    /// The answer for programs.
+    pub fn json(&self) -> Value {
+        let (surface, found, edges) = (self.surface, &self.validation, &self.validation.closedness);
+        let point = |v: u32| surface.points[v as usize].to_array();
+        let open_loops: Vec<Value> = self
+            .rims
+            .iter()
+            .map(|rim| {
+                json!({ "edges": rim.n_edges, "length": rim.length, "triangle": rim.triangle, "at": rim.at.to_array() })
+            })
+            .collect();
+        let junctions: Vec<Value> = found
+            .t_junctions
+            .iter()
+            .map(|j| {
+                json!({ "at": j.at.to_array(), "triangle": j.triangle, "edge": j.edge.map(point), "distance": j.distance })
+            })
+            .collect();
+        json!({
+            "schema": 1, "triangles": surface.n_triangles(), "vertices": surface.n_vertices(),
+            "labels": surface.label_names, "turned_triangles": self.turned,
+            "edges": edges.n_edges, "parts": edges.n_components, "open_edges": edges.open.len(),
+            "nonmanifold_edges": edges.n_nonmanifold, "two_sided_triangles": edges.two_sided.len(),
+            "valid": self.is_valid(), "n_defects": found.n_defects,
+            "defects": found.defects.iter().map(defect_json).collect::<Vec<_>>(),
+            "open_loops": open_loops, "t_junctions": junctions,
+            "closing": { "tried": self.closing, "smallest": self.closes().map(|c| c.share) },
+            "fitness": self.fitness, "advice": self.advice(),
+        })
+    }
+
+    /// The same for people; `surfaces` are the words of the command line.
+    pub fn print(&self, surfaces: &[String], is_repaired: bool, talk: &Talk) {
+        let edges = &self.validation.closedness;
+        talk.line(&format!(
+            "{} triangles, {} vertices, {} edges, {} part(s)",
+            self.surface.n_triangles(),
+            self.surface.n_vertices(),
+            edges.n_edges,
+            edges.n_components
+        ));
+        self.print_defects(talk);
+        if !edges.is_closed() {
+            self.print_openness(surfaces, talk);
+        }
+        self.print_fitness(talk);
+        for advice in self.advice() {
+            talk.line(&format!("advice: {advice}"));
+        }
+        if self.is_valid() {
+            talk.line("closed and free of defects: it can be meshed");
+        } else {
+            self.print_help(surfaces, is_repaired, talk);
+        }
+    }
+
+    /// Kind by kind, some of each.
+    fn print_defects(&self, talk: &Talk) {
+        let same_kind = |a: &Defect, b: &Defect| a.code() == b.code();
+        for kind in self.validation.defects.chunk_by(same_kind) {
+            let code = kind[0].code();
+            // Open edges are told hole by hole.
+            if code == "open-surface" {
+                continue;
+            }
+            let n = match &kind[0] {
+                Defect::SelfIntersection { .. } => self.validation.n_intersections,
+                _ => kind.len() as u64,
+            };
+            talk.line(&format!("{code}: {n}"));
+            for defect in kind.iter().take(LISTED) {
+                let at = defect
+                    .at()
+                    .map_or(String::new(), |p| format!(", near {}", show(p)));
+                talk.line(&format!("  {defect}{at}"));
+            }
+            tell_rest(n, talk);
+        }
+    }
+
+    fn print_openness(&self, surfaces: &[String], talk: &Talk) {
+        let open = &self.validation.closedness.open;
+        talk.line(&format!(
+            "{} open edges around {} hole(s):",
+            open.len(),
+            self.rims.len()
+        ));
+        for rim in self.rims.iter().take(LISTED) {
+            talk.line(&format!(
+                "  {} edges, length {}, at triangle {} near {}",
+                rim.n_edges,
+                short(rim.length),
+                rim.triangle,
+                show(rim.at)
+            ));
+        }
+        tell_rest(self.rims.len() as u64, talk);
+        let junctions = &self.validation.t_junctions;
+        if !junctions.is_empty() {
+            talk.line(&format!("{} T-junction(s):", junctions.len()));
+        }
+        for junction in junctions.iter().take(LISTED) {
+            let how = match junction.distance {
+                0.0 => "exactly".to_owned(),
+                distance => format!("but for {distance:.1e}"),
+            };
+            talk.line(&format!(
+                "  a vertex at {} lies on an open edge of triangle {}, {how}",
+                show(junction.at),
+                junction.triangle
+            ));
+        }
+        tell_rest(junctions.len() as u64, talk);
+        self.print_closing(surfaces, talk);
+    }
+
+    fn print_closing(&self, surfaces: &[String], talk: &Talk) {
+        let Some(last) = self.closing.last() else {
+            return;
+        };
+        let Some(closes) = self.closes() else {
+            talk.line(&format!(
+                "no repair closes it: {} edges stay open even when points nearer than {:e} of the box diagonal are joined",
+                last.open_edges, last.share
+            ));
+            return;
+        };
+        let surfaces = surfaces.join(" ");
+        let left = match closes.defects_left {
+            Some(0) | None => "and no defect is left".to_owned(),
+            Some(n) => format!("and {n} other defects are left"),
+        };
+        talk.line(&if closes.share > 0.0 {
+            format!(
+                "all close if points nearer than {:e} of the box diagonal ({:.3e}) are joined, {left}: `tetdb check {surfaces} --repair --weld {:e} --write OUT`",
+                closes.share, closes.distance, closes.share
+            )
+        } else {
+            format!("all close by a repair that joins no points, {left}: `tetdb check {surfaces} --repair --write OUT`")
+        });
+    }
+
+    fn print_fitness(&self, talk: &Talk) {
+        let f = &self.fitness;
+        if self.surface.n_triangles() == 0 {
+            return;
+        }
+        talk.line(&format!(
+            "shapes: {:.3} % of the triangles have an angle below 5 degrees (least {:.4}); edges {} to {}, median {}",
+            100.0 * f.small_angle_share,
+            f.angle_least_degrees,
+            short(f.edge_min),
+            short(f.edge_max),
+            short(f.edge_median)
+        ));
+        if let (Some(tets), Some(share)) = (f.tets_expected, f.forced_share) {
+            talk.line(&format!(
+                "mesh: about {} tetrahedra with default sizes; {:.2} % of them stand on one of {} triangles whose shape alone makes quality 2 or worse",
+                rounded(tets),
+                100.0 * share,
+                f.forcing_triangles
+            ));
+        }
+    }
+
+    /// What would make a better mesh.
+    fn advice(&self) -> Vec<String> {
+        let f = &self.fitness;
+        let mut advice = Vec::new();
+        if f.small_angle_share > POOR_SHARE || f.forced_share.is_some_and(|s| s > POOR_SHARE) {
+            let hopeless = match f.hopeless_triangles {
+                0 => String::new(),
+                n => format!(", {n} of them 10 or worse"),
+            };
+            advice.push(format!(
+                "{} triangles make every tetrahedron on them quality 2 or worse{hopeless}; all input triangles stay, so remesh the \
+                 surface first, with angles above 15 degrees",
+                f.forcing_triangles
+            ));
+        }
+        if f.edge_min > 0.0 && f.edge_max / f.edge_min > POOR_RATIO {
+            advice.push(format!(
+                "the shortest edge is {:.1e} of the longest; if such edges are no intended detail, take them out where the surface was made",
+                f.edge_min / f.edge_max
+            ));
+        }
+        advice
+    }
+
+    fn print_help(&self, surfaces: &[String], is_repaired: bool, talk: &Talk) {
+        let Some(first) = self.validation.defects.first() else {
+            return;
+        };
+        // How to close it was told with the holes.
+        if matches!(first, Defect::OpenEdge { .. }) && self.closes().is_some() {
+            return;
+        }
+        let is_dropped = matches!(first, Defect::Degenerate { .. } | Defect::Duplicate { .. });
+        let help = if is_dropped && !is_repaired {
+            format!(
+                "`tetdb check {} --repair --write OUT` drops such triangles",
+                surfaces.join(" ")
+            )
+        } else {
+            first.help().to_owned()
+        };
+        talk.line(&format!("help: {help}"));
+    }
+}
+
+fn defect_json(defect: &Defect) -> Value {
+    let mut value = json!({
+        "code": defect.code(), "triangles": defect.triangles(), "at": defect.at().map(|p| p.to_array()),
+        "message": defect.to_string(), "help": defect.help(),
+    });
+    if let Defect::SelfIntersection { kind, .. } = defect {
+        value["kind"] = json!(kind.word());
+    }
+    value
+}
+
+fn tell_rest(n: u64, talk: &Talk) {
+    if n > LISTED as u64 {
+        talk.line(&format!("  ... {n} in all; --json lists them"));
+    }
+}
+
+/// Four digits.
+fn short(x: f64) -> String {
+    let text = format!("{x:.3e}");
+    show_number(text.parse().unwrap_or(x))
+}
+
+/// Two digits are all an estimate has.
+fn rounded(x: f64) -> String {
+    let unit = 10f64.powf(x.log10().floor() - 1.0).max(1.0);
+    format!("{:.0}", (x / unit).round() * unit)
+}

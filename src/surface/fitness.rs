@@ -1,0 +1,179 @@
+//! What mesh the triangles of a surface allow: every input triangle stays, and a needle makes bad tetrahedra.
+
+use rayon::prelude::*;
+
+use super::Surface;
+use super::edges::{Groups, closedness};
+
+/// Angles below this many degrees count as small.
+pub const SMALL_ANGLE_DEGREES: f64 = 5.0;
+/// Quality from which a tetrahedron counts as forced: the first bin of the quality table ends here.
+pub const FORCED_QUALITY: f64 = 2.0;
+/// √6/12, the inradius of the regular tetrahedron of edge length 1.
+const ALPHA: f64 = 0.204_124_145_231_931_5;
+/// Regular tetrahedra of edge length 1 in a unit of volume.
+const PER_VOLUME: f64 = 8.485_281_374_238_57;
+/// Slope of sizes away from the surface when nothing is asked for: ln 1.3.
+const SLOPE: f64 = 0.262_364_264_467_491_1;
+
+/// Shapes of the triangles and what follows for the tetrahedra on them.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
+pub struct Fitness {
+    /// Triangles with an angle below [`SMALL_ANGLE_DEGREES`]; those without area are among them.
+    pub small_angles: u64,
+    pub small_angle_share: f64,
+    pub angle_least_degrees: f64,
+    /// Shortest, median and longest edge of a triangle, in input units.
+    pub edge_min: f64,
+    pub edge_median: f64,
+    pub edge_max: f64,
+    /// Triangles on which every tetrahedron has quality [`FORCED_QUALITY`] or worse.
+    pub forcing_triangles: u64,
+    /// The same with quality 10 or worse.
+    pub hopeless_triangles: u64,
+    /// Tetrahedra a mesh with default sizes will have, roughly; none for an open surface.
+    pub tets_expected: Option<f64>,
+    /// Share of them that stands on a forcing triangle and can therefore not be better.
+    pub forced_share: Option<f64>,
+}
+
+/// Sums over triangles.
+#[derive(Clone, Copy)]
+struct Sums {
+    n_small: u64,
+    angle: f64,
+    low: f64,
+    high: f64,
+    n_forcing: u64,
+    n_hopeless: u64,
+}
+
+/// Measures the shapes of all triangles.
+///
+/// The plane through the center of a tetrahedron's inscribed ball that is parallel to a face cuts out a smaller copy of the face
+/// around a circle of the ball's radius. So the inradius is below that of each face, and quality is above
+/// α · longest edge / inradius of any face.
+pub fn fitness(surface: &Surface) -> Fitness {
+    let n = surface.n_triangles();
+    if n == 0 {
+        return Fitness::default();
+    }
+    let none = Sums {
+        n_small: 0,
+        angle: f64::INFINITY,
+        low: f64::INFINITY,
+        high: 0.0,
+        n_forcing: 0,
+        n_hopeless: 0,
+    };
+    // Least and sum are free of the order of triangles, so the answer is the same for any number of threads.
+    let all = (0..n as u32)
+        .into_par_iter()
+        .map(|t| shape(surface, t))
+        .reduce(|| none, join);
+    let mut lengths: Vec<f64> = (0..n as u32)
+        .into_par_iter()
+        .flat_map_iter(|t| edge_lengths(surface, t))
+        .collect();
+    let middle = lengths.len() / 2;
+    let (_, median, _) = lengths.select_nth_unstable_by(middle, f64::total_cmp);
+    let tets_expected = expected(surface);
+    Fitness {
+        small_angles: all.n_small,
+        small_angle_share: all.n_small as f64 / n as f64,
+        angle_least_degrees: all.angle.to_degrees(),
+        edge_min: all.low,
+        edge_median: *median,
+        edge_max: all.high,
+        forcing_triangles: all.n_forcing,
+        hopeless_triangles: all.n_hopeless,
+        tets_expected,
+        forced_share: tets_expected.map(|tets| all.n_forcing as f64 / tets),
+    }
+}
+
+fn join(a: Sums, b: Sums) -> Sums {
+    Sums {
+        n_small: a.n_small + b.n_small,
+        angle: a.angle.min(b.angle),
+        low: a.low.min(b.low),
+        high: a.high.max(b.high),
+        n_forcing: a.n_forcing + b.n_forcing,
+        n_hopeless: a.n_hopeless + b.n_hopeless,
+    }
+}
+
+fn edge_lengths(surface: &Surface, t: u32) -> [f64; 3] {
+    let [a, b, c] = surface.corners(t);
+    [a.distance(b), b.distance(c), c.distance(a)]
+}
+
+fn area(surface: &Surface, t: u32) -> f64 {
+    let [a, b, c] = surface.corners(t);
+    0.5 * (b - a).cross(c - a).length()
+}
+
+fn shape(surface: &Surface, t: u32) -> Sums {
+    let lengths = edge_lengths(surface, t);
+    let corners = surface.corners(t);
+    let angles = [0, 1, 2].map(|i| {
+        let [a, b, c] = [corners[i], corners[(i + 1) % 3], corners[(i + 2) % 3]];
+        let (u, v) = (b - a, c - a);
+        u.cross(v).length().atan2(u.dot(v))
+    });
+    let angle = angles.into_iter().fold(f64::INFINITY, f64::min);
+    let high = lengths.into_iter().fold(0.0, f64::max);
+    let inradius = 2.0 * area(surface, t) / lengths.iter().sum::<f64>();
+    // A collapsed triangle has inradius 0, or none at all; then the quality is without bound.
+    let quality = ALPHA * high / inradius;
+    let is_worse = |bound: f64| u64::from(quality.is_nan() || quality >= bound);
+    Sums {
+        n_small: u64::from(angle < SMALL_ANGLE_DEGREES.to_radians()),
+        angle,
+        low: lengths.into_iter().fold(f64::INFINITY, f64::min),
+        high,
+        n_forcing: is_worse(FORCED_QUALITY),
+        n_hopeless: is_worse(10.0),
+    }
+}
+
+/// Tetrahedra to expect: over each triangle sizes grow inwards with the default slope, down to the mean depth.
+///
+/// The integral of 6√2/h³ over a prism on a triangle of mean edge length h, to depth D and with slope β, is
+/// 6√2 · area / 2β · (1/h² − 1/(h + βD)²); D is volume over area. At least one tetrahedron stands on each triangle.
+fn expected(surface: &Surface) -> Option<f64> {
+    let (volume, total) = volume_and_area(surface)?;
+    let depth = volume / total;
+    let tets: f64 = (0..surface.n_triangles() as u32)
+        .map(|t| {
+            let h = edge_lengths(surface, t).iter().sum::<f64>() / 3.0;
+            let ends = 1.0 / (h * h) - 1.0 / (h + SLOPE * depth).powi(2);
+            let over = PER_VOLUME * area(surface, t) / (2.0 * SLOPE) * ends;
+            if over.is_finite() { over.max(1.0) } else { 1.0 }
+        })
+        .sum();
+    Some(tets)
+}
+
+/// Volume, each part counted positive, and area of a closed surface.
+fn volume_and_area(surface: &Surface) -> Option<(f64, f64)> {
+    let closedness = closedness(surface);
+    if !closedness.is_closed() {
+        return None;
+    }
+    let mut parts = Groups::new(surface.n_vertices());
+    for [a, b, c] in &surface.triangles {
+        parts.join(*a, *b);
+        parts.join(*b, *c);
+    }
+    let origin = surface.bounds().low;
+    let mut volumes = vec![0.0; surface.n_vertices()];
+    let mut total = 0.0;
+    for (t, triangle) in (0u32..).zip(&surface.triangles) {
+        let [a, b, c] = surface.corners(t).map(|p| p - origin);
+        volumes[parts.root(triangle[0]) as usize] += a.dot(b.cross(c)) / 6.0;
+        total += area(surface, t);
+    }
+    let volume: f64 = volumes.iter().map(|v| v.abs()).sum();
+    (total > 0.0).then_some((volume, total))
+}

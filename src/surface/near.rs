@@ -1,0 +1,90 @@
+//! Joining points that are near each other, for surfaces whose seams do not quite meet.
+
+use std::collections::HashMap;
+
+use super::Surface;
+use super::weld::drop_unused_points;
+use crate::geom::Point;
+
+/// End of a chain of points.
+const NONE: u32 = u32::MAX;
+
+/// Joins points not farther apart than `distance` (in input units, positive) and returns how many were joined to another.
+///
+/// In the order of their ids each point goes to the nearest of those kept before it, or is kept: so no point
+/// moves farther than `distance`, and chains of near points do not run together. Effects: renumbers vertices; triangles
+/// may collapse, repeat or open.
+pub fn weld_near(surface: &mut Surface, distance: f64) -> usize {
+    let mut kept = Kept::new(surface.bounds().low, distance);
+    let points = &surface.points;
+    let new_ids: Vec<u32> = (0..points.len() as u32)
+        .map(|v| kept.find_or_keep(v, points))
+        .collect();
+    let n_joined = (0u32..).zip(&new_ids).filter(|(v, id)| *v != **id).count();
+    for v in surface.triangles.iter_mut().flatten() {
+        *v = new_ids[*v as usize];
+    }
+    drop_unused_points(surface);
+    n_joined
+}
+
+/// The points kept so far, in cubes of twice the distance: what is near lies in at most eight of them.
+struct Kept {
+    low: Point,
+    distance: f64,
+    /// Last point of each cube.
+    last: HashMap<[i64; 3], u32>,
+    /// For each point the one before it in its cube.
+    before: Vec<u32>,
+}
+
+impl Kept {
+    fn new(low: Point, distance: f64) -> Self {
+        Self {
+            low,
+            distance,
+            last: HashMap::new(),
+            before: Vec::new(),
+        }
+    }
+
+    /// The cube of a position.
+    fn cube(&self, p: Point) -> [i64; 3] {
+        ((p - self.low) / (2.0 * self.distance))
+            .to_array()
+            .map(|x| x.floor() as i64)
+    }
+
+    fn find_or_keep(&mut self, v: u32, points: &[Point]) -> u32 {
+        let p = points[v as usize];
+        self.before.push(NONE);
+        if let Some(near) = self.nearest(p, points) {
+            return near;
+        }
+        let last = self.last.insert(self.cube(p), v);
+        self.before[v as usize] = last.unwrap_or(NONE);
+        v
+    }
+
+    /// The kept point nearest to `p` within the distance; of equally near ones the first.
+    fn nearest(&self, p: Point, points: &[Point]) -> Option<u32> {
+        let margin = Point::splat(self.distance);
+        let (from, to) = (self.cube(p - margin), self.cube(p + margin));
+        let mut best: Option<(f64, u32)> = None;
+        for x in from[0]..=to[0] {
+            for y in from[1]..=to[1] {
+                for z in from[2]..=to[2] {
+                    let mut v = self.last.get(&[x, y, z]).copied().unwrap_or(NONE);
+                    while v != NONE {
+                        let candidate = (p.distance(points[v as usize]), v);
+                        if candidate.0 <= self.distance && best.is_none_or(|b| candidate < b) {
+                            best = Some(candidate);
+                        }
+                        v = self.before[v as usize];
+                    }
+                }
+            }
+        }
+        best.map(|(_, v)| v)
+    }
+}

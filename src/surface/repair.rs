@@ -1,0 +1,180 @@
+//! Repairs that were asked for: near points joined, useless triangles dropped, T-junctions divided, neighbors turned alike.
+
+use std::collections::BTreeMap;
+
+use super::Surface;
+use super::edges::{Facets, closedness};
+use super::near::weld_near;
+use super::orientation::orient_alike;
+use super::rims::t_junctions;
+use super::validate::validate;
+use super::weld::drop_unused_points;
+
+/// Shares of the box diagonal that [`closing`] tries.
+const CLOSING_SHARES: [f64; 8] = [0.0, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3];
+/// Rounds of dividing at most: each divides one edge of a triangle, at all vertices on it.
+const ROUNDS_MAX: usize = 64;
+
+/// What [`repair`] did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct Repair {
+    /// Points joined to another.
+    pub points_joined: usize,
+    /// Triangles without area that were dropped.
+    pub collapsed_dropped: usize,
+    /// Triangles of the same vertices and orientation as an earlier one that were dropped.
+    pub repeated_dropped: usize,
+    /// Triangles divided at a T-junction.
+    pub divided: usize,
+    /// Triangles turned round to run like their neighbors.
+    pub turned: usize,
+}
+
+/// Mends what can be mended without a guess.
+///
+/// Joins points not farther apart than `weld` (when given, in input units), drops triangles without area and repeated ones,
+/// divides triangles at vertices that lie on their open edges (exactly, or as near as `weld`), turns neighbors alike.
+/// Effects: renumbers vertices and triangles; no coordinate changes but by joining. Is not: a promise; validate the result.
+pub fn repair(surface: &mut Surface, weld: Option<f64>) -> Repair {
+    let mut done = Repair::default();
+    if let Some(distance) = weld {
+        done.points_joined = weld_near(surface, distance);
+    }
+    for _ in 0..ROUNDS_MAX {
+        drop_useless(surface, &mut done);
+        let n = divide(surface, weld.unwrap_or(0.0));
+        done.divided += n;
+        if n == 0 {
+            break;
+        }
+    }
+    drop_useless(surface, &mut done);
+    done.turned = orient_alike(surface).flipped.len();
+    done
+}
+
+/// Drops triangles without area and repeated ones.
+fn drop_useless(surface: &mut Surface, done: &mut Repair) {
+    let facets = Facets::of(surface);
+    let mut drop = vec![false; surface.n_triangles()];
+    for &(t, _) in &facets.degenerate {
+        drop[t as usize] = true;
+        done.collapsed_dropped += 1;
+    }
+    for &[_, t] in &facets.duplicates {
+        done.repeated_dropped += usize::from(!drop[t as usize]);
+        drop[t as usize] = true;
+    }
+    if drop.contains(&true) {
+        replace(surface, |t, triangle, pieces| {
+            if !drop[t as usize] {
+                pieces.push(triangle);
+            }
+        });
+        drop_unused_points(surface);
+    }
+}
+
+/// Divides triangles with vertices on an open edge of theirs, one edge of each, and returns how many.
+///
+/// Only where it brings two open edges together; a sheet that merely touches an open edge changes nothing.
+fn divide(surface: &mut Surface, distance: f64) -> usize {
+    let found = closedness(surface);
+    if found.is_closed() {
+        return 0;
+    }
+    let junctions = t_junctions(surface, &found, distance);
+    let sorted = |[a, b]: [u32; 2]| [a.min(b), a.max(b)];
+    let mut open: Vec<[u32; 2]> = found.open.iter().map(|(_, edge)| sorted(*edge)).collect();
+    open.sort_unstable();
+    // Triangle -> its edge and the vertices along it, both ends among them.
+    let mut cuts: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    for on_edge in junctions.chunk_by(|a, b| (a.triangle, a.edge) == (b.triangle, b.edge)) {
+        let (triangle, [a, b]) = (on_edge[0].triangle, on_edge[0].edge);
+        let [from, to] = [a, b].map(|v| surface.points[v as usize]);
+        let along = |v: u32| (surface.points[v as usize] - from).dot(to - from);
+        let mut chain: Vec<u32> = on_edge.iter().map(|j| j.vertex).collect();
+        chain.sort_unstable_by(|&v, &w| along(v).total_cmp(&along(w)));
+        chain.insert(0, a);
+        chain.push(b);
+        let brings_together = |pair: &[u32]| {
+            let edge = sorted([pair[0], pair[1]]);
+            open.binary_search(&edge).is_ok()
+        };
+        let own = &surface.triangles[triangle as usize];
+        let apex_is_free = !chain[1..chain.len() - 1].iter().any(|v| own.contains(v));
+        if apex_is_free && chain.windows(2).any(brings_together) {
+            cuts.entry(triangle).or_insert(chain);
+        }
+    }
+    replace(surface, |t, triangle, pieces| {
+        let Some(chain) = cuts.get(&t) else {
+            pieces.push(triangle);
+            return;
+        };
+        let ends = [chain[0], chain[chain.len() - 1]];
+        let apex = triangle.into_iter().find(|v| !ends.contains(v));
+        let apex = apex.expect("a facet has three vertices");
+        pieces.extend(chain.windows(2).map(|pair| [pair[0], pair[1], apex]));
+    });
+    cuts.len()
+}
+
+/// Puts what `pieces` gives in the place of each triangle; labels and files follow.
+fn replace(surface: &mut Surface, pieces: impl Fn(u32, [u32; 3], &mut Vec<[u32; 3]>)) {
+    let old = std::mem::take(&mut surface.triangles);
+    let old_labels = std::mem::take(&mut surface.labels);
+    let mut files = surface.files.iter_mut().peekable();
+    for (t, (triangle, label)) in (0u32..).zip(old.into_iter().zip(old_labels)) {
+        while let Some(file) = files.next_if(|file| file.triangle_first <= t) {
+            file.triangle_first = surface.triangles.len() as u32;
+        }
+        pieces(t, triangle, &mut surface.triangles);
+        surface.labels.resize(surface.triangles.len(), label);
+    }
+    for file in files {
+        file.triangle_first = surface.triangles.len() as u32;
+    }
+}
+
+/// What a repair would do to an open surface.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Closing {
+    /// Points this near are joined, as a share of the box diagonal; 0 means none.
+    pub share: f64,
+    /// The same in input units.
+    pub distance: f64,
+    pub points_joined: usize,
+    pub open_edges: usize,
+    /// No edge is open, and there is something left.
+    pub closes: bool,
+    /// Defects left when it closes.
+    pub defects_left: Option<u64>,
+}
+
+/// Tries [`repair`] without joining points, then with growing distances, until no edge is open.
+///
+/// The last entry tells whether one was enough.
+pub fn closing(surface: &Surface) -> Vec<Closing> {
+    let diagonal = surface.bounds().diagonal();
+    let mut tried = Vec::new();
+    for share in CLOSING_SHARES {
+        let mut joined = surface.clone();
+        let distance = share * diagonal;
+        let done = repair(&mut joined, (share > 0.0).then_some(distance));
+        let found = closedness(&joined);
+        let closes = found.is_closed() && joined.n_triangles() > 0;
+        tried.push(Closing {
+            share,
+            distance,
+            points_joined: done.points_joined,
+            open_edges: found.open.len(),
+            closes,
+            defects_left: closes.then(|| validate(&joined).n_defects),
+        });
+        if closes {
+            break;
+        }
+    }
+    tried
+}

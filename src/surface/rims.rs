@@ -1,0 +1,173 @@
+//! Where an open surface is open: the rims of its holes, and vertices that lie on open edges.
+
+use robust::Coord;
+
+use super::Surface;
+use super::edges::{Closedness, Groups};
+use crate::geom::{Aabb, Point};
+
+/// Vertices as near as this to an open edge count as lying on it, as a share of the box diagonal.
+///
+/// Single precision rounds to 6e-8 of a coordinate; a vertex meant to lie on an edge is rarely farther off.
+pub(super) const JUNCTION_SHARE: f64 = 1e-6;
+/// Vertices as near as this to an end of an edge are meant to be that end, as a share of the box diagonal.
+const GAP_SHARE: f64 = 1e-9;
+/// Pairs of a vertex and an edge looked at; beyond it the surface is a heap of loose triangles.
+const PAIRS_MAX: usize = 200_000_000;
+
+/// Open edges that hang together: the rim of a hole.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rim {
+    pub n_edges: usize,
+    pub length: f64,
+    /// The first triangle along it.
+    pub triangle: u32,
+    /// The middle of that triangle's first open edge.
+    pub at: Point,
+}
+
+/// A vertex on an open edge of a triangle that does not have it: the two sides of a seam are divided unlike.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TJunction {
+    pub vertex: u32,
+    pub at: Point,
+    /// The triangle and the edge (in its direction) the vertex lies on.
+    pub triangle: u32,
+    pub edge: [u32; 2],
+    /// From the vertex to the edge; 0 means exactly in line.
+    pub distance: f64,
+}
+
+/// The rims of the holes, the longest first.
+pub fn rims(surface: &Surface, closedness: &Closedness) -> Vec<Rim> {
+    let groups = open_groups(&closedness.open);
+    let n_groups = groups.iter().max().map_or(0, |&g| g as usize + 1);
+    let mut rims: Vec<Option<Rim>> = vec![None; n_groups];
+    for (&group, &(triangle, edge)) in groups.iter().zip(&closedness.open) {
+        let [a, b] = edge.map(|v| surface.points[v as usize]);
+        let rim = rims[group as usize].get_or_insert(Rim {
+            n_edges: 0,
+            length: 0.0,
+            triangle,
+            at: a.midpoint(b),
+        });
+        rim.n_edges += 1;
+        rim.length += a.distance(b);
+    }
+    let mut rims: Vec<Rim> = rims.into_iter().flatten().collect();
+    rims.sort_by(|a, b| {
+        let by_length = b.length.total_cmp(&a.length);
+        by_length.then(a.triangle.cmp(&b.triangle))
+    });
+    rims
+}
+
+/// For each open edge the number of its connected group, counted in order of first appearance.
+pub(super) fn open_groups(open: &[(u32, [u32; 2])]) -> Vec<u32> {
+    let vertices = ends(open);
+    let place = |v: u32| {
+        let found = vertices.binary_search(&v);
+        found.expect("every end is in the list") as u32
+    };
+    let mut groups = Groups::new(vertices.len());
+    for (_, [a, b]) in open {
+        groups.join(place(*a), place(*b));
+    }
+    let mut numbers = vec![u32::MAX; vertices.len()];
+    let mut n = 0;
+    open.iter()
+        .map(|(_, [a, _])| {
+            let number = &mut numbers[groups.root(place(*a)) as usize];
+            if *number == u32::MAX {
+                *number = n;
+                n += 1;
+            }
+            *number
+        })
+        .collect()
+}
+
+/// The vertices of open edges, ascending.
+fn ends(open: &[(u32, [u32; 2])]) -> Vec<u32> {
+    let mut vertices: Vec<u32> = open.iter().flat_map(|(_, v)| *v).collect();
+    vertices.sort_unstable();
+    vertices.dedup();
+    vertices
+}
+
+/// Vertices of open edges that lie on another open edge, not farther than `distance_max` from it, in order of the edges.
+///
+/// A vertex as near to an end of the edge is no junction, only a gap. Of several on one edge each is told.
+pub fn t_junctions(
+    surface: &Surface,
+    closedness: &Closedness,
+    distance_max: f64,
+) -> Vec<TJunction> {
+    let point = |v: u32| surface.points[v as usize];
+    let mut along = ends(&closedness.open);
+    let bounds = Aabb::around(along.iter().map(|&v| point(v)));
+    // Vertices are sorted along the longest side of their box; an edge looks at those beside it.
+    let extent = (bounds.high - bounds.low).to_array();
+    let axis = (0..3)
+        .max_by(|&i, &j| extent[i].total_cmp(&extent[j]))
+        .unwrap_or(0);
+    let key = |v: u32| point(v).to_array()[axis];
+    along.sort_unstable_by(|&a, &b| key(a).total_cmp(&key(b)));
+    let gap = GAP_SHARE * surface.bounds().diagonal();
+    let mut found = Vec::new();
+    let mut n_pairs = 0;
+    for &(triangle, edge) in &closedness.open {
+        let [a, b] = edge.map(point);
+        let margin = Point::splat(distance_max);
+        let (low, high) = (a.min(b) - margin, a.max(b) + margin);
+        let from = along.partition_point(|&v| key(v) < low.to_array()[axis]);
+        let beside = along[from..]
+            .iter()
+            .take_while(|&&v| key(v) <= high.to_array()[axis]);
+        for &vertex in beside {
+            n_pairs += 1;
+            let p = point(vertex);
+            if edge.contains(&vertex) || p.cmplt(low).any() || p.cmpgt(high).any() {
+                continue;
+            }
+            if let Some(distance) = on_edge(p, [a, b], distance_max, gap) {
+                found.push(TJunction {
+                    vertex,
+                    at: p,
+                    triangle,
+                    edge,
+                    distance,
+                });
+            }
+        }
+        if n_pairs > PAIRS_MAX {
+            break;
+        }
+    }
+    found
+}
+
+/// How far `p` is from the inside of the segment, unless it is farther than `distance_max`, or as near to an end.
+///
+/// Exactly in line, only `gap` counts as near to an end.
+fn on_edge(p: Point, [a, b]: [Point; 2], distance_max: f64, gap: f64) -> Option<f64> {
+    let to_end = p.distance(a).min(p.distance(b));
+    if in_line(a, p, b) {
+        let is_between = a.min(b).cmple(p).all() && p.cmple(a.max(b)).all();
+        return (is_between && to_end > gap).then_some(0.0);
+    }
+    if to_end <= distance_max.max(gap) {
+        return None;
+    }
+    let share = (p - a).dot(b - a) / (b - a).length_squared();
+    let distance = p.distance(a + (b - a) * share);
+    (share > 0.0 && share < 1.0 && distance <= distance_max).then_some(distance)
+}
+
+/// Whether three points lie on a line, exactly.
+pub(super) fn in_line(a: Point, b: Point, c: Point) -> bool {
+    let flat = |axis: fn(Point) -> Coord<f64>| robust::orient2d(axis(a), axis(b), axis(c)) == 0.0;
+    flat(|p| Coord { x: p.x, y: p.y })
+        && flat(|p| Coord { x: p.y, y: p.z })
+        && flat(|p| Coord { x: p.z, y: p.x })
+}
