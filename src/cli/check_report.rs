@@ -94,6 +94,12 @@ impl<'a> Findings<'a> {
             edges.n_edges,
             edges.n_components
         ));
+        if !edges.two_sided.is_empty() {
+            talk.line(&format!(
+                "{} triangles are given from both sides: each pair is one facet between two regions",
+                2 * edges.two_sided.len()
+            ));
+        }
         self.print_defects(talk);
         if !edges.is_closed() {
             self.print_openness(surfaces, talk);
