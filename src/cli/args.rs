@@ -20,7 +20,7 @@ pub struct Args {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Mesh a closed surface into a store, and verify it
-    Mesh(MeshArgs),
+    Mesh(Box<MeshArgs>),
     /// Go on with an unfinished store
     Resume(ResumeArgs),
     /// Say whether a surface can be meshed, and where it cannot
@@ -111,12 +111,32 @@ pub struct MeshArgs {
     /// Greatest ratio of neighboring edge lengths [default: 1.3]
     #[arg(long, value_name = "RATIO")]
     pub hgrad: Option<String>,
-    /// Which regions to fill
-    #[arg(long, value_enum, default_value = "parity")]
-    pub regions: Regions,
-    /// How far to optimize
-    #[arg(long, value_enum, default_value = "full")]
-    pub optimize: Optimize,
+    /// Edge length in a box, and at most OUTSIDE away from it; may be repeated
+    #[arg(
+        long,
+        value_name = "X0,Y0,Z0,X1,Y1,Z1,H[,OUTSIDE]",
+        allow_hyphen_values = true
+    )]
+    pub size_box: Vec<String>,
+    /// Edge length in a sphere, and at most OUTSIDE away from it; may be repeated
+    #[arg(long, value_name = "X,Y,Z,R,H[,OUTSIDE]", allow_hyphen_values = true)]
+    pub size_sphere: Vec<String>,
+    /// Edge length in a cylinder around the axis between two points; may be repeated
+    #[arg(
+        long,
+        value_name = "X0,Y0,Z0,X1,Y1,Z1,R,H[,OUTSIDE]",
+        allow_hyphen_values = true
+    )]
+    pub size_cylinder: Vec<String>,
+    /// Options from a TOML file, such as hsiz = "2%"; what the command line says goes first
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// Which regions to fill [default: parity]
+    #[arg(long, value_enum)]
+    pub regions: Option<Regions>,
+    /// How far to optimize [default: full]
+    #[arg(long, value_enum)]
+    pub optimize: Option<Optimize>,
     /// Replace the store if it is there
     #[arg(long)]
     pub force: bool,

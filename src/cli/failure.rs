@@ -39,6 +39,11 @@ pub const CODES: &[CodeRow] = &[
         2,
         "a size option has no meaning, or contradicts another",
     ),
+    row(
+        "bad-config",
+        2,
+        "a configuration file has a fault, or a key or word that is not known",
+    ),
     row("bad-memory", 2, "a memory size has no unit or no meaning"),
     row(
         "bad-sample",

@@ -3,20 +3,19 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use clap::ValueEnum;
 use serde_json::json;
 
 use super::args::{MeshArgs, ResumeArgs, RunArgs};
 use super::failure::Failure;
 use super::input::{self, Input};
 use super::talk::Talk;
-use super::{export, info, memory, signals, store, verify};
+use super::{config, export, info, memory, signals, store, verify};
 use crate::catalog::{Catalog, CatalogError, Job, Store, StoreState};
 use crate::pipeline::{self, Options, Summary};
 use crate::store::Budget;
 
 pub fn run(args: &MeshArgs, talk: &Talk) -> Result<u8, Failure> {
-    let options = options(args);
+    let options = config::options(args)?;
     // Sizes are checked before anything is read.
     options.sizes()?;
     let (cap, whence) = begin(&args.run, talk)?;
@@ -82,19 +81,6 @@ pub fn resume(args: &ResumeArgs, talk: &Talk) -> Result<u8, Failure> {
     let summary = work(&mut catalog, &input, &options, cap, talk)?;
     catalog.close()?;
     finish(&args.store, &input, &args.run, cap, Some(&summary), talk)
-}
-
-fn options(args: &MeshArgs) -> Options {
-    let word =
-        |v: &dyn Fn() -> Option<clap::builder::PossibleValue>| v().map(|p| p.get_name().to_owned());
-    Options {
-        hsiz: args.hsiz.clone(),
-        hmin: args.hmin.clone(),
-        hmax: args.hmax.clone(),
-        hgrad: args.hgrad.clone(),
-        regions: word(&|| args.regions.to_possible_value()),
-        optimize: word(&|| args.optimize.to_possible_value()),
-    }
 }
 
 /// Threads, signals, and the cap.

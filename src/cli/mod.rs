@@ -3,6 +3,7 @@
 mod args;
 mod check;
 mod check_report;
+mod config;
 mod digest;
 mod export;
 mod failure;

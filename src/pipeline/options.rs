@@ -2,7 +2,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::boundary::RegionPolicy;
 use crate::optimize::Mode;
-use crate::sizing::{SizeOptions, SizingError};
+use crate::sizing::{SizeOptions, SizeSource, SizingError};
 
 /// What decides the mesh, besides the surface; stored with the job. Memory and threads are not here: they do not.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -13,6 +13,13 @@ pub struct Options {
     pub hmin: Option<String>,
     pub hmax: Option<String>,
     pub hgrad: Option<String>,
+    /// Sizes in boxes, spheres and cylinders, as typed.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub size_box: Vec<String>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub size_sphere: Vec<String>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub size_cylinder: Vec<String>,
     /// `parity`, `all`, `outer`, `by-orientation`.
     pub regions: Option<String>,
     /// `none`, `delaunay`, `full`.
@@ -26,12 +33,23 @@ impl Options {
     pub fn sizes(&self) -> Result<SizeOptions, SizingError> {
         let text = |o: &'_ Option<String>| o.clone();
         let [hsiz, hmin, hmax, hgrad] = [&self.hsiz, &self.hmin, &self.hmax, &self.hgrad].map(text);
-        SizeOptions::parse(
+        let mut sizes = SizeOptions::parse(
             hsiz.as_deref(),
             hmin.as_deref(),
             hmax.as_deref(),
             hgrad.as_deref(),
-        )
+        )?;
+        let boxes = self.size_box.iter().map(|t| SizeSource::parse_box(t));
+        let spheres = self.size_sphere.iter().map(|t| SizeSource::parse_sphere(t));
+        let cylinders = self
+            .size_cylinder
+            .iter()
+            .map(|t| SizeSource::parse_cylinder(t));
+        sizes.sources = boxes
+            .chain(spheres)
+            .chain(cylinders)
+            .collect::<Result<_, _>>()?;
+        Ok(sizes)
     }
 
     /// Which regions are filled; `None` when the word is not known.

@@ -51,7 +51,8 @@ pub fn mesh(
     let surface_lease = budget.lease(surface.bytes() as u64, "the surface")?;
     let mut sizes = None;
     let field = match catalog.blob(BLOB_SIZE_FIELD)? {
-        Some(bytes) => SizeField::from_bytes(&bytes)?,
+        Some(bytes) => SizeField::from_bytes(&bytes)?
+            .with_sources(&options.sizes()?, surface.bounds().diagonal())?,
         None => {
             let built = SizeField::build_with_summary(
                 &surface.points,

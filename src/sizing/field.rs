@@ -4,6 +4,7 @@ use super::closed::{TETS_PER_LOAD, divide_parameters, metric_length};
 use super::corners::Corners;
 use super::options::SizeOptions;
 use super::seeds::{Frame, seeds_of};
+use super::sources::ResolvedSource;
 use super::summary::SizeSummary;
 use super::tree::{DEPTH, LATTICE, LEAF, Leaf, Tree, octant_of};
 use super::values::corner_values;
@@ -42,6 +43,8 @@ pub struct SizeField {
     jump: Jump,
     /// Lattice cells per input unit.
     per_lattice: f64,
+    /// Shapes with sizes of their own; not part of [`SizeField::to_bytes`].
+    sources: Vec<ResolvedSource>,
 }
 
 /// Where the descent begins: the entry and its level, for each cell of a regular grid.
@@ -84,9 +87,25 @@ impl SizeField {
             let of_leaf = corners.of_leaf.iter();
             of_leaf.map(|ids| ids.map(|c| h[c as usize])).collect()
         };
-        let field = Self::from_parts(frame, targets.beta, tree, values);
+        let field = Self::from_parts(frame, targets.beta, tree, values)
+            .with_sources(options, bounds.diagonal())?;
         let summary = summary::of(&field, &seeds, &targets, options);
         Ok((field, summary))
+    }
+
+    /// The field with the shapes of `options`, for a surface whose box has that diagonal.
+    ///
+    /// # Errors
+    /// Options that make no sense for this surface.
+    pub fn with_sources(
+        mut self,
+        options: &SizeOptions,
+        diagonal: f64,
+    ) -> Result<Self, SizingError> {
+        let least = options.resolve(diagonal)?.hmin.unwrap_or(0.0);
+        let resolved = options.sources.iter().map(|s| s.resolve(diagonal, least));
+        self.sources = resolved.collect();
+        Ok(self)
     }
 
     pub(super) fn from_parts(frame: Frame, beta: f64, tree: Tree, values: Vec<[f32; 8]>) -> Self {
@@ -98,6 +117,7 @@ impl SizeField {
             values,
             jump,
             per_lattice: f64::from(LATTICE) / frame.side,
+            sources: Vec::new(),
         }
     }
 
@@ -114,7 +134,11 @@ impl SizeField {
         let mask = !((LATTICE >> level) - 1);
         let per_width = WIDTHS_INVERSE[level as usize];
         let local = std::array::from_fn(|i| (at[i] - f64::from(cell[i] & mask)) * per_width);
-        trilinear(&self.values[(entry & !LEAF) as usize], local) * self.frame.side
+        let mut h = trilinear(&self.values[(entry & !LEAF) as usize], local) * self.frame.side;
+        for source in &self.sources {
+            h = h.min(source.h(p, self.beta));
+        }
+        h
     }
 
     /// Position in lattice units; points outside are moved to the cube's wall.

@@ -3,7 +3,8 @@
 //! The field is a pure function of position, so that no order of insertion, no decomposition and no
 //! number of threads can change what it says. It is built once from the surface: an octree,
 //! fine only where sizes differ (`tree`); values on its corners, interpolated from the surface's edges,
-//! joined to the wanted interior size and graded (`values`); trilinear between them (`field`).
+//! joined to the wanted interior size and graded (`values`); trilinear between them (`field`). Boxes, spheres and
+//! cylinders with sizes of their own are formulas beside it (`sources`); the least of all counts.
 //!
 //! Lengths along edges and loads of tetrahedra are closed forms for h linear between vertices (`closed`).
 //! Only IEEE basic operations and square roots are used: results are equal on every machine.
@@ -18,6 +19,7 @@ mod field;
 mod math;
 mod options;
 mod seeds;
+mod sources;
 mod summary;
 mod tree;
 mod values;
@@ -29,4 +31,5 @@ pub use closed::{TETS_PER_LOAD, divide_parameters, load_of_tet, metric_length};
 pub use error::SizingError;
 pub use field::SizeField;
 pub use options::{Length, SizeOptions};
+pub use sources::{Shape, SizeSource};
 pub use summary::{Range, SizeSummary, SizeWarning};

@@ -2,6 +2,7 @@
 
 use super::SizingError;
 use super::closed::slope_of_gradation;
+use super::sources::SizeSource;
 
 /// A length, or a share of the diagonal of the surface's box.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,7 +48,7 @@ impl Length {
 }
 
 /// Wanted sizes. By default they come from the surface's own edges.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct SizeOptions {
     /// One size for the whole interior, joined to the surface's edges by the gradation.
     pub hsiz: Option<Length>,
@@ -57,6 +58,8 @@ pub struct SizeOptions {
     /// Largest ratio of the lengths of two edges that follow each other. The field's slope is at
     /// most `beta = ln(hgrad)`: in a field of that slope, steps of one h grow by `exp(beta)` each.
     pub hgrad: f64,
+    /// Shapes with sizes of their own; `hmin` bounds them too.
+    pub sources: Vec<SizeSource>,
 }
 
 impl Default for SizeOptions {
@@ -68,6 +71,7 @@ impl Default for SizeOptions {
             hmin: None,
             hmax: None,
             hgrad: 1.3,
+            sources: Vec::new(),
         }
     }
 }

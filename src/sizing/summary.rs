@@ -140,6 +140,9 @@ fn source_of(options: &SizeOptions, targets: &Targets) -> String {
             _ => {}
         }
     }
+    if !options.sources.is_empty() {
+        parts.push(format!("{} shapes", options.sources.len()));
+    }
     parts.push("the surface's edges".to_owned());
     format!("{}, --hgrad {}", parts.join(", "), options.hgrad)
 }

@@ -108,6 +108,20 @@ const CASES: &[Case] = &[
         "--hmin",
     ),
     case(
+        "bad-size",
+        2,
+        "mesh sample:box,h=0.5 --size-sphere 1,2,3 -o x.tetdb",
+        "--size-sphere",
+    ),
+    Case {
+        word: "bad-config",
+        exit: 2,
+        files: &[("bad.toml", "hsize = \"2%\"\n")],
+        before: &[],
+        line: "mesh sample:box,h=0.5 --config bad.toml -o x.tetdb",
+        names: "hsize",
+    },
+    case(
         "bad-memory",
         2,
         "mesh sample:box,h=0.5 --memory 512 -o x.tetdb",

@@ -1,0 +1,91 @@
+//! The options that shape the mesh, from the command line and a file.
+
+use clap::ValueEnum;
+
+use super::args::{MeshArgs, Optimize, Regions};
+use super::failure::Failure;
+use crate::pipeline::Options;
+
+/// The options of a run: the file's, then the command line's over them, then the defaults.
+///
+/// Lists of shapes on the command line replace those of the file. Errors: the file, with its line and column.
+pub fn options(args: &MeshArgs) -> Result<Options, Failure> {
+    let mut options = match &args.config {
+        None => Options::default(),
+        Some(path) => {
+            let text = std::fs::read_to_string(path).map_err(|e| {
+                Failure::new("unreadable-file", format!("the file cannot be read: {e}"))
+                    .at(path.display())
+            })?;
+            read(&text).map_err(|failure| failure.at(path.display()))?
+        }
+    };
+    let texts = [
+        (&args.hsiz, &mut options.hsiz),
+        (&args.hmin, &mut options.hmin),
+        (&args.hmax, &mut options.hmax),
+        (&args.hgrad, &mut options.hgrad),
+        (&args.regions.map(word), &mut options.regions),
+        (&args.optimize.map(word), &mut options.optimize),
+    ];
+    for (given, option) in texts {
+        if given.is_some() {
+            option.clone_from(given);
+        }
+    }
+    let lists = [
+        (&args.size_box, &mut options.size_box),
+        (&args.size_sphere, &mut options.size_sphere),
+        (&args.size_cylinder, &mut options.size_cylinder),
+    ];
+    for (given, option) in lists {
+        if !given.is_empty() {
+            option.clone_from(given);
+        }
+    }
+    // The words are stored in full, so that a store tells all of what made it.
+    options.regions.get_or_insert_with(|| word(Regions::Parity));
+    options.optimize.get_or_insert_with(|| word(Optimize::Full));
+    if options.region_policy().is_none() || options.optimize_mode().is_none() {
+        let words = [&options.regions, &options.optimize].map(|w| w.clone().unwrap_or_default());
+        let failure = bad(format!("`{}` or `{}` is no known word", words[0], words[1]));
+        return Err(match &args.config {
+            Some(path) => failure.at(path.display()),
+            None => failure,
+        });
+    }
+    Ok(options)
+}
+
+fn read(text: &str) -> Result<Options, Failure> {
+    toml::from_str(text).map_err(|e| bad(e.to_string().trim_end().to_owned()))
+}
+
+fn bad(what: String) -> Failure {
+    Failure::new("bad-config", what).help(
+        "keys are those of `tetdb mesh --help`, for example hsiz = \"2%\" or size_sphere = [\"0,0,0,1,0.1\"]",
+    )
+}
+
+fn word(value: impl ValueEnum) -> String {
+    value
+        .to_possible_value()
+        .map(|p| p.get_name().to_owned())
+        .unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_are_read_and_their_faults_placed() {
+        let options = read("hsiz = \"2%\"\nsize_sphere = [\"0,0,0,1,0.1\"]\n");
+        let options = options.unwrap_or_else(|_| panic!("a good file"));
+        assert_eq!(options.hsiz.as_deref(), Some("2%"));
+        assert_eq!(options.size_sphere.len(), 1);
+        for text in ["hsiz = 3 4", "hsize = \"1\"", "size_box = 3"] {
+            assert_eq!(read(text).err().map(|f| f.exit()), Some(2), "{text}");
+        }
+    }
+}
