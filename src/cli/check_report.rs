@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 
+use super::check_expected;
 use super::talk::Talk;
 use crate::surface::{
     Closing, Defect, Fitness, Rim, Surface, Validation, closing, fitness, rims, show, show_number,
@@ -23,6 +24,8 @@ pub struct Findings<'a> {
     rims: Vec<Rim>,
     closing: Vec<Closing>,
     fitness: Fitness,
+    /// Tetrahedra with default sizes, roughly; none for an open surface.
+    tets_expected: Option<f64>,
 }
 
 impl<'a> Findings<'a> {
@@ -30,6 +33,8 @@ impl<'a> Findings<'a> {
     pub fn of(surface: &'a Surface, turned: usize) -> Self {
         let validation = validate(surface);
         let is_closed = validation.closedness.is_closed();
+        let fitness = fitness(surface, &validation.closedness);
+        let tets_expected = check_expected::tets(surface, &fitness);
         Self {
             surface,
             turned,
@@ -39,7 +44,8 @@ impl<'a> Findings<'a> {
             } else {
                 closing(surface)
             },
-            fitness: fitness(surface),
+            fitness,
+            tets_expected,
             validation,
         }
     }
@@ -51,6 +57,12 @@ impl<'a> Findings<'a> {
     /// The least distance that closes the surface.
     fn closes(&self) -> Option<&Closing> {
         self.closing.last().filter(|tried| tried.closes)
+    }
+
+    /// Share of the expected tetrahedra that cannot be good: at least one stands on each triangle.
+    fn forced_share(&self) -> Option<f64> {
+        let n = self.fitness.forcing_triangles as f64;
+        self.tets_expected.map(|tets| n / tets)
     }
 
     /// The answer for programs.
@@ -71,6 +83,9 @@ impl<'a> Findings<'a> {
                 json!({ "at": j.at.to_array(), "triangle": j.triangle, "edge": j.edge.map(point), "distance": j.distance })
             })
             .collect();
+        let mut fitness = json!(self.fitness);
+        fitness["tets_expected"] = json!(self.tets_expected);
+        fitness["forced_share"] = json!(self.forced_share());
         json!({
             "schema": 1, "triangles": surface.n_triangles(), "vertices": surface.n_vertices(),
             "labels": surface.label_names, "turned_triangles": self.turned,
@@ -80,7 +95,7 @@ impl<'a> Findings<'a> {
             "defects": found.defects.iter().map(defect_json).collect::<Vec<_>>(),
             "open_loops": open_loops, "t_junctions": junctions,
             "closing": { "tried": self.closing, "smallest": self.closes().map(|c| c.share) },
-            "fitness": self.fitness, "advice": self.advice(),
+            "fitness": fitness, "advice": self.advice(),
         })
     }
 
@@ -214,9 +229,9 @@ impl<'a> Findings<'a> {
             short(f.edge_max),
             short(f.edge_median)
         ));
-        if let (Some(tets), Some(share)) = (f.tets_expected, f.forced_share) {
+        if let (Some(tets), Some(share)) = (self.tets_expected, self.forced_share()) {
             talk.line(&format!(
-                "mesh: about {} tetrahedra with default sizes; {:.2} % of them stand on one of {} triangles whose shape alone makes quality 2 or worse",
+                "mesh: about {} tetrahedra with default sizes; at least {:.2} % of them stand on one of {} triangles whose shape alone makes quality 2 or worse",
                 rounded(tets),
                 100.0 * share,
                 f.forcing_triangles
@@ -228,7 +243,7 @@ impl<'a> Findings<'a> {
     fn advice(&self) -> Vec<String> {
         let f = &self.fitness;
         let mut advice = Vec::new();
-        if f.small_angle_share > POOR_SHARE || f.forced_share.is_some_and(|s| s > POOR_SHARE) {
+        if f.small_angle_share > POOR_SHARE || self.forced_share().is_some_and(|s| s > POOR_SHARE) {
             let hopeless = match f.hopeless_triangles {
                 0 => String::new(),
                 n => format!(", {n} of them 10 or worse"),

@@ -2,6 +2,7 @@
 
 mod args;
 mod check;
+mod check_expected;
 mod check_report;
 mod config;
 mod digest;

@@ -1,9 +1,9 @@
-//! What mesh the triangles of a surface allow: every input triangle stays, and a needle makes bad tetrahedra.
+//! How well the triangles of a surface are shaped: every input triangle stays, and a needle makes bad tetrahedra.
 
 use rayon::prelude::*;
 
 use super::Surface;
-use super::edges::{Groups, closedness};
+use super::edges::{Closedness, Groups};
 
 /// Angles below this many degrees count as small.
 pub const SMALL_ANGLE_DEGREES: f64 = 5.0;
@@ -11,11 +11,6 @@ pub const SMALL_ANGLE_DEGREES: f64 = 5.0;
 pub const FORCED_QUALITY: f64 = 2.0;
 /// √6/12, the inradius of the regular tetrahedron of edge length 1.
 const ALPHA: f64 = 0.204_124_145_231_931_5;
-/// Regular tetrahedra of edge length 1 in a unit of volume.
-const PER_VOLUME: f64 = 8.485_281_374_238_57;
-/// Slope of sizes away from the surface when nothing is asked for: ln 1.3.
-const SLOPE: f64 = 0.262_364_264_467_491_1;
-
 /// Shapes of the triangles and what follows for the tetrahedra on them.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Fitness {
@@ -31,10 +26,9 @@ pub struct Fitness {
     pub forcing_triangles: u64,
     /// The same with quality 10 or worse.
     pub hopeless_triangles: u64,
-    /// Tetrahedra a mesh with default sizes will have, roughly; none for an open surface.
-    pub tets_expected: Option<f64>,
-    /// Share of them that stands on a forcing triangle and can therefore not be better.
-    pub forced_share: Option<f64>,
+    pub area: f64,
+    /// What the surface encloses, each part counted positive; none when it is open.
+    pub volume: Option<f64>,
 }
 
 /// Sums over triangles.
@@ -53,7 +47,7 @@ struct Sums {
 /// The plane through the center of a tetrahedron's inscribed ball that is parallel to a face cuts out a smaller copy of the face
 /// around a circle of the ball's radius. So the inradius is below that of each face, and quality is above
 /// α · longest edge / inradius of any face.
-pub fn fitness(surface: &Surface) -> Fitness {
+pub fn fitness(surface: &Surface, closedness: &Closedness) -> Fitness {
     let n = surface.n_triangles();
     if n == 0 {
         return Fitness::default();
@@ -77,7 +71,6 @@ pub fn fitness(surface: &Surface) -> Fitness {
         .collect();
     let middle = lengths.len() / 2;
     let (_, median, _) = lengths.select_nth_unstable_by(middle, f64::total_cmp);
-    let tets_expected = expected(surface);
     Fitness {
         small_angles: all.n_small,
         small_angle_share: all.n_small as f64 / n as f64,
@@ -87,8 +80,8 @@ pub fn fitness(surface: &Surface) -> Fitness {
         edge_max: all.high,
         forcing_triangles: all.n_forcing,
         hopeless_triangles: all.n_hopeless,
-        tets_expected,
-        forced_share: tets_expected.map(|tets| all.n_forcing as f64 / tets),
+        area: (0..n as u32).map(|t| area(surface, t)).sum(),
+        volume: closedness.is_closed().then(|| volume(surface)),
     }
 }
 
@@ -137,43 +130,18 @@ fn shape(surface: &Surface, t: u32) -> Sums {
     }
 }
 
-/// Tetrahedra to expect: over each triangle sizes grow inwards with the default slope, down to the mean depth.
-///
-/// The integral of 6√2/h³ over a prism on a triangle of mean edge length h, to depth D and with slope β, is
-/// 6√2 · area / 2β · (1/h² − 1/(h + βD)²); D is volume over area. At least one tetrahedron stands on each triangle.
-fn expected(surface: &Surface) -> Option<f64> {
-    let (volume, total) = volume_and_area(surface)?;
-    let depth = volume / total;
-    let tets: f64 = (0..surface.n_triangles() as u32)
-        .map(|t| {
-            let h = edge_lengths(surface, t).iter().sum::<f64>() / 3.0;
-            let ends = 1.0 / (h * h) - 1.0 / (h + SLOPE * depth).powi(2);
-            let over = PER_VOLUME * area(surface, t) / (2.0 * SLOPE) * ends;
-            if over.is_finite() { over.max(1.0) } else { 1.0 }
-        })
-        .sum();
-    Some(tets)
-}
-
-/// Volume, each part counted positive, and area of a closed surface.
-fn volume_and_area(surface: &Surface) -> Option<(f64, f64)> {
-    let closedness = closedness(surface);
-    if !closedness.is_closed() {
-        return None;
-    }
+/// Volume enclosed, each part counted positive.
+fn volume(surface: &Surface) -> f64 {
     let mut parts = Groups::new(surface.n_vertices());
     for [a, b, c] in &surface.triangles {
         parts.join(*a, *b);
         parts.join(*b, *c);
     }
     let origin = surface.bounds().low;
-    let mut volumes = vec![0.0; surface.n_vertices()];
-    let mut total = 0.0;
+    let mut volumes = vec![0.0f64; surface.n_vertices()];
     for (t, triangle) in (0u32..).zip(&surface.triangles) {
         let [a, b, c] = surface.corners(t).map(|p| p - origin);
         volumes[parts.root(triangle[0]) as usize] += a.dot(b.cross(c)) / 6.0;
-        total += area(surface, t);
     }
-    let volume: f64 = volumes.iter().map(|v| v.abs()).sum();
-    (total > 0.0).then_some((volume, total))
+    volumes.iter().map(|v| v.abs()).sum()
 }

@@ -456,18 +456,18 @@ fn holes_are_listed_the_longest_first() {
 #[test]
 fn fitness_tells_needles_at_every_scale() {
     for scale in [1e-23, 1.0, 1e29] {
+        let fitness = |surface: &Surface| fitness(surface, &closedness(surface));
         let found = fitness(&build(cube(|p| p * scale)));
         assert_eq!((found.small_angles, found.forcing_triangles), (0, 0));
         assert!((found.angle_least_degrees - 45.0).abs() < 1e-9);
         assert!((found.edge_min / scale - 1.0).abs() < 1e-12);
-        assert!(
-            found
-                .tets_expected
-                .is_some_and(|n| (12.0..60.0).contains(&n))
-        );
+        let volume = found.volume.map(|v| v / scale.powi(3) - 1.0);
+        assert!(volume.is_some_and(|off| off.abs() < 1e-12));
+        assert!((found.area / scale.powi(2) - 6.0).abs() < 1e-12);
         let flat = fitness(&build(cube(|p| p * Point::new(scale, scale, scale / 50.0))));
         assert_eq!((flat.small_angles, flat.forcing_triangles), (8, 8));
         assert_eq!(flat.hopeless_triangles, 8);
     }
-    assert_eq!(fitness(&build([])), Fitness::default());
+    let nothing = build([]);
+    assert_eq!(fitness(&nothing, &closedness(&nothing)), Fitness::default());
 }
