@@ -6,15 +6,15 @@ use super::Surface;
 use super::edges::{Closedness, Groups};
 
 /// Angles below this many degrees count as small.
-pub const SMALL_ANGLE_DEGREES: f64 = 5.0;
+const SMALL_ANGLE_DEGREES: f64 = 5.0;
 /// Quality from which a tetrahedron counts as forced: the first bin of the quality table ends here.
-pub const FORCED_QUALITY: f64 = 2.0;
+const FORCED_QUALITY: f64 = 2.0;
 /// √6/12, the inradius of the regular tetrahedron of edge length 1.
 const ALPHA: f64 = 0.204_124_145_231_931_5;
 /// Shapes of the triangles and what follows for the tetrahedra on them.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Fitness {
-    /// Triangles with an angle below [`SMALL_ANGLE_DEGREES`]; those without area are among them.
+    /// Triangles with an angle below 5 degrees; those without area are among them.
     pub small_angles: u64,
     pub small_angle_share: f64,
     pub angle_least_degrees: f64,
@@ -22,7 +22,7 @@ pub struct Fitness {
     pub edge_min: f64,
     pub edge_median: f64,
     pub edge_max: f64,
-    /// Triangles on which every tetrahedron has quality [`FORCED_QUALITY`] or worse.
+    /// Triangles on which every tetrahedron has quality 2 or worse.
     pub forcing_triangles: u64,
     /// The same with quality 10 or worse.
     pub hopeless_triangles: u64,
