@@ -8,6 +8,7 @@
 //! ```
 //! Each point takes one crossed part away and adds none, so the number of points is bounded by that of crossings.
 
+use super::dyadic::Dyadic;
 use super::exact::ExactPoint;
 use super::find::Outcome;
 use super::flips::Flipper;
@@ -19,9 +20,8 @@ use crate::store::Pages;
 
 /// Points on one segment.
 const POINTS_MAX: usize = 2000;
-/// Flips are tried before each point, to this depth and effort.
-const FLIP_LEVEL: u32 = 1;
-const FLIP_WORK: u32 = 60;
+/// Fineness of places, in terms of some 50 bits: coordinates of doubles, divided, can differ by less than one term shows.
+pub(super) const TERMS: [u32; 4] = [2, 4, 8, 16];
 
 /// Why a patch could not be finished.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,9 +44,11 @@ impl<P: Pages> Patch<'_, P> {
         let mut chain = vec![a];
         while chain.len() < POINTS_MAX {
             let h = *chain.last().expect("starts with a");
+            // Flips are tried before each point.
+            let effort = self.effort;
             let mut flipper = Flipper::new(self, Target::Edge(h, b));
-            flipper.work = FLIP_WORK;
-            let flipped = flipper.recover_edge(h, b, FLIP_LEVEL);
+            flipper.work = effort.flip_work;
+            let flipped = flipper.recover_edge(h, b, effort.flip_level);
             let next = match exit_vertex(self, h, b) {
                 Exit::Reached(_) => b,
                 Exit::Vertex(v) if self.is_steiner(v) => v,
@@ -81,43 +83,48 @@ impl<P: Pages> Patch<'_, P> {
     }
 
     /// Puts a point of the segment `a b` into the cavity, near the middle of the piece that sees all of it.
+    ///
+    /// Where that piece is shorter than the effort says, a point farther on is tried first, in a cavity that grows to be
+    /// seen: what has no room here has none either when it leaves the surface.
     fn split(&mut self, a: u32, b: u32, cavity: &[u32]) -> Result<u32, Trouble> {
         let outer = self.outer_faces(cavity);
-        let (mut low, mut high) = (0.0f64, 1.0f64);
-        for (tet, i) in &outer {
-            let mut q = tet.vertices();
-            q[*i] = a;
-            let at_a = self.orient_fine(q);
-            q[*i] = b;
-            let at_b = self.orient_fine(q);
-            let t = at_a / (at_a - at_b);
-            if at_b > at_a {
-                low = low.max(t);
-            } else if at_b < at_a {
-                high = high.min(t);
-            }
-        }
+        let at: Vec<[Dyadic; 2]> = outer
+            .iter()
+            .map(|(tet, i)| {
+                [a, b].map(|end| {
+                    let mut q = tet.vertices();
+                    q[*i] = end;
+                    self.orient_exact(q)
+                })
+            })
+            .collect();
         let (pa, pb) = (self.position(a), self.position(b));
-        let width = high - low;
-        for share in [0.5, 0.4, 0.6, 0.25, 0.75, 0.1, 0.9] {
-            let t = low + width * share;
-            for t in [shortest(t, width * 0.1), t] {
-                let exact = ExactPoint::combination(pa, &[(pb, t)]);
-                if let Some(x) = self.star(cavity, &outer, exact) {
-                    return Ok(x);
+        let mut grown = false;
+        for terms in TERMS {
+            let Some((low, width)) = seen_piece(&at, terms) else {
+                continue;
+            };
+            if !grown && width.estimate() < self.effort.piece_min {
+                grown = true;
+                let middle = low.estimate();
+                for step in [1e-12, 1e-9, 1e-7, 1e-5, 1e-4, 1e-3, 1e-2, 0.1] {
+                    for t in [middle + step, middle - step] {
+                        if t <= 0.0 || t >= 1.0 {
+                            continue;
+                        }
+                        let t = Dyadic::from(t).shortened(&Dyadic::from(step * 0.1));
+                        let exact = ExactPoint::combination(pa, &[(pb, &t)]);
+                        if let Some(x) = self.star_grown(cavity, exact) {
+                            return Ok(x);
+                        }
+                    }
                 }
             }
-        }
-        // No room in doubles: a point farther on, in a cavity that grows to be seen.
-        let middle = low + width * 0.5;
-        for step in [1e-12, 1e-9, 1e-7, 1e-5, 1e-4, 1e-3, 1e-2, 0.1] {
-            for t in [middle + step, middle - step] {
-                if t <= 0.0 || t >= 1.0 {
-                    continue;
-                }
-                let t = shortest(t, step * 0.1);
-                let exact = ExactPoint::combination(pa, &[(pb, t)]);
-                if let Some(x) = self.star_grown(cavity, exact) {
+            let slack = width.times(&Dyadic::from(0.03125));
+            for share in [0.5, 0.375, 0.625, 0.25, 0.75, 0.125, 0.875] {
+                let t = low.plus(&width.times(&Dyadic::from(share)));
+                let exact = ExactPoint::combination(pa, &[(pb, &t.shortened(&slack))]);
+                if let Some(x) = self.star(cavity, &outer, exact) {
                     return Ok(x);
                 }
             }
@@ -126,15 +133,22 @@ impl<P: Pages> Patch<'_, P> {
     }
 }
 
-/// A number with few bits within `slack` of `t`: sums and products of it stay short.
-pub(super) fn shortest(t: f64, slack: f64) -> f64 {
-    let mut scale = 16.0;
-    while scale < 1e15 {
-        let rounded = (t * scale).round() / scale;
-        if (rounded - t).abs() <= slack {
-            return rounded;
+/// Where the segment sees all faces from inside, as its start and length in shares of the segment.
+///
+/// `at` has the volumes of each face with both ends; `terms` says how finely they are divided.
+fn seen_piece(at: &[[Dyadic; 2]], terms: u32) -> Option<(Dyadic, Dyadic)> {
+    let (mut low, mut high) = (Dyadic::from(0.0), Dyadic::from(1.0));
+    for [at_a, at_b] in at {
+        let fall = at_a.minus(at_b);
+        let Some(t) = at_a.over(&fall, terms) else {
+            continue;
+        };
+        if fall.sign() < 0 && t.compare(&low).is_gt() {
+            low = t;
+        } else if fall.sign() > 0 && t.compare(&high).is_lt() {
+            high = t;
         }
-        scale *= 16.0;
     }
-    t
+    let width = high.minus(&low);
+    (width.sign() > 0).then_some((low, width))
 }

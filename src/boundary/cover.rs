@@ -7,7 +7,8 @@
 
 use std::collections::HashSet;
 
-use super::chain::Trouble;
+use super::chain::{TERMS, Trouble};
+use super::dyadic::Dyadic;
 use super::exact::ExactPoint;
 use super::flips::Flipper;
 use super::patch::Patch;
@@ -18,8 +19,6 @@ use crate::store::Pages;
 
 /// Points in one facet.
 const POINTS_MAX: usize = 5000;
-const FLIP_LEVEL: u32 = 1;
-const FLIP_WORK: u32 = 40;
 
 /// What lies on the left of a directed edge.
 enum Left {
@@ -66,9 +65,10 @@ impl<P: Pages> Patch<'_, P> {
                     if points > POINTS_MAX {
                         return Err(Trouble::TooMuch);
                     }
+                    let effort = self.effort;
                     let mut flipper = Flipper::new(self, Target::Face(f));
-                    flipper.work = FLIP_WORK;
-                    if flipper.remove_edge(t, above, below, FLIP_LEVEL) {
+                    flipper.work = effort.flip_work;
+                    if flipper.remove_edge(t, above, below, effort.flip_level) {
                         flipper.keep();
                         continue;
                     }
@@ -125,48 +125,55 @@ impl<P: Pages> Patch<'_, P> {
             return Err(Trouble::Crossed([above, below, below]));
         }
         let outer = self.outer_faces(&around.tets);
-        let (up, down) = (
-            self.orient_fine([f[0], f[1], f[2], above]),
-            self.orient_fine([f[0], f[1], f[2], below]),
-        );
         let [a, b, c] = f.map(|v| self.position(v));
-        let (x, y) = (self.position(above), self.position(below));
-        let k = x + (y - x) * (up / (up - down)) - a;
-        let (u, v) = (b - a, c - a);
-        let n = u.cross(v);
-        let share =
-            |w: crate::geom::Point| (w.cross(v).dot(n) / n.dot(n), u.cross(w).dot(n) / n.dot(n));
-        let (s, t) = share(k);
+        // The crossing in shares of the sides from `a`: volumes of the edge with the sides, as parts of their sum.
+        let [over_a, over_b, over_c] =
+            [(1, 2), (2, 0), (0, 1)].map(|(i, j)| self.orient_exact([above, below, f[i], f[j]]));
+        let sum = over_a.plus(&over_b).plus(&over_c);
+        let share = |terms| Some((over_b.over(&sum, terms)?, over_c.over(&sum, terms)?));
+        let (s, t) = share(TERMS[0]).ok_or(Trouble::Broken("an edge crosses no facet"))?;
         // Room around the crossing: a fraction of the distance to the ring.
+        let (u, v) = (b - a, c - a);
+        let crossing = a + u * s.estimate() + v * t.estimate();
         let room = around
             .ring
             .iter()
-            .map(|&r| self.position(r).distance(a + k))
+            .map(|&r| self.position(r).distance(crossing))
             .fold(f64::INFINITY, f64::min)
             / u.length().max(v.length());
-        for slack in [room * 0.02, room * 1e-4, room * 1e-7, 0.0] {
-            let (s, t) = (
-                super::chain::shortest(s, slack),
-                super::chain::shortest(t, slack),
-            );
-            if s <= 0.0 || t <= 0.0 || s + t >= 1.0 {
-                continue;
-            }
-            let exact = ExactPoint::combination(a, &[(b, s), (c, t)]);
-            if self.star(&around.tets, &outer, exact).is_some() {
+        let near = |slack: f64, s: &Dyadic, t: &Dyadic| {
+            let slack = Dyadic::from(slack);
+            let short = [s, t].map(|x| {
+                if slack.sign() > 0 {
+                    x.shortened(&slack)
+                } else {
+                    x.clone()
+                }
+            });
+            let rest = Dyadic::from(1.0).minus(&short[0]).minus(&short[1]);
+            let inside = short[0].sign() > 0 && short[1].sign() > 0 && rest.sign() > 0;
+            inside.then(|| ExactPoint::combination(a, &[(b, &short[0]), (c, &short[1])]))
+        };
+        for slack in [0.02, 1e-4, 1e-7] {
+            if let Some(exact) = near(room * slack, &s, &t)
+                && self.star(&around.tets, &outer, exact).is_some()
+            {
                 return Ok(());
             }
         }
-        for slack in [room * 0.1, room * 1e-3, 0.0] {
-            let (s, t) = (
-                super::chain::shortest(s, slack),
-                super::chain::shortest(t, slack),
-            );
-            if s > 0.0 && t > 0.0 && s + t < 1.0 {
-                let exact = ExactPoint::combination(a, &[(b, s), (c, t)]);
-                if self.star_grown(&around.tets, exact).is_some() {
-                    return Ok(());
-                }
+        for slack in [0.1, 1e-3, 0.0] {
+            if let Some(exact) = near(room * slack, &s, &t)
+                && self.star_grown(&around.tets, exact).is_some()
+            {
+                return Ok(());
+            }
+        }
+        for terms in TERMS {
+            if let Some((s, t)) = share(terms)
+                && let Some(exact) = near(0.0, &s, &t)
+                && self.star(&around.tets, &outer, exact).is_some()
+            {
+                return Ok(());
             }
         }
         Err(Trouble::Precision("in a facet"))

@@ -1,116 +1,33 @@
 //! Points that are combinations of input points, kept without rounding.
 //!
-//! A point on a segment or a facet, `a + s (b - a) + t (c - a)` with doubles `s` and `t`, has coordinates
-//! that are short sums of doubles. Signs of orientations of such points are found by sums and products of such
-//! sums (J. R. Shewchuk, "Adaptive precision floating-point arithmetic and fast robust geometric predicates", 1997).
+//! A point on a segment or a facet, `a + s (b - a) + t (c - a)`, has coordinates that are whole numbers times powers of
+//! two when `s` and `t` are. Signs of orientations of such points are found without rounding.
 //! They exist in memory only, while a patch is at work.
 
+use super::dyadic::Dyadic;
 use crate::geom::{Point, orient};
-
-/// An exact value: the sum of doubles that do not overlap, smallest first, none zero.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Expansion(Vec<f64>);
-
-fn two_sum(a: f64, b: f64) -> (f64, f64) {
-    let x = a + b;
-    let bv = x - a;
-    (x, (a - (x - bv)) + (b - bv))
-}
-
-fn split(a: f64) -> (f64, f64) {
-    let c = 134_217_729.0 * a;
-    let high = c - (c - a);
-    (high, a - high)
-}
-
-fn two_product(a: f64, b: f64) -> (f64, f64) {
-    let x = a * b;
-    let ((ah, al), (bh, bl)) = (split(a), split(b));
-    (x, al * bl - (((x - ah * bh) - al * bh) - ah * bl))
-}
-
-impl Expansion {
-    fn of(a: f64) -> Self {
-        Self(if a == 0.0 { Vec::new() } else { vec![a] })
-    }
-
-    fn add_double(&mut self, b: f64) {
-        let mut q = b;
-        let mut sum = Vec::with_capacity(self.0.len() + 1);
-        for &e in &self.0 {
-            let (x, y) = two_sum(q, e);
-            if y != 0.0 {
-                sum.push(y);
-            }
-            q = x;
-        }
-        if q != 0.0 {
-            sum.push(q);
-        }
-        self.0 = sum;
-    }
-
-    fn add(&mut self, other: &Self) {
-        for &e in &other.0 {
-            self.add_double(e);
-        }
-    }
-
-    fn minus(&self, other: &Self) -> Self {
-        let mut r = self.clone();
-        for &e in &other.0 {
-            r.add_double(-e);
-        }
-        r
-    }
-
-    fn scaled(&self, b: f64) -> Self {
-        let mut r = Self::default();
-        for &e in &self.0 {
-            let (x, y) = two_product(e, b);
-            r.add_double(y);
-            r.add_double(x);
-        }
-        r
-    }
-
-    fn times(&self, other: &Self) -> Self {
-        let mut r = Self::default();
-        for &e in &other.0 {
-            r.add(&self.scaled(e));
-        }
-        r
-    }
-
-    /// The value rounded; its sign is exact.
-    pub(super) fn estimate(&self) -> f64 {
-        self.0.iter().sum()
-    }
-}
 
 /// A point whose coordinates are exact values.
 #[derive(Clone, Debug)]
-pub(super) struct ExactPoint([Expansion; 3]);
+pub(super) struct ExactPoint([Dyadic; 3]);
 
 impl ExactPoint {
     /// A point as it is.
     pub(super) fn explicit(p: Point) -> Self {
-        Self(p.to_array().map(Expansion::of))
+        Self(p.to_array().map(Dyadic::from))
     }
 
     /// `base + Σ share · (to - base)`.
-    pub(super) fn combination(base: Point, shares: &[(Point, f64)]) -> Self {
-        let from = base.to_array();
-        Self([0, 1, 2].map(|axis| {
-            let mut sum = Expansion::of(from[axis]);
-            for &(to, share) in shares {
-                let (x, y) = two_sum(to.to_array()[axis], -from[axis]);
-                let mut difference = Expansion::of(y);
-                difference.add_double(x);
-                sum.add(&difference.scaled(share));
+    pub(super) fn combination(base: Point, shares: &[(Point, &Dyadic)]) -> Self {
+        let from = Self::explicit(base);
+        let mut sum = from.clone();
+        for (to, share) in shares {
+            let to = Self::explicit(*to);
+            for i in 0..3 {
+                sum.0[i] = sum.0[i].plus(&to.0[i].minus(&from.0[i]).times(share));
             }
-            sum
-        }))
+        }
+        sum
     }
 
     /// Rounded to the nearest doubles or nearly so.
@@ -152,23 +69,24 @@ pub(super) fn orient_placed(p: [Placed<'_>; 4]) -> f64 {
     {
         return det;
     }
-    orient_exact(p)
+    orient_exact(p).estimate()
 }
 
+/// Six times the signed volume, without rounding.
 #[cold]
-pub(super) fn orient_exact(p: [Placed<'_>; 4]) -> f64 {
+pub(super) fn orient_exact(p: [Placed<'_>; 4]) -> Dyadic {
     let [a, b, c, d] = p.map(|p| match p.exact {
         Some(exact) => exact.clone(),
         None => ExactPoint::explicit(p.point),
     });
     let [u, v, w] = [b, c, d].map(|q| [0, 1, 2].map(|i| q.0[i].minus(&a.0[i])));
-    let mut det = Expansion::default();
+    let mut det = Dyadic::default();
     for (i, u) in u.iter().enumerate() {
         let (j, k) = ((i + 1) % 3, (i + 2) % 3);
         let minor = v[j].times(&w[k]).minus(&v[k].times(&w[j]));
-        det.add(&u.times(&minor));
+        det = det.plus(&u.times(&minor));
     }
-    det.estimate()
+    det
 }
 
 #[cfg(test)]
@@ -183,9 +101,9 @@ mod tests {
         let d = Point::new(0.2, 0.9, 5.3);
         let place = |point| Placed { point, exact: None };
         for k in 1..50 {
-            let (s, t) = (f64::from(k) / 97.3, f64::from(k) / 131.7);
-            let on_edge = ExactPoint::combination(a, &[(b, s)]);
-            let in_face = ExactPoint::combination(a, &[(b, s), (c, t)]);
+            let [s, t] = [97.3, 131.7].map(|n| Dyadic::from(f64::from(k) / n));
+            let on_edge = ExactPoint::combination(a, &[(b, &s)]);
+            let in_face = ExactPoint::combination(a, &[(b, &s), (c, &t)]);
             let x = Placed {
                 point: on_edge.rounded(),
                 exact: Some(&on_edge),

@@ -13,6 +13,8 @@
 
 mod chain;
 mod cover;
+mod dyadic;
+mod effort;
 mod error;
 mod exact;
 mod find;

@@ -4,6 +4,8 @@
 
 use std::collections::{HashMap, HashSet};
 
+use super::dyadic::Dyadic;
+use super::effort::Effort;
 use super::exact::{ExactPoint, Placed, orient_exact, orient_placed};
 use super::space::{Space, edge_key, sorted};
 use crate::geom::{Point, orient};
@@ -50,6 +52,8 @@ pub(super) struct Patch<'m, P: Pages> {
     required: HashSet<[u32; 3]>,
     /// Edges of the patch that must stay, besides those of `protected`.
     pub kept: HashSet<u64>,
+    /// How hard and in which order to try.
+    pub effort: Effort,
 }
 
 const FREE: Tet = Tet {
@@ -59,7 +63,7 @@ const FREE: Tet = Tet {
 
 impl<'m, P: Pages> Patch<'m, P> {
     /// An empty patch.
-    pub(super) fn new(mesh: &'m mut Mesh<P>, protected: &'m HashSet<u64>) -> Self {
+    pub(super) fn new(mesh: &'m mut Mesh<P>, protected: &'m HashSet<u64>, effort: Effort) -> Self {
         Self {
             mesh,
             protected,
@@ -72,6 +76,7 @@ impl<'m, P: Pages> Patch<'m, P> {
             brought_in: Vec::new(),
             required: HashSet::new(),
             kept: HashSet::new(),
+            effort,
         }
     }
 
@@ -185,8 +190,8 @@ impl<'m, P: Pages> Patch<'m, P> {
         }
     }
 
-    /// Six times the signed volume, correct to the last bits also near zero.
-    pub(super) fn orient_fine(&self, v: [u32; 4]) -> f64 {
+    /// Six times the signed volume, without rounding.
+    pub(super) fn orient_exact(&self, v: [u32; 4]) -> Dyadic {
         orient_exact(v.map(|v| self.placed(v)))
     }
 

@@ -3,6 +3,7 @@
 use std::collections::{HashMap, HashSet};
 
 use super::chain::Trouble;
+use super::effort::{EFFORTS, Effort};
 use super::find::{Found, find_face};
 use super::map::Missing;
 use super::patch::Patch;
@@ -30,7 +31,14 @@ pub(super) fn recover_by_points<P: Pages>(
         for group in groups(mesh, &missing.facets, &mut missing.protected) {
             stop_if_requested();
             report.patches += 1;
-            match recover_group(mesh, &missing.protected, &group, report) {
+            let mut outcome = Err(Trouble::TooMuch);
+            for effort in EFFORTS {
+                outcome = recover_group(mesh, &missing.protected, &group, effort, report);
+                if matches!(outcome, Ok(()) | Err(Trouble::Vertex(_))) {
+                    break;
+                }
+            }
+            match outcome {
                 Ok(()) => report.facets_by_points += group.len() as u32,
                 Err(trouble) => {
                     troubles.extend(group.iter().map(|&n| (n, trouble)));
@@ -86,6 +94,7 @@ fn recover_group<P: Pages>(
     mesh: &mut Mesh<P>,
     protected: &HashSet<u64>,
     group: &[u32],
+    effort: Effort,
     report: &mut RecoveryReport,
 ) -> Result<(), Trouble> {
     let corners: Vec<[u32; 3]> = group.iter().map(|&n| mesh.facet(n).vertices).collect();
@@ -93,7 +102,10 @@ fn recover_group<P: Pages>(
     let mut once = corners.clone();
     let mut seen = HashSet::new();
     once.retain(|&f| seen.insert(sorted(f)));
-    let mut patch = Patch::new(mesh, protected);
+    if effort.reversed {
+        once.reverse();
+    }
+    let mut patch = Patch::new(mesh, protected, effort);
     let mut skin = Skin {
         facets: once.iter().map(|f| f.map(|v| patch.vertex(v))).collect(),
         ..Skin::default()
@@ -139,7 +151,13 @@ fn build<P: Pages>(patch: &mut Patch<'_, P>, skin: &mut Skin) -> Result<u32, Tro
             if chains.contains_key(&(a, b)) {
                 continue;
             }
-            let chain = patch.chain(a, b)?;
+            let chain = if patch.effort.reversed {
+                let mut chain = patch.chain(b, a)?;
+                chain.reverse();
+                chain
+            } else {
+                patch.chain(a, b)?
+            };
             on_segments.extend(&chain[1..chain.len() - 1]);
             chains.insert((b, a), chain.iter().rev().copied().collect());
             chains.insert((a, b), chain);
@@ -191,6 +209,9 @@ fn build<P: Pages>(patch: &mut Patch<'_, P>, skin: &mut Skin) -> Result<u32, Tro
         }
     }
     late.extend(on_segments);
+    if patch.effort.reversed {
+        late.reverse();
+    }
     while !late.is_empty() {
         let before = late.len();
         let mut trouble = None;

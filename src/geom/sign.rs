@@ -35,17 +35,22 @@ const SLACK: f64 = 1.000_001;
 
 /// The points times the power of two that brings the largest coordinate near one: expansions have its sign then, where
 /// products of the last parts of very small or large coordinates would leave the range of doubles.
-fn scaled<const N: usize>(points: [Point; N]) -> [Coord3D<f64>; N] {
+///
+/// Also returns the inverse of that power.
+fn scaled<const N: usize>(points: [Point; N]) -> ([Coord3D<f64>; N], f64) {
     let largest = points
         .iter()
         .fold(0.0f64, |m, p| m.max(p.abs().max_element()));
     let exponent = (largest.to_bits() >> 52) as i32 - 1023;
-    let factor = f64::from_bits(((1023 - exponent.clamp(-1000, 1000)) as u64) << 52);
-    points.map(|p| Coord3D {
+    let power = |e: i32| f64::from_bits(((1023 + e) as u64) << 52);
+    let exponent = exponent.clamp(-1000, 1000);
+    let factor = power(-exponent);
+    let points = points.map(|p| Coord3D {
         x: p.x * factor,
         y: p.y * factor,
         z: p.z * factor,
-    })
+    });
+    (points, power(exponent))
 }
 
 /// Six times the signed volume of `a b c d`; the sign is exact, the magnitude is not.
@@ -79,8 +84,17 @@ fn orient_slow(a: Point, b: Point, c: Point, d: Point) -> f64 {
     {
         return det;
     }
-    let [a, b, c, d] = scaled([a, b, c, d]);
-    -robust::orient3d(a, b, c, d)
+    let ([a, b, c, d], unit) = scaled([a, b, c, d]);
+    let det = -robust::orient3d(a, b, c, d);
+    if det == 0.0 {
+        return 0.0;
+    }
+    // Back in input units, for those who add volumes; a volume too small for a double keeps its sign.
+    let volume = det * unit * unit * unit;
+    volume
+        .abs()
+        .clamp(f64::MIN_POSITIVE, f64::MAX)
+        .copysign(det)
 }
 
 /// The larger of two numbers that are not NaN: one instruction, where `f64::max` takes five.
@@ -189,7 +203,7 @@ fn insphere_slow(a: Point, b: Point, c: Point, d: Point, e: Point) -> f64 {
     match insphere_sign(a, b, c, d, e) {
         Some(sign) => f64::from(sign as i8),
         None => {
-            let [a, b, c, d, e] = scaled([a, b, c, d, e]);
+            let ([a, b, c, d, e], _) = scaled([a, b, c, d, e]);
             -robust::insphere(a, b, c, d, e)
         }
     }
@@ -256,6 +270,22 @@ mod tests {
             assert!(orient(o, x, y, z) > 0.0);
             assert!(orient(x, y, z, Point::splat(0.4) * scale) > 0.0);
             assert!(orient(x, y, z, Point::splat(0.3) * scale) < 0.0);
+        }
+    }
+
+    #[test]
+    fn volumes_the_filters_do_not_decide_are_in_input_units() {
+        let flat = 2f64.powi(-48);
+        for scale in [2f64.powi(-30), 1.0, 2f64.powi(30)] {
+            let [a, b, c] = [
+                Point::ONE,
+                Point::new(2.0, 1.0, 1.0),
+                Point::new(1.0, 2.0, 1.0),
+            ];
+            let [a, b, c] = [a, b, c].map(|p| p * scale);
+            let d = Point::new(1.5, 1.5, 1.0 + flat) * scale;
+            let volume = orient(a, b, c, d) / (flat * scale.powi(3));
+            assert!((volume - 1.0).abs() < 1e-9, "{volume} at scale {scale}");
         }
     }
 }

@@ -1,0 +1,240 @@
+//! A shape through the library, two ways, and what came of it.
+//!
+//! [`whole`] is what the command line does: a store on disk, all steps, and the audit against the surface. [`recovery`]
+//! goes as far as the colored coarse mesh, in memory, and checks that with a model of its own; it is what can be done a
+//! hundred thousand times.
+
+use std::collections::HashMap;
+use std::time::Duration;
+
+use tetdb::audit::{self, Level, VerifyOptions};
+use tetdb::boundary::{RecoveryReport, RegionPolicy, fill_regions, recover};
+use tetdb::catalog::{Catalog, Job, Store};
+use tetdb::delaunay::{Kernel, enclose, insertion_key};
+use tetdb::geom::{HilbertFrame, orient};
+use tetdb::mesh::{FaceRef, Facet, Mesh, VertexTag};
+use tetdb::pipeline::{self, Options};
+use tetdb::store::{Budget, FlatPages};
+use tetdb::surface::{Surface, orient_alike, validate};
+
+use super::shape::Shape;
+
+/// What came of a shape.
+#[derive(Clone, Debug)]
+pub enum Outcome {
+    /// A mesh that passed its check, with so many tetrahedra.
+    Meshed { tets: u64, recovery: Recovery },
+    /// The validator refused it.
+    Refused(String),
+    /// Recovery gave up: an error that is acceptable only where doubles have no answer.
+    GaveUp(String),
+    /// The check found the mesh wrong.
+    Wrong(String),
+}
+
+/// The figures of recovery that are compared.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Recovery {
+    pub missing: u32,
+    pub by_points: u32,
+    pub steiner: u32,
+    pub time: Duration,
+}
+
+impl From<&RecoveryReport> for Recovery {
+    fn from(r: &RecoveryReport) -> Self {
+        Self {
+            missing: r.missing_facets,
+            by_points: r.facets_by_points,
+            steiner: r.steiner,
+            time: r.map_time + r.flip_time + r.point_time,
+        }
+    }
+}
+
+/// Welded, oriented, validated.
+fn valid(shape: &Shape) -> Result<Surface, String> {
+    let mut surface = shape.surface();
+    orient_alike(&mut surface);
+    match validate(&surface).accept() {
+        Ok(()) => Ok(surface),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+/// All steps in a store, with the audit at full level against the surface.
+pub fn whole(shape: &Shape, optimize: &str) -> Outcome {
+    let surface = match valid(shape) {
+        Ok(surface) => surface,
+        Err(why) => return Outcome::Refused(why),
+    };
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    let path = dir.path().join("case.tetdb");
+    let job = Job {
+        options: String::new(),
+        surfaces: Vec::new(),
+        tool_version: String::new(),
+    };
+    let mut catalog = Catalog::create(&path, &job).expect("an empty folder");
+    // Few tetrahedra: what is tested is the surface.
+    let options = Options {
+        hsiz: Some("1000%".into()),
+        hgrad: Some("10".into()),
+        regions: Some("all".into()),
+        optimize: Some(optimize.into()),
+        ..Options::default()
+    };
+    let budget = Budget::new(256 << 20);
+    let made = pipeline::mesh(&mut catalog, &surface, &options, &budget, &pipeline::silent);
+    let summary = match made {
+        Ok(summary) => summary,
+        Err(error) => return Outcome::GaveUp(error.to_string()),
+    };
+    catalog.close().expect("the store can be closed");
+    let mut store = Store::open(&path).expect("the store was just made");
+    let options = VerifyOptions {
+        level: Level::Delaunay,
+        memory_bytes: 64 << 20,
+        temp_dir: dir.path().to_owned(),
+    };
+    let report = audit::verify(&mut store, Some(&surface), &options).expect("the store is sound");
+    let n = surface.n_triangles() as u64;
+    if !report.valid || report.triangles_missing != 0 || report.triangles_present != n {
+        return Outcome::Wrong(format!(
+            "{:?}; {} of {n} triangles present, {} unfilled, {} missing; {:?}",
+            report.findings,
+            report.triangles_present,
+            report.triangles_unfilled,
+            report.triangles_missing,
+            report.offenders.first()
+        ));
+    }
+    let recovery = summary.coarse.map(|c| Recovery::from(&c.recovery));
+    Outcome::Meshed {
+        tets: report.tets,
+        recovery: recovery.unwrap_or_default(),
+    }
+}
+
+/// The coarse mesh in memory, checked by [`wrong`].
+pub fn recovery(shape: &Shape) -> Outcome {
+    let surface = match valid(shape) {
+        Ok(surface) => surface,
+        Err(why) => return Outcome::Refused(why),
+    };
+    let mut mesh = delaunay(&surface);
+    let report = match recover(&mut mesh) {
+        Ok(report) => report,
+        Err(error) => {
+            // What recovery leaves behind when it gives up is a valid mesh all the same.
+            return match wrong(&mut mesh, None) {
+                None => Outcome::GaveUp(error.to_string()),
+                Some(what) => Outcome::Wrong(format!("{what}, after: {error}")),
+            };
+        }
+    };
+    if let Err(error) = fill_regions(&mut mesh, &RegionPolicy::All) {
+        return Outcome::Wrong(error.to_string());
+    }
+    match wrong(&mut mesh, Some(&surface)) {
+        None => Outcome::Meshed {
+            tets: u64::from(mesh.n_tets()),
+            recovery: Recovery::from(&report),
+        },
+        Some(what) => Outcome::Wrong(what),
+    }
+}
+
+/// The Delaunay mesh of the surface's points, with its triangles as facets.
+pub fn delaunay(surface: &Surface) -> Mesh<FlatPages> {
+    let mut mesh = Mesh::new(FlatPages::default());
+    let bounds = surface.bounds();
+    let mut hint = enclose(&mut mesh, &bounds);
+    let frame = HilbertFrame::new(&bounds);
+    let mut order: Vec<u32> = (0..surface.points.len() as u32).collect();
+    order.sort_by_key(|&i| (insertion_key(&frame, surface.points[i as usize]), i));
+    let mut kernel = Kernel::default();
+    let mut id = vec![0; surface.points.len()];
+    for i in order {
+        let p = surface.points[i as usize];
+        let v = mesh.add_vertex(p, 0.0);
+        mesh.set_vertex_attribute(v, VertexTag::Surface, i);
+        hint = kernel
+            .insert(&mut mesh, v, p, hint)
+            .expect("inside the box and new");
+        id[i as usize] = v;
+    }
+    for (n, t) in surface.triangles.iter().enumerate() {
+        mesh.add_facet(Facet {
+            vertices: t.map(|i| id[i as usize]),
+            label: 0,
+            input: n as u64,
+            regions: [0; 2],
+        });
+    }
+    mesh.refresh_tet_of();
+    mesh
+}
+
+/// What is wrong with a mesh: volumes not positive, neighbors not mutual, required faces other than the surface's
+/// triangles, open faces that are not required, vertices added on the surface. Without a surface, only the first two.
+fn wrong(mesh: &mut Mesh<FlatPages>, surface: Option<&Surface>) -> Option<String> {
+    let sorted = |mut f: [u32; 3]| {
+        f.sort_unstable();
+        f
+    };
+    let mut seen: HashMap<[u32; 3], u32> = HashMap::new();
+    for n in 0..mesh.n_facets() {
+        seen.insert(sorted(mesh.facet(n).vertices), 0);
+    }
+    let (mut n, mut from) = (0, 0);
+    while let Some((t, tet)) = mesh.next_tet(from) {
+        (n, from) = (n + 1, t + 1);
+        let [a, b, c, d] = mesh.points(&tet);
+        if orient(a, b, c, d) <= 0.0 {
+            return Some(format!("tetrahedron {t} is not positive"));
+        }
+        for i in 0..4 {
+            let face = sorted(tet.face(i));
+            if tet.is_required(i) {
+                match seen.get_mut(&face) {
+                    Some(times) => *times += 1,
+                    None => return Some(format!("face {face:?} is required and no facet")),
+                }
+            }
+            let across = tet.neighbor[i];
+            if !across.exists() {
+                if surface.is_some() && !tet.is_required(i) {
+                    return Some(format!("face {face:?} is open"));
+                }
+                continue;
+            }
+            let other = mesh.tet(across.tet());
+            if other.neighbor[across.face()] != FaceRef::new(t, i)
+                || sorted(other.face(across.face())) != face
+                || other.is_required(across.face()) != tet.is_required(i)
+            {
+                return Some(format!("the sides of face {face:?} differ"));
+            }
+        }
+    }
+    if n != mesh.n_tets() {
+        return Some(format!("{n} tetrahedra and not {}", mesh.n_tets()));
+    }
+    let surface = surface?;
+    for n in 0..mesh.n_facets() {
+        let facet = mesh.facet(n);
+        if seen[&sorted(facet.vertices)] == 0 {
+            return Some(format!("triangle {} is no face", facet.input));
+        }
+        let input = surface.triangles[facet.input as usize];
+        for (v, i) in facet.vertices.into_iter().zip(input) {
+            if mesh.vertex_attribute(v) != (VertexTag::Surface, i)
+                || mesh.point(v) != surface.points[i as usize]
+            {
+                return Some(format!("vertex {v} is not the input's {i}"));
+            }
+        }
+    }
+    None
+}
