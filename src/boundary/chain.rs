@@ -129,7 +129,7 @@ impl<P: Pages> Patch<'_, P> {
                 }
             }
         }
-        Err(Trouble::Precision("on a segment"))
+        Err(Trouble::Precision("doubles leave no place on its edges"))
     }
 }
 

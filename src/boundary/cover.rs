@@ -176,6 +176,6 @@ impl<P: Pages> Patch<'_, P> {
                 return Ok(());
             }
         }
-        Err(Trouble::Precision("in a facet"))
+        Err(Trouble::Precision("doubles leave no place on it"))
     }
 }

@@ -2,6 +2,7 @@ use std::fmt;
 
 use thiserror::Error;
 
+use super::nearness::Nearness;
 use crate::geom::Point;
 
 /// A facet, as a user can find it.
@@ -25,11 +26,13 @@ impl fmt::Display for FacetPlace {
 #[non_exhaustive]
 pub enum BoundaryError {
     /// These triangles could not be made faces of the mesh.
-    #[error("{} triangles could not be recovered, the first is {}: {reason}", facets.len(), facets[0])]
+    #[error("{} triangles could not be recovered, the first is {}: {reason}{}", facets.len(), facets[0], nearness.map_or(String::new(), |s| format!("; {s}")))]
     NotRecovered {
         /// Never empty.
         facets: Vec<FacetPlace>,
         reason: &'static str,
+        /// The narrowest place around them.
+        nearness: Option<Nearness>,
     },
     /// A vertex of the surface lies on an edge or a triangle it does not belong to.
     #[error("vertex {owner} at {point:?} lies on {facet}; check the surface for contacts")]

@@ -21,11 +21,19 @@ pub(super) struct Grown {
     pub quads: Vec<[u32; 4]>,
 }
 
+/// Why a cavity could not grow.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Obstacle {
+    /// The point is behind this required face, seen from the cavity.
+    Required([u32; 3]),
+    Other,
+}
+
 impl<P: Pages> Patch<'_, P> {
     /// Grows the cavity `seed` for vertex `x`, which is in no tetrahedron yet.
     ///
     /// Faces with vertex `open` are left to the caller, who will close the cavity there with the triangles `walls`.
-    /// `None` when a required face, a kept edge, a vertex or one of the `taken` tetrahedra would be swallowed.
+    /// Errors: [`Obstacle`], when a required face, a kept edge, a vertex or one of the `taken` tetrahedra would be swallowed.
     pub(super) fn grow(
         &mut self,
         seed: &[u32],
@@ -33,7 +41,7 @@ impl<P: Pages> Patch<'_, P> {
         open: Option<u32>,
         walls: &[[u32; 3]],
         taken: &HashSet<u32>,
-    ) -> Option<Grown> {
+    ) -> Result<Grown, Obstacle> {
         let mut cavity = seed.to_vec();
         let mut inside: HashSet<u32> = seed.iter().copied().collect();
         let mut next = 0;
@@ -50,18 +58,18 @@ impl<P: Pages> Patch<'_, P> {
                     continue;
                 }
                 if tet.is_required(i) {
-                    return None;
+                    return Err(Obstacle::Required(tet.face(i)));
                 }
                 let across = self.across(t, i);
                 if !across.exists() || taken.contains(&across.tet()) {
-                    return None;
+                    return Err(Obstacle::Other);
                 }
                 if inside.insert(across.tet()) {
                     cavity.push(across.tet());
                 }
             }
             if cavity.len() > CAVITY_MAX {
-                return None;
+                return Err(Obstacle::Other);
             }
         }
         let mut quads = Vec::new();
@@ -82,7 +90,7 @@ impl<P: Pages> Patch<'_, P> {
                 }
                 if inside.contains(&tet.neighbor[i].tet()) {
                     if tet.is_required(i) {
-                        return None;
+                        return Err(Obstacle::Other);
                     }
                 } else {
                     note(tet.face(i));
@@ -93,21 +101,21 @@ impl<P: Pages> Patch<'_, P> {
         for &t in &cavity {
             let v = self.tet(t).vertices();
             if v.iter().any(|&v| !rim.contains(&v) && Some(v) != open) {
-                return None;
+                return Err(Obstacle::Other);
             }
             for [i, j] in EDGES {
                 let (a, b) = (v[i], v[j]);
                 let lost =
                     Some(a) != open && Some(b) != open && !rim_edges.contains(&edge_key(a, b));
                 if lost && self.protects(a, b) {
-                    return None;
+                    return Err(Obstacle::Other);
                 }
             }
         }
         // The last growth may have turned a face that was seen before: all must be seen at the end.
         if quads.iter().any(|&q| self.orient(q) <= 0.0) {
-            return None;
+            return Err(Obstacle::Other);
         }
-        Some(Grown { cavity, quads })
+        Ok(Grown { cavity, quads })
     }
 }

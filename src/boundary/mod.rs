@@ -23,6 +23,7 @@ mod flood;
 mod grow;
 mod kernel;
 mod map;
+mod nearness;
 mod patch;
 mod points;
 mod polygon;
@@ -36,6 +37,7 @@ mod target;
 mod walk;
 
 pub use error::{BoundaryError, FacetPlace};
+pub use nearness::{Nearness, NearnessKind};
 pub use recover::recover;
 pub use regions::{RegionPolicy, RegionSummary, Regions, fill_regions};
 pub use report::RecoveryReport;

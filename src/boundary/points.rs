@@ -118,7 +118,7 @@ fn recover_group<P: Pages>(
     };
     let points = outcome.map_err(named)?;
     if !patch.is_sound() {
-        return Err(Trouble::Precision("a volume is not positive once rounded"));
+        return Err(Trouble::Precision("doubles leave no volume beside it"));
     }
     let whole = skin
         .facets

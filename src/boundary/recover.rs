@@ -7,6 +7,7 @@ use super::error::{BoundaryError, FacetPlace};
 use super::find::{Found, Outcome, find_face};
 use super::flips::Flipper;
 use super::map::{Missing, map};
+use super::nearness::narrowest;
 use super::points::recover_by_points;
 use super::report::RecoveryReport;
 use super::space::{Paged, Space, edge_key};
@@ -65,8 +66,10 @@ fn explain<P: Pages>(
         Trouble::TooMuch => "it crosses too many edges",
         Trouble::Broken(what) => what,
     };
+    let facets: Vec<u32> = troubles.iter().map(|&(n, _)| n).collect();
     BoundaryError::NotRecovered {
-        facets: troubles.iter().map(|&(n, _)| place(mesh, n)).collect(),
+        nearness: narrowest(mesh, &facets),
+        facets: facets.into_iter().map(|n| place(mesh, n)).collect(),
         reason,
     }
 }

@@ -113,6 +113,7 @@ fn survey<P: Pages>(
             return Err(BoundaryError::NotRecovered {
                 facets: vec![place(mesh, n)],
                 reason: "it is not a face of the mesh",
+                nearness: None,
             });
         };
         let tet = mesh.tet(face.tet());

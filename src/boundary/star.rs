@@ -47,7 +47,7 @@ impl<P: Pages> Patch<'_, P> {
     /// The same, where the cavity may grow to be seen whole.
     pub(super) fn star_grown(&mut self, seed: &[u32], exact: ExactPoint) -> Option<u32> {
         let x = self.add_vertex(exact.rounded(), Some(exact));
-        let Some(grown) = self.grow(seed, x, None, &[], &HashSet::new()) else {
+        let Ok(grown) = self.grow(seed, x, None, &[], &HashSet::new()) else {
             self.drop_vertex(x);
             return None;
         };

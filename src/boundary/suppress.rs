@@ -17,7 +17,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 
 use super::chain::Trouble;
 use super::flips::Flipper;
-use super::grow::Grown;
+use super::grow::{Grown, Obstacle};
 use super::kernel::{HalfSpace, center};
 use super::patch::Patch;
 use super::polygon::triangulate;
@@ -30,6 +30,9 @@ use crate::store::Pages;
 
 /// A place nearer than this to the planes around it, in units of the wedge, is second choice.
 const ROOM_MIN: f64 = 1e-3;
+
+/// Required faces beyond a wedge that may be added to its bounds, one after the other.
+const FIRM_MAX: usize = 24;
 
 /// The facets of a patch and the faces that make them up.
 #[derive(Default)]
@@ -53,6 +56,15 @@ struct Wedge {
     tets: Vec<u32>,
     /// Fans that bound it, and the sign of the side it is on.
     walls: Vec<(usize, bool)>,
+}
+
+/// The half-space behind a triangle; `None` when doubles see no normal.
+fn half_space([a, b, c]: [Point; 3]) -> Option<HalfSpace> {
+    let normal = (b - a).cross(c - a).normalize_or_zero();
+    (normal != Point::ZERO).then(|| HalfSpace {
+        normal,
+        offset: normal.dot(a),
+    })
 }
 
 impl<P: Pages> Patch<'_, P> {
@@ -130,7 +142,11 @@ impl<P: Pages> Patch<'_, P> {
                     taken.extend(grown.cavity.iter().copied());
                     old.extend(&grown.cavity[wedge.tets.len()..]);
                 }
-                None => return Err(Trouble::Precision("inside a wedge")),
+                None => {
+                    return Err(Trouble::Precision(
+                        "doubles leave no place between it and its neighbors",
+                    ));
+                }
             }
         }
         let ids = self.replace(&old, &new);
@@ -423,14 +439,9 @@ impl<P: Pages> Patch<'_, P> {
         let mut planes = Vec::new();
         // Planes that no growth can pass: the walls and required faces.
         let mut firm = Vec::new();
-        let mut plane = |[a, b, c]: [Point; 3], is_firm: bool| {
-            reach = reach.max(a.length()).max(b.length()).max(c.length());
-            let normal = (b - a).cross(c - a).normalize_or_zero();
-            if normal != Point::ZERO {
-                let half = HalfSpace {
-                    normal,
-                    offset: normal.dot(a),
-                };
+        let mut plane = |corners: [Point; 3], is_firm: bool| {
+            reach = corners.iter().map(|c| c.length()).fold(reach, f64::max);
+            if let Some(half) = half_space(corners) {
                 planes.push(half);
                 if is_firm {
                     firm.push(half);
@@ -458,33 +469,58 @@ impl<P: Pages> Patch<'_, P> {
         if let Some(d) = best.filter(|_| roomy) {
             proposals.push((d, false));
         }
-        if let Some(d) = center(&firm, reach) {
-            proposals.extend(halves(d, 24).map(|d| (d, true)));
+        // Required faces met beyond the wedge bound the place as well, and are found by meeting them.
+        for _ in 0..FIRM_MAX {
+            let Some(d) = center(&firm, reach) else { break };
+            match self.join_at(x, wedge, walls, taken, origin + d, true) {
+                Ok(grown) => return Some(grown),
+                Err(Obstacle::Required(face)) => {
+                    firm.extend(half_space(face.map(|v| self.position(v) - origin)));
+                }
+                Err(Obstacle::Other) => {
+                    proposals.extend(halves(d, 24).map(|d| (d, true)));
+                    break;
+                }
+            }
         }
         proposals.extend(halves(heart, 24).map(|d| (d, true)));
         if let Some(d) = best {
             proposals.extend(halves(d, 45).map(|d| (d, false)));
         }
         proposals.extend(halves(heart, 45).map(|d| (d, false)));
-        for (d, may_grow) in proposals {
-            let p = self.add_vertex(origin + d, None);
-            let quads: Vec<[u32; 4]> = walls.iter().map(|&[a, b, c]| [a, b, c, p]).collect();
-            if quads.iter().all(|&q| self.orient(q) > 0.0) {
+        proposals.into_iter().find_map(|(d, may_grow)| {
+            self.join_at(x, wedge, walls, taken, origin + d, may_grow)
+                .ok()
+        })
+    }
+
+    /// The wedge and its walls joined to a new vertex at `place`.
+    fn join_at(
+        &mut self,
+        x: u32,
+        wedge: &Wedge,
+        walls: &[[u32; 3]],
+        taken: &HashSet<u32>,
+        place: Point,
+        may_grow: bool,
+    ) -> Result<Grown, Obstacle> {
+        let p = self.add_vertex(place, None);
+        let quads: Vec<[u32; 4]> = walls.iter().map(|&[a, b, c]| [a, b, c, p]).collect();
+        let mut grown = Err(Obstacle::Other);
+        if quads.iter().all(|&q| self.orient(q) > 0.0) {
+            grown = if may_grow {
                 let mut others = taken.clone();
                 others.retain(|t| !wedge.tets.contains(t));
-                let grown = if may_grow {
-                    self.grow(&wedge.tets, p, Some(x), walls, &others)
-                } else {
-                    self.join_all(x, wedge, p)
-                };
-                if let Some(mut grown) = grown {
-                    grown.quads.extend(quads);
-                    return Some(grown);
-                }
-            }
-            self.drop_vertex(p);
+                self.grow(&wedge.tets, p, Some(x), walls, &others)
+            } else {
+                self.join_all(x, wedge, p).ok_or(Obstacle::Other)
+            };
         }
-        None
+        match &mut grown {
+            Ok(grown) => grown.quads.extend(quads),
+            Err(_) => self.drop_vertex(p),
+        }
+        grown
     }
 
     /// The wedge with `x` moved to `p`, if all volumes stay positive.

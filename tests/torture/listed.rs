@@ -15,16 +15,16 @@ const CASE_TIME_MAX: Duration = Duration::from_secs(30);
 /// Variants of each solid, times what `TETDB_TORTURE` says.
 fn variants() -> usize {
     let word = std::env::var("TETDB_TORTURE").unwrap_or_default();
-    2 * word.parse().unwrap_or(1)
+    word.parse().unwrap_or(1)
 }
 
 /// Whether the outcome keeps the promise; a refusal does only where rounding may have made crossings.
 fn judge(shape: &Shape, outcome: &Outcome, took: Duration, may_refuse: bool) -> Result<(), String> {
     let what = match outcome {
         Outcome::Meshed { .. } => None,
-        Outcome::Refused(_) if may_refuse => None,
+        Outcome::Refused(_) | Outcome::TooNear(_) if may_refuse => None,
         Outcome::Refused(why) => Some(format!("refused: {why}")),
-        Outcome::GaveUp(why) => Some(format!("gave up: {why}")),
+        Outcome::TooNear(why) | Outcome::GaveUp(why) => Some(format!("gave up: {why}")),
         Outcome::Wrong(what) => Some(format!("wrong: {what}")),
     };
     if std::env::var_os("TETDB_TORTURE_TELL").is_some() {
@@ -50,7 +50,7 @@ fn torture(solids: Vec<Shape>) {
                 recovery(shape)
             };
             refused[0] += 1;
-            refused[1] += usize::from(matches!(outcome, Outcome::Refused(_)));
+            refused[1] += usize::from(matches!(outcome, Outcome::Refused(_) | Outcome::TooNear(_)));
             failures.extend(judge(shape, &outcome, clock.elapsed(), may_refuse).err());
         };
         run(solid, false, true);

@@ -18,12 +18,15 @@ const SLOW: Duration = Duration::from_secs(20);
 struct Counts {
     meshed: u64,
     refused: u64,
+    too_near: Vec<String>,
     gave_up: Vec<String>,
     wrong: Vec<String>,
     panicked: Vec<String>,
     missing: u64,
     by_points: u64,
     steiner: u64,
+    tets: u64,
+    time: Duration,
     slowest: (Duration, String),
 }
 
@@ -33,13 +36,16 @@ impl Counts {
             self.slowest = (took, name.clone());
         }
         match outcome {
-            Ok(Outcome::Meshed { recovery, .. }) => {
+            Ok(Outcome::Meshed { tets, recovery }) => {
+                self.tets += tets;
+                self.time += recovery.time;
                 self.meshed += 1;
                 self.missing += u64::from(recovery.missing);
                 self.by_points += u64::from(recovery.by_points);
                 self.steiner += u64::from(recovery.steiner);
             }
             Ok(Outcome::Refused(_)) => self.refused += 1,
+            Ok(Outcome::TooNear(why)) => self.too_near.push(format!("{name}: {why}")),
             Ok(Outcome::GaveUp(why)) => self.gave_up.push(format!("{name}: {why}")),
             Ok(Outcome::Wrong(what)) => self.wrong.push(format!("{name}: {what}")),
             Err(panic) => {
@@ -98,22 +104,32 @@ fn run(seed: u64, first: u64, n: u64, threads: usize) -> Counts {
 }
 
 fn judge(counts: &Counts) {
-    for list in [&counts.gave_up, &counts.wrong, &counts.panicked] {
+    for list in [
+        &counts.too_near,
+        &counts.gave_up,
+        &counts.wrong,
+        &counts.panicked,
+    ] {
         list.iter().for_each(|line| println!("{line}"));
     }
     println!(
-        "{} meshed, {} refused by the validator, {} given up, {} wrong, {} panics; {} triangles missing, {} recovered with points, {} Steiner points; slowest {:?}: {}",
+        "{} meshed with {} tetrahedra, {} refused by the validator, {} too near for doubles, {} given up, {} wrong, {} panics; {} triangles missing, {} recovered with points, {} Steiner points, {:?} of recovery; slowest {:?}: {}",
         counts.meshed,
+        counts.tets,
         counts.refused,
+        counts.too_near.len(),
         counts.gave_up.len(),
         counts.wrong.len(),
         counts.panicked.len(),
         counts.missing,
         counts.by_points,
         counts.steiner,
+        counts.time,
         counts.slowest.0,
         counts.slowest.1,
     );
+    // Many that are too near would be an excuse.
+    assert!((counts.too_near.len() as u64) * 1000 <= counts.meshed);
     assert!(counts.gave_up.is_empty() && counts.wrong.is_empty() && counts.panicked.is_empty());
 }
 
@@ -134,7 +150,7 @@ fn a_few_random_cuts_are_meshed_and_verified_in_a_store() {
     for case in 0..12 {
         let shape = draw(2, case);
         match whole(&shape, "full") {
-            Outcome::Meshed { .. } | Outcome::Refused(_) => {}
+            Outcome::Meshed { .. } | Outcome::Refused(_) | Outcome::TooNear(_) => {}
             other => panic!("{}: {other:?}", shape.name),
         }
     }

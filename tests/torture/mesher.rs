@@ -8,12 +8,12 @@ use std::collections::HashMap;
 use std::time::Duration;
 
 use tetdb::audit::{self, Level, VerifyOptions};
-use tetdb::boundary::{RecoveryReport, RegionPolicy, fill_regions, recover};
+use tetdb::boundary::{BoundaryError, RecoveryReport, RegionPolicy, fill_regions, recover};
 use tetdb::catalog::{Catalog, Job, Store};
 use tetdb::delaunay::{Kernel, enclose, insertion_key};
 use tetdb::geom::{HilbertFrame, orient};
 use tetdb::mesh::{FaceRef, Facet, Mesh, VertexTag};
-use tetdb::pipeline::{self, Options};
+use tetdb::pipeline::{self, Options, PipelineError};
 use tetdb::store::{Budget, FlatPages};
 use tetdb::surface::{Surface, orient_alike, validate};
 
@@ -26,7 +26,9 @@ pub enum Outcome {
     Meshed { tets: u64, recovery: Recovery },
     /// The validator refused it.
     Refused(String),
-    /// Recovery gave up: an error that is acceptable only where doubles have no answer.
+    /// Recovery gave up where triangles are nearer to each other than [`NEAR`]: doubles may have no answer.
+    TooNear(String),
+    /// Recovery gave up elsewhere.
     GaveUp(String),
     /// The check found the mesh wrong.
     Wrong(String),
@@ -49,6 +51,20 @@ impl From<&RecoveryReport> for Recovery {
             steiner: r.steiner,
             time: r.map_time + r.flip_time + r.point_time,
         }
+    }
+}
+
+/// Triangles nearer than this, in radians or shares of their size, may leave doubles no place between them: a few units of
+/// the last place of coordinates some ten times their size.
+const NEAR: f64 = 1e-13;
+
+fn given_up(error: &BoundaryError) -> Outcome {
+    match error {
+        BoundaryError::NotRecovered {
+            nearness: Some(nearness),
+            ..
+        } if nearness.value < NEAR => Outcome::TooNear(error.to_string()),
+        _ => Outcome::GaveUp(error.to_string()),
     }
 }
 
@@ -88,6 +104,7 @@ pub fn whole(shape: &Shape, optimize: &str) -> Outcome {
     let made = pipeline::mesh(&mut catalog, &surface, &options, &budget, &pipeline::silent);
     let summary = match made {
         Ok(summary) => summary,
+        Err(PipelineError::Boundary(error)) => return given_up(&error),
         Err(error) => return Outcome::GaveUp(error.to_string()),
     };
     catalog.close().expect("the store can be closed");
@@ -128,7 +145,7 @@ pub fn recovery(shape: &Shape) -> Outcome {
         Err(error) => {
             // What recovery leaves behind when it gives up is a valid mesh all the same.
             return match wrong(&mut mesh, None) {
-                None => Outcome::GaveUp(error.to_string()),
+                None => given_up(&error),
                 Some(what) => Outcome::Wrong(format!("{what}, after: {error}")),
             };
         }
