@@ -40,7 +40,7 @@ fn base(random: &mut Random) -> Shape {
             let way = random.below(3);
             grid(n, |x, y, _| match way {
                 0 => true,
-                1 => (x + y) % 2 == 0,
+                1 => (x + y).is_multiple_of(2),
                 _ => random.one_in(2),
             })
         }

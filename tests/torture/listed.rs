@@ -119,7 +119,7 @@ fn grids_cut_one_way_both_ways_and_at_random() {
             let mut s = grid([n; 3], |x, y, face| match way {
                 0 => true,
                 1 => face % 2 == 0,
-                2 => (x + y) % 2 == 0,
+                2 => (x + y).is_multiple_of(2),
                 _ => random.one_in(2),
             });
             s.name = format!("{} cut way {way}", s.name);
@@ -156,7 +156,9 @@ fn needles_and_thin_plates() {
         solids.push(twisted(3, 1, -0.5, length));
     }
     for thickness in [1e-2, 1e-4, 1e-6, 1e-8] {
-        let s = grid([4, 4, 1], |x, y, face| (3 * x + y + face as u32) % 2 == 0);
+        let s = grid([4, 4, 1], |x, y, face| {
+            (3 * x + y + face as u32).is_multiple_of(2)
+        });
         let s = s.mapped(|p| Point::new(p.x, p.y, p.z * thickness));
         solids.push(s.named(&format!(" thick {thickness:e}")));
     }
@@ -221,7 +223,7 @@ fn vertices_one_bit_apart() {
     let mut random = Random::new(12);
     let mut solids = Vec::new();
     for n in [1, 2, 4] {
-        let cube = grid([n; 3], |x, y, _| (x * 7 + y) % 3 == 0).mapped(|p| p + Point::ONE);
+        let cube = grid([n; 3], |x, y, _| (x * 7 + y).is_multiple_of(3)).mapped(|p| p + Point::ONE);
         solids.push(twins(n, &mut random));
         // A plate as thin as doubles are, over a coordinate of one.
         let plate = cube.mapped(|p| {

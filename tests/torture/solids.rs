@@ -344,7 +344,7 @@ pub fn next_up(x: f64) -> f64 {
 
 /// A grid on a cube, many triangles of which are divided at a point a few bits away from a corner.
 pub fn twins(n: u32, random: &mut Random) -> Shape {
-    let mut s = grid([n; 3], |x, y, _| (x + y) % 2 == 0);
+    let mut s = grid([n; 3], |x, y, _| (x + y).is_multiple_of(2));
     s.name = format!("cube of {n} with twin vertices");
     s = s.mapped(|p| p + Point::ONE);
     let mut done: Vec<bool> = vec![false; s.points.len()];
