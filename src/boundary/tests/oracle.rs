@@ -5,6 +5,7 @@
 
 use std::cmp::Ordering;
 
+use crate::boundary::dyadic::Dyadic;
 use crate::boundary::exact::{ExactPoint, Placed, orient_placed};
 use crate::geom::Point;
 use crate::geom::dyadic::{Exact, combination, exact, orient_truth};
@@ -42,7 +43,10 @@ fn orientations_of_exact_points_are_those_of_exact_numbers() {
                     1 => &shares[..1],
                     _ => &shares[..],
                 };
-                let point = ExactPoint::combination(pick(0), shares);
+                let kept: Vec<(Point, Dyadic)> =
+                    shares.iter().map(|&(to, x)| (to, x.into())).collect();
+                let kept: Vec<(Point, &Dyadic)> = kept.iter().map(|(to, x)| (*to, x)).collect();
+                let point = ExactPoint::combination(pick(0), &kept);
                 let truth = combination(pick(0), shares);
                 if shares.is_empty() {
                     (pick(0), None, exact(pick(0)))
