@@ -15,7 +15,42 @@ const COORDINATE_BITS: i32 = 126;
 
 /// Sign of the sphere determinant of [`insphere`](super::insphere); `None` when the differences need more than a word.
 pub(super) fn insphere_sign(a: Point, b: Point, c: Point, d: Point, e: Point) -> Option<Ordering> {
-    let points = [a, b, c, d, e].map(|p| p.to_array().map(parts));
+    let seen =
+        rounded_differences([a, b, c, d], e).or_else(|| whole_differences([a, b, c, d, e]))?;
+    Some(determinant_sign(seen))
+}
+
+/// The differences where doubles hold them exactly, as they do for points near each other and not too near zero.
+fn rounded_differences(points: [Point; 4], e: Point) -> Option<[[i64; 3]; 4]> {
+    let mut seen = [[0.0f64; 3]; 4];
+    let mut unit = i32::MAX;
+    let mut largest = 0.0f64;
+    for (seen, p) in seen.iter_mut().zip(points) {
+        let x = p - e;
+        // What rounding took away (T. J. Dekker, 1971).
+        let e_virtual = p - x;
+        let tail = (p - (x + e_virtual)) + (e_virtual - e);
+        if tail != Point::ZERO {
+            return None;
+        }
+        *seen = x.to_array();
+        largest = largest.max(x.abs().max_element());
+        for x in *seen {
+            unit = unit.min(parts(x).1);
+        }
+    }
+    if !(-1000..=900).contains(&unit) {
+        return None;
+    }
+    let per_unit = f64::from_bits(((1023 - unit) as u64) << 52);
+    let word = (1u64 << DIFFERENCE_BITS) as f64;
+    (largest * per_unit < word).then(|| seen.map(|p| p.map(|x| (x * per_unit) as i64)))
+}
+
+/// The differences as whole numbers of the smallest unit any coordinate needs.
+#[cold]
+fn whole_differences(points: [Point; 5]) -> Option<[[i64; 3]; 4]> {
+    let points = points.map(|p| p.to_array().map(parts));
     let unit = points.iter().flatten().map(|p| p.1).min()?;
     let mut whole = [[0i128; 3]; 5];
     for (whole, point) in whole.iter_mut().zip(&points) {
@@ -39,7 +74,7 @@ pub(super) fn insphere_sign(a: Point, b: Point, c: Point, d: Point, e: Point) ->
             seen[i] = difference as i64;
         }
     }
-    Some(determinant_sign(seen))
+    Some(seen)
 }
 
 /// Mantissa and exponent, the mantissa odd or zero; a zero has the largest exponent.
