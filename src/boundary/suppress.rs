@@ -34,6 +34,9 @@ const ROOM_MIN: f64 = 1e-3;
 /// Required faces beyond a wedge that may be added to its bounds, one after the other.
 const FIRM_MAX: usize = 24;
 
+/// Times a place eight times nearer is looked for: to the last bits of a double.
+const NEARER_MAX: i32 = 16;
+
 /// The facets of a patch and the faces that make them up.
 #[derive(Default)]
 pub(super) struct Skin {
@@ -469,17 +472,22 @@ impl<P: Pages> Patch<'_, P> {
         if let Some(d) = best.filter(|_| roomy) {
             proposals.push((d, false));
         }
-        // Required faces met beyond the wedge bound the place as well, and are found by meeting them.
-        for _ in 0..FIRM_MAX {
-            let Some(d) = center(&firm, reach) else { break };
-            match self.join_at(x, wedge, walls, taken, origin + d, true) {
-                Ok(grown) => return Some(grown),
-                Err(Obstacle::Required(face)) => {
-                    firm.extend(half_space(face.map(|v| self.position(v) - origin)));
-                }
-                Err(Obstacle::Other) => {
-                    proposals.extend(halves(d, 24).map(|d| (d, true)));
-                    break;
+        // Required faces met beyond the wedge bound the place as well, and are found by meeting them. Far from `x` they may
+        // leave no place together; nearer, fewer are met.
+        for nearer in 0..NEARER_MAX {
+            let reach = reach * 0.125f64.powi(nearer);
+            let mut met = firm.clone();
+            for _ in 0..FIRM_MAX {
+                let Some(d) = center(&met, reach) else { break };
+                match self.join_at(x, wedge, walls, taken, origin + d, true) {
+                    Ok(grown) => return Some(grown),
+                    Err(Obstacle::Required(face)) => {
+                        met.extend(half_space(face.map(|v| self.position(v) - origin)));
+                    }
+                    Err(Obstacle::Other) => {
+                        proposals.extend(halves(d, 24).map(|d| (d, true)));
+                        break;
+                    }
                 }
             }
         }
