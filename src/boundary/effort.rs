@@ -17,7 +17,8 @@ pub(super) struct Effort {
     pub reversed: bool,
 }
 
-/// From the cheapest on. Of a hundred thousand random cuts the first leaves some fifty, and all of them together fewer than ten.
+/// From the cheapest on. Of a hundred thousand random cuts, all but some seven are recovered by one of them; in all but one of
+/// those, triangles are nearer to each other than the last bits of their coordinates.
 pub(super) const EFFORTS: [Effort; 10] = {
     let first = Effort {
         flip_level: 1,
