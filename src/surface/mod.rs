@@ -15,6 +15,7 @@ mod edges;
 mod fitness;
 mod near;
 mod orientation;
+mod point_tree;
 mod repair;
 mod rims;
 mod triangles;

@@ -6,6 +6,8 @@ use super::Surface;
 use super::weld::drop_unused_points;
 use crate::geom::Point;
 
+/// Width of a cube in distances. At 2 half of the looks along each axis go into two cubes; much wider cubes fill up.
+const CUBE: f64 = 8.0;
 /// End of a chain of points.
 const NONE: u32 = u32::MAX;
 
@@ -28,7 +30,7 @@ pub fn weld_near(surface: &mut Surface, distance: f64) -> usize {
     n_joined
 }
 
-/// The points kept so far, in cubes of twice the distance: what is near lies in at most eight of them.
+/// The points kept so far, in cubes [`CUBE`] times as wide as the distance: what is near lies in at most eight of them, mostly in one.
 struct Kept {
     low: Point,
     distance: f64,
@@ -50,7 +52,7 @@ impl Kept {
 
     /// The cube of a position.
     fn cube(&self, p: Point) -> [i64; 3] {
-        ((p - self.low) / (2.0 * self.distance))
+        ((p - self.low) / (CUBE * self.distance))
             .to_array()
             .map(|x| x.floor() as i64)
     }

@@ -1,9 +1,11 @@
 //! Where an open surface is open: the rims of its holes, and vertices that lie on open edges.
 
+use rayon::prelude::*;
 use robust::Coord;
 
 use super::Surface;
 use super::edges::{Closedness, Groups};
+use super::point_tree::PointTree;
 use crate::geom::{Aabb, Point};
 
 /// Vertices as near as this to an open edge count as lying on it, as a share of the box diagonal.
@@ -12,9 +14,6 @@ use crate::geom::{Aabb, Point};
 pub(super) const JUNCTION_SHARE: f64 = 1e-6;
 /// Vertices as near as this to an end of an edge are meant to be that end, as a share of the box diagonal.
 const GAP_SHARE: f64 = 1e-9;
-/// Pairs of a vertex and an edge looked at; beyond it the surface is a heap of loose triangles.
-const PAIRS_MAX: usize = 200_000_000;
-
 /// Open edges that hang together: the rim of a hole.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rim {
@@ -103,48 +102,40 @@ pub fn t_junctions(
     closedness: &Closedness,
     distance_max: f64,
 ) -> Vec<TJunction> {
+    if closedness.open.is_empty() {
+        return Vec::new();
+    }
     let point = |v: u32| surface.points[v as usize];
-    let mut along = ends(&closedness.open);
-    let bounds = Aabb::around(along.iter().map(|&v| point(v)));
-    // Vertices are sorted along the longest side of their box; an edge looks at those beside it.
-    let extent = (bounds.high - bounds.low).to_array();
-    let axis = (0..3)
-        .max_by(|&i, &j| extent[i].total_cmp(&extent[j]))
-        .unwrap_or(0);
-    let key = |v: u32| point(v).to_array()[axis];
-    along.sort_unstable_by(|&a, &b| key(a).total_cmp(&key(b)));
+    let ends = ends(&closedness.open);
+    let tree = PointTree::new(ends.into_iter().map(|v| (v, point(v))).collect());
     let gap = GAP_SHARE * surface.bounds().diagonal();
-    let mut found = Vec::new();
-    let mut n_pairs = 0;
-    for &(triangle, edge) in &closedness.open {
+    let margin = Point::splat(distance_max);
+    let on_open_edge = |&(triangle, edge): &(u32, [u32; 2])| {
         let [a, b] = edge.map(point);
-        let margin = Point::splat(distance_max);
-        let (low, high) = (a.min(b) - margin, a.max(b) + margin);
-        let from = along.partition_point(|&v| key(v) < low.to_array()[axis]);
-        let beside = along[from..]
-            .iter()
-            .take_while(|&&v| key(v) <= high.to_array()[axis]);
-        for &vertex in beside {
-            n_pairs += 1;
-            let p = point(vertex);
-            if edge.contains(&vertex) || p.cmplt(low).any() || p.cmpgt(high).any() {
-                continue;
+        let beside = Aabb {
+            low: a.min(b) - margin,
+            high: a.max(b) + margin,
+        };
+        let mut found = Vec::new();
+        tree.within(&beside, |vertex, at| {
+            if edge.contains(&vertex) {
+                return;
             }
-            if let Some(distance) = on_edge(p, [a, b], distance_max, gap) {
+            if let Some(distance) = on_edge(at, [a, b], distance_max, gap) {
                 found.push(TJunction {
                     vertex,
-                    at: p,
+                    at,
                     triangle,
                     edge,
                     distance,
                 });
             }
-        }
-        if n_pairs > PAIRS_MAX {
-            break;
-        }
-    }
-    found
+        });
+        found.sort_unstable_by_key(|junction| junction.vertex);
+        found
+    };
+    let open = closedness.open.par_iter();
+    open.flat_map_iter(on_open_edge).collect()
 }
 
 /// How far `p` is from the inside of the segment, unless it is farther than `distance_max`, or as near to an end.
