@@ -283,7 +283,7 @@ impl Pager {
 
     /// The next victims that would have to be written, so that one commit serves many misses.
     fn cold_dirty_frames(&self) -> Vec<u32> {
-        let n = (self.frames_max / 8).clamp(1, BATCH_PAGES_MAX - 1);
+        let n = (self.frames_max / 4).clamp(1, BATCH_PAGES_MAX - 1);
         let cold = self.order.iter().rev().map(|(&frame, ())| frame);
         cold.filter(|&frame| self.entry(frame) & (REFERENCED | DIRTY) == DIRTY)
             .take(n)
