@@ -6,6 +6,7 @@
 use super::links::Links;
 use super::locate::Located;
 use crate::geom::{Point, Seen, in_sphere_perturbed, insphere_filtered, orient};
+use crate::mesh::anatomy::mark::{IN_CAVITY, STAYS};
 use crate::mesh::anatomy::{FACES, MARK, REQUIRED, VERTEX_MASK};
 use crate::mesh::{FaceRef, Mesh, Tet};
 use crate::store::{Pages, stop_if_requested};
@@ -149,7 +150,7 @@ impl Kernel {
         self.cavity.clear();
         self.entries.clear();
         self.faces.clear();
-        mesh.set_mark(start.tet, 0, true);
+        mesh.set_mark(start.tet, IN_CAVITY, true);
         self.cavity.push(start.tet);
         self.entries.push(FaceRef::new(start.tet, 0));
         let mut next = 0;
@@ -181,7 +182,7 @@ impl Kernel {
                     let apex = Seen::new(mesh.point(v), p);
                     let det = insphere_filtered(&apex, &seen[f], &seen[h], &seen[g]);
                     if det > 0.0 || (det == 0.0 && in_conflict(mesh, across.tet(), p)) {
-                        mesh.set_mark(across.tet(), 0, true);
+                        mesh.set_mark(across.tet(), IN_CAVITY, true);
                         self.cavity.push(across.tet());
                         self.entries.push(across);
                         if CONSTRAINED && refuses(mesh, v) {
@@ -222,7 +223,7 @@ impl Kernel {
             let [a, b, c] = face.vertices;
             let (a, b, c) = (mesh.point(a), mesh.point(b), mesh.point(c));
             if orient(p, a, b, c) <= 0.0 && is_marked(mesh, face.inside.tet()) {
-                mesh.set_mark(face.inside.tet(), 0, false);
+                mesh.set_mark(face.inside.tet(), IN_CAVITY, false);
                 suspects.push(face.inside.tet());
             }
         }
@@ -237,7 +238,7 @@ impl Kernel {
                 let (a, b, c) = (mesh.point(a), mesh.point(b), mesh.point(c));
                 // Seen from the other side, where it is an outer face now.
                 if orient(p, a, c, b) <= 0.0 {
-                    mesh.set_mark(across.tet(), 0, false);
+                    mesh.set_mark(across.tet(), IN_CAVITY, false);
                     suspects.push(across.tet());
                 }
             }
@@ -300,10 +301,10 @@ impl Kernel {
     fn reflood<P: Pages>(&mut self, mesh: &mut Mesh<P>, seed: u32) {
         let before = std::mem::take(&mut self.cavity);
         self.faces.clear();
-        // The mark moves to node 2 while a tetrahedron is known to stay.
+        // The mark moves while a tetrahedron is known to stay.
         let settle = |mesh: &mut Mesh<P>, t: u32| {
-            mesh.set_mark(t, 0, false);
-            mesh.set_mark(t, 2, true);
+            mesh.set_mark(t, IN_CAVITY, false);
+            mesh.set_mark(t, STAYS, true);
         };
         settle(mesh, seed);
         self.cavity.push(seed);
@@ -315,7 +316,7 @@ impl Kernel {
                 let across = tet.neighbor[i];
                 if across.exists()
                     && !tet.is_required(i)
-                    && mesh.tet(across.tet()).node[0] & MARK != 0
+                    && mesh.tet(across.tet()).node[IN_CAVITY] & MARK != 0
                 {
                     settle(mesh, across.tet());
                     self.cavity.push(across.tet());
@@ -323,14 +324,14 @@ impl Kernel {
             }
         }
         for &t in &before {
-            mesh.set_mark(t, 0, false);
+            mesh.set_mark(t, IN_CAVITY, false);
         }
         for &t in &self.cavity {
             let tet = mesh.tet(t);
             for i in 0..4 {
                 let across = tet.neighbor[i];
                 let required = tet.is_required(i);
-                if required || !across.exists() || mesh.tet(across.tet()).node[2] & MARK == 0 {
+                if required || !across.exists() || mesh.tet(across.tet()).node[STAYS] & MARK == 0 {
                     self.faces.push(CavityFace {
                         vertices: tet.face(i),
                         outside: across,
@@ -341,15 +342,15 @@ impl Kernel {
             }
         }
         for &t in &self.cavity {
-            mesh.set_mark(t, 2, false);
-            mesh.set_mark(t, 0, true);
+            mesh.set_mark(t, STAYS, false);
+            mesh.set_mark(t, IN_CAVITY, true);
         }
     }
 
     /// Takes the marks back; the mesh is as before gathering.
     pub fn discard<P: Pages>(&mut self, mesh: &mut Mesh<P>) {
         for &t in &self.cavity {
-            mesh.set_mark(t, 0, false);
+            mesh.set_mark(t, IN_CAVITY, false);
         }
         self.cavity.clear();
         self.faces.clear();
@@ -438,7 +439,7 @@ impl Kernel {
 
 #[inline]
 fn is_marked<P: Pages>(mesh: &mut Mesh<P>, t: u32) -> bool {
-    mesh.tet(t).node[0] & MARK != 0
+    mesh.tet(t).node[IN_CAVITY] & MARK != 0
 }
 
 /// The sphere test of one tetrahedron where doubles did not decide.

@@ -25,6 +25,18 @@ pub const EDGE_OF: [[usize; 4]; 4] = [[6, 0, 1, 2], [0, 6, 3, 4], [1, 3, 6, 5], 
 pub const REQUIRED: u32 = 1 << 31;
 /// Bit of a node: see the byte page; node 0 marks the cavity, node 1 "examined", 2 and 3 are free.
 pub const MARK: u32 = 1 << 30;
+
+/// Which node's [`MARK`] means what: four notes about a tetrahedron, one owner each.
+pub mod mark {
+    /// It is in the cavity being gathered. Owner: the Delaunay kernel, down between its calls.
+    pub const IN_CAVITY: usize = 0;
+    /// It was looked at, and nothing near it changed since. Owner: refinement, then optimization.
+    pub const EXAMINED: usize = 1;
+    /// It stays in the cavity being shrunk. Owner: the Delaunay kernel, down between its calls.
+    pub const STAYS: usize = 2;
+    /// Dear operations were tried on it. Owner: optimization.
+    pub const RESCUED: usize = 3;
+}
 /// The vertex id of a node.
 pub const VERTEX_MASK: u32 = MARK - 1;
 

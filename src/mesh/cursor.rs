@@ -2,6 +2,7 @@
 
 use tetdb_schema::page::{NONE, RECORDS, SLOT_BITS, SLOT_MASK, SLOTS, Slot, u32_le};
 
+use super::anatomy::mark::IN_CAVITY;
 use super::anatomy::{FaceRef, MARK, REQUIRED, Tet, VERTEX_MASK};
 use crate::geom::Point;
 use crate::store::{Pager, Pages, StoreError, fail, kind};
@@ -258,11 +259,11 @@ impl<P: Pages> Mesh<P> {
         Tet::from_slot(self.pages.read::<{ kind::TETS }>(t))
     }
 
-    /// The vertex opposite `face`, unless node 0 of its tetrahedron carries the mark.
+    /// The vertex opposite `face`, unless its tetrahedron is marked as in the cavity.
     #[inline(always)]
     pub fn apex_if_unmarked(&mut self, face: FaceRef) -> Option<u32> {
         let slot = self.pages.read::<{ kind::TETS }>(face.tet());
-        if slot[0].to_native() & MARK != 0 {
+        if slot[IN_CAVITY].to_native() & MARK != 0 {
             return None;
         }
         Some(slot[face.face()].to_native() & VERTEX_MASK)

@@ -1,10 +1,11 @@
 //! Which pages of tetrahedra still have something to look at: one flag a page, nothing per tetrahedron.
 //!
-//! A tetrahedron that resisted every operation carries the mark "examined" (node 1) until something near
+//! A tetrahedron that resisted every operation carries the mark "examined" until something near
 //! it changes. Pages without news are not read again.
 
 use tetdb_schema::page::{SLOT_BITS, SLOTS};
 
+use crate::mesh::anatomy::mark::EXAMINED;
 use crate::mesh::anatomy::{MARK, VERTEX_MASK};
 use crate::mesh::{Mesh, Tet};
 use crate::store::Pages;
@@ -63,14 +64,14 @@ pub(super) fn tets_of_page<P: Pages>(
 /// Whether every operation has failed on this tetrahedron since something near it changed.
 #[inline]
 pub(super) fn is_examined(tet: &Tet) -> bool {
-    tet.node[1] & MARK != 0
+    tet.node[EXAMINED] & MARK != 0
 }
 
 /// Says that `t`, near which something changed, is worth another look if it is a bad one.
 pub(super) fn reopen<P: Pages>(mesh: &mut Mesh<P>, flags: &mut PageFlags, t: u32) {
     let tet = mesh.tet(t);
     if tet.is_live() && is_examined(&tet) {
-        mesh.set_mark(t, 1, false);
+        mesh.set_mark(t, EXAMINED, false);
         flags.raise(t);
     }
 }

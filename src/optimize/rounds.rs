@@ -6,6 +6,7 @@ use super::rescue::Rescue;
 use super::smooth::{Star, is_free, raised};
 use super::swap::Swapper;
 use crate::mesh::anatomy::MARK;
+use crate::mesh::anatomy::mark::{EXAMINED, RESCUED};
 use crate::mesh::{Mesh, Tet};
 use crate::store::{Pages, stop_if_requested};
 
@@ -13,8 +14,6 @@ use crate::store::{Pages, stop_if_requested};
 const ROUNDS_MAX: u32 = 8;
 /// A round that improves less than this share of the bad tetrahedra it looked at is the last.
 const GAIN_MIN: f64 = 1e-3;
-/// The mark of a tetrahedron on which rescue was tried.
-const RESCUED: usize = 2;
 /// Largest ball that is smoothed.
 const BALL_MAX: usize = 128;
 
@@ -147,14 +146,14 @@ impl Rounds {
             self.counts.attacked += 1;
             self.changed.clear();
             if is_forced(mesh, &tet, good) || !self.attack(mesh, t, &tet, good, target) {
-                mesh.set_mark(t, 1, true);
+                mesh.set_mark(t, EXAMINED, true);
                 continue;
             }
             for k in 0..self.changed.len() {
                 let t = self.changed[k];
                 let tet = mesh.tet(t);
                 if is_examined(&tet) {
-                    mesh.set_mark(t, 1, false);
+                    mesh.set_mark(t, EXAMINED, false);
                 }
                 for across in tet.neighbor {
                     if across.exists() {

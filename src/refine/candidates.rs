@@ -3,6 +3,7 @@
 use super::{Field, Worker};
 use crate::geom::Point;
 use crate::mesh::Mesh;
+use crate::mesh::anatomy::mark::EXAMINED;
 use crate::mesh::anatomy::{EDGES, MARK};
 use crate::store::Pages;
 
@@ -49,10 +50,10 @@ impl Worker {
                 break;
             }
             next = t + 1;
-            if tet.node[1] & MARK != 0 {
+            if tet.node[EXAMINED] & MARK != 0 {
                 continue;
             }
-            mesh.set_mark(t, 1, true);
+            mesh.set_mark(t, EXAMINED, true);
             let v = tet.vertices();
             for [i, j] in EDGES {
                 let (a, b) = (v[i].min(v[j]), v[i].max(v[j]));
