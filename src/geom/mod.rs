@@ -8,7 +8,7 @@ mod sign;
 mod wide;
 
 #[cfg(test)]
-pub(crate) mod dyadic;
+pub(crate) mod oracle;
 #[cfg(test)]
 pub(crate) mod tests;
 

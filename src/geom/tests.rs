@@ -5,7 +5,7 @@
 
 use std::cmp::Ordering;
 
-use super::dyadic::{exact, insphere_truth, orient_truth};
+use super::oracle::{exact, insphere_truth, orient_truth};
 use super::{Point, in_sphere_perturbed, insphere, orient};
 
 /// Seeded, uniform in [-0.5, 0.5).

@@ -185,32 +185,18 @@ fn lifted(square: u128, det: Wide<3>) -> Wide<5> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use robust::Coord3D;
-
-    fn expansions(p: [Point; 5]) -> Ordering {
-        let [a, b, c, d, e] = p.map(|p| Coord3D {
-            x: p.x,
-            y: p.y,
-            z: p.z,
-        });
-        (-robust::insphere(a, b, c, d, e)).total_cmp(&0.0)
-    }
+    use crate::geom::oracle::{exact, insphere_truth};
+    use crate::geom::tests::Numbers;
 
     #[test]
-    fn agrees_with_expansions_on_and_near_spheres() {
-        let mut state = 7u64;
-        let mut next = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-        };
+    fn nearly_all_points_of_one_sphere_fit_and_get_their_sign() {
+        let mut numbers = Numbers(7);
         let (mut decided, mut ties) = (0, 0);
         for round in 0..4000 {
-            let center = Point::new(next(), next(), next()) * 3.0;
+            let center = numbers.point() * 3.0;
             let radius = [1e-3, 0.1, 1.0, 64.0][round % 4];
             let p = [0; 5].map(|_| {
-                let p = Point::new(next(), next(), next());
+                let p = numbers.point();
                 if round % 3 == 0 {
                     // On a grid: many are exactly on one sphere.
                     (p * 3.0).round() * radius
@@ -222,22 +208,10 @@ mod tests {
             if let Some(sign) = insphere_sign(a, b, c, d, e) {
                 decided += 1;
                 ties += usize::from(sign == Ordering::Equal);
-                let expected = expansions(p);
-                // Minus zero orders below zero.
-                let is_zero = robust_is_zero(p);
-                assert_eq!(sign, if is_zero { Ordering::Equal } else { expected });
+                assert_eq!(sign, insphere_truth(&p.map(exact)), "{p:?}");
             }
         }
         assert!(decided > 3800 && ties > 300, "{decided} {ties}");
-    }
-
-    fn robust_is_zero(p: [Point; 5]) -> bool {
-        let [a, b, c, d, e] = p.map(|p| Coord3D {
-            x: p.x,
-            y: p.y,
-            z: p.z,
-        });
-        robust::insphere(a, b, c, d, e) == 0.0
     }
 
     #[test]

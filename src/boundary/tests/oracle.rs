@@ -8,7 +8,7 @@ use std::cmp::Ordering;
 use crate::boundary::dyadic::Dyadic;
 use crate::boundary::exact::{ExactPoint, Placed, orient_placed};
 use crate::geom::Point;
-use crate::geom::dyadic::{Exact, combination, exact, orient_truth};
+use crate::geom::oracle::{Exact, combination, exact, orient_truth};
 use crate::geom::tests::{Numbers, cases};
 
 #[test]

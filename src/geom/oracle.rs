@@ -1,4 +1,6 @@
 //! Numbers `m · 2^e` without rounding: the slow truth that signs are tested against.
+//!
+//! On a library's whole numbers, so that it shares nothing with the exact numbers of recovery, which it tests.
 
 use std::cmp::Ordering;
 use std::ops::{Add, Mul, Sub};
@@ -9,12 +11,12 @@ use super::Point;
 
 /// An exact value; every finite double is one, and so are sums and products.
 #[derive(Clone, Debug)]
-pub(crate) struct Dyadic {
+pub(crate) struct Truth {
     mantissa: IBig,
     exponent: i32,
 }
 
-impl From<f64> for Dyadic {
+impl From<f64> for Truth {
     fn from(x: f64) -> Self {
         assert!(x.is_finite());
         let bits = x.to_bits();
@@ -31,7 +33,7 @@ impl From<f64> for Dyadic {
     }
 }
 
-impl Dyadic {
+impl Truth {
     fn at_exponent(&self, exponent: i32) -> IBig {
         &self.mantissa << (self.exponent - exponent) as usize
     }
@@ -41,32 +43,32 @@ impl Dyadic {
     }
 }
 
-impl Add for &Dyadic {
-    type Output = Dyadic;
-    fn add(self, other: Self) -> Dyadic {
+impl Add for &Truth {
+    type Output = Truth;
+    fn add(self, other: Self) -> Truth {
         let exponent = self.exponent.min(other.exponent);
-        Dyadic {
+        Truth {
             mantissa: self.at_exponent(exponent) + other.at_exponent(exponent),
             exponent,
         }
     }
 }
 
-impl Sub for &Dyadic {
-    type Output = Dyadic;
-    fn sub(self, other: Self) -> Dyadic {
+impl Sub for &Truth {
+    type Output = Truth;
+    fn sub(self, other: Self) -> Truth {
         let exponent = self.exponent.min(other.exponent);
-        Dyadic {
+        Truth {
             mantissa: self.at_exponent(exponent) - other.at_exponent(exponent),
             exponent,
         }
     }
 }
 
-impl Mul for &Dyadic {
-    type Output = Dyadic;
-    fn mul(self, other: Self) -> Dyadic {
-        Dyadic {
+impl Mul for &Truth {
+    type Output = Truth;
+    fn mul(self, other: Self) -> Truth {
+        Truth {
             mantissa: &self.mantissa * &other.mantissa,
             exponent: self.exponent + other.exponent,
         }
@@ -74,19 +76,19 @@ impl Mul for &Dyadic {
 }
 
 /// A position without rounding.
-pub(crate) type Exact = [Dyadic; 3];
+pub(crate) type Exact = [Truth; 3];
 
 pub(crate) fn exact(p: Point) -> Exact {
-    p.to_array().map(Dyadic::from)
+    p.to_array().map(Truth::from)
 }
 
 /// `base + Σ share · (to - base)`.
 pub(crate) fn combination(base: Point, shares: &[(Point, f64)]) -> Exact {
     let mut at = exact(base);
     for &(to, share) in shares {
-        let (to, share) = (exact(to), Dyadic::from(share));
+        let (to, share) = (exact(to), Truth::from(share));
         for axis in 0..3 {
-            let difference = &to[axis] - &Dyadic::from(base[axis]);
+            let difference = &to[axis] - &Truth::from(base[axis]);
             at[axis] = &at[axis] + &(&share * &difference);
         }
     }
@@ -97,7 +99,7 @@ fn from(p: &Exact, origin: &Exact) -> Exact {
     [0, 1, 2].map(|i| &p[i] - &origin[i])
 }
 
-fn determinant([u, v, w]: [&Exact; 3]) -> Dyadic {
+fn determinant([u, v, w]: [&Exact; 3]) -> Truth {
     let minor = |i: usize, j: usize| &(&v[i] * &w[j]) - &(&v[j] * &w[i]);
     let sum = &(&u[0] * &minor(1, 2)) + &(&u[1] * &minor(2, 0));
     &sum + &(&u[2] * &minor(0, 1))
