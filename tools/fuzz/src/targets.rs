@@ -4,14 +4,14 @@
 //! Bytes that cannot have been written are also given a valid head and checksum, or only the checksum would be tested.
 
 use tetdb::io::read::{Format, read_memory};
+use tetdb::store::kind;
 use tetdb::surface::{orient_alike, validate};
 use tetdb_schema::chunk::{
     ChunkAddress, ChunkKind, ChunkRecord, Decoder, HEAD_BYTES, RangeSummary, TetSummary,
     VertexSummary,
 };
 use tetdb_schema::page::{
-    FORMAT_VERSION, Frame, PageAddress, PageKind, SLOTS, STORED_BYTES, access_page, open_page,
-    seal_page,
+    FORMAT_VERSION, Frame, PageAddress, SLOTS, STORED_BYTES, access_page, open_page, seal_page,
 };
 use tetdb_schema::record::{
     Facet, InterfaceFace, SealedFacet, SealedTet, SealedVertex, Tet, TetAttribute, Vertex,
@@ -84,16 +84,9 @@ fn read(format: Format, bytes: &[u8]) {
 }
 
 fn page(bytes: &[u8]) {
-    let kinds = [
-        PageKind::Tets,
-        PageKind::TetAttributes,
-        PageKind::Vertices,
-        PageKind::VertexAttributes,
-        PageKind::Facets,
-        PageKind::InterfaceFaces,
-        PageKind::Scratch,
-    ];
-    let kind = kinds[bytes.first().map_or(0, |&b| usize::from(b) % kinds.len())];
+    let kind = kind::ALL[bytes
+        .first()
+        .map_or(0, |&b| usize::from(b) % kind::ALL.len())];
     let address = PageAddress {
         kind,
         subdomain: 3,
