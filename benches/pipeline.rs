@@ -25,7 +25,7 @@ fn main() {
     let mut catalog = Catalog::create(&path, &job).expect("an empty place");
     let budget = Budget::new(8 << 30);
     let clock = Instant::now();
-    let summary = pipeline::mesh(
+    pipeline::mesh(
         &mut catalog,
         &surface,
         &Options::default(),
@@ -34,15 +34,17 @@ fn main() {
     )
     .expect("a sample meshes");
     let seconds = clock.elapsed().as_secs_f64();
-    let row = &summary.sealed.row;
+    let rows = catalog.subdomains().expect("sealed rows");
+    let tets: u64 = rows.iter().map(|r| r.tets).sum();
+    let bytes: u64 = rows.iter().map(|r| r.bytes).sum();
     for step in catalog.journal().expect("a journal") {
         println!("{:<28} {:8.2} s", step.step, step.seconds);
     }
     println!(
         "{word}: {} triangles, {} tetrahedra, {:.0} per second, {:.2} bytes each on disk",
         surface.n_triangles(),
-        row.tets,
-        row.tets as f64 / seconds,
-        row.bytes as f64 / row.tets as f64
+        tets,
+        tets as f64 / seconds,
+        bytes as f64 / tets as f64
     );
 }

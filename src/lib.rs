@@ -18,6 +18,9 @@ pub mod sizing;
 pub mod boundary;
 pub mod optimize;
 pub mod refine;
+
+pub mod bisect;
+pub mod topology;
 // Floor 6.
 pub mod audit;
 pub mod pipeline;

@@ -137,6 +137,9 @@ pub struct MeshArgs {
     /// How far to optimize [default: full]
     #[arg(long, value_enum)]
     pub optimize: Option<Optimize>,
+    /// Number of sub-domains: auto, or a number [default: auto, one for each 4 million tetrahedra]
+    #[arg(long, value_name = "N", alias = "domains")]
+    pub subdomains: Option<String>,
     /// Replace the store if it is there
     #[arg(long)]
     pub force: bool,

@@ -27,6 +27,7 @@ pub fn options(args: &MeshArgs) -> Result<Options, Failure> {
         (&args.hgrad, &mut options.hgrad),
         (&args.regions.map(word), &mut options.regions),
         (&args.optimize.map(word), &mut options.optimize),
+        (&args.subdomains, &mut options.subdomains),
     ];
     for (given, option) in texts {
         if given.is_some() {
@@ -54,6 +55,7 @@ pub fn options(args: &MeshArgs) -> Result<Options, Failure> {
             None => failure,
         });
     }
+    options.subdomain_count()?;
     Ok(options)
 }
 

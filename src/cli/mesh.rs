@@ -174,6 +174,12 @@ fn work(
         talk.progress(event)
     })?;
     talk.done();
+    if let Some(asked) = summary.subdomains_asked {
+        talk.note(&format!(
+            "note: {asked} sub-domains were asked for; the mesh is made in {}, for one of fewer than 25,000 tetrahedra would be all refined zone",
+            summary.subdomains
+        ));
+    }
     if let Some(sizes) = &summary.sizes {
         talk.note(&sizes.to_string());
         for warning in &sizes.warnings {

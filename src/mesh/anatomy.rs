@@ -26,6 +26,9 @@ pub const REQUIRED: u32 = 1 << 31;
 /// Bit of a node: see the byte page; node 0 marks the cavity, node 1 "examined", 2 and 3 are free.
 pub const MARK: u32 = 1 << 30;
 
+/// Flag of a tetrahedron's attribute: it has a face on an interface, and no later vertex may destroy it.
+pub const FROZEN: u32 = 1;
+
 /// Which node's [`MARK`] means what: four notes about a tetrahedron, one owner each.
 pub mod mark {
     /// It is in the cavity being gathered. Owner: the Delaunay kernel, down between its calls.
@@ -36,6 +39,8 @@ pub mod mark {
     pub const STAYS: usize = 2;
     /// Dear operations were tried on it. Owner: optimization.
     pub const RESCUED: usize = 3;
+    /// It was copied into the core of a cut. Owner: bisection, from the extraction of the core to the end of the split.
+    pub const IN_CORE: usize = 3;
 }
 /// The vertex id of a node.
 pub const VERTEX_MASK: u32 = MARK - 1;

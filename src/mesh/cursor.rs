@@ -29,6 +29,18 @@ pub struct Facet {
     pub regions: [u32; 2],
 }
 
+/// A face on an interface, and which cut made it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct InterfaceFace {
+    /// Counter-clockwise seen from outside the sub-domain.
+    pub vertices: [u32; 3],
+    /// Number of the cut, 1.., and of the face in it.
+    pub cut: u32,
+    pub index: u32,
+    /// Which side of the cut the sub-domain is on: 0 low, 1 high.
+    pub side: u32,
+}
+
 /// Records of one kind: ids handed out in order, freed slots used again, last freed first.
 #[derive(Clone, Copy, Debug)]
 struct Arena {
@@ -48,17 +60,26 @@ impl Default for Arena {
     }
 }
 
+/// Numbers of a [`MeshState`].
+pub const MESH_STATE_WORDS: usize = 12;
+
 /// Counts that, with the pages, are the whole state of a working mesh.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct MeshState {
     tets: Arena,
     vertices: Arena,
     facets: Arena,
+    interface_faces: Arena,
 }
 
 impl MeshState {
     /// Counts of records numbered without gaps.
-    pub(super) fn dense(n_tets: u32, n_vertices: u32, n_facets: u32) -> Self {
+    pub(super) fn dense(
+        n_tets: u32,
+        n_vertices: u32,
+        n_facets: u32,
+        n_interface_faces: u32,
+    ) -> Self {
         let arena = |n: u32| Arena {
             fresh: sparse(n),
             free_head: NONE,
@@ -68,12 +89,18 @@ impl MeshState {
             tets: arena(n_tets),
             vertices: arena(n_vertices),
             facets: arena(n_facets),
+            interface_faces: arena(n_interface_faces),
         }
     }
 
     /// The counts as numbers, for storing beside the pages.
-    pub fn to_words(self) -> [u32; 9] {
-        let [t, v, f] = [self.tets, self.vertices, self.facets];
+    pub fn to_words(self) -> [u32; MESH_STATE_WORDS] {
+        let [t, v, f, i] = [
+            self.tets,
+            self.vertices,
+            self.facets,
+            self.interface_faces,
+        ];
         [
             t.fresh,
             t.free_head,
@@ -84,11 +111,14 @@ impl MeshState {
             f.fresh,
             f.free_head,
             f.n_live,
+            i.fresh,
+            i.free_head,
+            i.n_live,
         ]
     }
 
     /// The inverse of [`MeshState::to_words`].
-    pub fn from_words(w: [u32; 9]) -> Self {
+    pub fn from_words(w: [u32; MESH_STATE_WORDS]) -> Self {
         let arena = |i: usize| Arena {
             fresh: w[i],
             free_head: w[i + 1],
@@ -98,6 +128,7 @@ impl MeshState {
             tets: arena(0),
             vertices: arena(3),
             facets: arena(6),
+            interface_faces: arena(9),
         }
     }
 }
@@ -142,6 +173,9 @@ fn attribute_place(id: u32) -> (u32, usize) {
 
 /// The sign bit of a vertex's size: the vertex never moves.
 const FIXED: u32 = 1 << 31;
+/// Bits of a vertex's tag; those above hold the cut of an interface vertex.
+const TAG_BITS: u32 = 3;
+const TAG_MASK: u32 = (1 << TAG_BITS) - 1;
 const WORD_ZERO: u32_le = u32_le::from_native(0);
 
 /// The coordinates in a vertex record.
@@ -482,7 +516,7 @@ impl<P: Pages> Mesh<P> {
     /// Tag and owner index of `v`; free vertices need none.
     pub fn vertex_attribute(&mut self, v: u32) -> (VertexTag, u32) {
         let (tag, owner) = self.attribute::<{ kind::VERTEX_ATTRIBUTES }>(v);
-        let tag = match tag {
+        let tag = match tag & TAG_MASK {
             1 => VertexTag::Surface,
             2 => VertexTag::Interface,
             3 => VertexTag::Steiner,
@@ -495,10 +529,27 @@ impl<P: Pages> Mesh<P> {
     /// Sets tag and owner index of `v`; any tag but free and Steiner fixes it.
     pub fn set_vertex_attribute(&mut self, v: u32, tag: VertexTag, owner: u32) {
         let fixed = !matches!(tag, VertexTag::Free | VertexTag::Steiner);
+        self.set_fixed(v, fixed);
+        self.set_attribute::<{ kind::VERTEX_ATTRIBUTES }>(v, tag as u32, owner);
+    }
+
+    fn set_fixed(&mut self, v: u32, fixed: bool) {
         let word = &mut self.pages.write::<{ kind::VERTICES }>(v)[6];
         let size = word.to_native() & !FIXED;
         *word = u32_le::from_native(size | if fixed { FIXED } else { 0 });
-        self.set_attribute::<{ kind::VERTEX_ATTRIBUTES }>(v, tag as u32, owner);
+    }
+
+    /// Makes `v` number `index` of the vertices of a cut, which fixes it; cut 0 only holds it for a while.
+    pub fn set_interface_vertex(&mut self, v: u32, cut: u32, index: u32) {
+        self.set_fixed(v, true);
+        let tag = VertexTag::Interface as u32 | cut << TAG_BITS;
+        self.set_attribute::<{ kind::VERTEX_ATTRIBUTES }>(v, tag, index);
+    }
+
+    /// Cut and number of an interface vertex, as set by [`Mesh::set_interface_vertex`].
+    pub fn interface_vertex(&mut self, v: u32) -> (u32, u32) {
+        let (tag, index) = self.attribute::<{ kind::VERTEX_ATTRIBUTES }>(v);
+        (tag >> TAG_BITS, index)
     }
 
     /// Points `tet_of` of every vertex to its tetrahedron of smallest id: one pass in page order.
@@ -589,6 +640,47 @@ impl<P: Pages> Mesh<P> {
         let n = self.state.facets.n_live;
         Self::take::<{ kind::FACETS }>(&mut self.pages, &mut self.state.facets, "facets");
         self.set_facet(n, f);
+        n
+    }
+
+    // ----- interface faces --------------------------------------------------------------------
+
+    /// Interface faces, numbered densely through [`sparse`].
+    pub fn n_interface_faces(&self) -> u32 {
+        self.state.interface_faces.n_live
+    }
+
+    /// Interface face `n`, counted from 0.
+    pub fn interface_face(&mut self, n: u32) -> InterfaceFace {
+        let w = self
+            .pages
+            .read::<{ kind::INTERFACE_FACES }>(sparse(n))
+            .map(u32_le::to_native);
+        InterfaceFace {
+            vertices: [w[0], w[1], w[2]],
+            cut: w[3],
+            index: w[4],
+            side: w[5],
+        }
+    }
+
+    /// Replaces interface face `n`.
+    pub fn set_interface_face(&mut self, n: u32, f: InterfaceFace) {
+        let [a, b, c] = f.vertices;
+        let words = [a, b, c, f.cut, f.index, f.side, 0, 0];
+        *self.pages.write::<{ kind::INTERFACE_FACES }>(sparse(n)) =
+            words.map(u32_le::from_native);
+    }
+
+    /// Adds an interface face after the others.
+    pub fn add_interface_face(&mut self, f: InterfaceFace) -> u32 {
+        let n = self.state.interface_faces.n_live;
+        Self::take::<{ kind::INTERFACE_FACES }>(
+            &mut self.pages,
+            &mut self.state.interface_faces,
+            "interface faces",
+        );
+        self.set_interface_face(n, f);
         n
     }
 }

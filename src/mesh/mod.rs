@@ -5,5 +5,7 @@ mod cursor;
 mod renumber;
 
 pub use anatomy::{FaceRef, Tet};
-pub use cursor::{Facet, Mesh, MeshState, VertexTag, dense, sparse};
+pub use cursor::{
+    Facet, InterfaceFace, MESH_STATE_WORDS, Mesh, MeshState, VertexTag, dense, sparse,
+};
 pub use renumber::{Workspace, renumber};

@@ -36,8 +36,19 @@ pub fn renumber<P: Pages>(
         facet.vertices = facet.vertices.map(|v| mesh.scratch(dense(v)));
         mesh.set_facet(n, facet);
     }
+    for n in 0..mesh.n_interface_faces() {
+        let mut face = mesh.interface_face(n);
+        face.vertices = face.vertices.map(|v| mesh.scratch(dense(v)));
+        mesh.set_interface_face(n, face);
+    }
     mesh.clear_scratch();
-    mesh.set_state(MeshState::dense(n_tets, n_vertices, mesh.n_facets()));
+    let (facets, interface_faces) = (mesh.n_facets(), mesh.n_interface_faces());
+    mesh.set_state(MeshState::dense(
+        n_tets,
+        n_vertices,
+        facets,
+        interface_faces,
+    ));
     Ok(())
 }
 

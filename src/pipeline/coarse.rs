@@ -56,7 +56,7 @@ pub(super) fn coarse<P: Pages>(
     })
 }
 
-fn stage(stage: &str) -> Event<'_> {
+fn stage(stage: &'static str) -> Event {
     Event {
         stage,
         done: 0,

@@ -5,7 +5,8 @@ use super::{Options, PipelineError};
 use crate::geom::Aabb;
 use crate::mesh::{Mesh, Workspace};
 use crate::optimize::{self, OptimizeReport};
-use crate::refine::{Field, RefineReport, saturate};
+use crate::bisect::{OutsideZones, Zone};
+use crate::refine::{Everywhere, Field, Place, RefineReport, saturate};
 use crate::sizing::SizeField;
 use crate::store::Pages;
 
@@ -16,11 +17,12 @@ pub struct FineReport {
     pub optimize: OptimizeReport,
 }
 
-/// Divides and optimizes a coarse mesh.
+/// Divides and optimizes a coarse mesh; no vertex is added in `zones`, which are final.
 pub(super) fn fine<P: Pages>(
     mesh: &mut Mesh<P>,
     field: &SizeField,
     bounds: Aabb,
+    zones: &[Zone],
     options: &Options,
     space: &Workspace,
     watch: &Watcher,
@@ -35,8 +37,15 @@ pub(super) fn fine<P: Pages>(
         let p = mesh.point(v);
         mesh.set_size(v, field.h(p) as f32);
     }
+    let outside = OutsideZones(zones);
+    let place: &dyn Place = if zones.is_empty() {
+        &Everywhere
+    } else {
+        &outside
+    };
     let wanted = Field {
         h: &|p| field.h(p),
+        place,
         bounds,
     };
     let refine = saturate(mesh, &wanted, space, &mut |inserted| {

@@ -3,20 +3,25 @@
 //! | step | state after it | what |
 //! |---|---|---|
 //! | `coarse` | coarse | validate; Delaunay mesh of the surface's vertices; recover every triangle; color and empty regions |
-//! | `fine` | sealed | size field; divide edges; optimize; sort, compress and seal |
+//! | `divide` | bisected | as often as there are sub-domains less one: refine a band, choose the interface, write two children |
+//! | `leaf` | sealed | each sub-domain alone: divide edges; optimize; sort, compress and seal |
 //!
 //! It receives a surface, not a path, and prints nothing: it tells a [`Watcher`] what goes on.
 
 mod coarse;
+mod divide;
 mod error;
 mod fine;
+mod leaf;
 mod options;
 mod plan;
 mod run;
 mod seal;
+mod tree;
 mod watch;
 
 pub use error::PipelineError;
+pub use fine::FineReport;
 pub use options::Options;
 pub use plan::{MEMORY_MIN, Plan};
 pub use run::{Summary, mesh};

@@ -1,5 +1,6 @@
 use serde::{Deserialize, Serialize};
 
+use super::PipelineError;
 use crate::boundary::RegionPolicy;
 use crate::optimize::Mode;
 use crate::sizing::{SizeOptions, SizeSource, SizingError};
@@ -24,6 +25,9 @@ pub struct Options {
     pub regions: Option<String>,
     /// `none`, `delaunay`, `full`.
     pub optimize: Option<String>,
+    /// `auto` or a number.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub subdomains: Option<String>,
 }
 
 impl Options {
@@ -50,6 +54,22 @@ impl Options {
             .chain(cylinders)
             .collect::<Result<_, _>>()?;
         Ok(sizes)
+    }
+
+    /// The number of sub-domains asked for; `None` for one that follows from the predicted size of the mesh.
+    ///
+    /// Errors: a text that is neither `auto` nor a number from 1.
+    pub fn subdomain_count(&self) -> Result<Option<u32>, PipelineError> {
+        match self.subdomains.as_deref() {
+            None | Some("auto") => Ok(None),
+            Some(text) => match text.parse() {
+                Ok(n) if n > 0 => Ok(Some(n)),
+                _ => Err(PipelineError::Option {
+                    option: "--subdomains",
+                    value: text.to_owned(),
+                }),
+            },
+        }
     }
 
     /// Which regions are filled; `None` when the word is not known.

@@ -11,6 +11,9 @@ const CATALOG: u64 = 3 << 20;
 /// Scratch of a phase (candidates, sort runs, chunks being encoded) beyond this brings nothing.
 const BUFFERS_MAX: u64 = 384 << 20;
 
+/// Frames one of several workers needs at least.
+const FRAMES_OF_WORKER: u64 = 24 << 20;
+
 /// Bytes for each use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Plan {
@@ -43,6 +46,12 @@ impl Plan {
             redb,
             buffers,
         })
+    }
+
+    /// How many sub-domains can be made at once: a worker needs frames of its own.
+    pub fn workers(&self) -> usize {
+        let by_frames = (self.frames / FRAMES_OF_WORKER).max(1);
+        rayon::current_num_threads().min(usize::try_from(by_frames).unwrap_or(usize::MAX))
     }
 }
 

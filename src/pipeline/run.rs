@@ -1,38 +1,48 @@
 //! All steps of one run.
 
-use std::path::PathBuf;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Instant;
 
-use tetdb_schema::ids::SubdomainId;
-
 use super::coarse::{CoarseReport, coarse};
-use super::fine::{FineReport, fine};
-use super::seal::{Target, seal};
-use super::watch::Watcher;
-use super::{Options, PipelineError, Plan};
+use super::divide::{DONE, WORK, read_owners};
+use super::leaf::{Common, Leaf, LeafJob, SealedTotals};
+use super::tree::{self, Part, PartMesh, blob};
+use super::watch::{Event, Watcher};
+use super::{FineReport, Options, PipelineError, Plan};
+use crate::bisect::{CutReport, load_of};
 use crate::boundary::RegionSummary;
-use crate::catalog::{Catalog, JournalRow, Measure, RegionRow, Sealed, StoreState};
+use crate::catalog::{
+    Catalog, CatalogError, InterfaceRow, JournalRow, Measure, RegionRow, StoreState,
+};
 use crate::geom::{Aabb, HilbertFrame};
-use crate::mesh::{Mesh, MeshState, Workspace, renumber};
-use crate::sizing::{SizeField, SizeSummary};
-use crate::store::{Backing, Budget, Pager, PagerStats, StoreFile, attempt};
+use crate::mesh::{Mesh, Workspace, renumber};
+use crate::optimize::Mode;
+use crate::sizing::{SizeField, SizeSummary, TETS_PER_LOAD};
+use crate::store::{Backing, Budget, Pager, PagerStats, attempt};
 use crate::surface::Surface;
 
-/// Numbers of the catalog's blobs.
-const BLOB_SIZE_FIELD: u32 = 1;
-const BLOB_MESH_STATE: u32 = 2;
-/// Generations of the only sub-domain.
+/// Generation of the coarse mesh.
 const COARSE: u32 = 1;
-const WORK: u32 = 2;
-const SEALED: u32 = 3;
+/// Tetrahedra of one sub-domain, unless a number of sub-domains is asked for.
+const TETS_PER_SUBDOMAIN: f64 = (4u64 << 20) as f64;
+/// Sub-domains smaller than this are nearly all refined zone: more are not made.
+const TETS_MIN: f64 = 25_000.0;
 
 /// What a run did; a part is absent when an earlier run had done its step.
 #[derive(Clone, Debug)]
 pub struct Summary {
     pub coarse: Option<CoarseReport>,
     pub sizes: Option<SizeSummary>,
-    pub fine: FineReport,
-    pub sealed: Sealed,
+    /// The bisections of this run, in order.
+    pub cuts: Vec<CutReport>,
+    /// What refinement and optimization did to the sub-domains of this run, by rank.
+    pub fine: BTreeMap<u32, FineReport>,
+    pub subdomains: u32,
+    /// What was asked for, when that was more than the mesh allows.
+    pub subdomains_asked: Option<u32>,
     pub pages: PagerStats,
     pub frames_used: usize,
 }
@@ -50,7 +60,7 @@ pub fn mesh(
 ) -> Result<Summary, PipelineError> {
     let surface_lease = budget.lease(surface.bytes() as u64, "the surface")?;
     let mut sizes = None;
-    let field = match catalog.blob(BLOB_SIZE_FIELD)? {
+    let field = match catalog.blob(blob::SIZE_FIELD)? {
         Some(bytes) => SizeField::from_bytes(&bytes)?
             .with_sources(&options.sizes()?, surface.bounds().diagonal())?,
         None => {
@@ -69,112 +79,86 @@ pub fn mesh(
         plan.frames + plan.redb + plan.redb / 2 + plan.buffers,
         "the working mesh",
     )?;
+    let run = Run {
+        catalog,
+        surface,
+        options,
+        field: &field,
+        plan,
+        bounds: surface.bounds(),
+        n: 1,
+        asked: None,
+        pages: PagerStats::default(),
+        watch,
+    };
     // Unwinding from a failed page access ends here; a step's commit is its last act, so nothing is half done.
-    attempt(|| {
-        let run = Run {
-            catalog,
-            surface,
-            options,
-            field: &field,
-            plan,
-            bounds: surface.bounds(),
-            watch,
-        };
-        run.steps(sizes)
-    })?
+    attempt(|| run.steps(sizes))?
 }
 
-struct Run<'a> {
-    catalog: &'a mut Catalog,
+pub(super) struct Run<'a> {
+    pub catalog: &'a mut Catalog,
     surface: &'a Surface,
     options: &'a Options,
-    field: &'a SizeField,
-    plan: Plan,
-    bounds: Aabb,
-    watch: &'a Watcher<'a>,
+    pub field: &'a SizeField,
+    pub plan: Plan,
+    pub bounds: Aabb,
+    /// Number of sub-domains there will be.
+    pub n: u32,
+    asked: Option<u32>,
+    pub pages: PagerStats,
+    pub watch: &'a Watcher<'a>,
 }
 
 impl Run<'_> {
     fn steps(mut self, sizes: Option<SizeSummary>) -> Result<Summary, PipelineError> {
-        let (mut mesh, coarse) = if self.catalog.state()? < StoreState::Coarse {
+        let mut open = None;
+        let mut coarse = None;
+        if self.catalog.state()? < StoreState::Coarse {
             let (mesh, report) = self.coarse_step()?;
-            (mesh, Some(report))
-        } else {
-            (self.reopen_coarse()?, None)
-        };
-        let clock = Instant::now();
-        let scratch = self.catalog.scratch_dir()?;
-        let space = Workspace {
-            dir: &scratch,
-            memory: self.plan.buffers / 2,
-        };
-        let fine = fine(
-            &mut mesh,
-            self.field,
-            self.bounds,
-            self.options,
-            &space,
-            self.watch,
-        )?;
-        let subdomain = SubdomainId::new(0).expect("zero is a rank");
-        let target = Target {
-            path: &self.catalog.file_path(0, SEALED),
-            scratch: &scratch,
-            subdomain,
-            generation: SEALED,
-            memory: self.plan.buffers,
-            bounds: self.bounds,
-        };
-        let sealed = seal(&mut mesh, &target, self.watch)?;
-        let pager = mesh.into_pages();
-        let (pages, frames_used) = (pager.stats(), pager.frames_used());
-        let work = pager.discard();
-        let regions = final_regions(self.catalog.regions()?, &sealed);
-        self.catalog.commit(|step| {
-            step.set_regions(&regions);
-            step.set_subdomain(&sealed.row);
-            step.list_file(0, SEALED);
-            step.unlist_file(0, COARSE);
-            step.set_state(StoreState::Sealed);
-            step.append_journal(&journal(
-                StoreState::Sealed,
-                "saturate, optimize, seal",
-                clock,
-                &[
-                    ("inserted_vertices", fine.refine.inserted as f64),
-                    ("pages_read", pages.pages_read as f64),
-                    ("pages_written", pages.pages_written as f64),
-                ],
-            ));
-            Ok(())
-        })?;
-        if let Some(path) = work {
-            remove(&path)?;
+            (open, coarse) = (Some(mesh), Some(report));
         }
-        Ok(Summary {
+        self.n = tree::n_subdomains(self.catalog)?;
+        let mut cuts = Vec::new();
+        while let Some(part) = (tree::parts(self.catalog, self.n)?.into_iter())
+            .find(|p| p.part.count > 1)
+        {
+            // Pages of the coarse mesh that are still resident would take the frames of the others.
+            open = None;
+            cuts.push(self.divide(part)?);
+        }
+        let mut summary = Summary {
             coarse,
             sizes,
-            fine,
-            sealed,
-            pages,
-            frames_used,
-        })
+            cuts,
+            fine: BTreeMap::new(),
+            subdomains: self.n,
+            subdomains_asked: self.asked,
+            pages: PagerStats::default(),
+            frames_used: 0,
+        };
+        let sealed: BTreeSet<u32> = self.catalog.subdomains()?.iter().map(|r| r.rank).collect();
+        let mut left = tree::parts(self.catalog, self.n)?;
+        left.retain(|p| !sealed.contains(&p.part.first));
+        self.leaves(left, open, &mut summary)?;
+        self.close()?;
+        summary.pages.add(self.pages);
+        Ok(summary)
     }
 
-    fn backing(&self, generation: u32, base: Option<StoreFile>) -> Backing {
-        Backing {
-            subdomain: 0,
-            generation,
-            work_path: self.catalog.file_path(0, generation),
-            base,
-            cache_bytes: self.plan.redb as usize,
-        }
+    pub(super) fn optimize_mode(&self) -> Result<Mode, PipelineError> {
+        self.options
+            .optimize_mode()
+            .ok_or_else(|| PipelineError::Option {
+                option: "--optimize",
+                value: self.options.optimize.clone().unwrap_or_default(),
+            })
     }
 
     fn coarse_step(&mut self) -> Result<(Mesh, CoarseReport), PipelineError> {
         let clock = Instant::now();
-        let pager = Pager::new(self.plan.frames, Some(self.backing(COARSE, None)));
-        let mut mesh = Mesh::new(pager);
+        let path = self.catalog.file_path(0, COARSE);
+        let backing = file_backing(0, COARSE, path, &self.plan, 1);
+        let mut mesh = Mesh::new(Pager::new(self.plan.frames, Some(backing)));
         let report = coarse(&mut mesh, self.surface, self.options, self.watch)?;
         let scratch = self.catalog.scratch_dir()?;
         let space = Workspace {
@@ -182,22 +166,24 @@ impl Run<'_> {
             memory: self.plan.buffers / 2,
         };
         renumber(&mut mesh, &HilbertFrame::new(&self.bounds), &space)?;
+        let load = self.load(&mut mesh);
+        let n = self.count(load)?;
         mesh.pages_mut().flush();
-        let state: Vec<u8> = mesh
-            .state()
-            .to_words()
-            .into_iter()
-            .flat_map(u32::to_le_bytes)
-            .collect();
-        let extents = mesh.pages().extents().into_iter().flatten();
-        let counts: Vec<u8> = extents.flat_map(u32::to_le_bytes).collect();
+        let part = PartMesh {
+            part: Part { first: 0, count: n },
+            generation: COARSE,
+            state: mesh.state(),
+            extents: mesh.pages().extents(),
+            load,
+        };
         let (field, surface) = (self.field.to_bytes(), self.surface);
         self.catalog.commit(|step| {
             step.list_file(0, COARSE);
             step.set_labels(&surface.label_names);
             step.set_regions(&report.regions.list.iter().map(region_row).collect());
-            step.set_blob(BLOB_SIZE_FIELD, &field);
-            step.set_blob(BLOB_MESH_STATE, &[state, counts].concat());
+            step.set_blob(blob::SIZE_FIELD, &field);
+            step.set_blob(blob::SUBDOMAINS, &n.to_le_bytes());
+            step.set_blob(blob::PART, &part.to_bytes());
             step.set_state(StoreState::Coarse);
             step.append_journal(&journal(
                 StoreState::Coarse,
@@ -209,31 +195,259 @@ impl Run<'_> {
                         f64::from(report.recovery.missing_segments),
                     ),
                     ("missing_facets", f64::from(report.recovery.missing_facets)),
+                    ("predicted_tets", TETS_PER_LOAD * load),
                 ],
             ));
             Ok(())
         })?;
-        let path = self.catalog.file_path(0, WORK);
-        mesh.pages_mut().next_generation(WORK, path);
+        let path = self.catalog.file_path(0, COARSE + WORK);
+        mesh.pages_mut().next_generation(COARSE + WORK, path);
         Ok((mesh, report))
     }
 
-    fn reopen_coarse(&mut self) -> Result<Mesh, PipelineError> {
-        let base = StoreFile::open_repaired(
-            &self.catalog.file_path(0, COARSE),
-            self.plan.redb as usize / 2,
-            false,
-        )?;
-        let bytes = self.catalog.blob(BLOB_MESH_STATE)?.unwrap_or_default();
-        let mut words = bytes
-            .chunks_exact(4)
-            .map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-        let mut next = || words.next().unwrap_or(0);
-        let state = MeshState::from_words(std::array::from_fn(|_| next()));
-        let extents = std::array::from_fn(|_| [next(), next()]);
-        let mut pager = Pager::new(self.plan.frames, Some(self.backing(WORK, Some(base))));
-        pager.adopt(extents);
-        Ok(Mesh::with_state(pager, state))
+    /// The load of the coarse mesh. Effects: sets the sizes of its vertices.
+    fn load(&self, mesh: &mut Mesh) -> f64 {
+        for v in mesh.vertex_ids() {
+            let p = mesh.point(v);
+            mesh.set_size(v, self.field.h(p) as f32);
+        }
+        load_of(mesh, &|p| self.field.h(p))
+    }
+
+    /// How many sub-domains there will be, for a load.
+    fn count(&mut self, load: f64) -> Result<u32, PipelineError> {
+        let predicted = TETS_PER_LOAD * load;
+        let asked = self.options.subdomain_count()?;
+        let auto = (predicted / TETS_PER_SUBDOMAIN).ceil().max(1.0);
+        let most = (predicted / TETS_MIN).floor().max(1.0);
+        let wanted = asked.map_or(auto, f64::from);
+        if wanted > most && wanted > 1.0 {
+            self.asked = asked;
+        }
+        Ok(wanted.min(most).min(f64::from(1u32 << 20)) as u32)
+    }
+
+    /// Makes the sub-domains that are left, as many at once as there are threads and memory for.
+    fn leaves(
+        &mut self,
+        left: Vec<PartMesh>,
+        open: Option<Mesh>,
+        summary: &mut Summary,
+    ) -> Result<(), PipelineError> {
+        let common = Common {
+            field: self.field,
+            options: self.options,
+            bounds: self.bounds,
+        };
+        if let (Some(mesh), [part]) = (open, &left[..]) {
+            let job = self.job(*part, 1)?;
+            let leaf = job.finish(mesh, common, self.watch)?;
+            return self.seal_step(leaf, summary);
+        }
+        let workers = self.plan.workers().min(left.len());
+        let mut jobs = Vec::with_capacity(left.len());
+        for part in left {
+            jobs.push(self.job(part, workers as u64)?);
+        }
+        jobs.reverse();
+        let queue = Mutex::new(jobs);
+        let (tell, hear) = channel();
+        // Threads of their own, not tasks of the pool: a task that waits for a sort would take up another sub-domain meanwhile,
+        // and its memory.
+        std::thread::scope(|scope| {
+            for _ in 0..workers {
+                let (queue, tell) = (&queue, tell.clone());
+                scope.spawn(move || work(queue, common, &tell));
+            }
+            drop(tell);
+            let result = self.listen(&hear, summary);
+            if result.is_err() {
+                queue.lock().unwrap_or_else(|e| e.into_inner()).clear();
+            }
+            result
+        })
+    }
+
+    /// Hands on what workers tell, and commits what they finish.
+    fn listen(
+        &mut self,
+        hear: &Receiver<Told>,
+        summary: &mut Summary,
+    ) -> Result<(), PipelineError> {
+        let mut first_error = None;
+        for told in hear {
+            match told {
+                Told::Progress(event) => (self.watch)(event),
+                Told::Done(Ok(leaf)) if first_error.is_none() => {
+                    if let Err(error) = self.seal_step(*leaf, summary) {
+                        first_error = Some(error);
+                    }
+                }
+                Told::Done(Ok(_)) => {}
+                Told::Done(Err(error)) => _ = first_error.get_or_insert(error),
+            }
+            if first_error.is_some() {
+                break;
+            }
+        }
+        first_error.map_or(Ok(()), Err)
+    }
+
+    fn job(&mut self, part: PartMesh, workers: u64) -> Result<LeafJob, PipelineError> {
+        let rank = part.part.first;
+        let mut owners = BTreeMap::new();
+        for cut in touching(self.catalog, part, self.n)? {
+            owners.insert(cut, read_owners(self.catalog, cut)?);
+        }
+        let scratch = self.catalog.scratch_dir()?.join(format!("leaf-{rank}"));
+        std::fs::create_dir_all(&scratch).map_err(|source| CatalogError::Io {
+            path: scratch.clone(),
+            source,
+        })?;
+        Ok(LeafJob {
+            part,
+            base: self.catalog.file_path(rank, part.generation),
+            work: self.catalog.file_path(rank, part.generation + WORK),
+            sealed: self.catalog.file_path(rank, part.generation + DONE),
+            scratch,
+            zones: tree::zones_above(self.catalog, part.part, self.n)?,
+            owners,
+            frames: self.plan.frames / workers,
+            redb: self.plan.redb / workers,
+            buffers: self.plan.buffers / workers,
+        })
+    }
+
+    /// Commits a finished sub-domain.
+    fn seal_step(&mut self, leaf: Leaf, summary: &mut Summary) -> Result<(), PipelineError> {
+        let (rank, generation) = (leaf.part.part.first, leaf.part.generation);
+        let refine = &leaf.fine.refine;
+        let measures = [
+            ("predicted_tets", TETS_PER_LOAD * leaf.part.load),
+            ("inserted_vertices", refine.inserted as f64),
+            ("zone_rejects", refine.out_of_place as f64),
+            ("frozen_hits", refine.frozen_hits as f64),
+            ("pages_read", leaf.pages.pages_read as f64),
+            ("pages_written", leaf.pages.pages_written as f64),
+        ];
+        // A finished sub-domain leaves the state of the whole as it is until the last one.
+        let state = self.catalog.state()?;
+        let mut row = journal(state, "saturate, optimize, seal", leaf.clock, &measures);
+        row.subdomain = Some(rank);
+        let totals = SealedTotals::of(&leaf.sealed).to_bytes();
+        self.catalog.commit(|step| {
+            step.set_subdomain(&leaf.sealed.row);
+            step.set_blob(blob::SEALED + rank, &totals);
+            step.list_file(rank, leaf.generation);
+            step.unlist_file(rank, generation);
+            step.append_journal(&row);
+            Ok(())
+        })?;
+        leaf.remove_work()?;
+        summary.pages.add(leaf.pages);
+        summary.frames_used = summary.frames_used.max(leaf.frames_used);
+        summary.fine.insert(rank, leaf.fine);
+        Ok(())
+    }
+
+    /// Everything is sealed: regions and interfaces of the whole.
+    fn close(&mut self) -> Result<(), PipelineError> {
+        let mut regions = self.catalog.regions()?;
+        for row in regions.iter_mut().filter(|r| r.filled) {
+            (row.tets, row.volume) = (0, 0.0);
+        }
+        let mut interfaces: BTreeMap<u32, Vec<InterfaceRow>> = BTreeMap::new();
+        for rank in 0..self.n {
+            let bytes = self.catalog.blob(blob::SEALED + rank)?.unwrap_or_default();
+            let totals = SealedTotals::from_bytes(&bytes).ok_or_else(|| CatalogError::Content {
+                path: self.catalog.dir().to_owned(),
+                subdomain: rank,
+                what: "its totals are missing or damaged".to_owned(),
+            })?;
+            for row in regions.iter_mut().filter(|r| r.filled) {
+                let here = totals.regions.get(&row.region).copied().unwrap_or_default();
+                row.tets += here.tets;
+                row.volume += here.volume;
+            }
+            // One side tells; verification compares it with the other.
+            for side in totals.interfaces.iter().filter(|s| rank < s.other) {
+                interfaces.entry(side.cut).or_default().push(InterfaceRow {
+                    cut: side.cut,
+                    low: rank,
+                    high: side.other,
+                    faces: side.faces,
+                    digest: side.digest.lanes,
+                });
+            }
+        }
+        let scratch = self.catalog.scratch_dir()?;
+        self.catalog.commit(|step| {
+            step.set_regions(&regions);
+            for (&cut, rows) in &interfaces {
+                step.set_interfaces(cut, rows);
+            }
+            step.set_state(StoreState::Sealed);
+            Ok(())
+        })?;
+        // Nothing in it counts; what cannot be removed now goes when the store is next opened for writing.
+        let _ = std::fs::remove_dir_all(scratch);
+        Ok(())
+    }
+}
+
+/// What a worker says.
+enum Told {
+    Progress(Event),
+    Done(Result<Box<Leaf>, PipelineError>),
+}
+
+/// Takes jobs until there is none.
+fn work(queue: &Mutex<Vec<LeafJob>>, common: Common, tell: &Sender<Told>) {
+    loop {
+        let job = queue.lock().unwrap_or_else(|e| e.into_inner()).pop();
+        let Some(job) = job else { return };
+        let last = std::cell::Cell::new(None::<Instant>);
+        let watch = |event: Event| {
+            let due = last.get().is_none_or(|t| t.elapsed().as_millis() > 100);
+            if due {
+                last.set(Some(Instant::now()));
+                // Nobody listens once a step has failed.
+                let _ = tell.send(Told::Progress(event));
+            }
+        };
+        let done = job.run(common, &watch).map(Box::new);
+        if tell.send(Told::Done(done)).is_err() {
+            return;
+        }
+    }
+}
+
+/// The cuts above a part, one of whose faces it may have.
+fn touching(catalog: &mut Catalog, part: PartMesh, n: u32) -> Result<Vec<u32>, CatalogError> {
+    let mut cuts = part.part.cuts_above(n);
+    let mut kept = Vec::with_capacity(cuts.len());
+    for cut in cuts.drain(..) {
+        if catalog.blob(blob::OWNERS + cut)?.is_some() {
+            kept.push(cut);
+        }
+    }
+    Ok(kept)
+}
+
+/// Where pages go that leave memory, with a share of redb's cache.
+pub(super) fn file_backing(
+    subdomain: u32,
+    generation: u32,
+    work_path: PathBuf,
+    plan: &Plan,
+    share: u64,
+) -> Backing {
+    Backing {
+        subdomain,
+        generation,
+        work_path,
+        base: None,
+        cache_bytes: (plan.redb / share) as usize,
     }
 }
 
@@ -247,16 +461,12 @@ fn region_row(region: &RegionSummary) -> RegionRow {
     }
 }
 
-/// The regions with the numbers of the sealed mesh; until then they count no tetrahedra.
-fn final_regions(mut rows: Vec<RegionRow>, sealed: &Sealed) -> Vec<RegionRow> {
-    for row in rows.iter_mut().filter(|row| row.filled) {
-        let totals = sealed.regions.get(&row.region).copied().unwrap_or_default();
-        (row.tets, row.volume) = (totals.tets, totals.volume);
-    }
-    rows
-}
-
-fn journal(state: StoreState, step: &str, clock: Instant, measures: &[(&str, f64)]) -> JournalRow {
+pub(super) fn journal(
+    state: StoreState,
+    step: &str,
+    clock: Instant,
+    measures: &[(&str, f64)],
+) -> JournalRow {
     JournalRow {
         state,
         subdomain: Some(0),
@@ -272,9 +482,13 @@ fn journal(state: StoreState, step: &str, clock: Instant, measures: &[(&str, f64
     }
 }
 
-fn remove(path: &PathBuf) -> Result<(), PipelineError> {
+pub(super) fn remove(path: &PathBuf) -> Result<(), PipelineError> {
+    remove_file(path)
+}
+
+fn remove_file(path: &Path) -> Result<(), PipelineError> {
     std::fs::remove_file(path).map_err(|source| {
-        let path = path.clone();
+        let path = path.to_owned();
         PipelineError::Store(crate::store::StoreError::Io { path, source })
     })
 }

@@ -5,11 +5,12 @@
 //! 2. tetrahedra sorted by their new numbers, smallest vertex first, which follows the curve too;
 //! 3. their required faces sorted by vertices and joined with the facets, which so learn their tetrahedra.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use tetdb_schema::ids::{Owner, SubdomainId, VertexId};
 use tetdb_schema::page::NONE;
-use tetdb_schema::record::{SealedFacet, SealedTet, SealedVertex, tag};
+use tetdb_schema::record::{InterfaceFace, SealedFacet, SealedTet, SealedVertex, tag};
 
 use super::PipelineError;
 use super::watch::{Event, Watcher};
@@ -18,6 +19,7 @@ use crate::geom::{Aabb, HilbertFrame};
 use crate::mesh::anatomy::FACES;
 use crate::mesh::{Mesh, VertexTag, dense};
 use crate::store::{Pages, Sorted, Sorter, stop_if_requested};
+use crate::topology::Owners;
 
 /// Where and how to seal.
 pub(super) struct Target<'a> {
@@ -28,6 +30,8 @@ pub(super) struct Target<'a> {
     /// Bytes for sort runs and for the writer together.
     pub memory: u64,
     pub bounds: Aabb,
+    /// Owners of the faces of the cuts around it, by cut.
+    pub owners: &'a BTreeMap<u32, Owners>,
 }
 
 /// Writes `mesh` to `target`. Effects: the mesh's scratch map is used up; `tet_of` must be right for all vertices.
@@ -51,7 +55,7 @@ pub(super) fn seal<P: Pages>(
     Ok(writer.finish()?)
 }
 
-fn tell(watch: &Watcher, stage: &str, done: u64, total: u32) {
+fn tell(watch: &Watcher, stage: &'static str, done: u64, total: u32) {
     if done.is_multiple_of(65_536) {
         stop_if_requested();
         watch(Event {
@@ -94,6 +98,11 @@ fn vertices<P: Pages>(
                     index: owner_index,
                 };
                 (tag::SURFACE, id.number())
+            }
+            VertexTag::Interface => {
+                let (cut, index) = mesh.interface_vertex(v);
+                let owner = Owner::Cut(cut);
+                (tag::INTERFACE, VertexId { owner, index }.number())
             }
             VertexTag::Steiner => (tag::STEINER, SealedVertex::own_id(target.subdomain, local)),
             _ => (tag::FREE, SealedVertex::own_id(target.subdomain, local)),
@@ -172,41 +181,107 @@ fn face_record(face: [u32; 3], number: u32, odd: bool) -> FaceRecord {
     record
 }
 
-/// Joins facets with the faces of tetrahedra; both ascend by their sorted vertices.
+/// What claims a required face.
+const FACET: u8 = 0;
+const INTERFACE: u8 = 1;
+/// Vertices ascending, number, parity, kind.
+type ClaimRecord = [u8; 18];
+
+/// Joins facets and interface faces with the faces of tetrahedra; all ascend by their sorted vertices.
 fn facets<P: Pages>(
     mesh: &mut Mesh<P>,
     faces: Sorted<17>,
     target: &Target,
     writer: &mut SealedWriter,
 ) -> Result<(), PipelineError> {
-    let mut sorter = Sorter::<17>::new(target.scratch, target.memory / 4);
+    let mut sorter = Sorter::<18>::new(target.scratch, target.memory / 4);
     for n in 0..mesh.n_facets() {
-        let facet = mesh.facet(n);
-        let (face, odd) = sorted_face(facet.vertices.map(|v| mesh.scratch(dense(v))));
-        sorter.push(face_record(face, n, odd))?;
+        let vertices = mesh.facet(n).vertices.map(|v| mesh.scratch(dense(v)));
+        sorter.push(claim_record(vertices, n, FACET))?;
+    }
+    for n in 0..mesh.n_interface_faces() {
+        let face = mesh.interface_face(n);
+        let vertices = face.vertices.map(|v| mesh.scratch(dense(v)));
+        sorter.push(claim_record(vertices, n, INTERFACE))?;
     }
     let mut faces = faces.peekable();
-    for record in sorter.finish()? {
-        let record = record?;
-        let facet = mesh.facet(word(&record, 12));
-        let mut sides = [NONE; 2];
-        while let Some(face) =
-            faces.next_if(|f| f.as_ref().map_or(true, |f| f[..12] <= record[..12]))
-        {
-            let face = face?;
-            if face[..12] == record[..12] {
-                // A tetrahedron sees its face from inside turn as the facet does when it lies behind it.
-                sides[usize::from(face[16] == record[16])] = word(&face, 12);
+    // A face may be both a facet and an interface face: what was read stays at hand.
+    let (mut at, mut sides) = ([0; 12], [NONE; 2]);
+    for claim in sorter.finish()? {
+        let claim = claim?;
+        if claim[..12] != at || sides == [NONE; 2] {
+            sides = [NONE; 2];
+            at.copy_from_slice(&claim[..12]);
+            while let Some(face) =
+                faces.next_if(|f| f.as_ref().map_or(true, |f| f[..12] <= claim[..12]))
+            {
+                let face = face?;
+                if face[..12] == claim[..12] {
+                    sides[usize::from(face[16])] = word(&face, 12);
+                }
             }
         }
-        writer.push_facet(SealedFacet {
-            vertices: facet.vertices.map(|v| mesh.scratch(dense(v))),
-            label: facet.label,
-            triangle: facet.input,
-            regions: facet.regions,
-            tets: sides,
-        })?;
+        // A tetrahedron sees its face from inside turn as the facet does when it lies behind it.
+        let odd = usize::from(claim[16]);
+        let tets = [sides[1 - odd], sides[odd]];
+        let number = word(&claim, 12);
+        if claim[17] == FACET {
+            push_facet(mesh, number, tets, writer)?;
+        } else {
+            push_interface_face(mesh, number, tets[1], target, writer)?;
+        }
     }
+    Ok(())
+}
+
+fn claim_record(vertices: [u32; 3], number: u32, kind: u8) -> ClaimRecord {
+    let (face, odd) = sorted_face(vertices);
+    let mut record: ClaimRecord = [0; 18];
+    record[..17].copy_from_slice(&face_record(face, number, odd));
+    record[17] = kind;
+    record
+}
+
+fn push_facet<P: Pages>(
+    mesh: &mut Mesh<P>,
+    number: u32,
+    tets: [u32; 2],
+    writer: &mut SealedWriter,
+) -> Result<(), PipelineError> {
+    let facet = mesh.facet(number);
+    writer.push_facet(SealedFacet {
+        vertices: facet.vertices.map(|v| mesh.scratch(dense(v))),
+        label: facet.label,
+        triangle: facet.input,
+        regions: facet.regions,
+        tets,
+    })?;
+    Ok(())
+}
+
+fn push_interface_face<P: Pages>(
+    mesh: &mut Mesh<P>,
+    number: u32,
+    tet: u32,
+    target: &Target,
+    writer: &mut SealedWriter,
+) -> Result<(), PipelineError> {
+    let face = mesh.interface_face(number);
+    let owners = target.owners.get(&face.cut);
+    let other = owners.and_then(|o| o.other(face.index, face.side));
+    let (Some(other), true) = (other, tet != NONE) else {
+        panic!(
+            "face {} of cut {} has no owner on the other side, or no tetrahedron in sub-domain {}",
+            face.index, face.cut, target.subdomain
+        );
+    };
+    writer.push_interface_face(InterfaceFace {
+        vertices: face.vertices.map(|v| mesh.scratch(dense(v))),
+        cut: face.cut,
+        index: face.index,
+        other,
+        tet,
+    })?;
     Ok(())
 }
 

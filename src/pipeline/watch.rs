@@ -1,13 +1,13 @@
 /// What a long run says while it works.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Event<'a> {
+pub struct Event {
     /// Name of the stage: one or two words, always the same for the same work.
-    pub stage: &'a str,
+    pub stage: &'static str,
     /// Work done so far, in `unit`.
     pub done: u64,
     /// Work there is in all, where that is known.
     pub total: Option<u64>,
-    pub unit: &'a str,
+    pub unit: &'static str,
 }
 
 /// Is told [`Event`]s, often; it must be quick.

@@ -100,7 +100,12 @@ impl Worker {
         if metric <= long {
             return;
         }
-        let pieces = (metric.round() as u32).clamp(2, PIECES_MAX);
+        let Some([from, to]) = field.place.stretch(pa, pb) else {
+            return;
+        };
+        // An edge short enough is divided as it is everywhere; of a long one only the stretch counts, so that its
+        // few pieces at a time do not step over the place.
+        let whole = metric <= f64::from(PIECES_MAX) || to - from >= 1.0;
         let class = if metric > 4.0 {
             0
         } else if metric > JITTER_FROM {
@@ -108,20 +113,35 @@ impl Worker {
         } else {
             2
         };
-        for k in 1..pieces {
-            let u = division(f64::from(k) / f64::from(pieces), hb / ha);
-            let mut point = pa + (pb - pa) * u;
+        let mut try_point = |mut point: Point| {
             let mut h = (field.h)(point);
             if metric > JITTER_FROM {
                 point += jitter(point) * (JITTER * h);
                 h = (field.h)(point);
             }
-            self.candidates.push(Candidate {
-                point,
-                h: h as f32,
-                tet,
-                key: class << 62 | self.order.index(point) >> 2,
-            });
+            if field.place.admits(point, h) {
+                self.candidates.push(Candidate {
+                    point,
+                    h: h as f32,
+                    tet,
+                    key: class << 62 | self.order.index(point) >> 2,
+                });
+            }
+        };
+        if whole {
+            let pieces = (metric.round() as u32).clamp(2, PIECES_MAX);
+            for k in 1..pieces {
+                let u = division(f64::from(k) / f64::from(pieces), hb / ha);
+                try_point(pa + (pb - pa) * u);
+            }
+        } else {
+            let middle = (field.h)(pa + (pb - pa) * (0.5 * (from + to)));
+            let pieces = ((to - from) * length / middle).round() as u32;
+            let pieces = pieces.clamp(1, PIECES_MAX);
+            for k in 0..pieces {
+                let u = from + (to - from) * ((f64::from(k) + 0.5) / f64::from(pieces));
+                try_point(pa + (pb - pa) * u);
+            }
         }
     }
 }

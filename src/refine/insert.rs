@@ -1,10 +1,11 @@
 //! Insert one candidate, or leave the mesh as it is.
 
 use super::candidates::Candidate;
-use super::{RefineReport, Worker};
+use super::{Field, RefineReport, Worker};
 use crate::delaunay::{Located, Rejected};
 use crate::geom::Point;
 use crate::mesh::Mesh;
+use crate::mesh::anatomy::FROZEN;
 use crate::store::Pages;
 
 /// Least distance to a vertex, in units of the mean of both wanted lengths.
@@ -17,6 +18,7 @@ impl Worker {
     pub(super) fn try_insert<P: Pages>(
         &mut self,
         mesh: &mut Mesh<P>,
+        field: &Field,
         c: &Candidate,
         report: &mut RefineReport,
     ) {
@@ -52,6 +54,16 @@ impl Worker {
             report.near += 1;
             return;
         }
+        if self.wants_frozen(mesh) {
+            self.kernel.discard(mesh);
+            report.frozen_hits += 1;
+            return;
+        }
+        if field.place.forbids(c.point, f64::from(c.h)) {
+            self.kernel.discard(mesh);
+            report.out_of_place += 1;
+            return;
+        }
         let v = mesh.add_vertex(c.point, c.h);
         let recycled = self.kernel.cavity().len();
         self.last = self.kernel.fill(mesh, v);
@@ -69,6 +81,13 @@ impl Worker {
         self.kernel
             .locate(mesh, c.point, c.tet)
             .or_else(|_| self.kernel.locate(mesh, c.point, self.last))
+    }
+
+    /// Whether the gathered cavity holds a tetrahedron frozen beside an interface: its face there is an outer one.
+    fn wants_frozen<P: Pages>(&mut self, mesh: &mut Mesh<P>) -> bool {
+        (self.kernel.faces().iter())
+            .filter(|f| f.required)
+            .any(|f| mesh.tet_attribute(f.inside.tet()).1 & FROZEN != 0)
     }
 
     /// Whether the gathered cavity has a required face too near.

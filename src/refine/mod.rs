@@ -10,6 +10,7 @@
 
 mod candidates;
 mod insert;
+mod place;
 
 use crate::delaunay::Kernel;
 use crate::geom::{Aabb, HilbertFrame, Point};
@@ -17,6 +18,7 @@ use crate::mesh::{Mesh, Workspace, dense, renumber, sparse};
 use crate::store::{Pages, StoreError, stop_if_requested};
 
 use candidates::Candidate;
+pub use place::{Everywhere, Place};
 
 /// Tetrahedra of one block. Small enough that a block's candidates fit a small lease, large enough that
 /// sorting along the curve pays; the mesh depends on it, so it is a constant of the format of results.
@@ -32,6 +34,8 @@ const GROWTH: f64 = 1.5;
 pub struct Field<'a> {
     /// Wanted edge length at a position.
     pub h: &'a dyn Fn(Point) -> f64,
+    /// Where points may go.
+    pub place: &'a dyn Place,
     /// Box of the mesh, which fixes the order along the curve.
     pub bounds: Aabb,
 }
@@ -46,6 +50,10 @@ pub struct RefineReport {
     pub near: u64,
     /// No cavity that keeps the required faces, or a walk that left the mesh.
     pub blocked: u64,
+    /// Refused for nothing but their place.
+    pub out_of_place: u64,
+    /// Cavities that wanted a tetrahedron frozen beside an interface.
+    pub frozen_hits: u64,
     /// Edges still longer than √2 when the passes ended.
     pub unsaturated: u64,
 }
@@ -125,7 +133,7 @@ impl Worker {
             report.candidates += self.candidates.len() as u64;
             let candidates = std::mem::take(&mut self.candidates);
             for candidate in &candidates {
-                self.try_insert(mesh, candidate, report);
+                self.try_insert(mesh, field, candidate, report);
             }
             self.candidates = candidates;
         }

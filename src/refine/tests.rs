@@ -13,7 +13,11 @@ fn cube(h: f64, pager: Pager) -> (Mesh<Pager>, RefineReport) {
         mesh.set_size(v, h as f32);
         assert_eq!(mesh.vertex_attribute(v).0, VertexTag::EnclosingBox);
     }
-    let field = Field { h: &|_| h, bounds };
+    let field = Field {
+        h: &|_| h,
+        place: &super::Everywhere,
+        bounds,
+    };
     let dir = tempfile::tempdir().expect("a temporary directory");
     let space = Workspace {
         dir: dir.path(),

@@ -44,6 +44,15 @@ pub struct PagerStats {
     pub commits: u64,
 }
 
+impl PagerStats {
+    /// Adds the traffic of another pager.
+    pub fn add(&mut self, other: Self) {
+        self.pages_read += other.pages_read;
+        self.pages_written += other.pages_written;
+        self.commits += other.commits;
+    }
+}
+
 /// Pages of one sub-domain under a fixed number of frames.
 ///
 /// Is not: shared. Each worker owns its pager, so the hot path takes no lock.

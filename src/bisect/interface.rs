@@ -1,0 +1,190 @@
+//! The interface: a minimum cut of the cutting zone, then moves that no sum over faces can see.
+//!
+//! Labels by the side of the middle give 3.85 faces per h² of the plane, many tetrahedra with two or three of them and pinched
+//! vertices. The minimum cut of the dual graph is the best of all interfaces for any cost that is a sum over faces:
+//! 2.8 faces per h². Over-constrained tetrahedra and pinched vertices depend on several faces at once; they are reduced by
+//! moving all free tetrahedra around an interface vertex to one side, or a single tetrahedron, as long as that gains.
+//!
+//! Source: the paper, section 1.1, "Choosing the interface", which makes the moves alone.
+
+use super::core::Rim;
+use super::flow::{Graph, NOBODY};
+use super::labels::{
+    InterfaceMeasures, begin, face_cost, is_free, is_high, measure, set_high,
+};
+use super::moves::Moves;
+use super::surface::CuttingSurface;
+use crate::geom::Point;
+use crate::mesh::{Mesh, dense};
+use crate::store::{Pages, stop_if_requested};
+use tetdb_schema::page::NONE;
+
+/// Nodes of a graph that is cut at once; wider interfaces are cut strip by strip, twice, the second time with the strips
+/// moved by half. The result depends on it, so it is a constant.
+const STRIP: usize = 400_000;
+/// Capacities are costs in this fraction.
+const SCALE: f64 = 256.0;
+
+/// Steps of the choice, for comparing what each brings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Steps {
+    pub minimum_cut: bool,
+    pub vertex_moves: bool,
+    pub tet_moves: bool,
+}
+
+impl Default for Steps {
+    fn default() -> Self {
+        Self {
+            minimum_cut: true,
+            vertex_moves: true,
+            tet_moves: true,
+        }
+    }
+}
+
+/// How the interface came about.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct InterfaceReport {
+    /// Tetrahedra of the cutting zone.
+    pub free_tets: u64,
+    /// By the side of the middles.
+    pub natural: InterfaceMeasures,
+    /// After the minimum cut.
+    pub minimum: InterfaceMeasures,
+    /// In the end.
+    pub chosen: InterfaceMeasures,
+    /// Rounds of the flow, over all strips.
+    pub flow_rounds: u64,
+    /// Moves accepted.
+    pub moves: u64,
+}
+
+/// Labels the core. Effects: its scratch map is used up; `tet_of` must be right.
+pub(super) fn choose<P: Pages>(
+    core: &mut Mesh<P>,
+    surface: &dyn CuttingSurface,
+    rim: &Rim,
+    steps: Steps,
+) -> InterfaceReport {
+    let free = begin(core, surface, rim);
+    let mut report = InterfaceReport {
+        free_tets: free.len() as u64,
+        ..InterfaceReport::default()
+    };
+    let mut moves = Moves::new(surface, rim);
+    report.natural = measure(core, rim);
+    report.natural.pinched = moves.count_pinched(core, &free);
+    if steps.minimum_cut {
+        report.flow_rounds = minimum_cut(core, surface, &free);
+    }
+    report.minimum = measure(core, rim);
+    report.minimum.pinched = moves.count_pinched(core, &free);
+    report.moves = moves.run(core, &free, steps);
+    report.chosen = measure(core, rim);
+    report.chosen.pinched = moves.count_pinched(core, &free);
+    report
+}
+
+/// Cuts strip by strip; returns the rounds of the flow.
+fn minimum_cut<P: Pages>(core: &mut Mesh<P>, surface: &dyn CuttingSurface, free: &[u32]) -> u64 {
+    core.clear_scratch();
+    for n in 0..dense(core.tet_ids_end()) {
+        core.set_scratch(n, NONE);
+    }
+    let mut order = free.to_vec();
+    let strips = free.len().div_ceil(STRIP).max(1);
+    if strips > 1 {
+        sort_along(core, surface, &mut order);
+    }
+    let mut graph = Graph::default();
+    let mut rounds = 0;
+    let length = free.len().div_ceil(strips).max(1);
+    for strip in order.chunks(length) {
+        rounds += cut_strip(core, surface, strip, &mut graph);
+    }
+    if strips > 1 {
+        let half = length / 2;
+        for strip in order[half..].chunks(length) {
+            rounds += cut_strip(core, surface, strip, &mut graph);
+        }
+    }
+    core.clear_scratch();
+    rounds
+}
+
+/// Sorts along the longest direction in the surface, among three.
+fn sort_along<P: Pages>(core: &mut Mesh<P>, surface: &dyn CuttingSurface, order: &mut Vec<u32>) {
+    let Some(&first) = order.first() else { return };
+    let tet = core.tet(first);
+    let normal = surface.normal(core.points(&tet)[0]);
+    let mut axes = [Point::X, Point::Y, Point::Z].map(|a| a - normal * normal.dot(a));
+    axes.sort_by(|a, b| b.length_squared().total_cmp(&a.length_squared()));
+    let axes = [axes[0].normalize(), normal.cross(axes[0].normalize())];
+    let mut ends = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
+    for &t in order.iter() {
+        let tet = core.tet(t);
+        let m = super::core::middle(core, &tet);
+        for (axis, end) in axes.iter().zip(&mut ends) {
+            let s = axis.dot(m);
+            *end = [end[0].min(s), end[1].max(s)];
+        }
+    }
+    let longer = usize::from(ends[1][1] - ends[1][0] > ends[0][1] - ends[0][0]);
+    let mut keyed: Vec<(f64, u32)> = order
+        .iter()
+        .map(|&t| {
+            let tet = core.tet(t);
+            (axes[longer].dot(super::core::middle(core, &tet)), t)
+        })
+        .collect();
+    keyed.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    order.clear();
+    order.extend(keyed.into_iter().map(|(_, t)| t));
+}
+
+fn cut_strip<P: Pages>(
+    core: &mut Mesh<P>,
+    surface: &dyn CuttingSurface,
+    strip: &[u32],
+    graph: &mut Graph,
+) -> u64 {
+    stop_if_requested();
+    for (node, &t) in strip.iter().enumerate() {
+        core.set_scratch(dense(t), node as u32);
+    }
+    graph.clear();
+    for &t in strip {
+        let tet = core.tet(t);
+        let mut neighbor = [NOBODY; 4];
+        let mut capacity = [0; 4];
+        let mut terminal = [0; 2];
+        for (i, across) in tet.neighbor.into_iter().enumerate() {
+            if !across.exists() {
+                continue;
+            }
+            let corners = tet.face(i).map(|v| core.point(v));
+            let cost = symmetric_cost(corners, surface);
+            let node = core.scratch(dense(across.tet()));
+            if node != NONE {
+                (neighbor[i], capacity[i]) = (node, cost);
+            } else {
+                terminal[usize::from(is_high(core, across.tet()))] += cost;
+            }
+        }
+        graph.push(neighbor, capacity, terminal);
+    }
+    let value = graph.cut();
+    for (node, &t) in strip.iter().enumerate() {
+        debug_assert!(is_free(core, t));
+        set_high(core, t, !graph.is_source_side(node as u32));
+        core.set_scratch(dense(t), NONE);
+    }
+    u64::from(value.rounds)
+}
+
+/// The cost of a face as a whole number, the same from both sides: its corners are taken in the order of their coordinates.
+fn symmetric_cost(mut corners: [Point; 3], surface: &dyn CuttingSurface) -> u32 {
+    corners.sort_unstable_by(|&a, &b| crate::geom::lex_cmp(a, b));
+    (SCALE * face_cost(corners, surface)).round() as u32
+}

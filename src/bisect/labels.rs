@@ -1,0 +1,195 @@
+//! Which side of the cut each tetrahedron of the core is on, and what that costs.
+
+use super::core::{Rim, middle, place, tet_ids};
+use super::surface::CuttingSurface;
+use crate::geom::Point;
+use crate::mesh::{Mesh, Tet};
+use crate::store::{Pages, stop_if_requested};
+
+/// Tetrahedra with a vertex nearer than this, in units of its h, may go to either side: the cutting zone. At 2.5 the interface has
+/// one face in a hundred less, and its spheres reach out of the refined zone.
+const FREE: f64 = 1.4;
+
+/// Bits of the attribute flags of the core's tetrahedra.
+const HIGH: u32 = 1 << 1;
+const MAY_CHANGE: u32 = 1 << 2;
+
+/// Which side `t` is on: `true` for the high one.
+#[inline]
+pub(super) fn is_high<P: Pages>(core: &mut Mesh<P>, t: u32) -> bool {
+    core.tet_attribute(t).1 & HIGH != 0
+}
+
+/// Whether `t` may go to either side.
+#[inline]
+pub(super) fn is_free<P: Pages>(core: &mut Mesh<P>, t: u32) -> bool {
+    core.tet_attribute(t).1 & MAY_CHANGE != 0
+}
+
+/// Puts `t` on a side.
+#[inline]
+pub(super) fn set_high<P: Pages>(core: &mut Mesh<P>, t: u32, high: bool) {
+    let (region, flags) = core.tet_attribute(t);
+    let flags = if high { flags | HIGH } else { flags & !HIGH };
+    core.set_tet_attribute(t, region, flags);
+}
+
+/// Labels every tetrahedron by the side of its middle; lists those of the cutting zone, in id order.
+///
+/// At the rim the side is that of the rim face: the tetrahedron beyond has all its vertices there.
+pub(super) fn begin<P: Pages>(
+    core: &mut Mesh<P>,
+    surface: &dyn CuttingSurface,
+    rim: &Rim,
+) -> Vec<u32> {
+    let mut free = Vec::new();
+    for t in tet_ids(core) {
+        let tet = core.tet(t);
+        if !tet.is_live() {
+            continue;
+        }
+        let (sides, least) = place(core, &tet, surface);
+        let mut high = surface.distance(middle(core, &tet)) >= 0.0;
+        let mut may_change = sides.crosses() || least <= FREE;
+        for i in 0..4 {
+            if !tet.neighbor[i].exists() && rim.find(tet.face(i)).is_some() {
+                may_change = false;
+                high = surface.distance(core.point(tet.face(i)[0])) >= 0.0;
+            }
+        }
+        if !sides.crosses() {
+            // A middle that rounds to the other side must not tell another side than its vertices.
+            high = sides.high;
+        }
+        if may_change {
+            free.push(t);
+        }
+        let flags = u32::from(high) * HIGH | u32::from(may_change) * MAY_CHANGE;
+        let (region, _) = core.tet_attribute(t);
+        core.set_tet_attribute(t, region, flags);
+        if t & 1023 == 0 {
+            stop_if_requested();
+        }
+    }
+    free
+}
+
+/// Longest edge of a triangle over its inradius, 1 for the regular one.
+pub(super) fn triangle_quality([a, b, c]: [Point; 3]) -> f64 {
+    let (x, y, z) = (a.distance(b), b.distance(c), c.distance(a));
+    let area = 0.5 * (b - a).cross(c - a).length();
+    let inradius = 2.0 * area / (x + y + z);
+    x.max(y).max(z) / (2.0 * 3f64.sqrt() * inradius.max(f64::MIN_POSITIVE))
+}
+
+/// Greatest shape term of a face: what is worse than this is all the same.
+const SHAPE_MAX: f64 = 20.0;
+
+/// Cost of a face on the interface: 1, and more for a bad shape or a slope.
+pub(super) fn face_cost(corners: [Point; 3], surface: &dyn CuttingSurface) -> f64 {
+    let [a, b, c] = corners;
+    let normal = (b - a).cross(c - a).normalize_or_zero();
+    let shape = (triangle_quality(corners) - 1.0).min(SHAPE_MAX);
+    1.0 + 0.5 * shape + 0.5 * (1.0 - normal.dot(surface.normal(a)).abs())
+}
+
+/// What an interface is like.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct InterfaceMeasures {
+    pub faces: u64,
+    /// Sum of the faces' qualities (longest edge over inradius, 1 is regular).
+    pub quality_sum: f64,
+    /// Tetrahedra with two or more faces that are interface faces or required.
+    pub over_constrained: u64,
+    /// Vertices around which a side has more than one part.
+    pub pinched: u64,
+}
+
+impl InterfaceMeasures {
+    /// Mean quality of the faces.
+    pub fn quality_mean(&self) -> f64 {
+        self.quality_sum / (self.faces.max(1)) as f64
+    }
+}
+
+/// Faces of the interface at `tet`: local numbers.
+pub(super) fn interface_faces<P: Pages>(
+    core: &mut Mesh<P>,
+    t: u32,
+    tet: &Tet,
+) -> impl Iterator<Item = usize> + use<P> {
+    let high = is_high(core, t);
+    let mut found = [false; 4];
+    for (i, across) in tet.neighbor.into_iter().enumerate() {
+        found[i] = across.exists() && is_high(core, across.tet()) != high;
+    }
+    (0..4).filter(move |&i| found[i])
+}
+
+/// Counts faces and over-constrained tetrahedra; pinched vertices are counted elsewhere.
+pub(super) fn measure<P: Pages>(core: &mut Mesh<P>, rim: &Rim) -> InterfaceMeasures {
+    let mut measures = InterfaceMeasures::default();
+    for t in tet_ids(core) {
+        let tet = core.tet(t);
+        if !tet.is_live() {
+            continue;
+        }
+        let high = is_high(core, t);
+        let mut constrained = 0;
+        let mut cut = 0;
+        for i in interface_faces(core, t, &tet) {
+            cut += 1;
+            if !high {
+                measures.faces += 1;
+                let corners = tet.face(i).map(|v| core.point(v));
+                measures.quality_sum += triangle_quality(corners);
+            }
+        }
+        if cut == 0 {
+            continue;
+        }
+        for i in 0..4 {
+            constrained += u32::from(is_constrained(core, &tet, i, rim));
+        }
+        let inner = (interface_faces(core, t, &tet)).filter(|&i| !tet.is_required(i));
+        measures.over_constrained += u64::from(inner.count() as u32 + constrained >= 2);
+    }
+    measures
+}
+
+/// Whether face `i` is required for ever, not only as a part of the rim.
+pub(super) fn is_constrained<P: Pages>(
+    _core: &mut Mesh<P>,
+    tet: &Tet,
+    i: usize,
+    rim: &Rim,
+) -> bool {
+    tet.is_required(i) && (tet.neighbor[i].exists() || rim.find(tet.face(i)).is_none())
+}
+
+/// Tetrahedra with a face on the interface, and how many of them have their circumsphere within the refined zone.
+///
+/// The zone is taken at its narrowest and h at the center less what the gradation lets it fall within the sphere.
+pub(super) fn enclosed<P: Pages>(
+    core: &mut Mesh<P>,
+    surface: &dyn CuttingSurface,
+    h: &dyn Fn(Point) -> f64,
+) -> (u64, u64) {
+    let (mut all, mut within) = (0, 0);
+    for t in tet_ids(core) {
+        let tet = core.tet(t);
+        if !tet.is_live() || interface_faces(core, t, &tet).next().is_none() {
+            continue;
+        }
+        all += 1;
+        let [a, b, c, d] = core.points(&tet);
+        let (u, v, w) = (b - a, c - a, d - a);
+        let sum = v.cross(w) * u.dot(u) + w.cross(u) * v.dot(v) + u.cross(v) * w.dot(w);
+        let to_center = sum / (2.0 * u.cross(v).dot(w));
+        let (center, radius) = (a + to_center, to_center.length());
+        // Sizes at the corners bound that of the center where the sphere is large.
+        let size = h(center) * super::zone::WIDTH_MIN;
+        within += u64::from(surface.distance(center).abs() + radius * 1.0001 <= size);
+    }
+    (all, within)
+}

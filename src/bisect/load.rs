@@ -1,0 +1,88 @@
+//! The load ∫ h⁻³ of a mesh in pieces small enough for h to be known in them.
+//!
+//! A coarse tetrahedron may span the whole domain while h varies tenfold within: its corners say nothing of its
+//! middle. It is divided along its longest edge until h varies little between the corners and the edge is a bounded number of
+//! wanted lengths long; the pieces then have a closed form.
+
+use crate::geom::Point;
+use crate::mesh::Mesh;
+use crate::sizing::load_of_tet;
+use crate::store::{Pages, stop_if_requested};
+
+/// Longest edge of a piece in units of its smallest h: a narrow dip of a field graded by 1.3 per unit length is not stepped over.
+const EDGE_MAX: f64 = 12.0;
+/// Largest ratio of sizes at the corners of a piece that is longer than [`EDGE_FINE`].
+const RATIO_MAX: f64 = 1.5;
+/// Pieces of about the wanted length are not divided further.
+const EDGE_FINE: f64 = 2.0;
+
+/// A piece of a tetrahedron.
+#[derive(Clone, Copy, Debug)]
+pub struct Piece {
+    pub points: [Point; 4],
+    /// Load ∫ h⁻³ of the piece.
+    pub load: f64,
+    /// Wanted length in its middle, as the mean of the corners.
+    pub h: f64,
+}
+
+/// Calls `visit` with every piece of every tetrahedron, in an order that depends on the mesh alone.
+pub fn for_each_piece<P: Pages>(
+    mesh: &mut Mesh<P>,
+    h: &dyn Fn(Point) -> f64,
+    mut visit: impl FnMut(&Piece),
+) {
+    let mut stack: Vec<([Point; 4], [f64; 4])> = Vec::new();
+    let mut from = 0;
+    while let Some((t, tet)) = mesh.next_tet(from) {
+        from = t + 1;
+        if t & 1023 == 0 {
+            stop_if_requested();
+        }
+        let points = mesh.points(&tet);
+        let sizes = std::array::from_fn(|i| f64::from(mesh.size(tet.vertex(i))));
+        stack.push((points, sizes));
+        while let Some((points, sizes)) = stack.pop() {
+            let (edge, [i, j]) = longest(&points);
+            let least = sizes.iter().fold(f64::INFINITY, |m, &x| m.min(x));
+            let most = sizes.iter().fold(0.0, |m: f64, &x| m.max(x));
+            let coarse = edge > EDGE_MAX * least || most > RATIO_MAX * least;
+            if coarse && edge > EDGE_FINE * least {
+                let middle = (points[i] + points[j]) * 0.5;
+                let size = h(middle);
+                for end in [i, j] {
+                    let (mut p, mut s) = (points, sizes);
+                    (p[end], s[end]) = (middle, size);
+                    stack.push((p, s));
+                }
+                continue;
+            }
+            let [a, b, c, d] = points;
+            let volume = (b - a).cross(c - a).dot(d - a) / 6.0;
+            visit(&Piece {
+                points,
+                load: load_of_tet(volume.max(0.0), sizes),
+                h: sizes.iter().sum::<f64>() * 0.25,
+            });
+        }
+    }
+}
+
+/// The longest edge (the first of equals) and its ends.
+fn longest(p: &[Point; 4]) -> (f64, [usize; 2]) {
+    let (mut most, mut ends) = (-1.0, [0, 1]);
+    for pair in crate::mesh::anatomy::EDGES {
+        let length = (p[pair[0]] - p[pair[1]]).length_squared();
+        if length > most {
+            (most, ends) = (length, pair);
+        }
+    }
+    (most.sqrt(), ends)
+}
+
+/// The load of the whole mesh.
+pub fn load_of<P: Pages>(mesh: &mut Mesh<P>, h: &dyn Fn(Point) -> f64) -> f64 {
+    let mut sum = 0.0;
+    for_each_piece(mesh, h, |piece| sum += piece.load);
+    sum
+}

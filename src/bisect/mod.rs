@@ -1,0 +1,125 @@
+//! One cut: plane, refined zone, interface, two children.
+//!
+//! 1. `plane`: across an axis of inertia of the load to come, where the load is shared as wanted.
+//! 2. `zone`: edges that meet a band around it are divided until the band has its final density.
+//! 3. `core`: its middle is copied out and optimized as a mesh of its own.
+//! 4. `interface`: faces of these final tetrahedra are chosen, by a minimum cut and moves; from then on they are required.
+//! 5. `split`: each side becomes a mesh of its own.
+//!
+//! What later vertices could destroy of the tetrahedra at the interface (Z) is frozen, so that what is valid stays valid; whether
+//! they ever wanted to is counted. When they did not, the interface has cost the Delaunay property nothing.
+//!
+//! Source: the paper, section 1.1.
+
+mod core;
+mod flow;
+mod interface;
+mod labels;
+mod load;
+mod moves;
+mod plane;
+mod split;
+mod surface;
+mod zone;
+
+pub use interface::{InterfaceReport, Steps};
+pub use labels::InterfaceMeasures;
+pub use load::{Piece, for_each_piece, load_of};
+pub use plane::{ChosenPlane, PlaneChoice, choose as choose_plane, principal_axes};
+pub use split::write_child;
+pub use surface::{CuttingSurface, Plane};
+pub use zone::{OutsideZones, WIDTH_MIN, WIDTH_NOISE, Zone};
+
+use crate::geom::{Aabb, Point};
+use crate::mesh::{Mesh, Workspace};
+use crate::optimize::{self, Settings};
+use crate::refine::{Field, RefineReport, saturate};
+use crate::store::{Pages, StoreError};
+
+/// What a cut is to do.
+#[derive(Clone, Copy)]
+pub struct CutPlan<'a> {
+    /// Number of the cut, from 1.
+    pub cut: u32,
+    /// Share of the load that belongs on the low side.
+    pub low: f64,
+    pub choice: PlaneChoice,
+    /// Zones of the cuts above it.
+    pub earlier: &'a [Zone],
+    /// Wanted length at a position.
+    pub h: &'a dyn Fn(Point) -> f64,
+    /// Box of the whole mesh.
+    pub bounds: Aabb,
+    pub optimize: Settings,
+    pub steps: Steps,
+}
+
+/// A sub-domain cut open: its interface is chosen, the children are not yet written.
+pub struct Opened {
+    pub zone: Zone,
+    pub report: CutReport,
+    rim: core::Rim,
+}
+
+/// How a cut went.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CutReport {
+    pub plane: ChosenPlane,
+    pub refine: RefineReport,
+    pub interface: InterfaceReport,
+    /// Interface vertices the cut made, which bear its number.
+    pub vertices: u32,
+    /// Tetrahedra with a face on the interface, and those whose circumsphere lies in the refined zone.
+    pub z_tets: u64,
+    pub z_enclosed: u64,
+}
+
+/// Refines the zone of a cut in `host` and chooses the interface in `core`, which must be empty.
+///
+/// `progress` is told a stage and what was done of it. Effects: all ids of `host` may change. Errors: the disk.
+pub fn open<P: Pages, Q: Pages>(
+    host: &mut Mesh<P>,
+    core: &mut Mesh<Q>,
+    plan: &CutPlan,
+    space: &Workspace,
+    progress: &dyn Fn(&'static str, u64),
+) -> Result<Opened, StoreError> {
+    progress("choose a plane", 0);
+    for v in host.vertex_ids() {
+        let p = host.point(v);
+        host.set_size(v, (plan.h)(p) as f32);
+    }
+    let plane = plane::choose(host, plan.h, plan.bounds.low, plan.low, plan.choice);
+    let zone = Zone {
+        cut: plan.cut,
+        surface: plane.plane,
+    };
+    let field = Field {
+        h: plan.h,
+        place: &zone::InZone {
+            zone: &zone,
+            earlier: plan.earlier,
+            h: plan.h,
+        },
+        bounds: plan.bounds,
+    };
+    let refine = saturate(host, &field, space, &mut |n| progress("refine the zone", n))?;
+    progress("choose the interface", 0);
+    let rim = core::extract(host, core, &zone.surface);
+    optimize::run_with(core, plan.optimize, &|_| {});
+    let interface = interface::choose(core, &zone.surface, &rim, plan.steps);
+    let (_, vertices) = split::number_interface(core, plan.cut);
+    let (z_tets, z_enclosed) = labels::enclosed(core, &zone.surface, plan.h);
+    Ok(Opened {
+        zone,
+        report: CutReport {
+            plane,
+            refine,
+            interface,
+            vertices,
+            z_tets,
+            z_enclosed,
+        },
+        rim,
+    })
+}

@@ -1,0 +1,205 @@
+//! The bisection tree: which parts there are, and what is known of each.
+//!
+//! A part is a run of ranks, named by its first. A cut is named by the first rank of its high side: so cuts are numbered from left to
+//! right, and the tree follows from the number of sub-domains alone.
+
+use crate::bisect::{Plane, Zone};
+use crate::catalog::{Catalog, CatalogError};
+use crate::geom::Point;
+use crate::mesh::{MESH_STATE_WORDS, MeshState};
+use crate::store::kind;
+
+/// Numbers of the catalog's blobs.
+pub(super) mod blob {
+    pub const SIZE_FIELD: u32 = 1;
+    /// How many sub-domains there will be.
+    pub const SUBDOMAINS: u32 = 3;
+    /// Of each part: its mesh.
+    pub const PART: u32 = 1 << 20;
+    /// Of each cut: its plane.
+    pub const CUT: u32 = 2 << 20;
+    /// Of each cut: who owns its faces.
+    pub const OWNERS: u32 = 3 << 20;
+    /// Of each sealed sub-domain: regions and interfaces.
+    pub const SEALED: u32 = 4 << 20;
+}
+
+/// Ranks `first..first + count`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Part {
+    pub first: u32,
+    pub count: u32,
+}
+
+impl Part {
+    /// The cut that divides it: the first rank of its high child.
+    pub(super) fn cut(self) -> u32 {
+        self.first + self.count / 2
+    }
+
+    pub(super) fn children(self) -> [Self; 2] {
+        let low = self.count / 2;
+        [
+            Self {
+                first: self.first,
+                count: low,
+            },
+            Self {
+                first: self.first + low,
+                count: self.count - low,
+            },
+        ]
+    }
+
+    /// Share of the load that belongs to the low child.
+    pub(super) fn low_share(self) -> f64 {
+        f64::from(self.count / 2) / f64::from(self.count)
+    }
+
+    /// The cuts above it, from the top, in a tree of `n` sub-domains.
+    pub(super) fn cuts_above(self, n: u32) -> Vec<u32> {
+        let mut cuts = Vec::new();
+        let mut at = Self { first: 0, count: n };
+        while at != self {
+            cuts.push(at.cut());
+            let [low, high] = at.children();
+            at = if self.first < high.first { low } else { high };
+        }
+        cuts
+    }
+}
+
+/// A part's working mesh, as its file holds it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PartMesh {
+    pub part: Part,
+    pub generation: u32,
+    pub state: MeshState,
+    pub extents: [[u32; 2]; kind::ALL.len()],
+    /// Predicted load of the part.
+    pub load: f64,
+}
+
+const PART_WORDS: usize = 4 + MESH_STATE_WORDS + 2 * kind::ALL.len();
+
+impl PartMesh {
+    pub(super) fn to_bytes(self) -> Vec<u8> {
+        let load = self.load.to_bits();
+        let head = [self.part.count, self.generation, load as u32, (load >> 32) as u32];
+        let words = (head.into_iter())
+            .chain(self.state.to_words())
+            .chain(self.extents.into_iter().flatten());
+        words.flat_map(u32::to_le_bytes).collect()
+    }
+
+    fn from_bytes(first: u32, bytes: &[u8]) -> Option<Self> {
+        let words: Vec<u32> = bytes
+            .chunks_exact(4)
+            .map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+            .collect();
+        if words.len() != PART_WORDS {
+            return None;
+        }
+        let (state, extents) = words[4..].split_at(MESH_STATE_WORDS);
+        Some(Self {
+            part: Part {
+                first,
+                count: words[0],
+            },
+            generation: words[1],
+            load: f64::from_bits(u64::from(words[2]) | u64::from(words[3]) << 32),
+            state: MeshState::from_words(std::array::from_fn(|i| state[i])),
+            extents: std::array::from_fn(|k| [extents[2 * k], extents[2 * k + 1]]),
+        })
+    }
+}
+
+/// How many sub-domains there will be, once that is decided.
+pub(super) fn n_subdomains(catalog: &mut Catalog) -> Result<u32, CatalogError> {
+    let bytes = catalog.blob(blob::SUBDOMAINS)?.unwrap_or_default();
+    let word = bytes.first_chunk().map(|&b| u32::from_le_bytes(b));
+    Ok(word.unwrap_or(1))
+}
+
+/// All parts, in order of rank.
+pub(super) fn parts(catalog: &mut Catalog, n: u32) -> Result<Vec<PartMesh>, CatalogError> {
+    let mut parts = Vec::new();
+    let mut first = 0;
+    while first < n {
+        let bytes = catalog.blob(blob::PART + first)?.unwrap_or_default();
+        let part = PartMesh::from_bytes(first, &bytes).ok_or_else(|| damaged(catalog, first))?;
+        first += part.part.count.max(1);
+        parts.push(part);
+    }
+    Ok(parts)
+}
+
+fn damaged(catalog: &Catalog, first: u32) -> CatalogError {
+    CatalogError::Content {
+        path: catalog.dir().to_owned(),
+        subdomain: first,
+        what: "its row in the bisection tree is missing or damaged".to_owned(),
+    }
+}
+
+pub(super) fn plane_bytes(plane: &Plane) -> Vec<u8> {
+    let [x, y, z] = plane.normal.to_array();
+    [x, y, z, plane.offset]
+        .into_iter()
+        .flat_map(f64::to_le_bytes)
+        .collect()
+}
+
+/// The zones of the cuts above `part`.
+pub(super) fn zones_above(
+    catalog: &mut Catalog,
+    part: Part,
+    n: u32,
+) -> Result<Vec<Zone>, CatalogError> {
+    let mut zones = Vec::new();
+    for cut in part.cuts_above(n) {
+        let bytes = catalog.blob(blob::CUT + cut)?.unwrap_or_default();
+        let numbers: Vec<f64> = bytes
+            .chunks_exact(8)
+            .map(|b| f64::from_le_bytes(std::array::from_fn(|i| b[i])))
+            .collect();
+        let &[x, y, z, offset] = &numbers[..] else {
+            return Err(damaged(catalog, cut));
+        };
+        let normal = Point::new(x, y, z);
+        let surface = Plane { normal, offset };
+        zones.push(Zone { cut, surface });
+    }
+    Ok(zones)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_number_of_sub_domains_has_a_tree() {
+        for n in [1, 2, 3, 5, 7, 100, 4096] {
+            let mut leaves = 0;
+            let mut cuts = Vec::new();
+            let mut stack = vec![Part { first: 0, count: n }];
+            while let Some(part) = stack.pop() {
+                if part.count == 1 {
+                    assert_eq!(part.first, leaves);
+                    leaves += 1;
+                    continue;
+                }
+                let above = part.cuts_above(n);
+                assert!(above.len() <= 12);
+                cuts.push(part.cut());
+                let [low, high] = part.children();
+                assert_eq!(high.first, part.cut());
+                assert_eq!(high.cuts_above(n), [above, vec![part.cut()]].concat());
+                stack.extend([high, low]);
+            }
+            cuts.sort_unstable();
+            assert_eq!(leaves, n);
+            assert_eq!(cuts, (1..n).collect::<Vec<_>>());
+        }
+    }
+}
