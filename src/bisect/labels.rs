@@ -99,8 +99,10 @@ pub struct InterfaceMeasures {
     pub faces: u64,
     /// Sum of the faces' qualities (longest edge over inradius, 1 is regular).
     pub quality_sum: f64,
-    /// Tetrahedra with two or more faces that are interface faces or required.
+    /// Tetrahedra with two or more interface faces.
     pub over_constrained: u64,
+    /// Tetrahedra with one interface face and a required one: where the interface ends at the surface, most have both.
+    pub at_surface: u64,
     /// Vertices around which a side has more than one part.
     pub pinched: u64,
 }
@@ -151,8 +153,8 @@ pub(super) fn measure<P: Pages>(core: &mut Mesh<P>, rim: &Rim) -> InterfaceMeasu
         for i in 0..4 {
             constrained += u32::from(is_constrained(core, &tet, i, rim));
         }
-        let inner = (interface_faces(core, t, &tet)).filter(|&i| !tet.is_required(i));
-        measures.over_constrained += u64::from(inner.count() as u32 + constrained >= 2);
+        measures.over_constrained += u64::from(cut >= 2);
+        measures.at_surface += u64::from(cut == 1 && constrained >= 1);
     }
     measures
 }

@@ -9,8 +9,8 @@ use crate::mesh::Mesh;
 use crate::sizing::load_of_tet;
 use crate::store::{Pages, stop_if_requested};
 
-/// Longest edge of a piece in units of its smallest h: a narrow dip of a field graded by 1.3 per unit length is not stepped over.
-const EDGE_MAX: f64 = 12.0;
+/// Longest edge of a piece in units of its smallest h: a narrow dip of a field graded by 1.3 per unit length is not stepped over, and the load is known where it lies.
+const EDGE_MAX: f64 = 5.0;
 /// Largest ratio of sizes at the corners of a piece that is longer than [`EDGE_FINE`].
 const RATIO_MAX: f64 = 1.5;
 /// Pieces of about the wanted length are not divided further.

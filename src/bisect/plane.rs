@@ -20,6 +20,8 @@ const SHIFTS: i32 = 6;
 const SHIFT: f64 = 0.2;
 /// A fixed vertex nearer to the plane than this, in units of its h, counts as grazed.
 const GRAZED: f64 = 0.35;
+/// Largest share of the load a shift may bring to the other side: over a dozen cuts it stays within the balance wanted.
+const TOLERANCE: f64 = 0.006;
 /// Least gain in grazed vertices that a shift away from the balanced position must bring, as a share.
 const GAIN: f64 = 0.1;
 
@@ -281,6 +283,12 @@ fn shift<P: Pages>(
     spreads: &[Spread],
 ) -> ChosenPlane {
     let plane = chosen.plane;
+    let spread = (spreads.iter())
+        .find(|s| s.axis == plane.normal)
+        .expect("the axis was spread");
+    let share = chosen.load[0] / chosen.load[1];
+    let reach = [-TOLERANCE, TOLERANCE].map(|t| (spread.quantile(share + t) - plane.offset).abs());
+    let reach = reach[0].min(reach[1]) / f64::from(SHIFTS);
     // Position −SHIFTS..=SHIFTS: grazed vertices. Each vertex counts at the positions it is near to.
     let mut grazed = vec![0u64; 2 * SHIFTS as usize + 1];
     let (mut sizes, mut n_near) = (0.0, 0u64);
@@ -291,12 +299,13 @@ fn shift<P: Pages>(
         let p = mesh.point(v);
         let size = h(p);
         let s = plane.distance(p) / size;
-        if s.abs() > GRAZED + SHIFT * f64::from(SHIFTS) {
+        let step = SHIFT.min(reach / size);
+        if s.abs() > GRAZED + step * f64::from(SHIFTS) {
             continue;
         }
         (sizes, n_near) = (sizes + size, n_near + 1);
         for (k, count) in grazed.iter_mut().enumerate() {
-            let at = SHIFT * (k as f64 - f64::from(SHIFTS));
+            let at = step * (k as f64 - f64::from(SHIFTS));
             *count += u64::from((s - at).abs() < GRAZED);
         }
     }
@@ -316,10 +325,8 @@ fn shift<P: Pages>(
     if best == middle {
         return chosen;
     }
-    let step = SHIFT * (best as f64 - f64::from(SHIFTS)) * sizes / n_near as f64;
-    let spread = (spreads.iter())
-        .find(|s| s.axis == plane.normal)
-        .expect("the axis was spread");
+    let mean = sizes / n_near as f64;
+    let step = SHIFT.min(reach / mean) * mean * (best as f64 - f64::from(SHIFTS));
     spread.at(plane.offset + step)
 }
 

@@ -52,6 +52,9 @@ pub(super) struct InZone<'a> {
 
 impl Place for InZone<'_> {
     fn stretch(&self, a: Point, b: Point) -> Option<[f64; 2]> {
+        if both_in_one(self.earlier, self.h, a, b) {
+            return None;
+        }
         let surface = &self.zone.surface;
         let near = a + (b - a) * surface.nearest(a, b);
         let h = (self.h)(near);
@@ -68,12 +71,21 @@ impl Place for InZone<'_> {
     }
 }
 
+/// Whether one zone holds both ends of an edge: it was saturated there, and what optimization made of it since is final.
+fn both_in_one(zones: &[Zone], h: &dyn Fn(Point) -> f64, a: Point, b: Point) -> bool {
+    let (ha, hb) = (h(a), h(b));
+    (zones.iter()).any(|zone| zone.holds(a, ha) && zone.holds(b, hb))
+}
+
 /// Everywhere but in the zones of earlier cuts.
-pub struct OutsideZones<'a>(pub &'a [Zone]);
+pub struct OutsideZones<'a> {
+    pub zones: &'a [Zone],
+    pub h: &'a dyn Fn(Point) -> f64,
+}
 
 impl Place for OutsideZones<'_> {
-    fn stretch(&self, _: Point, _: Point) -> Option<[f64; 2]> {
-        Some([0.0, 1.0])
+    fn stretch(&self, a: Point, b: Point) -> Option<[f64; 2]> {
+        (!both_in_one(self.zones, self.h, a, b)).then_some([0.0, 1.0])
     }
 
     fn admits(&self, _: Point, _: f64) -> bool {
@@ -81,7 +93,7 @@ impl Place for OutsideZones<'_> {
     }
 
     fn forbids(&self, p: Point, h: f64) -> bool {
-        self.0.iter().any(|zone| zone.holds(p, h))
+        self.zones.iter().any(|zone| zone.holds(p, h))
     }
 }
 

@@ -182,6 +182,7 @@ impl Run<'_> {
                 interface.natural.over_constrained as f64,
             ),
             ("over_constrained", interface.chosen.over_constrained as f64),
+            ("at_surface", interface.chosen.at_surface as f64),
             ("natural_pinched", interface.natural.pinched as f64),
             ("pinched", interface.chosen.pinched as f64),
             ("z_tets", report.z_tets as f64),

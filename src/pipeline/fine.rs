@@ -37,7 +37,8 @@ pub(super) fn fine<P: Pages>(
         let p = mesh.point(v);
         mesh.set_size(v, field.h(p) as f32);
     }
-    let outside = OutsideZones(zones);
+    let h = |p| field.h(p);
+    let outside = OutsideZones { zones, h: &h };
     let place: &dyn Place = if zones.is_empty() {
         &Everywhere
     } else {

@@ -54,14 +54,14 @@ impl Worker {
             report.near += 1;
             return;
         }
-        if self.wants_frozen(mesh) {
-            self.kernel.discard(mesh);
-            report.frozen_hits += 1;
-            return;
-        }
         if field.place.forbids(c.point, f64::from(c.h)) {
             self.kernel.discard(mesh);
             report.out_of_place += 1;
+            return;
+        }
+        if self.wants_frozen(mesh) {
+            self.kernel.discard(mesh);
+            report.frozen_hits += 1;
             return;
         }
         let v = mesh.add_vertex(c.point, c.h);
