@@ -148,12 +148,7 @@ pub(super) fn extract<P: Pages, Q: Pages>(
     rim
 }
 
-fn copy_tet<P: Pages, Q: Pages>(
-    host: &mut Mesh<P>,
-    core: &mut Mesh<Q>,
-    t: u32,
-    tet: &Tet,
-) -> u32 {
+fn copy_tet<P: Pages, Q: Pages>(host: &mut Mesh<P>, core: &mut Mesh<Q>, t: u32, tet: &Tet) -> u32 {
     let mut copy = *tet;
     for i in 0..4 {
         let v = copy_vertex(host, core, tet.vertex(i));

@@ -9,9 +9,7 @@
 
 use super::core::Rim;
 use super::flow::{Graph, NOBODY};
-use super::labels::{
-    InterfaceMeasures, begin, face_cost, is_free, is_high, measure, set_high,
-};
+use super::labels::{InterfaceMeasures, begin, face_cost, is_free, is_high, measure, set_high};
 use super::moves::Moves;
 use super::surface::CuttingSurface;
 use crate::geom::Point;

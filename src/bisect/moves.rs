@@ -181,7 +181,11 @@ impl<'a> Moves<'a> {
         for k in 0..self.vertices.len() {
             let v = self.vertices[k];
             // The ball from a tetrahedron at hand: around a vertex of the surface there may be several.
-            let start = self.moved.iter().copied().find(|&t| core.tet(t).local(v).is_some());
+            let start = self
+                .moved
+                .iter()
+                .copied()
+                .find(|&t| core.tet(t).local(v).is_some());
             if let Some(start) = start {
                 sum += self.parts_too_many(core, v, start);
             }

@@ -60,7 +60,14 @@ impl Moments {
     fn add(&mut self, p: Point, weight: f64) {
         self.weight += weight;
         self.first += p * weight;
-        let products = [p.x * p.x, p.y * p.y, p.z * p.z, p.x * p.y, p.x * p.z, p.y * p.z];
+        let products = [
+            p.x * p.x,
+            p.y * p.y,
+            p.z * p.z,
+            p.x * p.y,
+            p.x * p.z,
+            p.y * p.z,
+        ];
         for (sum, product) in self.second.iter_mut().zip(products) {
             *sum += weight * product;
         }
@@ -173,9 +180,13 @@ pub fn principal_axes(matrix: &[[f64; 3]; 3]) -> [Point; 3] {
     order.sort_by(|&i, &j| a[j][j].total_cmp(&a[i][i]));
     order.map(|k| {
         let axis = Point::new(v[0][k], v[1][k], v[2][k]).normalize();
-        let largest = axis.to_array().into_iter().fold(0.0, |m: f64, x| {
-            if x.abs() > m.abs() + 1e-9 { x } else { m }
-        });
+        let largest =
+            axis.to_array().into_iter().fold(
+                0.0,
+                |m: f64, x| {
+                    if x.abs() > m.abs() + 1e-9 { x } else { m }
+                },
+            );
         if largest < 0.0 { -axis } else { axis }
     })
 }
@@ -191,11 +202,7 @@ struct Spread {
 }
 
 impl Spread {
-    fn gather<P: Pages>(
-        mesh: &mut Mesh<P>,
-        h: &dyn Fn(Point) -> f64,
-        axes: &[Point],
-    ) -> Vec<Self> {
+    fn gather<P: Pages>(mesh: &mut Mesh<P>, h: &dyn Fn(Point) -> f64, axes: &[Point]) -> Vec<Self> {
         let mut ends = vec![[f64::INFINITY, f64::NEG_INFINITY]; axes.len()];
         let mut from = 0;
         while let Some((t, tet)) = mesh.next_tet(from) {
@@ -228,7 +235,9 @@ impl Spread {
 
     /// Spreads a piece over the bins between its ends as a body that is widest in its middle.
     fn add(&mut self, piece: &Piece) {
-        let at = piece.points.map(|p| (self.axis.dot(p) - self.low) / self.width);
+        let at = piece
+            .points
+            .map(|p| (self.axis.dot(p) - self.low) / self.width);
         let low = at.iter().fold(f64::INFINITY, |m, &x| m.min(x)).max(0.0);
         let high = at.iter().fold(0.0, |m: f64, &x| m.max(x)).min(BINS as f64);
         let (first, last) = (low as usize, (high as usize).min(BINS - 1));
@@ -236,7 +245,11 @@ impl Spread {
         for bin in first..=last.max(first) {
             let from = low.max(bin as f64);
             let to = high.min(bin as f64 + 1.0);
-            let share = if first == last { 1.0 } else { (to - from).max(0.0) * per_bin };
+            let share = if first == last {
+                1.0
+            } else {
+                (to - from).max(0.0) * per_bin
+            };
             self.load[bin] += share * piece.load;
             self.section[bin] += share * piece.load * piece.h;
         }
@@ -248,7 +261,11 @@ impl Spread {
         let mut sum = 0.0;
         for (bin, &load) in self.load.iter().enumerate() {
             if sum + load >= wanted {
-                let part = if load > 0.0 { (wanted - sum) / load } else { 0.0 };
+                let part = if load > 0.0 {
+                    (wanted - sum) / load
+                } else {
+                    0.0
+                };
                 return self.low + (bin as f64 + part) * self.width;
             }
             sum += load;
@@ -260,7 +277,8 @@ impl Spread {
     fn at(&self, offset: f64) -> ChosenPlane {
         let place = ((offset - self.low) / self.width).clamp(0.0, BINS as f64 - 1.0);
         let bin = place as usize;
-        let below: f64 = self.load[..bin].iter().sum::<f64>() + self.load[bin] * (place - bin as f64);
+        let below: f64 =
+            self.load[..bin].iter().sum::<f64>() + self.load[bin] * (place - bin as f64);
         // Pieces are coarse: the section is taken over a fiftieth of the length.
         let half = BINS / 100;
         let window = &self.section[bin.saturating_sub(half)..(bin + half).min(BINS)];

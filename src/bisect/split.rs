@@ -5,9 +5,7 @@ use super::core::{SHARED, copy_attribute, is_in_core, place, tet_ids};
 use super::labels::{interface_faces, is_high};
 use crate::geom::{Aabb, HilbertFrame};
 use crate::mesh::anatomy::{FROZEN, REQUIRED};
-use crate::mesh::{
-    FaceRef, InterfaceFace, Mesh, Tet, VertexTag, Workspace, dense, renumber,
-};
+use crate::mesh::{FaceRef, InterfaceFace, Mesh, Tet, VertexTag, Workspace, dense, renumber};
 use crate::store::{Pages, Sorted, Sorter, StoreError, stop_if_requested};
 use tetdb_schema::page::NONE;
 
@@ -171,9 +169,8 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
             if !tet.is_live() || is_high(self.core, t) != self.high {
                 continue;
             }
-            let nodes = std::array::from_fn(|i| {
-                self.core_vertex(tet.vertex(i)) | tet.node[i] & REQUIRED
-            });
+            let nodes =
+                std::array::from_fn(|i| self.core_vertex(tet.vertex(i)) | tet.node[i] & REQUIRED);
             let (region, _) = self.core.tet_attribute(t);
             let copy = self.add(nodes, region);
             self.core.set_scratch(self.core_base + dense(t), copy);
@@ -196,9 +193,8 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
             if !self.is_ours(&tet) {
                 continue;
             }
-            let nodes = std::array::from_fn(|i| {
-                self.host_vertex(tet.vertex(i)) | tet.node[i] & REQUIRED
-            });
+            let nodes =
+                std::array::from_fn(|i| self.host_vertex(tet.vertex(i)) | tet.node[i] & REQUIRED);
             let (region, flags) = self.host.tet_attribute(t);
             let copy = self.add(nodes, region);
             if flags & FROZEN != 0 {
@@ -322,7 +318,9 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
         let mut faces = self.required_faces(space)?.peekable();
         for claim in claims.finish()? {
             let claim = claim?;
-            while let Some(face) = faces.next_if(|f| f.as_ref().map_or(true, |f| f[..12] < claim[..12])) {
+            while let Some(face) =
+                faces.next_if(|f| f.as_ref().map_or(true, |f| f[..12] < claim[..12]))
+            {
                 face?;
             }
             let Some(Ok(face)) = faces.peek() else {

@@ -72,6 +72,9 @@ mod tests {
             assert!((plane.distance(a + (b - a) * u) - distance).abs() < 1e-12);
         }
         assert_eq!(plane.band(a, Point::X, 0.5), None);
-        assert_eq!(plane.band(Point::Z, Point::Z + Point::X, 0.5), Some([0.0, 1.0]));
+        assert_eq!(
+            plane.band(Point::Z, Point::Z + Point::X, 0.5),
+            Some([0.0, 1.0])
+        );
     }
 }

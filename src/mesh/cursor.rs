@@ -95,12 +95,7 @@ impl MeshState {
 
     /// The counts as numbers, for storing beside the pages.
     pub fn to_words(self) -> [u32; MESH_STATE_WORDS] {
-        let [t, v, f, i] = [
-            self.tets,
-            self.vertices,
-            self.facets,
-            self.interface_faces,
-        ];
+        let [t, v, f, i] = [self.tets, self.vertices, self.facets, self.interface_faces];
         [
             t.fresh,
             t.free_head,
@@ -668,8 +663,7 @@ impl<P: Pages> Mesh<P> {
     pub fn set_interface_face(&mut self, n: u32, f: InterfaceFace) {
         let [a, b, c] = f.vertices;
         let words = [a, b, c, f.cut, f.index, f.side, 0, 0];
-        *self.pages.write::<{ kind::INTERFACE_FACES }>(sparse(n)) =
-            words.map(u32_le::from_native);
+        *self.pages.write::<{ kind::INTERFACE_FACES }>(sparse(n)) = words.map(u32_le::from_native);
     }
 
     /// Adds an interface face after the others.

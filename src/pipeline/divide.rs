@@ -149,11 +149,13 @@ impl Run<'_> {
                 owners.insert(cut, read_owners(self.catalog, cut)?);
             }
             let table = owners.get_mut(&cut).expect("read above");
-            let other = table.other(index, side).ok_or_else(|| CatalogError::Content {
-                path: self.catalog.dir().to_owned(),
-                subdomain: low_name,
-                what: format!("face {index} of cut {cut} has no owner"),
-            })?;
+            let other = table
+                .other(index, side)
+                .ok_or_else(|| CatalogError::Content {
+                    path: self.catalog.dir().to_owned(),
+                    subdomain: low_name,
+                    what: format!("face {index} of cut {cut} has no owner"),
+                })?;
             table.faces[index as usize][side as usize] = high_name;
             neighbors.remove(low_name, other);
             neighbors.add(high_name, other);

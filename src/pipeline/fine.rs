@@ -2,10 +2,10 @@
 
 use super::watch::{Event, Watcher};
 use super::{Options, PipelineError};
+use crate::bisect::{OutsideZones, Zone};
 use crate::geom::Aabb;
 use crate::mesh::{Mesh, Workspace};
 use crate::optimize::{self, OptimizeReport};
-use crate::bisect::{OutsideZones, Zone};
 use crate::refine::{Everywhere, Field, Place, RefineReport, saturate};
 use crate::sizing::SizeField;
 use crate::store::Pages;

@@ -119,8 +119,8 @@ impl Run<'_> {
         }
         self.n = tree::n_subdomains(self.catalog)?;
         let mut cuts = Vec::new();
-        while let Some(part) = (tree::parts(self.catalog, self.n)?.into_iter())
-            .find(|p| p.part.count > 1)
+        while let Some(part) =
+            (tree::parts(self.catalog, self.n)?.into_iter()).find(|p| p.part.count > 1)
         {
             // Pages of the coarse mesh that are still resident would take the frames of the others.
             open = None;

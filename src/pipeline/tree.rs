@@ -85,7 +85,12 @@ const PART_WORDS: usize = 4 + MESH_STATE_WORDS + 2 * kind::ALL.len();
 impl PartMesh {
     pub(super) fn to_bytes(self) -> Vec<u8> {
         let load = self.load.to_bits();
-        let head = [self.part.count, self.generation, load as u32, (load >> 32) as u32];
+        let head = [
+            self.part.count,
+            self.generation,
+            load as u32,
+            (load >> 32) as u32,
+        ];
         let words = (head.into_iter())
             .chain(self.state.to_words())
             .chain(self.extents.into_iter().flatten());

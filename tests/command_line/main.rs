@@ -9,3 +9,4 @@ mod place;
 mod readme;
 mod regions;
 mod same_mesh;
+mod subdomains;
