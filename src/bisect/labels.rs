@@ -64,7 +64,7 @@ pub(super) fn begin<P: Pages>(
         if may_change {
             free.push(t);
         }
-        let flags = u32::from(high) * HIGH | u32::from(may_change) * MAY_CHANGE;
+        let flags = if high { HIGH } else { 0 } | if may_change { MAY_CHANGE } else { 0 };
         let (region, _) = core.tet_attribute(t);
         core.set_tet_attribute(t, region, flags);
         if t & 1023 == 0 {

@@ -12,6 +12,8 @@ use crate::catalog::{QualityRow, Store, StoreState};
 
 /// Regions listed for people.
 const REGIONS_LISTED: usize = 12;
+/// Sub-domains listed for people.
+const SUBDOMAINS_LISTED: usize = 32;
 
 pub fn run(args: &StoreArgs, talk: &Talk) -> Result<u8, Failure> {
     if talk.is_json() {
@@ -99,6 +101,20 @@ pub fn print(path: &Path, talk: &Talk) -> Result<(), Failure> {
         memory::show(bytes),
         bytes as f64 / tets.max(1) as f64
     ));
+    if rows.len() > 1 {
+        let topology = catalog.topology()?;
+        for row in rows.iter().take(SUBDOMAINS_LISTED) {
+            let neighbors = topology.iter().find(|t| t.subdomain == row.rank);
+            let neighbors = neighbors.map_or(0, |t| t.neighbors.len());
+            talk.line(&format!(
+                "  sub-domain {:>4}: {:>10} tetrahedra, {:>7} interface faces, {neighbors} neighbor(s), worst q {:.3}",
+                row.rank, row.tets, row.interface_faces, row.quality.worst
+            ));
+        }
+        if rows.len() > SUBDOMAINS_LISTED {
+            talk.line(&format!("  ... {} sub-domains in all", rows.len()));
+        }
+    }
     for region in regions.iter().take(REGIONS_LISTED) {
         let (name, what) = if region.filled {
             (

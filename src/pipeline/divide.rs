@@ -1,6 +1,7 @@
 //! One bisection as a step: the part's file in, the files of its two children out, one commit.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -145,10 +146,10 @@ impl Run<'_> {
         let mut owners = BTreeMap::from([(cut, Owners::new(faces, low_name, high_name))]);
         neighbors.set(low_name, high_name, u64::from(faces));
         for &(cut, index, side) in &high.inherited {
-            if !owners.contains_key(&cut) {
-                owners.insert(cut, read_owners(self.catalog, cut)?);
-            }
-            let table = owners.get_mut(&cut).expect("read above");
+            let table = match owners.entry(cut) {
+                Entry::Occupied(entry) => entry.into_mut(),
+                Entry::Vacant(entry) => entry.insert(read_owners(self.catalog, cut)?),
+            };
             let other = table
                 .other(index, side)
                 .ok_or_else(|| CatalogError::Content {

@@ -126,7 +126,7 @@ impl LeafJob {
 impl Leaf {
     /// Removes the file of changes, which nobody needs any more.
     pub(super) fn remove_work(&self) -> Result<(), PipelineError> {
-        self.work.as_ref().map_or(Ok(()), remove)
+        self.work.as_deref().map_or(Ok(()), remove)
     }
 }
 

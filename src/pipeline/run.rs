@@ -482,11 +482,7 @@ pub(super) fn journal(
     }
 }
 
-pub(super) fn remove(path: &PathBuf) -> Result<(), PipelineError> {
-    remove_file(path)
-}
-
-fn remove_file(path: &Path) -> Result<(), PipelineError> {
+pub(super) fn remove(path: &Path) -> Result<(), PipelineError> {
     std::fs::remove_file(path).map_err(|source| {
         let path = path.to_owned();
         PipelineError::Store(crate::store::StoreError::Io { path, source })
