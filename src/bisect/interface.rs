@@ -52,8 +52,6 @@ pub struct InterfaceReport {
     pub minimum: InterfaceMeasures,
     /// In the end.
     pub chosen: InterfaceMeasures,
-    /// Rounds of the flow, over all strips.
-    pub flow_rounds: u64,
     /// Moves accepted.
     pub moves: u64,
 }
@@ -74,7 +72,7 @@ pub(super) fn choose<P: Pages>(
     report.natural = measure(core, rim);
     report.natural.pinched = moves.count_pinched(core, &free);
     if steps.minimum_cut {
-        report.flow_rounds = minimum_cut(core, surface, &free);
+        minimum_cut(core, surface, &free);
     }
     report.minimum = measure(core, rim);
     report.minimum.pinched = moves.count_pinched(core, &free);
@@ -84,8 +82,8 @@ pub(super) fn choose<P: Pages>(
     report
 }
 
-/// Cuts strip by strip; returns the rounds of the flow.
-fn minimum_cut<P: Pages>(core: &mut Mesh<P>, surface: &dyn CuttingSurface, free: &[u32]) -> u64 {
+/// Cuts strip by strip.
+fn minimum_cut<P: Pages>(core: &mut Mesh<P>, surface: &dyn CuttingSurface, free: &[u32]) {
     core.clear_scratch();
     for n in 0..dense(core.tet_ids_end()) {
         core.set_scratch(n, NONE);
@@ -96,19 +94,17 @@ fn minimum_cut<P: Pages>(core: &mut Mesh<P>, surface: &dyn CuttingSurface, free:
         sort_along(core, surface, &mut order);
     }
     let mut graph = Graph::default();
-    let mut rounds = 0;
     let length = free.len().div_ceil(strips).max(1);
     for strip in order.chunks(length) {
-        rounds += cut_strip(core, surface, strip, &mut graph);
+        cut_strip(core, surface, strip, &mut graph);
     }
     if strips > 1 {
         let half = length / 2;
         for strip in order[half..].chunks(length) {
-            rounds += cut_strip(core, surface, strip, &mut graph);
+            cut_strip(core, surface, strip, &mut graph);
         }
     }
     core.clear_scratch();
-    rounds
 }
 
 /// Sorts along the longest direction in the surface, among three.
@@ -146,7 +142,7 @@ fn cut_strip<P: Pages>(
     surface: &dyn CuttingSurface,
     strip: &[u32],
     graph: &mut Graph,
-) -> u64 {
+) {
     stop_if_requested();
     for (node, &t) in strip.iter().enumerate() {
         core.set_scratch(dense(t), node as u32);
@@ -172,13 +168,12 @@ fn cut_strip<P: Pages>(
         }
         graph.push(neighbor, capacity, terminal);
     }
-    let value = graph.cut();
+    graph.cut();
     for (node, &t) in strip.iter().enumerate() {
         debug_assert!(is_free(core, t));
         set_high(core, t, !graph.is_source_side(node as u32));
         core.set_scratch(dense(t), NONE);
     }
-    u64::from(value.rounds)
 }
 
 /// The cost of a face as a whole number, the same from both sides: its corners are taken in the order of their coordinates.

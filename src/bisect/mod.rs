@@ -30,6 +30,8 @@ pub use split::write_child;
 pub use surface::{CuttingSurface, Plane};
 pub use zone::{OutsideZones, WIDTH_MIN, WIDTH_NOISE, Zone};
 
+use std::time::Instant;
+
 use crate::geom::{Aabb, Point};
 use crate::mesh::{Mesh, Workspace};
 use crate::optimize::{self, Settings};
@@ -72,6 +74,17 @@ pub struct CutReport {
     /// Tetrahedra with a face on the interface, and those whose circumsphere lies in the refined zone.
     pub z_tets: u64,
     pub z_enclosed: u64,
+    pub seconds: StageSeconds,
+}
+
+/// Wall time of the stages of a cut.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StageSeconds {
+    pub plane: f64,
+    pub zone: f64,
+    /// Copying the core out and optimizing it.
+    pub core: f64,
+    pub interface: f64,
 }
 
 /// Refines the zone of a cut in `host` and chooses the interface in `core`, which must be empty.
@@ -84,12 +97,20 @@ pub fn open<P: Pages, Q: Pages>(
     space: &Workspace,
     progress: &dyn Fn(&'static str, u64),
 ) -> Result<Opened, StoreError> {
+    let mut clock = Instant::now();
+    let mut lap = || {
+        std::mem::replace(&mut clock, Instant::now())
+            .elapsed()
+            .as_secs_f64()
+    };
+    let mut seconds = StageSeconds::default();
     progress("choose a plane", 0);
     for v in host.vertex_ids() {
         let p = host.point(v);
         host.set_size(v, (plan.h)(p) as f32);
     }
     let plane = plane::choose(host, plan.h, plan.bounds.low, plan.low, plan.choice);
+    seconds.plane = lap();
     let zone = Zone {
         cut: plan.cut,
         surface: plane.plane,
@@ -104,12 +125,15 @@ pub fn open<P: Pages, Q: Pages>(
         bounds: plan.bounds,
     };
     let refine = saturate(host, &field, space, &mut |n| progress("refine the zone", n))?;
+    seconds.zone = lap();
     progress("choose the interface", 0);
     let rim = core::extract(host, core, &zone.surface);
     optimize::run_with(core, plan.optimize, &|_| {});
+    seconds.core = lap();
     let interface = interface::choose(core, &zone.surface, &rim, plan.steps);
     let (_, vertices) = split::number_interface(core, plan.cut);
     let (z_tets, z_enclosed) = labels::enclosed(core, &zone.surface, plan.h);
+    seconds.interface = lap();
     Ok(Opened {
         zone,
         report: CutReport {
@@ -119,6 +143,7 @@ pub fn open<P: Pages, Q: Pages>(
             vertices,
             z_tets,
             z_enclosed,
+            seconds,
         },
         rim,
     })

@@ -1,5 +1,7 @@
 //! Moves of tetrahedra from one side of the interface to the other.
 
+use std::collections::BTreeSet;
+
 use super::core::Rim;
 use super::interface::Steps;
 use super::labels::{face_cost, interface_faces, is_constrained, is_free, is_high, set_high};
@@ -31,6 +33,8 @@ pub(super) struct Moves<'a> {
     vertices: Vec<u32>,
     part: Vec<u8>,
     stack: Vec<usize>,
+    /// Vertices around which a side is in several parts.
+    pinched: BTreeSet<u32>,
 }
 
 impl<'a> Moves<'a> {
@@ -45,6 +49,7 @@ impl<'a> Moves<'a> {
             vertices: Vec::new(),
             part: Vec::new(),
             stack: Vec::new(),
+            pinched: BTreeSet::new(),
         }
     }
 
@@ -101,8 +106,9 @@ impl<'a> Moves<'a> {
         let before = self.cost(core);
         self.put(core, high);
         let gain = before - self.cost(core);
-        // A pinched vertex may be worth more than the faces; without one there is nothing more to gain than faces.
-        if gain < -PINCH {
+        // Without a pinched vertex there is nothing more to gain than faces, which is told without looking at balls.
+        let may_mend = self.vertices.iter().any(|v| self.pinched.contains(v));
+        if gain < if may_mend { -PINCH } else { GAIN_MIN } {
             self.put(core, !high);
             return false;
         }
@@ -113,7 +119,28 @@ impl<'a> Moves<'a> {
             return false;
         }
         self.put(core, high);
+        if after > 0 || pinches > 0 {
+            self.note_pinched(core);
+        }
         true
+    }
+
+    /// Notes which vertices of `moved` are pinched now.
+    fn note_pinched<P: Pages>(&mut self, core: &mut Mesh<P>) {
+        for k in 0..self.vertices.len() {
+            let v = self.vertices[k];
+            let start = self
+                .moved
+                .iter()
+                .copied()
+                .find(|&t| core.tet(t).local(v).is_some());
+            let start = start.expect("a vertex of what was moved");
+            if self.parts_too_many(core, v, start) > 0 {
+                self.pinched.insert(v);
+            } else {
+                self.pinched.remove(&v);
+            }
+        }
     }
 
     fn put<P: Pages>(&self, core: &mut Mesh<P>, high: bool) {
@@ -238,12 +265,14 @@ impl<'a> Moves<'a> {
 
     /// Vertices around which a side is in several parts.
     pub(super) fn count_pinched<P: Pages>(&mut self, core: &mut Mesh<P>, free: &[u32]) -> u64 {
-        let mut pinched = 0;
+        self.pinched.clear();
         for v in interface_vertices(core, free) {
             let start = core.tet_of(v);
-            pinched += u64::from(self.parts_too_many(core, v, start) > 0);
+            if self.parts_too_many(core, v, start) > 0 {
+                self.pinched.insert(v);
+            }
         }
-        pinched
+        self.pinched.len() as u64
     }
 }
 

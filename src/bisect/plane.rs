@@ -6,9 +6,9 @@
 //!
 //! Source: the paper, section 1.1, "Defining the cutting plane".
 
-use super::load::{Piece, for_each_piece};
+use super::load::for_each_piece;
 use super::surface::{CuttingSurface, Plane};
-use crate::geom::Point;
+use crate::geom::{Aabb, Point};
 use crate::mesh::Mesh;
 use crate::store::Pages;
 
@@ -96,39 +96,108 @@ pub fn choose<P: Pages>(
     low: f64,
     choice: PlaneChoice,
 ) -> ChosenPlane {
-    let axes = match choice {
+    let axis = match choice {
         PlaneChoice::Given(plane) => {
-            let spread = Spread::gather(mesh, h, &[plane.normal]);
-            return spread[0].at(plane.offset);
+            return Spread::gather(mesh, h, plane.normal).at(plane.offset);
         }
-        PlaneChoice::Centroids => vec![principal_axes(&centroid_moments(mesh, origin))[0]],
+        PlaneChoice::Centroids => principal_axes(&centroid_moments(mesh, origin))[0],
         PlaneChoice::Load => {
-            let mut moments = Moments::default();
-            for_each_piece(mesh, h, |piece| {
-                // A uniform piece has the moments of its corners, a fifth of the weight, and its centroid, four fifths.
-                let middle = piece.points.iter().sum::<Point>() * 0.25 - origin;
-                moments.add(middle, 0.8 * piece.load);
-                for p in piece.points {
-                    moments.add(p - origin, 0.05 * piece.load);
-                }
-            });
-            let mut axes = principal_axes(&moments.matrix()).to_vec();
+            let grid = Grid::gather(mesh, h);
+            let mut axes = principal_axes(&grid.moments().matrix()).to_vec();
             axes.extend([Point::X, Point::Y, Point::Z]);
-            axes
+            // Fewest faces; of equals the first, but an axis along a coordinate is preferred where it costs a hundredth at most.
+            let areas = axes.iter().map(|&axis| {
+                let spread = grid.spread(axis);
+                spread.at(spread.quantile(low)).area
+            });
+            let scores = (0..)
+                .zip(areas)
+                .map(|(k, a)| if k < 3 { 1.01 * a } else { a });
+            let best = scores.zip(&axes).min_by(|a, b| a.0.total_cmp(&b.0));
+            *best.expect("there are axes").1
         }
     };
-    let spreads = Spread::gather(mesh, h, &axes);
-    let planes = spreads.iter().map(|s| s.at(s.quantile(low)));
-    // Fewest faces; of equals the first, but an axis along a coordinate is preferred where it costs a hundredth at most.
-    let mut best = None::<(f64, ChosenPlane)>;
-    for (k, plane) in planes.enumerate() {
-        let score = if k < 3 && axes.len() > 3 { 1.01 } else { 1.0 } * plane.area;
-        if best.is_none_or(|(least, _)| score < least) {
-            best = Some((score, plane));
+    let spread = Spread::gather(mesh, h, axis);
+    let chosen = spread.at(spread.quantile(low));
+    shift(mesh, h, chosen, &spread)
+}
+
+/// Cells of the grid along each axis.
+const CELLS: usize = 48;
+
+/// The load on a coarse grid: enough to compare directions.
+struct Grid {
+    low: Point,
+    width: Point,
+    /// Load and ∫ h⁻² of each cell.
+    cells: Vec<[f64; 2]>,
+}
+
+impl Grid {
+    fn gather<P: Pages>(mesh: &mut Mesh<P>, h: &dyn Fn(Point) -> f64) -> Self {
+        let bounds = bounds(mesh);
+        let width = (bounds.high - bounds.low) / CELLS as f64;
+        let mut cells = vec![[0.0; 2]; CELLS * CELLS * CELLS];
+        for_each_piece(mesh, h, |piece| {
+            let middle = piece.points.iter().sum::<Point>() * 0.25;
+            let at = ((middle - bounds.low) / width).to_array();
+            let [x, y, z] = at.map(|c| (c as usize).min(CELLS - 1));
+            let cell = &mut cells[(z * CELLS + y) * CELLS + x];
+            cell[0] += piece.load;
+            cell[1] += piece.load * piece.h;
+        });
+        Self {
+            low: bounds.low,
+            width,
+            cells,
         }
     }
-    let (_, chosen) = best.expect("there is an axis");
-    shift(mesh, h, chosen, &spreads)
+
+    /// Middles of the cells with something in them.
+    fn filled(&self) -> impl Iterator<Item = (Point, [f64; 2])> + '_ {
+        let filled = self.cells.iter().enumerate().filter(|(_, c)| c[0] > 0.0);
+        filled.map(|(n, &cell)| {
+            let at = [n % CELLS, n / CELLS % CELLS, n / (CELLS * CELLS)];
+            let at = Point::from_array(at.map(|c| c as f64 + 0.5));
+            (self.low + at * self.width, cell)
+        })
+    }
+
+    fn moments(&self) -> Moments {
+        let mut moments = Moments::default();
+        for (middle, cell) in self.filled() {
+            moments.add(middle - self.low, cell[0]);
+        }
+        moments
+    }
+
+    fn spread(&self, axis: Point) -> Spread {
+        let half = (self.width * 0.5).abs().dot(axis.abs());
+        let ends = self
+            .filled()
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], (p, _)| {
+                let s = axis.dot(p);
+                [l.min(s - half), h.max(s + half)]
+            });
+        let mut spread = Spread::new(axis, ends);
+        for (middle, [load, section]) in self.filled() {
+            let s = axis.dot(middle);
+            spread.add(s - half, s + half, load, section);
+        }
+        spread
+    }
+}
+
+fn bounds<P: Pages>(mesh: &mut Mesh<P>) -> Aabb {
+    let mut bounds = Aabb::EMPTY;
+    let mut from = 0;
+    while let Some((t, tet)) = mesh.next_tet(from) {
+        from = t + 1;
+        for p in mesh.points(&tet) {
+            bounds = bounds.with(p);
+        }
+    }
+    bounds
 }
 
 fn centroid_moments<P: Pages>(mesh: &mut Mesh<P>, origin: Point) -> [[f64; 3]; 3] {
@@ -201,44 +270,40 @@ struct Spread {
 }
 
 impl Spread {
-    fn gather<P: Pages>(mesh: &mut Mesh<P>, h: &dyn Fn(Point) -> f64, axes: &[Point]) -> Vec<Self> {
-        let mut ends = vec![[f64::INFINITY, f64::NEG_INFINITY]; axes.len()];
+    fn new(axis: Point, [low, high]: [f64; 2]) -> Self {
+        Self {
+            axis,
+            low,
+            width: (high - low) / BINS as f64,
+            load: vec![0.0; BINS],
+            section: vec![0.0; BINS],
+        }
+    }
+
+    fn gather<P: Pages>(mesh: &mut Mesh<P>, h: &dyn Fn(Point) -> f64, axis: Point) -> Self {
+        let mut ends = [f64::INFINITY, f64::NEG_INFINITY];
         let mut from = 0;
         while let Some((t, tet)) = mesh.next_tet(from) {
             from = t + 1;
             for p in mesh.points(&tet) {
-                for (axis, [low, high]) in axes.iter().zip(&mut ends) {
-                    let s = axis.dot(p);
-                    (*low, *high) = (low.min(s), high.max(s));
-                }
+                let s = axis.dot(p);
+                ends = [ends[0].min(s), ends[1].max(s)];
             }
         }
-        let mut spreads: Vec<Self> = axes
-            .iter()
-            .zip(ends)
-            .map(|(&axis, [low, high])| Self {
-                axis,
-                low,
-                width: (high - low) / BINS as f64,
-                load: vec![0.0; BINS],
-                section: vec![0.0; BINS],
-            })
-            .collect();
+        let mut spread = Self::new(axis, ends);
         for_each_piece(mesh, h, |piece| {
-            for spread in &mut spreads {
-                spread.add(piece);
-            }
+            let at = piece.points.map(|p| axis.dot(p));
+            let low = at[0].min(at[1]).min(at[2].min(at[3]));
+            let high = at[0].max(at[1]).max(at[2].max(at[3]));
+            spread.add(low, high, piece.load, piece.load * piece.h);
         });
-        spreads
+        spread
     }
 
-    /// Spreads a piece over the bins between its ends as a body that is widest in its middle.
-    fn add(&mut self, piece: &Piece) {
-        let at = piece
-            .points
-            .map(|p| (self.axis.dot(p) - self.low) / self.width);
-        let low = at.iter().fold(f64::INFINITY, |m, &x| m.min(x)).max(0.0);
-        let high = at.iter().fold(0.0, |m: f64, &x| m.max(x)).min(BINS as f64);
+    /// Spreads a body evenly over the bins between its ends.
+    fn add(&mut self, low: f64, high: f64, load: f64, section: f64) {
+        let low = ((low - self.low) / self.width).max(0.0);
+        let high = ((high - self.low) / self.width).min(BINS as f64);
         let (first, last) = (low as usize, (high as usize).min(BINS - 1));
         let per_bin = 1.0 / (high - low).max(1e-9);
         for bin in first..=last.max(first) {
@@ -249,8 +314,8 @@ impl Spread {
             } else {
                 (to - from).max(0.0) * per_bin
             };
-            self.load[bin] += share * piece.load;
-            self.section[bin] += share * piece.load * piece.h;
+            self.load[bin] += share * load;
+            self.section[bin] += share * section;
         }
     }
 
@@ -297,12 +362,9 @@ fn shift<P: Pages>(
     mesh: &mut Mesh<P>,
     h: &dyn Fn(Point) -> f64,
     chosen: ChosenPlane,
-    spreads: &[Spread],
+    spread: &Spread,
 ) -> ChosenPlane {
     let plane = chosen.plane;
-    let spread = (spreads.iter())
-        .find(|s| s.axis == plane.normal)
-        .expect("the axis was spread");
     let share = chosen.load[0] / chosen.load[1];
     let reach = [-TOLERANCE, TOLERANCE].map(|t| (spread.quantile(share + t) - plane.offset).abs());
     let reach = reach[0].min(reach[1]) / f64::from(SHIFTS);

@@ -57,7 +57,23 @@ pub(super) struct InZone<'a> {
     pub h: &'a dyn Fn(Point) -> f64,
 }
 
+/// How far from the surface a zone can reach, in units of h at a point not yet in it: by a third wider than it is, for
+/// the size may grow on the way.
+const REACH: f64 = 1.3 * (WIDTH_MIN + WIDTH_NOISE);
+
 impl Place for InZone<'_> {
+    fn is_partial(&self) -> bool {
+        true
+    }
+
+    fn reaches(&self, points: &[Point; 4], sizes: &[f64; 4]) -> bool {
+        let s = points.map(|p| self.zone.surface.distance(p));
+        let low = s.iter().fold(f64::INFINITY, |m, &s| m.min(s));
+        let high = s.iter().fold(f64::NEG_INFINITY, |m, &s| m.max(s));
+        let near = s.iter().zip(sizes).any(|(s, h)| s.abs() <= REACH * h);
+        near || (low < 0.0 && high > 0.0)
+    }
+
     fn stretch(&self, a: Point, b: Point) -> Option<[f64; 2]> {
         if both_in_one(self.earlier, self.h, a, b) {
             return None;
@@ -65,8 +81,7 @@ impl Place for InZone<'_> {
         let surface = &self.zone.surface;
         let near = a + (b - a) * surface.nearest(a, b);
         let h = (self.h)(near);
-        // Wider by a third, for the size may grow on the way to the limit.
-        surface.band(a, b, 1.3 * (WIDTH_MIN + WIDTH_NOISE) * h)
+        surface.band(a, b, REACH * h)
     }
 
     fn admits(&self, p: Point, h: f64) -> bool {

@@ -175,6 +175,7 @@ impl Run<'_> {
             ("zone_rejects", report.refine.out_of_place as f64),
             ("frozen_hits", report.refine.frozen_hits as f64),
             ("free_tets", interface.free_tets as f64),
+            ("moves", interface.moves as f64),
             ("natural_faces", interface.natural.faces as f64),
             ("minimum_faces", interface.minimum.faces as f64),
             ("interface_faces", interface.chosen.faces as f64),
@@ -190,6 +191,10 @@ impl Run<'_> {
             ("pinched", interface.chosen.pinched as f64),
             ("z_tets", report.z_tets as f64),
             ("z_enclosed", report.z_enclosed as f64),
+            ("plane_s", report.seconds.plane),
+            ("zone_s", report.seconds.zone),
+            ("core_s", report.seconds.core),
+            ("interface_s", report.seconds.interface),
             ("load_low", report.plane.load[0]),
             ("load", report.plane.load[1]),
         ];

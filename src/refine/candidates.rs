@@ -39,6 +39,7 @@ impl Worker {
     pub(super) fn collect_edges<P: Pages>(
         &mut self,
         mesh: &mut Mesh<P>,
+        field: &Field,
         from: u32,
         last: u32,
     ) -> u32 {
@@ -55,6 +56,13 @@ impl Worker {
             }
             mesh.set_mark(t, EXAMINED, true);
             let v = tet.vertices();
+            if field.place.is_partial() {
+                let points = mesh.points(&tet);
+                let sizes = v.map(|v| f64::from(mesh.size(v)));
+                if !field.place.reaches(&points, &sizes) {
+                    continue;
+                }
+            }
             for [i, j] in EDGES {
                 let (a, b) = (v[i].min(v[j]), v[i].max(v[j]));
                 self.edges.push((u64::from(a) << 32 | u64::from(b), t));

@@ -128,7 +128,7 @@ impl Worker {
     ) {
         let mut from = first;
         while from <= last {
-            from = self.collect_edges(mesh, from, last);
+            from = self.collect_edges(mesh, field, from, last);
             self.make_candidates(mesh, field);
             report.candidates += self.candidates.len() as u64;
             let candidates = std::mem::take(&mut self.candidates);

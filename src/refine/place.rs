@@ -4,6 +4,16 @@ use crate::geom::Point;
 
 /// A part of space in which edges are divided.
 pub trait Place {
+    /// Whether [`Place::reaches`] is worth asking: most tetrahedra are out of reach.
+    fn is_partial(&self) -> bool {
+        false
+    }
+
+    /// Whether points that divide edges of this tetrahedron may be of use; `sizes` are those of its corners.
+    fn reaches(&self, _points: &[Point; 4], _sizes: &[f64; 4]) -> bool {
+        true
+    }
+
     /// The stretch of the way from `a` to `b` on which points are of use, as parameters in [0, 1]; `None` when there is none.
     ///
     /// It may be too long, never too short.
