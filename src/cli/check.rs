@@ -154,15 +154,23 @@ fn write_files(
     }
     if let Some(out) = &args.write_bad {
         let defects = &findings.validation.defects;
-        let n = write::defects(surface, defects, out)?;
-        talk.note(&format!(
-            "wrote {n} defective triangles to {}",
-            out.display()
-        ));
-        fields.push((
-            "bad_triangles",
-            json!({ "file": out.display().to_string(), "triangles": n }),
-        ));
+        let mut n = 0;
+        let mut file = None;
+        if defects.is_empty() {
+            // A file without cells is one that some programs cannot read.
+            talk.note(&format!(
+                "no triangle is defective: {} was not written",
+                out.display()
+            ));
+        } else {
+            n = write::defects(surface, defects, out)?;
+            talk.note(&format!(
+                "wrote {n} defective triangles to {}",
+                out.display()
+            ));
+            file = Some(out.display().to_string());
+        }
+        fields.push(("bad_triangles", json!({ "file": file, "triangles": n })));
     }
     Ok(fields)
 }

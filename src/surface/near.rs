@@ -17,17 +17,30 @@ const NONE: u32 = u32::MAX;
 /// moves farther than `distance`, and chains of near points do not run together. Effects: renumbers vertices; triangles
 /// may collapse, repeat or open.
 pub fn weld_near(surface: &mut Surface, distance: f64) -> usize {
-    let mut kept = Kept::new(surface.bounds().low, distance);
-    let points = &surface.points;
-    let new_ids: Vec<u32> = (0..points.len() as u32)
-        .map(|v| kept.find_or_keep(v, points))
-        .collect();
-    let n_joined = (0u32..).zip(&new_ids).filter(|(v, id)| *v != **id).count();
+    let new_ids = new_ids(surface, distance);
     for v in surface.triangles.iter_mut().flatten() {
         *v = new_ids[*v as usize];
     }
     drop_unused_points(surface);
-    n_joined
+    count_joined(&new_ids)
+}
+
+/// How many points [`weld_near`] would join to another.
+pub(super) fn n_near(surface: &Surface, distance: f64) -> usize {
+    count_joined(&new_ids(surface, distance))
+}
+
+/// For each point the one it goes to, or itself.
+fn new_ids(surface: &Surface, distance: f64) -> Vec<u32> {
+    let mut kept = Kept::new(surface.bounds().low, distance);
+    let points = &surface.points;
+    (0..points.len() as u32)
+        .map(|v| kept.find_or_keep(v, points))
+        .collect()
+}
+
+fn count_joined(new_ids: &[u32]) -> usize {
+    (0u32..).zip(new_ids).filter(|(v, id)| *v != **id).count()
 }
 
 /// The points kept so far, in cubes [`CUBE`] times as wide as the distance: what is near lies in at most eight of them, mostly in one.

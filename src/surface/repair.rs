@@ -3,15 +3,15 @@
 use std::collections::BTreeMap;
 
 use super::Surface;
-use super::edges::{Facets, closedness};
-use super::near::weld_near;
+use super::edges::{Closedness, Facets, closedness};
+use super::near::{n_near, weld_near};
 use super::orientation::orient_alike;
-use super::rims::t_junctions;
+use super::rims::{TJunction, has_near_junctions, t_junctions};
 use super::validate::validate;
 use super::weld::drop_unused_points;
 
-/// Shares of the box diagonal that [`closing`] tries.
-const CLOSING_SHARES: [f64; 8] = [0.0, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3];
+/// Shares of the box diagonal that [`closing`] tries after none.
+const CLOSING_SHARES: [f64; 7] = [1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3];
 /// Rounds of dividing at most: each divides one edge of a triangle, at all vertices on it.
 const ROUNDS_MAX: usize = 64;
 
@@ -36,13 +36,18 @@ pub struct Repair {
 /// divides triangles at vertices that lie on their open edges (exactly, or as near as `weld`), turns neighbors alike.
 /// Effects: renumbers vertices and triangles; no coordinate changes but by joining. Is not: a promise; validate the result.
 pub fn repair(surface: &mut Surface, weld: Option<f64>) -> Repair {
+    mend(surface, weld, false)
+}
+
+/// The same; `to_close` says that nothing need be divided where that leaves open edges.
+fn mend(surface: &mut Surface, weld: Option<f64>, to_close: bool) -> Repair {
     let mut done = Repair::default();
     if let Some(distance) = weld {
         done.points_joined = weld_near(surface, distance);
     }
     for _ in 0..ROUNDS_MAX {
         drop_useless(surface, &mut done);
-        let n = divide(surface, weld.unwrap_or(0.0));
+        let n = divide(surface, weld.unwrap_or(0.0), to_close);
         done.divided += n;
         if n == 0 {
             break;
@@ -78,12 +83,15 @@ fn drop_useless(surface: &mut Surface, done: &mut Repair) {
 /// Divides triangles with vertices on an open edge of theirs, one edge of each, and returns how many.
 ///
 /// Only where it brings two open edges together; a sheet that merely touches an open edge changes nothing.
-fn divide(surface: &mut Surface, distance: f64) -> usize {
+fn divide(surface: &mut Surface, distance: f64, to_close: bool) -> usize {
     let found = closedness(surface);
     if found.is_closed() {
         return 0;
     }
     let junctions = t_junctions(surface, &found, distance);
+    if to_close && !may_close(&found, &junctions) {
+        return 0;
+    }
     let sorted = |[a, b]: [u32; 2]| [a.min(b), a.max(b)];
     let mut open: Vec<[u32; 2]> = found.open.iter().map(|(_, edge)| sorted(*edge)).collect();
     open.sort_unstable();
@@ -120,6 +128,18 @@ fn divide(surface: &mut Surface, distance: f64) -> usize {
     cuts.len()
 }
 
+/// Whether dividing may close the surface: each open edge is divided, or an end of it lies on another open edge.
+fn may_close(found: &Closedness, junctions: &[TJunction]) -> bool {
+    let mut on_edge: Vec<u32> = junctions.iter().map(|j| j.vertex).collect();
+    on_edge.sort_unstable();
+    found.open.iter().all(|&(triangle, edge)| {
+        let is_cut = junctions
+            .binary_search_by_key(&(triangle, edge), |j| (j.triangle, j.edge))
+            .is_ok();
+        is_cut || edge.iter().any(|v| on_edge.binary_search(v).is_ok())
+    })
+}
+
 /// Puts what `pieces` gives in the place of each triangle; labels and files follow.
 fn replace(surface: &mut Surface, pieces: impl Fn(u32, [u32; 3], &mut Vec<[u32; 3]>)) {
     let old = std::mem::take(&mut surface.triangles);
@@ -145,6 +165,7 @@ pub struct Closing {
     /// The same in input units.
     pub distance: f64,
     pub points_joined: usize,
+    /// Open edges left; where dividing cannot close them all, before any was divided.
     pub open_edges: usize,
     /// No edge is open, and there is something left.
     pub closes: bool,
@@ -154,27 +175,48 @@ pub struct Closing {
 
 /// Tries [`repair`] without joining points, then with growing distances, until no edge is open.
 ///
-/// The last entry tells whether one was enough.
+/// The last entry tells whether one was enough. A distance at which no points are joined and no vertex comes to lie on an
+/// open edge leaves what no distance leaves, and is not tried.
 pub fn closing(surface: &Surface) -> Vec<Closing> {
     let diagonal = surface.bounds().diagonal();
-    let mut tried = Vec::new();
-    for share in CLOSING_SHARES {
-        let mut joined = surface.clone();
-        let distance = share * diagonal;
-        let done = repair(&mut joined, (share > 0.0).then_some(distance));
-        let found = closedness(&joined);
-        let closes = found.is_closed() && joined.n_triangles() > 0;
-        tried.push(Closing {
-            share,
-            distance,
-            points_joined: done.points_joined,
-            open_edges: found.open.len(),
-            closes,
-            defects_left: closes.then(|| validate(&joined).n_defects),
-        });
+    let (first, unjoined) = try_closing(surface, None);
+    let mut tried = vec![first];
+    if tried[0].closes {
+        return tried;
+    }
+    let distances = CLOSING_SHARES.map(|share| share * diagonal);
+    let may_divide = has_near_junctions(&unjoined, &closedness(&unjoined), &distances);
+    drop(unjoined);
+    for ((share, distance), may_divide) in CLOSING_SHARES.into_iter().zip(distances).zip(may_divide)
+    {
+        let same = !may_divide && n_near(surface, distance) == 0;
+        let mut outcome = match same {
+            true => tried[0].clone(),
+            false => try_closing(surface, Some(distance)).0,
+        };
+        (outcome.share, outcome.distance) = (share, distance);
+        let closes = outcome.closes;
+        tried.push(outcome);
         if closes {
             break;
         }
     }
     tried
+}
+
+/// What [`repair`] makes of the surface, and the outcome, whose share is left to the caller.
+fn try_closing(surface: &Surface, weld: Option<f64>) -> (Closing, Surface) {
+    let mut joined = surface.clone();
+    let done = mend(&mut joined, weld, true);
+    let found = closedness(&joined);
+    let closes = found.is_closed() && joined.n_triangles() > 0;
+    let outcome = Closing {
+        share: 0.0,
+        distance: 0.0,
+        points_joined: done.points_joined,
+        open_edges: found.open.len(),
+        closes,
+        defects_left: closes.then(|| validate(&joined).n_defects),
+    };
+    (outcome, joined)
 }

@@ -138,6 +138,52 @@ pub fn t_junctions(
     open.flat_map_iter(on_open_edge).collect()
 }
 
+/// For each of the ascending `distances`, whether [`t_junctions`] would find more than the vertices exactly in line.
+pub(super) fn has_near_junctions(
+    surface: &Surface,
+    closedness: &Closedness,
+    distances: &[f64],
+) -> Vec<bool> {
+    let point = |v: u32| surface.points[v as usize];
+    let farthest = distances.last().copied().unwrap_or(0.0);
+    let tree = PointTree::new(
+        ends(&closedness.open)
+            .into_iter()
+            .map(|v| (v, point(v)))
+            .collect(),
+    );
+    let gap = GAP_SHARE * surface.bounds().diagonal();
+    let margin = Point::splat(farthest);
+    let beside = |(_, edge): &(u32, [u32; 2])| {
+        let [a, b] = edge.map(point);
+        let bounds = Aabb {
+            low: a.min(b) - margin,
+            high: a.max(b) + margin,
+        };
+        let mut found = vec![false; distances.len()];
+        tree.within(&bounds, |vertex, p| {
+            let to_end = p.distance(a).min(p.distance(b));
+            if edge.contains(&vertex) || to_end <= gap {
+                return;
+            }
+            let Some(distance) = to_inside([a, b], p).filter(|&d| d <= farthest) else {
+                return;
+            };
+            let mut near = distances.iter().map(|&max| distance <= max && max < to_end);
+            if near.clone().any(|n| n) && !in_line(a, p, b) {
+                found
+                    .iter_mut()
+                    .for_each(|f| *f |= near.next() == Some(true));
+            }
+        });
+        found
+    };
+    let either = |a: Vec<bool>, b: Vec<bool>| a.iter().zip(b).map(|(a, b)| *a || b).collect();
+    let open = closedness.open.par_iter();
+    open.map(beside)
+        .reduce(|| vec![false; distances.len()], either)
+}
+
 /// How far `p` is from the inside of the segment, unless it is farther than `distance_max`, or as near to an end.
 ///
 /// Exactly in line, only `gap` counts as near to an end.
@@ -150,9 +196,13 @@ fn on_edge(p: Point, [a, b]: [Point; 2], distance_max: f64, gap: f64) -> Option<
     if to_end <= distance_max.max(gap) {
         return None;
     }
+    to_inside([a, b], p).filter(|&distance| distance <= distance_max)
+}
+
+/// How far `p` is from the segment, if that is nearest to it between its ends.
+fn to_inside([a, b]: [Point; 2], p: Point) -> Option<f64> {
     let share = (p - a).dot(b - a) / (b - a).length_squared();
-    let distance = p.distance(a + (b - a) * share);
-    (share > 0.0 && share < 1.0 && distance <= distance_max).then_some(distance)
+    (share > 0.0 && share < 1.0).then(|| p.distance(a + (b - a) * share))
 }
 
 /// Whether three points lie on a line, exactly.

@@ -170,6 +170,18 @@ fn bad_triangles_are_written_to_be_looked_at() {
 }
 
 #[test]
+fn without_bad_triangles_no_file_is_written() {
+    let place = Place::new();
+    place.write("a.off", off(&cube_at(0.0, 0.0, 0.0)));
+    let answer = place
+        .run_line("check a.off --write-bad bad.vtu --json")
+        .json();
+    assert_eq!(answer["bad_triangles"]["triangles"], 0, "{answer}");
+    assert!(answer["bad_triangles"]["file"].is_null(), "{answer}");
+    assert!(!place.path("bad.vtu").exists());
+}
+
+#[test]
 fn fitness_is_told_and_advice_given() {
     let place = Place::new();
     let answer = place
