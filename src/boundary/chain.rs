@@ -114,7 +114,7 @@ impl<P: Pages> Patch<'_, P> {
                         }
                         let t = Dyadic::from(t).shortened(&Dyadic::from(step * 0.1));
                         let exact = ExactPoint::combination(pa, &[(pb, &t)]);
-                        if let Some(x) = self.star_grown(cavity, exact) {
+                        if let Some(x) = self.star_grown(cavity, [a, b, b], exact) {
                             return Ok(x);
                         }
                     }
@@ -133,7 +133,7 @@ impl<P: Pages> Patch<'_, P> {
             ] {
                 let t = low.plus(&width.times(&Dyadic::from(share)));
                 let exact = ExactPoint::combination(pa, &[(pb, &t.shortened(&slack))]);
-                if let Some(x) = self.star(cavity, &outer, exact) {
+                if let Some(x) = self.star(cavity, &outer, [a, b, b], exact) {
                     return Ok(x);
                 }
             }

@@ -156,14 +156,14 @@ impl<P: Pages> Patch<'_, P> {
         };
         for slack in [0.02, 1e-4, 1e-7] {
             if let Some(exact) = near(room * slack, &s, &t)
-                && self.star(&around.tets, &outer, exact).is_some()
+                && self.star(&around.tets, &outer, f, exact).is_some()
             {
                 return Ok(());
             }
         }
         for slack in [0.1, 1e-3, 0.0] {
             if let Some(exact) = near(room * slack, &s, &t)
-                && self.star_grown(&around.tets, exact).is_some()
+                && self.star_grown(&around.tets, f, exact).is_some()
             {
                 return Ok(());
             }
@@ -171,7 +171,7 @@ impl<P: Pages> Patch<'_, P> {
         for terms in TERMS {
             if let Some((s, t)) = share(terms)
                 && let Some(exact) = near(0.0, &s, &t)
-                && self.star(&around.tets, &outer, exact).is_some()
+                && self.star(&around.tets, &outer, f, exact).is_some()
             {
                 return Ok(());
             }

@@ -30,6 +30,17 @@ impl ExactPoint {
         sum
     }
 
+    /// `self + by`, of few bits: each coordinate is off by less than `slack`.
+    pub(super) fn moved(&self, by: Point, slack: &Dyadic) -> Self {
+        let by = Self::explicit(by);
+        Self([0, 1, 2].map(|i| self.0[i].plus(&by.0[i]).shortened(slack)))
+    }
+
+    /// From `self` to `other`, rounded after the subtraction.
+    pub(super) fn offset(&self, other: &Self) -> Point {
+        Point::from_array([0, 1, 2].map(|i| other.0[i].minus(&self.0[i]).estimate()))
+    }
+
     /// Rounded to the nearest doubles or nearly so.
     pub(super) fn rounded(&self) -> Point {
         Point::from_array([0, 1, 2].map(|i| self.0[i].estimate()))
@@ -48,9 +59,15 @@ const ORIENT_BOUND: f64 = 5.2e-15;
 const EPSILON: f64 = f64::EPSILON;
 
 /// Six times the signed volume; the sign is exact.
+#[cfg(test)]
 pub(super) fn orient_placed(p: [Placed<'_>; 4]) -> f64 {
+    orient_filtered(p).unwrap_or_else(|| orient_exact(p).estimate())
+}
+
+/// Six times the signed volume, where doubles suffice for its sign.
+pub(super) fn orient_filtered(p: [Placed<'_>; 4]) -> Option<f64> {
     if p.iter().all(|p| p.exact.is_none()) {
-        return orient(p[0].point, p[1].point, p[2].point, p[3].point);
+        return Some(orient(p[0].point, p[1].point, p[2].point, p[3].point));
     }
     let a = p[0].point;
     let (u, v, w) = (p[1].point - a, p[2].point - a, p[3].point - a);
@@ -63,13 +80,10 @@ pub(super) fn orient_placed(p: [Placed<'_>; 4]) -> f64 {
             .fold(0.0, f64::max);
     let m = u.abs().max(v.abs()).max(w.abs()) + Point::splat(2.0 * off);
     let pairs = m.x * m.y + m.y * m.z + m.z * m.x;
-    if det.abs() > ORIENT_BOUND * (m.x * m.y * m.z) + 24.0 * off * pairs
+    let is_sure = det.abs() > ORIENT_BOUND * (m.x * m.y * m.z) + 24.0 * off * pairs
         && m.min_element() > 1e-58
-        && m.max_element() < 1e61
-    {
-        return det;
-    }
-    orient_exact(p).estimate()
+        && m.max_element() < 1e61;
+    is_sure.then_some(det)
 }
 
 /// Six times the signed volume, without rounding.

@@ -173,11 +173,38 @@ impl<'a, S: Space> Flipper<'a, S> {
         found
     }
 
+    /// Whether two corners of the ring, not side by side, can be cut off, as every triangulation of four or more does.
+    ///
+    /// Most rings have none: looking at `n` triangles saves the search over `n` cubed.
+    fn has_two_ears(&mut self, ring: &[u32], c: u32, d: u32) -> bool {
+        let n = ring.len();
+        let mut ears: Vec<usize> = Vec::new();
+        for i in 0..n {
+            let [x, y, z] = [n - 1, 0, 1].map(|k| ring[(i + k) % n]);
+            if self.s.orient([x, y, z, d]) > 0.0 && self.s.orient([y, x, z, c]) > 0.0 {
+                ears.push(i);
+            }
+            // Of three in a ring of four or more, two are not side by side.
+            if n == 3 || ears.len() == 3 {
+                break;
+            }
+        }
+        match ears[..] {
+            [] => false,
+            [_] => n == 3,
+            [i, j] => j - i > 1 && j - i < n - 1,
+            _ => true,
+        }
+    }
+
     /// Replaces the shell by the best valid, allowed triangulation of its ring.
     fn triangulate_ring(&mut self, around: &Shell, c: u32, d: u32) -> bool {
         let ring = &around.ring;
         let n = ring.len();
         if !(3..=RING_MAX).contains(&n) {
+            return false;
+        }
+        if !self.has_two_ears(ring, c, d) {
             return false;
         }
         let target = self.target;
@@ -202,8 +229,12 @@ impl<'a, S: Space> Flipper<'a, S> {
 
 /// The worse of the two tetrahedra over a ring triangle: volume over cubed edge; 0 when it may not be.
 fn shape<S: Space>(s: &mut S, target: Target, [x, y, z]: [u32; 3], c: u32, d: u32) -> f64 {
-    let (up, down) = (s.orient([x, y, z, d]), s.orient([y, x, z, c]));
-    if up <= 0.0 || down <= 0.0 || !target.allows_face(s, [x, y, z]) {
+    let up = s.orient([x, y, z, d]);
+    if up <= 0.0 {
+        return 0.0;
+    }
+    let down = s.orient([y, x, z, c]);
+    if down <= 0.0 || !target.allows_face(s, [x, y, z]) {
         return 0.0;
     }
     let p = [x, y, z, c, d].map(|v| s.position(v));

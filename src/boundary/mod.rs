@@ -6,7 +6,9 @@
 //! 2. points on the missing part (`patch`, `chain`, `cover`): where flips are stuck, the crossings are given vertices
 //!    that lie on the input exactly, as combinations of its corners kept without rounding;
 //! 3. suppression (`suppress`): each such vertex is replaced by one vertex inside each volume around it, so that
-//!    the input triangle is whole again. Exists always in exact arithmetic; accepted only by exact signs.
+//!    the input triangle is whole again. Exists always in exact arithmetic; accepted only by exact signs;
+//! 4. where doubles leave no room for that, the new vertices stay exact until all are off the surface, and then move
+//!    apart until doubles have room (`settle`).
 //!
 //! Sources: P.-L. George, H. Borouchaki and E. Saltel, "'Ultimate' robustness in meshing an arbitrary polyhedron"
 //! (2003); N. P. Weatherill and O. Hassan (1994); M. Attene and others for points kept implicit (2020-2023).
@@ -30,6 +32,7 @@ mod polygon;
 mod recover;
 mod regions;
 mod report;
+mod settle;
 mod space;
 mod star;
 mod suppress;

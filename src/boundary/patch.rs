@@ -6,7 +6,7 @@ use std::collections::{HashMap, HashSet};
 
 use super::dyadic::Dyadic;
 use super::effort::Effort;
-use super::exact::{ExactPoint, Placed, orient_exact, orient_placed};
+use super::exact::{ExactPoint, Placed, orient_exact, orient_filtered};
 use super::space::{Space, edge_key, sorted};
 use crate::geom::{Point, orient};
 use crate::mesh::{FaceRef, Mesh, Tet, VertexTag};
@@ -23,6 +23,8 @@ struct PatchVertex {
     steiner: bool,
     point: Point,
     exact: Option<ExactPoint>,
+    /// Corners of the segment (one of them twice) or facet it lies on; itself three times if on none.
+    on: [u32; 3],
     tet_of: u32,
 }
 
@@ -131,6 +133,7 @@ impl<'m, P: Pages> Patch<'m, P> {
             steiner,
             point,
             exact: None,
+            on: [l; 3],
             tet_of: t,
         });
         self.local.insert(v, l);
@@ -139,14 +142,47 @@ impl<'m, P: Pages> Patch<'m, P> {
 
     /// Adds a vertex in no tetrahedron.
     pub(super) fn add_vertex(&mut self, point: Point, exact: Option<ExactPoint>) -> u32 {
+        let l = self.vertices.len() as u32;
         self.vertices.push(PatchVertex {
             id: NONE,
             steiner: true,
             point,
             exact,
+            on: [l; 3],
             tet_of: NONE,
         });
-        self.vertices.len() as u32 - 1
+        l
+    }
+
+    /// Adds a vertex in no tetrahedron that is a combination of the vertices `on`, from the input.
+    pub(super) fn add_vertex_on(&mut self, on: [u32; 3], exact: ExactPoint) -> u32 {
+        let v = self.add_vertex(exact.rounded(), Some(exact));
+        self.vertices[v as usize].on = on;
+        v
+    }
+
+    /// Whether it is known, without looking at their exact places, that a plane holds the four.
+    ///
+    /// While facets are covered nearly all exact signs are zero for this reason, and would take long to compute.
+    fn in_one_plane(&self, v: [u32; 4]) -> bool {
+        let on = v.map(|v| self.vertices[v as usize].on);
+        let known = |v: u32| self.vertices[v as usize].exact.is_none();
+        if !on.iter().flatten().all(|&v| known(v)) {
+            return false;
+        }
+        let is_facet = |&[a, b, c]: &[u32; 3]| a != b && b != c && c != a;
+        let Some(&f) = on.iter().find(|on| is_facet(on)) else {
+            // Up to three corners in all.
+            let first = on[0][0];
+            let second = on.iter().flatten().copied().find(|&v| v != first);
+            let others = |v: &&u32| **v != first && Some(**v) != second;
+            let third = on.iter().flatten().find(others);
+            return on.iter().flatten().filter(others).all(|v| Some(v) == third);
+        };
+        let [p, q, r] = f.map(|v| self.vertices[v as usize].point);
+        let beside =
+            |v: &u32| f.contains(v) || orient(p, q, r, self.vertices[*v as usize].point) == 0.0;
+        on.iter().flatten().all(beside)
     }
 
     /// Takes a vertex back that was added and is in no tetrahedron.
@@ -182,6 +218,39 @@ impl<'m, P: Pages> Patch<'m, P> {
         self.vertices[v as usize].id
     }
 
+    /// Whether the position of `v` is more than its rounded one.
+    pub(super) fn is_exact(&self, v: u32) -> bool {
+        self.vertices[v as usize].exact.is_some()
+    }
+
+    /// Where `v` is, without rounding.
+    pub(super) fn exact_place(&self, v: u32) -> ExactPoint {
+        let v = &self.vertices[v as usize];
+        let explicit = || ExactPoint::explicit(v.point);
+        v.exact.clone().unwrap_or_else(explicit)
+    }
+
+    /// Position of `v`, rounded, and the exact one if it differs.
+    pub(super) fn placement(&self, v: u32) -> (Point, Option<ExactPoint>) {
+        let v = &self.vertices[v as usize];
+        (v.point, v.exact.clone())
+    }
+
+    /// Moves `v`; the caller answers for the volumes around it.
+    pub(super) fn place(&mut self, v: u32, (point, exact): (Point, Option<ExactPoint>)) {
+        let v = &mut self.vertices[v as usize];
+        (v.point, v.exact) = (point, exact);
+    }
+
+    /// From `x` to `v`: the difference of what they are, not of what they round to.
+    pub(super) fn offset(&self, x: u32, v: u32) -> Point {
+        let (from, to) = (&self.vertices[x as usize], &self.vertices[v as usize]);
+        if from.exact.is_none() && to.exact.is_none() {
+            return to.point - from.point;
+        }
+        self.exact_place(x).offset(&self.exact_place(v))
+    }
+
     fn placed(&self, v: u32) -> Placed<'_> {
         let v = &self.vertices[v as usize];
         Placed {
@@ -193,6 +262,11 @@ impl<'m, P: Pages> Patch<'m, P> {
     /// Six times the signed volume, without rounding.
     pub(super) fn orient_exact(&self, v: [u32; 4]) -> Dyadic {
         orient_exact(v.map(|v| self.placed(v)))
+    }
+
+    /// Tetrahedron `t` as it is.
+    pub(super) fn tet_now(&self, t: u32) -> Tet {
+        self.tets[t as usize]
     }
 
     /// Live tetrahedra.
@@ -300,7 +374,11 @@ impl<P: Pages> Space for Patch<'_, P> {
     }
 
     fn orient(&mut self, v: [u32; 4]) -> f64 {
-        orient_placed(v.map(|v| self.placed(v)))
+        let placed = v.map(|v| self.placed(v));
+        orient_filtered(placed).unwrap_or_else(|| match self.in_one_plane(v) {
+            true => 0.0,
+            false => orient_exact(placed).estimate(),
+        })
     }
 
     fn position(&mut self, v: u32) -> Point {

@@ -233,6 +233,9 @@ fn build<P: Pages>(patch: &mut Patch<'_, P>, skin: &mut Skin) -> Result<u32, Tro
             patch.remove_free(v);
         }
     }
+    if patch.effort.exact {
+        patch.settle()?;
+    }
     Ok(points)
 }
 

@@ -4,8 +4,8 @@
 
 /// Triangles `[i, k, j]`, `i < k < j`, of the polygon `0..n`, so that the least value is greatest.
 ///
-/// `value` is asked once per triangle that may matter; `<= 0` forbids it. `chord` is asked for every inner edge
-/// `i < j`. `None` when nothing is allowed.
+/// `value` is asked once per triangle that may matter; `<= 0` forbids it. `chord` is asked for the inner
+/// edges `i < j` that could be used. `None` when nothing is allowed.
 pub(super) fn triangulate(
     n: usize,
     mut chord: impl FnMut(usize, usize) -> bool,
@@ -19,9 +19,6 @@ pub(super) fn triangulate(
     for len in 2..n {
         for i in 0..n - len {
             let j = i + len;
-            if len < n - 1 && !chord(i, j) {
-                continue;
-            }
             let mut top = (0.0, 0);
             for k in i + 1..j {
                 let bound = best[i * n + k].0.min(best[k * n + j].0);
@@ -32,7 +29,10 @@ pub(super) fn triangulate(
                     }
                 }
             }
-            best[i * n + j] = top;
+            // Most are forbidden by the triangles already.
+            if top.0 > 0.0 && (len == n - 1 || chord(i, j)) {
+                best[i * n + j] = top;
+            }
         }
     }
     if n < 3 || best[n - 1].0 <= 0.0 {

@@ -28,13 +28,16 @@ impl<P: Pages> Patch<'_, P> {
     }
 
     /// Replaces the cavity by the point joined to its outer faces, if the point sees them all from inside.
+    ///
+    /// `on` are the corners of what the point lies on.
     pub(super) fn star(
         &mut self,
         cavity: &[u32],
         outer: &[Outer],
+        on: [u32; 3],
         exact: ExactPoint,
     ) -> Option<u32> {
-        let x = self.add_vertex(exact.rounded(), Some(exact));
+        let x = self.add_vertex_on(on, exact);
         let new: Vec<[u32; 4]> = outer.iter().map(|(tet, i)| swapped(tet, *i, x)).collect();
         if new.iter().any(|&q| self.orient(q) <= 0.0) {
             self.drop_vertex(x);
@@ -45,8 +48,13 @@ impl<P: Pages> Patch<'_, P> {
     }
 
     /// The same, where the cavity may grow to be seen whole.
-    pub(super) fn star_grown(&mut self, seed: &[u32], exact: ExactPoint) -> Option<u32> {
-        let x = self.add_vertex(exact.rounded(), Some(exact));
+    pub(super) fn star_grown(
+        &mut self,
+        seed: &[u32],
+        on: [u32; 3],
+        exact: ExactPoint,
+    ) -> Option<u32> {
+        let x = self.add_vertex_on(on, exact);
         let Ok(grown) = self.grow(seed, x, None, &[], &HashSet::new()) else {
             self.drop_vertex(x);
             return None;

@@ -13,9 +13,10 @@
 //! Source: P.-L. George, H. Borouchaki and E. Saltel, "'Ultimate' robustness in meshing an arbitrary polyhedron",
 //! International Journal for Numerical Methods in Engineering 58 (2003).
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use super::chain::Trouble;
+use super::dyadic::Dyadic;
 use super::flips::Flipper;
 use super::grow::{Grown, Obstacle};
 use super::kernel::{HalfSpace, center};
@@ -36,6 +37,15 @@ const FIRM_MAX: usize = 24;
 
 /// Times a place eight times nearer is looked for: to the last bits of a double.
 const NEARER_MAX: i32 = 16;
+
+/// Vertices of a wedge between which directions into it are looked for.
+const WAYS_MAX: usize = 12;
+
+/// Times an exact place is looked for half as far away.
+const HALVES_MAX: usize = 400;
+
+/// Coordinates of an exact place keep bits down to this share of its distance.
+const FINE: f64 = 1.0 / 65536.0;
 
 /// The facets of a patch and the faces that make them up.
 #[derive(Default)]
@@ -62,7 +72,7 @@ struct Wedge {
 }
 
 /// The half-space behind a triangle; `None` when doubles see no normal.
-fn half_space([a, b, c]: [Point; 3]) -> Option<HalfSpace> {
+pub(super) fn half_space([a, b, c]: [Point; 3]) -> Option<HalfSpace> {
     let normal = (b - a).cross(c - a).normalize_or_zero();
     (normal != Point::ZERO).then(|| HalfSpace {
         normal,
@@ -72,7 +82,7 @@ fn half_space([a, b, c]: [Point; 3]) -> Option<HalfSpace> {
 
 impl<P: Pages> Patch<'_, P> {
     /// Removes edges of `x` that are on no facet, as far as that goes: fewer faces to be seen.
-    fn thin_out(&mut self, x: u32) {
+    pub(super) fn thin_out(&mut self, x: u32) {
         loop {
             let ball = ball(self, x);
             let mut link: Vec<(u32, u32)> = Vec::new();
@@ -87,8 +97,11 @@ impl<P: Pages> Patch<'_, P> {
             link.sort_unstable();
             link.dedup_by_key(|l| l.0);
             let mut thinner = false;
-            for (v, _) in link {
-                let Some(t) = find_edge(self, x, v) else {
+            for (v, t) in link {
+                // Mostly still where it was: finding it again takes signs of exact points.
+                let tet = self.tet(t);
+                let still = tet.local(x).is_some() && tet.local(v).is_some();
+                let Some(t) = still.then_some(t).or_else(|| find_edge(self, x, v)) else {
                     continue;
                 };
                 let mut flipper = Flipper::new(self, Target::Free);
@@ -454,12 +467,12 @@ impl<P: Pages> Patch<'_, P> {
         for &t in &wedge.tets {
             let tet = self.tet(t);
             let i = tet.local(x)?;
-            let corners = tet.face(i).map(|v| self.position(v) - origin);
+            let corners = tet.face(i).map(|v| self.offset(x, v));
             plane(corners, tet.is_required(i));
         }
         for &[p, q, r] in walls {
             // Seen from inside counter-clockwise, so the outward normal is reversed.
-            plane([q, p, r].map(|v| self.position(v) - origin), true);
+            plane([q, p, r].map(|v| self.offset(x, v)), true);
         }
         let mut proposals: Vec<(Point, bool)> = Vec::new();
         let best = center(&planes, reach);
@@ -467,7 +480,7 @@ impl<P: Pages> Patch<'_, P> {
             let room = planes.iter().map(|h| h.offset - h.normal.dot(d));
             room.fold(f64::INFINITY, f64::min) > ROOM_MIN * reach
         });
-        let heart = self.heart(x, wedge) - origin;
+        let heart = self.heart(x, wedge);
         let halves = |d: Point, n: i32| (0..n).map(move |k| d * 0.5f64.powi(k));
         if let Some(d) = best.filter(|_| roomy) {
             proposals.push((d, false));
@@ -482,7 +495,7 @@ impl<P: Pages> Patch<'_, P> {
                 match self.join_at(x, wedge, walls, taken, origin + d, true) {
                     Ok(grown) => return Some(grown),
                     Err(Obstacle::Required(face)) => {
-                        met.extend(half_space(face.map(|v| self.position(v) - origin)));
+                        met.extend(half_space(face.map(|v| self.offset(x, v))));
                     }
                     Err(Obstacle::Other) => {
                         proposals.extend(halves(d, 24).map(|d| (d, true)));
@@ -496,10 +509,68 @@ impl<P: Pages> Patch<'_, P> {
             proposals.extend(halves(d, 45).map(|d| (d, false)));
         }
         proposals.extend(halves(heart, 45).map(|d| (d, false)));
-        proposals.into_iter().find_map(|(d, may_grow)| {
+        let found = proposals.into_iter().find_map(|(d, may_grow)| {
             self.join_at(x, wedge, walls, taken, origin + d, may_grow)
                 .ok()
-        })
+        });
+        if found.is_some() || !self.effort.exact {
+            return found;
+        }
+        let mut ways: Vec<Point> = best.into_iter().chain([heart]).collect();
+        ways.extend(self.ways(x, wedge, walls));
+        ways.into_iter()
+            .find_map(|way| self.join_near(x, wedge, walls, way))
+    }
+
+    /// Directions into the cone between the walls: to vertices of the wedge, to the middle between two, and away from it.
+    fn ways(&self, x: u32, wedge: &Wedge, walls: &[[u32; 3]]) -> Vec<Point> {
+        let corners = wedge
+            .tets
+            .iter()
+            .flat_map(|&t| self.tet_now(t).vertices())
+            .chain(walls.iter().flatten().copied());
+        let corners: BTreeSet<u32> = corners.filter(|&v| v != x).collect();
+        let mut to: Vec<Point> = corners.iter().map(|&v| self.offset(x, v)).collect();
+        to.retain(|&d| d.length() > 0.0);
+        let n = to.len().min(WAYS_MAX);
+        for i in 0..n {
+            for j in 0..i {
+                let between = to[i].normalize() + to[j].normalize();
+                let size = to[i].length().min(to[j].length());
+                to.extend([between * size, between * -size]);
+            }
+        }
+        to
+    }
+
+    /// The wedge and its walls joined to a new vertex as near to `x` as it takes, which is kept exact.
+    fn join_near(
+        &mut self,
+        x: u32,
+        wedge: &Wedge,
+        walls: &[[u32; 3]],
+        mut way: Point,
+    ) -> Option<Grown> {
+        let from = self.exact_place(x);
+        for _ in 0..HALVES_MAX {
+            // Half of what is seen leaves room on both sides.
+            way *= 0.5;
+            let exact = from.moved(way, &Dyadic::from(way.length() * FINE));
+            let p = self.add_vertex(exact.rounded(), Some(exact));
+            let mut quads: Vec<[u32; 4]> = walls.iter().map(|&[a, b, c]| [a, b, c, p]).collect();
+            // The walls lie in planes through `x`: a way behind one of them is behind it everywhere.
+            let between_walls = quads.iter().all(|&q| self.orient(q) > 0.0);
+            let grown = between_walls.then(|| self.join_all(x, wedge, p));
+            if let Some(Some(mut grown)) = grown {
+                grown.quads.append(&mut quads);
+                return Some(grown);
+            }
+            self.drop_vertex(p);
+            if !between_walls {
+                break;
+            }
+        }
+        None
     }
 
     /// The wedge and its walls joined to a new vertex at `place`.
@@ -540,14 +611,14 @@ impl<P: Pages> Patch<'_, P> {
         })
     }
 
-    /// Mean of the wedge's other vertices: a direction to try when the planes give none.
+    /// From `x` to the mean of the wedge's other vertices: a direction to try when the planes give none.
     fn heart(&mut self, x: u32, wedge: &Wedge) -> Point {
         let mut sum = Point::ZERO;
         let mut n = 0.0;
         for &t in &wedge.tets {
             for v in self.tets_vertices(t) {
                 if v != x {
-                    sum += self.position(v);
+                    sum += self.offset(x, v);
                     n += 1.0;
                 }
             }
