@@ -13,7 +13,7 @@
 use super::polygon::triangulate;
 use super::space::Space;
 use super::target::Target;
-use super::walk::{Shell, find_edge, shell};
+use super::walk::{Shell, edge_at, find_edge, shell};
 use crate::mesh::FaceRef;
 use crate::mesh::anatomy::EDGES;
 
@@ -119,9 +119,12 @@ impl<'a, S: Space> Flipper<'a, S> {
         }
         let mark = self.log.len();
         'smaller: loop {
-            for (u, r) in self.in_the_way(&around, c, d) {
+            for (t, u, r) in self.in_the_way(&around, c, d) {
+                if self.work == 0 {
+                    break;
+                }
                 let before = self.log.len();
-                let Some(t) = find_edge(self.s, u, r) else {
+                let Some(t) = edge_at(self.s, t, u, r) else {
                     continue;
                 };
                 if !self.remove_edge(t, u, r, level - 1) {
@@ -150,7 +153,7 @@ impl<'a, S: Space> Flipper<'a, S> {
     }
 
     /// Edges from `c` or `d` to the ring beyond which the neighbors on the ring see each other.
-    fn in_the_way(&mut self, around: &Shell, c: u32, d: u32) -> Vec<(u32, u32)> {
+    fn in_the_way(&mut self, around: &Shell, c: u32, d: u32) -> Vec<(u32, u32, u32)> {
         let n = around.ring.len();
         let mut found = Vec::new();
         for i in 0..n {
@@ -164,10 +167,10 @@ impl<'a, S: Space> Flipper<'a, S> {
             }
             // Positive on all three means that x y crosses the face c d r.
             if self.s.orient([r, d, y, x]) <= 0.0 {
-                found.push((d, r));
+                found.push((around.tets[i], d, r));
             }
             if self.s.orient([c, r, y, x]) <= 0.0 {
-                found.push((c, r));
+                found.push((around.tets[i], c, r));
             }
         }
         found

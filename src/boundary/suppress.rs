@@ -24,7 +24,7 @@ use super::patch::Patch;
 use super::polygon::triangulate;
 use super::space::{Space, sorted};
 use super::target::Target;
-use super::walk::{ball, find_edge, swapped};
+use super::walk::{ball, edge_at, swapped};
 use crate::geom::Point;
 use crate::mesh::FaceRef;
 use crate::store::Pages;
@@ -99,9 +99,7 @@ impl<P: Pages> Patch<'_, P> {
             let mut thinner = false;
             for (v, t) in link {
                 // Mostly still where it was: finding it again takes signs of exact points.
-                let tet = self.tet(t);
-                let still = tet.local(x).is_some() && tet.local(v).is_some();
-                let Some(t) = still.then_some(t).or_else(|| find_edge(self, x, v)) else {
+                let Some(t) = edge_at(self, t, x, v) else {
                     continue;
                 };
                 let mut flipper = Flipper::new(self, Target::Free);

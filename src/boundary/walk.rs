@@ -96,6 +96,13 @@ pub(super) fn find_edge<S: Space>(s: &mut S, a: u32, b: u32) -> Option<u32> {
     s.tet(t).local(b).map(|_| t)
 }
 
+/// The same, where `t` had the edge when it was last looked at.
+pub(super) fn edge_at<S: Space>(s: &mut S, t: u32, a: u32, b: u32) -> Option<u32> {
+    let tet = s.tet(t);
+    let still = tet.is_live() && tet.local(a).is_some() && tet.local(b).is_some();
+    if still { Some(t) } else { find_edge(s, a, b) }
+}
+
 /// The tetrahedra around an edge `c d` and the vertices opposite it.
 ///
 /// Invariant: `tets[i]` has the vertices `c, d, ring[i], ring[i + 1]`, positive in this order.
