@@ -207,10 +207,12 @@ fn facets<P: Pages>(
     let mut faces = faces.peekable();
     // A face may be both a facet and an interface face: what was read stays at hand.
     let (mut at, mut sides) = ([0; 12], [NONE; 2]);
+    // Of a facet given from both sides the first one names the tetrahedra.
+    let mut is_named = [false; 2];
     for claim in sorter.finish()? {
         let claim = claim?;
         if claim[..12] != at || sides == [NONE; 2] {
-            sides = [NONE; 2];
+            (sides, is_named) = ([NONE; 2], [false; 2]);
             at.copy_from_slice(&claim[..12]);
             while let Some(face) =
                 faces.next_if(|f| f.as_ref().map_or(true, |f| f[..12] <= claim[..12]))
@@ -223,7 +225,10 @@ fn facets<P: Pages>(
         }
         // A tetrahedron sees its face from inside turn as the facet does when it lies behind it.
         let odd = usize::from(claim[16]);
-        let tets = [sides[1 - odd], sides[odd]];
+        let tets = match std::mem::replace(&mut is_named[usize::from(claim[17])], true) {
+            true => [NONE; 2],
+            false => [sides[1 - odd], sides[odd]],
+        };
         let number = word(&claim, 12);
         if claim[17] == FACET {
             push_facet(mesh, number, tets, writer)?;
