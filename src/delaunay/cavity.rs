@@ -59,7 +59,13 @@ pub struct Kernel {
     cavity: Vec<u32>,
     /// The face through which each tetrahedron of the cavity was entered.
     entries: Vec<FaceRef>,
+    /// The vertex each tetrahedron of the cavity brought in; none for the first.
+    apexes: Vec<u32>,
+    /// Outer faces that the point does not see from inside.
+    blind: Vec<u32>,
+    /// Local numbers of the outer faces' vertices, if they were given already.
     locals: Vec<[u8; 3]>,
+    numbered: bool,
     faces: Vec<CavityFace>,
     links: Links,
     new_tets: Vec<u32>,
@@ -74,7 +80,10 @@ impl Default for Kernel {
         Self {
             cavity: Vec::new(),
             entries: Vec::new(),
+            apexes: Vec::new(),
+            blind: Vec::new(),
             locals: Vec::new(),
+            numbered: false,
             faces: Vec::new(),
             links: Links::new(),
             new_tets: Vec::new(),
@@ -115,7 +124,7 @@ impl Kernel {
         refuses: impl FnMut(&mut Mesh<P>, u32) -> bool,
     ) -> Result<(), Rejected> {
         self.gather::<P, true>(mesh, p, start, refuses)?;
-        if let Err(rejected) = self.correct(mesh, p, start.tet) {
+        if let Err(rejected) = self.correct(mesh, p, start) {
             self.discard(mesh);
             return Err(rejected);
         }
@@ -150,6 +159,9 @@ impl Kernel {
         self.cavity.clear();
         self.entries.clear();
         self.faces.clear();
+        self.apexes.clear();
+        self.blind.clear();
+        self.numbered = false;
         mesh.set_mark(start.tet, IN_CAVITY, true);
         self.cavity.push(start.tet);
         self.entries.push(FaceRef::new(start.tet, 0));
@@ -158,7 +170,8 @@ impl Kernel {
             let entry = self.entries[next];
             let t = entry.tet();
             let tet = mesh.tet(t);
-            let [a, b, c, d] = mesh.points(&tet);
+            let corners = mesh.points(&tet);
+            let [a, b, c, d] = corners;
             let seen = [
                 Seen::new(a, p),
                 Seen::new(b, p),
@@ -185,12 +198,19 @@ impl Kernel {
                         mesh.set_mark(across.tet(), IN_CAVITY, true);
                         self.cavity.push(across.tet());
                         self.entries.push(across);
-                        if CONSTRAINED && refuses(mesh, v) {
-                            self.discard(mesh);
-                            return Err(Rejected::Refused);
+                        if CONSTRAINED {
+                            if refuses(mesh, v) {
+                                self.discard(mesh);
+                                return Err(Rejected::Refused);
+                            }
+                            self.apexes.push(v);
                         }
                         continue;
                     }
+                }
+                // Without constraints every outer face of a Delaunay cavity is seen.
+                if CONSTRAINED && orient(p, corners[f], corners[g], corners[h]) <= 0.0 {
+                    self.blind.push(self.faces.len() as u32);
                 }
                 self.faces.push(CavityFace {
                     vertices: tet.face(i),
@@ -214,17 +234,16 @@ impl Kernel {
         &mut self,
         mesh: &mut Mesh<P>,
         p: Point,
-        seed: u32,
+        start: &Located,
     ) -> Result<(), Rejected> {
         // What is left in the end is the largest part without a blind outer face, whatever the order.
         let mut suspects = std::mem::take(&mut self.suspects);
         suspects.clear();
-        for face in &self.faces {
-            let [a, b, c] = face.vertices;
-            let (a, b, c) = (mesh.point(a), mesh.point(b), mesh.point(c));
-            if orient(p, a, b, c) <= 0.0 && is_marked(mesh, face.inside.tet()) {
-                mesh.set_mark(face.inside.tet(), IN_CAVITY, false);
-                suspects.push(face.inside.tet());
+        for &k in &self.blind {
+            let inside = self.faces[k as usize].inside.tet();
+            if is_marked(mesh, inside) {
+                mesh.set_mark(inside, IN_CAVITY, false);
+                suspects.push(inside);
             }
         }
         let shrunk = !suspects.is_empty();
@@ -246,49 +265,41 @@ impl Kernel {
         self.suspects = suspects;
         if shrunk {
             self.stats.shrunk += 1;
-            if !is_marked(mesh, seed) {
+            if !is_marked(mesh, start.tet) {
                 return Err(Rejected::Blocked);
             }
-            self.reflood(mesh, seed);
+            self.reflood(mesh, start.tet);
         }
         self.list_outer();
         // A ball has 2 n - 4 faces on n vertices; anything else is pinched or has a hole.
-        if self.faces.len() + 4 != 2 * self.outer.len() {
+        if self.faces.len() + 4 != 2 * self.n_outer() {
             return Err(Rejected::Blocked);
         }
-        let small = self.outer.len() < CAVITY_SMALL;
-        let mut buried = false;
-        for &t in &self.cavity {
-            buried |= mesh.tet(t).vertices().into_iter().any(|v| {
-                let outer = if small {
-                    self.links.knows(v)
-                } else {
-                    self.outer.binary_search(&v).is_ok()
-                };
-                !outer
-            });
-        }
-        if buried {
+        if self.buries(start.record.vertices()) {
             Err(Rejected::Buries)
         } else {
             Ok(())
         }
     }
 
-    /// Lists the vertices of the outer faces: in order of appearance, or sorted when there are many.
+    /// Whether a vertex of the cavity is on none of its outer faces.
+    fn buries(&self, first: [u32; 4]) -> bool {
+        let numbered = self.numbered;
+        let mut vertices = first.iter().chain(&self.apexes);
+        vertices.any(|v| {
+            if numbered {
+                !self.links.knows(*v)
+            } else {
+                self.outer.binary_search(v).is_err()
+            }
+        })
+    }
+
+    /// Lists the vertices of the outer faces: numbered in order of appearance, or sorted when there are many.
     fn list_outer(&mut self) {
-        self.links.begin();
         self.outer.clear();
-        for v in self.faces.iter().flat_map(|face| face.vertices) {
-            let before = self.links.n_local();
-            if self.links.local(v).is_none() {
-                break;
-            }
-            if self.links.n_local() > before {
-                self.outer.push(v);
-            }
-        }
-        if self.outer.len() == CAVITY_SMALL {
+        self.numbered = self.number_faces();
+        if !self.numbered {
             self.outer.clear();
             self.outer
                 .extend(self.faces.iter().flat_map(|face| face.vertices));
@@ -297,10 +308,38 @@ impl Kernel {
         }
     }
 
+    /// Gives the vertices of the outer faces local numbers; `false` when they are too many.
+    fn number_faces(&mut self) -> bool {
+        self.links.begin();
+        self.locals.clear();
+        for face in &self.faces {
+            let [a, b, c] = face.vertices;
+            let (Some(a), Some(b), Some(c)) = (
+                self.links.local(a),
+                self.links.local(b),
+                self.links.local(c),
+            ) else {
+                return false;
+            };
+            self.locals.push([a, b, c]);
+        }
+        true
+    }
+
+    /// Vertices of the outer faces, once they are listed.
+    fn n_outer(&self) -> usize {
+        if self.numbered {
+            self.links.n_local()
+        } else {
+            self.outer.len()
+        }
+    }
+
     /// Keeps what is still connected to `seed` through marked tetrahedra; lists the outer faces anew.
     fn reflood<P: Pages>(&mut self, mesh: &mut Mesh<P>, seed: u32) {
         let before = std::mem::take(&mut self.cavity);
         self.faces.clear();
+        self.apexes.clear();
         // The mark moves while a tetrahedron is known to stay.
         let settle = |mesh: &mut Mesh<P>, t: u32| {
             mesh.set_mark(t, IN_CAVITY, false);
@@ -328,6 +367,7 @@ impl Kernel {
         }
         for &t in &self.cavity {
             let tet = mesh.tet(t);
+            self.apexes.extend(tet.vertices());
             for i in 0..4 {
                 let across = tet.neighbor[i];
                 let required = tet.is_required(i);
@@ -371,8 +411,13 @@ impl Kernel {
         while self.new_tets.len() < n_new {
             self.new_tets.push(mesh.take_tet());
         }
-        self.links.begin();
-        if !self.link_by_matrix(mesh, v) {
+        if !self.numbered && self.faces.len() <= 2 * CAVITY_SMALL {
+            self.numbered = self.number_faces();
+        }
+        if self.numbered {
+            self.link_by_matrix(mesh, v);
+        } else {
+            self.links.begin();
             self.link_by_sorting(mesh, v);
         }
         for k in n_new..self.cavity.len() {
@@ -382,22 +427,9 @@ impl Kernel {
         self.new_tets[0]
     }
 
-    /// Writes the new tetrahedra; `false` (with nothing written) when there are too many vertices.
-    fn link_by_matrix<P: Pages>(&mut self, mesh: &mut Mesh<P>, v: u32) -> bool {
-        if self.faces.len() > 2 * CAVITY_SMALL {
-            return false;
-        }
-        self.locals.clear();
-        for (face, &t) in self.faces.iter().zip(&self.new_tets) {
-            let [a, b, c] = face.vertices;
-            let (Some(a), Some(b), Some(c)) = (
-                self.links.local(a),
-                self.links.local(b),
-                self.links.local(c),
-            ) else {
-                return false;
-            };
-            self.locals.push([a, b, c]);
+    /// Writes the new tetrahedra; the outer faces' vertices must be numbered.
+    fn link_by_matrix<P: Pages>(&mut self, mesh: &mut Mesh<P>, v: u32) {
+        for (&[a, b, c], &t) in self.locals.iter().zip(&self.new_tets) {
             let t = t << 2;
             // Face j of (v, f0, f1, f2) is opposite f_{j-1}; it holds the edge f_j → f_{j+1}.
             self.links.set(b, c, t | 1);
@@ -412,7 +444,6 @@ impl Kernel {
             ];
             write_new(mesh, v, t, face, inner);
         }
-        true
     }
 
     #[cold]

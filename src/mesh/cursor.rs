@@ -18,6 +18,16 @@ pub enum VertexTag {
     EnclosingBox = 4,
 }
 
+/// A vertex as the end of an edge.
+#[derive(Clone, Copy, Debug)]
+pub struct End {
+    pub point: Point,
+    /// Wanted edge length.
+    pub h: f32,
+    /// Whether it may never move; see [`Mesh::is_fixed`].
+    pub fixed: bool,
+}
+
 /// A triangle of the input (or of an interface) and what lies on its two sides.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Facet {
@@ -173,6 +183,16 @@ const TAG_BITS: u32 = 3;
 const TAG_MASK: u32 = (1 << TAG_BITS) - 1;
 const WORD_ZERO: u32_le = u32_le::from_native(0);
 
+#[inline(always)]
+fn end(slot: &Slot) -> End {
+    let size = slot[6].to_native();
+    End {
+        point: position(slot),
+        h: f32::from_bits(size & !FIXED),
+        fixed: size & FIXED != 0,
+    }
+}
+
 /// The coordinates in a vertex record.
 #[inline(always)]
 fn position(w: &Slot) -> Point {
@@ -298,6 +318,12 @@ impl<P: Pages> Mesh<P> {
         Some(slot[face.face()].to_native() & VERTEX_MASK)
     }
 
+    /// The vertex opposite `face`.
+    #[inline(always)]
+    pub fn apex(&mut self, face: FaceRef) -> u32 {
+        self.pages.read::<{ kind::TETS }>(face.tet())[face.face()].to_native() & VERTEX_MASK
+    }
+
     /// Replaces the record of `t`.
     #[inline(always)]
     pub fn set_tet(&mut self, t: u32, tet: Tet) {
@@ -368,6 +394,7 @@ impl<P: Pages> Mesh<P> {
     }
 
     /// The first tetrahedron in use with an id of at least `from`, in id (and page) order.
+    #[inline(always)]
     pub fn next_tet(&mut self, mut from: u32) -> Option<(u32, Tet)> {
         if (from & SLOT_MASK) as usize >= RECORDS {
             from = ((from >> SLOT_BITS) + 1) << SLOT_BITS;
@@ -442,6 +469,15 @@ impl<P: Pages> Mesh<P> {
         let ids = [tet.vertex(0), tet.vertex(1), tet.vertex(2), tet.vertex(3)];
         let [a, b, c, d] = self.pages.read_four::<{ kind::VERTICES }>(ids);
         [position(a), position(b), position(c), position(d)]
+    }
+
+    /// The corners of a tetrahedron with all that decides about edges between them.
+    #[inline(always)]
+    pub fn ends(&mut self, tet: &Tet) -> [End; 4] {
+        let ids = [tet.vertex(0), tet.vertex(1), tet.vertex(2), tet.vertex(3)];
+        // Spelled out: `map` on arrays is not always inlined, which cost 5 % of a whole run.
+        let [a, b, c, d] = self.pages.read_four::<{ kind::VERTICES }>(ids);
+        [end(a), end(b), end(c), end(d)]
     }
 
     /// Moves `v`.

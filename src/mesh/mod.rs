@@ -6,6 +6,6 @@ mod renumber;
 
 pub use anatomy::{FaceRef, Tet};
 pub use cursor::{
-    Facet, InterfaceFace, MESH_STATE_WORDS, Mesh, MeshState, VertexTag, dense, sparse,
+    End, Facet, InterfaceFace, MESH_STATE_WORDS, Mesh, MeshState, VertexTag, dense, sparse,
 };
 pub use renumber::{Workspace, renumber};

@@ -21,7 +21,7 @@ pub struct Workspace<'a> {
 
 /// Renumbers vertices, tetrahedra and the facets' references to them; frees every unused id.
 ///
-/// The order is a function of positions alone. Effects: all ids change, the scratch map is used up, and `tet_of` is no longer
+/// Vertices are in the order of their positions alone, tetrahedra in that of their first vertex, then of their ids before. Effects: all ids change, the scratch map is used up, and `tet_of` is no longer
 /// right. Errors: the disk, while sorting.
 pub fn renumber<P: Pages>(
     mesh: &mut Mesh<P>,
@@ -30,7 +30,7 @@ pub fn renumber<P: Pages>(
 ) -> Result<(), StoreError> {
     mesh.clear_scratch();
     let n_vertices = renumber_vertices(mesh, order, space)?;
-    let n_tets = renumber_tets(mesh, order, space)?;
+    let n_tets = renumber_tets(mesh, space)?;
     for n in 0..mesh.n_facets() {
         let mut facet = mesh.facet(n);
         facet.vertices = facet.vertices.map(|v| mesh.scratch(dense(v)));
@@ -106,29 +106,28 @@ fn renumber_vertices<P: Pages>(
     Ok(n_new)
 }
 
-fn renumber_tets<P: Pages>(
-    mesh: &mut Mesh<P>,
-    order: &HilbertFrame,
-    space: &Workspace,
-) -> Result<u32, StoreError> {
+fn renumber_tets<P: Pages>(mesh: &mut Mesh<P>, space: &Workspace) -> Result<u32, StoreError> {
     // The map of tetrahedra lies behind that of vertices.
     let base = dense(mesh.vertex_ids_end());
-    let mut sorter = Sorter::<12>::new(space.dir, space.memory);
+    // The vertices' new numbers follow the curve already: the smallest one of a tetrahedron is its place.
+    let mut sorter = Sorter::<8>::new(space.dir, space.memory);
     let mut from = 0;
     while let Some((t, mut tet)) = mesh.next_tet(from) {
         from = t + 1;
+        let mut least = u32::MAX;
         for (i, v) in tet.vertices().into_iter().enumerate() {
-            tet.node[i] = tet.node[i] - v + mesh.scratch(dense(v));
+            let new = mesh.scratch(dense(v));
+            tet.node[i] = tet.node[i] - v + new;
+            least = least.min(new);
         }
         mesh.set_tet(t, tet);
-        let [a, b, c, d] = mesh.points(&tet);
-        sorter.push(record(order.index((a + b + c + d) * 0.25), t))?;
+        sorter.push((u64::from(least) << 32 | u64::from(t)).to_be_bytes())?;
     }
     let old_pages = mesh.pages().n_pages::<{ kind::TETS }>();
     let old_attributes = mesh.pages().n_pages::<{ kind::TET_ATTRIBUTES }>();
     let mut n_new = 0;
     for sorted in sorter.finish()? {
-        let t = id_of(sorted?);
+        let t = u64::from_be_bytes(sorted?) as u32;
         let to = sparse(n_new);
         mesh.copy_record::<{ kind::TETS }>(t, (old_pages << SLOT_BITS) + to);
         mesh.copy_attribute::<{ kind::TET_ATTRIBUTES }>(t, to, old_attributes);

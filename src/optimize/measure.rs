@@ -112,7 +112,7 @@ fn count_faces<P: Pages>(
         if !across.exists() || across.tet() < t || tet.is_required(i) {
             continue;
         }
-        let apex = mesh.tet(across.tet()).vertex(across.face());
+        let apex = mesh.apex(across);
         let apex = mesh.point(apex);
         table.faces += 1;
         table.faces_delaunay += u64::from(!sphere.has_inside(apex));

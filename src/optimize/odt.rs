@@ -74,11 +74,10 @@ fn gather<P: Pages>(mesh: &mut Mesh<P>) {
         if t & 1023 == 0 {
             stop_if_requested();
         }
-        let p = mesh.points(&tet);
-        let mut sizes = 0.0;
-        for i in 0..4 {
-            sizes += f64::from(mesh.size(tet.vertex(i)));
-        }
+        let ends = mesh.ends(&tet);
+        let p = [ends[0].point, ends[1].point, ends[2].point, ends[3].point];
+        let size = |i: usize| f64::from(ends[i].h);
+        let sizes = (size(0) + size(1)) + (size(2) + size(3));
         let weight = if sizes > 0.0 {
             64.0 / (sizes * sizes * sizes)
         } else {
@@ -90,6 +89,9 @@ fn gather<P: Pages>(mesh: &mut Mesh<P>) {
         let sum = (vw * u.dot(u) + wu * v.dot(v) + uv * w.dot(w)) * weight;
         let at = [Point::ZERO, u, v, w];
         for (i, corner) in at.into_iter().enumerate() {
+            if ends[i].fixed {
+                continue;
+            }
             // Seen from another corner, the center is nearer by that corner's position.
             let own = sum - corner * (2.0 * det);
             let slot = mesh.pages_mut().write::<{ kind::SCRATCH }>(tet.vertex(i));
@@ -103,6 +105,10 @@ fn gather<P: Pages>(mesh: &mut Mesh<P>) {
 /// Pins the vertices of required and hull faces.
 #[inline(always)]
 fn pin<P: Pages>(mesh: &mut Mesh<P>, tet: &Tet) {
+    let inner = tet.neighbor.iter().all(|face| face.exists());
+    if inner && !(0..4).any(|i| tet.is_required(i)) {
+        return;
+    }
     for (i, face) in FACES.into_iter().enumerate() {
         if tet.is_required(i) || !tet.neighbor[i].exists() {
             for k in face {
@@ -138,17 +144,25 @@ fn displace<P: Pages>(mesh: &mut Mesh<P>) -> Moves {
     moves
 }
 
+#[inline(always)]
+fn is_positive<P: Pages>(mesh: &mut Mesh<P>, tet: &Tet) -> bool {
+    let [a, b, c, d] = mesh.points(tet);
+    orient(a, b, c, d) > 0.0
+}
+
 /// Takes vertices back until every tetrahedron is exactly positive; where all were taken back it is, as before.
 fn restore<P: Pages>(mesh: &mut Mesh<P>, moves: &mut Moves) {
     let (mut ball, mut list) = (Ball::default(), Vec::new());
     let mut from = 0;
     while let Some((t, tet)) = mesh.next_tet(from) {
         from = t + 1;
+        if is_positive(mesh, &tet) {
+            continue;
+        }
         list.push((t, tet));
         // What is taken back here concerns tetrahedra near by; those passed already are in the list too.
         while let Some((t, tet)) = list.pop() {
-            let [a, b, c, d] = mesh.points(&tet);
-            if orient(a, b, c, d) > 0.0 {
+            if is_positive(mesh, &tet) {
                 continue;
             }
             for i in 0..4 {

@@ -80,17 +80,18 @@ pub fn run_with<P: Pages>(
     let mut report = OptimizeReport::default();
     let tell = |stage, done, total| progress(Progress { stage, done, total });
     // Refinement leaves its own marks.
+    tell("delaunay", 0, settings.odt_sweeps + 1);
     lower_marks(mesh);
     mesh.refresh_tet_of();
     let mut lawson = Lawson::default();
-    tell("delaunay", 0, settings.odt_sweeps + 1);
     lawson.sweep(mesh);
     for sweep in 0..settings.odt_sweeps {
+        tell("smooth", sweep, settings.odt_sweeps);
         let moves = odt::sweep(mesh);
         report.odt_moves += moves.moved;
         report.odt_held += moves.held;
-        lawson.sweep(mesh);
         tell("delaunay", sweep + 1, settings.odt_sweeps + 1);
+        lawson.sweep(mesh);
     }
     report.flips = lawson.stats;
     if settings.mode == Mode::Full {

@@ -2,7 +2,7 @@
 
 use super::quality::{CONTENT, face_bound, goodness};
 use crate::geom::Point;
-use crate::mesh::{Mesh, VertexTag};
+use crate::mesh::Mesh;
 use crate::reconnect::Ball;
 use crate::store::Pages;
 
@@ -20,10 +20,7 @@ const HALVINGS_MAX: u32 = 3;
 /// Whether `v` may move as far as its tag tells: it is no vertex of the surface, of an interface or of the box.
 #[inline]
 pub(super) fn is_free<P: Pages>(mesh: &mut Mesh<P>, v: u32) -> bool {
-    matches!(
-        mesh.vertex_attribute(v).0,
-        VertexTag::Free | VertexTag::Steiner
-    )
+    !mesh.is_fixed(v)
 }
 
 /// The star of a vertex: its position and the faces opposite it.

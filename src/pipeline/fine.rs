@@ -33,6 +33,12 @@ pub(super) fn fine<P: Pages>(
             option: "--optimize",
             value: options.optimize.clone().unwrap_or_default(),
         })?;
+    watch(Event {
+        stage: "divide edges",
+        done: 0,
+        total: None,
+        unit: "vertices",
+    });
     for v in mesh.vertex_ids() {
         let p = mesh.point(v);
         mesh.set_size(v, field.h(p) as f32);

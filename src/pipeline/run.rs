@@ -325,6 +325,7 @@ impl Run<'_> {
         let measures = [
             ("predicted_tets", TETS_PER_LOAD * leaf.part.load),
             ("inserted_vertices", refine.inserted as f64),
+            ("over_constrained_tets", refine.over_constrained as f64),
             ("zone_rejects", refine.out_of_place as f64),
             ("frozen_hits", refine.frozen_hits as f64),
             ("pages_read", leaf.pages.pages_read as f64),

@@ -2,13 +2,15 @@
 
 use super::{Field, Worker};
 use crate::geom::Point;
-use crate::mesh::Mesh;
 use crate::mesh::anatomy::mark::EXAMINED;
-use crate::mesh::anatomy::{EDGES, MARK};
+use crate::mesh::anatomy::{EDGE_OF, EDGES, MARK};
+use crate::mesh::{End, Mesh};
 use crate::store::Pages;
 
 /// Edges longer than this, in units of the wanted length, are divided.
 const LONG: f64 = std::f64::consts::SQRT_2;
+/// Square of a length, in units of the smaller size of its ends, that Simpson's rule never takes for more than [`LONG`].
+const SHORT: f64 = LONG * LONG * (1.0 - 1e-9);
 /// The same for edges between two fixed vertices: such edges make tetrahedra with four vertices on the surface.
 const LONG_FIXED: f64 = 1.0;
 /// An edge is cut into at most this many pieces at once: coarse edges cross the same space many times over, and
@@ -18,6 +20,8 @@ const PIECES_MAX: u32 = 6;
 const JITTER_FROM: f64 = 2.0;
 /// Largest displacement per axis in units of h.
 const JITTER: f64 = 0.4;
+/// Largest shell that is looked at for required faces.
+const SHELL_MAX: usize = 64;
 /// Edges gathered before their candidates are made and inserted; bounds the memory of a block.
 const EDGES_MAX: usize = 1 << 19;
 
@@ -56,14 +60,18 @@ impl Worker {
             }
             mesh.set_mark(t, EXAMINED, true);
             let v = tet.vertices();
+            let ends = mesh.ends(&tet);
             if field.place.is_partial() {
-                let points = mesh.points(&tet);
-                let sizes = v.map(|v| f64::from(mesh.size(v)));
+                let points = ends.map(|end| end.point);
+                let sizes = ends.map(|end| f64::from(end.h));
                 if !field.place.reaches(&points, &sizes) {
                     continue;
                 }
             }
             for [i, j] in EDGES {
+                if !may_be_long(&ends[i], &ends[j]) {
+                    continue;
+                }
                 let (a, b) = (v[i].min(v[j]), v[i].max(v[j]));
                 self.edges.push((u64::from(a) << 32 | u64::from(b), t));
             }
@@ -99,13 +107,14 @@ impl Worker {
         // Simpson's rule with the arithmetic mean in the middle: 1 % high at a ratio of two.
         let mut metric = length * (1.0 / ha + 8.0 / (ha + hb) + 1.0 / hb) / 6.0;
         let mut long = LONG;
-        if mesh.is_fixed(a) && mesh.is_fixed(b) {
+        let fixed = mesh.is_fixed(a) && mesh.is_fixed(b);
+        if fixed {
             long = LONG_FIXED;
             // Both ends only know the surface; the middle may want less.
             let hm = (field.h)((pa + pb) * 0.5);
             metric = metric.max(length * (1.0 / ha + 4.0 / hm + 1.0 / hb) / 6.0);
         }
-        if metric <= long {
+        if metric <= long || fixed && self.is_required(mesh, a, b, tet) {
             return;
         }
         let Some([from, to]) = field.place.stretch(pa, pb) else {
@@ -152,6 +161,27 @@ impl Worker {
             }
         }
     }
+}
+
+impl Worker {
+    /// Whether the edge a b of `tet` belongs to a required face: its points would lie in that face.
+    fn is_required<P: Pages>(&mut self, mesh: &mut Mesh<P>, a: u32, b: u32, tet: u32) -> bool {
+        let record = mesh.tet(tet);
+        let (Some(i), Some(j)) = (record.local(a), record.local(b)) else {
+            return false;
+        };
+        // A shell too large to be gathered is worth its candidate.
+        self.shell
+            .gather_from(mesh, tet, &record, EDGE_OF[i][j], SHELL_MAX)
+            && (self.shell.required || !self.shell.closed)
+    }
+}
+
+/// Whether an edge has to be looked at: most are too short whatever the size between their ends, and need no sorting.
+#[inline(always)]
+fn may_be_long(a: &End, b: &End) -> bool {
+    let least = f64::from(if a.h < b.h { a.h } else { b.h });
+    a.fixed && b.fixed || (a.point - b.point).length_squared() > SHORT * least * least
 }
 
 /// Parameter along an edge at the fraction `f` of its metric length, sizes growing from 1 to `r`.

@@ -14,7 +14,59 @@ const FILTER: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// because neither the face nor its vertices move.
 const HEIGHT: f64 = 0.25;
 
+/// Points inserted that are compared with the next one before anything else is done about it. With 16 they refuse half of what is too
+/// near in the end, with 64 a little more.
+const RECENT: usize = 32;
+
+/// The last points inserted. Candidates come along the curve, so what refuses one is often among them, and else the nearest of
+/// them is a good place to start the walk: comparing costs a fiftieth of walking from the divided edge, which is long gone.
+pub(super) struct Recent {
+    points: [(Point, f32); RECENT],
+    /// A tetrahedron of each.
+    tets: [u32; RECENT],
+    n: usize,
+}
+
+impl Recent {
+    pub(super) fn new() -> Self {
+        Self {
+            points: [(Point::ZERO, 0.0); RECENT],
+            tets: [0; RECENT],
+            n: 0,
+        }
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.n = 0;
+    }
+
+    fn push(&mut self, c: &Candidate, tet: u32) {
+        self.points[self.n % RECENT] = (c.point, c.h);
+        self.tets[self.n % RECENT] = tet;
+        self.n += 1;
+    }
+
+    /// Where to start the walk to `c`; none when one of the points is nearer than wanted.
+    fn hint(&self, c: &Candidate) -> Option<u32> {
+        let (mut nearest, mut at) = (NEAR_START * f64::from(c.h) * f64::from(c.h), usize::MAX);
+        for (k, &(q, h)) in self.points[..self.n.min(RECENT)].iter().enumerate() {
+            let squared = (q - c.point).length_squared();
+            if squared < nearest {
+                if refuses(squared, h, c) {
+                    return None;
+                }
+                (nearest, at) = (squared, k);
+            }
+        }
+        Some(self.tets.get(at).copied().unwrap_or(c.tet))
+    }
+}
+
+/// Square of the distance, in units of h, below which a point just inserted is a better place to start than the divided edge.
+const NEAR_START: f64 = 4.0;
+
 impl Worker {
+    /// Inserts `c` unless something forbids.
     pub(super) fn try_insert<P: Pages>(
         &mut self,
         mesh: &mut Mesh<P>,
@@ -22,7 +74,11 @@ impl Worker {
         c: &Candidate,
         report: &mut RefineReport,
     ) {
-        let start = match self.find(mesh, c) {
+        let Some(hint) = self.recent.hint(c) else {
+            report.near += 1;
+            return;
+        };
+        let start = match self.find(mesh, c, hint) {
             Ok(start) => start,
             Err(_) => {
                 report.blocked += 1;
@@ -75,11 +131,18 @@ impl Worker {
             }
         }
         report.inserted += 1;
+        self.recent.push(c, self.last);
     }
 
-    fn find<P: Pages>(&mut self, mesh: &mut Mesh<P>, c: &Candidate) -> Result<Located, Rejected> {
+    fn find<P: Pages>(
+        &mut self,
+        mesh: &mut Mesh<P>,
+        c: &Candidate,
+        hint: u32,
+    ) -> Result<Located, Rejected> {
         self.kernel
-            .locate(mesh, c.point, c.tet)
+            .locate(mesh, c.point, hint)
+            .or_else(|_| self.kernel.locate(mesh, c.point, c.tet))
             .or_else(|_| self.kernel.locate(mesh, c.point, self.last))
     }
 
@@ -106,8 +169,14 @@ impl Worker {
 #[inline]
 fn is_near<P: Pages>(mesh: &mut Mesh<P>, v: u32, c: &Candidate) -> bool {
     let (q, h) = mesh.point_and_size(v);
+    refuses((q - c.point).length_squared(), h, c)
+}
+
+/// Whether a vertex of size `h` at the square root of a distance is too near to the candidate.
+#[inline(always)]
+fn refuses(squared: f64, h: f32, c: &Candidate) -> bool {
     let least = FILTER * 0.5 * (f64::from(h) + f64::from(c.h));
-    (q - c.point).length_squared() < least * least
+    squared < least * least
 }
 
 fn height(p: Point, a: Point, b: Point, c: Point) -> f64 {

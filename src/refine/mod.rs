@@ -15,9 +15,11 @@ mod place;
 use crate::delaunay::Kernel;
 use crate::geom::{Aabb, HilbertFrame, Point};
 use crate::mesh::{Mesh, Workspace, dense, renumber, sparse};
+use crate::reconnect::Shell;
 use crate::store::{Pages, StoreError, stop_if_requested};
 
 use candidates::Candidate;
+use insert::Recent;
 pub use place::{Everywhere, Place};
 
 /// Tetrahedra of one block. Small enough that a block's candidates fit a small lease, large enough that
@@ -54,8 +56,8 @@ pub struct RefineReport {
     pub out_of_place: u64,
     /// Cavities that wanted a tetrahedron frozen beside an interface.
     pub frozen_hits: u64,
-    /// Edges still longer than √2 when the passes ended.
-    pub unsaturated: u64,
+    /// Tetrahedra with two required faces or more when the passes ended: none of their edges could be divided.
+    pub over_constrained: u64,
 }
 
 /// Divides edges until none is left to divide.
@@ -74,6 +76,8 @@ pub fn saturate<P: Pages>(
         order: HilbertFrame::new(&field.bounds),
         edges: Vec::new(),
         candidates: Vec::new(),
+        recent: Recent::new(),
+        shell: Shell::default(),
         active: Activity::all(mesh),
         last: 0,
     };
@@ -102,7 +106,19 @@ pub fn saturate<P: Pages>(
             break;
         }
     }
+    // Every sweep that follows goes in id order: this costs 0.8 s and saves them 2.2 s on 4 M tetrahedra.
+    renumber(mesh, &worker.order, space)?;
+    report.over_constrained = count_over_constrained(mesh);
     Ok(report)
+}
+
+fn count_over_constrained<P: Pages>(mesh: &mut Mesh<P>) -> u64 {
+    let (mut n, mut from) = (0, 0);
+    while let Some((t, tet)) = mesh.next_tet(from) {
+        from = t + 1;
+        n += u64::from((0..4).filter(|&i| tet.is_required(i)).count() > 1);
+    }
+    n
 }
 
 struct Worker {
@@ -111,6 +127,8 @@ struct Worker {
     /// Scratch: (edge as ordered pair, a tetrahedron that has it).
     edges: Vec<(u64, u32)>,
     candidates: Vec<Candidate>,
+    recent: Recent,
+    shell: Shell,
     active: Activity,
     /// A tetrahedron in use, where a walk can start when its own start is gone.
     last: u32,
@@ -132,6 +150,7 @@ impl Worker {
             self.make_candidates(mesh, field);
             report.candidates += self.candidates.len() as u64;
             let candidates = std::mem::take(&mut self.candidates);
+            self.recent.clear();
             for candidate in &candidates {
                 self.try_insert(mesh, field, candidate, report);
             }
