@@ -15,6 +15,7 @@
 
 mod against;
 mod claims;
+mod compare;
 mod interface;
 mod pairing;
 mod pass;
@@ -24,6 +25,7 @@ mod tests;
 
 use std::path::{Path, PathBuf};
 
+pub use compare::{Population, Qualities, qualities};
 pub use report::{Finding, Level, Offender, Report};
 
 use tetdb_schema::digest::Digest;

@@ -29,6 +29,8 @@ pub enum Command {
     Info(StoreArgs),
     /// Prove that a store holds a valid mesh
     Verify(VerifyArgs),
+    /// Set the qualities of two meshes side by side
+    Compare(CompareArgs),
     /// Print the digest of a store's mesh
     Digest(StoreArgs),
     /// Write a mesh file for other programs
@@ -46,6 +48,7 @@ impl Command {
             Self::Check(a) => a.json,
             Self::Info(a) | Self::Digest(a) => a.json,
             Self::Verify(a) => a.json,
+            Self::Compare(a) => a.json,
             Self::Export(a) => a.json,
             Self::Sample(a) => a.json,
         }
@@ -204,6 +207,24 @@ pub struct VerifyArgs {
     /// The surface whose triangles must all be there [default: what the store was made from]
     #[arg(long, value_name = "SURFACE")]
     pub against: Vec<String>,
+    /// Most memory to hold
+    #[arg(long, value_name = "SIZE")]
+    pub memory: Option<String>,
+    /// Answer with one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Two meshes side by side: tetrahedra by quality; those forced by the surface and those at interfaces apart.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Example:\n  tetdb compare one.tetdb four.tetdb\n\nExit code 0: the same mesh, bit by bit; 7: another."
+)]
+pub struct CompareArgs {
+    #[arg(value_name = "A")]
+    pub first: PathBuf,
+    #[arg(value_name = "B")]
+    pub second: PathBuf,
     /// Most memory to hold
     #[arg(long, value_name = "SIZE")]
     pub memory: Option<String>,

@@ -4,6 +4,7 @@ mod args;
 mod check;
 mod check_expected;
 mod check_report;
+mod compare;
 mod config;
 mod digest;
 mod export;
@@ -76,6 +77,7 @@ fn dispatch(command: &Command, talk: &Talk) -> Result<u8, Failure> {
         Command::Check(args) => check::run(args, talk),
         Command::Info(args) => info::run(args, talk),
         Command::Verify(args) => verify::run(args, talk),
+        Command::Compare(args) => compare::run(args, talk),
         Command::Digest(args) => digest::run(args, talk),
         Command::Export(args) => export::run(args, talk),
         Command::Sample(args) => sample::run(args, talk),

@@ -98,11 +98,13 @@ impl Talk {
         } else if now - state.told >= PLAIN_EVERY {
             state.told = now;
             let seconds = (now - state.since).as_secs_f64();
-            let rate = event.done as f64 / seconds.max(1e-9);
+            // Where several work side by side stages alternate, and a stage just begun has no rate.
+            let rate = (seconds > 1.0).then(|| event.done as f64 / seconds);
             let eta = event
                 .total
+                .zip(rate)
                 .filter(|_| event.done > 0)
-                .map(|t| t.saturating_sub(event.done) as f64 / rate);
+                .map(|(t, rate)| t.saturating_sub(event.done) as f64 / rate);
             if self.json {
                 self.stderr_json(&serde_json::json!({
                     "progress": { "stage": event.stage, "done": event.done, "total": event.total,
@@ -111,8 +113,9 @@ impl Talk {
             } else {
                 let of = event.total.map_or(String::new(), |t| format!(" of {t}"));
                 let eta = eta.map_or(String::new(), |s| format!(", {s:.0} s to go"));
+                let rate = rate.map_or(String::new(), |r| format!(", {r:.0} per second"));
                 eprintln!(
-                    "{}: {}{of} {}, {rate:.0} per second{eta}",
+                    "{}: {}{of} {}{rate}{eta}",
                     event.stage, event.done, event.unit
                 );
             }

@@ -35,6 +35,6 @@ mod tests;
 
 pub use lawson::LawsonStats;
 pub use measure::{Histogram, QualityTable, measure};
-pub use quality::{GOODNESS_WANTED, goodness, quality};
+pub use quality::{GOODNESS_WANTED, goodness, is_forcing, quality};
 pub use rounds::OperationCounts;
 pub use run::{Mode, OptimizeReport, Progress, Settings, run, run_with};

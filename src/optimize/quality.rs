@@ -74,6 +74,11 @@ pub(super) fn face_bound([a, b, c]: [Point; 3]) -> f64 {
     radius / (ALPHA * longest)
 }
 
+/// Whether every tetrahedron on a face has q of 2 or more, whatever its fourth vertex.
+pub fn is_forcing(corners: [Point; 3]) -> bool {
+    face_bound(corners) <= GOODNESS_WANTED
+}
+
 /// Whether the goodness is below `wanted` (at most); decides most good ones without a root or a division.
 #[inline(always)]
 pub(super) fn is_below(points: [Point; 4], wanted: f64) -> bool {

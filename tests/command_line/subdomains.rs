@@ -160,3 +160,31 @@ fn more_parts_than_the_mesh_allows_are_not_made() {
         assert!(!place.path("b.tetdb").exists());
     }
 }
+
+#[test]
+fn two_meshes_are_compared_by_kind_of_tetrahedron() {
+    let place = Place::new();
+    for (store, options) in [("a", ""), ("b", "--subdomains 2")] {
+        let line = format!("mesh {SAMPLE} -o {store}.tetdb {options}");
+        place.run_line(&line).succeeds();
+    }
+    let same = place
+        .run_line("compare a.tetdb a.tetdb --json")
+        .succeeds()
+        .json();
+    assert_eq!(same["same"], true);
+    let done = place.run_line("compare a.tetdb b.tetdb --json");
+    assert_eq!(done.exit(), Some(7));
+    let found = done.json();
+    assert_eq!(found["first"]["at_interface"]["tets"], 0);
+    for mesh in ["first", "second"] {
+        let count = |kind: &str| number(&found[mesh][kind]["tets"]);
+        assert_eq!(count("forced") + count("unforced"), count("all"));
+    }
+    assert!(number(&found["second"]["at_interface"]["tets"]) > 1000.0);
+    let text = place.run_line("compare a.tetdb b.tetdb").stdout();
+    assert!(
+        text.contains("at interfaces") && text.contains("the meshes differ"),
+        "{text}"
+    );
+}

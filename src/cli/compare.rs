@@ -1,0 +1,107 @@
+//! `compare`: two meshes side by side, as the paper does it.
+
+use serde_json::json;
+
+use super::args::CompareArgs;
+use super::failure::Failure;
+use super::talk::Talk;
+use super::{memory, store};
+use crate::audit::{Population, Qualities, qualities};
+
+/// Exit code when the meshes differ.
+const DIFFERENT: u8 = 7;
+
+pub fn run(args: &CompareArgs, talk: &Talk) -> Result<u8, Failure> {
+    let (cap, _) = memory::cap(args.memory.as_deref())?;
+    let memory = (cap / 4).min(256 << 20) as usize;
+    let mut found = Vec::with_capacity(2);
+    for path in [&args.first, &args.second] {
+        let mut open = store::open_finished(path)?;
+        let digest = open.digest()?;
+        found.push((digest, qualities(&mut open, memory)?));
+    }
+    let [(digest_a, a), (digest_b, b)] = &found[..] else {
+        unreachable!("two stores were read");
+    };
+    let same = digest_a == digest_b;
+    if talk.is_json() {
+        talk.answer(&json!({
+            "schema": 1, "same": same, "first": a, "second": b,
+            "digests": [digest_a[0].to_string(), digest_b[0].to_string()],
+        }));
+    } else {
+        print(a, b, talk);
+        talk.line(if same {
+            "the meshes are the same, bit by bit"
+        } else {
+            "the meshes differ"
+        });
+    }
+    Ok(if same { 0 } else { DIFFERENT })
+}
+
+fn print(a: &Qualities, b: &Qualities, talk: &Talk) {
+    talk.line(&format!(
+        "{:<14} {:>14} {:>9} {:>14} {:>9} {:>9}",
+        "", "first", "", "second", "", "change"
+    ));
+    let count = |name: &str, a: u64, b: u64| {
+        talk.line(&format!(
+            "{name:<14} {a:>14} {:>9} {b:>14} {:>9} {}",
+            "",
+            "",
+            change(a, b)
+        ));
+    };
+    count("sub-domains", a.subdomains, b.subdomains);
+    count("interfaces", a.interface_faces, b.interface_faces);
+    for (name, a, b) in [
+        ("all", &a.all, &b.all),
+        ("not forced", &a.unforced, &b.unforced),
+        ("forced", &a.forced, &b.forced),
+        ("at interfaces", &a.at_interface, &b.at_interface),
+    ] {
+        population(name, a, b, talk);
+    }
+}
+
+fn population(name: &str, a: &Population, b: &Population, talk: &Talk) {
+    if a.tets + b.tets == 0 {
+        return;
+    }
+    talk.line(&format!(
+        "{name:<14} {:>14} {:>9} {:>14} {:>9} {}",
+        a.tets,
+        "",
+        b.tets,
+        "",
+        change(a.tets, b.tets)
+    ));
+    for bin in (0..a.bins.len()).filter(|&k| a.bins[k] + b.bins[k] > 0) {
+        let to = match bin + 2 {
+            11 => "inf".to_owned(),
+            to => to.to_string(),
+        };
+        talk.line(&format!(
+            "  [{:>2}, {to:>3}[   {:>14} {:>8.4}% {:>14} {:>8.4}% {:>+8.4}",
+            bin + 1,
+            a.bins[bin],
+            100.0 * a.share(bin),
+            b.bins[bin],
+            100.0 * b.share(bin),
+            100.0 * (b.share(bin) - a.share(bin))
+        ));
+    }
+    talk.line(&format!(
+        "  {:<12} {:>14.3} {:>9} {:>14.3}",
+        "worst", a.worst, "", b.worst
+    ));
+}
+
+/// The change from `a` to `b` in percent.
+fn change(a: u64, b: u64) -> String {
+    if a == 0 {
+        return String::new();
+    }
+    format!("{:>+8.2}%", 100.0 * (b as f64 / a as f64 - 1.0))
+}
