@@ -35,6 +35,8 @@ pub enum Command {
     Digest(StoreArgs),
     /// Write a mesh file for other programs
     Export(ExportArgs),
+    /// Write the same surface in finer triangles
+    RefineSurface(RefineSurfaceArgs),
     /// Write a made surface to a file
     Sample(SampleArgs),
 }
@@ -50,6 +52,7 @@ impl Command {
             Self::Verify(a) => a.json,
             Self::Compare(a) => a.json,
             Self::Export(a) => a.json,
+            Self::RefineSurface(a) => a.json,
             Self::Sample(a) => a.json,
         }
     }
@@ -260,6 +263,27 @@ pub struct SampleArgs {
     /// The file to write: .stl (text), .off, .obj or .ply, all exact
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
+    /// Answer with one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// The same surface in finer triangles: edges longer than wanted are halved, no triangle leaves its place.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  tetdb refine-surface part.stl fine.stl --hsiz 1%")]
+pub struct RefineSurfaceArgs {
+    /// A surface file, or a sample
+    #[arg(value_name = "IN")]
+    pub surface: String,
+    /// The file to write: .stl (text), .off, .obj or .ply, all exact
+    #[arg(value_name = "OUT")]
+    pub output: PathBuf,
+    /// Wanted edge length: a length, or 1% of the box diagonal; shorter edges stay
+    #[arg(long, value_name = "H")]
+    pub hsiz: String,
+    /// Greatest ratio of neighboring edge lengths [default: 1.3]
+    #[arg(long, value_name = "RATIO")]
+    pub hgrad: Option<String>,
     /// Answer with one JSON object
     #[arg(long)]
     pub json: bool,

@@ -13,6 +13,7 @@ mod info;
 mod input;
 mod memory;
 mod mesh;
+mod refine_surface;
 mod sample;
 mod signals;
 mod store;
@@ -80,6 +81,7 @@ fn dispatch(command: &Command, talk: &Talk) -> Result<u8, Failure> {
         Command::Compare(args) => compare::run(args, talk),
         Command::Digest(args) => digest::run(args, talk),
         Command::Export(args) => export::run(args, talk),
+        Command::RefineSurface(args) => refine_surface::run(args, talk),
         Command::Sample(args) => sample::run(args, talk),
     }
 }

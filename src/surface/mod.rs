@@ -4,7 +4,7 @@
 //! `edges` (which triangles meet where), `orientation` (turning triangles the same way), `contact`
 //! (how two triangles touch), `broad` (which pairs to look at), `validate` (all of it together),
 //! `defect` (what can be wrong and what to do about it), `rims` (where it is open), `near` and `repair`
-//! (mending on demand), `fitness` (what mesh its triangles allow).
+//! (mending on demand), `fitness` (what mesh its triangles allow), `split` (finer triangles of the same surface).
 //!
 //! Is not: file formats (`io`), volumes and regions (`boundary`).
 
@@ -18,6 +18,7 @@ mod orientation;
 mod point_tree;
 mod repair;
 mod rims;
+mod split;
 mod triangles;
 mod validate;
 mod weld;
@@ -34,6 +35,7 @@ pub use near::weld_near;
 pub use orientation::{Orientation, orient_alike};
 pub use repair::{Closing, Repair, closing, repair};
 pub use rims::{Rim, TJunction, rims, t_junctions};
+pub use split::{SplitReport, split};
 pub use triangles::{Note, NoteKind, SourceFile, Surface};
 pub use validate::{Validation, validate};
 pub use weld::SurfaceBuilder;

@@ -162,6 +162,32 @@ fn more_parts_than_the_mesh_allows_are_not_made() {
 }
 
 #[test]
+fn a_surface_made_finer_is_the_same_surface() {
+    let place = Place::new();
+    place.run_line("sample box,h=0.5 -o a.off").succeeds();
+    let made = place
+        .run_line("refine-surface a.off b.off --hsiz 0.1 --json")
+        .succeeds()
+        .json();
+    assert_eq!(number(&made["report"]["deviation_max"]), 0.0);
+    assert!(number(&made["triangles"]) > 10.0 * number(&made["triangles_before"]));
+    place.run_line("mesh b.off -o b.tetdb").succeeds();
+    let volume: f64 = info(&place, "b.tetdb")["subdomains"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .map(|part| number(&part["volume"]))
+        .sum();
+    assert!((volume - 1.0).abs() < 1e-12, "{volume}");
+    for bad in ["0", "-1", "x", "nan"] {
+        let word = format!("--hsiz={bad}");
+        let done = place.run(&["refine-surface", "a.off", "c.off", &word]);
+        assert_eq!(done.exit(), Some(2), "{bad}");
+        assert!(!place.path("c.off").exists());
+    }
+}
+
+#[test]
 fn two_meshes_are_compared_by_kind_of_tetrahedron() {
     let place = Place::new();
     for (store, options) in [("a", ""), ("b", "--subdomains 2")] {

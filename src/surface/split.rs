@@ -1,0 +1,300 @@
+//! Divide triangles until their edges have a wanted length, without moving the surface.
+//!
+//! The longest edge of all (in units of the wanted length) is divided at its middle, together with every triangle that has it, and
+//! so on: in each of these triangles it is the longest, so angles never fall below half of what they were (Rivara), and
+//! the surface stays closed. Then edges inside an input triangle are swapped where that makes the least angle larger: this changes no
+//! point of the surface.
+//!
+//! Source: M.-C. Rivara, "New longest-edge algorithms for the refinement and/or improvement of unstructured triangulations"
+//! (1997).
+
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, HashMap};
+
+use super::{Surface, SurfaceError};
+use crate::geom::Point;
+
+/// Edges longer than this, in units of the wanted length, are divided: halves are then as much too short as it was too long.
+const LONG: f64 = std::f64::consts::SQRT_2;
+/// Passes of swaps end after this many even if they still gain.
+const SWAP_PASSES: u32 = 12;
+/// Triangles have 32-bit numbers; a wanted length that asks for more is refused before memory is.
+const TRIANGLES_MAX: usize = 1 << 30;
+
+/// What was done.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct SplitReport {
+    pub edges_divided: u64,
+    pub edges_swapped: u64,
+    /// Greatest distance of a new vertex from the input triangle it lies on: rounding of its coordinates.
+    pub deviation_max: f64,
+}
+
+/// An edge as its vertices, the smaller first.
+type Edge = (u32, u32);
+
+fn edge(a: u32, b: u32) -> Edge {
+    (a.min(b), a.max(b))
+}
+
+/// Divides the triangles of `surface`; `h` tells the wanted edge length at a position.
+///
+/// New triangles keep label and orientation; they stand in the place of the triangle they came from and behind the others.
+/// Memory: some 200 bytes a triangle made. Errors: more triangles than can be numbered.
+pub fn split(
+    surface: &Surface,
+    h: &dyn Fn(Point) -> f64,
+) -> Result<(Surface, SplitReport), SurfaceError> {
+    let mut splitter = Splitter::new(surface);
+    let mut heap = BinaryHeap::new();
+    let edges: Vec<Edge> = splitter.around.keys().copied().collect();
+    for e in edges {
+        splitter.consider(e, h, &mut heap);
+    }
+    // A heap by length and then by vertices: the order does not depend on that of a table.
+    while let Some((_, Reverse(e))) = heap.pop() {
+        if splitter.surface.triangles.len() > TRIANGLES_MAX {
+            return Err(SurfaceError::TooLarge {
+                what: "triangles",
+                limit: TRIANGLES_MAX,
+            });
+        }
+        splitter.divide(e, h, &mut heap);
+    }
+    for _ in 0..SWAP_PASSES {
+        if splitter.swap_all() == 0 {
+            break;
+        }
+    }
+    splitter.report.deviation_max = splitter.deviation(surface);
+    splitter.surface.notes.clear();
+    Ok((splitter.surface, splitter.report))
+}
+
+struct Splitter {
+    surface: Surface,
+    /// Input triangle of each triangle.
+    parent: Vec<u32>,
+    around: HashMap<Edge, Vec<u32>>,
+    report: SplitReport,
+}
+
+/// Lengths as bits, which order as they do, for positive numbers.
+type Ordered = (u64, Reverse<Edge>);
+
+impl Splitter {
+    fn new(surface: &Surface) -> Self {
+        let mut around: HashMap<Edge, Vec<u32>> = HashMap::new();
+        for (t, &[a, b, c]) in (0u32..).zip(&surface.triangles) {
+            for e in [edge(a, b), edge(b, c), edge(c, a)] {
+                around.entry(e).or_default().push(t);
+            }
+        }
+        Self {
+            surface: surface.clone(),
+            parent: (0..surface.triangles.len() as u32).collect(),
+            around,
+            report: SplitReport::default(),
+        }
+    }
+
+    fn point(&self, v: u32) -> Point {
+        self.surface.points[v as usize]
+    }
+
+    fn consider(&self, e: Edge, h: &dyn Fn(Point) -> f64, heap: &mut BinaryHeap<Ordered>) {
+        let (a, b) = (self.point(e.0), self.point(e.1));
+        let length = a.distance(b) / h((a + b) * 0.5);
+        if length > LONG {
+            heap.push((length.to_bits(), Reverse(e)));
+        }
+    }
+
+    /// Divides every triangle at `e`.
+    fn divide(&mut self, e: Edge, h: &dyn Fn(Point) -> f64, heap: &mut BinaryHeap<Ordered>) {
+        let triangles = self.around.remove(&e).expect("an edge is divided once");
+        let (a, b) = (self.point(e.0), self.point(e.1));
+        let middle = (a + b) * 0.5;
+        if middle == a || middle == b {
+            // No number lies between: nothing to divide.
+            self.around.insert(e, triangles);
+            return;
+        }
+        self.report.edges_divided += 1;
+        let m = self.surface.points.len() as u32;
+        self.surface.points.push(middle);
+        for t in triangles {
+            let corners = self.surface.triangles[t as usize];
+            let k = (0..3).find(|&k| edge(corners[k], corners[(k + 1) % 3]) == e);
+            let k = k.expect("the edge is of the triangle");
+            let [p, q, r] = [corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]];
+            let new = self.surface.triangles.len() as u32;
+            self.surface.triangles[t as usize] = [p, m, r];
+            self.surface.triangles.push([m, q, r]);
+            let label = self.surface.labels[t as usize];
+            self.surface.labels.push(label);
+            self.parent.push(self.parent[t as usize]);
+            let beside = self.around.get_mut(&edge(q, r)).expect("an edge of it");
+            for other in beside.iter_mut().filter(|o| **o == t) {
+                *other = new;
+            }
+            self.around.entry(edge(p, m)).or_default().push(t);
+            self.around.entry(edge(m, q)).or_default().push(new);
+            self.around.insert(edge(m, r), vec![t, new]);
+            self.consider(edge(m, r), h, heap);
+        }
+        for v in [e.0, e.1] {
+            self.consider(edge(v, m), h, heap);
+        }
+    }
+
+    /// Swaps edges within input triangles where that raises the least angle; returns how many.
+    fn swap_all(&mut self) -> u64 {
+        let mut swapped = 0;
+        for t in 0..self.surface.triangles.len() as u32 {
+            for k in 0..3 {
+                swapped += u64::from(self.swap(t, k));
+            }
+        }
+        self.report.edges_swapped += swapped;
+        swapped
+    }
+
+    fn swap(&mut self, t: u32, k: usize) -> bool {
+        let corners = self.surface.triangles[t as usize];
+        let [a, b, c] = [corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]];
+        let &[x, y] = &self.around[&edge(a, b)][..] else {
+            return false;
+        };
+        let other = if x == t { y } else { x };
+        if self.parent[t as usize] != self.parent[other as usize] {
+            return false;
+        }
+        let beyond = self.surface.triangles[other as usize];
+        let Some(d) = beyond.into_iter().find(|&v| v != a && v != b) else {
+            return false;
+        };
+        if self.around.contains_key(&edge(c, d)) {
+            return false;
+        }
+        let least = |triangles: [[u32; 3]; 2]| {
+            let angles = triangles.map(|t| self.least_sine(t));
+            angles[0].min(angles[1])
+        };
+        // Of the quadrilateral a d b c, the other diagonal; both triangles must turn as the old ones do.
+        let (old, new) = ([[a, b, c], [b, a, d]], [[a, d, c], [d, b, c]]);
+        let normal = self.normal([a, b, c]);
+        if new.iter().any(|&t| self.normal(t).dot(normal) <= 0.0)
+            || least(new) <= least(old) * 1.000_001
+        {
+            return false;
+        }
+        self.surface.triangles[t as usize] = new[0];
+        self.surface.triangles[other as usize] = new[1];
+        self.around.remove(&edge(a, b));
+        self.around.insert(edge(c, d), vec![t, other]);
+        for (e, from, to) in [(edge(a, d), other, t), (edge(b, c), t, other)] {
+            let list = self
+                .around
+                .get_mut(&e)
+                .expect("a side of the quadrilateral");
+            for side in list.iter_mut().filter(|s| **s == from) {
+                *side = to;
+            }
+        }
+        true
+    }
+
+    fn normal(&self, [a, b, c]: [u32; 3]) -> Point {
+        let (a, b, c) = (self.point(a), self.point(b), self.point(c));
+        (b - a).cross(c - a)
+    }
+
+    /// A measure of the least angle: twice the area over the square of the longest edge.
+    fn least_sine(&self, t: [u32; 3]) -> f64 {
+        let [a, b, c] = t.map(|v| self.point(v));
+        let longest = a
+            .distance_squared(b)
+            .max(b.distance_squared(c))
+            .max(c.distance_squared(a));
+        self.normal(t).length() / longest
+    }
+
+    /// Greatest distance of a vertex from the plane of the input triangle it came from.
+    fn deviation(&self, input: &Surface) -> f64 {
+        let mut most = 0.0f64;
+        for (t, &parent) in self.surface.triangles.iter().zip(&self.parent) {
+            let [a, b, c] = input.corners(parent);
+            let normal = (b - a).cross(c - a).normalize_or_zero();
+            for &v in t {
+                most = most.max((self.point(v) - a).dot(normal).abs());
+            }
+        }
+        most
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::surface::validate;
+
+    fn cube() -> Surface {
+        let mut points = Vec::new();
+        for i in 0..8u32 {
+            points.push(Point::new(
+                f64::from(i & 1),
+                f64::from(i >> 1 & 1),
+                f64::from(i >> 2),
+            ));
+        }
+        let triangles = vec![
+            [0, 2, 1],
+            [1, 2, 3],
+            [4, 5, 6],
+            [5, 7, 6],
+            [0, 1, 4],
+            [1, 5, 4],
+            [2, 6, 3],
+            [3, 6, 7],
+            [0, 4, 2],
+            [2, 4, 6],
+            [1, 3, 5],
+            [3, 7, 5],
+        ];
+        Surface {
+            points,
+            labels: vec![0; triangles.len()],
+            triangles,
+            label_names: vec!["all".to_owned()],
+            ..Surface::default()
+        }
+    }
+
+    #[test]
+    fn edges_get_the_wanted_length_and_the_surface_stays() {
+        let h = |p: Point| 0.05 + 0.1 * p.x;
+        let (fine, report) = split(&cube(), &h).expect("few triangles");
+        assert!(validate(&fine).accept().is_ok());
+        assert_eq!(report.deviation_max, 0.0);
+        assert!(report.edges_divided > 1000 && report.edges_swapped > 0);
+        let area: f64 = (0..fine.n_triangles() as u32)
+            .map(|t| {
+                let [a, b, c] = fine.corners(t);
+                0.5 * (b - a).cross(c - a).length()
+            })
+            .sum();
+        assert!((area - 6.0).abs() < 1e-12);
+        for &[a, b, c] in &fine.triangles {
+            for (a, b) in [(a, b), (b, c), (c, a)] {
+                let (a, b) = (fine.points[a as usize], fine.points[b as usize]);
+                // Swaps may leave the longer diagonal of a good quadrilateral.
+                assert!(a.distance(b) < 1.5 * LONG * h((a + b) * 0.5));
+            }
+        }
+        assert_eq!(
+            split(&cube(), &h).expect("the same").0.triangles,
+            fine.triangles
+        );
+    }
+}
