@@ -21,7 +21,7 @@ const SHIFT: f64 = 0.2;
 /// A fixed vertex nearer to the plane than this, in units of its h, counts as grazed.
 const GRAZED: f64 = 0.35;
 /// Largest share of the load a shift may bring to the other side: over a dozen cuts it stays within the balance wanted.
-const TOLERANCE: f64 = 0.006;
+const TOLERANCE: f64 = 0.003;
 /// Least gain in grazed vertices that a shift away from the balanced position must bring, as a share.
 const GAIN: f64 = 0.1;
 
