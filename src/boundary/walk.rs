@@ -4,6 +4,7 @@ use std::collections::HashSet;
 
 use super::space::Space;
 use crate::mesh::{FaceRef, Tet};
+use crate::store::stop_if_requested;
 
 /// Steps towards a direction inside one ball before all of it is searched.
 const TURNS_MAX: u32 = 400;
@@ -70,6 +71,7 @@ fn leaves_cone<S: Space>(s: &mut S, tet: &Tet, i: usize, b: u32, turn: u32) -> O
 
 /// All tetrahedra that have `v`.
 pub(super) fn ball<S: Space>(s: &mut S, v: u32) -> Vec<u32> {
+    stop_if_requested();
     let first = s.tet_of(v);
     let mut seen: HashSet<u32> = HashSet::from([first]);
     let mut all = vec![first];
@@ -129,6 +131,8 @@ pub(super) fn opposite(tet: &Tet, c: u32, d: u32) -> Option<(usize, usize)> {
 
 /// The shell of the edge `c d` of tetrahedron `t`; `None` when it reaches the hull.
 pub(super) fn shell<S: Space>(s: &mut S, t: u32, c: u32, d: u32) -> Option<Shell> {
+    // Every flip and every search comes by here.
+    stop_if_requested();
     let mut shell = Shell {
         tets: Vec::new(),
         ring: Vec::new(),
