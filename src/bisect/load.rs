@@ -15,6 +15,9 @@ const EDGE_MAX: f64 = 5.0;
 const RATIO_MAX: f64 = 1.5;
 /// Below this ratio the closed form is replaced by its second order: two parts in a thousand off at most, five times as fast.
 const SECOND_ORDER: f64 = 1.25;
+/// A piece with less load than this (ten tetrahedra) is not divided, however long: coarse tetrahedra span the domain and are thin,
+/// and dividing them all to the last took half of a bisection.
+const LOAD_MIN: f64 = 1.0;
 /// Pieces of about the wanted length are not divided further.
 const EDGE_FINE: f64 = 2.0;
 
@@ -49,9 +52,19 @@ pub fn for_each_piece<P: Pages>(
             let least = sizes.iter().fold(f64::INFINITY, |m, &x| m.min(x));
             let most = sizes.iter().fold(0.0, |m: f64, &x| m.max(x));
             let coarse = edge > EDGE_MAX * least || most > RATIO_MAX * least;
+            let [a, b, c, d] = points;
+            let volume = (b - a).cross(c - a).dot(d - a) / 6.0;
             if coarse && edge > EDGE_FINE * least {
                 let middle = (points[i] + points[j]) * 0.5;
                 let size = h(middle);
+                if volume <= LOAD_MIN * least.min(size).powi(3) {
+                    visit(&Piece {
+                        points,
+                        load: load_of_tet(volume.max(0.0), sizes),
+                        h: sizes.iter().sum::<f64>() * 0.25,
+                    });
+                    continue;
+                }
                 for end in [i, j] {
                     let (mut p, mut s) = (points, sizes);
                     (p[end], s[end]) = (middle, size);
@@ -59,8 +72,6 @@ pub fn for_each_piece<P: Pages>(
                 }
                 continue;
             }
-            let [a, b, c, d] = points;
-            let volume = (b - a).cross(c - a).dot(d - a) / 6.0;
             let mean = sizes.iter().sum::<f64>() * 0.25;
             let density = if most < SECOND_ORDER * least {
                 let spread: f64 = sizes.iter().map(|h| (h - mean) * (h - mean)).sum();

@@ -13,7 +13,7 @@ use crate::store::{Pages, stop_if_requested};
 /// Costs beside those of faces: a tetrahedron with two constrained faces, one with three, a side in two parts around a vertex.
 const TWO: f64 = 2.0;
 const THREE: f64 = 6.0;
-const PINCH: f64 = 12.0;
+const PINCH: f64 = 60.0;
 /// What a move must gain at least: more than rounding of a sum of some hundred costs.
 const GAIN_MIN: f64 = 1e-6;
 /// Passes over the interface.
