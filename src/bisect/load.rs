@@ -57,20 +57,14 @@ pub fn for_each_piece<P: Pages>(
             if coarse && edge > EDGE_FINE * least {
                 let middle = (points[i] + points[j]) * 0.5;
                 let size = h(middle);
-                if volume <= LOAD_MIN * least.min(size).powi(3) {
-                    visit(&Piece {
-                        points,
-                        load: load_of_tet(volume.max(0.0), sizes),
-                        h: sizes.iter().sum::<f64>() * 0.25,
-                    });
+                if volume > LOAD_MIN * least.min(size).powi(3) {
+                    for end in [i, j] {
+                        let (mut p, mut s) = (points, sizes);
+                        (p[end], s[end]) = (middle, size);
+                        stack.push((p, s));
+                    }
                     continue;
                 }
-                for end in [i, j] {
-                    let (mut p, mut s) = (points, sizes);
-                    (p[end], s[end]) = (middle, size);
-                    stack.push((p, s));
-                }
-                continue;
             }
             let mean = sizes.iter().sum::<f64>() * 0.25;
             let density = if most < SECOND_ORDER * least {

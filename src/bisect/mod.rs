@@ -131,7 +131,7 @@ pub fn open<P: Pages, Q: Pages>(
     optimize::run_with(core, plan.optimize, &|_| {});
     seconds.core = lap();
     let interface = interface::choose(core, &zone.surface, &rim, plan.steps);
-    let (_, vertices) = split::number_interface(core, plan.cut);
+    let vertices = split::number_interface(core, plan.cut);
     let (z_tets, z_enclosed) = labels::enclosed(core, &zone.surface, plan.h);
     seconds.interface = lap();
     Ok(Opened {

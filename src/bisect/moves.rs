@@ -129,13 +129,7 @@ impl<'a> Moves<'a> {
     fn note_pinched<P: Pages>(&mut self, core: &mut Mesh<P>) {
         for k in 0..self.vertices.len() {
             let v = self.vertices[k];
-            let start = self
-                .moved
-                .iter()
-                .copied()
-                .find(|&t| core.tet(t).local(v).is_some());
-            let start = start.expect("a vertex of what was moved");
-            if self.parts_too_many(core, v, start) > 0 {
+            if self.parts_around(core, v) > 0 {
                 self.pinched.insert(v);
             } else {
                 self.pinched.remove(&v);
@@ -192,9 +186,7 @@ impl<'a> Moves<'a> {
         if n == 0 {
             return 0.0;
         }
-        n += (0..4)
-            .filter(|&i| is_constrained(core, tet, i, self.rim))
-            .count();
+        n += (0..4).filter(|&i| is_constrained(tet, i, self.rim)).count();
         match n {
             0 | 1 => 0.0,
             2 => TWO,
@@ -207,20 +199,20 @@ impl<'a> Moves<'a> {
         let mut sum = 0;
         for k in 0..self.vertices.len() {
             let v = self.vertices[k];
-            // The ball from a tetrahedron at hand: around a vertex of the surface there may be several.
-            let start = self
-                .moved
-                .iter()
-                .copied()
-                .find(|&t| core.tet(t).local(v).is_some());
-            if let Some(start) = start {
-                sum += self.parts_too_many(core, v, start);
-            }
+            sum += self.parts_around(core, v);
         }
         sum
     }
 
-    /// Parts of the ball of `v` beyond one a side.
+    /// Parts too many around a vertex of `moved`, in the ball of the first of these that has it: around a vertex of the
+    /// surface there may be several balls.
+    fn parts_around<P: Pages>(&mut self, core: &mut Mesh<P>, v: u32) -> i32 {
+        let mut moved = self.moved.iter().copied();
+        let start = moved.find(|&t| core.tet(t).local(v).is_some());
+        self.parts_too_many(core, v, start.expect("a vertex of what is moved"))
+    }
+
+    /// Parts of the ball of `v` beyond one a side; none where there are more than [`BALL_MAX`] tetrahedra.
     fn parts_too_many<P: Pages>(&mut self, core: &mut Mesh<P>, v: u32, start: u32) -> i32 {
         if !self.around.gather(core, v, start, BALL_MAX) {
             return 0;

@@ -1,11 +1,11 @@
 //! Write a child: the host's tetrahedra of one side, those of the core with that label, joined at the rim.
 
 use super::Opened;
-use super::core::{SHARED, copy_attribute, is_in_core, place, tet_ids};
+use super::core::{SHARED, copy_attribute, is_held, is_in_core, place, tet_ids};
 use super::labels::{interface_faces, is_high};
 use crate::geom::{Aabb, HilbertFrame};
 use crate::mesh::anatomy::{FROZEN, REQUIRED};
-use crate::mesh::{FaceRef, InterfaceFace, Mesh, Tet, VertexTag, Workspace, dense, renumber};
+use crate::mesh::{FaceRef, InterfaceFace, Mesh, Tet, Workspace, dense, renumber};
 use crate::store::{Pages, Sorted, Sorter, StoreError, stop_if_requested};
 use tetdb_schema::page::NONE;
 
@@ -17,25 +17,18 @@ type ClaimRecord = [u8; 17];
 const FACET: u8 = 0;
 const INTERFACE: u8 = 1;
 
-/// Gives the vertices of the cut's interface their numbers, in the order of its faces; returns faces and vertices.
-pub(super) fn number_interface<P: Pages>(core: &mut Mesh<P>, cut: u32) -> (u32, u32) {
-    let (mut faces, mut vertices) = (0, 0);
+/// Gives the vertices of the cut's interface their numbers, in the order of its faces; returns how many they are.
+pub(super) fn number_interface<P: Pages>(core: &mut Mesh<P>, cut: u32) -> u32 {
+    let mut vertices = 0;
     for_each_interface_face(core, |core, tet, i| {
-        faces += 1;
         for v in tet.face(i) {
-            let (tag, _) = core.vertex_attribute(v);
-            let unnamed = match tag {
-                VertexTag::Interface => core.interface_vertex(v).0 == 0,
-                VertexTag::Surface => false,
-                _ => true,
-            };
-            if unnamed {
+            if !core.is_fixed(v) || is_held(core, v) {
                 core.set_interface_vertex(v, cut, vertices);
                 vertices += 1;
             }
         }
     });
-    (faces, vertices)
+    vertices
 }
 
 /// Calls `visit` with every interface face, seen from its tetrahedron on the low side, in id order.
@@ -81,7 +74,6 @@ pub fn write_child<P: Pages, Q: Pages, R: Pages>(
     split.tag_rim_vertices();
     split.new_interface();
     split.inherit(space)?;
-    split.host_done();
     renumber(child, &HilbertFrame::new(bounds), space)
 }
 
@@ -118,9 +110,7 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
         }
         let (p, h) = self.core.point_and_size(v);
         let copy = self.child.add_vertex(p, h);
-        let held = self.core.vertex_attribute(v).0 == VertexTag::Interface
-            && self.core.interface_vertex(v).0 == 0;
-        if !held {
+        if !is_held(self.core, v) {
             copy_attribute(self.core, v, self.child, copy);
         }
         self.core.set_scratch(dense(v), copy);
@@ -268,10 +258,8 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
                 continue;
             }
             let copy = known & !SHARED;
-            let held = self.core.vertex_attribute(copy).0 == VertexTag::Interface
-                && self.core.interface_vertex(copy).0 == 0;
             let to = self.core.scratch(dense(copy));
-            if held && to != NONE {
+            if to != NONE && is_held(self.core, copy) {
                 copy_attribute(self.host, v, self.child, to);
             }
         }
@@ -382,10 +370,6 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
             self.child.add_interface_face(kept);
             self.freeze(face);
         }
-    }
-
-    fn host_done(&mut self) {
-        self.core.clear_scratch();
     }
 }
 

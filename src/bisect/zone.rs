@@ -5,7 +5,7 @@
 //! any other place).
 
 use super::surface::{CuttingSurface, Plane};
-use crate::geom::Point;
+use crate::geom::{Point, mix};
 use crate::refine::Place;
 
 /// Half the width of the zone at its narrowest, in units of the wanted length. Circumspheres of a saturated mesh have radii below
@@ -134,14 +134,6 @@ fn noise(p: Point, seed: u64) -> f64 {
     let edge = |dy: f64, dz: f64| blend(value(0.0, dy, dz), value(1.0, dy, dz), x);
     let face = |dz: f64| blend(edge(0.0, dz), edge(1.0, dz), y);
     blend(face(0.0), face(1.0), z)
-}
-
-/// Finalizer of splitmix64.
-fn mix(v: u64) -> u64 {
-    let mut z = v.wrapping_add(0x9E37_79B9_7F4A_7C15);
-    z = (z ^ z >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ z >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
-    z ^ z >> 31
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 //! factor of eight: one single sweep is 30 % slower (large cavities along its moving front) and reads up to
 //! fourteen times more pages when memory is short.
 
-use crate::geom::{HilbertFrame, Point};
+use crate::geom::{HilbertFrame, Point, STEP, mix};
 
 /// Bits of the hash that decide a round: seven eighths of the points are in the last.
 const ROUND_BITS: u32 = 3;
@@ -19,14 +19,9 @@ pub fn insertion_key(frame: &HilbertFrame, p: Point) -> u64 {
     u64::from(ROUNDS_MAX - round) << 60 | frame.index(p) >> 3
 }
 
-/// Splitmix finalizer over the coordinate bits.
+/// The coordinate bits, mixed.
 fn hash(p: Point) -> u64 {
     p.to_array()
         .into_iter()
-        .fold(0x9E37_79B9_7F4A_7C15, |h: u64, c| {
-            let mut z = (h ^ c.to_bits()).wrapping_add(0x9E37_79B9_7F4A_7C15);
-            z = (z ^ z >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-            z = (z ^ z >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
-            z ^ z >> 31
-        })
+        .fold(STEP, |h, c| mix(h ^ c.to_bits()))
 }

@@ -3,6 +3,7 @@
 //! One convention holds everywhere (drawn in `mesh/anatomy.rs`): a tetrahedron `a b c d` is positive
 //! when `det(b-a, c-a, d-a) > 0`, and [`insphere`] is positive inside the sphere of a positive one.
 
+mod hash;
 mod hilbert;
 mod sign;
 mod wide;
@@ -12,6 +13,7 @@ pub(crate) mod oracle;
 #[cfg(test)]
 pub(crate) mod tests;
 
+pub use hash::{STEP, mix};
 pub use hilbert::{HilbertFrame, hilbert_index};
 pub use sign::{
     Seen, in_sphere_perturbed, insphere, insphere_filtered, lex_cmp, orient, orient_sign,

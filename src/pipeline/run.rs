@@ -296,7 +296,7 @@ impl Run<'_> {
     fn job(&mut self, part: PartMesh, workers: u64) -> Result<LeafJob, PipelineError> {
         let rank = part.part.first;
         let mut owners = BTreeMap::new();
-        for cut in touching(self.catalog, part, self.n)? {
+        for cut in part.part.cuts_above(self.n) {
             owners.insert(cut, read_owners(self.catalog, cut)?);
         }
         let scratch = self.catalog.scratch_dir()?.join(format!("leaf-{rank}"));
@@ -421,18 +421,6 @@ fn work(queue: &Mutex<Vec<LeafJob>>, common: Common, tell: &Sender<Told>) {
             return;
         }
     }
-}
-
-/// The cuts above a part, one of whose faces it may have.
-fn touching(catalog: &mut Catalog, part: PartMesh, n: u32) -> Result<Vec<u32>, CatalogError> {
-    let mut cuts = part.part.cuts_above(n);
-    let mut kept = Vec::with_capacity(cuts.len());
-    for cut in cuts.drain(..) {
-        if catalog.blob(blob::OWNERS + cut)?.is_some() {
-            kept.push(cut);
-        }
-    }
-    Ok(kept)
 }
 
 /// Where pages go that leave memory, with a share of redb's cache.

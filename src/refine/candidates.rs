@@ -1,7 +1,7 @@
 //! Points that divide long edges.
 
 use super::{Field, Worker};
-use crate::geom::Point;
+use crate::geom::{Point, mix};
 use crate::mesh::anatomy::mark::EXAMINED;
 use crate::mesh::anatomy::{EDGE_OF, EDGES, MARK};
 use crate::mesh::{End, Mesh};
@@ -204,12 +204,4 @@ fn jitter(p: Point) -> Point {
         (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
     };
     Point::new(next(), next(), next())
-}
-
-/// Finalizer of splitmix64.
-fn mix(v: u64) -> u64 {
-    let mut z = v.wrapping_add(0x9E37_79B9_7F4A_7C15);
-    z = (z ^ z >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ z >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
-    z ^ z >> 31
 }

@@ -54,7 +54,7 @@ pub struct RefineReport {
     pub blocked: u64,
     /// Refused for nothing but their place.
     pub out_of_place: u64,
-    /// Cavities that wanted a tetrahedron frozen beside an interface.
+    /// Cavities, made star-shaped and allowed where they lie, that held a tetrahedron frozen beside an interface.
     pub frozen_hits: u64,
     /// Tetrahedra with two required faces or more when the passes ended: none of their edges could be divided.
     pub over_constrained: u64,

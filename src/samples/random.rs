@@ -1,10 +1,8 @@
 //! Random numbers that are the same on every machine.
 
-use crate::geom::Point;
+use crate::geom::{Point, STEP, mix};
 
 /// SplitMix64: a counter and a mixing function.
-///
-/// Source: G. Steele, D. Lea, C. Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014.
 #[derive(Clone, Debug)]
 pub(super) struct Random {
     state: u64,
@@ -16,11 +14,9 @@ impl Random {
     }
 
     fn bits(&mut self) -> u64 {
-        self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.state;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+        let bits = mix(self.state);
+        self.state = self.state.wrapping_add(STEP);
+        bits
     }
 
     /// Uniform in `[0, 1[`, a multiple of 2^-53.

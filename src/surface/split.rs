@@ -1,7 +1,7 @@
 //! Divide triangles until their edges have a wanted length, without moving the surface.
 //!
 //! The longest edge of all (in units of the wanted length) is divided at its middle, together with every triangle that has it, and
-//! so on: in each of these triangles it is the longest, so angles never fall below half of what they were (Rivara), and
+//! so on: in each of these triangles it is the longest, so for a uniform length angles never fall below half of what they were (Rivara), and
 //! the surface stays closed. Then edges inside an input triangle are swapped where that makes the least angle larger: this changes no
 //! point of the surface.
 //!
