@@ -2,63 +2,91 @@
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use super::PipelineError;
-use super::run::{Run, file_backing, journal, remove};
+use super::crew::crew;
+use super::leaf::Common;
+use super::run::{Run, journal, remove};
 use super::tree::{self, Part, PartMesh, blob};
-use super::watch::Event;
-use crate::bisect::{self, CutPlan, CutReport, Opened, PlaneChoice, Steps};
+use super::watch::{Event, Watcher};
+use super::{PipelineError, Plan};
+use crate::bisect::{self, CutPlan, CutReport, Opened, PlaneChoice, Steps, Zone};
 use crate::catalog::{CatalogError, NeighborRow, StoreState, TopologyRow};
 use crate::mesh::{Mesh, Workspace};
 use crate::optimize::Settings;
-use crate::store::{Backing, Pager, PagerStats, StoreFile};
+use crate::store::{Backing, Pager, PagerStats, StoreFile, attempt};
 use crate::topology::{Neighbors, Owners};
 
 /// Generations a bisection is on: what it changes in place, and what it leaves.
 pub(super) const WORK: u32 = 1;
 pub(super) const DONE: u32 = 2;
 
+/// What a worker needs to bisect a part.
+pub(super) struct CutJob {
+    pub parent: PartMesh,
+    /// The part's file, the file of its changes, and those of its children.
+    base: PathBuf,
+    work: PathBuf,
+    made: [PathBuf; 2],
+    scratch: PathBuf,
+    /// Zones of the cuts above it.
+    zones: Vec<Zone>,
+    share: Plan,
+}
+
+/// A part in two; its files are not yet listed.
+pub(super) struct Divided {
+    parent: PartMesh,
+    opened: Opened,
+    children: [Child; 2],
+    pages: PagerStats,
+    frames_used: usize,
+    clock: Instant,
+}
+
 /// A child as its file holds it.
 struct Child {
     mesh: PartMesh,
     /// Cut and number of the faces it took over from its parent, and on which side of those cuts it is.
     inherited: Vec<(u32, u32, u32)>,
-    stats: PagerStats,
 }
 
-impl Run<'_> {
-    /// Bisects `parent`; returns how the cut went.
-    pub(super) fn divide(&mut self, parent: PartMesh) -> Result<CutReport, PipelineError> {
+impl CutJob {
+    /// Does the whole job; a failed page access ends here.
+    pub(super) fn run(self, common: Common, watch: &Watcher) -> Result<Divided, PipelineError> {
+        attempt(|| self.divide(common, watch))?
+    }
+
+    fn divide(&self, common: Common, watch: &Watcher) -> Result<Divided, PipelineError> {
         let clock = Instant::now();
-        let part = parent.part;
-        let cut = part.cut();
-        let zones = tree::zones_above(self.catalog, part, self.n)?;
-        let mut host = self.reopen(parent, self.plan.frames / 2)?;
-        let scratch = self.catalog.scratch_dir()?;
+        let (part, generation) = (self.parent.part, self.parent.generation + WORK);
         let space = Workspace {
-            dir: &scratch,
-            memory: self.plan.buffers / 2,
+            dir: &self.scratch,
+            memory: self.share.buffers / 2,
         };
-        let core_path = scratch.join(format!("core-{cut}.redb"));
+        let backing = self.backing(part.first, generation, self.work.clone(), 2);
+        let mut host = open_part(
+            self.parent,
+            self.base.clone(),
+            backing,
+            self.share.frames / 2,
+        )?;
+        let core_path = self.scratch.join("core.redb");
         let mut core = Mesh::new(Pager::new(
-            self.plan.frames / 4,
-            Some(file_backing(part.first, 0, core_path, &self.plan, 4)),
+            self.share.frames / 4,
+            Some(self.backing(part.first, 0, core_path, 4)),
         ));
-        let field = self.field;
-        let mode = self.optimize_mode()?;
         let plan = CutPlan {
-            cut,
+            cut: part.cut(),
             low: part.low_share(),
             choice: PlaneChoice::default(),
-            earlier: &zones,
-            h: &|p| field.h(p),
-            bounds: self.bounds,
-            optimize: Settings::of(mode),
+            earlier: &self.zones,
+            h: &|p| common.field.h(p),
+            bounds: common.bounds,
+            optimize: Settings::of(common.mode),
             steps: Steps::default(),
         };
-        let watch = self.watch;
         let opened = bisect::open(&mut host, &mut core, &plan, &space, &|stage, done| {
             watch(Event {
                 stage,
@@ -67,39 +95,52 @@ impl Run<'_> {
                 unit: "vertices",
             });
         })?;
+        let mut pages = PagerStats::default();
         let mut children = Vec::with_capacity(2);
-        for child in part.children() {
-            let generation = parent.generation + DONE;
-            let made = self.child((&mut host, &mut core), &opened, child, generation, &space)?;
+        for (child, path) in part.children().into_iter().zip(&self.made) {
+            let (made, stats) = self.child(
+                (&mut host, &mut core),
+                &opened,
+                (child, path),
+                common,
+                &space,
+            )?;
+            pages.add(stats);
             children.push(made);
         }
-        let host_stats = host.pages().stats();
+        pages.add(host.pages().stats());
+        let frames_used = host.pages().frames_used() + core.pages().frames_used();
         for mesh in [host, core] {
             if let Some(path) = mesh.into_pages().discard() {
                 remove(&path)?;
             }
         }
-        self.pages.add(host_stats);
-        for child in &children {
-            self.pages.add(child.stats);
-        }
-        self.commit_children(parent, &opened, &children, clock)?;
-        Ok(opened.report)
+        let Ok(children) = children.try_into() else {
+            unreachable!("a cut has two sides");
+        };
+        Ok(Divided {
+            parent: self.parent,
+            opened,
+            children,
+            pages,
+            frames_used,
+            clock,
+        })
     }
 
     fn child(
-        &mut self,
+        &self,
         (host, core): (&mut Mesh, &mut Mesh),
         opened: &Opened,
-        part: Part,
-        generation: u32,
+        (part, path): (Part, &Path),
+        common: Common,
         space: &Workspace,
-    ) -> Result<Child, PipelineError> {
-        let path = self.catalog.file_path(part.first, generation);
-        let backing = file_backing(part.first, generation, path, &self.plan, 2);
-        let mut mesh = Mesh::new(Pager::new(self.plan.frames / 4, Some(backing)));
+    ) -> Result<(Child, PagerStats), PipelineError> {
+        let generation = self.parent.generation + DONE;
+        let backing = self.backing(part.first, generation, path.to_owned(), 2);
+        let mut mesh = Mesh::new(Pager::new(self.share.frames / 4, Some(backing)));
         let high = part.first == opened.zone.cut;
-        bisect::write_child(host, core, &mut mesh, opened, high, &self.bounds, space)?;
+        bisect::write_child(host, core, &mut mesh, opened, high, &common.bounds, space)?;
         mesh.pages_mut().flush();
         let mut inherited = Vec::new();
         for n in 0..mesh.n_interface_faces() {
@@ -121,22 +162,84 @@ impl Run<'_> {
         let pager = mesh.into_pages();
         let stats = pager.stats();
         pager.discard();
-        Ok(Child {
+        let child = Child {
             mesh: part_mesh,
             inherited,
-            stats,
+        };
+        Ok((child, stats))
+    }
+
+    /// Where pages go that leave memory, with one part in `share` of redb's cache.
+    fn backing(&self, subdomain: u32, generation: u32, work_path: PathBuf, share: u64) -> Backing {
+        Backing {
+            subdomain,
+            generation,
+            work_path,
+            base: None,
+            cache_bytes: (self.share.redb / share) as usize,
+        }
+    }
+}
+
+impl Run<'_> {
+    /// Bisects until no part has more than one sub-domain, as many parts at once as there are threads and memory for.
+    pub(super) fn divide_all(&mut self) -> Result<Vec<CutReport>, PipelineError> {
+        let mut whole = tree::parts(self.catalog, self.n)?;
+        whole.retain(|p| p.part.count > 1);
+        let workers = self.plan.workers();
+        // One part alone has all the memory: its children come when it is done.
+        let share = self.plan.shared_by(whole.len().min(workers).max(1) as u64);
+        let mut jobs = Vec::with_capacity(whole.len());
+        for part in whole.into_iter().rev() {
+            jobs.push(self.cut_job(part, share)?);
+        }
+        let (common, watch) = (self.common()?, self.watch);
+        let mut reports = Vec::new();
+        let share = self.plan.shared_by(workers as u64);
+        crew(
+            jobs,
+            workers,
+            watch,
+            &|job: CutJob, watch| job.run(common, watch),
+            &mut |done| {
+                reports.push(done.opened.report);
+                let mut jobs = Vec::with_capacity(2);
+                for part in self.commit_children(done)?.into_iter().rev() {
+                    if part.part.count > 1 {
+                        jobs.push(self.cut_job(part, share)?);
+                    }
+                }
+                Ok(jobs)
+            },
+        )?;
+        Ok(reports)
+    }
+
+    fn cut_job(&mut self, parent: PartMesh, share: Plan) -> Result<CutJob, PipelineError> {
+        let first = parent.part.first;
+        let made = (parent.part.children())
+            .map(|p| self.catalog.file_path(p.first, parent.generation + DONE));
+        Ok(CutJob {
+            parent,
+            base: self.catalog.file_path(first, parent.generation),
+            work: self.catalog.file_path(first, parent.generation + WORK),
+            made,
+            scratch: self.scratch(&format!("cut-{}", parent.part.cut()))?,
+            zones: tree::zones_above(self.catalog, parent.part, self.n)?,
+            share,
         })
     }
 
-    fn commit_children(
-        &mut self,
-        parent: PartMesh,
-        opened: &Opened,
-        children: &[Child],
-        clock: Instant,
-    ) -> Result<(), PipelineError> {
+    /// Commits a bisection; returns the two parts.
+    fn commit_children(&mut self, divided: Divided) -> Result<[PartMesh; 2], PipelineError> {
+        let Divided {
+            parent,
+            opened,
+            children,
+            ..
+        } = &divided;
         let cut = opened.zone.cut;
-        let [low, high] = [&children[0], &children[1]];
+        let [low, high] = children;
         let faces = opened.report.interface.chosen.faces as u32;
         let (low_name, high_name) = (low.mesh.part.first, high.mesh.part.first);
         let mut neighbors = neighbors_of(&self.catalog.topology()?);
@@ -195,7 +298,7 @@ impl Run<'_> {
             ("load_low", report.plane.load[0]),
             ("load", report.plane.load[1]),
         ];
-        let mut row = journal(StoreState::Bisected, "bisect", clock, &measures);
+        let mut row = journal(StoreState::Bisected, "bisect", divided.clock, &measures);
         row.subdomain = Some(low_name);
         self.catalog.commit(|step| {
             for child in children {
@@ -215,16 +318,9 @@ impl Run<'_> {
             step.append_journal(&row);
             Ok(())
         })?;
-        Ok(())
-    }
-
-    /// The working mesh of a part, with changes going to the next generation.
-    pub(super) fn reopen(&mut self, part: PartMesh, frames: u64) -> Result<Mesh, PipelineError> {
-        let first = part.part.first;
-        let base = self.catalog.file_path(first, part.generation);
-        let work = self.catalog.file_path(first, part.generation + WORK);
-        let backing = file_backing(first, part.generation + WORK, work, &self.plan, 2);
-        open_part(part, base, backing, frames)
+        self.pages.add(divided.pages);
+        self.frames_used = self.frames_used.max(divided.frames_used);
+        Ok([low.mesh, high.mesh])
     }
 }
 

@@ -1,11 +1,11 @@
 //! The fine mesh of one sub-domain: sizes, saturation, optimization.
 
+use super::PipelineError;
 use super::watch::{Event, Watcher};
-use super::{Options, PipelineError};
 use crate::bisect::{OutsideZones, Zone};
 use crate::geom::Aabb;
 use crate::mesh::{Mesh, Workspace};
-use crate::optimize::{self, OptimizeReport};
+use crate::optimize::{self, Mode, OptimizeReport};
 use crate::refine::{Everywhere, Field, Place, RefineReport, saturate};
 use crate::sizing::SizeField;
 use crate::store::Pages;
@@ -23,16 +23,10 @@ pub(super) fn fine<P: Pages>(
     field: &SizeField,
     bounds: Aabb,
     zones: &[Zone],
-    options: &Options,
+    mode: Mode,
     space: &Workspace,
     watch: &Watcher,
 ) -> Result<FineReport, PipelineError> {
-    let mode = options
-        .optimize_mode()
-        .ok_or_else(|| PipelineError::Option {
-            option: "--optimize",
-            value: options.optimize.clone().unwrap_or_default(),
-        })?;
     watch(Event {
         stage: "divide edges",
         done: 0,

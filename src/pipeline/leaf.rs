@@ -13,11 +13,12 @@ use super::run::remove;
 use super::seal::{Target, seal};
 use super::tree::PartMesh;
 use super::watch::Watcher;
-use super::{Options, PipelineError};
+use super::{PipelineError, Plan};
 use crate::bisect::Zone;
 use crate::catalog::{InterfaceSide, RegionTotals, Sealed};
 use crate::geom::Aabb;
 use crate::mesh::{Mesh, Workspace};
+use crate::optimize::Mode;
 use crate::sizing::SizeField;
 use crate::store::{Backing, PagerStats, attempt};
 use crate::topology::Owners;
@@ -33,16 +34,14 @@ pub(super) struct LeafJob {
     pub zones: Vec<Zone>,
     /// Owners of the faces around it, by cut.
     pub owners: BTreeMap<u32, Owners>,
-    pub frames: u64,
-    pub redb: u64,
-    pub buffers: u64,
+    pub share: Plan,
 }
 
 /// What is the same for all sub-domains.
 #[derive(Clone, Copy)]
 pub(super) struct Common<'a> {
     pub field: &'a SizeField,
-    pub options: &'a Options,
+    pub mode: Mode,
     pub bounds: Aabb,
 }
 
@@ -67,9 +66,9 @@ impl LeafJob {
                 generation: self.part.generation + WORK,
                 work_path: self.work.clone(),
                 base: None,
-                cache_bytes: self.redb as usize,
+                cache_bytes: self.share.redb as usize,
             };
-            let mesh = open_part(self.part, self.base.clone(), backing, self.frames)?;
+            let mesh = open_part(self.part, self.base.clone(), backing, self.share.frames)?;
             self.finish(mesh, common, watch)
         })?
     }
@@ -84,14 +83,14 @@ impl LeafJob {
         let clock = Instant::now();
         let space = Workspace {
             dir: &self.scratch,
-            memory: self.buffers / 2,
+            memory: self.share.buffers / 2,
         };
         let fine = fine(
             &mut mesh,
             common.field,
             common.bounds,
             &self.zones,
-            common.options,
+            common.mode,
             &space,
             watch,
         )?;
@@ -102,7 +101,7 @@ impl LeafJob {
             scratch: &self.scratch,
             subdomain: SubdomainId::new(rank).expect("fewer parts than ranks"),
             generation,
-            memory: self.buffers,
+            memory: self.share.buffers,
             bounds: common.bounds,
             owners: &self.owners,
         };

@@ -9,6 +9,7 @@
 //! It receives a surface, not a path, and prints nothing: it tells a [`Watcher`] what goes on.
 
 mod coarse;
+mod crew;
 mod divide;
 mod error;
 mod fine;

@@ -48,6 +48,15 @@ impl Plan {
         })
     }
 
+    /// An equal share for each of `workers`.
+    pub fn shared_by(&self, workers: u64) -> Self {
+        Self {
+            frames: self.frames / workers,
+            redb: self.redb / workers,
+            buffers: self.buffers / workers,
+        }
+    }
+
     /// How many sub-domains can be made at once: a worker needs frames of its own.
     pub fn workers(&self) -> usize {
         let by_frames = (self.frames / FRAMES_OF_WORKER).max(1);

@@ -2,15 +2,14 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
-use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Instant;
 
 use super::coarse::{CoarseReport, coarse};
+use super::crew::crew;
 use super::divide::{DONE, WORK, read_owners};
 use super::leaf::{Common, Leaf, LeafJob, SealedTotals};
 use super::tree::{self, Part, PartMesh, blob};
-use super::watch::{Event, Watcher};
+use super::watch::Watcher;
 use super::{FineReport, Options, PipelineError, Plan};
 use crate::bisect::{CutReport, load_of};
 use crate::boundary::RegionSummary;
@@ -19,7 +18,6 @@ use crate::catalog::{
 };
 use crate::geom::{Aabb, HilbertFrame};
 use crate::mesh::{Mesh, Workspace, renumber};
-use crate::optimize::Mode;
 use crate::sizing::{SizeField, SizeSummary, TETS_PER_LOAD};
 use crate::store::{Backing, Budget, Pager, PagerStats, attempt};
 use crate::surface::Surface;
@@ -89,6 +87,7 @@ pub fn mesh(
         n: 1,
         asked: None,
         pages: PagerStats::default(),
+        frames_used: 0,
         watch,
     };
     // Unwinding from a failed page access ends here; a step's commit is its last act, so nothing is half done.
@@ -106,10 +105,11 @@ pub(super) struct Run<'a> {
     pub n: u32,
     asked: Option<u32>,
     pub pages: PagerStats,
+    pub frames_used: usize,
     pub watch: &'a Watcher<'a>,
 }
 
-impl Run<'_> {
+impl<'a> Run<'a> {
     fn steps(mut self, sizes: Option<SizeSummary>) -> Result<Summary, PipelineError> {
         let mut open = None;
         let mut coarse = None;
@@ -118,14 +118,9 @@ impl Run<'_> {
             (open, coarse) = (Some(mesh), Some(report));
         }
         self.n = tree::n_subdomains(self.catalog)?;
-        let mut cuts = Vec::new();
-        while let Some(part) =
-            (tree::parts(self.catalog, self.n)?.into_iter()).find(|p| p.part.count > 1)
-        {
-            // Pages of the coarse mesh that are still resident would take the frames of the others.
-            open = None;
-            cuts.push(self.divide(part)?);
-        }
+        // Pages of the coarse mesh that are still resident would take the frames of the others.
+        open = open.filter(|_| self.n == 1);
+        let cuts = self.divide_all()?;
         let mut summary = Summary {
             coarse,
             sizes,
@@ -134,7 +129,7 @@ impl Run<'_> {
             subdomains: self.n,
             subdomains_asked: self.asked,
             pages: PagerStats::default(),
-            frames_used: 0,
+            frames_used: self.frames_used,
         };
         let sealed: BTreeSet<u32> = self.catalog.subdomains()?.iter().map(|r| r.rank).collect();
         let mut left = tree::parts(self.catalog, self.n)?;
@@ -145,19 +140,29 @@ impl Run<'_> {
         Ok(summary)
     }
 
-    pub(super) fn optimize_mode(&self) -> Result<Mode, PipelineError> {
-        self.options
-            .optimize_mode()
-            .ok_or_else(|| PipelineError::Option {
+    /// What is the same for all workers.
+    pub(super) fn common(&self) -> Result<Common<'a>, PipelineError> {
+        let mode = self.options.optimize_mode();
+        Ok(Common {
+            field: self.field,
+            mode: mode.ok_or_else(|| PipelineError::Option {
                 option: "--optimize",
                 value: self.options.optimize.clone().unwrap_or_default(),
-            })
+            })?,
+            bounds: self.bounds,
+        })
     }
 
     fn coarse_step(&mut self) -> Result<(Mesh, CoarseReport), PipelineError> {
         let clock = Instant::now();
         let path = self.catalog.file_path(0, COARSE);
-        let backing = file_backing(0, COARSE, path, &self.plan, 1);
+        let backing = Backing {
+            subdomain: 0,
+            generation: COARSE,
+            work_path: path,
+            base: None,
+            cache_bytes: self.plan.redb as usize,
+        };
         let mut mesh = Mesh::new(Pager::new(self.plan.frames, Some(backing)));
         let report = coarse(&mut mesh, self.surface, self.options, self.watch)?;
         let scratch = self.catalog.scratch_dir()?;
@@ -234,11 +239,7 @@ impl Run<'_> {
         open: Option<Mesh>,
         summary: &mut Summary,
     ) -> Result<(), PipelineError> {
-        let common = Common {
-            field: self.field,
-            options: self.options,
-            bounds: self.bounds,
-        };
+        let common = self.common()?;
         if let (Some(mesh), [part]) = (open, &left[..]) {
             let job = self.job(*part, 1)?;
             let leaf = job.finish(mesh, common, self.watch)?;
@@ -246,51 +247,19 @@ impl Run<'_> {
         }
         let workers = self.plan.workers().min(left.len());
         let mut jobs = Vec::with_capacity(left.len());
-        for part in left {
+        for part in left.into_iter().rev() {
             jobs.push(self.job(part, workers as u64)?);
         }
-        jobs.reverse();
-        let queue = Mutex::new(jobs);
-        let (tell, hear) = channel();
-        // Threads of their own, not tasks of the pool: a task that waits for a sort would take up another sub-domain meanwhile,
-        // and its memory.
-        std::thread::scope(|scope| {
-            for _ in 0..workers {
-                let (queue, tell) = (&queue, tell.clone());
-                scope.spawn(move || work(queue, common, &tell));
-            }
-            drop(tell);
-            let result = self.listen(&hear, summary);
-            if result.is_err() {
-                queue.lock().unwrap_or_else(|e| e.into_inner()).clear();
-            }
-            result
-        })
-    }
-
-    /// Hands on what workers tell, and commits what they finish.
-    fn listen(
-        &mut self,
-        hear: &Receiver<Told>,
-        summary: &mut Summary,
-    ) -> Result<(), PipelineError> {
-        let mut first_error = None;
-        for told in hear {
-            match told {
-                Told::Progress(event) => (self.watch)(event),
-                Told::Done(Ok(leaf)) if first_error.is_none() => {
-                    if let Err(error) = self.seal_step(*leaf, summary) {
-                        first_error = Some(error);
-                    }
-                }
-                Told::Done(Ok(_)) => {}
-                Told::Done(Err(error)) => _ = first_error.get_or_insert(error),
-            }
-            if first_error.is_some() {
-                break;
-            }
-        }
-        first_error.map_or(Ok(()), Err)
+        crew(
+            jobs,
+            workers,
+            self.watch,
+            &|job: LeafJob, watch| job.run(common, watch).map(Box::new),
+            &mut |leaf| {
+                self.seal_step(*leaf, summary)?;
+                Ok(Vec::new())
+            },
+        )
     }
 
     fn job(&mut self, part: PartMesh, workers: u64) -> Result<LeafJob, PipelineError> {
@@ -299,23 +268,26 @@ impl Run<'_> {
         for cut in part.part.cuts_above(self.n) {
             owners.insert(cut, read_owners(self.catalog, cut)?);
         }
-        let scratch = self.catalog.scratch_dir()?.join(format!("leaf-{rank}"));
-        std::fs::create_dir_all(&scratch).map_err(|source| CatalogError::Io {
-            path: scratch.clone(),
-            source,
-        })?;
+        let share = self.plan.shared_by(workers);
         Ok(LeafJob {
             part,
             base: self.catalog.file_path(rank, part.generation),
             work: self.catalog.file_path(rank, part.generation + WORK),
             sealed: self.catalog.file_path(rank, part.generation + DONE),
-            scratch,
+            scratch: self.scratch(&format!("leaf-{rank}"))?,
             zones: tree::zones_above(self.catalog, part.part, self.n)?,
             owners,
-            frames: self.plan.frames / workers,
-            redb: self.plan.redb / workers,
-            buffers: self.plan.buffers / workers,
+            share,
         })
+    }
+
+    /// A scratch folder of this name.
+    pub(super) fn scratch(&mut self, name: &str) -> Result<PathBuf, CatalogError> {
+        let path = self.catalog.scratch_dir()?.join(name);
+        match std::fs::create_dir_all(&path) {
+            Ok(()) => Ok(path),
+            Err(source) => Err(CatalogError::Io { path, source }),
+        }
     }
 
     /// Commits a finished sub-domain.
@@ -393,50 +365,6 @@ impl Run<'_> {
         // Nothing in it counts; what cannot be removed now goes when the store is next opened for writing.
         let _ = std::fs::remove_dir_all(scratch);
         Ok(())
-    }
-}
-
-/// What a worker says.
-enum Told {
-    Progress(Event),
-    Done(Result<Box<Leaf>, PipelineError>),
-}
-
-/// Takes jobs until there is none.
-fn work(queue: &Mutex<Vec<LeafJob>>, common: Common, tell: &Sender<Told>) {
-    loop {
-        let job = queue.lock().unwrap_or_else(|e| e.into_inner()).pop();
-        let Some(job) = job else { return };
-        let last = std::cell::Cell::new(None::<Instant>);
-        let watch = |event: Event| {
-            let due = last.get().is_none_or(|t| t.elapsed().as_millis() > 100);
-            if due {
-                last.set(Some(Instant::now()));
-                // Nobody listens once a step has failed.
-                let _ = tell.send(Told::Progress(event));
-            }
-        };
-        let done = job.run(common, &watch).map(Box::new);
-        if tell.send(Told::Done(done)).is_err() {
-            return;
-        }
-    }
-}
-
-/// Where pages go that leave memory, with a share of redb's cache.
-pub(super) fn file_backing(
-    subdomain: u32,
-    generation: u32,
-    work_path: PathBuf,
-    plan: &Plan,
-    share: u64,
-) -> Backing {
-    Backing {
-        subdomain,
-        generation,
-        work_path,
-        base: None,
-        cache_bytes: (plan.redb / share) as usize,
     }
 }
 
