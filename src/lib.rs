@@ -2,6 +2,7 @@
 #![doc = include_str!("README.md")]
 
 // Floor 0.
+pub mod expr;
 pub mod geom;
 // Floor 1.
 pub mod store;

@@ -1,0 +1,385 @@
+//! Words to operations: precedence climbing, kinds checked on the way.
+
+use super::machine::{Binary, Op, Unary};
+use super::words::{Word, fault, next_word};
+use super::{ExprError, Expression, Kind};
+
+/// How tightly operators bind, from the loosest.
+const OR: u8 = 1;
+const AND: u8 = 2;
+const COMPARISON: u8 = 4;
+const SUM: u8 = 5;
+const PRODUCT: u8 = 6;
+const POWER: u8 = 7;
+
+/// An infix operator.
+struct Infix {
+    binds: u8,
+    /// The kind of its operands.
+    takes: Kind,
+    gives: Kind,
+    op: Binary,
+}
+
+fn infix(word: Word) -> Option<Infix> {
+    let (binds, op) = match word {
+        Word::Name("or") => (OR, Binary::Or),
+        Word::Name("and") => (AND, Binary::And),
+        Word::Sign("=" | "==") => (COMPARISON, Binary::Equal),
+        Word::Sign("!=") => (COMPARISON, Binary::NotEqual),
+        Word::Sign("<") => (COMPARISON, Binary::Less),
+        Word::Sign("<=") => (COMPARISON, Binary::LessEqual),
+        Word::Sign(">") => (COMPARISON, Binary::Greater),
+        Word::Sign(">=") => (COMPARISON, Binary::GreaterEqual),
+        Word::Sign("+") => (SUM, Binary::Add),
+        Word::Sign("-") => (SUM, Binary::Subtract),
+        Word::Sign("*") => (PRODUCT, Binary::Multiply),
+        Word::Sign("/") => (PRODUCT, Binary::Divide),
+        Word::Sign("^") => (POWER, Binary::Power),
+        _ => return None,
+    };
+    let (takes, gives) = match binds {
+        OR | AND => (Kind::Truth, Kind::Truth),
+        COMPARISON => (Kind::Number, Kind::Truth),
+        _ => (Kind::Number, Kind::Number),
+    };
+    Some(Infix {
+        binds,
+        takes,
+        gives,
+        op,
+    })
+}
+
+/// What a name in front of a bracket does.
+enum Function {
+    One(Unary),
+    Two(Binary),
+    /// Two or more.
+    Many(Binary),
+    If,
+}
+
+const FUNCTIONS: &str =
+    "abs, ceil, cos, exp, floor, if, log, max, min, pow, round, sign, sin, sqrt, tan";
+
+fn function(name: &str) -> Option<Function> {
+    Some(match name {
+        "abs" => Function::One(Unary::Abs),
+        "ceil" => Function::One(Unary::Ceil),
+        "cos" => Function::One(Unary::Cos),
+        "exp" => Function::One(Unary::Exp),
+        "floor" => Function::One(Unary::Floor),
+        "if" => Function::If,
+        "log" => Function::One(Unary::Log),
+        "max" => Function::Many(Binary::Max),
+        "min" => Function::Many(Binary::Min),
+        "pow" => Function::Two(Binary::Power),
+        "round" => Function::One(Unary::Round),
+        "sign" => Function::One(Unary::Sign),
+        "sin" => Function::One(Unary::Sin),
+        "sqrt" => Function::One(Unary::Sqrt),
+        "tan" => Function::One(Unary::Tan),
+        _ => return None,
+    })
+}
+
+struct Parser<'a> {
+    text: &'a str,
+    variables: &'a [&'a str],
+    /// The word to be looked at, where it begins and ends.
+    word: Word<'a>,
+    start: usize,
+    end: usize,
+    ops: Vec<Op>,
+    lists: Vec<Vec<f64>>,
+    /// Values on the stack after `ops`.
+    waiting: usize,
+    /// Brackets and signs around the place.
+    depth: usize,
+}
+
+/// Reads a whole text.
+pub(super) fn parse(text: &str, variables: &[&str]) -> Result<Expression, ExprError> {
+    if text.len() > Expression::TEXT_MAX {
+        let most = Expression::TEXT_MAX;
+        return Err(fault(0, format!("it is longer than {most} bytes")));
+    }
+    let mut parser = Parser {
+        text,
+        variables,
+        word: Word::End,
+        start: 0,
+        end: 0,
+        ops: Vec::new(),
+        lists: Vec::new(),
+        waiting: 0,
+        depth: 0,
+    };
+    parser.advance()?;
+    let kind = parser.expression(OR)?;
+    if parser.word != Word::End {
+        let what = parser.found();
+        return Err(fault(
+            parser.start,
+            format!("expected an operator or the end, found {what}"),
+        ));
+    }
+    Ok(Expression {
+        ops: parser.ops,
+        lists: parser.lists,
+        kind,
+    })
+}
+
+impl<'a> Parser<'a> {
+    fn advance(&mut self) -> Result<(), ExprError> {
+        (self.word, self.start, self.end) = next_word(self.text, self.end)?;
+        Ok(())
+    }
+
+    /// The word at hand as a message names it.
+    fn found(&self) -> String {
+        match self.word {
+            Word::End => "the end".to_owned(),
+            _ => format!("`{}`", &self.text[self.start..self.end]),
+        }
+    }
+
+    fn expect(&mut self, sign: &'static str) -> Result<(), ExprError> {
+        if self.word != Word::Sign(sign) {
+            let found = self.found();
+            return Err(fault(
+                self.start,
+                format!("expected `{sign}`, found {found}"),
+            ));
+        }
+        self.advance()
+    }
+
+    fn push(&mut self, op: Op) -> Result<(), ExprError> {
+        match op {
+            Op::Constant(_) | Op::Variable(_) => self.waiting += 1,
+            Op::Unary(_) | Op::In(_) => {}
+            Op::Binary(_) => self.waiting -= 1,
+            Op::If => self.waiting -= 2,
+        }
+        if self.waiting > Expression::STACK_MAX {
+            return Err(self.too_deep());
+        }
+        self.ops.push(op);
+        Ok(())
+    }
+
+    fn too_deep(&self) -> ExprError {
+        fault(self.start, "too much within each other; take it apart")
+    }
+
+    /// Operators that bind at least as tightly as `least`, and their operands.
+    fn expression(&mut self, least: u8) -> Result<Kind, ExprError> {
+        self.depth += 1;
+        if self.depth > Expression::STACK_MAX {
+            return Err(self.too_deep());
+        }
+        let start = self.start;
+        let mut kind = self.operand()?;
+        let mut compared = false;
+        loop {
+            if self.word == Word::Name("in") && least <= COMPARISON {
+                self.not_chained(compared)?;
+                check(kind, Kind::Number, start, "in")?;
+                kind = self.list()?;
+                compared = true;
+                continue;
+            }
+            let Some(operator) = infix(self.word).filter(|o| o.binds >= least) else {
+                break;
+            };
+            if operator.binds == COMPARISON {
+                self.not_chained(compared)?;
+            }
+            let name = &self.text[self.start..self.end];
+            check(kind, operator.takes, start, name)?;
+            self.advance()?;
+            let right = self.start;
+            // Powers to the right, all others to the left.
+            let binds = operator.binds + u8::from(operator.binds != POWER);
+            let other = self.expression(binds)?;
+            check(other, operator.takes, right, name)?;
+            self.push(Op::Binary(operator.op))?;
+            kind = operator.gives;
+            compared = operator.binds == COMPARISON;
+        }
+        self.depth -= 1;
+        Ok(kind)
+    }
+
+    fn not_chained(&self, compared: bool) -> Result<(), ExprError> {
+        match compared {
+            true => Err(fault(
+                self.start,
+                "comparisons are not chained; write `a < b and b < c`",
+            )),
+            false => Ok(()),
+        }
+    }
+
+    fn operand(&mut self) -> Result<Kind, ExprError> {
+        let (word, start) = (self.word, self.start);
+        match word {
+            Word::Number(value) => {
+                self.advance()?;
+                self.push(Op::Constant(value))?;
+                Ok(Kind::Number)
+            }
+            Word::Sign("(") => {
+                self.advance()?;
+                let kind = self.expression(OR)?;
+                self.expect(")")?;
+                Ok(kind)
+            }
+            Word::Sign("-") => self.prefix(Unary::Negate, POWER, Kind::Number),
+            Word::Name("not") => self.prefix(Unary::Not, COMPARISON, Kind::Truth),
+            Word::Name(name) if !matches!(name, "and" | "or" | "in") => self.name(name),
+            _ => {
+                let found = self.found();
+                Err(fault(
+                    start,
+                    format!("expected a number, a name or `(`, found {found}"),
+                ))
+            }
+        }
+    }
+
+    fn prefix(&mut self, op: Unary, binds: u8, kind: Kind) -> Result<Kind, ExprError> {
+        let name = &self.text[self.start..self.end];
+        self.advance()?;
+        let start = self.start;
+        let found = self.expression(binds)?;
+        check(found, kind, start, name)?;
+        self.push(Op::Unary(op))?;
+        Ok(kind)
+    }
+
+    fn name(&mut self, name: &str) -> Result<Kind, ExprError> {
+        let start = self.start;
+        self.advance()?;
+        if let Some(v) = self.variables.iter().position(|known| *known == name) {
+            self.push(Op::Variable(v))?;
+            return Ok(Kind::Number);
+        }
+        let (value, kind) = match name {
+            "pi" => (std::f64::consts::PI, Kind::Number),
+            "true" => (1.0, Kind::Truth),
+            "false" => (0.0, Kind::Truth),
+            _ => {
+                return match function(name) {
+                    Some(function) => self.call(name, &function),
+                    None => Err(self.unknown(name, start)),
+                };
+            }
+        };
+        self.push(Op::Constant(value))?;
+        Ok(kind)
+    }
+
+    fn unknown(&self, name: &str, start: usize) -> ExprError {
+        let message = if self.word == Word::Sign("(") {
+            format!("there is no function `{name}`; there are {FUNCTIONS}")
+        } else if self.variables.is_empty() {
+            format!("there is no variable `{name}`")
+        } else {
+            let known = self.variables.join(", ");
+            format!("there is no variable `{name}`; there are {known}")
+        };
+        fault(start, message)
+    }
+
+    fn call(&mut self, name: &str, function: &Function) -> Result<Kind, ExprError> {
+        self.expect("(")?;
+        match function {
+            Function::One(op) => {
+                self.argument(name, Kind::Number)?;
+                self.push(Op::Unary(*op))?;
+            }
+            Function::Two(op) => {
+                self.argument(name, Kind::Number)?;
+                self.expect(",")?;
+                self.argument(name, Kind::Number)?;
+                self.push(Op::Binary(*op))?;
+            }
+            Function::Many(op) => {
+                self.argument(name, Kind::Number)?;
+                loop {
+                    self.expect(",")?;
+                    self.argument(name, Kind::Number)?;
+                    self.push(Op::Binary(*op))?;
+                    if self.word == Word::Sign(")") {
+                        break;
+                    }
+                }
+            }
+            Function::If => {
+                self.argument(name, Kind::Truth)?;
+                for _ in 0..2 {
+                    self.expect(",")?;
+                    self.argument(name, Kind::Number)?;
+                }
+                self.push(Op::If)?;
+            }
+        }
+        self.expect(")")?;
+        Ok(Kind::Number)
+    }
+
+    fn argument(&mut self, name: &str, kind: Kind) -> Result<(), ExprError> {
+        let start = self.start;
+        let found = self.expression(OR)?;
+        check(found, kind, start, name)
+    }
+
+    /// `in [number, ..]`.
+    fn list(&mut self) -> Result<Kind, ExprError> {
+        self.advance()?;
+        self.expect("[")?;
+        let mut list = Vec::new();
+        loop {
+            let negative = self.word == Word::Sign("-");
+            if negative {
+                self.advance()?;
+            }
+            let Word::Number(value) = self.word else {
+                let found = self.found();
+                return Err(fault(
+                    self.start,
+                    format!("a list holds numbers, found {found}"),
+                ));
+            };
+            list.push(if negative { -value } else { value });
+            self.advance()?;
+            if self.word != Word::Sign(",") {
+                break;
+            }
+            self.advance()?;
+        }
+        self.expect("]")?;
+        self.push(Op::In(self.lists.len()))?;
+        self.lists.push(list);
+        Ok(Kind::Truth)
+    }
+}
+
+/// An operand of another kind than its operator takes is a fault.
+fn check(found: Kind, expected: Kind, at: usize, name: &str) -> Result<(), ExprError> {
+    match (expected, found) {
+        (Kind::Number, Kind::Truth) => {
+            let message = format!("`{name}` takes numbers, this is a truth");
+            Err(fault(at, message))
+        }
+        (Kind::Truth, Kind::Number) => {
+            let message = format!("`{name}` takes truths such as `x > 1`, this is a number");
+            Err(fault(at, message))
+        }
+        _ => Ok(()),
+    }
+}
