@@ -9,6 +9,7 @@ mod config;
 mod digest;
 mod export;
 mod failure;
+mod heap;
 mod info;
 mod input;
 mod memory;
@@ -33,6 +34,7 @@ pub use failure::{CODES, CodeRow};
 
 /// Runs the command line of this process and returns its exit code.
 pub fn run() -> ExitCode {
+    heap::keep_little();
     let args = match Args::try_parse() {
         Ok(args) => args,
         Err(error) => return unparsed(&error),

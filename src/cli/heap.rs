@@ -1,0 +1,26 @@
+//! How the C library keeps memory that was given back: not at all, where it is large.
+//!
+//! The ledger counts what is held. But the allocator of the GNU C library keeps what a thread gave back for that thread's next
+//! requests, and learns from each large block that is freed to keep blocks of its size, up to 32 MiB. Measured: a run in six sub-domains
+//! with two threads and a cap of 224 MiB held 199 MiB at most and had 339 MiB resident; with one heap for all threads, and blocks
+//! from 256 KiB on mapped for themselves, 236 MiB, for 2 % more CPU time.
+
+/// Blocks of this many bytes go back to the system when they are freed.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+const MAPPED_FROM: i32 = 256 << 10;
+
+/// Sets the allocator up. To be called before there are threads.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+#[allow(unsafe_code)]
+pub fn keep_little() {
+    // SAFETY: `mallopt` takes two numbers and changes only how the allocator works from now on; no other thread exists yet. An answer
+    // of 0 means that the setting is not known, and costs nothing but memory.
+    unsafe {
+        libc::mallopt(libc::M_ARENA_MAX, 1);
+        libc::mallopt(libc::M_MMAP_THRESHOLD, MAPPED_FROM);
+    }
+}
+
+/// Other allocators are left as they are.
+#[cfg(not(all(target_os = "linux", target_env = "gnu")))]
+pub fn keep_little() {}
