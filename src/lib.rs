@@ -28,5 +28,6 @@ pub mod audit;
 pub mod pipeline;
 // Floor 7.
 pub mod io;
+pub mod report;
 // Floor 8.
 pub mod cli;

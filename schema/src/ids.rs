@@ -192,6 +192,29 @@ impl fmt::Display for VertexId {
     }
 }
 
+impl FromStr for VertexId {
+    type Err = IdError;
+
+    fn from_str(text: &str) -> Result<Self, IdError> {
+        let parsed = text.split_once(':').and_then(|(owner, index)| {
+            let owner = match owner.strip_prefix("cut") {
+                Some(cut) => Owner::from_number(cut.parse().ok()?)
+                    .filter(|owner| matches!(owner, Owner::Cut(_)))?,
+                None if owner == "surface" => Owner::Surface,
+                None => Owner::Subdomain(SubdomainId::new(owner.parse().ok()?)?),
+            };
+            Some(Self {
+                owner,
+                index: index.parse().ok()?,
+            })
+        });
+        parsed.ok_or_else(|| IdError {
+            text: text.to_owned(),
+            expected: "a vertex such as surface:12, cut3:5 or 7:40",
+        })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -222,6 +245,17 @@ mod tests {
             };
             assert!(id.number() < 1 << 53);
             assert_eq!(VertexId::from_number(id.number()), Some(id));
+            assert_eq!(id.to_string().parse(), Ok(id));
+        }
+        for text in [
+            "7",
+            "cut0:1",
+            "cut1048576:1",
+            "surface:x",
+            "surface1:2",
+            ":3",
+        ] {
+            assert!(text.parse::<VertexId>().is_err(), "{text}");
         }
         assert!("7".parse::<TetId>().is_err() && "7:x".parse::<TetId>().is_err());
         assert_eq!(

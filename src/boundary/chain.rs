@@ -8,7 +8,6 @@
 //! ```
 //! Each point takes one crossed part away and adds none, so the number of points is bounded by that of crossings.
 
-use super::dyadic::Dyadic;
 use super::exact::ExactPoint;
 use super::find::Outcome;
 use super::flips::Flipper;
@@ -16,6 +15,7 @@ use super::patch::Patch;
 use super::space::{Space, edge_key};
 use super::target::Target;
 use super::walk::{Exit, exit_vertex, shell};
+use crate::geom::Dyadic;
 use crate::store::Pages;
 
 /// Points on one segment.

@@ -8,13 +8,13 @@
 use std::collections::HashSet;
 
 use super::chain::{TERMS, Trouble};
-use super::dyadic::Dyadic;
 use super::exact::ExactPoint;
 use super::flips::Flipper;
 use super::patch::Patch;
 use super::space::{Space, edge_key};
 use super::target::Target;
 use super::walk::{find_edge, shell};
+use crate::geom::Dyadic;
 use crate::store::Pages;
 
 /// Points in one facet.

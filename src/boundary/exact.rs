@@ -4,7 +4,7 @@
 //! two when `s` and `t` are. Signs of orientations of such points are found without rounding.
 //! They exist in memory only, while a patch is at work.
 
-use super::dyadic::Dyadic;
+use crate::geom::Dyadic;
 use crate::geom::{Point, orient};
 
 /// A point whose coordinates are exact values.

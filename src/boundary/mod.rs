@@ -15,7 +15,6 @@
 
 mod chain;
 mod cover;
-mod dyadic;
 mod effort;
 mod error;
 mod exact;

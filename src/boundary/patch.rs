@@ -4,10 +4,10 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::dyadic::Dyadic;
 use super::effort::Effort;
 use super::exact::{ExactPoint, Placed, orient_exact, orient_filtered};
 use super::space::{Space, edge_key, sorted};
+use crate::geom::Dyadic;
 use crate::geom::{Point, orient};
 use crate::mesh::{FaceRef, Mesh, Tet, VertexTag};
 use crate::store::Pages;

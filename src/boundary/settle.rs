@@ -11,13 +11,13 @@
 use std::collections::HashSet;
 
 use super::chain::Trouble;
-use super::dyadic::Dyadic;
 use super::exact::ExactPoint;
 use super::kernel::{HalfSpace, center};
 use super::patch::Patch;
 use super::space::Space;
 use super::suppress::half_space;
 use super::walk::ball;
+use crate::geom::Dyadic;
 use crate::geom::Point;
 use crate::store::Pages;
 

@@ -16,7 +16,6 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use super::chain::Trouble;
-use super::dyadic::Dyadic;
 use super::flips::Flipper;
 use super::grow::{Grown, Obstacle};
 use super::kernel::{HalfSpace, center};
@@ -25,6 +24,7 @@ use super::polygon::triangulate;
 use super::space::{Space, sorted};
 use super::target::Target;
 use super::walk::{ball, edge_at, swapped};
+use crate::geom::Dyadic;
 use crate::geom::Point;
 use crate::mesh::FaceRef;
 use crate::store::Pages;

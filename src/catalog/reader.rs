@@ -175,6 +175,16 @@ impl Subdomain {
         &self.vertex_chunks
     }
 
+    /// Chunks of vertices read so far.
+    pub fn vertex_chunks_read(&self) -> u64 {
+        self.cache.loads()
+    }
+
+    /// The chunk a vertex is in.
+    pub fn vertex_chunk_of(&self, v: u32) -> usize {
+        self.cache.chunk_of(v)
+    }
+
     /// Vertex `v` of the sub-domain, from the cache of decoded chunks.
     ///
     /// Errors: damage; a number no vertex has.

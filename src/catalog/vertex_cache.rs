@@ -72,6 +72,7 @@ pub struct VertexCache {
     last: usize,
     bytes: usize,
     bytes_max: usize,
+    loads: u64,
 }
 
 impl VertexCache {
@@ -99,7 +100,18 @@ impl VertexCache {
             last: 0,
             bytes: 0,
             bytes_max,
+            loads: 0,
         })
+    }
+
+    /// Chunks read so far.
+    pub fn loads(&self) -> u64 {
+        self.loads
+    }
+
+    /// The chunk vertex `v` is in; of a number no vertex has, the last one.
+    pub fn chunk_of(&self, v: u32) -> usize {
+        self.firsts.partition_point(|&f| f <= v).saturating_sub(1)
     }
 
     /// Vertex `v`, read from `file` when its chunk is not resident.
@@ -116,7 +128,7 @@ impl VertexCache {
             if v >= self.n_vertices {
                 return Err(self.no_such_vertex(file, v));
             }
-            chunk = self.firsts.partition_point(|&f| f <= v).saturating_sub(1);
+            chunk = self.chunk_of(v);
             self.last = chunk;
         }
         if self.places[chunk] == NOT_RESIDENT {
@@ -167,6 +179,7 @@ impl VertexCache {
             chunk: chunk as u32,
         };
         let first = load_chunk(file, &mut self.decoder, address, &mut self.scratch)?;
+        self.loads += 1;
         if first != self.firsts[chunk] {
             return Err(CatalogError::Content {
                 path: file.path().to_owned(),

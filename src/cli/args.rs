@@ -27,6 +27,8 @@ pub enum Command {
     Check(CheckArgs),
     /// Say what a store holds
     Info(StoreArgs),
+    /// Ask for tetrahedra by place, number, neighborhood or condition
+    Query(Box<super::query_args::QueryArgs>),
     /// Prove that a store holds a valid mesh
     Verify(VerifyArgs),
     /// Set the qualities of two meshes side by side
@@ -49,6 +51,7 @@ impl Command {
             Self::Resume(a) => a.run.json,
             Self::Check(a) => a.json,
             Self::Info(a) | Self::Digest(a) => a.json,
+            Self::Query(a) => a.json,
             Self::Verify(a) => a.json,
             Self::Compare(a) => a.json,
             Self::Export(a) => a.json,

@@ -7,6 +7,7 @@ use crate::catalog::CatalogError;
 use crate::io::read::ReadError;
 use crate::io::write::WriteError;
 use crate::pipeline::PipelineError;
+use crate::report::ReportError;
 use crate::sizing::SizingError;
 use crate::store::StoreError;
 use crate::surface::SurfaceError;
@@ -44,6 +45,12 @@ pub const CODES: &[CodeRow] = &[
         2,
         "a configuration file has a fault, or a key or word that is not known",
     ),
+    row(
+        "bad-query",
+        2,
+        "a place, list, id or column of a query has no meaning",
+    ),
+    row("bad-expression", 2, "an expression cannot be read"),
     row("bad-memory", 2, "a memory size has no unit or no meaning"),
     row(
         "bad-sample",
@@ -118,6 +125,11 @@ pub const CODES: &[CodeRow] = &[
         "the surface encloses no region to fill",
     ),
     row("no-such-store", 3, "there is no store at this path"),
+    row(
+        "no-such-part",
+        3,
+        "the store has no such tetrahedron, vertex, label, sub-domain or interface",
+    ),
     row("damaged", 4, "the store is not what was written"),
     row("busy", 5, "another process writes the store"),
     row("memory", 6, "the memory cap is too small for this work"),
@@ -272,7 +284,8 @@ impl From<CatalogError> for Failure {
         let code = match e {
             CatalogError::Store(inner) => return inner.into(),
             CatalogError::Busy { .. } => "busy",
-            CatalogError::NotFound { .. } | CatalogError::NoSubdomain { .. } => "no-such-store",
+            CatalogError::NotFound { .. } => "no-such-store",
+            CatalogError::NoSubdomain { .. } => "no-such-part",
             CatalogError::NotOurs { .. } => "not-a-store",
             CatalogError::Finished { .. } => "store-exists",
             CatalogError::Unfinished { .. } | CatalogError::NotSealed { .. } => "store-unfinished",
@@ -283,6 +296,16 @@ impl From<CatalogError> for Failure {
             _ => "io",
         };
         Self::new(code, &e).help(help_of(code))
+    }
+}
+
+impl From<ReportError> for Failure {
+    fn from(e: ReportError) -> Self {
+        match e {
+            ReportError::Catalog(e) => e.into(),
+            ReportError::Store(e) => e.into(),
+            other => Self::new("no-such-part", other).help(help_of("no-such-part")),
+        }
     }
 }
 
@@ -323,6 +346,7 @@ fn help_of(code: &str) -> &'static str {
         }
         "memory" => "give more with --memory, or mesh a coarser surface",
         "stopped" => "`tetdb resume STORE` goes on from the last finished step",
+        "no-such-part" => "`tetdb info STORE` lists what there is",
         "no-such-store" => "check the path; `tetdb mesh SURFACE -o STORE` makes a store",
         "not-a-store" => "choose another path; what is there was not made by this program",
         "store-exists" => "choose another path, or replace it with --force",

@@ -14,6 +14,10 @@ mod info;
 mod input;
 mod memory;
 mod mesh;
+mod query;
+mod query_args;
+mod query_ask;
+mod query_rows;
 mod refine_surface;
 mod sample;
 mod signals;
@@ -79,6 +83,7 @@ fn dispatch(command: &Command, talk: &Talk) -> Result<u8, Failure> {
         Command::Resume(args) => mesh::resume(args, talk),
         Command::Check(args) => check::run(args, talk),
         Command::Info(args) => info::run(args, talk),
+        Command::Query(args) => query::run(args, talk),
         Command::Verify(args) => verify::run(args, talk),
         Command::Compare(args) => compare::run(args, talk),
         Command::Digest(args) => digest::run(args, talk),

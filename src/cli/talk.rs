@@ -63,6 +63,13 @@ impl Talk {
         }
     }
 
+    /// What an answer has cost, for programs.
+    pub fn measures(&self, value: &serde_json::Value) {
+        if self.json {
+            self.stderr_json(&serde_json::json!({ "measures": value }));
+        }
+    }
+
     /// One line of the answer.
     pub fn line(&self, text: &str) {
         // A closed stdout ends the answer quietly.

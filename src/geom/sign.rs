@@ -55,7 +55,7 @@ fn scaled<const N: usize>(points: [Point; N]) -> ([Coord3D<f64>; N], f64) {
 
 /// Six times the signed volume of `a b c d`; the sign is exact, the magnitude is not.
 ///
-/// Positive when `d` lies on the side of the plane `a b c` from which `a b c` turn clockwise, that is
+/// Positive when `d` lies on the side of the plane `a b c` from which `a b c` turn counter-clockwise, that is
 /// when `det(b-a, c-a, d-a) > 0`.
 #[inline(always)]
 pub fn orient(a: Point, b: Point, c: Point, d: Point) -> f64 {

@@ -59,6 +59,18 @@ const fn case(word: &'static str, exit: i32, line: &'static str, names: &'static
     }
 }
 
+/// A question to a store of one tetrahedron.
+const fn asked(word: &'static str, exit: i32, line: &'static str, names: &'static str) -> Case {
+    Case {
+        word,
+        exit,
+        files: &[("a.off", TETRA)],
+        before: &["mesh a.off"],
+        line,
+        names,
+    }
+}
+
 /// A surface file that `mesh` refuses.
 const fn bad_file(
     word: &'static str,
@@ -126,6 +138,43 @@ const CASES: &[Case] = &[
         2,
         "mesh sample:box,h=0.5 --memory 512 -o x.tetdb",
         "512",
+    ),
+    asked("bad-query", 2, "query a.tetdb --box 1,1,1,0,0,0", "--box"),
+    asked("bad-query", 2, "query a.tetdb --select id,shape", "shape"),
+    asked("bad-query", 2, "query a.tetdb --tet 12", "12"),
+    asked(
+        "bad-expression",
+        2,
+        "query a.tetdb --where quality>",
+        "quality>",
+    ),
+    asked(
+        "bad-expression",
+        2,
+        "query a.tetdb --where quality+1",
+        "compares",
+    ),
+    asked("no-such-part", 3, "query a.tetdb --tet 0:99", "0:99"),
+    asked("no-such-part", 3, "query a.tetdb --ball cut1:7", "cut1:7"),
+    asked("no-such-part", 3, "query a.tetdb --label hull", "hull"),
+    asked("no-such-part", 3, "query a.tetdb --subdomain 4", "4"),
+    asked(
+        "unreadable-file",
+        3,
+        "query a.tetdb --points missing.txt",
+        "missing.txt",
+    ),
+    asked(
+        "unexpected-text",
+        3,
+        "query a.tetdb --points a.off",
+        "a.off, line 1",
+    ),
+    asked(
+        "unknown-format",
+        3,
+        "query a.tetdb --region 1 -o a.xyz",
+        "a.xyz",
     ),
     case("bad-sample", 2, "mesh sample:bix -o x.tetdb", "bix"),
     case("bad-sample", 2, "mesh sample:box,g=1 -o x.tetdb", "g"),

@@ -6,6 +6,7 @@ mod damage;
 mod errors;
 mod odd_inputs;
 mod place;
+mod query;
 mod readme;
 mod regions;
 mod same_mesh;

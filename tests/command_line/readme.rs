@@ -30,6 +30,16 @@ fn commands() -> Vec<&'static str> {
     found
 }
 
+/// Words of a line; double quotes keep one together.
+fn words(line: &str) -> Vec<&str> {
+    let parts = line.split('"').enumerate();
+    let words = parts.flat_map(|(i, part)| match i % 2 {
+        0 => part.split_whitespace().collect(),
+        _ => vec![part],
+    });
+    words.collect()
+}
+
 #[test]
 fn its_commands_run() {
     let place = Place::new();
@@ -44,9 +54,8 @@ fn its_commands_run() {
             .strip_prefix(CARGO_RUN)
             .or_else(|| command.strip_prefix("tetdb "));
         let line = line.unwrap_or_else(|| panic!("{command:?} is neither cargo's nor tetdb's"));
-        place
-            .run_line(&line.replace(SMALLER.0, SMALLER.1))
-            .succeeds();
+        let line = line.replace(SMALLER.0, SMALLER.1);
+        place.run(&words(&line)).succeeds();
     }
 }
 

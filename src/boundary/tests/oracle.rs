@@ -5,8 +5,8 @@
 
 use std::cmp::Ordering;
 
-use crate::boundary::dyadic::Dyadic;
 use crate::boundary::exact::{ExactPoint, Placed, orient_placed};
+use crate::geom::Dyadic;
 use crate::geom::Point;
 use crate::geom::oracle::{Exact, combination, exact, orient_truth};
 use crate::geom::tests::{Numbers, cases};

@@ -17,7 +17,9 @@ mod faces;
 mod gmsh;
 mod medit;
 mod merged;
+mod npy;
 mod numbering;
+mod selected;
 mod stream;
 mod surface;
 #[cfg(test)]
@@ -30,6 +32,8 @@ use std::path::{Path, PathBuf};
 
 pub use defects::defects;
 pub use error::WriteError;
+pub use npy::{NpyField, NpyTable, TextFile};
+pub use selected::{SelectedTet, SelectedVtu};
 pub use surface::{SurfaceReport, surface};
 
 use crate::catalog::Store;

@@ -11,7 +11,7 @@ use super::vtu_boundary;
 use super::vtu_layout::{Array, Group, Index, Layout};
 
 /// VTK's number of a tetrahedron.
-const TETRA: u8 = 10;
+pub(super) const TETRA: u8 = 10;
 
 pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<()> {
     mesh.expect_passes(2, 1);

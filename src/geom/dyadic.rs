@@ -6,7 +6,7 @@ use std::cmp::Ordering;
 ///
 /// Invariant: the last word of the magnitude is not zero, and the first one is odd.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct Dyadic {
+pub struct Dyadic {
     negative: bool,
     /// Words, least significant first.
     magnitude: Vec<u64>,
@@ -107,15 +107,18 @@ impl Dyadic {
         .trimmed()
     }
 
-    pub(super) fn plus(&self, other: &Self) -> Self {
+    /// `self + other`.
+    pub fn plus(&self, other: &Self) -> Self {
         self.sum(other, false)
     }
 
-    pub(super) fn minus(&self, other: &Self) -> Self {
+    /// `self - other`.
+    pub fn minus(&self, other: &Self) -> Self {
         self.sum(other, true)
     }
 
-    pub(super) fn times(&self, other: &Self) -> Self {
+    /// `self * other`.
+    pub fn times(&self, other: &Self) -> Self {
         let (a, b) = (&self.magnitude, &other.magnitude);
         let mut product = vec![0u64; a.len() + b.len()];
         for (i, &x) in a.iter().enumerate() {
@@ -136,7 +139,7 @@ impl Dyadic {
     }
 
     /// -1, 0 or 1.
-    pub(super) fn sign(&self) -> i32 {
+    pub fn sign(&self) -> i32 {
         match (self.is_zero(), self.negative) {
             (true, _) => 0,
             (false, true) => -1,
@@ -144,7 +147,8 @@ impl Dyadic {
         }
     }
 
-    pub(super) fn compare(&self, other: &Self) -> Ordering {
+    /// How `self` stands to `other`.
+    pub fn compare(&self, other: &Self) -> Ordering {
         self.minus(other).sign().cmp(&0)
     }
 
@@ -167,7 +171,7 @@ impl Dyadic {
     }
 
     /// The value rounded; one out of range keeps its sign.
-    pub(super) fn estimate(&self) -> f64 {
+    pub fn estimate(&self) -> f64 {
         let (leading, exponent) = self.leading();
         if leading == 0.0 {
             return 0.0;
@@ -180,7 +184,7 @@ impl Dyadic {
     }
 
     /// `self / other` to about `50 * terms` bits; `None` for a division by zero.
-    pub(super) fn over(&self, other: &Self, terms: u32) -> Option<Self> {
+    pub fn over(&self, other: &Self, terms: u32) -> Option<Self> {
         let (divisor, divisor_exponent) = other.leading();
         if divisor == 0.0 {
             return None;
@@ -201,7 +205,7 @@ impl Dyadic {
     }
 
     /// A number of few bits within `slack`, which is positive.
-    pub(super) fn shortened(&self, slack: &Self) -> Self {
+    pub fn shortened(&self, slack: &Self) -> Self {
         // The last bit kept is worth at most `slack`, so cutting the rest off moves by less.
         let (_, exponent) = slack.leading();
         let unit = exponent + 63;

@@ -1,0 +1,238 @@
+//! `query`: tetrahedra by place, number, neighborhood or condition.
+
+use std::fs::File;
+use std::io::{BufRead, BufReader, stdin};
+use std::path::Path;
+
+use super::failure::Failure;
+use super::query_args::QueryArgs;
+use super::query_ask::{bad, point, selection};
+use super::query_rows::{Column, FileSink, Row, Sink, Writer};
+use super::talk::Talk;
+use super::{memory, store};
+use crate::geom::Point;
+use crate::report::{Found, Inquiry, Ordered, ReportError, VARIABLES};
+use crate::store::{Budget, attempt};
+
+/// Memory of a point on its way to its answer.
+const POINT_BYTES: u64 = 512;
+/// Points answered together, at most.
+const POINTS_MAX: u64 = 1 << 17;
+
+pub fn run(args: &QueryArgs, talk: &Talk) -> Result<u8, Failure> {
+    let (cap, _) = memory::cap(args.memory.as_deref())?;
+    let budget = Budget::new(cap);
+    let columns = columns(args)?;
+    let order = order(args)?;
+    let open = store::open_finished(&args.store)?;
+    let mut inquiry = Inquiry::open(open, &budget)?;
+    let lease = budget.lease(cap / 8, "answers")?;
+    attempt(|| -> Result<u8, Failure> {
+        let n = if args.point.is_empty() && args.points.is_none() {
+            let selection = selection(args, &mut inquiry)?;
+            let mut writer = writer(args, columns, cap)?;
+            let found = inquiry.select(selection)?;
+            let n = match order {
+                Some((variable, descending)) => {
+                    let dir = std::env::temp_dir();
+                    let sorted = Ordered::new(found, variable, descending, &dir, lease.bytes())?;
+                    put(sorted, args.limit, &mut writer)?
+                }
+                None => put(found, args.limit, &mut writer)?,
+            };
+            end(writer, talk)?;
+            n
+        } else {
+            let mut writer = writer(args, columns, cap)?;
+            let n = locate(args, &mut inquiry, lease.bytes(), &mut writer)?;
+            end(writer, talk)?;
+            n
+        };
+        tell(n, &inquiry, talk);
+        Ok(0)
+    })?
+}
+
+fn writer(args: &QueryArgs, columns: Vec<Column>, cap: u64) -> Result<Writer, Failure> {
+    let sink = match &args.output {
+        Some(out) => {
+            let file = FileSink::new(out, &columns, cap / 16)?;
+            Sink::File(Box::new(file), out.clone())
+        }
+        None if args.json => Sink::Objects,
+        None if args.csv => Sink::Values,
+        None => Sink::Table,
+    };
+    Ok(Writer::new(sink, columns))
+}
+
+fn end(writer: Writer, talk: &Talk) -> Result<(), Failure> {
+    if let Some((path, bytes)) = writer.finish()? {
+        let size = memory::show(bytes);
+        talk.note(&format!("wrote {} ({size})", path.display()));
+    }
+    Ok(())
+}
+
+fn tell(n: u64, inquiry: &Inquiry, talk: &Talk) {
+    let measures = inquiry.measures();
+    talk.measures(&serde_json::json!({ "found": n, "chunks": measures }));
+    if !talk.is_json() {
+        talk.note(&format!(
+            "{n} found; read {} of {} chunks of tetrahedra, {} of {} of vertices",
+            measures.tet_chunks_read,
+            measures.tet_chunks,
+            measures.vertex_chunks_read,
+            measures.vertex_chunks
+        ));
+    }
+}
+
+fn columns(args: &QueryArgs) -> Result<Vec<Column>, Failure> {
+    let of_points = !args.point.is_empty() || args.points.is_some();
+    let default = match args.json || args.output.is_some() {
+        true => "id,subdomain,region,quality,volume,vertices,points",
+        false if of_points => "id,region,quality",
+        false => "id,subdomain,region,quality,x,y,z",
+    };
+    let names = args.select.as_deref().unwrap_or(default);
+    let columns = names.split(',').map(|name| {
+        let name = name.trim();
+        let known = || {
+            format!(
+                "columns among id, vertices, points, {}",
+                VARIABLES.join(", ")
+            )
+        };
+        Column::named(name).ok_or_else(|| bad("--select", name, &known()))
+    });
+    let mut columns = columns.collect::<Result<Vec<_>, _>>()?;
+    if of_points {
+        columns.insert(0, Column::Point);
+        columns.push(Column::Barycentric);
+    }
+    Ok(columns)
+}
+
+/// The variable answers are sorted by, and whether they fall.
+fn order(args: &QueryArgs) -> Result<Option<(usize, bool)>, Failure> {
+    let Some(text) = &args.order_by else {
+        return Ok(None);
+    };
+    let falling = text.starts_with('-');
+    let name = text.trim_start_matches('-');
+    match VARIABLES.iter().position(|v| *v == name) {
+        Some(variable) => Ok(Some((variable, falling != args.desc))),
+        None => {
+            let known = format!("one of {}", VARIABLES.join(", "));
+            Err(bad("--order-by", text, &known))
+        }
+    }
+}
+
+fn put(
+    found: impl Iterator<Item = Result<Found, ReportError>>,
+    limit: Option<u64>,
+    writer: &mut Writer,
+) -> Result<u64, Failure> {
+    let mut n = 0;
+    let limit = limit.map_or(usize::MAX, |n| usize::try_from(n).unwrap_or(usize::MAX));
+    for found in found.take(limit) {
+        n += 1;
+        let row = Row {
+            found: Some(found?),
+            located: None,
+        };
+        if !writer.put(&row)? {
+            break;
+        }
+    }
+    Ok(n)
+}
+
+/// Answers points in blocks that fit the memory. Returns how many are in the mesh.
+fn locate(
+    args: &QueryArgs,
+    inquiry: &mut Inquiry,
+    memory: u64,
+    writer: &mut Writer,
+) -> Result<u64, Failure> {
+    let block = (memory / POINT_BYTES).clamp(1, POINTS_MAX) as usize;
+    let mut points = Vec::new();
+    let mut n = 0;
+    for text in &args.point {
+        points.push(point("--point", text)?);
+    }
+    let mut answer = |points: &mut Vec<Point>, writer: &mut Writer| -> Result<bool, Failure> {
+        for located in inquiry.locate(points)? {
+            n += u64::from(located.found.is_some());
+            let row = Row {
+                found: located.found,
+                located: Some(located),
+            };
+            if !writer.put(&row)? {
+                return Ok(false);
+            }
+        }
+        points.clear();
+        Ok(true)
+    };
+    if let Some(path) = &args.points {
+        for (number, line) in (1u64..).zip(lines(path)?) {
+            let line = line.map_err(|e| unreadable(path, &e))?;
+            points.extend(parse_line(path, number, &line)?);
+            if points.len() >= block && !answer(&mut points, writer)? {
+                return Ok(n);
+            }
+        }
+    }
+    answer(&mut points, writer)?;
+    Ok(n)
+}
+
+fn lines(path: &Path) -> Result<Box<dyn Iterator<Item = std::io::Result<String>>>, Failure> {
+    if path == Path::new("-") {
+        return Ok(Box::new(stdin().lines()));
+    }
+    let file = File::open(path).map_err(|e| unreadable(path, &e))?;
+    Ok(Box::new(BufReader::new(file).lines()))
+}
+
+fn unreadable(path: &Path, error: &std::io::Error) -> Failure {
+    Failure::new(
+        "unreadable-file",
+        format!("the points cannot be read: {error}"),
+    )
+    .at(path.display())
+    .help("check the path and its permissions")
+}
+
+/// Three numbers with commas or spaces between; nothing in empty lines and behind `#`.
+fn parse_line(path: &Path, number: u64, line: &str) -> Result<Option<Point>, Failure> {
+    let text = line.split('#').next().unwrap_or_default().trim();
+    if text.is_empty() {
+        return Ok(None);
+    }
+    let words: Vec<&str> = text
+        .split(|c: char| c == ',' || c.is_whitespace())
+        .filter(|word| !word.is_empty())
+        .collect();
+    let fault = |code, message: String| {
+        Failure::new(code, message)
+            .at(format!("{}, line {number}", path.display()))
+            .help("write a point a line: 0.1,0.2,0.3 or 0.1 0.2 0.3")
+    };
+    let mut point = [0.0; 3];
+    if words.len() != 3 {
+        let message = format!("expected three coordinates, found {}", words.len());
+        return Err(fault("unexpected-text", message));
+    }
+    for (x, word) in point.iter_mut().zip(&words) {
+        *x = word.parse().unwrap_or(f64::NAN);
+        if !x.is_finite() {
+            let message = format!("{word} is not a finite number");
+            return Err(fault("not-a-number", message));
+        }
+    }
+    Ok(Some(Point::from_array(point)))
+}

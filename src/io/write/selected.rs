@@ -1,0 +1,160 @@
+//! Chosen tetrahedra, of any number, as a VTK file with their vertices once each.
+//!
+//! How many there are is known at the end only, so they wait in a scratch file; their vertices are numbered by two sorts,
+//! as those of whole meshes are.
+
+use std::path::{Path, PathBuf};
+
+use super::Result;
+use super::draft::Draft;
+use super::npy::length;
+use super::stream::{Records, Stream, scratch, word, word64};
+use super::vtu::TETRA;
+use super::vtu_layout::{Array, Group, Index, Layout};
+use crate::store::{Sorted, Sorter};
+
+/// Region, sub-domain, quality, number.
+const CELL: usize = 4 + 4 + 8 + 8;
+
+/// A tetrahedron to be written.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SelectedTet {
+    /// Its lasting id as a number.
+    pub id: u64,
+    pub subdomain: u32,
+    pub region: u32,
+    pub quality: f64,
+    /// Lasting ids of its vertices; positive volume in this order.
+    pub vertices: [u64; 4],
+    pub corners: [[f64; 3]; 4],
+}
+
+/// Tetrahedra being gathered for one `.vtu` file; nothing has its name until [`SelectedVtu::finish`].
+pub struct SelectedVtu {
+    draft: Draft,
+    out: PathBuf,
+    cells: Stream,
+    cells_path: PathBuf,
+    /// Vertex id, corner (4 · tetrahedron + place), position.
+    corners: Sorter<40>,
+    n: u64,
+    memory_bytes: u64,
+}
+
+impl SelectedVtu {
+    /// Begins `out`, holding about `memory_bytes`. Errors: its folder cannot be written.
+    pub fn new(out: &Path, memory_bytes: u64) -> Result<Self> {
+        let draft = Draft::new(out)?;
+        let cells_path = draft.dir().join("cells");
+        Ok(Self {
+            cells: scratch(&cells_path)?,
+            corners: Sorter::new(draft.dir(), memory_bytes / 2),
+            draft,
+            out: out.to_owned(),
+            cells_path,
+            n: 0,
+            memory_bytes,
+        })
+    }
+
+    /// Adds a tetrahedron. Errors: the disk.
+    pub fn push(&mut self, tet: &SelectedTet) -> Result<()> {
+        for (place, (vertex, corner)) in (0u64..).zip(tet.vertices.iter().zip(tet.corners)) {
+            let mut record = [0; 40];
+            record[..8].copy_from_slice(&vertex.to_be_bytes());
+            record[8..16].copy_from_slice(&(4 * self.n + place).to_be_bytes());
+            for (bytes, x) in record[16..].chunks_exact_mut(8).zip(corner) {
+                bytes.copy_from_slice(&x.to_le_bytes());
+            }
+            self.corners.push(record)?;
+        }
+        self.n += 1;
+        self.cells.bytes(&tet.region.to_le_bytes());
+        self.cells.bytes(&tet.subdomain.to_le_bytes());
+        self.cells.bytes(&tet.quality.to_le_bytes());
+        self.cells.bytes(&tet.id.to_le_bytes());
+        self.cells.end()
+    }
+
+    /// Writes the file and gives it its name; returns its length. Errors: the disk.
+    pub fn finish(mut self) -> Result<u64> {
+        self.cells.finish()?;
+        let points_path = self.draft.dir().join("points");
+        let mut points = scratch(&points_path)?;
+        let dir = self.draft.dir().to_owned();
+        let mut numbers = Sorter::new(&dir, self.memory_bytes / 2);
+        let n_points = number(self.corners.finish()?, &mut points, &mut numbers)?;
+        points.finish()?;
+        let index = Index::new(n_points, 4 * self.n);
+        let arrays = vec![
+            Array::new(Group::PointData, "global_id", "Int64"),
+            Array::new(Group::CellData, "subdomain", "UInt32"),
+            Array::new(Group::CellData, "region", "UInt32"),
+            Array::new(Group::CellData, "quality", "Float64"),
+            Array::new(Group::CellData, "global_id", "Int64"),
+            Array::new(Group::Points, "Points", "Float64").vectors(),
+            Array::new(Group::Cells, "connectivity", index.kind()),
+            Array::new(Group::Cells, "offsets", index.kind()),
+            Array::new(Group::Cells, "types", "UInt8"),
+        ];
+        let layout = Layout::new(arrays, [n_points, self.n, 4], "");
+        let path = self.draft.create(&self.out, layout.file_bytes())?;
+        let mut strips = layout.open::<9>(&path)?;
+        let [
+            vertex_ids,
+            ranks,
+            regions,
+            qualities,
+            ids,
+            places,
+            nodes,
+            ends,
+            types,
+        ] = &mut strips;
+        let mut points = Records::<32>::open(&points_path, 0)?;
+        while let Some(record) = points.next()? {
+            vertex_ids.put(&word64(&record, 0).to_le_bytes())?;
+            places.put(&record[8..])?;
+        }
+        let mut cells = Records::<CELL>::open(&self.cells_path, 0)?;
+        let mut end = 0;
+        while let Some(record) = cells.next()? {
+            end += 4;
+            regions.put(&record[..4])?;
+            ranks.put(&record[4..8])?;
+            qualities.put(&record[8..16])?;
+            ids.put(&record[16..])?;
+            index.put(ends, end)?;
+            types.put(&[TETRA])?;
+        }
+        for record in numbers.finish()? {
+            index.put(nodes, u64::from_be_bytes(word(&record?, 8)))?;
+        }
+        strips
+            .into_iter()
+            .try_for_each(super::stream::Strip::finish)?;
+        length(self.draft)
+    }
+}
+
+/// Gives vertices dense numbers by their ids: writes id and position of each once, and (corner, number) of every corner.
+fn number(corners: Sorted<40>, points: &mut Stream, numbers: &mut Sorter<16>) -> Result<u64> {
+    let mut last = None;
+    let mut n = 0u64;
+    for record in corners {
+        let record = record?;
+        let vertex = word64(&record, 0);
+        if last != Some(vertex) {
+            last = Some(vertex);
+            n += 1;
+            points.bytes(&record[..8]);
+            points.bytes(&record[16..]);
+            points.end()?;
+        }
+        let mut entry = [0; 16];
+        entry[..8].copy_from_slice(&record[8..16]);
+        entry[8..].copy_from_slice(&(n - 1).to_be_bytes());
+        numbers.push(entry)?;
+    }
+    Ok(n)
+}

@@ -1,0 +1,28 @@
+//! What can be wrong with a question.
+
+use tetdb_schema::ids::{TetId, VertexId};
+
+use crate::catalog::CatalogError;
+use crate::store::StoreError;
+
+/// Why there is no answer.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReportError {
+    #[error(transparent)]
+    Catalog(#[from] CatalogError),
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// The store has no such tetrahedron.
+    #[error("there is no tetrahedron {id}")]
+    NoTet { id: TetId },
+    /// The store has no such vertex.
+    #[error("there is no vertex {id}")]
+    NoVertex { id: VertexId },
+    /// The store has no such label.
+    #[error("there is no label {name:?}; there are {}", known.join(", "))]
+    NoLabel { name: String, known: Vec<String> },
+    /// The two sub-domains share no face.
+    #[error("sub-domains {0} and {1} have no interface")]
+    NoInterface(u32, u32),
+}

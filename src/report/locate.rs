@@ -1,0 +1,178 @@
+//! Which tetrahedron holds a point.
+
+use tetdb_schema::ids::TetId;
+
+use super::found::Found;
+use super::frame::Searched;
+use super::inquiry::{bounds_of, chunk_bounds};
+use super::{Inquiry, ReportError};
+use crate::geom::{Aabb, HilbertFrame, Point, orient};
+
+/// Up to so many points are looked for one by one, each in as few chunks as can be; more make it worth to decode chunks whole.
+const FEW: usize = 16;
+
+/// A point and the tetrahedron that holds it; of several, which then have it on a face, the one with the least id.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Located {
+    pub point: Point,
+    /// `None` outside the mesh.
+    pub found: Option<Found>,
+    /// Shares of the corners, of sum 1 but for rounding; a zero says exactly that the point is on that face.
+    pub barycentric: [f64; 4],
+}
+
+/// A chunk whose box holds the point.
+#[derive(Clone, Copy)]
+pub(super) struct Candidate {
+    pub rank: u32,
+    pub chunk: u32,
+    resident: bool,
+    /// 0 in the middle of the box, 1 on its sides.
+    eccentricity: f64,
+}
+
+/// What is known of a point so far.
+pub(super) struct Search {
+    pub point: Point,
+    pub best: Option<(Found, [f64; 4])>,
+    /// Whether the point is strictly inside `best`: no other tetrahedron holds it.
+    pub settled: bool,
+}
+
+impl Search {
+    /// Looks at a tetrahedron.
+    pub fn look(&mut self, id: TetId, corners: &[Point; 4], found: impl FnOnce() -> Found) {
+        let Some(shares) = shares(corners, self.point) else {
+            return;
+        };
+        if self.best.is_none_or(|(best, _)| id < best.id) {
+            self.best = Some((found(), shares));
+        }
+        self.settled = shares.iter().all(|&s| s > 0.0);
+    }
+}
+
+/// Six times the volumes of the point with each face, or `None` where one is negative: signs are exact.
+fn shares(corners: &[Point; 4], p: Point) -> Option<[f64; 4]> {
+    let mut shares = [0.0; 4];
+    for i in 0..4 {
+        let mut with = *corners;
+        with[i] = p;
+        let [a, b, c, d] = with;
+        shares[i] = orient(a, b, c, d);
+        if shares[i] < 0.0 {
+            return None;
+        }
+    }
+    Some(shares)
+}
+
+fn holds(bounds: &Aabb, p: Point) -> bool {
+    bounds.low.cmple(p).all() && p.cmple(bounds.high).all()
+}
+
+impl Inquiry {
+    /// Finds the tetrahedra of `points`; the answers are in their order.
+    ///
+    /// Many points share the chunks they need: they are looked for in the order of the Hilbert curve.
+    /// Memory: some 300 bytes a point. Errors: damage.
+    pub fn locate(&mut self, points: &[Point]) -> Result<Vec<Located>, ReportError> {
+        let curve = HilbertFrame::new(&self.bounds());
+        let mut order: Vec<(u64, usize)> = points
+            .iter()
+            .enumerate()
+            .map(|(i, &p)| (curve.index(p), i))
+            .collect();
+        order.sort_unstable();
+        let mut answers: Vec<Located> = points
+            .iter()
+            .map(|&point| Located {
+                point,
+                found: None,
+                barycentric: [0.0; 4],
+            })
+            .collect();
+        let mut candidates = Vec::new();
+        for (_, i) in order {
+            let search = self.search(points[i], points.len() <= FEW, &mut candidates)?;
+            if let Some((found, shares)) = search.best {
+                let sum: f64 = shares.iter().sum();
+                answers[i].found = Some(found);
+                answers[i].barycentric = shares.map(|s| s / sum);
+            }
+        }
+        Ok(answers)
+    }
+
+    fn search(
+        &mut self,
+        point: Point,
+        lazily: bool,
+        candidates: &mut Vec<Candidate>,
+    ) -> Result<Search, ReportError> {
+        let mut search = Search {
+            point,
+            best: None,
+            settled: false,
+        };
+        self.candidates(point, candidates)?;
+        for candidate in candidates {
+            if lazily && !candidate.resident {
+                self.search_lazily(candidate.rank, candidate.chunk, &mut search)?;
+            } else {
+                let searched = self.searched(candidate.rank, candidate.chunk)?;
+                search_frame(&searched, &mut search);
+            }
+            if search.settled {
+                break;
+            }
+        }
+        Ok(search)
+    }
+
+    /// The chunks whose boxes hold a point, the most promising first.
+    fn candidates(&mut self, p: Point, candidates: &mut Vec<Candidate>) -> Result<(), ReportError> {
+        candidates.clear();
+        let mut ranks = Vec::new();
+        self.tree.visit(&|b| holds(b, p), &mut |i| {
+            if holds(&bounds_of(&self.rows[i]), p) {
+                ranks.push(self.rows[i].rank);
+            }
+        });
+        for rank in ranks {
+            let part = self.part(rank)?;
+            part.tree.visit(&|b| holds(b, p), &mut |chunk| {
+                let bounds = chunk_bounds(&part.subdomain, chunk);
+                if holds(&bounds, p) {
+                    let (center, extent) =
+                        ((bounds.low + bounds.high) * 0.5, bounds.high - bounds.low);
+                    candidates.push(Candidate {
+                        rank,
+                        chunk: chunk as u32,
+                        resident: false,
+                        eccentricity: ((p - center) / extent).abs().max_element() * 2.0,
+                    });
+                }
+            });
+        }
+        for candidate in candidates.iter_mut() {
+            candidate.resident = self.is_resident(candidate.rank, candidate.chunk);
+        }
+        candidates.sort_by(|a, b| {
+            let by_residency = b.resident.cmp(&a.resident);
+            by_residency.then(a.eccentricity.total_cmp(&b.eccentricity))
+        });
+        Ok(())
+    }
+}
+
+fn search_frame(searched: &Searched, search: &mut Search) {
+    let (frame, p) = (&searched.frame, search.point);
+    searched.tree.visit(&|b| holds(b, p), &mut |i| {
+        let tet = &frame.tets[i];
+        if !search.settled {
+            let id = frame.id(tet);
+            search.look(id, &frame.corners(tet), || frame.found(tet));
+        }
+    });
+}

@@ -1,0 +1,36 @@
+//! Questions to a finished store, answered from the chunks that matter.
+//!
+//! An [`Inquiry`] holds a store open within a budget: some sub-domains' summaries, and the chunks decoded last. A
+//! question rules out sub-domains by their boxes, then chunks by their summaries (box, qualities, regions, vertices), and
+//! decides with exact signs inside the chunks that are left. Answers come as iterators; nothing here knows formats.
+//!
+//! Reading order: `solid` (boxes, balls, planes and what meets them) on `exact`; `frame` (a decoded chunk) and `tree`;
+//! `inquiry` (what is held); `locate` (points), `lazy` (a single point); `found` (a tetrahedron with its columns);
+//! `selection` (what is asked for), `marks` (faces of the surface and of interfaces), `select` (the answers one after the other),
+//! `order` (sorted), `around` (tetrahedra around vertices, edges, neighbors).
+
+mod around;
+mod error;
+mod exact;
+mod found;
+mod frame;
+mod inquiry;
+mod lazy;
+mod locate;
+mod marks;
+mod order;
+mod select;
+mod selection;
+mod solid;
+#[cfg(test)]
+mod tests;
+mod tree;
+
+pub use error::ReportError;
+pub use found::{Found, VARIABLES};
+pub use inquiry::{Inquiry, Measures};
+pub use locate::Located;
+pub use order::Ordered;
+pub use select::Selected;
+pub use selection::{Selection, Sharing};
+pub use solid::Solid;

@@ -1,0 +1,161 @@
+//! The tetrahedra of a selection, one after the other in the order of their ids.
+
+use std::vec::IntoIter;
+
+use tetdb_schema::ids::TetId;
+
+use super::found::Found;
+use super::inquiry::{bounds_of, vertex_bounds};
+use super::marks::Marks;
+use super::selection::Selection;
+use super::{Inquiry, ReportError};
+use crate::catalog::Subdomain;
+use crate::geom::Aabb;
+
+/// The answers to [`Inquiry::select`]; holds one chunk's at a time. Ends after the first error.
+pub struct Selected<'a> {
+    inquiry: &'a mut Inquiry,
+    selection: Selection,
+    ranks: IntoIter<u32>,
+    rank: u32,
+    /// Chunks of the sub-domain to be read.
+    chunks: IntoIter<u32>,
+    marks: Option<Marks>,
+    ready: IntoIter<Found>,
+}
+
+impl Inquiry {
+    /// Tetrahedra of which all of `selection` holds, in the order of their ids.
+    ///
+    /// Errors: sub-domains the store does not have; an interface that is not there.
+    pub fn select(&mut self, selection: Selection) -> Result<Selected<'_>, ReportError> {
+        self.check(&selection)?;
+        let ranks: Vec<u32> = self
+            .rows
+            .iter()
+            .filter(|row| selection.may_be_in(row.rank, &bounds_of(row)))
+            .map(|row| row.rank)
+            .collect();
+        Ok(Selected {
+            inquiry: self,
+            selection,
+            ranks: ranks.into_iter(),
+            rank: 0,
+            chunks: Vec::new().into_iter(),
+            marks: None,
+            ready: Vec::new().into_iter(),
+        })
+    }
+
+    fn check(&mut self, selection: &Selection) -> Result<(), ReportError> {
+        let named = selection.subdomains.iter().flatten();
+        for &rank in named.chain(selection.interface.iter().flatten()) {
+            self.store.catalog().subdomain(rank)?;
+        }
+        if let Some([a, b]) = selection.interface {
+            let rows = self.store.catalog().interfaces()?;
+            let pair = [a.min(b), a.max(b)];
+            if !rows.iter().any(|row| [row.low, row.high] == pair) {
+                return Err(ReportError::NoInterface(a, b));
+            }
+        }
+        for &id in selection.tets.iter().flatten() {
+            let row = self.rows.iter().find(|r| r.rank == id.subdomain().rank());
+            if row.is_none_or(|row| u64::from(id.local()) >= row.tets) {
+                return Err(ReportError::NoTet { id });
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Selected<'_> {
+    /// What it has cost so far.
+    pub fn measures(&self) -> super::Measures {
+        self.inquiry.measures()
+    }
+
+    /// Opens the next sub-domain, or returns `false` after the last.
+    fn next_part(&mut self) -> Result<bool, ReportError> {
+        let Some(rank) = self.ranks.next() else {
+            return Ok(false);
+        };
+        self.rank = rank;
+        self.marks = None;
+        let marks = self.inquiry.marks(rank, &self.selection)?;
+        let part = self.inquiry.part(rank)?;
+        let mut chunks = Vec::new();
+        for (chunk, summary) in (0u32..).zip(part.subdomain.tet_summaries()) {
+            let marked = marks
+                .as_ref()
+                .is_none_or(|m| m.any(summary.first, summary.count));
+            if marked && self.selection.may_be_among(rank, summary) {
+                chunks.push(chunk);
+            }
+        }
+        self.marks = marks;
+        self.chunks = chunks.into_iter();
+        Ok(true)
+    }
+
+    fn read(&mut self, chunk: u32) -> Result<(), ReportError> {
+        let (selection, marks) = (&self.selection, &self.marks);
+        let mut place = 0;
+        let frame = self.inquiry.frame(self.rank, chunk, |part, local, tet| {
+            marks.as_ref().is_none_or(|m| m.has(local))
+                && TetId::new(part.id(), local).is_some_and(|id| selection.may_be(id, tet.region))
+                && (!selection.is_local()
+                    || selection.may_meet(&around(part, tet.nodes, &mut place)))
+        })?;
+        let found: Vec<Found> = frame
+            .tets
+            .iter()
+            .map(|tet| frame.found(tet))
+            .filter(|found| selection.holds(found))
+            .collect();
+        self.ready = found.into_iter();
+        Ok(())
+    }
+
+    fn advance(&mut self) -> Result<Option<Found>, ReportError> {
+        loop {
+            if let Some(found) = self.ready.next() {
+                return Ok(Some(found));
+            }
+            if let Some(chunk) = self.chunks.next() {
+                self.read(chunk)?;
+            } else if !self.next_part()? {
+                return Ok(None);
+            }
+        }
+    }
+}
+
+impl Iterator for Selected<'_> {
+    type Item = Result<Found, ReportError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let next = self.advance();
+        if next.is_err() {
+            self.ranks = Vec::new().into_iter();
+            self.chunks = Vec::new().into_iter();
+        }
+        next.transpose()
+    }
+}
+
+/// A box around the chunks the vertices are in, `place` being the chunk found last.
+fn around(part: &Subdomain, nodes: [u32; 4], place: &mut usize) -> Aabb {
+    let summaries = part.vertex_summaries();
+    nodes.iter().fold(Aabb::EMPTY, |sum, &v| {
+        let last = &summaries[*place];
+        if v < last.first || v - last.first >= last.count {
+            *place = part.vertex_chunk_of(v);
+        }
+        let b = vertex_bounds(part, *place);
+        Aabb {
+            low: sum.low.min(b.low),
+            high: sum.high.max(b.high),
+        }
+    })
+}
