@@ -199,7 +199,7 @@ fn solids(random: &mut Random, lattice: Option<usize>, bounds: &Aabb) -> Vec<Sol
 #[test]
 fn solids_select_what_meets_them_and_what_lies_in_them() -> Outcome {
     let mut random = Random::new(2);
-    for (made, lattice) in [(grid(3, 2)?, Some(3)), (real()?, None)] {
+    for (made, lattice) in [(grid(4, 2)?, Some(4)), (real()?, None)] {
         let all = made.all()?;
         let mut inquiry = made.inquiry(64 << 20)?;
         let bounds = inquiry.bounds();
@@ -218,7 +218,7 @@ fn solids_select_what_meets_them_and_what_lies_in_them() -> Outcome {
                     let far = solid
                         .bounds()
                         .is_some_and(|b| !b.meets(&Aabb::around(tet.corners)));
-                    if lattice.is_none() && i % 97 != 0 && (far || i % 13 != 0) {
+                    if lattice.is_none() && i % if far { 997 } else { 41 } != 0 {
                         continue;
                     }
                     let expected = match inside {
@@ -234,7 +234,7 @@ fn solids_select_what_meets_them_and_what_lies_in_them() -> Outcome {
                 touching += found.len();
             }
         }
-        assert!(touching > 1000, "only {touching} found");
+        assert!(touching > 500, "only {touching} found");
     }
     Ok(())
 }
