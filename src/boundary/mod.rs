@@ -27,6 +27,7 @@ mod map;
 mod nearness;
 mod patch;
 mod points;
+mod policy;
 mod polygon;
 mod recover;
 mod regions;
@@ -40,8 +41,9 @@ mod walk;
 
 pub use error::{BoundaryError, FacetPlace};
 pub use nearness::{Nearness, NearnessKind};
+pub use policy::{Filled, RegionPolicy, Walls};
 pub use recover::recover;
-pub use regions::{RegionPolicy, RegionSummary, Regions, fill_regions};
+pub use regions::{RegionSummary, Regions, fill_regions};
 pub use report::RecoveryReport;
 
 #[cfg(test)]

@@ -1,10 +1,11 @@
-//! Which volumes are filled: components between required faces, and the policy that chooses among them.
+//! Which volumes are filled: components between required faces, those kept that the policy chooses.
 
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::error::BoundaryError;
 use super::find::{Found, find_face};
 use super::flood::{Flood, OUTSIDE};
+use super::policy::{RegionPolicy, Walls};
 use super::recover::place;
 use super::space::Paged;
 use crate::delaunay::Kernel;
@@ -12,21 +13,6 @@ use crate::geom::Point;
 use crate::mesh::{Mesh, VertexTag};
 use crate::store::{Pages, stop_if_requested};
 use tetdb_schema::page::NONE;
-
-/// Which bounded volumes get tetrahedra.
-#[derive(Clone, Debug, PartialEq)]
-pub enum RegionPolicy {
-    /// What an odd number of shells separates from the outside; all where that is contradictory.
-    Parity,
-    /// Every bounded volume.
-    All,
-    /// What lies directly behind the outside.
-    Outer,
-    /// What the normals point out of.
-    ByOrientation,
-    /// The volumes of these points.
-    Seeds(Vec<Point>),
-}
 
 /// A volume enclosed by facets.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,13 +37,6 @@ pub struct Regions {
     pub all_instead_of_parity: bool,
     /// Input numbers of facets with no filled region on either side, at most a thousand.
     pub loose_facets: Vec<u64>,
-}
-
-/// How two components meet: facets seen from the lower-numbered one in front, from behind, and faces.
-#[derive(Clone, Copy, Debug, Default)]
-struct Wall {
-    front: u64,
-    back: u64,
 }
 
 /// Colors the volumes, deletes everything that is not filled, and the enclosing box.
@@ -98,11 +77,8 @@ pub fn fill_regions<P: Pages>(
 }
 
 /// Notes on both sides of every facet which component lies there.
-fn survey<P: Pages>(
-    mesh: &mut Mesh<P>,
-    flood: &mut Flood,
-) -> Result<BTreeMap<(u32, u32), Wall>, BoundaryError> {
-    let mut walls: BTreeMap<(u32, u32), Wall> = BTreeMap::new();
+fn survey<P: Pages>(mesh: &mut Mesh<P>, flood: &mut Flood) -> Result<Walls, BoundaryError> {
+    let mut walls: Walls = BTreeMap::new();
     let none = std::collections::HashSet::new();
     for n in 0..mesh.n_facets() {
         if n & 1023 == 0 {
@@ -143,108 +119,35 @@ fn survey<P: Pages>(
 fn choose<P: Pages>(
     mesh: &mut Mesh<P>,
     flood: &Flood,
-    walls: &BTreeMap<(u32, u32), Wall>,
+    walls: &Walls,
     policy: &RegionPolicy,
     regions: &mut Regions,
 ) -> Result<BTreeSet<u32>, BoundaryError> {
-    let all: BTreeSet<u32> = (OUTSIDE + 1..flood.components.len() as u32).collect();
-    match policy {
-        RegionPolicy::All => Ok(all),
-        RegionPolicy::Outer => Ok(walls
-            .keys()
-            .filter(|&&(low, _)| low == OUTSIDE)
-            .map(|&(_, high)| high)
-            .collect()),
-        RegionPolicy::Parity => {
-            // A wall given once from each side, as two touching solids do, is crossed twice.
-            let depth = spread(flood, walls, |w| i64::from(w.front != w.back), 2);
-            Ok(match depth {
-                Some(depth) => all
-                    .into_iter()
-                    .filter(|&c| depth[c as usize].rem_euclid(2) == 1)
-                    .collect(),
-                None => {
-                    regions.all_instead_of_parity = true;
-                    all
-                }
-            })
-        }
-        RegionPolicy::ByOrientation => {
-            if let Some((_, w)) = walls
-                .iter()
-                .find(|(_, w)| w.front != 0 && w.back != 0 && w.front != w.back)
-            {
-                return Err(BoundaryError::Leak {
-                    what: format!(
-                        "of the triangles between two volumes {} point one way and {} the other; orient the surface",
-                        w.front, w.back
-                    ),
-                });
-            }
-            let sign = |w: &Wall| i64::from(w.front > w.back) - i64::from(w.back > w.front);
-            let winding = spread(flood, walls, sign, 0).ok_or(BoundaryError::Leak {
-                what: "the orientations around its volumes contradict each other".into(),
-            })?;
-            Ok(all
-                .into_iter()
-                .filter(|&c| winding[c as usize] > 0)
-                .collect())
-        }
-        RegionPolicy::Seeds(seeds) => {
-            let mut filled = BTreeSet::new();
-            let mut kernel = Kernel::default();
-            for &p in seeds {
-                let start = mesh.tet_of(0);
-                let component = match kernel.locate(mesh, p, start) {
-                    Ok(found) => mesh.tet_attribute(found.tet).0,
-                    Err(_) => OUTSIDE,
-                };
-                if component == OUTSIDE {
-                    return Err(BoundaryError::Leak {
-                        what: format!("the seed {:?} is outside", p.to_array()),
-                    });
-                }
-                filled.insert(component);
-            }
-            Ok(filled)
-        }
+    if let RegionPolicy::Seeds(seeds) = policy {
+        return of_seeds(mesh, seeds);
     }
+    let chosen = policy.filled(OUTSIDE, flood.components.len() as u32, walls)?;
+    regions.all_instead_of_parity = chosen.all_instead_of_parity;
+    Ok(chosen.volumes)
 }
 
-/// Carries a value from the outside through the walls; `None` when two ways disagree (modulo `modulus`, if not 0).
-fn spread(
-    flood: &Flood,
-    walls: &BTreeMap<(u32, u32), Wall>,
-    step: impl Fn(&Wall) -> i64,
-    modulus: i64,
-) -> Option<Vec<i64>> {
-    let mut next: Vec<Vec<(u32, i64)>> = vec![Vec::new(); flood.components.len()];
-    for (&(low, high), wall) in walls {
-        let step = step(wall);
-        next[low as usize].push((high, step));
-        next[high as usize].push((low, -step));
-    }
-    let mut value: Vec<Option<i64>> = vec![None; flood.components.len()];
-    value[OUTSIDE as usize] = Some(0);
-    let mut queue = VecDeque::from([OUTSIDE]);
-    while let Some(c) = queue.pop_front() {
-        let here = value[c as usize].expect("queued with a value");
-        for &(other, step) in &next[c as usize] {
-            match value[other as usize] {
-                None => {
-                    value[other as usize] = Some(here + step);
-                    queue.push_back(other);
-                }
-                Some(known) => {
-                    let gap = known - here - step;
-                    if gap != 0 && (modulus == 0 || gap.rem_euclid(modulus) != 0) {
-                        return None;
-                    }
-                }
-            }
+fn of_seeds<P: Pages>(mesh: &mut Mesh<P>, seeds: &[Point]) -> Result<BTreeSet<u32>, BoundaryError> {
+    let mut filled = BTreeSet::new();
+    let mut kernel = Kernel::default();
+    for &p in seeds {
+        let start = mesh.tet_of(0);
+        let component = match kernel.locate(mesh, p, start) {
+            Ok(found) => mesh.tet_attribute(found.tet).0,
+            Err(_) => OUTSIDE,
+        };
+        if component == OUTSIDE {
+            return Err(BoundaryError::Leak {
+                what: format!("the seed {:?} is outside", p.to_array()),
+            });
         }
+        filled.insert(component);
     }
-    Some(value.into_iter().map(|v| v.unwrap_or(0)).collect())
+    Ok(filled)
 }
 
 /// Deletes what is not filled and writes the numbers of what is.

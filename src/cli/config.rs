@@ -2,14 +2,14 @@
 
 use clap::ValueEnum;
 
-use super::args::{MeshArgs, Optimize, Regions};
+use super::args::{Optimize, Regions, ShapeArgs};
 use super::failure::Failure;
 use crate::pipeline::Options;
 
 /// The options of a run: the file's, then the command line's over them, then the defaults.
 ///
 /// Lists of shapes on the command line replace those of the file. Errors: the file, with its line and column.
-pub fn options(args: &MeshArgs) -> Result<Options, Failure> {
+pub fn options(args: &ShapeArgs) -> Result<Options, Failure> {
     let mut options = match &args.config {
         None => Options::default(),
         Some(path) => {

@@ -133,6 +133,11 @@ pub const CODES: &[CodeRow] = &[
     row("damaged", 4, "the store is not what was written"),
     row("busy", 5, "another process writes the store"),
     row("memory", 6, "the memory cap is too small for this work"),
+    row(
+        "no-room",
+        6,
+        "the disk has less room than the mesh is expected to need",
+    ),
     row("disk-full", 6, "the disk is full"),
     row("io", 6, "the system refused to read or write a file"),
     row("invalid-mesh", 7, "verification found the mesh invalid"),

@@ -9,13 +9,13 @@ use super::args::{MeshArgs, ResumeArgs, RunArgs};
 use super::failure::Failure;
 use super::input::{self, Input};
 use super::talk::Talk;
-use super::{config, export, info, memory, signals, store, verify};
+use super::{config, estimate, export, info, memory, signals, store, verify};
 use crate::catalog::{Catalog, CatalogError, Job, Store, StoreState};
 use crate::pipeline::{self, Options, Summary};
 use crate::store::Budget;
 
 pub fn run(args: &MeshArgs, talk: &Talk) -> Result<u8, Failure> {
-    let options = config::options(args)?;
+    let options = config::options(&args.shape)?;
     // Sizes are checked before anything is read.
     options.sizes()?;
     let (cap, whence) = begin(&args.run, talk)?;
@@ -32,6 +32,10 @@ pub fn run(args: &MeshArgs, talk: &Talk) -> Result<u8, Failure> {
         clock.elapsed().as_secs_f64()
     ));
     talk.note(&format!("memory: {} ({whence})", memory::show(cap)));
+    let prepared = pipeline::prepare(&input.surface, &options)?;
+    if !args.no_preflight {
+        estimate::preflight(&prepared.estimate, cap, &path, talk)?;
+    }
     // With --force the old store is only replaced once the new one is sealed.
     let replaced = path.exists().then(|| path.with_extension("tetdb-new"));
     let place = replaced.clone().unwrap_or_else(|| path.clone());
@@ -44,8 +48,17 @@ pub fn run(args: &MeshArgs, talk: &Talk) -> Result<u8, Failure> {
         tool_version: env!("CARGO_PKG_VERSION").to_owned(),
     };
     let mut catalog = Catalog::create(&place, &job)?;
-    let summary = work(&mut catalog, &input, &options, cap, talk);
-    let summary = match summary {
+    let budget = Budget::new(cap);
+    let watch = |event| talk.progress(event);
+    let made = pipeline::mesh_prepared(
+        &mut catalog,
+        &input.surface,
+        &options,
+        prepared,
+        &budget,
+        &watch,
+    );
+    let summary = match made.map_err(Failure::from) {
         // A refused surface or option leaves nothing to resume.
         Err(failure) if matches!(failure.exit(), 2 | 3) => {
             drop(catalog);
@@ -54,6 +67,7 @@ pub fn run(args: &MeshArgs, talk: &Talk) -> Result<u8, Failure> {
         }
         other => other?,
     };
+    tell(&summary, talk);
     catalog.close()?;
     if replaced.is_some() {
         remove_store(&path)?;
@@ -78,7 +92,10 @@ pub fn resume(args: &ResumeArgs, talk: &Talk) -> Result<u8, Failure> {
             .at(args.store.display())
     })?;
     let mut catalog = Catalog::open_writable(&args.store)?;
-    let summary = work(&mut catalog, &input, &options, cap, talk)?;
+    let watch = |event| talk.progress(event);
+    let budget = Budget::new(cap);
+    let summary = pipeline::mesh(&mut catalog, &input.surface, &options, &budget, &watch)?;
+    tell(&summary, talk);
     catalog.close()?;
     finish(&args.store, &input, &args.run, cap, Some(&summary), talk)
 }
@@ -162,17 +179,7 @@ fn already_there(
     Ok(Some(0))
 }
 
-fn work(
-    catalog: &mut Catalog,
-    input: &Input,
-    options: &Options,
-    cap: u64,
-    talk: &Talk,
-) -> Result<Summary, Failure> {
-    let budget = Budget::new(cap);
-    let summary = pipeline::mesh(catalog, &input.surface, options, &budget, &|event| {
-        talk.progress(event)
-    })?;
+fn tell(summary: &Summary, talk: &Talk) {
     talk.done();
     if let Some(asked) = summary.subdomains_asked {
         talk.note(&format!(
@@ -186,7 +193,6 @@ fn work(
             talk.note(&format!("warning: {warning}"));
         }
     }
-    Ok(summary)
 }
 
 /// Verify, export, tell.

@@ -7,6 +7,7 @@ mod check_report;
 mod compare;
 mod config;
 mod digest;
+mod estimate;
 mod export;
 mod failure;
 mod heap;
@@ -80,6 +81,7 @@ fn is_command(word: &str) -> bool {
 fn dispatch(command: &Command, talk: &Talk) -> Result<u8, Failure> {
     match command {
         Command::Mesh(args) => mesh::run(args, talk),
+        Command::Estimate(args) => estimate::run(args, talk),
         Command::Resume(args) => mesh::resume(args, talk),
         Command::Check(args) => check::run(args, talk),
         Command::Info(args) => info::run(args, talk),

@@ -34,13 +34,7 @@ pub(super) fn coarse<P: Pages>(
     mesh.refresh_tet_of();
     let recovery = recover(mesh)?;
     watch(stage("color the regions"));
-    let policy = options
-        .region_policy()
-        .ok_or_else(|| PipelineError::Option {
-            option: "--regions",
-            value: options.regions.clone().unwrap_or_default(),
-        })?;
-    let regions = fill_regions(mesh, &policy)?;
+    let regions = fill_regions(mesh, &options.regions()?)?;
     if mesh.n_tets() == 0 {
         return Err(PipelineError::NothingFilled {
             policy: options

@@ -12,6 +12,7 @@ mod coarse;
 mod crew;
 mod divide;
 mod error;
+mod estimate;
 mod fine;
 mod leaf;
 mod options;
@@ -22,8 +23,9 @@ mod tree;
 mod watch;
 
 pub use error::PipelineError;
+pub use estimate::{Estimate, Prepared, prepare};
 pub use fine::FineReport;
 pub use options::Options;
 pub use plan::{MEMORY_MIN, Plan};
-pub use run::{Summary, mesh};
+pub use run::{Summary, mesh, mesh_prepared};
 pub use watch::{Event, Watcher, silent};

@@ -92,4 +92,23 @@ impl Options {
             _ => return None,
         })
     }
+
+    /// [`Options::region_policy`], or an error that names the word.
+    pub(super) fn regions(&self) -> Result<RegionPolicy, PipelineError> {
+        self.region_policy()
+            .ok_or_else(|| unknown("--regions", &self.regions))
+    }
+
+    /// [`Options::optimize_mode`], or an error that names the word.
+    pub(super) fn mode(&self) -> Result<Mode, PipelineError> {
+        self.optimize_mode()
+            .ok_or_else(|| unknown("--optimize", &self.optimize))
+    }
+}
+
+fn unknown(option: &'static str, value: &Option<String>) -> PipelineError {
+    PipelineError::Option {
+        option,
+        value: value.clone().unwrap_or_default(),
+    }
 }

@@ -10,7 +10,7 @@ use super::divide::{DONE, WORK, read_owners};
 use super::leaf::{Common, Leaf, LeafJob, SealedTotals};
 use super::tree::{self, Part, PartMesh, blob};
 use super::watch::Watcher;
-use super::{FineReport, Options, PipelineError, Plan};
+use super::{Estimate, FineReport, Options, PipelineError, Plan, Prepared, prepare};
 use crate::bisect::{CutReport, load_of};
 use crate::boundary::RegionSummary;
 use crate::catalog::{
@@ -24,10 +24,6 @@ use crate::surface::Surface;
 
 /// Generation of the coarse mesh.
 const COARSE: u32 = 1;
-/// Tetrahedra of one sub-domain, unless a number of sub-domains is asked for.
-const TETS_PER_SUBDOMAIN: f64 = (4u64 << 20) as f64;
-/// Sub-domains smaller than this are nearly all refined zone: more are not made.
-const TETS_MIN: f64 = 25_000.0;
 
 /// What a run did; a part is absent when an earlier run had done its step.
 #[derive(Clone, Debug)]
@@ -56,21 +52,48 @@ pub fn mesh(
     budget: &Budget,
     watch: &Watcher,
 ) -> Result<Summary, PipelineError> {
-    let surface_lease = budget.lease(surface.bytes() as u64, "the surface")?;
-    let mut sizes = None;
-    let field = match catalog.blob(blob::SIZE_FIELD)? {
-        Some(bytes) => SizeField::from_bytes(&bytes)?
-            .with_sources(&options.sizes()?, surface.bounds().diagonal())?,
-        None => {
-            let built = SizeField::build_with_summary(
-                &surface.points,
-                &surface.triangles,
-                &options.sizes()?,
-            )?;
-            sizes = Some(built.1);
-            built.0
+    match catalog.blob(blob::SIZE_FIELD)? {
+        None => mesh_prepared(
+            catalog,
+            surface,
+            options,
+            prepare(surface, options)?,
+            budget,
+            watch,
+        ),
+        Some(bytes) => {
+            let field = SizeField::from_bytes(&bytes)?;
+            let field = field.with_sources(&options.sizes()?, surface.bounds().diagonal())?;
+            go_on(catalog, surface, options, (field, None), budget, watch)
         }
-    };
+    }
+}
+
+/// [`mesh`] into a new store, with what [`prepare`] made of this surface and these options.
+///
+/// Errors: as [`mesh`].
+pub fn mesh_prepared(
+    catalog: &mut Catalog,
+    surface: &Surface,
+    options: &Options,
+    prepared: Prepared,
+    budget: &Budget,
+    watch: &Watcher,
+) -> Result<Summary, PipelineError> {
+    let start = (prepared.field, Some((prepared.sizes, prepared.estimate)));
+    go_on(catalog, surface, options, start, budget, watch)
+}
+
+fn go_on(
+    catalog: &mut Catalog,
+    surface: &Surface,
+    options: &Options,
+    (field, new): (SizeField, Option<(SizeSummary, Estimate)>),
+    budget: &Budget,
+    watch: &Watcher,
+) -> Result<Summary, PipelineError> {
+    let (sizes, estimate) = new.unzip();
+    let surface_lease = budget.lease(surface.bytes() as u64, "the surface")?;
     let field_lease = budget.lease(field.bytes() as u64, "the size field")?;
     let plan = Plan::new(budget.cap(), surface_lease.bytes() + field_lease.bytes())?;
     let _lease = budget.lease(
@@ -85,7 +108,7 @@ pub fn mesh(
         plan,
         bounds: surface.bounds(),
         n: 1,
-        asked: None,
+        estimate,
         pages: PagerStats::default(),
         frames_used: 0,
         watch,
@@ -103,7 +126,8 @@ pub(super) struct Run<'a> {
     pub bounds: Aabb,
     /// Number of sub-domains there will be.
     pub n: u32,
-    asked: Option<u32>,
+    /// Before the coarse mesh is made.
+    estimate: Option<Estimate>,
     pub pages: PagerStats,
     pub frames_used: usize,
     pub watch: &'a Watcher<'a>,
@@ -127,7 +151,7 @@ impl<'a> Run<'a> {
             cuts,
             fine: BTreeMap::new(),
             subdomains: self.n,
-            subdomains_asked: self.asked,
+            subdomains_asked: self.estimate.and_then(|e| e.subdomains_asked),
             pages: PagerStats::default(),
             frames_used: self.frames_used,
         };
@@ -142,13 +166,9 @@ impl<'a> Run<'a> {
 
     /// What is the same for all workers.
     pub(super) fn common(&self) -> Result<Common<'a>, PipelineError> {
-        let mode = self.options.optimize_mode();
         Ok(Common {
             field: self.field,
-            mode: mode.ok_or_else(|| PipelineError::Option {
-                option: "--optimize",
-                value: self.options.optimize.clone().unwrap_or_default(),
-            })?,
+            mode: self.options.mode()?,
             bounds: self.bounds,
         })
     }
@@ -172,7 +192,7 @@ impl<'a> Run<'a> {
         };
         renumber(&mut mesh, &HilbertFrame::new(&self.bounds), &space)?;
         let load = self.load(&mut mesh);
-        let n = self.count(load)?;
+        let (n, predicted) = self.estimate.map_or((1, 0.0), |e| (e.subdomains, e.tets()));
         mesh.pages_mut().flush();
         let part = PartMesh {
             part: Part { first: 0, count: n },
@@ -200,7 +220,7 @@ impl<'a> Run<'a> {
                         f64::from(report.recovery.missing_segments),
                     ),
                     ("missing_facets", f64::from(report.recovery.missing_facets)),
-                    ("predicted_tets", TETS_PER_LOAD * load),
+                    ("predicted_tets", predicted),
                 ],
             ));
             Ok(())
@@ -217,19 +237,6 @@ impl<'a> Run<'a> {
             mesh.set_size(v, self.field.h(p) as f32);
         }
         load_of(mesh, &|p| self.field.h(p))
-    }
-
-    /// How many sub-domains there will be, for a load.
-    fn count(&mut self, load: f64) -> Result<u32, PipelineError> {
-        let predicted = TETS_PER_LOAD * load;
-        let asked = self.options.subdomain_count()?;
-        let auto = (predicted / TETS_PER_SUBDOMAIN).ceil().max(1.0);
-        let most = (predicted / TETS_MIN).floor().max(1.0);
-        let wanted = asked.map_or(auto, f64::from);
-        if wanted > most && wanted > 1.0 {
-            self.asked = asked;
-        }
-        Ok(wanted.min(most).min(f64::from(1u32 << 20)) as u32)
     }
 
     /// Makes the sub-domains that are left, as many at once as there are threads and memory for.

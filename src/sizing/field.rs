@@ -1,6 +1,6 @@
 //! The size field: built once, read from every thread.
 
-use super::closed::{TETS_PER_LOAD, divide_parameters, metric_length};
+use super::closed::{divide_parameters, metric_length};
 use super::corners::Corners;
 use super::options::SizeOptions;
 use super::seeds::{Frame, seeds_of};
@@ -9,7 +9,7 @@ use super::summary::SizeSummary;
 use super::tree::{DEPTH, LATTICE, LEAF, Leaf, Tree, octant_of};
 use super::values::corner_values;
 use super::{SizingError, summary};
-use crate::geom::{Aabb, Point, lex_cmp};
+use crate::geom::{Point, lex_cmp};
 use std::cmp::Ordering;
 
 /// Levels that one look into the jump table replaces: 32,768 entries of 8 bytes stay in cache.
@@ -44,7 +44,7 @@ pub struct SizeField {
     /// Lattice cells per input unit.
     per_lattice: f64,
     /// Shapes with sizes of their own; not part of [`SizeField::to_bytes`].
-    sources: Vec<ResolvedSource>,
+    pub(super) sources: Vec<ResolvedSource>,
 }
 
 /// Where the descent begins: the entry and its level, for each cell of a regular grid.
@@ -197,29 +197,6 @@ impl SizeField {
             + self.values.capacity() * size_of::<[f32; 8]>()
             + self.jump.cells.capacity() * size_of::<(u32, u32)>()
     }
-
-    /// Load ∫ h⁻³ over the domain; `inside` says what share of a box the domain covers.
-    ///
-    /// Boxes are at most `width_max` wide and small enough for h to vary by at most 1.4 in them.
-    pub fn load(&self, width_max: f64, inside: impl Fn(&Aabb) -> f64) -> f64 {
-        let mut sum = 0.0;
-        for (leaf, values) in self.tree.leaves().iter().zip(&self.values) {
-            let low = self.frame.low + leaf.low() * self.frame.side;
-            let values = values.map(|h| f64::from(h) * self.frame.side);
-            let part = Part {
-                low,
-                width: leaf.side() * self.frame.side,
-                values,
-            };
-            sum += part.load(width_max, &inside, DEPTH - leaf.level);
-        }
-        sum
-    }
-
-    /// Predicted number of tetrahedra: [`TETS_PER_LOAD`] times the load.
-    pub fn predicted_tets(&self, width_max: f64, inside: impl Fn(&Aabb) -> f64) -> f64 {
-        TETS_PER_LOAD * self.load(width_max, inside)
-    }
 }
 
 /// Value at `local`, each coordinate from 0 to 1.
@@ -269,65 +246,5 @@ impl Jump {
     fn at(&self, cell: [u32; 3]) -> (u32, u32) {
         let coarse = cell.map(|c| c >> (DEPTH - self.level));
         self.cells[Self::index(coarse, self.level)]
-    }
-}
-
-/// A box with the sizes at its corners, all in input units.
-struct Part {
-    low: Point,
-    width: f64,
-    values: [f64; 8],
-}
-
-impl Part {
-    fn load(&self, width_max: f64, inside: &impl Fn(&Aabb) -> f64, divisions: u32) -> f64 {
-        let low = self.values.iter().copied().fold(f64::INFINITY, f64::min);
-        let high = self.values.iter().copied().fold(0.0, f64::max);
-        if divisions > 0 && (self.width > width_max || high > 1.4 * low) {
-            let parts = (0..8).map(|octant| self.part(octant));
-            return parts
-                .map(|part| part.load(width_max, inside, divisions - 1))
-                .sum();
-        }
-        let share = inside(&Aabb {
-            low: self.low,
-            high: self.low + Point::splat(self.width),
-        });
-        if share == 0.0 {
-            return 0.0;
-        }
-        share * self.width * self.width * self.width * self.mean_inverse_cube()
-    }
-
-    /// Mean of h⁻³ by the eight points of Gauss.
-    fn mean_inverse_cube(&self) -> f64 {
-        let near = 0.5 - 0.5 / 3f64.sqrt();
-        let at = |upper: usize| if upper == 1 { 1.0 - near } else { near };
-        let sum: f64 = (0..8)
-            .map(|i| {
-                let h = self.value(Point::new(at(i & 1), at(i >> 1 & 1), at(i >> 2)));
-                1.0 / (h * h * h)
-            })
-            .sum();
-        sum / 8.0
-    }
-
-    fn value(&self, local: Point) -> f64 {
-        (0..8).fold(0.0, |sum, c| {
-            let weight = |axis: usize| {
-                let x = local[axis];
-                if c >> axis & 1 == 1 { x } else { 1.0 - x }
-            };
-            sum + self.values[c] * weight(0) * weight(1) * weight(2)
-        })
-    }
-
-    fn part(&self, octant: usize) -> Self {
-        let offset = |i: usize| Point::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2) as f64);
-        Self {
-            low: self.low + offset(octant) * (0.5 * self.width),
-            width: 0.5 * self.width,
-            values: std::array::from_fn(|c| self.value((offset(octant) + offset(c)) * 0.5)),
-        }
     }
 }

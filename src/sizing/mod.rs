@@ -14,8 +14,10 @@
 mod closed;
 mod codec;
 mod corners;
+mod count;
 mod error;
 mod field;
+mod integral;
 mod math;
 mod options;
 mod seeds;
@@ -28,8 +30,10 @@ mod values;
 mod tests;
 
 pub use closed::{TETS_PER_LOAD, divide_parameters, load_of_tet, metric_length};
+pub use count::Counts;
 pub use error::SizingError;
 pub use field::SizeField;
+pub use integral::{Domain, Skin};
 pub use options::{Length, SizeOptions};
 pub use sources::{Shape, SizeSource};
 pub use summary::{Range, SizeSummary, SizeWarning};

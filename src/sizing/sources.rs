@@ -144,6 +144,11 @@ pub(super) struct ResolvedSource {
 }
 
 impl ResolvedSource {
+    /// The smallest size it asks for.
+    pub(super) fn least(&self) -> f64 {
+        self.inside.min(self.outside)
+    }
+
     /// The size wanted at `p` in a field of slope `beta`.
     #[inline]
     pub(super) fn h(&self, p: Point, beta: f64) -> f64 {

@@ -1,7 +1,8 @@
 //! The field is continuous, graded, near the surface's edges, and the same for any number of threads.
 
 use super::*;
-use crate::geom::{Aabb, Point};
+use crate::geom::Point;
+use crate::surface::{Seeker, Surface, Volumes};
 
 /// A small generator for test points; the seed is printed by what fails.
 struct Dice(u64);
@@ -248,34 +249,74 @@ fn edges_are_divided_the_same_from_both_ends() {
     }
 }
 
+/// The cube's surface with what is asked of it.
+fn with_domain<T>(surface: &(Vec<Point>, Vec<[u32; 3]>), ask: impl FnOnce(&Domain) -> T) -> T {
+    // Walls are welded: each grid has its own points.
+    let mut welded = Surface::default();
+    let mut number = std::collections::BTreeMap::new();
+    let ids: Vec<u32> = (surface.0.iter())
+        .map(|p| {
+            let next = number.len() as u32;
+            // Two zeros are one.
+            let key = p.to_array().map(|x| (x + 0.0).to_bits());
+            *number.entry(key).or_insert_with(|| {
+                welded.points.push(*p);
+                next
+            })
+        })
+        .collect();
+    welded.triangles = surface
+        .1
+        .iter()
+        .map(|t| t.map(|v| ids[v as usize]))
+        .collect();
+    let seeker = Seeker::new(&welded);
+    let volumes = Volumes::of(&seeker);
+    let filled: Vec<bool> = (0..volumes.n_volumes).map(|v| v > 0).collect();
+    assert_eq!(filled, [false, true]);
+    ask(&Domain {
+        seeker: &seeker,
+        volumes: &volumes,
+        filled: &filled,
+    })
+}
+
 #[test]
 fn loads_are_integrals() {
-    let even = cube(20, |i| i as f64 / 20.0);
-    let field = build(&even, &SizeOptions::default());
-    let h = field.h(Point::splat(0.5));
-    // The unit cube inside the field's slightly larger one.
-    let share = |b: &Aabb| {
-        let (low, high) = (b.low.max(Point::ZERO), b.high.min(Point::ONE));
-        let cut = (high - low).max(Point::ZERO);
-        let whole = b.high - b.low;
-        cut.x * cut.y * cut.z / (whole.x * whole.y * whole.z)
+    let shape = "0.5,0.5,0.5,0.1,0.01".to_owned();
+    let sphere = SizeOptions {
+        sources: vec![SizeSource::parse_sphere(&shape).unwrap()],
+        ..SizeOptions::default()
     };
-    let load = field.load(0.1, share);
-    assert!((load * h * h * h - 1.0).abs() < 0.1, "{load}");
-    let steep = build(&graded(20.0, 60), &SizeOptions::default());
-    let load = steep.load(0.1, share);
-    let n = 100;
-    let middle = |i: usize| (i as f64 + 0.5) / n as f64;
-    let mut sum = 0.0;
-    for i in 0..n * n * n {
-        let h = steep.h(Point::new(
-            middle(i % n),
-            middle(i / n % n),
-            middle(i / n / n),
-        ));
-        sum += 1.0 / (h * h * h * (n * n * n) as f64);
+    let even = cube(20, |i| i as f64 / 20.0);
+    for (surface, options, n) in [
+        (&even, &SizeOptions::default(), 50),
+        (&graded(20.0, 60), &SizeOptions::default(), 80),
+        (&even, &sphere, 100),
+    ] {
+        let field = build(surface, options);
+        // One point anywhere in each cell of a grid.
+        let mut dice = Dice(7);
+        let points: Vec<Point> = (0..n * n * n)
+            .map(|i| Point::new((i % n) as f64, (i / n % n) as f64, (i / n / n) as f64))
+            .map(|cell| (cell + dice.point()) / n as f64)
+            .collect();
+        for skin in [0.0, 0.5] {
+            let inside = |p: &&Point| p.min(Point::ONE - **p).min_element() > skin * field.h(**p);
+            let sum: f64 = points
+                .iter()
+                .filter(inside)
+                .map(|&p| field.h(p).powi(-3))
+                .sum();
+            let expected = sum / points.len() as f64;
+            let skin = Skin {
+                triangles: skin,
+                vertices: 0.0,
+            };
+            let load = with_domain(surface, |domain| field.load(domain, skin));
+            assert!((load / expected - 1.0).abs() < 0.03, "{load} {expected}");
+        }
     }
-    assert!((load / sum - 1.0).abs() < 0.05, "{load} {sum}");
 }
 
 #[test]

@@ -14,6 +14,7 @@ mod flat;
 mod page_table;
 mod pager;
 mod sort;
+mod space;
 mod stop;
 
 pub use budget::{Budget, Lease};
@@ -22,6 +23,7 @@ pub use file::StoreFile;
 pub use flat::FlatPages;
 pub use pager::{Backing, Pager, PagerStats};
 pub use sort::{Sorted, Sorter};
+pub use space::available_bytes;
 pub use stop::{attempt, fail, request_stop, stop_if_requested};
 
 use tetdb_schema::page::Slot;

@@ -8,7 +8,7 @@ use crate::geom::{Aabb, HilbertFrame};
 /// Triangles in one leaf.
 const LEAF: usize = 4;
 /// Children of one node.
-const ARITY: usize = 4;
+pub(super) const ARITY: usize = 4;
 /// Leaves one task handles.
 const BLOCK: usize = 256;
 /// Leaves between two looks at how much was found.
@@ -23,11 +23,11 @@ const FOUND_MAX: u64 = 10_000_000;
 /// Memory: about 52 bytes per triangle and a third of that for the tree.
 pub(super) struct BoxTree {
     /// Triangle ids in curve order.
-    order: Vec<u32>,
+    pub(super) order: Vec<u32>,
     /// Their boxes, in the same order.
-    boxes: Vec<Aabb>,
+    pub(super) boxes: Vec<Aabb>,
     /// `levels[0]` are the leaves; a node of level k + 1 holds `ARITY` nodes of level k.
-    levels: Vec<Vec<Aabb>>,
+    pub(super) levels: Vec<Vec<Aabb>>,
 }
 
 impl BoxTree {
@@ -143,7 +143,8 @@ impl BoxTree {
         }
     }
 
-    fn members(&self, leaf: usize) -> std::ops::Range<usize> {
+    /// Places of a leaf's triangles in curve order.
+    pub(super) fn members(&self, leaf: usize) -> std::ops::Range<usize> {
         leaf * LEAF..((leaf + 1) * LEAF).min(self.boxes.len())
     }
 

@@ -81,7 +81,7 @@ impl EdgeUse {
         [t[self.corner()], t[(self.corner() + 1) % 3]]
     }
 
-    fn is_forward(self, surface: &Surface) -> bool {
+    pub fn is_forward(self, surface: &Surface) -> bool {
         let [a, b] = self.vertices(surface);
         a < b
     }

@@ -4,9 +4,10 @@
 //! `edges` (which triangles meet where), `orientation` (turning triangles the same way), `contact`
 //! (how two triangles touch), `broad` (which pairs to look at), `validate` (all of it together),
 //! `defect` (what can be wrong and what to do about it), `rims` (where it is open), `near` and `repair`
-//! (mending on demand), `fitness` (what mesh its triangles allow), `split` (finer triangles of the same surface).
+//! (mending on demand), `fitness` (what mesh its triangles allow), `split` (finer triangles of the same surface),
+//! `seek` (distances and what lies above), `volumes` (what is enclosed).
 //!
-//! Is not: file formats (`io`), volumes and regions (`boundary`).
+//! Is not: file formats (`io`), which volumes are filled (`boundary`).
 
 mod broad;
 mod contact;
@@ -18,9 +19,11 @@ mod orientation;
 mod point_tree;
 mod repair;
 mod rims;
+mod seek;
 mod split;
 mod triangles;
 mod validate;
+mod volumes;
 mod weld;
 
 #[cfg(test)]
@@ -35,7 +38,9 @@ pub use near::weld_near;
 pub use orientation::{Orientation, orient_alike};
 pub use repair::{Closing, Repair, closing, repair};
 pub use rims::{Rim, TJunction, rims, t_junctions};
+pub use seek::{Crossing, Seeker};
 pub use split::{SplitReport, split};
 pub use triangles::{Note, NoteKind, SourceFile, Surface};
 pub use validate::{Validation, validate};
+pub use volumes::{OUTSIDE, Volumes, Wall};
 pub use weld::SurfaceBuilder;

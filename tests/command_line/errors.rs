@@ -307,6 +307,12 @@ const CASES: &[Case] = &[
         "mesh sample:box,h=0.5 --memory 5MiB -o x.tetdb",
         "5MiB",
     ),
+    case(
+        "no-room",
+        6,
+        "mesh sample:box,h=0.5 --size-sphere 0.5,0.5,0.5,0.2,0.0001 -o x.tetdb",
+        "3.4",
+    ),
     Case {
         word: "io",
         exit: 6,

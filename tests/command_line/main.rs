@@ -10,4 +10,5 @@ mod query;
 mod readme;
 mod regions;
 mod same_mesh;
+mod sizes;
 mod subdomains;

@@ -1,5 +1,6 @@
 //! Files in the making: a folder beside the output, removed whatever happens; rename when all are whole.
 
+use crate::store::available_bytes;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -88,17 +89,4 @@ fn folder(out: &Path) -> &Path {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     }
-}
-
-/// Bytes free on the disk of `dir`, where the system tells.
-#[cfg(unix)]
-fn available_bytes(dir: &Path) -> Option<u64> {
-    let disk = rustix::fs::statvfs(dir).ok()?;
-    Some(disk.f_bavail.saturating_mul(disk.f_frsize))
-}
-
-/// Elsewhere a full disk is found while writing.
-#[cfg(not(unix))]
-fn available_bytes(_: &Path) -> Option<u64> {
-    None
 }

@@ -1,0 +1,203 @@
+//! What a mesh will be and what it will take, before any of it is made.
+//!
+//! Numbers of tetrahedra come from the size field and the surface; bytes and seconds per tetrahedron, vertex and triangle are measured.
+//! Unless another case is named, they are those of `balls,count=100` (394,000 tetrahedra on 62,000 triangles), `box,h=0.02` (1.03 million on
+//! 30,000), the armadillo (1.02 million on 52,000), `balls,count=1000` (4.04 million on 506,000).
+
+use super::{MEMORY_MIN, Options, PipelineError, Plan};
+use crate::optimize::Mode;
+use crate::sizing::{Counts, Domain, SizeField, SizeSummary};
+use crate::surface::{OUTSIDE, Seeker, Surface, Volumes};
+
+/// Tetrahedra of one sub-domain, unless a number of sub-domains is asked for.
+const TETS_PER_SUBDOMAIN: f64 = (4u64 << 20) as f64;
+/// Sub-domains smaller than this are nearly all refined zone: more are not made.
+const TETS_MIN: f64 = 25_000.0;
+/// Inner tetrahedra without and with only part of the optimization, over those with all of it: 1.072 and 1.083, 1.023 and 1.026.
+const UNOPTIMIZED: f64 = 1.078;
+const DELAUNAY: f64 = 1.025;
+
+/// Bytes of a sealed sub-domain for each tetrahedron, vertex and facet: sums within 6 % on seven surfaces.
+const SEALED_TET: f64 = 2.74;
+const SEALED_VERTEX: f64 = 22.1;
+const SEALED_FACET: f64 = 10.0;
+/// The least file of a sub-domain, and the catalog without its size field: redb's own pages.
+const FILE_LEAST: f64 = 50e3;
+const CATALOG_LEAST: f64 = 100e3;
+/// Bytes of the coarse mesh on disk for each triangle: 120 to 130.
+const COARSE_TRIANGLE: f64 = 126.0;
+/// Bytes of a bisected part on disk for each tetrahedron of its refined zones, in the box in four parts.
+const ZONE_TET: f64 = 65.0;
+/// Width of a refined zone in wanted lengths.
+const ZONE_WIDTH: f64 = 8.0;
+/// Pages that leave memory take up this many times their size, for what is written in a commit is not written over; and
+/// never more than [`SPILLED_MAX`] times all pages. With caps of 64 and 96 MiB: 2.5 to 3.1.
+const SPILLED: f64 = 3.0;
+const SPILLED_MAX: f64 = 2.2;
+
+/// Bytes of frames for each tetrahedron: 100 to 105.
+const FRAMES_TET: f64 = 102.0;
+/// Bytes held beside the frames: by the program; by buffers that fill up soon; for each tetrahedron; for each triangle of the input.
+const PROGRAM: f64 = 12e6;
+const BUFFERS_MAX: f64 = 8e6;
+const BUFFERS_TET: f64 = 200.0;
+const BESIDE_TET: f64 = 45.0;
+const BESIDE_TRIANGLE: f64 = 200.0;
+/// Held beyond the cap: code, stacks, what the allocator keeps. 17 to 20 MB.
+const BEYOND_CAP: f64 = 18e6;
+
+/// CPU seconds for each tetrahedron and each triangle on one core of an EPYC at 2.6 GHz. Where needles make recovery slow it may take ten times that.
+const SECONDS_TET: f64 = 1.0 / 240e3;
+const SECONDS_TRIANGLE: f64 = 12e-6;
+/// For verification.
+const SECONDS_VERIFY: f64 = 0.42e-6;
+
+/// What to expect of a mesh.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate {
+    pub counts: Counts,
+    pub triangles: u64,
+    pub vertices: f64,
+    pub subdomains: u32,
+    /// What was asked for, when that was more than the mesh allows.
+    pub subdomains_asked: Option<u32>,
+    /// Bytes of surface and size field, held all the time.
+    pub held_bytes: u64,
+    field_bytes: u64,
+}
+
+/// A size field and what it makes expect: everything before the first step.
+#[derive(Clone, Debug)]
+pub struct Prepared {
+    pub field: SizeField,
+    pub sizes: SizeSummary,
+    pub estimate: Estimate,
+}
+
+/// Builds the size field and counts what it will give. It makes nothing on disk.
+///
+/// The result depends on surface and options alone. Errors: options that make no sense for the surface; orientations that contradict each other.
+pub fn prepare(surface: &Surface, options: &Options) -> Result<Prepared, PipelineError> {
+    let (field, sizes) =
+        SizeField::build_with_summary(&surface.points, &surface.triangles, &options.sizes()?)?;
+    let estimate = Estimate::of(surface, options, &field)?;
+    Ok(Prepared {
+        field,
+        sizes,
+        estimate,
+    })
+}
+
+impl Estimate {
+    fn of(surface: &Surface, options: &Options, field: &SizeField) -> Result<Self, PipelineError> {
+        let seeker = Seeker::new(surface);
+        let volumes = Volumes::of(&seeker);
+        let policy = options.regions()?;
+        let chosen = policy.filled(OUTSIDE, volumes.n_volumes, &volumes.walls())?;
+        let filled: Vec<bool> = (0..volumes.n_volumes)
+            .map(|v| chosen.volumes.contains(&v))
+            .collect();
+        let domain = Domain {
+            seeker: &seeker,
+            volumes: &volumes,
+            filled: &filled,
+        };
+        let mut counts = field.counts(&domain);
+        counts.inner_tets *= match options.mode()? {
+            Mode::None => UNOPTIMIZED,
+            Mode::Delaunay => DELAUNAY,
+            Mode::Full => 1.0,
+        };
+        let (subdomains, subdomains_asked) =
+            n_subdomains(counts.tets(), options.subdomain_count()?);
+        Ok(Self {
+            counts,
+            triangles: surface.n_triangles() as u64,
+            vertices: surface.n_vertices() as f64 + counts.inner_vertices,
+            subdomains,
+            subdomains_asked,
+            held_bytes: (surface.bytes() + field.bytes()) as u64,
+            field_bytes: field.bytes() as u64,
+        })
+    }
+
+    pub fn tets(&self) -> f64 {
+        self.counts.tets()
+    }
+
+    /// Bytes of the finished store.
+    pub fn store_bytes(&self) -> u64 {
+        let sealed = SEALED_TET * self.tets()
+            + SEALED_VERTEX * self.vertices
+            + SEALED_FACET * self.triangles as f64;
+        let files = FILE_LEAST * f64::from(self.subdomains) + CATALOG_LEAST;
+        (sealed + files) as u64 + self.field_bytes
+    }
+
+    /// Most bytes on disk while it is made with `cap` bytes of memory by so many threads.
+    pub fn disk_peak_bytes(&self, cap: u64, threads: usize) -> u64 {
+        let parts = COARSE_TRIANGLE * self.triangles as f64 + ZONE_TET * self.zone_tets();
+        let frames = Plan::new(cap, self.held_bytes).map_or(0, |plan| plan.frames) as f64;
+        let pages = self.pages_bytes(threads);
+        let spilled = (SPILLED * (pages - frames)).clamp(0.0, SPILLED_MAX * pages);
+        self.store_bytes() + (parts + spilled) as u64
+    }
+
+    /// Most bytes the process will hold with a cap of `cap`.
+    pub fn memory_bytes(&self, cap: u64, threads: usize) -> u64 {
+        self.memory_full_bytes(threads).min(cap + BEYOND_CAP as u64)
+    }
+
+    /// The same without a cap: more memory than this changes nothing.
+    pub fn memory_full_bytes(&self, threads: usize) -> u64 {
+        let pages = self.pages_bytes(threads);
+        let buffers = (BUFFERS_TET * self.tets()).min(BUFFERS_MAX);
+        let beside = BESIDE_TET / FRAMES_TET * pages + BESIDE_TRIANGLE * self.triangles as f64;
+        // A part that is opened again is read through a cache.
+        let cache = match self.subdomains {
+            1 => 0.0,
+            _ => ZONE_TET * self.zone_tets().min(1e6),
+        };
+        (PROGRAM + buffers + pages + beside + cache) as u64
+    }
+
+    /// The smallest cap under which all steps find room.
+    pub fn memory_least_bytes(&self) -> u64 {
+        let mut cap = MEMORY_MIN;
+        while Plan::new(cap, self.held_bytes).is_err() {
+            cap += 1 << 20;
+        }
+        cap
+    }
+
+    /// Seconds on so many threads, with verification. Only sub-domains are made side by side.
+    pub fn seconds(&self, threads: usize) -> f64 {
+        let side_by_side = f64::from(self.subdomains).min(threads.max(1) as f64);
+        SECONDS_TRIANGLE * self.triangles as f64
+            + SECONDS_TET * self.tets() / side_by_side
+            + SECONDS_VERIFY * self.tets()
+    }
+
+    /// Pages of the sub-domains made at one time.
+    fn pages_bytes(&self, threads: usize) -> f64 {
+        let at_once = f64::from(self.subdomains).min(threads.max(1) as f64);
+        FRAMES_TET * self.tets() / f64::from(self.subdomains) * at_once
+    }
+
+    /// Tetrahedra of the refined zones of all cuts, were the domain a cube cut into cubes.
+    fn zone_tets(&self) -> f64 {
+        let n = f64::from(self.subdomains);
+        let side = (self.counts.inner_vertices / n).cbrt().max(1.0);
+        let shared = 3.0 * (1.0 - 1.0 / n.cbrt());
+        (ZONE_WIDTH / side * shared).min(1.0) * self.tets()
+    }
+}
+
+/// How many sub-domains a mesh of so many tetrahedra is made in, and what was asked for when that is more.
+fn n_subdomains(tets: f64, asked: Option<u32>) -> (u32, Option<u32>) {
+    let auto = (tets / TETS_PER_SUBDOMAIN).ceil().max(1.0);
+    let most = (tets / TETS_MIN).floor().max(1.0);
+    let wanted = asked.map_or(auto, f64::from);
+    let n = wanted.min(most).min(f64::from(1u32 << 20)) as u32;
+    (n, asked.filter(|_| wanted > most && wanted > 1.0))
+}
