@@ -177,6 +177,7 @@ pub(crate) fn two_subdomains(path: &std::path::Path) -> Result<(), CatalogError>
     let side = sealed[0].interfaces[0];
     assert_eq!(side.digest, sealed[1].interfaces[0].digest);
     catalog.commit(|step| {
+        step.set_labels(&vec!["label_0".to_owned()]);
         for part in &sealed {
             step.list_file(part.row.rank, 1);
             step.set_subdomain(&part.row);

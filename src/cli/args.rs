@@ -76,7 +76,7 @@ pub struct RunArgs {
     /// Skip the verification at the end
     #[arg(long)]
     pub no_verify: bool,
-    /// Also write these mesh files (.vtu, .mesh, .meshb, .msh, .inp)
+    /// Also write these mesh files (.vtu, .pvtu, .mesh, .meshb, .msh, .inp)
     #[arg(long, value_name = "FILE")]
     pub export: Vec<PathBuf>,
     /// Answer with one JSON object
@@ -278,13 +278,34 @@ pub struct CompareArgs {
 }
 
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  tetdb export part.tetdb part.vtu part.msh")]
+#[command(
+    after_help = "Examples:\n  tetdb export part.tetdb part.vtu part.msh\n  tetdb export part.tetdb part.pvtu topology.json\n  \
+    tetdb export part.tetdb piece.meshb --pieces --subdomain 3,5\n  tetdb export part.tetdb cuts.vtu --interfaces"
+)]
 pub struct ExportArgs {
     #[arg(value_name = "STORE")]
     pub store: PathBuf,
-    /// Files to write; the extension tells the format: .vtu, .mesh, .meshb, .msh, .inp
+    /// Files to write; the extension tells the format: .vtu, .pvtu, .mesh, .meshb, .msh, .inp, .json (topology)
     #[arg(required = true, value_name = "OUT")]
     pub out: Vec<PathBuf>,
+    /// A file for each sub-domain, NAME_00007.mesh, with the faces it shares with others; .pvtu always does so
+    #[arg(long)]
+    pub pieces: bool,
+    /// Only these sub-domains, as numbers with commas between them
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        alias = "domain",
+        alias = "subdomains"
+    )]
+    pub subdomain: Vec<u32>,
+    /// Only input triangles and faces between sub-domains (.vtu)
+    #[arg(long, conflicts_with = "interfaces")]
+    pub boundary: bool,
+    /// Only faces between sub-domains (.vtu)
+    #[arg(long)]
+    pub interfaces: bool,
     /// Most memory to hold
     #[arg(long, value_name = "SIZE")]
     pub memory: Option<String>,

@@ -8,7 +8,7 @@ use super::args::ExportArgs;
 use super::failure::Failure;
 use super::talk::Talk;
 use super::{memory, store};
-use crate::io::write::{self, ExportReport, MeshFormat};
+use crate::io::write::{self, Content, ENDINGS, ExportReport, MeshFormat, Selection};
 use crate::pipeline::Event;
 
 /// A writer holds no more than this, however large the cap.
@@ -16,12 +16,30 @@ const MEMORY_MAX: u64 = 512 << 20;
 
 pub fn run(args: &ExportArgs, talk: &Talk) -> Result<u8, Failure> {
     let (cap, _) = memory::cap(args.memory.as_deref())?;
+    let selection = Selection {
+        subdomains: args.subdomain.iter().copied().collect(),
+        pieces: args.pieces,
+        content: match (args.boundary, args.interfaces) {
+            (true, _) => Content::Boundary,
+            (_, true) => Content::Interfaces,
+            _ => Content::Mesh,
+        },
+    };
     for out in &args.out {
         check_format(out)?;
+        if selection.content != Content::Mesh
+            && MeshFormat::of_extension(out) != Some(MeshFormat::Vtu)
+        {
+            return Err(
+                Failure::new("usage", "faces without tetrahedra are written as .vtu")
+                    .at(out.display())
+                    .help("end the name with .vtu"),
+            );
+        }
     }
     let mut reports = Vec::new();
     for out in &args.out {
-        reports.push(write(&args.store, out, cap, talk)?);
+        reports.push(write(&args.store, out, &selection, cap, talk)?);
     }
     if talk.is_json() {
         talk.answer(&json!({ "schema": 1, "exports": reports }));
@@ -38,15 +56,21 @@ pub fn check_format(out: &Path) -> Result<(), Failure> {
             "the format of a mesh file cannot be told from its name",
         )
         .at(out.display())
-        .help("end the name with .vtu, .mesh, .meshb, .msh or .inp")),
+        .help(format!("end the name with {ENDINGS}"))),
     }
 }
 
 /// Writes one file, and what belongs to it.
-pub fn write(path: &Path, out: &Path, cap: u64, talk: &Talk) -> Result<ExportReport, Failure> {
+pub fn write(
+    path: &Path,
+    out: &Path,
+    selection: &Selection,
+    cap: u64,
+    talk: &Talk,
+) -> Result<ExportReport, Failure> {
     let mut store = store::open_finished(path)?;
     let memory = (cap / 2).min(MEMORY_MAX) as usize;
-    let report = write::export(&mut store, out, memory, &|done, total| {
+    let report = write::export(&mut store, out, selection, memory, &|done, total| {
         talk.progress(Event {
             stage: "export",
             done,

@@ -11,6 +11,7 @@ use super::input::{self, Input};
 use super::talk::Talk;
 use super::{config, estimate, export, info, memory, signals, store, verify};
 use crate::catalog::{Catalog, CatalogError, Job, Store, StoreState};
+use crate::io::write::Selection;
 use crate::pipeline::{self, Options, Summary};
 use crate::store::Budget;
 
@@ -254,7 +255,7 @@ fn finish(
 
 fn write_exports(path: &Path, args: &RunArgs, cap: u64, talk: &Talk) -> Result<(), Failure> {
     for out in &args.export {
-        export::write(path, out, cap, talk)?;
+        export::write(path, out, &Selection::default(), cap, talk)?;
     }
     Ok(())
 }

@@ -5,6 +5,7 @@ mod crash;
 mod damage;
 mod errors;
 mod odd_inputs;
+mod pieces;
 mod place;
 mod query;
 mod readme;

@@ -33,10 +33,11 @@ pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
         stream.end()
     })?;
     let regions = mesh.regions()?;
-    let sides = elements(mesh, draft.dir(), &mut stream, &regions)?;
+    let dir = mesh.dir().to_owned();
+    let sides = elements(mesh, &dir, &mut stream, &regions)?;
     let names = set_names(&mesh.labels());
     surfaces(sides, &names, &mut stream)?;
-    node_sets(mesh, draft.dir(), &names, &mut stream)?;
+    node_sets(mesh, &dir, &names, &mut stream)?;
     stream.finish()
 }
 

@@ -1,54 +1,86 @@
-//! Input triangles that bound a filled region, from all sub-domains, in the order of the input.
+//! Boundary faces of what is written: input triangles in the order of the input, then faces shared with other sub-domains.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use tetdb_schema::record::{NO_TET, SealedFacet};
+use tetdb_schema::record::{InterfaceFace, NO_TET, SealedFacet};
 
 use super::Result;
 use super::numbering::PartNumbers;
 use super::stream::{Records, scratch, word32, word64};
 use crate::store::Sorter;
 
-const BYTES: usize = 52;
+const BYTES: usize = 61;
 
-/// An input triangle in the merged mesh.
+/// Marks the key of an interface face, and sorts it behind the input triangles; below it the number of the cut, then of the face.
+const INTERFACE: u64 = 1 << 63;
+
+/// A boundary face in the merged mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Face {
-    /// Its number in the input.
-    pub triangle: u64,
-    /// Numbers of its vertices, in the input's order.
+    /// Number of the input triangle, or an interface face's cut and number in it.
+    key: u64,
+    /// Numbers of its vertices: in the input's order, or counter-clockwise seen from the other sub-domain.
     pub vertices: [u64; 3],
     pub label: u32,
-    /// In front (where the normal points to) and behind; 0 is empty.
+    /// Of an input triangle: in front (where the normal points to) and behind; 0 is empty, and stands for unknown at an interface.
     pub regions: [u32; 2],
-    /// Number of the tetrahedron on its filled side, on the front one when both are.
+    /// Number of the tetrahedron on its filled side, on the front one when both are written.
     pub tet: u64,
+    /// The sub-domain of that tetrahedron.
+    pub subdomain: u32,
+    /// The sub-domain behind an interface face.
+    pub neighbor: u32,
 }
 
 impl Face {
-    fn to_record(self) -> [u8; BYTES] {
+    /// Its number in the input.
+    pub fn triangle(&self) -> Option<u64> {
+        (self.key < INTERFACE).then_some(self.key)
+    }
+
+    /// The cut an interface face is of, and its number there.
+    pub fn cut(&self) -> Option<(u32, u32)> {
+        let key = self.key.checked_sub(INTERFACE)?;
+        Some(((key >> 32) as u32, key as u32))
+    }
+
+    /// `second`: on the side that has no word when both sides are written.
+    fn to_record(self, second: bool) -> [u8; BYTES] {
         let mut record = [0; BYTES];
-        record[..8].copy_from_slice(&self.triangle.to_be_bytes());
+        record[..8].copy_from_slice(&self.key.to_be_bytes());
+        record[8] = u8::from(second);
         for (i, v) in self.vertices.into_iter().enumerate() {
-            record[8 + 8 * i..16 + 8 * i].copy_from_slice(&v.to_be_bytes());
+            record[9 + 8 * i..17 + 8 * i].copy_from_slice(&v.to_be_bytes());
         }
-        record[32..36].copy_from_slice(&self.label.to_be_bytes());
-        record[36..40].copy_from_slice(&self.regions[0].to_be_bytes());
-        record[40..44].copy_from_slice(&self.regions[1].to_be_bytes());
-        record[44..].copy_from_slice(&self.tet.to_be_bytes());
+        let [front, back] = self.regions;
+        let words = [self.label, front, back, self.subdomain, self.neighbor];
+        for (i, word) in words.into_iter().enumerate() {
+            record[33 + 4 * i..37 + 4 * i].copy_from_slice(&word.to_be_bytes());
+        }
+        record[53..].copy_from_slice(&self.tet.to_be_bytes());
         record
     }
 
     fn from_record(record: &[u8; BYTES]) -> Self {
         Self {
-            triangle: word64(record, 0),
-            vertices: [8, 16, 24].map(|at| word64(record, at)),
-            label: word32(record, 32),
-            regions: [36, 40].map(|at| word32(record, at)),
-            tet: word64(record, 44),
+            key: word64(record, 0),
+            vertices: [9, 17, 25].map(|at| word64(record, at)),
+            label: word32(record, 33),
+            regions: [37, 41].map(|at| word32(record, at)),
+            subdomain: word32(record, 45),
+            neighbor: word32(record, 49),
+            tet: word64(record, 53),
         }
     }
+}
+
+/// The sub-domain whose faces are collected, with what the merged mesh knows of it.
+pub(super) struct Part<'a> {
+    pub rank: u32,
+    pub numbers: &'a PartNumbers,
+    /// Number of its first tetrahedron.
+    pub tet_first: u64,
 }
 
 /// Collects faces of one sub-domain after the other.
@@ -66,23 +98,40 @@ impl FaceSorter {
         }
     }
 
-    /// Adds a facet of a sub-domain whose first tetrahedron has number `tet_first`.
+    /// Adds a facet of a sub-domain.
     ///
-    /// A triangle between two sub-domains is in both: the one with its filled side, or with its front
-    /// when both sides are filled, has the word. Errors: the disk.
-    pub fn push(&mut self, f: &SealedFacet, numbers: &PartNumbers, tet_first: u64) -> Result<()> {
-        let side = usize::from(f.regions[0] == 0);
-        if f.tets[side] == NO_TET {
+    /// A triangle between two sub-domains is in both: the one with its filled side, or with its front when both sides are
+    /// filled, has the word, unless it is not written. Errors: the disk.
+    pub fn push(&mut self, f: &SealedFacet, part: &Part) -> Result<()> {
+        let preferred = usize::from(f.regions[0] == 0);
+        let here = [preferred, 1 - preferred];
+        let Some(&side) = here.iter().find(|&&side| f.tets[side] != NO_TET) else {
             return Ok(());
-        }
+        };
         let face = Face {
-            triangle: f.triangle,
-            vertices: f.vertices.map(|v| numbers.of(v)),
+            key: f.triangle,
+            vertices: f.vertices.map(|v| part.numbers.of(v)),
             label: f.label,
             regions: f.regions,
-            tet: tet_first + u64::from(f.tets[side]),
+            tet: part.tet_first + u64::from(f.tets[side]),
+            subdomain: part.rank,
+            neighbor: part.rank,
         };
-        Ok(self.sorter.push(face.to_record())?)
+        Ok(self.sorter.push(face.to_record(side != preferred))?)
+    }
+
+    /// Adds an interface face of a sub-domain, under a label. Errors: the disk.
+    pub fn push_interface(&mut self, f: &InterfaceFace, label: u32, part: &Part) -> Result<()> {
+        let face = Face {
+            key: INTERFACE | u64::from(f.cut) << 32 | u64::from(f.index),
+            vertices: f.vertices.map(|v| part.numbers.of(v)),
+            label,
+            regions: [0, 0],
+            tet: part.tet_first + u64::from(f.tet),
+            subdomain: part.rank,
+            neighbor: f.other,
+        };
+        Ok(self.sorter.push(face.to_record(false))?)
     }
 
     /// Ends collecting. Errors: the disk.
@@ -93,10 +142,14 @@ impl FaceSorter {
             path: self.path,
         };
         let mut stream = scratch(&faces.path)?;
+        let mut last = None;
         for record in self.sorter.finish()? {
             let record = record?;
+            if last.replace(word64(&record, 0)) == Some(word64(&record, 0)) {
+                continue;
+            }
             faces.n += 1;
-            *faces.labels.entry(word32(&record, 32)).or_default() += 1;
+            *faces.labels.entry(word32(&record, 33)).or_default() += 1;
             stream.bytes(&record);
             stream.end()?;
         }
@@ -114,7 +167,7 @@ pub(super) struct Faces {
 }
 
 impl Faces {
-    /// Every face in the order of the input. Errors: the disk, and those of `each`.
+    /// Every face, input triangles first. Errors: the disk, and those of `each`.
     pub fn each(&self, mut each: impl FnMut(&Face) -> Result<()>) -> Result<()> {
         let mut records = Records::<BYTES>::open(&self.path, 0)?;
         while let Some(record) = records.next()? {

@@ -1,7 +1,7 @@
 //! Gmsh 2.2, binary: physical surfaces are labels, physical volumes regions.
 //!
 //! Physical and elementary tags are the same: label + 1 on triangles, the region on tetrahedra.
-//! Elements are numbered from 1, triangles first. Source: the Gmsh reference manual, "MSH file format version 2".
+//! Elements are numbered from 1, triangles first. Of several sub-domains each is a partition, numbered from 1. Source: the Gmsh reference manual, "MSH file format version 2".
 
 use std::path::Path;
 
@@ -13,13 +13,21 @@ use super::stream::Stream;
 /// Gmsh's numbers of the two types of elements.
 const TRIANGLE: u32 = 2;
 const TETRAHEDRON: u32 = 4;
-/// Tags of an element: physical, elementary.
+/// Tags of an element: physical, elementary; of several sub-domains also the number of its partitions, 1, and the partition.
 const N_TAGS: u32 = 2;
+const N_TAGS_PARTITIONED: u32 = 4;
 
 pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<()> {
     mesh.check_limits(out, i32::MAX as u64)?;
     mesh.expect_passes(1, 1);
-    let bytes = 200 + 28 * mesh.n_vertices() + 24 * mesh.n_faces() + 28 * mesh.n_tets();
+    let elements_bytes = 24 * mesh.n_faces() + 28 * mesh.n_tets();
+    let partition_bytes = 8 * (mesh.n_faces() + mesh.n_tets());
+    let partitioned = if mesh.n_parts() > 1 {
+        partition_bytes
+    } else {
+        0
+    };
+    let bytes = 200 + 28 * mesh.n_vertices() + elements_bytes + partitioned;
     let names = physical_names(mesh)?;
     let path = draft.create(out, bytes + names.len() as u64)?;
     let mut stream = Stream::open(&path)?;
@@ -50,22 +58,33 @@ fn put(stream: &mut Stream, words: &[u32]) {
 
 fn elements(mesh: &mut Merged, stream: &mut Stream) -> Result<()> {
     let mut number = 0;
+    let partitioned = mesh.n_parts() > 1;
+    let n_tags = if partitioned {
+        N_TAGS_PARTITIONED
+    } else {
+        N_TAGS
+    };
+    let put_head = |stream: &mut Stream, number: u32, tag: u32, subdomain: u32| {
+        put(stream, &[number, tag, tag]);
+        if partitioned {
+            put(stream, &[1, subdomain + 1]);
+        }
+    };
     if mesh.n_faces() > 0 {
-        put(stream, &[TRIANGLE, mesh.n_faces() as u32, N_TAGS]);
+        put(stream, &[TRIANGLE, mesh.n_faces() as u32, n_tags]);
         mesh.faces().each(|face| {
             number += 1;
-            let tag = face.label + 1;
-            let [a, b, c] = face.vertices.map(|v| v as u32 + 1);
-            put(stream, &[number, tag, tag, a, b, c]);
+            put_head(stream, number, face.label + 1, face.subdomain);
+            put(stream, &face.vertices.map(|v| v as u32 + 1));
             stream.end()
         })?;
     }
     if mesh.n_tets() > 0 {
-        put(stream, &[TETRAHEDRON, mesh.n_tets() as u32, N_TAGS]);
+        put(stream, &[TETRAHEDRON, mesh.n_tets() as u32, n_tags]);
         mesh.tets(|tet| {
             number += 1;
-            let [a, b, c, d] = tet.nodes.map(|v| v as u32 + 1);
-            put(stream, &[number, tet.region, tet.region, a, b, c, d]);
+            put_head(stream, number, tet.region, tet.subdomain);
+            put(stream, &tet.nodes.map(|v| v as u32 + 1));
             stream.end()
         })?;
     }

@@ -1,13 +1,13 @@
-//! The sub-domains of a store as one mesh, streamed.
+//! Sub-domains of a store as one mesh, streamed.
 
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use tetdb_schema::ids::TetId;
 use tetdb_schema::record::SealedVertex;
 
-use super::faces::{FaceSorter, Faces};
+use super::faces::{FaceSorter, Faces, Part};
 use super::numbering::Numbering;
 use super::{Result, WriteError};
 use crate::catalog::{Catalog, CatalogError, Shape, Store, Subdomain, SubdomainRow};
@@ -47,7 +47,36 @@ pub(super) struct Tet {
     pub quality: f64,
 }
 
-/// A finished store as one conforming mesh.
+/// Which faces bound what is written, beside those that it shares with sub-domains that are not written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum FaceSet {
+    /// Input triangles.
+    Skin,
+    /// Input triangles and all interface faces.
+    SkinAndInterfaces,
+    /// All interface faces, no input triangle.
+    Interfaces,
+}
+
+/// What is written: these sub-domains, or all when there are none, with these faces.
+#[derive(Clone, Copy)]
+pub(super) struct Scope<'s> {
+    pub ranks: &'s BTreeSet<u32>,
+    pub faces: FaceSet,
+}
+
+impl Scope<'_> {
+    fn holds(&self, rank: u32) -> bool {
+        self.ranks.is_empty() || self.ranks.contains(&rank)
+    }
+
+    /// Whether the face between sub-domain `rank`, which is written, and `other` is listed, and by this side.
+    fn lists(&self, rank: u32, other: u32) -> bool {
+        !self.holds(other) || (self.faces != FaceSet::Skin && rank < other)
+    }
+}
+
+/// Sub-domains of a finished store as one conforming mesh.
 ///
 /// Shape: `parts` by rank. Each pass reads every chunk once and holds a quarter of the memory.
 pub(super) struct Merged<'a> {
@@ -56,6 +85,7 @@ pub(super) struct Merged<'a> {
     numbering: Numbering,
     faces: Faces,
     label_names: Vec<String>,
+    dir: PathBuf,
     memory: usize,
     progress: Progress<'a>,
 }
@@ -66,26 +96,39 @@ impl<'a> Merged<'a> {
     /// Errors: a store that is not finished, damage, the disk.
     pub fn open(
         store: &'a mut Store,
+        scope: Scope,
         dir: &Path,
         memory: usize,
         progress: Progress<'a>,
     ) -> Result<Self> {
         let catalog = store.catalog();
-        let path = catalog.dir().to_owned();
-        if !catalog.state()?.is_finished() {
-            return Err(CatalogError::Unfinished { path }.into());
-        }
-        let parts = catalog.subdomains()?;
+        let mut parts = catalog.subdomains()?;
+        parts.retain(|row| scope.holds(row.rank));
         let label_names = catalog.labels()?;
         let counts: Vec<_> = parts.iter().map(|row| (row.rank, row.vertices)).collect();
         let numbering = Numbering::new(store, &counts, dir, memory)?;
-        let faces = collect_faces(store, &parts, &numbering, dir, memory)?;
+        let first_label = label_names.len() as u32;
+        let mut sorter = FaceSorter::new(dir, memory as u64 / 4);
+        let mut tet_first = 0;
+        for (p, row) in parts.iter().enumerate() {
+            let numbers = numbering.part(p)?;
+            let part = Part {
+                rank: row.rank,
+                numbers: &numbers,
+                tet_first,
+            };
+            let mut from = Subdomain::open(store.catalog(), row.rank, memory / 4)?;
+            collect_faces(&mut from, &part, scope, first_label, &mut sorter)?;
+            tet_first += row.tets;
+        }
+        let faces = sorter.finish()?;
         Ok(Self {
             store,
             parts,
             numbering,
             faces,
             label_names,
+            dir: dir.to_owned(),
             memory,
             progress,
         })
@@ -93,6 +136,11 @@ impl<'a> Merged<'a> {
 
     pub fn n_vertices(&self) -> u64 {
         self.numbering.n_vertices()
+    }
+
+    /// Number of sub-domains.
+    pub fn n_parts(&self) -> usize {
+        self.parts.len()
     }
 
     pub fn n_tets(&self) -> u64 {
@@ -107,6 +155,11 @@ impl<'a> Merged<'a> {
         &self.faces
     }
 
+    /// The folder for scratch.
+    pub fn dir(&self) -> &Path {
+        &self.dir
+    }
+
     /// Bytes for a sorter beside a pass.
     pub fn sorter_bytes(&self) -> u64 {
         self.memory as u64 / 4
@@ -114,9 +167,11 @@ impl<'a> Merged<'a> {
 
     /// Names of the labels the faces have, ascending by label.
     pub fn labels(&self) -> BTreeMap<u32, String> {
-        let name = |&label: &u32| {
-            let known = self.label_names.get(label as usize);
-            (label, known.cloned().unwrap_or(format!("label_{label}")))
+        // A label that the input has not stands for an interface: collect_faces puts them behind.
+        let first = self.label_names.len() as u32;
+        let name = |&label: &u32| match self.label_names.get(label as usize) {
+            Some(name) => (label, name.clone()),
+            None => (label, format!("interface_{}", label - first)),
         };
         self.faces.labels.keys().map(name).collect()
     }
@@ -262,32 +317,38 @@ fn too_many_vertices(catalog: &Catalog, row: &SubdomainRow, end: u64) -> Catalog
     }
 }
 
+/// Hands the faces of a sub-domain that `scope` lists to `sorter`; interface faces are labelled by the sub-domain behind
+/// them, from `first_label` on.
 fn collect_faces(
-    store: &mut Store,
-    parts: &[SubdomainRow],
-    numbering: &Numbering,
-    dir: &Path,
-    memory: usize,
-) -> Result<Faces> {
-    let mut sorter = FaceSorter::new(dir, memory as u64 / 4);
-    let mut tet_first = 0;
-    for (p, row) in parts.iter().enumerate() {
-        let numbers = numbering.part(p)?;
-        let mut part = Subdomain::open(store.catalog(), row.rank, memory / 4)?;
-        let path = part.path().to_owned();
-        for facet in part.facets() {
+    from: &mut Subdomain,
+    part: &Part,
+    scope: Scope,
+    first_label: u32,
+    sorter: &mut FaceSorter,
+) -> Result<()> {
+    let n_vertices = from.row().vertices;
+    let path = from.path().to_owned();
+    let checked = |vertices: [u32; 3]| match vertices.iter().any(|&v| u64::from(v) >= n_vertices) {
+        false => Ok(()),
+        true => Err(CatalogError::Content {
+            path: path.clone(),
+            subdomain: part.rank,
+            what: format!("a face names vertices {vertices:?}"),
+        }),
+    };
+    if scope.faces != FaceSet::Interfaces {
+        for facet in from.facets() {
             let facet = facet?;
-            if facet.vertices.iter().any(|&v| u64::from(v) >= row.vertices) {
-                return Err(CatalogError::Content {
-                    path,
-                    subdomain: row.rank,
-                    what: format!("a facet names vertices {:?}", facet.vertices),
-                }
-                .into());
-            }
-            sorter.push(&facet, &numbers, tet_first)?;
+            checked(facet.vertices)?;
+            sorter.push(&facet, part)?;
         }
-        tet_first += row.tets;
     }
-    sorter.finish()
+    for face in from.interfaces() {
+        let face = face?;
+        if scope.lists(part.rank, face.other) {
+            checked(face.vertices)?;
+            sorter.push_interface(&face, first_label + face.other, part)?;
+        }
+    }
+    Ok(())
 }

@@ -2,12 +2,13 @@
 //!
 //! A store becomes one conforming mesh: vertices and tetrahedra numbered densely in (sub-domain,
 //! local) order, a vertex that several sub-domains share once, and every input triangle that bounds
-//! a filled region as a boundary face, in the order of the input. All is streamed: memory does not
+//! a filled region as a boundary face, in the order of the input. Or each sub-domain becomes a mesh of its own, numbered as in the
+//! store, and the faces that it shares with others are boundary faces too. All is streamed: memory does not
 //! grow with the mesh. Files are made in a folder beside their place and renamed when they are whole
 //! and synced. Coordinates are never rounded.
 //!
-//! Reading order: [`export`] (which format), `merged` (the sub-domains as one mesh), `numbering`
-//! (shared vertices), `faces` (input triangles), `draft` and `stream` (files), then one file per format.
+//! Reading order: [`export`] (what is written, in which format), `pieces` (a file for each sub-domain), `merged` (sub-domains as one mesh),
+//! `numbering` (shared vertices), `faces` (its boundary), `draft` and `stream` (files), then one file per format.
 
 mod abaqus;
 mod defects;
@@ -19,15 +20,18 @@ mod medit;
 mod merged;
 mod npy;
 mod numbering;
+mod pieces;
 mod selected;
 mod stream;
 mod surface;
 #[cfg(test)]
 mod tests;
+mod topology;
 mod vtu;
 mod vtu_boundary;
 mod vtu_layout;
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 pub use defects::defects;
@@ -36,10 +40,10 @@ pub use npy::{NpyField, NpyTable, TextFile};
 pub use selected::{SelectedTet, SelectedVtu};
 pub use surface::{SurfaceReport, surface};
 
-use crate::catalog::Store;
+use crate::catalog::{CatalogError, Store};
 use crate::store::attempt;
 use draft::Draft;
-use merged::{Merged, Progress};
+use merged::{FaceSet, Merged, Progress, Scope};
 
 type Result<T> = std::result::Result<T, WriteError>;
 
@@ -57,6 +61,10 @@ pub enum MeshFormat {
     Gmsh,
     /// Abaqus input.
     Abaqus,
+    /// VTK XML, each sub-domain a piece in a file of its own.
+    Pvtu,
+    /// JSON: who neighbors whom, and the vertices and faces that each two sub-domains share.
+    Topology,
 }
 
 impl MeshFormat {
@@ -69,6 +77,8 @@ impl MeshFormat {
             "meshb" => Self::MeditBinary,
             "msh" => Self::Gmsh,
             "inp" => Self::Abaqus,
+            "pvtu" => Self::Pvtu,
+            "json" => Self::Topology,
             _ => return None,
         })
     }
@@ -85,45 +95,128 @@ pub struct ExportReport {
     pub triangles: u64,
 }
 
-/// Writes the finished mesh of `store` to `out` in the format its extension tells, replacing what is there.
+/// Endings of the formats.
+pub const ENDINGS: &str = ".vtu, .pvtu, .mesh, .meshb, .msh, .inp or .json";
+
+/// What of a mesh is written.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Selection {
+    /// Ranks of sub-domains; none stands for all. What bounds them towards others is boundary.
+    pub subdomains: BTreeSet<u32>,
+    /// Each sub-domain in a file of its own.
+    pub pieces: bool,
+    pub content: Content,
+}
+
+/// Which elements are written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Content {
+    /// Tetrahedra and boundary faces.
+    #[default]
+    Mesh,
+    /// Input triangles and interface faces; only as [`MeshFormat::Vtu`].
+    Boundary,
+    /// Interface faces; only as [`MeshFormat::Vtu`].
+    Interfaces,
+}
+
+/// Writes what `selection` says of the finished mesh of `store` to `out` in the format its extension tells, replacing what is there.
 ///
 /// Holds about `memory_bytes`, and tells progress as (done, total) in records read. The files depend on the
 /// mesh alone. Errors: [`WriteError`]; no file of `out`'s name is touched before all are whole.
 pub fn export(
     store: &mut Store,
     out: &Path,
+    selection: &Selection,
     memory_bytes: usize,
     tell: &dyn Fn(u64, u64),
 ) -> Result<ExportReport> {
-    let format = MeshFormat::of_extension(out).ok_or_else(|| WriteError::UnknownFormat {
+    let unknown = |known| WriteError::UnknownFormat {
         path: out.to_owned(),
-        known: ".vtu, .mesh, .meshb, .msh or .inp",
-    })?;
-    attempt(|| export_as(format, store, out, memory_bytes, tell))?
+        known,
+    };
+    let format = MeshFormat::of_extension(out).ok_or_else(|| unknown(ENDINGS))?;
+    if selection.content != Content::Mesh && format != MeshFormat::Vtu {
+        return Err(unknown(
+            ".vtu, the only format for faces without tetrahedra",
+        ));
+    }
+    attempt(|| {
+        let catalog = store.catalog();
+        let path = catalog.dir().to_owned();
+        if !catalog.state()?.is_finished() {
+            return Err(CatalogError::Unfinished { path }.into());
+        }
+        for &rank in &selection.subdomains {
+            store.subdomain(rank)?;
+        }
+        let mut draft = Draft::new(out)?;
+        let counts = match format {
+            MeshFormat::Topology => topology::write(store, &mut draft, out, memory_bytes)?,
+            MeshFormat::Pvtu => {
+                pieces::write(store, &mut draft, out, selection, memory_bytes, tell)?
+            }
+            _ if selection.pieces => {
+                pieces::write(store, &mut draft, out, selection, memory_bytes, tell)?
+            }
+            _ => {
+                let scope = Scope {
+                    ranks: &selection.subdomains,
+                    faces: match selection.content {
+                        Content::Mesh => FaceSet::Skin,
+                        Content::Boundary => FaceSet::SkinAndInterfaces,
+                        Content::Interfaces => FaceSet::Interfaces,
+                    },
+                };
+                let progress = Progress::new(tell);
+                let dir = draft.dir().to_owned();
+                let mut mesh = Merged::open(store, scope, &dir, memory_bytes, progress)?;
+                write(format, selection.content, &mut mesh, &mut draft, out)?
+            }
+        };
+        Ok(ExportReport {
+            vertices: counts.vertices,
+            tets: counts.tets,
+            triangles: counts.triangles,
+            files: draft.publish()?,
+        })
+    })?
 }
 
-fn export_as(
+/// What was written.
+#[derive(Clone, Copy, Default)]
+struct Counts {
+    vertices: u64,
+    tets: u64,
+    triangles: u64,
+}
+
+/// Writes a mesh as one file, and what belongs to it.
+fn write(
     format: MeshFormat,
-    store: &mut Store,
+    content: Content,
+    mesh: &mut Merged,
+    draft: &mut Draft,
     out: &Path,
-    memory_bytes: usize,
-    tell: &dyn Fn(u64, u64),
-) -> Result<ExportReport> {
-    let mut draft = Draft::new(out)?;
-    let progress = Progress::new(tell);
-    let mut mesh = Merged::open(store, draft.dir(), memory_bytes, progress)?;
-    match format {
-        MeshFormat::Vtu => vtu::write(&mut mesh, &mut draft, out)?,
-        MeshFormat::Medit => medit::write_text(&mut mesh, &mut draft, out)?,
-        MeshFormat::MeditBinary => medit::write_binary(&mut mesh, &mut draft, out)?,
-        MeshFormat::Gmsh => gmsh::write(&mut mesh, &mut draft, out)?,
-        MeshFormat::Abaqus => abaqus::write(&mut mesh, &mut draft, out)?,
-    }
-    mesh.tell_end();
-    Ok(ExportReport {
+) -> Result<Counts> {
+    let mut counts = Counts {
         vertices: mesh.n_vertices(),
         tets: mesh.n_tets(),
         triangles: mesh.n_faces(),
-        files: draft.publish()?,
-    })
+    };
+    match format {
+        MeshFormat::Vtu if content != Content::Mesh => {
+            mesh.expect_passes(1, 0);
+            counts.vertices = vtu_boundary::write(mesh, draft, out)?;
+            counts.tets = 0;
+        }
+        MeshFormat::Vtu | MeshFormat::Pvtu => vtu::write(mesh, draft, out)?,
+        MeshFormat::Medit => medit::write_text(mesh, draft, out)?,
+        MeshFormat::MeditBinary => medit::write_binary(mesh, draft, out)?,
+        MeshFormat::Gmsh => gmsh::write(mesh, draft, out)?,
+        MeshFormat::Abaqus => abaqus::write(mesh, draft, out)?,
+        MeshFormat::Topology => unreachable!("the topology is no mesh"),
+    }
+    mesh.tell_end();
+    Ok(counts)
 }

@@ -166,8 +166,8 @@ impl Numbering {
     }
 }
 
-/// All vertices that another sub-domain may also have, as (id, part, local).
-fn candidates(
+/// All vertices that another sub-domain may also have, as (id, place in `parts`, local).
+pub(super) fn candidates(
     store: &mut Store,
     parts: &[(u32, u64)],
     dir: &Path,

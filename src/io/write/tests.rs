@@ -270,7 +270,7 @@ fn two_subdomains_become_one_mesh_in_every_format() -> Outcome {
     for name in ["a.vtu", "a.mesh", "a.meshb", "a.msh", "a.inp"] {
         let out = dir.path().join(name);
         std::fs::write(&out, b"what was there before")?;
-        let report = export(&mut store, &out, 1 << 20, &quiet)?;
+        let report = export(&mut store, &out, &Selection::default(), 1 << 20, &quiet)?;
         assert_eq!((report.vertices, report.tets, report.triangles), (5, 2, 6));
         for (file, bytes) in report.files {
             assert_eq!(std::fs::metadata(file)?.len(), bytes);
@@ -305,7 +305,7 @@ fn shared_vertices_are_one_and_the_boundary_is_whole() -> Outcome {
     cubes(&path, n)?;
     let mut store = Store::open(&path)?;
     let out = dir.path().join("c.vtu");
-    let report = export(&mut store, &out, 1 << 20, &quiet)?;
+    let report = export(&mut store, &out, &Selection::default(), 1 << 20, &quiet)?;
     let counts = [(n + 1).pow(3), 6 * n.pow(3), 12 * n * n].map(u64::from);
     assert_eq!([report.vertices, report.tets, report.triangles], counts);
     let vtu = Vtu::read(&out)?;
@@ -325,7 +325,7 @@ fn shared_vertices_are_one_and_the_boundary_is_whole() -> Outcome {
     let ranks = vtu.numbers("CellData.subdomain", u32::from_le_bytes);
     assert_eq!(ranks.iter().sum::<u32>() as usize * 2, ranks.len());
     let text = dir.path().join("c.mesh");
-    export(&mut store, &text, 1 << 20, &quiet)?;
+    export(&mut store, &text, &Selection::default(), 1 << 20, &quiet)?;
     assert_eq!(seen_in_medit(&text)?.canonical(), seen.canonical());
     Ok(())
 }
@@ -341,7 +341,13 @@ fn boundaries_read_back_as_the_surface() -> Outcome {
         (0..s.n_triangles() as u32).map(corners).collect::<Vec<_>>()
     };
     let boundary = dir.path().join("b.vtu");
-    export(&mut store, &boundary, 1 << 20, &quiet)?;
+    export(
+        &mut store,
+        &boundary,
+        &Selection::default(),
+        1 << 20,
+        &quiet,
+    )?;
     let vtu = Vtu::read(&dir.path().join("b_boundary.vtu"))?;
     let points = vtu.points();
     let nodes = vtu.numbers("Cells.connectivity", i32::from_le_bytes);
@@ -361,7 +367,7 @@ fn boundaries_read_back_as_the_surface() -> Outcome {
     );
     for name in ["b.mesh", "b.meshb", "b.msh"] {
         let out = dir.path().join(name);
-        export(&mut store, &out, 1 << 20, &quiet)?;
+        export(&mut store, &out, &Selection::default(), 1 << 20, &quiet)?;
         let surface = read_surface(&[out])?;
         assert_eq!(triangles(&surface), expected, "{name}");
         let runs = |l: &[u32]| l.windows(2).map(|w| w[0] == w[1]).collect::<Vec<_>>();
@@ -385,7 +391,7 @@ fn files_do_not_depend_on_the_memory() -> Outcome {
         let out = dir.path().join(name);
         let mut files = Vec::new();
         for memory in [1 << 16, 64 << 20] {
-            export(&mut store, &out, memory, &quiet)?;
+            export(&mut store, &out, &Selection::default(), memory, &quiet)?;
             files.push(std::fs::read(&out)?);
         }
         assert!(files[0] == files[1], "{name}");
@@ -404,6 +410,7 @@ fn progress_ends_at_its_total() -> Outcome {
         export(
             &mut Store::open(&path)?,
             &dir.path().join(name),
+            &Selection::default(),
             1 << 20,
             &tell,
         )?;
@@ -421,7 +428,13 @@ fn what_cannot_be_written_leaves_nothing() -> Outcome {
     two_subdomains(&path)?;
     let mut store = Store::open(&path)?;
     let mut code = |name: &str| {
-        let error = export(&mut store, &dir.path().join(name), 1 << 20, &quiet);
+        let error = export(
+            &mut store,
+            &dir.path().join(name),
+            &Selection::default(),
+            1 << 20,
+            &quiet,
+        );
         error.map(|_| "written").unwrap_or_else(|e| {
             assert!(!e.help().is_empty() && e.to_string().contains(name));
             e.code()
@@ -432,7 +445,13 @@ fn what_cannot_be_written_leaves_nothing() -> Outcome {
     std::fs::create_dir(dir.path().join("folder.vtu"))?;
     assert_eq!(code("folder.vtu"), "io");
     std::fs::remove_file(path.join("subdomain-00001-g1.redb"))?;
-    let error = export(&mut store, &dir.path().join("a.vtu"), 1 << 20, &quiet);
+    let error = export(
+        &mut store,
+        &dir.path().join("a.vtu"),
+        &Selection::default(),
+        1 << 20,
+        &quiet,
+    );
     let error = error.err().ok_or("an error")?;
     assert_eq!(error.code(), "damaged");
     assert_eq!(

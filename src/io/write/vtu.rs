@@ -1,4 +1,4 @@
-//! VTK XML unstructured grids: the tetrahedra in one file, the input triangles in another beside it.
+//! VTK XML unstructured grids: the tetrahedra in one file, the boundary faces in another beside it.
 //!
 //! Source: the VTK file formats document, appended raw data with 64-bit lengths.
 
@@ -65,7 +65,8 @@ pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
     ] {
         strip.finish()?;
     }
-    vtu_boundary::write(mesh, draft, &boundary_path(out))
+    vtu_boundary::write(mesh, draft, &boundary_path(out))?;
+    Ok(())
 }
 
 /// `NAME_boundary.vtu` beside `NAME.vtu`.

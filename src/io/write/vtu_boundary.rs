@@ -1,5 +1,6 @@
-//! The input triangles as a VTK file with vertices of their own.
+//! The boundary faces as a VTK file with vertices of their own.
 //!
+//! `input_id` is -1 on faces shared with another sub-domain; there `neighbor` is its number, `cut` and `cut_face` name the face for both.
 //! Its vertices are those of the faces, in the order of the mesh; `mesh_vertex` tells where each is in
 //! the file of the tetrahedra. Label names stand in the field array `label_names`: bytes of UTF-8, a zero
 //! after each name, because arrays of text are not read by every program.
@@ -25,8 +26,9 @@ struct Corners {
     dense: Sorted<16>,
 }
 
-pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<()> {
-    let corners = corners(mesh, draft.dir())?;
+/// Writes the faces; returns the number of their vertices.
+pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<u64> {
+    let corners = corners(mesh, mesh.dir())?;
     let n_faces = mesh.n_faces();
     let index = Index::new(corners.n_vertices, 3 * n_faces);
     let arrays = vec![
@@ -36,6 +38,10 @@ pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
         Array::new(Group::CellData, "input_id", "Int64"),
         Array::new(Group::CellData, "region_front", "UInt32"),
         Array::new(Group::CellData, "region_back", "UInt32"),
+        Array::new(Group::CellData, "subdomain", "UInt32"),
+        Array::new(Group::CellData, "neighbor", "Int64"),
+        Array::new(Group::CellData, "cut", "Int64"),
+        Array::new(Group::CellData, "cut_face", "Int64"),
         Array::new(Group::Points, "Points", "Float64").vectors(),
         Array::new(Group::Cells, "connectivity", index.kind()),
         Array::new(Group::Cells, "offsets", index.kind()),
@@ -50,6 +56,10 @@ pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
         mut triangles,
         mut fronts,
         mut backs,
+        mut ranks,
+        mut neighbors,
+        mut cuts,
+        mut cut_faces,
         mut points,
         mut nodes,
         mut ends,
@@ -76,18 +86,29 @@ pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
     mesh.faces().each(|face| {
         end += 3;
         labels.put(&face.label.to_le_bytes())?;
-        triangles.put(&face.triangle.to_le_bytes())?;
+        triangles.put(&or_none(face.triangle()).to_le_bytes())?;
         fronts.put(&face.regions[0].to_le_bytes())?;
         backs.put(&face.regions[1].to_le_bytes())?;
+        ranks.put(&face.subdomain.to_le_bytes())?;
+        let cut = face.cut();
+        neighbors.put(&or_none(cut.map(|_| u64::from(face.neighbor))).to_le_bytes())?;
+        cuts.put(&or_none(cut.map(|c| u64::from(c.0))).to_le_bytes())?;
+        cut_faces.put(&or_none(cut.map(|c| u64::from(c.1))).to_le_bytes())?;
         index.put(&mut ends, end)?;
         types.put(&[TRIANGLE])
     })?;
     for strip in [
-        numbers, ids, labels, triangles, fronts, backs, points, nodes, ends, types,
+        numbers, ids, labels, triangles, fronts, backs, ranks, neighbors, cuts, cut_faces, points,
+        nodes, ends, types,
     ] {
         strip.finish()?;
     }
-    Ok(())
+    Ok(corners.n_vertices)
+}
+
+/// A number, or -1.
+fn or_none(number: Option<u64>) -> i64 {
+    number.map_or(-1, |n| n as i64)
 }
 
 fn corners(mesh: &Merged, dir: &Path) -> Result<Corners> {

@@ -1,0 +1,110 @@
+//! Each sub-domain as a mesh of its own: vertices and tetrahedra as they are numbered in the store, and the faces it shares
+//! with others among its boundary faces, labelled `interface_N` by the sub-domain N behind them.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::draft::Draft;
+use super::merged::{FaceSet, Merged, Progress, Scope};
+use super::stream::Stream;
+use super::{Counts, MeshFormat, Result, Selection, WriteError};
+use crate::catalog::Store;
+
+pub(super) fn write(
+    store: &mut Store,
+    draft: &mut Draft,
+    out: &Path,
+    selection: &Selection,
+    memory: usize,
+    tell: &dyn Fn(u64, u64),
+) -> Result<Counts> {
+    let format = MeshFormat::of_extension(out).expect("the format was told from the name");
+    let (parallel, extension) = match format {
+        MeshFormat::Pvtu => (true, "vtu"),
+        _ => (
+            false,
+            out.extension().and_then(|e| e.to_str()).unwrap_or_default(),
+        ),
+    };
+    let mut rows = store.catalog().subdomains()?;
+    if !selection.subdomains.is_empty() {
+        rows.retain(|row| selection.subdomains.contains(&row.rank));
+    }
+    let all: u64 = rows.iter().map(|row| row.tets).sum();
+    let (mut counts, mut pieces) = (Counts::default(), Vec::new());
+    for row in rows {
+        let piece = piece_path(out, row.rank, extension);
+        let scope = Scope {
+            ranks: &BTreeSet::from([row.rank]),
+            faces: FaceSet::SkinAndInterfaces,
+        };
+        let dir = draft.dir().join(format!("piece-{}", row.rank));
+        fs::create_dir(&dir).map_err(|e| WriteError::io(&dir, e))?;
+        // A piece's records stand for its tetrahedra in the whole.
+        let told = |done: u64, total: u64| {
+            let share = done as f64 / total.max(1) as f64;
+            tell(counts.tets + (share * row.tets as f64) as u64, all);
+        };
+        let mut mesh = Merged::open(store, scope, &dir, memory, Progress::new(&told))?;
+        let made = super::write(format, selection.content, &mut mesh, draft, &piece)?;
+        fs::remove_dir_all(&dir).map_err(|e| WriteError::io(&dir, e))?;
+        counts.vertices += made.vertices;
+        counts.tets += made.tets;
+        counts.triangles += made.triangles;
+        pieces.push(piece);
+    }
+    if parallel {
+        head(draft, out, &pieces)?;
+    }
+    Ok(counts)
+}
+
+/// `NAME_00007.vtu` beside `NAME.pvtu`.
+fn piece_path(out: &Path, rank: u32, extension: &str) -> PathBuf {
+    let stem = out.file_stem().unwrap_or_default().to_string_lossy();
+    out.with_file_name(format!("{stem}_{rank:05}.{extension}"))
+}
+
+/// The file that names the pieces. Arrays as in `vtu`. Source: the VTK file formats document, "Parallel file formats".
+fn head(draft: &mut Draft, out: &Path, pieces: &[PathBuf]) -> Result<()> {
+    let path = draft.create(out, 2000)?;
+    let mut stream = Stream::open(&path)?;
+    stream.text(
+        "<?xml version=\"1.0\"?>\n<VTKFile type=\"PUnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" \
+         header_type=\"UInt64\">\n  <PUnstructuredGrid GhostLevel=\"0\">\n",
+    );
+    let groups: [(&str, &[(&str, &str)]); 2] = [
+        ("PPointData", &[("global_id", "Int64")]),
+        (
+            "PCellData",
+            &[
+                ("subdomain", "UInt32"),
+                ("region", "UInt32"),
+                ("quality", "Float64"),
+                ("global_id", "Int64"),
+            ],
+        ),
+    ];
+    for (group, arrays) in groups {
+        stream.text(&format!("    <{group}>\n"));
+        for (name, kind) in arrays {
+            stream.text(&format!(
+                "      <PDataArray type=\"{kind}\" Name=\"{name}\"/>\n"
+            ));
+        }
+        stream.text(&format!("    </{group}>\n"));
+    }
+    stream.text("    <PPoints>\n      <PDataArray type=\"Float64\" Name=\"Points\" NumberOfComponents=\"3\"/>\n    </PPoints>\n");
+    for piece in pieces {
+        let name = piece.file_name().unwrap_or_default().to_string_lossy();
+        let name = name
+            .replace('&', "&amp;")
+            .replace('"', "&quot;")
+            .replace('<', "&lt;");
+        stream.text(&format!("    <Piece Source=\"{name}\"/>\n"));
+        stream.end()?;
+    }
+    stream.text("  </PUnstructuredGrid>\n</VTKFile>\n");
+    stream.finish()
+}

@@ -1,0 +1,160 @@
+//! Sub-domains leave the store one by one, with all that a parallel solver must know of their neighbors.
+//!
+//! Why: a mesh made in parts is used in parts; what two parts share must be the same in both files, or a solver is wrong without noticing.
+//! How: one sample in four parts, each part read back from its own file and compared with the others and with what the store says.
+
+use std::collections::{BTreeMap, HashSet};
+
+use serde_json::Value;
+
+use super::place::Place;
+
+/// A MEDIT text file: vertices as they are written, triangles with their reference, number of tetrahedra.
+struct Piece {
+    vertices: Vec<String>,
+    triangles: Vec<([usize; 3], u32)>,
+    tets: usize,
+}
+
+impl Piece {
+    fn read(place: &Place, name: &str) -> Self {
+        let text = std::fs::read_to_string(place.path(name)).expect("the piece is there");
+        let section = |keyword: &str| -> Vec<&str> {
+            let mut lines = text.lines().skip_while(move |l| *l != keyword).skip(1);
+            let n = lines.next().expect("a count").parse().expect("a number");
+            lines.take(n).collect()
+        };
+        let vertices = section("Vertices").into_iter().map(str::to_owned).collect();
+        let triangles = section("Triangles").into_iter().map(|line| {
+            let words: Vec<usize> = line
+                .split(' ')
+                .map(|w| w.parse().expect("a number"))
+                .collect();
+            ([words[0] - 1, words[1] - 1, words[2] - 1], words[3] as u32)
+        });
+        Self {
+            vertices,
+            triangles: triangles.collect(),
+            tets: section("Tetrahedra").len(),
+        }
+    }
+
+    /// Triangles with a reference, each as the texts of its corners in ascending order.
+    fn faces(&self, reference: u32) -> HashSet<[&str; 3]> {
+        let of = self.triangles.iter().filter(|t| t.1 == reference);
+        of.map(|(corners, _)| {
+            let mut face = corners.map(|v| self.vertices[v].as_str());
+            face.sort_unstable();
+            face
+        })
+        .collect()
+    }
+}
+
+fn list(value: &Value) -> Vec<usize> {
+    let items = value.as_array().expect("a list").iter();
+    items
+        .map(|v| v.as_u64().expect("a number") as usize)
+        .collect()
+}
+
+#[test]
+fn what_two_parts_share_is_the_same_in_both_files() {
+    let place = Place::new();
+    place
+        .run_line("mesh sample:box,h=0.038 -o four.tetdb --subdomains 4")
+        .succeeds();
+    place
+        .run_line("export four.tetdb part.mesh --pieces")
+        .succeeds();
+    place.run_line("export four.tetdb topology.json").succeeds();
+    let info = place.run_line("info four.tetdb --json").succeeds().json();
+    let parts = info["subdomains"].as_array().expect("a list");
+    let n_labels = info["labels"].as_array().expect("a list").len() as u32;
+    let pieces: Vec<Piece> = (0..parts.len())
+        .map(|rank| Piece::read(&place, &format!("part_{rank:05}.mesh")))
+        .collect();
+    assert_eq!(pieces.len(), 4);
+    for (piece, part) in pieces.iter().zip(parts) {
+        assert_eq!(piece.tets as u64, part["tets"]);
+        assert_eq!(piece.vertices.len() as u64, part["vertices"]);
+        let faces = part["facets"].as_u64().expect("a number")
+            + part["interface_faces"].as_u64().expect("a number");
+        assert_eq!(piece.triangles.len() as u64, faces);
+    }
+    let text = std::fs::read_to_string(place.path("topology.json")).expect("the topology");
+    let topology: Value = serde_json::from_str(&text).expect("JSON");
+    let mut shared_faces = BTreeMap::new();
+    for pair in topology["pairs"].as_array().expect("a list") {
+        let [low, high] =
+            ["low", "high"].map(|side| pair[side].as_u64().expect("a number") as usize);
+        let numbers = list(&pair["vertices"][0]);
+        assert!(low < high && !numbers.is_empty());
+        let others = list(&pair["vertices"][1]);
+        assert_eq!(numbers.len(), others.len());
+        for (&a, &b) in numbers.iter().zip(&others) {
+            assert_eq!(pieces[low].vertices[a], pieces[high].vertices[b]);
+        }
+        // Points are text made from exact coordinates: equal text is the same vertex.
+        let here: HashSet<&String> = pieces[low].vertices.iter().collect();
+        let both = pieces[high]
+            .vertices
+            .iter()
+            .filter(|v| here.contains(v))
+            .count();
+        assert_eq!(
+            both,
+            numbers.len(),
+            "{low} and {high} share vertices that are not listed"
+        );
+        let reference = |other: usize| n_labels + other as u32 + 1;
+        let faces = pieces[low].faces(reference(high));
+        assert_eq!(faces, pieces[high].faces(reference(low)));
+        assert_eq!(faces.len(), list(&pair["faces"][0]).len());
+        assert_eq!(faces.len(), list(&pair["faces"][1]).len());
+        if !faces.is_empty() {
+            shared_faces.insert((low, high), faces.len() as u64);
+        }
+    }
+    let told = info["interfaces"].as_array().expect("a list").iter();
+    let mut by_pair = BTreeMap::new();
+    for row in told {
+        let [low, high, faces] =
+            ["low", "high", "faces"].map(|key| row[key].as_u64().expect("a number"));
+        *by_pair.entry((low as usize, high as usize)).or_insert(0) += faces;
+    }
+    assert_eq!(shared_faces, by_pair);
+}
+
+#[test]
+fn some_parts_are_a_mesh_with_a_closed_boundary() {
+    let place = Place::new();
+    place
+        .run_line("mesh sample:box,h=0.045 -o three.tetdb --subdomains 3")
+        .succeeds();
+    place
+        .run_line("export three.tetdb two.mesh --subdomain 0,1")
+        .succeeds();
+    let two = Piece::read(&place, "two.mesh");
+    let mut edges = BTreeMap::new();
+    for (corners, _) in &two.triangles {
+        for i in 0..3 {
+            let [a, b] = [corners[i], corners[(i + 1) % 3]];
+            *edges.entry([a.min(b), a.max(b)]).or_insert(0) += 1;
+        }
+    }
+    assert!(
+        !edges.is_empty() && edges.values().all(|n| n % 2 == 0),
+        "the boundary has a rim"
+    );
+    // It is a surface as good as any: its mesh is made like one.
+    place.run_line("check two.mesh").succeeds();
+    let nine = place.run_line("export three.tetdb nine.mesh --subdomain 9");
+    assert_eq!(nine.exit(), Some(3));
+    let faces = place.run_line("export three.tetdb faces.msh --interfaces");
+    assert_eq!(faces.exit(), Some(2));
+    assert!(!place.path("nine.mesh").exists() && !place.path("faces.msh").exists());
+    place
+        .run_line("export three.tetdb faces.vtu --interfaces")
+        .succeeds();
+}
