@@ -3,7 +3,7 @@
 
   exports.py INFO.json FILE...
 
-INFO.json: what `tetdb info --json` printed. FILE: exports of that store (.vtu .mesh .meshb .msh .inp).
+INFO.json: what `tetdb info --json` printed. FILE: exports of that store (.vtu .mesh .meshb .msh .inp .npy).
 Each file is opened by every program that reads its format (pyvista, meshio, gmsh; pip names); counts of
 tetrahedra, vertices and boundary triangles, volume, labels and regions are compared. A program that is
 not installed is skipped and named. Exit code 0 when all agree, else 1.
@@ -19,7 +19,7 @@ except ImportError:
     sys.exit("skipped: numpy is not installed")
 
 READERS = {".vtu": ("pyvista", "meshio"), ".mesh": ("meshio", "gmsh"), ".meshb": ("meshio",),
-           ".msh": ("gmsh", "meshio"), ".inp": ("meshio",)}
+           ".msh": ("gmsh", "meshio"), ".inp": ("meshio",), ".npy": ("numpy",)}
 
 
 def volume(points, tets):
@@ -54,6 +54,14 @@ def by_pyvista(path):
     tris = skin.point_data["mesh_vertex"][tris]
     return seen(np.asarray(mesh.points), tets, tris, mesh.cell_data["region"],
                 {names[i] for i in np.unique(skin.cell_data["label"])})
+
+
+def by_numpy(path):
+    load = lambda name: np.load(f"{path[:-4]}_{name}.npy", mmap_mode="r")
+    ids, quality = load("global_id"), load("quality")
+    assert len(ids) == len(quality) == len(load("subdomain")) and (np.diff(ids) > 0).all()
+    assert len(load("vertex_id")) == len(load("points")) and len(load("label")) == len(load("triangles"))
+    return seen(load("points"), load("tets"), load("triangles"), load("region"))
 
 
 def by_meshio(path):

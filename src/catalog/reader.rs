@@ -21,6 +21,32 @@ use crate::store::StoreFile;
 const MEMORY_BYTES: usize = 16 << 20;
 
 /// A store open for reading.
+///
+/// Sub-domains are read on their own, chunk by chunk; for tetrahedra by place or condition see [`report`](crate::report).
+///
+/// ```
+/// use tetdb::catalog::Store;
+/// # use tetdb::catalog::{Catalog, Job};
+/// # let dir = tempfile::tempdir()?;
+/// # let path = dir.path().join("box.tetdb");
+/// # let surface = tetdb::samples::SampleSpec::parse("box,h=0.5")?.make()?.into();
+/// # let mut catalog = Catalog::create(&path, &Job::default())?;
+/// # let (options, budget) = (Default::default(), tetdb::store::Budget::new(256 << 20));
+/// # tetdb::pipeline::mesh(&mut catalog, &surface, &options, &budget, &|_| {})?;
+/// # catalog.close()?;
+///
+/// let mut store = Store::open(&path)?;
+/// let mut part = store.subdomain(0)?;
+/// let tets = part.tets().collect::<Result<Vec<_>, _>>()?;
+/// let (id, tet) = tets[0];
+/// assert_eq!(id.to_string(), "0:0");
+/// let [a, b, c, d] = part.corners(tet.nodes)?.map(|corner| corner.point);
+/// assert!((b - a).dot((c - a).cross(d - a)) > 0.0);
+/// // Input triangles with the tetrahedra on both sides, and faces shared with other sub-domains.
+/// assert!(part.facets().count() > 0);
+/// assert_eq!(part.interfaces().count(), 0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Store {
     catalog: Catalog,
 }

@@ -76,7 +76,7 @@ pub struct RunArgs {
     /// Skip the verification at the end
     #[arg(long)]
     pub no_verify: bool,
-    /// Also write these mesh files (.vtu, .pvtu, .mesh, .meshb, .msh, .inp)
+    /// Also write these mesh files (.vtu, .pvtu, .mesh, .meshb, .msh, .inp, .npy)
     #[arg(long, value_name = "FILE")]
     pub export: Vec<PathBuf>,
     /// Answer with one JSON object
@@ -285,7 +285,7 @@ pub struct CompareArgs {
 pub struct ExportArgs {
     #[arg(value_name = "STORE")]
     pub store: PathBuf,
-    /// Files to write; the extension tells the format: .vtu, .pvtu, .mesh, .meshb, .msh, .inp, .json (topology)
+    /// Files to write; the extension tells the format: .vtu, .pvtu, .mesh, .meshb, .msh, .inp, .npy (an array a file), .json (topology)
     #[arg(required = true, value_name = "OUT")]
     pub out: Vec<PathBuf>,
     /// A file for each sub-domain, NAME_00007.mesh, with the faces it shares with others; .pvtu always does so

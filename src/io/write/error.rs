@@ -77,7 +77,7 @@ impl WriteError {
     pub fn help(&self) -> &'static str {
         match self {
             Self::UnknownFormat { .. } => {
-                "end the name of a mesh with .vtu, .mesh, .meshb, .msh or .inp, of a surface with .stl, .off, .obj or .ply"
+                "end the name of a mesh with .vtu, .mesh, .meshb, .msh, .inp or .npy, of a surface with .stl, .off, .obj or .ply"
             }
             Self::Lossy { .. } => "choose .ply, .obj, .off or .stl (text), which keep doubles",
             Self::TooLarge { .. } => "export to .vtu or .meshb, whose numbers have 64 bits",

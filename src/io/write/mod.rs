@@ -19,6 +19,7 @@ mod gmsh;
 mod medit;
 mod merged;
 mod npy;
+mod npy_columns;
 mod numbering;
 mod pieces;
 mod selected;
@@ -61,6 +62,8 @@ pub enum MeshFormat {
     Gmsh,
     /// Abaqus input.
     Abaqus,
+    /// NumPy arrays, a file each: `NAME_points.npy`, `NAME_tets.npy` and others.
+    Numpy,
     /// VTK XML, each sub-domain a piece in a file of its own.
     Pvtu,
     /// JSON: who neighbors whom, and the vertices and faces that each two sub-domains share.
@@ -77,6 +80,7 @@ impl MeshFormat {
             "meshb" => Self::MeditBinary,
             "msh" => Self::Gmsh,
             "inp" => Self::Abaqus,
+            "npy" => Self::Numpy,
             "pvtu" => Self::Pvtu,
             "json" => Self::Topology,
             _ => return None,
@@ -96,7 +100,7 @@ pub struct ExportReport {
 }
 
 /// Endings of the formats.
-pub const ENDINGS: &str = ".vtu, .pvtu, .mesh, .meshb, .msh, .inp or .json";
+pub const ENDINGS: &str = ".vtu, .pvtu, .mesh, .meshb, .msh, .inp, .npy or .json";
 
 /// What of a mesh is written.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -215,6 +219,7 @@ fn write(
         MeshFormat::MeditBinary => medit::write_binary(mesh, draft, out)?,
         MeshFormat::Gmsh => gmsh::write(mesh, draft, out)?,
         MeshFormat::Abaqus => abaqus::write(mesh, draft, out)?,
+        MeshFormat::Numpy => npy_columns::write(mesh, draft, out)?,
         MeshFormat::Topology => unreachable!("the topology is no mesh"),
     }
     mesh.tell_end();

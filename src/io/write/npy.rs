@@ -13,7 +13,7 @@ pub(super) const HEAD_BYTES: usize = 1024;
 /// Magic, version 1.0.
 const MAGIC: &[u8; 8] = b"\x93NUMPY\x01\x00";
 
-/// The head of an array of `rows` entries of `kind` (`'<f8'`, or a list of fields) and inner shape `inner` (`3,` or nothing).
+/// The head of an array of `rows` entries of `kind` (`'<f8'`, or a list of fields) and inner shape `inner` (` 3` or nothing).
 pub(super) fn head(kind: &str, rows: u64, inner: &str) -> Vec<u8> {
     let text = format!("{{'descr': {kind}, 'fortran_order': False, 'shape': ({rows},{inner}), }}");
     let length = HEAD_BYTES - MAGIC.len() - 2;

@@ -115,6 +115,52 @@ impl Vtu {
     }
 }
 
+/// The numbers of a NumPy file, whose head must tell this type and inner shape.
+fn npy(path: &Path, kind: &str, inner: &str) -> Outcome<Vec<u8>> {
+    let bytes = std::fs::read(path)?;
+    let start = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+    let head = std::str::from_utf8(&bytes[10..start])?.to_owned();
+    assert!(bytes.starts_with(b"\x93NUMPY\x01\x00") && start % 64 == 0 && head.ends_with('\n'));
+    assert!(head.contains(&format!("'descr': {kind},")), "{head}");
+    let rows = head
+        .split("'shape': (")
+        .nth(1)
+        .and_then(|s| s.split(',').next());
+    let rows: usize = rows.ok_or("a shape")?.parse()?;
+    assert!(head.contains(&format!("({rows},{inner})")), "{head}");
+    let width: usize = kind[3..4].parse()?;
+    let numbers = inner.trim().parse().unwrap_or(1);
+    assert_eq!(bytes.len() - start, rows * width * numbers);
+    Ok(bytes[start..].to_vec())
+}
+
+fn seen_in_npy(stem: &Path) -> Outcome<Seen> {
+    let file = |name: &str| format!("{}_{name}.npy", stem.display()).into();
+    let load = |name: &str, kind, inner| -> Outcome<Vec<u8>> {
+        let path: std::path::PathBuf = file(name);
+        npy(&path, kind, inner)
+    };
+    let numbers = |bytes: Vec<u8>| -> Vec<u32> {
+        let words = bytes.chunks(4);
+        words
+            .map(|c| u32::from_le_bytes(c.try_into().expect("four")))
+            .collect()
+    };
+    let points = load("points", "'<f8'", " 3")?;
+    let doubles = points.chunks(8);
+    let x: Vec<f64> = doubles
+        .map(|c| f64::from_le_bytes(c.try_into().expect("eight")))
+        .collect();
+    Ok(Seen {
+        points: x.chunks(3).map(|p| [p[0], p[1], p[2]]).collect(),
+        tets: numbers(load("tets", "'<i4'", " 4")?)
+            .chunks(4)
+            .map(|t| [0, 1, 2, 3].map(|i| t[i] as usize))
+            .collect(),
+        regions: numbers(load("region", "'<u4'", "")?),
+    })
+}
+
 /// The numbers of a MEDIT text file after a keyword.
 fn medit(path: &Path, keyword: &str) -> Outcome<Vec<f64>> {
     let text = std::fs::read_to_string(path)?;
@@ -324,6 +370,20 @@ fn shared_vertices_are_one_and_the_boundary_is_whole() -> Outcome {
     assert_eq!(ids[ids.len() / 2], 1 << 29);
     let ranks = vtu.numbers("CellData.subdomain", u32::from_le_bytes);
     assert_eq!(ranks.iter().sum::<u32>() as usize * 2, ranks.len());
+    let report = export(
+        &mut store,
+        &dir.path().join("c.npy"),
+        &Selection::default(),
+        1 << 20,
+        &quiet,
+    )?;
+    assert_eq!(report.files.len(), 10);
+    let arrays = seen_in_npy(&dir.path().join("c"))?;
+    assert_eq!(arrays, seen);
+    let ids_too = npy(&dir.path().join("c_global_id.npy"), "'<i8'", "")?;
+    assert_eq!(ids_too, vtu.arrays["CellData.global_id"]);
+    let triangles = npy(&dir.path().join("c_triangles.npy"), "'<i4'", " 3")?;
+    assert_eq!(triangles.len() as u64, 12 * report.triangles);
     let text = dir.path().join("c.mesh");
     export(&mut store, &text, &Selection::default(), 1 << 20, &quiet)?;
     assert_eq!(seen_in_medit(&text)?.canonical(), seen.canonical());

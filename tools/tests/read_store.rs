@@ -1,0 +1,52 @@
+//! The example that knows only the schema reads what the library wrote.
+//!
+//! Why: a store must be readable by programs that do not have the mesher.
+//! How: a small mesh in two sub-domains, read by the example and by the library; the example's text names no `tetdb::`.
+
+use tetdb::catalog::{Catalog, Job, Store};
+use tetdb::pipeline::{self, Options};
+use tetdb::samples::SampleSpec;
+use tetdb::store::Budget;
+
+#[path = "../examples/read_store.rs"]
+mod example;
+
+#[test]
+fn the_schema_alone_reads_a_store() -> Result<(), Box<dyn std::error::Error>> {
+    let dir = tempfile::tempdir()?;
+    let path = dir.path().join("box.tetdb");
+    let surface = SampleSpec::parse("box,h=0.05")?.make()?.into();
+    let options = Options {
+        subdomains: Some("2".to_owned()),
+        ..Options::default()
+    };
+    let job = Job {
+        options: serde_json::to_string(&options)?,
+        ..Job::default()
+    };
+    let mut catalog = Catalog::create(&path, &job)?;
+    pipeline::mesh(
+        &mut catalog,
+        &surface,
+        &options,
+        &Budget::new(256 << 20),
+        &|_| {},
+    )?;
+    catalog.close()?;
+
+    let found = example::read(&path)?;
+    let mut store = Store::open(&path)?;
+    let rows = store.catalog().subdomains()?;
+    assert_eq!(found.subdomains, 2);
+    assert_eq!(found.subdomains, rows.len());
+    assert_eq!(found.tets, rows.iter().map(|r| r.tets).sum::<u64>());
+    assert_eq!(found.vertices, rows.iter().map(|r| r.vertices).sum::<u64>());
+    assert!((found.volume - rows.iter().map(|r| r.volume).sum::<f64>()).abs() < 1e-9);
+    assert_eq!(found.digest, store.digest()?[0].to_string());
+    let text = include_str!("../examples/read_store.rs");
+    assert!(
+        !text.contains("tetdb::"),
+        "the example may use the schema only"
+    );
+    Ok(())
+}
