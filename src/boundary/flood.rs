@@ -16,8 +16,8 @@ pub(super) struct Component {
     pub volume: f64,
     pub tets: u32,
     pub facets: u32,
-    /// The smallest facet around it.
-    pub facet_first: u32,
+    /// The first side of a facet at it: twice the facet, and one more for its back.
+    pub side_first: u64,
     pub labels: BTreeSet<u32>,
 }
 
@@ -55,7 +55,7 @@ impl Flood {
     fn fill<P: Pages>(&mut self, mesh: &mut Mesh<P>, first: u32) {
         let component = self.components.len() as u32;
         let mut found = Component {
-            facet_first: u32::MAX,
+            side_first: u64::MAX,
             ..Component::default()
         };
         let mut stack = Stack { len: 0 };
@@ -80,10 +80,10 @@ impl Flood {
     }
 
     /// Facet `n` bounds component `c`.
-    pub(super) fn touch(&mut self, c: u32, n: u32, label: u32) {
+    pub(super) fn touch(&mut self, c: u32, side: u64, label: u32) {
         let component = &mut self.components[c as usize];
         component.facets += 1;
-        component.facet_first = component.facet_first.min(n);
+        component.side_first = component.side_first.min(side);
         component.labels.insert(label);
     }
 }

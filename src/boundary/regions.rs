@@ -31,7 +31,7 @@ pub struct RegionSummary {
 /// The bounded volumes of a surface.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Regions {
-    /// Ordered by the smallest facet around each.
+    /// Ordered by the smallest facet around each, the one in front of it first.
     pub list: Vec<RegionSummary>,
     /// Parity was contradictory (shared walls), so all were filled.
     pub all_instead_of_parity: bool,
@@ -55,7 +55,7 @@ pub fn fill_regions<P: Pages>(
     let mut regions = Regions::default();
     let filled = choose(mesh, &flood, &walls, policy, &mut regions)?;
     let mut order: Vec<u32> = (OUTSIDE + 1..flood.components.len() as u32).collect();
-    order.sort_by_key(|&c| flood.components[c as usize].facet_first);
+    order.sort_by_key(|&c| flood.components[c as usize].side_first);
     let mut number = vec![0u32; flood.components.len()];
     let mut n = 0;
     for &c in &order {
@@ -102,9 +102,9 @@ fn survey<P: Pages>(mesh: &mut Mesh<P>, flood: &mut Flood) -> Result<Walls, Boun
         facet.regions = if behind { [there, here] } else { [here, there] };
         mesh.set_facet(n, facet);
         let [front, back] = facet.regions;
-        flood.touch(front, n, facet.label);
+        flood.touch(front, 2 * u64::from(n), facet.label);
         if front != back {
-            flood.touch(back, n, facet.label);
+            flood.touch(back, 2 * u64::from(n) + 1, facet.label);
             let wall = walls.entry((front.min(back), front.max(back))).or_default();
             if front < back {
                 wall.front += 1;

@@ -131,6 +131,12 @@ pub struct ShapeArgs {
         allow_hyphen_values = true
     )]
     pub size_cylinder: Vec<String>,
+    /// Edge length in a region, by its number in `tetdb info` or a label of triangles around it; may be repeated
+    #[arg(long, value_name = "REGION_OR_LABEL,H")]
+    pub size_region: Vec<String>,
+    /// Edge length as an expression in x, y and z, such as 'max(0.02, 0.1*sqrt(x^2+y^2))'
+    #[arg(long, value_name = "EXPR", allow_hyphen_values = true)]
+    pub size_expr: Option<String>,
     /// Options from a TOML file, such as hsiz = "2%"; what the command line says goes first
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,

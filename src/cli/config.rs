@@ -25,6 +25,7 @@ pub fn options(args: &ShapeArgs) -> Result<Options, Failure> {
         (&args.hmin, &mut options.hmin),
         (&args.hmax, &mut options.hmax),
         (&args.hgrad, &mut options.hgrad),
+        (&args.size_expr, &mut options.size_expr),
         (&args.regions.map(word), &mut options.regions),
         (&args.optimize.map(word), &mut options.optimize),
         (&args.subdomains, &mut options.subdomains),
@@ -38,6 +39,7 @@ pub fn options(args: &ShapeArgs) -> Result<Options, Failure> {
         (&args.size_box, &mut options.size_box),
         (&args.size_sphere, &mut options.size_sphere),
         (&args.size_cylinder, &mut options.size_cylinder),
+        (&args.size_region, &mut options.size_region),
     ];
     for (given, option) in lists {
         if !given.is_empty() {

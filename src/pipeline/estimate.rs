@@ -4,9 +4,10 @@
 //! Unless another case is named, they are those of `balls,count=100` (394,000 tetrahedra on 62,000 triangles), `box,h=0.02` (1.03 million on
 //! 30,000), the armadillo (1.02 million on 52,000), `balls,count=1000` (4.04 million on 506,000).
 
+use super::regions::region_sizes;
 use super::{MEMORY_MIN, Options, PipelineError, Plan};
 use crate::optimize::Mode;
-use crate::sizing::{Counts, Domain, SizeField, SizeSummary};
+use crate::sizing::{Counts, Domain, SizeField, SizeSummary, Wish};
 use crate::surface::{OUTSIDE, Seeker, Surface, Volumes};
 
 /// Tetrahedra of one sub-domain, unless a number of sub-domains is asked for.
@@ -78,9 +79,24 @@ pub struct Prepared {
 ///
 /// The result depends on surface and options alone. Errors: options that make no sense for the surface; orientations that contradict each other.
 pub fn prepare(surface: &Surface, options: &Options) -> Result<Prepared, PipelineError> {
+    let sizes = options.sizes()?;
+    let seeker = Seeker::new(surface);
+    let volumes = Volumes::of(&seeker);
+    let policy = options.regions()?;
+    let chosen = policy.filled(OUTSIDE, volumes.n_volumes, &volumes.walls())?;
+    let filled: Vec<bool> = (0..volumes.n_volumes)
+        .map(|v| chosen.volumes.contains(&v))
+        .collect();
+    let domain = Domain {
+        seeker: &seeker,
+        volumes: &volumes,
+        filled: &filled,
+    };
+    let regions = region_sizes(&domain, &sizes)?;
+    let wishes: Vec<&dyn Wish> = regions.iter().map(|r| r as &dyn Wish).collect();
     let (field, sizes) =
-        SizeField::build_with_summary(&surface.points, &surface.triangles, &options.sizes()?)?;
-    let estimate = Estimate::of(surface, options, &field)?;
+        SizeField::build_with(&surface.points, &surface.triangles, &sizes, &wishes)?;
+    let estimate = Estimate::of(&domain, options, &field)?;
     Ok(Prepared {
         field,
         sizes,
@@ -89,20 +105,9 @@ pub fn prepare(surface: &Surface, options: &Options) -> Result<Prepared, Pipelin
 }
 
 impl Estimate {
-    fn of(surface: &Surface, options: &Options, field: &SizeField) -> Result<Self, PipelineError> {
-        let seeker = Seeker::new(surface);
-        let volumes = Volumes::of(&seeker);
-        let policy = options.regions()?;
-        let chosen = policy.filled(OUTSIDE, volumes.n_volumes, &volumes.walls())?;
-        let filled: Vec<bool> = (0..volumes.n_volumes)
-            .map(|v| chosen.volumes.contains(&v))
-            .collect();
-        let domain = Domain {
-            seeker: &seeker,
-            volumes: &volumes,
-            filled: &filled,
-        };
-        let mut counts = field.counts(&domain);
+    fn of(domain: &Domain, options: &Options, field: &SizeField) -> Result<Self, PipelineError> {
+        let surface = domain.seeker.surface();
+        let mut counts = field.counts(domain);
         counts.inner_tets *= match options.mode()? {
             Mode::None => UNOPTIMIZED,
             Mode::Delaunay => DELAUNAY,

@@ -17,6 +17,7 @@ mod fine;
 mod leaf;
 mod options;
 mod plan;
+mod regions;
 mod run;
 mod seal;
 mod tree;

@@ -3,7 +3,7 @@ use serde::{Deserialize, Serialize};
 use super::PipelineError;
 use crate::boundary::RegionPolicy;
 use crate::optimize::Mode;
-use crate::sizing::{SizeOptions, SizeSource, SizingError};
+use crate::sizing::{Formula, RegionSize, SizeOptions, SizeSource, SizingError};
 
 /// What decides the mesh, besides the surface; stored with the job. Memory and threads are not here: they do not.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -21,6 +21,12 @@ pub struct Options {
     pub size_sphere: Vec<String>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub size_cylinder: Vec<String>,
+    /// Sizes of regions, as typed.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub size_region: Vec<String>,
+    /// A length as an expression in x, y and z.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_expr: Option<String>,
     /// `parity`, `all`, `outer`, `by-orientation`.
     pub regions: Option<String>,
     /// `none`, `delaunay`, `full`.
@@ -53,6 +59,9 @@ impl Options {
             .chain(spheres)
             .chain(cylinders)
             .collect::<Result<_, _>>()?;
+        sizes.formula = self.size_expr.as_deref().map(Formula::parse).transpose()?;
+        let regions = self.size_region.iter().map(|t| RegionSize::parse(t));
+        sizes.regions = regions.collect::<Result<_, _>>()?;
         Ok(sizes)
     }
 

@@ -12,6 +12,24 @@ pub enum SizingError {
     },
     #[error("the smallest size {hmin} is above the largest size {hmax}; change --hmin or --hmax")]
     Crossed { hmin: f64, hmax: f64 },
+    #[error("--size-expr {text}: {message} (at character {})", at + 1)]
+    BadFormula {
+        text: String,
+        /// Byte of the text.
+        at: usize,
+        message: String,
+    },
+    #[error(
+        "--size-expr {text} is {found} at ({}, {}, {}): expected a length above zero everywhere in the surface's box",
+        at[0], at[1], at[2]
+    )]
+    NoSize {
+        text: String,
+        at: [f64; 3],
+        found: f64,
+    },
+    #[error("--size-region {found}: {expected}")]
+    BadRegion { found: String, expected: String },
     #[error("the surface has no edge of positive length, so it gives no size")]
     NoEdges,
     #[error(

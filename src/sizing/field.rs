@@ -8,6 +8,7 @@ use super::sources::ResolvedSource;
 use super::summary::SizeSummary;
 use super::tree::{DEPTH, LATTICE, LEAF, Leaf, Tree, octant_of};
 use super::values::corner_values;
+use super::wishes::{Wish, Wishes};
 use super::{SizingError, summary};
 use crate::geom::{Point, lex_cmp};
 use std::cmp::Ordering;
@@ -64,26 +65,35 @@ impl SizeField {
         triangles: &[[u32; 3]],
         options: &SizeOptions,
     ) -> Result<Self, SizingError> {
-        Ok(Self::build_with_summary(points, triangles, options)?.0)
+        Ok(Self::build_with(points, triangles, options, &[])?.0)
     }
 
-    /// Builds the field and says where its sizes came from.
+    /// Builds the field with further wishes, and says where its sizes came from.
     ///
     /// # Errors
-    /// As [`SizeField::build`].
-    pub fn build_with_summary(
+    /// As [`SizeField::build`]; a wish that is no size somewhere in the surface's box.
+    pub fn build_with(
         points: &[Point],
         triangles: &[[u32; 3]],
         options: &SizeOptions,
+        wishes: &[&dyn Wish],
     ) -> Result<(Self, SizeSummary), SizingError> {
         let (frame, bounds, seeds) = seeds_of(points, triangles)?;
         let targets = options.resolve(bounds.diagonal())?;
         let scaled = targets.scaled(1.0 / frame.side);
-        let tree = Tree::build(&seeds, &scaled)?;
+        let mut list = wishes.to_vec();
+        list.extend(options.formula.iter().map(|f| f as &dyn Wish));
+        let wishes = Wishes {
+            list: &list,
+            frame,
+            bounds,
+            least: scaled.hmin.unwrap_or(0.0),
+        };
+        let tree = Tree::build(&seeds, &scaled, &wishes)?;
         let values = {
             let leaves = tree.leaves();
             let corners = Corners::of(&tree, &leaves);
-            let h = corner_values(&tree, &leaves, &corners, &seeds, &scaled);
+            let h = corner_values(&tree, &leaves, &corners, &seeds, &scaled, &wishes)?;
             let of_leaf = corners.of_leaf.iter();
             of_leaf.map(|ids| ids.map(|c| h[c as usize])).collect()
         };

@@ -4,7 +4,11 @@
 //! number of threads can change what it says. It is built once from the surface: an octree,
 //! fine only where sizes differ (`tree`); values on its corners, interpolated from the surface's edges,
 //! joined to the wanted interior size and graded (`values`); trilinear between them (`field`). Boxes, spheres and
-//! cylinders with sizes of their own are formulas beside it (`sources`); the least of all counts.
+//! cylinders with sizes of their own are formulas beside it (`sources`); expressions (`formula`), sizes of regions (`region`) are
+//! brought into the octree when it is made (`wishes`). The least of all counts.
+//!
+//! How much there is to mesh follows from the field and the surface: the load of what is inside (`integral`), tetrahedra and
+//! vertices to expect (`count`).
 //!
 //! Lengths along edges and loads of tetrahedra are closed forms for h linear between vertices (`closed`).
 //! Only IEEE basic operations and square roots are used: results are equal on every machine.
@@ -17,14 +21,17 @@ mod corners;
 mod count;
 mod error;
 mod field;
+mod formula;
 mod integral;
 mod math;
 mod options;
+mod region;
 mod seeds;
 mod sources;
 mod summary;
 mod tree;
 mod values;
+mod wishes;
 
 #[cfg(test)]
 mod tests;
@@ -33,7 +40,10 @@ pub use closed::{TETS_PER_LOAD, divide_parameters, load_of_tet, metric_length};
 pub use count::Counts;
 pub use error::SizingError;
 pub use field::SizeField;
+pub use formula::Formula;
 pub use integral::{Domain, Skin};
-pub use options::{Length, SizeOptions};
+pub use options::{Length, RegionSize, SizeOptions};
+pub use region::Region;
 pub use sources::{Shape, SizeSource};
 pub use summary::{Range, SizeSummary, SizeWarning};
+pub use wishes::Wish;

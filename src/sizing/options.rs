@@ -2,6 +2,7 @@
 
 use super::SizingError;
 use super::closed::slope_of_gradation;
+use super::formula::Formula;
 use super::sources::SizeSource;
 
 /// A length, or a share of the diagonal of the surface's box.
@@ -47,6 +48,35 @@ impl Length {
     }
 }
 
+/// A size for one region, as asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RegionSize {
+    /// A region's number, or a label of triangles around it.
+    pub which: String,
+    pub h: Length,
+}
+
+impl RegionSize {
+    /// Reads `REGION_OR_LABEL,H`; a label may hold commas.
+    ///
+    /// # Errors
+    /// Names the option and the value.
+    pub fn parse(text: &str) -> Result<Self, SizingError> {
+        let parts = text
+            .rsplit_once(',')
+            .filter(|(which, _)| !which.trim().is_empty());
+        let (which, h) = parts.ok_or_else(|| SizingError::BadValue {
+            option: "--size-region",
+            found: text.to_owned(),
+            expected: "REGION,H or LABEL,H, such as 2,0.05",
+        })?;
+        Ok(Self {
+            which: which.trim().to_owned(),
+            h: Length::parse("--size-region", h)?,
+        })
+    }
+}
+
 /// Wanted sizes. By default they come from the surface's own edges.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SizeOptions {
@@ -60,6 +90,10 @@ pub struct SizeOptions {
     pub hgrad: f64,
     /// Shapes with sizes of their own; `hmin` bounds them too.
     pub sources: Vec<SizeSource>,
+    /// A length by position; `hmin` bounds it too.
+    pub formula: Option<Formula>,
+    /// Lengths of regions; `hmin` bounds them too. Whoever builds the field makes [`Region`](super::Region)s of them.
+    pub regions: Vec<RegionSize>,
 }
 
 impl Default for SizeOptions {
@@ -72,6 +106,8 @@ impl Default for SizeOptions {
             hmax: None,
             hgrad: 1.3,
             sources: Vec::new(),
+            formula: None,
+            regions: Vec::new(),
         }
     }
 }
@@ -100,6 +136,11 @@ impl SizeOptions {
             options.hgrad = value.ok_or_else(|| bad_gradation(text))?;
         }
         Ok(options)
+    }
+
+    /// Slope bound of the field, `ln(hgrad)`.
+    pub fn beta(&self) -> f64 {
+        slope_of_gradation(self.hgrad)
     }
 
     /// Lengths for a box of that diagonal, checked together.

@@ -143,6 +143,12 @@ fn source_of(options: &SizeOptions, targets: &Targets) -> String {
     if !options.sources.is_empty() {
         parts.push(format!("{} shapes", options.sources.len()));
     }
+    if !options.regions.is_empty() {
+        parts.push(format!("{} regions", options.regions.len()));
+    }
+    if options.formula.is_some() {
+        parts.push("--size-expr".to_owned());
+    }
     parts.push("the surface's edges".to_owned());
     format!("{}, --hgrad {}", parts.join(", "), options.hgrad)
 }

@@ -59,6 +59,13 @@ fn options(hsiz: Option<&str>, hmin: Option<&str>, hmax: Option<&str>) -> SizeOp
     SizeOptions::parse(hsiz, hmin, hmax, None).unwrap()
 }
 
+fn formula(text: &str) -> SizeOptions {
+    SizeOptions {
+        formula: Some(Formula::parse(text).unwrap()),
+        ..SizeOptions::default()
+    }
+}
+
 fn build(surface: &(Vec<Point>, Vec<[u32; 3]>), options: &SizeOptions) -> SizeField {
     SizeField::build(&surface.0, &surface.1, options).unwrap()
 }
@@ -85,6 +92,14 @@ fn fields() -> Vec<(&'static str, SizeField)> {
         (
             "steep, hmin",
             build(&steep, &options(None, Some("2%"), None)),
+        ),
+        (
+            "even, a valley",
+            build(&even, &formula("0.01+0.4*abs(x-y)")),
+        ),
+        (
+            "even, a step",
+            build(&even, &formula("if(x+2*z<1.1,0.01,1)")),
         ),
         (
             "steep, hsiz",
@@ -199,6 +214,52 @@ fn steep_surfaces_are_followed() {
 }
 
 #[test]
+fn formulas_are_followed_as_far_as_the_gradation_allows() {
+    let even = cube(20, |i| i as f64 / 20.0);
+    let surface_h = build(&even, &SizeOptions::default()).h(Point::splat(0.5));
+    let valley = build(&even, &formula("0.01+0.4*abs(x-0.4)"));
+    let mut dice = Dice(8);
+    for _ in 0..10_000 {
+        let p = dice.point();
+        // Steeper than the field may be: it rises with its own slope.
+        let wanted = (0.01 + valley.beta() * (p.x - 0.4).abs()).min(surface_h);
+        let ratio = valley.h(p) / wanted;
+        assert!((0.85..1.3).contains(&ratio), "{p} {ratio}");
+    }
+    // A ball a tenth of the cube wide, far from everything else.
+    let ball = "if((x-0.3)^2+(y-0.6)^2+(z-0.45)^2<0.0025,0.004,9)";
+    let ball = build(&even, &formula(ball));
+    let center = ball.h(Point::new(0.3, 0.6, 0.45));
+    assert!((center / 0.004 - 1.0).abs() < 0.01, "{center}");
+    assert!(ball.h(Point::splat(0.9)) > 0.9 * surface_h);
+    // No size goes below --hmin.
+    let mut floored = formula("0.004");
+    floored.hmin = Some(Length::Absolute(0.03));
+    let h = build(&even, &floored).h(Point::splat(0.5));
+    assert!((h / 0.03 - 1.0).abs() < 1e-5, "{h}");
+}
+
+#[test]
+fn formulas_that_give_no_size_are_refused() {
+    let even = cube(4, |i| i as f64 / 4.0);
+    for text in ["x-0.5", "1/0", "0/0", "-1", "sqrt(x-0.9)", "0"] {
+        let found = SizeField::build(&even.0, &even.1, &formula(text)).unwrap_err();
+        assert!(
+            matches!(found, SizingError::NoSize { .. }),
+            "{text} {found}"
+        );
+        assert!(found.to_string().contains(text), "{found}");
+    }
+    // Outside the surface's box nothing is asked.
+    let inside = "if(min(x,min(y,z))<-1e-9 or max(x,max(y,z))>1.000000001,0/0,0.1)";
+    assert!(SizeField::build(&even.0, &even.1, &formula(inside)).is_ok());
+    for text in ["x +", "w", "x > 0", ""] {
+        let found = Formula::parse(text).unwrap_err();
+        assert!(matches!(found, SizingError::BadFormula { .. }), "{found}");
+    }
+}
+
+#[test]
 fn equal_bits_for_any_number_of_threads() {
     let steep = graded(20.0, 120);
     let bytes = [1, 2, 3].map(|n| {
@@ -206,7 +267,9 @@ fn equal_bits_for_any_number_of_threads() {
             .num_threads(n)
             .build()
             .unwrap();
-        pool.install(|| build(&steep, &options(None, None, Some("0.05"))).to_bytes())
+        let mut asked = options(None, None, Some("0.05"));
+        asked.formula = formula("0.02+x*y").formula;
+        pool.install(|| build(&steep, &asked).to_bytes())
     });
     assert!(bytes[0] == bytes[1] && bytes[0] == bytes[2]);
 }
@@ -344,7 +407,7 @@ fn bad_values_are_named() {
 fn summaries_say_where_sizes_came_from() {
     let (points, triangles) = cube(20, |i| i as f64 / 20.0);
     let asked = options(Some("1%"), None, None);
-    let (_, summary) = SizeField::build_with_summary(&points, &triangles, &asked).unwrap();
+    let (_, summary) = SizeField::build_with(&points, &triangles, &asked, &[]).unwrap();
     let text = summary.to_string();
     assert!(
         text.contains("--hsiz 1% = 0.0173") && text.contains("--hgrad 1.3"),

@@ -6,6 +6,7 @@
 use super::SizingError;
 use super::options::Targets;
 use super::seeds::Seed;
+use super::wishes::Wishes;
 use crate::geom::Point;
 use rayon::prelude::*;
 
@@ -19,7 +20,7 @@ pub(super) const LEAF: u32 = 1 << 31;
 const LEAVES_MAX: usize = 1 << 28;
 /// Leaves stay wider than this many of their smallest size. With 2, leaves where sizes vary are one to
 /// two sizes wide, over which the gradation lets the size change by half; with 1, eight times as many.
-const CELLS_PER_SIZE: f64 = 2.0;
+pub(super) const CELLS_PER_SIZE: f64 = 2.0;
 /// Sizes in a cell may spread this much without a trend: irregular surfaces do.
 const SPREAD_MAX: f64 = 2.0;
 /// The means of its eight parts may differ this much, if each has at least `TREND_SEEDS`.
@@ -87,10 +88,15 @@ pub(super) struct Tree {
 
 impl Tree {
     /// The balanced octree for these seeds and wanted sizes (all in units of the root's side).
-    pub(super) fn build(seeds: &[Seed], targets: &Targets) -> Result<Self, SizingError> {
+    pub(super) fn build(
+        seeds: &[Seed],
+        targets: &Targets,
+        wishes: &Wishes,
+    ) -> Result<Self, SizingError> {
         let all: Vec<u32> = (0..seeds.len() as u32).collect();
         let shape = shape_of(Leaf::ROOT, &all, seeds, targets);
         let mut tree = Self::from_shape(&shape);
+        wishes.refine(&mut tree)?;
         tree.balance()?;
         Ok(tree.numbered())
     }
@@ -111,6 +117,36 @@ impl Tree {
         let mut blocks = Vec::new();
         let root = entry(&mut shape.iter().copied(), &mut blocks);
         Self { root, blocks }
+    }
+
+    /// Divides the leaves, in their order, as these depth-first lists of "is divided" say.
+    pub(super) fn graft(&mut self, shapes: &[Vec<bool>]) -> Result<(), SizingError> {
+        let found: usize = shapes.iter().map(Vec::len).sum();
+        if found > LEAVES_MAX {
+            return Err(SizingError::TooLarge {
+                found,
+                expected: LEAVES_MAX,
+            });
+        }
+        fn copy<'a>(
+            tree: &Tree,
+            entry: u32,
+            shapes: &mut impl Iterator<Item = &'a Vec<bool>>,
+            all: &mut Vec<bool>,
+        ) {
+            if entry & LEAF != 0 {
+                all.extend(shapes.next().into_iter().flatten());
+                return;
+            }
+            all.push(true);
+            for child in tree.blocks[entry as usize] {
+                copy(tree, child, shapes, all);
+            }
+        }
+        let mut all = Vec::new();
+        copy(self, self.root, &mut shapes.iter(), &mut all);
+        *self = Self::from_shape(&all);
+        Ok(())
     }
 
     /// The entry of the leaf that holds a lattice cell: block and octant (none for the root), level.

@@ -1,9 +1,11 @@
 //! Sizes at the octree's corners: gathered from the surface, filled in between, graded.
 
+use super::SizingError;
 use super::corners::Corners;
 use super::options::Targets;
 use super::seeds::Seed;
 use super::tree::{LATTICE, Leaf, Tree};
+use super::wishes::Wishes;
 use crate::geom::Point;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -52,7 +54,8 @@ pub(super) fn corner_values(
     corners: &Corners,
     seeds: &[Seed],
     targets: &Targets,
-) -> Vec<f32> {
+    wishes: &Wishes,
+) -> Result<Vec<f32>, SizingError> {
     let (gathered, nearest) = gather(tree, leaves, corners, seeds);
     let grading = Grading::new(leaves, corners, targets.beta);
     let mut h = if targets.hsiz.is_some() {
@@ -83,8 +86,9 @@ pub(super) fn corner_values(
             *h = wanted.max(-lower[i]).min(upper[i]);
         }
     }
+    wishes.lower(leaves, corners, &mut h)?;
     grading.grade_closed(&mut h);
-    h
+    Ok(h)
 }
 
 /// Weighted means of the seeds' sizes at the corners of the leaves that hold them, infinite elsewhere;

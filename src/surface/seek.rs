@@ -33,7 +33,12 @@ pub struct Seeker<'a> {
 
 impl<'a> Seeker<'a> {
     pub fn new(surface: &'a Surface) -> Self {
-        let tree = BoxTree::new(surface, |_| true);
+        Self::of(surface, |_| true)
+    }
+
+    /// Sees the triangles that `keep` accepts alone.
+    pub fn of(surface: &'a Surface, keep: impl Fn(u32) -> bool + Sync) -> Self {
+        let tree = BoxTree::new(surface, keep);
         Self { surface, tree }
     }
 

@@ -89,15 +89,43 @@ impl Volumes {
         walls
     }
 
-    /// Labels of the triangles at each volume.
-    pub fn labels(&self, surface: &Surface) -> Vec<BTreeSet<u32>> {
-        let mut labels = vec![BTreeSet::new(); self.n_volumes as usize];
-        for (volumes, &label) in self.of_side.iter().zip(&surface.labels) {
-            for &v in volumes {
-                labels[v as usize].insert(label);
+    /// How many triangles must be crossed from the outside to each volume.
+    pub fn depths(&self) -> Vec<u32> {
+        let mut depths = vec![u32::MAX; self.n_volumes as usize];
+        depths[OUTSIDE as usize] = 0;
+        let walls: Vec<(u32, u32)> = self.walls().into_keys().collect();
+        // Each round reaches one wall farther.
+        let mut next = 1;
+        loop {
+            let mut is_found = false;
+            for &(a, b) in &walls {
+                for (from, to) in [(a, b), (b, a)] {
+                    if depths[from as usize] == next - 1 && depths[to as usize] > next {
+                        depths[to as usize] = next;
+                        is_found = true;
+                    }
+                }
             }
+            if !is_found {
+                return depths;
+            }
+            next += 1;
         }
-        labels
+    }
+
+    /// The volumes that triangles of a label enclose: of the two at each the one farther from the outside, both where they are equally far.
+    pub fn enclosed_by(&self, surface: &Surface, label: u32) -> BTreeSet<u32> {
+        let depths = self.depths();
+        let depth = |v: u32| depths[v as usize];
+        let mut found = BTreeSet::new();
+        for (&[front, back], _) in
+            (self.of_side.iter().zip(&surface.labels)).filter(|(_, l)| **l == label)
+        {
+            let deepest = depth(front).max(depth(back));
+            found.extend([front, back].into_iter().filter(|&v| depth(v) == deepest));
+        }
+        found.remove(&OUTSIDE);
+        found
     }
 
     /// The volume that holds `p`, which is not on the surface.

@@ -21,6 +21,8 @@ fn estimates_come_true() {
         "sample:knot,h=0.2",
         "sample:shells,count=3,h=0.2 --regions all",
         "sample:box,h=0.2 --size-sphere 0.5,0.5,0.5,0.2,0.02",
+        "sample:box,h=0.2 --size-expr 0.03+0.3*abs(x-0.5)",
+        "sample:shells,count=2,h=0.2 --regions all --size-region 2,0.06",
     ]
     .into_iter()
     .enumerate()
@@ -60,4 +62,130 @@ fn the_look_ahead_can_be_left_out() {
     let place = Place::new();
     let line = "mesh sample:box,h=0.5 -o a.tetdb --no-preflight";
     place.run_line(line).succeeds();
+}
+
+/// Tetrahedra of each region.
+fn tets_of_regions(place: &Place, store: &str) -> Vec<f64> {
+    let info = place.run(&["info", store, "--json"]).succeeds().json();
+    let regions = info["regions"].as_array().expect("a list").clone();
+    regions.iter().map(|r| number(r, "tets")).collect()
+}
+
+#[test]
+fn regions_have_sizes_of_their_own() {
+    let place = Place::new();
+    let sample = "sample:shells,count=3,h=0.2 --regions all";
+    let mut found = Vec::new();
+    for (store, options) in [
+        ("plain", ""),
+        ("first", "--size-region 1,0.1"),
+        ("second", "--size-region 2,0.08"),
+        ("named", "--size-region shell-2,0.08"),
+        ("both", "--size-region 2,0.08 --size-region shell-3,0.04"),
+    ] {
+        let line = format!("mesh {sample} {options} -o {store}.tetdb");
+        place.run_line(&line).succeeds();
+        found.push(tets_of_regions(&place, &format!("{store}.tetdb")));
+    }
+    // The region asked for has its tetrahedra, others only those of the transition.
+    let [plain, first, second, named, both] = &found[..] else {
+        panic!("{found:?}")
+    };
+    assert!(
+        first[0] > 4.0 * plain[0] && first[2] < 3.0 * plain[2],
+        "{found:?}"
+    );
+    assert!(
+        second[1] > 8.0 * plain[1] && second[1] > second[0],
+        "{found:?}"
+    );
+    assert_eq!(second, named);
+    assert!(both[2] > 3.0 * second[2], "{found:?}");
+    for (option, named) in [
+        ("--size-region=4,0.1", "regions 1 to 3"),
+        ("--size-region=0,0.1", "regions 1 to 3"),
+        ("--size-region=core,0.1", "shell-3"),
+        ("--size-region=1", "REGION,H"),
+        ("--size-region=1,-0.1", "-0.1"),
+    ] {
+        let mut words: Vec<&str> =
+            "mesh sample:shells,count=3,h=0.2 --regions all -o bad.tetdb --json"
+                .split(' ')
+                .collect();
+        words.push(option);
+        let done = place.run(&words);
+        let error = done.error();
+        assert_eq!(
+            (error["code"].as_str(), done.exit()),
+            (Some("bad-size"), Some(2))
+        );
+        let message = error["message"].as_str().unwrap_or_default();
+        assert!(message.contains(named), "{option}: {message}");
+        assert!(!place.path("bad.tetdb").exists());
+    }
+}
+
+#[test]
+fn sizes_by_position_give_one_mesh() {
+    let place = Place::new();
+    let expression = "0.06+0.3*abs(x-0.5)";
+    let mut digests = Vec::new();
+    place.write(
+        "job.toml",
+        format!("size_expr = \"{expression}\"\nsize_region = [\"1,0.15\"]\n"),
+    );
+    let typed = format!("--size-expr {expression} --size-region 1,0.15");
+    for (store, options) in [
+        ("a", format!("{typed} --threads 1 --memory 64MiB")),
+        ("b", format!("{typed} --threads 2 --memory 1GiB")),
+        ("c", "--config job.toml".to_owned()),
+    ] {
+        let line = format!("mesh sample:box,h=0.2 {options} -o {store}.tetdb");
+        place.run_line(&line).succeeds();
+        digests.push(place.digest(&format!("{store}.tetdb")));
+    }
+    for millis in [30, 100, 300] {
+        let line = format!("mesh sample:box,h=0.2 {typed} -o k.tetdb --threads 1");
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let mut child = place.command(&words).spawn().expect("the program starts");
+        std::thread::sleep(std::time::Duration::from_millis(millis));
+        child.kill().expect("the child can be killed");
+        child.wait().expect("the child can be waited for");
+        if place.path("k.tetdb/catalog.redb").exists() {
+            place.run_line("resume k.tetdb").succeeds();
+            digests.push(place.digest("k.tetdb"));
+        }
+        let _ = std::fs::remove_dir_all(place.path("k.tetdb"));
+    }
+    assert!(digests.iter().all(|d| *d == digests[0]), "{digests:?}");
+}
+
+#[test]
+fn expressions_that_are_no_sizes_are_named() {
+    let place = Place::new();
+    for (expression, named) in [
+        ("x", "is 0 at (0, 0, 0)"),
+        ("1/(x-x)", "inf"),
+        ("x+", "character 3"),
+        ("x>1", "true or false"),
+        ("w", "w"),
+    ] {
+        let option = format!("--size-expr={expression}");
+        let done = place.run(&[
+            "mesh",
+            "sample:box,h=0.5",
+            "-o",
+            "a.tetdb",
+            "--json",
+            &option,
+        ]);
+        let error = done.error();
+        assert_eq!(
+            (error["code"].as_str(), done.exit()),
+            (Some("bad-size"), Some(2))
+        );
+        let message = error["message"].as_str().unwrap_or_default();
+        assert!(message.contains(named), "{expression}: {message}");
+        assert!(place.names().is_empty());
+    }
 }
