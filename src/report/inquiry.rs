@@ -277,3 +277,12 @@ pub(super) fn vertex_bounds(part: &Subdomain, chunk: usize) -> Aabb {
     let [low, high] = part.vertex_summaries()[chunk].bounds.map(Point::from_array);
     Aabb { low, high }
 }
+
+/// The chunk of vertices that holds vertex `v`, `place` being the one found last.
+pub(super) fn vertex_chunk(part: &Subdomain, v: u32, place: &mut usize) -> usize {
+    let last = &part.vertex_summaries()[*place];
+    if v < last.first || v - last.first >= last.count {
+        *place = part.vertex_chunk_of(v);
+    }
+    *place
+}

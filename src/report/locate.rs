@@ -4,8 +4,10 @@ use tetdb_schema::ids::TetId;
 
 use super::found::Found;
 use super::frame::Searched;
-use super::inquiry::{bounds_of, chunk_bounds};
+use super::inquiry::{bounds_of, chunk_bounds, vertex_bounds};
+use super::lazy::nearness;
 use super::{Inquiry, ReportError};
+use crate::catalog::Subdomain;
 use crate::geom::{Aabb, HilbertFrame, Point, orient};
 
 /// Up to so many points are looked for one by one, each in as few chunks as can be; more make it worth to decode chunks whole.
@@ -27,8 +29,8 @@ pub(super) struct Candidate {
     pub rank: u32,
     pub chunk: u32,
     resident: bool,
-    /// 0 in the middle of the box, 1 on its sides.
-    eccentricity: f64,
+    /// Negative where the point is within the box of vertices that lead its tetrahedra.
+    nearness: f64,
 }
 
 /// What is known of a point so far.
@@ -116,21 +118,20 @@ impl Inquiry {
             settled: false,
         };
         self.candidates(point, candidates)?;
-        for candidate in candidates {
-            if lazily && !candidate.resident {
-                self.search_lazily(candidate.rank, candidate.chunk, &mut search)?;
-            } else {
-                let searched = self.searched(candidate.rank, candidate.chunk)?;
-                search_frame(&searched, &mut search);
-            }
+        let n_resident = candidates.partition_point(|c| c.resident);
+        let n_whole = if lazily { n_resident } else { candidates.len() };
+        for candidate in &candidates[..n_whole] {
+            let searched = self.searched(candidate.rank, candidate.chunk)?;
+            search_frame(&searched, &mut search);
             if search.settled {
-                break;
+                return Ok(search);
             }
         }
+        self.search_lazily(&candidates[n_whole..], &mut search)?;
         Ok(search)
     }
 
-    /// The chunks whose boxes hold a point, the most promising first.
+    /// The chunks whose boxes hold a point, resident ones first, then the most promising.
     fn candidates(&mut self, p: Point, candidates: &mut Vec<Candidate>) -> Result<(), ReportError> {
         candidates.clear();
         let mut ranks = Vec::new();
@@ -142,15 +143,12 @@ impl Inquiry {
         for rank in ranks {
             let part = self.part(rank)?;
             part.tree.visit(&|b| holds(b, p), &mut |chunk| {
-                let bounds = chunk_bounds(&part.subdomain, chunk);
-                if holds(&bounds, p) {
-                    let (center, extent) =
-                        ((bounds.low + bounds.high) * 0.5, bounds.high - bounds.low);
+                if holds(&chunk_bounds(&part.subdomain, chunk), p) {
                     candidates.push(Candidate {
                         rank,
                         chunk: chunk as u32,
                         resident: false,
-                        eccentricity: ((p - center) / extent).abs().max_element() * 2.0,
+                        nearness: leaders_nearness(&part.subdomain, chunk, p),
                     });
                 }
             });
@@ -160,10 +158,25 @@ impl Inquiry {
         }
         candidates.sort_by(|a, b| {
             let by_residency = b.resident.cmp(&a.resident);
-            by_residency.then(a.eccentricity.total_cmp(&b.eccentricity))
+            by_residency.then(a.nearness.total_cmp(&b.nearness))
         });
         Ok(())
     }
+}
+
+/// How near the vertices that lead the tetrahedra of a chunk are.
+///
+/// Tetrahedra are sorted by their least vertex, and vertices along a curve: those of a chunk are led by the vertices from its least
+/// one to the least of the next chunk, which are in chunks of vertices with small boxes.
+fn leaders_nearness(part: &Subdomain, chunk: usize, p: Point) -> f64 {
+    let least = |chunk: usize| part.tet_summaries().get(chunk).map(|s| s.vertices[0]);
+    let first = part.vertex_chunk_of(least(chunk).unwrap_or_default());
+    let last = least(chunk + 1).map_or(part.vertex_summaries().len() - 1, |v| {
+        part.vertex_chunk_of(v)
+    });
+    (first..=last.max(first))
+        .map(|c| nearness(&vertex_bounds(part, c), p))
+        .fold(f64::INFINITY, f64::min)
 }
 
 fn search_frame(searched: &Searched, search: &mut Search) {

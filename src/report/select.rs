@@ -5,7 +5,7 @@ use std::vec::IntoIter;
 use tetdb_schema::ids::TetId;
 
 use super::found::Found;
-use super::inquiry::{bounds_of, vertex_bounds};
+use super::inquiry::{bounds_of, vertex_bounds, vertex_chunk};
 use super::marks::Marks;
 use super::selection::Selection;
 use super::{Inquiry, ReportError};
@@ -146,13 +146,8 @@ impl Iterator for Selected<'_> {
 
 /// A box around the chunks the vertices are in, `place` being the chunk found last.
 fn around(part: &Subdomain, nodes: [u32; 4], place: &mut usize) -> Aabb {
-    let summaries = part.vertex_summaries();
     nodes.iter().fold(Aabb::EMPTY, |sum, &v| {
-        let last = &summaries[*place];
-        if v < last.first || v - last.first >= last.count {
-            *place = part.vertex_chunk_of(v);
-        }
-        let b = vertex_bounds(part, *place);
+        let b = vertex_bounds(part, vertex_chunk(part, v, place));
         Aabb {
             low: sum.low.min(b.low),
             high: sum.high.max(b.high),
