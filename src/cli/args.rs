@@ -28,6 +28,7 @@ pub enum Command {
     /// Say whether a surface can be meshed, and where it cannot
     Check(CheckArgs),
     /// Say what a store holds
+    #[command(after_help = "Examples:\n  tetdb info part.tetdb\n  tetdb info part.tetdb --json")]
     Info(StoreArgs),
     /// Ask for tetrahedra by place, number, neighborhood or condition
     Query(Box<super::query_args::QueryArgs>),
@@ -36,6 +37,7 @@ pub enum Command {
     /// Set the qualities of two meshes side by side
     Compare(CompareArgs),
     /// Print the digest of a store's mesh
+    #[command(after_help = "Example:\n  tetdb digest part.tetdb")]
     Digest(StoreArgs),
     /// Write a mesh file for other programs
     Export(ExportArgs),
@@ -43,6 +45,10 @@ pub enum Command {
     RefineSurface(RefineSurfaceArgs),
     /// Write a made surface to a file
     Sample(SampleArgs),
+    /// Print the completions of a shell
+    Completions(CompletionsArgs),
+    /// Print a manual page, or write them all
+    Man(ManArgs),
 }
 
 impl Command {
@@ -60,6 +66,7 @@ impl Command {
             Self::Export(a) => a.json,
             Self::RefineSurface(a) => a.json,
             Self::Sample(a) => a.json,
+            Self::Completions(_) | Self::Man(_) => false,
         }
     }
 }
@@ -355,4 +362,27 @@ pub struct RefineSurfaceArgs {
     /// Answer with one JSON object
     #[arg(long)]
     pub json: bool,
+}
+
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  tetdb completions bash > ~/.local/share/bash-completion/completions/tetdb\n  \
+    tetdb completions zsh > ~/.zfunc/_tetdb\n  tetdb completions fish > ~/.config/fish/completions/tetdb.fish"
+)]
+pub struct CompletionsArgs {
+    #[arg(value_name = "SHELL")]
+    pub shell: clap_complete::Shell,
+}
+
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  tetdb man query | man -l -\n  tetdb man --dir ~/.local/share/man/man1"
+)]
+pub struct ManArgs {
+    /// The command whose page is wanted [default: that of the program]
+    #[arg(value_name = "COMMAND")]
+    pub command: Option<String>,
+    /// Write all pages into this folder
+    #[arg(long, value_name = "DIR", conflicts_with = "command")]
+    pub dir: Option<PathBuf>,
 }

@@ -21,6 +21,7 @@ mod query_ask;
 mod query_rows;
 mod refine_surface;
 mod sample;
+mod shell;
 mod signals;
 mod store;
 mod talk;
@@ -92,5 +93,7 @@ fn dispatch(command: &Command, talk: &Talk) -> Result<u8, Failure> {
         Command::Export(args) => export::run(args, talk),
         Command::RefineSurface(args) => refine_surface::run(args, talk),
         Command::Sample(args) => sample::run(args, talk),
+        Command::Completions(args) => shell::completions(args),
+        Command::Man(args) => shell::man(args, talk),
     }
 }

@@ -11,5 +11,6 @@ mod query;
 mod readme;
 mod regions;
 mod same_mesh;
+mod shell;
 mod sizes;
 mod subdomains;

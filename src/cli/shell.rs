@@ -1,0 +1,72 @@
+//! `completions` and `man`: what shells and manual readers want to know of the command line.
+
+use std::io::Write;
+use std::path::Path;
+
+use clap::{Command, CommandFactory};
+
+use super::args::{Args, CompletionsArgs, ManArgs};
+use super::failure::Failure;
+use super::talk::Talk;
+
+pub fn completions(args: &CompletionsArgs) -> Result<u8, Failure> {
+    let mut script = Vec::new();
+    clap_complete::generate(args.shell, &mut Args::command(), "tetdb", &mut script);
+    print(&script);
+    Ok(0)
+}
+
+pub fn man(args: &ManArgs, talk: &Talk) -> Result<u8, Failure> {
+    let mut root = Args::command();
+    root.build();
+    if let Some(dir) = &args.dir {
+        for command in std::iter::once(&root).chain(pages(&root)) {
+            let path = dir.join(format!("{}.1", name(command)));
+            std::fs::write(&path, page(command)?).map_err(|e| unwritable(&path, &e))?;
+            talk.note(&format!("wrote {}", path.display()));
+        }
+        return Ok(0);
+    }
+    let command = match &args.command {
+        None => &root,
+        Some(word) => pages(&root)
+            .find(|c| c.get_name() == word.as_str())
+            .ok_or_else(|| {
+                Failure::new("usage", format!("there is no command {word}")).help("`tetdb --help`")
+            })?,
+    };
+    print(&page(command)?);
+    Ok(0)
+}
+
+/// The commands that have a page of their own.
+fn pages(root: &Command) -> impl Iterator<Item = &Command> {
+    root.get_subcommands()
+        .filter(|c| c.get_name() != "help" && !c.is_hide_set())
+}
+
+/// `tetdb` or `tetdb-mesh`.
+fn name(command: &Command) -> String {
+    let full = command.get_bin_name().unwrap_or(command.get_name());
+    full.replace(' ', "-")
+}
+
+fn page(command: &Command) -> Result<Vec<u8>, Failure> {
+    let mut text = Vec::new();
+    let rendered = clap_mangen::Man::new(command.clone())
+        .title(name(command))
+        .render(&mut text);
+    rendered.map_err(|e| Failure::internal(e.to_string()))?;
+    Ok(text)
+}
+
+fn unwritable(path: &Path, error: &std::io::Error) -> Failure {
+    Failure::new("io", error)
+        .at(path.display())
+        .help("give a folder that exists with --dir")
+}
+
+/// To the standard output; where that is closed, nobody listens.
+fn print(bytes: &[u8]) {
+    let _ = std::io::stdout().write_all(bytes);
+}
