@@ -141,6 +141,9 @@ pub struct ShapeArgs {
     /// Edge length in a region, by its number in `tetdb info` or a label of triangles around it; may be repeated
     #[arg(long, value_name = "REGION_OR_LABEL,H")]
     pub size_region: Vec<String>,
+    /// Edge lengths at the vertices of a mesh: a MEDIT .sol with its background .mesh of tetrahedra beside it, or with one length for each of the surface's vertices
+    #[arg(long, value_name = "FILE")]
+    pub size_field: Option<String>,
     /// Edge length as an expression in x, y and z, such as 'max(0.02, 0.1*sqrt(x^2+y^2))'
     #[arg(long, value_name = "EXPR", allow_hyphen_values = true)]
     pub size_expr: Option<String>,

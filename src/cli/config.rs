@@ -3,6 +3,7 @@
 use clap::ValueEnum;
 
 use super::args::{Optimize, Regions, ShapeArgs};
+use super::background;
 use super::failure::Failure;
 use crate::pipeline::Options;
 
@@ -26,6 +27,7 @@ pub fn options(args: &ShapeArgs) -> Result<Options, Failure> {
         (&args.hmax, &mut options.hmax),
         (&args.hgrad, &mut options.hgrad),
         (&args.size_expr, &mut options.size_expr),
+        (&args.size_field, &mut options.size_field),
         (&args.regions.map(word), &mut options.regions),
         (&args.optimize.map(word), &mut options.optimize),
         (&args.subdomains, &mut options.subdomains),
@@ -58,6 +60,7 @@ pub fn options(args: &ShapeArgs) -> Result<Options, Failure> {
         });
     }
     options.subdomain_count()?;
+    background::identify(&mut options)?;
     Ok(options)
 }
 

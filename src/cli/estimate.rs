@@ -7,7 +7,7 @@ use serde_json::json;
 use super::args::EstimateArgs;
 use super::failure::Failure;
 use super::talk::Talk;
-use super::{config, input, memory};
+use super::{background, config, input, memory};
 use crate::pipeline::{self, Estimate};
 use crate::store::available_bytes;
 
@@ -20,7 +20,8 @@ pub fn run(args: &EstimateArgs, talk: &Talk) -> Result<u8, Failure> {
     let (cap, whence) = memory::cap(args.memory.as_deref())?;
     let threads = args.threads.unwrap_or_else(rayon::current_num_threads);
     let input = input::load_valid(&args.surfaces, talk)?;
-    let prepared = pipeline::prepare(&input.surface, &options)?;
+    let background = background::read(&options, cap)?;
+    let prepared = pipeline::prepare(&input.surface, &options, background.as_ref())?;
     let estimate = &prepared.estimate;
     let disk_free = free_at(args.output.as_deref().unwrap_or(Path::new(".")));
     let disk = estimate.disk_peak_bytes(cap, threads);

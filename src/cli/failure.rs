@@ -151,6 +151,11 @@ pub const CODES: &[CodeRow] = &[
         "the surface is not the one the store was begun with",
     ),
     row(
+        "size-field-changed",
+        8,
+        "the sizes of --size-field are not those the store was begun with",
+    ),
+    row(
         "stopped",
         130,
         "stopped by a signal; `tetdb resume` goes on",

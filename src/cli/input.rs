@@ -91,7 +91,7 @@ fn from_files(arguments: &[String]) -> Result<Input, Failure> {
 }
 
 /// What identifies a file later: absolute path, length, hash.
-fn source(path: &Path) -> Result<SurfaceSource, Failure> {
+pub fn source(path: &Path) -> Result<SurfaceSource, Failure> {
     let io = |e: std::io::Error| {
         Failure::new("unreadable-file", format!("the file cannot be read: {e}")).at(path.display())
     };

@@ -9,7 +9,7 @@ use super::args::{MeshArgs, ResumeArgs, RunArgs};
 use super::failure::Failure;
 use super::input::{self, Input};
 use super::talk::Talk;
-use super::{config, estimate, export, info, memory, signals, store, verify};
+use super::{background, config, estimate, export, info, memory, signals, store, verify};
 use crate::catalog::{Catalog, CatalogError, Job, Store, StoreState};
 use crate::io::write::Selection;
 use crate::pipeline::{self, Options, Summary};
@@ -33,7 +33,10 @@ pub fn run(args: &MeshArgs, talk: &Talk) -> Result<u8, Failure> {
         clock.elapsed().as_secs_f64()
     ));
     talk.note(&format!("memory: {} ({whence})", memory::show(cap)));
-    let prepared = pipeline::prepare(&input.surface, &options)?;
+    let prepared = {
+        let background = background::read(&options, cap)?;
+        pipeline::prepare(&input.surface, &options, background.as_ref())?
+    };
     if !args.no_preflight {
         estimate::preflight(&prepared.estimate, cap, &path, talk)?;
     }
@@ -95,7 +98,21 @@ pub fn resume(args: &ResumeArgs, talk: &Talk) -> Result<u8, Failure> {
     let mut catalog = Catalog::open_writable(&args.store)?;
     let watch = |event| talk.progress(event);
     let budget = Budget::new(cap);
-    let summary = pipeline::mesh(&mut catalog, &input.surface, &options, &budget, &watch)?;
+    let summary = if state < StoreState::Coarse {
+        let background = background::read(&options, cap)?;
+        let prepared = pipeline::prepare(&input.surface, &options, background.as_ref())?;
+        drop(background);
+        pipeline::mesh_prepared(
+            &mut catalog,
+            &input.surface,
+            &options,
+            prepared,
+            &budget,
+            &watch,
+        )?
+    } else {
+        pipeline::mesh(&mut catalog, &input.surface, &options, &budget, &watch)?
+    };
     tell(&summary, talk);
     catalog.close()?;
     finish(&args.store, &input, &args.run, cap, Some(&summary), talk)

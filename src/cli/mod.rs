@@ -1,6 +1,7 @@
 //! What the user typed, what it means, one file per command.
 
 mod args;
+mod background;
 mod check;
 mod check_expected;
 mod check_report;

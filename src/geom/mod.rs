@@ -3,6 +3,7 @@
 //! One convention holds everywhere (drawn in `mesh/anatomy.rs`): a tetrahedron `a b c d` is positive
 //! when `det(b-a, c-a, d-a) > 0`, and [`insphere`] is positive inside the sphere of a positive one.
 
+mod boxes;
 mod dyadic;
 mod hash;
 mod hilbert;
@@ -14,6 +15,7 @@ pub(crate) mod oracle;
 #[cfg(test)]
 pub(crate) mod tests;
 
+pub use boxes::BoxTree;
 pub use dyadic::Dyadic;
 pub use hash::{STEP, mix};
 pub use hilbert::{HilbertFrame, hilbert_index};

@@ -23,6 +23,9 @@ pub enum PipelineError {
     /// An option that was checked before has no meaning any more.
     #[error("option {option}: '{value}' is not known")]
     Option { option: &'static str, value: String },
+    /// The sizes of a file were not handed in.
+    #[error("the sizes of {file} must be read before the mesh is begun")]
+    SizeField { file: String },
     /// Nothing is enclosed by the surface under the chosen rule for regions.
     #[error("no region is filled: the surface encloses nothing under --regions {policy}")]
     NothingFilled { policy: String },

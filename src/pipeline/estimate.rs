@@ -7,7 +7,7 @@
 use super::regions::region_sizes;
 use super::{MEMORY_MIN, Options, PipelineError, Plan};
 use crate::optimize::Mode;
-use crate::sizing::{Counts, Domain, SizeField, SizeSummary, Wish};
+use crate::sizing::{Background, Counts, Domain, Further, SizeField, SizeSummary, Wish};
 use crate::surface::{OUTSIDE, Seeker, Surface, Volumes};
 
 /// Tetrahedra of one sub-domain, unless a number of sub-domains is asked for.
@@ -75,10 +75,17 @@ pub struct Prepared {
     pub estimate: Estimate,
 }
 
-/// Builds the size field and counts what it will give. It makes nothing on disk.
+/// Builds the size field and counts what it will give. It makes nothing on disk. `background` is what the options' `size_field` holds.
 ///
 /// The result depends on surface and options alone. Errors: options that make no sense for the surface; orientations that contradict each other.
-pub fn prepare(surface: &Surface, options: &Options) -> Result<Prepared, PipelineError> {
+pub fn prepare(
+    surface: &Surface,
+    options: &Options,
+    background: Option<&Background>,
+) -> Result<Prepared, PipelineError> {
+    if let (Some(file), None) = (&options.size_field, background) {
+        return Err(PipelineError::SizeField { file: file.clone() });
+    }
     let sizes = options.sizes()?;
     let seeker = Seeker::new(surface);
     let volumes = Volumes::of(&seeker);
@@ -93,9 +100,22 @@ pub fn prepare(surface: &Surface, options: &Options) -> Result<Prepared, Pipelin
         filled: &filled,
     };
     let regions = region_sizes(&domain, &sizes)?;
-    let wishes: Vec<&dyn Wish> = regions.iter().map(|r| r as &dyn Wish).collect();
-    let (field, sizes) =
-        SizeField::build_with(&surface.points, &surface.triangles, &sizes, &wishes)?;
+    let mut wishes: Vec<&dyn Wish> = regions.iter().map(|r| r as &dyn Wish).collect();
+    let mut at_vertices = None;
+    match background {
+        Some(Background::Mesh(mesh)) => wishes.push(&**mesh),
+        Some(Background::AtVertices(h)) => at_vertices = Some(&h[..]),
+        None => {}
+    }
+    let further = Further {
+        wishes: &wishes,
+        at_vertices,
+    };
+    let (field, mut sizes) =
+        SizeField::build_with(&surface.points, &surface.triangles, &sizes, &further)?;
+    if background.is_some() {
+        sizes.source = format!("--size-field, {}", sizes.source);
+    }
     let estimate = Estimate::of(&domain, options, &field)?;
     Ok(Prepared {
         field,

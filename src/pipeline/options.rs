@@ -27,6 +27,12 @@ pub struct Options {
     /// A length as an expression in x, y and z.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_expr: Option<String>,
+    /// A file of sizes at the vertices of a mesh; stored with its full path.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_field: Option<String>,
+    /// What the files of `size_field` hold, as 32 hex digits: found by the program, so that a changed file is noticed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_field_hash: Option<String>,
     /// `parity`, `all`, `outer`, `by-orientation`.
     pub regions: Option<String>,
     /// `none`, `delaunay`, `full`.

@@ -57,7 +57,7 @@ pub fn mesh(
             catalog,
             surface,
             options,
-            prepare(surface, options)?,
+            prepare(surface, options, None)?,
             budget,
             watch,
         ),

@@ -30,6 +30,10 @@ pub enum SizingError {
     },
     #[error("--size-region {found}: {expected}")]
     BadRegion { found: String, expected: String },
+    #[error(
+        "--size-field: {found} sizes for the {expected} vertices of the surface; without a mesh of tetrahedra beside it the file must have one for each"
+    )]
+    SizeCount { found: usize, expected: usize },
     #[error("the surface has no edge of positive length, so it gives no size")]
     NoEdges,
     #[error(

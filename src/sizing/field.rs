@@ -48,6 +48,14 @@ pub struct SizeField {
     pub(super) sources: Vec<ResolvedSource>,
 }
 
+/// Sizes besides those of the surface's edges and the options.
+#[derive(Clone, Copy, Default)]
+pub struct Further<'a> {
+    pub wishes: &'a [&'a dyn Wish],
+    /// One for each vertex of the surface.
+    pub at_vertices: Option<&'a [f64]>,
+}
+
 /// Where the descent begins: the entry and its level, for each cell of a regular grid.
 #[derive(Clone, Debug, PartialEq)]
 struct Jump {
@@ -65,10 +73,10 @@ impl SizeField {
         triangles: &[[u32; 3]],
         options: &SizeOptions,
     ) -> Result<Self, SizingError> {
-        Ok(Self::build_with(points, triangles, options, &[])?.0)
+        Ok(Self::build_with(points, triangles, options, &Further::default())?.0)
     }
 
-    /// Builds the field with further wishes, and says where its sizes came from.
+    /// Builds the field with further sizes, and says where its sizes came from.
     ///
     /// # Errors
     /// As [`SizeField::build`]; a wish that is no size somewhere in the surface's box.
@@ -76,12 +84,16 @@ impl SizeField {
         points: &[Point],
         triangles: &[[u32; 3]],
         options: &SizeOptions,
-        wishes: &[&dyn Wish],
+        further: &Further,
     ) -> Result<(Self, SizeSummary), SizingError> {
-        let (frame, bounds, seeds) = seeds_of(points, triangles)?;
+        let (frame, bounds, mut seeds) = seeds_of(points, triangles)?;
+        if let Some(h) = further.at_vertices {
+            seeds.lower(h)?;
+        }
+        let seeds = seeds.list;
         let targets = options.resolve(bounds.diagonal())?;
         let scaled = targets.scaled(1.0 / frame.side);
-        let mut list = wishes.to_vec();
+        let mut list = further.wishes.to_vec();
         list.extend(options.formula.iter().map(|f| f as &dyn Wish));
         let wishes = Wishes {
             list: &list,

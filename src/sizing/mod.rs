@@ -4,8 +4,8 @@
 //! number of threads can change what it says. It is built once from the surface: an octree,
 //! fine only where sizes differ (`tree`); values on its corners, interpolated from the surface's edges,
 //! joined to the wanted interior size and graded (`values`); trilinear between them (`field`). Boxes, spheres and
-//! cylinders with sizes of their own are formulas beside it (`sources`); expressions (`formula`), sizes of regions (`region`) are
-//! brought into the octree when it is made (`wishes`). The least of all counts.
+//! cylinders with sizes of their own are formulas beside it (`sources`); expressions (`formula`), sizes of regions (`region`) and of background meshes
+//! (`background`) are brought into the octree when it is made (`wishes`). The least of all counts.
 //!
 //! How much there is to mesh follows from the field and the surface: the load of what is inside (`integral`), tetrahedra and
 //! vertices to expect (`count`).
@@ -15,6 +15,7 @@
 //!
 //! In memory for now: about 37 bytes per leaf when built, about five times that while building.
 
+mod background;
 mod closed;
 mod codec;
 mod corners;
@@ -36,10 +37,11 @@ mod wishes;
 #[cfg(test)]
 mod tests;
 
+pub use background::{Background, BackgroundMesh};
 pub use closed::{TETS_PER_LOAD, divide_parameters, load_of_tet, metric_length};
 pub use count::Counts;
 pub use error::SizingError;
-pub use field::SizeField;
+pub use field::{Further, SizeField};
 pub use formula::Formula;
 pub use integral::{Domain, Skin};
 pub use options::{Length, RegionSize, SizeOptions};

@@ -34,6 +34,31 @@ pub(super) struct Seed {
     pub(super) h: f64,
 }
 
+/// Seeds, and the vertices they belong to.
+#[derive(Debug)]
+pub(super) struct Seeds {
+    pub(super) list: Vec<Seed>,
+    vertices: Vec<u32>,
+    n_vertices: usize,
+    side: f64,
+}
+
+impl Seeds {
+    /// Lowers sizes to those given, one for each vertex of the surface, in input units.
+    pub(super) fn lower(&mut self, h: &[f64]) -> Result<(), SizingError> {
+        if h.len() != self.n_vertices {
+            return Err(SizingError::SizeCount {
+                found: h.len(),
+                expected: self.n_vertices,
+            });
+        }
+        for (seed, &v) in self.list.iter_mut().zip(&self.vertices) {
+            seed.h = seed.h.min(h[v as usize] / self.side);
+        }
+        Ok(())
+    }
+}
+
 /// Sizes of the vertices that triangles use, in vertex order, and the box around them.
 ///
 /// The size is the geometric mean of the arithmetic and the harmonic mean of the incident edges'
@@ -42,7 +67,7 @@ pub(super) struct Seed {
 pub(super) fn seeds_of(
     points: &[Point],
     triangles: &[[u32; 3]],
-) -> Result<(Frame, Aabb, Vec<Seed>), SizingError> {
+) -> Result<(Frame, Aabb, Seeds), SizingError> {
     // Per vertex: number of edge ends, their lengths' sum, their inverse lengths' sum.
     let mut sums = vec![[0.0f64; 3]; points.len()];
     let mut bounds = Aabb::EMPTY;
@@ -61,15 +86,24 @@ pub(super) fn seeds_of(
         }
     }
     let frame = Frame::around(&bounds);
-    let used = points.iter().zip(&sums).filter(|(_, s)| s[0] > 0.0);
-    let seeds: Vec<Seed> = used
-        .map(|(&p, s)| Seed {
-            at: frame.unit(p),
-            h: (s[1] / s[2]).sqrt() / frame.side,
-        })
-        .collect();
-    if seeds.is_empty() || !frame.side.is_normal() {
+    let used = (0..points.len()).filter(|&v| sums[v][0] > 0.0);
+    let vertices: Vec<u32> = used.map(|v| v as u32).collect();
+    let seed = |&v: &u32| {
+        let [_, sum, inverse] = sums[v as usize];
+        Seed {
+            at: frame.unit(points[v as usize]),
+            h: (sum / inverse).sqrt() / frame.side,
+        }
+    };
+    let list: Vec<Seed> = vertices.iter().map(seed).collect();
+    if list.is_empty() || !frame.side.is_normal() {
         return Err(SizingError::NoEdges);
     }
+    let seeds = Seeds {
+        list,
+        vertices,
+        n_vertices: points.len(),
+        side: frame.side,
+    };
     Ok((frame, bounds, seeds))
 }

@@ -188,6 +188,7 @@ fn steep_surfaces_are_followed() {
     let steep = graded(50.0, 60);
     let field = build(&steep, &SizeOptions::default());
     let (_, _, seeds) = seeds::seeds_of(&steep.0, &steep.1).unwrap();
+    let seeds = seeds.list;
     let side = field.frame.side;
     let (mut near, mut ratio_low, mut ratio_high) = (0, f64::INFINITY, 0.0f64);
     for seed in &seeds {
@@ -407,7 +408,8 @@ fn bad_values_are_named() {
 fn summaries_say_where_sizes_came_from() {
     let (points, triangles) = cube(20, |i| i as f64 / 20.0);
     let asked = options(Some("1%"), None, None);
-    let (_, summary) = SizeField::build_with(&points, &triangles, &asked, &[]).unwrap();
+    let (_, summary) =
+        SizeField::build_with(&points, &triangles, &asked, &Further::default()).unwrap();
     let text = summary.to_string();
     assert!(
         text.contains("--hsiz 1% = 0.0173") && text.contains("--hgrad 1.3"),

@@ -1,14 +1,10 @@
-//! Which pairs of triangles are near enough to look at: a tree of boxes over the Hilbert order.
+//! Which pairs of triangles are near enough to look at.
 
 use rayon::prelude::*;
 
 use super::Surface;
-use crate::geom::{Aabb, HilbertFrame};
+use crate::geom::{Aabb, BoxTree};
 
-/// Triangles in one leaf.
-const LEAF: usize = 4;
-/// Children of one node.
-pub(super) const ARITY: usize = 4;
 /// Leaves one task handles.
 const BLOCK: usize = 256;
 /// Leaves between two looks at how much was found.
@@ -18,49 +14,18 @@ const BLOCK_LISTED_MAX: usize = 8192;
 /// Results after which the search ends: the input is hopeless and its pairs may be quadratic.
 const FOUND_MAX: u64 = 10_000_000;
 
-/// Boxes of triangles in Hilbert order of their centers, and of groups of groups of them.
-///
-/// Memory: about 52 bytes per triangle and a third of that for the tree.
-pub(super) struct BoxTree {
-    /// Triangle ids in curve order.
-    pub(super) order: Vec<u32>,
-    /// Their boxes, in the same order.
-    pub(super) boxes: Vec<Aabb>,
-    /// `levels[0]` are the leaves; a node of level k + 1 holds `ARITY` nodes of level k.
-    pub(super) levels: Vec<Vec<Aabb>>,
+/// A tree over the triangles that `keep` accepts.
+pub(super) fn tree_of(surface: &Surface, keep: impl Fn(u32) -> bool + Sync) -> BoxTree {
+    let box_of = |t: u32| Aabb::around(surface.corners(t));
+    BoxTree::new(
+        &surface.bounds(),
+        surface.n_triangles() as u32,
+        keep,
+        box_of,
+    )
 }
 
 impl BoxTree {
-    /// A tree over the triangles that `keep` accepts.
-    pub fn new(surface: &Surface, keep: impl Fn(u32) -> bool + Sync) -> Self {
-        let frame = HilbertFrame::new(&surface.bounds());
-        let mut keys: Vec<(u64, u32)> = (0..surface.n_triangles() as u32)
-            .into_par_iter()
-            .filter(|&t| keep(t))
-            .map(|t| {
-                let [a, b, c] = surface.corners(t);
-                (frame.index((a + b + c) / 3.0), t)
-            })
-            .collect();
-        keys.par_sort_unstable();
-        let order: Vec<u32> = keys.into_iter().map(|(_, t)| t).collect();
-        let boxes: Vec<Aabb> = order
-            .par_iter()
-            .map(|&t| Aabb::around(surface.corners(t)))
-            .collect();
-        let mut levels = vec![enclose(&boxes, LEAF)];
-        while let Some(last) = levels.last()
-            && last.len() > 1
-        {
-            levels.push(enclose(last, ARITY));
-        }
-        Self {
-            order,
-            boxes,
-            levels,
-        }
-    }
-
     /// Calls `test` on each pair of triangles whose boxes share a point and collects what it returns.
     ///
     /// At most `listed_max` results are kept, of all that are counted; which ones does not depend on
@@ -123,12 +88,12 @@ impl BoxTree {
         stack.push((self.levels.len() - 1, 0));
         while let Some((level, node)) = stack.pop() {
             // The last leaf below the node.
-            let last = (node + 1) * ARITY.pow(level as u32) - 1;
+            let last = (node + 1) * Self::ARITY.pow(level as u32) - 1;
             if last <= leaf || !self.levels[level][node].meets(&bounds) {
                 continue;
             }
             if level > 0 {
-                let children = node * ARITY..((node + 1) * ARITY).min(self.levels[level - 1].len());
+                let children = self.children(level, node);
                 stack.extend(children.map(|child| (level - 1, child)));
                 continue;
             }
@@ -143,26 +108,10 @@ impl BoxTree {
         }
     }
 
-    /// Places of a leaf's triangles in curve order.
-    pub(super) fn members(&self, leaf: usize) -> std::ops::Range<usize> {
-        leaf * LEAF..((leaf + 1) * LEAF).min(self.boxes.len())
-    }
-
     fn try_pair(&self, i: usize, j: usize, pair: &mut impl FnMut(u32, u32)) {
         if self.boxes[i].meets(&self.boxes[j]) {
             let (a, b) = (self.order[i], self.order[j]);
             pair(a.min(b), a.max(b));
         }
     }
-}
-
-fn enclose(boxes: &[Aabb], group: usize) -> Vec<Aabb> {
-    let join = |a: Aabb, b: &Aabb| Aabb {
-        low: a.low.min(b.low),
-        high: a.high.max(b.high),
-    };
-    boxes
-        .par_chunks(group)
-        .map(|g| g.iter().fold(Aabb::EMPTY, join))
-        .collect()
 }

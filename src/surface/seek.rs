@@ -1,8 +1,8 @@
 //! The surface as seen from a point: how far it is, and which triangle lies above.
 
 use super::Surface;
-use super::broad::{ARITY, BoxTree};
-use crate::geom::{Aabb, Point};
+use super::broad::tree_of;
+use crate::geom::{Aabb, BoxTree, Point};
 
 /// A triangle met by a line along z.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,7 +38,7 @@ impl<'a> Seeker<'a> {
 
     /// Sees the triangles that `keep` accepts alone.
     pub fn of(surface: &'a Surface, keep: impl Fn(u32) -> bool + Sync) -> Self {
-        let tree = BoxTree::new(surface, keep);
+        let tree = tree_of(surface, keep);
         Self { surface, tree }
     }
 
@@ -75,8 +75,8 @@ impl<'a> Seeker<'a> {
             }
             if level > 0 {
                 let below = &self.tree.levels[level - 1];
-                let children = node * ARITY..((node + 1) * ARITY).min(below.len());
                 let from = stack.len();
+                let children = self.tree.children(level, node);
                 stack.extend(children.map(|c| (level - 1, c, distance2(&below[c], p))));
                 // The nearest is looked at first.
                 stack[from..].sort_by(|a, b| b.2.total_cmp(&a.2).then(b.1.cmp(&a.1)));
@@ -138,8 +138,7 @@ impl<'a> Seeker<'a> {
                 continue;
             }
             if level > 0 {
-                let n = self.tree.levels[level - 1].len();
-                let children = node * ARITY..((node + 1) * ARITY).min(n);
+                let children = self.tree.children(level, node);
                 stack.extend(children.map(|c| (level - 1, c)));
                 continue;
             }

@@ -1,6 +1,6 @@
 //! Exact validation: everything that keeps a surface from bounding volumes, found and listed.
 
-use super::broad::BoxTree;
+use super::broad::tree_of;
 use super::contact::{ContactKind, contact};
 use super::edges::{Closedness, Facets};
 use super::rims::{JUNCTION_SHARE, TJunction, t_junctions};
@@ -78,7 +78,7 @@ pub fn validate(surface: &Surface) -> Validation {
         skip[t as usize] = true;
     }
     drop(facets.uses);
-    let tree = BoxTree::new(surface, |t| !skip[t as usize]);
+    let tree = tree_of(surface, |t| !skip[t as usize]);
     let (mut touching, n_intersections) = tree.pairs(LISTED_MAX, |a, b| {
         let ids = [a, b].map(|t| surface.triangles[t as usize]);
         let found = contact(surface.corners(a), ids[0], surface.corners(b), ids[1])?;

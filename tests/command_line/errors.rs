@@ -17,6 +17,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("store-unfinished", "crash.rs"),
     ("stopped", "crash.rs"),
     ("surface-changed", "below"),
+    ("size-field-changed", "size_files.rs"),
     ("invalid-mesh", "below"),
 ];
 

@@ -12,5 +12,6 @@ mod readme;
 mod regions;
 mod same_mesh;
 mod shell;
+mod size_files;
 mod sizes;
 mod subdomains;

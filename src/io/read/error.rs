@@ -76,6 +76,15 @@ pub enum ReadError {
     Unsupported { place: Place, what: String },
     #[error("the file holds no triangles")]
     Empty { place: Place },
+    #[error("{what} would take {needed} bytes of memory, more than the {limit} there are for them")]
+    TooLarge {
+        place: Place,
+        what: &'static str,
+        needed: u64,
+        limit: u64,
+    },
+    #[error("no file of sizes or no mesh lies beside it: expected {expected}")]
+    Alone { place: Place, expected: String },
     #[error("{source}")]
     Surface { place: Place, source: SurfaceError },
 }
@@ -94,6 +103,8 @@ impl ReadError {
             Self::CoordinateRange { .. } => "coordinate-range",
             Self::Unsupported { .. } => "unsupported-content",
             Self::Empty { .. } => "empty-surface",
+            Self::TooLarge { .. } => "memory",
+            Self::Alone { .. } => "unreadable-file",
             Self::Surface { source, .. } => source.code(),
         }
     }
@@ -111,6 +122,8 @@ impl ReadError {
             | Self::CoordinateRange { place, .. }
             | Self::Unsupported { place, .. }
             | Self::Empty { place }
+            | Self::TooLarge { place, .. }
+            | Self::Alone { place, .. }
             | Self::Surface { place, .. } => place,
         }
     }
@@ -142,6 +155,10 @@ impl ReadError {
             }
             Self::Empty { .. } => {
                 "choose a file that holds a surface; lines, points and tetrahedra alone bound nothing"
+            }
+            Self::TooLarge { .. } => "give more with --memory, or a coarser background mesh",
+            Self::Alone { .. } => {
+                "put the .sol file and its .mesh side by side, under the same name"
             }
             Self::Surface { source, .. } => source.help(),
         }

@@ -17,25 +17,25 @@ use super::{ReadError, Result, Target};
 use crate::geom::Point;
 use crate::surface::NoteKind;
 
-const DIMENSION: i64 = 3;
-const VERTICES: i64 = 4;
+pub(super) const DIMENSION: i64 = 3;
+pub(super) const VERTICES: i64 = 4;
 const TRIANGLES: i64 = 6;
 const QUADRILATERALS: i64 = 7;
-const TETRAHEDRA: i64 = 8;
+pub(super) const TETRAHEDRA: i64 = 8;
 const PRISMS: i64 = 9;
 const HEXAHEDRA: i64 = 10;
 const TRIANGLES_P2: i64 = 24;
 const PYRAMIDS: i64 = 49;
 const END: i64 = 54;
 
-struct Numbers<R> {
-    feed: Feed<R>,
+pub(super) struct Numbers<R> {
+    pub(super) feed: Feed<R>,
     big: bool,
-    version: i32,
+    pub(super) version: i32,
 }
 
 impl<R: BufRead> Numbers<R> {
-    fn i32(&mut self) -> Result<i32> {
+    pub(super) fn i32(&mut self) -> Result<i32> {
         let bytes = self.feed.bytes::<4>()?;
         Ok(if self.big {
             i32::from_be_bytes(bytes)
@@ -54,7 +54,7 @@ impl<R: BufRead> Numbers<R> {
     }
 
     /// A count, vertex number or reference.
-    fn integer(&mut self) -> Result<i64> {
+    pub(super) fn integer(&mut self) -> Result<i64> {
         if self.version >= 4 {
             self.i64()
         } else {
@@ -71,7 +71,7 @@ impl<R: BufRead> Numbers<R> {
         }
     }
 
-    fn coordinate(&mut self) -> Result<f64> {
+    pub(super) fn coordinate(&mut self) -> Result<f64> {
         let x = if self.version == 1 {
             f64::from(f32::from_bits(self.i32()? as u32))
         } else {
@@ -80,49 +80,66 @@ impl<R: BufRead> Numbers<R> {
         self.feed.checked(x)
     }
 
-    fn integer_bytes(&self) -> u64 {
+    pub(super) fn integer_bytes(&self) -> u64 {
         if self.version >= 4 { 8 } else { 4 }
     }
 
-    fn count(&mut self, what: &'static str, bytes_min: u64) -> Result<u64> {
+    pub(super) fn count(&mut self, what: &'static str, bytes_min: u64) -> Result<u64> {
         let declared = self.integer()?;
         self.feed.check_count(what, declared, bytes_min)
     }
 }
 
-pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut Target) -> Result<()> {
-    feed.binary = true;
-    let magic = feed.bytes::<4>()?;
-    let big = match i32::from_le_bytes(magic) {
-        1 => false,
-        0x0100_0000 => true,
-        _ => return Err(feed.unexpected("1 as the first number of a .meshb file", &magic)),
-    };
-    let mut numbers = Numbers {
-        feed,
-        big,
-        version: 0,
-    };
-    numbers.version = numbers.i32()?;
-    if !(1..=4).contains(&numbers.version) {
-        let version = numbers.version;
-        return Err(numbers
-            .feed
-            .unsupported(format!("version {version} of .meshb")));
+impl<R: BufRead> Numbers<R> {
+    /// Begins a binary file: its byte order and version.
+    pub(super) fn open(mut feed: Feed<R>) -> Result<Self> {
+        feed.binary = true;
+        let magic = feed.bytes::<4>()?;
+        let big = match i32::from_le_bytes(magic) {
+            1 => false,
+            0x0100_0000 => true,
+            _ => return Err(feed.unexpected("1 as the first number of a .meshb file", &magic)),
+        };
+        let mut numbers = Self {
+            feed,
+            big,
+            version: 0,
+        };
+        numbers.version = numbers.i32()?;
+        if !(1..=4).contains(&numbers.version) {
+            let version = numbers.version;
+            return Err(numbers
+                .feed
+                .unsupported(format!("version {version} of .meshb")));
+        }
+        Ok(numbers)
     }
+
+    /// Calls `read` with the keyword of each section, at the place after it; what it leaves of a section is skipped.
+    pub(super) fn sections(
+        &mut self,
+        mut read: impl FnMut(&mut Self, i64) -> Result<()>,
+    ) -> Result<()> {
+        while self.feed.offset < self.feed.len {
+            let keyword = i64::from(self.i32()?);
+            if keyword == END {
+                break;
+            }
+            let next = self.position()?;
+            read(self, keyword)?;
+            if next == 0 {
+                break;
+            }
+            skip_to(&mut self.feed, next)?;
+        }
+        Ok(())
+    }
+}
+
+pub(super) fn read<R: BufRead>(feed: Feed<R>, target: &mut Target) -> Result<()> {
+    let mut numbers = Numbers::open(feed)?;
     let mut n_vertices = 0;
-    while numbers.feed.offset < numbers.feed.len {
-        let keyword = i64::from(numbers.i32()?);
-        if keyword == END {
-            break;
-        }
-        let next = numbers.position()?;
-        read_section(&mut numbers, keyword, &mut n_vertices, target)?;
-        if next == 0 {
-            break;
-        }
-        skip_to(&mut numbers.feed, next)?;
-    }
+    numbers.sections(|numbers, keyword| read_section(numbers, keyword, &mut n_vertices, target))?;
     numbers.feed.finish(target.builder)
 }
 

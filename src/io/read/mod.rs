@@ -1,4 +1,4 @@
-//! Surface files read as streams: STL, OFF, OBJ, PLY, MEDIT, Gmsh, TetGen.
+//! Surface files read as streams: STL, OFF, OBJ, PLY, MEDIT, Gmsh, TetGen; sizes at the vertices of MEDIT meshes.
 //!
 //! A declared count is believed only after it was compared with the length of the file; every error
 //! tells its line (text) or byte (binary). Decimal text becomes the nearest double, binary floats
@@ -13,6 +13,7 @@ mod meditb;
 mod obj;
 mod off;
 mod ply;
+mod sizes;
 mod stl;
 mod tetgen;
 
@@ -27,6 +28,7 @@ use std::path::{Path, PathBuf};
 
 pub use error::{Place, ReadError, Spot};
 use feed::{Feed, Result};
+pub use sizes::{read_sizes, size_files};
 
 use crate::surface::{Surface, SurfaceBuilder, SurfaceError};
 
