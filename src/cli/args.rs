@@ -43,6 +43,8 @@ pub enum Command {
     Export(ExportArgs),
     /// Write the same surface in finer triangles
     RefineSurface(RefineSurfaceArgs),
+    /// Draw a cut through the mesh
+    Snapshot(SnapshotArgs),
     /// Write a made surface to a file
     Sample(SampleArgs),
     /// Print the completions of a shell
@@ -65,6 +67,7 @@ impl Command {
             Self::Compare(a) => a.json,
             Self::Export(a) => a.json,
             Self::RefineSurface(a) => a.json,
+            Self::Snapshot(a) => a.json,
             Self::Sample(a) => a.json,
             Self::Completions(_) | Self::Man(_) => false,
         }
@@ -388,4 +391,48 @@ pub struct ManArgs {
     /// Write all pages into this folder
     #[arg(long, value_name = "DIR", conflicts_with = "command")]
     pub dir: Option<PathBuf>,
+}
+
+/// What colors stand for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ColorBy {
+    Subdomain,
+    Region,
+    Quality,
+    Size,
+}
+
+/// A cut through the mesh by a plane, seen from the side its direction points to. Reads only what the plane meets.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  tetdb snapshot part.tetdb cut.png\n  tetdb snapshot part.tetdb cut.png --plane 0,0,0,1,0.5,0 --crinkle --color quality\n  \
+    tetdb snapshot part.tetdb bad.svg --where \"quality > 2\" --crinkle"
+)]
+pub struct SnapshotArgs {
+    #[arg(value_name = "STORE")]
+    pub store: PathBuf,
+    /// The picture to write: .png or .svg
+    #[arg(value_name = "OUT")]
+    pub output: PathBuf,
+    /// A point of the plane and the direction towards the viewer [default: across the middle of the mesh]
+    #[arg(long, value_name = "X,Y,Z,NX,NY,NZ", allow_hyphen_values = true)]
+    pub plane: Option<String>,
+    /// Draw the tetrahedra that meet the plane whole, not the polygons it cuts out of them
+    #[arg(long)]
+    pub crinkle: bool,
+    /// What colors stand for: size is the mean of the longest and the shortest edge
+    #[arg(long, value_enum, default_value = "subdomain", value_name = "WHAT")]
+    pub color: ColorBy,
+    /// Draw only tetrahedra of which this holds, as in `tetdb query`
+    #[arg(long = "where", value_name = "EXPRESSION", allow_hyphen_values = true)]
+    pub condition: Option<String>,
+    /// Width and height in pixels
+    #[arg(long, value_name = "WxH", default_value = "1600x1200")]
+    pub size: String,
+    /// Most memory to hold
+    #[arg(long, value_name = "SIZE")]
+    pub memory: Option<String>,
+    /// Answer with one JSON object
+    #[arg(long)]
+    pub json: bool,
 }

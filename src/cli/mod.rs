@@ -24,6 +24,7 @@ mod refine_surface;
 mod sample;
 mod shell;
 mod signals;
+mod snapshot;
 mod store;
 mod talk;
 mod verify;
@@ -93,6 +94,7 @@ fn dispatch(command: &Command, talk: &Talk) -> Result<u8, Failure> {
         Command::Digest(args) => digest::run(args, talk),
         Command::Export(args) => export::run(args, talk),
         Command::RefineSurface(args) => refine_surface::run(args, talk),
+        Command::Snapshot(args) => snapshot::run(args, talk),
         Command::Sample(args) => sample::run(args, talk),
         Command::Completions(args) => shell::completions(args),
         Command::Man(args) => shell::man(args, talk),

@@ -144,7 +144,8 @@ fn solids(args: &QueryArgs) -> Result<Vec<Solid>, Failure> {
     Ok(solids)
 }
 
-fn condition(text: &str) -> Result<Expression, Failure> {
+/// A truth about the variables of a query.
+pub fn condition(text: &str) -> Result<Expression, Failure> {
     let condition =
         Expression::parse(text, &VARIABLES).map_err(|error| bad_expression(text, &error))?;
     if condition.kind() == Kind::Truth {

@@ -1,4 +1,5 @@
 //! Mesh files in and out, streamed. Only this room and the command line know formats.
 
+pub mod picture;
 pub mod read;
 pub mod write;

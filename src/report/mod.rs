@@ -7,7 +7,7 @@
 //! Reading order: `solid` (boxes, balls, planes and what meets them) on `exact`; `frame` (a decoded chunk) and `tree`;
 //! `inquiry` (what is held); `locate` (points), `lazy` (a single point); `found` (a tetrahedron with its columns);
 //! `selection` (what is asked for), `marks` (faces of the surface and of interfaces), `select` (the answers one after the other),
-//! `order` (sorted), `around` (tetrahedra around vertices, edges, neighbors).
+//! `order` (sorted), `around` (tetrahedra around vertices, edges, neighbors), `section` (cuts by a plane, to be drawn).
 
 mod around;
 mod error;
@@ -19,6 +19,7 @@ mod lazy;
 mod locate;
 mod marks;
 mod order;
+mod section;
 mod select;
 mod selection;
 mod solid;
@@ -31,6 +32,7 @@ pub use found::{Found, VARIABLES};
 pub use inquiry::{Inquiry, Measures};
 pub use locate::Located;
 pub use order::Ordered;
+pub use section::{Extent, Piece, Section, View};
 pub use select::Selected;
 pub use selection::{Selection, Sharing};
 pub use solid::Solid;

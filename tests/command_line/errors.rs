@@ -177,6 +177,19 @@ const CASES: &[Case] = &[
         "query a.tetdb --region 1 -o a.xyz",
         "a.xyz",
     ),
+    asked(
+        "bad-query",
+        2,
+        "snapshot a.tetdb a.svg --plane 9,9,9,0,0,1",
+        "--plane 9,9,9",
+    ),
+    asked(
+        "bad-query",
+        2,
+        "snapshot a.tetdb a.svg --size 10x10",
+        "10x10",
+    ),
+    asked("unknown-format", 3, "snapshot a.tetdb a.gif", "a.gif"),
     case("bad-sample", 2, "mesh sample:bix -o x.tetdb", "bix"),
     case("bad-sample", 2, "mesh sample:box,g=1 -o x.tetdb", "g"),
     case(

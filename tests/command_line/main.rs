@@ -14,4 +14,5 @@ mod same_mesh;
 mod shell;
 mod size_files;
 mod sizes;
+mod snapshot;
 mod subdomains;

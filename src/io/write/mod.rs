@@ -37,7 +37,7 @@ use std::path::{Path, PathBuf};
 
 pub use defects::defects;
 pub use error::WriteError;
-pub use npy::{NpyField, NpyTable, TextFile};
+pub use npy::{NpyField, NpyTable, TextFile, bytes};
 pub use selected::{SelectedTet, SelectedVtu};
 pub use surface::{SurfaceReport, surface};
 

@@ -113,6 +113,16 @@ impl TextFile {
     }
 }
 
+/// Writes a whole file at once; returns its length. Errors: the disk.
+pub fn bytes(out: &Path, content: &[u8]) -> Result<u64> {
+    let mut draft = Draft::new(out)?;
+    let path = draft.create(out, content.len() as u64)?;
+    let mut stream = Stream::open(&path)?;
+    stream.bytes(content);
+    stream.finish()?;
+    length(draft)
+}
+
 /// Publishes the one file of a draft.
 pub(super) fn length(draft: Draft) -> Result<u64> {
     let files = draft.publish()?;

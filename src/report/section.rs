@@ -1,0 +1,250 @@
+//! A cut through the mesh by a plane, as flat pieces in the order they are to be drawn.
+//!
+//! A *section* has the polygon in which the plane cuts each tetrahedron. A *crinkle cut* has the tetrahedra that meet the plane as
+//! they are: their faces towards the viewer, the far ones first. Positions here are for the eye: they are rounded.
+
+use std::path::Path;
+
+use super::found::Found;
+use super::selection::Selection;
+use super::solid::Solid;
+use super::{Inquiry, ReportError};
+use crate::geom::Point;
+use crate::store::{Sorted, Sorter};
+use tetdb_schema::record::FACES;
+
+/// A plane seen from the side its normal points to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    origin: Point,
+    right: Point,
+    up: Point,
+    normal: Point,
+}
+
+impl View {
+    /// The plane through `origin`, orthogonal to `normal`, which is not zero; z is up where it can be.
+    pub fn new(origin: Point, normal: Point) -> Self {
+        // Twice, since one division leaves very long and very short ones off by more than rounding.
+        let normal = (normal / normal.abs().max_element()).normalize();
+        let upright = if normal.z.abs() > 0.999 {
+            Point::Y
+        } else {
+            Point::Z
+        };
+        let up = (upright - normal * upright.dot(normal)).normalize();
+        Self {
+            origin,
+            right: up.cross(normal),
+            up,
+            normal,
+        }
+    }
+
+    fn height(&self, p: Point) -> f64 {
+        (p - self.origin).dot(self.normal)
+    }
+
+    fn flat(&self, p: Point) -> [f64; 2] {
+        let p = p - self.origin;
+        [p.dot(self.right), p.dot(self.up)]
+    }
+}
+
+/// A flat piece of a tetrahedron.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Piece {
+    /// Its corners in the plane, in input units, to the right and up; the fourth is meant where `n` is 4.
+    pub corners: [[f64; 2]; 4],
+    pub n: usize,
+    /// How much it faces the viewer, 0 to 1; 1 in a section.
+    pub facing: f32,
+    pub subdomain: u32,
+    pub region: u32,
+    pub quality: f32,
+    /// Mean length of the tetrahedron's longest and shortest edge.
+    pub size: f32,
+}
+
+/// What all pieces together are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Extent {
+    pub n: u64,
+    /// Low and high corner in the plane.
+    pub bounds: [[f64; 2]; 2],
+    pub quality: [f32; 2],
+    pub size: [f32; 2],
+}
+
+/// Depth, corners, then what is told of the tetrahedron.
+const BYTES: usize = 8 + 8 * 8 + 6 * 4;
+
+/// The pieces of a cut, far ones first.
+pub struct Section {
+    pub extent: Extent,
+    sorted: Sorted<BYTES>,
+}
+
+impl Inquiry {
+    /// Cuts what suits `selection`, whole tetrahedra when `crinkle` says so; holds about `memory_bytes` and runs in `dir`.
+    ///
+    /// Errors: damage, the disk.
+    pub fn section(
+        &mut self,
+        view: &View,
+        crinkle: bool,
+        mut selection: Selection,
+        dir: &Path,
+        memory_bytes: u64,
+    ) -> Result<Section, ReportError> {
+        selection.solids.push(Solid::Plane {
+            point: view.origin,
+            normal: view.normal,
+        });
+        let mut sorter = Sorter::new(dir, memory_bytes);
+        let mut extent = Extent {
+            n: 0,
+            bounds: [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]],
+            quality: [f32::INFINITY, 0.0],
+            size: [f32::INFINITY, 0.0],
+        };
+        for tet in self.select(selection)? {
+            let tet = tet?;
+            for (depth, piece) in pieces(view, crinkle, &tet) {
+                extent.add(&piece);
+                sorter.push(record(depth, &piece))?;
+            }
+        }
+        Ok(Section {
+            extent,
+            sorted: sorter.finish()?,
+        })
+    }
+}
+
+impl Extent {
+    fn add(&mut self, piece: &Piece) {
+        self.n += 1;
+        for corner in &piece.corners[..piece.n] {
+            for (axis, &x) in corner.iter().enumerate() {
+                self.bounds[0][axis] = self.bounds[0][axis].min(x);
+                self.bounds[1][axis] = self.bounds[1][axis].max(x);
+            }
+        }
+        let [least, most] = self.quality;
+        self.quality = [least.min(piece.quality), most.max(piece.quality)];
+        let [least, most] = self.size;
+        self.size = [least.min(piece.size), most.max(piece.size)];
+    }
+}
+
+impl Iterator for Section {
+    type Item = Result<Piece, ReportError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let record = self.sorted.next()?;
+        Some(record.map(|r| piece(&r)).map_err(ReportError::from))
+    }
+}
+
+/// The pieces of a tetrahedron with their heights over the plane.
+fn pieces(view: &View, crinkle: bool, tet: &Found) -> Vec<(f64, Piece)> {
+    let [least, most] = tet.edges();
+    let piece = |corners: &[[f64; 2]], facing: f64| {
+        let mut all = [[0.0; 2]; 4];
+        all[..corners.len()].copy_from_slice(corners);
+        Piece {
+            corners: all,
+            n: corners.len(),
+            facing: facing as f32,
+            subdomain: tet.id.subdomain().rank(),
+            region: tet.region,
+            quality: tet.shape.quality as f32,
+            size: (0.5 * (least + most)) as f32,
+        }
+    };
+    if !crinkle {
+        let polygon = polygon(view, tet);
+        let seen = polygon.len() >= 3;
+        return seen
+            .then(|| (0.0, piece(&polygon, 1.0)))
+            .into_iter()
+            .collect();
+    }
+    let mut found = Vec::new();
+    for face in FACES {
+        let [a, b, c] = face.map(|i| tet.corners[i]);
+        let outward = (b - a).cross(c - a);
+        let facing = outward.dot(view.normal) / outward.length();
+        if facing > 0.0 {
+            let flat = [a, b, c].map(|p| view.flat(p));
+            let height = [a, b, c].map(|p| view.height(p)).iter().sum::<f64>() / 3.0;
+            found.push((height, piece(&flat, facing)));
+        }
+    }
+    found
+}
+
+/// Where the plane cuts a tetrahedron: three or four corners, or none.
+fn polygon(view: &View, tet: &Found) -> Vec<[f64; 2]> {
+    let heights = tet.corners.map(|c| view.height(c));
+    let (above, below): (Vec<usize>, Vec<usize>) = (0..4).partition(|&i| heights[i] > 0.0);
+    // From the vertex of the lower id, so that neighbors find the same point.
+    let cut = |i: usize, j: usize| {
+        let (i, j) = match tet.vertices[i] < tet.vertices[j] {
+            true => (i, j),
+            false => (j, i),
+        };
+        let t = heights[i] / (heights[i] - heights[j]);
+        view.flat(tet.corners[i] + (tet.corners[j] - tet.corners[i]) * t)
+    };
+    match (&above[..], &below[..]) {
+        ([a], [b, c, d]) | ([b, c, d], [a]) => vec![cut(*a, *b), cut(*a, *c), cut(*a, *d)],
+        ([a, b], [c, d]) => vec![cut(*a, *c), cut(*a, *d), cut(*b, *d), cut(*b, *c)],
+        _ => Vec::new(),
+    }
+}
+
+fn record(depth: f64, piece: &Piece) -> [u8; BYTES] {
+    let bits = depth.to_bits();
+    // In the order of the numbers.
+    let key = bits ^ if bits >> 63 == 1 { u64::MAX } else { 1 << 63 };
+    let mut record = [0; BYTES];
+    record[..8].copy_from_slice(&key.to_be_bytes());
+    let corners = piece.corners.as_flattened().iter();
+    for (bytes, x) in record[8..72].chunks_exact_mut(8).zip(corners) {
+        bytes.copy_from_slice(&x.to_le_bytes());
+    }
+    let words = [
+        piece.n as u32,
+        piece.facing.to_bits(),
+        piece.subdomain,
+        piece.region,
+        piece.quality.to_bits(),
+        piece.size.to_bits(),
+    ];
+    for (bytes, word) in record[72..].chunks_exact_mut(4).zip(words) {
+        bytes.copy_from_slice(&word.to_le_bytes());
+    }
+    record
+}
+
+fn piece(record: &[u8; BYTES]) -> Piece {
+    let double = |i: usize| {
+        let bytes = record[8 + 8 * i..16 + 8 * i].try_into();
+        f64::from_le_bytes(bytes.expect("eight bytes were taken"))
+    };
+    let word = |i: usize| {
+        let bytes = record[72 + 4 * i..76 + 4 * i].try_into();
+        u32::from_le_bytes(bytes.expect("four bytes were taken"))
+    };
+    Piece {
+        corners: [0, 1, 2, 3].map(|i| [double(2 * i), double(2 * i + 1)]),
+        n: word(0) as usize,
+        facing: f32::from_bits(word(1)),
+        subdomain: word(2),
+        region: word(3),
+        quality: f32::from_bits(word(4)),
+        size: f32::from_bits(word(5)),
+    }
+}

@@ -1,0 +1,84 @@
+//! Pictures are there, of the right size, and of the right things.
+//!
+//! Why: a picture is believed at a glance; it must show the mesh that is there.
+//! How: the PNG's head and some of its pixels by way of a second picture; the SVG's polygons, counted and measured. That a section
+//! covers what the plane cuts, once, is shown in `src/report/tests.rs`.
+
+use super::place::Place;
+
+/// Corners of the polygons of an SVG file with their fill color, those of the bar of colors left out.
+fn polygons(text: &str) -> Vec<(Vec<[f64; 2]>, &str)> {
+    let paths = text.lines().filter(|l| l.contains("stroke=\"#222\""));
+    paths
+        .map(|line| {
+            let word = |name: &str| {
+                let at = line.find(name).expect("the attribute") + name.len();
+                line[at..].split('"').next().expect("its end")
+            };
+            let corners = word(" d=\"M").trim_end_matches('z').split('L');
+            let corners = corners.map(|corner| {
+                let (x, y) = corner.split_once(',').expect("two numbers");
+                [x.parse().expect("a number"), y.parse().expect("a number")]
+            });
+            (corners.collect(), word("fill=\""))
+        })
+        .collect()
+}
+
+fn area(corners: &[[f64; 2]]) -> f64 {
+    let turned = corners.iter().zip(corners.iter().cycle().skip(1));
+    let twice: f64 = turned.map(|(p, q)| p[0] * q[1] - p[1] * q[0]).sum();
+    twice.abs() / 2.0
+}
+
+#[test]
+fn a_cut_is_drawn_whole_and_in_its_colors() {
+    let place = Place::new();
+    let line = "mesh sample:box,h=0.05 -o a.tetdb --subdomains 2";
+    place.run_line(line).succeeds();
+    let cut = "snapshot a.tetdb cut.svg --size 500x500 --plane 0.5,0.5,0.5,0,0,1 --json";
+    let answer = place.run_line(cut).succeeds().json();
+    let svg = std::fs::read_to_string(place.path("cut.svg")).expect("it was written");
+    let pieces = polygons(&svg);
+    assert_eq!(answer["pieces"], pieces.len());
+    assert_eq!(answer["bytes"], svg.len());
+    // The square with margins of 4 % on both sides.
+    let sum: f64 = pieces.iter().map(|(corners, _)| area(corners)).sum();
+    assert!((sum / (460.0 * 460.0) - 1.0).abs() < 0.002, "{sum}");
+    let mut colors: Vec<&str> = pieces.iter().map(|(_, color)| *color).collect();
+    colors.sort_unstable();
+    colors.dedup();
+    assert_eq!(colors.len(), 2, "a color for each sub-domain");
+
+    let whole = "snapshot a.tetdb whole.svg --crinkle --color size --where x<0.5 --size 500x500";
+    place.run_line(whole).succeeds();
+    let svg = std::fs::read_to_string(place.path("whole.svg")).expect("it was written");
+    let pieces = polygons(&svg);
+    assert!(pieces.iter().all(|(corners, _)| corners.len() == 3));
+    let widest = pieces
+        .iter()
+        .flat_map(|(c, _)| c)
+        .map(|c| c[0])
+        .fold(0.0, f64::max);
+    assert!(widest < 420.0, "the bar of colors has its place: {widest}");
+}
+
+#[test]
+#[cfg(feature = "pictures")]
+fn a_png_has_the_size_asked_for() {
+    let place = Place::new();
+    place
+        .run_line("mesh sample:box,h=0.2 -o a.tetdb")
+        .succeeds();
+    for (name, options) in [("a.png", ""), ("b.png", ""), ("c.png", "--color quality")] {
+        let line = format!("snapshot a.tetdb {name} --size 320x240 {options}");
+        place.run_line(&line).succeeds();
+    }
+    let read = |name: &str| std::fs::read(place.path(name)).expect("it was written");
+    let png = read("a.png");
+    assert!(png.starts_with(b"\x89PNG\r\n\x1a\n"));
+    let side = |at: usize| png[at..at + 4].try_into().map(u32::from_be_bytes);
+    assert_eq!([side(16).ok(), side(20).ok()], [Some(320), Some(240)]);
+    assert_eq!(png, read("b.png"), "the same mesh gives the same picture");
+    assert_ne!(png, read("c.png"));
+}
