@@ -90,8 +90,11 @@ def by_gmsh(path):
         place = np.zeros(int(tags.max()) + 1, np.int64)
         place[tags] = np.arange(len(tags))
         tets = place[gmsh.model.mesh.getElementsByType(4)[1]].reshape(-1, 4)
-        tris = place[gmsh.model.mesh.getElementsByType(2)[1]].reshape(-1, 3)
         groups = gmsh.model.getPhysicalGroups()
+        # Between partitions gmsh adds triangles of its own, which belong to no group of the input.
+        skins = [e for dim, tag in groups if dim == 2 for e in gmsh.model.getEntitiesForPhysicalGroup(2, tag)] or [-1]
+        tris = np.concatenate([gmsh.model.mesh.getElementsByType(2, skin)[1] for skin in skins])
+        tris = place[tris].reshape(-1, 3)
         regions = [tag for dim, tag in groups if dim == 3] or None
         labels = {gmsh.model.getPhysicalName(2, tag) for dim, tag in groups if dim == 2}
         return seen(xyz.reshape(-1, 3), tets, tris, regions, labels if path.endswith(".msh") else None)
