@@ -68,6 +68,15 @@ impl Graph {
         self.terminal.clear();
     }
 
+    /// Bytes it has room for.
+    pub(super) fn bytes(&self) -> u64 {
+        let queues = (self.active.capacity() + self.orphans.capacity()) * size_of::<u32>();
+        let arcs = (self.neighbor.capacity() + self.residual.capacity()) * size_of::<[u32; 4]>();
+        let nodes = self.terminal.capacity() * size_of::<[u32; 2]>()
+            + self.places.capacity() * size_of::<Place>();
+        (queues + arcs + nodes) as u64
+    }
+
     pub(super) fn n_nodes(&self) -> usize {
         self.neighbor.len()
     }

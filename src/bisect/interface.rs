@@ -44,6 +44,8 @@ impl Default for Steps {
 /// How the interface came about.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct InterfaceReport {
+    /// Most bytes the choice held beside the core.
+    pub bytes: u64,
     /// Tetrahedra of the cutting zone.
     pub free_tets: u64,
     /// By the side of the middles.
@@ -72,8 +74,9 @@ pub(super) fn choose<P: Pages>(
     report.natural = measure(core, rim);
     report.natural.pinched = moves.count_pinched(core, &free);
     if steps.minimum_cut {
-        minimum_cut(core, surface, &free);
+        report.bytes = minimum_cut(core, surface, &free);
     }
+    report.bytes += size_of_val(&free[..]) as u64;
     report.minimum = measure(core, rim);
     report.minimum.pinched = moves.count_pinched(core, &free);
     report.moves = moves.run(core, &free, steps);
@@ -82,16 +85,17 @@ pub(super) fn choose<P: Pages>(
     report
 }
 
-/// Cuts strip by strip.
-fn minimum_cut<P: Pages>(core: &mut Mesh<P>, surface: &dyn CuttingSurface, free: &[u32]) {
+/// Cuts strip by strip; returns the most bytes held.
+fn minimum_cut<P: Pages>(core: &mut Mesh<P>, surface: &dyn CuttingSurface, free: &[u32]) -> u64 {
     core.clear_scratch();
     for n in 0..dense(core.tet_ids_end()) {
         core.set_scratch(n, NONE);
     }
     let mut order = free.to_vec();
     let strips = free.len().div_ceil(STRIP).max(1);
+    let mut sorting = 0;
     if strips > 1 {
-        sort_along(core, surface, &mut order);
+        sorting = sort_along(core, surface, &mut order);
     }
     let mut graph = Graph::default();
     let length = free.len().div_ceil(strips).max(1);
@@ -105,11 +109,18 @@ fn minimum_cut<P: Pages>(core: &mut Mesh<P>, surface: &dyn CuttingSurface, free:
         }
     }
     core.clear_scratch();
+    size_of_val(&order[..]) as u64 + sorting.max(graph.bytes())
 }
 
-/// Sorts along the longest direction in the surface, among three.
-fn sort_along<P: Pages>(core: &mut Mesh<P>, surface: &dyn CuttingSurface, order: &mut Vec<u32>) {
-    let Some(&first) = order.first() else { return };
+/// Sorts along the longest direction in the surface, among three; returns the bytes held meanwhile.
+fn sort_along<P: Pages>(
+    core: &mut Mesh<P>,
+    surface: &dyn CuttingSurface,
+    order: &mut Vec<u32>,
+) -> u64 {
+    let Some(&first) = order.first() else {
+        return 0;
+    };
     let tet = core.tet(first);
     let normal = surface.normal(core.points(&tet)[0]);
     let mut axes = [Point::X, Point::Y, Point::Z].map(|a| a - normal * normal.dot(a));
@@ -134,7 +145,8 @@ fn sort_along<P: Pages>(core: &mut Mesh<P>, surface: &dyn CuttingSurface, order:
         .collect();
     keyed.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     order.clear();
-    order.extend(keyed.into_iter().map(|(_, t)| t));
+    order.extend(keyed.iter().map(|&(_, t)| t));
+    size_of_val(&keyed[..]) as u64
 }
 
 fn cut_strip<P: Pages>(

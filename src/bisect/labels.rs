@@ -3,8 +3,9 @@
 use super::core::{Rim, middle, place, tet_ids};
 use super::surface::CuttingSurface;
 use crate::geom::Point;
-use crate::mesh::{Mesh, Tet};
+use crate::mesh::{Mesh, Tet, dense};
 use crate::store::{Pages, stop_if_requested};
+use tetdb_schema::page::NONE;
 
 /// Tetrahedra with a vertex nearer than this, in units of its h, may go to either side: the cutting zone. At 2.5 the interface has
 /// one face in a hundred less, and its spheres reach out of the refined zone.
@@ -162,6 +163,47 @@ pub(super) fn measure<P: Pages>(core: &mut Mesh<P>, rim: &Rim) -> InterfaceMeasu
 /// Whether face `i` is required for ever, not only as a part of the rim.
 pub(super) fn is_constrained(tet: &Tet, i: usize, rim: &Rim) -> bool {
     tet.is_required(i) && (tet.neighbor[i].exists() || rim.find(tet.face(i)).is_none())
+}
+
+/// The least number of tetrahedra between the interface and what is not in the core: so many at least are final on each side of it.
+///
+/// Effects: uses the core's scratch map. Where no interface or no rim is, there is no such number: `None`.
+pub(super) fn layers_least<P: Pages>(core: &mut Mesh<P>, rim: &Rim) -> Option<u32> {
+    core.clear_scratch();
+    for n in 0..dense(core.tet_ids_end()) {
+        core.set_scratch(n, NONE);
+    }
+    let mut layer = Vec::new();
+    for t in tet_ids(core) {
+        let tet = core.tet(t);
+        if tet.is_live() && interface_faces(core, t, &tet).next().is_some() {
+            core.set_scratch(dense(t), 1);
+            layer.push(t);
+        }
+    }
+    let mut n = 1;
+    while !layer.is_empty() {
+        stop_if_requested();
+        let mut next = Vec::new();
+        for t in layer {
+            let tet = core.tet(t);
+            for (i, across) in tet.neighbor.into_iter().enumerate() {
+                if !across.exists() {
+                    if rim.find(tet.face(i)).is_some() {
+                        return Some(n);
+                    }
+                    continue;
+                }
+                let other = dense(across.tet());
+                if core.scratch(other) == NONE {
+                    core.set_scratch(other, n + 1);
+                    next.push(across.tet());
+                }
+            }
+        }
+        (layer, n) = (next, n + 1);
+    }
+    None
 }
 
 /// Tetrahedra with a face on the interface, and how many of them have their circumsphere within the refined zone.

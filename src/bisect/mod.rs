@@ -38,6 +38,13 @@ use crate::optimize::{self, Settings};
 use crate::refine::{Field, RefineReport, saturate};
 use crate::store::{Pages, StoreError};
 
+/// How cuts are made, for comparing what each part of the method brings; the default is the method.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Cutting {
+    pub plane: PlaneChoice,
+    pub steps: Steps,
+}
+
 /// What a cut is to do.
 #[derive(Clone, Copy)]
 pub struct CutPlan<'a> {
@@ -45,7 +52,7 @@ pub struct CutPlan<'a> {
     pub cut: u32,
     /// Share of the load that belongs on the low side.
     pub low: f64,
-    pub choice: PlaneChoice,
+    pub cutting: Cutting,
     /// Zones of the cuts above it.
     pub earlier: &'a [Zone],
     /// Wanted length at a position.
@@ -53,7 +60,6 @@ pub struct CutPlan<'a> {
     /// Box of the whole mesh.
     pub bounds: Aabb,
     pub optimize: Settings,
-    pub steps: Steps,
 }
 
 /// A sub-domain cut open: its interface is chosen, the children are not yet written.
@@ -74,6 +80,8 @@ pub struct CutReport {
     /// Tetrahedra with a face on the interface, and those whose circumsphere lies in the refined zone.
     pub z_tets: u64,
     pub z_enclosed: u64,
+    /// Final tetrahedra between the interface and what is not final: at least so many, on each side.
+    pub layers_least: Option<u32>,
     pub seconds: StageSeconds,
 }
 
@@ -109,7 +117,7 @@ pub fn open<P: Pages, Q: Pages>(
         let p = host.point(v);
         host.set_size(v, (plan.h)(p) as f32);
     }
-    let plane = plane::choose(host, plan.h, plan.bounds.low, plan.low, plan.choice);
+    let plane = plane::choose(host, plan.h, plan.bounds.low, plan.low, plan.cutting.plane);
     seconds.plane = lap();
     let zone = Zone {
         cut: plan.cut,
@@ -130,9 +138,10 @@ pub fn open<P: Pages, Q: Pages>(
     let rim = core::extract(host, core, &zone.surface);
     optimize::run_with(core, plan.optimize, &|_| {});
     seconds.core = lap();
-    let interface = interface::choose(core, &zone.surface, &rim, plan.steps);
+    let interface = interface::choose(core, &zone.surface, &rim, plan.cutting.steps);
     let vertices = split::number_interface(core, plan.cut);
     let (z_tets, z_enclosed) = labels::enclosed(core, &zone.surface, plan.h);
+    let layers_least = labels::layers_least(core, &rim);
     seconds.interface = lap();
     Ok(Opened {
         zone,
@@ -143,6 +152,7 @@ pub fn open<P: Pages, Q: Pages>(
             vertices,
             z_tets,
             z_enclosed,
+            layers_least,
             seconds,
         },
         rim,

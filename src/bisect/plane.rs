@@ -22,6 +22,8 @@ const SHIFT: f64 = 0.2;
 const GRAZED: f64 = 0.35;
 /// Largest share of the load a shift may bring to the other side: over a dozen cuts it stays within the balance wanted.
 const TOLERANCE: f64 = 0.003;
+/// Lengths along the diagonal where volume stands for load: pieces of some lengths are then as fine as a histogram needs.
+const VOLUME_STEPS: f64 = 200.0;
 /// Least gain in grazed vertices that a shift away from the balanced position must bring, as a share.
 const GAIN: f64 = 0.1;
 
@@ -33,6 +35,8 @@ pub enum PlaneChoice {
     Load,
     /// As the paper says: centroids of the mesh, unweighted; the axis of the largest moment; placed by load.
     Centroids,
+    /// As `Load`, but shared by volume: what becomes of the balance when sizes do not count.
+    Volume,
     /// This one, as it is.
     Given(Plane),
 }
@@ -96,12 +100,16 @@ pub fn choose<P: Pages>(
     low: f64,
     choice: PlaneChoice,
 ) -> ChosenPlane {
+    if choice == PlaneChoice::Volume {
+        let everywhere = bounds(mesh).diagonal() / VOLUME_STEPS;
+        return choose(mesh, &|_| everywhere, origin, low, PlaneChoice::Load);
+    }
     let axis = match choice {
         PlaneChoice::Given(plane) => {
             return Spread::gather(mesh, h, plane.normal).at(plane.offset);
         }
         PlaneChoice::Centroids => principal_axes(&centroid_moments(mesh, origin))[0],
-        PlaneChoice::Load => {
+        PlaneChoice::Load | PlaneChoice::Volume => {
             let grid = Grid::gather(mesh, h);
             let mut axes = principal_axes(&grid.moments().matrix()).to_vec();
             axes.extend([Point::X, Point::Y, Point::Z]);

@@ -23,7 +23,9 @@ pub struct CoarseReport {
 const TELL_EVERY: usize = 4096;
 
 /// Builds the coarse mesh of a valid surface into an empty mesh.
-pub(super) fn coarse<P: Pages>(
+///
+/// Errors: triangles that cannot be recovered; regions of which none is filled.
+pub fn coarse<P: Pages>(
     mesh: &mut Mesh<P>,
     surface: &Surface,
     options: &Options,

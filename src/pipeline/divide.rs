@@ -11,7 +11,7 @@ use super::run::{Run, journal, remove};
 use super::tree::{self, Part, PartMesh, blob};
 use super::watch::{Event, Watcher};
 use super::{PipelineError, Plan};
-use crate::bisect::{self, CutPlan, CutReport, Opened, PlaneChoice, Steps, Zone};
+use crate::bisect::{self, CutPlan, CutReport, Opened, Zone};
 use crate::catalog::{CatalogError, NeighborRow, StoreState, TopologyRow};
 use crate::mesh::{Mesh, Workspace};
 use crate::optimize::Settings;
@@ -80,12 +80,11 @@ impl CutJob {
         let plan = CutPlan {
             cut: part.cut(),
             low: part.low_share(),
-            choice: PlaneChoice::default(),
+            cutting: common.cutting,
             earlier: &self.zones,
             h: &|p| common.field.h(p),
             bounds: common.bounds,
             optimize: Settings::of(common.mode),
-            steps: Steps::default(),
         };
         let opened = bisect::open(&mut host, &mut core, &plan, &space, &|stage, done| {
             watch(Event {
@@ -150,6 +149,10 @@ impl CutJob {
             }
         }
         inherited.sort_unstable();
+        if mesh.n_tets() == 0 {
+            let cut = opened.zone.cut;
+            return Err(PipelineError::EmptyPart { cut });
+        }
         let [below, all] = opened.report.plane.load;
         let load = if high { all - below } else { below };
         let part_mesh = PartMesh {
@@ -291,6 +294,11 @@ impl Run<'_> {
             ("pinched", interface.chosen.pinched as f64),
             ("z_tets", report.z_tets as f64),
             ("z_enclosed", report.z_enclosed as f64),
+            (
+                "layers_least",
+                report.layers_least.map_or(f64::INFINITY, f64::from),
+            ),
+            ("choice_bytes", interface.bytes as f64),
             ("plane_s", report.seconds.plane),
             ("zone_s", report.seconds.zone),
             ("core_s", report.seconds.core),

@@ -29,4 +29,7 @@ pub enum PipelineError {
     /// Nothing is enclosed by the surface under the chosen rule for regions.
     #[error("no region is filled: the surface encloses nothing under --regions {policy}")]
     NothingFilled { policy: String },
+    /// All tetrahedra came to lie on one side of a cut.
+    #[error("cut {cut} leaves no tetrahedron on one side: ask for fewer sub-domains")]
+    EmptyPart { cut: u32 },
 }

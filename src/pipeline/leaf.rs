@@ -14,7 +14,7 @@ use super::seal::{Target, seal};
 use super::tree::PartMesh;
 use super::watch::Watcher;
 use super::{PipelineError, Plan};
-use crate::bisect::Zone;
+use crate::bisect::{Cutting, Zone};
 use crate::catalog::{InterfaceSide, RegionTotals, Sealed};
 use crate::geom::Aabb;
 use crate::mesh::{Mesh, Workspace};
@@ -42,6 +42,7 @@ pub(super) struct LeafJob {
 pub(super) struct Common<'a> {
     pub field: &'a SizeField,
     pub mode: Mode,
+    pub cutting: Cutting,
     pub bounds: Aabb,
 }
 

@@ -23,6 +23,7 @@ mod seal;
 mod tree;
 mod watch;
 
+pub use coarse::{CoarseReport, coarse as coarse_mesh};
 pub use error::PipelineError;
 pub use estimate::{Estimate, Prepared, prepare};
 pub use fine::FineReport;

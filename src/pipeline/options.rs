@@ -1,6 +1,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::PipelineError;
+use crate::bisect::Cutting;
 use crate::boundary::RegionPolicy;
 use crate::optimize::Mode;
 use crate::sizing::{Formula, RegionSize, SizeOptions, SizeSource, SizingError};
@@ -40,6 +41,9 @@ pub struct Options {
     /// `auto` or a number.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub subdomains: Option<String>,
+    /// For comparisons by a program. It is not stored: a run that is resumed makes cuts as usual.
+    #[serde(skip)]
+    pub cutting: Cutting,
 }
 
 impl Options {

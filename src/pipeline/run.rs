@@ -169,6 +169,7 @@ impl<'a> Run<'a> {
         Ok(Common {
             field: self.field,
             mode: self.options.mode()?,
+            cutting: self.options.cutting,
             bounds: self.bounds,
         })
     }

@@ -1,0 +1,247 @@
+//! One cut, stage by stage: resident, with a pool smaller than the mesh, and with parts of the method switched off.
+//!
+//! `cargo bench --bench bisection -- [sample] [method|pool|volume]`; without arguments a smoke size and all of them. `method` compares what each
+//! step of choosing the interface brings, `pool` runs with frames for a twentieth of the pages, `volume` places the plane without regard to sizes.
+//! Wall seconds of one thread; the coarse mesh is not counted.
+
+use std::path::Path;
+use std::time::Instant;
+
+use tetdb::bisect::{self, CutPlan, CutReport, Cutting, PlaneChoice, Steps, load_of};
+use tetdb::geom::{Point, mix};
+use tetdb::mesh::{Mesh, Workspace, renumber};
+use tetdb::optimize::{Mode, Settings};
+use tetdb::pipeline::{self, Options, silent};
+use tetdb::samples::SampleSpec;
+use tetdb::sizing::{SizeField, SizeOptions, TETS_PER_LOAD};
+use tetdb::store::{Backing, Pager, attempt};
+use tetdb::surface::Surface;
+
+struct Bench {
+    surface: Surface,
+    field: SizeField,
+    dir: tempfile::TempDir,
+}
+
+/// What one cut came to.
+struct Cut {
+    report: CutReport,
+    seconds: f64,
+    /// Of both children: a sum over their tetrahedra, whatever their order.
+    digest: u64,
+    tets: u64,
+    pages: usize,
+    pages_read: u64,
+    pages_written: u64,
+}
+
+impl Bench {
+    fn new(words: &str) -> Self {
+        let made = SampleSpec::parse(words).and_then(|spec| spec.make());
+        let surface: Surface = made.expect("a sample").into();
+        let sizes = SizeOptions::default();
+        let field = SizeField::build(&surface.points, &surface.triangles, &sizes);
+        Self {
+            field: field.expect("sizes"),
+            surface,
+            dir: tempfile::tempdir().expect("a temporary directory"),
+        }
+    }
+
+    fn pool(&self, name: &str, bytes: u64) -> Mesh {
+        let backing = Backing {
+            subdomain: 0,
+            generation: 1,
+            work_path: self.dir.path().join(name),
+            base: None,
+            cache_bytes: 16 << 20,
+        };
+        Mesh::new(Pager::new(bytes, Some(backing)))
+    }
+
+    /// Cuts the coarse mesh in halves with `bytes` of frames.
+    fn cut(&self, cutting: Cutting, bytes: u64) -> Cut {
+        let space = Workspace {
+            dir: self.dir.path(),
+            memory: 64 << 20,
+        };
+        let bounds = self.surface.bounds();
+        let mut host = self.pool("host.redb", bytes / 2);
+        let options = Options::default();
+        pipeline::coarse_mesh(&mut host, &self.surface, &options, &silent).expect("a mesh");
+        renumber(&mut host, &tetdb::geom::HilbertFrame::new(&bounds), &space).expect("room");
+        let clock = Instant::now();
+        let mut core = self.pool("core.redb", bytes / 4);
+        let plan = CutPlan {
+            cut: 1,
+            low: 0.5,
+            cutting,
+            earlier: &[],
+            h: &|p| self.field.h(p),
+            bounds,
+            optimize: Settings::of(Mode::Full),
+        };
+        let opened = bisect::open(&mut host, &mut core, &plan, &space, &|_, _| {}).expect("room");
+        let (mut digest, mut tets, mut pages) = (0u64, 0, 0);
+        for high in [false, true] {
+            let name = format!("child-{high}.redb");
+            let mut child = self.pool(&name, bytes / 4);
+            bisect::write_child(
+                &mut host, &mut core, &mut child, &opened, high, &bounds, &space,
+            )
+            .expect("room");
+            digest = digest.wrapping_add(sum(&mut child, high));
+            tets += u64::from(child.n_tets());
+            pages += child
+                .pages()
+                .extents()
+                .iter()
+                .map(|e| e[1] as usize)
+                .sum::<usize>();
+            remove(child, &self.dir.path().join(name));
+        }
+        let stats = host.pages().stats();
+        let cut = Cut {
+            report: opened.report,
+            seconds: clock.elapsed().as_secs_f64(),
+            digest,
+            tets,
+            pages,
+            pages_read: stats.pages_read,
+            pages_written: stats.pages_written,
+        };
+        remove(host, &self.dir.path().join("host.redb"));
+        remove(core, &self.dir.path().join("core.redb"));
+        cut
+    }
+}
+
+/// A sum of all tetrahedra of a child.
+fn sum(mesh: &mut Mesh, high: bool) -> u64 {
+    let (mut sum, mut from) = (0u64, 0);
+    while let Some((t, tet)) = mesh.next_tet(from) {
+        from = t + 1;
+        let corner = |p: Point| (p.to_array().into_iter()).fold(1, |s, x| mix(s ^ x.to_bits()));
+        let corners = tet.vertices().map(|v| corner(mesh.point(v)));
+        let all = corners.into_iter().fold(0, u64::wrapping_add);
+        sum = sum.wrapping_add(mix(all ^ u64::from(high)));
+    }
+    sum
+}
+
+fn remove(mesh: Mesh, path: &Path) {
+    mesh.into_pages().discard();
+    // A pool that held everything made no file.
+    let _ = std::fs::remove_file(path);
+}
+
+fn tell(name: &str, cut: &Cut) {
+    let (interface, seconds) = (cut.report.interface, cut.report.seconds);
+    println!(
+        "{name:<22} {:.2} s: plane {:.2}, zone {:.2} ({} vertices), core {:.2}, interface {:.2}",
+        cut.seconds,
+        seconds.plane,
+        seconds.zone,
+        cut.report.refine.inserted,
+        seconds.core,
+        seconds.interface,
+    );
+    println!(
+        "{:22} {} free tetrahedra, {:.1} bytes each; final layers at the interface at least {:?}; {} of {} spheres in the zone",
+        "",
+        interface.free_tets,
+        interface.bytes as f64 / interface.free_tets.max(1) as f64,
+        cut.report.layers_least,
+        cut.report.z_enclosed,
+        cut.report.z_tets,
+    );
+    for (what, m) in [
+        ("natural", interface.natural),
+        ("minimum cut", interface.minimum),
+        ("chosen", interface.chosen),
+    ] {
+        println!(
+            "{:22} {what:<12} {} faces ({:+.1} %), quality {:.3}, {} tetrahedra with several, {} pinched vertices",
+            "",
+            m.faces,
+            100.0 * (m.faces as f64 / interface.natural.faces as f64 - 1.0),
+            m.quality_mean(),
+            m.over_constrained,
+            m.pinched,
+        );
+    }
+}
+
+fn main() {
+    let mut words = std::env::args().skip(1).filter(|a| !a.starts_with("--"));
+    let sample = words.next().unwrap_or_else(|| "box,h=0.1".to_owned());
+    let only = words.next();
+    let asked = |name: &str| only.as_deref().is_none_or(|o| o == name);
+    let bench = Bench::new(&sample);
+    let plenty = 4 << 30;
+    let whole = bench.cut(Cutting::default(), plenty);
+    println!("{sample}: {} triangles", bench.surface.n_triangles());
+    tell("as it is", &whole);
+    let steps = |minimum_cut, vertex_moves, tet_moves| Cutting {
+        steps: Steps {
+            minimum_cut,
+            vertex_moves,
+            tet_moves,
+        },
+        ..Cutting::default()
+    };
+    if asked("method") {
+        for (name, cutting) in [
+            ("minimum cut alone", steps(true, false, false)),
+            ("moves of vertices", steps(false, true, false)),
+            ("moves of tetrahedra", steps(false, false, true)),
+            ("both moves", steps(false, true, true)),
+        ] {
+            tell(name, &bench.cut(cutting, plenty));
+        }
+    }
+    if asked("pool") {
+        let frames = (whole.pages as u64).div_ceil(20) << 16;
+        let pool = attempt(|| bench.cut(Cutting::default(), frames)).expect("room");
+        tell("frames for 5 %", &pool);
+        println!(
+            "{:22} {} tetrahedra, {} pages, {} read, {} written; {:.2} times the time; {}",
+            "",
+            pool.tets,
+            pool.pages,
+            pool.pages_read,
+            pool.pages_written,
+            pool.seconds / whole.seconds,
+            if pool.digest == whole.digest {
+                "the same children"
+            } else {
+                "OTHER CHILDREN"
+            },
+        );
+    }
+    if asked("volume") {
+        let plane = PlaneChoice::Volume;
+        let cut = bench.cut(
+            Cutting {
+                plane,
+                ..Cutting::default()
+            },
+            plenty,
+        );
+        println!(
+            "shared by load: {:?} and by volume: {:?}",
+            whole.report.plane, cut.report.plane
+        );
+    }
+    let mut mesh = Mesh::new(Pager::new(plenty, None));
+    pipeline::coarse_mesh(&mut mesh, &bench.surface, &Options::default(), &silent).expect("a mesh");
+    for v in mesh.vertex_ids() {
+        let p = mesh.point(v);
+        mesh.set_size(v, bench.field.h(p) as f32);
+    }
+    let load = load_of(&mut mesh, &|p| bench.field.h(p));
+    println!(
+        "the whole mesh will have about {:.0} tetrahedra",
+        TETS_PER_LOAD * load
+    );
+}
