@@ -123,12 +123,8 @@ fn a_plane_that_leaves_nothing_on_one_side_is_refused() {
 #[test]
 fn a_plane_through_a_needle_thin_gap_loses_nothing() {
     // An octahedron pressed flat: nowhere thicker than a five-thousandth of an edge, and no short edge that would ask for small sizes.
-    let mut lens = Surface::default();
-    lens.points = [(0, 1e-4), (1, 0.3), (2, 0.3)]
-        .into_iter()
-        .flat_map(|(axis, x)| [x, -x].map(|x| Point::AXES[axis] * x))
-        .collect();
-    for [x, y, z] in [
+    let corners = [(0, 1e-4), (1, 0.3), (2, 0.3)].into_iter();
+    let triangles = [
         [0, 2, 4],
         [1, 4, 2],
         [0, 4, 3],
@@ -137,10 +133,15 @@ fn a_plane_through_a_needle_thin_gap_loses_nothing() {
         [1, 2, 5],
         [0, 3, 5],
         [1, 5, 3],
-    ] {
-        lens.triangles.push([x, y, z]);
-        lens.labels.push(0);
-    }
+    ];
+    let lens = Surface {
+        points: corners
+            .flat_map(|(axis, x)| [x, -x].map(|x| Point::AXES[axis] * x))
+            .collect(),
+        labels: vec![0; triangles.len()],
+        triangles: triangles.to_vec(),
+        ..Surface::default()
+    };
     let surface = cube_with_hole(&lens, 0.047, Point::ONE);
     is_whole(&surface, across_x(0.5));
     is_whole(&surface, across_x(0.5 + 0.5e-4));
