@@ -7,7 +7,7 @@
 use super::regions::region_sizes;
 use super::{MEMORY_MIN, Options, PipelineError, Plan};
 use crate::optimize::Mode;
-use crate::sizing::{Background, Counts, Domain, Further, SizeField, SizeSummary, Wish};
+use crate::sizing::{Background, Counts, Domain, Further, Region, SizeField, SizeSummary, Wish};
 use crate::surface::{OUTSIDE, Seeker, Surface, Volumes};
 
 /// Tetrahedra of one sub-domain, unless a number of sub-domains is asked for.
@@ -86,7 +86,26 @@ pub fn prepare(
     if let (Some(file), None) = (&options.size_field, background) {
         return Err(PipelineError::SizeField { file: file.clone() });
     }
-    let sizes = options.sizes()?;
+    let asked = options.sizes()?;
+    let built = |regions: &[Region]| {
+        let mut wishes: Vec<&dyn Wish> = regions.iter().map(|r| r as &dyn Wish).collect();
+        let mut at_vertices = None;
+        match background {
+            Some(Background::Mesh(mesh)) => wishes.push(&**mesh),
+            Some(Background::AtVertices(h)) => at_vertices = Some(&h[..]),
+            None => {}
+        }
+        let further = Further {
+            wishes: &wishes,
+            at_vertices,
+        };
+        SizeField::build_with(&surface.points, &surface.triangles, &asked, &further)
+    };
+    // What building takes is given back before the surface's tree is made, where regions have no sizes of their own.
+    let early = match asked.regions.is_empty() {
+        true => Some(built(&[])?),
+        false => None,
+    };
     let seeker = Seeker::new(surface);
     let volumes = Volumes::of(&seeker);
     let policy = options.regions()?;
@@ -99,20 +118,10 @@ pub fn prepare(
         volumes: &volumes,
         filled: &filled,
     };
-    let regions = region_sizes(&domain, &sizes)?;
-    let mut wishes: Vec<&dyn Wish> = regions.iter().map(|r| r as &dyn Wish).collect();
-    let mut at_vertices = None;
-    match background {
-        Some(Background::Mesh(mesh)) => wishes.push(&**mesh),
-        Some(Background::AtVertices(h)) => at_vertices = Some(&h[..]),
-        None => {}
-    }
-    let further = Further {
-        wishes: &wishes,
-        at_vertices,
+    let (field, mut sizes) = match early {
+        Some(built) => built,
+        None => built(&region_sizes(&domain, &asked)?)?,
     };
-    let (field, mut sizes) =
-        SizeField::build_with(&surface.points, &surface.triangles, &sizes, &further)?;
     if background.is_some() {
         sizes.source = format!("--size-field, {}", sizes.source);
     }

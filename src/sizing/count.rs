@@ -70,16 +70,18 @@ impl SizeField {
     fn needles(&self, domain: &Domain) -> f64 {
         let surface = domain.seeker.surface();
         let h: Vec<f64> = surface.points.par_iter().map(|&p| self.h(p)).collect();
+        let steepest = 0.5 * NEEDLE_FROM * 3f64.sqrt() * self.beta();
         let over = |t: usize| {
             let corners = surface.triangles[t];
             let edges = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| {
                 let [v, w] = [i, j].map(|k: usize| corners[k] as usize);
                 let [a, b] = [v, w].map(|v| surface.points[v]);
-                let least = h[v].min(h[w]).min(self.h((a + b) * 0.5));
-                match a.distance(b) > NEEDLE_FROM * least {
-                    true => (self.lengths_along(a, b) - NEEDLE_FROM).max(0.0),
-                    false => 0.0,
+                let (length, least) = (a.distance(b), h[v].min(h[w]));
+                // Sizes between fall by no more than the slope allows.
+                if length * (1.0 + steepest) <= NEEDLE_FROM * least {
+                    return 0.0;
                 }
+                (self.lengths_along(a, b) - NEEDLE_FROM).max(0.0)
             });
             // Two triangles share an edge.
             0.5 * f64::from(domain.n_filled(t)) * edges.iter().sum::<f64>()

@@ -202,12 +202,17 @@ impl Sum<'_> {
                 triangles,
                 vertices,
             } = self.skin;
-            let away = seeker.distance(middle, reach + triangles * high);
+            let far = reach + triangles.max(vertices) * high;
+            let away = seeker.distance(middle, far);
             let inside = cell.is_inside || filled[volumes.at(seeker, middle) as usize];
             if away >= reach && !inside {
                 return false;
             }
-            let away_vertices = seeker.distance_to_vertices(middle, reach + vertices * high);
+            // No vertex is nearer than the surface.
+            let away_vertices = match away < far {
+                true => seeker.distance_to_vertices(middle, reach + vertices * high),
+                false => f64::INFINITY,
+            };
             cell.is_inside |= away >= reach;
             cell.is_deep =
                 away >= reach + triangles * high && away_vertices >= reach + vertices * high;

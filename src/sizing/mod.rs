@@ -13,7 +13,8 @@
 //! Lengths along edges and loads of tetrahedra are closed forms for h linear between vertices (`closed`).
 //! Only IEEE basic operations and square roots are used: results are equal on every machine.
 //!
-//! In memory for now: about 37 bytes per leaf when built, about five times that while building.
+//! In memory: about 39 bytes per leaf when built, about five times that while building. `balls,count=1000` has 107,000 leaves, 4.2 MB, 8 bytes for each of
+//! its 506,000 triangles. The cap and the number of threads change nothing of it.
 
 mod background;
 mod closed;
