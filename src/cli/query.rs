@@ -16,6 +16,8 @@ use crate::store::{Budget, attempt};
 
 /// Memory of a point on its way to its answer.
 const POINT_BYTES: u64 = 512;
+/// The place of quality among the variables.
+const QUALITY: usize = 0;
 /// Points answered together, at most.
 const POINTS_MAX: u64 = 1 << 17;
 
@@ -31,14 +33,21 @@ pub fn run(args: &QueryArgs, talk: &Talk) -> Result<u8, Failure> {
         let n = if args.point.is_empty() && args.points.is_none() {
             let selection = selection(args, &mut inquiry)?;
             let mut writer = writer(args, columns, cap)?;
-            let found = inquiry.select(selection)?;
             let n = match order {
+                Some((QUALITY, descending))
+                    if few(args.limit, lease.bytes()) && inquiry.has_extremes(&selection) =>
+                {
+                    let limit = args.limit.unwrap_or_default() as usize;
+                    let found = inquiry.extreme(&selection, descending, limit)?;
+                    put(found.into_iter().map(Ok), args.limit, &mut writer)?
+                }
                 Some((variable, descending)) => {
+                    let found = inquiry.select(selection)?;
                     let dir = std::env::temp_dir();
                     let sorted = Ordered::new(found, variable, descending, &dir, lease.bytes())?;
                     put(sorted, args.limit, &mut writer)?
                 }
-                None => put(found, args.limit, &mut writer)?,
+                None => put(inquiry.select(selection)?, args.limit, &mut writer)?,
             };
             end(writer, talk)?;
             n
@@ -51,6 +60,11 @@ pub fn run(args: &QueryArgs, talk: &Talk) -> Result<u8, Failure> {
         tell(n, &inquiry, talk);
         Ok(0)
     })?
+}
+
+/// Whether so many answers are held at once without a thought.
+fn few(limit: Option<u64>, memory: u64) -> bool {
+    limit.is_some_and(|n| n.saturating_mul(2 * size_of::<Found>() as u64) <= memory)
 }
 
 fn writer(args: &QueryArgs, columns: Vec<Column>, cap: u64) -> Result<Writer, Failure> {

@@ -7,11 +7,12 @@
 //! Reading order: `solid` (boxes, balls, planes and what meets them) on `exact`; `frame` (a decoded chunk) and `tree`;
 //! `inquiry` (what is held); `locate` (points), `lazy` (a single point); `found` (a tetrahedron with its columns);
 //! `selection` (what is asked for), `marks` (faces of the surface and of interfaces), `select` (the answers one after the other),
-//! `order` (sorted), `around` (tetrahedra around vertices, edges, neighbors), `section` (cuts by a plane, to be drawn).
+//! `order` (sorted), `extreme` (the worst few), `around` (tetrahedra around vertices, edges, neighbors), `section` (cuts by a plane, to be drawn).
 
 mod around;
 mod error;
 mod exact;
+mod extreme;
 mod found;
 mod frame;
 mod inquiry;

@@ -47,7 +47,7 @@ impl Inquiry {
         })
     }
 
-    fn check(&mut self, selection: &Selection) -> Result<(), ReportError> {
+    pub(super) fn check(&mut self, selection: &Selection) -> Result<(), ReportError> {
         let named = selection.subdomains.iter().flatten();
         for &rank in named.chain(selection.interface.iter().flatten()) {
             self.store.catalog().subdomain(rank)?;
@@ -99,20 +99,7 @@ impl Selected<'_> {
     }
 
     fn read(&mut self, chunk: u32) -> Result<(), ReportError> {
-        let (selection, marks) = (&self.selection, &self.marks);
-        let mut place = 0;
-        let frame = self.inquiry.frame(self.rank, chunk, |part, local, tet| {
-            marks.as_ref().is_none_or(|m| m.has(local))
-                && TetId::new(part.id(), local).is_some_and(|id| selection.may_be(id, tet.region))
-                && (!selection.is_local()
-                    || selection.may_meet(&around(part, tet.nodes, &mut place)))
-        })?;
-        let found: Vec<Found> = frame
-            .tets
-            .iter()
-            .map(|tet| frame.found(tet))
-            .filter(|found| selection.holds(found))
-            .collect();
+        let found = found_in(self.inquiry, &self.selection, &self.marks, self.rank, chunk)?;
         self.ready = found.into_iter();
         Ok(())
     }
@@ -142,6 +129,24 @@ impl Iterator for Selected<'_> {
         }
         next.transpose()
     }
+}
+
+/// What suits in one chunk, ascending by id.
+pub(super) fn found_in(
+    inquiry: &mut Inquiry,
+    selection: &Selection,
+    marks: &Option<Marks>,
+    rank: u32,
+    chunk: u32,
+) -> Result<Vec<Found>, ReportError> {
+    let mut place = 0;
+    let frame = inquiry.frame(rank, chunk, |part, local, tet| {
+        marks.as_ref().is_none_or(|m| m.has(local))
+            && TetId::new(part.id(), local).is_some_and(|id| selection.may_be(id, tet.region))
+            && (!selection.is_local() || selection.may_meet(&around(part, tet.nodes, &mut place)))
+    })?;
+    let found = frame.tets.iter().map(|tet| frame.found(tet));
+    Ok(found.filter(|found| selection.holds(found)).collect())
 }
 
 /// A box around the chunks the vertices are in, `place` being the chunk found last.
