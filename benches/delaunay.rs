@@ -1,13 +1,14 @@
 //! Delaunay meshes of random points: the kernel through resident cursors, on flat arrays, and with
 //! frame pools smaller than the mesh. One thread; CPU seconds of the thread.
 //!
-//! `cargo bench --bench delaunay -- [points] [runs] [all|flat|resident|balls]`; without arguments a smoke size.
-//! `balls` takes the vertices of a balls surface instead of random points; pools then read the points from disk too.
+//! `cargo bench --bench delaunay -- [points] [runs] [all|flat|resident|balls|slab]`; without arguments a smoke size.
+//! `slab` puts the points into a slab a million times wider than thick, in a mesh of a fiftieth as many, and beside it all over the cube: what the
+//! band around a cut could come to at worst. `balls` takes the vertices of a balls surface instead of random points; pools then read the points from disk too.
 
 use std::path::Path;
 
 use tetdb::delaunay::{Kernel, enclose, insertion_key};
-use tetdb::geom::{Aabb, HilbertFrame, Point};
+use tetdb::geom::{Aabb, HilbertFrame, Point, orient_sign};
 use tetdb::mesh::Mesh;
 use tetdb::samples::SampleSpec;
 use tetdb::store::{Backing, FlatPages, Pager, Pages, Sorter};
@@ -24,6 +25,9 @@ fn main() {
         .iter()
         .find(|w| w.parse::<usize>().is_err())
         .map_or("all", String::as_str);
+    if only == "slab" {
+        return slab(n);
+    }
     let points = if only == "balls" {
         ball_points(n)
     } else {
@@ -189,6 +193,55 @@ fn insert_all<P: Pages>(
         per(s.sphere_tests)
     );
     (f64::from(mesh.n_tets()) / seconds, mesh)
+}
+
+/// Ends with an error when a tetrahedron is inverted or the slab costs more than three times as much as the cube.
+fn slab(n: usize) {
+    let points = random_points(n + n / 50);
+    let (coarse, points) = points.split_at(n / 50);
+    let everywhere = insert_into("all over the cube", coarse, points.to_vec());
+    let flat = |p: &Point| Point::new(p.x, p.y, 0.5 + 1e-6 * (p.z - 0.5));
+    let thin = insert_into("in the slab", coarse, points.iter().map(flat).collect());
+    println!("slab / cube: {:.2}", thin / everywhere);
+    assert!(thin < 3.0 * everywhere, "the slab costs too much");
+}
+
+/// Inserts `points` into a mesh of `coarse`; returns CPU seconds per point.
+fn insert_into(name: &str, coarse: &[Point], mut points: Vec<Point>) -> f64 {
+    let mut mesh = Mesh::new(FlatPages::default());
+    let mut kernel = Kernel::default();
+    let mut hint = enclose(
+        &mut mesh,
+        &Aabb::around(coarse.iter().chain(&points).copied()),
+    );
+    let mut put = |p: &Point| {
+        let v = mesh.add_vertex(*p, 0.0);
+        let before = kernel.stats.walk_steps;
+        let inserted = kernel.insert(&mut mesh, v, *p, hint);
+        hint = inserted.expect("the points are distinct");
+        kernel.stats.walk_steps - before
+    };
+    coarse.iter().for_each(|p| _ = put(p));
+    let started = cpu_seconds();
+    let frame = HilbertFrame::new(&Aabb::around(points.iter().copied()));
+    points.sort_by_cached_key(|&p| insertion_key(&frame, p));
+    let longest = points.iter().map(&mut put).max();
+    let seconds = (cpu_seconds() - started) / points.len() as f64;
+    println!(
+        "{name}: {:.2} microseconds per point; longest walk {longest:?}, largest cavity {}",
+        1e6 * seconds,
+        kernel.stats.cavity_largest
+    );
+    let mut from = 0;
+    while let Some((t, tet)) = mesh.next_tet(from) {
+        from = t + 1;
+        let [a, b, c, d] = tet.vertices().map(|v| mesh.point(v));
+        assert!(
+            orient_sign(a, b, c, d).is_gt(),
+            "tetrahedron {t} is inverted"
+        );
+    }
+    seconds
 }
 
 /// CPU time of this thread where the system tells it, else wall time.
