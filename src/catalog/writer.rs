@@ -127,7 +127,7 @@ impl SealedWriter {
         generation: u32,
         memory_bytes: usize,
     ) -> Result<Self, CatalogError> {
-        let file = StoreFile::create(path, memory_bytes / 2)?;
+        let file = StoreFile::create_unsynced(path, memory_bytes / 2)?;
         let io = |e| CatalogError::io(path, e);
         let rank = subdomain.rank();
         Ok(Self {

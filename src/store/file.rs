@@ -8,6 +8,7 @@ use redb::{
 };
 
 use super::StoreError;
+use super::unsynced::Unsynced;
 
 /// The only table of a file; see the schema's page on keys.
 const PAGES: TableDefinition<u64, &[u8]> = TableDefinition::new("pages");
@@ -19,8 +20,8 @@ enum Handle {
 
 /// Values by key in one redb file.
 ///
-/// Invariant: every write is one durable commit. Is not: a cache of its own; redb's is bounded by the
-/// `cache_bytes` given at opening, which the caller has leased.
+/// Invariant: every write is one commit, durable but in a file from [`StoreFile::create_unsynced`]. Is not: a cache of its own; redb's is
+/// bounded by the `cache_bytes` given at opening, which the caller has leased.
 pub struct StoreFile {
     path: PathBuf,
     handle: Handle,
@@ -33,16 +34,32 @@ impl StoreFile {
     ///
     /// Errors: [`StoreError::Io`] when it exists or its folder cannot be written.
     pub fn create(path: &Path, cache_bytes: usize) -> Result<Self, StoreError> {
+        Self::fresh(path, cache_bytes, |builder| builder.create(path))
+    }
+
+    /// Creates a file that must not exist, for one process, and does not sync its commits: who lists it in the catalog syncs it.
+    ///
+    /// Errors: as [`StoreFile::create`].
+    pub fn create_unsynced(path: &Path, cache_bytes: usize) -> Result<Self, StoreError> {
+        Self::fresh(path, cache_bytes, |builder| {
+            builder.create_with_backend(Unsynced::create(path)?)
+        })
+    }
+
+    fn fresh(
+        path: &Path,
+        cache_bytes: usize,
+        create: impl FnOnce(&redb::Builder) -> Result<Database, redb::DatabaseError>,
+    ) -> Result<Self, StoreError> {
         if path.exists() {
             return Err(StoreError::Io {
                 path: path.to_owned(),
                 source: ErrorKind::AlreadyExists.into(),
             });
         }
-        let db = Database::builder()
-            .set_cache_size(cache_bytes)
-            .create(path)
-            .map_err(|e| Failure::Error(e.into()).at(path))?;
+        let mut builder = Database::builder();
+        builder.set_cache_size(cache_bytes);
+        let db = create(&builder).map_err(|e| Failure::Error(e.into()).at(path))?;
         let mut file = Self {
             path: path.to_owned(),
             handle: Handle::Writer(Box::new(db)),

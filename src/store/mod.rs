@@ -16,6 +16,7 @@ mod pager;
 mod sort;
 mod space;
 mod stop;
+mod unsynced;
 
 pub use budget::{Budget, Lease};
 pub use error::StoreError;

@@ -308,7 +308,7 @@ impl Pager {
             });
         };
         if self.work.is_none() {
-            match StoreFile::create(&backing.work_path, backing.cache_bytes) {
+            match StoreFile::create_unsynced(&backing.work_path, backing.cache_bytes) {
                 Ok(file) => self.work = Some(file),
                 Err(error) => fail(error),
             }
