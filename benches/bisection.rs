@@ -1,7 +1,7 @@
 //! One cut, stage by stage: resident, with a pool smaller than the mesh, and with parts of the method switched off.
 //!
 //! `cargo bench --bench bisection -- [sample] [method|pool|volume]`; without arguments a smoke size and all of them. `method` compares what each
-//! step of choosing the interface brings, `pool` runs with frames for a twentieth of the pages, `volume` places the plane without regard to sizes.
+//! step of choosing the interface brings, `pool` runs with frames for a twentieth of the finished mesh, `volume` places the plane without regard to sizes.
 //! Wall seconds of one thread; the coarse mesh is not counted.
 
 use std::path::Path;
@@ -16,6 +16,9 @@ use tetdb::samples::SampleSpec;
 use tetdb::sizing::{SizeField, SizeOptions, TETS_PER_LOAD};
 use tetdb::store::{Backing, Pager, attempt};
 use tetdb::surface::Surface;
+
+/// Bytes of pages per tetrahedron of a finished mesh, its vertices included.
+const BYTES_PER_TET: f64 = 42.0;
 
 struct Bench {
     surface: Surface,
@@ -199,25 +202,6 @@ fn main() {
         ] {
             tell(name, &bench.cut(cutting, plenty));
         }
-    }
-    if asked("pool") {
-        let frames = (whole.pages as u64).div_ceil(20) << 16;
-        let pool = attempt(|| bench.cut(Cutting::default(), frames)).expect("room");
-        tell("frames for 5 %", &pool);
-        println!(
-            "{:22} {} tetrahedra, {} pages, {} read, {} written; {:.2} times the time; {}",
-            "",
-            pool.tets,
-            pool.pages,
-            pool.pages_read,
-            pool.pages_written,
-            pool.seconds / whole.seconds,
-            if pool.digest == whole.digest {
-                "the same children"
-            } else {
-                "OTHER CHILDREN"
-            },
-        );
     }
     if asked("volume") {
         let plane = PlaneChoice::Volume;
