@@ -224,8 +224,26 @@ fn main() {
         mesh.set_size(v, bench.field.h(p) as f32);
     }
     let load = load_of(&mut mesh, &|p| bench.field.h(p));
-    println!(
-        "the whole mesh will have about {:.0} tetrahedra",
-        TETS_PER_LOAD * load
-    );
+    let predicted = TETS_PER_LOAD * load;
+    println!("the finished mesh will have about {predicted:.0} tetrahedra");
+    if asked("pool") {
+        let bytes = (BYTES_PER_TET * predicted / 20.0) as u64;
+        let pool = attempt(|| bench.cut(Cutting::default(), bytes)).expect("room");
+        tell("frames for 5 %", &pool);
+        println!(
+            "{:22} {} tetrahedra, {} pages, {} frames, {} read, {} written; {:.2} times the time; {}",
+            "",
+            pool.tets,
+            pool.pages,
+            bytes >> 16,
+            pool.pages_read,
+            pool.pages_written,
+            pool.seconds / whole.seconds,
+            if pool.digest == whole.digest {
+                "the same children"
+            } else {
+                "OTHER CHILDREN"
+            },
+        );
+    }
 }

@@ -20,6 +20,9 @@ use tetdb_schema::page::NONE;
 /// Nodes of a graph that is cut at once; wider interfaces are cut strip by strip, twice, the second time with the strips
 /// moved by half. The result depends on it, so it is a constant.
 const STRIP: usize = 400_000;
+/// Share of a strip on each side of its border that is cut again: with halves of strips, a cut of 600,000 tetrahedra took two thirds longer and
+/// had no face less.
+const BORDER: usize = 8;
 /// Capacities are costs in this fraction.
 const SCALE: f64 = 256.0;
 
@@ -102,11 +105,11 @@ fn minimum_cut<P: Pages>(core: &mut Mesh<P>, surface: &dyn CuttingSurface, free:
     for strip in order.chunks(length) {
         cut_strip(core, surface, strip, &mut graph);
     }
-    if strips > 1 {
-        let half = length / 2;
-        for strip in order[half..].chunks(length) {
-            cut_strip(core, surface, strip, &mut graph);
-        }
+    // Where two strips meet each was cut without the other: once more across their border.
+    let half = length / BORDER;
+    for border in (length..free.len()).step_by(length) {
+        let end = free.len().min(border + half);
+        cut_strip(core, surface, &order[border - half..end], &mut graph);
     }
     core.clear_scratch();
     size_of_val(&order[..]) as u64 + sorting.max(graph.bytes())
