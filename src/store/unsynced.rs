@@ -10,8 +10,8 @@ use redb::{DatabaseError, StorageBackend, StorageError};
 /// A redb file that is not synced at its commits.
 ///
 /// A file that the catalog does not list yet is worth nothing after a crash, whatever reached the disk; the commit that lists it syncs
-/// it as a whole first. Syncing each batch of a small pool instead took two thirds of the time of a cut with frames for a
-/// twentieth of its pages. Is not: for files that are changed in place once they are listed, nor for several processes; it takes no lock.
+/// it as a whole first. Syncing each batch instead was most of the time of a cut with very few frames. Is not: for files that are
+/// changed in place once they are listed, nor for several processes; it takes no lock.
 #[derive(Debug)]
 pub(super) struct Unsynced(FileBackend);
 
