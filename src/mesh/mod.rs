@@ -2,10 +2,10 @@
 
 pub mod anatomy;
 mod cursor;
+mod faces;
 mod renumber;
 
 pub use anatomy::{FaceRef, Tet};
-pub use cursor::{
-    End, Facet, InterfaceFace, MESH_STATE_WORDS, Mesh, MeshState, VertexTag, dense, sparse,
-};
+pub use cursor::{End, MESH_STATE_WORDS, Mesh, MeshState, VertexTag, dense, sparse};
+pub use faces::{Facet, InterfaceFace};
 pub use renumber::{Workspace, renumber};
