@@ -228,7 +228,7 @@ impl Estimate {
 }
 
 /// How many sub-domains a mesh of so many tetrahedra is made in, and what was asked for when that is more.
-fn n_subdomains(tets: f64, asked: Option<u32>) -> (u32, Option<u32>) {
+pub(super) fn n_subdomains(tets: f64, asked: Option<u32>) -> (u32, Option<u32>) {
     let auto = (tets / TETS_PER_SUBDOMAIN).ceil().max(1.0);
     let most = (tets / TETS_MIN).floor().max(1.0);
     let wanted = asked.map_or(auto, f64::from);

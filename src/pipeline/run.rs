@@ -7,6 +7,7 @@ use std::time::Instant;
 use super::coarse::{CoarseReport, coarse};
 use super::crew::crew;
 use super::divide::{DONE, WORK, read_owners};
+use super::estimate::n_subdomains;
 use super::leaf::{Common, Leaf, LeafJob, SealedTotals};
 use super::tree::{self, Part, PartMesh, blob};
 use super::watch::Watcher;
@@ -151,7 +152,10 @@ impl<'a> Run<'a> {
             cuts,
             fine: BTreeMap::new(),
             subdomains: self.n,
-            subdomains_asked: self.estimate.and_then(|e| e.subdomains_asked),
+            subdomains_asked: self
+                .options
+                .subdomain_count()?
+                .filter(|&asked| asked > self.n),
             pages: PagerStats::default(),
             frames_used: self.frames_used,
         };
@@ -193,7 +197,10 @@ impl<'a> Run<'a> {
         };
         renumber(&mut mesh, &HilbertFrame::new(&self.bounds), &space)?;
         let load = self.load(&mut mesh);
-        let (n, predicted) = self.estimate.map_or((1, 0.0), |e| (e.subdomains, e.tets()));
+        // Where vertices nearly touch, sizes at a point are next to nothing and the estimate knows no bound; the mesh's own load does.
+        let told = self.estimate.map_or(0.0, |e| e.tets());
+        let predicted = told.min(TETS_PER_LOAD * load);
+        let (n, _) = n_subdomains(predicted, self.options.subdomain_count()?);
         mesh.pages_mut().flush();
         let part = PartMesh {
             part: Part { first: 0, count: n },
