@@ -8,7 +8,7 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use super::field::SizeField;
-use super::tree::{LEAF, Leaf, octant_of};
+use super::tree::{DEPTH, LEAF, Leaf, octant_of};
 use crate::geom::Point;
 use crate::surface::{Seeker, Volumes};
 
@@ -63,6 +63,7 @@ impl SizeField {
             domain,
             skin,
             ranges: self.ranges(),
+            least: self.frame.side / f64::from(1u32 << DEPTH),
             heap: BinaryHeap::new(),
             known: 0.0,
             cut: 0.0,
@@ -105,15 +106,13 @@ fn range(values: &[f32; 8]) -> [f32; 2] {
     all.fold([f32::INFINITY, 0.0], |[l, h], &x| [l.min(x), h.max(x)])
 }
 
-fn inverse_cube(h: f64) -> f64 {
-    1.0 / (h * h * h)
-}
-
 struct Sum<'a> {
     field: &'a SizeField,
     domain: &'a Domain<'a>,
     skin: Skin,
     ranges: Vec<[f32; 2]>,
+    /// Side of the octree's finest cells.
+    least: f64,
     heap: BinaryHeap<ByUnknown>,
     /// Load of cells of which all is known.
     known: f64,
@@ -166,7 +165,7 @@ impl Sum<'_> {
         if !self.look(&mut cell) {
             return 0.0;
         }
-        if cell.unknown == 0.0 || cell.leaf.level == super::tree::DEPTH {
+        if cell.unknown == 0.0 || cell.leaf.level == DEPTH {
             self.known += cell.load;
             return 0.0;
         }
@@ -228,16 +227,16 @@ impl Sum<'_> {
             }
         }
         let volume = width * width * width;
-        let spread = volume * (inverse_cube(low) - inverse_cube(high));
+        let spread = volume * (self.inverse_cube(low) - self.inverse_cube(high));
         if cell.entry & LEAF == 0 {
-            cell.load = share * volume * inverse_cube(field.h(middle));
+            cell.load = share * volume * self.inverse_cube(field.h(middle));
             cell.unknown = spread;
         } else {
             cell.load = share * volume * self.mean_inverse_cube(middle, width);
             cell.unknown = SHARE_SIZES * spread;
         }
         if cell.is_cut {
-            cell.unknown += volume * inverse_cube(high);
+            cell.unknown += volume * self.inverse_cube(high);
         }
         true
     }
@@ -265,13 +264,20 @@ impl Sum<'_> {
         [low, high.max(low)]
     }
 
+    /// h⁻³, of no length below the side of the octree's finest cells: where vertices touch but for a bit, sizes next to nothing
+    /// stand for a point, and a cell cannot tell how fast they grow around it.
+    fn inverse_cube(&self, h: f64) -> f64 {
+        let h = h.max(self.least);
+        1.0 / (h * h * h)
+    }
+
     /// Mean of h⁻³ by the eight points of Gauss.
     fn mean_inverse_cube(&self, middle: Point, width: f64) -> f64 {
         let step = width * 0.5 / 3f64.sqrt();
         let at = |i: usize, axis: usize| if i >> axis & 1 == 1 { step } else { -step };
         let all = (0..8).map(|i| {
             let p = middle + Point::new(at(i, 0), at(i, 1), at(i, 2));
-            inverse_cube(self.field.h(p))
+            self.inverse_cube(self.field.h(p))
         });
         all.sum::<f64>() / 8.0
     }

@@ -384,6 +384,28 @@ fn loads_are_integrals() {
 }
 
 #[test]
+fn vertices_that_nearly_touch_have_a_bounded_load() {
+    // A triangle divided at a point as near to one of its corners as doubles can tell, in the middle of a wall.
+    let whole = cube(4, |i| i as f64 / 4.0);
+    let mut twin = whole.clone();
+    let t = twin.1.len() / 2;
+    let [a, b, c] = twin.1[t];
+    let [p, q, r] = [a, b, c].map(|v| twin.0[v as usize]);
+    let d = twin.0.len() as u32;
+    twin.0
+        .push(p + ((q - p) * 2.0 + (r - p)) * (4.0 * f64::EPSILON));
+    assert_ne!(twin.0[d as usize], p);
+    twin.1[t] = [a, b, d];
+    twin.1.extend([[b, c, d], [c, a, d]]);
+    let told = [&whole, &twin].map(|s| {
+        let field = build(s, &SizeOptions::default());
+        with_domain(s, |domain| field.counts(domain).tets())
+    });
+    // Sizes that grow from nothing: each doubling of the distance to the point costs as much as the last, twenty times.
+    assert!(told[0] < 1e4 && told[1] < told[0] + 3e5, "{told:?}");
+}
+
+#[test]
 fn bad_values_are_named() {
     for (result, parts) in [
         (Length::parse("--hsiz", "0"), ["--hsiz 0", "above zero"]),
