@@ -55,7 +55,7 @@ impl Bench {
         let backing = Backing {
             subdomain: 0,
             generation: 1,
-            work_path: self.dir.path().join(name),
+            work_path: self.dir.path().join(name).into(),
             base: None,
             cache_bytes: 16 << 20,
         };
@@ -65,7 +65,7 @@ impl Bench {
     /// Cuts the coarse mesh in halves with `bytes` of frames.
     fn cut(&self, cutting: Cutting, bytes: u64) -> Cut {
         let space = Workspace {
-            dir: self.dir.path(),
+            dir: &self.dir.path().into(),
             memory: 64 << 20,
         };
         let bounds = self.surface.bounds();

@@ -61,7 +61,7 @@ fn main() {
                 let backing = Backing {
                     subdomain: 0,
                     generation: 1,
-                    work_path: dir.path().join(format!("{percent}-{run}.redb")),
+                    work_path: dir.path().join(format!("{percent}-{run}.redb")).into(),
                     base: None,
                     cache_bytes: 16 << 20,
                 };

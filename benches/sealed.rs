@@ -170,7 +170,7 @@ fn store(vertices: &[SealedVertex], tets: &[SealedTet]) {
     let facets = hull(tets);
     let start = cpu_seconds();
     let mut writer =
-        SealedWriter::create(&catalog.file_path(0, 1), id, 1, 48 << 20).expect("a new file");
+        SealedWriter::create(catalog.file_path(0, 1), id, 1, 48 << 20).expect("a new file");
     for &v in vertices {
         writer.push_vertex(v).expect("disk");
     }

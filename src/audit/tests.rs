@@ -104,7 +104,7 @@ fn verified(draft: &Draft, level: Level) -> Result<Report, CatalogError> {
     let path = dir.path().join("a.tetdb");
     let mut catalog = Catalog::create(&path, &Job::default())?;
     let id = SubdomainId::new(0).expect("small");
-    let mut writer = SealedWriter::create(&catalog.file_path(0, 1), id, 1, 4 << 20)?;
+    let mut writer = SealedWriter::create(catalog.file_path(0, 1), id, 1, 4 << 20)?;
     for (index, &point) in (0..).zip(&draft.points) {
         writer.push_vertex(SealedVertex {
             point,

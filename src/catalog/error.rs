@@ -98,9 +98,9 @@ impl CatalogError {
 
     /// Wraps a failed operation on `path`.
     pub(crate) fn io(path: &Path, source: std::io::Error) -> Self {
-        Self::Io {
-            path: path.to_owned(),
-            source,
+        match StoreError::io(path, source) {
+            StoreError::Io { path, source } => Self::Io { path, source },
+            full => Self::Store(full),
         }
     }
 }

@@ -1,7 +1,6 @@
 //! The directory of a store: made, opened, its files named and, when nobody lists them, removed.
 
-use std::fs::{self, File};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use rkyv::api::high::{HighDeserializer, HighValidator};
 use rkyv::bytecheck::CheckBytes;
@@ -14,7 +13,7 @@ use super::records::{
 };
 use super::rows::{self, RowKind};
 use super::{CatalogError, Step};
-use crate::store::StoreFile;
+use crate::store::{DiskPath, StoreFile};
 
 /// First bytes of the format row; the version follows as two bytes.
 const MAGIC: &[u8; 8] = b"TETDBCAT";
@@ -30,7 +29,7 @@ const SCRATCH: &str = "scratch";
 ///
 /// Many processes may read, or one may write. Changes happen in [`Catalog::commit`] only.
 pub struct Catalog {
-    dir: PathBuf,
+    dir: DiskPath,
     file: StoreFile,
     writable: bool,
     journal_rows: u32,
@@ -41,14 +40,15 @@ impl Catalog {
     ///
     /// An empty directory is taken over. Errors: [`CatalogError::Finished`], [`CatalogError::Unfinished`],
     /// [`CatalogError::NotOurs`] or [`CatalogError::Busy`] say what is already there.
-    pub fn create(dir: &Path, job: &Job) -> Result<Self, CatalogError> {
-        refuse_existing(dir)?;
-        fs::create_dir_all(dir).map_err(|e| CatalogError::io(dir, e))?;
+    pub fn create(dir: impl Into<DiskPath>, job: &Job) -> Result<Self, CatalogError> {
+        let dir = dir.into();
+        refuse_existing(&dir)?;
+        dir.create_dir_all()?;
         let draft = dir.join(CATALOG_NEW);
-        remove(&draft)?;
+        draft.remove_file()?;
         let file = StoreFile::create(&draft, CACHE_BYTES)?;
         let mut catalog = Self {
-            dir: dir.to_owned(),
+            dir,
             file,
             writable: true,
             journal_rows: 0,
@@ -61,42 +61,40 @@ impl Catalog {
             step.set_job(job);
             Ok(())
         })?;
-        catalog.file.rename(&dir.join(CATALOG))?;
-        sync_dir(dir)?;
-        if let Some(parent) = dir.parent().filter(|p| !p.as_os_str().is_empty()) {
-            sync_dir(parent)?;
-        }
+        catalog.file.rename(CATALOG)?;
+        catalog.dir.sync_dir()?;
+        // An empty directory that was taken over may be as new as the store.
+        catalog.dir.folder().sync_dir()?;
         Ok(catalog)
     }
 
     /// Whether `dir` is a directory where a store can be made: empty, or left by a run that was killed before its first commit.
-    pub fn is_vacant(dir: &Path) -> bool {
-        fs::read_dir(dir).is_ok_and(|mut entries| {
-            entries.all(|entry| entry.is_ok_and(|entry| entry.file_name() == CATALOG_NEW))
-        })
+    pub fn is_vacant(dir: impl Into<DiskPath>) -> bool {
+        let names = dir.into().list();
+        names.is_ok_and(|names| names.iter().all(|name| name == CATALOG_NEW))
     }
 
     /// Opens a store for reading; other processes may read it as well.
     ///
     /// Errors: [`CatalogError::NotFound`], [`CatalogError::NotOurs`], [`CatalogError::Busy`] while it is written, [`CatalogError::Format`].
-    pub fn open(dir: &Path) -> Result<Self, CatalogError> {
-        Self::open_as(dir, false)
+    pub fn open(dir: impl Into<DiskPath>) -> Result<Self, CatalogError> {
+        Self::open_as(dir.into(), false)
     }
 
     /// Opens a store for writing, alone, and removes files that an interrupted step left.
     ///
     /// Errors: as [`Catalog::open`]; [`CatalogError::Busy`] also while another process reads it.
-    pub fn open_writable(dir: &Path) -> Result<Self, CatalogError> {
-        let mut catalog = Self::open_as(dir, true)?;
+    pub fn open_writable(dir: impl Into<DiskPath>) -> Result<Self, CatalogError> {
+        let mut catalog = Self::open_as(dir.into(), true)?;
         catalog.purge()?;
         Ok(catalog)
     }
 
-    fn open_as(dir: &Path, writable: bool) -> Result<Self, CatalogError> {
+    fn open_as(dir: DiskPath, writable: bool) -> Result<Self, CatalogError> {
         let path = dir.join(CATALOG);
         if !dir.exists() {
             return Err(CatalogError::NotFound {
-                path: dir.to_owned(),
+                path: dir.path().to_owned(),
             });
         }
         if !path.is_file() {
@@ -105,12 +103,12 @@ impl Catalog {
                 false => "it has no catalog",
             };
             return Err(CatalogError::NotOurs {
-                path: dir.to_owned(),
+                path: dir.path().to_owned(),
                 reason,
             });
         }
         let mut catalog = Self {
-            dir: dir.to_owned(),
+            dir,
             file: StoreFile::open_repaired(&path, CACHE_BYTES, writable)?,
             writable,
             journal_rows: 0,
@@ -130,20 +128,20 @@ impl Catalog {
         let key = RowKind::Format.key(0, 0);
         let Some(format) = self.bytes(key)? else {
             return Err(CatalogError::NotOurs {
-                path: self.dir.clone(),
+                path: self.dir().to_owned(),
                 reason: "its catalog has no format row",
             });
         };
         let version = format.strip_prefix(MAGIC).and_then(|v| v.try_into().ok());
         let Some(version) = version.map(u16::from_le_bytes) else {
             return Err(CatalogError::NotOurs {
-                path: self.dir.clone(),
+                path: self.dir().to_owned(),
                 reason: "its catalog is another program's",
             });
         };
         if version != FORMAT_VERSION {
             return Err(CatalogError::Format {
-                path: self.dir.clone(),
+                path: self.dir().to_owned(),
                 expected: FORMAT_VERSION,
                 found: version,
             });
@@ -153,11 +151,11 @@ impl Catalog {
 
     /// The directory of the store.
     pub fn dir(&self) -> &Path {
-        &self.dir
+        self.dir.path()
     }
 
     /// Where the file of a sub-domain in a generation is, whether it exists or not.
-    pub fn file_path(&self, subdomain: u32, generation: u32) -> PathBuf {
+    pub fn file_path(&self, subdomain: u32, generation: u32) -> DiskPath {
         self.dir.join(file_name(FileRow {
             subdomain,
             generation,
@@ -167,9 +165,9 @@ impl Catalog {
     /// A folder for sorted runs, made when it is not there; removed when the store is next opened for writing.
     ///
     /// Errors: the folder cannot be made.
-    pub fn scratch_dir(&self) -> Result<PathBuf, CatalogError> {
+    pub fn scratch_dir(&self) -> Result<DiskPath, CatalogError> {
         let path = self.dir.join(SCRATCH);
-        fs::create_dir_all(&path).map_err(|e| CatalogError::io(&path, e))?;
+        path.create_dir_all()?;
         Ok(path)
     }
 
@@ -184,21 +182,21 @@ impl Catalog {
         assert!(
             self.writable,
             "{} is open for reading only",
-            self.dir.display()
+            self.dir().display()
         );
         let mut step = Step::new(self.journal_rows);
         describe(&mut step)?;
         for file in &step.listed {
-            let path = self.file_path(file.subdomain, file.generation);
-            let synced = File::open(&path).and_then(|f| f.sync_all());
-            synced.map_err(|e| CatalogError::io(&path, e))?;
+            self.file_path(file.subdomain, file.generation)
+                .sync_file()?;
         }
-        sync_dir(&self.dir)?;
+        self.dir.sync_dir()?;
         let changes = step.changes.iter();
         self.file.change(changes.map(|(&k, v)| (k, v.as_deref())))?;
         self.journal_rows = step.journal_rows;
         for file in &step.unlisted {
-            remove(&self.file_path(file.subdomain, file.generation))?;
+            self.file_path(file.subdomain, file.generation)
+                .remove_file()?;
         }
         Ok(())
     }
@@ -206,17 +204,12 @@ impl Catalog {
     /// Removes sub-domain files the catalog does not list, and scratch.
     fn purge(&mut self) -> Result<(), CatalogError> {
         let listed = self.files()?;
-        let dir = &self.dir;
-        let entries = fs::read_dir(dir).map_err(|e| CatalogError::io(dir, e))?;
-        for entry in entries {
-            let entry = entry.map_err(|e| CatalogError::io(dir, e))?;
-            let name = entry.file_name();
-            let file = name.to_str().and_then(parse_file_name);
-            if file.is_some_and(|f| !listed.contains(&f)) {
-                remove(&entry.path())?;
+        for name in self.dir.list()? {
+            let path = self.dir.join(&name);
+            if parse_file_name(&name).is_some_and(|f| !listed.contains(&f)) {
+                path.remove_file()?;
             } else if name == SCRATCH {
-                let path = entry.path();
-                fs::remove_dir_all(&path).map_err(|e| CatalogError::io(&path, e))?;
+                path.remove_dir_all()?;
             }
         }
         Ok(())
@@ -255,7 +248,7 @@ impl Catalog {
     pub fn subdomain(&mut self, rank: u32) -> Result<SubdomainRow, CatalogError> {
         let row = self.row(RowKind::Subdomain.key(0, rank))?;
         row.ok_or_else(|| CatalogError::NoSubdomain {
-            path: self.dir.clone(),
+            path: self.dir().to_owned(),
             subdomain: rank,
         })
     }
@@ -350,8 +343,8 @@ impl Catalog {
 }
 
 /// Says what is in the way of a new store, if anything is.
-fn refuse_existing(dir: &Path) -> Result<(), CatalogError> {
-    let path = dir.to_owned();
+fn refuse_existing(dir: &DiskPath) -> Result<(), CatalogError> {
+    let path = dir.path().to_owned();
     if !dir.exists() {
         return Ok(());
     }
@@ -382,16 +375,4 @@ fn parse_file_name(name: &str) -> Option<FileRow> {
         generation: generation.parse().ok()?,
     };
     (file_name(file) == name).then_some(file)
-}
-
-fn remove(path: &Path) -> Result<(), CatalogError> {
-    match fs::remove_file(path) {
-        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(CatalogError::io(path, e)),
-        _ => Ok(()),
-    }
-}
-
-fn sync_dir(dir: &Path) -> Result<(), CatalogError> {
-    let synced = File::open(dir).and_then(|d| d.sync_all());
-    synced.map_err(|e| CatalogError::io(dir, e))
 }

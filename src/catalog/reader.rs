@@ -15,7 +15,7 @@ use super::records::{SubdomainRow, SubdomainState};
 use super::vertex_cache::load_chunk;
 use super::writer::CHUNK_KINDS;
 use super::{Catalog, CatalogError, Corner, VertexCache};
-use crate::store::StoreFile;
+use crate::store::{DiskPath, StoreFile};
 
 /// Memory of one open sub-domain unless told otherwise.
 const MEMORY_BYTES: usize = 16 << 20;
@@ -55,8 +55,8 @@ impl Store {
     /// Opens a store in any state; others may read it at the same time.
     ///
     /// Errors: as [`Catalog::open`].
-    pub fn open(path: impl AsRef<Path>) -> Result<Self, CatalogError> {
-        let catalog = Catalog::open(path.as_ref())?;
+    pub fn open(path: impl Into<DiskPath>) -> Result<Self, CatalogError> {
+        let catalog = Catalog::open(path)?;
         Ok(Self { catalog })
     }
 
@@ -138,7 +138,7 @@ impl Subdomain {
         }
         let path = catalog.file_path(rank, row.generation);
         let damaged = |what: String| CatalogError::Content {
-            path: path.clone(),
+            path: path.path().to_owned(),
             subdomain: rank,
             what,
         };
@@ -168,7 +168,7 @@ impl Subdomain {
         );
         Ok(Self {
             id,
-            cache: cache.map_err(|e| CatalogError::io(&path, e))?,
+            cache: cache.map_err(|e| CatalogError::io(path.path(), e))?,
             row,
             file,
             tet_chunks,

@@ -46,10 +46,10 @@ fn what_is_in_the_way_of_a_new_store_is_named() -> Outcome {
     drop(readers);
     let found = no_error(Catalog::create(dir.path(), &job()));
     assert!(matches!(found, CatalogError::NotOurs { .. }), "{found}");
-    let found = no_error(Catalog::open(&dir.path().join("b")));
+    let found = no_error(Catalog::open(dir.path().join("b")));
     assert!(matches!(found, CatalogError::NotFound { .. }), "{found}");
     std::fs::create_dir(dir.path().join("empty"))?;
-    Catalog::create(&dir.path().join("empty"), &job())?.close()?;
+    Catalog::create(dir.path().join("empty"), &job())?.close()?;
     Ok(())
 }
 
@@ -59,13 +59,13 @@ fn a_step_flips_rows_and_forgets_files_together() -> Outcome {
     let path = dir.path().join("a.tetdb");
     let mut catalog = Catalog::create(&path, &job())?;
     let (old, new) = (catalog.file_path(3, 1), catalog.file_path(3, 2));
-    std::fs::write(&old, b"old")?;
+    std::fs::write(old.path(), b"old")?;
     catalog.commit(|step| {
         step.list_file(3, 1);
         step.set_blob(1, &vec![7; 200_000]);
         Ok(())
     })?;
-    std::fs::write(&new, b"new")?;
+    std::fs::write(new.path(), b"new")?;
     let journal = JournalRow {
         state: StoreState::Coarse,
         subdomain: Some(3),
@@ -89,7 +89,7 @@ fn a_step_flips_rows_and_forgets_files_together() -> Outcome {
     assert_eq!(Catalog::open(&killed)?.journal()?.len(), 2);
     // Killed between writing a file and listing it.
     let torn = catalog.file_path(4, 1);
-    std::fs::write(&torn, b"torn")?;
+    std::fs::write(torn.path(), b"torn")?;
     std::fs::write(path.join("notes.txt"), b"mine")?;
     catalog.scratch_dir()?;
     drop(catalog);

@@ -1,7 +1,6 @@
 //! Makes the file of a sealed sub-domain: vertices, then tetrahedra, then faces, each a stream.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use tetdb_schema::chunk::{
@@ -17,7 +16,7 @@ use super::{
     sorted_face,
 };
 use crate::geom::{Aabb, Point};
-use crate::store::StoreFile;
+use crate::store::{DiskPath, StoreFile};
 
 /// Most bytes of one commit; redb's cache is three times a batch, or every page is written twice.
 const BATCH_BYTES_MAX: usize = 16 << 20;
@@ -81,7 +80,7 @@ impl Batch {
 /// nothing that counts until [`SealedWriter::finish`] returns and the catalog lists it.
 /// Memory: about the bytes given, for redb's cache, the batch and decoded vertices.
 pub struct SealedWriter {
-    path: PathBuf,
+    path: DiskPath,
     file: StoreFile,
     subdomain: SubdomainId,
     generation: u32,
@@ -122,16 +121,18 @@ impl SealedWriter {
     ///
     /// Errors: the file cannot be made.
     pub fn create(
-        path: &Path,
+        path: impl Into<DiskPath>,
         subdomain: SubdomainId,
         generation: u32,
         memory_bytes: usize,
     ) -> Result<Self, CatalogError> {
-        let file = StoreFile::create_unsynced(path, memory_bytes / 2)?;
-        let io = |e| CatalogError::io(path, e);
+        let path = path.into();
+        let file = StoreFile::create_unsynced(&path, memory_bytes / 2)?;
+        let name = path.path().to_owned();
+        let io = |e| CatalogError::io(&name, e);
         let rank = subdomain.rank();
         Ok(Self {
-            path: path.to_owned(),
+            path,
             file,
             subdomain,
             generation,
@@ -177,7 +178,7 @@ impl SealedWriter {
     }
 
     fn io(&self) -> impl Fn(std::io::Error) -> CatalogError + use<> {
-        let path = self.path.clone();
+        let path = self.path.path().to_owned();
         move |e| CatalogError::io(&path, e)
     }
 
@@ -335,7 +336,7 @@ impl SealedWriter {
         ];
         self.batch.flush(&mut self.file)?;
         self.file.compact()?;
-        let metadata = std::fs::metadata(&self.path).map_err(&io)?;
+        let bytes = self.path.bytes()?;
         let mut interface_digest = Digest::default();
         let mut interfaces = Vec::with_capacity(self.interfaces.len());
         for ((cut, other), (faces, digest)) in self.interfaces {
@@ -371,7 +372,7 @@ impl SealedWriter {
             quality: totals.quality(),
             volume: totals.volume,
             bounds: array(&totals.bounds),
-            bytes: metadata.len(),
+            bytes,
         };
         Ok(Sealed {
             row,

@@ -4,18 +4,16 @@
 //! sweep in id order touches every page again and again. New records are written behind the old ones in sorted order, then
 //! the old pages are dropped from the front.
 
-use std::path::Path;
-
 use super::cursor::{Mesh, VertexTag, dense, sparse};
 use super::{FaceRef, MeshState};
 use crate::geom::HilbertFrame;
-use crate::store::{Pages, Sorter, StoreError, kind};
+use crate::store::{DiskPath, Pages, Sorter, StoreError, kind};
 use tetdb_schema::page::{NONE, SLOT_BITS};
 
 /// Where sorting may put its runs, and how many bytes it may hold.
 #[derive(Clone, Copy, Debug)]
 pub struct Workspace<'a> {
-    pub dir: &'a Path,
+    pub dir: &'a DiskPath,
     pub memory: u64,
 }
 
@@ -209,7 +207,7 @@ mod tests {
         let before = shape(&mut mesh);
         let dir = tempfile::tempdir().expect("a temporary directory");
         let space = Workspace {
-            dir: dir.path(),
+            dir: &dir.path().into(),
             memory: 1 << 20,
         };
         for _ in 0..2 {

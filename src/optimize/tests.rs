@@ -229,7 +229,7 @@ fn paging_changes_nothing() {
     let backing = Backing {
         subdomain: 0,
         generation: 1,
-        work_path: dir.path().join("work.redb"),
+        work_path: dir.path().join("work.redb").into(),
         base: None,
         cache_bytes: 4 << 20,
     };

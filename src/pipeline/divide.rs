@@ -2,12 +2,11 @@
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
-use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use super::crew::crew;
 use super::leaf::Common;
-use super::run::{Run, journal, remove};
+use super::run::{Run, journal};
 use super::tree::{self, Part, PartMesh, blob};
 use super::watch::{Event, Watcher};
 use super::{PipelineError, Plan};
@@ -15,7 +14,7 @@ use crate::bisect::{self, CutPlan, CutReport, Opened, Zone};
 use crate::catalog::{CatalogError, NeighborRow, StoreState, TopologyRow};
 use crate::mesh::{Mesh, Workspace};
 use crate::optimize::Settings;
-use crate::store::{Backing, Pager, PagerStats, StoreFile, attempt};
+use crate::store::{Backing, DiskPath, Pager, PagerStats, StoreFile, attempt};
 use crate::topology::{Neighbors, Owners};
 
 /// Generations a bisection is on: what it changes in place, and what it leaves.
@@ -26,10 +25,10 @@ pub(super) const DONE: u32 = 2;
 pub(super) struct CutJob {
     pub parent: PartMesh,
     /// The part's file, the file of its changes, and those of its children.
-    base: PathBuf,
-    work: PathBuf,
-    made: [PathBuf; 2],
-    scratch: PathBuf,
+    base: DiskPath,
+    work: DiskPath,
+    made: [DiskPath; 2],
+    scratch: DiskPath,
     /// Zones of the cuts above it.
     zones: Vec<Zone>,
     share: Plan,
@@ -111,7 +110,7 @@ impl CutJob {
         let frames_used = host.pages().frames_used() + core.pages().frames_used();
         for mesh in [host, core] {
             if let Some(path) = mesh.into_pages().discard() {
-                remove(&path)?;
+                path.remove_file()?;
             }
         }
         let Ok(children) = children.try_into() else {
@@ -131,12 +130,12 @@ impl CutJob {
         &self,
         (host, core): (&mut Mesh, &mut Mesh),
         opened: &Opened,
-        (part, path): (Part, &Path),
+        (part, path): (Part, &DiskPath),
         common: Common,
         space: &Workspace,
     ) -> Result<(Child, PagerStats), PipelineError> {
         let generation = self.parent.generation + DONE;
-        let backing = self.backing(part.first, generation, path.to_owned(), 2);
+        let backing = self.backing(part.first, generation, path.clone(), 2);
         let mut mesh = Mesh::new(Pager::new(self.share.frames / 4, Some(backing)));
         let high = part.first == opened.zone.cut;
         bisect::write_child(host, core, &mut mesh, opened, high, &common.bounds, space)?;
@@ -173,7 +172,7 @@ impl CutJob {
     }
 
     /// Where pages go that leave memory, with one part in `share` of redb's cache.
-    fn backing(&self, subdomain: u32, generation: u32, work_path: PathBuf, share: u64) -> Backing {
+    fn backing(&self, subdomain: u32, generation: u32, work_path: DiskPath, share: u64) -> Backing {
         Backing {
             subdomain,
             generation,
@@ -335,7 +334,7 @@ impl Run<'_> {
 /// Opens a part's mesh from the file `base`.
 pub(super) fn open_part(
     part: PartMesh,
-    base: PathBuf,
+    base: DiskPath,
     mut backing: Backing,
     frames: u64,
 ) -> Result<Mesh, PipelineError> {

@@ -1,7 +1,6 @@
 //! One sub-domain: saturated, optimized and sealed alone, by a worker of its own.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 use std::time::Instant;
 
 use tetdb_schema::digest::Digest;
@@ -9,7 +8,6 @@ use tetdb_schema::ids::SubdomainId;
 
 use super::divide::{DONE, WORK, open_part};
 use super::fine::{FineReport, fine};
-use super::run::remove;
 use super::seal::{Target, seal};
 use super::tree::PartMesh;
 use super::watch::Watcher;
@@ -20,17 +18,17 @@ use crate::geom::Aabb;
 use crate::mesh::{Mesh, Workspace};
 use crate::optimize::Mode;
 use crate::sizing::SizeField;
-use crate::store::{Backing, PagerStats, attempt};
+use crate::store::{Backing, DiskPath, PagerStats, attempt};
 use crate::topology::Owners;
 
 /// What a worker needs to make a sub-domain.
 pub(super) struct LeafJob {
     pub part: PartMesh,
     /// The part's file, the file of its changes, the file to make.
-    pub base: PathBuf,
-    pub work: PathBuf,
-    pub sealed: PathBuf,
-    pub scratch: PathBuf,
+    pub base: DiskPath,
+    pub work: DiskPath,
+    pub sealed: DiskPath,
+    pub scratch: DiskPath,
     pub zones: Vec<Zone>,
     /// Owners of the faces around it, by cut.
     pub owners: BTreeMap<u32, Owners>,
@@ -54,7 +52,7 @@ pub(super) struct Leaf {
     pub fine: FineReport,
     pub pages: PagerStats,
     pub frames_used: usize,
-    pub work: Option<PathBuf>,
+    pub work: Option<DiskPath>,
     pub clock: Instant,
 }
 
@@ -126,7 +124,10 @@ impl LeafJob {
 impl Leaf {
     /// Removes the file of changes, which nobody needs any more.
     pub(super) fn remove_work(&self) -> Result<(), PipelineError> {
-        self.work.as_deref().map_or(Ok(()), remove)
+        match &self.work {
+            Some(path) => Ok(path.remove_file()?),
+            None => Ok(()),
+        }
     }
 }
 

@@ -1,7 +1,6 @@
 //! All steps of one run.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use super::coarse::{CoarseReport, coarse};
@@ -20,7 +19,7 @@ use crate::catalog::{
 use crate::geom::{Aabb, HilbertFrame};
 use crate::mesh::{Mesh, Workspace, renumber};
 use crate::sizing::{SizeField, SizeSummary, TETS_PER_LOAD};
-use crate::store::{Backing, Budget, Pager, PagerStats, attempt};
+use crate::store::{Backing, Budget, DiskPath, Pager, PagerStats, attempt};
 use crate::surface::Surface;
 
 /// Generation of the coarse mesh.
@@ -297,12 +296,10 @@ impl<'a> Run<'a> {
     }
 
     /// A scratch folder of this name.
-    pub(super) fn scratch(&mut self, name: &str) -> Result<PathBuf, CatalogError> {
+    pub(super) fn scratch(&mut self, name: &str) -> Result<DiskPath, CatalogError> {
         let path = self.catalog.scratch_dir()?.join(name);
-        match std::fs::create_dir_all(&path) {
-            Ok(()) => Ok(path),
-            Err(source) => Err(CatalogError::Io { path, source }),
-        }
+        path.create_dir_all()?;
+        Ok(path)
     }
 
     /// Commits a finished sub-domain.
@@ -378,7 +375,7 @@ impl<'a> Run<'a> {
             Ok(())
         })?;
         // Nothing in it counts; what cannot be removed now goes when the store is next opened for writing.
-        let _ = std::fs::remove_dir_all(scratch);
+        let _ = scratch.remove_dir_all();
         Ok(())
     }
 }
@@ -412,11 +409,4 @@ pub(super) fn journal(
             })
             .collect(),
     }
-}
-
-pub(super) fn remove(path: &Path) -> Result<(), PipelineError> {
-    std::fs::remove_file(path).map_err(|source| {
-        let path = path.to_owned();
-        PipelineError::Store(crate::store::StoreError::Io { path, source })
-    })
 }

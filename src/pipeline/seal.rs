@@ -6,7 +6,6 @@
 //! 3. their required faces sorted by vertices and joined with the facets, which so learn their tetrahedra.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use tetdb_schema::ids::{Owner, SubdomainId, VertexId};
 use tetdb_schema::page::NONE;
@@ -18,13 +17,13 @@ use crate::catalog::{Sealed, SealedWriter, sorted_face};
 use crate::geom::{Aabb, HilbertFrame};
 use crate::mesh::anatomy::FACES;
 use crate::mesh::{Mesh, VertexTag, dense};
-use crate::store::{Pages, Sorted, Sorter, stop_if_requested};
+use crate::store::{DiskPath, Pages, Sorted, Sorter, stop_if_requested};
 use crate::topology::Owners;
 
 /// Where and how to seal.
 pub(super) struct Target<'a> {
-    pub path: &'a Path,
-    pub scratch: &'a Path,
+    pub path: &'a DiskPath,
+    pub scratch: &'a DiskPath,
     pub subdomain: SubdomainId,
     pub generation: u32,
     /// Bytes for sort runs and for the writer together.

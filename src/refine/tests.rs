@@ -20,7 +20,7 @@ fn cube(h: f64, pager: Pager) -> (Mesh<Pager>, RefineReport) {
     };
     let dir = tempfile::tempdir().expect("a temporary directory");
     let space = Workspace {
-        dir: dir.path(),
+        dir: &dir.path().into(),
         memory: 1 << 20,
     };
     let report = saturate(&mut mesh, &field, &space, &mut |_| ()).expect("room for runs");
@@ -66,7 +66,7 @@ fn the_same_points_whatever_the_pool() {
     let backing = Backing {
         subdomain: 0,
         generation: 1,
-        work_path: dir.path().join("work.redb"),
+        work_path: dir.path().join("work.redb").into(),
         base: None,
         cache_bytes: 1 << 20,
     };

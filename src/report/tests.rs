@@ -69,7 +69,7 @@ fn real() -> Outcome<Made> {
         options: serde_json::to_string(&options)?,
         ..Job::default()
     };
-    let mut catalog = Catalog::create(&made.path(), &job)?;
+    let mut catalog = Catalog::create(made.path(), &job)?;
     let budget = Budget::new(512 << 20);
     crate::pipeline::mesh(&mut catalog, &surface.into(), &options, &budget, &|_| {})?;
     catalog.close()?;

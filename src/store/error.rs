@@ -1,4 +1,5 @@
-use std::path::PathBuf;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
 
 use tetdb_schema::page::PageError;
 use thiserror::Error;
@@ -53,4 +54,15 @@ pub enum StoreError {
     /// The user asked to stop; the step in flight is lost, everything before it is kept.
     #[error("stopped")]
     Stopped,
+}
+
+impl StoreError {
+    /// Wraps a failed operation on `path`.
+    pub(crate) fn io(path: &Path, source: std::io::Error) -> Self {
+        let path = path.to_owned();
+        match source.kind() {
+            ErrorKind::StorageFull | ErrorKind::QuotaExceeded => Self::Full { path },
+            _ => Self::Io { path, source },
+        }
+    }
 }

@@ -1,14 +1,16 @@
 //! One redb file of keyed values: a sub-domain in one generation.
 
 use std::io::ErrorKind;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use redb::{
-    Database, Durability, ReadOnlyDatabase, ReadOnlyTable, ReadableDatabase, TableDefinition,
+    Database, DatabaseError, Durability, ReadOnlyDatabase, ReadOnlyTable, ReadableDatabase,
+    StorageBackend, StorageError, TableDefinition,
 };
 
-use super::StoreError;
-use super::unsynced::Unsynced;
+use super::backend::{Synced, Unsynced};
+use super::disk::Reader;
+use super::{DiskPath, StoreError};
 
 /// The only table of a file; see the schema's page on keys.
 const PAGES: TableDefinition<u64, &[u8]> = TableDefinition::new("pages");
@@ -23,7 +25,7 @@ enum Handle {
 /// Invariant: every write is one commit, durable but in a file from [`StoreFile::create_unsynced`]. Is not: a cache of its own; redb's is
 /// bounded by the `cache_bytes` given at opening, which the caller has leased.
 pub struct StoreFile {
-    path: PathBuf,
+    path: DiskPath,
     handle: Handle,
     /// Kept between reads; dropped at each commit, because it shows the state before it.
     table: Option<ReadOnlyTable<u64, &'static [u8]>>,
@@ -33,36 +35,32 @@ impl StoreFile {
     /// Creates a file that must not exist.
     ///
     /// Errors: [`StoreError::Io`] when it exists or its folder cannot be written.
-    pub fn create(path: &Path, cache_bytes: usize) -> Result<Self, StoreError> {
-        Self::fresh(path, cache_bytes, |builder| builder.create(path))
+    pub fn create(path: impl Into<DiskPath>, cache_bytes: usize) -> Result<Self, StoreError> {
+        Self::fresh(path.into(), cache_bytes, Synced)
     }
 
     /// Creates a file that must not exist, for one process, and does not sync its commits: who lists it in the catalog syncs it.
     ///
     /// Errors: as [`StoreFile::create`].
-    pub fn create_unsynced(path: &Path, cache_bytes: usize) -> Result<Self, StoreError> {
-        Self::fresh(path, cache_bytes, |builder| {
-            builder.create_with_backend(Unsynced::create(path)?)
-        })
+    pub fn create_unsynced(
+        path: impl Into<DiskPath>,
+        cache_bytes: usize,
+    ) -> Result<Self, StoreError> {
+        Self::fresh(path.into(), cache_bytes, Unsynced)
     }
 
-    fn fresh(
-        path: &Path,
+    fn fresh<B: StorageBackend>(
+        path: DiskPath,
         cache_bytes: usize,
-        create: impl FnOnce(&redb::Builder) -> Result<Database, redb::DatabaseError>,
+        backend: fn(Box<dyn StorageBackend>) -> B,
     ) -> Result<Self, StoreError> {
-        if path.exists() {
-            return Err(StoreError::Io {
-                path: path.to_owned(),
-                source: ErrorKind::AlreadyExists.into(),
-            });
-        }
         let mut builder = Database::builder();
         builder.set_cache_size(cache_bytes);
-        let db = create(&builder).map_err(|e| Failure::Error(e.into()).at(path))?;
+        let file = path.told(path.disk().create(path.path()))?;
+        let db = guarded(|| builder.create_with_backend(backend(file)));
         let mut file = Self {
-            path: path.to_owned(),
-            handle: Handle::Writer(Box::new(db)),
+            handle: Handle::Writer(Box::new(db.map_err(|e| e.at(path.path()))?)),
+            path,
             table: None,
         };
         file.write(std::iter::empty())?;
@@ -72,19 +70,25 @@ impl StoreFile {
     /// Opens an existing file; read-only opening lets other readers in and creates nothing.
     ///
     /// Errors: [`StoreError::Busy`] while another process writes it, [`StoreError::Damaged`] when redb cannot read it.
-    pub fn open(path: &Path, cache_bytes: usize, writable: bool) -> Result<Self, StoreError> {
+    pub fn open(
+        path: impl Into<DiskPath>,
+        cache_bytes: usize,
+        writable: bool,
+    ) -> Result<Self, StoreError> {
+        let path = path.into();
         let mut builder = Database::builder();
         builder.set_cache_size(cache_bytes);
         // redb follows its tree of free pages while it opens.
         let handle = guarded(|| match writable {
-            true => builder.open(path).map(|db| Handle::Writer(Box::new(db))),
-            false => builder
-                .open_read_only(path)
-                .map(|db| Handle::Reader(Box::new(db))),
+            true => open_writable(&path, &builder).map(|db| Handle::Writer(Box::new(db))),
+            false => Ok(match path.disk().open_read_only(path.path(), &builder)? {
+                Reader::Shared(db) => Handle::Reader(Box::new(db)),
+                Reader::Private(db) => Handle::Writer(Box::new(db)),
+            }),
         });
         Ok(Self {
-            path: path.to_owned(),
-            handle: handle.map_err(|e| e.at(path))?,
+            handle: handle.map_err(|e| e.at(path.path()))?,
+            path,
             table: None,
         })
     }
@@ -94,10 +98,11 @@ impl StoreFile {
     ///
     /// Errors: as [`StoreFile::open`].
     pub fn open_repaired(
-        path: &Path,
+        path: impl Into<DiskPath>,
         cache_bytes: usize,
         writable: bool,
     ) -> Result<Self, StoreError> {
+        let path = &path.into();
         match Self::open(path, cache_bytes, writable) {
             Err(StoreError::Database { source, .. })
                 if !writable && matches!(*source, redb::Error::RepairAborted) =>
@@ -112,17 +117,21 @@ impl StoreFile {
     /// Gives the file another name in its folder, replacing what had it; readers see the old name or the new.
     ///
     /// Errors: the system refuses.
-    pub fn rename(&mut self, to: &Path) -> Result<(), StoreError> {
-        std::fs::rename(&self.path, to).map_err(|source| StoreError::Io {
-            path: to.to_owned(),
-            source,
-        })?;
-        self.path = to.to_owned();
+    pub fn rename(&mut self, name: &str) -> Result<(), StoreError> {
+        let to = self.path.folder().join(name);
+        let renamed = to.disk().rename(self.path.path(), to.path());
+        to.told(renamed)?;
+        self.path = to;
         Ok(())
     }
 
     /// Where the file is.
     pub fn path(&self) -> &Path {
+        self.path.path()
+    }
+
+    /// The same, with the disk.
+    pub fn place(&self) -> &DiskPath {
         &self.path
     }
 
@@ -136,7 +145,7 @@ impl StoreFile {
     ) -> Result<Option<T>, StoreError> {
         let table = self.table()?;
         let found = guarded(|| table.get(key).map(|v| v.map(|v| use_bytes(v.value()))));
-        found.map_err(|e| e.at(&self.path))
+        found.map_err(|e| e.at(self.path.path()))
     }
 
     /// Calls `visit` with every key and value of `keys`, ascending, until it returns `false`.
@@ -155,7 +164,7 @@ impl StoreFile {
             }
             Ok(())
         });
-        done.map_err(|e| e.at(&self.path))
+        done.map_err(|e| e.at(self.path.path()))
     }
 
     /// Writes `values` in one durable commit. Ascending keys are fastest.
@@ -176,7 +185,7 @@ impl StoreFile {
         changes: impl Iterator<Item = (u64, Option<&'a [u8]>)>,
     ) -> Result<(), StoreError> {
         let Handle::Writer(db) = &self.handle else {
-            unreachable!("{} is open for reading only", self.path.display());
+            unreachable!("{} is open for reading only", self.path().display());
         };
         self.table = None;
         let committed = guarded(|| -> Result<(), redb::Error> {
@@ -195,7 +204,7 @@ impl StoreFile {
             txn.commit()?;
             Ok(())
         });
-        committed.map_err(|e| e.at(&self.path))
+        committed.map_err(|e| e.at(self.path.path()))
     }
 
     /// Shrinks the file to what it holds, and closes it.
@@ -203,7 +212,7 @@ impl StoreFile {
         self.table = None;
         if let Handle::Writer(db) = &mut self.handle {
             let done = guarded(|| db.compact().map_err(redb::Error::from));
-            done.map_err(|e| e.at(&self.path))?;
+            done.map_err(|e| e.at(self.path.path()))?;
         }
         Ok(())
     }
@@ -217,10 +226,19 @@ impl StoreFile {
                 };
                 Ok(txn.open_table(PAGES)?)
             });
-            self.table = Some(opened.map_err(|e| e.at(&self.path))?);
+            self.table = Some(opened.map_err(|e| e.at(self.path.path()))?);
         }
         Ok(self.table.as_ref().expect("just opened"))
     }
+}
+
+/// Opens what is there; an empty file is none of redb's, which would begin a database in it.
+fn open_writable(path: &DiskPath, builder: &redb::Builder) -> Result<Database, DatabaseError> {
+    let file = path.disk().open(path.path()).map_err(StorageError::Io)?;
+    if file.len().map_err(StorageError::Io)? == 0 {
+        return Err(StorageError::Io(ErrorKind::InvalidData.into()).into());
+    }
+    builder.create_with_backend(Synced(file))
 }
 
 /// A failure inside redb: an error it returned, or a panic on a tree it could not follow.
@@ -235,9 +253,6 @@ impl Failure {
         match self {
             Self::Panic(reason) => StoreError::Damaged { path, reason },
             Self::Error(redb::Error::Corrupted(reason)) => StoreError::Damaged { path, reason },
-            Self::Error(redb::Error::Io(e)) if e.kind() == ErrorKind::StorageFull => {
-                StoreError::Full { path }
-            }
             Self::Error(redb::Error::DatabaseAlreadyOpen) => StoreError::Busy { path },
             Self::Error(redb::Error::Io(e)) if e.kind() == ErrorKind::NotFound => {
                 StoreError::Missing {
@@ -254,6 +269,7 @@ impl Failure {
                     reason: e.to_string(),
                 }
             }
+            Self::Error(redb::Error::Io(e)) => StoreError::io(&path, e),
             Self::Error(source) => StoreError::Database {
                 path,
                 source: Box::new(source),

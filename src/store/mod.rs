@@ -7,18 +7,21 @@
 //! turns that back into a value. A step is atomic, so what it leaves half-done in memory is dropped
 //! with it. Nothing but [`attempt`] may catch such an unwinding. A request to stop travels the same way.
 
+mod backend;
 mod budget;
+mod disk;
 mod error;
 mod file;
 mod flat;
 mod page_table;
 mod pager;
+mod real_disk;
 mod sort;
 mod space;
 mod stop;
-mod unsynced;
 
 pub use budget::{Budget, Lease};
+pub use disk::{Disk, DiskPath, Entry, Reader};
 pub use error::StoreError;
 pub use file::StoreFile;
 pub use flat::FlatPages;

@@ -6,8 +6,6 @@
 //! only when a page is missed: the least recent frame without the bit is evicted, one with the bit is
 //! given a second chance. A list touched at each change of page costs 70 % (measured), a bit a few.
 
-use std::path::PathBuf;
-
 use lru::LruCache;
 use tetdb_schema::page::{
     FRAME_BYTES, PageAddress, SLOT_BITS, SLOTS, Slot, open_page, page_key, seal_page, stored_bytes,
@@ -15,7 +13,7 @@ use tetdb_schema::page::{
 };
 
 use super::page_table::{DIRTY, FRAMES_LIMIT, IN_BASE, IN_WORK, PageTable, REFERENCED, RESIDENT};
-use super::{Pages, StoreError, StoreFile, fail, kind, stop_if_requested};
+use super::{DiskPath, Pages, StoreError, StoreFile, fail, kind, stop_if_requested};
 
 /// Dirty pages written in one commit; a quarter of what redb's cache should hold.
 const BATCH_PAGES_MAX: usize = 256;
@@ -29,7 +27,7 @@ pub struct Backing {
     /// Generation being written.
     pub generation: u32,
     /// File of that generation; created by the first page that leaves memory.
-    pub work_path: PathBuf,
+    pub work_path: DiskPath,
     /// The generation this step started from.
     pub base: Option<StoreFile>,
     /// Bytes redb may cache per file.
@@ -147,7 +145,7 @@ impl Pager {
     /// Ends a generation: all pages are in its file, which becomes the base of the next one, written to `path`.
     ///
     /// The caller must have flushed, and the generation before must have had no base of its own.
-    pub fn next_generation(&mut self, generation: u32, path: PathBuf) {
+    pub fn next_generation(&mut self, generation: u32, path: DiskPath) {
         let backing = self.backing.as_mut().expect("a pool with a store");
         assert!(backing.base.is_none(), "pages would be in three files");
         backing.base = self.work.take();
@@ -168,8 +166,8 @@ impl Pager {
     }
 
     /// Closes the files without writing what is dirty; returns the path of this generation's file, if it was made.
-    pub fn discard(self) -> Option<PathBuf> {
-        self.work.map(|file| file.path().to_owned())
+    pub fn discard(self) -> Option<DiskPath> {
+        self.work.map(|file| file.place().clone())
     }
 
     /// The entry of the page in `frame`.

@@ -2,14 +2,12 @@
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
-use std::fs::File;
 use std::io::{BufReader, BufWriter, Read, Write};
-use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::slice::ParallelSliceMut;
 
-use super::{StoreError, stop_if_requested};
+use super::{DiskPath, StoreError, stop_if_requested};
 
 /// Numbers run files within the process.
 static RUNS: AtomicU64 = AtomicU64::new(0);
@@ -24,19 +22,19 @@ pub struct Sorter<const N: usize> {
     records: Vec<[u8; N]>,
     records_max: usize,
     memory_bytes: usize,
-    dir: PathBuf,
+    dir: DiskPath,
     runs: Vec<Run>,
 }
 
 /// A sorted file that goes when it is dropped.
 struct Run {
-    path: PathBuf,
+    path: DiskPath,
 }
 
 impl Drop for Run {
     fn drop(&mut self) {
         // The folder of runs is scratch: what stays here is removed when the store is next opened for writing.
-        let _ = std::fs::remove_file(&self.path);
+        let _ = self.path.remove_file();
     }
 }
 
@@ -53,7 +51,7 @@ fn order<const N: usize>(a: &[u8; N], b: &[u8; N]) -> std::cmp::Ordering {
 
 impl<const N: usize> Sorter<N> {
     /// A sorter with runs in `dir`, which must exist.
-    pub fn new(dir: &Path, memory_bytes: u64) -> Self {
+    pub fn new(dir: impl Into<DiskPath>, memory_bytes: u64) -> Self {
         let memory_bytes = usize::try_from(memory_bytes)
             .unwrap_or(usize::MAX)
             .max(1 << 16);
@@ -61,7 +59,7 @@ impl<const N: usize> Sorter<N> {
             records: Vec::new(),
             records_max: memory_bytes / N,
             memory_bytes,
-            dir: dir.to_owned(),
+            dir: dir.into(),
             runs: Vec::new(),
         }
     }
@@ -90,14 +88,15 @@ impl<const N: usize> Sorter<N> {
             .dir
             .join(format!("run-{}-{number}", std::process::id()));
         let run = Run { path };
-        let written = File::create(&run.path).and_then(|file| {
+        let created = run.path.disk().create_stream(run.path.path());
+        let written = created.and_then(|file| {
             let mut out = BufWriter::with_capacity(1 << 18, file);
             for record in &self.records {
                 out.write_all(record)?;
             }
             out.flush()
         });
-        written.map_err(|e| io_error(&run.path, e))?;
+        run.path.told(written)?;
         self.runs.push(run);
         self.records.clear();
         Ok(())
@@ -124,7 +123,9 @@ impl<const N: usize> Sorter<N> {
             readers: Vec::with_capacity(self.runs.len()),
         };
         for (k, run) in self.runs.drain(..).enumerate() {
-            let file = File::open(&run.path).map_err(|e| io_error(&run.path, e))?;
+            let file = run
+                .path
+                .told(run.path.disk().open_stream(run.path.path()))?;
             let mut reader = RunReader {
                 bytes: BufReader::with_capacity(buffer, file),
                 run,
@@ -139,7 +140,7 @@ impl<const N: usize> Sorter<N> {
 }
 
 struct RunReader {
-    bytes: BufReader<File>,
+    bytes: BufReader<Box<dyn Read + Send + Sync>>,
     run: Run,
 }
 
@@ -149,20 +150,8 @@ impl RunReader {
         match self.bytes.read_exact(&mut record) {
             Ok(()) => Ok(Some(record)),
             Err(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => Ok(None),
-            Err(e) => Err(io_error(&self.run.path, e)),
+            Err(e) => self.run.path.told(Err(e)),
         }
-    }
-}
-
-fn io_error(path: &Path, source: std::io::Error) -> StoreError {
-    if source.kind() == std::io::ErrorKind::StorageFull {
-        return StoreError::Full {
-            path: path.to_owned(),
-        };
-    }
-    StoreError::Io {
-        path: path.to_owned(),
-        source,
     }
 }
 

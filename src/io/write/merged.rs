@@ -308,7 +308,10 @@ fn damaged(part: &Subdomain, found: u32, expected: u32) -> CatalogError {
 
 fn too_many_vertices(catalog: &Catalog, row: &SubdomainRow, end: u64) -> CatalogError {
     CatalogError::Content {
-        path: catalog.file_path(row.rank, row.generation),
+        path: catalog
+            .file_path(row.rank, row.generation)
+            .path()
+            .to_owned(),
         subdomain: row.rank,
         what: format!(
             "a chunk ends at vertex {end}, the catalog counts {}",

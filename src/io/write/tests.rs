@@ -194,7 +194,7 @@ fn cubes(path: &Path, n: u32) -> Outcome {
     let mut parts = Vec::new();
     for rank in 0..2 {
         let id = SubdomainId::new(rank).ok_or("a rank")?;
-        let mut writer = SealedWriter::create(&catalog.file_path(rank, 1), id, 1, 4 << 20)?;
+        let mut writer = SealedWriter::create(catalog.file_path(rank, 1), id, 1, 4 << 20)?;
         let mut local = BTreeMap::new();
         let keep = |x: u32| if rank == 0 { x <= half } else { x >= half };
         // Backwards, so that shared vertices stand at different places in the two parts.

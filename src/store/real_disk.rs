@@ -1,0 +1,87 @@
+//! The disk the operating system shows.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Read, Write};
+use std::path::Path;
+
+use redb::backends::FileBackend;
+use redb::{Builder, DatabaseError, StorageBackend};
+
+use super::available_bytes;
+use super::disk::{Disk, Entry, Reader};
+
+/// Files and folders of this machine, with redb's own locks on database files.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RealDisk;
+
+fn backend(file: File) -> io::Result<Box<dyn StorageBackend>> {
+    match FileBackend::new(file) {
+        Ok(backend) => Ok(Box::new(backend)),
+        Err(e) => Err(io::Error::other(e)),
+    }
+}
+
+impl Disk for RealDisk {
+    fn create(&self, path: &Path) -> io::Result<Box<dyn StorageBackend>> {
+        let mut options = OpenOptions::new();
+        backend(options.read(true).write(true).create_new(true).open(path)?)
+    }
+
+    fn open(&self, path: &Path) -> io::Result<Box<dyn StorageBackend>> {
+        backend(OpenOptions::new().read(true).write(true).open(path)?)
+    }
+
+    fn open_read_only(&self, path: &Path, builder: &Builder) -> Result<Reader, DatabaseError> {
+        builder.open_read_only(path).map(Reader::Shared)
+    }
+
+    fn create_stream(&self, path: &Path) -> io::Result<Box<dyn Write>> {
+        Ok(Box::new(File::create(path)?))
+    }
+
+    fn open_stream(&self, path: &Path) -> io::Result<Box<dyn Read + Send + Sync>> {
+        Ok(Box::new(File::open(path)?))
+    }
+
+    fn sync_file(&self, path: &Path) -> io::Result<()> {
+        File::open(path)?.sync_all()
+    }
+
+    fn sync_dir(&self, dir: &Path) -> io::Result<()> {
+        File::open(dir)?.sync_all()
+    }
+
+    fn create_dir(&self, dir: &Path) -> io::Result<()> {
+        fs::create_dir(dir)
+    }
+
+    fn remove_dir_all(&self, dir: &Path) -> io::Result<()> {
+        fs::remove_dir_all(dir)
+    }
+
+    fn remove_file(&self, path: &Path) -> io::Result<()> {
+        fs::remove_file(path)
+    }
+
+    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
+        fs::rename(from, to)
+    }
+
+    fn list(&self, dir: &Path) -> io::Result<Vec<String>> {
+        fs::read_dir(dir)?
+            .map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned()))
+            .collect()
+    }
+
+    fn entry(&self, path: &Path) -> Option<Entry> {
+        let metadata = fs::metadata(path).ok()?;
+        match metadata.is_dir() {
+            true => Some(Entry::Folder),
+            false => Some(Entry::File(metadata.len())),
+        }
+    }
+
+    fn available_bytes(&self, path: &Path) -> Option<u64> {
+        available_bytes(path)
+    }
+}
