@@ -338,7 +338,7 @@ pub struct ExportArgs {
     after_help = "Examples:\n  tetdb sample balls,count=1000,h=0.0093 -o balls.stl\n  tetdb sample box,h=0.1 -o box.off"
 )]
 pub struct SampleArgs {
-    /// NAME,key=value,... with the names balls, box, knot, shells, sphere
+    /// NAME,key=value,... with the names balls, box, grains, knot, shells, sphere
     #[arg(value_name = "SAMPLE")]
     pub sample: String,
     /// The file to write: .stl (text), .off, .obj or .ply, all exact

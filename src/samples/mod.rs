@@ -12,6 +12,8 @@ mod balls;
 mod boxes;
 mod build;
 mod error;
+mod grains;
+mod hull;
 mod knot;
 mod random;
 mod sample;

@@ -1,6 +1,7 @@
 //! From a word such as `balls,count=1000,h=0.02` to what it asks for.
 
 use super::balls::Balls;
+use super::grains::Grains;
 use super::shells::{ShellKind, make_shells};
 use super::{Sample, SampleError, boxes, knot, sphere};
 use crate::geom::Point;
@@ -11,7 +12,7 @@ use std::str::FromStr;
 /// What a surface argument begins with when it names a sample.
 pub const PREFIX: &str = "sample:";
 /// The samples there are.
-pub const SAMPLES: &[&str] = &["balls", "box", "knot", "shells", "sphere"];
+pub const SAMPLES: &[&str] = &["balls", "box", "grains", "knot", "shells", "sphere"];
 /// Above this a sample is refused: it is made in memory, about 40 bytes per triangle.
 const TRIANGLES_MAX: u64 = 100_000_000;
 
@@ -30,6 +31,7 @@ pub enum SampleKind {
         sides: Point,
         h: f64,
     },
+    Grains(Grains),
     Knot {
         tube: f64,
         h: f64,
@@ -56,6 +58,7 @@ impl SampleSpec {
         let kind = match name {
             "balls" => parse_balls(rest)?,
             "box" => parse_box(rest)?,
+            "grains" => parse_grains(rest)?,
             "knot" => {
                 let keys = Keys::new("knot", &["tube", "h"], rest)?;
                 let tube = keys.number("tube", 0.2, 0.001, 0.3)?;
@@ -89,6 +92,7 @@ impl SampleSpec {
         match self.kind {
             SampleKind::Balls(_) => "balls",
             SampleKind::Box { .. } => "box",
+            SampleKind::Grains(_) => "grains",
             SampleKind::Knot { .. } => "knot",
             SampleKind::Shells { .. } => "shells",
             SampleKind::Sphere { .. } => "sphere",
@@ -106,6 +110,9 @@ impl SampleSpec {
                     "{PREFIX}box,x={},y={},z={},h={h}",
                     sides.x, sides.y, sides.z
                 )
+            }
+            SampleKind::Grains(Grains { count, seed, h }) => {
+                format!("{PREFIX}grains,count={count},seed={seed},h={h}")
             }
             SampleKind::Knot { tube, h } => format!("{PREFIX}knot,tube={tube},h={h}"),
             SampleKind::Shells { count, kind, h } => {
@@ -128,6 +135,7 @@ impl SampleSpec {
         match &self.kind {
             SampleKind::Balls(balls) => balls.make(),
             SampleKind::Box { sides, h } => boxes::make_box(*sides, *h),
+            SampleKind::Grains(grains) => grains.make(),
             SampleKind::Knot { tube, h } => knot::make_knot(*tube, *h),
             SampleKind::Shells { count, kind, h } => make_shells(*count, *kind, *h),
             SampleKind::Sphere { radius, h } => sphere::make_sphere(*radius, *h),
@@ -163,6 +171,14 @@ fn parse_box(rest: &str) -> Result<SampleKind, SampleError> {
     let sides = Point::new(x, y, keys.length("z", 1.0)?);
     let h = keys.length("h", sides.max_element() / 20.0)?;
     Ok(SampleKind::Box { sides, h })
+}
+
+fn parse_grains(rest: &str) -> Result<SampleKind, SampleError> {
+    let keys = Keys::new("grains", &["count", "seed", "h"], rest)?;
+    let count = keys.number("count", 100, 1, 10_000_000)?;
+    let seed = keys.number("seed", 1, 0, u64::MAX)?;
+    let h = keys.length("h", Grains::h_default(count))?;
+    Ok(SampleKind::Grains(Grains { count, seed, h }))
 }
 
 fn parse_shells(rest: &str) -> Result<SampleKind, SampleError> {

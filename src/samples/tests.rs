@@ -1,7 +1,8 @@
 //! Closed, oriented, near the wanted edges, the same on every machine.
 
 use super::*;
-use std::collections::{HashMap, HashSet};
+use crate::geom::{Aabb, Point, orient};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 fn made(text: &str) -> Sample {
     SampleSpec::parse(text).unwrap().make().unwrap()
@@ -105,7 +106,7 @@ fn balls_keep_their_gaps() {
     let gap = 0.006 * (1000.0f64 / 60.0).cbrt();
     let part = parts(&sample);
     let mut cells: HashMap<[i32; 3], Vec<usize>> = HashMap::new();
-    let cell = |p: crate::geom::Point| p.to_array().map(|x| (x / gap).floor() as i32);
+    let cell = |p: Point| p.to_array().map(|x| (x / gap).floor() as i32);
     for (i, &p) in sample.points.iter().enumerate() {
         cells.entry(cell(p)).or_default().push(i);
     }
@@ -166,6 +167,47 @@ fn any_count_of_balls_finds_room() {
 }
 
 #[test]
+fn grains_are_disjoint_convex_polyhedra() {
+    let count = 300;
+    let sample = made(&format!("grains,count={count}"));
+    assert_eq!(check_closed(&sample), 2 * (count + 1));
+    let part = parts(&sample);
+    let mut grains: BTreeMap<u32, Vec<[u32; 3]>> = BTreeMap::new();
+    for (&t, &label) in sample.triangles.iter().zip(&sample.labels) {
+        if label == 1 {
+            grains.entry(part[t[0] as usize]).or_default().push(t);
+        }
+    }
+    assert_eq!(grains.len() as i64, count);
+    let mean = grains.values().map(Vec::len).sum::<usize>() as f64 / count as f64;
+    assert!((80.0..82.0).contains(&mean), "{mean} triangles");
+    let mut boxes = Vec::new();
+    for grain in grains.values() {
+        let ids: BTreeSet<u32> = grain.iter().flatten().copied().collect();
+        let points: Vec<Point> = ids.iter().map(|&v| sample.points[v as usize]).collect();
+        let size = points
+            .iter()
+            .map(|p| points[0].distance(*p))
+            .fold(0.0, f64::max);
+        for t in grain {
+            let [a, b, c] = t.map(|v| sample.points[v as usize]);
+            // Inward triangles: all else lies in front.
+            assert!(points.iter().all(|&p| orient(a, b, c, p) >= 0.0));
+            assert!(a.distance(b).min(b.distance(c)) > 0.05 * size);
+        }
+        boxes.push(Aabb::around(points));
+    }
+    let volumes = boxes
+        .iter()
+        .map(|b| (b.high - b.low).to_array().iter().product::<f64>());
+    let (low, high) = volumes.fold((1.0, 0.0), |(low, high), v| (v.min(low), v.max(high)));
+    assert!(high > 8.0 * low, "sizes vary: {low} {high}");
+    for (i, a) in boxes.iter().enumerate() {
+        assert!(boxes[..i].iter().all(|b| !a.meets(b)));
+    }
+}
+
+#[test]
 fn shells_fill_in_turn() {
     let sample = made("shells,count=3,kind=boxes,h=0.1");
     assert_eq!(check_closed(&sample), 6);
@@ -198,6 +240,7 @@ fn the_same_word_gives_the_same_bits() {
     let found = [
         "balls,count=20,seed=5",
         "box,h=0.2",
+        "grains,count=30,seed=2",
         "knot,h=0.1",
         "shells",
         "sphere",
@@ -207,6 +250,7 @@ fn the_same_word_gives_the_same_bits() {
     for text in [
         "balls,count=20",
         "box,x=0.3",
+        "grains,count=20",
         "knot",
         "shells,kind=boxes",
         "sphere,h=0.3",
@@ -232,9 +276,10 @@ fn surfaces_have_the_order_of_files() {
 }
 
 /// Written down when the makers were made; they may never change.
-const EXPECTED: [u64; 5] = [
+const EXPECTED: [u64; 6] = [
     0x4d86_8dcf_cc8b_164a,
     0x7aac_3221_1b6f_2f59,
+    0x61bc_4b9e_33a2_3dfd,
     0x7d56_a7e3_de65_fb91,
     0x21ff_4baa_bce4_d8bc,
     0x4b01_fd45_d99f_a41f,
@@ -282,6 +327,8 @@ fn table_of_sizes() {
         "balls,count=1000,h=0.02",
         "balls,count=10000",
         "box",
+        "grains",
+        "grains,count=5000",
         "knot",
         "shells",
         "sphere",
