@@ -7,6 +7,8 @@
 //!
 //! Source: the paper, section 1.1, "Choosing the interface", which makes the moves alone.
 
+use rayon::prelude::*;
+
 use super::core::Rim;
 use super::flow::{Graph, NOBODY};
 use super::labels::{InterfaceMeasures, begin, face_cost, is_free, is_high, measure, set_high};
@@ -87,6 +89,9 @@ pub(super) fn choose<P: Pages>(
     report
 }
 
+/// Strips that are cut at once, each with a graph of its own.
+const AT_ONCE: usize = 2;
+
 /// Cuts strip by strip; returns the most bytes held.
 fn minimum_cut<P: Pages>(core: &mut Mesh<P>, surface: &dyn CuttingSurface, free: &[u32]) -> u64 {
     core.clear_scratch();
@@ -99,18 +104,31 @@ fn minimum_cut<P: Pages>(core: &mut Mesh<P>, surface: &dyn CuttingSurface, free:
     if strips > 1 {
         sorting = sort_along(core, surface, &mut order);
     }
-    let mut graph = Graph::default();
     let length = free.len().div_ceil(strips).max(1);
-    for strip in order.chunks(length) {
-        cut_strip(core, surface, strip, &mut graph);
-    }
     let half = length / BORDER;
+    // First every other strip, then those between, then what lies around the borders: those of one kind do not touch.
+    let mut kinds: [Vec<&[u32]>; 3] = [Vec::new(), Vec::new(), Vec::new()];
+    for (k, strip) in order.chunks(length).enumerate() {
+        kinds[k % 2].push(strip);
+    }
     for border in (length..free.len()).step_by(length) {
-        let end = free.len().min(border + half);
-        cut_strip(core, surface, &order[border - half..end], &mut graph);
+        kinds[2].push(&order[border - half..free.len().min(border + half)]);
+    }
+    let mut graphs: Vec<Graph> = (0..strips.min(AT_ONCE)).map(|_| Graph::default()).collect();
+    for strips in kinds.iter().flat_map(|kind| kind.chunks(AT_ONCE)) {
+        for (strip, graph) in strips.iter().zip(&mut graphs) {
+            stop_if_requested();
+            read_strip(core, surface, strip, graph);
+        }
+        graphs[..strips.len()].par_iter_mut().for_each(|graph| {
+            graph.cut();
+        });
+        for (strip, graph) in strips.iter().zip(&graphs) {
+            label_strip(core, strip, graph);
+        }
     }
     core.clear_scratch();
-    size_of_val(&order[..]) as u64 + sorting.max(graph.bytes())
+    size_of_val(&order[..]) as u64 + sorting.max(graphs.iter().map(Graph::bytes).sum())
 }
 
 /// Sorts along the longest direction in the surface, among three; returns the bytes held meanwhile.
@@ -150,13 +168,13 @@ fn sort_along<P: Pages>(
     size_of_val(&keyed[..]) as u64
 }
 
-fn cut_strip<P: Pages>(
+/// Makes the graph of a strip; what lies around it is source or sink.
+fn read_strip<P: Pages>(
     core: &mut Mesh<P>,
     surface: &dyn CuttingSurface,
     strip: &[u32],
     graph: &mut Graph,
 ) {
-    stop_if_requested();
     for (node, &t) in strip.iter().enumerate() {
         core.set_scratch(dense(t), node as u32);
     }
@@ -181,11 +199,16 @@ fn cut_strip<P: Pages>(
         }
         graph.push(neighbor, capacity, terminal);
     }
-    graph.cut();
+    for &t in strip {
+        core.set_scratch(dense(t), NONE);
+    }
+}
+
+/// Labels a strip as its graph was cut.
+fn label_strip<P: Pages>(core: &mut Mesh<P>, strip: &[u32], graph: &Graph) {
     for (node, &t) in strip.iter().enumerate() {
         debug_assert!(is_free(core, t));
         set_high(core, t, !graph.is_source_side(node as u32));
-        core.set_scratch(dense(t), NONE);
     }
 }
 

@@ -4,6 +4,8 @@
 //! middle. It is divided along its longest edge until h varies little between the corners and the edge is a bounded number of
 //! wanted lengths long; the pieces then have a closed form.
 
+use rayon::prelude::*;
+
 use crate::geom::Point;
 use crate::mesh::Mesh;
 use crate::sizing::load_of_tet;
@@ -31,54 +33,85 @@ pub struct Piece {
     pub h: f64,
 }
 
-/// Calls `visit` with every piece of every tetrahedron, in an order that depends on the mesh alone.
-pub fn for_each_piece<P: Pages>(
+/// Sums are kept in so many lanes at once. The result depends on it in its last bits, so it is a constant.
+const LANES: usize = 2;
+/// Consecutive tetrahedra that go to the same lane, and how many such blocks are read before the lanes are worked on.
+const BLOCK: usize = 64;
+const BLOCKS: usize = 32;
+
+/// A wanted length at each point, asked from several threads.
+pub type SizeAt<'a> = dyn Fn(Point) -> f64 + Sync + 'a;
+
+/// Corners of a tetrahedron and the sizes there.
+type Sized4 = ([Point; 4], [f64; 4]);
+
+/// Adds every piece of every tetrahedron to the sum of its lane; `empty` makes a sum.
+///
+/// Which lane a tetrahedron goes to, and in which order, depends on the mesh alone; the caller adds the lanes up in order.
+pub fn tally<P: Pages, T: Send>(
     mesh: &mut Mesh<P>,
-    h: &dyn Fn(Point) -> f64,
-    mut visit: impl FnMut(&Piece),
-) {
-    let mut stack: Vec<([Point; 4], [f64; 4])> = Vec::new();
+    h: &SizeAt,
+    empty: impl Fn() -> T,
+    add: impl Fn(&mut T, &Piece) + Sync,
+) -> [T; LANES] {
+    let mut lanes: [(Vec<Sized4>, T); LANES] = std::array::from_fn(|_| (Vec::new(), empty()));
     let mut from = 0;
-    while let Some((t, tet)) = mesh.next_tet(from) {
-        from = t + 1;
-        if t & 1023 == 0 {
-            stop_if_requested();
+    loop {
+        let mut read = 0;
+        while let Some((t, tet)) = mesh.next_tet(from).filter(|_| read < BLOCK * BLOCKS) {
+            from = t + 1;
+            let points = mesh.points(&tet);
+            let sizes = std::array::from_fn(|i| f64::from(mesh.size(tet.vertex(i))));
+            lanes[read / BLOCK % LANES].0.push((points, sizes));
+            read += 1;
         }
-        let points = mesh.points(&tet);
-        let sizes = std::array::from_fn(|i| f64::from(mesh.size(tet.vertex(i))));
-        stack.push((points, sizes));
-        while let Some((points, sizes)) = stack.pop() {
-            let (edge, [i, j]) = longest(&points);
-            let least = sizes.iter().fold(f64::INFINITY, |m, &x| m.min(x));
-            let most = sizes.iter().fold(0.0, |m: f64, &x| m.max(x));
-            let coarse = edge > EDGE_MAX * least || most > RATIO_MAX * least;
-            let [a, b, c, d] = points;
-            let volume = (b - a).cross(c - a).dot(d - a) / 6.0;
-            if coarse && edge > EDGE_FINE * least {
-                let middle = (points[i] + points[j]) * 0.5;
-                let size = h(middle);
-                if volume > LOAD_MIN * least.min(size).powi(3) {
-                    for end in [i, j] {
-                        let (mut p, mut s) = (points, sizes);
-                        (p[end], s[end]) = (middle, size);
-                        stack.push((p, s));
-                    }
-                    continue;
-                }
+        if read == 0 {
+            return lanes.map(|(_, sum)| sum);
+        }
+        stop_if_requested();
+        lanes.par_iter_mut().for_each(|(tets, sum)| {
+            let mut stack = Vec::new();
+            for tet in tets.drain(..) {
+                divide(tet, h, &mut stack, &mut |piece| add(sum, piece));
             }
-            let mean = sizes.iter().sum::<f64>() * 0.25;
-            let density = if most < SECOND_ORDER * least {
-                let spread: f64 = sizes.iter().map(|h| (h - mean) * (h - mean)).sum();
-                (1.0 + 0.3 * spread / (mean * mean)) / (mean * mean * mean)
-            } else {
-                load_of_tet(1.0, sizes)
-            };
-            visit(&Piece {
-                points,
-                load: density * volume.max(0.0),
-                h: mean,
-            });
+        });
+    }
+}
+
+/// Calls `visit` with every piece of a tetrahedron; `stack` is empty before and after.
+fn divide(tet: Sized4, h: &SizeAt, stack: &mut Vec<Sized4>, visit: &mut impl FnMut(&Piece)) {
+    stack.push(tet);
+    while let Some((points, sizes)) = stack.pop() {
+        let (edge, [i, j]) = longest(&points);
+        let least = sizes.iter().fold(f64::INFINITY, |m, &x| m.min(x));
+        let most = sizes.iter().fold(0.0, |m: f64, &x| m.max(x));
+        let coarse = edge > EDGE_MAX * least || most > RATIO_MAX * least;
+        let [a, b, c, d] = points;
+        let volume = (b - a).cross(c - a).dot(d - a) / 6.0;
+        if coarse && edge > EDGE_FINE * least {
+            let middle = (points[i] + points[j]) * 0.5;
+            let size = h(middle);
+            if volume > LOAD_MIN * least.min(size).powi(3) {
+                for end in [i, j] {
+                    let (mut p, mut s) = (points, sizes);
+                    (p[end], s[end]) = (middle, size);
+                    stack.push((p, s));
+                }
+                continue;
+            }
         }
+        let mean = sizes.iter().sum::<f64>() * 0.25;
+        let density = if most < SECOND_ORDER * least {
+            let spread: f64 = sizes.iter().map(|h| (h - mean) * (h - mean)).sum();
+            (1.0 + 0.3 * spread / (mean * mean)) / (mean * mean * mean)
+        } else {
+            load_of_tet(1.0, sizes)
+        };
+        visit(&Piece {
+            points,
+            load: density * volume.max(0.0),
+            h: mean,
+        });
     }
 }
 
@@ -95,8 +128,7 @@ fn longest(p: &[Point; 4]) -> (f64, [usize; 2]) {
 }
 
 /// The load of the whole mesh.
-pub fn load_of<P: Pages>(mesh: &mut Mesh<P>, h: &dyn Fn(Point) -> f64) -> f64 {
-    let mut sum = 0.0;
-    for_each_piece(mesh, h, |piece| sum += piece.load);
-    sum
+pub fn load_of<P: Pages>(mesh: &mut Mesh<P>, h: &SizeAt) -> f64 {
+    let sums = tally(mesh, h, || 0.0, |sum, piece| *sum += piece.load);
+    sums.into_iter().sum()
 }

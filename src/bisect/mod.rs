@@ -24,7 +24,7 @@ mod zone;
 
 pub use interface::{InterfaceReport, Steps};
 pub use labels::InterfaceMeasures;
-pub use load::{Piece, for_each_piece, load_of};
+pub use load::{SizeAt, load_of};
 pub use plane::{ChosenPlane, PlaneChoice, choose as choose_plane, principal_axes};
 pub use split::write_child;
 pub use surface::{CuttingSurface, Plane};
@@ -32,7 +32,7 @@ pub use zone::{OutsideZones, WIDTH_MIN, WIDTH_NOISE, Zone};
 
 use std::time::Instant;
 
-use crate::geom::{Aabb, Point};
+use crate::geom::Aabb;
 use crate::mesh::{Mesh, Workspace};
 use crate::optimize::{self, Settings};
 use crate::refine::{Field, RefineReport, saturate};
@@ -56,7 +56,7 @@ pub struct CutPlan<'a> {
     /// Zones of the cuts above it.
     pub earlier: &'a [Zone],
     /// Wanted length at a position.
-    pub h: &'a dyn Fn(Point) -> f64,
+    pub h: &'a SizeAt<'a>,
     /// Box of the whole mesh.
     pub bounds: Aabb,
     pub optimize: Settings,
@@ -113,10 +113,7 @@ pub fn open<P: Pages, Q: Pages>(
     };
     let mut seconds = StageSeconds::default();
     progress("choose a plane", 0);
-    for v in host.vertex_ids() {
-        let p = host.point(v);
-        host.set_size(v, (plan.h)(p) as f32);
-    }
+    plane::set_sizes(host, plan.h);
     let plane = plane::choose(host, plan.h, plan.bounds.low, plan.low, plan.cutting.plane);
     seconds.plane = lap();
     let zone = Zone {

@@ -6,7 +6,7 @@
 //!
 //! Source: the paper, section 1.1, "Defining the cutting plane".
 
-use super::load::for_each_piece;
+use super::load::{SizeAt, tally};
 use super::surface::{CuttingSurface, Plane};
 use crate::geom::{Aabb, Point};
 use crate::mesh::Mesh;
@@ -95,14 +95,17 @@ impl Moments {
 /// Sizes must be set at all vertices. `origin` is a point near the mesh: moments are taken about it, so that digits are kept.
 pub fn choose<P: Pages>(
     mesh: &mut Mesh<P>,
-    h: &dyn Fn(Point) -> f64,
+    h: &SizeAt,
     origin: Point,
     low: f64,
     choice: PlaneChoice,
 ) -> ChosenPlane {
     if choice == PlaneChoice::Volume {
         let everywhere = bounds(mesh).diagonal() / VOLUME_STEPS;
-        return choose(mesh, &|_| everywhere, origin, low, PlaneChoice::Load);
+        set_sizes(mesh, &|_| everywhere);
+        let chosen = choose(mesh, &|_| everywhere, origin, low, PlaneChoice::Load);
+        set_sizes(mesh, h);
+        return chosen;
     }
     let axis = match choice {
         PlaneChoice::Given(plane) => {
@@ -127,7 +130,15 @@ pub fn choose<P: Pages>(
     };
     let spread = Spread::gather(mesh, h, axis);
     let chosen = spread.at(spread.quantile(low));
-    shift(mesh, h, chosen, &spread)
+    shift(mesh, chosen, &spread)
+}
+
+/// Sets the size of every vertex.
+pub(super) fn set_sizes<P: Pages>(mesh: &mut Mesh<P>, h: &SizeAt) {
+    for v in mesh.vertex_ids() {
+        let p = mesh.point(v);
+        mesh.set_size(v, h(p) as f32);
+    }
 }
 
 /// Cells of the grid along each axis.
@@ -142,11 +153,11 @@ struct Grid {
 }
 
 impl Grid {
-    fn gather<P: Pages>(mesh: &mut Mesh<P>, h: &dyn Fn(Point) -> f64) -> Self {
+    fn gather<P: Pages>(mesh: &mut Mesh<P>, h: &SizeAt) -> Self {
         let bounds = bounds(mesh);
         let width = (bounds.high - bounds.low) / CELLS as f64;
-        let mut cells = vec![[0.0; 2]; CELLS * CELLS * CELLS];
-        for_each_piece(mesh, h, |piece| {
+        let empty = || vec![[0.0; 2]; CELLS * CELLS * CELLS];
+        let [mut cells, others @ ..] = tally(mesh, h, empty, |cells, piece| {
             let middle = piece.points.iter().sum::<Point>() * 0.25;
             let at = ((middle - bounds.low) / width).to_array();
             let [x, y, z] = at.map(|c| (c as usize).min(CELLS - 1));
@@ -154,6 +165,11 @@ impl Grid {
             cell[0] += piece.load;
             cell[1] += piece.load * piece.h;
         });
+        for other in &others {
+            for (cell, more) in cells.iter_mut().zip(other) {
+                *cell = [cell[0] + more[0], cell[1] + more[1]];
+            }
+        }
         Self {
             low: bounds.low,
             width,
@@ -187,12 +203,12 @@ impl Grid {
                 let s = axis.dot(p);
                 [l.min(s - half), h.max(s + half)]
             });
-        let mut spread = Spread::new(axis, ends);
+        let mut ramps = Ramps::new(axis, ends);
         for (middle, [load, section]) in self.filled() {
             let s = axis.dot(middle);
-            spread.add(s - half, s + half, load, section);
+            ramps.add(s - half, s + half, load, section);
         }
-        spread
+        ramps.sum_up()
     }
 }
 
@@ -277,18 +293,75 @@ struct Spread {
     section: Vec<f64>,
 }
 
-impl Spread {
+/// A [`Spread`] in the making: load and section of each bin less those of the bin before, so that a body changes four entries however
+/// many bins it covers.
+struct Ramps {
+    axis: Point,
+    low: f64,
+    width: f64,
+    steps: Vec<[f64; 2]>,
+}
+
+impl Ramps {
     fn new(axis: Point, [low, high]: [f64; 2]) -> Self {
         Self {
             axis,
             low,
             width: (high - low) / BINS as f64,
-            load: vec![0.0; BINS],
-            section: vec![0.0; BINS],
+            steps: vec![[0.0; 2]; BINS + 2],
         }
     }
 
-    fn gather<P: Pages>(mesh: &mut Mesh<P>, h: &dyn Fn(Point) -> f64, axis: Point) -> Self {
+    /// Spreads a body evenly over the bins between its ends.
+    fn add(&mut self, low: f64, high: f64, load: f64, section: f64) {
+        let low = ((low - self.low) / self.width).max(0.0);
+        let high = ((high - self.low) / self.width).min(BINS as f64);
+        let first = (low as usize).min(BINS - 1);
+        let last = (high as usize).min(BINS - 1).max(first);
+        let rate = 1.0 / (high - low).max(1e-9);
+        let mut step = |bin: usize, share: f64| {
+            let [a, b] = &mut self.steps[bin];
+            (*a, *b) = (*a + share * load, *b + share * section);
+        };
+        if first == last {
+            step(first, 1.0);
+            step(first + 1, -1.0);
+            return;
+        }
+        let (head, tail) = (first as f64 + 1.0 - low, high - last as f64);
+        step(first, rate * head);
+        step(first + 1, rate * (1.0 - head));
+        step(last, rate * (tail - 1.0));
+        step(last + 1, -rate * tail);
+    }
+
+    fn add_all(&mut self, other: &Self) {
+        for (step, more) in self.steps.iter_mut().zip(&other.steps) {
+            *step = [step[0] + more[0], step[1] + more[1]];
+        }
+    }
+
+    fn sum_up(self) -> Spread {
+        let (mut load, mut section) = (Vec::with_capacity(BINS), Vec::with_capacity(BINS));
+        let mut sum = [0.0; 2];
+        for step in &self.steps[..BINS] {
+            sum = [sum[0] + step[0], sum[1] + step[1]];
+            // Rounding leaves a little of either sign where there is nothing.
+            load.push(f64::max(sum[0], 0.0));
+            section.push(f64::max(sum[1], 0.0));
+        }
+        Spread {
+            axis: self.axis,
+            low: self.low,
+            width: self.width,
+            load,
+            section,
+        }
+    }
+}
+
+impl Spread {
+    fn gather<P: Pages>(mesh: &mut Mesh<P>, h: &SizeAt, axis: Point) -> Self {
         let mut ends = [f64::INFINITY, f64::NEG_INFINITY];
         let mut from = 0;
         while let Some((t, tet)) = mesh.next_tet(from) {
@@ -298,33 +371,15 @@ impl Spread {
                 ends = [ends[0].min(s), ends[1].max(s)];
             }
         }
-        let mut spread = Self::new(axis, ends);
-        for_each_piece(mesh, h, |piece| {
+        let empty = || Ramps::new(axis, ends);
+        let [mut ramps, others @ ..] = tally(mesh, h, empty, |ramps, piece| {
             let at = piece.points.map(|p| axis.dot(p));
             let low = at[0].min(at[1]).min(at[2].min(at[3]));
             let high = at[0].max(at[1]).max(at[2].max(at[3]));
-            spread.add(low, high, piece.load, piece.load * piece.h);
+            ramps.add(low, high, piece.load, piece.load * piece.h);
         });
-        spread
-    }
-
-    /// Spreads a body evenly over the bins between its ends.
-    fn add(&mut self, low: f64, high: f64, load: f64, section: f64) {
-        let low = ((low - self.low) / self.width).max(0.0);
-        let high = ((high - self.low) / self.width).min(BINS as f64);
-        let (first, last) = (low as usize, (high as usize).min(BINS - 1));
-        let per_bin = 1.0 / (high - low).max(1e-9);
-        for bin in first..=last.max(first) {
-            let from = low.max(bin as f64);
-            let to = high.min(bin as f64 + 1.0);
-            let share = if first == last {
-                1.0
-            } else {
-                (to - from).max(0.0) * per_bin
-            };
-            self.load[bin] += share * load;
-            self.section[bin] += share * section;
-        }
+        others.iter().for_each(|other| ramps.add_all(other));
+        ramps.sum_up()
     }
 
     /// Position below which the share `low` of the load lies.
@@ -366,12 +421,7 @@ impl Spread {
 }
 
 /// Moves the plane a little where it would graze fixed vertices.
-fn shift<P: Pages>(
-    mesh: &mut Mesh<P>,
-    h: &dyn Fn(Point) -> f64,
-    chosen: ChosenPlane,
-    spread: &Spread,
-) -> ChosenPlane {
+fn shift<P: Pages>(mesh: &mut Mesh<P>, chosen: ChosenPlane, spread: &Spread) -> ChosenPlane {
     let plane = chosen.plane;
     let share = chosen.load[0] / chosen.load[1];
     let reach = [-TOLERANCE, TOLERANCE].map(|t| (spread.quantile(share + t) - plane.offset).abs());
@@ -383,8 +433,8 @@ fn shift<P: Pages>(
         if !mesh.is_fixed(v) {
             continue;
         }
-        let p = mesh.point(v);
-        let size = h(p);
+        let (p, size) = mesh.point_and_size(v);
+        let size = f64::from(size);
         let s = plane.distance(p) / size;
         let step = SHIFT.min(reach / size);
         if s.abs() > GRAZED + step * f64::from(SHIFTS) {
@@ -420,6 +470,34 @@ fn shift<P: Pages>(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn bodies_are_spread_over_the_bins_they_cover() {
+        let ends = [-1.0, BINS as f64 - 1.0];
+        let bodies = [
+            (-1.0, 2.5, 7.0),
+            (4.25, 4.75, 1.0),
+            (6.5, 9.0, 5.0),
+            (0.0, BINS as f64 - 1.0, 4095.0),
+        ];
+        let mut ramps = Ramps::new(Point::X, ends);
+        let mut other = Ramps::new(Point::X, ends);
+        for (k, &(low, high, load)) in bodies.iter().enumerate() {
+            let to = if k % 2 == 0 { &mut ramps } else { &mut other };
+            to.add(low, high, load, 2.0 * load);
+        }
+        ramps.add_all(&other);
+        let spread = ramps.sum_up();
+        for bin in 0..BINS {
+            let (from, to) = (bin as f64 - 1.0, bin as f64);
+            let parts = bodies.iter().map(|&(low, high, load)| {
+                (high.min(to) - low.max(from)).max(0.0) / (high - low) * load
+            });
+            let wanted: f64 = parts.sum();
+            assert!((spread.load[bin] - wanted).abs() < 1e-12, "bin {bin}");
+            assert!((spread.section[bin] - 2.0 * wanted).abs() < 1e-12);
+        }
+    }
 
     #[test]
     fn principal_axes_are_eigenvectors() {
