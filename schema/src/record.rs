@@ -153,6 +153,38 @@ impl SealedTet {
     }
 }
 
+/// A tetrahedron of a coarse leaf, the working mesh a sub-domain is made from; its number is its place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct CoarseTet {
+    /// Vertex numbers in the leaf, in the working mesh's order.
+    pub nodes: [u32; 4],
+    /// Bits 0..4: face i is required. Bits 4..8: the mark of node i.
+    pub bits: u8,
+    pub region: u32,
+    /// Flags of its attribute.
+    pub flags: u32,
+}
+
+/// A vertex of a coarse leaf; its number is its place. Its wanted length follows from the size field.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct CoarseVertex {
+    pub point: [f64; 3],
+    /// The words of its attribute: tag (and the cut it lies on), index within the owner.
+    pub tag: u32,
+    pub owner: u32,
+}
+
+/// An interface face of a coarse leaf.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct CoarseFace {
+    pub vertices: [u32; 3],
+    pub cut: u32,
+    /// Number of the face in the cut.
+    pub index: u32,
+    /// 0: the leaf is on the cut's low side, 1: on the high side.
+    pub side: u32,
+}
+
 /// What a vertex is to the mesh.
 pub mod tag {
     pub const FREE: u32 = 0;

@@ -39,6 +39,9 @@ pub enum CatalogError {
     /// The sub-domain is not sealed yet.
     #[error("sub-domain {subdomain} of {path} is not finished")]
     NotSealed { path: PathBuf, subdomain: u32 },
+    /// The sub-domain's coarse leaf was not kept.
+    #[error("{path} has no coarse leaf of sub-domain {subdomain}, from which it could be made again")]
+    NoCoarseLeaf { path: PathBuf, subdomain: u32 },
     /// A row of the catalog cannot be what was written.
     #[error("{path} is damaged: catalog row {key:016x} {reason}")]
     Row {
@@ -82,7 +85,8 @@ impl CatalogError {
             | Self::Finished { .. }
             | Self::Unfinished { .. }
             | Self::Format { .. }
-            | Self::NotSealed { .. } => 8,
+            | Self::NotSealed { .. }
+            | Self::NoCoarseLeaf { .. } => 8,
             Self::Row { .. } | Self::Chunk { .. } | Self::Content { .. } => 4,
             Self::Store(
                 StoreError::Damaged { .. } | StoreError::Page { .. } | StoreError::Missing { .. },

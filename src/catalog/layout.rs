@@ -9,7 +9,7 @@ use rkyv::{Archive, Deserialize};
 use tetdb_schema::page::FORMAT_VERSION;
 
 use super::records::{
-    FileRow, InterfaceRow, Job, JournalRow, RegionRow, StoreState, SubdomainRow, TopologyRow,
+    CoarseRow, FileRow, InterfaceRow, Job, JournalRow, RegionRow, StoreState, SubdomainRow, TopologyRow,
 };
 use super::rows::{self, RowKind};
 use super::{CatalogError, Step};
@@ -156,10 +156,20 @@ impl Catalog {
 
     /// Where the file of a sub-domain in a generation is, whether it exists or not.
     pub fn file_path(&self, subdomain: u32, generation: u32) -> DiskPath {
-        self.dir.join(file_name(FileRow {
+        let file = FileRow {
             subdomain,
             generation,
-        }))
+        };
+        self.dir.join(named(SUBDOMAIN, file))
+    }
+
+    /// Where the file of a coarse leaf in a generation is, whether it exists or not.
+    pub fn coarse_path(&self, subdomain: u32, generation: u32) -> DiskPath {
+        let file = FileRow {
+            subdomain,
+            generation,
+        };
+        self.dir.join(named(COARSE, file))
     }
 
     /// A folder for sorted runs, made when it is not there; removed when the store is next opened for writing.
@@ -190,6 +200,10 @@ impl Catalog {
             self.file_path(file.subdomain, file.generation)
                 .sync_file()?;
         }
+        for file in &step.coarse_listed {
+            self.coarse_path(file.subdomain, file.generation)
+                .sync_file()?;
+        }
         self.dir.sync_dir()?;
         let changes = step.changes.iter();
         self.file.change(changes.map(|(&k, v)| (k, v.as_deref())))?;
@@ -198,15 +212,28 @@ impl Catalog {
             self.file_path(file.subdomain, file.generation)
                 .remove_file()?;
         }
+        for file in &step.coarse_unlisted {
+            self.coarse_path(file.subdomain, file.generation)
+                .remove_file()?;
+        }
         Ok(())
     }
 
     /// Removes sub-domain files the catalog does not list, and scratch.
     fn purge(&mut self) -> Result<(), CatalogError> {
         let listed = self.files()?;
+        let coarse: Vec<FileRow> = (self.coarse_leaves()?.iter())
+            .map(|row| FileRow {
+                subdomain: row.rank,
+                generation: row.generation,
+            })
+            .collect();
         for name in self.dir.list()? {
             let path = self.dir.join(&name);
-            if parse_file_name(&name).is_some_and(|f| !listed.contains(&f)) {
+            let is_stray = |kind, listed: &[FileRow]| {
+                parsed(kind, &name).is_some_and(|file| !listed.contains(&file))
+            };
+            if is_stray(SUBDOMAIN, &listed) || is_stray(COARSE, &coarse) {
                 path.remove_file()?;
             } else if name == SCRATCH {
                 path.remove_dir_all()?;
@@ -256,6 +283,16 @@ impl Catalog {
     /// The files that count, by sub-domain and generation.
     pub fn files(&mut self) -> Result<Vec<FileRow>, CatalogError> {
         self.rows(RowKind::File)
+    }
+
+    /// The coarse leaves that were kept, by sub-domain.
+    pub fn coarse_leaves(&mut self) -> Result<Vec<CoarseRow>, CatalogError> {
+        self.rows(RowKind::Coarse)
+    }
+
+    /// The coarse leaf of one sub-domain, if it was kept.
+    pub fn coarse_leaf(&mut self, rank: u32) -> Result<Option<CoarseRow>, CatalogError> {
+        self.row(RowKind::Coarse.key(0, rank))
     }
 
     /// The interfaces by cut, then by ranks.
@@ -361,18 +398,23 @@ fn refuse_existing(dir: &DiskPath) -> Result<(), CatalogError> {
     }
 }
 
-fn file_name(file: FileRow) -> String {
-    format!("subdomain-{:05}-g{}.redb", file.subdomain, file.generation)
+/// First words of the names of files.
+const SUBDOMAIN: &str = "subdomain";
+const COARSE: &str = "coarse";
+
+fn named(kind: &str, file: FileRow) -> String {
+    format!("{kind}-{:05}-g{}.redb", file.subdomain, file.generation)
 }
 
-fn parse_file_name(name: &str) -> Option<FileRow> {
+fn parsed(kind: &str, name: &str) -> Option<FileRow> {
     let (subdomain, generation) = name
-        .strip_prefix("subdomain-")?
+        .strip_prefix(kind)?
+        .strip_prefix('-')?
         .strip_suffix(".redb")?
         .split_once("-g")?;
     let file = FileRow {
         subdomain: subdomain.parse().ok()?,
         generation: generation.parse().ok()?,
     };
-    (file_name(file) == name).then_some(file)
+    (named(kind, file) == name).then_some(file)
 }

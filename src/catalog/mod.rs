@@ -4,6 +4,7 @@
 //! files and then flips the catalog in one commit, so that a store is at any moment as one of its
 //! steps left it. [`Store`] is the reader for everybody, [`SealedWriter`] makes what it reads.
 
+mod coarse;
 mod error;
 mod faces;
 mod layout;
@@ -17,12 +18,13 @@ mod tests;
 mod vertex_cache;
 mod writer;
 
+pub use coarse::{CoarseLeaf, CoarseWriter};
 pub use error::CatalogError;
 pub use faces::{FacePairs, Paired, sorted_face};
 pub use layout::Catalog;
 pub use reader::{Chunk, Chunks, Store, Subdomain};
 pub use records::{
-    FileRow, InterfaceRow, Job, JournalRow, Measure, NeighborRow, QualityRow, RegionRow,
+    CoarseRow, FileRow, InterfaceRow, Job, JournalRow, Measure, NeighborRow, QualityRow, RegionRow,
     StoreState, SubdomainRow, SubdomainState, SurfaceSource, TopologyRow,
 };
 pub use shape::{QUALITY_BINS, Shape, quality_bin};

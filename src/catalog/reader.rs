@@ -115,12 +115,12 @@ pub struct Chunk<R> {
 
 /// The chunks of one kind, in order; ends after the first error.
 pub struct Chunks<'a, R> {
-    file: &'a mut StoreFile,
-    decoder: Decoder<R>,
-    address: ChunkAddress,
-    end: u32,
-    expected: u64,
-    total: u64,
+    pub(super) file: &'a mut StoreFile,
+    pub(super) decoder: Decoder<R>,
+    pub(super) address: ChunkAddress,
+    pub(super) end: u32,
+    pub(super) expected: u64,
+    pub(super) total: u64,
 }
 
 impl Subdomain {

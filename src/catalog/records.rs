@@ -146,6 +146,22 @@ pub struct FileRow {
     pub generation: u32,
 }
 
+/// A coarse leaf: the working mesh a sub-domain was made from, kept.
+#[derive(Archive, Serialize, Deserialize, Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct CoarseRow {
+    pub rank: u32,
+    /// The generation in the name of its file.
+    pub generation: u32,
+    pub tets: u64,
+    pub vertices: u64,
+    pub facets: u64,
+    pub interface_faces: u64,
+    /// Chunks of tetrahedra, vertices, facets, interface faces.
+    pub chunks: [u32; 4],
+    /// Length of the file.
+    pub bytes: u64,
+}
+
 /// An interface: the faces two sub-domains share because of one cut.
 #[derive(Archive, Serialize, Deserialize, Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct InterfaceRow {

@@ -23,6 +23,7 @@ pub(super) enum RowKind {
     Topology = 72,
     Journal = 73,
     Blob = 74,
+    Coarse = 75,
 }
 
 impl RowKind {

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::records::{
-    FileRow, InterfaceRow, Job, JournalRow, RegionRow, StoreState, SubdomainRow, TopologyRow,
+    CoarseRow, FileRow, InterfaceRow, Job, JournalRow, RegionRow, StoreState, SubdomainRow, TopologyRow,
 };
 use super::rows::{self, RowKind};
 
@@ -15,6 +15,9 @@ pub struct Step {
     pub(super) changes: BTreeMap<u64, Option<Vec<u8>>>,
     pub(super) listed: BTreeSet<FileRow>,
     pub(super) unlisted: BTreeSet<FileRow>,
+    /// The same for coarse leaves.
+    pub(super) coarse_listed: BTreeSet<FileRow>,
+    pub(super) coarse_unlisted: BTreeSet<FileRow>,
     pub(super) journal_rows: u32,
 }
 
@@ -24,6 +27,8 @@ impl Step {
             changes: BTreeMap::new(),
             listed: BTreeSet::new(),
             unlisted: BTreeSet::new(),
+            coarse_listed: BTreeSet::new(),
+            coarse_unlisted: BTreeSet::new(),
             journal_rows,
         }
     }
@@ -99,6 +104,25 @@ impl Step {
         self.unlisted.insert(file);
     }
 
+    /// A coarse leaf counts from now on; its file is synced before the commit.
+    pub fn list_coarse(&mut self, row: &CoarseRow) {
+        self.put(RowKind::Coarse.key(0, row.rank), row);
+        self.coarse_listed.insert(FileRow {
+            subdomain: row.rank,
+            generation: row.generation,
+        });
+    }
+
+    /// Forgets a coarse leaf; its file is removed after the commit.
+    pub fn drop_coarse(&mut self, row: &CoarseRow) {
+        self.changes
+            .insert(RowKind::Coarse.key(0, row.rank), None);
+        self.coarse_unlisted.insert(FileRow {
+            subdomain: row.rank,
+            generation: row.generation,
+        });
+    }
+
     /// All interfaces of one cut.
     pub fn set_interfaces(&mut self, cut: u32, interfaces: &Vec<InterfaceRow>) {
         self.put(RowKind::Interface.key(0, cut), interfaces);
@@ -129,5 +153,12 @@ impl Step {
             pieces = 1;
         }
         self.changes.insert(RowKind::Blob.key(number, pieces), None);
+    }
+
+    /// Forgets a blob of so many bytes.
+    pub fn remove_blob(&mut self, number: u32, bytes: usize) {
+        for piece in 0..=bytes.div_ceil(BLOB_PIECE) as u32 {
+            self.changes.insert(RowKind::Blob.key(number, piece), None);
+        }
     }
 }

@@ -50,14 +50,28 @@ pub struct Sealed {
 }
 
 /// Values waiting for a commit.
-struct Batch {
+pub(super) struct Batch {
     values: Vec<(u64, Vec<u8>)>,
     bytes: usize,
     bytes_max: usize,
 }
 
 impl Batch {
-    fn push(&mut self, file: &mut StoreFile, key: u64, value: Vec<u8>) -> Result<(), CatalogError> {
+    /// A batch that fits redb's cache, half of `memory_bytes`.
+    pub(super) fn of(memory_bytes: usize) -> Self {
+        Self {
+            values: Vec::new(),
+            bytes: 0,
+            bytes_max: (memory_bytes / 6).min(BATCH_BYTES_MAX),
+        }
+    }
+
+    pub(super) fn push(
+        &mut self,
+        file: &mut StoreFile,
+        key: u64,
+        value: Vec<u8>,
+    ) -> Result<(), CatalogError> {
         self.bytes += value.len();
         self.values.push((key, value));
         if self.bytes >= self.bytes_max {
@@ -66,7 +80,7 @@ impl Batch {
         Ok(())
     }
 
-    fn flush(&mut self, file: &mut StoreFile) -> Result<(), CatalogError> {
+    pub(super) fn flush(&mut self, file: &mut StoreFile) -> Result<(), CatalogError> {
         file.write(self.values.iter().map(|(key, value)| (*key, &value[..])))?;
         self.values.clear();
         self.bytes = 0;
@@ -137,11 +151,7 @@ impl SealedWriter {
             subdomain,
             generation,
             memory_bytes,
-            batch: Batch {
-                values: Vec::new(),
-                bytes: 0,
-                bytes_max: (memory_bytes / 6).min(BATCH_BYTES_MAX),
-            },
+            batch: Batch::of(memory_bytes),
             vertices: Packer::new(rank, generation).map_err(io)?,
             vertex_chunks: Vec::new(),
             cache: None,

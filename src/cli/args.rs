@@ -159,6 +159,9 @@ pub struct ShapeArgs {
     /// How far to optimize [default: full]
     #[arg(long, value_enum)]
     pub optimize: Option<Optimize>,
+    /// Do not keep what sub-domains are made from: a smaller store, in which none can be made again by `tetdb resaturate`
+    #[arg(long)]
+    pub drop_coarse: bool,
     /// Number of sub-domains: auto, or a number [default: auto, one for each 4 million tetrahedra]
     #[arg(long, value_name = "N", alias = "domains")]
     pub subdomains: Option<String>,

@@ -48,6 +48,7 @@ pub fn options(args: &ShapeArgs) -> Result<Options, Failure> {
             option.clone_from(given);
         }
     }
+    options.drop_coarse |= args.drop_coarse;
     // The words are stored in full, so that a store tells all of what made it.
     options.regions.get_or_insert_with(|| word(Regions::Parity));
     options.optimize.get_or_insert_with(|| word(Optimize::Full));

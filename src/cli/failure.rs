@@ -143,6 +143,11 @@ pub const CODES: &[CodeRow] = &[
     row("invalid-mesh", 7, "verification found the mesh invalid"),
     row("store-exists", 8, "a finished store is already there"),
     row("store-unfinished", 8, "the store is not finished"),
+    row(
+        "no-coarse-leaf",
+        8,
+        "what the sub-domain was made from was not kept",
+    ),
     row("not-a-store", 8, "what is there is not a store"),
     row("store-format", 8, "the store has another format version"),
     row(
@@ -299,6 +304,7 @@ impl From<CatalogError> for Failure {
             CatalogError::NotOurs { .. } => "not-a-store",
             CatalogError::Finished { .. } => "store-exists",
             CatalogError::Unfinished { .. } | CatalogError::NotSealed { .. } => "store-unfinished",
+            CatalogError::NoCoarseLeaf { .. } => "no-coarse-leaf",
             CatalogError::Format { .. } => "store-format",
             CatalogError::Row { .. }
             | CatalogError::Chunk { .. }
@@ -360,6 +366,7 @@ fn help_of(code: &str) -> &'static str {
         "no-such-store" => "check the path; `tetdb mesh SURFACE -o STORE` makes a store",
         "not-a-store" => "choose another path; what is there was not made by this program",
         "store-exists" => "choose another path, or replace it with --force",
+        "no-coarse-leaf" => "mesh the surface again without --drop-coarse",
         "store-unfinished" => "`tetdb resume STORE` goes on with it",
         "store-format" => "use the version of this program that made the store, or mesh again",
         _ => "check the path and its permissions",

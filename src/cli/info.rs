@@ -31,6 +31,8 @@ pub fn object(path: &Path) -> Result<Value, Failure> {
     let (state, job) = (catalog.state()?, catalog.job()?);
     let rows = catalog.subdomains()?;
     let topology = catalog.topology()?;
+    let coarse = catalog.coarse_leaves()?;
+    let coarse_of = |rank| coarse.iter().find(|c| c.rank == rank).map(|c| c.bytes);
     let subdomains: Vec<Value> = rows
         .iter()
         .map(|row| {
@@ -39,7 +41,7 @@ pub fn object(path: &Path) -> Result<Value, Failure> {
                 "id": row.rank, "state": row.state, "tets": row.tets, "vertices": row.vertices, "facets": row.facets,
                 "interface_faces": row.interface_faces, "digest": hex(row.digest), "interface_digest": hex(row.interface_digest),
                 "neighbors": neighbors.map(|t| &t.neighbors), "quality": row.quality, "worst_q": row.quality.worst,
-                "volume": row.volume, "bounds": row.bounds, "bytes": row.bytes,
+                "volume": row.volume, "bounds": row.bounds, "bytes": row.bytes, "coarse_bytes": coarse_of(row.rank),
             })
         })
         .collect();
@@ -50,6 +52,7 @@ pub fn object(path: &Path) -> Result<Value, Failure> {
         "tets": rows.iter().map(|r| r.tets).sum::<u64>(),
         "vertices": rows.iter().map(|r| r.vertices).sum::<u64>(),
         "bytes": rows.iter().map(|r| r.bytes).sum::<u64>(),
+        "coarse_bytes": coarse.iter().map(|c| c.bytes).sum::<u64>(),
         "digest": hex(sum(rows.iter().map(|r| r.digest))),
         "subdomains": subdomains, "interfaces": catalog.interfaces()?, "journal": catalog.journal()?,
     }))
@@ -101,6 +104,14 @@ pub fn print(path: &Path, talk: &Talk) -> Result<(), Failure> {
         memory::show(bytes),
         bytes as f64 / tets.max(1) as f64
     ));
+    let coarse: u64 = catalog.coarse_leaves()?.iter().map(|c| c.bytes).sum();
+    if coarse > 0 {
+        talk.line(&format!(
+            "coarse leaves, from which sub-domains can be made again: {}, {:.2} bytes per tetrahedron",
+            memory::show(coarse),
+            coarse as f64 / tets.max(1) as f64
+        ));
+    }
     if rows.len() > 1 {
         let topology = catalog.topology()?;
         for row in rows.iter().take(SUBDOMAINS_LISTED) {

@@ -179,7 +179,11 @@ fn already_there(
         }
         .into());
     }
-    let same_options = serde_json::from_str::<Options>(&job.options).is_ok_and(|o| o == *options);
+    let same_options = serde_json::from_str::<Options>(&job.options).is_ok_and(|mut o| {
+        // A store that kept more or less than asked for holds the same mesh.
+        o.drop_coarse = options.drop_coarse;
+        o == *options
+    });
     let input = input::load(&args.surfaces, talk)?;
     if !same_options || job.surfaces != input.sources {
         return Err(CatalogError::Finished {

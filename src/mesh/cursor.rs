@@ -80,6 +80,11 @@ impl MeshState {
         }
     }
 
+    /// Tetrahedra in use.
+    pub fn n_tets(&self) -> u32 {
+        self.tets.n_live
+    }
+
     /// The counts as numbers, for storing beside the pages.
     pub fn to_words(self) -> [u32; MESH_STATE_WORDS] {
         let [t, v, f, i] = [self.tets, self.vertices, self.facets, self.interface_faces];
@@ -562,6 +567,18 @@ impl<P: Pages> Mesh<P> {
     pub fn interface_vertex(&mut self, v: u32) -> (u32, u32) {
         let (tag, index) = self.attribute::<{ kind::VERTEX_ATTRIBUTES }>(v);
         (tag >> TAG_BITS, index)
+    }
+
+    /// The words of the attribute of `v` as they are stored.
+    pub(super) fn vertex_words(&mut self, v: u32) -> (u32, u32) {
+        self.attribute::<{ kind::VERTEX_ATTRIBUTES }>(v)
+    }
+
+    /// Sets the words of the attribute of `v`; the tag in them says whether it is fixed.
+    pub(super) fn set_vertex_words(&mut self, v: u32, tag: u32, owner: u32) {
+        let free = [VertexTag::Free, VertexTag::Steiner].map(|tag| tag as u32);
+        self.set_fixed(v, !free.contains(&(tag & TAG_MASK)));
+        self.set_attribute::<{ kind::VERTEX_ATTRIBUTES }>(v, tag, owner);
     }
 
     /// Points `tet_of` of every vertex to its tetrahedron of smallest id: one pass in page order.

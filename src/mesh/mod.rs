@@ -3,6 +3,7 @@
 pub mod anatomy;
 mod cursor;
 mod faces;
+mod kept;
 mod renumber;
 
 pub use anatomy::{FaceRef, Tet};

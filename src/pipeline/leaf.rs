@@ -8,12 +8,13 @@ use tetdb_schema::ids::SubdomainId;
 
 use super::divide::{DONE, WORK, open_part};
 use super::fine::{FineReport, fine};
+use super::keep::keep;
 use super::seal::{Target, seal};
 use super::tree::PartMesh;
 use super::watch::Watcher;
 use super::{PipelineError, Plan};
 use crate::bisect::{Cutting, Zone};
-use crate::catalog::{InterfaceSide, RegionTotals, Sealed};
+use crate::catalog::{CoarseRow, InterfaceSide, RegionTotals, Sealed};
 use crate::geom::Aabb;
 use crate::mesh::{Mesh, Workspace};
 use crate::optimize::Mode;
@@ -28,6 +29,8 @@ pub(super) struct LeafJob {
     pub base: DiskPath,
     pub work: DiskPath,
     pub sealed: DiskPath,
+    /// Where to keep the coarse leaf, if it is to be kept.
+    pub kept: Option<DiskPath>,
     pub scratch: DiskPath,
     pub zones: Vec<Zone>,
     /// Owners of the faces around it, by cut.
@@ -49,6 +52,9 @@ pub(super) struct Leaf {
     pub part: PartMesh,
     pub generation: u32,
     pub sealed: Sealed,
+    pub kept: Option<CoarseRow>,
+    /// Seconds it took to keep the coarse leaf.
+    pub keep_s: f64,
     pub fine: FineReport,
     pub pages: PagerStats,
     pub frames_used: usize,
@@ -84,6 +90,12 @@ impl LeafJob {
             dir: &self.scratch,
             memory: self.share.buffers / 2,
         };
+        let (rank, coarse) = (self.part.part.first, self.part.generation);
+        let kept = match &self.kept {
+            Some(path) => Some(keep(&mut mesh, path, rank, coarse, self.share.buffers)?),
+            None => None,
+        };
+        let keep_s = clock.elapsed().as_secs_f64();
         let fine = fine(
             &mut mesh,
             common.field,
@@ -93,8 +105,7 @@ impl LeafJob {
             &space,
             watch,
         )?;
-        let generation = self.part.generation + DONE;
-        let rank = self.part.part.first;
+        let generation = coarse + DONE;
         let target = Target {
             path: &self.sealed,
             scratch: &self.scratch,
@@ -112,6 +123,8 @@ impl LeafJob {
             part: self.part,
             generation,
             sealed,
+            kept,
+            keep_s,
             fine,
             pages,
             frames_used,

@@ -14,6 +14,7 @@ mod divide;
 mod error;
 mod estimate;
 mod fine;
+mod keep;
 mod leaf;
 mod options;
 mod plan;

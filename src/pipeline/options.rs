@@ -41,6 +41,9 @@ pub struct Options {
     /// `auto` or a number.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub subdomains: Option<String>,
+    /// Whether sub-domains are made for good: what they were made from is not kept. It does not shape the mesh.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub drop_coarse: bool,
     /// For comparisons by a program. It is not stored: a run that is resumed makes cuts as usual.
     #[serde(skip)]
     pub cutting: Cutting,

@@ -288,6 +288,8 @@ impl<'a> Run<'a> {
             base: self.catalog.file_path(rank, part.generation),
             work: self.catalog.file_path(rank, part.generation + WORK),
             sealed: self.catalog.file_path(rank, part.generation + DONE),
+            kept: (!self.options.drop_coarse)
+                .then(|| self.catalog.coarse_path(rank, part.generation)),
             scratch: self.scratch(&format!("leaf-{rank}"))?,
             zones: tree::zones_above(self.catalog, part.part, self.n)?,
             owners,
@@ -308,6 +310,8 @@ impl<'a> Run<'a> {
         let refine = &leaf.fine.refine;
         let measures = [
             ("predicted_tets", TETS_PER_LOAD * leaf.part.load),
+            ("coarse_tets", f64::from(leaf.part.state.n_tets())),
+            ("keep_s", leaf.keep_s),
             ("inserted_vertices", refine.inserted as f64),
             ("over_constrained_tets", refine.over_constrained as f64),
             ("zone_rejects", refine.out_of_place as f64),
@@ -325,6 +329,9 @@ impl<'a> Run<'a> {
             step.set_blob(blob::SEALED + rank, &totals);
             step.list_file(rank, leaf.generation);
             step.unlist_file(rank, generation);
+            if let Some(kept) = &leaf.kept {
+                step.list_coarse(kept);
+            }
             step.append_journal(&row);
             Ok(())
         })?;

@@ -5,6 +5,7 @@
 //! allocates nothing that the head's checked count does not justify.
 
 mod codec;
+mod coarse;
 mod columns;
 mod facets;
 mod packer;
@@ -41,6 +42,10 @@ pub enum ChunkKind {
     VertexSummaries = 41,
     FacetSummaries = 42,
     InterfaceSummaries = 43,
+    CoarseTets = 49,
+    CoarseVertices = 50,
+    CoarseFacets = 51,
+    CoarseFaces = 52,
 }
 
 impl ChunkKind {

@@ -19,6 +19,27 @@ fn base<const I: usize>(nodes: &[u32; 4], before: &[u32; 4]) -> u32 {
     if like_before { before[I] } else { nodes[I - 1] }
 }
 
+/// Appends the four columns of nodes.
+pub(super) fn encode_nodes(records: &[SealedTet], columns: &mut Columns) {
+    let mut scratch = vec![0; records.len()];
+    encode_node::<0>(records, &mut scratch, columns);
+    encode_node::<1>(records, &mut scratch, columns);
+    encode_node::<2>(records, &mut scratch, columns);
+    encode_node::<3>(records, &mut scratch, columns);
+}
+
+/// The inverse of [`encode_nodes`]; fills the nodes of `records`.
+pub(super) fn decode_nodes(
+    columns: &mut Reader<'_>,
+    records: &mut [SealedTet],
+) -> Result<(), Malformed> {
+    let mut scratch = vec![0; records.len()];
+    decode_node::<0>(columns, &mut scratch, records)?;
+    decode_node::<1>(columns, &mut scratch, records)?;
+    decode_node::<2>(columns, &mut scratch, records)?;
+    decode_node::<3>(columns, &mut scratch, records)
+}
+
 fn encode_node<const I: usize>(records: &[SealedTet], scratch: &mut [u32], columns: &mut Columns) {
     let mut before = [0; 4];
     for (z, t) in scratch.iter_mut().zip(records) {
@@ -48,11 +69,7 @@ impl ChunkRecord for SealedTet {
     const RAW_BYTES_MAX: usize = 4 * 4 + 10;
 
     fn encode(records: &[Self], _first: u32, columns: &mut Columns) {
-        let mut scratch = vec![0; records.len()];
-        encode_node::<0>(records, &mut scratch, columns);
-        encode_node::<1>(records, &mut scratch, columns);
-        encode_node::<2>(records, &mut scratch, columns);
-        encode_node::<3>(records, &mut scratch, columns);
+        encode_nodes(records, columns);
         columns.dictionary(records.iter().map(|t| u64::from(t.region)));
     }
 
@@ -65,11 +82,7 @@ impl ChunkRecord for SealedTet {
         let start = records.len();
         records.resize(start + count, Self::default());
         let records = &mut records[start..];
-        let mut scratch = vec![0; count];
-        decode_node::<0>(columns, &mut scratch, records)?;
-        decode_node::<1>(columns, &mut scratch, records)?;
-        decode_node::<2>(columns, &mut scratch, records)?;
-        decode_node::<3>(columns, &mut scratch, records)?;
+        decode_nodes(columns, records)?;
         columns.dictionary(count, |i, region| records[i].region = region as u32)
     }
 }

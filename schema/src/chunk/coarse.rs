@@ -1,0 +1,217 @@
+//! Coarse leaves: working meshes kept as they were, in the order they were, less what follows from the rest (neighbors, sizes).
+
+use super::columns::{Columns, Malformed, Reader, unzigzag32, unzigzag64, zigzag32, zigzag64};
+use super::facets::{decode_vertices, encode_vertices};
+use super::tets::{decode_nodes, encode_nodes};
+use super::{ChunkKind, ChunkRecord};
+use crate::record::{CoarseFace, CoarseTet, CoarseVertex, Facet, SealedTet};
+
+/// The even orders of four nodes.
+const TURNS: [[usize; 4]; 12] = [
+    [0, 1, 2, 3],
+    [0, 2, 3, 1],
+    [0, 3, 1, 2],
+    [1, 0, 3, 2],
+    [1, 3, 2, 0],
+    [1, 2, 0, 3],
+    [2, 0, 1, 3],
+    [2, 1, 3, 0],
+    [2, 3, 0, 1],
+    [3, 0, 2, 1],
+    [3, 2, 1, 0],
+    [3, 1, 0, 2],
+];
+
+impl CoarseTet {
+    /// The nodes turned as those of a sealed tetrahedron, and which of [`TURNS`] turns them back.
+    fn turned(&self) -> (SealedTet, u8) {
+        let turned = SealedTet {
+            nodes: self.nodes,
+            region: self.region,
+        }
+        .rotated();
+        let back = TURNS
+            .iter()
+            .position(|turn| turn.map(|i| turned.nodes[i]) == self.nodes);
+        (turned, back.expect("a rotation is even") as u8)
+    }
+}
+
+impl ChunkRecord for CoarseTet {
+    const KIND: ChunkKind = ChunkKind::CoarseTets;
+    const COUNT_MAX: usize = 32_768;
+    const RAW_BYTES_MAX: usize = 4 * 4 + 1 + 3 * 10;
+
+    fn encode(records: &[Self], _first: u32, columns: &mut Columns) {
+        let (turned, turns): (Vec<SealedTet>, Vec<u8>) = records.iter().map(Self::turned).unzip();
+        encode_nodes(&turned, columns);
+        columns.raw(&turns);
+        columns.dictionary(records.iter().map(|t| u64::from(t.bits)));
+        columns.dictionary(records.iter().map(|t| u64::from(t.region)));
+        columns.dictionary(records.iter().map(|t| u64::from(t.flags)));
+    }
+
+    fn decode(
+        columns: &mut Reader<'_>,
+        _first: u32,
+        count: usize,
+        records: &mut Vec<Self>,
+    ) -> Result<(), Malformed> {
+        let mut turned = vec![SealedTet::default(); count];
+        decode_nodes(columns, &mut turned)?;
+        let start = records.len();
+        for (tet, &turn) in turned.iter().zip(columns.raw(count)?) {
+            let turn = TURNS
+                .get(usize::from(turn))
+                .ok_or(Malformed("an unknown turn"))?;
+            records.push(Self {
+                nodes: turn.map(|i| tet.nodes[i]),
+                ..Self::default()
+            });
+        }
+        let records = &mut records[start..];
+        columns.dictionary(count, |i, bits| records[i].bits = bits as u8)?;
+        columns.dictionary(count, |i, region| records[i].region = region as u32)?;
+        columns.dictionary(count, |i, flags| records[i].flags = flags as u32)
+    }
+}
+
+impl ChunkRecord for CoarseVertex {
+    const KIND: ChunkKind = ChunkKind::CoarseVertices;
+    const COUNT_MAX: usize = 8192;
+    const RAW_BYTES_MAX: usize = 3 * 8 + 10 + 5;
+
+    fn encode(records: &[Self], _first: u32, columns: &mut Columns) {
+        let mut differences = Vec::with_capacity(records.len());
+        for axis in 0..3 {
+            let mut base = 0;
+            differences.clear();
+            differences.extend(records.iter().map(|v| {
+                let bits = v.point[axis].to_bits();
+                zigzag64(bits, std::mem::replace(&mut base, bits))
+            }));
+            columns.planes(&differences, 8);
+        }
+        columns.dictionary(records.iter().map(|v| u64::from(v.tag)));
+        let mut base = 0;
+        let owners = records.iter().map(|v| v.owner);
+        let owners: Vec<u32> = owners
+            .map(|owner| zigzag32(owner, std::mem::replace(&mut base, owner)))
+            .collect();
+        columns.planes32(&owners);
+    }
+
+    fn decode(
+        columns: &mut Reader<'_>,
+        _first: u32,
+        count: usize,
+        records: &mut Vec<Self>,
+    ) -> Result<(), Malformed> {
+        let start = records.len();
+        records.resize(start + count, Self::default());
+        let records = &mut records[start..];
+        for axis in 0..3 {
+            let mut base = 0;
+            for (v, z) in records.iter_mut().zip(columns.planes(count, 8)?) {
+                base = unzigzag64(z, base);
+                v.point[axis] = f64::from_bits(base);
+            }
+        }
+        columns.dictionary(count, |i, tag| records[i].tag = tag as u32)?;
+        let mut owners = vec![0; count];
+        columns.planes32(&mut owners)?;
+        let mut base = 0;
+        for (v, z) in records.iter_mut().zip(owners) {
+            base = unzigzag32(z, base);
+            v.owner = base;
+        }
+        Ok(())
+    }
+}
+
+impl ChunkRecord for Facet {
+    const KIND: ChunkKind = ChunkKind::CoarseFacets;
+    const COUNT_MAX: usize = 16_384;
+    const RAW_BYTES_MAX: usize = 3 * 5 + 10 + 10 + 2 * 10;
+
+    fn encode(records: &[Self], _first: u32, columns: &mut Columns) {
+        encode_vertices(records.iter().map(|f| f.vertices), columns);
+        columns.dictionary(records.iter().map(|f| u64::from(f.label)));
+        let mut base = 0;
+        for f in records {
+            columns.varint(zigzag64(f.triangle, base));
+            base = f.triangle;
+        }
+        for side in 0..2 {
+            columns.dictionary(records.iter().map(|f| u64::from(f.regions[side])));
+        }
+    }
+
+    fn decode(
+        columns: &mut Reader<'_>,
+        _first: u32,
+        count: usize,
+        records: &mut Vec<Self>,
+    ) -> Result<(), Malformed> {
+        let start = records.len();
+        let faces = decode_vertices(columns, count)?;
+        records.extend(faces.into_iter().map(|vertices| Self {
+            vertices,
+            label: 0,
+            triangle: 0,
+            regions: [0; 2],
+        }));
+        let records = &mut records[start..];
+        columns.dictionary(count, |i, label| records[i].label = label as u32)?;
+        let mut base = 0;
+        for f in records.iter_mut() {
+            base = unzigzag64(columns.varint()?, base);
+            f.triangle = base;
+        }
+        for side in 0..2 {
+            columns.dictionary(count, |i, r| records[i].regions[side] = r as u32)?;
+        }
+        Ok(())
+    }
+}
+
+impl ChunkRecord for CoarseFace {
+    const KIND: ChunkKind = ChunkKind::CoarseFaces;
+    const COUNT_MAX: usize = 16_384;
+    const RAW_BYTES_MAX: usize = 3 * 5 + 2 * 10 + 5;
+
+    fn encode(records: &[Self], _first: u32, columns: &mut Columns) {
+        encode_vertices(records.iter().map(|f| f.vertices), columns);
+        columns.dictionary(records.iter().map(|f| u64::from(f.cut)));
+        columns.dictionary(records.iter().map(|f| u64::from(f.side)));
+        let mut base = 0;
+        columns.varints32(
+            records
+                .iter()
+                .map(|f| zigzag32(f.index, std::mem::replace(&mut base, f.index))),
+        );
+    }
+
+    fn decode(
+        columns: &mut Reader<'_>,
+        _first: u32,
+        count: usize,
+        records: &mut Vec<Self>,
+    ) -> Result<(), Malformed> {
+        let start = records.len();
+        let faces = decode_vertices(columns, count)?;
+        records.extend(faces.into_iter().map(|vertices| Self {
+            vertices,
+            ..Self::default()
+        }));
+        let records = &mut records[start..];
+        columns.dictionary(count, |i, cut| records[i].cut = cut as u32)?;
+        columns.dictionary(count, |i, side| records[i].side = side as u32)?;
+        let mut base = 0;
+        for f in records.iter_mut() {
+            base = unzigzag32(columns.varint32()?, base);
+            f.index = base;
+        }
+        Ok(())
+    }
+}
