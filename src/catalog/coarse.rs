@@ -2,8 +2,6 @@
 //!
 //! A leaf has a file of its own, so that damage to a sealed sub-domain does not reach what mends it.
 
-use std::path::Path;
-
 use tetdb_schema::chunk::{ChunkAddress, ChunkRecord, Decoder, Packer};
 use tetdb_schema::record::{CoarseFace, CoarseTet, CoarseVertex, Facet};
 
@@ -11,12 +9,13 @@ use super::reader::Chunks;
 use super::records::CoarseRow;
 use super::writer::Batch;
 use super::{Catalog, CatalogError};
-use crate::store::StoreFile;
+use crate::store::{DiskPath, StoreFile};
 
 /// Writes a coarse leaf, once: vertices, tetrahedra, facets and interface faces, each in the working mesh's order.
 ///
 /// The file holds nothing that counts until the catalog lists it. Memory: about the bytes given.
 pub struct CoarseWriter {
+    path: DiskPath,
     file: StoreFile,
     batch: Batch,
     rank: u32,
@@ -32,13 +31,14 @@ impl CoarseWriter {
     ///
     /// Errors: the file cannot be made.
     pub fn create(
-        path: &Path,
+        path: &DiskPath,
         rank: u32,
         generation: u32,
         memory_bytes: usize,
     ) -> Result<Self, CatalogError> {
-        let io = |e| CatalogError::io(path, e);
+        let io = |e| CatalogError::io(path.path(), e);
         Ok(Self {
+            path: path.clone(),
             file: StoreFile::create_unsynced(path, memory_bytes / 2)?,
             batch: Batch::of(memory_bytes),
             rank,
@@ -78,9 +78,8 @@ impl CoarseWriter {
         end(file, batch, &mut self.facets)?;
         end(file, batch, &mut self.faces)?;
         batch.flush(file)?;
-        let path = self.file.path().to_owned();
         self.file.compact()?;
-        let metadata = std::fs::metadata(&path).map_err(|e| CatalogError::io(&path, e))?;
+        let bytes = self.path.bytes()?;
         Ok(CoarseRow {
             rank: self.rank,
             generation: self.generation,
@@ -94,7 +93,7 @@ impl CoarseWriter {
                 self.facets.chunks(),
                 self.faces.chunks(),
             ],
-            bytes: metadata.len(),
+            bytes,
         })
     }
 }
@@ -141,21 +140,26 @@ impl CoarseLeaf {
         rank: u32,
         cache_bytes: usize,
     ) -> Result<Self, CatalogError> {
-        let Some(row) = catalog.coarse_leaf(rank)? else {
-            return Err(CatalogError::NoCoarseLeaf {
-                path: catalog.dir().to_owned(),
-                subdomain: rank,
-            });
-        };
-        let path = catalog.coarse_path(rank, row.generation);
+        let row = catalog.coarse_leaf(rank)?;
+        let row = row.ok_or_else(|| CatalogError::NoCoarseLeaf {
+            path: catalog.dir().to_owned(),
+            subdomain: rank,
+        })?;
+        Self::open_at(&catalog.coarse_path(rank, row.generation), row, cache_bytes)
+    }
+
+    /// Opens the leaf that `row` tells of at `path`.
+    ///
+    /// Errors: damage.
+    pub fn open_at(path: &DiskPath, row: CoarseRow, cache_bytes: usize) -> Result<Self, CatalogError> {
         if !path.is_file() {
             return Err(CatalogError::Content {
-                path,
-                subdomain: rank,
+                path: path.path().to_owned(),
+                subdomain: row.rank,
                 what: "the file of its coarse leaf is missing".to_owned(),
             });
         }
-        let file = StoreFile::open_repaired(&path, cache_bytes, false)?;
+        let file = StoreFile::open_repaired(path, cache_bytes, false)?;
         Ok(Self { row, file })
     }
 

@@ -40,7 +40,9 @@ pub enum CatalogError {
     #[error("sub-domain {subdomain} of {path} is not finished")]
     NotSealed { path: PathBuf, subdomain: u32 },
     /// The sub-domain's coarse leaf was not kept.
-    #[error("{path} has no coarse leaf of sub-domain {subdomain}, from which it could be made again")]
+    #[error(
+        "{path} has no coarse leaf of sub-domain {subdomain}, from which it could be made again"
+    )]
     NoCoarseLeaf { path: PathBuf, subdomain: u32 },
     /// A row of the catalog cannot be what was written.
     #[error("{path} is damaged: catalog row {key:016x} {reason}")]

@@ -9,7 +9,8 @@ use rkyv::{Archive, Deserialize};
 use tetdb_schema::page::FORMAT_VERSION;
 
 use super::records::{
-    CoarseRow, FileRow, InterfaceRow, Job, JournalRow, RegionRow, StoreState, SubdomainRow, TopologyRow,
+    CoarseRow, FileRow, InterfaceRow, Job, JournalRow, RegionRow, StoreState, SubdomainRow,
+    TopologyRow,
 };
 use super::rows::{self, RowKind};
 use super::{CatalogError, Step};
@@ -278,6 +279,11 @@ impl Catalog {
             path: self.dir().to_owned(),
             subdomain: rank,
         })
+    }
+
+    /// What the sub-domains of the last change were before it, by rank.
+    pub fn before(&mut self) -> Result<Vec<SubdomainRow>, CatalogError> {
+        self.rows(RowKind::Before)
     }
 
     /// The files that count, by sub-domain and generation.

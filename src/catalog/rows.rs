@@ -24,6 +24,7 @@ pub(super) enum RowKind {
     Journal = 73,
     Blob = 74,
     Coarse = 75,
+    Before = 76,
 }
 
 impl RowKind {

@@ -3,7 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::records::{
-    CoarseRow, FileRow, InterfaceRow, Job, JournalRow, RegionRow, StoreState, SubdomainRow, TopologyRow,
+    CoarseRow, FileRow, InterfaceRow, Job, JournalRow, RegionRow, StoreState, SubdomainRow,
+    TopologyRow,
 };
 use super::rows::{self, RowKind};
 
@@ -76,6 +77,16 @@ impl Step {
         self.put(RowKind::Subdomain.key(0, row.rank), row);
     }
 
+    /// What a sub-domain was before its last change; its file must stay listed.
+    pub fn set_before(&mut self, row: &SubdomainRow) {
+        self.put(RowKind::Before.key(0, row.rank), row);
+    }
+
+    /// Forgets what a sub-domain was before.
+    pub fn remove_before(&mut self, rank: u32) {
+        self.changes.insert(RowKind::Before.key(0, rank), None);
+    }
+
     /// Forgets a sub-domain.
     pub fn remove_subdomain(&mut self, rank: u32) {
         self.changes.insert(RowKind::Subdomain.key(0, rank), None);
@@ -115,8 +126,7 @@ impl Step {
 
     /// Forgets a coarse leaf; its file is removed after the commit.
     pub fn drop_coarse(&mut self, row: &CoarseRow) {
-        self.changes
-            .insert(RowKind::Coarse.key(0, row.rank), None);
+        self.changes.insert(RowKind::Coarse.key(0, row.rank), None);
         self.coarse_unlisted.insert(FileRow {
             subdomain: row.rank,
             generation: row.generation,

@@ -25,6 +25,8 @@ pub enum Command {
     Estimate(Box<EstimateArgs>),
     /// Go on with an unfinished store
     Resume(ResumeArgs),
+    /// Make sub-domains of a finished store again, with other sizes or because they are damaged
+    Resaturate(Box<super::resaturate_args::ResaturateArgs>),
     /// Say whether a surface can be meshed, and where it cannot
     Check(CheckArgs),
     /// Say what a store holds
@@ -60,6 +62,7 @@ impl Command {
             Self::Mesh(a) => a.run.json,
             Self::Estimate(a) => a.json,
             Self::Resume(a) => a.run.json,
+            Self::Resaturate(a) => a.run.json,
             Self::Check(a) => a.json,
             Self::Info(a) | Self::Digest(a) => a.json,
             Self::Query(a) => a.json,
@@ -109,9 +112,9 @@ pub enum Optimize {
     Full,
 }
 
-/// What shapes the mesh, besides the surface.
-#[derive(Debug, clap::Args)]
-pub struct ShapeArgs {
+/// Wanted edge lengths.
+#[derive(Clone, Debug, Default, PartialEq, clap::Args)]
+pub struct SizeArgs {
     /// Edge length inside: a length, or 1% of the box diagonal [default: from the surface's edges]
     #[arg(long, value_name = "H")]
     pub hsiz: Option<String>,
@@ -150,6 +153,13 @@ pub struct ShapeArgs {
     /// Edge length as an expression in x, y and z, such as 'max(0.02, 0.1*sqrt(x^2+y^2))'
     #[arg(long, value_name = "EXPR", allow_hyphen_values = true)]
     pub size_expr: Option<String>,
+}
+
+/// What shapes the mesh, besides the surface.
+#[derive(Debug, clap::Args)]
+pub struct ShapeArgs {
+    #[command(flatten)]
+    pub sizes: SizeArgs,
     /// Options from a TOML file, such as hsiz = "2%"; what the command line says goes first
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,

@@ -2,7 +2,7 @@
 
 use clap::ValueEnum;
 
-use super::args::{Optimize, Regions, ShapeArgs};
+use super::args::{Optimize, Regions, ShapeArgs, SizeArgs};
 use super::background;
 use super::failure::Failure;
 use crate::pipeline::Options;
@@ -21,30 +21,14 @@ pub fn options(args: &ShapeArgs) -> Result<Options, Failure> {
             read(&text).map_err(|failure| failure.at(path.display()))?
         }
     };
+    take_sizes(&args.sizes, &mut options);
     let texts = [
-        (&args.hsiz, &mut options.hsiz),
-        (&args.hmin, &mut options.hmin),
-        (&args.hmax, &mut options.hmax),
-        (&args.hgrad, &mut options.hgrad),
-        (&args.size_expr, &mut options.size_expr),
-        (&args.size_field, &mut options.size_field),
         (&args.regions.map(word), &mut options.regions),
         (&args.optimize.map(word), &mut options.optimize),
         (&args.subdomains, &mut options.subdomains),
     ];
     for (given, option) in texts {
         if given.is_some() {
-            option.clone_from(given);
-        }
-    }
-    let lists = [
-        (&args.size_box, &mut options.size_box),
-        (&args.size_sphere, &mut options.size_sphere),
-        (&args.size_cylinder, &mut options.size_cylinder),
-        (&args.size_region, &mut options.size_region),
-    ];
-    for (given, option) in lists {
-        if !given.is_empty() {
             option.clone_from(given);
         }
     }
@@ -63,6 +47,34 @@ pub fn options(args: &ShapeArgs) -> Result<Options, Failure> {
     options.subdomain_count()?;
     background::identify(&mut options)?;
     Ok(options)
+}
+
+/// Puts the sizes of the command line over those of `options`.
+pub fn take_sizes(args: &SizeArgs, options: &mut Options) {
+    let texts = [
+        (&args.hsiz, &mut options.hsiz),
+        (&args.hmin, &mut options.hmin),
+        (&args.hmax, &mut options.hmax),
+        (&args.hgrad, &mut options.hgrad),
+        (&args.size_expr, &mut options.size_expr),
+        (&args.size_field, &mut options.size_field),
+    ];
+    for (given, option) in texts {
+        if given.is_some() {
+            option.clone_from(given);
+        }
+    }
+    let lists = [
+        (&args.size_box, &mut options.size_box),
+        (&args.size_sphere, &mut options.size_sphere),
+        (&args.size_cylinder, &mut options.size_cylinder),
+        (&args.size_region, &mut options.size_region),
+    ];
+    for (given, option) in lists {
+        if !given.is_empty() {
+            option.clone_from(given);
+        }
+    }
 }
 
 fn read(text: &str) -> Result<Options, Failure> {

@@ -148,6 +148,11 @@ pub const CODES: &[CodeRow] = &[
         8,
         "what the sub-domain was made from was not kept",
     ),
+    row(
+        "nothing-to-undo",
+        8,
+        "no previous version of a sub-domain is kept",
+    ),
     row("not-a-store", 8, "what is there is not a store"),
     row("store-format", 8, "the store has another format version"),
     row(
@@ -348,6 +353,11 @@ impl From<PipelineError> for Failure {
             PipelineError::Store(e) => e.into(),
             PipelineError::NothingFilled { .. } => Self::new("nothing-filled", &e)
                 .help("try --regions all, and look at the surface with `tetdb check SURFACE`"),
+            PipelineError::NothingToUndo { .. } => {
+                Self::new("nothing-to-undo", &e).help("only the last `tetdb resaturate` can be undone, once, and not after --forget")
+            }
+            PipelineError::SizeCount { .. } => Self::new("count-mismatch", &e)
+                .help("`tetdb export STORE part.npy --subdomain N` writes the arrays of a sub-domain in that order"),
             other => Self::new("usage", other),
         }
     }
@@ -358,7 +368,7 @@ fn help_of(code: &str) -> &'static str {
         "busy" => "wait for the other process, or stop it",
         "disk-full" => "free some space, then `tetdb resume STORE`",
         "damaged" => {
-            "`tetdb verify STORE` lists all damage; mesh the surface again if there is no copy"
+            "`tetdb resaturate STORE --repair` makes damaged sub-domains again; `tetdb verify STORE` lists what is damaged"
         }
         "memory" => "give more with --memory, or mesh a coarser surface",
         "stopped" => "`tetdb resume STORE` goes on from the last finished step",

@@ -1,5 +1,6 @@
 //! `info`: what a store holds.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde_json::{Value, json};
@@ -9,6 +10,7 @@ use super::failure::Failure;
 use super::memory;
 use super::talk::Talk;
 use crate::catalog::{QualityRow, Store, StoreState};
+use crate::pipeline;
 
 /// Regions listed for people.
 const REGIONS_LISTED: usize = 12;
@@ -33,6 +35,12 @@ pub fn object(path: &Path) -> Result<Value, Failure> {
     let topology = catalog.topology()?;
     let coarse = catalog.coarse_leaves()?;
     let coarse_of = |rank| coarse.iter().find(|c| c.rank == rank).map(|c| c.bytes);
+    let mut sizes = BTreeMap::new();
+    for row in &rows {
+        if let Some(text) = pipeline::asked(catalog, row.rank)? {
+            sizes.insert(row.rank, serde_json::from_str(&text).unwrap_or(Value::Null));
+        }
+    }
     let subdomains: Vec<Value> = rows
         .iter()
         .map(|row| {
@@ -41,7 +49,7 @@ pub fn object(path: &Path) -> Result<Value, Failure> {
                 "id": row.rank, "state": row.state, "tets": row.tets, "vertices": row.vertices, "facets": row.facets,
                 "interface_faces": row.interface_faces, "digest": hex(row.digest), "interface_digest": hex(row.interface_digest),
                 "neighbors": neighbors.map(|t| &t.neighbors), "quality": row.quality, "worst_q": row.quality.worst,
-                "volume": row.volume, "bounds": row.bounds, "bytes": row.bytes, "coarse_bytes": coarse_of(row.rank),
+                "volume": row.volume, "bounds": row.bounds, "bytes": row.bytes, "coarse_bytes": coarse_of(row.rank), "sizes": sizes.get(&row.rank),
             })
         })
         .collect();
@@ -53,6 +61,7 @@ pub fn object(path: &Path) -> Result<Value, Failure> {
         "vertices": rows.iter().map(|r| r.vertices).sum::<u64>(),
         "bytes": rows.iter().map(|r| r.bytes).sum::<u64>(),
         "coarse_bytes": coarse.iter().map(|c| c.bytes).sum::<u64>(),
+        "previous_bytes": catalog.before()?.iter().map(|r| r.bytes).sum::<u64>(),
         "digest": hex(sum(rows.iter().map(|r| r.digest))),
         "subdomains": subdomains, "interfaces": catalog.interfaces()?, "journal": catalog.journal()?,
     }))
@@ -64,7 +73,8 @@ fn sum(digests: impl Iterator<Item = [u64; 2]>) -> [u64; 2] {
     })
 }
 
-fn hex(digest: [u64; 2]) -> String {
+/// A digest as it is shown.
+pub fn hex(digest: [u64; 2]) -> String {
     tetdb_schema::digest::Digest { lanes: digest }.to_string()
 }
 
@@ -110,6 +120,14 @@ pub fn print(path: &Path, talk: &Talk) -> Result<(), Failure> {
             "coarse leaves, from which sub-domains can be made again: {}, {:.2} bytes per tetrahedron",
             memory::show(coarse),
             coarse as f64 / tets.max(1) as f64
+        ));
+    }
+    let before = catalog.before()?;
+    if !before.is_empty() {
+        talk.line(&format!(
+            "previous version of {} sub-domain(s), for `tetdb resaturate --undo`: {}",
+            before.len(),
+            memory::show(before.iter().map(|r| r.bytes).sum())
         ));
     }
     if rows.len() > 1 {
@@ -183,6 +201,11 @@ fn merged<'a>(rows: impl Iterator<Item = &'a QualityRow>) -> QualityRow {
         ];
     }
     all
+}
+
+/// Percent of tetrahedra with a quality below 2.
+pub fn share_below_two(q: &QualityRow) -> f64 {
+    100.0 * q.bins[0] as f64 / q.bins.iter().sum::<u64>().max(1) as f64
 }
 
 /// The paper's table: share and number of tetrahedra by quality.

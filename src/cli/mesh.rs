@@ -119,7 +119,7 @@ pub fn resume(args: &ResumeArgs, talk: &Talk) -> Result<u8, Failure> {
 }
 
 /// Threads, signals, and the cap.
-fn begin(args: &RunArgs, talk: &Talk) -> Result<(u64, String), Failure> {
+pub(super) fn begin(args: &RunArgs, talk: &Talk) -> Result<(u64, String), Failure> {
     if let Some(threads) = args.threads {
         if threads == 0 {
             return Err(
@@ -274,7 +274,12 @@ fn finish(
     Ok(0)
 }
 
-fn write_exports(path: &Path, args: &RunArgs, cap: u64, talk: &Talk) -> Result<(), Failure> {
+pub(super) fn write_exports(
+    path: &Path,
+    args: &RunArgs,
+    cap: u64,
+    talk: &Talk,
+) -> Result<(), Failure> {
     for out in &args.export {
         export::write(path, out, &Selection::default(), cap, talk)?;
     }

@@ -21,6 +21,9 @@ mod query_args;
 mod query_ask;
 mod query_rows;
 mod refine_surface;
+mod resaturate;
+mod resaturate_args;
+mod resaturate_sizes;
 mod sample;
 mod shell;
 mod signals;
@@ -86,6 +89,7 @@ fn dispatch(command: &Command, talk: &Talk) -> Result<u8, Failure> {
         Command::Mesh(args) => mesh::run(args, talk),
         Command::Estimate(args) => estimate::run(args, talk),
         Command::Resume(args) => mesh::resume(args, talk),
+        Command::Resaturate(args) => resaturate::run(args, talk),
         Command::Check(args) => check::run(args, talk),
         Command::Info(args) => info::run(args, talk),
         Command::Query(args) => query::run(args, talk),

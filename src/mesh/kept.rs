@@ -6,7 +6,7 @@ use tetdb_schema::record::{self, CoarseFace, CoarseTet, CoarseVertex};
 
 use super::anatomy::{MARK, REQUIRED, VERTEX_MASK};
 use super::cursor::{Mesh, dense, sparse};
-use super::{Facet, FaceRef, InterfaceFace, Tet, Workspace};
+use super::{FaceRef, Facet, InterfaceFace, Tet, Workspace};
 use crate::store::{Pages, Sorter, StoreError, stop_if_requested};
 
 /// A face with its vertices ascending, and where it is.
@@ -134,9 +134,7 @@ impl<P: Pages> Mesh<P> {
             }
         }
         let place = |face: &FaceRecord| {
-            FaceRef(u32::from_be_bytes([
-                face[12], face[13], face[14], face[15],
-            ]))
+            FaceRef(u32::from_be_bytes([face[12], face[13], face[14], face[15]]))
         };
         let mut open = None::<FaceRecord>;
         for face in faces.finish()? {

@@ -29,6 +29,18 @@ pub enum PipelineError {
     /// Nothing is enclosed by the surface under the chosen rule for regions.
     #[error("no region is filled: the surface encloses nothing under --regions {policy}")]
     NothingFilled { policy: String },
+    /// There is no version of before to go back to.
+    #[error("{path} keeps no previous version of any sub-domain")]
+    NothingToUndo { path: std::path::PathBuf },
+    /// Sizes for the tetrahedra or vertices of sub-domains that have another number of them.
+    #[error(
+        "{found} lengths for {tets} tetrahedra or {vertices} vertices: expected one for each, in the order of the .npy export"
+    )]
+    SizeCount {
+        found: u64,
+        tets: u64,
+        vertices: u64,
+    },
     /// All tetrahedra came to lie on one side of a cut.
     #[error("cut {cut} leaves no tetrahedron on one side: ask for fewer sub-domains")]
     EmptyPart { cut: u32 },

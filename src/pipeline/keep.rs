@@ -1,16 +1,14 @@
 //! Coarse leaves: what a sub-domain is made from is kept, so that it can be made again.
 
-use std::path::Path;
-
 use super::PipelineError;
 use crate::catalog::{CatalogError, CoarseLeaf, CoarseRow, CoarseWriter};
 use crate::mesh::{Mesh, Workspace};
-use crate::store::{Backing, Pager, Pages, stop_if_requested};
+use crate::store::{Backing, DiskPath, Pager, Pages, stop_if_requested};
 
 /// Writes the working mesh of sub-domain `rank`, which has no gaps, to `path`. Errors: the disk.
 pub(super) fn keep<P: Pages>(
     mesh: &mut Mesh<P>,
-    path: &Path,
+    path: &DiskPath,
     rank: u32,
     generation: u32,
     memory: u64,
@@ -49,7 +47,7 @@ pub(super) fn reopen(
 ) -> Result<Mesh, PipelineError> {
     let (rank, path) = (leaf.row().rank, backing.work_path.clone());
     let damaged = |what: &str| CatalogError::Content {
-        path: path.clone(),
+        path: path.path().to_owned(),
         subdomain: rank,
         what: format!("its coarse leaf has {what}"),
     };

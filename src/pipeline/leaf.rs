@@ -6,7 +6,7 @@ use std::time::Instant;
 use tetdb_schema::digest::Digest;
 use tetdb_schema::ids::SubdomainId;
 
-use super::divide::{DONE, WORK, open_part};
+use super::divide::{WORK, open_part};
 use super::fine::{FineReport, fine};
 use super::keep::keep;
 use super::seal::{Target, seal};
@@ -29,6 +29,10 @@ pub(super) struct LeafJob {
     pub base: DiskPath,
     pub work: DiskPath,
     pub sealed: DiskPath,
+    /// Generation of the file to make.
+    pub generation: u32,
+    /// A size field of its own, in place of that of the whole.
+    pub field: Option<SizeField>,
     /// Where to keep the coarse leaf, if it is to be kept.
     pub kept: Option<DiskPath>,
     pub scratch: DiskPath,
@@ -98,14 +102,14 @@ impl LeafJob {
         let keep_s = clock.elapsed().as_secs_f64();
         let fine = fine(
             &mut mesh,
-            common.field,
+            self.field.as_ref().unwrap_or(common.field),
             common.bounds,
             &self.zones,
             common.mode,
             &space,
             watch,
         )?;
-        let generation = coarse + DONE;
+        let generation = self.generation;
         let target = Target {
             path: &self.sealed,
             scratch: &self.scratch,

@@ -19,8 +19,10 @@ mod leaf;
 mod options;
 mod plan;
 mod regions;
+mod resaturate;
 mod run;
 mod seal;
+mod sizes;
 mod tree;
 mod watch;
 
@@ -30,5 +32,10 @@ pub use estimate::{Estimate, Prepared, prepare};
 pub use fine::FineReport;
 pub use options::Options;
 pub use plan::{MEMORY_MIN, Plan};
+pub use resaturate::{
+    Forecast, Remade, ResaturateSummary, Resaturation, asked, changed, forecast, forget,
+    resaturate, undo,
+};
 pub use run::{Summary, mesh, mesh_prepared};
+pub use sizes::{NewSizes, Values};
 pub use watch::{Event, Watcher, silent};

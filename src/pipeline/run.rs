@@ -214,6 +214,7 @@ impl<'a> Run<'a> {
             step.set_labels(&surface.label_names);
             step.set_regions(&report.regions.list.iter().map(region_row).collect());
             step.set_blob(blob::SIZE_FIELD, &field);
+            step.set_blob(blob::BOUNDS, &tree::bounds_bytes(&surface.bounds()));
             step.set_blob(blob::SUBDOMAINS, &n.to_le_bytes());
             step.set_blob(blob::PART, &part.to_bytes());
             step.set_state(StoreState::Coarse);
@@ -288,6 +289,8 @@ impl<'a> Run<'a> {
             base: self.catalog.file_path(rank, part.generation),
             work: self.catalog.file_path(rank, part.generation + WORK),
             sealed: self.catalog.file_path(rank, part.generation + DONE),
+            generation: part.generation + DONE,
+            field: None,
             kept: (!self.options.drop_coarse)
                 .then(|| self.catalog.coarse_path(rank, part.generation)),
             scratch: self.scratch(&format!("leaf-{rank}"))?,
@@ -344,34 +347,7 @@ impl<'a> Run<'a> {
 
     /// Everything is sealed: regions and interfaces of the whole.
     fn close(&mut self) -> Result<(), PipelineError> {
-        let mut regions = self.catalog.regions()?;
-        for row in regions.iter_mut().filter(|r| r.filled) {
-            (row.tets, row.volume) = (0, 0.0);
-        }
-        let mut interfaces: BTreeMap<u32, Vec<InterfaceRow>> = BTreeMap::new();
-        for rank in 0..self.n {
-            let bytes = self.catalog.blob(blob::SEALED + rank)?.unwrap_or_default();
-            let totals = SealedTotals::from_bytes(&bytes).ok_or_else(|| CatalogError::Content {
-                path: self.catalog.dir().to_owned(),
-                subdomain: rank,
-                what: "its totals are missing or damaged".to_owned(),
-            })?;
-            for row in regions.iter_mut().filter(|r| r.filled) {
-                let here = totals.regions.get(&row.region).copied().unwrap_or_default();
-                row.tets += here.tets;
-                row.volume += here.volume;
-            }
-            // One side tells; verification compares it with the other.
-            for side in totals.interfaces.iter().filter(|s| rank < s.other) {
-                interfaces.entry(side.cut).or_default().push(InterfaceRow {
-                    cut: side.cut,
-                    low: rank,
-                    high: side.other,
-                    faces: side.faces,
-                    digest: side.digest.lanes,
-                });
-            }
-        }
+        let (regions, interfaces) = whole(self.catalog, self.n, &BTreeMap::new())?;
         let scratch = self.catalog.scratch_dir()?;
         self.catalog.commit(|step| {
             step.set_regions(&regions);
@@ -385,6 +361,55 @@ impl<'a> Run<'a> {
         let _ = scratch.remove_dir_all();
         Ok(())
     }
+}
+
+/// Regions of the whole, and its interfaces by cut, from the totals of all `n` sub-domains; those in `changed` go first.
+pub(super) fn whole(
+    catalog: &mut Catalog,
+    n: u32,
+    changed: &BTreeMap<u32, SealedTotals>,
+) -> Result<(Vec<RegionRow>, BTreeMap<u32, Vec<InterfaceRow>>), PipelineError> {
+    let mut regions = catalog.regions()?;
+    for row in regions.iter_mut().filter(|r| r.filled) {
+        (row.tets, row.volume) = (0, 0.0);
+    }
+    let mut interfaces: BTreeMap<u32, Vec<InterfaceRow>> = BTreeMap::new();
+    for rank in 0..n {
+        let totals = match changed.get(&rank) {
+            Some(totals) => totals.clone(),
+            None => totals_of(catalog, blob::SEALED, rank)?,
+        };
+        for row in regions.iter_mut().filter(|r| r.filled) {
+            let here = totals.regions.get(&row.region).copied().unwrap_or_default();
+            row.tets += here.tets;
+            row.volume += here.volume;
+        }
+        // One side tells; verification compares it with the other.
+        for side in totals.interfaces.iter().filter(|s| rank < s.other) {
+            interfaces.entry(side.cut).or_default().push(InterfaceRow {
+                cut: side.cut,
+                low: rank,
+                high: side.other,
+                faces: side.faces,
+                digest: side.digest.lanes,
+            });
+        }
+    }
+    Ok((regions, interfaces))
+}
+
+/// The totals of a sub-domain, kept in the blobs that begin with `first`.
+pub(super) fn totals_of(
+    catalog: &mut Catalog,
+    first: u32,
+    rank: u32,
+) -> Result<SealedTotals, CatalogError> {
+    let bytes = catalog.blob(first + rank)?.unwrap_or_default();
+    SealedTotals::from_bytes(&bytes).ok_or_else(|| CatalogError::Content {
+        path: catalog.dir().to_owned(),
+        subdomain: rank,
+        what: "its totals are missing or damaged".to_owned(),
+    })
 }
 
 fn region_row(region: &RegionSummary) -> RegionRow {

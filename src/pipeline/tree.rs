@@ -5,7 +5,7 @@
 
 use crate::bisect::{Plane, Zone};
 use crate::catalog::{Catalog, CatalogError};
-use crate::geom::Point;
+use crate::geom::{Aabb, Point};
 use crate::mesh::{MESH_STATE_WORDS, MeshState};
 use crate::store::kind;
 
@@ -14,6 +14,8 @@ pub(super) mod blob {
     pub const SIZE_FIELD: u32 = 1;
     /// How many sub-domains there will be.
     pub const SUBDOMAINS: u32 = 3;
+    /// The box of the surface: six numbers.
+    pub const BOUNDS: u32 = 4;
     /// Of each part: its mesh.
     pub const PART: u32 = 1 << 20;
     /// Of each cut: its plane.
@@ -22,6 +24,13 @@ pub(super) mod blob {
     pub const OWNERS: u32 = 3 << 20;
     /// Of each sealed sub-domain: regions and interfaces.
     pub const SEALED: u32 = 4 << 20;
+    /// Of each sub-domain made again with other sizes: its size field, and in words what was asked for.
+    pub const FIELD: u32 = 5 << 20;
+    pub const ASKED: u32 = 6 << 20;
+    /// The last three as they were before the last change.
+    pub const SEALED_BEFORE: u32 = 7 << 20;
+    pub const FIELD_BEFORE: u32 = 8 << 20;
+    pub const ASKED_BEFORE: u32 = 9 << 20;
 }
 
 /// Ranks `first..first + count`.
@@ -137,6 +146,28 @@ pub(super) fn parts(catalog: &mut Catalog, n: u32) -> Result<Vec<PartMesh>, Cata
         parts.push(part);
     }
     Ok(parts)
+}
+
+pub(super) fn bounds_bytes(bounds: &Aabb) -> Vec<u8> {
+    let corners = [bounds.low, bounds.high].map(|p| p.to_array());
+    let numbers = corners.into_iter().flatten();
+    numbers.flat_map(f64::to_le_bytes).collect()
+}
+
+/// The box of the surface.
+pub(super) fn bounds(catalog: &mut Catalog) -> Result<Aabb, CatalogError> {
+    let bytes = catalog.blob(blob::BOUNDS)?.unwrap_or_default();
+    let mut numbers = bytes
+        .chunks_exact(8)
+        .map(|b| f64::from_le_bytes(std::array::from_fn(|i| b[i])));
+    let mut corner = || {
+        let [x, y, z] = [numbers.next()?, numbers.next()?, numbers.next()?];
+        Some(Point::new(x, y, z))
+    };
+    match (corner(), corner()) {
+        (Some(low), Some(high)) => Ok(Aabb { low, high }),
+        _ => Err(damaged(catalog, 0)),
+    }
 }
 
 fn damaged(catalog: &Catalog, first: u32) -> CatalogError {

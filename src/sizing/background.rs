@@ -64,6 +64,11 @@ impl BackgroundMesh {
         }
     }
 
+    /// Memory held, in bytes, for so many vertices and tetrahedra.
+    pub fn bytes(vertices: u64, tets: u64) -> u64 {
+        80 * vertices + 90 * tets
+    }
+
     /// Least and greatest size of the vertices in a box.
     fn range_in(&self, cell: &Aabb) -> [f64; 2] {
         let [mut low, mut high] = NONE;

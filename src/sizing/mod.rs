@@ -34,6 +34,7 @@ mod summary;
 mod tree;
 mod values;
 mod wishes;
+mod within;
 
 #[cfg(test)]
 mod tests;

@@ -64,29 +64,36 @@ pub(super) fn corner_values(
         fill(leaves, corners, &gathered)
     };
     if targets.any() {
-        // Between the cone that rises from the surface's sizes and the one that falls from them.
-        let cone = |slope: f64, sign: f32| {
-            let starts = gathered.iter().zip(&nearest);
-            let mut cone: Vec<f32> = starts
-                .map(|(&h, &d)| {
-                    if h.is_finite() {
-                        bound(sign * h, slope * d)
-                    } else {
-                        f32::INFINITY
-                    }
-                })
-                .collect();
-            grading.grade(&mut cone);
-            cone
-        };
-        let upper = cone(targets.beta, 1.0);
-        let lower = cone(targets.beta, -1.0);
+        let [lower, upper] = grading.cones(&gathered, &nearest);
         for (i, h) in h.iter_mut().enumerate() {
             let wanted = targets.interior(f64::from(*h)) as f32;
-            *h = wanted.max(-lower[i]).min(upper[i]);
+            *h = wanted.max(lower[i]).min(upper[i]);
         }
     }
     wishes.lower(leaves, corners, &mut h)?;
+    grading.grade_closed(&mut h);
+    Ok(h)
+}
+
+/// Sizes at all corners that are those of `wishes`, joined to the seeds' sizes by the gradation: near the seeds neither
+/// finer nor coarser than it allows. Where nothing is wished, what is wished around it.
+pub(super) fn corner_values_within(
+    tree: &Tree,
+    leaves: &[Leaf],
+    corners: &Corners,
+    seeds: &[Seed],
+    beta: f64,
+    wishes: &Wishes,
+) -> Result<Vec<f32>, SizingError> {
+    let (gathered, nearest) = gather(tree, leaves, corners, seeds);
+    let grading = Grading::new(leaves, corners, beta);
+    let mut wished = vec![f32::INFINITY; corners.n_corners];
+    wishes.lower(leaves, corners, &mut wished)?;
+    let mut h = fill(leaves, corners, &wished);
+    let [lower, upper] = grading.cones(&gathered, &nearest);
+    for (i, h) in h.iter_mut().enumerate() {
+        *h = h.max(lower[i]).min(upper[i]);
+    }
     grading.grade_closed(&mut h);
     Ok(h)
 }
@@ -243,6 +250,22 @@ impl<'a> Grading<'a> {
             around,
             beta,
         }
+    }
+
+    /// What the gradation allows beside sizes at some corners, each at a distance from where it holds: the least, the most.
+    fn cones(&self, gathered: &[f32], nearest: &[f64]) -> [Vec<f32>; 2] {
+        [-1.0f32, 1.0].map(|sign| {
+            let starts = gathered.iter().zip(nearest);
+            let mut cone: Vec<f32> = starts
+                .map(|(&h, &d)| match h.is_finite() {
+                    true => bound(sign * h, self.beta * d),
+                    false => f32::INFINITY,
+                })
+                .collect();
+            self.grade(&mut cone);
+            cone.iter_mut().for_each(|h| *h *= sign);
+            cone
+        })
     }
 
     /// Largest differences in a leaf, by squared distance of corners in sides.

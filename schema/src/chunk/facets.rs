@@ -5,7 +5,10 @@ use super::{ChunkKind, ChunkRecord};
 use crate::record::{InterfaceFace, SealedFacet};
 
 /// Three vertices: the first against the face before, the others against the first.
-pub(super) fn encode_vertices(faces: impl Iterator<Item = [u32; 3]> + Clone, columns: &mut Columns) {
+pub(super) fn encode_vertices(
+    faces: impl Iterator<Item = [u32; 3]> + Clone,
+    columns: &mut Columns,
+) {
     let mut base = 0;
     columns.varints32(
         faces
@@ -16,7 +19,10 @@ pub(super) fn encode_vertices(faces: impl Iterator<Item = [u32; 3]> + Clone, col
     columns.varints32(faces.map(|[a, _, c]| zigzag32(c, a)));
 }
 
-pub(super) fn decode_vertices(columns: &mut Reader<'_>, count: usize) -> Result<Vec<[u32; 3]>, Malformed> {
+pub(super) fn decode_vertices(
+    columns: &mut Reader<'_>,
+    count: usize,
+) -> Result<Vec<[u32; 3]>, Malformed> {
     let mut faces = vec![[0; 3]; count];
     let mut base = 0;
     for face in &mut faces {

@@ -4,8 +4,8 @@
 //! A decoder meets whatever a disk returns: it answers damage with an error, never with a panic, and
 //! allocates nothing that the head's checked count does not justify.
 
-mod codec;
 mod coarse;
+mod codec;
 mod columns;
 mod facets;
 mod packer;

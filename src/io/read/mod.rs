@@ -8,6 +8,7 @@ mod error;
 mod feed;
 mod gmsh;
 mod gmsh_numbers;
+mod lengths;
 mod medit;
 mod meditb;
 mod obj;
@@ -28,6 +29,7 @@ use std::path::{Path, PathBuf};
 
 pub use error::{Place, ReadError, Spot};
 use feed::{Feed, Result};
+pub use lengths::read_lengths;
 pub use sizes::{read_sizes, size_files};
 
 use crate::surface::{Surface, SurfaceBuilder, SurfaceError};
@@ -190,6 +192,12 @@ fn unique(stem: &str, taken: &[String]) -> String {
 }
 
 fn open(path: &Path) -> Result<Feed<BufReader<File>>> {
+    let (reader, length) = open_plain(path)?;
+    Ok(Feed::new(&path.to_string_lossy(), reader, length))
+}
+
+/// Opens a regular file; tells its length.
+fn open_plain(path: &Path) -> Result<(BufReader<File>, u64)> {
     let name = path.to_string_lossy();
     let unreadable = |reason: String| ReadError::Unreadable {
         place: Place {
@@ -203,11 +211,7 @@ fn open(path: &Path) -> Result<Feed<BufReader<File>>> {
     if !meta.is_file() {
         return Err(unreadable("it is not a regular file".to_owned()));
     }
-    Ok(Feed::new(
-        &name,
-        BufReader::with_capacity(BUFFER_BYTES, file),
-        meta.len(),
-    ))
+    Ok((BufReader::with_capacity(BUFFER_BYTES, file), meta.len()))
 }
 
 fn read_file(path: &Path, target: &mut Target) -> Result<()> {

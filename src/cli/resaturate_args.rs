@@ -1,0 +1,50 @@
+//! What can be typed after `tetdb resaturate`.
+
+use std::path::PathBuf;
+
+use super::args::{RunArgs, SizeArgs};
+
+/// Make sub-domains of a finished store again, from their coarse leaves. Interfaces and all other sub-domains stay as they are.
+///
+/// Size options take the place of all sizes that the sub-domains were made with; without any, they are made as they were.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  tetdb resaturate part.tetdb --subdomain 5,9 --hsiz 1%\n  tetdb resaturate part.tetdb --subdomain 5 --refine-by 0.5\n  \
+    tetdb resaturate part.tetdb --subdomain 5 --size-field h.npy\n  tetdb resaturate part.tetdb --changed --size-sphere 0,0,0,0.1,0.01 --dry-run\n  \
+    tetdb resaturate part.tetdb --undo\n  tetdb resaturate part.tetdb --repair"
+)]
+pub struct ResaturateArgs {
+    #[arg(value_name = "STORE")]
+    pub store: PathBuf,
+    /// The sub-domains to make again, as numbers with commas between them
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        alias = "domain",
+        alias = "subdomains"
+    )]
+    pub subdomain: Vec<u32>,
+    /// Make those again whose sizes would be others (by 5 % somewhere)
+    #[arg(long, conflicts_with_all = ["subdomain", "undo", "forget", "repair"])]
+    pub changed: bool,
+    #[command(flatten)]
+    pub sizes: SizeArgs,
+    /// Multiply lengths: those asked for, or else those the sub-domain was made with
+    #[arg(long, value_name = "FACTOR")]
+    pub refine_by: Option<String>,
+    /// Only list what would be made again, with the tetrahedra to expect
+    #[arg(long, conflicts_with_all = ["undo", "forget", "repair"])]
+    pub dry_run: bool,
+    /// Bring back what was before the last change
+    #[arg(long, conflicts_with_all = ["subdomain", "forget", "repair"])]
+    pub undo: bool,
+    /// Drop what was before the last change: the store gets smaller, --undo impossible
+    #[arg(long, conflicts_with_all = ["subdomain", "repair"])]
+    pub forget: bool,
+    /// Make damaged sub-domains again as they were; without --subdomain all that are damaged
+    #[arg(long)]
+    pub repair: bool,
+    #[command(flatten)]
+    pub run: RunArgs,
+}

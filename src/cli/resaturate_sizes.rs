@@ -1,0 +1,165 @@
+//! Sizes for sub-domains that are made again, as typed.
+
+use std::path::Path;
+
+use serde_json::json;
+
+use super::args::SizeArgs;
+use super::failure::Failure;
+use super::resaturate_args::ResaturateArgs;
+use super::talk::Talk;
+use super::{background, config, store};
+use crate::catalog::Store;
+use crate::io::read::read_lengths;
+use crate::pipeline::{self, NewSizes, Options, Values};
+use crate::sizing::{SizeField, SizingError};
+
+/// The options the store was made with. Errors: they cannot be read.
+pub fn options_of(open: &mut Store, path: &Path) -> Result<Options, Failure> {
+    let job = open.catalog().job()?;
+    serde_json::from_str(&job.options).map_err(|e| {
+        Failure::new("damaged", format!("the job's options cannot be read: {e}")).at(path.display())
+    })
+}
+
+/// Whether any sizes are asked for.
+pub fn are_given(args: &ResaturateArgs) -> bool {
+    args.refine_by.is_some() || args.sizes != SizeArgs::default()
+}
+
+/// What is asked for; `None` for the sizes that are recorded.
+///
+/// Errors: sizes without a meaning; files that cannot be read; a surface that is not what it was, where its edges are needed.
+pub fn new_sizes(
+    args: &ResaturateArgs,
+    open: &mut Store,
+    options: &Options,
+    cap: u64,
+    talk: &Talk,
+) -> Result<Option<NewSizes>, Failure> {
+    if !are_given(args) {
+        return Ok(None);
+    }
+    let factor = factor(args.refine_by.as_deref())?;
+    let mut asked = Options::default();
+    config::take_sizes(&args.sizes, &mut asked);
+    let lengths = asked.size_field.take_if(|file| file.ends_with(".npy"));
+    let parsed = asked.sizes()?;
+    let beta = match args.sizes.hgrad {
+        Some(_) => parsed.beta(),
+        None => options.sizes()?.beta(),
+    };
+    let mut sizes = NewSizes {
+        field: None,
+        values: None,
+        factor,
+        limits: [0.0, f64::INFINITY],
+        beta,
+        asked: String::new(),
+    };
+    if let Some(file) = &lengths {
+        let others = SizeArgs {
+            hmin: None,
+            hmax: None,
+            hgrad: None,
+            size_field: None,
+            ..args.sizes.clone()
+        };
+        if others != SizeArgs::default() || args.changed {
+            return Err(Failure::new(
+                "usage",
+                "lengths one by one go with --subdomain, --hmin, --hmax, --hgrad and --refine-by only",
+            )
+            .at(file)
+            .help("leave the other options away"));
+        }
+        sizes.limits = limits(open, args)?;
+        sizes.values = Some(values(Path::new(file), open, args, cap)?);
+    } else if args.sizes != SizeArgs::default() {
+        sizes.field = Some(field(open, &mut asked, options, cap, talk)?);
+    }
+    asked.size_field = lengths.or(asked.size_field);
+    let asked = serde_json::to_value(&asked).unwrap_or_default();
+    sizes.asked = json!({ "options": asked, "refine_by": args.refine_by }).to_string();
+    Ok(Some(sizes))
+}
+
+fn factor(text: Option<&str>) -> Result<f64, Failure> {
+    let Some(text) = text else {
+        return Ok(1.0);
+    };
+    match text.trim().parse::<f64>() {
+        Ok(x) if x.is_normal() && x > 0.0 => Ok(x),
+        _ => Err(SizingError::BadValue {
+            option: "--refine-by",
+            found: text.to_owned(),
+            expected: "a factor above zero, such as 0.5",
+        }
+        .into()),
+    }
+}
+
+/// The field of the whole surface with other options, but the regions and the gradation it was made with.
+fn field(
+    open: &mut Store,
+    asked: &mut Options,
+    options: &Options,
+    cap: u64,
+    talk: &Talk,
+) -> Result<SizeField, Failure> {
+    background::identify(asked)?;
+    let mut all = asked.clone();
+    all.regions.clone_from(&options.regions);
+    all.optimize.clone_from(&options.optimize);
+    if all.hgrad.is_none() {
+        all.hgrad.clone_from(&options.hgrad);
+    }
+    let input = store::surface_of(open, &[], talk)?;
+    let background = background::read(&all, cap)?;
+    let prepared = pipeline::prepare(&input.surface, &all, background.as_ref())?;
+    talk.note(&prepared.sizes.to_string());
+    Ok(prepared.field)
+}
+
+/// `--hmin` and `--hmax` of lengths one by one; shares are of the box of all sub-domains.
+fn limits(open: &mut Store, args: &ResaturateArgs) -> Result<[f64; 2], Failure> {
+    let rows = open.catalog().subdomains()?;
+    let side = |axis: usize| {
+        let low = rows.iter().map(|r| r.bounds[0][axis]);
+        let high = rows.iter().map(|r| r.bounds[1][axis]);
+        high.fold(f64::NEG_INFINITY, f64::max) - low.fold(f64::INFINITY, f64::min)
+    };
+    let diagonal = (0..3).map(|axis| side(axis).powi(2)).sum::<f64>().sqrt();
+    let parse = |option, text: &Option<String>| match text {
+        Some(text) => Ok(Some(
+            crate::sizing::Length::parse(option, text)?.resolve(diagonal),
+        )),
+        None => Ok::<_, SizingError>(None),
+    };
+    let hmin = parse("--hmin", &args.sizes.hmin)?;
+    let hmax = parse("--hmax", &args.sizes.hmax)?;
+    if let (Some(hmin), Some(hmax)) = (hmin, hmax)
+        && hmin > hmax
+    {
+        return Err(SizingError::Crossed { hmin, hmax }.into());
+    }
+    Ok([hmin.unwrap_or(0.0), hmax.unwrap_or(f64::INFINITY)])
+}
+
+/// Lengths for the tetrahedra or the vertices of the named sub-domains: their number tells.
+fn values(
+    file: &Path,
+    open: &mut Store,
+    args: &ResaturateArgs,
+    cap: u64,
+) -> Result<Values, Failure> {
+    let lengths = read_lengths(file, cap / 4)?;
+    let catalog = open.catalog();
+    // What is not as many as either is told of as wrong for both later.
+    match args.subdomain[..] {
+        [rank] if lengths.len() as u64 == catalog.subdomain(rank)?.vertices => {
+            Ok(Values::Vertices(lengths))
+        }
+        _ => Ok(Values::Tets(lengths)),
+    }
+}

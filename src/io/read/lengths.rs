@@ -1,0 +1,181 @@
+//! A list of lengths from a NumPy array file: one dimension, floating point.
+//!
+//! Source: the NPY format, versions 1 to 3, of NumPy's documentation (NEP 1).
+
+use std::io::{BufRead, Read};
+use std::path::Path;
+
+use super::error::{Place, ReadError, Spot};
+use super::feed::Result;
+use super::open_plain;
+
+const MAGIC: &[u8; 6] = b"\x93NUMPY";
+/// Longest head that is read.
+const HEAD_MAX: usize = 1 << 16;
+
+/// Reads lengths above zero, holding at most `limit` bytes.
+///
+/// # Errors
+/// What is no such file, not one-dimensional, not of 4 or 8 byte floating point numbers; the place of what is no length.
+pub fn read_lengths(path: &Path, limit: u64) -> Result<Vec<f64>> {
+    let place = |spot| Place {
+        file: path.display().to_string(),
+        spot,
+    };
+    let (mut from, length_of_file) = open_plain(path)?;
+    let mut at = 0;
+    let mut take = |n: usize| -> Result<Vec<u8>> {
+        let mut bytes = vec![0; n];
+        from.read_exact(&mut bytes)
+            .map_err(|e| ReadError::Truncated {
+                place: place(Spot::Byte(at)),
+                expected: format!("{n} more bytes"),
+                found: e.to_string(),
+            })?;
+        at += n as u64;
+        Ok(bytes)
+    };
+    let unexpected = |spot, expected: &str, found: String| ReadError::Unexpected {
+        place: place(spot),
+        expected: expected.to_owned(),
+        found,
+    };
+    let start = take(8)?;
+    if !start.starts_with(MAGIC) {
+        let found = format!("{:x?}", &start[..6]);
+        return Err(unexpected(Spot::Byte(0), "an array file of NumPy", found));
+    }
+    let length = match start[6] {
+        1 => take(2)?
+            .iter()
+            .rev()
+            .fold(0, |n, &b| n << 8 | usize::from(b)),
+        _ => take(4)?
+            .iter()
+            .rev()
+            .fold(0, |n, &b| n << 8 | usize::from(b)),
+    };
+    if length > HEAD_MAX {
+        return Err(unexpected(
+            Spot::Byte(8),
+            "a short head",
+            format!("{length} bytes"),
+        ));
+    }
+    let head = String::from_utf8_lossy(&take(length)?).into_owned();
+    let kind = value_of(&head, "descr").unwrap_or_default();
+    let kind = kind.trim_matches(['\'', '"']).to_owned();
+    let (bytes, big) = match kind.as_str() {
+        "<f8" | "=f8" => (8, false),
+        "<f4" | "=f4" => (4, false),
+        ">f8" => (8, true),
+        ">f4" => (4, true),
+        _ => {
+            let expected = "floating point numbers of 4 or 8 bytes (float32 or float64)";
+            return Err(unexpected(Spot::Byte(8), expected, format!("type {kind}")));
+        }
+    };
+    let shape = value_of(&head, "shape").unwrap_or_default();
+    let sides: Vec<&str> = (shape.trim_matches(['(', ')']).split(','))
+        .map(str::trim)
+        .filter(|side| !side.is_empty())
+        .collect();
+    let n: u64 = match &sides[..] {
+        [n] => n.parse().unwrap_or(u64::MAX),
+        _ => u64::MAX,
+    };
+    if n == u64::MAX {
+        let found = format!("an array of shape {shape}");
+        return Err(unexpected(Spot::Byte(8), "a list of one dimension", found));
+    }
+    let needed = n.saturating_mul(8);
+    if needed > limit {
+        return Err(ReadError::TooLarge {
+            place: place(Spot::Whole),
+            what: "the lengths",
+            needed,
+            limit,
+        });
+    }
+    let mut lengths = Vec::with_capacity(n.min(length_of_file) as usize);
+    for i in 0..n {
+        let mut word = take(bytes)?;
+        if big {
+            word.reverse();
+        }
+        let h = match bytes {
+            8 => f64::from_le_bytes(std::array::from_fn(|i| word[i])),
+            _ => f64::from(f32::from_le_bytes(std::array::from_fn(|i| word[i]))),
+        };
+        if !(h.is_normal() && h > 0.0) {
+            return Err(ReadError::Unexpected {
+                place: place(Spot::Whole),
+                expected: "a length above zero".to_owned(),
+                found: format!("{h} as number {i}"),
+            });
+        }
+        lengths.push(h);
+    }
+    if !from.fill_buf().is_ok_and(<[u8]>::is_empty) {
+        let found = "more bytes".to_owned();
+        return Err(unexpected(
+            Spot::Whole,
+            "the end of the file behind its last number",
+            found,
+        ));
+    }
+    Ok(lengths)
+}
+
+/// The text of a key's value in a head, up to the comma that ends it.
+fn value_of(head: &str, key: &str) -> Option<String> {
+    let rest = head.split_once(&format!("'{key}':"))?.1.trim_start();
+    let end = match rest.starts_with(['(', '[']) {
+        true => rest.find([')', ']'])? + 1,
+        false => rest.find([',', '}'])?,
+    };
+    Some(rest[..end].trim().to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn file(kind: &str, shape: &str, data: &[u8]) -> Vec<u8> {
+        let head = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}\n");
+        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+        bytes.extend((head.len() as u16).to_le_bytes());
+        bytes.extend(head.as_bytes());
+        bytes.extend(data);
+        bytes
+    }
+
+    fn read(bytes: &[u8]) -> Result<Vec<f64>> {
+        let dir = tempfile::tempdir().expect("a temporary folder");
+        let path = dir.path().join("h.npy");
+        std::fs::write(&path, bytes).expect("the folder takes files");
+        read_lengths(&path, 1 << 20)
+    }
+
+    #[test]
+    fn lengths_come_back_and_all_else_is_told() {
+        let two: Vec<u8> = [0.5f64, 2.0].iter().flat_map(|h| h.to_le_bytes()).collect();
+        assert_eq!(read(&file("<f8", "(2,)", &two)).ok(), Some(vec![0.5, 2.0]));
+        let single: Vec<u8> = [0.5f32].iter().flat_map(|h| h.to_be_bytes()).collect();
+        assert_eq!(read(&file(">f4", "(1,)", &single)).ok(), Some(vec![0.5]));
+        assert_eq!(read(&file("<f8", "(0,)", &[])).ok(), Some(Vec::new()));
+        for (kind, shape, data, code) in [
+            ("<f8", "(2,)", &two[..15], "truncated-file"),
+            ("<f8", "(1,)", &two[..], "unexpected-text"),
+            ("<i8", "(2,)", &two[..], "unexpected-text"),
+            ("<f8", "(2, 1)", &two[..], "unexpected-text"),
+            ("<f8", "(1,)", &[0; 8][..], "unexpected-text"),
+            ("<f8", "(9000000000,)", &two[..], "memory"),
+            ("<f8", "()", &two[..], "unexpected-text"),
+        ] {
+            let found = read(&file(kind, shape, data)).expect_err(code);
+            assert_eq!(found.code(), code, "{kind} {shape}: {found}");
+        }
+        assert!(read(b"OFF\n").is_err() && read(b"PK\x03\x04 something else").is_err());
+    }
+}

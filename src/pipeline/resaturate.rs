@@ -1,0 +1,555 @@
+//! Sub-domains made again from their coarse leaves, each alone; what lies around them stays as it is.
+//!
+//! Workers write new files beside the old ones; when all are done, one commit lists the new files and remembers the old as the previous
+//! version. A run that is killed leaves the old mesh or the new one.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::Instant;
+
+use super::crew::crew;
+use super::divide::read_owners;
+use super::keep::reopen;
+use super::leaf::{Common, Leaf, LeafJob, SealedTotals};
+use super::run::{journal, totals_of, whole};
+use super::sizes::{NewSizes, Recorded, Values, predicted};
+use super::tree::{self, Part, blob};
+use super::watch::Watcher;
+use super::{FineReport, Options, PipelineError, Plan};
+use crate::catalog::{Catalog, CatalogError, CoarseLeaf, CoarseRow, StoreState, SubdomainRow};
+use crate::mesh::Workspace;
+use crate::sizing::SizeField;
+use crate::store::{Backing, Budget, DiskPath, PagerStats, attempt};
+
+/// What to make again.
+#[derive(Clone, Debug)]
+pub struct Resaturation {
+    pub ranks: BTreeSet<u32>,
+    /// `None`: with the sizes that are recorded.
+    pub sizes: Option<NewSizes>,
+    /// The file of each is damaged: it must become what the catalog says it was, and is no previous version.
+    pub repair: bool,
+}
+
+/// A sub-domain before and after.
+#[derive(Clone, Debug)]
+pub struct Remade {
+    pub before: SubdomainRow,
+    pub after: SubdomainRow,
+    /// `None` where an older version came back.
+    pub fine: Option<FineReport>,
+}
+
+/// What a run did, by rank.
+#[derive(Clone, Debug)]
+pub struct ResaturateSummary {
+    pub parts: Vec<Remade>,
+    pub pages: PagerStats,
+    pub frames_used: usize,
+}
+
+/// What would be made again.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Forecast {
+    pub rank: u32,
+    pub tets: u64,
+    /// Tetrahedra to expect.
+    pub predicted: f64,
+}
+
+/// Makes sub-domains of a finished store again, in one step.
+///
+/// The result depends on the store and the sizes alone. Interfaces and all other sub-domains stay as they are. Effects: one commit; the
+/// replaced files stay as the previous version, the one before goes. Errors: a sub-domain that is not there or whose coarse leaf
+/// was not kept; sizes that make no sense. The store is then as it was.
+pub fn resaturate(
+    catalog: &mut Catalog,
+    options: &Options,
+    what: &Resaturation,
+    budget: &Budget,
+    watch: &Watcher,
+) -> Result<ResaturateSummary, PipelineError> {
+    let mut again = Again::open(catalog, options, what)?;
+    attempt(|| {
+        let fields = again.fields(budget)?;
+        again.run(fields, budget, watch)
+    })?
+}
+
+/// What [`resaturate`] would make, without making it. Errors: as there.
+pub fn forecast(
+    catalog: &mut Catalog,
+    options: &Options,
+    what: &Resaturation,
+    budget: &Budget,
+) -> Result<Vec<Forecast>, PipelineError> {
+    let mut again = Again::open(catalog, options, what)?;
+    attempt(|| {
+        let memory = budget.available() / 4;
+        let mut list = Vec::new();
+        for (rank, new) in again.fields(budget)? {
+            let recorded = Recorded {
+                whole: &again.field,
+            };
+            let old = recorded.own(again.catalog, rank)?;
+            let old = old.as_ref().unwrap_or(&again.field);
+            let tets = again.catalog.subdomain(rank)?.tets;
+            let predicted = match &new {
+                Some(new) => predicted(again.catalog, rank, [old, new], memory)?,
+                None => tets as f64,
+            };
+            list.push(Forecast {
+                rank,
+                tets,
+                predicted,
+            });
+        }
+        Ok(list)
+    })?
+}
+
+/// The sub-domains that `sizes` would make otherwise than they are. Errors: damage; sizes that make no sense.
+pub fn changed(
+    catalog: &mut Catalog,
+    options: &Options,
+    sizes: &NewSizes,
+    budget: &Budget,
+) -> Result<BTreeSet<u32>, PipelineError> {
+    let field = whole_field(catalog, options)?;
+    let recorded = Recorded { whole: &field };
+    let mut ranks = BTreeSet::new();
+    for row in catalog.subdomains()? {
+        let memory = budget.available() / 4;
+        if attempt(|| recorded.differs(catalog, row.rank, sizes, memory))?? {
+            ranks.insert(row.rank);
+        }
+    }
+    Ok(ranks)
+}
+
+/// Brings back what the sub-domains of the last change were before it, in one step.
+///
+/// Errors: [`PipelineError::NothingToUndo`].
+pub fn undo(catalog: &mut Catalog) -> Result<ResaturateSummary, PipelineError> {
+    let clock = Instant::now();
+    let before = catalog.before()?;
+    if before.is_empty() {
+        return Err(PipelineError::NothingToUndo {
+            path: catalog.dir().to_owned(),
+        });
+    }
+    let n = tree::n_subdomains(catalog)?;
+    let (mut parts, mut totals, mut blobs) = (Vec::new(), BTreeMap::new(), Vec::new());
+    for row in before {
+        let rank = row.rank;
+        totals.insert(rank, totals_of(catalog, blob::SEALED_BEFORE, rank)?);
+        for (now, then) in VERSIONED {
+            let old = catalog.blob(then + rank)?;
+            let new = catalog.blob(now + rank)?;
+            blobs.push(([now + rank, then + rank], old, new));
+        }
+        parts.push(Remade {
+            before: catalog.subdomain(rank)?,
+            after: row,
+            fine: None,
+        });
+    }
+    let (regions, _) = whole(catalog, n, &totals)?;
+    catalog.commit(|step| {
+        for ([now, then], old, new) in &blobs {
+            let length = |blob: &Option<Vec<u8>>| blob.as_ref().map_or(0, Vec::len);
+            step.remove_blob(*now, length(new));
+            step.remove_blob(*then, length(old));
+            if let Some(bytes) = old {
+                step.set_blob(*now, bytes);
+            }
+        }
+        for part in &parts {
+            step.remove_before(part.after.rank);
+            step.set_subdomain(&part.after);
+            step.unlist_file(part.after.rank, part.before.generation);
+        }
+        step.set_regions(&regions);
+        step.set_state(StoreState::Sealed);
+        step.append_journal(&journal(StoreState::Sealed, "undo", clock, &[]));
+        Ok(())
+    })?;
+    Ok(ResaturateSummary {
+        parts,
+        pages: PagerStats::default(),
+        frames_used: 0,
+    })
+}
+
+/// Drops the previous version; returns of how many sub-domains there was one. Errors: the disk.
+pub fn forget(catalog: &mut Catalog) -> Result<usize, PipelineError> {
+    let before = Before::of(catalog)?;
+    let n = before.rows.len();
+    if n > 0 {
+        catalog.commit(|step| {
+            before.drop(step);
+            Ok(())
+        })?;
+    }
+    Ok(n)
+}
+
+/// Blobs of which there is a previous version: where they are, where those are.
+const VERSIONED: [(u32, u32); 3] = [
+    (blob::SEALED, blob::SEALED_BEFORE),
+    (blob::FIELD, blob::FIELD_BEFORE),
+    (blob::ASKED, blob::ASKED_BEFORE),
+];
+
+/// The previous version, and the lengths of its blobs.
+struct Before {
+    rows: Vec<SubdomainRow>,
+    blobs: Vec<(u32, usize)>,
+}
+
+impl Before {
+    fn of(catalog: &mut Catalog) -> Result<Self, CatalogError> {
+        let rows = catalog.before()?;
+        let mut blobs = Vec::new();
+        for row in &rows {
+            for (_, then) in VERSIONED {
+                if let Some(bytes) = catalog.blob(then + row.rank)? {
+                    blobs.push((then + row.rank, bytes.len()));
+                }
+            }
+        }
+        Ok(Self { rows, blobs })
+    }
+
+    fn drop(&self, step: &mut crate::catalog::Step) {
+        for row in &self.rows {
+            step.remove_before(row.rank);
+            step.unlist_file(row.rank, row.generation);
+        }
+        for &(number, length) in &self.blobs {
+            step.remove_blob(number, length);
+        }
+    }
+}
+
+/// What was asked for when a sub-domain was last made again with other sizes; `None` for one with those of the whole.
+///
+/// Errors: a damaged catalog.
+pub fn asked(catalog: &mut Catalog, rank: u32) -> Result<Option<String>, CatalogError> {
+    let bytes = catalog.blob(blob::ASKED + rank)?;
+    Ok(bytes.map(|bytes| String::from_utf8_lossy(&bytes).into_owned()))
+}
+
+/// The recorded field of the whole.
+fn whole_field(catalog: &mut Catalog, options: &Options) -> Result<SizeField, PipelineError> {
+    let bytes = catalog.blob(blob::SIZE_FIELD)?.unwrap_or_default();
+    let diagonal = tree::bounds(catalog)?.diagonal();
+    let field = SizeField::from_bytes(&bytes)?;
+    Ok(field.with_sources(&options.sizes()?, diagonal)?)
+}
+
+/// One run.
+struct Again<'a> {
+    catalog: &'a mut Catalog,
+    options: &'a Options,
+    what: &'a Resaturation,
+    /// Of the whole.
+    field: SizeField,
+    /// Rows of what is made again, by rank.
+    rows: Vec<(SubdomainRow, CoarseRow)>,
+    n: u32,
+    clock: Instant,
+}
+
+/// A sub-domain to be made again.
+struct Job {
+    leaf: LeafJob,
+    kept: CoarseRow,
+    path: DiskPath,
+}
+
+impl Job {
+    fn run(self, common: Common, watch: &Watcher) -> Result<Leaf, PipelineError> {
+        attempt(|| {
+            let share = self.leaf.share;
+            let backing = Backing {
+                subdomain: self.kept.rank,
+                generation: self.leaf.generation,
+                work_path: self.leaf.work.clone(),
+                base: None,
+                cache_bytes: share.redb as usize,
+            };
+            let space = Workspace {
+                dir: &self.leaf.scratch,
+                memory: share.buffers / 2,
+            };
+            let cache = (share.redb / 2) as usize;
+            let mut kept = CoarseLeaf::open_at(&self.path, self.kept, cache)?;
+            let mesh = reopen(&mut kept, backing, share.frames, &space)?;
+            drop(kept);
+            self.leaf.finish(mesh, common, watch)
+        })?
+    }
+}
+
+impl<'a> Again<'a> {
+    fn open(
+        catalog: &'a mut Catalog,
+        options: &'a Options,
+        what: &'a Resaturation,
+    ) -> Result<Self, PipelineError> {
+        let clock = Instant::now();
+        let mut rows = Vec::new();
+        for &rank in &what.ranks {
+            let row = catalog.subdomain(rank)?;
+            let kept = catalog.coarse_leaf(rank)?;
+            let kept = kept.ok_or_else(|| CatalogError::NoCoarseLeaf {
+                path: catalog.dir().to_owned(),
+                subdomain: rank,
+            })?;
+            rows.push((row, kept));
+        }
+        Ok(Self {
+            field: whole_field(catalog, options)?,
+            n: tree::n_subdomains(catalog)?,
+            catalog,
+            options,
+            what,
+            rows,
+            clock,
+        })
+    }
+
+    /// The field of each sub-domain that is made again; `None` for that of the whole.
+    fn fields(
+        &mut self,
+        budget: &Budget,
+    ) -> Result<BTreeMap<u32, Option<SizeField>>, PipelineError> {
+        let recorded = Recorded { whole: &self.field };
+        let memory = budget.available() / 4;
+        let mut fields = BTreeMap::new();
+        if let Some(values) = self.what.sizes.as_ref().and_then(|s| s.values.as_ref()) {
+            self.count(values)?;
+        }
+        let mut from = 0;
+        for (row, _) in &self.rows {
+            let field = match &self.what.sizes {
+                Some(sizes) => {
+                    let made = recorded.made_new(self.catalog, row.rank, sizes, from, memory)?;
+                    from += row.tets as usize;
+                    Some(made)
+                }
+                None => recorded.own(self.catalog, row.rank)?,
+            };
+            fields.insert(row.rank, field);
+        }
+        Ok(fields)
+    }
+
+    /// Refuses lengths that are not one for each.
+    fn count(&self, values: &Values) -> Result<(), PipelineError> {
+        let tets: u64 = self.rows.iter().map(|(row, _)| row.tets).sum();
+        let vertices = match &self.rows[..] {
+            [(row, _)] => row.vertices,
+            _ => 0,
+        };
+        let (found, expected) = match values {
+            Values::Tets(h) => (h.len() as u64, tets),
+            Values::Vertices(h) => (h.len() as u64, vertices),
+        };
+        match found == expected {
+            true => Ok(()),
+            false => Err(PipelineError::SizeCount {
+                found,
+                tets,
+                vertices,
+            }),
+        }
+    }
+
+    fn run(
+        &mut self,
+        fields: BTreeMap<u32, Option<SizeField>>,
+        budget: &Budget,
+        watch: &Watcher,
+    ) -> Result<ResaturateSummary, PipelineError> {
+        let of = |field: &SizeField| field.bytes() as u64;
+        let own: u64 = fields.values().flatten().map(of).sum();
+        let asked = self.what.sizes.as_ref().and_then(|s| s.field.as_ref());
+        // Those of the sub-domains are held as bytes, too, until they are committed.
+        let held = 2 * own + of(&self.field) + asked.map_or(0, of);
+        let _fields = budget.lease(held, "the size fields")?;
+        let plan = Plan::new(budget.cap(), held)?;
+        let leased = plan.frames + plan.redb + plan.redb / 2 + plan.buffers;
+        let _lease = budget.lease(leased, "the working mesh")?;
+        let bounds = tree::bounds(self.catalog)?;
+        let workers = plan.workers().min(self.rows.len()).max(1);
+        let share = plan.shared_by(workers as u64);
+        let (mut jobs, mut made) = (Vec::with_capacity(self.rows.len()), BTreeMap::new());
+        for (rank, field) in fields.into_iter().rev() {
+            if let (Some(field), true) = (&field, self.what.sizes.is_some()) {
+                made.insert(rank, field.to_bytes());
+            }
+            jobs.push(self.job(rank, field, share)?);
+        }
+        let common = Common {
+            field: &self.field,
+            mode: self.options.mode()?,
+            cutting: self.options.cutting,
+            bounds,
+        };
+        let mut leaves = BTreeMap::new();
+        crew(
+            jobs,
+            workers,
+            watch,
+            &|job: Job, watch| job.run(common, watch).map(Box::new),
+            &mut |leaf| {
+                leaf.remove_work()?;
+                leaves.insert(leaf.sealed.row.rank, *leaf);
+                Ok(Vec::new())
+            },
+        )?;
+        self.commit(leaves, &made)
+    }
+
+    fn job(
+        &mut self,
+        rank: u32,
+        field: Option<SizeField>,
+        share: Plan,
+    ) -> Result<Job, PipelineError> {
+        let part = Part {
+            first: rank,
+            count: 1,
+        };
+        let mut owners = BTreeMap::new();
+        for cut in part.cuts_above(self.n) {
+            owners.insert(cut, read_owners(self.catalog, cut)?);
+        }
+        // The faces of cuts stay; with sizes of its own a sub-domain may be refined up to them.
+        let zones = match field {
+            Some(_) => Vec::new(),
+            None => tree::zones_above(self.catalog, part, self.n)?,
+        };
+        let kept = self.rows.iter().find(|(row, _)| row.rank == rank);
+        let kept = kept.expect("asked for").1;
+        let files = self.catalog.files()?;
+        let generations = (files.iter().filter(|f| f.subdomain == rank)).map(|f| f.generation);
+        let last = generations.max().unwrap_or(0);
+        let scratch = self.catalog.scratch_dir()?.join(format!("leaf-{rank}"));
+        scratch.create_dir_all()?;
+        let parts = tree::parts(self.catalog, self.n)?;
+        let leaf = LeafJob {
+            part: parts[rank as usize],
+            base: self.catalog.coarse_path(rank, kept.generation),
+            work: self.catalog.file_path(rank, last + 1),
+            sealed: self.catalog.file_path(rank, last + 2),
+            generation: last + 2,
+            field,
+            kept: None,
+            scratch,
+            zones,
+            owners,
+            share,
+        };
+        Ok(Job {
+            leaf,
+            kept,
+            path: self.catalog.coarse_path(rank, kept.generation),
+        })
+    }
+
+    fn commit(
+        &mut self,
+        leaves: BTreeMap<u32, Leaf>,
+        made: &BTreeMap<u32, Vec<u8>>,
+    ) -> Result<ResaturateSummary, PipelineError> {
+        let (mut totals, mut old_blobs) = (BTreeMap::new(), Vec::new());
+        for (row, _) in &self.rows {
+            let (rank, sealed) = (row.rank, &leaves[&row.rank].sealed);
+            assert_eq!(
+                sealed.row.interface_digest, row.interface_digest,
+                "the interfaces of sub-domain {rank} have changed"
+            );
+            if self.what.repair && sealed.row.digest != row.digest {
+                return Err(CatalogError::Content {
+                    path: self.catalog.dir().to_owned(),
+                    subdomain: rank,
+                    what: "made again it is not what the catalog says it was".to_owned(),
+                }
+                .into());
+            }
+            totals.insert(rank, SealedTotals::of(sealed));
+            for (now, then) in VERSIONED {
+                old_blobs.push((then + rank, self.catalog.blob(now + rank)?));
+            }
+        }
+        let (regions, _) = whole(self.catalog, self.n, &totals)?;
+        let dropped = Before::of(self.catalog)?;
+        let (what, rows, clock) = (self.what, &self.rows, self.clock);
+        let asked = what.sizes.as_ref().map(|sizes| sizes.asked.as_bytes());
+        let step_name = match what.repair {
+            true => "repair",
+            false => "resaturate",
+        };
+        self.catalog.commit(|step| {
+            if !what.repair {
+                dropped.drop(step);
+                for (number, bytes) in &old_blobs {
+                    if let Some(bytes) = bytes {
+                        step.set_blob(*number, bytes);
+                    }
+                }
+            }
+            for (row, _) in rows {
+                let (rank, leaf) = (row.rank, &leaves[&row.rank]);
+                step.list_file(rank, leaf.generation);
+                step.set_subdomain(&leaf.sealed.row);
+                step.set_blob(blob::SEALED + rank, &totals[&rank].to_bytes());
+                match what.repair {
+                    true => step.unlist_file(rank, row.generation),
+                    false => step.set_before(row),
+                }
+                if let (Some(field), Some(asked)) = (made.get(&rank), asked) {
+                    step.set_blob(blob::FIELD + rank, field);
+                    step.set_blob(blob::ASKED + rank, asked);
+                }
+                let refine = &leaf.fine.refine;
+                let measures = [
+                    ("tets_before", row.tets as f64),
+                    ("tets", leaf.sealed.row.tets as f64),
+                    ("inserted_vertices", refine.inserted as f64),
+                    ("frozen_hits", refine.frozen_hits as f64),
+                    ("pages_read", leaf.pages.pages_read as f64),
+                    ("pages_written", leaf.pages.pages_written as f64),
+                ];
+                let since = if leaves.len() == 1 { clock } else { leaf.clock };
+                let mut journal = journal(StoreState::Sealed, step_name, since, &measures);
+                journal.subdomain = Some(rank);
+                step.append_journal(&journal);
+            }
+            step.set_regions(&regions);
+            step.set_state(StoreState::Sealed);
+            Ok(())
+        })?;
+        if let Ok(scratch) = self.catalog.scratch_dir() {
+            // Nothing in it counts.
+            let _ = scratch.remove_dir_all();
+        }
+        let mut summary = ResaturateSummary {
+            parts: Vec::new(),
+            pages: PagerStats::default(),
+            frames_used: 0,
+        };
+        for ((before, _), leaf) in self.rows.iter().zip(leaves.into_values()) {
+            summary.pages.add(leaf.pages);
+            summary.frames_used = summary.frames_used.max(leaf.frames_used);
+            summary.parts.push(Remade {
+                before: before.clone(),
+                after: leaf.sealed.row,
+                fine: Some(leaf.fine),
+            });
+        }
+        Ok(summary)
+    }
+}
