@@ -151,7 +151,11 @@ impl CoarseLeaf {
     /// Opens the leaf that `row` tells of at `path`.
     ///
     /// Errors: damage.
-    pub fn open_at(path: &DiskPath, row: CoarseRow, cache_bytes: usize) -> Result<Self, CatalogError> {
+    pub fn open_at(
+        path: &DiskPath,
+        row: CoarseRow,
+        cache_bytes: usize,
+    ) -> Result<Self, CatalogError> {
         if !path.is_file() {
             return Err(CatalogError::Content {
                 path: path.path().to_owned(),
