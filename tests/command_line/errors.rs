@@ -18,6 +18,8 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("stopped", "crash.rs"),
     ("surface-changed", "below"),
     ("size-field-changed", "size_files.rs"),
+    ("no-coarse-leaf", "resaturate.rs"),
+    ("nothing-to-undo", "resaturate.rs"),
     ("invalid-mesh", "below"),
 ];
 

@@ -1,7 +1,9 @@
 //! Chunks come back; damage is an error, never a panic.
 
 use super::*;
-use crate::record::{InterfaceFace, SealedFacet, SealedTet, SealedVertex};
+use crate::record::{
+    CoarseFace, CoarseTet, CoarseVertex, Facet, InterfaceFace, SealedFacet, SealedTet, SealedVertex,
+};
 
 /// Deterministic pseudo-random numbers.
 fn random(seed: u64) -> impl FnMut() -> u64 {
@@ -67,6 +69,64 @@ fn faces(n: u32) -> Vec<InterfaceFace> {
         .collect()
 }
 
+/// Of a coarse leaf: any even turn of the nodes, in any order.
+fn coarse_tets(n: u32) -> Vec<CoarseTet> {
+    let mut next = random(3);
+    (tets(n).into_iter().enumerate())
+        .map(|(i, tet)| {
+            let [a, b, c, d] = tet.nodes;
+            // Nodes of a tetrahedron differ.
+            let nodes = [a, b, c + 50, d + 100];
+            let [a, b, c, d] = nodes;
+            let turned = [
+                nodes,
+                [b, a, d, c],
+                [c, d, a, b],
+                [b, c, a, d],
+                [d, a, c, b],
+            ];
+            CoarseTet {
+                nodes: turned[(next() % 5) as usize],
+                bits: next() as u8 & 0x93,
+                region: tet.region,
+                flags: u32::from(i % 40 == 0),
+            }
+        })
+        .collect()
+}
+
+fn coarse_vertices(n: u32) -> Vec<CoarseVertex> {
+    (vertices(n).into_iter())
+        .map(|v| CoarseVertex {
+            point: v.point,
+            tag: v.tag | v.tag << 7,
+            owner: v.id as u32,
+        })
+        .collect()
+}
+
+fn coarse_facets(n: u32) -> Vec<Facet> {
+    (facets(n).into_iter())
+        .map(|f| Facet {
+            vertices: f.vertices,
+            label: f.label,
+            triangle: f.triangle,
+            regions: f.regions,
+        })
+        .collect()
+}
+
+fn coarse_faces(n: u32) -> Vec<CoarseFace> {
+    (faces(n).into_iter())
+        .map(|f| CoarseFace {
+            vertices: f.vertices,
+            cut: f.cut,
+            index: f.index,
+            side: f.cut & 1,
+        })
+        .collect()
+}
+
 fn pack<R: ChunkRecord>(records: &[R]) -> Vec<Packed<R>> {
     let mut packer = Packer::new(5, 2).expect("a zstd context");
     let mut chunks = Vec::new();
@@ -99,6 +159,10 @@ fn every_kind_comes_back() {
         come_back(&vertices(n));
         come_back(&facets(n));
         come_back(&faces(n));
+        come_back(&coarse_tets(n));
+        come_back(&coarse_vertices(n));
+        come_back(&coarse_facets(n));
+        come_back(&coarse_faces(n));
     }
     let summary = TetSummary {
         bounds: [[0.1; 3], [0.9; 3]],

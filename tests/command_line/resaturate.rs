@@ -1,0 +1,395 @@
+//! Sub-domains of a finished store can be made again, and nothing else changes.
+//!
+//! Why: whoever wants a finer place in a large mesh must not wait for all of it, nor lose what he has; whoever's disk lost a
+//! file must not mesh again.
+//! How: one small store in four parts, copied for each case; digests, sizes of edges and qualities before and after.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::time::Duration;
+
+use serde_json::Value;
+use tetdb::catalog::Store;
+use tetdb_schema::record::tag;
+
+use super::place::{Done, Place};
+
+const MESH: &str = "mesh sample:box,h=0.045 -o a.tetdb --subdomains 4 --no-verify";
+
+fn made() -> Place {
+    let place = Place::new();
+    place.run_line(MESH).succeeds();
+    place
+}
+
+fn info(place: &Place) -> Value {
+    place.run_line("info a.tetdb --json").succeeds().json()
+}
+
+/// One word of each sub-domain.
+fn each(info: &Value, key: &str) -> Vec<String> {
+    let parts = info["subdomains"].as_array().expect("a list");
+    parts.iter().map(|part| part[key].to_string()).collect()
+}
+
+fn verifies(place: &Place) {
+    place.run_line("verify a.tetdb --full").succeeds();
+}
+
+fn refuses(done: &Done, code: &str, exit: i32) {
+    let error = done.error();
+    assert_eq!(
+        (error["code"].as_str(), done.exit()),
+        (Some(code), Some(exit)),
+        "{error}"
+    );
+    assert!(error["help"].as_str().is_some_and(|help| !help.is_empty()));
+}
+
+/// Ranks whose digests differ.
+fn changed(before: &Value, after: &Value) -> BTreeSet<usize> {
+    assert_eq!(
+        each(before, "interface_digest"),
+        each(after, "interface_digest")
+    );
+    assert_eq!(before["interfaces"], after["interfaces"]);
+    let pairs = each(before, "digest")
+        .into_iter()
+        .zip(each(after, "digest"));
+    (pairs.enumerate())
+        .filter(|(_, (a, b))| a != b)
+        .map(|(rank, _)| rank)
+        .collect()
+}
+
+#[test]
+fn without_options_the_mesh_is_the_same_whatever_the_machine() {
+    let place = made();
+    let before = info(&place);
+    assert!(before["coarse_bytes"].as_u64().is_some_and(|b| b > 0));
+    for options in ["--threads 1 --memory 64MiB", "--threads 2"] {
+        let line = format!("resaturate a.tetdb --subdomain 0,1,2,3 {options} --json");
+        let answer = place.run_line(&line).succeeds().json();
+        assert_eq!(answer["digest"], before["digest"]);
+        assert_eq!(answer["subdomains"].as_array().map(Vec::len), Some(4));
+        assert!(changed(&before, &info(&place)).is_empty());
+    }
+    let line = "resaturate a.tetdb --subdomain 2 --refine-by 0.7 --json --threads";
+    let digest = |options: &str| {
+        let answer = place
+            .run_line(&format!("{line} {options}"))
+            .succeeds()
+            .json();
+        place.run_line("resaturate a.tetdb --undo").succeeds();
+        answer["digest"].clone()
+    };
+    assert_eq!(digest("1 --memory 64MiB"), digest("2 --memory 1GiB"));
+    assert_eq!(info(&place)["digest"], before["digest"]);
+}
+
+#[test]
+fn half_the_size_changes_one_part_only_and_can_be_undone() {
+    let place = made();
+    let before = info(&place);
+    let line = "resaturate a.tetdb --subdomain 1 --refine-by 0.5";
+    let list = place
+        .run_line(&format!("{line} --dry-run --json"))
+        .succeeds();
+    let predicted = list.json()["subdomains"][0]["predicted_tets"].as_f64();
+    place.run_line(line).succeeds();
+    verifies(&place);
+    let after = info(&place);
+    assert_eq!(changed(&before, &after), BTreeSet::from([1]));
+    let tets = after["subdomains"][1]["tets"].as_f64().expect("a number");
+    let ratio = predicted.expect("a number") / tets;
+    assert!((0.8..1.25).contains(&ratio), "{ratio} of {tets}");
+    let sum: f64 = after["regions"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .map(|r| r["tets"].as_f64().unwrap_or_default())
+        .sum();
+    assert_eq!(sum, after["tets"].as_f64().expect("a number"));
+    assert!(after["subdomains"][1]["sizes"]["refine_by"] == "0.5");
+    let median = metric_median(&place, 1);
+    assert!((0.9..1.1).contains(&median), "{median}");
+    let good = |info: &Value| {
+        let bins = info["subdomains"][1]["quality"]["bins"]
+            .as_array()
+            .expect("a list")
+            .clone();
+        let bins: Vec<f64> = bins.iter().filter_map(Value::as_f64).collect();
+        100.0 * bins[0] / bins.iter().sum::<f64>()
+    };
+    assert!(
+        (good(&after) - good(&before)).abs() < 0.5,
+        "{} {}",
+        good(&before),
+        good(&after)
+    );
+    // Made again as it is now, with nothing said of sizes.
+    place
+        .run_line("resaturate a.tetdb --subdomain 1")
+        .succeeds();
+    assert!(changed(&after, &info(&place)).is_empty());
+    // Only the last change can be undone: it changed nothing.
+    place.run_line("resaturate a.tetdb --undo").succeeds();
+    assert_eq!(info(&place)["digest"], after["digest"]);
+    refuses(
+        &place.run_line("resaturate a.tetdb --undo --json"),
+        "nothing-to-undo",
+        8,
+    );
+    place.run_line(line).succeeds();
+    place.run_line("resaturate a.tetdb --undo").succeeds();
+    assert_eq!(info(&place)["digest"], after["digest"]);
+    verifies(&place);
+    place.run_line(line).succeeds();
+    let files = || {
+        place
+            .names()
+            .iter()
+            .filter(|n| n.contains("/subdomain-"))
+            .count()
+    };
+    assert_eq!(files(), 5);
+    place.run_line("resaturate a.tetdb --forget").succeeds();
+    assert_eq!(files(), 4);
+    refuses(
+        &place.run_line("resaturate a.tetdb --undo --json"),
+        "nothing-to-undo",
+        8,
+    );
+}
+
+/// The median length of edges in units of the lengths wanted at their ends, of those farther than twice that from all faces that stay.
+fn metric_median(place: &Place, rank: u32) -> f64 {
+    let mut store = Store::open(place.path("a.tetdb")).expect("a finished store");
+    let mut part = store.subdomain(rank).expect("a sealed sub-domain");
+    let vertices: Vec<_> = part.vertices().map(|v| v.expect("no damage")).collect();
+    let skin: Vec<[f64; 3]> = (vertices.iter())
+        .filter(|v| v.tag == tag::SURFACE || v.tag == tag::INTERFACE)
+        .map(|v| v.point)
+        .collect();
+    let distance = |a: [f64; 3], b: [f64; 3]| {
+        let squares = (0..3).map(|i| (a[i] - b[i]).powi(2));
+        squares.sum::<f64>().sqrt()
+    };
+    let inner: Vec<bool> = (vertices.iter())
+        .map(|v| {
+            let near = |p: &[f64; 3]| distance(*p, v.point) < 2.5 * f64::from(v.h);
+            !skin.iter().any(near)
+        })
+        .collect();
+    let mut edges = BTreeSet::new();
+    for tet in part.tets() {
+        let nodes = tet.expect("no damage").1.nodes;
+        for (i, j) in [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)] {
+            edges.insert((nodes[i].min(nodes[j]), nodes[i].max(nodes[j])));
+        }
+    }
+    let mut lengths: Vec<f64> = (edges.into_iter())
+        .filter(|&(a, b)| inner[a as usize] && inner[b as usize])
+        .map(|(a, b)| {
+            let (a, b) = (&vertices[a as usize], &vertices[b as usize]);
+            distance(a.point, b.point) * 0.5 * f64::from(1.0 / a.h + 1.0 / b.h)
+        })
+        .collect();
+    assert!(lengths.len() > 1000, "{} edges", lengths.len());
+    lengths.sort_unstable_by(f64::total_cmp);
+    lengths[lengths.len() / 2]
+}
+
+#[test]
+fn only_what_a_size_reaches_is_changed() {
+    let place = made();
+    let before = info(&place);
+    let corner = "--size-sphere 0,0,0,0.1,0.02";
+    let line = format!("resaturate a.tetdb --changed {corner} --dry-run --json");
+    let list = place.run_line(&line).succeeds().json();
+    let ids: Vec<usize> = (list["subdomains"].as_array().expect("a list").iter())
+        .filter_map(|f| f["id"].as_u64())
+        .map(|id| id as usize)
+        .collect();
+    assert!(!ids.is_empty() && ids.len() < 4, "{list}");
+    assert_eq!(
+        info(&place)["digest"],
+        before["digest"],
+        "a dry run writes nothing"
+    );
+    place
+        .run_line(&format!("resaturate a.tetdb --changed {corner}"))
+        .succeeds();
+    let after = info(&place);
+    assert_eq!(changed(&before, &after), ids.iter().copied().collect());
+    assert!(after["tets"].as_u64() > before["tets"].as_u64());
+    // The same again: nothing would be another.
+    let again = place.run_line(&format!("resaturate a.tetdb --changed {corner} --json"));
+    assert_eq!(
+        again.succeeds().json()["subdomains"],
+        Value::Array(Vec::new())
+    );
+}
+
+/// The file of a sub-domain that counts.
+fn sealed(place: &Place, rank: u32) -> std::path::PathBuf {
+    let start = format!("a.tetdb/subdomain-{rank:05}-");
+    let name = place.names().into_iter().find(|n| n.starts_with(&start));
+    place.path(&name.expect("a sealed sub-domain has a file"))
+}
+
+#[test]
+fn a_damaged_part_is_made_again_from_its_coarse_leaf() {
+    let place = made();
+    let before = info(&place);
+    place.run_line("resaturate a.tetdb --repair").succeeds();
+    // A chunk, all of the file, no file.
+    for damage in 0..3 {
+        let file = sealed(&place, 2);
+        let mut bytes = std::fs::read(&file).expect("the file is readable");
+        let chunk = bytes
+            .windows(4)
+            .position(|w| w == b"TETC")
+            .expect("a chunk");
+        match damage {
+            0 => bytes[chunk + 100] ^= 1,
+            1 => bytes[..4096].fill(0xff),
+            _ => {}
+        }
+        match damage {
+            2 => std::fs::remove_file(&file).expect("the file can be removed"),
+            _ => std::fs::write(&file, &bytes).expect("the file is writable"),
+        }
+        let done = place.run_line("verify a.tetdb --json");
+        refuses(&done, "damaged", 4);
+        let error = done.error();
+        assert!(
+            error["message"]
+                .as_str()
+                .is_some_and(|m| m.contains("00002")),
+            "{error}"
+        );
+        assert!(
+            error["help"]
+                .as_str()
+                .is_some_and(|h| h.contains("--repair")),
+            "{error}"
+        );
+        place.run_line("resaturate a.tetdb --repair").succeeds();
+        verifies(&place);
+        assert_eq!(info(&place)["digest"], before["digest"]);
+    }
+    // Of a sub-domain with sizes of its own, too.
+    place
+        .run_line("resaturate a.tetdb --subdomain 2 --refine-by 0.8")
+        .succeeds();
+    place.run_line("resaturate a.tetdb --forget").succeeds();
+    let finer = info(&place);
+    std::fs::remove_file(sealed(&place, 2)).expect("the file can be removed");
+    place
+        .run_line("resaturate a.tetdb --repair --subdomain 2")
+        .succeeds();
+    assert_eq!(info(&place)["digest"], finer["digest"]);
+}
+
+#[test]
+fn a_killed_change_leaves_old_or_new() {
+    let place = made();
+    let before = info(&place)["digest"].clone();
+    let line = "resaturate a.tetdb --subdomain 0,3 --refine-by 0.6 --no-verify";
+    place.run_line(line).succeeds();
+    let after = info(&place)["digest"].clone();
+    place
+        .run_line("resaturate a.tetdb --undo --no-verify")
+        .succeeds();
+    assert_eq!(info(&place)["digest"], before);
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let mut n_old = 0;
+    for millis in [0, 60, 250, 700] {
+        let mut child = place.command(&words).spawn().expect("the program starts");
+        std::thread::sleep(Duration::from_millis(millis));
+        child.kill().expect("the child can be killed");
+        child.wait().expect("the child can be waited for");
+        // A killed writer's lock goes with it.
+        let found = info(&place)["digest"].clone();
+        assert!(
+            found == before || found == after,
+            "{found} after {millis} ms"
+        );
+        verifies(&place);
+        if found == before {
+            n_old += 1;
+            place.run_line(line).succeeds();
+            assert_eq!(info(&place)["digest"], after);
+        }
+        place
+            .run_line("resaturate a.tetdb --undo --no-verify")
+            .succeeds();
+        assert_eq!(info(&place)["digest"], before);
+    }
+    assert!(n_old > 0, "every run was done before it was killed");
+}
+
+#[test]
+fn what_cannot_be_made_again_is_told() {
+    let place = made();
+    let line = |rest: &str| place.run_line(&format!("resaturate a.tetdb --json {rest}"));
+    refuses(&line(""), "usage", 2);
+    refuses(&line("--changed"), "usage", 2);
+    refuses(&line("--undo --hsiz 1"), "usage", 2);
+    refuses(&line("--undo"), "nothing-to-undo", 8);
+    refuses(&line("--subdomain 7"), "no-such-part", 3);
+    refuses(&line("--subdomain 1 --refine-by 0"), "bad-size", 2);
+    refuses(&line("--subdomain 1 --hsiz -1"), "usage", 2);
+    refuses(&line("--subdomain 1 --hmin 2 --hmax 1"), "bad-size", 2);
+    refuses(
+        &line("--subdomain 1 --size-field none.npy"),
+        "unreadable-file",
+        3,
+    );
+    let npy = |shape: &str, values: &[f64]| {
+        let head = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}\n");
+        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+        bytes.extend((head.len() as u16).to_le_bytes());
+        bytes.extend(head.as_bytes());
+        bytes.extend(values.iter().flat_map(|h| h.to_le_bytes()));
+        place.write("h.npy", bytes);
+    };
+    npy("(2,)", &[0.1, 0.2]);
+    let file = "--subdomain 1 --size-field h.npy";
+    refuses(&line(file), "count-mismatch", 3);
+    refuses(&line(&format!("{file} --hsiz 1")), "usage", 2);
+    npy("(2,)", &[0.1, -0.2]);
+    refuses(&line(file), "unexpected-text", 3);
+    npy("(1, 2)", &[0.1, 0.2]);
+    refuses(&line(file), "unexpected-text", 3);
+    // Without coarse leaves the mesh is the same, and final.
+    let digest = place.digest("a.tetdb");
+    place
+        .run_line(&format!("{MESH} --drop-coarse --force"))
+        .succeeds();
+    assert_eq!(place.digest("a.tetdb"), digest);
+    assert_eq!(info(&place)["coarse_bytes"], 0);
+    refuses(&line("--subdomain 1"), "no-coarse-leaf", 8);
+    assert!(!place.names().iter().any(|name| name.contains("coarse-")));
+    // What is not finished is not made again.
+    let words = [
+        "mesh",
+        "sample:balls,count=12",
+        "-o",
+        "b.tetdb",
+        "--threads",
+        "1",
+    ];
+    let mut child = place.command(&words).spawn().expect("the program starts");
+    while !Path::new(&place.path("b.tetdb/catalog.redb")).exists() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    child.kill().expect("the child can be killed");
+    child.wait().expect("the child can be waited for");
+    refuses(
+        &place.run_line("resaturate b.tetdb --subdomain 0 --json"),
+        "store-unfinished",
+        8,
+    );
+}
