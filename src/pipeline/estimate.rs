@@ -22,8 +22,12 @@ const DELAUNAY: f64 = 1.025;
 const SEALED_TET: f64 = 2.74;
 const SEALED_VERTEX: f64 = 22.1;
 const SEALED_FACET: f64 = 10.0;
-/// The least file of a sub-domain, and the catalog without its size field: redb's own pages.
+/// Bytes of the coarse leaves for each triangle, and for each tetrahedron of the refined zones: 14 to 20, and 8 to 10.
+const KEPT_TRIANGLE: f64 = 18.0;
+const KEPT_ZONE_TET: f64 = 9.0;
+/// The least file of a sub-domain, of a coarse leaf, and the catalog without its size field: redb's own pages.
 const FILE_LEAST: f64 = 50e3;
+const COARSE_FILE_LEAST: f64 = 30e3;
 const CATALOG_LEAST: f64 = 100e3;
 /// Bytes of the coarse mesh on disk for each triangle: 120 to 130.
 const COARSE_TRIANGLE: f64 = 126.0;
@@ -65,6 +69,8 @@ pub struct Estimate {
     /// Bytes of surface and size field, held all the time.
     pub held_bytes: u64,
     field_bytes: u64,
+    /// Whether the coarse leaves stay in the store.
+    keeps_coarse: bool,
 }
 
 /// A size field and what it makes expect: everything before the first step.
@@ -152,6 +158,7 @@ impl Estimate {
             subdomains_asked,
             held_bytes: (surface.bytes() + field.bytes()) as u64,
             field_bytes: field.bytes() as u64,
+            keeps_coarse: !options.drop_coarse,
         })
     }
 
@@ -165,7 +172,16 @@ impl Estimate {
             + SEALED_VERTEX * self.vertices
             + SEALED_FACET * self.triangles as f64;
         let files = FILE_LEAST * f64::from(self.subdomains) + CATALOG_LEAST;
-        (sealed + files) as u64 + self.field_bytes
+        (sealed + files) as u64 + self.field_bytes + self.coarse_bytes()
+    }
+
+    /// Bytes of the coarse leaves in it.
+    fn coarse_bytes(&self) -> u64 {
+        if !self.keeps_coarse {
+            return 0;
+        }
+        let files = COARSE_FILE_LEAST * f64::from(self.subdomains);
+        (KEPT_TRIANGLE * self.triangles as f64 + KEPT_ZONE_TET * self.zone_tets() + files) as u64
     }
 
     /// Most bytes on disk while it is made with `cap` bytes of memory by so many threads.

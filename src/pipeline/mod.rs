@@ -6,8 +6,12 @@
 //! | `divide` | bisected | as often as there are sub-domains less one: refine a band, choose the interface, write two children |
 //! | `leaf` | sealed | each sub-domain alone: divide edges; optimize; sort, compress and seal |
 //!
+//! A finished store goes on: `resaturate` makes sub-domains again from their coarse leaves, with other sizes (`sizes`) or because they
+//! are damaged; `before` brings back what was.
+//!
 //! It receives a surface, not a path, and prints nothing: it tells a [`Watcher`] what goes on.
 
+mod before;
 mod coarse;
 mod crew;
 mod divide;
@@ -26,6 +30,7 @@ mod sizes;
 mod tree;
 mod watch;
 
+pub use before::{forget, undo};
 pub use coarse::{CoarseReport, coarse as coarse_mesh};
 pub use error::PipelineError;
 pub use estimate::{Estimate, Prepared, prepare};
@@ -33,8 +38,7 @@ pub use fine::FineReport;
 pub use options::Options;
 pub use plan::{MEMORY_MIN, Plan};
 pub use resaturate::{
-    Forecast, Remade, ResaturateSummary, Resaturation, asked, changed, forecast, forget,
-    resaturate, undo,
+    Forecast, Remade, ResaturateSummary, Resaturation, asked, changed, forecast, resaturate,
 };
 pub use run::{Summary, mesh, mesh_prepared};
 pub use sizes::{NewSizes, Values};

@@ -6,18 +6,19 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Instant;
 
+use super::before::{Before, VERSIONED};
 use super::crew::crew;
 use super::divide::read_owners;
 use super::keep::reopen;
 use super::leaf::{Common, Leaf, LeafJob, SealedTotals};
-use super::run::{journal, totals_of, whole};
+use super::run::{journal, whole};
 use super::sizes::{NewSizes, Recorded, Values, predicted};
 use super::tree::{self, Part, blob};
 use super::watch::Watcher;
 use super::{FineReport, Options, PipelineError, Plan};
 use crate::catalog::{Catalog, CatalogError, CoarseLeaf, CoarseRow, StoreState, SubdomainRow};
 use crate::mesh::Workspace;
-use crate::sizing::SizeField;
+use crate::sizing::{BackgroundMesh, SizeField};
 use crate::store::{Backing, Budget, DiskPath, PagerStats, attempt};
 
 /// What to make again.
@@ -126,111 +127,6 @@ pub fn changed(
     Ok(ranks)
 }
 
-/// Brings back what the sub-domains of the last change were before it, in one step.
-///
-/// Errors: [`PipelineError::NothingToUndo`].
-pub fn undo(catalog: &mut Catalog) -> Result<ResaturateSummary, PipelineError> {
-    let clock = Instant::now();
-    let before = catalog.before()?;
-    if before.is_empty() {
-        return Err(PipelineError::NothingToUndo {
-            path: catalog.dir().to_owned(),
-        });
-    }
-    let n = tree::n_subdomains(catalog)?;
-    let (mut parts, mut totals, mut blobs) = (Vec::new(), BTreeMap::new(), Vec::new());
-    for row in before {
-        let rank = row.rank;
-        totals.insert(rank, totals_of(catalog, blob::SEALED_BEFORE, rank)?);
-        for (now, then) in VERSIONED {
-            let old = catalog.blob(then + rank)?;
-            let new = catalog.blob(now + rank)?;
-            blobs.push(([now + rank, then + rank], old, new));
-        }
-        parts.push(Remade {
-            before: catalog.subdomain(rank)?,
-            after: row,
-            fine: None,
-        });
-    }
-    let (regions, _) = whole(catalog, n, &totals)?;
-    catalog.commit(|step| {
-        for ([now, then], old, new) in &blobs {
-            let length = |blob: &Option<Vec<u8>>| blob.as_ref().map_or(0, Vec::len);
-            step.remove_blob(*now, length(new));
-            step.remove_blob(*then, length(old));
-            if let Some(bytes) = old {
-                step.set_blob(*now, bytes);
-            }
-        }
-        for part in &parts {
-            step.remove_before(part.after.rank);
-            step.set_subdomain(&part.after);
-            step.unlist_file(part.after.rank, part.before.generation);
-        }
-        step.set_regions(&regions);
-        step.set_state(StoreState::Sealed);
-        step.append_journal(&journal(StoreState::Sealed, "undo", clock, &[]));
-        Ok(())
-    })?;
-    Ok(ResaturateSummary {
-        parts,
-        pages: PagerStats::default(),
-        frames_used: 0,
-    })
-}
-
-/// Drops the previous version; returns of how many sub-domains there was one. Errors: the disk.
-pub fn forget(catalog: &mut Catalog) -> Result<usize, PipelineError> {
-    let before = Before::of(catalog)?;
-    let n = before.rows.len();
-    if n > 0 {
-        catalog.commit(|step| {
-            before.drop(step);
-            Ok(())
-        })?;
-    }
-    Ok(n)
-}
-
-/// Blobs of which there is a previous version: where they are, where those are.
-const VERSIONED: [(u32, u32); 3] = [
-    (blob::SEALED, blob::SEALED_BEFORE),
-    (blob::FIELD, blob::FIELD_BEFORE),
-    (blob::ASKED, blob::ASKED_BEFORE),
-];
-
-/// The previous version, and the lengths of its blobs.
-struct Before {
-    rows: Vec<SubdomainRow>,
-    blobs: Vec<(u32, usize)>,
-}
-
-impl Before {
-    fn of(catalog: &mut Catalog) -> Result<Self, CatalogError> {
-        let rows = catalog.before()?;
-        let mut blobs = Vec::new();
-        for row in &rows {
-            for (_, then) in VERSIONED {
-                if let Some(bytes) = catalog.blob(then + row.rank)? {
-                    blobs.push((then + row.rank, bytes.len()));
-                }
-            }
-        }
-        Ok(Self { rows, blobs })
-    }
-
-    fn drop(&self, step: &mut crate::catalog::Step) {
-        for row in &self.rows {
-            step.remove_before(row.rank);
-            step.unlist_file(row.rank, row.generation);
-        }
-        for &(number, length) in &self.blobs {
-            step.remove_blob(number, length);
-        }
-    }
-}
-
 /// What was asked for when a sub-domain was last made again with other sizes; `None` for one with those of the whole.
 ///
 /// Errors: a damaged catalog.
@@ -327,9 +223,14 @@ impl<'a> Again<'a> {
         let recorded = Recorded { whole: &self.field };
         let memory = budget.available() / 4;
         let mut fields = BTreeMap::new();
-        if let Some(values) = self.what.sizes.as_ref().and_then(|s| s.values.as_ref()) {
+        let values = self.what.sizes.as_ref().and_then(|s| s.values.as_ref());
+        if let Some(values) = values {
             self.count(values)?;
         }
+        let _lease = match &self.what.sizes {
+            Some(_) => Some(budget.lease(self.field_bytes(values), "building size fields")?),
+            None => None,
+        };
         let mut from = 0;
         for (row, _) in &self.rows {
             let field = match &self.what.sizes {
@@ -343,6 +244,21 @@ impl<'a> Again<'a> {
             fields.insert(row.rank, field);
         }
         Ok(fields)
+    }
+
+    /// What it takes to build one field after the other.
+    fn field_bytes(&self, values: Option<&Values>) -> u64 {
+        /// Bytes of the octree while it is built, for each face of a skin.
+        const SKIN_FACE: u64 = 300;
+        let one = |(row, kept): &(SubdomainRow, CoarseRow)| {
+            let skin = 24 * kept.vertices + SKIN_FACE * (kept.facets + kept.interface_faces);
+            match values {
+                Some(_) => skin + BackgroundMesh::bytes(row.vertices, row.tets),
+                None => skin,
+            }
+        };
+        let most = self.rows.iter().map(one).max().unwrap_or(0);
+        most + values.map_or(0, Values::bytes)
     }
 
     /// Refuses lengths that are not one for each.

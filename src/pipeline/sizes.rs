@@ -20,6 +20,14 @@ pub enum Values {
     Vertices(Vec<f64>),
 }
 
+impl Values {
+    /// Memory held, in bytes.
+    pub(super) fn bytes(&self) -> u64 {
+        let (Self::Tets(h) | Self::Vertices(h)) = self;
+        8 * h.len() as u64
+    }
+}
+
 /// What takes the place of recorded sizes.
 #[derive(Clone, Debug)]
 pub struct NewSizes {

@@ -2,7 +2,7 @@
 //!
 //! Why: whoever wants a finer place in a large mesh must not wait for all of it, nor lose what he has; whoever's disk lost a
 //! file must not mesh again.
-//! How: one small store in four parts, copied for each case; digests, sizes of edges and qualities before and after.
+//! How: one small store in three parts for each case; digests, sizes of edges and qualities before and after.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -14,7 +14,7 @@ use tetdb_schema::record::tag;
 
 use super::place::{Done, Place};
 
-const MESH: &str = "mesh sample:box,h=0.045 -o a.tetdb --subdomains 4 --no-verify";
+const MESH: &str = "mesh sample:box,h=0.045 -o a.tetdb --subdomains 3 --no-verify";
 
 fn made() -> Place {
     let place = Place::new();
@@ -68,10 +68,10 @@ fn without_options_the_mesh_is_the_same_whatever_the_machine() {
     let before = info(&place);
     assert!(before["coarse_bytes"].as_u64().is_some_and(|b| b > 0));
     for options in ["--threads 1 --memory 64MiB", "--threads 2"] {
-        let line = format!("resaturate a.tetdb --subdomain 0,1,2,3 {options} --json");
+        let line = format!("resaturate a.tetdb --subdomain 0,1,2 {options} --json");
         let answer = place.run_line(&line).succeeds().json();
         assert_eq!(answer["digest"], before["digest"]);
-        assert_eq!(answer["subdomains"].as_array().map(Vec::len), Some(4));
+        assert_eq!(answer["subdomains"].as_array().map(Vec::len), Some(3));
         assert!(changed(&before, &info(&place)).is_empty());
     }
     let line = "resaturate a.tetdb --subdomain 2 --refine-by 0.7 --json --threads";
@@ -152,9 +152,9 @@ fn half_the_size_changes_one_part_only_and_can_be_undone() {
             .filter(|n| n.contains("/subdomain-"))
             .count()
     };
-    assert_eq!(files(), 5);
-    place.run_line("resaturate a.tetdb --forget").succeeds();
     assert_eq!(files(), 4);
+    place.run_line("resaturate a.tetdb --forget").succeeds();
+    assert_eq!(files(), 3);
     refuses(
         &place.run_line("resaturate a.tetdb --undo --json"),
         "nothing-to-undo",
@@ -211,7 +211,7 @@ fn only_what_a_size_reaches_is_changed() {
         .filter_map(|f| f["id"].as_u64())
         .map(|id| id as usize)
         .collect();
-    assert!(!ids.is_empty() && ids.len() < 4, "{list}");
+    assert!(!ids.is_empty() && ids.len() < 3, "{list}");
     assert_eq!(
         info(&place)["digest"],
         before["digest"],
@@ -296,7 +296,7 @@ fn a_damaged_part_is_made_again_from_its_coarse_leaf() {
 fn a_killed_change_leaves_old_or_new() {
     let place = made();
     let before = info(&place)["digest"].clone();
-    let line = "resaturate a.tetdb --subdomain 0,3 --refine-by 0.6 --no-verify";
+    let line = "resaturate a.tetdb --subdomain 0,2 --refine-by 0.7 --no-verify";
     place.run_line(line).succeeds();
     let after = info(&place)["digest"].clone();
     place
