@@ -25,7 +25,7 @@ pub enum Command {
     Estimate(Box<EstimateArgs>),
     /// Go on with an unfinished store
     Resume(ResumeArgs),
-    /// Make sub-domains of a finished store again, with other sizes or because they are damaged
+    /// Make sub-domains again: with other sizes, or damaged ones
     Resaturate(Box<super::resaturate_args::ResaturateArgs>),
     /// Say whether a surface can be meshed, and where it cannot
     Check(CheckArgs),

@@ -37,7 +37,7 @@ pub fn undo(catalog: &mut Catalog) -> Result<ResaturateSummary, PipelineError> {
             fine: None,
         });
     }
-    let (regions, _) = whole(catalog, n, &totals)?;
+    let regions = whole(catalog, n, &totals)?.regions;
     catalog.commit(|step| {
         for ([now, then], old, new) in &blobs {
             let length = |blob: &Option<Vec<u8>>| blob.as_ref().map_or(0, Vec::len);

@@ -400,7 +400,7 @@ impl<'a> Again<'a> {
                 old_blobs.push((then + rank, self.catalog.blob(now + rank)?));
             }
         }
-        let (regions, _) = whole(self.catalog, self.n, &totals)?;
+        let regions = whole(self.catalog, self.n, &totals)?.regions;
         let dropped = Before::of(self.catalog)?;
         let (what, rows, clock) = (self.what, &self.rows, self.clock);
         let asked = what.sizes.as_ref().map(|sizes| sizes.asked.as_bytes());

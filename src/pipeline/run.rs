@@ -347,7 +347,10 @@ impl<'a> Run<'a> {
 
     /// Everything is sealed: regions and interfaces of the whole.
     fn close(&mut self) -> Result<(), PipelineError> {
-        let (regions, interfaces) = whole(self.catalog, self.n, &BTreeMap::new())?;
+        let Whole {
+            regions,
+            interfaces,
+        } = whole(self.catalog, self.n, &BTreeMap::new())?;
         let scratch = self.catalog.scratch_dir()?;
         self.catalog.commit(|step| {
             step.set_regions(&regions);
@@ -363,12 +366,19 @@ impl<'a> Run<'a> {
     }
 }
 
-/// Regions of the whole, and its interfaces by cut, from the totals of all `n` sub-domains; those in `changed` go first.
+/// What sub-domains sum up to.
+pub(super) struct Whole {
+    pub regions: Vec<RegionRow>,
+    /// By cut.
+    pub interfaces: BTreeMap<u32, Vec<InterfaceRow>>,
+}
+
+/// The whole from the totals of all `n` sub-domains; those in `changed` go first.
 pub(super) fn whole(
     catalog: &mut Catalog,
     n: u32,
     changed: &BTreeMap<u32, SealedTotals>,
-) -> Result<(Vec<RegionRow>, BTreeMap<u32, Vec<InterfaceRow>>), PipelineError> {
+) -> Result<Whole, PipelineError> {
     let mut regions = catalog.regions()?;
     for row in regions.iter_mut().filter(|r| r.filled) {
         (row.tets, row.volume) = (0, 0.0);
@@ -395,7 +405,10 @@ pub(super) fn whole(
             });
         }
     }
-    Ok((regions, interfaces))
+    Ok(Whole {
+        regions,
+        interfaces,
+    })
 }
 
 /// The totals of a sub-domain, kept in the blobs that begin with `first`.
