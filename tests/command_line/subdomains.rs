@@ -133,9 +133,12 @@ fn threads_memory_and_interruptions_do_not_change_the_parts() {
             digests.push(place.digest("k.tetdb"));
             let names = place.names();
             let mut files = names.iter().filter(|n| n.starts_with("k.tetdb/"));
-            assert_eq!(files.clone().count(), 4, "{:?}", files.next());
+            // The catalog; of each part the sealed mesh and the coarse leaf.
+            assert_eq!(files.clone().count(), 7, "{:?}", files.next());
         }
-        std::fs::remove_dir_all(place.path("k.tetdb")).expect("a killed run leaves a folder");
+        if place.path("k.tetdb").exists() {
+            std::fs::remove_dir_all(place.path("k.tetdb")).expect("the folder can be removed");
+        }
     }
     assert!(digests.iter().all(|d| *d == digests[0]), "{digests:?}");
 }
