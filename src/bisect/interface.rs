@@ -13,6 +13,7 @@ use super::core::Rim;
 use super::flow::{Graph, NOBODY};
 use super::labels::{InterfaceMeasures, begin, face_cost, is_free, is_high, measure, set_high};
 use super::moves::Moves;
+use super::split::interface_points;
 use super::surface::CuttingSurface;
 use crate::geom::Point;
 use crate::mesh::{Mesh, dense};
@@ -62,14 +63,18 @@ pub struct InterfaceReport {
     pub moves: u64,
 }
 
-/// Labels the core. Effects: its scratch map is used up; `tet_of` must be right.
+/// Labels the core; tells the faces of the natural interface where they are wanted. Effects: its scratch map is used up; `tet_of` must be right.
 pub(super) fn choose<P: Pages>(
     core: &mut Mesh<P>,
     surface: &dyn CuttingSurface,
     rim: &Rim,
     steps: Steps,
+    natural: Option<&mut Vec<[Point; 3]>>,
 ) -> InterfaceReport {
     let free = begin(core, surface, rim);
+    if let Some(natural) = natural {
+        *natural = interface_points(core);
+    }
     let mut report = InterfaceReport {
         free_tets: free.len() as u64,
         ..InterfaceReport::default()

@@ -32,7 +32,7 @@ pub use zone::{OutsideZones, WIDTH_MIN, WIDTH_NOISE, Zone};
 
 use std::time::Instant;
 
-use crate::geom::Aabb;
+use crate::geom::{Aabb, Point};
 use crate::mesh::{Mesh, Workspace};
 use crate::optimize::{self, Settings};
 use crate::refine::{Field, RefineReport, saturate};
@@ -95,6 +95,21 @@ pub struct StageSeconds {
     pub interface: f64,
 }
 
+/// A sub-domain whose zone is refined.
+pub struct Refined {
+    pub zone: Zone,
+    plane: ChosenPlane,
+    refine: RefineReport,
+    seconds: StageSeconds,
+}
+
+/// Faces of an interface as points, seen from the low side: before and after the choice.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct InterfaceFaces {
+    pub natural: Vec<[Point; 3]>,
+    pub chosen: Vec<[Point; 3]>,
+}
+
 /// Refines the zone of a cut in `host` and chooses the interface in `core`, which must be empty.
 ///
 /// `progress` is told a stage and what was done of it. Effects: all ids of `host` may change. Errors: the disk.
@@ -105,17 +120,25 @@ pub fn open<P: Pages, Q: Pages>(
     space: &Workspace,
     progress: &dyn Fn(&'static str, u64),
 ) -> Result<Opened, StoreError> {
-    let mut clock = Instant::now();
-    let mut lap = || {
-        std::mem::replace(&mut clock, Instant::now())
-            .elapsed()
-            .as_secs_f64()
-    };
+    let refined = refine(host, plan, space, progress)?;
+    Ok(choose(host, core, plan, refined, None, progress))
+}
+
+/// The first part of [`open`]: the plane is chosen and its zone refined.
+///
+/// Errors: the disk.
+pub fn refine<P: Pages>(
+    host: &mut Mesh<P>,
+    plan: &CutPlan,
+    space: &Workspace,
+    progress: &dyn Fn(&'static str, u64),
+) -> Result<Refined, StoreError> {
+    let clock = Instant::now();
     let mut seconds = StageSeconds::default();
     progress("choose a plane", 0);
     plane::set_sizes(host, plan.h);
     let plane = plane::choose(host, plan.h, plan.bounds.low, plan.low, plan.cutting.plane);
-    seconds.plane = lap();
+    seconds.plane = clock.elapsed().as_secs_f64();
     let zone = Zone {
         cut: plan.cut,
         surface: plane.plane,
@@ -130,17 +153,45 @@ pub fn open<P: Pages, Q: Pages>(
         bounds: plan.bounds,
     };
     let refine = saturate(host, &field, space, &mut |n| progress("refine the zone", n))?;
-    seconds.zone = lap();
+    seconds.zone = clock.elapsed().as_secs_f64() - seconds.plane;
+    Ok(Refined {
+        zone,
+        plane,
+        refine,
+        seconds,
+    })
+}
+
+/// The second part of [`open`]: the interface is chosen in `core`, which must be empty; `faces` learns what it was and is.
+pub fn choose<P: Pages, Q: Pages>(
+    host: &mut Mesh<P>,
+    core: &mut Mesh<Q>,
+    plan: &CutPlan,
+    refined: Refined,
+    mut faces: Option<&mut InterfaceFaces>,
+    progress: &dyn Fn(&'static str, u64),
+) -> Opened {
+    let Refined {
+        zone,
+        plane,
+        refine,
+        mut seconds,
+    } = refined;
+    let clock = Instant::now();
     progress("choose the interface", 0);
     let rim = core::extract(host, core, &zone.surface);
     optimize::run_with(core, plan.optimize, &|_| {});
-    seconds.core = lap();
-    let interface = interface::choose(core, &zone.surface, &rim, plan.cutting.steps);
+    seconds.core = clock.elapsed().as_secs_f64();
+    let natural = faces.as_mut().map(|f| &mut f.natural);
+    let interface = interface::choose(core, &zone.surface, &rim, plan.cutting.steps, natural);
+    if let Some(faces) = faces {
+        faces.chosen = split::interface_points(core);
+    }
     let vertices = split::number_interface(core, plan.cut);
     let (z_tets, z_enclosed) = labels::enclosed(core, &zone.surface, plan.h);
     let layers_least = labels::layers_least(core, &rim);
-    seconds.interface = lap();
-    Ok(Opened {
+    seconds.interface = clock.elapsed().as_secs_f64() - seconds.core;
+    Opened {
         zone,
         report: CutReport {
             plane,
@@ -153,5 +204,5 @@ pub fn open<P: Pages, Q: Pages>(
             seconds,
         },
         rim,
-    })
+    }
 }

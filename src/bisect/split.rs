@@ -3,7 +3,7 @@
 use super::Opened;
 use super::core::{SHARED, copy_attribute, is_held, is_in_core, place, tet_ids};
 use super::labels::{interface_faces, is_high};
-use crate::geom::{Aabb, HilbertFrame};
+use crate::geom::{Aabb, HilbertFrame, Point};
 use crate::mesh::anatomy::{FROZEN, REQUIRED};
 use crate::mesh::{FaceRef, InterfaceFace, Mesh, Tet, Workspace, dense, renumber};
 use crate::store::{Pages, Sorted, Sorter, StoreError, stop_if_requested};
@@ -29,6 +29,15 @@ pub(super) fn number_interface<P: Pages>(core: &mut Mesh<P>, cut: u32) -> u32 {
         }
     });
     vertices
+}
+
+/// The interface faces by their points, in id order.
+pub(super) fn interface_points<P: Pages>(core: &mut Mesh<P>) -> Vec<[Point; 3]> {
+    let mut points = Vec::new();
+    for_each_interface_face(core, |core, tet, i| {
+        points.push(tet.face(i).map(|v| core.point(v)));
+    });
+    points
 }
 
 /// Calls `visit` with every interface face, seen from its tetrahedron on the low side, in id order.

@@ -9,8 +9,8 @@ use rkyv::{Archive, Deserialize};
 use tetdb_schema::page::FORMAT_VERSION;
 
 use super::records::{
-    CoarseRow, FileRow, InterfaceRow, Job, JournalRow, RegionRow, StoreState, SubdomainRow,
-    TopologyRow,
+    CoarseRow, FileRow, InterfaceRow, Job, JournalRow, RegionRow, StageRow, StoreState,
+    SubdomainRow, TopologyRow,
 };
 use super::rows::{self, RowKind};
 use super::{CatalogError, Step};
@@ -310,6 +310,11 @@ impl Catalog {
     /// Who neighbors whom, by sub-domain.
     pub fn topology(&mut self) -> Result<Vec<TopologyRow>, CatalogError> {
         self.rows(RowKind::Topology)
+    }
+
+    /// Meshes that were kept to be looked at, the coarse ones first, by cut.
+    pub fn stages(&mut self) -> Result<Vec<StageRow>, CatalogError> {
+        self.rows(RowKind::Stage)
     }
 
     /// All steps done so far, in order.

@@ -25,7 +25,7 @@ pub use layout::Catalog;
 pub use reader::{Chunk, Chunks, Store, Subdomain};
 pub use records::{
     CoarseRow, FileRow, InterfaceRow, Job, JournalRow, Measure, NeighborRow, QualityRow, RegionRow,
-    StoreState, SubdomainRow, SubdomainState, SurfaceSource, TopologyRow,
+    Stage, StageRow, StoreState, SubdomainRow, SubdomainState, SurfaceSource, TopologyRow,
 };
 pub use shape::{QUALITY_BINS, Shape, quality_bin};
 pub use step::Step;

@@ -133,6 +133,18 @@ impl Subdomain {
         memory_bytes: usize,
     ) -> Result<Self, CatalogError> {
         let row = catalog.subdomain(rank)?;
+        Self::open_row(catalog, row, memory_bytes)
+    }
+
+    /// The same of a row at hand, which may be that of a [`StageRow`](super::StageRow).
+    ///
+    /// Errors: as [`Store::subdomain`].
+    pub fn open_row(
+        catalog: &Catalog,
+        row: SubdomainRow,
+        memory_bytes: usize,
+    ) -> Result<Self, CatalogError> {
+        let rank = row.rank;
         if row.state != SubdomainState::Sealed {
             return Err(not_sealed(catalog, rank));
         }

@@ -207,3 +207,35 @@ pub struct Measure {
     pub name: String,
     pub value: f64,
 }
+
+/// What a bisection had before it, and after its zone was refined.
+#[derive(
+    Archive,
+    Serialize,
+    Deserialize,
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    serde::Serialize,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum Stage {
+    Coarse,
+    Refined,
+}
+
+/// A mesh on its way, kept to be looked at; it is no part of the finished mesh.
+#[derive(Archive, Serialize, Deserialize, Clone, Debug, PartialEq, serde::Serialize)]
+pub struct StageRow {
+    pub cut: u32,
+    pub stage: Stage,
+    /// The plane of the cut: `normal · x = offset`.
+    pub normal: [f64; 3],
+    pub offset: f64,
+    /// Its file, as that of a sealed sub-domain; `rank` is the number of the cut.
+    pub row: SubdomainRow,
+}

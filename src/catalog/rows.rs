@@ -25,6 +25,7 @@ pub(super) enum RowKind {
     Blob = 74,
     Coarse = 75,
     Before = 76,
+    Stage = 77,
 }
 
 impl RowKind {

@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::records::{
-    CoarseRow, FileRow, InterfaceRow, Job, JournalRow, RegionRow, StoreState, SubdomainRow,
-    TopologyRow,
+    CoarseRow, FileRow, InterfaceRow, Job, JournalRow, RegionRow, StageRow, StoreState,
+    SubdomainRow, TopologyRow,
 };
 use super::rows::{self, RowKind};
 
@@ -141,6 +141,11 @@ impl Step {
     /// The neighbors of one sub-domain.
     pub fn set_topology(&mut self, row: &TopologyRow) {
         self.put(RowKind::Topology.key(0, row.subdomain), row);
+    }
+
+    /// A mesh kept to be looked at.
+    pub fn set_stage(&mut self, stage: &StageRow) {
+        self.put(RowKind::Stage.key(stage.stage as u32, stage.cut), stage);
     }
 
     /// Appends to the journal.

@@ -22,6 +22,8 @@ pub struct Corner {
     /// Its name for ever, as a number.
     pub id: u64,
     pub tag: u32,
+    /// The edge length wanted there; 0 where none was.
+    pub h: f32,
 }
 
 /// Reads one chunk of a file and checks it.
@@ -154,6 +156,7 @@ impl VertexCache {
             mix: 0,
             id: 0,
             tag: 0,
+            h: 0.0,
         }; N];
         for (corner, v) in corners.iter_mut().zip(vertices) {
             *corner = self.corner(file, v)?;
@@ -206,6 +209,7 @@ impl VertexCache {
                 mix: vertex_mix(v.point),
                 id: v.id,
                 tag: v.tag,
+                h: v.h,
             })
             .collect();
         self.bytes += needed;

@@ -47,6 +47,8 @@ pub enum Command {
     RefineSurface(RefineSurfaceArgs),
     /// Draw a cut through the mesh
     Snapshot(SnapshotArgs),
+    /// Write a page about a mesh, with everything in it to look at
+    Report(ReportArgs),
     /// Write a made surface to a file
     Sample(SampleArgs),
     /// Print the completions of a shell
@@ -71,6 +73,7 @@ impl Command {
             Self::Export(a) => a.json,
             Self::RefineSurface(a) => a.json,
             Self::Snapshot(a) => a.json,
+            Self::Report(a) => a.json,
             Self::Sample(a) => a.json,
             Self::Completions(_) | Self::Man(_) => false,
         }
@@ -175,6 +178,9 @@ pub struct ShapeArgs {
     /// Number of sub-domains: auto, or a number [default: auto, one for each 4 million tetrahedra]
     #[arg(long, value_name = "N", alias = "domains")]
     pub subdomains: Option<String>,
+    /// Keep the meshes before and after each cut is refined, and the interface before and after it is chosen, for `tetdb snapshot --stage`
+    #[arg(long)]
+    pub keep_stages: bool,
 }
 
 #[derive(Debug, clap::Args)]
@@ -317,7 +323,7 @@ pub struct CompareArgs {
 pub struct ExportArgs {
     #[arg(value_name = "STORE")]
     pub store: PathBuf,
-    /// Files to write; the extension tells the format: .vtu, .pvtu, .mesh, .meshb, .msh, .inp, .npy (an array a file), .json (topology)
+    /// Files to write; the extension tells the format: .vtu, .pvtu, .mesh, .meshb, .msh, .inp, .npy (an array a file), .json (topology), .parquet (where built in)
     #[arg(required = true, value_name = "OUT")]
     pub out: Vec<PathBuf>,
     /// A file for each sub-domain, NAME_00007.mesh, with the faces it shares with others; .pvtu always does so
@@ -415,11 +421,12 @@ pub enum ColorBy {
     Size,
 }
 
-/// A cut through the mesh by a plane, seen from the side its direction points to. Reads only what the plane meets.
+/// A cut through the mesh by a plane, seen from the side its direction points to; or surfaces in space. Reads only what is seen.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  tetdb snapshot part.tetdb cut.png\n  tetdb snapshot part.tetdb cut.png --plane 0,0,0,1,0.5,0 --crinkle --color quality\n  \
-    tetdb snapshot part.tetdb bad.svg --where \"quality > 2\" --crinkle"
+    tetdb snapshot part.tetdb bad.svg --where \"quality > 2\" --crinkle\n  tetdb snapshot part.tetdb inside.png --surface --plane 0,0,0,1,0,0\n  \
+    tetdb snapshot part.tetdb shell.png --shell 3 --from 1,1,0.5\n  tetdb snapshot part.tetdb refined.png --stage 2:refined"
 )]
 pub struct SnapshotArgs {
     #[arg(value_name = "STORE")]
@@ -433,6 +440,19 @@ pub struct SnapshotArgs {
     /// Draw the tetrahedra that meet the plane whole, not the polygons it cuts out of them
     #[arg(long)]
     pub crinkle: bool,
+    /// The whole surface in space, shaded; with --plane, what lies beyond it is left out and the inside is seen
+    #[arg(long, conflicts_with_all = ["crinkle", "condition"])]
+    pub surface: bool,
+    /// What bounds one sub-domain in space, shaded: input triangles in its color, interfaces in that of the neighbor; with --plane as above
+    #[arg(long, value_name = "SUBDOMAIN", conflicts_with_all = ["surface", "crinkle", "condition"])]
+    pub shell: Option<u32>,
+    /// What a cut had on its way, of a store made with --keep-stages: coarse or refined (the mesh, with the plane of the cut as a line),
+    /// natural or interface (the interface in space, before and after its faces were chosen)
+    #[arg(long, value_name = "CUT:WHAT", conflicts_with_all = ["surface", "shell"])]
+    pub stage: Option<String>,
+    /// The direction towards the viewer of what is shown in space
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    pub from: Option<String>,
     /// What colors stand for: size is the mean of the longest and the shortest edge
     #[arg(long, value_enum, default_value = "subdomain", value_name = "WHAT")]
     pub color: ColorBy,
@@ -442,6 +462,24 @@ pub struct SnapshotArgs {
     /// Width and height in pixels
     #[arg(long, value_name = "WxH", default_value = "1600x1200")]
     pub size: String,
+    /// Most memory to hold
+    #[arg(long, value_name = "SIZE")]
+    pub memory: Option<String>,
+    /// Answer with one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// A page for any browser, in one file and without a network: numbers, tables, charts, and the mesh in space to turn and cut.
+/// Below 20 MB whatever the mesh.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  tetdb report part.tetdb part.html")]
+pub struct ReportArgs {
+    #[arg(value_name = "STORE")]
+    pub store: PathBuf,
+    /// The page to write: .html; one that is there is replaced
+    #[arg(value_name = "OUT")]
+    pub output: PathBuf,
     /// Most memory to hold
     #[arg(long, value_name = "SIZE")]
     pub memory: Option<String>,

@@ -33,6 +33,7 @@ pub fn options(args: &ShapeArgs) -> Result<Options, Failure> {
         }
     }
     options.drop_coarse |= args.drop_coarse;
+    options.keep_stages |= args.keep_stages;
     // The words are stored in full, so that a store tells all of what made it.
     options.regions.get_or_insert_with(|| word(Regions::Parity));
     options.optimize.get_or_insert_with(|| word(Optimize::Full));

@@ -128,7 +128,7 @@ pub const CODES: &[CodeRow] = &[
     row(
         "no-such-part",
         3,
-        "the store has no such tetrahedron, vertex, label, sub-domain or interface",
+        "the store has no such tetrahedron, vertex, label, sub-domain, interface or stage",
     ),
     row("damaged", 4, "the store is not what was written"),
     row("busy", 5, "another process writes the store"),

@@ -9,7 +9,7 @@ use super::args::StoreArgs;
 use super::failure::Failure;
 use super::memory;
 use super::talk::Talk;
-use crate::catalog::{QualityRow, Store, StoreState};
+use crate::catalog::{QualityRow, Store, StoreState, SubdomainRow};
 use crate::pipeline;
 
 /// Regions listed for people.
@@ -53,6 +53,10 @@ pub fn object(path: &Path) -> Result<Value, Failure> {
             })
         })
         .collect();
+    let stages = catalog.stages()?.into_iter().map(
+        |s| json!({ "cut": s.cut, "stage": s.stage, "tets": s.row.tets, "bytes": s.row.bytes }),
+    );
+    let stages: Vec<Value> = stages.collect();
     Ok(json!({
         "schema": 1, "store": path.display().to_string(), "state": state, "finished": state.is_finished(),
         "surfaces": job.surfaces, "options": serde_json::from_str::<Value>(&job.options).unwrap_or(Value::Null),
@@ -62,8 +66,8 @@ pub fn object(path: &Path) -> Result<Value, Failure> {
         "bytes": rows.iter().map(|r| r.bytes).sum::<u64>(),
         "coarse_bytes": coarse.iter().map(|c| c.bytes).sum::<u64>(),
         "previous_bytes": catalog.before()?.iter().map(|r| r.bytes).sum::<u64>(),
-        "digest": hex(sum(rows.iter().map(|r| r.digest))),
-        "subdomains": subdomains, "interfaces": catalog.interfaces()?, "journal": catalog.journal()?,
+        "digest": digest(&rows),
+        "stages": stages, "subdomains": subdomains, "interfaces": catalog.interfaces()?, "journal": catalog.journal()?,
     }))
 }
 
@@ -71,6 +75,11 @@ fn sum(digests: impl Iterator<Item = [u64; 2]>) -> [u64; 2] {
     digests.fold([0; 2], |s, d| {
         [s[0].wrapping_add(d[0]), s[1].wrapping_add(d[1])]
     })
+}
+
+/// The digest of the whole mesh.
+pub fn digest(rows: &[SubdomainRow]) -> String {
+    hex(sum(rows.iter().map(|r| r.digest)))
 }
 
 /// A digest as it is shown.
@@ -165,10 +174,7 @@ pub fn print(path: &Path, talk: &Talk) -> Result<(), Failure> {
     for line in quality_lines(&merged(rows.iter().map(|r| &r.quality))) {
         talk.line(&line);
     }
-    talk.line(&format!(
-        "digest {}",
-        hex(sum(rows.iter().map(|r| r.digest)))
-    ));
+    talk.line(&format!("digest {}", digest(&rows)));
     Ok(())
 }
 

@@ -21,6 +21,7 @@ mod query_args;
 mod query_ask;
 mod query_rows;
 mod refine_surface;
+mod report;
 mod resaturate;
 mod resaturate_args;
 mod resaturate_sizes;
@@ -99,6 +100,7 @@ fn dispatch(command: &Command, talk: &Talk) -> Result<u8, Failure> {
         Command::Export(args) => export::run(args, talk),
         Command::RefineSurface(args) => refine_surface::run(args, talk),
         Command::Snapshot(args) => snapshot::run(args, talk),
+        Command::Report(args) => report::run(args, talk),
         Command::Sample(args) => sample::run(args, talk),
         Command::Completions(args) => shell::completions(args),
         Command::Man(args) => shell::man(args, talk),

@@ -7,11 +7,12 @@ use std::time::Instant;
 use super::crew::crew;
 use super::leaf::Common;
 use super::run::{Run, journal};
+use super::stages::{StageFiles, Stages};
 use super::tree::{self, Part, PartMesh, blob};
 use super::watch::{Event, Watcher};
 use super::{PipelineError, Plan};
 use crate::bisect::{self, CutPlan, CutReport, Opened, Zone};
-use crate::catalog::{CatalogError, NeighborRow, StoreState, TopologyRow};
+use crate::catalog::{CatalogError, NeighborRow, Stage, StoreState, TopologyRow};
 use crate::mesh::{Mesh, Workspace};
 use crate::optimize::Settings;
 use crate::store::{Backing, DiskPath, Pager, PagerStats, StoreFile, attempt};
@@ -31,6 +32,8 @@ pub(super) struct CutJob {
     scratch: DiskPath,
     /// Zones of the cuts above it.
     zones: Vec<Zone>,
+    /// Where meshes on their way go, when they are kept.
+    kept: Option<StageFiles>,
     share: Plan,
 }
 
@@ -38,6 +41,7 @@ pub(super) struct CutJob {
 pub(super) struct Divided {
     parent: PartMesh,
     opened: Opened,
+    stages: Stages,
     children: [Child; 2],
     pages: PagerStats,
     frames_used: usize,
@@ -85,14 +89,24 @@ impl CutJob {
             bounds: common.bounds,
             optimize: Settings::of(common.mode),
         };
-        let opened = bisect::open(&mut host, &mut core, &plan, &space, &|stage, done| {
+        let progress = |stage, done| {
             watch(Event {
                 stage,
                 done,
                 total: None,
                 unit: "vertices",
             });
-        })?;
+        };
+        let mut stages = Stages::default();
+        if let Some(kept) = &self.kept {
+            kept.keep(&mut host, Stage::Coarse, &mut stages, watch)?;
+        }
+        let refined = bisect::refine(&mut host, &plan, &space, &progress)?;
+        if let Some(kept) = &self.kept {
+            kept.keep(&mut host, Stage::Refined, &mut stages, watch)?;
+        }
+        let faces = self.kept.as_ref().map(|_| &mut stages.faces);
+        let opened = bisect::choose(&mut host, &mut core, &plan, refined, faces, &progress);
         let mut pages = PagerStats::default();
         let mut children = Vec::with_capacity(2);
         for (child, path) in part.children().into_iter().zip(&self.made) {
@@ -119,6 +133,7 @@ impl CutJob {
         Ok(Divided {
             parent: self.parent,
             opened,
+            stages,
             children,
             pages,
             frames_used,
@@ -221,13 +236,19 @@ impl Run<'_> {
         let first = parent.part.first;
         let made = (parent.part.children())
             .map(|p| self.catalog.file_path(p.first, parent.generation + DONE));
+        let scratch = self.scratch(&format!("cut-{}", parent.part.cut()))?;
+        let kept = self.options.keep_stages.then(|| {
+            let cut = parent.part.cut();
+            StageFiles::new(self.catalog, cut, &scratch, share.buffers, self.bounds)
+        });
         Ok(CutJob {
             parent,
             base: self.catalog.file_path(first, parent.generation),
             work: self.catalog.file_path(first, parent.generation + WORK),
             made,
-            scratch: self.scratch(&format!("cut-{}", parent.part.cut()))?,
+            scratch,
             zones: tree::zones_above(self.catalog, parent.part, self.n)?,
+            kept,
             share,
         })
     }
@@ -237,6 +258,7 @@ impl Run<'_> {
         let Divided {
             parent,
             opened,
+            stages,
             children,
             ..
         } = &divided;
@@ -304,6 +326,9 @@ impl Run<'_> {
             ("interface_s", report.seconds.interface),
             ("load_low", report.plane.load[0]),
             ("load", report.plane.load[1]),
+            ("pages_read", divided.pages.pages_read as f64),
+            ("pages_written", divided.pages.pages_written as f64),
+            ("frames_used", divided.frames_used as f64),
         ];
         let mut row = journal(StoreState::Bisected, "bisect", divided.clock, &measures);
         row.subdomain = Some(low_name);
@@ -314,6 +339,7 @@ impl Run<'_> {
                 step.set_blob(number, &child.mesh.to_bytes());
             }
             step.unlist_file(parent.part.first, parent.generation);
+            stages.describe(&opened.zone, step);
             step.set_blob(blob::CUT + cut, &tree::plane_bytes(&opened.zone.surface));
             for (cut, table) in &owners {
                 step.set_blob(blob::OWNERS + cut, &table.to_bytes());

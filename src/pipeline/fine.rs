@@ -1,5 +1,7 @@
 //! The fine mesh of one sub-domain: sizes, saturation, optimization.
 
+use std::time::Instant;
+
 use super::PipelineError;
 use super::watch::{Event, Watcher};
 use crate::bisect::{OutsideZones, Zone};
@@ -15,6 +17,8 @@ use crate::store::Pages;
 pub struct FineReport {
     pub refine: RefineReport,
     pub optimize: OptimizeReport,
+    /// What refinement and optimization took.
+    pub seconds: [f64; 2],
 }
 
 /// Divides and optimizes a coarse mesh; no vertex is added in `zones`, which are final.
@@ -33,6 +37,7 @@ pub(super) fn fine<P: Pages>(
         total: None,
         unit: "vertices",
     });
+    let clock = Instant::now();
     for v in mesh.vertex_ids() {
         let p = mesh.point(v);
         mesh.set_size(v, field.h(p) as f32);
@@ -57,6 +62,7 @@ pub(super) fn fine<P: Pages>(
             unit: "vertices",
         });
     })?;
+    let refined = clock.elapsed().as_secs_f64();
     let optimize = optimize::run(mesh, mode, &|p: optimize::Progress| {
         watch(Event {
             stage: p.stage,
@@ -65,5 +71,9 @@ pub(super) fn fine<P: Pages>(
             unit: "pages",
         });
     });
-    Ok(FineReport { refine, optimize })
+    Ok(FineReport {
+        refine,
+        optimize,
+        seconds: [refined, clock.elapsed().as_secs_f64() - refined],
+    })
 }

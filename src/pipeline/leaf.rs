@@ -63,6 +63,7 @@ pub(super) struct Leaf {
     pub pages: PagerStats,
     pub frames_used: usize,
     pub work: Option<DiskPath>,
+    pub seal_seconds: f64,
     pub clock: Instant,
 }
 
@@ -117,9 +118,11 @@ impl LeafJob {
             generation,
             memory: self.share.buffers,
             bounds: common.bounds,
-            owners: &self.owners,
+            owners: Some(&self.owners),
         };
+        let seal_clock = Instant::now();
         let sealed = seal(&mut mesh, &target, watch)?;
+        let seal_seconds = seal_clock.elapsed().as_secs_f64();
         let pager = mesh.into_pages();
         let (pages, frames_used) = (pager.stats(), pager.frames_used());
         let work = pager.discard();
@@ -133,6 +136,7 @@ impl LeafJob {
             pages,
             frames_used,
             work,
+            seal_seconds,
             clock,
         })
     }

@@ -27,6 +27,7 @@ mod resaturate;
 mod run;
 mod seal;
 mod sizes;
+mod stages;
 mod tree;
 mod watch;
 
@@ -42,4 +43,5 @@ pub use resaturate::{
 };
 pub use run::{Summary, mesh, mesh_prepared};
 pub use sizes::{NewSizes, Values};
+pub use stages::kept_faces;
 pub use watch::{Event, Watcher, silent};

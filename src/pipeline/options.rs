@@ -44,6 +44,9 @@ pub struct Options {
     /// Whether sub-domains are made for good: what they were made from is not kept. It does not shape the mesh.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub drop_coarse: bool,
+    /// Whether meshes on their way are kept to be looked at; the finished mesh is the same.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub keep_stages: bool,
     /// For comparisons by a program. It is not stored: a run that is resumed makes cuts as usual.
     #[serde(skip)]
     pub cutting: Cutting,

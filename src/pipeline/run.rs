@@ -120,7 +120,7 @@ fn go_on(
 pub(super) struct Run<'a> {
     pub catalog: &'a mut Catalog,
     surface: &'a Surface,
-    options: &'a Options,
+    pub options: &'a Options,
     pub field: &'a SizeField,
     pub plan: Plan,
     pub bounds: Aabb,
@@ -208,6 +208,7 @@ impl<'a> Run<'a> {
             extents: mesh.pages().extents(),
             load,
         };
+        let (pages, frames_used) = (mesh.pages().stats(), mesh.pages().frames_used());
         let (field, surface) = (self.field.to_bytes(), self.surface);
         self.catalog.commit(|step| {
             step.list_file(0, COARSE);
@@ -229,6 +230,9 @@ impl<'a> Run<'a> {
                     ),
                     ("missing_facets", f64::from(report.recovery.missing_facets)),
                     ("predicted_tets", predicted),
+                    ("pages_read", pages.pages_read as f64),
+                    ("pages_written", pages.pages_written as f64),
+                    ("frames_used", frames_used as f64),
                 ],
             ));
             Ok(())
@@ -321,6 +325,10 @@ impl<'a> Run<'a> {
             ("frozen_hits", refine.frozen_hits as f64),
             ("pages_read", leaf.pages.pages_read as f64),
             ("pages_written", leaf.pages.pages_written as f64),
+            ("frames_used", leaf.frames_used as f64),
+            ("refine_s", leaf.fine.seconds[0]),
+            ("optimize_s", leaf.fine.seconds[1]),
+            ("seal_s", leaf.seal_seconds),
         ];
         // A finished sub-domain leaves the state of the whole as it is until the last one.
         let state = self.catalog.state()?;

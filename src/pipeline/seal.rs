@@ -29,8 +29,8 @@ pub(super) struct Target<'a> {
     /// Bytes for sort runs and for the writer together.
     pub memory: u64,
     pub bounds: Aabb,
-    /// Owners of the faces of the cuts around it, by cut.
-    pub owners: &'a BTreeMap<u32, Owners>,
+    /// Owners of the faces of the cuts around it, by cut; without them interface faces are left out.
+    pub owners: Option<&'a BTreeMap<u32, Owners>>,
 }
 
 /// Writes `mesh` to `target`. Effects: the mesh's scratch map is used up; `tet_of` must be right for all vertices.
@@ -198,7 +198,8 @@ fn facets<P: Pages>(
         let vertices = mesh.facet(n).vertices.map(|v| mesh.scratch(dense(v)));
         sorter.push(claim_record(vertices, n, FACET))?;
     }
-    for n in 0..mesh.n_interface_faces() {
+    let n_interface_faces = target.owners.map_or(0, |_| mesh.n_interface_faces());
+    for n in 0..n_interface_faces {
         let face = mesh.interface_face(n);
         let vertices = face.vertices.map(|v| mesh.scratch(dense(v)));
         sorter.push(claim_record(vertices, n, INTERFACE))?;
@@ -271,7 +272,7 @@ fn push_interface_face<P: Pages>(
     writer: &mut SealedWriter,
 ) -> Result<(), PipelineError> {
     let face = mesh.interface_face(number);
-    let owners = target.owners.get(&face.cut);
+    let owners = target.owners.and_then(|o| o.get(&face.cut));
     let other = owners.and_then(|o| o.other(face.index, face.side));
     let (Some(other), true) = (other, tet != NONE) else {
         panic!(

@@ -31,6 +31,8 @@ pub(super) mod blob {
     pub const SEALED_BEFORE: u32 = 7 << 20;
     pub const FIELD_BEFORE: u32 = 8 << 20;
     pub const ASKED_BEFORE: u32 = 9 << 20;
+    /// Of each cut whose stages are kept: faces of its interface, before and after the choice.
+    pub const FACES: u32 = 10 << 20;
 }
 
 /// Ranks `first..first + count`.

@@ -22,7 +22,21 @@ pub enum ReportError {
     /// The store has no such label.
     #[error("there is no label {name:?}; there are {}", known.join(", "))]
     NoLabel { name: String, known: Vec<String> },
+    /// No stage of the cut was kept.
+    #[error("no stage of cut {cut} is in the store; {}", cuts(kept))]
+    NoStage { cut: u32, kept: Vec<u32> },
     /// The two sub-domains share no face.
     #[error("sub-domains {0} and {1} have no interface")]
     NoInterface(u32, u32),
+}
+
+fn cuts(kept: &[u32]) -> String {
+    if kept.is_empty() {
+        return "it was made without --keep-stages".to_owned();
+    }
+    let mut cuts: Vec<u32> = kept.to_vec();
+    cuts.sort_unstable();
+    cuts.dedup();
+    let cuts: Vec<String> = cuts.iter().map(u32::to_string).collect();
+    format!("there are {}", cuts.join(", "))
 }

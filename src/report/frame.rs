@@ -36,7 +36,7 @@ pub(super) struct Searched {
 
 /// Spreads the vertex numbers of a chunk; they come from a store, not from an adversary.
 #[derive(Default)]
-struct Spread(u64);
+pub(super) struct Spread(u64);
 
 impl Hasher for Spread {
     fn finish(&self) -> u64 {

@@ -9,7 +9,7 @@ use tetdb_schema::record::SealedTet;
 use super::ReportError;
 use super::frame::{Frame, Searched};
 use super::tree::BoxTree;
-use crate::catalog::{CatalogError, Chunk, Store, Subdomain, SubdomainRow};
+use crate::catalog::{CatalogError, Chunk, Stage, Store, Subdomain, SubdomainRow};
 use crate::geom::{Aabb, Point};
 use crate::store::{Budget, Lease, stop_if_requested};
 
@@ -90,6 +90,8 @@ pub struct Inquiry {
     frames_bytes_max: usize,
     pub(super) budget: Budget,
     measures: Measures,
+    /// The plane of the cut, of a mesh that was kept on its way.
+    cutting: Option<[Point; 2]>,
     _lease: Lease,
 }
 
@@ -99,6 +101,34 @@ impl Inquiry {
     /// Errors: damage; sub-domains that are not sealed; a budget below some ten MiB.
     pub fn open(mut store: Store, budget: &Budget) -> Result<Self, ReportError> {
         let rows = store.catalog().subdomains()?;
+        Self::of_rows(store, rows, budget)
+    }
+
+    /// Opens questions to a mesh that was kept on its way.
+    ///
+    /// Errors: [`ReportError::NoStage`]; as [`Inquiry::open`].
+    pub fn open_stage(
+        mut store: Store,
+        cut: u32,
+        stage: Stage,
+        budget: &Budget,
+    ) -> Result<Self, ReportError> {
+        let kept = store.catalog().stages()?;
+        let Some(row) = kept.iter().find(|s| (s.cut, s.stage) == (cut, stage)) else {
+            let kept = kept.iter().map(|s| s.cut).collect();
+            return Err(ReportError::NoStage { cut, kept });
+        };
+        let normal = Point::from_array(row.normal);
+        let mut inquiry = Self::of_rows(store, vec![row.row.clone()], budget)?;
+        inquiry.cutting = Some([normal * row.offset, normal]);
+        Ok(inquiry)
+    }
+
+    fn of_rows(
+        mut store: Store,
+        rows: Vec<SubdomainRow>,
+        budget: &Budget,
+    ) -> Result<Self, ReportError> {
         let labels = store.catalog().labels()?;
         let cap = budget.cap();
         let frames_bytes_max = (cap / 2).min(FRAMES_BYTES_MAX);
@@ -129,8 +159,14 @@ impl Inquiry {
             frames_bytes_max: frames_bytes_max as usize,
             budget: budget.clone(),
             measures,
+            cutting: None,
             _lease: lease,
         })
+    }
+
+    /// A point and the normal of the plane that was to cut it, of a mesh that was kept on its way.
+    pub fn cutting(&self) -> Option<[Point; 2]> {
+        self.cutting
     }
 
     /// What all questions so far have cost.
@@ -166,7 +202,13 @@ impl Inquiry {
                 };
                 self.measures.vertex_chunks_read += part.subdomain.vertex_chunks_read();
             }
-            let subdomain = Subdomain::open(self.store.catalog(), rank, PART_BYTES as usize)?;
+            let row = self.rows.iter().find(|row| row.rank == rank);
+            let row = match row {
+                Some(row) => row.clone(),
+                // Says that there is none.
+                None => self.store.catalog().subdomain(rank)?,
+            };
+            let subdomain = Subdomain::open_row(self.store.catalog(), row, PART_BYTES as usize)?;
             let chunks = subdomain.tet_summaries().len() + subdomain.vertex_summaries().len();
             let bytes = chunks as u64 * SUMMARY_BYTES;
             // What the share of a sub-domain does not cover.

@@ -41,11 +41,39 @@ impl View {
         }
     }
 
-    fn height(&self, p: Point) -> f64 {
+    /// How much a face with this normal faces the viewer, -1 to 1.
+    pub(super) fn facing(&self, normal: Point) -> f64 {
+        normal.dot(self.normal)
+    }
+
+    /// Where a straight line in space that lies in the plane runs in it: a point and a direction.
+    pub fn line(&self, point: Point, direction: Point) -> [[f64; 2]; 2] {
+        let to = self.flat(self.origin + direction);
+        [self.flat(point), to]
+    }
+
+    /// The line in which another plane meets this one, as a point and a direction in it; `None` where they are parallel.
+    pub fn crossing(&self, point: Point, normal: Point) -> Option<[[f64; 2]; 2]> {
+        let direction = self.normal.cross(normal);
+        let square = direction.length_squared();
+        if square < 1e-12 {
+            return None;
+        }
+        let across = direction.cross(self.normal);
+        let step = (point - self.origin).dot(normal) / across.dot(normal);
+        Some(self.line(self.origin + across * step, direction / square.sqrt()))
+    }
+
+    /// The point at a place in the plane.
+    pub(super) fn raised(&self, [x, y]: [f64; 2]) -> Point {
+        self.origin + self.right * x + self.up * y
+    }
+
+    pub(super) fn height(&self, p: Point) -> f64 {
         (p - self.origin).dot(self.normal)
     }
 
-    fn flat(&self, p: Point) -> [f64; 2] {
+    pub(super) fn flat(&self, p: Point) -> [f64; 2] {
         let p = p - self.origin;
         [p.dot(self.right), p.dot(self.up)]
     }
@@ -57,7 +85,9 @@ pub struct Piece {
     /// Its corners in the plane, in input units, to the right and up; the fourth is meant where `n` is 4.
     pub corners: [[f64; 2]; 4],
     pub n: usize,
-    /// How much it faces the viewer, 0 to 1; 1 in a section.
+    /// Heights of the corners over the plane, towards the viewer.
+    pub heights: [f64; 4],
+    /// How much it faces the viewer, 0 to 1 (1 in a section); of a shell, less than 0 seen from behind.
     pub facing: f32,
     pub subdomain: u32,
     pub region: u32,
@@ -76,8 +106,8 @@ pub struct Extent {
     pub size: [f32; 2],
 }
 
-/// Depth, corners, then what is told of the tetrahedron.
-const BYTES: usize = 8 + 8 * 8 + 6 * 4;
+/// Depth, corners, heights, then what is told of the tetrahedron.
+const BYTES: usize = 8 + 12 * 8 + 6 * 4;
 
 /// The pieces of a cut, far ones first.
 pub struct Section {
@@ -101,23 +131,45 @@ impl Inquiry {
             point: view.origin,
             normal: view.normal,
         });
-        let mut sorter = Sorter::new(dir, memory_bytes);
-        let mut extent = Extent {
-            n: 0,
-            bounds: [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]],
-            quality: [f32::INFINITY, 0.0],
-            size: [f32::INFINITY, 0.0],
-        };
+        let mut all = Pieces::new(dir, memory_bytes);
         for tet in self.select(selection)? {
             let tet = tet?;
             for (depth, piece) in pieces(view, crinkle, &tet) {
-                extent.add(&piece);
-                sorter.push(record(depth, &piece))?;
+                all.push(depth, &piece)?;
             }
         }
+        all.finish()
+    }
+}
+
+/// Pieces on their way into order.
+pub(super) struct Pieces {
+    sorter: Sorter<BYTES>,
+    extent: Extent,
+}
+
+impl Pieces {
+    pub fn new(dir: &Path, memory_bytes: u64) -> Self {
+        Self {
+            sorter: Sorter::new(dir, memory_bytes),
+            extent: Extent {
+                n: 0,
+                bounds: [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]],
+                quality: [f32::INFINITY, 0.0],
+                size: [f32::INFINITY, 0.0],
+            },
+        }
+    }
+
+    pub fn push(&mut self, depth: f64, piece: &Piece) -> Result<(), ReportError> {
+        self.extent.add(piece);
+        Ok(self.sorter.push(record(depth, piece))?)
+    }
+
+    pub fn finish(self) -> Result<Section, ReportError> {
         Ok(Section {
-            extent,
-            sorted: sorter.finish()?,
+            extent: self.extent,
+            sorted: self.sorter.finish()?,
         })
     }
 }
@@ -148,14 +200,15 @@ impl Iterator for Section {
 }
 
 /// The pieces of a tetrahedron with their heights over the plane.
-fn pieces(view: &View, crinkle: bool, tet: &Found) -> Vec<(f64, Piece)> {
+pub(super) fn pieces(view: &View, crinkle: bool, tet: &Found) -> Vec<(f64, Piece)> {
     let [least, most] = tet.edges();
-    let piece = |corners: &[[f64; 2]], facing: f64| {
+    let piece = |corners: &[[f64; 2]], heights: [f64; 4], facing: f64| {
         let mut all = [[0.0; 2]; 4];
         all[..corners.len()].copy_from_slice(corners);
         Piece {
             corners: all,
             n: corners.len(),
+            heights,
             facing: facing as f32,
             subdomain: tet.id.subdomain().rank(),
             region: tet.region,
@@ -167,7 +220,7 @@ fn pieces(view: &View, crinkle: bool, tet: &Found) -> Vec<(f64, Piece)> {
         let polygon = polygon(view, tet);
         let seen = polygon.len() >= 3;
         return seen
-            .then(|| (0.0, piece(&polygon, 1.0)))
+            .then(|| (0.0, piece(&polygon, [0.0; 4], 1.0)))
             .into_iter()
             .collect();
     }
@@ -178,8 +231,8 @@ fn pieces(view: &View, crinkle: bool, tet: &Found) -> Vec<(f64, Piece)> {
         let facing = outward.dot(view.normal) / outward.length();
         if facing > 0.0 {
             let flat = [a, b, c].map(|p| view.flat(p));
-            let height = [a, b, c].map(|p| view.height(p)).iter().sum::<f64>() / 3.0;
-            found.push((height, piece(&flat, facing)));
+            let [x, y, z] = [a, b, c].map(|p| view.height(p));
+            found.push(((x + y + z) / 3.0, piece(&flat, [x, y, z, 0.0], facing)));
         }
     }
     found
@@ -211,8 +264,8 @@ fn record(depth: f64, piece: &Piece) -> [u8; BYTES] {
     let key = bits ^ if bits >> 63 == 1 { u64::MAX } else { 1 << 63 };
     let mut record = [0; BYTES];
     record[..8].copy_from_slice(&key.to_be_bytes());
-    let corners = piece.corners.as_flattened().iter();
-    for (bytes, x) in record[8..72].chunks_exact_mut(8).zip(corners) {
+    let corners = piece.corners.as_flattened().iter().chain(&piece.heights);
+    for (bytes, x) in record[8..104].chunks_exact_mut(8).zip(corners) {
         bytes.copy_from_slice(&x.to_le_bytes());
     }
     let words = [
@@ -223,7 +276,7 @@ fn record(depth: f64, piece: &Piece) -> [u8; BYTES] {
         piece.quality.to_bits(),
         piece.size.to_bits(),
     ];
-    for (bytes, word) in record[72..].chunks_exact_mut(4).zip(words) {
+    for (bytes, word) in record[104..].chunks_exact_mut(4).zip(words) {
         bytes.copy_from_slice(&word.to_le_bytes());
     }
     record
@@ -235,11 +288,12 @@ fn piece(record: &[u8; BYTES]) -> Piece {
         f64::from_le_bytes(bytes.expect("eight bytes were taken"))
     };
     let word = |i: usize| {
-        let bytes = record[72 + 4 * i..76 + 4 * i].try_into();
+        let bytes = record[104 + 4 * i..108 + 4 * i].try_into();
         u32::from_le_bytes(bytes.expect("four bytes were taken"))
     };
     Piece {
         corners: [0, 1, 2, 3].map(|i| [double(2 * i), double(2 * i + 1)]),
+        heights: [8, 9, 10, 11].map(double),
         n: word(0) as usize,
         facing: f32::from_bits(word(1)),
         subdomain: word(2),

@@ -10,6 +10,7 @@ mod place;
 mod query;
 mod readme;
 mod regions;
+mod report;
 mod resaturate;
 mod same_mesh;
 mod shell;

@@ -42,9 +42,13 @@ fn a_cut_is_drawn_whole_and_in_its_colors() {
     let pieces = polygons(&svg);
     assert_eq!(answer["pieces"], pieces.len());
     assert_eq!(answer["bytes"], svg.len());
-    // The square with margins of 4 % on both sides.
+    // The square with margins of 4 % on both sides, and room for the list of colors.
     let sum: f64 = pieces.iter().map(|(corners, _)| area(corners)).sum();
-    assert!((sum / (460.0 * 460.0) - 1.0).abs() < 0.002, "{sum}");
+    assert!((sum / (422.5 * 422.5) - 1.0).abs() < 0.002, "{sum}");
+    for color in pieces.iter().map(|(_, color)| *color) {
+        let square = format!("fill=\"{color}\" stroke=\"{color}\"");
+        assert_eq!(svg.matches(&square).count(), 1, "a square of each color");
+    }
     let mut colors: Vec<&str> = pieces.iter().map(|(_, color)| *color).collect();
     colors.sort_unstable();
     colors.dedup();
@@ -81,4 +85,77 @@ fn a_png_has_the_size_asked_for() {
     assert_eq!([side(16).ok(), side(20).ok()], [Some(320), Some(240)]);
     assert_eq!(png, read("b.png"), "the same mesh gives the same picture");
     assert_ne!(png, read("c.png"));
+}
+
+#[test]
+fn stages_are_drawn_where_they_were_kept_and_change_nothing() {
+    let place = Place::new();
+    for (name, more) in [("a.tetdb", "--keep-stages"), ("b.tetdb", "")] {
+        let line = format!("mesh sample:box,h=0.05 -o {name} --subdomains 2 --no-verify {more}");
+        place.run_line(&line).succeeds();
+    }
+    assert_eq!(place.digest("a.tetdb"), place.digest("b.tetdb"));
+    let pieces = |stage: &str| {
+        let line = format!("snapshot a.tetdb {stage}.svg --stage 1:{stage} --json");
+        let answer = place.run_line(&line).succeeds().json();
+        answer["pieces"].as_u64().expect("a number")
+    };
+    assert!(pieces("refined") > 2 * pieces("coarse"));
+    let svg = std::fs::read_to_string(place.path("coarse.svg")).expect("it was written");
+    assert!(svg.contains("#0a0a0a"), "the plane of the cut is a line");
+    let info = place.run_line("info a.tetdb --json").succeeds().json();
+    assert_eq!(info["stages"].as_array().map(Vec::len), Some(2));
+    assert!(info["stages"][1]["tets"].as_u64() > info["stages"][0]["tets"].as_u64());
+    let measures = &info["journal"][1]["measures"];
+    let measure = |name: &str| {
+        let list = measures.as_array().expect("a list");
+        let found = list.iter().find(|m| m["name"] == name);
+        found.expect("the measure")["value"].as_f64()
+    };
+    assert_eq!(Some(pieces("natural") as f64), measure("natural_faces"));
+    assert_eq!(Some(pieces("interface") as f64), measure("interface_faces"));
+    for line in [
+        "snapshot b.tetdb c.svg --stage 1:coarse --json",
+        "snapshot b.tetdb c.svg --stage 1:natural --json",
+        "snapshot a.tetdb c.svg --stage 2:refined --json",
+    ] {
+        assert_eq!(
+            place.run_line(line).error()["code"],
+            "no-such-part",
+            "{line}"
+        );
+    }
+    for line in [
+        "snapshot a.tetdb c.svg --stage 1 --json",
+        "snapshot a.tetdb c.svg --from 1,0,0 --json",
+        "snapshot a.tetdb c.svg --surface --color quality --json",
+        "snapshot a.tetdb c.svg --surface --from 0,0,0 --json",
+    ] {
+        assert_eq!(place.run_line(line).error()["code"], "bad-query", "{line}");
+    }
+}
+
+#[test]
+fn surfaces_are_drawn_with_what_bounds_them() {
+    let place = Place::new();
+    let line = "mesh sample:box,h=0.05 -o a.tetdb --subdomains 2 --no-verify";
+    place.run_line(line).succeeds();
+    let info = place.run_line("info a.tetdb --json").succeeds().json();
+    let part = &info["subdomains"][1];
+    let pieces = |options: &str| {
+        let line = format!("snapshot a.tetdb a.svg --json {options}");
+        let answer = place.run_line(&line).succeeds().json();
+        answer["pieces"].as_u64().expect("a number")
+    };
+    let number = |key: &str| part[key].as_u64().expect("a number");
+    assert_eq!(
+        pieces("--shell 1"),
+        number("facets") + number("interface_faces")
+    );
+    let all = number("facets") + info["subdomains"][0]["facets"].as_u64().expect("a number");
+    assert_eq!(pieces("--surface"), all);
+    let half = pieces("--surface --plane 0.5,0.5,0.5,1,0,0");
+    assert!((2 * half).abs_diff(all) < all / 10, "{half} of {all}");
+    let failed = place.run_line("snapshot a.tetdb b.svg --shell 2 --json");
+    assert_eq!(failed.error()["code"], "no-such-part");
 }

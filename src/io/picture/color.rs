@@ -5,6 +5,13 @@
 pub struct Rgb(pub [u8; 3]);
 
 impl Rgb {
+    /// This with a share of another, 0 to 1.
+    #[must_use]
+    pub fn mixed(self, other: Self, share: f32) -> Self {
+        let mix = |a: u8, b: u8| f32::from(a) + share * (f32::from(b) - f32::from(a));
+        Self([0, 1, 2].map(|k| mix(self.0[k], other.0[k]).round() as u8))
+    }
+
     /// The same in less light, 0 to 1.
     #[must_use]
     pub fn lit(self, light: f32) -> Self {

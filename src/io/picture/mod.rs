@@ -8,6 +8,7 @@ mod digits;
 mod png;
 mod svg;
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 pub use color::{Rgb, category, scale};
@@ -27,6 +28,9 @@ pub const ENDINGS: &str = if cfg!(feature = "pictures") {
 const MARGIN: f64 = 0.04;
 /// Width of the bar of colors and what stands beside it, as a share of the height.
 const BAR: f64 = 0.16;
+/// The same of a list of kinds, and how many it has at most.
+const KINDS: f64 = 0.075;
+const KINDS_MOST: usize = 24;
 /// Edges shorter than so many pixels are not drawn: they would be all there is.
 const EDGE_PIXELS_MIN: f64 = 4.0;
 
@@ -47,6 +51,8 @@ pub struct Frame {
     /// Mean length of an edge in those units: how fine what is drawn is.
     pub edge: f64,
     pub bar: Option<Bar>,
+    /// Whether colors stand for kinds, of which there are several: those told with [`Picture::kind`] are listed.
+    pub kinds: bool,
 }
 
 /// A picture under way.
@@ -58,6 +64,8 @@ pub struct Picture {
     middle: [f64; 2],
     /// Width of edges in pixels, if they are drawn.
     line: Option<f32>,
+    /// Kinds drawn so far.
+    kinds: BTreeSet<u32>,
 }
 
 enum Canvas {
@@ -82,7 +90,8 @@ impl Picture {
             }
         };
         let [width, height] = frame.pixels.map(f64::from);
-        let bar = frame.bar.map_or(0.0, |_| BAR * height);
+        let beside = if frame.kinds { KINDS } else { 0.0 };
+        let bar = frame.bar.map_or(beside * height, |_| BAR * height);
         let margin = MARGIN * width.min(height);
         let room = [width - bar - 2.0 * margin, height - 2.0 * margin];
         let [low, high] = frame.bounds;
@@ -98,7 +107,15 @@ impl Picture {
             center: [0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1])],
             middle: [margin + 0.5 * room[0], margin + 0.5 * room[1]],
             line,
+            kinds: BTreeSet::new(),
         })
+    }
+
+    /// What is drawn next is of this kind.
+    pub fn kind(&mut self, kind: u32) {
+        if self.kinds.len() <= KINDS_MOST {
+            self.kinds.insert(kind);
+        }
     }
 
     /// Draws a polygon over what is there. Errors: the disk.
@@ -119,10 +136,64 @@ impl Picture {
         Ok(())
     }
 
+    /// Draws a triangle in space: what is nearer, by `heights` towards the viewer, hides what is farther. In a format without depth it is
+    /// drawn over what is there, so that far ones must come first. Errors: the disk.
+    pub fn solid(&mut self, corners: &[[f64; 2]; 3], heights: [f64; 3], color: Rgb) -> Result<()> {
+        match &mut self.canvas {
+            #[cfg(feature = "pictures")]
+            Canvas::Png(canvas) => {
+                let pixels = corners.map(|c| {
+                    [
+                        self.middle[0] + (c[0] - self.center[0]) * self.scale,
+                        self.middle[1] - (c[1] - self.center[1]) * self.scale,
+                    ]
+                });
+                canvas.solid(pixels, heights, color, self.line);
+                Ok(())
+            }
+            Canvas::Svg(_) => self.polygon(corners, color),
+        }
+    }
+
+    /// Draws a straight black line through a point, across all of the picture. Errors: the disk.
+    pub fn line(&mut self, [point, direction]: [[f64; 2]; 2]) -> Result<()> {
+        let [low, high] = self.frame.bounds;
+        // The part within the bounds, a little longer.
+        let (mut from, mut to) = (f64::NEG_INFINITY, f64::INFINITY);
+        for axis in 0..2 {
+            if direction[axis] != 0.0 {
+                let ends = [low[axis], high[axis]].map(|x| (x - point[axis]) / direction[axis]);
+                from = from.max(ends[0].min(ends[1]));
+                to = to.min(ends[0].max(ends[1]));
+            }
+        }
+        if from.is_nan() || to.is_nan() || from >= to || !(to - from).is_finite() {
+            return Ok(());
+        }
+        let more = 0.02 * (to - from);
+        let half = 0.0012 * f64::from(self.frame.pixels[1]).max(400.0) / self.scale;
+        let across = [-direction[1] * half, direction[0] * half];
+        let corner =
+            |t: f64, side: f64| [0, 1].map(|k| point[k] + direction[k] * t + across[k] * side);
+        let (from, to) = (from - more, to + more);
+        let corners = [
+            corner(from, -1.0),
+            corner(to, -1.0),
+            corner(to, 1.0),
+            corner(from, 1.0),
+        ];
+        let line = self.line.take();
+        let drawn = self.polygon(&corners, Rgb([10; 3]));
+        self.line = line;
+        drawn
+    }
+
     /// Draws the bar of colors and gives the file its name; returns its length. Errors: the disk.
     pub fn finish(mut self) -> Result<u64> {
         if let Some(bar) = self.frame.bar {
             self.bar(bar)?;
+        } else if self.frame.kinds {
+            self.list()?;
         }
         match self.canvas {
             #[cfg(feature = "pictures")]
@@ -157,12 +228,35 @@ impl Picture {
             let share = f64::from(i) / 4.0;
             let text = digits::shown(bar.least + share * (bar.most - bar.least));
             let y = top + tall * (1.0 - share as f32) - 2.5 * pixel;
-            let x = left + 0.03 * height;
-            for place in digits::pixels(&text) {
-                let [column, row] = place.map(f32::from);
-                let corner = [x + column * pixel, y + row * pixel].map(f32::round);
-                self.rectangle(corner, [pixel, pixel], Rgb([40; 3]))?;
-            }
+            self.text([left + 0.03 * height, y], pixel, &text)?;
+        }
+        Ok(())
+    }
+
+    /// Squares of the kinds that were drawn at the right, a number beside each.
+    fn list(&mut self) -> Result<()> {
+        let [width, height] = self.frame.pixels.map(|n| n as f32);
+        let (left, side) = (width - KINDS as f32 * height, 0.022 * height);
+        let kinds: Vec<u32> = self.kinds.iter().copied().take(KINDS_MOST).collect();
+        let step = 1.5 * side;
+        let top = 0.5 * (height - step * kinds.len() as f32);
+        let pixel = (height / 400.0).max(1.0).round();
+        for (n, kind) in kinds.into_iter().enumerate() {
+            let y = top + step * n as f32;
+            self.rectangle([left, y], [side, side], category(kind))?;
+            let text = kind.to_string();
+            let at = [left + 1.4 * side, y + 0.5 * side - 2.5 * pixel];
+            self.text(at, pixel, &text)?;
+        }
+        Ok(())
+    }
+
+    /// Digits in dots of `pixel` pixels.
+    fn text(&mut self, [x, y]: [f32; 2], pixel: f32, text: &str) -> Result<()> {
+        for place in digits::pixels(text) {
+            let [column, row] = place.map(f32::from);
+            let corner = [x + column * pixel, y + row * pixel].map(f32::round);
+            self.rectangle(corner, [pixel, pixel], Rgb([40; 3]))?;
         }
         Ok(())
     }

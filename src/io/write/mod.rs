@@ -21,6 +21,8 @@ mod merged;
 mod npy;
 mod npy_columns;
 mod numbering;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod pieces;
 mod selected;
 mod stream;
@@ -66,6 +68,9 @@ pub enum MeshFormat {
     Numpy,
     /// VTK XML, each sub-domain a piece in a file of its own.
     Pvtu,
+    /// Apache Parquet: of each sub-domain the tetrahedra `NAME_00007.parquet` and the vertices `NAME_00007_vertices.parquet`.
+    #[cfg(feature = "parquet")]
+    Parquet,
     /// JSON: who neighbors whom, and the vertices and faces that each two sub-domains share.
     Topology,
 }
@@ -82,6 +87,8 @@ impl MeshFormat {
             "inp" => Self::Abaqus,
             "npy" => Self::Numpy,
             "pvtu" => Self::Pvtu,
+            #[cfg(feature = "parquet")]
+            "parquet" => Self::Parquet,
             "json" => Self::Topology,
             _ => return None,
         })
@@ -100,7 +107,11 @@ pub struct ExportReport {
 }
 
 /// Endings of the formats.
-pub const ENDINGS: &str = ".vtu, .pvtu, .mesh, .meshb, .msh, .inp, .npy or .json";
+pub const ENDINGS: &str = if cfg!(feature = "parquet") {
+    ".vtu, .pvtu, .mesh, .meshb, .msh, .inp, .npy, .parquet or .json"
+} else {
+    ".vtu, .pvtu, .mesh, .meshb, .msh, .inp, .npy or .json (.parquet needs a build with `--features parquet`)"
+};
 
 /// What of a mesh is written.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -157,6 +168,10 @@ pub fn export(
         let mut draft = Draft::new(out)?;
         let counts = match format {
             MeshFormat::Topology => topology::write(store, &mut draft, out, memory_bytes)?,
+            #[cfg(feature = "parquet")]
+            MeshFormat::Parquet => {
+                parquet::write(store, &mut draft, out, selection, memory_bytes, tell)?
+            }
             MeshFormat::Pvtu => {
                 pieces::write(store, &mut draft, out, selection, memory_bytes, tell)?
             }
@@ -220,6 +235,8 @@ fn write(
         MeshFormat::Gmsh => gmsh::write(mesh, draft, out)?,
         MeshFormat::Abaqus => abaqus::write(mesh, draft, out)?,
         MeshFormat::Numpy => npy_columns::write(mesh, draft, out)?,
+        #[cfg(feature = "parquet")]
+        MeshFormat::Parquet => unreachable!("its pieces are written elsewhere"),
         MeshFormat::Topology => unreachable!("the topology is no mesh"),
     }
     mesh.tell_end();

@@ -61,7 +61,7 @@ pub(super) fn write(
 }
 
 /// `NAME_00007.vtu` beside `NAME.pvtu`.
-fn piece_path(out: &Path, rank: u32, extension: &str) -> PathBuf {
+pub(super) fn piece_path(out: &Path, rank: u32, extension: &str) -> PathBuf {
     let stem = out.file_stem().unwrap_or_default().to_string_lossy();
     out.with_file_name(format!("{stem}_{rank:05}.{extension}"))
 }

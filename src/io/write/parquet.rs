@@ -1,0 +1,231 @@
+//! Columns as Apache Parquet: for each sub-domain a file of tetrahedra and one of vertices.
+//!
+//! `NAME_00007.parquet` has a row for each tetrahedron, `NAME_00007_vertices.parquet` one for each vertex; `NAME.parquet` is not
+//! written. Rows are in the order of the store, which is that of a Hilbert curve, and each group of rows has the least and greatest value
+//! of each column: a program that asks for a place reads the groups that are there.
+
+use std::fs::OpenOptions;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use parquet::basic::{Compression, ZstdLevel};
+use parquet::data_type::{DataType, DoubleType, FloatType, Int32Type, Int64Type};
+use parquet::errors::ParquetError;
+use parquet::file::properties::WriterProperties;
+use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
+use parquet::schema::parser::parse_message_type;
+use tetdb_schema::ids::TetId;
+
+use super::draft::Draft;
+use super::pieces::piece_path;
+use super::{Counts, Result, Selection, WriteError};
+use crate::catalog::{Shape, Store, Subdomain};
+use crate::geom::Point;
+use crate::store::stop_if_requested;
+
+/// Rows of a group: small enough that a place is in few of them, large enough for columns to pack well.
+const GROUP_ROWS: usize = 65_536;
+
+/// Ids are those of `tetdb query`: they last. `x y z` is the centroid.
+const TETS: &str = "message tets { REQUIRED INT64 id; REQUIRED INT32 subdomain; REQUIRED INT32 region; \
+    REQUIRED DOUBLE quality; REQUIRED DOUBLE volume; REQUIRED DOUBLE x; REQUIRED DOUBLE y; REQUIRED DOUBLE z; \
+    REQUIRED INT64 v0; REQUIRED INT64 v1; REQUIRED INT64 v2; REQUIRED INT64 v3; }";
+/// `h` is the edge length wanted there. A vertex of an interface is in the file of each of its sub-domains.
+const VERTICES: &str = "message vertices { REQUIRED INT64 id; REQUIRED DOUBLE x; REQUIRED DOUBLE y; \
+    REQUIRED DOUBLE z; REQUIRED FLOAT h; REQUIRED INT32 tag; }";
+
+/// A file under way.
+struct Table {
+    path: PathBuf,
+    writer: SerializedFileWriter<BufWriter<std::fs::File>>,
+}
+
+type Group<'a> = SerializedRowGroupWriter<'a, BufWriter<std::fs::File>>;
+
+fn failed(path: &Path, error: ParquetError) -> WriteError {
+    match error {
+        ParquetError::External(inner) => match inner.downcast::<std::io::Error>() {
+            Ok(io) => WriteError::io(path, *io),
+            Err(other) => WriteError::io(path, std::io::Error::other(other.to_string())),
+        },
+        other => WriteError::io(path, std::io::Error::other(other)),
+    }
+}
+
+impl Table {
+    fn create(draft: &mut Draft, out: &Path, schema: &str, bytes: u64) -> Result<Self> {
+        let path = draft.create(out, bytes)?;
+        let file = OpenOptions::new().write(true).open(&path);
+        let file = BufWriter::new(file.map_err(|e| WriteError::io(&path, e))?);
+        let schema = Arc::new(parse_message_type(schema).expect("the schemas are well formed"));
+        let packing = Compression::ZSTD(ZstdLevel::default());
+        let properties = WriterProperties::builder()
+            .set_compression(packing)
+            .set_created_by(concat!("tetdb ", env!("CARGO_PKG_VERSION")).to_owned())
+            .build();
+        let writer = SerializedFileWriter::new(file, schema, Arc::new(properties));
+        let writer = writer.map_err(|e| failed(&path, e))?;
+        Ok(Self { path, writer })
+    }
+
+    /// Writes a group of rows.
+    fn group(
+        &mut self,
+        columns: impl FnOnce(&mut Group) -> std::result::Result<(), ParquetError>,
+    ) -> Result<()> {
+        stop_if_requested();
+        let written = self.writer.next_row_group().and_then(|mut group| {
+            columns(&mut group)?;
+            group.close().map(drop)
+        });
+        written.map_err(|e| failed(&self.path, e))
+    }
+
+    fn finish(self) -> Result<()> {
+        let closed = self.writer.close();
+        closed.map(drop).map_err(|e| failed(&self.path, e))
+    }
+}
+
+/// Writes the next column of a group.
+fn column<T: DataType>(
+    group: &mut Group,
+    values: &[T::T],
+) -> std::result::Result<(), ParquetError> {
+    let next = group.next_column()?;
+    let mut column = next.expect("a column for each of the schema");
+    column.typed::<T>().write_batch(values, None, None)?;
+    column.close()
+}
+
+pub(super) fn write(
+    store: &mut Store,
+    draft: &mut Draft,
+    out: &Path,
+    selection: &Selection,
+    memory: usize,
+    tell: &dyn Fn(u64, u64),
+) -> Result<Counts> {
+    let mut rows = store.catalog().subdomains()?;
+    if !selection.subdomains.is_empty() {
+        rows.retain(|row| selection.subdomains.contains(&row.rank));
+    }
+    let all: u64 = rows.iter().map(|row| row.tets).sum();
+    let mut counts = Counts::default();
+    for row in rows {
+        let mut part = Subdomain::open(store.catalog(), row.rank, memory / 2)?;
+        let piece = piece_path(out, row.rank, "parquet");
+        let mut table = Table::create(draft, &piece, TETS, row.tets * 32)?;
+        let mut tets = Tets::default();
+        for chunk in 0..row.chunks[0] {
+            tets.add(&mut part, chunk)?;
+            if tets.ids.len() >= GROUP_ROWS {
+                tets.write(&mut table, row.rank)?;
+            }
+            tell(counts.tets + tets.done, all);
+        }
+        tets.write(&mut table, row.rank)?;
+        table.finish()?;
+        counts.tets += row.tets;
+        counts.vertices += row.vertices;
+        let name = piece.file_stem().unwrap_or_default().to_string_lossy();
+        let beside = piece.with_file_name(format!("{name}_vertices.parquet"));
+        let mut table = Table::create(draft, &beside, VERTICES, row.vertices * 24)?;
+        vertices(&mut part, &mut table)?;
+        table.finish()?;
+    }
+    Ok(counts)
+}
+
+/// Columns of a group of tetrahedra.
+#[derive(Default)]
+struct Tets {
+    ids: Vec<i64>,
+    regions: Vec<i32>,
+    /// Quality, volume, centroid.
+    numbers: [Vec<f64>; 5],
+    vertices: [Vec<i64>; 4],
+    done: u64,
+}
+
+impl Tets {
+    fn add(&mut self, part: &mut Subdomain, chunk: u32) -> Result<()> {
+        let records = part.tet_chunk(chunk)?;
+        for (local, tet) in (records.first..).zip(&records.records) {
+            let corners = part.corners(tet.nodes)?;
+            let id = TetId::new(part.id(), local).expect("the reader counted the tetrahedra");
+            self.ids.push(id.number() as i64);
+            self.regions.push(tet.region as i32);
+            let points = corners.map(|c| c.point);
+            let shape = Shape::of(points);
+            let [x, y, z] = (points.iter().copied().sum::<Point>() * 0.25).to_array();
+            let numbers = [shape.quality, shape.volume, x, y, z];
+            for (column, number) in self.numbers.iter_mut().zip(numbers) {
+                column.push(number);
+            }
+            for (column, corner) in self.vertices.iter_mut().zip(corners) {
+                column.push(corner.id as i64);
+            }
+        }
+        self.done += records.records.len() as u64;
+        Ok(())
+    }
+
+    fn write(&mut self, table: &mut Table, rank: u32) -> Result<()> {
+        if self.ids.is_empty() {
+            return Ok(());
+        }
+        let ranks = vec![rank as i32; self.ids.len()];
+        table.group(|group| {
+            column::<Int64Type>(group, &self.ids)?;
+            column::<Int32Type>(group, &ranks)?;
+            column::<Int32Type>(group, &self.regions)?;
+            for numbers in &self.numbers {
+                column::<DoubleType>(group, numbers)?;
+            }
+            for vertices in &self.vertices {
+                column::<Int64Type>(group, vertices)?;
+            }
+            Ok(())
+        })?;
+        let done = self.done;
+        *self = Self {
+            done,
+            ..Self::default()
+        };
+        Ok(())
+    }
+}
+
+fn vertices(part: &mut Subdomain, table: &mut Table) -> Result<()> {
+    let (mut ids, mut h, mut tags) = (Vec::new(), Vec::new(), Vec::new());
+    let mut points: [Vec<f64>; 3] = Default::default();
+    let last = part.row().chunks[1];
+    for (done, chunk) in (1..).zip(part.vertex_chunks()) {
+        for vertex in chunk?.records {
+            ids.push(vertex.id as i64);
+            for (column, x) in points.iter_mut().zip(vertex.point) {
+                column.push(x);
+            }
+            h.push(vertex.h);
+            tags.push(vertex.tag as i32);
+        }
+        if ids.len() < GROUP_ROWS && done < last {
+            continue;
+        }
+        table.group(|group| {
+            column::<Int64Type>(group, &ids)?;
+            for column_of in &points {
+                column::<DoubleType>(group, column_of)?;
+            }
+            column::<FloatType>(group, &h)?;
+            column::<Int32Type>(group, &tags)
+        })?;
+        ids.clear();
+        h.clear();
+        tags.clear();
+        points.iter_mut().for_each(Vec::clear);
+    }
+    Ok(())
+}
