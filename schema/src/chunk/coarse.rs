@@ -1,7 +1,5 @@
 //! Coarse leaves: working meshes kept as they were, in the order they were, less what follows from the rest (neighbors, sizes).
 
-use std::ops::Range;
-
 use super::columns::{Columns, Malformed, Reader, unzigzag32, unzigzag64, zigzag32, zigzag64};
 use super::facets::{decode_vertices, encode_vertices};
 use super::tets::{decode_nodes, encode_nodes};
@@ -45,19 +43,9 @@ impl ChunkRecord for CoarseTet {
     const RAW_BYTES_MAX: usize = 4 * 4 + 1 + 3 * 10;
 
     fn encode(records: &[Self], _first: u32, columns: &mut Columns) {
-        let turned: Vec<(SealedTet, u8)> = records.iter().map(Self::turned).collect();
-        let mut order: Vec<u32> = (0..records.len() as u32).collect();
-        let mut places = vec![0; records.len()];
-        for run in runs(turned.len(), |i| turned[i].0.nodes[0]) {
-            order[run.clone()].sort_unstable_by_key(|&i| turned[i as usize].0.nodes);
-            for i in run.clone() {
-                places[i] = order[i] - run.start as u32;
-            }
-        }
-        let sorted: Vec<SealedTet> = order.iter().map(|&i| turned[i as usize].0).collect();
-        encode_nodes(&sorted, columns);
-        columns.planes32(&places);
-        columns.raw(&turned.iter().map(|t| t.1).collect::<Vec<u8>>());
+        let (turned, turns): (Vec<SealedTet>, Vec<u8>) = records.iter().map(Self::turned).unzip();
+        encode_nodes(&turned, columns);
+        columns.raw(&turns);
         columns.dictionary(records.iter().map(|t| u64::from(t.bits)));
         columns.dictionary(records.iter().map(|t| u64::from(t.region)));
         columns.dictionary(records.iter().map(|t| u64::from(t.flags)));
@@ -69,47 +57,23 @@ impl ChunkRecord for CoarseTet {
         count: usize,
         records: &mut Vec<Self>,
     ) -> Result<(), Malformed> {
-        let mut sorted = vec![SealedTet::default(); count];
-        decode_nodes(columns, &mut sorted)?;
-        let mut places = vec![0; count];
-        columns.planes32(&mut places)?;
+        let mut turned = vec![SealedTet::default(); count];
+        decode_nodes(columns, &mut turned)?;
         let start = records.len();
-        records.resize(start + count, Self::default());
-        let records = &mut records[start..];
-        for run in runs(count, |i| sorted[i].nodes[0]) {
-            for i in run.clone() {
-                let place = places[i] as usize;
-                if place >= run.len() {
-                    return Err(Malformed("a tetrahedron outside its run"));
-                }
-                records[run.start + place].nodes = sorted[i].nodes;
-            }
-        }
-        for (record, &turn) in records.iter_mut().zip(columns.raw(count)?) {
+        for (tet, &turn) in turned.iter().zip(columns.raw(count)?) {
             let turn = TURNS
                 .get(usize::from(turn))
                 .ok_or(Malformed("an unknown turn"))?;
-            record.nodes = turn.map(|i| record.nodes[i]);
+            records.push(Self {
+                nodes: turn.map(|i| tet.nodes[i]),
+                ..Self::default()
+            });
         }
+        let records = &mut records[start..];
         columns.dictionary(count, |i, bits| records[i].bits = bits as u8)?;
         columns.dictionary(count, |i, region| records[i].region = region as u32)?;
         columns.dictionary(count, |i, flags| records[i].flags = flags as u32)
     }
-}
-
-/// Runs of places with the same key: what leads with the same vertex is sorted, which takes a third less, and its place in the run kept.
-fn runs(count: usize, key: impl Fn(usize) -> u32) -> impl Iterator<Item = Range<usize>> {
-    let mut from = 0;
-    std::iter::from_fn(move || {
-        let start = from;
-        if start >= count {
-            return None;
-        }
-        while from < count && key(from) == key(start) {
-            from += 1;
-        }
-        Some(start..from)
-    })
 }
 
 impl ChunkRecord for CoarseVertex {
