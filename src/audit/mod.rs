@@ -59,6 +59,8 @@ pub fn verify(
         let memory = options.memory_bytes / 4;
         let mut part = Subdomain::open(store.catalog(), row.rank, memory)?;
         audit.subdomain(&mut part)?;
+        // Damage of chunks is told with their places by now; what is left is in the tree between them.
+        part.check()?;
     }
     let interfaces = store.catalog().interfaces()?;
     let regions = store.catalog().regions()?;

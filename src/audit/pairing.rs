@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::claims::word;
 use crate::catalog::CatalogError;
-use crate::store::{Sorter, StoreError};
+use crate::store::{Sorter, StoreError, stop_if_requested};
 
 /// Vertices ascending, reference, opposite vertex, region, parity, mark.
 const BYTES: usize = 26;
@@ -54,6 +54,7 @@ impl OpenSides {
     ) -> Result<(), CatalogError> {
         let mut sides: Vec<Side> = Vec::new();
         for record in self.sorter.finish()? {
+            stop_if_requested();
             let record = record?;
             let side = Side {
                 face: [0, 1, 2].map(|i| word(&record, i)),

@@ -17,6 +17,7 @@ use crate::catalog::{
     CatalogError, Corner, FacePairs, InterfaceRow, Paired, RegionRow, Subdomain, sorted_face,
 };
 use crate::geom::{Point, insphere, orient};
+use crate::store::stop_if_requested;
 
 /// Volumes that agree this well, relative to the sum of what was added, are the same: sums of
 /// millions of terms lose some six of sixteen digits at most.
@@ -115,6 +116,7 @@ impl<'a> Audit<'a> {
         let (chunks, total) = (part.row().chunks[2], part.row().facets);
         let mut n = 0;
         for chunk in 0..chunks {
+            stop_if_requested();
             for facet in part.facet_chunk(chunk)?.records {
                 n += 1;
                 let corners = part.corners(facet.vertices)?;
@@ -180,6 +182,7 @@ impl<'a> Audit<'a> {
         let mut open = OpenSides::new(self.scratch, self.options.memory_bytes / 4);
         let mut expected = 0;
         for chunk in 0..part.tet_summaries().len() {
+            stop_if_requested();
             let chunk = part.tet_chunk(chunk as u32)?;
             if chunk.first != expected {
                 return Err(CatalogError::Content {

@@ -115,6 +115,10 @@ impl Catalog {
             journal_rows: 0,
         };
         catalog.check_format()?;
+        if !writable {
+            // A file opened for writing has been checked.
+            catalog.file.check()?;
+        }
         let file = &mut catalog.file;
         let mut journal_rows = 0;
         file.scan(RowKind::Journal.keys(), |_, _| {

@@ -188,6 +188,13 @@ impl Subdomain {
         })
     }
 
+    /// Compares its whole file with redb's checksums; chunks have their own, which are compared whenever one is read.
+    ///
+    /// Errors: damage.
+    pub fn check(&self) -> Result<(), CatalogError> {
+        Ok(self.file.check()?)
+    }
+
     /// Its rank.
     pub fn id(&self) -> SubdomainId {
         self.id

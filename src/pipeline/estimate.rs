@@ -12,8 +12,6 @@ use crate::surface::{OUTSIDE, Seeker, Surface, Volumes};
 
 /// Tetrahedra of one sub-domain, unless a number of sub-domains is asked for.
 const TETS_PER_SUBDOMAIN: f64 = (4u64 << 20) as f64;
-/// Sub-domains smaller than this are nearly all refined zone: more are not made.
-const TETS_MIN: f64 = 25_000.0;
 /// Inner tetrahedra without and with only part of the optimization, over those with all of it: 1.072 and 1.083, 1.023 and 1.026.
 const UNOPTIMIZED: f64 = 1.078;
 const DELAUNAY: f64 = 1.025;
@@ -148,8 +146,7 @@ impl Estimate {
             Mode::Delaunay => DELAUNAY,
             Mode::Full => 1.0,
         };
-        let (subdomains, subdomains_asked) =
-            n_subdomains(counts.tets(), options.subdomain_count()?);
+        let (subdomains, subdomains_asked) = n_subdomains(counts.tets(), options)?;
         Ok(Self {
             counts,
             triangles: surface.n_triangles() as u64,
@@ -244,10 +241,14 @@ impl Estimate {
 }
 
 /// How many sub-domains a mesh of so many tetrahedra is made in, and what was asked for when that is more.
-pub(super) fn n_subdomains(tets: f64, asked: Option<u32>) -> (u32, Option<u32>) {
+pub(super) fn n_subdomains(
+    tets: f64,
+    options: &Options,
+) -> Result<(u32, Option<u32>), PipelineError> {
+    let asked = options.subdomain_count()?;
     let auto = (tets / TETS_PER_SUBDOMAIN).ceil().max(1.0);
-    let most = (tets / TETS_MIN).floor().max(1.0);
+    let most = (tets / options.subdomain_tets_min()).floor().max(1.0);
     let wanted = asked.map_or(auto, f64::from);
     let n = wanted.min(most).min(f64::from(1u32 << 20)) as u32;
-    (n, asked.filter(|_| wanted > most && wanted > 1.0))
+    Ok((n, asked.filter(|_| wanted > most && wanted > 1.0)))
 }

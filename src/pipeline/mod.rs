@@ -36,7 +36,7 @@ pub use coarse::{CoarseReport, coarse as coarse_mesh};
 pub use error::PipelineError;
 pub use estimate::{Estimate, Prepared, prepare};
 pub use fine::FineReport;
-pub use options::Options;
+pub use options::{Options, Trial};
 pub use plan::{MEMORY_MIN, Plan};
 pub use resaturate::{
     Forecast, Remade, ResaturateSummary, Resaturation, asked, changed, forecast, resaturate,

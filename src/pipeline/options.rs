@@ -1,10 +1,13 @@
 use serde::{Deserialize, Serialize};
 
-use super::PipelineError;
+use super::{PipelineError, Plan};
 use crate::bisect::Cutting;
 use crate::boundary::RegionPolicy;
 use crate::optimize::Mode;
 use crate::sizing::{Formula, RegionSize, SizeOptions, SizeSource, SizingError};
+
+/// Sub-domains smaller than this are nearly all refined zone: more are not made.
+const TETS_MIN: f64 = 25_000.0;
 
 /// What decides the mesh, besides the surface; stored with the job. Memory and threads are not here: they do not.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -50,6 +53,18 @@ pub struct Options {
     /// For comparisons by a program. It is not stored: a run that is resumed makes cuts as usual.
     #[serde(skip)]
     pub cutting: Cutting,
+    /// For tests by a program. Not stored either: how many sub-domains there will be is, once that is decided.
+    #[serde(skip)]
+    pub trial: Trial,
+}
+
+/// What makes of a small mesh a test of what happens to large ones.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Trial {
+    /// As many sub-domains as are asked for, however small they are.
+    pub subdomains_small: bool,
+    /// Frames and buffers that are not shares of the cap: with very few, pages leave memory and sorts have runs.
+    pub plan: Option<Plan>,
 }
 
 impl Options {
@@ -94,6 +109,14 @@ impl Options {
                     value: text.to_owned(),
                 }),
             },
+        }
+    }
+
+    /// Fewest tetrahedra of a sub-domain.
+    pub(super) fn subdomain_tets_min(&self) -> f64 {
+        match self.trial.subdomains_small {
+            true => 1.0,
+            false => TETS_MIN,
         }
     }
 

@@ -95,7 +95,11 @@ fn go_on(
     let (sizes, estimate) = new.unzip();
     let surface_lease = budget.lease(surface.bytes() as u64, "the surface")?;
     let field_lease = budget.lease(field.bytes() as u64, "the size field")?;
-    let plan = Plan::new(budget.cap(), surface_lease.bytes() + field_lease.bytes())?;
+    let held = surface_lease.bytes() + field_lease.bytes();
+    let plan = match options.trial.plan {
+        Some(plan) => plan,
+        None => Plan::new(budget.cap(), held)?,
+    };
     let _lease = budget.lease(
         plan.frames + plan.redb + plan.redb / 2 + plan.buffers,
         "the working mesh",
@@ -199,8 +203,8 @@ impl<'a> Run<'a> {
         // Where vertices nearly touch, sizes at a point are next to nothing and the estimate knows no bound; the mesh's own load does.
         let told = self.estimate.map_or(0.0, |e| e.tets());
         let predicted = told.min(TETS_PER_LOAD * load);
-        let (n, _) = n_subdomains(predicted, self.options.subdomain_count()?);
-        mesh.pages_mut().flush();
+        let (n, _) = n_subdomains(predicted, self.options)?;
+        mesh.pages_mut().end_generation();
         let part = PartMesh {
             part: Part { first: 0, count: n },
             generation: COARSE,
@@ -238,7 +242,7 @@ impl<'a> Run<'a> {
             Ok(())
         })?;
         let path = self.catalog.file_path(0, COARSE + WORK);
-        mesh.pages_mut().next_generation(COARSE + WORK, path);
+        mesh.pages_mut().next_generation(COARSE + WORK, path)?;
         Ok((mesh, report))
     }
 

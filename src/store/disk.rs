@@ -7,7 +7,7 @@ use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use redb::{Builder, Database, DatabaseError, ReadOnlyDatabase, StorageBackend};
+use redb::{Builder, DatabaseError, ReadOnlyDatabase, StorageBackend};
 
 use super::StoreError;
 use super::real_disk::RealDisk;
@@ -21,8 +21,15 @@ pub trait Disk: Debug + Send + Sync {
     fn create(&self, path: &Path) -> io::Result<Box<dyn StorageBackend>>;
     /// Opens a database file for reading and writing.
     fn open(&self, path: &Path) -> io::Result<Box<dyn StorageBackend>>;
-    /// Opens a database file, and the database in it, for reading only: redb does so by path alone.
-    fn open_read_only(&self, path: &Path, builder: &Builder) -> Result<Reader, DatabaseError>;
+    /// Opens a database file for reading, whoever has it.
+    fn open_to_look(&self, path: &Path) -> io::Result<Box<dyn StorageBackend>>;
+    /// Opens the database in a file for reading, beside other readers: redb does so for real files only, by their paths. `None`: this disk
+    /// has none.
+    fn open_shared(
+        &self,
+        path: &Path,
+        builder: &Builder,
+    ) -> Option<Result<ReadOnlyDatabase, DatabaseError>>;
     /// Creates a file to be written once from its beginning, such as a sorted run.
     fn create_stream(&self, path: &Path) -> io::Result<Box<dyn Write>>;
     /// Opens a file to be read once from its beginning.
@@ -53,13 +60,6 @@ pub enum Entry {
     Folder,
     /// A file of this many bytes.
     File(u64),
-}
-
-/// A database open for reading.
-pub enum Reader {
-    Shared(ReadOnlyDatabase),
-    /// One whose changes reach no file, for disks that are no files.
-    Private(Database),
 }
 
 /// A path on a disk: the real one, unless said otherwise.

@@ -8,9 +8,11 @@ use redb::{
     StorageBackend, StorageError, TableDefinition,
 };
 
-use super::backend::{Synced, Unsynced};
-use super::disk::Reader;
+use super::backend::{Private, Synced, Unsynced};
 use super::{DiskPath, StoreError};
+
+/// A check goes through a file once, so that a cache brings nothing.
+const CHECK_CACHE_BYTES: usize = 1 << 20;
 
 /// The only table of a file; see the schema's page on keys.
 const PAGES: TableDefinition<u64, &[u8]> = TableDefinition::new("pages");
@@ -26,7 +28,8 @@ enum Handle {
 /// bounded by the `cache_bytes` given at opening, which the caller has leased.
 pub struct StoreFile {
     path: DiskPath,
-    handle: Handle,
+    /// Always there until it is dropped.
+    handle: Option<Handle>,
     /// Kept between reads; dropped at each commit, because it shows the state before it.
     table: Option<ReadOnlyTable<u64, &'static [u8]>>,
 }
@@ -59,7 +62,7 @@ impl StoreFile {
         let file = path.told(path.disk().create(path.path()))?;
         let db = guarded(|| builder.create_with_backend(backend(file)));
         let mut file = Self {
-            handle: Handle::Writer(Box::new(db.map_err(|e| e.at(path.path()))?)),
+            handle: Some(Handle::Writer(Box::new(db.map_err(|e| e.at(path.path()))?))),
             path,
             table: None,
         };
@@ -81,16 +84,25 @@ impl StoreFile {
         // redb follows its tree of free pages while it opens.
         let handle = guarded(|| match writable {
             true => open_writable(&path, &builder).map(|db| Handle::Writer(Box::new(db))),
-            false => Ok(match path.disk().open_read_only(path.path(), &builder)? {
-                Reader::Shared(db) => Handle::Reader(Box::new(db)),
-                Reader::Private(db) => Handle::Writer(Box::new(db)),
-            }),
+            false => match path.disk().open_shared(path.path(), &builder) {
+                Some(db) => db.map(|db| Handle::Reader(Box::new(db))),
+                None => open_private(&path, &builder).map(|db| Handle::Writer(Box::new(db))),
+            },
         });
-        Ok(Self {
-            handle: handle.map_err(|e| e.at(path.path()))?,
+        let mut file = Self {
+            handle: Some(handle.map_err(|e| e.at(path.path()))?),
             path,
             table: None,
-        })
+        };
+        // redb writes once more when it closes what it opened for writing. On a damaged tree it panics meanwhile, and again in what that
+        // unwinds, which ends the process: so a damaged file is never closed.
+        if matches!(file.handle, Some(Handle::Writer(_)))
+            && let Err(damage) = file.check()
+        {
+            std::mem::forget(file.handle.take());
+            return Err(damage);
+        }
+        Ok(file)
     }
 
     /// Opens an existing file as [`StoreFile::open`] does, also one whose writer was killed: that is first opened for
@@ -184,7 +196,7 @@ impl StoreFile {
         &mut self,
         changes: impl Iterator<Item = (u64, Option<&'a [u8]>)>,
     ) -> Result<(), StoreError> {
-        let Handle::Writer(db) = &self.handle else {
+        let Some(Handle::Writer(db)) = &self.handle else {
             unreachable!("{} is open for reading only", self.path().display());
         };
         self.table = None;
@@ -207,10 +219,28 @@ impl StoreFile {
         committed.map_err(|e| e.at(self.path.path()))
     }
 
+    /// Reads the whole file and compares every page of redb's tree with its checksum, which nothing else does: what is read by key is right or
+    /// missing, but a range of keys may silently lack some.
+    ///
+    /// Effects: none on the file. Errors: [`StoreError::Damaged`].
+    pub fn check(&self) -> Result<(), StoreError> {
+        let mut builder = Database::builder();
+        builder.set_cache_size(CHECK_CACHE_BYTES);
+        let sound = guarded(|| open_private(&self.path, &builder)?.check_integrity());
+        match sound.map_err(|e| e.at(self.path())) {
+            Ok(true) => Ok(()),
+            Ok(false) | Err(StoreError::Damaged { .. }) => Err(StoreError::Damaged {
+                path: self.path().to_owned(),
+                reason: "its tree of pages does not match its checksums".to_owned(),
+            }),
+            Err(other) => Err(other),
+        }
+    }
+
     /// Shrinks the file to what it holds, and closes it.
     pub fn compact(mut self) -> Result<(), StoreError> {
         self.table = None;
-        if let Handle::Writer(db) = &mut self.handle {
+        if let Some(Handle::Writer(db)) = &mut self.handle {
             let done = guarded(|| db.compact().map_err(redb::Error::from));
             done.map_err(|e| e.at(self.path.path()))?;
         }
@@ -220,7 +250,7 @@ impl StoreFile {
     fn table(&mut self) -> Result<&ReadOnlyTable<u64, &'static [u8]>, StoreError> {
         if self.table.is_none() {
             let opened = guarded(|| -> Result<_, redb::Error> {
-                let txn = match &self.handle {
+                let txn = match self.handle.as_ref().expect("a file that is not dropped") {
                     Handle::Writer(db) => db.begin_read()?,
                     Handle::Reader(db) => db.begin_read()?,
                 };
@@ -232,13 +262,35 @@ impl StoreFile {
     }
 }
 
+impl Drop for StoreFile {
+    fn drop(&mut self) {
+        self.table = None;
+        let handle = self.handle.take();
+        // redb looks at its tree once more when it closes. What it may find was told already, or is found by who opens the file next.
+        let _ = caught(|| drop(handle));
+    }
+}
+
 /// Opens what is there; an empty file is none of redb's, which would begin a database in it.
 fn open_writable(path: &DiskPath, builder: &redb::Builder) -> Result<Database, DatabaseError> {
     let file = path.disk().open(path.path()).map_err(StorageError::Io)?;
-    if file.len().map_err(StorageError::Io)? == 0 {
-        return Err(StorageError::Io(ErrorKind::InvalidData.into()).into());
-    }
+    refuse_empty(&*file)?;
     builder.create_with_backend(Synced(file))
+}
+
+/// Opens what is there, changing nothing.
+fn open_private(path: &DiskPath, builder: &redb::Builder) -> Result<Database, DatabaseError> {
+    let file = path.disk().open_to_look(path.path());
+    let file = file.map_err(StorageError::Io)?;
+    refuse_empty(&*file)?;
+    builder.create_with_backend(Private::new(file).map_err(StorageError::Io)?)
+}
+
+fn refuse_empty(file: &dyn StorageBackend) -> Result<(), StorageError> {
+    match file.len()? {
+        0 => Err(StorageError::Io(ErrorKind::InvalidData.into())),
+        _ => Ok(()),
+    }
 }
 
 /// A failure inside redb: an error it returned, or a panic on a tree it could not follow.
@@ -270,6 +322,18 @@ impl Failure {
                 }
             }
             Self::Error(redb::Error::Io(e)) => StoreError::io(&path, e),
+            // Every file has its one table from its first commit on.
+            Self::Error(
+                e @ (redb::Error::TableDoesNotExist(_)
+                | redb::Error::TableTypeMismatch { .. }
+                | redb::Error::TableIsMultimap(_)
+                | redb::Error::TableIsNotMultimap(_)
+                | redb::Error::TypeDefinitionChanged { .. }
+                | redb::Error::UpgradeRequired(_)),
+            ) => StoreError::Damaged {
+                path,
+                reason: e.to_string(),
+            },
             Self::Error(source) => StoreError::Database {
                 path,
                 source: Box::new(source),

@@ -21,7 +21,7 @@ mod space;
 mod stop;
 
 pub use budget::{Budget, Lease};
-pub use disk::{Disk, DiskPath, Entry, Reader};
+pub use disk::{Disk, DiskPath, Entry};
 pub use error::StoreError;
 pub use file::StoreFile;
 pub use flat::FlatPages;

@@ -142,13 +142,24 @@ impl Pager {
         }
     }
 
-    /// Ends a generation: all pages are in its file, which becomes the base of the next one, written to `path`.
+    /// Ends a generation: writes every dirty page and closes the file, so that it may be listed. A file that is listed is not written to
+    /// again, not even by redb when it is closed: that would not be synced, and a loss of power could leave it torn.
     ///
-    /// The caller must have flushed, and the generation before must have had no base of its own.
-    pub fn next_generation(&mut self, generation: u32, path: DiskPath) {
+    /// No page can be loaded until [`Pager::next_generation`]. Unwinds on errors.
+    pub fn end_generation(&mut self) {
+        self.flush();
+        self.work = None;
+    }
+
+    /// Begins a generation, written to `path`, on what [`Pager::end_generation`] left; that one must have had no base of its own.
+    ///
+    /// Errors: the file cannot be opened again.
+    pub fn next_generation(&mut self, generation: u32, path: DiskPath) -> Result<(), StoreError> {
+        assert!(self.work.is_none(), "the generation before has ended");
         let backing = self.backing.as_mut().expect("a pool with a store");
         assert!(backing.base.is_none(), "pages would be in three files");
-        backing.base = self.work.take();
+        let base = StoreFile::open_repaired(&backing.work_path, backing.cache_bytes / 2, false)?;
+        backing.base = Some(base);
         backing.generation = generation;
         backing.work_path = path;
         for table in &mut self.tables {
@@ -163,6 +174,7 @@ impl Pager {
         for frame in 0..self.owners.len() as u32 {
             self.set_place(frame, IN_BASE);
         }
+        Ok(())
     }
 
     /// Closes the files without writing what is dirty; returns the path of this generation's file, if it was made.

@@ -5,10 +5,10 @@ use std::io::{self, Read, Write};
 use std::path::Path;
 
 use redb::backends::FileBackend;
-use redb::{Builder, DatabaseError, StorageBackend};
+use redb::{Builder, DatabaseError, ReadOnlyDatabase, StorageBackend};
 
 use super::available_bytes;
-use super::disk::{Disk, Entry, Reader};
+use super::disk::{Disk, Entry};
 
 /// Files and folders of this machine, with redb's own locks on database files.
 #[derive(Clone, Copy, Debug)]
@@ -31,8 +31,16 @@ impl Disk for RealDisk {
         backend(OpenOptions::new().read(true).write(true).open(path)?)
     }
 
-    fn open_read_only(&self, path: &Path, builder: &Builder) -> Result<Reader, DatabaseError> {
-        builder.open_read_only(path).map(Reader::Shared)
+    fn open_to_look(&self, path: &Path) -> io::Result<Box<dyn StorageBackend>> {
+        backend(File::open(path)?)
+    }
+
+    fn open_shared(
+        &self,
+        path: &Path,
+        builder: &Builder,
+    ) -> Option<Result<ReadOnlyDatabase, DatabaseError>> {
+        Some(builder.open_read_only(path))
     }
 
     fn create_stream(&self, path: &Path) -> io::Result<Box<dyn Write>> {
