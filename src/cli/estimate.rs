@@ -128,6 +128,32 @@ pub fn preflight(estimate: &Estimate, cap: u64, store: &Path, talk: &Talk) -> Re
     Ok(())
 }
 
+/// Says of a full disk what is missing: what is free, and what a run that is expected to need `needed` bytes in all still lacks.
+pub fn with_room(mut failure: Failure, store: &Path, needed: Option<u64>) -> Failure {
+    if let ("disk-full", Some(free)) = (failure.code, free_at(store)) {
+        failure.message += &format!("; {} are free", memory::show(free));
+        let missing = needed.map_or(0, |n| n.saturating_sub(bytes_on_disk(store) + free));
+        if missing > 0 {
+            failure.message += &format!(", about {} more are needed", memory::show(missing));
+        }
+    }
+    failure
+}
+
+/// Bytes that files in a folder take up, where the system tells; else their lengths.
+fn bytes_on_disk(dir: &Path) -> u64 {
+    let entries = std::fs::read_dir(dir).into_iter().flatten().flatten();
+    let bytes = entries.map(|entry| match entry.metadata() {
+        Ok(metadata) if metadata.is_dir() => bytes_on_disk(&entry.path()),
+        #[cfg(unix)]
+        Ok(metadata) => std::os::unix::fs::MetadataExt::blocks(&metadata) * 512,
+        #[cfg(not(unix))]
+        Ok(metadata) => metadata.len(),
+        Err(_) => 0,
+    });
+    bytes.sum()
+}
+
 /// Bytes free where a store would be made: on the disk of the nearest folder that exists.
 fn free_at(store: &Path) -> Option<u64> {
     let absolute = std::path::absolute(store).ok()?;

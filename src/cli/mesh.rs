@@ -51,6 +51,7 @@ pub fn run(args: &MeshArgs, talk: &Talk) -> Result<u8, Failure> {
         surfaces: input.sources.clone(),
         tool_version: env!("CARGO_PKG_VERSION").to_owned(),
     };
+    let needed = (prepared.estimate).disk_peak_bytes(cap, rayon::current_num_threads());
     let mut catalog = Catalog::create(&place, &job)?;
     let budget = Budget::new(cap);
     let watch = |event| talk.progress(event);
@@ -69,7 +70,7 @@ pub fn run(args: &MeshArgs, talk: &Talk) -> Result<u8, Failure> {
             remove_store(&place)?;
             return Err(failure);
         }
-        other => other?,
+        other => other.map_err(|e| estimate::with_room(e, &place, Some(needed)))?,
     };
     tell(&summary, talk);
     catalog.close()?;
@@ -98,7 +99,7 @@ pub fn resume(args: &ResumeArgs, talk: &Talk) -> Result<u8, Failure> {
     let mut catalog = Catalog::open_writable(&args.store)?;
     let watch = |event| talk.progress(event);
     let budget = Budget::new(cap);
-    let summary = if state < StoreState::Coarse {
+    let made = if state < StoreState::Coarse {
         let background = background::read(&options, cap)?;
         let prepared = pipeline::prepare(&input.surface, &options, background.as_ref())?;
         drop(background);
@@ -109,10 +110,11 @@ pub fn resume(args: &ResumeArgs, talk: &Talk) -> Result<u8, Failure> {
             prepared,
             &budget,
             &watch,
-        )?
+        )
     } else {
-        pipeline::mesh(&mut catalog, &input.surface, &options, &budget, &watch)?
+        pipeline::mesh(&mut catalog, &input.surface, &options, &budget, &watch)
     };
+    let summary = made.map_err(|e| estimate::with_room(e.into(), &args.store, None))?;
     tell(&summary, talk);
     catalog.close()?;
     finish(&args.store, &input, &args.run, cap, Some(&summary), talk)

@@ -29,6 +29,7 @@ impl Draft {
             let source = std::io::Error::from(std::io::ErrorKind::IsADirectory);
             return Err(WriteError::io(out, source));
         }
+        remove_abandoned(&name, &dir);
         fs::create_dir(&dir).map_err(|e| WriteError::io(out, e))?;
         let files = Vec::new();
         Ok(Self { dir, files })
@@ -83,10 +84,64 @@ impl Drop for Draft {
     }
 }
 
+/// Removes folders that writers of the same file left when they were killed, also one of `new`'s name: the system gives numbers of processes
+/// again. Nothing depends on it: what cannot be removed stays.
+fn remove_abandoned(name: &str, new: &Path) {
+    let is_abandoned = |path: &Path| {
+        let file_name = path.file_name().unwrap_or_default().to_string_lossy();
+        let middle = file_name
+            .strip_prefix(&format!(".{name}."))
+            .and_then(|rest| rest.strip_suffix(".tmp"));
+        let Some((process, number)) = middle.and_then(|m| m.split_once('-')) else {
+            return false;
+        };
+        let is_draft = [process, number].iter().all(|n| n.parse::<u32>().is_ok());
+        let processes = Path::new("/proc");
+        let is_gone = processes.join("self").exists() && !processes.join(process).exists();
+        is_draft && (is_gone || path == new)
+    };
+    for entry in fs::read_dir(folder(new)).into_iter().flatten().flatten() {
+        if is_abandoned(&entry.path()) {
+            let _ = fs::remove_dir_all(entry.path());
+        }
+    }
+}
+
 /// The folder a file is in.
 fn folder(out: &Path) -> &Path {
     match out.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn folders_of_killed_writers_go_and_others_stay() -> std::io::Result<()> {
+        let dir = tempfile::tempdir()?;
+        let here = std::process::id();
+        // No process has a number this high.
+        let gone = [
+            ".a.vtu.4294967295-0.tmp".to_owned(),
+            format!(".a.vtu.{here}-77.tmp"),
+        ];
+        let stay = [
+            format!(".a.vtu.{here}-78.tmp"),
+            ".b.vtu.4294967295-0.tmp".to_owned(),
+            ".a.vtu.mine.tmp".to_owned(),
+        ];
+        for name in gone.iter().chain(&stay) {
+            fs::create_dir(dir.path().join(name))?;
+            fs::write(dir.path().join(name).join("out-0"), b"half")?;
+        }
+        remove_abandoned("a.vtu", &dir.path().join(&gone[1]));
+        let there = |name: &String| dir.path().join(name).exists();
+        assert!(stay.iter().all(there));
+        assert!(!there(&gone[1]));
+        assert_eq!(there(&gone[0]), !Path::new("/proc/self").exists());
+        Ok(())
     }
 }
