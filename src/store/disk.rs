@@ -126,19 +126,24 @@ impl DiskPath {
 
     /// Makes the folder, and those above it that are missing, to last.
     pub fn create_dir_all(&self) -> Result<(), StoreError> {
+        self.told(self.make_dirs())
+    }
+
+    fn make_dirs(&self) -> io::Result<()> {
         if self.is_dir() {
             return Ok(());
         }
         let folder = self.folder();
         if folder.path != self.path {
-            folder.create_dir_all()?;
+            folder.make_dirs()?;
         }
         match self.disk.create_dir(&self.path) {
-            Err(e) if e.kind() == io::ErrorKind::AlreadyExists && self.is_dir() => Ok(()),
-            made => {
-                self.told(made)?;
-                folder.sync_dir()
-            }
+            Ok(()) => self.disk.sync_dir(&folder.path),
+            Err(e) if e.kind() == io::ErrorKind::AlreadyExists => match self.is_dir() {
+                true => Ok(()),
+                false => Err(io::ErrorKind::NotADirectory.into()),
+            },
+            Err(e) => Err(e),
         }
     }
 

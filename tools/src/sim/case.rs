@@ -1,0 +1,181 @@
+//! The fault case: a mesh of 30,000 tetrahedra in eight sub-domains, with so little memory that pages leave it and sorts spill.
+
+use std::sync::Arc;
+
+use tetdb::audit;
+use tetdb::catalog::{Catalog, CatalogError, Job, Store, StoreState};
+use tetdb::pipeline::{self, Options, PipelineError, Plan, Trial, silent};
+use tetdb::samples::SampleSpec;
+use tetdb::store::{Budget, DiskPath, StoreFile};
+use tetdb::surface::Surface;
+use tetdb_schema::digest::Digest;
+use tetdb_schema::page::STORED_BYTES;
+use xxhash_rust::xxh3::{Xxh3, xxh3_64};
+
+use super::SimDisk;
+
+const STORE: &str = "/case.tetdb";
+
+/// Surface and options.
+pub struct Case {
+    surface: Surface,
+    options: Options,
+    budget: u64,
+}
+
+/// The digests of tetrahedra and of interface faces.
+pub type Digests = [String; 2];
+
+/// How a run ended, when it did not end well.
+pub type Ended = Result<(), PipelineError>;
+
+impl Case {
+    /// `words` name a sample, such as `box,h=0.1`.
+    pub fn new(words: &str, subdomains: u32) -> Self {
+        let surface = SampleSpec::parse(words).and_then(|spec| spec.make());
+        let options = Options {
+            subdomains: Some(subdomains.to_string()),
+            trial: Trial {
+                subdomains_small: true,
+                plan: Some(Plan {
+                    frames: 1 << 20,
+                    redb: 512 << 10,
+                    buffers: 128 << 10,
+                }),
+            },
+            ..Options::default()
+        };
+        Self {
+            surface: surface.expect("a sample").into(),
+            options,
+            budget: 128 << 20,
+        }
+    }
+
+    /// The one all campaigns use.
+    pub fn small() -> Self {
+        Self::new("box,h=0.08", 8)
+    }
+
+    /// A smaller one, not optimized, for what is done to every single call: the disk is asked for much the same.
+    pub fn tiny() -> Self {
+        let mut case = Self::new("box,h=0.12", 8);
+        case.options.optimize = Some("none".to_owned());
+        case
+    }
+
+    pub fn store(&self, disk: &Arc<SimDisk>) -> DiskPath {
+        disk.path(STORE)
+    }
+
+    /// Begins the store, or goes on with it, until it is verified; as the program does.
+    pub fn run(&self, disk: &Arc<SimDisk>) -> Ended {
+        let store = self.store(disk);
+        let mut catalog = match store.exists() && !Catalog::is_vacant(&store) {
+            true => Catalog::open_writable(&store)?,
+            false => Catalog::create(&store, &Job::default())?,
+        };
+        if !catalog.state()?.is_finished() {
+            let budget = Budget::new(self.budget);
+            pipeline::mesh(&mut catalog, &self.surface, &self.options, &budget, &silent)?;
+        }
+        catalog.close()?;
+        let mut catalog = Catalog::open_writable(&store)?;
+        if catalog.state()? < StoreState::Verified {
+            catalog.commit(|step| {
+                step.set_state(StoreState::Verified);
+                Ok(())
+            })?;
+        }
+        Ok(catalog.close()?)
+    }
+
+    /// The digests of a finished store, once from the catalog and once from all records.
+    pub fn digests(&self, disk: &Arc<SimDisk>) -> Result<Digests, CatalogError> {
+        let mut store = Store::open(self.store(disk))?;
+        let told = store.digest()?.map(|d| d.to_string());
+        let found = audit::digest(&mut store, 16 << 20)?.map(|d| d.to_string());
+        assert_eq!(told, found, "the catalog and the records disagree");
+        Ok(told)
+    }
+
+    /// Opens a store in whatever state, for writing, and reads every row and every value of the files it lists.
+    pub fn check(&self, disk: &Arc<SimDisk>) -> Result<StoreState, CatalogError> {
+        let path = self.store(disk);
+        let mut catalog = Catalog::open_writable(&path)?;
+        let state = catalog.state()?;
+        catalog.job()?;
+        catalog.labels()?;
+        catalog.regions()?;
+        catalog.interfaces()?;
+        catalog.topology()?;
+        catalog.journal()?;
+        for file in catalog.files()? {
+            let place = catalog.file_path(file.subdomain, file.generation);
+            let mut values = 0u64;
+            let mut torn = None;
+            let mut opened = StoreFile::open_repaired(&place, 1 << 20, false)?;
+            opened.scan(0..u64::MAX, |key, value| {
+                values += 1;
+                if !is_sound(value) {
+                    torn = Some(key);
+                }
+                torn.is_none()
+            })?;
+            if let Some(key) = torn {
+                return Err(content(
+                    &path,
+                    file.subdomain,
+                    format!("value {key:x} is torn"),
+                ));
+            }
+            if values == 0 {
+                return Err(content(&path, file.subdomain, "its file is empty".into()));
+            }
+        }
+        let rows = catalog.subdomains()?;
+        drop(catalog);
+        let mut store = Store::open(&path)?;
+        let found = audit::digest(&mut store, 4 << 20)?;
+        let mut told = [Digest::default(); 2];
+        for row in rows {
+            told[0].merge(&Digest { lanes: row.digest });
+            told[1].merge(&Digest {
+                lanes: row.interface_digest,
+            });
+        }
+        if found.map(|d| d.to_string()) != told.map(|d| d.to_string()) {
+            return Err(content(
+                &path,
+                0,
+                "a sealed sub-domain has another digest".into(),
+            ));
+        }
+        Ok(state)
+    }
+}
+
+fn content(path: &DiskPath, subdomain: u32, what: String) -> CatalogError {
+    CatalogError::Content {
+        path: path.path().to_owned(),
+        subdomain,
+        what,
+    }
+}
+
+/// Whether a page or chunk matches its checksum.
+fn is_sound(value: &[u8]) -> bool {
+    /// Bytes of the records of a page; its checksum follows.
+    const RECORDS: usize = 2046 * 32;
+    let word = |at: usize| value[at..].first_chunk().map(|&b| u64::from_le_bytes(b));
+    match value.get(8..12) {
+        Some(b"TETC") => word(0) == Some(xxh3_64(&value[8..])),
+        _ if value.len() == STORED_BYTES => {
+            let mut hash = Xxh3::new();
+            hash.update(&value[..RECORDS]);
+            hash.update(&value[RECORDS + 8..]);
+            word(RECORDS) == Some(hash.digest())
+        }
+        _ => false,
+    }
+}

@@ -1,0 +1,124 @@
+//! The program killed at random times, again and again.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use super::Item;
+use crate::sim::Rng;
+
+const MESH: &[&str] = &[
+    "mesh",
+    "sample:box,h=0.045",
+    "-o",
+    "a.tetdb",
+    "--subdomains",
+    "2",
+    "--memory",
+    "64MiB",
+];
+
+/// A folder to mesh in, and what comes out of it undisturbed.
+pub struct Kills {
+    program: PathBuf,
+    dir: tempfile::TempDir,
+    digest: String,
+    duration: Duration,
+}
+
+impl Kills {
+    pub fn new(program: &Path) -> Self {
+        let program = program.canonicalize().expect("the program to be killed");
+        let dir = tempfile::tempdir().expect("a folder for stores");
+        let mut kills = Self {
+            program,
+            dir,
+            digest: String::new(),
+            duration: Duration::ZERO,
+        };
+        let clock = Instant::now();
+        kills.succeed(MESH).expect("an undisturbed run");
+        kills.duration = clock.elapsed();
+        kills.digest = kills
+            .succeed(&["digest", "a.tetdb"])
+            .expect("a finished store");
+        kills
+    }
+
+    fn command(&self, words: &[&str]) -> Command {
+        let mut command = Command::new(&self.program);
+        command.args(words).current_dir(self.dir.path());
+        command
+    }
+
+    /// What a run that must succeed says on its standard output.
+    fn succeed(&self, words: &[&str]) -> Result<String, String> {
+        let done = self.command(words).output().map_err(|e| e.to_string())?;
+        match done.status.success() {
+            true => Ok(String::from_utf8_lossy(&done.stdout).into_owned()),
+            false => Err(format!(
+                "{words:?}: {:?} {}",
+                done.status.code(),
+                String::from_utf8_lossy(&done.stderr)
+            )),
+        }
+    }
+
+    /// Starts a run and kills it after `delay`; whether it was still running.
+    fn kill(&self, words: &[&str], delay: Duration) -> Result<bool, String> {
+        let mut command = self.command(words);
+        command.stdout(Stdio::null()).stderr(Stdio::null());
+        let mut child = command.spawn().map_err(|e| e.to_string())?;
+        let clock = Instant::now();
+        while clock.elapsed() < delay {
+            if let Ok(Some(status)) = child.try_wait() {
+                return match status.success() {
+                    true => Ok(false),
+                    false => Err(format!("{words:?} ended with {status}")),
+                };
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        child.kill().map_err(|e| e.to_string())?;
+        child.wait().map_err(|e| e.to_string())?;
+        Ok(true)
+    }
+
+    /// Every tenth run is killed a second time while it is resumed.
+    pub fn item(&mut self, seed: u64, item: u64) -> Item {
+        let mut rng = Rng(seed ^ item.wrapping_mul(0xD6E8_FEB8_6659_FD93));
+        let mut done = Item::default();
+        let result = self.one(&mut rng, item.is_multiple_of(10), &mut done);
+        done.note("killed", result);
+        let _ = std::fs::remove_dir_all(self.dir.path().join("a.tetdb"));
+        done
+    }
+
+    fn one(&self, rng: &mut Rng, twice: bool, done: &mut Item) -> Result<(), String> {
+        let _ = std::fs::remove_dir_all(self.dir.path().join("a.tetdb"));
+        let any = |rng: &mut Rng| self.duration.mul_f64(rng.below(1000) as f64 / 1000.0);
+        let first = any(rng);
+        done.count(match self.kill(MESH, first)? {
+            true => "killed",
+            false => "finished first",
+        });
+        let begun = self.dir.path().join("a.tetdb/catalog.redb").exists();
+        if twice && begun {
+            let second = any(rng);
+            if self.kill(&["resume", "a.tetdb"], second)? {
+                done.count("killed again");
+            }
+        }
+        match begun {
+            true => self.succeed(&["resume", "a.tetdb"])?,
+            false => {
+                done.count("before the first commit");
+                self.succeed(MESH)?
+            }
+        };
+        match self.succeed(&["digest", "a.tetdb"])? == self.digest {
+            true => Ok(()),
+            false => Err(format!("another digest after {first:?}")),
+        }
+    }
+}
