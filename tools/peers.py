@@ -106,6 +106,8 @@ def child(mesher, surface, out):
     else:
         result = mesh_tetgen(points, triangles)
     position, tets, cpu, peak = result
+    if len(tets) == 0:
+        sys.exit(f"{mesher} made no tetrahedra")
     if out != "-":
         np.savez(out, points=position, tets=tets)
     print(json.dumps({"tets": len(tets), "cpu": cpu, "peak": peak}))
@@ -133,10 +135,6 @@ def run_tetdb(program, surface, optimize, directory, keep):
 
 def read_surface(path):
     """Points and triangles of a surface file."""
-    if path.endswith((".mesh", ".meshb", ".msh")):
-        import meshio
-        mesh = meshio.read(path)
-        return np.asarray(mesh.points, float) + 0.0, np.concatenate([c.data for c in mesh.cells if c.type == "triangle"])
     import trimesh
     mesh = trimesh.load(path, process=False, maintain_order=True, force="mesh", skip_materials=True)
     return np.asarray(mesh.vertices, float) + 0.0, np.asarray(mesh.faces)
@@ -233,6 +231,10 @@ def compare(surface, args, directory):
     made = os.path.join(directory, "surface.ply")
     if not os.path.exists(surface):
         subprocess.run([args.tetdb, "sample", surface, "-o", made], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        path = made
+    elif not surface.endswith((".ply", ".stl", ".off", ".obj")):
+        # Formats the others do not read: the same triangles, none of them longer than asked for.
+        subprocess.run([args.tetdb, "refine-surface", surface, made, "--hsiz", "1e30"], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         path = made
     else:
         path = surface
