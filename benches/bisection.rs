@@ -1,20 +1,22 @@
 //! One cut, stage by stage: resident, with a pool smaller than the mesh, and with parts of the method switched off.
 //!
-//! `cargo bench --bench bisection -- [sample] [method|pool|volume]`; without arguments a smoke size and all of them. `method` compares what each
-//! step of choosing the interface brings, `pool` runs with frames for a twentieth of the finished mesh, `volume` places the plane without regard to sizes.
+//! `cargo bench --bench bisection -- [sample] [method|pool|balance]`; without arguments a smoke size and all of them. `method` compares what each
+//! step of choosing the interface brings, `pool` runs with frames for a twentieth of the finished mesh, `balance [least length] [n]…` makes whole meshes of
+//! a box whose sizes are graded 20:1 in so many sub-domains, planes placed by load and by volume.
 //! Wall seconds of one thread; the coarse mesh is not counted.
 
 use std::path::Path;
 use std::time::Instant;
 
 use tetdb::bisect::{self, CutPlan, CutReport, Cutting, PlaneChoice, Steps, load_of};
+use tetdb::catalog::{Catalog, Job};
 use tetdb::geom::{Point, mix};
 use tetdb::mesh::{Mesh, Workspace, renumber};
 use tetdb::optimize::{Mode, Settings};
 use tetdb::pipeline::{self, Options, silent};
 use tetdb::samples::SampleSpec;
 use tetdb::sizing::{SizeField, SizeOptions, TETS_PER_LOAD};
-use tetdb::store::{Backing, Pager, attempt};
+use tetdb::store::{Backing, Budget, Pager, attempt};
 use tetdb::surface::Surface;
 
 /// Bytes of pages per tetrahedron of a finished mesh, its vertices included.
@@ -175,6 +177,54 @@ fn tell(name: &str, cut: &Cut) {
     }
 }
 
+/// Shares of `n` sub-domains of a box, finest along one wall and twenty times as coarse away from it.
+fn balance(least: f64, n: u32) {
+    let coarse = 20.0 * least;
+    let surface: Surface = SampleSpec::parse(&format!("box,h={coarse}"))
+        .and_then(|spec| spec.make())
+        .expect("a sample")
+        .into();
+    for (name, plane) in [("load", PlaneChoice::Load), ("volume", PlaneChoice::Volume)] {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let mut catalog =
+            Catalog::create(&dir.path().join("b.tetdb"), &Job::default()).expect("an empty place");
+        let options = Options {
+            size_expr: Some(format!("min({coarse}, {least} + 0.26 * x)")),
+            subdomains: Some(n.to_string()),
+            optimize: Some("none".to_owned()),
+            cutting: Cutting {
+                plane,
+                ..Cutting::default()
+            },
+            ..Options::default()
+        };
+        let budget = Budget::new(4 << 30);
+        pipeline::mesh(&mut catalog, &surface, &options, &budget, &silent).expect("a mesh");
+        let tets = catalog.subdomains().expect("rows").into_iter();
+        let tets: Vec<f64> = tets.map(|row| row.tets as f64).collect();
+        let journal = catalog.journal().expect("rows");
+        let told = journal.iter().flat_map(|row| &row.measures);
+        let told: Vec<f64> = told
+            .filter(|m| m.name == "predicted_tets")
+            .map(|m| m.value)
+            .collect();
+        // The first is that of the whole.
+        let predicted = &told[told.len() - tets.len()..];
+        println!(
+            "balance by {name:<7} {} sub-domains, {} tetrahedra: most over mean of what was shared {:.3}, of tetrahedra {:.3}",
+            tets.len(),
+            tets.iter().sum::<f64>(),
+            most_over_mean(predicted),
+            most_over_mean(&tets),
+        );
+    }
+}
+
+fn most_over_mean(numbers: &[f64]) -> f64 {
+    let most = numbers.iter().fold(0.0, |m: f64, &x| m.max(x));
+    most * numbers.len() as f64 / numbers.iter().sum::<f64>()
+}
+
 fn main() {
     let mut words = std::env::args().skip(1).filter(|a| !a.starts_with("--"));
     let sample = words.next().unwrap_or_else(|| "box,h=0.1".to_owned());
@@ -203,19 +253,15 @@ fn main() {
             tell(name, &bench.cut(cutting, plenty));
         }
     }
-    if asked("volume") {
-        let plane = PlaneChoice::Volume;
-        let cut = bench.cut(
-            Cutting {
-                plane,
-                ..Cutting::default()
-            },
-            plenty,
-        );
-        println!(
-            "shared by load: {:?} and by volume: {:?}",
-            whole.report.plane, cut.report.plane
-        );
+    if asked("balance") {
+        let least = words.next().map_or(0.02, |w| w.parse().expect("a length"));
+        let mut counts: Vec<u32> = words.map(|w| w.parse().expect("a number")).collect();
+        if counts.is_empty() {
+            counts.push(2);
+        }
+        for n in counts {
+            balance(least, n);
+        }
     }
     let mut mesh = Mesh::new(Pager::new(plenty, None));
     pipeline::coarse_mesh(&mut mesh, &bench.surface, &Options::default(), &silent).expect("a mesh");
