@@ -187,7 +187,7 @@ fn balance(least: f64, n: u32) {
     for (name, plane) in [("load", PlaneChoice::Load), ("volume", PlaneChoice::Volume)] {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let mut catalog =
-            Catalog::create(&dir.path().join("b.tetdb"), &Job::default()).expect("an empty place");
+            Catalog::create(dir.path().join("b.tetdb"), &Job::default()).expect("an empty place");
         let options = Options {
             size_expr: Some(format!("min({coarse}, {least} + 0.26 * x)")),
             subdomains: Some(n.to_string()),
