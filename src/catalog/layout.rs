@@ -338,6 +338,11 @@ impl Catalog {
         Ok(whole)
     }
 
+    /// Bytes of the catalog's file.
+    pub fn bytes(&self) -> Result<u64, CatalogError> {
+        Ok(self.dir.join(CATALOG).bytes()?)
+    }
+
     /// Shrinks the catalog to what it holds, and closes it.
     pub fn close(self) -> Result<(), CatalogError> {
         Ok(self.file.compact()?)

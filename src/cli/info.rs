@@ -66,7 +66,7 @@ pub fn object(path: &Path) -> Result<Value, Failure> {
         "bytes": rows.iter().map(|r| r.bytes).sum::<u64>(),
         "coarse_bytes": coarse.iter().map(|c| c.bytes).sum::<u64>(),
         "previous_bytes": catalog.before()?.iter().map(|r| r.bytes).sum::<u64>(),
-        "digest": digest(&rows),
+        "catalog_bytes": catalog.bytes()?, "digest": digest(&rows),
         "stages": stages, "subdomains": subdomains, "interfaces": catalog.interfaces()?, "journal": catalog.journal()?,
     }))
 }
@@ -131,6 +131,12 @@ pub fn print(path: &Path, talk: &Talk) -> Result<(), Failure> {
             coarse as f64 / tets.max(1) as f64
         ));
     }
+    let own = catalog.bytes()?;
+    talk.line(&format!(
+        "catalog, with the wanted sizes: {}, {:.2} bytes per tetrahedron",
+        memory::show(own),
+        own as f64 / tets.max(1) as f64
+    ));
     let before = catalog.before()?;
     if !before.is_empty() {
         talk.line(&format!(

@@ -2,47 +2,96 @@
 //!
 //! | offset | bytes | content, little endian |
 //! |---|---|---|
-//! | 0 | 8 | `TETDBSZ1` |
+//! | 0 | 8 | `TETDBSZ2` |
 //! | 8 | 24 | low corner of the cube, 3 × f64 |
 //! | 32 | 8 | side of the cube, f64 |
 //! | 40 | 8 | slope bound, f64 |
-//! | 48 | 4 | root entry |
-//! | 52 | 4 | number of blocks B |
-//! | 56 | 4 | number of leaves L |
+//! | 48 | 4 | cells of the octree, those with children too: C |
+//! | 52 | 4 | leaves L |
+//! | 56 | 4 | values V |
 //! | 60 | 4 | zero |
-//! | 64 | 32 B | blocks, 8 × u32 entries each |
-//! | 64 + 32 B | 32 L | values at the leaves' corners, 8 × f32 each |
+//! | 64 | … | zstd frame of C + L + 4 V bytes |
+//!
+//! In the frame: of each cell, depth first and octants in order, 1 for a leaf and 0 for one with children; of each leaf a byte whose bit
+//! `i` says that the value at corner `i` is new; the new values, f32. A value that is not new is that of the last leaf with this corner, as
+//! far as a table of [`REMEMBERED`] corners knows it: neighbors have corners in common, so that a leaf takes about 5 bytes instead of 37.
+
+use std::fmt::Display;
+use std::io::Read;
 
 use super::SizingError;
 use super::field::SizeField;
 use super::seeds::Frame;
-use super::tree::{DEPTH, LEAF, Tree};
-use crate::geom::Point;
-use std::fmt::Display;
+use super::tree::{DEPTH, LEAF, Leaf, Tree};
+use crate::geom::{Point, mix};
 
-const MAGIC: &[u8; 8] = b"TETDBSZ1";
+const MAGIC: &[u8; 8] = b"TETDBSZ2";
 const HEADER_BYTES: usize = 64;
+/// Corners remembered, a power of two: a megabyte.
+const REMEMBERED: usize = 1 << 16;
+
+/// The last value seen at some corners.
+struct Memory {
+    slots: Vec<([u32; 3], f32)>,
+}
+
+impl Memory {
+    fn new() -> Self {
+        // No corner of the lattice is there, and no size is zero.
+        let nowhere = ([u32::MAX; 3], 0.0);
+        Self {
+            slots: vec![nowhere; REMEMBERED],
+        }
+    }
+
+    fn slot(&mut self, corner: [u32; 3]) -> &mut ([u32; 3], f32) {
+        let [x, y, z] = corner.map(u64::from);
+        let n = mix(x | y << 21 | z << 42) as usize % REMEMBERED;
+        &mut self.slots[n]
+    }
+}
 
 impl SizeField {
     /// The field as bytes; equal fields give equal bytes.
     pub fn to_bytes(&self) -> Vec<u8> {
-        let n_words = self.tree.blocks.len() + self.values.len();
-        let mut bytes = Vec::with_capacity(HEADER_BYTES + 32 * n_words);
+        let n_leaves = self.values.len();
+        let mut cells = Vec::with_capacity(self.tree.blocks.len() + n_leaves);
+        let mut news = Vec::with_capacity(n_leaves);
+        let mut values: Vec<u8> = Vec::new();
+        let mut memory = Memory::new();
+        let mut stack = vec![(self.tree.root, Leaf::ROOT)];
+        while let Some((entry, cell)) = stack.pop() {
+            cells.push(u8::from(entry & LEAF != 0));
+            if entry & LEAF == 0 {
+                let block = self.tree.blocks[entry as usize];
+                stack.extend((0..8).rev().map(|i| (block[i], cell.child(i))));
+                continue;
+            }
+            let mut new = 0;
+            for (i, &value) in self.values[(entry & !LEAF) as usize].iter().enumerate() {
+                let slot = memory.slot(cell.corner(i));
+                let seen = (cell.corner(i), value);
+                if *slot != seen {
+                    *slot = seen;
+                    new |= 1 << i;
+                    values.extend(value.to_le_bytes());
+                }
+            }
+            news.push(new);
+        }
+        let mut bytes = Vec::with_capacity(HEADER_BYTES + values.len());
         bytes.extend(MAGIC);
         let Frame { low, side } = self.frame;
         for x in [low.x, low.y, low.z, side, self.beta] {
             bytes.extend(x.to_le_bytes());
         }
-        let counts = [self.tree.root, self.tree.blocks.len() as u32];
-        for n in counts.into_iter().chain([self.values.len() as u32, 0]) {
-            bytes.extend(n.to_le_bytes());
+        for n in [cells.len(), n_leaves, values.len() / 4, 0] {
+            bytes.extend((n as u32).to_le_bytes());
         }
-        for entry in self.tree.blocks.iter().flatten() {
-            bytes.extend(entry.to_le_bytes());
-        }
-        for value in self.values.iter().flatten() {
-            bytes.extend(value.to_le_bytes());
-        }
+        cells.append(&mut news);
+        cells.append(&mut values);
+        let frame = zstd::bulk::compress(&cells, 1).expect("memory is all it takes");
+        bytes.extend(frame);
         bytes
     }
 
@@ -55,10 +104,10 @@ impl SizeField {
             return Err(damaged("length", bytes.len(), "at least 64"));
         }
         if &bytes[..8] != MAGIC {
-            return Err(damaged("magic", format!("{:x?}", &bytes[..8]), "TETDBSZ1"));
+            return Err(damaged("magic", format!("{:x?}", &bytes[..8]), "TETDBSZ2"));
         }
-        let number = |i: usize| f64::from_le_bytes(eight(&bytes[8 + 8 * i..]));
-        let count = |i: usize| u32::from_le_bytes(four(&bytes[48 + 4 * i..]));
+        let number = |i: usize| f64::from_le_bytes(array(&bytes[8 + 8 * i..]));
+        let count = |i: usize| u32::from_le_bytes(array(&bytes[48 + 4 * i..])) as usize;
         let low = Point::new(number(0), number(1), number(2));
         let (side, beta) = (number(3), number(4));
         if !low.is_finite() || !side.is_normal() || side < 0.0 {
@@ -71,51 +120,85 @@ impl SizeField {
         if !(beta > 0.0 && beta.is_finite()) {
             return Err(damaged("slope", beta, "above zero"));
         }
-        let (root, n_blocks, n_leaves) = (count(0), count(1) as usize, count(2) as usize);
-        let expected = HEADER_BYTES + 32 * (n_blocks + n_leaves);
-        if bytes.len() != expected {
-            return Err(damaged("length", bytes.len(), expected));
+        let [n_cells, n_leaves, n_values] = [0, 1, 2].map(count);
+        let expected = n_cells + n_leaves + 4 * n_values;
+        let mut body = Vec::new();
+        // Grows with what is there, not with what a damaged header promises.
+        let read = zstd::Decoder::with_buffer(&bytes[HEADER_BYTES..])
+            .and_then(|frame| frame.take(expected as u64 + 1).read_to_end(&mut body));
+        if read.is_err() || body.len() != expected {
+            return Err(damaged("length of the octree", body.len(), expected));
         }
-        let (blocks, values) = bytes[HEADER_BYTES..].split_at(32 * n_blocks);
-        let blocks: Vec<[u32; 8]> = words(blocks, u32::from_le_bytes);
-        let values: Vec<[f32; 8]> = words(values, f32::from_le_bytes);
-        let good = |h: f32| h.is_finite() && h > 0.0;
-        if let Some(h) = values.iter().flatten().find(|&&h| !good(h)) {
-            return Err(damaged("a size", h, "finite and above zero"));
-        }
-        let tree = Tree { root, blocks };
-        check_tree(&tree, n_leaves)?;
+        let (cells, rest) = body.split_at(n_cells);
+        let (news, values) = rest.split_at(n_leaves);
+        let (tree, values) = read_tree(cells, news, values)?;
         Ok(Self::from_parts(Frame { low, side }, beta, tree, values))
     }
 }
 
-/// Blocks and leaves are met once each, in depth-first order, and no deeper than the lattice.
-fn check_tree(tree: &Tree, n_leaves: usize) -> Result<(), SizingError> {
-    let (mut blocks, mut leaves) = (0, 0);
-    let mut stack = vec![(tree.root, 0u32)];
-    while let Some((entry, level)) = stack.pop() {
-        let (next, limit) = if entry & LEAF != 0 {
-            leaves += 1;
-            (LEAF | (leaves - 1), n_leaves as u32)
-        } else {
-            blocks += 1;
-            (blocks - 1, tree.blocks.len() as u32)
+/// The octree and the values at its leaves' corners.
+fn read_tree(
+    cells: &[u8],
+    news: &[u8],
+    values: &[u8],
+) -> Result<(Tree, Vec<[f32; 8]>), SizingError> {
+    let mut values = values.chunks_exact(4).map(|b| f32::from_le_bytes(array(b)));
+    let mut tree = Tree {
+        root: LEAF,
+        blocks: Vec::with_capacity(cells.len() - news.len().min(cells.len())),
+    };
+    let mut leaves = Vec::with_capacity(news.len());
+    let mut memory = Memory::new();
+    // A cell, and the block and octant whose entry it is.
+    let mut stack = vec![(Leaf::ROOT, None)];
+    for &is_leaf in cells {
+        let Some((cell, place)) = stack.pop() else {
+            return Err(damaged("number of cells", cells.len(), "fewer"));
         };
-        if entry != next || (next & !LEAF) >= limit || level > DEPTH {
-            return Err(damaged("an octree entry", entry, next));
-        }
-        if entry & LEAF == 0 {
-            if level == DEPTH {
-                return Err(damaged("the octree's depth", level + 1, DEPTH));
+        let entry = if is_leaf == 0 {
+            tree.blocks.len() as u32
+        } else {
+            LEAF | leaves.len() as u32
+        };
+        match place {
+            None => tree.root = entry,
+            Some((block, octant)) => {
+                let block: &mut [u32; 8] = &mut tree.blocks[block as usize];
+                block[octant] = entry;
             }
-            let block = tree.blocks[entry as usize];
-            stack.extend(block.iter().rev().map(|&child| (child, level + 1)));
         }
+        if is_leaf == 0 {
+            if cell.level == DEPTH {
+                return Err(damaged("the octree's depth", DEPTH + 1, DEPTH));
+            }
+            tree.blocks.push([LEAF; 8]);
+            stack.extend((0..8).rev().map(|i| (cell.child(i), Some((entry, i)))));
+            continue;
+        }
+        let Some(&new) = news.get(leaves.len()) else {
+            return Err(damaged("number of leaves", leaves.len() + 1, news.len()));
+        };
+        let mut corners = [0.0; 8];
+        for (i, value) in corners.iter_mut().enumerate() {
+            let corner = cell.corner(i);
+            let slot = memory.slot(corner);
+            if new >> i & 1 != 0 {
+                let h = values.next().unwrap_or(f32::NAN);
+                if !(h.is_finite() && h > 0.0) {
+                    return Err(damaged("a size", h, "finite and above zero"));
+                }
+                *slot = (corner, h);
+            } else if slot.0 != corner {
+                return Err(damaged("a corner", format!("{corner:?}"), "seen before"));
+            }
+            *value = slot.1;
+        }
+        leaves.push(corners);
     }
-    if (blocks as usize, leaves as usize) != (tree.blocks.len(), n_leaves) {
-        return Err(damaged("number of leaves", leaves, n_leaves));
+    if !stack.is_empty() || leaves.len() != news.len() || values.next().is_some() {
+        return Err(damaged("number of leaves", leaves.len(), news.len()));
     }
-    Ok(())
+    Ok((tree, leaves))
 }
 
 fn damaged(what: &'static str, found: impl Display, expected: impl Display) -> SizingError {
@@ -126,17 +209,7 @@ fn damaged(what: &'static str, found: impl Display, expected: impl Display) -> S
     }
 }
 
-fn four(bytes: &[u8]) -> [u8; 4] {
+/// The first bytes; the caller knows that they are there.
+fn array<const N: usize>(bytes: &[u8]) -> [u8; N] {
     std::array::from_fn(|i| bytes[i])
-}
-
-fn eight(bytes: &[u8]) -> [u8; 8] {
-    std::array::from_fn(|i| bytes[i])
-}
-
-fn words<T: Copy>(bytes: &[u8], word: impl Fn([u8; 4]) -> T) -> Vec<[T; 8]> {
-    bytes
-        .chunks_exact(32)
-        .map(|chunk| std::array::from_fn(|i| word(four(&chunk[4 * i..]))))
-        .collect()
 }
