@@ -339,7 +339,7 @@ impl Catalog {
     }
 
     /// Bytes of the catalog's file.
-    pub fn bytes(&self) -> Result<u64, CatalogError> {
+    pub fn file_bytes(&self) -> Result<u64, CatalogError> {
         Ok(self.dir.join(CATALOG).bytes()?)
     }
 

@@ -66,7 +66,7 @@ pub fn object(path: &Path) -> Result<Value, Failure> {
         "bytes": rows.iter().map(|r| r.bytes).sum::<u64>(),
         "coarse_bytes": coarse.iter().map(|c| c.bytes).sum::<u64>(),
         "previous_bytes": catalog.before()?.iter().map(|r| r.bytes).sum::<u64>(),
-        "catalog_bytes": catalog.bytes()?, "digest": digest(&rows),
+        "catalog_bytes": catalog.file_bytes()?, "digest": digest(&rows),
         "stages": stages, "subdomains": subdomains, "interfaces": catalog.interfaces()?, "journal": catalog.journal()?,
     }))
 }
@@ -131,7 +131,7 @@ pub fn print(path: &Path, talk: &Talk) -> Result<(), Failure> {
             coarse as f64 / tets.max(1) as f64
         ));
     }
-    let own = catalog.bytes()?;
+    let own = catalog.file_bytes()?;
     talk.line(&format!(
         "catalog, with the wanted sizes: {}, {:.2} bytes per tetrahedron",
         memory::show(own),
