@@ -140,6 +140,7 @@ fn threads_memory_and_interruptions_do_not_change_the_parts() {
             std::fs::remove_dir_all(place.path("k.tetdb")).expect("the folder can be removed");
         }
     }
+    assert!(digests.len() > 3, "no killed run had begun");
     assert!(digests.iter().all(|d| *d == digests[0]), "{digests:?}");
 }
 
