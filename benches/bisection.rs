@@ -8,7 +8,7 @@
 use std::path::Path;
 use std::time::Instant;
 
-use tetdb::bisect::{self, CutPlan, CutReport, Cutting, PlaneChoice, Steps, load_of};
+use tetdb::bisect::{self, CutPlan, CutReport, Method, PlaneChoice, Steps, load_of};
 use tetdb::catalog::{Catalog, Job};
 use tetdb::geom::{Point, mix};
 use tetdb::mesh::{Mesh, Workspace, renumber};
@@ -65,7 +65,7 @@ impl Bench {
     }
 
     /// Cuts the coarse mesh in halves with `bytes` of frames.
-    fn cut(&self, cutting: Cutting, bytes: u64) -> Cut {
+    fn cut(&self, method: Method, bytes: u64) -> Cut {
         let space = Workspace {
             dir: &self.dir.path().into(),
             memory: 64 << 20,
@@ -80,7 +80,7 @@ impl Bench {
         let plan = CutPlan {
             cut: 1,
             low: 0.5,
-            cutting,
+            method,
             earlier: &[],
             h: &|p| self.field.h(p),
             bounds,
@@ -192,9 +192,9 @@ fn balance(least: f64, n: u32) {
             size_expr: Some(format!("min({coarse}, {least} + 0.26 * x)")),
             subdomains: Some(n.to_string()),
             optimize: Some("none".to_owned()),
-            cutting: Cutting {
+            method: Method {
                 plane,
-                ..Cutting::default()
+                ..Method::default()
             },
             ..Options::default()
         };
@@ -232,25 +232,25 @@ fn main() {
     let asked = |name: &str| only.as_deref().is_none_or(|o| o == name);
     let bench = Bench::new(&sample);
     let plenty = 4 << 30;
-    let whole = bench.cut(Cutting::default(), plenty);
+    let whole = bench.cut(Method::default(), plenty);
     println!("{sample}: {} triangles", bench.surface.n_triangles());
     tell("as it is", &whole);
-    let steps = |minimum_cut, vertex_moves, tet_moves| Cutting {
+    let steps = |minimum_cut, vertex_moves, tet_moves| Method {
         steps: Steps {
             minimum_cut,
             vertex_moves,
             tet_moves,
         },
-        ..Cutting::default()
+        ..Method::default()
     };
     if asked("method") {
-        for (name, cutting) in [
+        for (name, method) in [
             ("minimum cut alone", steps(true, false, false)),
             ("moves of vertices", steps(false, true, false)),
             ("moves of tetrahedra", steps(false, false, true)),
             ("both moves", steps(false, true, true)),
         ] {
-            tell(name, &bench.cut(cutting, plenty));
+            tell(name, &bench.cut(method, plenty));
         }
     }
     if asked("balance") {
@@ -274,7 +274,7 @@ fn main() {
     println!("the finished mesh will have about {predicted:.0} tetrahedra");
     if asked("pool") {
         let bytes = (BYTES_PER_TET * predicted / 20.0) as u64;
-        let pool = attempt(|| bench.cut(Cutting::default(), bytes)).expect("room");
+        let pool = attempt(|| bench.cut(Method::default(), bytes)).expect("room");
         tell("frames for 5 %", &pool);
         println!(
             "{:22} {} tetrahedra, {} pages, {} frames, {} read, {} written; {:.2} times the time; {}",

@@ -1,6 +1,7 @@
 //! From a surface to a sealed store, stage by stage, through the library: resident, in one sub-domain.
 //!
-//! `cargo bench --bench pipeline -- [sample [none|delaunay|full]]`; without arguments a smoke size. Seconds are those the main
+//! `cargo bench --bench pipeline -- [sample [none|delaunay|full [ends]]]`; without arguments a smoke size. With `ends`, lengths between
+//! the vertices of the surface are interpolated along divided edges, the paper's way. Seconds are those the main
 //! thread was on a processor where the system tells them, else those that passed.
 
 use std::cell::RefCell;
@@ -8,9 +9,11 @@ use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 use std::path::Path;
 use std::time::Instant;
 
+use tetdb::bisect::Method;
 use tetdb::catalog::{Catalog, Job, Store};
 use tetdb::geom::Point;
 use tetdb::pipeline::{self, Event, Options};
+use tetdb::refine::Lengths;
 use tetdb::samples::SampleSpec;
 use tetdb::store::Budget;
 use tetdb::surface::Surface;
@@ -76,8 +79,17 @@ fn share_of_unit_edges(store: &Path) -> f64 {
 fn main() {
     let mut words = std::env::args().skip(1).filter(|a| !a.starts_with("--"));
     let word = words.next().unwrap_or_else(|| "balls,count=4".to_owned());
+    let optimize = words.next();
+    let lengths = match words.next().as_deref() {
+        Some("ends") => Lengths::Ends,
+        _ => Lengths::Field,
+    };
     let options = Options {
-        optimize: words.next(),
+        optimize,
+        method: Method {
+            lengths,
+            ..Method::default()
+        },
         subdomains: Some("1".to_owned()),
         ..Options::default()
     };

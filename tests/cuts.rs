@@ -7,7 +7,7 @@
 use std::path::Path;
 
 use tetdb::audit::{self, Level, Report, VerifyOptions};
-use tetdb::bisect::{CutReport, Cutting, Plane, PlaneChoice, choose_plane};
+use tetdb::bisect::{CutReport, Method, Plane, PlaneChoice, choose_plane};
 use tetdb::catalog::{Catalog, Job, Store};
 use tetdb::geom::{Point, mix};
 use tetdb::mesh::Mesh;
@@ -31,9 +31,9 @@ fn mesh_cut_by<T>(
     let path = dir.path().join("two.tetdb");
     let options = Options {
         subdomains: Some("2".to_owned()),
-        cutting: Cutting {
+        method: Method {
             plane: PlaneChoice::Given(plane),
-            ..Cutting::default()
+            ..Method::default()
         },
         ..Options::default()
     };

@@ -35,12 +35,13 @@ use std::time::Instant;
 use crate::geom::{Aabb, Point};
 use crate::mesh::{Mesh, Workspace};
 use crate::optimize::{self, Settings};
-use crate::refine::{Field, RefineReport, saturate};
+use crate::refine::{Field, Lengths, RefineReport, saturate};
 use crate::store::{Pages, StoreError};
 
-/// How cuts are made, for comparing what each part of the method brings; the default is the method.
+/// Ways to go, for comparing what each part of the method brings; the default is the method.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Cutting {
+pub struct Method {
+    pub lengths: Lengths,
     pub plane: PlaneChoice,
     pub steps: Steps,
 }
@@ -52,7 +53,7 @@ pub struct CutPlan<'a> {
     pub cut: u32,
     /// Share of the load that belongs on the low side.
     pub low: f64,
-    pub cutting: Cutting,
+    pub method: Method,
     /// Zones of the cuts above it.
     pub earlier: &'a [Zone],
     /// Wanted length at a position.
@@ -137,13 +138,14 @@ pub fn refine<P: Pages>(
     let mut seconds = StageSeconds::default();
     progress("choose a plane", 0);
     plane::set_sizes(host, plan.h);
-    let plane = plane::choose(host, plan.h, plan.bounds.low, plan.low, plan.cutting.plane);
+    let plane = plane::choose(host, plan.h, plan.bounds.low, plan.low, plan.method.plane);
     seconds.plane = clock.elapsed().as_secs_f64();
     let zone = Zone {
         cut: plan.cut,
         surface: plane.plane,
     };
     let field = Field {
+        lengths: plan.method.lengths,
         h: plan.h,
         place: &zone::InZone {
             zone: &zone,
@@ -183,7 +185,7 @@ pub fn choose<P: Pages, Q: Pages>(
     optimize::run_with(core, plan.optimize, &|_| {});
     seconds.core = clock.elapsed().as_secs_f64();
     let natural = faces.as_mut().map(|f| &mut f.natural);
-    let interface = interface::choose(core, &zone.surface, &rim, plan.cutting.steps, natural);
+    let interface = interface::choose(core, &zone.surface, &rim, plan.method.steps, natural);
     if let Some(faces) = faces {
         faces.chosen = split::interface_points(core);
     }

@@ -83,7 +83,7 @@ impl CutJob {
         let plan = CutPlan {
             cut: part.cut(),
             low: part.low_share(),
-            cutting: common.cutting,
+            method: common.method,
             earlier: &self.zones,
             h: &|p| common.field.h(p),
             bounds: common.bounds,

@@ -3,11 +3,11 @@
 use std::time::Instant;
 
 use super::PipelineError;
+use super::leaf::Common;
 use super::watch::{Event, Watcher};
 use crate::bisect::{OutsideZones, Zone};
-use crate::geom::Aabb;
 use crate::mesh::{Mesh, Workspace};
-use crate::optimize::{self, Mode, OptimizeReport};
+use crate::optimize::{self, OptimizeReport};
 use crate::refine::{Everywhere, Field, Place, RefineReport, saturate};
 use crate::sizing::SizeField;
 use crate::store::Pages;
@@ -25,9 +25,8 @@ pub struct FineReport {
 pub(super) fn fine<P: Pages>(
     mesh: &mut Mesh<P>,
     field: &SizeField,
-    bounds: Aabb,
+    common: Common,
     zones: &[Zone],
-    mode: Mode,
     space: &Workspace,
     watch: &Watcher,
 ) -> Result<FineReport, PipelineError> {
@@ -52,7 +51,8 @@ pub(super) fn fine<P: Pages>(
     let wanted = Field {
         h: &|p| field.h(p),
         place,
-        bounds,
+        lengths: common.method.lengths,
+        bounds: common.bounds,
     };
     let refine = saturate(mesh, &wanted, space, &mut |inserted| {
         watch(Event {
@@ -63,7 +63,7 @@ pub(super) fn fine<P: Pages>(
         });
     })?;
     let refined = clock.elapsed().as_secs_f64();
-    let optimize = optimize::run(mesh, mode, &|p: optimize::Progress| {
+    let optimize = optimize::run(mesh, common.mode, &|p: optimize::Progress| {
         watch(Event {
             stage: p.stage,
             done: u64::from(p.done),

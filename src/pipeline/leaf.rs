@@ -13,7 +13,7 @@ use super::seal::{Target, seal};
 use super::tree::PartMesh;
 use super::watch::Watcher;
 use super::{PipelineError, Plan};
-use crate::bisect::{Cutting, Zone};
+use crate::bisect::{Method, Zone};
 use crate::catalog::{CoarseRow, InterfaceSide, RegionTotals, Sealed};
 use crate::geom::Aabb;
 use crate::mesh::{Mesh, Workspace};
@@ -47,7 +47,7 @@ pub(super) struct LeafJob {
 pub(super) struct Common<'a> {
     pub field: &'a SizeField,
     pub mode: Mode,
-    pub cutting: Cutting,
+    pub method: Method,
     pub bounds: Aabb,
 }
 
@@ -104,9 +104,8 @@ impl LeafJob {
         let fine = fine(
             &mut mesh,
             self.field.as_ref().unwrap_or(common.field),
-            common.bounds,
+            common,
             &self.zones,
-            common.mode,
             &space,
             watch,
         )?;

@@ -1,7 +1,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{PipelineError, Plan};
-use crate::bisect::Cutting;
+use crate::bisect::Method;
 use crate::boundary::RegionPolicy;
 use crate::optimize::Mode;
 use crate::sizing::{Formula, RegionSize, SizeOptions, SizeSource, SizingError};
@@ -52,7 +52,7 @@ pub struct Options {
     pub keep_stages: bool,
     /// For comparisons by a program. It is not stored: a run that is resumed makes cuts as usual.
     #[serde(skip)]
-    pub cutting: Cutting,
+    pub method: Method,
     /// For tests by a program. Not stored either: how many sub-domains there will be is, once that is decided.
     #[serde(skip)]
     pub trial: Trial,

@@ -310,7 +310,7 @@ impl<'a> Again<'a> {
         let common = Common {
             field: &self.field,
             mode: self.options.mode()?,
-            cutting: self.options.cutting,
+            method: self.options.method,
             bounds,
         };
         let mut leaves = BTreeMap::new();

@@ -176,7 +176,7 @@ impl<'a> Run<'a> {
         Ok(Common {
             field: self.field,
             mode: self.options.mode()?,
-            cutting: self.options.cutting,
+            method: self.options.method,
             bounds: self.bounds,
         })
     }

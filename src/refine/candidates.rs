@@ -1,6 +1,6 @@
 //! Points that divide long edges.
 
-use super::{Field, Worker};
+use super::{Field, Lengths, Worker};
 use crate::geom::{Point, mix};
 use crate::mesh::anatomy::mark::EXAMINED;
 use crate::mesh::anatomy::{EDGE_OF, EDGES, MARK};
@@ -104,6 +104,10 @@ impl Worker {
         let (pb, hb) = mesh.point_and_size(b);
         let (ha, hb) = (f64::from(ha), f64::from(hb));
         let length = (pb - pa).length();
+        let length_at = |u: f64, p: Point| match field.lengths {
+            Lengths::Field => (field.h)(p),
+            Lengths::Ends => ha + (hb - ha) * u,
+        };
         // Simpson's rule with the arithmetic mean in the middle: 1 % high at a ratio of two.
         let mut metric = length * (1.0 / ha + 8.0 / (ha + hb) + 1.0 / hb) / 6.0;
         let mut long = LONG;
@@ -111,7 +115,7 @@ impl Worker {
         if fixed {
             long = LONG_FIXED;
             // Both ends only know the surface; the middle may want less.
-            let hm = (field.h)((pa + pb) * 0.5);
+            let hm = length_at(0.5, (pa + pb) * 0.5);
             metric = metric.max(length * (1.0 / ha + 4.0 / hm + 1.0 / hb) / 6.0);
         }
         if metric <= long || fixed && self.is_required(mesh, a, b, tet) {
@@ -130,11 +134,12 @@ impl Worker {
         } else {
             2
         };
-        let mut try_point = |mut point: Point| {
-            let mut h = (field.h)(point);
+        let mut try_point = |u: f64| {
+            let mut point = pa + (pb - pa) * u;
+            let mut h = length_at(u, point);
             if metric > JITTER_FROM {
                 point += jitter(point) * (JITTER * h);
-                h = (field.h)(point);
+                h = length_at(u, point);
             }
             if field.place.admits(point, h) {
                 self.candidates.push(Candidate {
@@ -149,15 +154,16 @@ impl Worker {
             let pieces = (metric.round() as u32).clamp(2, PIECES_MAX);
             for k in 1..pieces {
                 let u = division(f64::from(k) / f64::from(pieces), hb / ha);
-                try_point(pa + (pb - pa) * u);
+                try_point(u);
             }
         } else {
-            let middle = (field.h)(pa + (pb - pa) * (0.5 * (from + to)));
+            let u = 0.5 * (from + to);
+            let middle = length_at(u, pa + (pb - pa) * u);
             let pieces = ((to - from) * length / middle).round() as u32;
             let pieces = pieces.clamp(1, PIECES_MAX);
             for k in 0..pieces {
                 let u = from + (to - from) * ((f64::from(k) + 0.5) / f64::from(pieces));
-                try_point(pa + (pb - pa) * u);
+                try_point(u);
             }
         }
     }

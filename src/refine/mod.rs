@@ -32,8 +32,20 @@ const PASSES_MAX: u32 = 40;
 /// jumps between layers made in different passes; above, sorting costs more than it saves.
 const GROWTH: f64 = 1.5;
 
+/// Where the wanted length at a point that divides an edge comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Lengths {
+    /// From the size field.
+    #[default]
+    Field,
+    /// Interpolated between the ends of the edge, hence from the vertices of the coarse mesh: the paper's way, section 1.1.
+    /// Kept for comparison: what the vertices of the surface do not know is never seen.
+    Ends,
+}
+
 /// What is wanted where, and where points may go.
 pub struct Field<'a> {
+    pub lengths: Lengths,
     /// Wanted edge length at a position.
     pub h: &'a dyn Fn(Point) -> f64,
     /// Where points may go.

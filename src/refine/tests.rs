@@ -6,15 +6,21 @@ use crate::store::{Backing, Pager, kind};
 
 /// A cube of fixed corners, divided until edges have length `h`.
 fn cube(h: f64, pager: Pager) -> (Mesh<Pager>, RefineReport) {
+    graded(pager, Lengths::Field, &|_| h)
+}
+
+fn graded(pager: Pager, lengths: Lengths, h: &dyn Fn(Point) -> f64) -> (Mesh<Pager>, RefineReport) {
     let mut mesh = Mesh::new(pager);
     let bounds = Aabb::around([Point::ZERO, Point::ONE]);
     enclose(&mut mesh, &bounds);
     for v in 0..8 {
-        mesh.set_size(v, h as f32);
+        let p = mesh.point(v);
+        mesh.set_size(v, h(p) as f32);
         assert_eq!(mesh.vertex_attribute(v).0, VertexTag::EnclosingBox);
     }
     let field = Field {
-        h: &|_| h,
+        lengths,
+        h,
         place: &super::Everywhere,
         bounds,
     };
@@ -57,6 +63,18 @@ fn edges_end_near_the_wanted_length() {
         "{long} of {n} edges are long"
     );
     assert!(mesh.pages().n_pages::<{ kind::TETS }>() > 1);
+}
+
+#[test]
+fn between_vertices_only_the_field_knows() {
+    // Fine in the middle, where no vertex of the coarse mesh is.
+    let middle = |p: Point| 0.3 + 0.5 * (p - Point::splat(0.5)).length();
+    let inserted = |lengths| {
+        let pager = Pager::new(1 << 28, None);
+        graded(pager, lengths, &middle).1.inserted
+    };
+    let (field, ends) = (inserted(Lengths::Field), inserted(Lengths::Ends));
+    assert!(ends > 0 && 3 * ends < field, "{ends} of {field}");
 }
 
 #[test]
