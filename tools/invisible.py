@@ -1,21 +1,27 @@
 #!/usr/bin/env python3
 """Can one see in a finished mesh where it was cut?
 
-    python3 tools/invisible.py parts.vtu whole.vtu [--size H]
+    python3 tools/invisible.py --sample box,h=0.0155 --sample box,h=0.017 ... [--tetdb PATH]
+    python3 tools/invisible.py --pair parts.vtu whole.vtu --pair ...
 
-`parts.vtu` is the export of a mesh in two sub-domains, `whole.vtu` that of the same surface and options in one. The cut is fitted by a
-plane; in `whole.vtu` the same plane is a fake one, which tells what chance and the surface do. Sizes must be uniform away from the
-surface (such as a box): they are taken as H, or as the median edge length.
+Each cut is a pair of exports: of a mesh in two sub-domains, and of the same surface and options in one; with `--sample` both are
+made. In the mesh of one piece the interface of the other is a fake cut, which tells what chance and the surface do. Sizes must be
+uniform (such as in a box): they are taken as the median edge length.
 
-Printed, for the true and the fake plane, over tetrahedra farther than 2 H from the surface:
-- Kolmogorov distances of quality and of edge length between tetrahedra nearer than 1 H to the plane (and 3.5 to 6.5 H, where the
-  refined zone ended) and those farther than 8 H;
-- densities of vertices in slices of 0.25 H out to 8 H: coefficient of variation, and what chance alone would make of it;
+Printed for the true and the fake cuts, for each alone and for all together, over tetrahedra away from the surface (farther than
+2 h) and near it:
+- Kolmogorov distances of quality and of metric edge length between tetrahedra nearer than 1 h to the interface (and at 3.5 to
+  6.5 h, where the refined zone ended) and those farther than 8 h;
+- densities of vertices in slices of 0.25 h out to 8 h from the plane of the cut: coefficient of variation, and what chance alone would make of it;
 - the area under the curve of a classifier that tries to tell near tetrahedra from far ones by their shape, size, valences and
-  directions, trained on one half of the plane and tested on the other; 0.5 is guessing.
+  directions, trained on all cuts but one and tested on that one (on halves of the plane when there is one cut); 0.5 is guessing;
+- the mean and the 95th percentile of edge lengths within 4 h of the interface, in the cut mesh over the other.
 Needs numpy, scipy, pyvista and scikit-learn.
 """
 import argparse
+import pathlib
+import subprocess
+import tempfile
 
 import numpy as np
 import pyvista
@@ -64,56 +70,137 @@ def kolmogorov(a, b):
     return np.abs(np.searchsorted(np.sort(a), at, "right") / len(a) - np.searchsorted(np.sort(b), at, "right") / len(b)).max()
 
 
-def judge(name, points, tets, normal, offset, size, surface_distance):
-    middle = points[tets].mean(1)
-    s = (middle @ normal - offset) / size
-    inner = surface_distance(middle) > 2 * size
-    quality, length, columns = features(points, tets, normal, size)
-    far = inner & (np.abs(s) > 8)
-    near = {"< 1 h": inner & (np.abs(s) < 1), "3.5-6.5 h": inner & (np.abs(s) > 3.5) & (np.abs(s) < 6.5)}
-    across = np.linalg.svd(normal[None])[2][1]
-    half = middle @ across > np.median(middle @ across)
+SAMPLES = 30000
+NEAR = {"< 1 h": (0, 1), "3.5-6.5 h": (3.5, 6.5)}
+
+
+class Cut:
+    """Features of all tetrahedra of one mesh, and where they are relative to an interface (true or fake)."""
+
+    def __init__(self, mesh, interface, normal, offset, size):
+        points, tets = mesh[:2]
+        walls = points[pair_faces(tets)[3]]
+        hull = cKDTree(walls.mean(1))
+        middle = points[tets].mean(1)
+        plane = np.abs(middle @ normal - offset) / size
+        # Only what is near the plane needs its distance to the interface itself.
+        self.distance = plane.copy()
+        band = plane < 9
+        self.distance[band] = interface.query(middle[band], workers=2)[0] / size
+        away, wall = hull.query(middle, workers=2)
+        self.inner = away > 2 * size
+        # Walls that face the cut are not met by it: near the surface only those it crosses are compared.
+        facing = np.cross(walls[:, 1] - walls[:, 0], walls[:, 2] - walls[:, 0])
+        facing = np.abs(facing @ normal) > 0.5 * np.linalg.norm(facing, axis=1)
+        self.distance[~self.inner & facing[wall]] = np.nan
+        self.quality, self.length, self.columns = features(points, tets, normal, size)
+        across = np.linalg.svd(normal[None])[2][1]
+        self.half = middle @ across > np.median(middle @ across)
+        away = hull.query(points, workers=2)[0] > 2 * size
+        d = (points[away] @ normal - offset) / size
+        self.slices = np.histogram(d, np.arange(-8, 8.01, 0.25))[0]
+
+    def near(self, kind, inner):
+        low, high = NEAR[kind]
+        return (self.inner == inner) & (self.distance >= low) & (self.distance < high)
+
+    def far(self, inner):
+        return (self.inner == inner) & (self.distance > 8)
+
+
+def some(rng, chosen):
+    return rng.permutation(np.flatnonzero(chosen))[:SAMPLES]
+
+
+def auc(cuts, kind, inner):
+    """Mean over the cuts of the area under the curve, each judged by what the others taught."""
     rng = np.random.default_rng(1)
-    for kind, chosen in near.items():
-        auc = []
-        for side in (half, ~half):
-            train = np.concatenate([rng.permutation(np.flatnonzero(c & side))[:40000] for c in (chosen, far)])
-            test = np.concatenate([rng.permutation(np.flatnonzero(c & ~side))[:40000] for c in (chosen, far)])
-            model = HistGradientBoostingClassifier(max_iter=120, random_state=1).fit(columns[train], chosen[train])
-            auc.append(roc_auc_score(chosen[test], model.predict_proba(columns[test])[:, 1]))
-        print(f"{name:6} {kind:10} {chosen.sum():8} tets: KS quality {kolmogorov(quality[chosen], quality[far]):.4f}, KS edge length "
-              f"{kolmogorov(length[chosen].ravel(), length[far].ravel()):.4f}, AUC {np.mean(auc):.3f}")
-    inside = surface_distance(points) > 2 * size
-    d = (points[inside] @ normal - offset) / size
-    counts = np.histogram(d, np.arange(-8, 8.01, 0.25))[0]
-    print(f"{name:6} density in 64 slices: cv {counts.std() / counts.mean():.4f}, chance {1 / np.sqrt(counts.mean()):.4f}, "
-          f"extremes {counts.min() / counts.mean() - 1:+.3f} {counts.max() / counts.mean() - 1:+.3f}")
+    if len(cuts) > 1:
+        folds = [([(c, True) for j, c in enumerate(cuts) if j != i], [(cuts[i], True)]) for i in range(len(cuts))]
+    else:
+        folds = [([(cuts[0], side)], [(cuts[0], ~side)]) for side in (cuts[0].half, ~cuts[0].half)]
+    areas = []
+    for train, test in folds:
+        sets = []
+        for part in (train, test):
+            picks = [(c, some(rng, c.near(kind, inner) & where), some(rng, c.far(inner) & where)) for c, where in part]
+            # As many of each kind from each cut: else a cut could be known by its size.
+            picks = [(c, n[: min(len(n), len(f))], f[: min(len(n), len(f))]) for c, n, f in picks]
+            sets.append((np.concatenate([c.columns[i] for c, n, f in picks for i in (n, f)]),
+                         np.concatenate([np.repeat([1, 0], [len(n), len(f)]) for _, n, f in picks])))
+        model = HistGradientBoostingClassifier(max_iter=120, random_state=1).fit(*sets[0])
+        areas.append(roc_auc_score(sets[1][1], model.predict_proba(sets[1][0])[:, 1]))
+    return float(np.mean(areas))
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("parts")
-    parser.add_argument("whole")
-    parser.add_argument("--size", type=float)
-    args = parser.parse_args()
-    points, tets, part = read(args.parts)
-    a, b, faces, hull, _ = pair_faces(tets)
+def judge(name, cuts):
+    for inner in (True, False):
+        place = "away from the surface" if inner else "near the surface"
+        for kind in NEAR:
+            near = [c.near(kind, inner) for c in cuts]
+            far = [c.far(inner) for c in cuts]
+            both = [np.concatenate([v(c)[m].ravel() for c, m in zip(cuts, masks)]) for v in
+                    (lambda c: c.quality, lambda c: c.length) for masks in (near, far)]
+            print(f"{name:10} {place:21} {kind:10} {sum(m.sum() for m in near):8} tets: KS quality {kolmogorov(*both[:2]):.4f}, "
+                  f"KS edge length {kolmogorov(*both[2:]):.4f}, AUC {auc(cuts, kind, inner):.3f}", flush=True)
+    # Slices of cuts with other sizes are compared as shares of their own mean.
+    shares = np.mean([c.slices / c.slices.mean() for c in cuts], axis=0)
+    chance = np.sqrt(np.sum([1 / c.slices.mean() for c in cuts])) / len(cuts)
+    print(f"{name:10} density in 64 slices: cv {shares.std():.4f}, chance {chance:.4f}, extremes {shares.min() - 1:+.3f} {shares.max() - 1:+.3f}", flush=True)
+
+
+def make(sample, tetdb, folder):
+    """Exports of the sample in two sub-domains and in one."""
+    paths = []
+    for n in (2, 1):
+        store, out = folder / "cut.tetdb", folder / f"{sample}_{n}.vtu"
+        for command in (["mesh", f"sample:{sample}", "-o", store, "--subdomains", n, "--no-verify", "--force"],
+                        ["export", store, out]):
+            subprocess.run([tetdb, *map(str, command)], check=True, stdout=subprocess.DEVNULL)
+        paths.append(out)
+    return paths
+
+
+def look(parts, whole):
+    """The true cut and the fake one."""
+    points, tets, part = read(parts)
+    a, b, faces, _, _ = pair_faces(tets)
     cut = part[a] != part[b]
     at = points[np.unique(faces[cut])]
     center = at.mean(0)
     normal = np.linalg.svd(at - center, full_matrices=False)[2][2]
     edge = points[faces[:, 0]] - points[faces[:, 1]]
-    size = args.size or float(np.median(np.linalg.norm(edge, axis=1)))
+    size = float(np.median(np.linalg.norm(edge, axis=1)))
     offset = float(center @ normal)
-    q = points[faces[cut]]
-    print(f"{cut.sum()} interface faces, plane {normal.round(4)} at {offset:.4f}, h {size:.5f}, spread "
-          f"{np.std((at - center) @ normal) / size:.2f} h, area {np.linalg.norm(np.cross(q[:, 1] - q[:, 0], q[:, 2] - q[:, 0]), axis=1).sum() / 2 / size**2:.0f} h2")
-    for name, path in (("cut", None), ("fake", args.whole)):
-        if path:
-            points, tets, _ = read(path)
-            hull = pair_faces(tets)[3]
-        tree = cKDTree(points[hull].mean(1))
-        judge(name, points, tets, normal, offset, size, lambda p, tree=tree: tree.query(p, workers=2)[0])
+    interface = cKDTree(np.concatenate([at, points[faces[cut]].mean(1)]))
+    print(f"{parts}: {cut.sum()} interface faces, plane {normal.round(4)} at {offset:.4f}, h {size:.5f}, "
+          f"spread {np.std((at - center) @ normal) / size:.2f} h", flush=True)
+    cuts = [Cut(mesh, interface, normal, offset, size) for mesh in ((points, tets), read(whole)[:2])]
+    for inner in (True, False):
+        lengths = [c.length[(c.inner == inner) & (c.distance < 4)].ravel() for c in cuts]
+        mean, high = ([f(l) for l in lengths] for f in (np.mean, lambda l: np.quantile(l, 0.95)))
+        print(f"  {'away from' if inner else 'near'} the surface, within 4 h: edge length over that of one piece: mean {mean[0] / mean[1]:.4f}, 95th percentile {high[0] / high[1]:.4f}")
+    return cuts
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--pair", nargs=2, action="append", default=[], metavar=("PARTS", "WHOLE"))
+    parser.add_argument("--sample", action="append", default=[])
+    parser.add_argument("--tetdb", default="target/release/tetdb")
+    args = parser.parse_args()
+    if not args.pair and not args.sample:
+        parser.error("give --sample or --pair")
+    looked = [look(*pair) for pair in args.pair]
+    for sample in args.sample:
+        with tempfile.TemporaryDirectory() as folder:
+            looked.append(look(*make(sample, args.tetdb, pathlib.Path(folder))))
+    cut, fake = zip(*looked)
+    for k, (c, f) in enumerate(looked if len(looked) > 1 else []):
+        judge(f"cut {k + 1}", [c])
+        judge(f"fake {k + 1}", [f])
+    judge("cuts", cut)
+    judge("fakes", fake)
 
 
 if __name__ == "__main__":

@@ -1,9 +1,11 @@
 //! Which side of the cut each tetrahedron of the core is on, and what that costs.
 
-use super::core::{Rim, middle, place, tet_ids};
+use std::collections::BTreeSet;
+
+use super::core::{Rim, is_in_core, middle, place, tet_ids};
 use super::surface::CuttingSurface;
 use crate::geom::Point;
-use crate::mesh::{Mesh, Tet, dense};
+use crate::mesh::{FaceRef, Mesh, Tet, dense};
 use crate::store::{Pages, stop_if_requested};
 use tetdb_schema::page::NONE;
 
@@ -165,10 +167,20 @@ pub(super) fn is_constrained(tet: &Tet, i: usize, rim: &Rim) -> bool {
     tet.is_required(i) && (tet.neighbor[i].exists() || rim.find(tet.face(i)).is_none())
 }
 
-/// The least number of tetrahedra between the interface and what is not in the core: so many at least are final on each side of it.
+/// Layers beyond which nobody counts: two are asked for.
+pub const LAYERS_MOST: u32 = 3;
+
+/// The least number of tetrahedra, from face to face, between the interface and the first with a vertex out of the refined zone;
+/// [`LAYERS_MOST`] stands for more.
 ///
-/// Effects: uses the core's scratch map. Where no interface or no rim is, there is no such number: `None`.
-pub(super) fn layers_least<P: Pages>(core: &mut Mesh<P>, rim: &Rim) -> Option<u32> {
+/// The way leads through the core and over its rim into the host. Effects: uses the core's scratch map. Where no interface is, there is no
+/// such number: `None`.
+pub(super) fn layers_least<P: Pages, Q: Pages>(
+    host: &mut Mesh<P>,
+    core: &mut Mesh<Q>,
+    rim: &Rim,
+    surface: &dyn CuttingSurface,
+) -> Option<u32> {
     core.clear_scratch();
     for n in 0..dense(core.tet_ids_end()) {
         core.set_scratch(n, NONE);
@@ -181,29 +193,57 @@ pub(super) fn layers_least<P: Pages>(core: &mut Mesh<P>, rim: &Rim) -> Option<u3
             layer.push(t);
         }
     }
-    let mut n = 1;
-    while !layer.is_empty() {
+    if layer.is_empty() {
+        return None;
+    }
+    // Tetrahedra of the host in the layer at hand and the one before: a way never leads farther back.
+    let (mut beyond, mut before) = (BTreeSet::new(), BTreeSet::new());
+    for n in 1..=LAYERS_MOST {
         stop_if_requested();
         let mut next = Vec::new();
+        let mut next_beyond = BTreeSet::new();
         for t in layer {
             let tet = core.tet(t);
+            if !is_in_zone(core, &tet, surface) {
+                return Some(n - 1);
+            }
             for (i, across) in tet.neighbor.into_iter().enumerate() {
                 if !across.exists() {
-                    if rim.find(tet.face(i)).is_some() {
-                        return Some(n);
-                    }
-                    continue;
-                }
-                let other = dense(across.tet());
-                if core.scratch(other) == NONE {
-                    core.set_scratch(other, n + 1);
+                    next_beyond.extend(rim.find(tet.face(i)).map(FaceRef::tet));
+                } else if core.scratch(dense(across.tet())) == NONE {
+                    core.set_scratch(dense(across.tet()), n + 1);
                     next.push(across.tet());
                 }
             }
         }
-        (layer, n) = (next, n + 1);
+        for &t in &beyond {
+            let tet = host.tet(t);
+            if !is_in_zone(host, &tet, surface) {
+                return Some(n - 1);
+            }
+            let onward = tet.neighbor.into_iter().filter(|across| across.exists());
+            // Back into the core the way is shorter.
+            for across in onward.map(FaceRef::tet) {
+                if !beyond.contains(&across)
+                    && !before.contains(&across)
+                    && !is_in_core(&host.tet(across))
+                {
+                    next_beyond.insert(across);
+                }
+            }
+        }
+        next_beyond.retain(|t| !beyond.contains(t) && !before.contains(t));
+        (before, beyond, layer) = (beyond, next_beyond, next);
     }
-    None
+    Some(LAYERS_MOST)
+}
+
+/// Whether all vertices of `tet` lie in the refined zone at its narrowest.
+fn is_in_zone<P: Pages>(mesh: &mut Mesh<P>, tet: &Tet, surface: &dyn CuttingSurface) -> bool {
+    tet.vertices().into_iter().all(|v| {
+        let (p, h) = mesh.point_and_size(v);
+        surface.distance(p).abs() <= super::zone::WIDTH_MIN * f64::from(h)
+    })
 }
 
 /// Tetrahedra with a face on the interface, and how many of them have their circumsphere within the refined zone.

@@ -81,7 +81,8 @@ pub struct CutReport {
     /// Tetrahedra with a face on the interface, and those whose circumsphere lies in the refined zone.
     pub z_tets: u64,
     pub z_enclosed: u64,
-    /// Final tetrahedra between the interface and what is not final: at least so many, on each side.
+    /// Tetrahedra, from face to face, between the interface and the first with a vertex out of the refined zone, at least; three
+    /// stands for more.
     pub layers_least: Option<u32>,
     pub seconds: StageSeconds,
 }
@@ -191,7 +192,7 @@ pub fn choose<P: Pages, Q: Pages>(
     }
     let vertices = split::number_interface(core, plan.cut);
     let (z_tets, z_enclosed) = labels::enclosed(core, &zone.surface, plan.h);
-    let layers_least = labels::layers_least(core, &rim);
+    let layers_least = labels::layers_least(host, core, &rim, &zone.surface);
     seconds.interface = clock.elapsed().as_secs_f64() - seconds.core;
     Opened {
         zone,
