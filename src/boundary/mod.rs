@@ -38,6 +38,7 @@ mod star;
 mod suppress;
 mod target;
 mod walk;
+mod wedge;
 
 pub use error::{BoundaryError, FacetPlace};
 pub use nearness::{Nearness, NearnessKind};

@@ -2,7 +2,8 @@
 
 use tetdb_schema::page::u32_le;
 
-use super::cursor::{Mesh, sparse};
+use super::cursor::Mesh;
+use super::state::sparse;
 use crate::store::{Pages, kind};
 
 /// A triangle of the input (or of an interface) and what lies on its two sides.

@@ -5,7 +5,8 @@
 use tetdb_schema::record::{self, CoarseFace, CoarseTet, CoarseVertex};
 
 use super::anatomy::{MARK, REQUIRED, VERTEX_MASK};
-use super::cursor::{Mesh, dense, sparse};
+use super::cursor::Mesh;
+use super::state::{dense, sparse};
 use super::{FaceRef, Facet, InterfaceFace, Tet, Workspace};
 use crate::store::{Pages, Sorter, StoreError, stop_if_requested};
 

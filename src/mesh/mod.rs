@@ -5,8 +5,12 @@ mod cursor;
 mod faces;
 mod kept;
 mod renumber;
+mod state;
+mod vertices;
 
 pub use anatomy::{FaceRef, Tet};
-pub use cursor::{End, MESH_STATE_WORDS, Mesh, MeshState, VertexTag, dense, sparse};
+pub use cursor::Mesh;
 pub use faces::{Facet, InterfaceFace};
 pub use renumber::{Workspace, renumber};
+pub use state::{MESH_STATE_WORDS, MeshState, dense, sparse};
+pub use vertices::{End, VertexTag};

@@ -4,7 +4,9 @@
 //! sweep in id order touches every page again and again. New records are written behind the old ones in sorted order, then
 //! the old pages are dropped from the front.
 
-use super::cursor::{Mesh, VertexTag, dense, sparse};
+use super::cursor::Mesh;
+use super::state::{dense, sparse};
+use super::vertices::VertexTag;
 use super::{FaceRef, MeshState};
 use crate::geom::HilbertFrame;
 use crate::store::{DiskPath, Pages, Sorter, StoreError, kind};

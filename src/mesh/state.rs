@@ -1,0 +1,135 @@
+//! Ids of records, and how many of each kind there are.
+
+use tetdb_schema::page::{NONE, RECORDS, SLOT_BITS, SLOT_MASK};
+
+/// Records of one kind: ids handed out in order, freed slots used again, last freed first.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Arena {
+    /// The next id never used.
+    pub(super) fresh: u32,
+    pub(super) free_head: u32,
+    pub(super) n_live: u32,
+}
+
+impl Default for Arena {
+    fn default() -> Self {
+        Self {
+            fresh: 0,
+            free_head: NONE,
+            n_live: 0,
+        }
+    }
+}
+
+/// Numbers of a [`MeshState`].
+pub const MESH_STATE_WORDS: usize = 12;
+
+/// Counts that, with the pages, are the whole state of a working mesh.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct MeshState {
+    pub(super) tets: Arena,
+    pub(super) vertices: Arena,
+    pub(super) facets: Arena,
+    pub(super) interface_faces: Arena,
+}
+
+impl MeshState {
+    /// Counts of records numbered without gaps.
+    pub(super) fn dense(
+        n_tets: u32,
+        n_vertices: u32,
+        n_facets: u32,
+        n_interface_faces: u32,
+    ) -> Self {
+        let arena = |n: u32| Arena {
+            fresh: sparse(n),
+            free_head: NONE,
+            n_live: n,
+        };
+        Self {
+            tets: arena(n_tets),
+            vertices: arena(n_vertices),
+            facets: arena(n_facets),
+            interface_faces: arena(n_interface_faces),
+        }
+    }
+
+    /// Tetrahedra in use.
+    pub fn n_tets(&self) -> u32 {
+        self.tets.n_live
+    }
+
+    /// The counts as numbers, for storing beside the pages.
+    pub fn to_words(self) -> [u32; MESH_STATE_WORDS] {
+        let [t, v, f, i] = [self.tets, self.vertices, self.facets, self.interface_faces];
+        [
+            t.fresh,
+            t.free_head,
+            t.n_live,
+            v.fresh,
+            v.free_head,
+            v.n_live,
+            f.fresh,
+            f.free_head,
+            f.n_live,
+            i.fresh,
+            i.free_head,
+            i.n_live,
+        ]
+    }
+
+    /// The inverse of [`MeshState::to_words`].
+    pub fn from_words(w: [u32; MESH_STATE_WORDS]) -> Self {
+        let arena = |i: usize| Arena {
+            fresh: w[i],
+            free_head: w[i + 1],
+            n_live: w[i + 2],
+        };
+        Self {
+            tets: arena(0),
+            vertices: arena(3),
+            facets: arena(6),
+            interface_faces: arena(9),
+        }
+    }
+}
+
+/// The id after `id` within pages whose last two slots hold no record.
+#[inline]
+pub(super) fn next_id(id: u32) -> u32 {
+    if (id & SLOT_MASK) as usize == RECORDS - 1 {
+        id + 3
+    } else {
+        id + 1
+    }
+}
+
+/// Position of record `id` when the unused slots are left out.
+#[inline]
+pub fn dense(id: u32) -> u32 {
+    (id >> SLOT_BITS) * RECORDS as u32 + (id & SLOT_MASK)
+}
+
+/// The id at position `n`; inverse of [`dense`].
+#[inline]
+pub fn sparse(n: u32) -> u32 {
+    ((n / RECORDS as u32) << SLOT_BITS) | (n % RECORDS as u32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn unused_slots_are_never_ids() {
+        for n in [0, 1, 2045, 2046, 4091, 4092, 100_000] {
+            assert_eq!(dense(sparse(n)), n);
+            assert!((sparse(n) & SLOT_MASK) < RECORDS as u32);
+        }
+        let mut id = 0;
+        for n in 0..10_000 {
+            assert_eq!(id, sparse(n));
+            id = next_id(id);
+        }
+    }
+}
