@@ -1,6 +1,6 @@
 //! `estimate`, and the look at disk and memory before `mesh` begins.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
@@ -9,7 +9,8 @@ use super::failure::Failure;
 use super::talk::Talk;
 use super::{background, config, input, memory};
 use crate::pipeline::{self, Estimate};
-use crate::store::available_bytes;
+use crate::store::{Room, available_bytes};
+use crate::surface::Surface;
 
 /// A mesh is refused when less than this share of the disk it is expected to take is free: predictions may be that far off.
 const REFUSED_BELOW: f64 = 0.7;
@@ -21,9 +22,11 @@ pub fn run(args: &EstimateArgs, talk: &Talk) -> Result<u8, Failure> {
     let threads = args.threads.unwrap_or_else(rayon::current_num_threads);
     let input = input::load_valid(&args.surfaces, talk)?;
     let background = background::read(&options, cap)?;
-    let prepared = pipeline::prepare(&input.surface, &options, background.as_ref())?;
+    let store = args.output.as_deref().unwrap_or(Path::new("."));
+    let room = room(cap, &input.surface, store)?;
+    let prepared = pipeline::prepare(&input.surface, &options, background.as_ref(), &room)?;
     let estimate = &prepared.estimate;
-    let disk_free = free_at(args.output.as_deref().unwrap_or(Path::new(".")));
+    let disk_free = free_at(store);
     let disk = estimate.disk_peak_bytes(cap, threads);
     let fits_memory = cap >= estimate.memory_least_bytes();
     let fits_disk = disk_free.is_none_or(|free| free >= disk);
@@ -97,7 +100,7 @@ pub fn preflight(estimate: &Estimate, cap: u64, store: &Path, talk: &Talk) -> Re
     if cap < least {
         let message = format!(
             "the surface and its size field take {}: with a cap of {} too little is left for the mesh",
-            memory::show(estimate.held_bytes),
+            memory::show(estimate.held_bytes(cap)),
             memory::show(cap)
         );
         let help = format!("give at least --memory {}MiB", least.div_ceil(1 << 20));
@@ -154,11 +157,31 @@ fn bytes_on_disk(dir: &Path) -> u64 {
     bytes.sum()
 }
 
-/// Bytes free where a store would be made: on the disk of the nearest folder that exists.
-fn free_at(store: &Path) -> Option<u64> {
+/// What `cap` leaves beside the surface, and scratch files where a store would be made.
+pub fn room(cap: u64, surface: &Surface, store: &Path) -> Result<Room, Failure> {
+    let bytes = cap.saturating_sub(surface.bytes() as u64);
+    let folder = folder_of(store).ok_or_else(|| {
+        let message = "there is no folder above it";
+        Failure::new("io", message).at(store.display())
+    })?;
+    Ok(Room::new(bytes, &folder))
+}
+
+/// The nearest folder that exists.
+fn folder_of(store: &Path) -> Option<PathBuf> {
     let absolute = std::path::absolute(store).ok()?;
-    let folder = absolute.ancestors().find(|folder| folder.is_dir())?;
-    available_bytes(folder)
+    let above = absolute
+        .ancestors()
+        .skip(usize::from(store != Path::new(".")));
+    above
+        .into_iter()
+        .find(|folder| folder.is_dir())
+        .map(Path::to_owned)
+}
+
+/// Bytes free where a store would be made.
+fn free_at(store: &Path) -> Option<u64> {
+    available_bytes(&folder_of(store)?)
 }
 
 fn round(x: f64) -> u64 {

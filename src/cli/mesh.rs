@@ -35,7 +35,8 @@ pub fn run(args: &MeshArgs, talk: &Talk) -> Result<u8, Failure> {
     talk.note(&format!("memory: {} ({whence})", memory::show(cap)));
     let prepared = {
         let background = background::read(&options, cap)?;
-        pipeline::prepare(&input.surface, &options, background.as_ref())?
+        let room = estimate::room(cap, &input.surface, &path)?;
+        pipeline::prepare(&input.surface, &options, background.as_ref(), &room)?
     };
     if !args.no_preflight {
         estimate::preflight(&prepared.estimate, cap, &path, talk)?;
@@ -101,7 +102,8 @@ pub fn resume(args: &ResumeArgs, talk: &Talk) -> Result<u8, Failure> {
     let budget = Budget::new(cap);
     let made = if state < StoreState::Coarse {
         let background = background::read(&options, cap)?;
-        let prepared = pipeline::prepare(&input.surface, &options, background.as_ref())?;
+        let room = estimate::room(cap, &input.surface, &args.store)?;
+        let prepared = pipeline::prepare(&input.surface, &options, background.as_ref(), &room)?;
         drop(background);
         pipeline::mesh_prepared(
             &mut catalog,

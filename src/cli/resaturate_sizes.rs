@@ -13,6 +13,7 @@ use crate::catalog::Store;
 use crate::io::read::read_lengths;
 use crate::pipeline::{self, NewSizes, Options, Values};
 use crate::sizing::{SizeField, SizingError};
+use crate::store::Room;
 
 /// The options the store was made with. Errors: they cannot be read.
 pub fn options_of(open: &mut Store, path: &Path) -> Result<Options, Failure> {
@@ -116,7 +117,8 @@ fn field(
     }
     let input = store::surface_of(open, &[], talk)?;
     let background = background::read(&all, cap)?;
-    let prepared = pipeline::prepare(&input.surface, &all, background.as_ref())?;
+    let room = Room::boundless();
+    let prepared = pipeline::prepare(&input.surface, &all, background.as_ref(), &room)?;
     talk.note(&prepared.sizes.to_string());
     Ok(prepared.field)
 }

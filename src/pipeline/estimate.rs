@@ -8,6 +8,7 @@ use super::regions::region_sizes;
 use super::{MEMORY_MIN, Options, PipelineError, Plan};
 use crate::optimize::Mode;
 use crate::sizing::{Background, Counts, Domain, Further, Region, SizeField, SizeSummary, Wish};
+use crate::store::{Room, attempt};
 use crate::surface::{OUTSIDE, Seeker, Surface, Volumes};
 
 /// Tetrahedra of one sub-domain, unless a number of sub-domains is asked for.
@@ -64,9 +65,10 @@ pub struct Estimate {
     pub subdomains: u32,
     /// What was asked for, when that was more than the mesh allows.
     pub subdomains_asked: Option<u32>,
-    /// Bytes of surface and size field, held all the time.
-    pub held_bytes: u64,
-    field_bytes: u64,
+    surface_bytes: u64,
+    /// Of the size field: its octree, and sizes at corners, which go to a scratch file where their share of the cap is too small.
+    octree_bytes: u64,
+    sizes_bytes: u64,
     /// Whether the coarse leaves stay in the store.
     keeps_coarse: bool,
 }
@@ -86,6 +88,17 @@ pub fn prepare(
     surface: &Surface,
     options: &Options,
     background: Option<&Background>,
+    room: &Room,
+) -> Result<Prepared, PipelineError> {
+    // A scratch file that fails unwinds to here.
+    attempt(|| prepare_in(surface, options, background, room))?
+}
+
+fn prepare_in(
+    surface: &Surface,
+    options: &Options,
+    background: Option<&Background>,
+    room: &Room,
 ) -> Result<Prepared, PipelineError> {
     if let (Some(file), None) = (&options.size_field, background) {
         return Err(PipelineError::SizeField { file: file.clone() });
@@ -103,7 +116,7 @@ pub fn prepare(
             wishes: &wishes,
             at_vertices,
         };
-        SizeField::build_with(&surface.points, &surface.triangles, &asked, &further)
+        SizeField::build_with(&surface.points, &surface.triangles, &asked, &further, room)
     };
     // What building takes is given back before the surface's tree is made, where regions have no sizes of their own.
     let early = match asked.regions.is_empty() {
@@ -147,14 +160,16 @@ impl Estimate {
             Mode::Full => 1.0,
         };
         let (subdomains, subdomains_asked) = n_subdomains(counts.tets(), options)?;
+        let sizes_bytes = (field.n_leaves() * size_of::<[f32; 8]>()) as u64;
         Ok(Self {
             counts,
             triangles: surface.n_triangles() as u64,
             vertices: surface.n_vertices() as f64 + counts.inner_vertices,
             subdomains,
             subdomains_asked,
-            held_bytes: (surface.bytes() + field.bytes()) as u64,
-            field_bytes: field.bytes() as u64,
+            surface_bytes: surface.bytes() as u64,
+            octree_bytes: field.bytes_in(0) - SizeField::share_of(0).min(sizes_bytes),
+            sizes_bytes,
             keeps_coarse: !options.drop_coarse,
         })
     }
@@ -163,13 +178,19 @@ impl Estimate {
         self.counts.tets()
     }
 
+    /// Bytes of surface and size field, held all the time under `cap`.
+    pub fn held_bytes(&self, cap: u64) -> u64 {
+        let share = SizeField::share_of(cap.saturating_sub(self.surface_bytes));
+        self.surface_bytes + self.octree_bytes + self.sizes_bytes.min(share)
+    }
+
     /// Bytes of the finished store.
     pub fn store_bytes(&self) -> u64 {
         let sealed = SEALED_TET * self.tets()
             + SEALED_VERTEX * self.vertices
             + SEALED_FACET * self.triangles as f64;
         let files = FILE_LEAST * f64::from(self.subdomains) + CATALOG_LEAST;
-        (sealed + files) as u64 + self.field_bytes + self.coarse_bytes()
+        (sealed + files) as u64 + self.octree_bytes + self.sizes_bytes + self.coarse_bytes()
     }
 
     /// Bytes of the coarse leaves in it.
@@ -184,7 +205,7 @@ impl Estimate {
     /// Most bytes on disk while it is made with `cap` bytes of memory by so many threads.
     pub fn disk_peak_bytes(&self, cap: u64, threads: usize) -> u64 {
         let parts = COARSE_TRIANGLE * self.triangles as f64 + ZONE_TET * self.zone_tets();
-        let frames = Plan::new(cap, self.held_bytes).map_or(0, |plan| plan.frames) as f64;
+        let frames = Plan::new(cap, self.held_bytes(cap)).map_or(0, |plan| plan.frames) as f64;
         let pages = self.pages_bytes(threads);
         let spilled = (SPILLED * (pages - frames)).clamp(0.0, SPILLED_MAX * pages);
         self.store_bytes() + (parts + spilled) as u64
@@ -211,7 +232,7 @@ impl Estimate {
     /// The smallest cap under which all steps find room.
     pub fn memory_least_bytes(&self) -> u64 {
         let mut cap = MEMORY_MIN;
-        while Plan::new(cap, self.held_bytes).is_err() {
+        while Plan::new(cap, self.held_bytes(cap)).is_err() {
             cap += 1 << 20;
         }
         cap

@@ -19,7 +19,7 @@ use crate::catalog::{
 use crate::geom::{Aabb, HilbertFrame};
 use crate::mesh::{Mesh, Workspace, renumber};
 use crate::sizing::{SizeField, SizeSummary, TETS_PER_LOAD};
-use crate::store::{Backing, Budget, DiskPath, Pager, PagerStats, attempt};
+use crate::store::{Backing, Budget, DiskPath, Pager, PagerStats, Room, attempt};
 use crate::surface::Surface;
 
 /// Generation of the coarse mesh.
@@ -52,17 +52,18 @@ pub fn mesh(
     budget: &Budget,
     watch: &Watcher,
 ) -> Result<Summary, PipelineError> {
+    let room = Room::new(
+        budget.cap().saturating_sub(surface.bytes() as u64),
+        catalog.scratch_dir()?,
+    );
     match catalog.blob(blob::SIZE_FIELD)? {
-        None => mesh_prepared(
-            catalog,
-            surface,
-            options,
-            prepare(surface, options, None)?,
-            budget,
-            watch,
-        ),
+        None => {
+            let prepared = prepare(surface, options, None, &room)?;
+            mesh_prepared(catalog, surface, options, prepared, budget, watch)
+        }
         Some(bytes) => {
-            let field = SizeField::from_bytes(&bytes)?;
+            let field = attempt(|| SizeField::from_bytes_in(&bytes, &room))??;
+            drop(bytes);
             let field = field.with_sources(&options.sizes()?, surface.bounds().diagonal())?;
             go_on(catalog, surface, options, (field, None), budget, watch)
         }

@@ -24,6 +24,7 @@ use super::field::SizeField;
 use super::seeds::Frame;
 use super::tree::{DEPTH, LEAF, Leaf, Tree};
 use crate::geom::{Point, mix};
+use crate::store::{Fixed, List, Room};
 
 const MAGIC: &[u8; 8] = b"TETDBSZ2";
 const HEADER_BYTES: usize = 64;
@@ -68,7 +69,8 @@ impl SizeField {
                 continue;
             }
             let mut new = 0;
-            for (i, &value) in self.values[(entry & !LEAF) as usize].iter().enumerate() {
+            let corners = self.values.get((entry & !LEAF) as usize);
+            for (i, value) in corners.into_iter().enumerate() {
                 let slot = memory.slot(cell.corner(i));
                 let seen = (cell.corner(i), value);
                 if *slot != seen {
@@ -100,6 +102,14 @@ impl SizeField {
     /// # Errors
     /// [`SizingError::Damaged`] names what is wrong.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, SizingError> {
+        Self::from_bytes_in(bytes, &Room::boundless())
+    }
+
+    /// [`SizeField::from_bytes`] with values that go to a scratch file where their share of `room` is too small.
+    ///
+    /// # Errors
+    /// As there. A scratch file that fails unwinds.
+    pub fn from_bytes_in(bytes: &[u8], room: &Room) -> Result<Self, SizingError> {
         if bytes.len() < HEADER_BYTES {
             return Err(damaged("length", bytes.len(), "at least 64"));
         }
@@ -131,7 +141,8 @@ impl SizeField {
         }
         let (cells, rest) = body.split_at(n_cells);
         let (news, values) = rest.split_at(n_leaves);
-        let (tree, values) = read_tree(cells, news, values)?;
+        let leaves = room.list_within(Self::share_of(room.cap()));
+        let (tree, values) = read_tree(cells, news, values, leaves)?;
         Ok(Self::from_parts(Frame { low, side }, beta, tree, values))
     }
 }
@@ -141,13 +152,13 @@ fn read_tree(
     cells: &[u8],
     news: &[u8],
     values: &[u8],
-) -> Result<(Tree, Vec<[f32; 8]>), SizingError> {
+    mut leaves: List<[f32; 8]>,
+) -> Result<(Tree, Fixed<[f32; 8]>), SizingError> {
     let mut values = values.chunks_exact(4).map(|b| f32::from_le_bytes(array(b)));
     let mut tree = Tree {
         root: LEAF,
         blocks: Vec::with_capacity(cells.len() - news.len().min(cells.len())),
     };
-    let mut leaves = Vec::with_capacity(news.len());
     let mut memory = Memory::new();
     // A cell, and the block and octant whose entry it is.
     let mut stack = vec![(Leaf::ROOT, None)];
@@ -198,7 +209,7 @@ fn read_tree(
     if !stack.is_empty() || leaves.len() != news.len() || values.next().is_some() {
         return Err(damaged("number of leaves", leaves.len(), news.len()));
     }
-    Ok((tree, leaves))
+    Ok((tree, leaves.done().fixed()))
 }
 
 fn damaged(what: &'static str, found: impl Display, expected: impl Display) -> SizingError {

@@ -9,10 +9,11 @@
 //! ```
 
 use super::tree::{LATTICE, Leaf, Tree};
-use rayon::prelude::*;
+use crate::store::{Column, Room, StoreError, fail};
 
 /// A hanging corner and the four corners (an edge's two, twice) whose mean it takes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
 pub(super) struct Hanging {
     /// Level of the smaller leaf: coarser ones come first.
     pub(super) level: u32,
@@ -21,6 +22,22 @@ pub(super) struct Hanging {
 }
 
 impl Hanging {
+    /// As bytes that sort by level, then by corner.
+    fn to_bytes(self) -> [u8; 24] {
+        let [a, b, c, d] = self.on;
+        let all = [self.level, self.corner, a, b, c, d].map(u32::to_be_bytes);
+        std::array::from_fn(|i| all[i / 4][i % 4])
+    }
+
+    fn from_bytes(bytes: [u8; 24]) -> Self {
+        let number = |i: usize| u32::from_be_bytes(std::array::from_fn(|k| bytes[4 * i + k]));
+        Self {
+            level: number(0),
+            corner: number(1),
+            on: std::array::from_fn(|i| number(2 + i)),
+        }
+    }
+
     /// Whether it is in the middle of an edge; else of a face.
     fn on_edge(&self) -> bool {
         self.on[0] == self.on[2]
@@ -49,16 +66,18 @@ impl Hanging {
 /// Corners of a tree.
 pub(super) struct Corners {
     /// Corner numbers of each leaf, in the octants' order.
-    pub(super) of_leaf: Vec<[u32; 8]>,
+    pub(super) of_leaf: Column<[u32; 8]>,
     pub(super) n_corners: usize,
     /// Sorted by level, each corner once.
-    pub(super) hanging: Vec<Hanging>,
+    pub(super) hanging: Column<Hanging>,
 }
 
 impl Corners {
-    pub(super) fn of(tree: &Tree, leaves: &[Leaf]) -> Self {
-        let (of_leaf, n_corners) = number_corners(leaves);
-        let hanging = find_hanging(tree, leaves, &of_leaf);
+    /// A disk that fails unwinds.
+    pub(super) fn of(tree: &Tree, room: &Room) -> Self {
+        let numbered = number_corners(tree, room);
+        let (mut of_leaf, n_corners) = numbered.unwrap_or_else(|e| fail(e));
+        let hanging = find_hanging(tree, &mut of_leaf, room).unwrap_or_else(|e| fail(e));
         Self {
             of_leaf,
             n_corners,
@@ -68,26 +87,38 @@ impl Corners {
 }
 
 /// Numbers corners along the Morton curve, so that near corners are near in memory.
-fn number_corners(leaves: &[Leaf]) -> (Vec<[u32; 8]>, usize) {
-    let mut keys: Vec<(u64, u32)> = leaves
-        .par_iter()
-        .enumerate()
-        .flat_map_iter(|(i, leaf)| {
-            (0..8).map(move |c| (morton(leaf.corner(c)), (8 * i + c) as u32))
-        })
-        .collect();
-    keys.par_sort_unstable();
-    let mut of_leaf = vec![[0u32; 8]; leaves.len()];
+fn number_corners(tree: &Tree, room: &Room) -> Result<(Column<[u32; 8]>, usize), StoreError> {
+    let mut keys = room.sorter::<12>();
+    let mut n_leaves = 0;
+    for (i, leaf) in tree.leaves().enumerate() {
+        n_leaves += 1;
+        for c in 0..8 {
+            let mut key = [0; 12];
+            key[..8].copy_from_slice(&morton(leaf.corner(c)).to_be_bytes());
+            key[8..].copy_from_slice(&((8 * i + c) as u32).to_be_bytes());
+            keys.push(key)?;
+        }
+    }
+    let keys = keys.finish()?;
+    let mut of_leaf = room.column(n_leaves, [0u32; 8]);
     let mut n_corners = 0u32;
     let mut last = None;
-    for (key, slot) in keys {
-        if last != Some(key) {
+    for key in keys {
+        let (corner, slot) = word_and(key?);
+        if last != Some(corner) {
             n_corners += 1;
-            last = Some(key);
+            last = Some(corner);
         }
-        of_leaf[slot as usize / 8][slot as usize % 8] = n_corners - 1;
+        let number = n_corners - 1;
+        of_leaf.change(slot as usize / 8, |ids| ids[slot as usize % 8] = number);
     }
-    (of_leaf, n_corners as usize)
+    Ok((of_leaf, n_corners as usize))
+}
+
+/// A number of eight bytes and one of four.
+fn word_and(key: [u8; 12]) -> (u64, u32) {
+    let number = u128::from_be_bytes(std::array::from_fn(|i| if i < 4 { 0 } else { key[i - 4] }));
+    ((number >> 32) as u64, number as u32)
 }
 
 /// Interleaves the bits of a lattice position, 21 per axis.
@@ -103,23 +134,36 @@ fn morton(p: [u32; 3]) -> u64 {
     spread(p[0]) | spread(p[1]) << 1 | spread(p[2]) << 2
 }
 
-fn find_hanging(tree: &Tree, leaves: &[Leaf], of_leaf: &[[u32; 8]]) -> Vec<Hanging> {
-    let mut hanging: Vec<Hanging> = leaves
-        .par_iter()
-        .zip(of_leaf)
-        .flat_map_iter(|(leaf, ids)| {
-            leaf.outer_neighbors()
-                .filter_map(|cell| larger_leaf(tree, leaf, cell))
-                .flat_map(|(large, larger)| {
-                    let ids_large = &of_leaf[larger as usize];
-                    (0..8).filter_map(move |c| hangs(leaf, c, ids[c], &large, ids_large))
-                })
-                .collect::<Vec<_>>()
-        })
-        .collect();
-    hanging.par_sort_unstable();
-    hanging.dedup_by_key(|h| h.corner);
-    hanging
+fn find_hanging(
+    tree: &Tree,
+    of_leaf: &mut Column<[u32; 8]>,
+    room: &Room,
+) -> Result<Column<Hanging>, StoreError> {
+    let mut found = room.sorter::<24>();
+    for (i, leaf) in tree.leaves().enumerate() {
+        let ids = of_leaf.get(i);
+        for cell in leaf.outer_neighbors() {
+            let Some((large, larger)) = larger_leaf(tree, &leaf, cell) else {
+                continue;
+            };
+            let ids_large = of_leaf.get(larger as usize);
+            for (c, &id) in ids.iter().enumerate() {
+                if let Some(hanging) = hangs(&leaf, c, id, &large, &ids_large) {
+                    found.push(hanging.to_bytes())?;
+                }
+            }
+        }
+    }
+    let mut hanging = room.list();
+    let mut last = None;
+    for bytes in found.finish()? {
+        let next = Hanging::from_bytes(bytes?);
+        if last != Some(next.corner) {
+            hanging.push(next);
+            last = Some(next.corner);
+        }
+    }
+    Ok(hanging.done())
 }
 
 /// The leaf at a neighboring cell, when it is larger.

@@ -7,14 +7,19 @@ use super::seeds::{Frame, seeds_of};
 use super::sources::ResolvedSource;
 use super::summary::SizeSummary;
 use super::tree::{DEPTH, LATTICE, LEAF, Leaf, Tree, octant_of};
-use super::values::corner_values;
+use super::values::Maker;
 use super::wishes::{Wish, Wishes};
 use super::{SizingError, summary};
 use crate::geom::{Point, lex_cmp};
+use crate::store::{Column, Fixed, Room};
 use std::cmp::Ordering;
 
 /// Levels that one look into the jump table replaces: 32,768 entries of 8 bytes stay in cache.
 const JUMP: u32 = 5;
+
+/// Share of a room that values take at most, and what they may take of any.
+const SHARE: u64 = 8;
+const SHARE_MIN: u64 = 512 << 10;
 
 /// Inverse widths of cells by level, in lattice units.
 const WIDTHS_INVERSE: [f64; DEPTH as usize + 1] = {
@@ -40,7 +45,7 @@ pub struct SizeField {
     pub(super) beta: f64,
     pub(super) tree: Tree,
     /// Values at the corners of each leaf, in units of the cube's side: one half cache line.
-    pub(super) values: Vec<[f32; 8]>,
+    pub(super) values: Fixed<[f32; 8]>,
     jump: Jump,
     /// Lattice cells per input unit.
     per_lattice: f64,
@@ -73,24 +78,26 @@ impl SizeField {
         triangles: &[[u32; 3]],
         options: &SizeOptions,
     ) -> Result<Self, SizingError> {
-        Ok(Self::build_with(points, triangles, options, &Further::default())?.0)
+        let room = Room::boundless();
+        Ok(Self::build_with(points, triangles, options, &Further::default(), &room)?.0)
     }
 
-    /// Builds the field with further sizes, and says where its sizes came from.
+    /// Builds the field with further sizes, and says where its sizes came from. The room changes nothing of it.
     ///
     /// # Errors
-    /// As [`SizeField::build`]; a wish that is no size somewhere in the surface's box.
+    /// As [`SizeField::build`]; a wish that is no size somewhere in the surface's box. A scratch file that fails unwinds
+    /// ([`attempt`](crate::store::attempt)).
     pub fn build_with(
         points: &[Point],
         triangles: &[[u32; 3]],
         options: &SizeOptions,
         further: &Further,
+        room: &Room,
     ) -> Result<(Self, SizeSummary), SizingError> {
-        let (frame, bounds, mut seeds) = seeds_of(points, triangles)?;
+        let (frame, bounds, mut seeds) = seeds_of(points, triangles, room)?;
         if let Some(h) = further.at_vertices {
             seeds.lower(h)?;
         }
-        let seeds = seeds.list;
         let targets = options.resolve(bounds.diagonal())?;
         let scaled = targets.scaled(1.0 / frame.side);
         let mut list = further.wishes.to_vec();
@@ -102,16 +109,19 @@ impl SizeField {
             least: scaled.hmin.unwrap_or(0.0),
         };
         let tree = Tree::build(&seeds, &scaled, &wishes)?;
-        let values = {
-            let leaves = tree.leaves();
-            let corners = Corners::of(&tree, &leaves);
-            let h = corner_values(&tree, &leaves, &corners, &seeds, &scaled, &wishes)?;
-            let of_leaf = corners.of_leaf.iter();
-            of_leaf.map(|ids| ids.map(|c| h[c as usize])).collect()
+        let mut corners = Corners::of(&tree, room);
+        let mut maker = Maker {
+            tree: &tree,
+            corners: &mut corners,
+            seeds: &seeds,
+            beta: scaled.beta,
+            wishes: &wishes,
+            room,
         };
-        let field = Self::from_parts(frame, targets.beta, tree, values)
+        let h = maker.values(&scaled)?;
+        let field = Self::of_corners(frame, targets.beta, tree, corners, h, room)
             .with_sources(options, bounds.diagonal())?;
-        let summary = summary::of(&field, &seeds, &targets, options);
+        let summary = summary::of(&field, &seeds, &targets, options, room);
         Ok((field, summary))
     }
 
@@ -130,7 +140,29 @@ impl SizeField {
         Ok(self)
     }
 
-    pub(super) fn from_parts(frame: Frame, beta: f64, tree: Tree, values: Vec<[f32; 8]>) -> Self {
+    /// The field of these sizes at the corners of leaves.
+    pub(super) fn of_corners(
+        frame: Frame,
+        beta: f64,
+        tree: Tree,
+        mut corners: Corners,
+        mut h: Column<f32>,
+        room: &Room,
+    ) -> Self {
+        let mut values = room.list_within(Self::share_of(room.cap()));
+        for i in 0..corners.of_leaf.len() {
+            values.push(corners.of_leaf.get(i).map(|c| h.get(c as usize)));
+        }
+        drop((corners, h));
+        Self::from_parts(frame, beta, tree, values.done().fixed())
+    }
+
+    /// Bytes that values take of a room of `bytes`, at most.
+    pub fn share_of(bytes: u64) -> u64 {
+        (bytes / SHARE).max(SHARE_MIN)
+    }
+
+    pub(super) fn from_parts(frame: Frame, beta: f64, tree: Tree, values: Fixed<[f32; 8]>) -> Self {
         let jump = Jump::new(&tree);
         Self {
             frame,
@@ -156,7 +188,7 @@ impl SizeField {
         let mask = !((LATTICE >> level) - 1);
         let per_width = WIDTHS_INVERSE[level as usize];
         let local = std::array::from_fn(|i| (at[i] - f64::from(cell[i] & mask)) * per_width);
-        let mut h = trilinear(&self.values[(entry & !LEAF) as usize], local) * self.frame.side;
+        let mut h = trilinear(&self.values.get((entry & !LEAF) as usize), local) * self.frame.side;
         for source in &self.sources {
             h = h.min(source.h(p, self.beta));
         }
@@ -202,10 +234,12 @@ impl SizeField {
 
     /// Smallest and largest value at any corner, in input units: no value of the field is beyond.
     pub fn range(&self) -> (f64, f64) {
-        let all = self.values.iter().flatten();
-        let (low, high) = all.fold((f32::INFINITY, 0f32), |(low, high), &h| {
-            (low.min(h), high.max(h))
-        });
+        let (mut low, mut high) = (f32::INFINITY, 0f32);
+        for i in 0..self.values.len() {
+            for h in self.values.get(i) {
+                (low, high) = (low.min(h), high.max(h));
+            }
+        }
         (
             f64::from(low) * self.frame.side,
             f64::from(high) * self.frame.side,
@@ -214,9 +248,19 @@ impl SizeField {
 
     /// Memory held, in bytes.
     pub fn bytes(&self) -> usize {
+        self.octree_bytes() + self.values.bytes()
+    }
+
+    /// Memory held when it was made in a room of so many bytes.
+    pub fn bytes_in(&self, room: u64) -> u64 {
+        let values = (self.values.len() * size_of::<[f32; 8]>()) as u64;
+        self.octree_bytes() as u64 + values.min(Self::share_of(room))
+    }
+
+    /// What is held in any room.
+    fn octree_bytes(&self) -> usize {
         size_of::<Self>()
             + self.tree.blocks.capacity() * size_of::<[u32; 8]>()
-            + self.values.capacity() * size_of::<[f32; 8]>()
             + self.jump.cells.capacity() * size_of::<(u32, u32)>()
     }
 }

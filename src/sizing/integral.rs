@@ -91,7 +91,7 @@ impl SizeField {
                 let [l, h] = if entry & LEAF == 0 {
                     ranges[entry as usize]
                 } else {
-                    range(&self.values[(entry & !LEAF) as usize])
+                    range(&self.values.get((entry & !LEAF) as usize))
                 };
                 (low, high) = (low.min(l), high.max(h));
             }
@@ -246,7 +246,7 @@ impl Sum<'_> {
         let field = self.field;
         let [low, high] = match cell.entry & LEAF {
             0 => self.ranges[cell.entry as usize],
-            _ => range(&field.values[(cell.entry & !LEAF) as usize]),
+            _ => range(&field.values.get((cell.entry & !LEAF) as usize)),
         };
         let [mut low, mut high] = [low, high].map(|h| f64::from(h) * field.frame.side);
         if cell.entry & LEAF != 0 {

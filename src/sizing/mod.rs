@@ -13,10 +13,12 @@
 //! Lengths along edges and loads of tetrahedra are closed forms for h linear between vertices (`closed`).
 //! Only IEEE basic operations and square roots are used: results are equal on every machine.
 //!
-//! In memory: about 39 bytes per leaf when built, about five times that while building. `balls,count=1000` has 107,000 leaves, 4.2 MB, 8 bytes for each of
-//! its 506,000 triangles. The cap and the number of threads change nothing of it.
+//! In memory: about 37 bytes per leaf when built, about four times that while building. `balls,count=1000` has 107,000 leaves, 4.2 MB, 8 bytes for each of
+//! its 506,000 triangles. Of these only the octree's 5 bytes per leaf and, while building, 8 per vertex must be held: the rest is in arrays that go
+//! to scratch files where the room given is too small (`store::Room`). The room and the number of threads change nothing of the field.
 
 mod background;
+mod bits;
 mod closed;
 mod codec;
 mod corners;
@@ -24,6 +26,7 @@ mod count;
 mod error;
 mod field;
 mod formula;
+mod grading;
 mod integral;
 mod math;
 mod options;

@@ -2,7 +2,8 @@
 
 use super::field::SizeField;
 use super::options::{Length, SizeOptions, Targets};
-use super::seeds::Seed;
+use super::seeds::Seeds;
+use crate::store::{Room, fail};
 use std::fmt;
 
 /// Below this share of the surface's median edge, an interior size is warned about: the surface is
@@ -74,19 +75,21 @@ impl fmt::Display for SizeSummary {
 
 pub(super) fn of(
     field: &SizeField,
-    seeds: &[Seed],
+    seeds: &Seeds,
     targets: &Targets,
     options: &SizeOptions,
+    room: &Room,
 ) -> SizeSummary {
     let side = field.frame.side;
-    let surface = weighted_range(seeds.iter().map(|s| (s.h * side, 1.0)).collect());
-    let leaves = field.tree.leaves();
-    let middles = leaves.iter().zip(&field.values).map(|(leaf, values)| {
+    let all = seeds.vertices().map(|v| (seeds.h(v) * side, 1.0));
+    let surface = weighted_range(all, room);
+    let middles = field.tree.leaves().enumerate().map(|(i, leaf)| {
+        let values = field.values.get(i);
         let mean = values.iter().map(|&h| f64::from(h)).sum::<f64>() / 8.0;
         (mean * side, leaf.side() * leaf.side() * leaf.side())
     });
+    let median = weighted_range(middles, room).median;
     let (low, high) = field.range();
-    let median = weighted_range(middles.collect()).median;
     let wanted = [("--hsiz", targets.hsiz), ("--hmax", targets.hmax)];
     let warnings = wanted.into_iter().filter_map(|(option, wanted)| {
         let wanted = wanted.filter(|&h| h < FAR_BELOW * surface.median)?;
@@ -107,21 +110,34 @@ pub(super) fn of(
     }
 }
 
-/// Lowest, weighted median and highest of a list that is not empty.
-fn weighted_range(mut list: Vec<(f64, f64)>) -> Range {
-    list.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
-    let total: f64 = list.iter().map(|x| x.1).sum();
-    let mut sum = 0.0;
-    let middle = list.iter().find(|x| {
-        sum += x.1;
-        sum >= 0.5 * total
-    });
-    let value = |x: Option<&(f64, f64)>| x.map_or(0.0, |x| x.0);
-    Range {
-        low: value(list.first()),
-        median: value(middle),
-        high: value(list.last()),
+/// Lowest, weighted median and highest of a list of positive numbers with weights that is not empty.
+fn weighted_range(list: impl Iterator<Item = (f64, f64)>, room: &Room) -> Range {
+    let mut sorter = room.sorter::<16>();
+    let mut total = 0.0;
+    for (x, weight) in list {
+        total += weight;
+        // Positive numbers sort as their bits do.
+        let key = u128::from(x.to_bits()) << 64 | u128::from(weight.to_bits());
+        let pushed = sorter.push(key.to_be_bytes());
+        pushed.unwrap_or_else(|e| fail(e));
     }
+    let mut sum = 0.0;
+    let mut range = Range {
+        low: f64::INFINITY,
+        median: f64::NAN,
+        high: 0.0,
+    };
+    for key in sorter.finish().unwrap_or_else(|e| fail(e)) {
+        let key = u128::from_be_bytes(key.unwrap_or_else(|e| fail(e)));
+        let [x, weight] = [(key >> 64) as u64, key as u64].map(f64::from_bits);
+        let is_below = sum < 0.5 * total;
+        sum += weight;
+        if is_below && sum >= 0.5 * total {
+            range.median = x;
+        }
+        (range.low, range.high) = (range.low.min(x), x);
+    }
+    range
 }
 
 fn source_of(options: &SizeOptions, targets: &Targets) -> String {

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::geom::Point;
+use crate::store::Room;
 use crate::surface::{Seeker, Surface, Volumes};
 
 /// A small generator for test points; the seed is printed by what fails.
@@ -187,27 +188,27 @@ fn interior_size_is_joined_to_the_surface() {
 fn steep_surfaces_are_followed() {
     let steep = graded(50.0, 60);
     let field = build(&steep, &SizeOptions::default());
-    let (_, _, seeds) = seeds::seeds_of(&steep.0, &steep.1).unwrap();
-    let seeds = seeds.list;
+    let (_, _, seeds) = seeds::seeds_of(&steep.0, &steep.1, &Room::boundless()).unwrap();
+    let all: Vec<u32> = seeds.vertices().collect();
     let side = field.frame.side;
     let (mut near, mut ratio_low, mut ratio_high) = (0, f64::INFINITY, 0.0f64);
-    for seed in &seeds {
-        let ratio = field.h(field.frame.low + seed.at * side) / (seed.h * side);
+    for &v in &all {
+        let ratio = field.h(field.frame.low + seeds.at(v) * side) / (seeds.h(v) * side);
         ratio_low = ratio_low.min(ratio);
         ratio_high = ratio_high.max(ratio);
         near += usize::from((0.7..1.4).contains(&ratio));
     }
     println!(
         "ratio {ratio_low:.3} to {ratio_high:.3}, {near} of {}",
-        seeds.len()
+        all.len()
     );
     // Grid lines give long thin triangles, whose vertices differ in size more than any gradation allows.
-    assert!(near * 10 > seeds.len() * 9);
+    assert!(near * 10 > all.len() * 9);
     assert!(ratio_low > 0.08 && ratio_high < 2.5);
     let (low, high) = field.range();
-    let smallest = seeds
+    let smallest = all
         .iter()
-        .fold(f64::INFINITY, |low, seed| low.min(seed.h * side));
+        .fold(f64::INFINITY, |low, &v| low.min(seeds.h(v) * side));
     assert!(
         low > 0.95 * smallest && low < 1.5 * smallest && high > 0.03,
         "{low} {high}"
@@ -258,6 +259,40 @@ fn formulas_that_give_no_size_are_refused() {
         let found = Formula::parse(text).unwrap_err();
         assert!(matches!(found, SizingError::BadFormula { .. }), "{found}");
     }
+}
+
+#[test]
+fn equal_bits_in_a_room_too_small() {
+    let dir = tempfile::tempdir().unwrap();
+    let even = cube(40, |i| i as f64 / 40.0);
+    let steep = graded(20.0, 40);
+    let mut sampled = Dice(5);
+    for (surface, options) in [
+        (&steep, options(None, None, None)),
+        (&even, options(Some("2%"), None, None)),
+        (&steep, options(Some("5%"), Some("0.5%"), Some("9%"))),
+        (&even, formula("0.02 + 0.1*abs(x - 0.4)")),
+    ] {
+        let [wide, narrow] = [Room::boundless(), Room::new(1 << 16, dir.path())].map(|room| {
+            let (points, triangles) = surface;
+            let further = Further::default();
+            SizeField::build_with(points, triangles, &options, &further, &room).unwrap()
+        });
+        assert!(
+            narrow.0.bytes() > 0 && wide.1.n_leaves > 1000,
+            "{}",
+            wide.1.n_leaves
+        );
+        assert_eq!(wide.0.to_bytes(), narrow.0.to_bytes());
+        assert_eq!(wide.1.to_string(), narrow.1.to_string());
+        for _ in 0..1000 {
+            let p = sampled.point();
+            assert_eq!(wide.0.h(p).to_bits(), narrow.0.h(p).to_bits());
+        }
+        let read = SizeField::from_bytes_in(&wide.0.to_bytes(), &Room::new(1 << 16, dir.path()));
+        assert_eq!(read.unwrap().to_bytes(), wide.0.to_bytes());
+    }
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
 }
 
 #[test]
@@ -430,8 +465,14 @@ fn bad_values_are_named() {
 fn summaries_say_where_sizes_came_from() {
     let (points, triangles) = cube(20, |i| i as f64 / 20.0);
     let asked = options(Some("1%"), None, None);
-    let (_, summary) =
-        SizeField::build_with(&points, &triangles, &asked, &Further::default()).unwrap();
+    let (_, summary) = SizeField::build_with(
+        &points,
+        &triangles,
+        &asked,
+        &Further::default(),
+        &Room::boundless(),
+    )
+    .unwrap();
     let text = summary.to_string();
     assert!(
         text.contains("--hsiz 1% = 0.0173") && text.contains("--hgrad 1.3"),

@@ -5,7 +5,7 @@
 
 use super::SizingError;
 use super::options::Targets;
-use super::seeds::Seed;
+use super::seeds::Seeds;
 use super::wishes::Wishes;
 use crate::geom::Point;
 use rayon::prelude::*;
@@ -89,20 +89,22 @@ pub(super) struct Tree {
 impl Tree {
     /// The balanced octree for these seeds and wanted sizes (all in units of the root's side).
     pub(super) fn build(
-        seeds: &[Seed],
+        seeds: &Seeds,
         targets: &Targets,
         wishes: &Wishes,
     ) -> Result<Self, SizingError> {
-        let all: Vec<u32> = (0..seeds.len() as u32).collect();
+        let all: Vec<u32> = seeds.vertices().collect();
         let shape = shape_of(Leaf::ROOT, &all, seeds, targets);
+        drop(all);
         let mut tree = Self::from_shape(&shape);
+        drop(shape);
         wishes.refine(&mut tree)?;
         tree.balance()?;
         Ok(tree.numbered())
     }
 
     /// From the depth-first list of "is divided".
-    fn from_shape(shape: &[bool]) -> Self {
+    pub(super) fn from_shape(shape: &[bool]) -> Self {
         fn entry(shape: &mut impl Iterator<Item = bool>, blocks: &mut Vec<[u32; 8]>) -> u32 {
             if shape.next() != Some(true) {
                 return LEAF;
@@ -117,36 +119,6 @@ impl Tree {
         let mut blocks = Vec::new();
         let root = entry(&mut shape.iter().copied(), &mut blocks);
         Self { root, blocks }
-    }
-
-    /// Divides the leaves, in their order, as these depth-first lists of "is divided" say.
-    pub(super) fn graft(&mut self, shapes: &[Vec<bool>]) -> Result<(), SizingError> {
-        let found: usize = shapes.iter().map(Vec::len).sum();
-        if found > LEAVES_MAX {
-            return Err(SizingError::TooLarge {
-                found,
-                expected: LEAVES_MAX,
-            });
-        }
-        fn copy<'a>(
-            tree: &Tree,
-            entry: u32,
-            shapes: &mut impl Iterator<Item = &'a Vec<bool>>,
-            all: &mut Vec<bool>,
-        ) {
-            if entry & LEAF != 0 {
-                all.extend(shapes.next().into_iter().flatten());
-                return;
-            }
-            all.push(true);
-            for child in tree.blocks[entry as usize] {
-                copy(tree, child, shapes, all);
-            }
-        }
-        let mut all = Vec::new();
-        copy(self, self.root, &mut shapes.iter(), &mut all);
-        *self = Self::from_shape(&all);
-        Ok(())
     }
 
     /// The entry of the leaf that holds a lattice cell: block and octant (none for the root), level.
@@ -171,48 +143,58 @@ impl Tree {
         (entry & !LEAF, level)
     }
 
-    /// All leaves, depth first.
-    pub(super) fn leaves(&self) -> Vec<Leaf> {
-        let mut leaves = Vec::with_capacity(self.blocks.len() * 7 + 1);
-        let mut stack = vec![(self.root, Leaf::ROOT)];
-        while let Some((entry, leaf)) = stack.pop() {
-            if entry & LEAF != 0 {
-                leaves.push(leaf);
-                continue;
-            }
-            let block = &self.blocks[entry as usize];
-            stack.extend((0..8).rev().map(|o| (block[o], leaf.child(o))));
+    /// All cells, depth first, each before its children; of a leaf its number.
+    pub(super) fn cells(&self) -> Cells<'_> {
+        Cells {
+            tree: self,
+            stack: vec![(self.root, Leaf::ROOT)],
+            is_backward: false,
         }
-        leaves
+    }
+
+    /// All leaves, depth first: in the order of their numbers, once they are numbered.
+    pub(super) fn leaves(&self) -> impl Iterator<Item = Leaf> {
+        self.cells()
+            .filter_map(|(number, leaf)| number.map(|_| leaf))
+    }
+
+    /// All leaves with their numbers, from the last to the first.
+    pub(super) fn leaves_backward(&self) -> impl Iterator<Item = (u32, Leaf)> {
+        let cells = Cells {
+            is_backward: true,
+            ..self.cells()
+        };
+        cells.filter_map(|(number, leaf)| Some((number?, leaf)))
     }
 
     /// Divides leaves until neighbors differ by one level at most, from the deepest level up.
     fn balance(&mut self) -> Result<(), SizingError> {
-        let mut levels: Vec<Vec<[u32; 3]>> = vec![Vec::new(); DEPTH as usize + 1];
-        for leaf in self.leaves() {
-            levels[leaf.level as usize].push(leaf.anchor);
-        }
-        for level in (2..=DEPTH).rev() {
-            for anchor in std::mem::take(&mut levels[level as usize]) {
-                // Deeper levels may have divided it since.
-                if self.find(anchor).1 != level {
-                    continue;
-                }
-                for cell in (Leaf { anchor, level }).outer_neighbors() {
-                    while let (Some((block, octant)), found) = self.find(cell) {
-                        if found + 1 >= level {
-                            break;
-                        }
-                        self.divide(block, octant)?;
-                        let width = LATTICE >> found;
-                        let parent = Leaf {
-                            anchor: cell.map(|x| x & !(width - 1)),
-                            level: found,
-                        };
-                        let children = (0..8).map(|o| parent.child(o).anchor);
-                        levels[found as usize + 1].extend(children);
+        let deepest = self.leaves().map(|leaf| leaf.level).max().unwrap_or(0);
+        for level in (2..=deepest).rev() {
+            // No leaf of this level appears or goes while those around are divided, so the walk may see them as they were.
+            let mut stack = vec![(self.root, Leaf::ROOT)];
+            while let Some((entry, cell)) = stack.pop() {
+                if entry & LEAF == 0 {
+                    if cell.level < level {
+                        let block = self.blocks[entry as usize];
+                        stack.extend((0..8).map(|o| (block[o], cell.child(o))));
                     }
+                } else if cell.level == level {
+                    self.divide_around(cell)?;
                 }
+            }
+        }
+        Ok(())
+    }
+
+    /// Divides what is next to a leaf and larger than twice its width.
+    fn divide_around(&mut self, leaf: Leaf) -> Result<(), SizingError> {
+        for cell in leaf.outer_neighbors() {
+            while let (Some((block, octant)), found) = self.find(cell) {
+                if found + 1 >= leaf.level {
+                    break;
+                }
+                self.divide(block, octant)?;
             }
         }
         Ok(())
@@ -255,6 +237,31 @@ impl Tree {
     }
 }
 
+/// A walk over all cells of a tree.
+pub(super) struct Cells<'a> {
+    tree: &'a Tree,
+    stack: Vec<(u32, Leaf)>,
+    is_backward: bool,
+}
+
+impl Iterator for Cells<'_> {
+    type Item = (Option<u32>, Leaf);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let (entry, cell) = self.stack.pop()?;
+        if entry & LEAF != 0 {
+            return Some((Some(entry & !LEAF), cell));
+        }
+        let block = &self.tree.blocks[entry as usize];
+        let child = |o: usize| (block[o], cell.child(o));
+        match self.is_backward {
+            true => self.stack.extend((0..8).map(child)),
+            false => self.stack.extend((0..8).rev().map(child)),
+        }
+        Some((None, cell))
+    }
+}
+
 /// The octant of a lattice cell in its ancestor at `level`.
 #[inline]
 pub(super) fn octant_of(cell: [u32; 3], level: u32) -> usize {
@@ -286,7 +293,7 @@ impl Leaf {
 }
 
 /// Which cells are divided, depth first, `near` being the seeds in the cell or half its side around it.
-fn shape_of(cell: Leaf, near: &[u32], seeds: &[Seed], targets: &Targets) -> Vec<bool> {
+fn shape_of(cell: Leaf, near: &[u32], seeds: &Seeds, targets: &Targets) -> Vec<bool> {
     if !is_divided(cell, near, seeds, targets) {
         return vec![false];
     }
@@ -306,21 +313,21 @@ fn shape_of(cell: Leaf, near: &[u32], seeds: &[Seed], targets: &Targets) -> Vec<
 }
 
 /// Seeds in a cell or half its side around it.
-fn near_child(cell: Leaf, near: &[u32], seeds: &[Seed]) -> Vec<u32> {
+fn near_child(cell: Leaf, near: &[u32], seeds: &Seeds) -> Vec<u32> {
     let side = cell.side();
     let low = cell.low() - Point::splat(0.5 * side);
     let high = low + Point::splat(2.0 * side);
     near.iter()
         .copied()
         .filter(|&s| {
-            let p = seeds[s as usize].at;
+            let p = seeds.at(s);
             p.cmpge(low).all() && p.cmple(high).all()
         })
         .collect()
 }
 
 /// Whether sizes in and around a cell ask for smaller cells.
-fn is_divided(cell: Leaf, near: &[u32], seeds: &[Seed], targets: &Targets) -> bool {
+fn is_divided(cell: Leaf, near: &[u32], seeds: &Seeds, targets: &Targets) -> bool {
     if cell.level == DEPTH || near.is_empty() {
         return false;
     }
@@ -328,11 +335,11 @@ fn is_divided(cell: Leaf, near: &[u32], seeds: &[Seed], targets: &Targets) -> bo
     let (mut low, mut high) = (f64::INFINITY, 0.0f64);
     let mut parts = [(0u32, 0.0f64); 8];
     for &s in near {
-        let seed = &seeds[s as usize];
-        low = low.min(seed.h);
-        high = high.max(seed.h);
-        let part = &mut parts[seed.at.cmpge(middle).bitmask() as usize];
-        *part = (part.0 + 1, part.1 + seed.h);
+        let h = seeds.h(s);
+        low = low.min(h);
+        high = high.max(h);
+        let part = &mut parts[seeds.at(s).cmpge(middle).bitmask() as usize];
+        *part = (part.0 + 1, part.1 + h);
     }
     if cell.side() <= CELLS_PER_SIZE * low {
         return false;

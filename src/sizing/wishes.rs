@@ -11,13 +11,19 @@
 use rayon::prelude::*;
 
 use super::SizingError;
+use super::bits::Bits;
 use super::corners::Corners;
 use super::seeds::Frame;
 use super::tree::{CELLS_PER_SIZE, DEPTH, LATTICE, Leaf, Tree};
 use crate::geom::{Aabb, Point};
+use crate::store::Column;
 
 /// Levels down to which every cell is asked.
 const LEVELS_ASKED: u32 = 5;
+/// Cells and corners asked about side by side.
+const CELLS_AT_ONCE: usize = 1 << 16;
+/// Cells at most: as many leaves as can be numbered.
+const CELLS_MAX: usize = 1 << 28;
 /// Wishes between corners may be off what lies between their values by this share.
 const BEND_MAX: f64 = 0.1;
 
@@ -65,12 +71,30 @@ impl Wishes<'_> {
         if self.list.is_empty() {
             return Ok(());
         }
-        let shapes: Result<Vec<Vec<bool>>, _> = tree
-            .leaves()
-            .par_iter()
-            .map(|&leaf| self.shape_of(leaf))
-            .collect();
-        tree.graft(&shapes?)
+        let mut all = Vec::new();
+        let mut cells = tree.cells();
+        loop {
+            let some: Vec<_> = cells.by_ref().take(CELLS_AT_ONCE).collect();
+            if some.is_empty() {
+                break;
+            }
+            let shapes: Result<Vec<Vec<bool>>, _> = some
+                .into_par_iter()
+                .map(|(number, cell)| match number {
+                    Some(_) => self.shape_of(cell),
+                    None => Ok(vec![true]),
+                })
+                .collect();
+            all.extend(shapes?.into_iter().flatten());
+            if all.len() > CELLS_MAX {
+                return Err(SizingError::TooLarge {
+                    found: all.len(),
+                    expected: CELLS_MAX,
+                });
+            }
+        }
+        *tree = Tree::from_shape(&all);
+        Ok(())
     }
 
     /// Which cells are divided in a cell, depth first.
@@ -134,23 +158,38 @@ impl Wishes<'_> {
     /// Lowers values at the corners of leaves to what is wished there.
     pub(super) fn lower(
         &self,
-        leaves: &[Leaf],
-        corners: &Corners,
-        h: &mut [f32],
+        tree: &Tree,
+        corners: &mut Corners,
+        h: &mut Column<f32>,
     ) -> Result<(), SizingError> {
         if self.list.is_empty() {
             return Ok(());
         }
-        let mut places = vec![[0u32; 3]; corners.n_corners];
-        for (leaf, ids) in leaves.iter().zip(&corners.of_leaf) {
-            for (c, &id) in ids.iter().enumerate() {
-                places[id as usize] = leaf.corner(c);
+        let mut is_known = Bits::new(corners.n_corners);
+        let mut places: Vec<(u32, [u32; 3])> = Vec::with_capacity(CELLS_AT_ONCE + 8);
+        for (i, leaf) in tree.leaves().enumerate() {
+            for (c, id) in corners.of_leaf.get(i).into_iter().enumerate() {
+                if !is_known.set(id) {
+                    places.push((id, leaf.corner(c)));
+                }
+            }
+            if places.len() >= CELLS_AT_ONCE {
+                self.lower_at(&mut places, h)?;
             }
         }
-        h.par_iter_mut().zip(&places).try_for_each(|(h, &at)| {
-            *h = h.min(self.h(at)? as f32);
-            Ok(())
-        })
+        self.lower_at(&mut places, h)
+    }
+
+    fn lower_at(
+        &self,
+        places: &mut Vec<(u32, [u32; 3])>,
+        h: &mut Column<f32>,
+    ) -> Result<(), SizingError> {
+        let wished: Result<Vec<f64>, _> = places.par_iter().map(|&(_, at)| self.h(at)).collect();
+        for ((id, _), wished) in places.drain(..).zip(wished?) {
+            h.change(id as usize, |h| *h = h.min(wished as f32));
+        }
+        Ok(())
     }
 }
 

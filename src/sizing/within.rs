@@ -6,9 +6,10 @@ use super::field::SizeField;
 use super::options::Targets;
 use super::seeds::seeds_of;
 use super::tree::Tree;
-use super::values::corner_values_within;
+use super::values::Maker;
 use super::wishes::{Wish, Wishes};
 use crate::geom::Point;
+use crate::store::Room;
 
 impl SizeField {
     /// The field of `wish` inside a skin that stays: triangles index points.
@@ -24,7 +25,8 @@ impl SizeField {
         wish: &dyn Wish,
         beta: f64,
     ) -> Result<Self, SizingError> {
-        let (frame, bounds, seeds) = seeds_of(points, triangles)?;
+        let room = &Room::boundless();
+        let (frame, bounds, seeds) = seeds_of(points, triangles, room)?;
         let wishes = Wishes {
             list: &[wish],
             frame,
@@ -38,13 +40,18 @@ impl SizeField {
             hmax: None,
             beta,
         };
-        let tree = Tree::build(&seeds.list, &along_skin, &wishes)?;
-        let leaves = tree.leaves();
-        let corners = Corners::of(&tree, &leaves);
-        let h = corner_values_within(&tree, &leaves, &corners, &seeds.list, beta, &wishes)?;
-        let of_leaf = corners.of_leaf.iter();
-        let values = of_leaf.map(|ids| ids.map(|c| h[c as usize])).collect();
-        Ok(Self::from_parts(frame, beta, tree, values))
+        let tree = Tree::build(&seeds, &along_skin, &wishes)?;
+        let mut corners = Corners::of(&tree, room);
+        let mut maker = Maker {
+            tree: &tree,
+            corners: &mut corners,
+            seeds: &seeds,
+            beta,
+            wishes: &wishes,
+            room,
+        };
+        let h = maker.values_within()?;
+        Ok(Self::of_corners(frame, beta, tree, corners, h, room))
     }
 }
 

@@ -9,18 +9,22 @@
 
 mod backend;
 mod budget;
+mod column;
 mod disk;
 mod error;
 mod file;
 mod flat;
 mod page_table;
+mod paged;
 mod pager;
 mod real_disk;
+mod scratch;
 mod sort;
 mod space;
 mod stop;
 
 pub use budget::{Budget, Lease};
+pub use column::{Column, Fixed, List, Room};
 pub use disk::{Disk, DiskPath, Entry};
 pub use error::StoreError;
 pub use file::StoreFile;
