@@ -58,7 +58,10 @@ struct Child {
 impl CutJob {
     /// Does the whole job; a failed page access ends here.
     pub(super) fn run(self, common: Common, watch: &Watcher) -> Result<Divided, PipelineError> {
-        attempt(|| self.divide(common, watch))?
+        let divided = attempt(|| self.divide(common, watch))??;
+        // Empty by now; thousands of cuts would leave as many folders.
+        let _ = self.scratch.remove_dir_all();
+        Ok(divided)
     }
 
     fn divide(&self, common: Common, watch: &Watcher) -> Result<Divided, PipelineError> {

@@ -125,6 +125,7 @@ impl LeafJob {
         let pager = mesh.into_pages();
         let (pages, frames_used) = (pager.stats(), pager.frames_used());
         let work = pager.discard();
+        let _ = self.scratch.remove_dir_all();
         Ok(Leaf {
             part: self.part,
             generation,
