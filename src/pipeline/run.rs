@@ -270,10 +270,13 @@ impl<'a> Run<'a> {
             return self.seal_step(leaf, summary);
         }
         let workers = self.plan.workers().min(left.len());
-        let mut jobs = Vec::with_capacity(left.len());
-        for part in left.into_iter().rev() {
+        // A job knows the owners of all faces of the cuts above it: of thousands only the next few are drawn up.
+        let mut left = left.into_iter();
+        let mut jobs = Vec::with_capacity(2 * workers);
+        for part in left.by_ref().take(2 * workers) {
             jobs.push(self.job(part, workers as u64)?);
         }
+        jobs.reverse();
         crew(
             jobs,
             workers,
@@ -281,7 +284,8 @@ impl<'a> Run<'a> {
             &|job: LeafJob, watch| job.run(common, watch).map(Box::new),
             &mut |leaf| {
                 self.seal_step(*leaf, summary)?;
-                Ok(Vec::new())
+                let next = left.next().map(|part| self.job(part, workers as u64));
+                Ok(next.transpose()?.into_iter().collect())
             },
         )
     }
