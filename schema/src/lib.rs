@@ -4,5 +4,6 @@
 pub mod chunk;
 pub mod digest;
 pub mod ids;
+pub mod leaf;
 pub mod page;
 pub mod record;

@@ -47,6 +47,7 @@ pub enum PageKind {
     Facets = 5,
     InterfaceFaces = 6,
     Scratch = 7,
+    FacetTets = 8,
 }
 
 /// Key of page `page` of `kind` in the table of a sub-domain's file.
@@ -85,6 +86,11 @@ pub enum PageError {
 
 /// Writes the header of a frame, so that `frame[..SLOTS - 1]` may be stored.
 pub fn seal_page(frame: &mut [Slot], address: PageAddress, generation: u32) {
+    seal_full_page(frame, address, generation, 0);
+}
+
+/// The same for a page whose first `count` slots hold records, which its header says.
+pub fn seal_full_page(frame: &mut [Slot], address: PageAddress, generation: u32, count: u32) {
     let version_kind = u32::from(FORMAT_VERSION) | (address.kind as u32) << 16;
     let words = [
         0,
@@ -94,7 +100,7 @@ pub fn seal_page(frame: &mut [Slot], address: PageAddress, generation: u32) {
         address.subdomain,
         address.page,
         generation,
-        0,
+        count,
     ];
     frame[HEADER_SLOT] = words.map(u32_le::from_native);
     let sum = checksum(frame);
@@ -150,6 +156,11 @@ pub fn open_page(bytes: &[u8], address: PageAddress, frame: &mut [Slot]) -> Resu
         }
     }
     Ok(header[6])
+}
+
+/// The number of records that the header of an open page tells; 0 where it tells none.
+pub fn page_count(frame: &[Slot]) -> u32 {
+    frame[HEADER_SLOT][7].to_native()
 }
 
 /// Borrows a stored page in place, for readers that bring their own aligned bytes.

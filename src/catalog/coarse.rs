@@ -2,12 +2,13 @@
 //!
 //! A leaf has a file of its own, so that damage to a sealed sub-domain does not reach what mends it.
 
-use tetdb_schema::chunk::{ChunkAddress, ChunkRecord, Decoder, Packer};
+use tetdb_schema::chunk::{ChunkAddress, ChunkRecord, Packer};
 use tetdb_schema::record::{CoarseFace, CoarseTet, CoarseVertex, Facet};
 
+use super::batch::Batch;
+use super::form::Loader;
 use super::reader::Chunks;
 use super::records::CoarseRow;
-use super::writer::Batch;
 use super::{Catalog, CatalogError};
 use crate::store::{DiskPath, StoreFile};
 
@@ -201,7 +202,7 @@ impl CoarseLeaf {
                 chunk: 0,
             },
             end: self.row.chunks[kind],
-            decoder: Decoder::new().expect("zstd makes a context whenever there is memory"),
+            loader: Loader::chunks().expect("zstd makes a context whenever there is memory"),
             file: &mut self.file,
             expected: 0,
             total,

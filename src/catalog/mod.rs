@@ -4,9 +4,11 @@
 //! files and then flips the catalog in one commit, so that a store is at any moment as one of its
 //! steps left it. [`Store`] is the reader for everybody, [`SealedWriter`] makes what it reads.
 
+mod batch;
 mod coarse;
 mod error;
 mod faces;
+mod form;
 mod layout;
 mod reader;
 mod records;
@@ -15,12 +17,14 @@ mod shape;
 mod step;
 #[cfg(test)]
 mod tests;
+mod totals;
 mod vertex_cache;
 mod writer;
 
 pub use coarse::{CoarseLeaf, CoarseWriter};
 pub use error::CatalogError;
 pub use faces::{FacePairs, Paired, sorted_face};
+pub use form::Form;
 pub use layout::Catalog;
 pub use reader::{Chunk, Chunks, Store, Subdomain};
 pub use records::{

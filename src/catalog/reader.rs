@@ -4,17 +4,16 @@
 
 use std::path::Path;
 
-use tetdb_schema::chunk::{
-    ChunkAddress, ChunkRecord, Decoder, RangeSummary, TetSummary, VertexSummary,
-};
+use tetdb_schema::chunk::{ChunkAddress, ChunkRecord, RangeSummary, TetSummary, VertexSummary};
 use tetdb_schema::digest::Digest;
 use tetdb_schema::ids::{SubdomainId, TetId};
+use tetdb_schema::leaf::PageRecord;
 use tetdb_schema::record::{InterfaceFace, SealedFacet, SealedTet, SealedVertex};
 
-use super::records::{SubdomainRow, SubdomainState};
-use super::vertex_cache::load_chunk;
+use super::form::Loader;
+use super::records::SubdomainRow;
 use super::writer::CHUNK_KINDS;
-use super::{Catalog, CatalogError, Corner, VertexCache};
+use super::{Catalog, CatalogError, Corner, Form, VertexCache};
 use crate::store::{DiskPath, StoreFile};
 
 /// Memory of one open sub-domain unless told otherwise.
@@ -78,7 +77,7 @@ impl Store {
     pub fn digest(&mut self) -> Result<[Digest; 2], CatalogError> {
         let mut both = [Digest::default(); 2];
         for row in self.catalog.subdomains()? {
-            if row.state != SubdomainState::Sealed {
+            if Form::of(row.state).is_none() {
                 return Err(not_sealed(&self.catalog, row.rank));
             }
             both[0].merge(&Digest { lanes: row.digest });
@@ -97,9 +96,10 @@ fn not_sealed(catalog: &Catalog, subdomain: u32) -> CatalogError {
     }
 }
 
-/// A sealed sub-domain open for reading.
+/// A finished sub-domain open for reading, whatever its form.
 pub struct Subdomain {
     id: SubdomainId,
+    form: Form,
     row: SubdomainRow,
     file: StoreFile,
     tet_chunks: Vec<TetSummary>,
@@ -116,7 +116,7 @@ pub struct Chunk<R> {
 /// The chunks of one kind, in order; ends after the first error.
 pub struct Chunks<'a, R> {
     pub(super) file: &'a mut StoreFile,
-    pub(super) decoder: Decoder<R>,
+    pub(super) loader: Loader<R>,
     pub(super) address: ChunkAddress,
     pub(super) end: u32,
     pub(super) expected: u64,
@@ -145,9 +145,7 @@ impl Subdomain {
         memory_bytes: usize,
     ) -> Result<Self, CatalogError> {
         let rank = row.rank;
-        if row.state != SubdomainState::Sealed {
-            return Err(not_sealed(catalog, rank));
-        }
+        let form = Form::of(row.state).ok_or_else(|| not_sealed(catalog, rank))?;
         let path = catalog.file_path(rank, row.generation);
         let damaged = |what: String| CatalogError::Content {
             path: path.path().to_owned(),
@@ -173,6 +171,7 @@ impl Subdomain {
             )));
         }
         let cache = VertexCache::new(
+            form,
             (rank, row.generation),
             vertex_chunks.iter().map(|s| s.first).collect(),
             vertices as u32,
@@ -180,6 +179,7 @@ impl Subdomain {
         );
         Ok(Self {
             id,
+            form,
             cache: cache.map_err(|e| CatalogError::io(path.path(), e))?,
             row,
             file,
@@ -324,11 +324,12 @@ impl Subdomain {
         self.interface_chunks().at(chunk)
     }
 
-    fn chunks<R: ChunkRecord>(&mut self, total: u64) -> Chunks<'_, R> {
+    fn chunks<R: PageRecord>(&mut self, total: u64) -> Chunks<'_, R> {
         Chunks {
             address: address::<R>(&self.row),
             end: n_chunks::<R>(&self.row),
-            decoder: Decoder::new().expect("zstd makes a context whenever there is memory"),
+            loader: Loader::of(self.form, (self.row.rank, self.row.generation))
+                .expect("zstd makes a context whenever there is memory"),
             file: &mut self.file,
             expected: 0,
             total,
@@ -355,14 +356,14 @@ fn summaries<R: ChunkRecord>(
     file: &mut StoreFile,
     row: &SubdomainRow,
 ) -> Result<Vec<R>, CatalogError> {
-    let mut decoder = Decoder::new().map_err(|e| CatalogError::io(file.path(), e))?;
+    let mut loader = Loader::chunks().map_err(|e| CatalogError::io(file.path(), e))?;
     let (mut all, mut block) = (Vec::new(), Vec::new());
     for chunk in 0..n_chunks::<R>(row) {
         let address = ChunkAddress {
             chunk,
             ..address::<R>(row)
         };
-        load_chunk(file, &mut decoder, address, &mut block)?;
+        loader.load(file, address, &mut block)?;
         all.append(&mut block);
     }
     Ok(all)
@@ -391,7 +392,7 @@ impl<R: ChunkRecord> Chunks<'_, R> {
 
     fn load(&mut self) -> Result<Chunk<R>, CatalogError> {
         let mut records = Vec::new();
-        let first = load_chunk(self.file, &mut self.decoder, self.address, &mut records)?;
+        let first = self.loader.load(self.file, self.address, &mut records)?;
         Ok(Chunk { first, records })
     }
 

@@ -57,7 +57,9 @@ impl StoreState {
 pub enum SubdomainState {
     Coarse,
     Saturated,
+    /// Finished, and kept as working pages.
     Optimized,
+    /// Finished, and packed into chunks.
     Sealed,
 }
 

@@ -15,6 +15,8 @@ pub struct Shape {
     pub quality: f64,
     /// Least and greatest cosine of the six dihedral angles.
     pub cosines: [f64; 2],
+    /// Length of the longest edge.
+    pub edge_max: f64,
 }
 
 impl Shape {
@@ -46,6 +48,7 @@ impl Shape {
             volume: six_volumes / 6.0,
             quality,
             cosines,
+            edge_max: longest.sqrt(),
         }
     }
 }

@@ -1,11 +1,12 @@
 //! Vertices of a sealed sub-domain by number, from a bounded set of decoded chunks.
 
 use lru::LruCache;
-use tetdb_schema::chunk::{ChunkAddress, ChunkError, ChunkKind, ChunkRecord, Decoder};
+use tetdb_schema::chunk::{ChunkAddress, ChunkKind};
 use tetdb_schema::digest::vertex_mix;
 use tetdb_schema::record::SealedVertex;
 
-use super::CatalogError;
+use super::form::Loader;
+use super::{CatalogError, Form};
 use crate::geom::Point;
 use crate::store::StoreFile;
 
@@ -26,34 +27,6 @@ pub struct Corner {
     pub h: f32,
 }
 
-/// Reads one chunk of a file and checks it.
-pub(super) fn load_chunk<R: ChunkRecord>(
-    file: &mut StoreFile,
-    decoder: &mut Decoder<R>,
-    address: ChunkAddress,
-    records: &mut Vec<R>,
-) -> Result<u32, CatalogError> {
-    let read = file.read(address.key(), |value| {
-        decoder.decode(value, address, records)
-    })?;
-    match read {
-        Some(Ok(first)) => Ok(first),
-        Some(Err(source)) => Err(damaged(file, source)),
-        None => Err(CatalogError::Content {
-            path: file.path().to_owned(),
-            subdomain: address.subdomain,
-            what: format!("{:?} chunk {} is missing", address.kind, address.chunk),
-        }),
-    }
-}
-
-fn damaged(file: &StoreFile, source: ChunkError) -> CatalogError {
-    CatalogError::Chunk {
-        path: file.path().to_owned(),
-        source,
-    }
-}
-
 /// Decoded vertex chunks within a budget.
 ///
 /// A hit sets a reference bit; the `lru` crate orders the chunks when one is missed, and a chunk
@@ -69,7 +42,7 @@ pub struct VertexCache {
     vacant: Vec<u32>,
     referenced: Vec<bool>,
     order: LruCache<u32, ()>,
-    decoder: Decoder<SealedVertex>,
+    loader: Loader<SealedVertex>,
     scratch: Vec<SealedVertex>,
     last: usize,
     bytes: usize,
@@ -78,10 +51,11 @@ pub struct VertexCache {
 }
 
 impl VertexCache {
-    /// A cache for a sub-domain whose vertex chunks start at `firsts`.
+    /// A cache for a sub-domain of this form whose vertex chunks start at `firsts`.
     ///
     /// Errors: the decoder cannot be made.
     pub fn new(
+        form: Form,
         (subdomain, generation): (u32, u32),
         firsts: Vec<u32>,
         n_vertices: u32,
@@ -97,7 +71,7 @@ impl VertexCache {
             resident: Vec::new(),
             vacant: Vec::new(),
             order: LruCache::unbounded(),
-            decoder: Decoder::new()?,
+            loader: Loader::of(form, (subdomain, generation))?,
             scratch: Vec::new(),
             last: 0,
             bytes: 0,
@@ -181,7 +155,7 @@ impl VertexCache {
             generation: self.generation,
             chunk: chunk as u32,
         };
-        let first = load_chunk(file, &mut self.decoder, address, &mut self.scratch)?;
+        let first = self.loader.load(file, address, &mut self.scratch)?;
         self.loads += 1;
         if first != self.firsts[chunk] {
             return Err(CatalogError::Content {

@@ -6,6 +6,7 @@
 
 use super::regions::region_sizes;
 use super::{MEMORY_MIN, Options, PipelineError, Plan};
+use crate::catalog::Form;
 use crate::optimize::Mode;
 use crate::sizing::{Background, Counts, Domain, Further, Region, SizeField, SizeSummary, Wish};
 use crate::store::{Room, attempt};
@@ -24,6 +25,8 @@ const SEALED_FACET: f64 = 10.0;
 /// Bytes of the coarse leaves for each triangle, and for each tetrahedron of the refined zones: 14 to 20, and 8 to 10.
 const KEPT_TRIANGLE: f64 = 18.0;
 const KEPT_ZONE_TET: f64 = 9.0;
+/// Of one kept as working pages, for each record of whatever kind: a slot, and a quarter of another.
+const PAGES_RECORD: f64 = 40.05;
 /// The least file of a sub-domain, of a coarse leaf, and the catalog without its size field: redb's own pages.
 const FILE_LEAST: f64 = 50e3;
 const COARSE_FILE_LEAST: f64 = 30e3;
@@ -69,6 +72,7 @@ pub struct Estimate {
     /// Of the size field: its octree, and sizes at corners, which go to a scratch file where their share of the cap is too small.
     octree_bytes: u64,
     sizes_bytes: u64,
+    form: Form,
     /// Whether the coarse leaves stay in the store.
     keeps_coarse: bool,
 }
@@ -170,6 +174,7 @@ impl Estimate {
             surface_bytes: surface.bytes() as u64,
             octree_bytes: field.bytes_in(0) - SizeField::share_of(0).min(sizes_bytes),
             sizes_bytes,
+            form: options.form()?,
             keeps_coarse: !options.drop_coarse,
         })
     }
@@ -186,9 +191,11 @@ impl Estimate {
 
     /// Bytes of the finished store.
     pub fn store_bytes(&self) -> u64 {
-        let sealed = SEALED_TET * self.tets()
-            + SEALED_VERTEX * self.vertices
-            + SEALED_FACET * self.triangles as f64;
+        let [tet, vertex, facet] = match self.form {
+            Form::Sealed => [SEALED_TET, SEALED_VERTEX, SEALED_FACET],
+            Form::Pages => [PAGES_RECORD; 3],
+        };
+        let sealed = tet * self.tets() + vertex * self.vertices + facet * self.triangles as f64;
         let files = FILE_LEAST * f64::from(self.subdomains) + CATALOG_LEAST;
         (sealed + files) as u64 + self.octree_bytes + self.sizes_bytes + self.coarse_bytes()
     }

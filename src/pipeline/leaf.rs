@@ -14,7 +14,7 @@ use super::tree::PartMesh;
 use super::watch::Watcher;
 use super::{PipelineError, Plan};
 use crate::bisect::{Method, Zone};
-use crate::catalog::{CoarseRow, InterfaceSide, RegionTotals, Sealed};
+use crate::catalog::{CoarseRow, Form, InterfaceSide, RegionTotals, Sealed};
 use crate::geom::Aabb;
 use crate::mesh::{Mesh, Workspace};
 use crate::optimize::Mode;
@@ -29,6 +29,7 @@ pub(super) struct LeafJob {
     pub base: DiskPath,
     pub work: DiskPath,
     pub sealed: DiskPath,
+    pub form: Form,
     /// Generation of the file to make.
     pub generation: u32,
     /// A size field of its own, in place of that of the whole.
@@ -112,6 +113,7 @@ impl LeafJob {
         let generation = self.generation;
         let target = Target {
             path: &self.sealed,
+            form: self.form,
             scratch: &self.scratch,
             subdomain: SubdomainId::new(rank).expect("fewer parts than ranks"),
             generation,

@@ -20,6 +20,7 @@ mod estimate;
 mod fine;
 mod keep;
 mod leaf;
+mod neighbors;
 mod options;
 mod plan;
 mod regions;

@@ -3,6 +3,7 @@ use serde::{Deserialize, Serialize};
 use super::{PipelineError, Plan};
 use crate::bisect::Method;
 use crate::boundary::RegionPolicy;
+use crate::catalog::Form;
 use crate::optimize::Mode;
 use crate::sizing::{Formula, RegionSize, SizeOptions, SizeSource, SizingError};
 
@@ -47,6 +48,9 @@ pub struct Options {
     /// Whether sub-domains are made for good: what they were made from is not kept. It does not shape the mesh.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub drop_coarse: bool,
+    /// `packed`, `none`: whether finished sub-domains are packed into chunks or kept as working pages. It does not shape the mesh.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seal: Option<String>,
     /// Whether meshes on their way are kept to be looked at; the finished mesh is the same.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub keep_stages: bool,
@@ -139,6 +143,17 @@ impl Options {
             "full" => Mode::Full,
             _ => return None,
         })
+    }
+
+    /// The form of finished sub-domains.
+    ///
+    /// Errors: a word that is not known.
+    pub fn form(&self) -> Result<Form, PipelineError> {
+        match self.seal.as_deref().unwrap_or("packed") {
+            "packed" => Ok(Form::Sealed),
+            "none" => Ok(Form::Pages),
+            _ => Err(unknown("--seal", &self.seal)),
+        }
     }
 
     /// [`Options::region_policy`], or an error that names the word.

@@ -16,7 +16,9 @@ use super::sizes::{NewSizes, Recorded, Values, predicted};
 use super::tree::{self, Part, blob};
 use super::watch::Watcher;
 use super::{FineReport, Options, PipelineError, Plan};
-use crate::catalog::{Catalog, CatalogError, CoarseLeaf, CoarseRow, StoreState, SubdomainRow};
+use crate::catalog::{
+    Catalog, CatalogError, CoarseLeaf, CoarseRow, Form, StoreState, SubdomainRow,
+};
 use crate::mesh::Workspace;
 use crate::sizing::{BackgroundMesh, SizeField};
 use crate::store::{Backing, Budget, DiskPath, PagerStats, attempt};
@@ -347,8 +349,9 @@ impl<'a> Again<'a> {
             Some(_) => Vec::new(),
             None => tree::zones_above(self.catalog, part, self.n)?,
         };
-        let kept = self.rows.iter().find(|(row, _)| row.rank == rank);
-        let kept = kept.expect("asked for").1;
+        let asked = self.rows.iter().find(|(row, _)| row.rank == rank);
+        let (row, kept) = asked.expect("asked for");
+        let (row, kept) = (row.clone(), *kept);
         let files = self.catalog.files()?;
         let generations = (files.iter().filter(|f| f.subdomain == rank)).map(|f| f.generation);
         let last = generations.max().unwrap_or(0);
@@ -361,6 +364,8 @@ impl<'a> Again<'a> {
             work: self.catalog.file_path(rank, last + 1),
             sealed: self.catalog.file_path(rank, last + 2),
             generation: last + 2,
+            // As it was.
+            form: Form::of(row.state).unwrap_or_default(),
             field,
             kept: None,
             scratch,

@@ -303,6 +303,7 @@ impl<'a> Run<'a> {
             work: self.catalog.file_path(rank, part.generation + WORK),
             sealed: self.catalog.file_path(rank, part.generation + DONE),
             generation: part.generation + DONE,
+            form: self.options.form()?,
             field: None,
             kept: (!self.options.drop_coarse)
                 .then(|| self.catalog.coarse_path(rank, part.generation)),

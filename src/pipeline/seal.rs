@@ -8,12 +8,14 @@
 use std::collections::BTreeMap;
 
 use tetdb_schema::ids::{Owner, SubdomainId, VertexId};
+use tetdb_schema::leaf::TetPlace;
 use tetdb_schema::page::NONE;
 use tetdb_schema::record::{InterfaceFace, SealedFacet, SealedTet, SealedVertex, tag};
 
 use super::PipelineError;
+use super::neighbors::Neighbors;
 use super::watch::{Event, Watcher};
-use crate::catalog::{Sealed, SealedWriter, sorted_face};
+use crate::catalog::{Form, Sealed, SealedWriter, sorted_face};
 use crate::geom::{Aabb, HilbertFrame};
 use crate::mesh::anatomy::FACES;
 use crate::mesh::{Mesh, VertexTag, dense};
@@ -23,6 +25,7 @@ use crate::topology::Owners;
 /// Where and how to seal.
 pub(super) struct Target<'a> {
     pub path: &'a DiskPath,
+    pub form: Form,
     pub scratch: &'a DiskPath,
     pub subdomain: SubdomainId,
     pub generation: u32,
@@ -33,13 +36,14 @@ pub(super) struct Target<'a> {
     pub owners: Option<&'a BTreeMap<u32, Owners>>,
 }
 
-/// Writes `mesh` to `target`. Effects: the mesh's scratch map is used up; `tet_of` must be right for all vertices.
+/// Writes `mesh` to `target`, in the order and under the numbers of a sealed sub-domain whatever the form. Effects: the mesh's scratch map is used up; `tet_of` must be right for all vertices.
 pub(super) fn seal<P: Pages>(
     mesh: &mut Mesh<P>,
     target: &Target,
     watch: &Watcher,
 ) -> Result<Sealed, PipelineError> {
-    let mut writer = SealedWriter::create(
+    let mut writer = SealedWriter::create_as(
+        target.form,
         target.path,
         target.subdomain,
         target.generation,
@@ -47,8 +51,19 @@ pub(super) fn seal<P: Pages>(
     )?;
     mesh.clear_scratch();
     vertices(mesh, target, &mut writer, watch)?;
+    let mut neighbors = match target.form {
+        Form::Sealed => None,
+        Form::Pages => Some(Neighbors::of(sort_tets(mesh, target)?, target)?),
+    };
     let order = sort_tets(mesh, target)?;
-    let faces = tets(order, mesh.n_tets(), target, &mut writer, watch)?;
+    let faces = tets(
+        order,
+        mesh.n_tets(),
+        &mut neighbors,
+        target,
+        &mut writer,
+        watch,
+    )?;
     facets(mesh, faces, target, &mut writer)?;
     mesh.clear_scratch();
     Ok(writer.finish()?)
@@ -117,25 +132,26 @@ fn vertices<P: Pages>(
     Ok(())
 }
 
-/// Nodes, region and required faces of a tetrahedron: 4 + 1 big-endian words and a mask.
-type TetRecord = [u8; 21];
+/// Nodes, region and flags of a tetrahedron, 4 + 1 + 1 big-endian words, and a mask of its required faces.
+pub(super) type TetRecord = [u8; 25];
 
-fn sort_tets<P: Pages>(mesh: &mut Mesh<P>, target: &Target) -> Result<Sorted<21>, PipelineError> {
-    let mut sorter = Sorter::<21>::new(target.scratch, target.memory / 4);
+fn sort_tets<P: Pages>(mesh: &mut Mesh<P>, target: &Target) -> Result<Sorted<25>, PipelineError> {
+    let mut sorter = Sorter::<25>::new(target.scratch, target.memory / 4);
     let mut from = 0;
     while let Some((t, tet)) = mesh.next_tet(from) {
         from = t + 1;
         let [a, b, c, d] = tet.vertices();
         let nodes = [a, b, c, d].map(|v| mesh.scratch(dense(v)));
-        let (region, _) = mesh.tet_attribute(t);
+        let (region, flags) = mesh.tet_attribute(t);
         let rotated = SealedTet { nodes, region }.rotated();
-        let mut record: TetRecord = [0; 21];
+        let mut record: TetRecord = [0; 25];
         for (i, node) in rotated.nodes.into_iter().enumerate() {
             record[4 * i..4 * i + 4].copy_from_slice(&node.to_be_bytes());
             let old = nodes.iter().position(|&n| n == node).unwrap_or(0);
-            record[20] |= u8::from(tet.is_required(old)) << i;
+            record[24] |= u8::from(tet.is_required(old)) << i;
         }
         record[16..20].copy_from_slice(&region.to_be_bytes());
+        record[20..24].copy_from_slice(&flags.to_be_bytes());
         sorter.push(record)?;
     }
     Ok(sorter.finish()?)
@@ -145,8 +161,9 @@ fn sort_tets<P: Pages>(mesh: &mut Mesh<P>, target: &Target) -> Result<Sorted<21>
 type FaceRecord = [u8; 17];
 
 fn tets(
-    order: Sorted<21>,
+    order: Sorted<25>,
     n_tets: u32,
+    neighbors: &mut Option<Neighbors>,
     target: &Target,
     writer: &mut SealedWriter,
     watch: &Watcher,
@@ -154,14 +171,20 @@ fn tets(
     let mut faces = Sorter::<17>::new(target.scratch, target.memory / 4);
     for (t, record) in order.enumerate() {
         let record = record?;
-        let nodes = [
-            word(&record, 0),
-            word(&record, 4),
-            word(&record, 8),
-            word(&record, 12),
-        ];
-        writer.push_tet(nodes, word(&record, 16))?;
-        for i in (0..4).filter(|i| record[20] >> i & 1 != 0) {
+        let nodes = nodes(&record);
+        let region = word(&record, 16);
+        match neighbors {
+            None => writer.push_tet(nodes, region)?,
+            Some(neighbors) => {
+                let place = TetPlace {
+                    neighbors: neighbors.next()?,
+                    required: record[24],
+                    flags: word(&record, 20),
+                };
+                writer.push_placed_tet(SealedTet { nodes, region }, &place)?;
+            }
+        }
+        for i in (0..4).filter(|i| record[24] >> i & 1 != 0) {
             let (face, odd) = sorted_face(FACES[i].map(|k| nodes[k]));
             faces.push(face_record(face, t as u32, odd))?;
         }
@@ -290,7 +313,12 @@ fn push_interface_face<P: Pages>(
     Ok(())
 }
 
-fn word(record: &[u8], at: usize) -> u32 {
+/// The nodes of a tetrahedron, rotated.
+pub(super) fn nodes(record: &TetRecord) -> [u32; 4] {
+    [0, 4, 8, 12].map(|at| word(record, at))
+}
+
+pub(super) fn word(record: &[u8], at: usize) -> u32 {
     let bytes = [record[at], record[at + 1], record[at + 2], record[at + 3]];
     u32::from_be_bytes(bytes)
 }

@@ -8,7 +8,7 @@ use super::seal::{Target, seal};
 use super::tree::blob;
 use super::watch::Watcher;
 use crate::bisect::{InterfaceFaces, Zone};
-use crate::catalog::{Catalog, CatalogError, Sealed, Stage, StageRow, Step};
+use crate::catalog::{Catalog, CatalogError, Form, Sealed, Stage, StageRow, Step};
 use crate::geom::{Aabb, Point};
 use crate::mesh::Mesh;
 use crate::store::{DiskPath, Pages};
@@ -63,6 +63,7 @@ impl StageFiles {
         watch: &Watcher,
     ) -> Result<(), PipelineError> {
         let target = Target {
+            form: Form::Sealed,
             path: &self.paths[stage as usize],
             scratch: &self.scratch,
             subdomain: SubdomainId::new(self.cut).expect("fewer cuts than ranks"),

@@ -4,6 +4,8 @@ mod check;
 mod crash;
 mod damage;
 mod errors;
+mod forms;
+mod json;
 mod odd_inputs;
 mod pieces;
 mod place;

@@ -1,15 +1,17 @@
 //! Reads a finished store with `tetdb-schema` and redb alone: `cargo run --release --example read_store -- part.tetdb`.
 //!
 //! A store is a directory. Its catalog names the files that count, one for each sub-domain; in each, chunks of
-//! tetrahedra and of vertices stand under keys made of their kind and number, and `tetdb-schema` decodes them. Counts,
+//! tetrahedra and of vertices stand under keys made of their kind and number, and `tetdb-schema` decodes them; of a store made with
+//! `--seal none` there are working pages in their place. Counts,
 //! volume and digest are printed, as `tetdb info` and `tetdb digest` have them. What the bytes mean is told in `schema/README.md`.
 
 use std::error::Error;
 use std::path::Path;
 
 use redb::{ReadOnlyDatabase, ReadableDatabase, TableDefinition};
-use tetdb_schema::chunk::{ChunkAddress, ChunkKind, ChunkRecord, Decoder};
+use tetdb_schema::chunk::{ChunkAddress, ChunkKind, Decoder};
 use tetdb_schema::digest::{Digest, vertex_mix};
+use tetdb_schema::leaf::{PageDecoder, PageRecord};
 use tetdb_schema::record::{SealedTet, SealedVertex};
 
 /// The only table of every file.
@@ -69,8 +71,8 @@ fn files(store: &Path) -> Result<Vec<(u32, u32)>, Box<dyn Error>> {
     Ok(files)
 }
 
-/// All records of a kind: chunk after chunk until there is none.
-fn records<R: ChunkRecord>(
+/// All records of a kind: chunk after chunk, or page after page, until there is none.
+fn records<R: PageRecord>(
     file: &ReadOnlyDatabase,
     subdomain: u32,
     generation: u32,
@@ -91,6 +93,18 @@ fn records<R: ChunkRecord>(
         };
         // Checks checksum, kind, sub-domain, generation and number.
         decoder.decode(value.value(), address, &mut chunk)?;
+        all.append(&mut chunk);
+    }
+    let mut pages = PageDecoder::new(subdomain, generation);
+    for page in 0.. {
+        let (main, beside) = PageDecoder::keys::<R>(page);
+        let Some(value) = table.get(main)? else { break };
+        pages.open::<R>(page, value.value())?;
+        if let Some(beside) = beside {
+            let value = table.get(beside)?.ok_or("attributes are missing")?;
+            pages.open_beside::<R>(page, value.value())?;
+        }
+        pages.records(page, &mut chunk)?;
         all.append(&mut chunk);
     }
     Ok(all)

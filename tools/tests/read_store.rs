@@ -13,11 +13,20 @@ mod example;
 
 #[test]
 fn the_schema_alone_reads_a_store() -> Result<(), Box<dyn std::error::Error>> {
+    let digests = ["packed", "none"].map(check);
+    let [packed, pages] = digests;
+    assert_eq!(packed?, pages?);
+    Ok(())
+}
+
+/// Makes a store in this form and reads it twice; returns its digest.
+fn check(seal: &str) -> Result<String, Box<dyn std::error::Error>> {
     let dir = tempfile::tempdir()?;
     let path = dir.path().join("box.tetdb");
     let surface = SampleSpec::parse("box,h=0.05")?.make()?.into();
     let options = Options {
         subdomains: Some("2".to_owned()),
+        seal: Some(seal.to_owned()),
         ..Options::default()
     };
     let job = Job {
@@ -48,5 +57,5 @@ fn the_schema_alone_reads_a_store() -> Result<(), Box<dyn std::error::Error>> {
         !text.contains("tetdb::"),
         "the example may use the schema only"
     );
-    Ok(())
+    Ok(found.digest)
 }

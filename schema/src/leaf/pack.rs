@@ -1,0 +1,113 @@
+//! Fills pages with a stream of records.
+
+use super::{BESIDE, PageRecord, Working};
+use crate::page::{
+    NONE, PageAddress, PageKind, RECORDS, SLOTS, Slot, page_key, seal_full_page, stored_bytes,
+    u32_le,
+};
+
+/// A page of records ready to be stored, with whatever else is full by now.
+pub struct PageSet<R> {
+    pub page: u32,
+    /// Number of the first record.
+    pub first: u32,
+    pub records: Vec<R>,
+    /// Keys and values: the page, and the page of second words when it is full.
+    pub values: Vec<(u64, Vec<u8>)>,
+}
+
+/// Collects records and fills pages with them; the counterpart of [`Packer`](crate::chunk::Packer).
+pub struct PagePacker<R> {
+    subdomain: u32,
+    generation: u32,
+    /// Records in pages that are out.
+    first: u32,
+    pending: Vec<R>,
+    slots: Vec<Slot>,
+    beside: Vec<[u32; 2]>,
+    beside_pages: u32,
+}
+
+impl<R: PageRecord> PagePacker<R> {
+    /// A packer for the records of one sub-domain in one generation.
+    pub fn new(subdomain: u32, generation: u32) -> Self {
+        Self {
+            subdomain,
+            generation,
+            first: 0,
+            pending: Vec::new(),
+            slots: Vec::new(),
+            beside: Vec::new(),
+            beside_pages: 0,
+        }
+    }
+
+    /// Records taken so far.
+    pub fn count(&self) -> u64 {
+        u64::from(self.first) + self.pending.len() as u64
+    }
+
+    /// Pages of records so far.
+    pub fn pages(&self) -> u32 {
+        self.first.div_ceil(RECORDS as u32)
+    }
+
+    /// Takes a record and what it becomes; returns a page when one is full.
+    pub fn push(&mut self, record: R, working: Working) -> Option<PageSet<R>> {
+        self.pending.push(record);
+        self.slots.push(working.slot);
+        if R::BESIDE.is_some() {
+            self.beside.push(working.beside);
+        }
+        (self.pending.len() == RECORDS).then(|| self.page(false))
+    }
+
+    /// What is left as the last page; `None` when nothing is.
+    pub fn cut(&mut self) -> Option<PageSet<R>> {
+        (!self.pending.is_empty()).then(|| self.page(true))
+    }
+
+    fn page(&mut self, last: bool) -> PageSet<R> {
+        let page = self.first / RECORDS as u32;
+        // A slot without a tetrahedron says so; of the others only the count tells.
+        let empty = [u32_le::from_native(if R::PAGE == PageKind::Tets { NONE } else { 0 }); 8];
+        let mut values = vec![self.sealed(R::PAGE, page, &self.slots, empty)];
+        self.slots.clear();
+        if let Some(kind) = R::BESIDE
+            && (self.beside.len() == BESIDE * RECORDS || last)
+        {
+            let slots: Vec<Slot> = (self.beside.chunks(BESIDE))
+                .map(|four| {
+                    std::array::from_fn(|i| {
+                        u32_le::from_native(four.get(i / 2).map_or(0, |two| two[i % 2]))
+                    })
+                })
+                .collect();
+            let zero = [u32_le::from_native(0); 8];
+            values.push(self.sealed(kind, self.beside_pages, &slots, zero));
+            self.beside.clear();
+            self.beside_pages += 1;
+        }
+        let records = std::mem::take(&mut self.pending);
+        let first = self.first;
+        self.first += records.len() as u32;
+        PageSet {
+            page,
+            first,
+            records,
+            values,
+        }
+    }
+
+    fn sealed(&self, kind: PageKind, page: u32, slots: &[Slot], empty: Slot) -> (u64, Vec<u8>) {
+        let mut frame = vec![empty; SLOTS];
+        frame[..slots.len()].copy_from_slice(slots);
+        let address = PageAddress {
+            kind,
+            subdomain: self.subdomain,
+            page,
+        };
+        seal_full_page(&mut frame, address, self.generation, slots.len() as u32);
+        (page_key(kind, page), stored_bytes(&frame).to_vec())
+    }
+}

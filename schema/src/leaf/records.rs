@@ -1,0 +1,210 @@
+//! Records of a finished sub-domain as slots of working pages.
+
+use super::{dense, sparse};
+use crate::chunk::ChunkRecord;
+use crate::ids::{Owner, SubdomainId, VertexId};
+use crate::page::{NONE, PageKind, Slot, u32_le};
+use crate::record::{Facet, InterfaceFace, SealedFacet, SealedTet, SealedVertex, Tet, Vertex, tag};
+
+const VERTEX_MASK: u32 = (1 << 30) - 1;
+const REQUIRED: u32 = 1 << 31;
+const FIXED: u32 = 1 << 31;
+const TAG_BITS: u32 = 3;
+
+/// What a working tetrahedron has beside its nodes and its region.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TetPlace {
+    /// For each face the one on its other side, as 4 · tetrahedron + face with the tetrahedron's number, or [`NONE`].
+    pub neighbors: [u32; 4],
+    /// Bit i: face i is required.
+    pub required: u8,
+    /// Flags of the attribute.
+    pub flags: u32,
+}
+
+/// What a record becomes: a slot, and two words that stand beside it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Working {
+    pub slot: Slot,
+    pub beside: [u32; 2],
+}
+
+/// A record that can be kept in working pages.
+pub trait PageRecord: ChunkRecord {
+    /// The kind of its pages.
+    const PAGE: PageKind;
+    /// The kind of the pages of its two other words, if it has any.
+    const BESIDE: Option<PageKind>;
+
+    /// What number `n` of sub-domain `rank` is; `None` for what no writer writes.
+    fn from_working(working: &Working, rank: u32, n: u32) -> Option<Self>;
+}
+
+impl SealedTet {
+    /// As a working tetrahedron.
+    pub fn to_working(self, place: &TetPlace) -> Working {
+        let required = |i: usize| {
+            if place.required >> i & 1 == 1 {
+                REQUIRED
+            } else {
+                0
+            }
+        };
+        let neighbor = place.neighbors.map(|face| match face {
+            NONE => NONE,
+            face => sparse(face >> 2) << 2 | face & 3,
+        });
+        let node = std::array::from_fn(|i| sparse(self.nodes[i]) | required(i));
+        Working {
+            slot: Tet { node, neighbor }.to_slot(),
+            beside: [self.region, place.flags],
+        }
+    }
+}
+
+impl PageRecord for SealedTet {
+    const PAGE: PageKind = PageKind::Tets;
+    const BESIDE: Option<PageKind> = Some(PageKind::TetAttributes);
+
+    fn from_working(working: &Working, _rank: u32, _n: u32) -> Option<Self> {
+        let tet = Tet::from_slot(&working.slot);
+        (tet.node[0] != NONE).then(|| Self {
+            nodes: tet.node.map(|node| dense(node & VERTEX_MASK)),
+            region: working.beside[0],
+        })
+    }
+}
+
+impl SealedVertex {
+    /// As a working vertex of sub-domain `rank`, which is nailed down unless it is the mesher's own. Its tetrahedron is not told.
+    pub fn to_working(self, rank: u32) -> Working {
+        let id = VertexId::from_number(self.id);
+        let (cut, index) = match id.map(|id| (id.owner, id.index)) {
+            Some((Owner::Cut(cut), index)) => (cut, index),
+            Some((Owner::Surface, index)) => (0, index),
+            Some((Owner::Subdomain(owner), _)) => {
+                debug_assert_eq!(owner.rank(), rank);
+                (0, 0)
+            }
+            None => (0, 0),
+        };
+        let fixed = match self.tag {
+            tag::FREE | tag::STEINER => 0,
+            _ => FIXED,
+        };
+        let vertex = Vertex {
+            point: self.point,
+            h: f32::from_bits(self.h.to_bits() | fixed),
+            v2t: NONE,
+        };
+        Working {
+            slot: vertex.to_slot(),
+            beside: [self.tag | cut << TAG_BITS, index],
+        }
+    }
+}
+
+impl PageRecord for SealedVertex {
+    const PAGE: PageKind = PageKind::Vertices;
+    const BESIDE: Option<PageKind> = Some(PageKind::VertexAttributes);
+
+    fn from_working(working: &Working, rank: u32, n: u32) -> Option<Self> {
+        let vertex = Vertex::from_slot(&working.slot);
+        let [word, index] = working.beside;
+        let (tag, cut) = (word & ((1 << TAG_BITS) - 1), word >> TAG_BITS);
+        let owner = match tag {
+            tag::SURFACE => Owner::Surface,
+            tag::INTERFACE => Owner::Cut(cut),
+            _ => Owner::Subdomain(SubdomainId::new(rank)?),
+        };
+        let index = match owner {
+            Owner::Subdomain(_) => n,
+            _ => index,
+        };
+        Some(Self {
+            point: vertex.point,
+            h: f32::from_bits(vertex.h.to_bits() & !FIXED),
+            tag,
+            id: VertexId { owner, index }.number(),
+        })
+    }
+}
+
+/// A tetrahedron's number as an id, or none.
+fn tet_id(n: u32) -> u32 {
+    if n == NONE { NONE } else { sparse(n) }
+}
+
+fn tet_number(id: u32) -> u32 {
+    if id == NONE { NONE } else { dense(id) }
+}
+
+impl SealedFacet {
+    /// As a working facet.
+    pub fn to_working(self) -> Working {
+        let facet = Facet {
+            vertices: self.vertices.map(sparse),
+            label: self.label,
+            triangle: self.triangle,
+            regions: self.regions,
+        };
+        Working {
+            slot: facet.to_slot(),
+            beside: self.tets.map(tet_id),
+        }
+    }
+}
+
+impl PageRecord for SealedFacet {
+    const PAGE: PageKind = PageKind::Facets;
+    const BESIDE: Option<PageKind> = Some(PageKind::FacetTets);
+
+    fn from_working(working: &Working, _rank: u32, _n: u32) -> Option<Self> {
+        let facet = Facet::from_slot(&working.slot);
+        Some(Self {
+            vertices: facet.vertices.map(dense),
+            label: facet.label,
+            triangle: facet.triangle,
+            regions: facet.regions,
+            tets: working.beside.map(tet_number),
+        })
+    }
+}
+
+impl InterfaceFace {
+    /// As a working interface face of sub-domain `rank`; lower ranks are on the low side of a cut.
+    pub fn to_working(self, rank: u32) -> Working {
+        let [a, b, c] = self.vertices.map(sparse);
+        let side = u32::from(rank > self.other);
+        let words = [
+            a,
+            b,
+            c,
+            self.cut,
+            self.index,
+            side,
+            self.other,
+            tet_id(self.tet),
+        ];
+        Working {
+            slot: words.map(u32_le::from_native),
+            beside: [0; 2],
+        }
+    }
+}
+
+impl PageRecord for InterfaceFace {
+    const PAGE: PageKind = PageKind::InterfaceFaces;
+    const BESIDE: Option<PageKind> = None;
+
+    fn from_working(working: &Working, _rank: u32, _n: u32) -> Option<Self> {
+        let [a, b, c, cut, index, _side, other, tet] = working.slot.map(u32_le::to_native);
+        Some(Self {
+            vertices: [a, b, c].map(dense),
+            cut,
+            index,
+            other,
+            tet: tet_number(tet),
+        })
+    }
+}
