@@ -320,6 +320,16 @@ pub(super) fn vertex_bounds(part: &Subdomain, chunk: usize) -> Aabb {
     Aabb { low, high }
 }
 
+/// How far the vertices of a chunk's tetrahedra can be from a point that one of them holds: not farther than its longest edge.
+pub(super) fn reach(part: &Subdomain, chunk: usize) -> f64 {
+    /// More than what rounding takes from lengths.
+    const SLACK: f64 = 1.0 + 1e-6;
+    match part.tet_summaries()[chunk].edge_max {
+        told if told > 0.0 => f64::from(told) * SLACK,
+        _ => f64::INFINITY,
+    }
+}
+
 /// The chunk of vertices that holds vertex `v`, `place` being the one found last.
 pub(super) fn vertex_chunk(part: &Subdomain, v: u32, place: &mut usize) -> usize {
     let last = &part.vertex_summaries()[*place];

@@ -1,22 +1,55 @@
 //! A single point, with as few chunks as can be.
 //!
-//! A tetrahedron lies in the box around the boxes of the chunks its vertices are in: most of a chunk is ruled out before any
-//! vertex is read. Of the rest, chunks of vertices whose boxes hold the point are read first, chunk of tetrahedra by
-//! chunk, and what has all its vertices is looked at; nearly always that settles it. Only then are other chunks of vertices read, the
-//! nearest first.
+//! No vertex of a tetrahedron that holds the point is farther from it than the longest edge of its chunk, and the tetrahedron lies in
+//! the box around its vertices. Of a vertex that has not been read the box of its chunk is known. So a chunk of
+//! tetrahedra is read only when one of the vertices that lead them is near enough, most of it is ruled out at once, and each
+//! chunk of vertices that is read rules out more. What is left decides what is read next: the chunk that completes most,
+//! where the point is central in it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
+use std::hash::BuildHasherDefault;
 
 use tetdb_schema::ids::TetId;
 use tetdb_schema::record::SealedTet;
 
 use super::found::Found;
-use super::inquiry::{checked_chunk, vertex_bounds, vertex_chunk};
-use super::locate::{Candidate, Search};
+use super::frame::Spread;
+use super::inquiry::{checked_chunk, vertex_chunk};
+use super::locate::{Candidate, Search, leaders};
 use super::{Inquiry, ReportError};
-use crate::catalog::Subdomain;
+use crate::catalog::{CatalogError, Subdomain};
 use crate::geom::{Aabb, Point};
 use crate::store::stop_if_requested;
+
+/// What a chunk of vertices has near a point, as far as its summary tells.
+#[derive(Clone, Copy)]
+pub(super) struct Near {
+    /// The distance of the nearest cell that has vertices; where the point is in one, a negative number, the less the more central.
+    pub nearness: f64,
+    /// Around all places within reach where there may be vertices; empty where there are none.
+    bounds: Aabb,
+}
+
+impl Near {
+    pub(super) fn of(part: &Subdomain, chunk: usize, p: Point, reach: f64) -> Self {
+        let mut near = Self {
+            nearness: f64::INFINITY,
+            bounds: Aabb::EMPTY,
+        };
+        for cell in part.vertex_summaries()[chunk].cells() {
+            let [low, high] = cell.map(Point::from_array);
+            let nearness = nearness(&Aabb { low, high }, p);
+            near.nearness = near.nearness.min(nearness);
+            if nearness <= reach {
+                near.bounds = Aabb {
+                    low: near.bounds.low.min(low.max(p - reach)),
+                    high: near.bounds.high.max(high.min(p + reach)),
+                };
+            }
+        }
+        near
+    }
+}
 
 /// A tetrahedron that may hold the point, and the chunks of its vertices.
 struct Waiting {
@@ -26,35 +59,66 @@ struct Waiting {
 }
 
 /// What is wanted, and what has been read.
-#[derive(Default)]
 struct Lazy {
+    point: Point,
+    /// No vertex of a tetrahedron that holds the point is farther away.
+    reach: f64,
     waiting: Vec<Waiting>,
-    /// How near a chunk of vertices is, by sub-domain and number; `None` once it is read.
-    nearness: BTreeMap<(u32, u32), Option<f64>>,
+    /// Chunks of vertices looked at, by sub-domain and number: what they have near, and whether they are read.
+    chunks: HashMap<(u32, u32), (Near, bool), BuildHasherDefault<Spread>>,
 }
 
 impl Lazy {
-    /// The nearest chunk not yet read that some tetrahedron waits for, not farther than `most`.
-    fn nearest(&self, most: f64) -> Option<(u32, u32)> {
-        let mut wanted: Option<((u32, u32), f64)> = None;
-        for w in &self.waiting {
-            for chunk in w.chunks {
-                let key = (w.id.subdomain().rank(), chunk);
-                if let Some(Some(near)) = self.nearness.get(&key)
-                    && *near <= most
-                    && wanted.is_none_or(|(_, least)| *near < least)
-                {
-                    wanted = Some((key, *near));
-                }
-            }
-        }
-        wanted.map(|(key, _)| key)
+    /// What a chunk of vertices has near the point, and whether it is read.
+    fn near(&mut self, part: &Subdomain, chunk: u32) -> (Near, bool) {
+        let (p, reach) = (self.point, self.reach);
+        let new = || (Near::of(part, chunk as usize, p, reach), false);
+        let key = (part.id().rank(), chunk);
+        *self.chunks.entry(key).or_insert_with(new)
     }
 
-    fn is_ready(&self, w: &Waiting) -> bool {
-        let rank = w.id.subdomain().rank();
-        let is_read = |c: u32| self.nearness.get(&(rank, c)) == Some(&None);
-        w.chunks.into_iter().all(is_read)
+    /// From now on the chunk is read.
+    fn note(&mut self, rank: u32, chunk: u32) {
+        if let Some((_, is_read)) = self.chunks.get_mut(&(rank, chunk)) {
+            *is_read = true;
+        }
+    }
+
+    fn is_read(&self, rank: u32, chunk: u32) -> bool {
+        self.chunks.get(&(rank, chunk)).is_some_and(|c| c.1)
+    }
+
+    fn nearness(&self, key: (u32, u32)) -> f64 {
+        self.chunks
+            .get(&key)
+            .map_or(f64::INFINITY, |c| c.0.nearness)
+    }
+
+    /// The chunk to read next: of the tetrahedra that lack fewest, the one that most of them lack, then the nearest.
+    fn next(&self) -> Option<(u32, u32)> {
+        let mut wanted = BTreeMap::<(u32, u32), (usize, usize)>::new();
+        for w in &self.waiting {
+            let rank = w.id.subdomain().rank();
+            let mut chunks = w.chunks;
+            chunks.sort_unstable();
+            let is_new = |i: &usize| *i == 0 || chunks[*i] != chunks[*i - 1];
+            let lacking = (0..4).filter(is_new).map(|i| chunks[i]);
+            let lacking: Vec<u32> = lacking.filter(|&c| !self.is_read(rank, c)).collect();
+            for &chunk in &lacking {
+                let (fewest, many) = wanted.entry((rank, chunk)).or_insert((usize::MAX, 0));
+                if lacking.len() < *fewest {
+                    (*fewest, *many) = (lacking.len(), 0);
+                }
+                *many += usize::from(lacking.len() == *fewest);
+            }
+        }
+        let best = wanted
+            .into_iter()
+            .min_by(|(a, (few, many)), (b, (fewer, more))| {
+                let by_lack = few.cmp(fewer).then(more.cmp(many));
+                by_lack.then(self.nearness(*a).total_cmp(&self.nearness(*b)))
+            });
+        best.map(|(key, _)| key)
     }
 }
 
@@ -65,9 +129,15 @@ impl Inquiry {
         candidates: &[Candidate],
         search: &mut Search,
     ) -> Result<(), ReportError> {
-        let mut lazy = Lazy::default();
+        let reaches = candidates.iter().map(|c| c.reach);
+        let mut lazy = Lazy {
+            point: search.point,
+            reach: reaches.fold(0.0, f64::max),
+            waiting: Vec::new(),
+            chunks: HashMap::default(),
+        };
         for candidate in candidates {
-            self.gather(candidate, search.point, &mut lazy)?;
+            self.gather(candidate, &mut lazy)?;
             self.read_up_to(0.0, &mut lazy, search)?;
             if search.settled {
                 return Ok(());
@@ -77,13 +147,12 @@ impl Inquiry {
     }
 
     /// Adds the tetrahedra of a chunk that may hold the point.
-    fn gather(
-        &mut self,
-        candidate: &Candidate,
-        p: Point,
-        lazy: &mut Lazy,
-    ) -> Result<(), ReportError> {
+    fn gather(&mut self, candidate: &Candidate, lazy: &mut Lazy) -> Result<(), ReportError> {
         stop_if_requested();
+        let part = &mut self.part(candidate.rank)?.subdomain;
+        if !is_led_near(part, candidate, lazy)? {
+            return Ok(());
+        }
         self.count_tets();
         let part = &mut self.part(candidate.rank)?.subdomain;
         let records = checked_chunk(part, candidate.chunk)?;
@@ -95,37 +164,37 @@ impl Inquiry {
                 part.corner(v)?;
             }
             let chunks = tet.nodes.map(|v| vertex_chunk(part, v, &mut place) as u32);
-            let around = around(part, chunks);
-            if !(around.low.cmple(p).all() && p.cmple(around.high).all()) {
-                continue;
-            }
             let id = TetId::new(part.id(), local);
-            let id = id.expect("the chunk was checked");
-            for c in chunks {
-                let near = || Some(nearness(&vertex_bounds(part, c as usize), p));
-                lazy.nearness
-                    .entry((candidate.rank, c))
-                    .or_insert_with(near);
+            let waiting = Waiting {
+                id: id.expect("the chunk was checked"),
+                tet,
+                chunks,
+            };
+            if may_hold(part, &waiting, lazy)? {
+                lazy.waiting.push(waiting);
             }
-            lazy.waiting.push(Waiting { id, tet, chunks });
         }
         Ok(())
     }
 
-    /// Reads chunks of vertices as far as `most`, the nearest first, until the point is settled; looks at what has all its vertices.
+    /// Reads chunks of vertices that are not farther than `most` until the point is settled; looks at what has all its vertices.
     fn read_up_to(
         &mut self,
         most: f64,
         lazy: &mut Lazy,
         search: &mut Search,
     ) -> Result<(), ReportError> {
-        while !search.settled {
-            let (ready, rest): (Vec<_>, Vec<_>) = std::mem::take(&mut lazy.waiting)
-                .into_iter()
-                .partition(|w| lazy.is_ready(w));
-            lazy.waiting = rest;
-            for w in ready {
-                let part = &mut self.part(w.id.subdomain().rank())?.subdomain;
+        loop {
+            let mut rest = Vec::new();
+            for w in std::mem::take(&mut lazy.waiting) {
+                let rank = w.id.subdomain().rank();
+                let part = &mut self.part(rank)?.subdomain;
+                if !w.chunks.iter().all(|&c| lazy.is_read(rank, c)) {
+                    if may_hold(part, &w, lazy)? {
+                        rest.push(w);
+                    }
+                    continue;
+                }
                 let corners = part.corners(w.tet.nodes)?;
                 let points = corners.map(|c| c.point);
                 search.look(w.id, &points, || {
@@ -135,28 +204,71 @@ impl Inquiry {
                     return Ok(());
                 }
             }
-            let Some(next) = lazy.nearest(most) else {
-                break;
+            lazy.waiting = rest;
+            let Some(next) = lazy.next() else {
+                return Ok(());
             };
-            lazy.nearness.insert(next, None);
+            if lazy.nearness(next) > most {
+                return Ok(());
+            }
+            lazy.note(next.0, next.1);
         }
-        Ok(())
     }
 }
 
-/// A box around tetrahedra with vertices in these chunks.
-fn around(part: &Subdomain, chunks: [u32; 4]) -> Aabb {
-    chunks.iter().fold(Aabb::EMPTY, |sum, &c| {
-        let b = vertex_bounds(part, c as usize);
-        Aabb {
-            low: sum.low.min(b.low),
-            high: sum.high.max(b.high),
+/// Whether a vertex that leads tetrahedra of the chunk may be near enough; reads what chunks of vertices that takes, the nearest first.
+fn is_led_near(
+    part: &mut Subdomain,
+    candidate: &Candidate,
+    lazy: &mut Lazy,
+) -> Result<bool, CatalogError> {
+    if lazy.reach == f64::INFINITY {
+        return Ok(true);
+    }
+    let leaders = leaders(part, candidate.chunk as usize);
+    let first = part.vertex_chunk_of(leaders.start) as u32;
+    let last = part.vertex_chunk_of(leaders.end.saturating_sub(1)) as u32;
+    let reach = lazy.reach;
+    let mut chunks: Vec<(f64, u32)> = (first..=last.max(first))
+        .map(|c| (lazy.near(part, c).0.nearness, c))
+        .filter(|&(nearness, _)| nearness <= reach)
+        .collect();
+    chunks.sort_by(|a, b| a.0.total_cmp(&b.0));
+    for (_, chunk) in chunks {
+        let summary = &part.vertex_summaries()[chunk as usize];
+        let end = summary.first.saturating_add(summary.count);
+        lazy.note(candidate.rank, chunk);
+        for v in leaders.start.max(summary.first)..leaders.end.min(end) {
+            if part.corner(v)?.point.distance(lazy.point) <= lazy.reach {
+                return Ok(true);
+            }
         }
-    })
+    }
+    Ok(false)
+}
+
+/// Whether what is known of its vertices lets the tetrahedron hold the point.
+fn may_hold(part: &mut Subdomain, w: &Waiting, lazy: &mut Lazy) -> Result<bool, CatalogError> {
+    let (p, mut around) = (lazy.point, Aabb::EMPTY);
+    for (v, chunk) in w.tet.nodes.into_iter().zip(w.chunks) {
+        let (near, is_read) = lazy.near(part, chunk);
+        let bounds = match is_read {
+            true => Aabb::around([part.corner(v)?.point]),
+            false => near.bounds,
+        };
+        if nearness(&bounds, p) > lazy.reach || bounds.low.x > bounds.high.x {
+            return Ok(false);
+        }
+        around = Aabb {
+            low: around.low.min(bounds.low),
+            high: around.high.max(bounds.high),
+        };
+    }
+    Ok(around.low.cmple(p).all() && p.cmple(around.high).all())
 }
 
 /// The distance of a point from a box; within it, a negative number, the less the more central it is.
-pub(super) fn nearness(bounds: &Aabb, p: Point) -> f64 {
+fn nearness(bounds: &Aabb, p: Point) -> f64 {
     let outside = (p - p.clamp(bounds.low, bounds.high)).length();
     if outside > 0.0 {
         return outside;

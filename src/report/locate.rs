@@ -1,11 +1,13 @@
 //! Which tetrahedron holds a point.
 
+use std::ops::Range;
+
 use tetdb_schema::ids::TetId;
 
 use super::found::Found;
 use super::frame::Searched;
-use super::inquiry::{bounds_of, chunk_bounds, vertex_bounds};
-use super::lazy::nearness;
+use super::inquiry::{bounds_of, chunk_bounds, reach};
+use super::lazy::Near;
 use super::{Inquiry, ReportError};
 use crate::catalog::Subdomain;
 use crate::geom::{Aabb, HilbertFrame, Point, orient};
@@ -31,6 +33,8 @@ pub(super) struct Candidate {
     resident: bool,
     /// Negative where the point is within the box of vertices that lead its tetrahedra.
     nearness: f64,
+    /// How far vertices of a tetrahedron that holds the point can be.
+    pub reach: f64,
 }
 
 /// What is known of a point so far.
@@ -143,12 +147,18 @@ impl Inquiry {
         for rank in ranks {
             let part = self.part(rank)?;
             part.tree.visit(&|b| holds(b, p), &mut |chunk| {
-                if holds(&chunk_bounds(&part.subdomain, chunk), p) {
+                if !holds(&chunk_bounds(&part.subdomain, chunk), p) {
+                    return;
+                }
+                let reach = reach(&part.subdomain, chunk);
+                let nearness = leaders_nearness(&part.subdomain, chunk, p);
+                if nearness <= reach {
                     candidates.push(Candidate {
                         rank,
                         chunk: chunk as u32,
                         resident: false,
-                        nearness: leaders_nearness(&part.subdomain, chunk, p),
+                        nearness,
+                        reach,
                     });
                 }
             });
@@ -164,18 +174,25 @@ impl Inquiry {
     }
 }
 
-/// How near the vertices that lead the tetrahedra of a chunk are.
+/// The vertices that lead the tetrahedra of a chunk: the first, and one after the last.
 ///
 /// Tetrahedra are sorted by their least vertex, and vertices along a curve: those of a chunk are led by the vertices from its least
 /// one to the least of the next chunk, which are in chunks of vertices with small boxes.
-fn leaders_nearness(part: &Subdomain, chunk: usize, p: Point) -> f64 {
+pub(super) fn leaders(part: &Subdomain, chunk: usize) -> Range<u32> {
     let least = |chunk: usize| part.tet_summaries().get(chunk).map(|s| s.vertices[0]);
-    let first = part.vertex_chunk_of(least(chunk).unwrap_or_default());
-    let last = least(chunk + 1).map_or(part.vertex_summaries().len() - 1, |v| {
-        part.vertex_chunk_of(v)
-    });
+    let n_vertices = part.row().vertices as u32;
+    let first = least(chunk).unwrap_or_default();
+    let last = least(chunk + 1).map_or(n_vertices, |v| v.saturating_add(1));
+    first..last.min(n_vertices)
+}
+
+/// How near they are, as far as the boxes of their chunks tell.
+fn leaders_nearness(part: &Subdomain, chunk: usize, p: Point) -> f64 {
+    let leaders = leaders(part, chunk);
+    let first = part.vertex_chunk_of(leaders.start);
+    let last = part.vertex_chunk_of(leaders.end.saturating_sub(1));
     (first..=last.max(first))
-        .map(|c| nearness(&vertex_bounds(part, c), p))
+        .map(|c| Near::of(part, c, p, f64::INFINITY).nearness)
         .fold(f64::INFINITY, f64::min)
 }
 

@@ -22,6 +22,8 @@ pub struct TetSummary {
     pub open_faces: u32,
     /// Bytes of the stored value.
     pub bytes: u32,
+    /// Not less than the length of any edge; 0 where that is not told.
+    pub edge_max: f32,
 }
 
 /// Of a chunk of vertices; 64 bytes.
@@ -30,6 +32,8 @@ pub struct VertexSummary {
     pub bounds: [[f64; 3]; 2],
     pub first: u32,
     pub count: u32,
+    /// Which cells of the box, divided in four along each axis, have vertices: bit x + 4 y + 16 z. 0: not told.
+    pub cells: u64,
 }
 
 /// Of a chunk of facets or interface faces; 16 bytes.
@@ -102,6 +106,7 @@ impl ChunkRecord for TetSummary {
             for word in [r0, r1, v0, v1, s.first, s.count, s.open_faces, s.bytes] {
                 columns.raw(&word.to_le_bytes());
             }
+            columns.raw(&s.edge_max.to_le_bytes());
             pad(columns, start, Self::BYTES);
         }
     }
@@ -124,6 +129,7 @@ impl ChunkRecord for TetSummary {
                 count: f.u32(),
                 open_faces: f.u32(),
                 bytes: f.u32(),
+                edge_max: f.f32(),
             });
             f.finish()?;
         }
@@ -134,6 +140,38 @@ impl ChunkRecord for TetSummary {
 impl VertexSummary {
     /// Bytes of a summary.
     pub const BYTES: usize = 64;
+
+    /// The bits of the cells of a box that some points in it are in.
+    pub fn cells_of(bounds: &[[f64; 3]; 2], points: impl Iterator<Item = [f64; 3]>) -> u64 {
+        let cell = |axis: usize, x: f64| {
+            let [low, high] = [bounds[0][axis], bounds[1][axis]];
+            let share = (x - low) / (high - low);
+            // A box without extent gives no number, which becomes 0.
+            (share * 4.0).clamp(0.0, 3.0) as u32
+        };
+        points.fold(0, |cells, p| {
+            cells | 1 << (cell(0, p[0]) + 4 * cell(1, p[1]) + 16 * cell(2, p[2]))
+        })
+    }
+
+    /// Boxes that hold all its vertices: of the cells that have some, a little larger than they are; or of the whole.
+    pub fn cells(&self) -> impl Iterator<Item = [[f64; 3]; 2]> + '_ {
+        /// More than what rounding moves a border by, in extents of the box.
+        const SLACK: f64 = 1e-9;
+        let whole = (self.cells == 0).then_some(self.bounds);
+        let bits = (0..64u32).filter(|i| self.cells >> i & 1 == 1);
+        let [low, high] = self.bounds;
+        whole.into_iter().chain(bits.map(move |i| {
+            let place = [i & 3, i >> 2 & 3, i >> 4].map(f64::from);
+            [0.0, 1.0].map(|end| {
+                std::array::from_fn(|axis| {
+                    let share = (place[axis] + end) / 4.0 + (2.0 * end - 1.0) * SLACK;
+                    let x = low[axis] + share * (high[axis] - low[axis]);
+                    x.clamp(low[axis], high[axis])
+                })
+            })
+        }))
+    }
 }
 
 impl ChunkRecord for VertexSummary {
@@ -147,7 +185,8 @@ impl ChunkRecord for VertexSummary {
             put_bounds(columns, &s.bounds);
             columns.raw(&s.first.to_le_bytes());
             columns.raw(&s.count.to_le_bytes());
-            pad(columns, start, Self::BYTES);
+            columns.raw(&s.cells.to_le_bytes());
+            debug_assert_eq!(columns.bytes.len(), start + Self::BYTES);
         }
     }
 
@@ -163,6 +202,7 @@ impl ChunkRecord for VertexSummary {
                 bounds: f.bounds(),
                 first: f.u32(),
                 count: f.u32(),
+                cells: u64::from_le_bytes(f.take()),
             });
             f.finish()?;
         }

@@ -174,6 +174,7 @@ fn every_kind_comes_back() {
         count: 3,
         open_faces: 5,
         bytes: 65_000,
+        edge_max: 0.7,
     };
     come_back(&vec![summary; 3000]);
     let bounds = [[0.5; 3]; 2];
@@ -181,7 +182,8 @@ fn every_kind_comes_back() {
         VertexSummary {
             bounds,
             first: 0,
-            count: 9
+            count: 9,
+            cells: 5 << 40,
         };
         5000
     ]);
@@ -267,6 +269,60 @@ fn damage_is_an_error() {
             bounds,
             first: 0,
             count: 9,
+            cells: 5 << 40,
         }; 40],
     );
+}
+
+#[test]
+fn the_cells_of_a_box_hold_its_vertices() {
+    let mut state = 7u64;
+    let mut random = || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        (state >> 11) as f64 / (1u64 << 53) as f64
+    };
+    for scale in [1e-200, 1e-9, 1.0, 1e9] {
+        for flat in [false, true] {
+            let points: Vec<[f64; 3]> = (0..40)
+                .map(|i| {
+                    let on_border = |x: f64| {
+                        if i % 3 == 0 {
+                            (x * 4.0).floor() / 4.0
+                        } else {
+                            x
+                        }
+                    };
+                    let z = if flat { 0.3 } else { on_border(random()) };
+                    [on_border(random()), on_border(random()), z].map(|x| (x - 0.4) * scale)
+                })
+                .collect();
+            let bounds = [f64::min as fn(f64, f64) -> f64, f64::max].map(|of| {
+                std::array::from_fn(|axis| {
+                    points
+                        .iter()
+                        .map(|p| p[axis])
+                        .reduce(of)
+                        .expect("forty points")
+                })
+            });
+            let cells = VertexSummary::cells_of(&bounds, points.iter().copied());
+            let told = VertexSummary {
+                bounds,
+                first: 0,
+                count: 40,
+                cells,
+            };
+            for p in &points {
+                let is_in = |[low, high]: [[f64; 3]; 2]| {
+                    (0..3).all(|axis| low[axis] <= p[axis] && p[axis] <= high[axis])
+                };
+                assert!(told.cells().any(is_in), "{p:?} of {bounds:?}");
+            }
+            assert!(flat || told.cells().count() > 20);
+            let untold = VertexSummary { cells: 0, ..told };
+            assert_eq!(untold.cells().collect::<Vec<_>>(), [bounds]);
+        }
+    }
 }
