@@ -26,6 +26,7 @@ pub fn options(args: &ShapeArgs) -> Result<Options, Failure> {
         (&args.regions.map(word), &mut options.regions),
         (&args.optimize.map(word), &mut options.optimize),
         (&args.subdomains, &mut options.subdomains),
+        (&args.seal.map(word), &mut options.seal),
     ];
     for (given, option) in texts {
         if given.is_some() {
@@ -46,6 +47,7 @@ pub fn options(args: &ShapeArgs) -> Result<Options, Failure> {
         });
     }
     options.subdomain_count()?;
+    options.form()?;
     background::identify(&mut options)?;
     Ok(options)
 }

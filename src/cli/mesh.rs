@@ -186,6 +186,7 @@ fn already_there(
     let same_options = serde_json::from_str::<Options>(&job.options).is_ok_and(|mut o| {
         // A store that kept more or less than asked for holds the same mesh.
         o.drop_coarse = options.drop_coarse;
+        o.seal.clone_from(&options.seal);
         o == *options
     });
     let input = input::load(&args.surfaces, talk)?;

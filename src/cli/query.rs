@@ -4,8 +4,8 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, stdin};
 use std::path::Path;
 
+use super::args::QueryArgs;
 use super::failure::Failure;
-use super::query_args::QueryArgs;
 use super::query_ask::{bad, point, selection};
 use super::query_rows::{Column, FileSink, Row, Sink, Writer};
 use super::talk::Talk;

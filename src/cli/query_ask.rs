@@ -1,7 +1,7 @@
 //! What a query asks for: words to places, ids and conditions.
 
+use super::args::QueryArgs;
 use super::failure::Failure;
-use super::query_args::QueryArgs;
 use crate::expr::{ExprError, Expression, Kind};
 use crate::geom::{Aabb, Point};
 use crate::report::{Inquiry, ReportError, Selection, Solid, VARIABLES};

@@ -5,9 +5,9 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
+use super::args::ResaturateArgs;
 use super::failure::Failure;
 use super::info::{hex, share_below_two};
-use super::resaturate_args::ResaturateArgs;
 use super::resaturate_sizes::{self, new_sizes};
 use super::talk::Talk;
 use super::{memory, mesh, store, verify};

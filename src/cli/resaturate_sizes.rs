@@ -4,9 +4,9 @@ use std::path::Path;
 
 use serde_json::json;
 
+use super::args::ResaturateArgs;
 use super::args::SizeArgs;
 use super::failure::Failure;
-use super::resaturate_args::ResaturateArgs;
 use super::talk::Talk;
 use super::{background, config, store};
 use crate::catalog::Store;

@@ -2,18 +2,21 @@
 
 use std::path::PathBuf;
 
-use super::args::{RunArgs, SizeArgs};
+use super::{RunArgs, SizeArgs};
 
 /// Make sub-domains of a finished store again, from their coarse leaves. Interfaces and all other sub-domains stay as they are.
 ///
 /// Size options take the place of all sizes that the sub-domains were made with; without any, they are made as they were.
 #[derive(Debug, clap::Args)]
 #[command(
+    mut_arg("size_field", |arg| arg.help("Edge lengths from a file: .npy, one for each tetrahedron (or vertex) of the named sub-domains in the order in which `tetdb export --subdomain` writes them; or a MEDIT .sol with its background .mesh of tetrahedra beside it")),
+    mut_arg("hsiz", |arg| arg.help("Edge length inside: a length, or 1% of the box diagonal [default: as it was made]")),
     after_help = "Examples:\n  tetdb resaturate part.tetdb --subdomain 5,9 --hsiz 1%\n  tetdb resaturate part.tetdb --subdomain 5 --refine-by 0.5\n  \
     tetdb resaturate part.tetdb --subdomain 5 --size-field h.npy\n  tetdb resaturate part.tetdb --changed --size-sphere 0,0,0,0.1,0.01 --dry-run\n  \
     tetdb resaturate part.tetdb --undo\n  tetdb resaturate part.tetdb --repair"
 )]
 pub struct ResaturateArgs {
+    /// The store, as `tetdb mesh` made it
     #[arg(value_name = "STORE")]
     pub store: PathBuf,
     /// The sub-domains to make again, as numbers with commas between them

@@ -13,6 +13,7 @@ use std::path::PathBuf;
     angle_min, angle_max (dihedral, degrees); columns also: id, vertices, points."
 )]
 pub struct QueryArgs {
+    /// The store, as `tetdb mesh` made it
     #[arg(value_name = "STORE")]
     pub store: PathBuf,
     /// The tetrahedron that holds a point; may be repeated
@@ -40,7 +41,7 @@ pub struct QueryArgs {
     /// Of these sub-domains, such as 0,3
     #[arg(long, value_name = "LIST", alias = "domain")]
     pub subdomain: Option<String>,
-    /// Of these regions
+    /// Of these regions, as numbers in `tetdb info`
     #[arg(long, value_name = "LIST")]
     pub region: Option<String>,
     /// With a face on an input triangle of one of these labels, names or numbers
@@ -67,7 +68,7 @@ pub struct QueryArgs {
     /// Those that have both vertices of an edge
     #[arg(long, value_name = "VERTEX,VERTEX")]
     pub shell: Option<String>,
-    /// Columns to answer with
+    /// Columns to answer with, such as id,quality,vertices
     #[arg(long, value_name = "COLUMNS")]
     pub select: Option<String>,
     /// Sort by a column of numbers [default: by id]

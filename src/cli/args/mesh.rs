@@ -1,0 +1,64 @@
+//! What can be typed behind `mesh`, `estimate` and `resume`.
+
+use std::path::PathBuf;
+
+use super::{RunArgs, ShapeArgs};
+
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  tetdb mesh part.stl\n  tetdb mesh part.stl -o part.tetdb --hsiz 2% --memory 2GiB --export part.vtu\n  \
+    tetdb mesh sample:balls,count=100 -o balls.tetdb"
+)]
+pub struct MeshArgs {
+    /// Surface files (STL, PLY, OBJ, OFF, MEDIT, Gmsh, TetGen), or a sample such as sample:balls,count=100
+    #[arg(required = true, value_name = "SURFACE")]
+    pub surfaces: Vec<String>,
+    /// The store to make [default: the surface's name with .tetdb, here]
+    #[arg(short, long, value_name = "STORE")]
+    pub output: Option<PathBuf>,
+    #[command(flatten)]
+    pub shape: ShapeArgs,
+    /// Replace the store if it is there
+    #[arg(long)]
+    pub force: bool,
+    /// Begin even when disk or memory are expected not to hold the mesh
+    #[arg(long, hide = true)]
+    pub no_preflight: bool,
+    #[command(flatten)]
+    pub run: RunArgs,
+}
+
+/// What a mesh will be and what it will take, before any of it is made. Nothing is refused but a bad surface or option.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  tetdb estimate part.stl\n  tetdb estimate part.stl --hsiz 1% --memory 2GiB\n  tetdb estimate sample:balls,count=100 --json"
+)]
+pub struct EstimateArgs {
+    /// Surface files, or a sample such as sample:balls,count=100
+    #[arg(required = true, value_name = "SURFACE")]
+    pub surfaces: Vec<String>,
+    /// Where the store would be [default: here]
+    #[arg(short, long, value_name = "STORE")]
+    pub output: Option<PathBuf>,
+    #[command(flatten)]
+    pub shape: ShapeArgs,
+    /// Most memory the run would hold [default: 60 % of what is free]
+    #[arg(long, value_name = "SIZE")]
+    pub memory: Option<String>,
+    /// Threads the run would use [default: all cores]
+    #[arg(long, value_name = "N")]
+    pub threads: Option<usize>,
+    /// Answer with one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  tetdb resume part.tetdb --memory 2GiB")]
+pub struct ResumeArgs {
+    /// The store whose run was killed or stopped
+    #[arg(value_name = "STORE")]
+    pub store: PathBuf,
+    #[command(flatten)]
+    pub run: RunArgs,
+}

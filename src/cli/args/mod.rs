@@ -1,0 +1,144 @@
+//! What can be typed.
+
+mod mesh;
+mod query;
+mod resaturate;
+mod shape;
+mod show;
+mod store;
+mod surface;
+
+use std::path::PathBuf;
+
+use clap::{Parser, Subcommand};
+
+pub use mesh::{EstimateArgs, MeshArgs, ResumeArgs};
+pub use query::QueryArgs;
+pub use resaturate::ResaturateArgs;
+pub use shape::{Optimize, Regions, ShapeArgs, SizeArgs};
+pub use show::{ColorBy, CompletionsArgs, ManArgs, ReportArgs, SnapshotArgs};
+pub use store::{CompareArgs, ExportArgs, StoreArgs, VerifyArgs};
+pub use surface::{CheckArgs, RefineSurfaceArgs, SampleArgs};
+
+/// Tetrahedral meshes of any size in a database, every input triangle kept.
+#[derive(Debug, Parser)]
+#[command(name = "tetdb", version, about, max_term_width = 110)]
+#[command(
+    after_help = "`tetdb mesh` fills a closed triangle surface with tetrahedra and leaves a store, which is a directory; most other commands take a\n\
+    store and read it. A run that was stopped goes on with `tetdb resume`. Made surfaces such as sample:balls,count=100 stand\n\
+    wherever a surface file can.\n\n\
+    Examples:\n  tetdb check part.stl\n  tetdb mesh part.stl --export part.vtu\n  tetdb info part.tetdb\n  tetdb report part.tetdb part.html\n  \
+    tetdb mesh sample:balls,count=100 -o balls.tetdb --memory 256MiB\n\nExit codes: 0 done, 1 internal error, 2 usage, 3 bad input, 4 store damaged, 5 store busy,\n\
+    6 memory or disk, 7 the answer is no, 8 store unusable as it is, 130/143 stopped."
+)]
+pub struct Args {
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Mesh a closed surface into a store, and verify it
+    Mesh(Box<MeshArgs>),
+    /// Say what a mesh will be and what it will take, without making it
+    ///
+    /// Nothing is refused but a bad surface or option.
+    Estimate(Box<EstimateArgs>),
+    /// Go on with an unfinished store
+    Resume(ResumeArgs),
+    /// Make sub-domains again: with other sizes, or damaged ones
+    ///
+    /// Each is made from the coarse mesh kept in the store. Interfaces and all other sub-domains stay as they are. Size options take the
+    /// place of all sizes that the sub-domains were made with; without any, they are made as they were.
+    Resaturate(Box<ResaturateArgs>),
+    /// Say whether a surface can be meshed, and where it cannot
+    ///
+    /// Holes, T-junctions, triangles without area, repeated ones and crossings are listed with their places. Nothing is changed unless
+    /// --repair is given.
+    Check(CheckArgs),
+    /// Say what a store holds
+    #[command(after_help = "Examples:\n  tetdb info part.tetdb\n  tetdb info part.tetdb --json")]
+    Info(StoreArgs),
+    /// Ask for tetrahedra by place, number, neighborhood or condition
+    ///
+    /// All that is given must hold; nothing given means all tetrahedra. Only the parts of the store that matter are read.
+    Query(Box<QueryArgs>),
+    /// Prove that a store holds a valid mesh
+    ///
+    /// All tetrahedra positive by exact signs, each face paired or on the surface, each input triangle there, checksums and digest as they
+    /// were written.
+    Verify(VerifyArgs),
+    /// Set the qualities of two meshes side by side
+    ///
+    /// Tetrahedra by quality; those that the surface forces to be bad and those at interfaces apart.
+    Compare(CompareArgs),
+    /// Print the digest of a store's mesh
+    ///
+    /// 32 hex digits: equal ones mean equal meshes, down to the last bit of each coordinate.
+    #[command(after_help = "Example:\n  tetdb digest part.tetdb")]
+    Digest(StoreArgs),
+    /// Write a mesh file for other programs
+    Export(ExportArgs),
+    /// Write the same surface in finer triangles
+    ///
+    /// Edges longer than wanted are halved, no triangle leaves its place.
+    RefineSurface(RefineSurfaceArgs),
+    /// Draw a cut through the mesh, or its surfaces in space
+    ///
+    /// A cut is seen from the side its direction points to. Only what is seen is read.
+    Snapshot(SnapshotArgs),
+    /// Write a page about a mesh, with everything in it to look at
+    ///
+    /// For any browser, in one file and without a network: numbers, tables, charts, and the mesh in space to turn and cut. Below 20 MB
+    /// whatever the mesh.
+    Report(ReportArgs),
+    /// Write a made surface to a file
+    Sample(SampleArgs),
+    /// Print the completions of a shell
+    Completions(CompletionsArgs),
+    /// Print a manual page, or write them all
+    Man(ManArgs),
+}
+
+impl Command {
+    /// Whether output is for programs.
+    pub fn is_json(&self) -> bool {
+        match self {
+            Self::Mesh(a) => a.run.json,
+            Self::Estimate(a) => a.json,
+            Self::Resume(a) => a.run.json,
+            Self::Resaturate(a) => a.run.json,
+            Self::Check(a) => a.json,
+            Self::Info(a) | Self::Digest(a) => a.json,
+            Self::Query(a) => a.json,
+            Self::Verify(a) => a.json,
+            Self::Compare(a) => a.json,
+            Self::Export(a) => a.json,
+            Self::RefineSurface(a) => a.json,
+            Self::Snapshot(a) => a.json,
+            Self::Report(a) => a.json,
+            Self::Sample(a) => a.json,
+            Self::Completions(_) | Self::Man(_) => false,
+        }
+    }
+}
+
+/// How to run; none of this changes the mesh.
+#[derive(Debug, clap::Args)]
+pub struct RunArgs {
+    /// Most memory to hold, such as 512MiB or 8GiB [default: 60 % of what is free]
+    #[arg(long, value_name = "SIZE")]
+    pub memory: Option<String>,
+    /// Threads to use [default: all cores]
+    #[arg(long, value_name = "N")]
+    pub threads: Option<usize>,
+    /// Skip the verification at the end
+    #[arg(long)]
+    pub no_verify: bool,
+    /// Also write these mesh files (.vtu, .pvtu, .mesh, .meshb, .msh, .inp, .npy, .json, .parquet where built in)
+    #[arg(long, value_name = "FILE")]
+    pub export: Vec<PathBuf>,
+    /// Answer with one JSON object
+    #[arg(long)]
+    pub json: bool,
+}

@@ -1,0 +1,106 @@
+//! What shapes a mesh: sizes, regions, optimization, sub-domains.
+
+use std::path::PathBuf;
+
+use clap::ValueEnum;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Regions {
+    /// What an odd number of shells separates from the outside: a shell in a shell is a hole
+    Parity,
+    /// Every bounded region
+    All,
+    /// Only what lies behind the outermost shells
+    Outer,
+    /// What lies behind triangles that look away from it
+    ByOrientation,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Optimize {
+    /// Nothing after the last vertex is inserted
+    None,
+    /// Only changes that keep the mesh locally Delaunay
+    Delaunay,
+    /// Until no badly shaped tetrahedron can be improved
+    Full,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Seal {
+    /// In chunks, packed
+    Packed,
+    /// As the pages they are worked in: no time is taken to pack or unpack them, at six times the bytes
+    None,
+}
+
+/// Wanted edge lengths.
+#[derive(Clone, Debug, Default, PartialEq, clap::Args)]
+pub struct SizeArgs {
+    /// Edge length inside: a length, or 1% of the box diagonal [default: from the surface's edges]
+    #[arg(long, value_name = "H")]
+    pub hsiz: Option<String>,
+    /// Least edge length inside
+    #[arg(long, value_name = "H")]
+    pub hmin: Option<String>,
+    /// Greatest edge length inside
+    #[arg(long, value_name = "H")]
+    pub hmax: Option<String>,
+    /// Greatest ratio of neighboring edge lengths [default: 1.3]
+    #[arg(long, value_name = "RATIO")]
+    pub hgrad: Option<String>,
+    /// Edge length in a box, and at most OUTSIDE away from it; may be repeated
+    #[arg(
+        long,
+        value_name = "X0,Y0,Z0,X1,Y1,Z1,H[,OUTSIDE]",
+        allow_hyphen_values = true
+    )]
+    pub size_box: Vec<String>,
+    /// Edge length in a sphere, and at most OUTSIDE away from it; may be repeated
+    #[arg(long, value_name = "X,Y,Z,R,H[,OUTSIDE]", allow_hyphen_values = true)]
+    pub size_sphere: Vec<String>,
+    /// Edge length in a cylinder around the axis between two points; may be repeated
+    #[arg(
+        long,
+        value_name = "X0,Y0,Z0,X1,Y1,Z1,R,H[,OUTSIDE]",
+        allow_hyphen_values = true
+    )]
+    pub size_cylinder: Vec<String>,
+    /// Edge length in a region, by its number in `tetdb info` or a label of triangles around it; may be repeated
+    #[arg(long, value_name = "REGION_OR_LABEL,H")]
+    pub size_region: Vec<String>,
+    /// Edge lengths at the vertices of a mesh: a MEDIT .sol with its background .mesh of tetrahedra beside it, or with one length for each of the surface's vertices
+    #[arg(long, value_name = "FILE")]
+    pub size_field: Option<String>,
+    /// Edge length as an expression in x, y and z, such as 'max(0.02, 0.1*sqrt(x^2+y^2))'
+    #[arg(long, value_name = "EXPR", allow_hyphen_values = true)]
+    pub size_expr: Option<String>,
+}
+
+/// What shapes the mesh, besides the surface.
+#[derive(Debug, clap::Args)]
+pub struct ShapeArgs {
+    #[command(flatten)]
+    pub sizes: SizeArgs,
+    /// Options from a TOML file, such as hsiz = "2%"; what the command line says goes first
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// Which regions to fill [default: parity]
+    #[arg(long, value_enum)]
+    pub regions: Option<Regions>,
+    /// How far to optimize [default: full]
+    #[arg(long, value_enum)]
+    pub optimize: Option<Optimize>,
+    /// Do not keep what sub-domains are made from: a smaller store, in which none can be made again by `tetdb resaturate`
+    #[arg(long)]
+    pub drop_coarse: bool,
+    /// How finished sub-domains are kept [default: packed]
+    #[arg(long, value_enum)]
+    pub seal: Option<Seal>,
+    /// Number of sub-domains: auto, or a number [default: auto, one for each 4 million tetrahedra]
+    #[arg(long, value_name = "N", alias = "domains")]
+    pub subdomains: Option<String>,
+    /// Keep the meshes before and after each cut is refined, and the interface before and after it is chosen, for `tetdb snapshot --stage`
+    #[arg(long)]
+    pub keep_stages: bool,
+}

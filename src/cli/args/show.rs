@@ -1,0 +1,109 @@
+//! What can be typed behind `snapshot`, `report`, `completions` and `man`.
+
+use std::path::PathBuf;
+
+use clap::ValueEnum;
+
+/// What colors stand for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ColorBy {
+    Subdomain,
+    Region,
+    Quality,
+    Size,
+}
+
+/// A cut through the mesh by a plane, seen from the side its direction points to; or surfaces in space. Reads only what is seen.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  tetdb snapshot part.tetdb cut.png\n  tetdb snapshot part.tetdb cut.png --plane 0,0,0,1,0.5,0 --crinkle --color quality\n  \
+    tetdb snapshot part.tetdb bad.svg --where \"quality > 2\" --crinkle\n  tetdb snapshot part.tetdb whole.png --surface\n  tetdb snapshot part.tetdb inside.png --surface --plane 0,0,0,1,0,0\n  \
+    tetdb snapshot part.tetdb shell.png --shell 3 --from 1,1,0.5\n  tetdb snapshot stages.tetdb coarse.png --stage 2:coarse\n  tetdb snapshot stages.tetdb refined.png --stage 2:refined\n  \
+    tetdb snapshot stages.tetdb natural.png --stage 2:natural\n  tetdb snapshot stages.tetdb interface.png --stage 2:interface\n\n\
+    Two meshes compared: give both the same --plane, --color and --size; quality is always colored from 1 to 3.\n\
+    Stages need a store made with --keep-stages."
+)]
+pub struct SnapshotArgs {
+    /// The store, as `tetdb mesh` made it
+    #[arg(value_name = "STORE")]
+    pub store: PathBuf,
+    /// The picture to write: .png or .svg
+    #[arg(value_name = "OUT")]
+    pub output: PathBuf,
+    /// A point of the plane and the direction towards the viewer [default: across the middle of the mesh]
+    #[arg(long, value_name = "X,Y,Z,NX,NY,NZ", allow_hyphen_values = true)]
+    pub plane: Option<String>,
+    /// Draw the tetrahedra that meet the plane whole, not the polygons it cuts out of them
+    #[arg(long)]
+    pub crinkle: bool,
+    /// The whole surface in space, shaded; with --plane, what lies beyond it is left out and the inside is seen
+    #[arg(long, conflicts_with_all = ["crinkle", "condition"])]
+    pub surface: bool,
+    /// What bounds one sub-domain in space, shaded: input triangles in its color, interfaces in that of the neighbor; with --plane as above
+    #[arg(long, value_name = "SUBDOMAIN", conflicts_with_all = ["surface", "crinkle", "condition"])]
+    pub shell: Option<u32>,
+    /// What a cut had on its way, of a store made with --keep-stages: coarse or refined (the mesh, with the plane of the cut as a line),
+    /// natural or interface (the interface in space, before and after its faces were chosen)
+    #[arg(long, value_name = "CUT:WHAT", conflicts_with_all = ["surface", "shell"])]
+    pub stage: Option<String>,
+    /// The direction towards the viewer of what is shown in space
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    pub from: Option<String>,
+    /// What colors stand for: size is the mean of the longest and the shortest edge
+    #[arg(long, value_enum, default_value = "subdomain", value_name = "WHAT")]
+    pub color: ColorBy,
+    /// Draw only tetrahedra of which this holds, as in `tetdb query`
+    #[arg(long = "where", value_name = "EXPRESSION", allow_hyphen_values = true)]
+    pub condition: Option<String>,
+    /// Width and height in pixels
+    #[arg(long, value_name = "WxH", default_value = "1600x1200")]
+    pub size: String,
+    /// Most memory to hold
+    #[arg(long, value_name = "SIZE")]
+    pub memory: Option<String>,
+    /// Answer with one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// A page for any browser, in one file and without a network: numbers, tables, charts, and the mesh in space to turn and cut.
+/// Below 20 MB whatever the mesh.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  tetdb report part.tetdb part.html")]
+pub struct ReportArgs {
+    /// The store, as `tetdb mesh` made it
+    #[arg(value_name = "STORE")]
+    pub store: PathBuf,
+    /// The page to write: .html; one that is there is replaced
+    #[arg(value_name = "OUT")]
+    pub output: PathBuf,
+    /// Most memory to hold
+    #[arg(long, value_name = "SIZE")]
+    pub memory: Option<String>,
+    /// Answer with one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  tetdb completions bash > ~/.local/share/bash-completion/completions/tetdb\n  \
+    tetdb completions zsh > ~/.zfunc/_tetdb\n  tetdb completions fish > ~/.config/fish/completions/tetdb.fish"
+)]
+pub struct CompletionsArgs {
+    #[arg(value_name = "SHELL")]
+    pub shell: clap_complete::Shell,
+}
+
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  tetdb man query | man -l -\n  tetdb man --dir ~/.local/share/man/man1"
+)]
+pub struct ManArgs {
+    /// The command whose page is wanted [default: that of the program]
+    #[arg(value_name = "COMMAND")]
+    pub command: Option<String>,
+    /// Write all pages into this folder
+    #[arg(long, value_name = "DIR", conflicts_with = "command")]
+    pub dir: Option<PathBuf>,
+}

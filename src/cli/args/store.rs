@@ -1,0 +1,94 @@
+//! What can be typed behind `info`, `digest`, `verify`, `compare` and `export`.
+
+use std::path::PathBuf;
+
+#[derive(Debug, clap::Args)]
+pub struct StoreArgs {
+    /// The store, as `tetdb mesh` made it
+    #[arg(value_name = "STORE")]
+    pub store: PathBuf,
+    /// Answer with one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  tetdb verify part.tetdb\n  tetdb verify part.tetdb --full --against part.stl\n\n\
+    Exit code 0: the mesh is valid; 7: it is not; 4: the store is damaged, and what is damaged is listed."
+)]
+pub struct VerifyArgs {
+    /// The store, as `tetdb mesh` made it
+    #[arg(value_name = "STORE")]
+    pub store: PathBuf,
+    /// Also count the faces that are locally Delaunay
+    #[arg(long)]
+    pub full: bool,
+    /// The surface whose triangles must all be there [default: what the store was made from]
+    #[arg(long, value_name = "SURFACE")]
+    pub against: Vec<String>,
+    /// Most memory to hold
+    #[arg(long, value_name = "SIZE")]
+    pub memory: Option<String>,
+    /// Answer with one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Two meshes side by side: tetrahedra by quality; those forced by the surface and those at interfaces apart.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Example:\n  tetdb compare one.tetdb four.tetdb\n\nExit code 0: the same mesh, bit by bit; 7: another."
+)]
+pub struct CompareArgs {
+    /// A store
+    #[arg(value_name = "A")]
+    pub first: PathBuf,
+    /// The other one
+    #[arg(value_name = "B")]
+    pub second: PathBuf,
+    /// Most memory to hold
+    #[arg(long, value_name = "SIZE")]
+    pub memory: Option<String>,
+    /// Answer with one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  tetdb export part.tetdb part.vtu part.msh\n  tetdb export part.tetdb part.pvtu topology.json\n  \
+    tetdb export part.tetdb piece.meshb --pieces --subdomain 3,5\n  tetdb export part.tetdb cuts.vtu --interfaces"
+)]
+pub struct ExportArgs {
+    /// The store, as `tetdb mesh` made it
+    #[arg(value_name = "STORE")]
+    pub store: PathBuf,
+    /// Files to write; the extension tells the format: .vtu, .pvtu, .mesh, .meshb, .msh, .inp, .npy (an array a file), .json (topology), .parquet (where built in)
+    #[arg(required = true, value_name = "OUT")]
+    pub out: Vec<PathBuf>,
+    /// A file for each sub-domain, NAME_00007.mesh, with the faces it shares with others; .pvtu always does so
+    #[arg(long)]
+    pub pieces: bool,
+    /// Only these sub-domains, as numbers with commas between them
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        alias = "domain",
+        alias = "subdomains"
+    )]
+    pub subdomain: Vec<u32>,
+    /// Only input triangles and faces between sub-domains (.vtu)
+    #[arg(long, conflicts_with = "interfaces")]
+    pub boundary: bool,
+    /// Only faces between sub-domains (.vtu)
+    #[arg(long)]
+    pub interfaces: bool,
+    /// Most memory to hold
+    #[arg(long, value_name = "SIZE")]
+    pub memory: Option<String>,
+    /// Answer with one JSON object
+    #[arg(long)]
+    pub json: bool,
+}

@@ -1,0 +1,76 @@
+//! What can be typed behind `check`, `refine-surface` and `sample`.
+
+use std::path::PathBuf;
+
+/// What is wrong with a surface, and what mesh it allows. Nothing is changed unless --repair is given.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  tetdb check part.stl\n  tetdb check part.stl --json\n  tetdb check part.stl --write-bad bad.vtu\n  \
+    tetdb check part.stl --repair --write fixed.stl\n  tetdb check part.stl --repair --weld 1e-6 --write fixed.stl\n\n\
+    Exit code 0: the surface can be meshed; 3: it has defects. With --repair this is said of what was written."
+)]
+pub struct CheckArgs {
+    /// Surface files, or a sample such as sample:balls,count=100
+    #[arg(required = true, value_name = "SURFACE")]
+    pub surfaces: Vec<String>,
+    /// Write the defective triangles to this .vtu file, the kind of defect as cell data
+    #[arg(long, value_name = "FILE")]
+    pub write_bad: Option<PathBuf>,
+    /// Drop triangles without area and repeated ones, divide triangles at T-junctions, turn neighbors alike
+    #[arg(long, requires = "write")]
+    pub repair: bool,
+    /// With --repair: first join points not farther apart than this share of the box diagonal
+    #[arg(long, value_name = "R", requires = "repair")]
+    pub weld: Option<String>,
+    /// With --repair: where to write the repaired surface (.stl, .ply, .obj, .off)
+    #[arg(long, value_name = "OUT", requires = "repair")]
+    pub write: Option<PathBuf>,
+    /// Answer with one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  tetdb sample balls,count=1000,h=0.0093 -o balls.stl\n  tetdb sample box,h=0.1 -o box.off\n\n\
+    Keys, each with a default:
+  balls   count, seed, h      a cube with empty balls of many sizes in it
+  box     x, y, z, h          sides of a box
+  grains  count, seed, h      disjoint convex polyhedra in a box; mesh them with --regions all
+  knot    tube, h             a knotted tube
+  shells  count, kind, h      one inside the other; kind is spheres or boxes
+  sphere  radius, h
+h is the length of the edges."
+)]
+pub struct SampleArgs {
+    /// NAME,key=value,... with the names balls, box, grains, knot, shells, sphere
+    #[arg(value_name = "SAMPLE")]
+    pub sample: String,
+    /// The file to write: .stl (text), .off, .obj or .ply, all exact
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Answer with one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// The same surface in finer triangles: edges longer than wanted are halved, no triangle leaves its place.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  tetdb refine-surface part.stl fine.stl --hsiz 1%")]
+pub struct RefineSurfaceArgs {
+    /// A surface file, or a sample
+    #[arg(value_name = "IN")]
+    pub surface: String,
+    /// The file to write: .stl (text), .off, .obj or .ply, all exact
+    #[arg(value_name = "OUT")]
+    pub output: PathBuf,
+    /// Wanted edge length: a length, or 1% of the box diagonal; shorter edges stay
+    #[arg(long, value_name = "H")]
+    pub hsiz: String,
+    /// Greatest ratio of neighboring edge lengths [default: 1.3]
+    #[arg(long, value_name = "RATIO")]
+    pub hgrad: Option<String>,
+    /// Answer with one JSON object
+    #[arg(long)]
+    pub json: bool,
+}

@@ -1,0 +1,227 @@
+//! JSON.md tells every key that is answered, and no other.
+//!
+//! Why: scripts are written from that page.
+//! How: each section's commands are run; the keys of what they answer, over all runs of a section, must be those of its tables.
+
+use std::collections::BTreeSet;
+
+use serde_json::Value;
+
+use super::place::Place;
+
+const PAGE: &str = include_str!("../../JSON.md");
+/// Keys below these are of anybody's making.
+const FREE: [&str; 4] = [
+    "options",
+    "subdomains[].sizes.options",
+    "findings",
+    "measures.chunks",
+];
+
+/// What is run in which section, in order. The surfaces are made before.
+const RUNS: [(&str, &[&str]); 13] = [
+    (
+        "sample",
+        &[
+            "sample box,h=0.045 -o box.stl",
+            "sample sphere,h=0.2 -o sphere.stl",
+        ],
+    ),
+    (
+        "check",
+        &[
+            "check sphere.stl",
+            "check holes.off --write-bad bad.vtu",
+            "check crossing.off",
+            "check holes.off --repair --weld 1e-3 --write fixed.off",
+        ],
+    ),
+    (
+        "estimate",
+        &["estimate box.stl --subdomains 2 --memory 256MiB"],
+    ),
+    (
+        "info",
+        &[
+            "mesh box.stl -o a.tetdb --subdomains 2 --keep-stages --memory 256MiB",
+            "resume a.tetdb",
+        ],
+    ),
+    ("digest", &["digest a.tetdb"]),
+    (
+        "verify",
+        &[
+            "verify a.tetdb --full",
+            "verify a.tetdb --against sphere.stl",
+        ],
+    ),
+    ("compare", &["compare a.tetdb a.tetdb"]),
+    (
+        "export",
+        &["export a.tetdb a.vtu a.npy", "export a.tetdb a.json"],
+    ),
+    (
+        "refine-surface",
+        &["refine-surface sphere.stl fine.stl --hsiz 0.1"],
+    ),
+    (
+        "query",
+        &[
+            "query a.tetdb --point 0.1,0.2,0.3 --point 7,7,7",
+            "query a.tetdb --tet 0:5",
+            "query a.tetdb --tet 0:5 --select id,x,y,z,edge_min,edge_max,angle_min,angle_max",
+        ],
+    ),
+    ("snapshot", &["snapshot a.tetdb a.svg"]),
+    ("report", &["report a.tetdb a.html"]),
+    (
+        "resaturate",
+        &[
+            "resaturate a.tetdb --subdomain 1 --refine-by 0.9 --dry-run",
+            "resaturate a.tetdb --subdomain 1 --refine-by 0.9",
+            "info a.tetdb",
+            "resaturate a.tetdb --undo",
+            "resaturate a.tetdb --repair --subdomain 0",
+            "resaturate a.tetdb --forget",
+        ],
+    ),
+];
+
+/// A square without its lid, with a repeated triangle and a vertex on an edge.
+const HOLES: &str = "OFF\n9 8 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n1 0 1\n0.5 0.5 0.5\n0.5 0 0\n0.5 0 0\n\
+    3 0 1 2\n3 0 2 3\n3 0 1 5\n3 0 1 5\n3 0 5 4\n3 0 1 7\n3 3 6 2\n3 2 5 0\n";
+/// Two tetrahedra that cross, and a triangle whose neighbor across has its edge in two.
+const CROSSING: &str = "OFF\n13 11 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n0.1 0.1 0.1\n2 0.1 0.1\n0.1 2 0.1\n0.1 0.1 2\n\
+    5 0 0\n7 0 0\n6 1 0\n6 0 0\n6 -1 0\n\
+    3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n3 4 6 5\n3 4 5 7\n3 4 7 6\n3 5 6 7\n3 8 9 10\n3 11 8 12\n3 9 11 12\n";
+
+/// The keys of each section; of `info` also where it is told under other names.
+fn documented(section: &str) -> BTreeSet<String> {
+    let mut inside = false;
+    let mut keys = BTreeSet::new();
+    for line in PAGE.lines() {
+        if let Some(title) = line.strip_prefix("## ") {
+            inside = title.starts_with(&format!("`tetdb {section}`")) || title.starts_with(section);
+        }
+        let Some(row) = line.strip_prefix("| `").filter(|_| inside) else {
+            continue;
+        };
+        let cell = row.split(" |").next().unwrap_or_default();
+        keys.extend(cell.trim_matches('`').split("`, `").map(str::to_owned));
+    }
+    assert!(!keys.is_empty(), "JSON.md tells nothing of {section}");
+    keys
+}
+
+/// The keys of a value; those below [`FREE`] as one.
+fn collect(value: &Value, key: &str, keys: &mut BTreeSet<String>) {
+    match value {
+        Value::Object(object) if FREE.contains(&key) => {
+            if !object.is_empty() {
+                keys.insert(format!("{key}.*"));
+            }
+        }
+        Value::Object(object) => {
+            for (name, value) in object {
+                let key = match key {
+                    "" => name.clone(),
+                    above => format!("{above}.{name}"),
+                };
+                collect(value, &key, keys);
+            }
+        }
+        Value::Array(list) => {
+            for value in list {
+                collect(value, &format!("{key}[]"), keys);
+            }
+        }
+        _ => {
+            keys.insert(key.to_owned());
+        }
+    }
+}
+
+/// What is told by its parts is told: a null in place of an object or list has the key of neither.
+fn settle(found: &mut BTreeSet<String>, told: &BTreeSet<String>) {
+    found.retain(|key| {
+        let parts = [format!("{key}."), format!("{key}[")];
+        told.contains(key) || !told.iter().any(|t| parts.iter().any(|p| t.starts_with(p)))
+    });
+}
+
+#[test]
+fn every_key_is_told_and_no_other() {
+    let place = Place::new();
+    place.write("holes.off", HOLES);
+    place.write("crossing.off", CROSSING);
+    let talk = documented("stderr");
+    let (mut said, mut of_info) = (BTreeSet::new(), BTreeSet::new());
+    for (section, lines) in RUNS {
+        let mut found = BTreeSet::new();
+        for line in lines {
+            let done = place.run_line(&format!("{line} --json"));
+            assert!(
+                matches!(done.exit(), Some(0 | 3 | 7)),
+                "{line}: {}",
+                done.stderr()
+            );
+            for answer in done.stdout().lines() {
+                let value: Value = serde_json::from_str(answer).expect("an object a line");
+                let into = match line.starts_with("info") || section == "info" {
+                    true => &mut of_info,
+                    false => &mut found,
+                };
+                collect(&value, "", into);
+            }
+            for line in done.stderr().lines() {
+                let value: Value = serde_json::from_str(line).expect("an object a line");
+                collect(&value, "", &mut said);
+            }
+        }
+        if section != "info" {
+            same(section, found);
+        }
+    }
+    same("info", of_info);
+    let failed = place.run_line("info nothing.tetdb --json").stderr();
+    for line in failed.lines() {
+        let value: Value = serde_json::from_str(line).expect("an object a line");
+        collect(&value, "", &mut said);
+    }
+    // A line of progress comes only of what lasts; its keys are those of a test of their own.
+    settle(&mut said, &talk);
+    let untold: Vec<&String> = said.difference(&talk).collect();
+    assert!(
+        untold.is_empty(),
+        "stderr says what JSON.md does not: {untold:?}"
+    );
+    let unsaid = talk
+        .difference(&said)
+        .filter(|k| !k.starts_with("progress"));
+    assert_eq!(unsaid.collect::<Vec<_>>(), Vec::<&String>::new());
+}
+
+fn same(section: &str, mut found: BTreeSet<String>) {
+    let told = documented(section);
+    settle(&mut found, &told);
+    let untold: Vec<&String> = found.difference(&told).collect();
+    let missing: Vec<&String> = told.difference(&found).collect();
+    assert!(
+        untold.is_empty() && missing.is_empty(),
+        "{section}: JSON.md does not tell {untold:?}, and tells {missing:?}, which no run answered"
+    );
+}
+
+/// No command with `--json` is left out.
+#[test]
+fn every_command_has_a_section() {
+    let help = Place::new().run(&["--help"]).succeeds().stdout();
+    let commands = help.lines().skip_while(|l| *l != "Commands:").skip(1);
+    for line in commands.take_while(|l| !l.is_empty()) {
+        let name = line.split_whitespace().next().unwrap_or_default();
+        let is_silent = ["help", "completions", "man"].contains(&name);
+        let is_told = PAGE.contains(&format!("## `tetdb {name}`"))
+            || ["mesh", "resume"].contains(&name) && PAGE.contains(&format!("`{name}`"));
+        assert!(is_silent || is_told, "JSON.md has no section on {name}");
+    }
+}
