@@ -1,7 +1,10 @@
 //! Coarse leaves: working meshes kept as they were, in the order they were, less what follows from the rest (neighbors, sizes).
 
-use super::columns::{Columns, Malformed, Reader, unzigzag32, unzigzag64, zigzag32, zigzag64};
+use super::columns::{Columns, Malformed, Reader};
 use super::facets::{decode_vertices, encode_vertices};
+use super::steps::{
+    put_points, put_steps32, put_steps64, steps32, take_points, take_steps32, take_steps64, walk32,
+};
 use super::tets::{decode_nodes, encode_nodes};
 use super::{ChunkKind, ChunkRecord};
 use crate::record::{CoarseFace, CoarseTet, CoarseVertex, Facet, SealedTet};
@@ -82,22 +85,9 @@ impl ChunkRecord for CoarseVertex {
     const RAW_BYTES_MAX: usize = 3 * 8 + 10 + 5;
 
     fn encode(records: &[Self], _first: u32, columns: &mut Columns) {
-        let mut differences = Vec::with_capacity(records.len());
-        for axis in 0..3 {
-            let mut base = 0;
-            differences.clear();
-            differences.extend(records.iter().map(|v| {
-                let bits = v.point[axis].to_bits();
-                zigzag64(bits, std::mem::replace(&mut base, bits))
-            }));
-            columns.planes(&differences, 8);
-        }
+        put_points(records.iter().map(|v| v.point), columns);
         columns.dictionary(records.iter().map(|v| u64::from(v.tag)));
-        let mut base = 0;
-        let owners = records.iter().map(|v| v.owner);
-        let owners: Vec<u32> = owners
-            .map(|owner| zigzag32(owner, std::mem::replace(&mut base, owner)))
-            .collect();
+        let owners: Vec<u32> = steps32(records.iter().map(|v| v.owner)).collect();
         columns.planes32(&owners);
     }
 
@@ -110,20 +100,12 @@ impl ChunkRecord for CoarseVertex {
         let start = records.len();
         records.resize(start + count, Self::default());
         let records = &mut records[start..];
-        for axis in 0..3 {
-            let mut base = 0;
-            for (v, z) in records.iter_mut().zip(columns.planes(count, 8)?) {
-                base = unzigzag64(z, base);
-                v.point[axis] = f64::from_bits(base);
-            }
-        }
+        take_points(columns, count, |i, axis, x| records[i].point[axis] = x)?;
         columns.dictionary(count, |i, tag| records[i].tag = tag as u32)?;
         let mut owners = vec![0; count];
         columns.planes32(&mut owners)?;
-        let mut base = 0;
-        for (v, z) in records.iter_mut().zip(owners) {
-            base = unzigzag32(z, base);
-            v.owner = base;
+        for (v, owner) in records.iter_mut().zip(walk32(owners.into_iter())) {
+            v.owner = owner;
         }
         Ok(())
     }
@@ -137,11 +119,7 @@ impl ChunkRecord for Facet {
     fn encode(records: &[Self], _first: u32, columns: &mut Columns) {
         encode_vertices(records.iter().map(|f| f.vertices), columns);
         columns.dictionary(records.iter().map(|f| u64::from(f.label)));
-        let mut base = 0;
-        for f in records {
-            columns.varint(zigzag64(f.triangle, base));
-            base = f.triangle;
-        }
+        put_steps64(records.iter().map(|f| f.triangle), columns);
         for side in 0..2 {
             columns.dictionary(records.iter().map(|f| u64::from(f.regions[side])));
         }
@@ -163,11 +141,7 @@ impl ChunkRecord for Facet {
         }));
         let records = &mut records[start..];
         columns.dictionary(count, |i, label| records[i].label = label as u32)?;
-        let mut base = 0;
-        for f in records.iter_mut() {
-            base = unzigzag64(columns.varint()?, base);
-            f.triangle = base;
-        }
+        take_steps64(columns, count, |i, triangle| records[i].triangle = triangle)?;
         for side in 0..2 {
             columns.dictionary(count, |i, r| records[i].regions[side] = r as u32)?;
         }
@@ -184,12 +158,7 @@ impl ChunkRecord for CoarseFace {
         encode_vertices(records.iter().map(|f| f.vertices), columns);
         columns.dictionary(records.iter().map(|f| u64::from(f.cut)));
         columns.dictionary(records.iter().map(|f| u64::from(f.side)));
-        let mut base = 0;
-        columns.varints32(
-            records
-                .iter()
-                .map(|f| zigzag32(f.index, std::mem::replace(&mut base, f.index))),
-        );
+        put_steps32(records.iter().map(|f| f.index), columns);
     }
 
     fn decode(
@@ -207,11 +176,6 @@ impl ChunkRecord for CoarseFace {
         let records = &mut records[start..];
         columns.dictionary(count, |i, cut| records[i].cut = cut as u32)?;
         columns.dictionary(count, |i, side| records[i].side = side as u32)?;
-        let mut base = 0;
-        for f in records.iter_mut() {
-            base = unzigzag32(columns.varint32()?, base);
-            f.index = base;
-        }
-        Ok(())
+        take_steps32(columns, count, |i, index| records[i].index = index)
     }
 }

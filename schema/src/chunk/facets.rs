@@ -1,6 +1,7 @@
 //! Sealed facets and interface faces.
 
-use super::columns::{Columns, Malformed, Reader, unzigzag32, unzigzag64, zigzag32, zigzag64};
+use super::columns::{Columns, Malformed, Reader, unzigzag32, zigzag32};
+use super::steps::{put_steps32, put_steps64, take_steps32, take_steps64};
 use super::{ChunkKind, ChunkRecord};
 use crate::record::{InterfaceFace, SealedFacet};
 
@@ -9,12 +10,7 @@ pub(super) fn encode_vertices(
     faces: impl Iterator<Item = [u32; 3]> + Clone,
     columns: &mut Columns,
 ) {
-    let mut base = 0;
-    columns.varints32(
-        faces
-            .clone()
-            .map(|[a, ..]| zigzag32(a, std::mem::replace(&mut base, a))),
-    );
+    put_steps32(faces.clone().map(|[a, ..]| a), columns);
     columns.varints32(faces.clone().map(|[a, b, _]| zigzag32(b, a)));
     columns.varints32(faces.map(|[a, _, c]| zigzag32(c, a)));
 }
@@ -24,11 +20,7 @@ pub(super) fn decode_vertices(
     count: usize,
 ) -> Result<Vec<[u32; 3]>, Malformed> {
     let mut faces = vec![[0; 3]; count];
-    let mut base = 0;
-    for face in &mut faces {
-        base = unzigzag32(columns.varint32()?, base);
-        face[0] = base;
-    }
+    take_steps32(columns, count, |i, a| faces[i][0] = a)?;
     for place in 1..3 {
         for face in &mut faces {
             face[place] = unzigzag32(columns.varint32()?, face[0]);
@@ -70,11 +62,7 @@ impl ChunkRecord for SealedFacet {
     fn encode(records: &[Self], _first: u32, columns: &mut Columns) {
         encode_vertices(records.iter().map(|f| f.vertices), columns);
         columns.dictionary(records.iter().map(|f| u64::from(f.label)));
-        let mut base = 0;
-        for f in records {
-            columns.varint(zigzag64(f.triangle, base));
-            base = f.triangle;
-        }
+        put_steps64(records.iter().map(|f| f.triangle), columns);
         for side in 0..2 {
             columns.dictionary(records.iter().map(|f| u64::from(f.regions[side])));
             encode_tets(records.iter().map(|f| f.tets[side]), columns);
@@ -98,11 +86,7 @@ impl ChunkRecord for SealedFacet {
         }));
         let records = &mut records[start..];
         columns.dictionary(count, |i, label| records[i].label = label as u32)?;
-        let mut base = 0;
-        for f in records.iter_mut() {
-            base = unzigzag64(columns.varint()?, base);
-            f.triangle = base;
-        }
+        take_steps64(columns, count, |i, triangle| records[i].triangle = triangle)?;
         for side in 0..2 {
             columns.dictionary(count, |i, r| records[i].regions[side] = r as u32)?;
             let mut base = 0;
@@ -123,12 +107,7 @@ impl ChunkRecord for InterfaceFace {
         encode_vertices(records.iter().map(|f| f.vertices), columns);
         columns.dictionary(records.iter().map(|f| u64::from(f.cut)));
         columns.dictionary(records.iter().map(|f| u64::from(f.other)));
-        let mut base = 0;
-        columns.varints32(
-            records
-                .iter()
-                .map(|f| zigzag32(f.index, std::mem::replace(&mut base, f.index))),
-        );
+        put_steps32(records.iter().map(|f| f.index), columns);
         encode_tets(records.iter().map(|f| f.tet), columns);
     }
 
@@ -150,11 +129,7 @@ impl ChunkRecord for InterfaceFace {
         let records = &mut records[start..];
         columns.dictionary(count, |i, cut| records[i].cut = cut as u32)?;
         columns.dictionary(count, |i, other| records[i].other = other as u32)?;
-        let mut base = 0;
-        for f in records.iter_mut() {
-            base = unzigzag32(columns.varint32()?, base);
-            f.index = base;
-        }
+        take_steps32(columns, count, |i, index| records[i].index = index)?;
         let mut base = 0;
         for f in records.iter_mut() {
             f.tet = decode_tet(columns, &mut base)?;

@@ -9,6 +9,7 @@ mod codec;
 mod columns;
 mod facets;
 mod packer;
+mod steps;
 mod summaries;
 #[cfg(test)]
 mod tests;

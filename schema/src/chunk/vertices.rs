@@ -1,6 +1,7 @@
 //! Sealed vertices: the high bytes of neighboring coordinates agree, the low ones are noise kept as it is.
 
-use super::columns::{Columns, Malformed, Reader, unzigzag32, unzigzag64, zigzag32, zigzag64};
+use super::columns::{Columns, Malformed, Reader, unzigzag32, zigzag32};
+use super::steps::{put_points, steps32, take_points, walk32};
 use super::{ChunkKind, ChunkRecord};
 use crate::record::SealedVertex;
 
@@ -24,23 +25,11 @@ impl ChunkRecord for SealedVertex {
     const RAW_BYTES_MAX: usize = 3 * 8 + 4 + 10 + 10 + 5;
 
     fn encode(records: &[Self], first: u32, columns: &mut Columns) {
-        let mut differences = Vec::with_capacity(records.len());
-        for axis in 0..3 {
-            let mut base = 0;
-            differences.clear();
-            differences.extend(records.iter().map(|v| {
-                let bits = v.point[axis].to_bits();
-                zigzag64(bits, std::mem::replace(&mut base, bits))
-            }));
-            columns.planes(&differences, 8);
-        }
-        let mut base = 0;
-        differences.clear();
-        differences.extend(records.iter().map(|v| {
-            let bits = v.h.to_bits();
-            u64::from(zigzag32(bits, std::mem::replace(&mut base, bits)))
-        }));
-        columns.planes(&differences, 4);
+        put_points(records.iter().map(|v| v.point), columns);
+        let sizes: Vec<u64> = steps32(records.iter().map(|v| v.h.to_bits()))
+            .map(u64::from)
+            .collect();
+        columns.planes(&sizes, 4);
         columns.dictionary(records.iter().map(|v| u64::from(v.tag)));
         columns.dictionary(records.iter().map(|v| v.id >> 32));
         let mut guess = IndexGuess::default();
@@ -67,17 +56,10 @@ impl ChunkRecord for SealedVertex {
         };
         records.resize(start + count, empty);
         let records = &mut records[start..];
-        for axis in 0..3 {
-            let mut base = 0;
-            for (v, z) in records.iter_mut().zip(columns.planes(count, 8)?) {
-                base = unzigzag64(z, base);
-                v.point[axis] = f64::from_bits(base);
-            }
-        }
-        let mut base = 0;
-        for (v, z) in records.iter_mut().zip(columns.planes(count, 4)?) {
-            base = unzigzag32(z as u32, base);
-            v.h = f32::from_bits(base);
+        take_points(columns, count, |i, axis, x| records[i].point[axis] = x)?;
+        let sizes = columns.planes(count, 4)?.into_iter().map(|z| z as u32);
+        for (v, bits) in records.iter_mut().zip(walk32(sizes)) {
+            v.h = f32::from_bits(bits);
         }
         columns.dictionary(count, |i, tag| records[i].tag = tag as u32)?;
         columns.dictionary(count, |i, owner| records[i].id = owner << 32)?;

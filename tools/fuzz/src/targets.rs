@@ -10,11 +10,14 @@ use tetdb_schema::chunk::{
     ChunkAddress, ChunkKind, ChunkRecord, Decoder, HEAD_BYTES, RangeSummary, TetSummary,
     VertexSummary,
 };
+use tetdb_schema::leaf::{PageDecoder, PageRecord, beside_page};
 use tetdb_schema::page::{
-    FORMAT_VERSION, Frame, PageAddress, SLOTS, STORED_BYTES, access_page, open_page, seal_page,
+    FORMAT_VERSION, Frame, PageAddress, PageKind, SLOTS, STORED_BYTES, access_page, open_page,
+    seal_full_page, seal_page,
 };
 use tetdb_schema::record::{
-    Facet, InterfaceFace, SealedFacet, SealedTet, SealedVertex, Tet, TetAttribute, Vertex,
+    CoarseFace, CoarseTet, CoarseVertex, Facet, InterfaceFace, SealedFacet, SealedTet,
+    SealedVertex, Tet, TetAttribute, Vertex,
 };
 use xxhash_rust::xxh3::xxh3_64;
 
@@ -55,6 +58,11 @@ pub const TARGETS: &[Target] = &[
         name: "page",
         format: None,
         run: page,
+    },
+    Target {
+        name: "leaf",
+        format: None,
+        run: leaf,
     },
     Target {
         name: "chunk",
@@ -112,18 +120,71 @@ fn page(bytes: &[u8]) {
     }
 }
 
+/// Two bytes of count, then the slots of a page and of the one beside it.
+fn leaf(bytes: &[u8]) {
+    let Some((&kind, rest)) = bytes.split_first() else {
+        return;
+    };
+    match kind % 4 {
+        0 => leaf_records::<SealedTet>(rest),
+        1 => leaf_records::<SealedVertex>(rest),
+        2 => leaf_records::<SealedFacet>(rest),
+        _ => leaf_records::<InterfaceFace>(rest),
+    }
+}
+
+fn leaf_records<R: PageRecord>(bytes: &[u8]) {
+    /// So that the page beside it is not its first.
+    const PAGE: u32 = 9;
+    let mut decoder = PageDecoder::new(5, 2);
+    assert!(decoder.open::<R>(PAGE, bytes).is_err());
+    let count = bytes.iter().take(2).fold(0, |n, &b| n << 8 | u32::from(b)) % 2100;
+    let mut content = bytes.get(2..).unwrap_or_default().to_vec();
+    content.resize(2 * STORED_BYTES, 0);
+    let (main, beside) = content.split_at(STORED_BYTES);
+    let sealed = |kind: PageKind, page: u32, content: &[u8]| {
+        let mut frame: Box<Frame> = Box::new([Default::default(); SLOTS]);
+        bytemuck::cast_slice_mut(&mut frame[..SLOTS - 1]).copy_from_slice(content);
+        let address = PageAddress {
+            kind,
+            subdomain: 5,
+            page,
+        };
+        seal_full_page(&mut frame[..], address, 2, count);
+        bytemuck::cast_slice::<_, u8>(&frame[..SLOTS - 1]).to_vec()
+    };
+    let opened = decoder.open::<R>(PAGE, &sealed(R::PAGE, PAGE, main));
+    assert_eq!(opened, Ok(()));
+    if let Some(kind) = R::BESIDE {
+        let value = sealed(kind, beside_page(PAGE), beside);
+        assert_eq!(decoder.open_beside::<R>(PAGE, &value), Ok(()));
+    }
+    let mut records: Vec<R> = Vec::new();
+    let first = decoder.records(PAGE, &mut records);
+    assert!(records.len() <= count as usize);
+    assert_eq!(
+        first.is_ok(),
+        records.len() == count as usize && (1..=2046).contains(&count)
+    );
+}
+
 fn chunk(bytes: &[u8]) {
     let Some((&kind, rest)) = bytes.split_first() else {
         return;
     };
-    match kind % 7 {
+    match kind % 12 {
         0 => records::<SealedTet>(rest),
         1 => records::<SealedVertex>(rest),
         2 => records::<SealedFacet>(rest),
         3 => records::<InterfaceFace>(rest),
         4 => records::<TetSummary>(rest),
         5 => records::<VertexSummary>(rest),
-        _ => records::<RangeSummary<true>>(rest),
+        6 => records::<RangeSummary<true>>(rest),
+        7 => records::<RangeSummary<false>>(rest),
+        8 => records::<CoarseTet>(rest),
+        9 => records::<CoarseVertex>(rest),
+        10 => records::<Facet>(rest),
+        _ => records::<CoarseFace>(rest),
     }
 }
 
