@@ -11,11 +11,12 @@
 //!
 //! Reading order: [`Report`] (what is found), `claims` (facets say which tetrahedra they touch),
 //! `pass` (once through a sub-domain), `pairing` (faces across chunks), `interface` (faces across
-//! sub-domains), `against` (the input).
+//! sub-domains), `against` (the input). `damage` lists all that cannot be read.
 
 mod against;
 mod claims;
 mod compare;
+mod damage;
 mod interface;
 mod pairing;
 mod pass;
@@ -26,6 +27,7 @@ mod tests;
 use std::path::{Path, PathBuf};
 
 pub use compare::{Population, Qualities, qualities};
+pub use damage::damage;
 pub use report::{Finding, Level, Offender, Report};
 
 use tetdb_schema::digest::Digest;
@@ -61,6 +63,10 @@ pub fn verify(
         audit.subdomain(&mut part)?;
         // Damage of chunks is told with their places by now; what is left is in the tree between them.
         part.check()?;
+    }
+    // What is only kept is no part of the mesh, but who wants it one day must not learn of its damage then.
+    if let Some(first) = damage::damage_of_kept(store)?.into_iter().next() {
+        return Err(first);
     }
     let interfaces = store.catalog().interfaces()?;
     let regions = store.catalog().regions()?;

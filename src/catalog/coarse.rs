@@ -173,6 +173,11 @@ impl CoarseLeaf {
         &self.row
     }
 
+    /// Compares its whole file with redb's checksums. Errors: damage.
+    pub fn check(&self) -> Result<(), CatalogError> {
+        Ok(self.file.check()?)
+    }
+
     /// The vertices a chunk at a time.
     pub fn vertices(&mut self) -> Chunks<'_, CoarseVertex> {
         self.chunks(1, self.row.vertices)

@@ -310,6 +310,13 @@ impl Subdomain {
         self.tet_chunks().at(chunk)
     }
 
+    /// Reads and checks one chunk of vertices.
+    ///
+    /// Errors: damage.
+    pub fn vertex_chunk(&mut self, chunk: u32) -> Result<Chunk<SealedVertex>, CatalogError> {
+        self.vertex_chunks().at(chunk)
+    }
+
     /// Reads and checks one chunk of facets.
     ///
     /// Errors: damage.

@@ -368,7 +368,7 @@ fn help_of(code: &str) -> &'static str {
         "busy" => "wait for the other process, or stop it",
         "disk-full" => "free some space, then `tetdb resume STORE`",
         "damaged" => {
-            "`tetdb resaturate STORE --repair` makes damaged sub-domains again; `tetdb verify STORE` lists what is damaged"
+            "`tetdb verify STORE` lists what is damaged; `tetdb resaturate STORE --repair` makes damaged sub-domains again, `--forget` drops a damaged previous version"
         }
         "memory" => "give more with --memory, or mesh a coarser surface",
         "stopped" => "`tetdb resume STORE` goes on from the last finished step",

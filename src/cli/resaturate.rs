@@ -126,7 +126,8 @@ fn read_all(catalog: &mut Catalog, rank: u32) -> Result<(), CatalogError> {
     part.vertex_chunks().try_for_each(|c| c.map(drop))?;
     part.tet_chunks().try_for_each(|c| c.map(drop))?;
     part.facet_chunks().try_for_each(|c| c.map(drop))?;
-    part.interface_chunks().try_for_each(|c| c.map(drop))
+    part.interface_chunks().try_for_each(|c| c.map(drop))?;
+    part.check()
 }
 
 fn forget(path: &Path, talk: &Talk) -> Result<u8, Failure> {
@@ -233,7 +234,7 @@ fn prove(path: &Path, cap: u64, talk: &Talk) -> Result<(), Failure> {
         if surface.is_none() {
             talk.note("note: the surface is not where it was; the mesh is verified without it");
         }
-        verify::check(&mut open, path, surface, cap, Level::Delaunay)?
+        verify::check(&mut open, talk, surface, cap, Level::Delaunay)?
     };
     if !report.valid {
         let failure = verify::invalid(&report, path);

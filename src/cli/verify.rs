@@ -8,8 +8,9 @@ use super::args::VerifyArgs;
 use super::failure::Failure;
 use super::talk::Talk;
 use super::{memory, store};
-use crate::audit::{Level, Report, VerifyOptions};
-use crate::catalog::Store;
+use crate::audit::{self, Level, Report, VerifyOptions};
+use crate::catalog::{CatalogError, Store};
+use crate::store::attempt;
 use crate::surface::Surface;
 
 pub fn run(args: &VerifyArgs, talk: &Talk) -> Result<u8, Failure> {
@@ -28,7 +29,7 @@ pub fn run(args: &VerifyArgs, talk: &Talk) -> Result<u8, Failure> {
     } else {
         Level::Geometry
     };
-    let report = check(&mut open, &args.store, surface.as_ref(), cap, level)?;
+    let report = check(&mut open, talk, surface.as_ref(), cap, level)?;
     if talk.is_json() {
         let mut answer = serde_json::to_value(&report).unwrap_or_default();
         answer["schema"] = json!(1);
@@ -42,10 +43,10 @@ pub fn run(args: &VerifyArgs, talk: &Talk) -> Result<u8, Failure> {
     Ok(0)
 }
 
-/// Verifies within `cap`, less what the surface holds.
+/// Verifies within `cap`, less what the surface holds. What is damaged is listed, all of it.
 pub fn check(
     store: &mut Store,
-    path: &Path,
+    talk: &Talk,
     surface: Option<&Surface>,
     cap: u64,
     level: Level,
@@ -57,10 +58,18 @@ pub fn check(
         memory_bytes: memory as usize,
         temp_dir: std::env::temp_dir(),
     };
-    let _ = path;
-    Ok(crate::store::attempt(|| {
-        crate::audit::verify(store, surface, &options)
-    })??)
+    let verified = attempt(|| audit::verify(store, surface, &options));
+    let error = match verified.map_err(CatalogError::from) {
+        Ok(Ok(report)) => return Ok(report),
+        Ok(Err(error)) | Err(error) => error,
+    };
+    if error.is_damage()
+        && let Ok(Ok(list)) = attempt(|| audit::damage(store))
+    {
+        list.iter()
+            .for_each(|damage| talk.note(&damage.to_string()));
+    }
+    Err(error.into())
 }
 
 /// A valid report in one line.

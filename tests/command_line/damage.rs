@@ -121,3 +121,77 @@ fn another_format_version_is_refused() {
         );
     }
 }
+
+/// Turns a bit in the payload of the `n`-th chunk of the file whose name begins so; returns the name.
+fn flip(place: &Place, begins: &str, generation: bool, n: usize) -> String {
+    let mut names: Vec<String> = fs::read_dir(place.path("a.tetdb"))
+        .expect("a store is a folder")
+        .map(|entry| {
+            entry
+                .expect("an entry")
+                .file_name()
+                .to_string_lossy()
+                .into_owned()
+        })
+        .filter(|name| name.starts_with(begins))
+        .collect();
+    // Of two generations the shorter name, then the lesser one, is the older.
+    names.sort_by_key(|name| (name.len(), name.clone()));
+    let name = match generation {
+        true => names.first(),
+        false => names.last(),
+    };
+    let name = name.expect("a file").clone();
+    let path = place.path(&format!("a.tetdb/{name}"));
+    let mut bytes = fs::read(&path).expect("a file");
+    let chunks = (0..bytes.len() - 64).filter(|&i| bytes[i..].starts_with(b"TETC"));
+    let magic = chunks.clone().nth(n).expect("so many chunks");
+    bytes[magic + 70] ^= 1;
+    fs::write(&path, bytes).expect("room");
+    name
+}
+
+#[test]
+fn damage_in_what_is_only_kept_is_found_and_all_of_it_listed() {
+    let place = Place::new();
+    place
+        .run_line("mesh sample:box,h=0.045 -o a.tetdb --subdomains 2")
+        .succeeds();
+    place
+        .run_line("resaturate a.tetdb --subdomain 1 --refine-by 0.9")
+        .succeeds();
+    place.run_line("verify a.tetdb").succeeds();
+    let digest = place.digest("a.tetdb");
+    let before = flip(&place, "subdomain-00001", true, 1);
+    let leaf = flip(&place, "coarse-00000", true, 0);
+    let refused = |line: &str, names: &[&String]| {
+        let done = place.run_line(line);
+        assert_eq!(done.exit(), Some(4), "{}", done.stderr());
+        assert_eq!(done.error()["code"], "damaged");
+        for name in names {
+            assert!(done.stderr().contains(*name), "{name}: {}", done.stderr());
+        }
+    };
+    refused("verify a.tetdb --json", &[&before, &leaf]);
+    // The mesh is not harmed, and what can be dropped can be.
+    assert_eq!(place.digest("a.tetdb"), digest);
+    place
+        .run_line("query a.tetdb --point 0.1,0.2,0.3")
+        .succeeds();
+    refused("resaturate a.tetdb --subdomain 0 --json", &[&leaf]);
+    place.run_line("resaturate a.tetdb --forget").succeeds();
+    let part = flip(&place, "subdomain-00001", false, 2);
+    refused("verify a.tetdb --json", &[&part, &leaf]);
+    assert!(
+        !place
+            .run_line("verify a.tetdb --json")
+            .stderr()
+            .contains(&before)
+    );
+    // A coarse leaf that is sound makes its sub-domain again; the other one is past help.
+    place
+        .run_line("resaturate a.tetdb --repair --no-verify")
+        .succeeds();
+    assert_eq!(place.digest("a.tetdb"), digest);
+    refused("verify a.tetdb --json", &[&leaf]);
+}

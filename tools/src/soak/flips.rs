@@ -58,6 +58,16 @@ impl Flips {
             "2",
         ];
         assert_eq!(flips.ask(&mesh).0, Some(0), "a store is made");
+        // Files of the previous version are kept beside those that count, and the coarse leaves.
+        let change = [
+            "resaturate",
+            "a.tetdb",
+            "--subdomain",
+            "1",
+            "--refine-by",
+            "0.9",
+        ];
+        assert_eq!(flips.ask(&change).0, Some(0), "a sub-domain is made again");
         let store = flips.dir.path().join("a.tetdb");
         for entry in std::fs::read_dir(store).expect("a store is a folder") {
             let path = entry.expect("a readable folder").path();
@@ -180,7 +190,7 @@ fn place_of(name: &str, value: Option<u64>) -> Vec<String> {
     let Some(key) = value else {
         return Vec::new();
     };
-    match name.starts_with("subdomain-") {
+    match name.starts_with("subdomain-") || name.starts_with("coarse-") {
         true => vec![format!("chunk {}:", key as u32)],
         false => Vec::new(),
     }
