@@ -9,7 +9,7 @@ use super::args::{MeshArgs, ResumeArgs, RunArgs};
 use super::failure::Failure;
 use super::input::{self, Input};
 use super::talk::Talk;
-use super::{background, config, estimate, export, info, memory, signals, store, verify};
+use super::{background, config, estimate, export, info, memory, replace, signals, store, verify};
 use crate::catalog::{Catalog, CatalogError, Job, Store, StoreState};
 use crate::io::write::Selection;
 use crate::pipeline::{self, Options, Summary};
@@ -21,6 +21,7 @@ pub fn run(args: &MeshArgs, talk: &Talk) -> Result<u8, Failure> {
     options.sizes()?;
     let (cap, whence) = begin(&args.run, talk)?;
     let path = output(args);
+    replace::settle(&path, talk)?;
     if let Some(exit) = already_there(&path, args, &options, talk)? {
         return Ok(exit);
     }
@@ -42,62 +43,87 @@ pub fn run(args: &MeshArgs, talk: &Talk) -> Result<u8, Failure> {
         estimate::preflight(&prepared.estimate, cap, &path, talk)?;
     }
     // With --force the old store is only replaced once the new one is sealed.
-    let replaced = path.exists().then(|| path.with_extension("tetdb-new"));
-    let place = replaced.clone().unwrap_or_else(|| path.clone());
-    if replaced.is_some() && place.exists() {
-        remove_store(&place)?;
-    }
+    let replaces = path.exists() && !Catalog::is_vacant(&path);
+    let place = match replaces {
+        true => replace::new_of(&path),
+        false => path.clone(),
+    };
     let job = Job {
         options: serde_json::to_string(&options).unwrap_or_default(),
         surfaces: input.sources.clone(),
         tool_version: env!("CARGO_PKG_VERSION").to_owned(),
     };
     let needed = (prepared.estimate).disk_peak_bytes(cap, rayon::current_num_threads());
-    let mut catalog = Catalog::create(&place, &job)?;
+    let is_same = |begun: &mut Catalog| begun.job().is_ok_and(|begun| begun == job);
+    let begun = match replaces {
+        true => replace::take_up(&path, is_same)?,
+        false => None,
+    };
+    let mut catalog = match begun {
+        Some(catalog) => {
+            talk.note(&format!("going on with {}", place.display()));
+            catalog
+        }
+        None => Catalog::create(&place, &job)?,
+    };
     let budget = Budget::new(cap);
     let watch = |event| talk.progress(event);
-    let made = pipeline::mesh_prepared(
-        &mut catalog,
-        &input.surface,
-        &options,
-        prepared,
-        &budget,
-        &watch,
-    );
+    let made = if catalog.state()? < StoreState::Coarse {
+        pipeline::mesh_prepared(
+            &mut catalog,
+            &input.surface,
+            &options,
+            prepared,
+            &budget,
+            &watch,
+        )
+    } else {
+        drop(prepared);
+        pipeline::mesh(&mut catalog, &input.surface, &options, &budget, &watch)
+    };
     let summary = match made.map_err(Failure::from) {
         // A refused surface or option leaves nothing to resume.
         Err(failure) if matches!(failure.exit(), 2 | 3) => {
             drop(catalog);
-            remove_store(&place)?;
+            replace::remove(&place)?;
             return Err(failure);
         }
         other => other.map_err(|e| estimate::with_room(e, &place, Some(needed)))?,
     };
     tell(&summary, talk);
     catalog.close()?;
-    if replaced.is_some() {
-        remove_store(&path)?;
-        rename(&place, &path)?;
+    if replaces {
+        replace::exchange(&path)?;
     }
     finish(&path, &input, &args.run, cap, Some(&summary), talk)
 }
 
 pub fn resume(args: &ResumeArgs, talk: &Talk) -> Result<u8, Failure> {
     let (cap, _) = begin(&args.run, talk)?;
-    let mut reader = Store::open(&args.store)?;
+    replace::settle(&args.store, talk)?;
+    // A run with --force was interrupted: what it replaces is finished.
+    let replaces = replace::is_begun(&args.store);
+    let place = match replaces {
+        true => replace::new_of(&args.store),
+        false => args.store.clone(),
+    };
+    let mut reader = Store::open(&place)?;
     let state = reader.catalog().state()?;
     let input = store::surface_of(&mut reader, &[], talk)?;
     let job = reader.catalog().job()?;
     drop(reader);
     if state.is_finished() {
+        if replaces {
+            replace::exchange(&args.store)?;
+        }
         talk.note(&format!("{} is already finished", args.store.display()));
         return finish(&args.store, &input, &args.run, cap, None, talk);
     }
     let options: Options = serde_json::from_str(&job.options).map_err(|e| {
         Failure::new("damaged", format!("the job's options cannot be read: {e}"))
-            .at(args.store.display())
+            .at(place.display())
     })?;
-    let mut catalog = Catalog::open_writable(&args.store)?;
+    let mut catalog = Catalog::open_writable(&place)?;
     let watch = |event| talk.progress(event);
     let budget = Budget::new(cap);
     let made = if state < StoreState::Coarse {
@@ -116,9 +142,12 @@ pub fn resume(args: &ResumeArgs, talk: &Talk) -> Result<u8, Failure> {
     } else {
         pipeline::mesh(&mut catalog, &input.surface, &options, &budget, &watch)
     };
-    let summary = made.map_err(|e| estimate::with_room(e.into(), &args.store, None))?;
+    let summary = made.map_err(|e| estimate::with_room(e.into(), &place, None))?;
     tell(&summary, talk);
     catalog.close()?;
+    if replaces {
+        replace::exchange(&args.store)?;
+    }
     finish(&args.store, &input, &args.run, cap, Some(&summary), talk)
 }
 
@@ -236,7 +265,7 @@ fn finish(
             let mut store = store::open_finished(path)?;
             verify::check(
                 &mut store,
-                path,
+                talk,
                 Some(&input.surface),
                 cap,
                 crate::audit::Level::Delaunay,
@@ -289,13 +318,4 @@ pub(super) fn write_exports(
         export::write(path, out, &Selection::default(), cap, talk)?;
     }
     Ok(())
-}
-
-fn remove_store(path: &Path) -> Result<(), Failure> {
-    // Only ever called on a directory whose catalog carried our magic, or that this run made.
-    std::fs::remove_dir_all(path).map_err(|e| Failure::new("io", e).at(path.display()))
-}
-
-fn rename(from: &Path, to: &Path) -> Result<(), Failure> {
-    std::fs::rename(from, to).map_err(|e| Failure::new("io", e).at(to.display()))
 }

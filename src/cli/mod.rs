@@ -20,6 +20,7 @@ mod query;
 mod query_ask;
 mod query_rows;
 mod refine_surface;
+mod replace;
 mod report;
 mod resaturate;
 mod resaturate_sizes;

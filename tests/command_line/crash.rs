@@ -143,3 +143,62 @@ fn a_stopped_run_says_so_and_can_be_resumed() {
         std::fs::remove_dir_all(place.path("a.tetdb")).expect("the store can be removed");
     }
 }
+
+/// A store that is to be replaced stays until the new one is whole, and what an interrupted run left is taken up.
+#[test]
+fn a_killed_replacement_is_taken_up() {
+    let place = Place::new();
+    let expected = undisturbed(&place);
+    let (old, new) = (
+        "mesh sample:box,h=0.2 -o a.tetdb",
+        ["mesh", SAMPLE, "-o", "a.tetdb", "--force"],
+    );
+    let begun = |place: &Place| {
+        let mut child = place
+            .command(&[&new[..], &["--threads", "1"]].concat())
+            .spawn()
+            .expect("the program starts");
+        // Until the coarse mesh is there, or the end.
+        while !place.path("a.tetdb-new/subdomain-00000-g1.redb").exists() {
+            if child.try_wait().expect("the child can be asked").is_some() {
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        std::thread::sleep(Duration::from_millis(40));
+        child.kill().expect("the child can be killed");
+        child.wait().expect("the child can be waited for");
+    };
+    let whole = |place: &Place| {
+        assert_eq!(place.digest("a.tetdb"), expected);
+        for left in ["a.tetdb-new", "a.tetdb-old"] {
+            assert!(!place.path(left).exists(), "{left} is still there");
+        }
+        std::fs::remove_dir_all(place.path("a.tetdb")).expect("the store can be removed");
+    };
+    // `resume` goes on with what was begun.
+    place.run_line(old).succeeds();
+    let first = place.digest("a.tetdb");
+    begun(&place);
+    assert_eq!(place.digest("a.tetdb"), first, "it is there until the end");
+    place.run_line("resume a.tetdb").succeeds();
+    whole(&place);
+    // So does the same command; another one begins anew.
+    place.run_line(old).succeeds();
+    begun(&place);
+    place.run(&new).succeeds();
+    whole(&place);
+    place.run_line(old).succeeds();
+    begun(&place);
+    place
+        .run_line(&format!("{old} --force --optimize none"))
+        .succeeds();
+    assert_ne!(place.digest("a.tetdb"), expected);
+    assert!(!place.path("a.tetdb-new").exists());
+    // Killed between two renames, and before the old one was gone.
+    for (from, to) in [("whole.tetdb", "a.tetdb-new"), ("a.tetdb", "a.tetdb-old")] {
+        std::fs::rename(place.path(from), place.path(to)).expect("names can be changed");
+    }
+    place.run_line("resume a.tetdb").succeeds();
+    whole(&place);
+}
