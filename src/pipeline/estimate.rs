@@ -72,6 +72,7 @@ pub struct Estimate {
     /// Of the size field: its octree, and sizes at corners, which go to a scratch file where their share of the cap is too small.
     octree_bytes: u64,
     sizes_bytes: u64,
+    /// How finished sub-domains are kept.
     form: Form,
     /// Whether the coarse leaves stay in the store.
     keeps_coarse: bool,

@@ -151,7 +151,8 @@ mod tests {
                     let other = mesh.tet(face.tet());
                     assert_eq!(other.neighbor[face.face()], FaceRef::new(t, i));
                     let [mut a, mut b] = [tet.face(i), other.face(face.face())];
-                    (a.sort_unstable(), b.sort_unstable());
+                    a.sort_unstable();
+                    b.sort_unstable();
                     assert_eq!(a, b);
                 }
             }
