@@ -16,7 +16,7 @@ use tetdb::optimize::{Mode, Settings};
 use tetdb::pipeline::{self, Options, silent};
 use tetdb::samples::SampleSpec;
 use tetdb::sizing::{SizeField, SizeOptions, TETS_PER_LOAD};
-use tetdb::store::{Backing, Budget, Pager, attempt};
+use tetdb::store::{Backing, Budget, Pager, Room, attempt};
 use tetdb::surface::Surface;
 
 /// Bytes of pages per tetrahedron of a finished mesh, its vertices included.
@@ -73,7 +73,14 @@ impl Bench {
         let bounds = self.surface.bounds();
         let mut host = self.pool("host.redb", bytes / 2);
         let options = Options::default();
-        pipeline::coarse_mesh(&mut host, &self.surface, &options, &silent).expect("a mesh");
+        pipeline::coarse_mesh(
+            &mut host,
+            &self.surface,
+            &options,
+            &Room::boundless(),
+            &silent,
+        )
+        .expect("a mesh");
         renumber(&mut host, &tetdb::geom::HilbertFrame::new(&bounds), &space).expect("room");
         let clock = Instant::now();
         let mut core = self.pool("core.redb", bytes / 4);
@@ -264,7 +271,14 @@ fn main() {
         }
     }
     let mut mesh = Mesh::new(Pager::new(plenty, None));
-    pipeline::coarse_mesh(&mut mesh, &bench.surface, &Options::default(), &silent).expect("a mesh");
+    pipeline::coarse_mesh(
+        &mut mesh,
+        &bench.surface,
+        &Options::default(),
+        &Room::boundless(),
+        &silent,
+    )
+    .expect("a mesh");
     for v in mesh.vertex_ids() {
         let p = mesh.point(v);
         mesh.set_size(v, bench.field.h(p) as f32);

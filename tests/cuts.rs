@@ -13,7 +13,7 @@ use tetdb::geom::{Point, mix};
 use tetdb::mesh::Mesh;
 use tetdb::pipeline::{self, Options, PipelineError, silent};
 use tetdb::samples::SampleSpec;
-use tetdb::store::{Budget, FlatPages};
+use tetdb::store::{Budget, FlatPages, Room};
 use tetdb::surface::Surface;
 
 fn sample(words: &str) -> Surface {
@@ -173,7 +173,14 @@ fn spread(mesh: &mut Mesh<FlatPages>) -> Point {
 
 fn papers_plane(surface: &Surface) -> (Mesh<FlatPages>, Plane) {
     let mut mesh = Mesh::new(FlatPages::default());
-    pipeline::coarse_mesh(&mut mesh, surface, &Options::default(), &silent).expect("a mesh");
+    pipeline::coarse_mesh(
+        &mut mesh,
+        surface,
+        &Options::default(),
+        &Room::boundless(),
+        &silent,
+    )
+    .expect("a mesh");
     for v in mesh.vertex_ids() {
         mesh.set_size(v, 1.0);
     }

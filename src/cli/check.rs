@@ -7,7 +7,7 @@ use serde_json::json;
 use super::args::CheckArgs;
 use super::check_report::Findings;
 use super::failure::Failure;
-use super::input::{self, Input};
+use super::input::{self, Input, Space};
 use super::talk::Talk;
 use crate::io::write;
 use crate::surface::{Repair, Surface, repair};
@@ -30,7 +30,7 @@ pub fn run(args: &CheckArgs, talk: &Talk) -> Result<u8, Failure> {
     if let Some(out) = &args.write {
         refuse_input(out, &args.surfaces)?;
     }
-    let mut input = input::load(&args.surfaces, talk)?;
+    let mut input = input::load(&args.surfaces, Space::Boundless, talk)?;
     let mended = args.repair.then(|| mend(&mut input, weld_share));
     let findings = Findings::of(&input.surface, input.turned);
     let written = write_files(args, &input.surface, &findings, talk)?;

@@ -6,10 +6,11 @@ use serde_json::json;
 
 use super::args::EstimateArgs;
 use super::failure::Failure;
+use super::input::Space;
 use super::talk::Talk;
 use super::{background, config, input, memory};
 use crate::pipeline::{self, Estimate};
-use crate::store::{Room, available_bytes};
+use crate::store::available_bytes;
 use crate::surface::Surface;
 
 /// A mesh is refused when less than this share of the disk it is expected to take is free: predictions may be that far off.
@@ -20,10 +21,11 @@ pub fn run(args: &EstimateArgs, talk: &Talk) -> Result<u8, Failure> {
     options.sizes()?;
     let (cap, whence) = memory::cap(args.memory.as_deref())?;
     let threads = args.threads.unwrap_or_else(rayon::current_num_threads);
-    let input = input::load_valid(&args.surfaces, talk)?;
-    let background = background::read(&options, cap)?;
     let store = args.output.as_deref().unwrap_or(Path::new("."));
-    let room = room(cap, &input.surface, store)?;
+    let space = Space::Capped(cap, store);
+    let input = input::load_valid(&args.surfaces, space, talk)?;
+    let background = background::read(&options, cap)?;
+    let room = space.room(&input.surface)?;
     let prepared = pipeline::prepare(&input.surface, &options, background.as_ref(), &room)?;
     let estimate = &prepared.estimate;
     let disk_free = free_at(store);
@@ -94,6 +96,21 @@ pub fn run(args: &EstimateArgs, talk: &Talk) -> Result<u8, Failure> {
     Ok(0)
 }
 
+/// Refuses a surface that leaves too little of the cap, before anything is made of it.
+pub fn surface_fits(surface: &Surface, cap: u64) -> Result<(), Failure> {
+    let least = pipeline::least_for(surface);
+    if cap >= least {
+        return Ok(());
+    }
+    let message = format!(
+        "the surface alone takes {}: with a cap of {} too little is left for the mesh",
+        memory::show(surface.bytes() as u64),
+        memory::show(cap)
+    );
+    let help = format!("give at least --memory {}MiB", least.div_ceil(1 << 20));
+    Err(Failure::new("memory", message).help(help))
+}
+
 /// Refuses a mesh that memory or disk cannot hold, before anything is written.
 pub fn preflight(estimate: &Estimate, cap: u64, store: &Path, talk: &Talk) -> Result<(), Failure> {
     let least = estimate.memory_least_bytes();
@@ -157,18 +174,8 @@ fn bytes_on_disk(dir: &Path) -> u64 {
     bytes.sum()
 }
 
-/// What `cap` leaves beside the surface, and scratch files where a store would be made.
-pub fn room(cap: u64, surface: &Surface, store: &Path) -> Result<Room, Failure> {
-    let bytes = cap.saturating_sub(surface.bytes() as u64);
-    let folder = folder_of(store).ok_or_else(|| {
-        let message = "there is no folder above it";
-        Failure::new("io", message).at(store.display())
-    })?;
-    Ok(Room::new(bytes, &folder))
-}
-
 /// The nearest folder that exists.
-fn folder_of(store: &Path) -> Option<PathBuf> {
+pub fn folder_of(store: &Path) -> Option<PathBuf> {
     let absolute = std::path::absolute(store).ok()?;
     let above = absolute
         .ancestors()

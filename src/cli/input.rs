@@ -5,12 +5,14 @@ use std::path::{Path, PathBuf};
 
 use xxhash_rust::xxh3::Xxh3;
 
+use super::estimate;
 use super::failure::Failure;
 use super::talk::Talk;
 use crate::catalog::SurfaceSource;
 use crate::io::read::read_surface;
 use crate::samples::{PREFIX, SampleSpec};
-use crate::surface::{Surface, Validation, orient_alike, validate};
+use crate::store::{Room, attempt};
+use crate::surface::{Surface, Validation, orient_alike_in, validate_in};
 
 /// A surface, read and turned one way, and where it came from.
 pub struct Input {
@@ -20,8 +22,33 @@ pub struct Input {
     pub turned: usize,
 }
 
+/// The memory a command may hold, and where its scratch files go.
+#[derive(Clone, Copy)]
+pub enum Space<'a> {
+    /// All in memory.
+    Boundless,
+    /// Bytes in all, and the place of a store: scratch files are made beside it.
+    Capped(u64, &'a Path),
+}
+
+impl Space<'_> {
+    /// What there is beside a surface.
+    pub fn room(self, surface: &Surface) -> Result<Room, Failure> {
+        match self {
+            Self::Boundless => Ok(Room::boundless()),
+            Self::Capped(cap, store) => {
+                let folder = estimate::folder_of(store).ok_or_else(|| {
+                    Failure::new("io", "there is no folder above it").at(store.display())
+                })?;
+                let bytes = cap.saturating_sub(surface.bytes() as u64);
+                Ok(Room::new(bytes, &folder))
+            }
+        }
+    }
+}
+
 /// Reads files or makes a sample.
-pub fn load(arguments: &[String], talk: &Talk) -> Result<Input, Failure> {
+pub fn load(arguments: &[String], space: Space, talk: &Talk) -> Result<Input, Failure> {
     let samples = arguments.iter().filter(|a| a.starts_with(PREFIX)).count();
     let mut input = match (samples, arguments) {
         (1, [word]) => made(word)?,
@@ -36,7 +63,9 @@ pub fn load(arguments: &[String], talk: &Talk) -> Result<Input, Failure> {
     for note in &input.surface.notes {
         talk.note(&format!("note: {note}"));
     }
-    let orientation = orient_alike(&mut input.surface);
+    input.surface.shrink();
+    let room = space.room(&input.surface)?;
+    let orientation = attempt(|| orient_alike_in(&mut input.surface, &room))?;
     input.turned = orientation.flipped.len();
     if input.turned > 0 {
         talk.note(&format!(
@@ -48,15 +77,16 @@ pub fn load(arguments: &[String], talk: &Talk) -> Result<Input, Failure> {
 }
 
 /// [`load`], and refuse a surface with defects.
-pub fn load_valid(arguments: &[String], talk: &Talk) -> Result<Input, Failure> {
-    let input = load(arguments, talk)?;
-    validated(&input.surface)?;
+pub fn load_valid(arguments: &[String], space: Space, talk: &Talk) -> Result<Input, Failure> {
+    let input = load(arguments, space, talk)?;
+    validated(&input.surface, space)?;
     Ok(input)
 }
 
 /// Validates completely.
-pub fn validated(surface: &Surface) -> Result<Validation, Failure> {
-    let validation = validate(surface);
+pub fn validated(surface: &Surface, space: Space) -> Result<Validation, Failure> {
+    let room = space.room(surface)?;
+    let validation = attempt(|| validate_in(surface, &room))?;
     validation.accept()?;
     Ok(validation)
 }

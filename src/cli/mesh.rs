@@ -1,5 +1,6 @@
 //! `mesh` and `resume`.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -7,13 +8,17 @@ use serde_json::json;
 
 use super::args::{MeshArgs, ResumeArgs, RunArgs};
 use super::failure::Failure;
-use super::input::{self, Input};
+use super::input::{self, Input, Space};
 use super::talk::Talk;
 use super::{background, config, estimate, export, info, memory, replace, signals, store, verify};
 use crate::catalog::{Catalog, CatalogError, Job, Store, StoreState};
 use crate::io::write::Selection;
 use crate::pipeline::{self, Options, Summary};
 use crate::store::Budget;
+use crate::surface::Surface;
+
+/// A surface that takes more than this part of the cap is not kept while the mesh is refined.
+const SURFACE_KEPT: u64 = 8;
 
 pub fn run(args: &MeshArgs, talk: &Talk) -> Result<u8, Failure> {
     let options = config::options(&args.shape)?;
@@ -26,7 +31,12 @@ pub fn run(args: &MeshArgs, talk: &Talk) -> Result<u8, Failure> {
         return Ok(exit);
     }
     let clock = Instant::now();
-    let input = input::load_valid(&args.surfaces, talk)?;
+    let space = Space::Capped(cap, &path);
+    let mut input = input::load(&args.surfaces, space, talk)?;
+    if !args.no_preflight {
+        estimate::surface_fits(&input.surface, cap)?;
+    }
+    input::validated(&input.surface, space)?;
     talk.note(&format!(
         "{} triangles and {} vertices, closed and free of defects ({:.1} s)",
         input.surface.n_triangles(),
@@ -36,7 +46,7 @@ pub fn run(args: &MeshArgs, talk: &Talk) -> Result<u8, Failure> {
     talk.note(&format!("memory: {} ({whence})", memory::show(cap)));
     let prepared = {
         let background = background::read(&options, cap)?;
-        let room = estimate::room(cap, &input.surface, &path)?;
+        let room = space.room(&input.surface)?;
         pipeline::prepare(&input.surface, &options, background.as_ref(), &room)?
     };
     if !args.no_preflight {
@@ -68,18 +78,12 @@ pub fn run(args: &MeshArgs, talk: &Talk) -> Result<u8, Failure> {
     };
     let budget = Budget::new(cap);
     let watch = |event| talk.progress(event);
+    let surface = lent_or_given(&mut input, cap);
     let made = if catalog.state()? < StoreState::Coarse {
-        pipeline::mesh_prepared(
-            &mut catalog,
-            &input.surface,
-            &options,
-            prepared,
-            &budget,
-            &watch,
-        )
+        pipeline::mesh_prepared(&mut catalog, surface, &options, prepared, &budget, &watch)
     } else {
         drop(prepared);
-        pipeline::mesh(&mut catalog, &input.surface, &options, &budget, &watch)
+        pipeline::mesh(&mut catalog, &surface, &options, &budget, &watch)
     };
     let summary = match made.map_err(Failure::from) {
         // A refused surface or option leaves nothing to resume.
@@ -109,7 +113,8 @@ pub fn resume(args: &ResumeArgs, talk: &Talk) -> Result<u8, Failure> {
     };
     let mut reader = Store::open(&place)?;
     let state = reader.catalog().state()?;
-    let input = store::surface_of(&mut reader, &[], talk)?;
+    let space = Space::Capped(cap, &args.store);
+    let mut input = store::surface_of(&mut reader, &[], space, talk)?;
     let job = reader.catalog().job()?;
     drop(reader);
     if state.is_finished() {
@@ -128,17 +133,11 @@ pub fn resume(args: &ResumeArgs, talk: &Talk) -> Result<u8, Failure> {
     let budget = Budget::new(cap);
     let made = if state < StoreState::Coarse {
         let background = background::read(&options, cap)?;
-        let room = estimate::room(cap, &input.surface, &args.store)?;
+        let room = space.room(&input.surface)?;
         let prepared = pipeline::prepare(&input.surface, &options, background.as_ref(), &room)?;
         drop(background);
-        pipeline::mesh_prepared(
-            &mut catalog,
-            &input.surface,
-            &options,
-            prepared,
-            &budget,
-            &watch,
-        )
+        let surface = lent_or_given(&mut input, cap);
+        pipeline::mesh_prepared(&mut catalog, surface, &options, prepared, &budget, &watch)
     } else {
         pipeline::mesh(&mut catalog, &input.surface, &options, &budget, &watch)
     };
@@ -149,6 +148,14 @@ pub fn resume(args: &ResumeArgs, talk: &Talk) -> Result<u8, Failure> {
         replace::exchange(&args.store)?;
     }
     finish(&args.store, &input, &args.run, cap, Some(&summary), talk)
+}
+
+/// The surface for the pipeline: given away when it is large against the cap, to be read again for verification.
+fn lent_or_given(input: &mut Input, cap: u64) -> Cow<'_, Surface> {
+    match input.surface.bytes() as u64 > cap / SURFACE_KEPT {
+        true => Cow::Owned(std::mem::take(&mut input.surface)),
+        false => Cow::Borrowed(&input.surface),
+    }
 }
 
 /// Threads, signals, and the cap.
@@ -218,7 +225,8 @@ fn already_there(
         o.seal.clone_from(&options.seal);
         o == *options
     });
-    let input = input::load(&args.surfaces, talk)?;
+    let cap = memory::cap(args.run.memory.as_deref())?.0;
+    let input = input::load(&args.surfaces, Space::Capped(cap, path), talk)?;
     if !same_options || job.surfaces != input.sources {
         return Err(CatalogError::Finished {
             path: path.to_owned(),
@@ -229,7 +237,6 @@ fn already_there(
         "{} already holds the finished mesh of this surface with these options",
         path.display()
     ));
-    let cap = memory::cap(args.run.memory.as_deref())?.0;
     write_exports(path, &args.run, cap, talk)?;
     info::print(path, talk)?;
     Ok(Some(0))
@@ -263,10 +270,19 @@ fn finish(
     if !args.no_verify {
         let report = {
             let mut store = store::open_finished(path)?;
+            let again;
+            let surface = match input.surface.n_triangles() {
+                0 => {
+                    let space = Space::Capped(cap, path);
+                    again = store::surface_of(&mut store, &[], space, talk)?;
+                    &again.surface
+                }
+                _ => &input.surface,
+            };
             verify::check(
                 &mut store,
                 talk,
-                Some(&input.surface),
+                Some(surface),
                 cap,
                 crate::audit::Level::Delaunay,
             )?

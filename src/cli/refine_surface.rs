@@ -4,7 +4,7 @@ use serde_json::json;
 
 use super::args::RefineSurfaceArgs;
 use super::failure::Failure;
-use super::input;
+use super::input::{self, Space};
 use super::talk::Talk;
 use crate::io::write;
 use crate::sizing::{SizeField, SizeOptions};
@@ -12,13 +12,13 @@ use crate::surface::split;
 
 pub fn run(args: &RefineSurfaceArgs, talk: &Talk) -> Result<u8, Failure> {
     let options = SizeOptions::parse(Some(&args.hsiz), None, None, args.hgrad.as_deref())?;
-    let input = input::load_valid(std::slice::from_ref(&args.surface), talk)?;
+    let input = input::load_valid(std::slice::from_ref(&args.surface), Space::Boundless, talk)?;
     let surface = input.surface;
     let wanted = (options.hsiz).map_or(f64::INFINITY, |l| l.resolve(surface.bounds().diagonal()));
     // Where the surface is finer than asked for, sizes grow from its edges as inside a mesh.
     let field = SizeField::build(&surface.points, &surface.triangles, &options)?;
     let (fine, report) = split(&surface, &|p| field.h(p).min(wanted))?;
-    input::validated(&fine)?;
+    input::validated(&fine, Space::Boundless)?;
     write::surface(&fine, &args.output)?;
     let (triangles, vertices) = (fine.n_triangles(), fine.n_vertices());
     if talk.is_json() {

@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 use super::args::ResaturateArgs;
 use super::failure::Failure;
 use super::info::{hex, share_below_two};
+use super::input::Space;
 use super::resaturate_sizes::{self, new_sizes};
 use super::talk::Talk;
 use super::{memory, mesh, store, verify};
@@ -229,7 +230,7 @@ fn object(part: &Remade) -> Value {
 fn prove(path: &Path, cap: u64, talk: &Talk) -> Result<(), Failure> {
     let report = {
         let mut open = store::open_finished(path)?;
-        let surface = store::surface_of(&mut open, &[], talk).ok();
+        let surface = store::surface_of(&mut open, &[], Space::Boundless, talk).ok();
         let surface = surface.as_ref().map(|input| &input.surface);
         if surface.is_none() {
             talk.note("note: the surface is not where it was; the mesh is verified without it");

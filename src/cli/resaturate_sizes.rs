@@ -7,6 +7,7 @@ use serde_json::json;
 use super::args::ResaturateArgs;
 use super::args::SizeArgs;
 use super::failure::Failure;
+use super::input::Space;
 use super::talk::Talk;
 use super::{background, config, store};
 use crate::catalog::Store;
@@ -115,7 +116,7 @@ fn field(
     if all.hgrad.is_none() {
         all.hgrad.clone_from(&options.hgrad);
     }
-    let input = store::surface_of(open, &[], talk)?;
+    let input = store::surface_of(open, &[], Space::Boundless, talk)?;
     let background = background::read(&all, cap)?;
     let room = Room::boundless();
     let prepared = pipeline::prepare(&input.surface, &all, background.as_ref(), &room)?;

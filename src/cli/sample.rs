@@ -4,7 +4,7 @@ use serde_json::json;
 
 use super::args::SampleArgs;
 use super::failure::Failure;
-use super::input;
+use super::input::{self, Space};
 use super::talk::Talk;
 use crate::io::write;
 use crate::samples::PREFIX;
@@ -15,7 +15,7 @@ pub fn run(args: &SampleArgs, talk: &Talk) -> Result<u8, Failure> {
     } else {
         format!("{PREFIX}{}", args.sample)
     };
-    let surface = input::load(&[word], talk)?.surface;
+    let surface = input::load(&[word], Space::Boundless, talk)?.surface;
     write::surface(&surface, &args.output)?;
     let (triangles, vertices) = (surface.n_triangles(), surface.n_vertices());
     if talk.is_json() {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::failure::Failure;
-use super::input::{self, Input};
+use super::input::{self, Input, Space};
 use super::talk::Talk;
 use crate::catalog::Store;
 
@@ -24,14 +24,19 @@ pub fn open_finished(path: &Path) -> Result<Store, Failure> {
 /// Reads the surface a store was made from again, or another one when it is given.
 ///
 /// Errors: `surface-changed` when a file is not what it was.
-pub fn surface_of(store: &mut Store, given: &[String], talk: &Talk) -> Result<Input, Failure> {
+pub fn surface_of(
+    store: &mut Store,
+    given: &[String],
+    space: Space,
+    talk: &Talk,
+) -> Result<Input, Failure> {
     let job = store.catalog().job()?;
     let arguments: Vec<String> = if given.is_empty() {
         job.surfaces.iter().map(|s| s.path.clone()).collect()
     } else {
         given.to_vec()
     };
-    let input = input::load(&arguments, talk)?;
+    let input = input::load(&arguments, space, talk)?;
     if given.is_empty() {
         for (then, now) in job.surfaces.iter().zip(&input.sources) {
             if (then.bytes, then.hash) != (now.bytes, now.hash) {

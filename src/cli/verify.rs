@@ -6,6 +6,7 @@ use serde_json::json;
 
 use super::args::VerifyArgs;
 use super::failure::Failure;
+use super::input::Space;
 use super::talk::Talk;
 use super::{memory, store};
 use crate::audit::{self, Level, Report, VerifyOptions};
@@ -16,7 +17,10 @@ use crate::surface::Surface;
 pub fn run(args: &VerifyArgs, talk: &Talk) -> Result<u8, Failure> {
     let (cap, _) = memory::cap(args.memory.as_deref())?;
     let mut open = store::open_finished(&args.store)?;
-    let surface = match store::surface_of(&mut open, &args.against, talk) {
+    // The store may be one that can only be read.
+    let scratch = std::env::temp_dir().join("verify");
+    let space = Space::Capped(cap, &scratch);
+    let surface = match store::surface_of(&mut open, &args.against, space, talk) {
         Ok(input) => Some(input.surface),
         Err(failure) if args.against.is_empty() && failure.code == "unreadable-file" => {
             talk.note("note: the surface is not where it was; the mesh is verified without it (give it with --against)");

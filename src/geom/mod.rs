@@ -3,7 +3,6 @@
 //! One convention holds everywhere (drawn in `mesh/anatomy.rs`): a tetrahedron `a b c d` is positive
 //! when `det(b-a, c-a, d-a) > 0`, and [`insphere`] is positive inside the sphere of a positive one.
 
-mod boxes;
 mod dyadic;
 mod hash;
 mod hilbert;
@@ -15,7 +14,6 @@ pub(crate) mod oracle;
 #[cfg(test)]
 pub(crate) mod tests;
 
-pub use boxes::BoxTree;
 pub use dyadic::Dyadic;
 pub use hash::{STEP, mix};
 pub use hilbert::{HilbertFrame, hilbert_index};
@@ -27,7 +25,8 @@ pub use sign::{
 pub type Point = glam::DVec3;
 
 /// Axis-aligned box, `low <= high` on each axis; the empty box has `low > high`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
 pub struct Aabb {
     pub low: Point,
     pub high: Point,

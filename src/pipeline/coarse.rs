@@ -1,14 +1,12 @@
 //! The coarse mesh: the Delaunay mesh of the surface's vertices with every triangle of it, emptied outside.
 
-use rayon::prelude::*;
-
 use super::watch::{Event, Watcher};
 use super::{Options, PipelineError};
 use crate::boundary::{RecoveryReport, Regions, fill_regions, recover};
 use crate::delaunay::{Kernel, KernelStats, enclose, insertion_key};
 use crate::geom::HilbertFrame;
 use crate::mesh::{Facet, Mesh, VertexTag};
-use crate::store::Pages;
+use crate::store::{Pages, Room, fail};
 use crate::surface::Surface;
 
 /// What the coarse step did.
@@ -24,14 +22,15 @@ const TELL_EVERY: usize = 4096;
 
 /// Builds the coarse mesh of a valid surface into an empty mesh.
 ///
-/// Errors: triangles that cannot be recovered; regions of which none is filled.
+/// Errors: triangles that cannot be recovered; regions of which none is filled. Pages and scratch files that fail unwind.
 pub fn coarse<P: Pages>(
     mesh: &mut Mesh<P>,
     surface: &Surface,
     options: &Options,
+    room: &Room,
     watch: &Watcher,
 ) -> Result<CoarseReport, PipelineError> {
-    let kernel = triangulate(mesh, surface, watch);
+    let kernel = triangulate(mesh, surface, room, watch);
     watch(stage("recover the surface"));
     mesh.refresh_tet_of();
     let recovery = recover(mesh)?;
@@ -65,25 +64,33 @@ fn stage(stage: &'static str) -> Event {
 ///
 /// Vertices are numbered in the order of insertion, so that near vertices share pages; the number in the surface is
 /// kept as the owner's index.
-fn triangulate<P: Pages>(mesh: &mut Mesh<P>, surface: &Surface, watch: &Watcher) -> KernelStats {
+fn triangulate<P: Pages>(
+    mesh: &mut Mesh<P>,
+    surface: &Surface,
+    room: &Room,
+    watch: &Watcher,
+) -> KernelStats {
     let bounds = surface.bounds();
     let frame = HilbertFrame::new(&bounds);
-    let mut order: Vec<(u64, u32)> = surface
-        .points
-        .par_iter()
-        .enumerate()
-        .map(|(i, &p)| (insertion_key(&frame, p), i as u32))
-        .collect();
-    order.par_sort_unstable();
+    let mut order = room.sorter::<12>();
+    for (i, &p) in (0u32..).zip(&surface.points) {
+        let mut record = [0; 12];
+        record[..8].copy_from_slice(&insertion_key(&frame, p).to_be_bytes());
+        record[8..].copy_from_slice(&i.to_be_bytes());
+        order.push(record).unwrap_or_else(|e| fail(e));
+    }
+    let order = order.finish().unwrap_or_else(|e| fail(e));
     let mut kernel = Kernel::default();
     let mut hint = enclose(mesh, &bounds);
-    let mut number = vec![0u32; surface.points.len()];
-    let total = order.len();
-    for (k, (_, i)) in order.into_iter().enumerate() {
+    let total = surface.points.len();
+    let mut number = room.column(total, 0u32);
+    for (k, record) in order.enumerate() {
+        let record = record.unwrap_or_else(|e| fail(e));
+        let i = u32::from_be_bytes([record[8], record[9], record[10], record[11]]);
         let p = surface.points[i as usize];
         let v = mesh.add_vertex(p, 0.0);
         mesh.set_vertex_attribute(v, VertexTag::Surface, i);
-        number[i as usize] = v;
+        number.set(i as usize, v);
         hint = kernel
             .insert(mesh, v, p, hint)
             .unwrap_or_else(|e| panic!("vertex {i} of the surface at {p} was refused: {e:?}"));
@@ -98,7 +105,7 @@ fn triangulate<P: Pages>(mesh: &mut Mesh<P>, surface: &Surface, watch: &Watcher)
     }
     for (n, (corners, &label)) in surface.triangles.iter().zip(&surface.labels).enumerate() {
         mesh.add_facet(Facet {
-            vertices: corners.map(|c| number[c as usize]),
+            vertices: corners.map(|c| number.get(c as usize)),
             label,
             input: n as u64,
             regions: [0, 0],

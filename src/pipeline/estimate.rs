@@ -12,6 +12,12 @@ use crate::sizing::{Background, Counts, Domain, Further, Region, SizeField, Size
 use crate::store::{Room, attempt};
 use crate::surface::{OUTSIDE, Seeker, Surface, Volumes};
 
+/// Bytes held while volumes are told, for each triangle: which volume each side has, which sides see each other, and which is left out.
+const PREPARE_TRIANGLE: usize = 17;
+/// Bytes held while sizes are made, for each vertex: its size, and lists of those near a cell.
+const PREPARE_VERTEX: usize = 20;
+/// Bytes for frames of what is not held.
+const PREPARE_LEAST: usize = 8 << 20;
 /// Tetrahedra of one sub-domain, unless a number of sub-domains is asked for.
 const TETS_PER_SUBDOMAIN: f64 = (4u64 << 20) as f64;
 /// Inner tetrahedra without and with only part of the optimization, over those with all of it: 1.072 and 1.083, 1.023 and 1.026.
@@ -69,6 +75,7 @@ pub struct Estimate {
     /// What was asked for, when that was more than the mesh allows.
     pub subdomains_asked: Option<u32>,
     surface_bytes: u64,
+    least_to_prepare: u64,
     /// Of the size field: its octree, and sizes at corners, which go to a scratch file where their share of the cap is too small.
     octree_bytes: u64,
     sizes_bytes: u64,
@@ -128,8 +135,8 @@ fn prepare_in(
         true => Some(built(&[])?),
         false => None,
     };
-    let seeker = Seeker::new(surface);
-    let volumes = Volumes::of(&seeker);
+    let seeker = Seeker::of(surface, room, |_| true);
+    let volumes = Volumes::of_in(&seeker, room);
     let policy = options.regions()?;
     let chosen = policy.filled(OUTSIDE, volumes.n_volumes, &volumes.walls())?;
     let filled: Vec<bool> = (0..volumes.n_volumes)
@@ -173,6 +180,7 @@ impl Estimate {
             subdomains,
             subdomains_asked,
             surface_bytes: surface.bytes() as u64,
+            least_to_prepare: least_to_prepare(surface),
             octree_bytes: field.bytes_in(0) - SizeField::share_of(0).min(sizes_bytes),
             sizes_bytes,
             form: options.form()?,
@@ -239,7 +247,7 @@ impl Estimate {
 
     /// The smallest cap under which all steps find room.
     pub fn memory_least_bytes(&self) -> u64 {
-        let mut cap = MEMORY_MIN;
+        let mut cap = (self.least_to_prepare + self.octree_bytes).max(MEMORY_MIN);
         while Plan::new(cap, self.held_bytes(cap)).is_err() {
             cap += 1 << 20;
         }
@@ -269,6 +277,21 @@ impl Estimate {
     }
 }
 
+/// The smallest cap under which this surface may be meshed, as far as it alone tells: the size field needs a little more.
+pub fn least_for(surface: &Surface) -> u64 {
+    let mut cap = least_to_prepare(surface).max(MEMORY_MIN);
+    while Plan::new(cap, surface.bytes() as u64).is_err() {
+        cap += 1 << 20;
+    }
+    cap
+}
+
+/// The smallest cap under which volumes and sizes can be told: what is held of each triangle and vertex beside the surface.
+fn least_to_prepare(surface: &Surface) -> u64 {
+    let beside = PREPARE_TRIANGLE * surface.n_triangles() + PREPARE_VERTEX * surface.n_vertices();
+    (surface.bytes() + beside + PREPARE_LEAST) as u64
+}
+
 /// How many sub-domains a mesh of so many tetrahedra is made in, and what was asked for when that is more.
 pub(super) fn n_subdomains(
     tets: f64,
@@ -280,4 +303,52 @@ pub(super) fn n_subdomains(
     let wanted = asked.map_or(auto, f64::from);
     let n = wanted.min(most).min(f64::from(1u32 << 20)) as u32;
     Ok((n, asked.filter(|_| wanted > most && wanted > 1.0)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::samples::SampleSpec;
+    use crate::surface::{orient_alike_in, validate_in};
+
+    #[test]
+    fn a_surface_larger_than_its_room_gives_the_same() -> Result<(), Box<dyn std::error::Error>> {
+        let dir = tempfile::tempdir()?;
+        let mut surface: Surface = SampleSpec::parse("grains,count=400")?.make()?.into();
+        surface.shrink();
+        let options = Options {
+            regions: Some("all".to_owned()),
+            ..Options::default()
+        };
+        let wide = prepare(&surface, &options, None, &Room::boundless())?;
+        let narrow = Room::new(surface.bytes() as u64 / 4, dir.path());
+        orient_alike_in(&mut surface, &narrow);
+        assert!(validate_in(&surface, &narrow).is_valid());
+        let made = prepare(&surface, &options, None, &narrow)?;
+        assert_eq!(made.estimate, wide.estimate);
+        assert_eq!(made.sizes.to_string(), wide.sizes.to_string());
+        assert_eq!(made.field.to_bytes(), wide.field.to_bytes());
+        assert!(made.field.bytes() < wide.field.bytes());
+        // What is held of it, and no more, is what the ledger was told.
+        assert!(made.field.bytes() as u64 <= wide.estimate.octree_bytes + (1 << 20));
+        Ok(())
+    }
+
+    #[test]
+    fn the_least_cap_leaves_room_for_the_surface_and_little_more() {
+        let surface = |n: usize| Surface {
+            triangles: vec![[0; 3]; n],
+            ..Surface::default()
+        };
+        assert_eq!(least_for(&surface(0)), MEMORY_MIN);
+        for n in [1 << 20, 1 << 22] {
+            let surface = surface(n);
+            let (held, least) = (surface.bytes() as u64, least_for(&surface));
+            assert!(Plan::new(least, held).is_ok());
+            assert!(
+                least > held && least < 3 * held + MEMORY_MIN,
+                "{held} {least}"
+            );
+        }
+    }
 }

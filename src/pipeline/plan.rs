@@ -30,8 +30,18 @@ impl Plan {
     ///
     /// Errors: [`StoreError::Budget`] when less than half of [`MEMORY_MIN`] would be left for frames.
     pub fn new(cap: u64, held: u64) -> Result<Self, StoreError> {
-        let redb = (cap / 8).min(REDB_MAX);
-        let buffers = (cap / 4).min(BUFFERS_MAX);
+        let wide = Self::with_shares(cap, held, 1);
+        match &wide {
+            // What is held leaves few frames: they need it more than caches and buffers.
+            Ok(plan) if plan.frames >= cap / 8 => wide,
+            _ => Self::with_shares(cap, held, 2),
+        }
+    }
+
+    /// With caches and buffers of the `narrow`th part of their usual share.
+    fn with_shares(cap: u64, held: u64, narrow: u64) -> Result<Self, StoreError> {
+        let redb = (cap / 8 / narrow).min(REDB_MAX);
+        let buffers = (cap / 4 / narrow).min(BUFFERS_MAX);
         let rest = cap.saturating_sub(redb + redb / 2 + buffers + CATALOG);
         let least = MEMORY_MIN / 4;
         if rest < held + least {

@@ -1,5 +1,6 @@
 //! All steps of one run.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Instant;
 
@@ -7,6 +8,7 @@ use super::coarse::{CoarseReport, coarse};
 use super::crew::crew;
 use super::divide::{DONE, WORK, read_owners};
 use super::estimate::n_subdomains;
+use super::held::Held;
 use super::leaf::{Common, Leaf, LeafJob, SealedTotals};
 use super::tree::{self, Part, PartMesh, blob};
 use super::watch::Watcher;
@@ -59,12 +61,14 @@ pub fn mesh(
     match catalog.blob(blob::SIZE_FIELD)? {
         None => {
             let prepared = prepare(surface, options, None, &room)?;
+            let surface = Cow::Borrowed(surface);
             mesh_prepared(catalog, surface, options, prepared, budget, watch)
         }
         Some(bytes) => {
             let field = attempt(|| SizeField::from_bytes_in(&bytes, &room))??;
             drop(bytes);
             let field = field.with_sources(&options.sizes()?, surface.bounds().diagonal())?;
+            let surface = Cow::Borrowed(surface);
             go_on(catalog, surface, options, (field, None), budget, watch)
         }
     }
@@ -72,10 +76,11 @@ pub fn mesh(
 
 /// [`mesh`] into a new store, with what [`prepare`] made of this surface and these options.
 ///
+/// A surface that is given away is dropped once the coarse mesh exists, which leaves its memory to what follows.
 /// Errors: as [`mesh`].
 pub fn mesh_prepared(
     catalog: &mut Catalog,
-    surface: &Surface,
+    surface: Cow<Surface>,
     options: &Options,
     prepared: Prepared,
     budget: &Budget,
@@ -87,31 +92,21 @@ pub fn mesh_prepared(
 
 fn go_on(
     catalog: &mut Catalog,
-    surface: &Surface,
+    surface: Cow<Surface>,
     options: &Options,
     (field, new): (SizeField, Option<(SizeSummary, Estimate)>),
     budget: &Budget,
     watch: &Watcher,
 ) -> Result<Summary, PipelineError> {
     let (sizes, estimate) = new.unzip();
-    let surface_lease = budget.lease(surface.bytes() as u64, "the surface")?;
-    let field_lease = budget.lease(field.bytes() as u64, "the size field")?;
-    let held = surface_lease.bytes() + field_lease.bytes();
-    let plan = match options.trial.plan {
-        Some(plan) => plan,
-        None => Plan::new(budget.cap(), held)?,
-    };
-    let _lease = budget.lease(
-        plan.frames + plan.redb + plan.redb / 2 + plan.buffers,
-        "the working mesh",
-    )?;
+    let held = Held::of(&surface, &field, options, budget)?;
     let run = Run {
         catalog,
-        surface,
+        bounds: surface.bounds(),
+        surface: Some(surface),
         options,
         field: &field,
-        plan,
-        bounds: surface.bounds(),
+        plan: held.plan,
         n: 1,
         estimate,
         pages: PagerStats::default(),
@@ -119,12 +114,13 @@ fn go_on(
         watch,
     };
     // Unwinding from a failed page access ends here; a step's commit is its last act, so nothing is half done.
-    attempt(|| run.steps(sizes))?
+    attempt(|| run.steps(sizes, held, budget))?
 }
 
 pub(super) struct Run<'a> {
     pub catalog: &'a mut Catalog,
-    surface: &'a Surface,
+    /// Until the coarse mesh exists.
+    surface: Option<Cow<'a, Surface>>,
     pub options: &'a Options,
     pub field: &'a SizeField,
     pub plan: Plan,
@@ -139,7 +135,12 @@ pub(super) struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    fn steps(mut self, sizes: Option<SizeSummary>) -> Result<Summary, PipelineError> {
+    fn steps(
+        mut self,
+        sizes: Option<SizeSummary>,
+        mut held: Held,
+        budget: &Budget,
+    ) -> Result<Summary, PipelineError> {
         let mut open = None;
         let mut coarse = None;
         if self.catalog.state()? < StoreState::Coarse {
@@ -147,6 +148,11 @@ impl<'a> Run<'a> {
             (open, coarse) = (Some(mesh), Some(report));
         }
         self.n = tree::n_subdomains(self.catalog)?;
+        if let Some(Cow::Owned(surface)) = self.surface.take() {
+            drop(surface);
+            held = held.without_surface(self.options, budget)?;
+            self.plan = held.plan;
+        }
         // Pages of the coarse mesh that are still resident would take the frames of the others.
         open = open.filter(|_| self.n == 1);
         let cuts = self.divide_all()?;
@@ -193,8 +199,11 @@ impl<'a> Run<'a> {
             cache_bytes: self.plan.redb as usize,
         };
         let mut mesh = Mesh::new(Pager::new(self.plan.frames, Some(backing)));
-        let report = coarse(&mut mesh, self.surface, self.options, self.watch)?;
         let scratch = self.catalog.scratch_dir()?;
+        let room = Room::new(self.plan.buffers / 2, &scratch);
+        let surface = self.surface.take().unwrap_or_default();
+        let report = coarse(&mut mesh, &surface, self.options, &room, self.watch)?;
+        drop(room);
         let space = Workspace {
             dir: &scratch,
             memory: self.plan.buffers / 2,
@@ -214,7 +223,7 @@ impl<'a> Run<'a> {
             load,
         };
         let (pages, frames_used) = (mesh.pages().stats(), mesh.pages().frames_used());
-        let (field, surface) = (self.field.to_bytes(), self.surface);
+        let field = self.field.to_bytes();
         self.catalog.commit(|step| {
             step.list_file(0, COARSE);
             step.set_labels(&surface.label_names);
@@ -242,6 +251,7 @@ impl<'a> Run<'a> {
             ));
             Ok(())
         })?;
+        self.surface = Some(surface);
         let path = self.catalog.file_path(0, COARSE + WORK);
         mesh.pages_mut().next_generation(COARSE + WORK, path)?;
         Ok((mesh, report))

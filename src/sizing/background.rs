@@ -2,7 +2,9 @@
 
 use super::SizingError;
 use super::wishes::Wish;
-use crate::geom::{Aabb, BoxTree, Point};
+use crate::geom::{Aabb, Point};
+use crate::store::Room;
+use crate::surface::BoxTree;
 
 /// Sizes in a cell are taken as equal when they differ by less than this share.
 const SPREAD_MAX: f64 = 0.1;
@@ -35,17 +37,18 @@ pub struct BackgroundMesh {
 impl BackgroundMesh {
     /// Shape: `h` runs parallel to `points`, which `tets` index; sizes are above zero.
     pub fn new(points: Vec<Point>, tets: Vec<[u32; 4]>, h: Vec<f64>) -> Self {
+        let room = &Room::boundless();
         let bounds = Aabb::around(points.iter().copied());
         let around = |t: u32| Aabb::around(tets[t as usize].map(|v| points[v as usize]));
-        let tree = BoxTree::new(&bounds, tets.len() as u32, |_| true, around);
+        let tree = BoxTree::new(&bounds, tets.len() as u32, room, |_| true, around);
         let at = |v: u32| Aabb::around([points[v as usize]]);
-        let vertices = BoxTree::new(&bounds, points.len() as u32, |_| true, at);
+        let vertices = BoxTree::new(&bounds, points.len() as u32, room, |_| true, at);
         let join = |[a, b]: [f64; 2], [c, d]: [f64; 2]| [a.min(c), b.max(d)];
         let mut ranges: Vec<Vec<[f64; 2]>> = Vec::new();
         for (level, nodes) in vertices.levels.iter().enumerate() {
             let range = |node: usize| match level {
                 0 => (vertices.members(node))
-                    .map(|i| [h[vertices.order[i] as usize]; 2])
+                    .map(|i| [h[vertices.order.get(i) as usize]; 2])
                     .fold(NONE, join),
                 _ => (vertices.children(level, node))
                     .map(|child| ranges[level - 1][child])
@@ -79,7 +82,7 @@ impl BackgroundMesh {
             .map(|n| (top, n))
             .collect();
         while let Some((level, node)) = stack.pop() {
-            let bounds = &self.vertices.levels[level][node];
+            let bounds = &self.vertices.levels[level].get(node);
             if holds(bounds) {
                 add(self.ranges[level][node]);
             } else if !cell.meets(bounds) {
@@ -88,8 +91,8 @@ impl BackgroundMesh {
                 stack.extend(children.map(|child| (level - 1, child)));
             } else {
                 for i in self.vertices.members(node) {
-                    if holds(&self.vertices.boxes[i]) {
-                        add([self.h[self.vertices.order[i] as usize]; 2]);
+                    if holds(&self.vertices.boxes.get(i)) {
+                        add([self.h[self.vertices.order.get(i) as usize]; 2]);
                     }
                 }
             }

@@ -25,16 +25,20 @@ impl Hanging {
     /// As bytes that sort by level, then by corner.
     fn to_bytes(self) -> [u8; 24] {
         let [a, b, c, d] = self.on;
-        let all = [self.level, self.corner, a, b, c, d].map(u32::to_be_bytes);
-        std::array::from_fn(|i| all[i / 4][i % 4])
+        let mut bytes = [0; 24];
+        let places = bytes.chunks_exact_mut(4);
+        for (place, x) in places.zip([self.level, self.corner, a, b, c, d]) {
+            place.copy_from_slice(&x.to_be_bytes());
+        }
+        bytes
     }
 
-    fn from_bytes(bytes: [u8; 24]) -> Self {
-        let number = |i: usize| u32::from_be_bytes(std::array::from_fn(|k| bytes[4 * i + k]));
+    fn from_bytes(b: [u8; 24]) -> Self {
+        let number = |i: usize| u32::from_be_bytes([b[i], b[i + 1], b[i + 2], b[i + 3]]);
         Self {
             level: number(0),
-            corner: number(1),
-            on: std::array::from_fn(|i| number(2 + i)),
+            corner: number(4),
+            on: [number(8), number(12), number(16), number(20)],
         }
     }
 
@@ -116,12 +120,15 @@ fn number_corners(tree: &Tree, room: &Room) -> Result<(Column<[u32; 8]>, usize),
 }
 
 /// A number of eight bytes and one of four.
+#[inline]
 fn word_and(key: [u8; 12]) -> (u64, u32) {
-    let number = u128::from_be_bytes(std::array::from_fn(|i| if i < 4 { 0 } else { key[i - 4] }));
-    ((number >> 32) as u64, number as u32)
+    let [a, b, c, d, e, f, g, h, slot @ ..] = key;
+    let number = u64::from_be_bytes([a, b, c, d, e, f, g, h]);
+    (number, u32::from_be_bytes(slot))
 }
 
 /// Interleaves the bits of a lattice position, 21 per axis.
+#[inline]
 fn morton(p: [u32; 3]) -> u64 {
     let spread = |x: u32| {
         let mut x = u64::from(x);

@@ -3,6 +3,7 @@
 use super::SizingError;
 use super::wishes::Wish;
 use crate::geom::Point;
+use crate::store::Room;
 use crate::surface::{Seeker, Volumes};
 
 /// Cells at the border of a region are at most this many of its lengths wide.
@@ -36,7 +37,7 @@ impl<'a> Region<'a> {
         Self {
             seeker,
             volumes,
-            border: Seeker::of(seeker.surface(), is_border),
+            border: Seeker::of(seeker.surface(), &Room::boundless(), is_border),
             is_here,
             h,
             beta,

@@ -21,11 +21,6 @@ impl Frame {
             side,
         }
     }
-
-    /// Position in the unit cube; points outside are moved to its wall.
-    pub(super) fn unit(&self, p: Point) -> Point {
-        ((p - self.low) * (1.0 / self.side)).clamp(Point::ZERO, Point::ONE)
-    }
 }
 
 /// Sizes of the surface's vertices that their edges give, and their positions, in units of the cube's side.
@@ -33,6 +28,7 @@ impl Frame {
 pub(super) struct Seeds<'a> {
     points: &'a [Point],
     frame: Frame,
+    per_side: f64,
     /// By vertex; zero where no triangle has it.
     h: Vec<f64>,
 }
@@ -46,10 +42,11 @@ impl Seeds<'_> {
             .map(|(v, _)| v)
     }
 
-    /// Position of a vertex.
+    /// Position of a vertex in the unit cube.
     #[inline]
     pub(super) fn at(&self, v: u32) -> Point {
-        self.frame.unit(self.points[v as usize])
+        let p = self.points[v as usize] - self.frame.low;
+        (p * self.per_side).clamp(Point::ZERO, Point::ONE)
     }
 
     /// Size at a vertex.
@@ -97,7 +94,13 @@ pub(super) fn seeds_of<'a>(
     if h.iter().all(|&h| h == 0.0) || !frame.side.is_normal() {
         return Err(SizingError::NoEdges);
     }
-    Ok((frame, bounds, Seeds { points, frame, h }))
+    let seeds = Seeds {
+        points,
+        frame,
+        per_side: 1.0 / frame.side,
+        h,
+    };
+    Ok((frame, bounds, seeds))
 }
 
 /// Sizes of the vertices from `first` on.

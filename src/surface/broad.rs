@@ -2,8 +2,9 @@
 
 use rayon::prelude::*;
 
-use super::Surface;
-use crate::geom::{Aabb, BoxTree};
+use super::{BoxTree, Surface};
+use crate::geom::Aabb;
+use crate::store::Room;
 
 /// Leaves one task handles.
 const BLOCK: usize = 256;
@@ -15,11 +16,16 @@ const BLOCK_LISTED_MAX: usize = 8192;
 const FOUND_MAX: u64 = 10_000_000;
 
 /// A tree over the triangles that `keep` accepts.
-pub(super) fn tree_of(surface: &Surface, keep: impl Fn(u32) -> bool + Sync) -> BoxTree {
+pub(super) fn tree_of(
+    surface: &Surface,
+    room: &Room,
+    keep: impl Fn(u32) -> bool + Sync,
+) -> BoxTree {
     let box_of = |t: u32| Aabb::around(surface.corners(t));
     BoxTree::new(
         &surface.bounds(),
         surface.n_triangles() as u32,
+        room,
         keep,
         box_of,
     )
@@ -84,12 +90,12 @@ impl BoxTree {
                 self.try_pair(i, j, pair);
             }
         }
-        let bounds = self.levels[0][leaf];
+        let bounds = self.levels[0].get(leaf);
         stack.push((self.levels.len() - 1, 0));
         while let Some((level, node)) = stack.pop() {
             // The last leaf below the node.
             let last = (node + 1) * Self::ARITY.pow(level as u32) - 1;
-            if last <= leaf || !self.levels[level][node].meets(&bounds) {
+            if last <= leaf || !self.levels[level].get(node).meets(&bounds) {
                 continue;
             }
             if level > 0 {
@@ -99,7 +105,7 @@ impl BoxTree {
             }
             for i in own
                 .clone()
-                .filter(|&i| self.boxes[i].meets(&self.levels[0][node]))
+                .filter(|&i| self.boxes.get(i).meets(&self.levels[0].get(node)))
             {
                 for j in self.members(node) {
                     self.try_pair(i, j, pair);
@@ -109,8 +115,8 @@ impl BoxTree {
     }
 
     fn try_pair(&self, i: usize, j: usize, pair: &mut impl FnMut(u32, u32)) {
-        if self.boxes[i].meets(&self.boxes[j]) {
-            let (a, b) = (self.order[i], self.order[j]);
+        if self.boxes.get(i).meets(&self.boxes.get(j)) {
+            let (a, b) = (self.order.get(i), self.order.get(j));
             pair(a.min(b), a.max(b));
         }
     }

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::Surface;
 use super::rims::{in_line, open_groups};
+use crate::store::{Column, Room, fail};
 
 /// What edges alone tell about a surface.
 ///
@@ -40,9 +41,9 @@ impl Closedness {
     }
 }
 
-/// Looks at the edges of a surface. Near-linear: two sorts; memory 16 bytes per triangle and per edge use.
+/// Looks at the edges of a surface. Near-linear: two sorts; memory 16 bytes per triangle and 12 per edge use.
 pub fn closedness(surface: &Surface) -> Closedness {
-    Facets::of(surface).closedness(surface)
+    Facets::of(surface, &Room::boundless()).closedness(surface)
 }
 
 /// The triangles that count: collapsed ones and repetitions set apart.
@@ -51,21 +52,40 @@ pub(super) struct Facets {
     pub duplicates: Vec<[u32; 2]>,
     pub two_sided: Vec<[u32; 2]>,
     /// Uses of edges by facets, sorted by edge.
-    pub uses: Vec<EdgeUse>,
+    uses: Column<EdgeUse>,
     /// Per triangle: not the first of its vertices, or a vertex repeated.
     pub is_left_out: Vec<bool>,
 }
 
 /// One facet at one edge.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
 pub(super) struct EdgeUse {
-    /// Smaller vertex in the high half, larger in the low half.
-    pub edge: u64,
+    /// The edge's vertices, the smaller one first.
+    pub edge: [u32; 2],
     /// `4 * triangle + k`, the edge going from corner k to the next.
     half: u32,
 }
 
 impl EdgeUse {
+    /// As bytes that sort as it does.
+    fn to_bytes(self) -> [u8; 12] {
+        let mut bytes = [0; 12];
+        let places = bytes.chunks_exact_mut(4);
+        for (place, x) in places.zip([self.edge[0], self.edge[1], self.half]) {
+            place.copy_from_slice(&x.to_be_bytes());
+        }
+        bytes
+    }
+
+    fn from_bytes(b: [u8; 12]) -> Self {
+        let number = |i: usize| u32::from_be_bytes([b[i], b[i + 1], b[i + 2], b[i + 3]]);
+        Self {
+            edge: [number(0), number(4)],
+            half: number(8),
+        }
+    }
+
     pub fn triangle(self) -> u32 {
         self.half >> 2
     }
@@ -93,7 +113,8 @@ pub(super) fn same_direction(surface: &Surface, a: EdgeUse, b: EdgeUse) -> bool 
 }
 
 impl Facets {
-    pub fn of(surface: &Surface) -> Self {
+    /// A scratch file that fails unwinds.
+    pub fn of(surface: &Surface, room: &Room) -> Self {
         let degenerate: Vec<(u32, bool)> = (0..surface.n_triangles() as u32)
             .into_par_iter()
             .filter_map(|t| collapse(surface, t).map(|repeated| (t, repeated)))
@@ -102,22 +123,27 @@ impl Facets {
         for &(t, repeated) in &degenerate {
             is_left_out[t as usize] = repeated;
         }
-        let (duplicates, two_sided) = repetitions(surface, &mut is_left_out);
-        let mut uses: Vec<EdgeUse> = Vec::with_capacity(3 * surface.n_triangles());
+        let (duplicates, two_sided) = repetitions(surface, &mut is_left_out, room);
+        let mut sorter = room.sorter::<12>();
         for (t, triangle) in (0u32..).zip(&surface.triangles) {
             if is_left_out[t as usize] {
                 continue;
             }
             for k in 0..3 {
                 let (a, b) = (triangle[k as usize], triangle[(k as usize + 1) % 3]);
-                let edge = u64::from(a.min(b)) << 32 | u64::from(a.max(b));
-                uses.push(EdgeUse {
-                    edge,
+                let edge_use = EdgeUse {
+                    edge: [a.min(b), a.max(b)],
                     half: 4 * t + k,
-                });
+                };
+                let pushed = sorter.push(edge_use.to_bytes());
+                pushed.unwrap_or_else(|e| fail(e));
             }
         }
-        uses.par_sort_unstable();
+        let mut uses = room.list();
+        for bytes in sorter.finish().unwrap_or_else(|e| fail(e)) {
+            uses.push(EdgeUse::from_bytes(bytes.unwrap_or_else(|e| fail(e))));
+        }
+        let uses = uses.done();
         Self {
             degenerate,
             duplicates,
@@ -127,12 +153,26 @@ impl Facets {
         }
     }
 
-    /// The uses of each edge together.
-    pub fn edges(&self) -> impl Iterator<Item = &[EdgeUse]> {
-        self.uses.chunk_by(|a, b| a.edge == b.edge)
+    /// Calls `visit` with the uses of each edge together.
+    pub fn each_edge(&mut self, mut visit: impl FnMut(&[EdgeUse])) {
+        let mut together = Vec::new();
+        for i in 0..self.uses.len() {
+            let next = self.uses.get(i);
+            if together
+                .last()
+                .is_some_and(|u: &EdgeUse| u.edge != next.edge)
+            {
+                visit(&together);
+                together.clear();
+            }
+            together.push(next);
+        }
+        if !together.is_empty() {
+            visit(&together);
+        }
     }
 
-    pub fn closedness(&self, surface: &Surface) -> Closedness {
+    pub fn closedness(&mut self, surface: &Surface) -> Closedness {
         let mut found = Closedness {
             degenerate: self.degenerate.clone(),
             duplicates: self.duplicates.clone(),
@@ -140,7 +180,7 @@ impl Facets {
             ..Closedness::default()
         };
         let mut parts = Groups::new(surface.n_triangles());
-        for uses in self.edges() {
+        self.each_edge(|uses| {
             found.n_edges += 1;
             match uses {
                 [only] => found.open.push((only.triangle(), only.vertices(surface))),
@@ -153,7 +193,7 @@ impl Facets {
             for pair in uses.windows(2) {
                 parts.join(pair[0].triangle(), pair[1].triangle());
             }
-        }
+        });
         let roots = (0..surface.n_triangles() as u32)
             .filter(|&t| !self.is_left_out[t as usize] && parts.root(t) == t);
         found.n_components = roots.count();
@@ -175,32 +215,43 @@ fn collapse(surface: &Surface, t: u32) -> Option<bool> {
 }
 
 /// Pairs of triangles of the same vertices; all but the first of each set are left out.
-fn repetitions(surface: &Surface, is_left_out: &mut [bool]) -> (Vec<[u32; 2]>, Vec<[u32; 2]>) {
-    let mut keys: Vec<([u32; 3], u32)> = (0..surface.n_triangles() as u32)
-        .into_par_iter()
-        .filter(|&t| !is_left_out[t as usize])
-        .map(|t| {
-            let mut key = surface.triangles[t as usize];
+fn repetitions(
+    surface: &Surface,
+    is_left_out: &mut [bool],
+    room: &Room,
+) -> (Vec<[u32; 2]>, Vec<[u32; 2]>) {
+    let mut sorter = room.sorter::<16>();
+    for (t, triangle) in (0u32..).zip(&surface.triangles) {
+        if !is_left_out[t as usize] {
+            let mut key = *triangle;
             key.sort_unstable();
-            (key, t)
-        })
-        .collect();
-    keys.par_sort_unstable();
+            let mut record = [0; 16];
+            for (place, x) in record.chunks_exact_mut(4).zip([key[0], key[1], key[2], t]) {
+                place.copy_from_slice(&x.to_be_bytes());
+            }
+            let pushed = sorter.push(record);
+            pushed.unwrap_or_else(|e| fail(e));
+        }
+    }
     let (mut duplicates, mut two_sided) = (Vec::new(), Vec::new());
-    for set in keys.chunk_by(|a, b| a.0 == b.0).filter(|set| set.len() > 1) {
-        let first = set[0].1;
-        let mut opposite = None;
-        for &(_, t) in &set[1..] {
-            is_left_out[t as usize] = true;
-            let same =
-                is_odd(surface.triangles[first as usize]) == is_odd(surface.triangles[t as usize]);
-            match (same, opposite) {
-                (true, _) => duplicates.push([first, t]),
-                (false, Some(earlier)) => duplicates.push([earlier, t]),
-                (false, None) => {
-                    opposite = Some(t);
-                    two_sided.push([first, t]);
-                }
+    // Of the set at hand: its vertices, the first triangle, the first one of the other orientation.
+    let mut set = None::<([u8; 12], u32, Option<u32>)>;
+    for key in sorter.finish().unwrap_or_else(|e| fail(e)) {
+        let key = key.unwrap_or_else(|e| fail(e));
+        let [vertices @ .., a, b, c, d] = key;
+        let t = u32::from_be_bytes([a, b, c, d]);
+        let Some((_, first, opposite)) = set.as_mut().filter(|set| set.0 == vertices) else {
+            set = Some((vertices, t, None));
+            continue;
+        };
+        is_left_out[t as usize] = true;
+        let [known, new] = [*first, t].map(|t| is_odd(surface.triangles[t as usize]));
+        match (known == new, *opposite) {
+            (true, _) => duplicates.push([*first, t]),
+            (false, Some(earlier)) => duplicates.push([earlier, t]),
+            (false, None) => {
+                *opposite = Some(t);
+                two_sided.push([*first, t]);
             }
         }
     }

@@ -2,13 +2,14 @@
 //!
 //! Reading order: [`triangles`](Surface) (what a surface is), `weld` (how readers build one),
 //! `edges` (which triangles meet where), `orientation` (turning triangles the same way), `contact`
-//! (how two triangles touch), `broad` (which pairs to look at), `validate` (all of it together),
+//! (how two triangles touch), `boxes` and `broad` (which pairs to look at), `validate` (all of it together),
 //! `defect` (what can be wrong and what to do about it), `rims` (where it is open), `near` and `repair`
 //! (mending on demand), `fitness` (what mesh its triangles allow), `split` (finer triangles of the same surface),
 //! `seek` (distances and what lies above), `volumes` (what is enclosed).
 //!
 //! Is not: file formats (`io`), which volumes are filled (`boundary`).
 
+mod boxes;
 mod broad;
 mod contact;
 mod defect;
@@ -29,18 +30,19 @@ mod weld;
 #[cfg(test)]
 mod tests;
 
+pub use boxes::BoxTree;
 pub use contact::{Contact, ContactKind, contact};
 pub use defect::{Defect, SurfaceError};
 pub(crate) use defect::{show, show_number};
 pub use edges::{Closedness, closedness};
 pub use fitness::{Fitness, fitness};
 pub use near::weld_near;
-pub use orientation::{Orientation, orient_alike};
+pub use orientation::{Orientation, orient_alike, orient_alike_in};
 pub use repair::{Closing, Repair, closing, repair};
 pub use rims::{Rim, TJunction, rims, t_junctions};
 pub use seek::{Crossing, Seeker};
 pub use split::{SplitReport, split};
 pub use triangles::{Note, NoteKind, SourceFile, Surface};
-pub use validate::{Validation, validate};
+pub use validate::{Validation, validate, validate_in};
 pub use volumes::{OUTSIDE, Volumes, Wall};
 pub use weld::SurfaceBuilder;

@@ -1,7 +1,8 @@
 //! Turning triangles the same way, from neighbor to neighbor.
 
 use super::Surface;
-use super::edges::{Facets, same_direction};
+use super::edges::{Facets, Groups, same_direction};
+use crate::store::Room;
 
 /// What [`orient_alike`] did.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -21,8 +22,21 @@ pub struct Orientation {
 /// facet's second triangle turns with its first. Effects: exchanges two corners of a turned triangle;
 /// ids, labels and vertices stay.
 pub fn orient_alike(surface: &mut Surface) -> Orientation {
-    let facets = Facets::of(surface);
-    let links = links(surface, &facets);
+    orient_alike_in(surface, &Room::boundless())
+}
+
+/// [`orient_alike`] in a room: of a surface that has nothing to be turned, 5 bytes a triangle are held beside it.
+///
+/// A scratch file that fails unwinds.
+pub fn orient_alike_in(surface: &mut Surface, room: &Room) -> Orientation {
+    let mut facets = Facets::of(surface, room);
+    if let Some(n_patches) = patches_of_one_way(surface, &mut facets) {
+        return Orientation {
+            n_patches,
+            ..Orientation::default()
+        };
+    }
+    let links = links(surface, &mut facets);
     let n = surface.n_triangles();
     let mut turn: Vec<Option<bool>> = vec![None; n];
     let mut done = Orientation::default();
@@ -67,6 +81,21 @@ pub fn orient_alike(surface: &mut Surface) -> Orientation {
     done
 }
 
+/// Number of patches when no two triangles at a manifold edge run along it in the same direction.
+fn patches_of_one_way(surface: &Surface, facets: &mut Facets) -> Option<usize> {
+    let mut patches = Groups::new(surface.n_triangles());
+    let mut is_one_way = true;
+    facets.each_edge(|uses| {
+        if let [a, b] = uses {
+            is_one_way &= !same_direction(surface, *a, *b);
+            patches.join(a.triangle(), b.triangle());
+        }
+    });
+    let roots = (0u32..).zip(&facets.is_left_out);
+    let roots = roots.filter(|(t, left_out)| !**left_out && patches.root(*t) == *t);
+    is_one_way.then(|| roots.count())
+}
+
 /// Decides which triangles of a patch turn.
 fn settle(patch: &[u32], fits: bool, turn: &mut [Option<bool>], done: &mut Orientation) {
     let n_turned = patch
@@ -96,14 +125,14 @@ impl Link {
     }
 }
 
-fn links(surface: &Surface, facets: &Facets) -> Vec<[Option<Link>; 3]> {
+fn links(surface: &Surface, facets: &mut Facets) -> Vec<[Option<Link>; 3]> {
     let mut links = vec![[None; 3]; surface.n_triangles()];
-    for uses in facets.edges() {
+    facets.each_edge(|uses| {
         if let [a, b] = uses {
             let unlike = u32::from(same_direction(surface, *a, *b));
             links[a.triangle() as usize][a.corner()] = Some(Link(b.triangle() << 1 | unlike));
             links[b.triangle() as usize][b.corner()] = Some(Link(a.triangle() << 1 | unlike));
         }
-    }
+    });
     links
 }

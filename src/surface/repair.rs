@@ -9,6 +9,7 @@ use super::orientation::orient_alike;
 use super::rims::{TJunction, has_near_junctions, t_junctions};
 use super::validate::validate;
 use super::weld::drop_unused_points;
+use crate::store::Room;
 
 /// Shares of the box diagonal that [`closing`] tries after none.
 const CLOSING_SHARES: [f64; 7] = [1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3];
@@ -60,7 +61,7 @@ fn mend(surface: &mut Surface, weld: Option<f64>, to_close: bool) -> Repair {
 
 /// Drops triangles without area and repeated ones.
 fn drop_useless(surface: &mut Surface, done: &mut Repair) {
-    let facets = Facets::of(surface);
+    let facets = Facets::of(surface, &Room::boundless());
     let mut drop = vec![false; surface.n_triangles()];
     for &(t, _) in &facets.degenerate {
         drop[t as usize] = true;

@@ -1,8 +1,9 @@
 //! The surface as seen from a point: how far it is, and which triangle lies above.
 
-use super::Surface;
 use super::broad::tree_of;
-use crate::geom::{Aabb, BoxTree, Point};
+use super::{BoxTree, Surface};
+use crate::geom::{Aabb, Point};
+use crate::store::Room;
 
 /// A triangle met by a line along z.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,7 +26,7 @@ impl Crossing {
     }
 }
 
-/// Answers questions about one surface, which must stay as it is. Memory: that of its tree, about 70 bytes per triangle.
+/// Answers questions about one surface, which must stay as it is. Memory: that of its tree, about 70 bytes per triangle, or what the room allows.
 pub struct Seeker<'a> {
     surface: &'a Surface,
     tree: BoxTree,
@@ -33,12 +34,14 @@ pub struct Seeker<'a> {
 
 impl<'a> Seeker<'a> {
     pub fn new(surface: &'a Surface) -> Self {
-        Self::of(surface, |_| true)
+        Self::of(surface, &Room::boundless(), |_| true)
     }
 
     /// Sees the triangles that `keep` accepts alone.
-    pub fn of(surface: &'a Surface, keep: impl Fn(u32) -> bool + Sync) -> Self {
-        let tree = tree_of(surface, keep);
+    ///
+    /// A scratch file that fails unwinds, here and later.
+    pub fn of(surface: &'a Surface, room: &Room, keep: impl Fn(u32) -> bool + Sync) -> Self {
+        let tree = tree_of(surface, room, keep);
         Self { surface, tree }
     }
 
@@ -77,14 +80,14 @@ impl<'a> Seeker<'a> {
                 let below = &self.tree.levels[level - 1];
                 let from = stack.len();
                 let children = self.tree.children(level, node);
-                stack.extend(children.map(|c| (level - 1, c, distance2(&below[c], p))));
+                stack.extend(children.map(|c| (level - 1, c, distance2(&below.get(c), p))));
                 // The nearest is looked at first.
                 stack[from..].sort_by(|a, b| b.2.total_cmp(&a.2).then(b.1.cmp(&a.1)));
                 continue;
             }
             for i in self.tree.members(node) {
-                if distance2(&self.tree.boxes[i], p) < best {
-                    let reach = reach(self.surface.corners(self.tree.order[i]));
+                if distance2(&self.tree.boxes.get(i), p) < best {
+                    let reach = reach(self.surface.corners(self.tree.order.get(i)));
                     if reach < best {
                         (best, found) = (reach, reach);
                     }
@@ -134,7 +137,7 @@ impl<'a> Seeker<'a> {
         };
         let mut stack = vec![(top, 0)];
         while let Some((level, node)) = stack.pop() {
-            if misses(&self.tree.levels[level][node], high) {
+            if misses(&self.tree.levels[level].get(node), high) {
                 continue;
             }
             if level > 0 {
@@ -143,8 +146,8 @@ impl<'a> Seeker<'a> {
                 continue;
             }
             for i in self.tree.members(node) {
-                if !misses(&self.tree.boxes[i], high)
-                    && let Some(c) = self.crossing(self.tree.order[i], p)
+                if !misses(&self.tree.boxes.get(i), high)
+                    && let Some(c) = self.crossing(self.tree.order.get(i), p)
                 {
                     high = visit(c);
                 }

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::geom::Point;
+use crate::store::Room;
 
 /// Corners of the unit cube as bits x, y, z; two triangles for each side, seen from outside.
 const CUBE: [[u32; 3]; 12] = [
@@ -470,4 +471,47 @@ fn fitness_tells_needles_at_every_scale() {
     }
     let nothing = build([]);
     assert_eq!(fitness(&nothing, &closedness(&nothing)), Fitness::default());
+}
+
+#[test]
+fn a_room_too_small_changes_nothing() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut triangles = Vec::new();
+    for k in 0..6000 {
+        let at = [k % 20, k / 20 % 20, k / 400].map(|i| 3.0 * f64::from(i));
+        // Every hundredth cube crosses the next one.
+        let shift = if k % 100 == 0 { 2.5 } else { 0.0 };
+        let low = Point::from_array(at) + Point::new(shift, 0.1 * shift, 0.0);
+        let mut made = cube(|p| low + p * (1.0 + f64::from(k % 7) / 5.0));
+        if k % 500 == 1 {
+            made[3].swap(0, 1);
+        }
+        if k % 700 == 2 {
+            made.push(made[5]);
+        }
+        triangles.extend(made);
+    }
+    let crossing = build(triangles.clone());
+    let apart = build(triangles.into_iter().skip(12).take(12 * 99));
+    for surface in [crossing, apart] {
+        // The triangles alone take more than that.
+        let narrow = Room::new(16 << 10, dir.path());
+        assert!(surface.bytes() as u64 > narrow.cap());
+        let validation = validate(&surface);
+        assert_eq!(validate_in(&surface, &narrow), validation);
+        let (mut a, mut b) = (surface.clone(), surface);
+        assert_eq!(orient_alike(&mut a), orient_alike_in(&mut b, &narrow));
+        assert_eq!(a, b);
+        let seeker = Seeker::of(&a, &narrow, |_| true);
+        let wide = Seeker::new(&a);
+        assert_eq!(Volumes::of_in(&seeker, &narrow), Volumes::of(&wide));
+        for k in 0..500 {
+            let p = Point::new(f64::from(k * 7 % 61), f64::from(k * 11 % 61), 0.3);
+            assert_eq!(seeker.distance(p, 9.0), wide.distance(p, 9.0));
+            assert_eq!(seeker.above(p), wide.above(p));
+        }
+        drop(seeker);
+        assert_eq!(narrow.available(), narrow.cap(), "all is given back");
+    }
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
 }

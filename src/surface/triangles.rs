@@ -67,6 +67,13 @@ impl Surface {
         Aabb::around(self.points.iter().copied())
     }
 
+    /// Gives back memory kept for more triangles to come.
+    pub fn shrink(&mut self) {
+        self.points.shrink_to_fit();
+        self.triangles.shrink_to_fit();
+        self.labels.shrink_to_fit();
+    }
+
     /// Bytes of memory held, for the budget.
     pub fn bytes(&self) -> usize {
         let names: usize = self

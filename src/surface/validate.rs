@@ -5,6 +5,7 @@ use super::contact::{ContactKind, contact};
 use super::edges::{Closedness, Facets};
 use super::rims::{JUNCTION_SHARE, TJunction, t_junctions};
 use super::{Defect, Surface, SurfaceError};
+use crate::store::Room;
 
 /// Self-intersections listed at most; all are counted.
 const LISTED_MAX: usize = 100_000;
@@ -62,7 +63,14 @@ impl Validation {
 /// Near-linear time where boxes of triangles overlap few others; about 150 bytes per triangle. Same
 /// result for any number of threads. Orientation is no defect: see [`Closedness::n_inconsistent`].
 pub fn validate(surface: &Surface) -> Validation {
-    let facets = Facets::of(surface);
+    validate_in(surface, &Room::boundless())
+}
+
+/// [`validate`] in a room: 6 bytes a triangle are held beside the surface, the rest goes to scratch files where the room is too small.
+///
+/// A scratch file that fails unwinds ([`attempt`](crate::store::attempt)).
+pub fn validate_in(surface: &Surface, room: &Room) -> Validation {
+    let mut facets = Facets::of(surface, room);
     let closedness = facets.closedness(surface);
     let t_junctions = match closedness.is_closed() {
         true => Vec::new(),
@@ -73,12 +81,13 @@ pub fn validate(surface: &Surface) -> Validation {
         ),
     };
     let mut defects = edge_defects(surface, &closedness, &t_junctions);
-    let mut skip = facets.is_left_out;
-    for &(t, _) in &facets.degenerate {
-        skip[t as usize] = true;
+    let Facets {
+        mut is_left_out, ..
+    } = facets;
+    for &(t, _) in &closedness.degenerate {
+        is_left_out[t as usize] = true;
     }
-    drop(facets.uses);
-    let tree = tree_of(surface, |t| !skip[t as usize]);
+    let tree = tree_of(surface, room, |t| !is_left_out[t as usize]);
     let (mut touching, n_intersections) = tree.pairs(LISTED_MAX, |a, b| {
         let ids = [a, b].map(|t| surface.triangles[t as usize]);
         let found = contact(surface.corners(a), ids[0], surface.corners(b), ids[1])?;
