@@ -151,7 +151,11 @@ impl SizeField {
     ) -> Self {
         let mut values = room.list_within(Self::share_of(room.cap()));
         for i in 0..corners.of_leaf.len() {
-            values.push(corners.of_leaf.get(i).map(|c| h.get(c as usize)));
+            let mut at_corners = [0.0; 8];
+            for (value, c) in at_corners.iter_mut().zip(corners.of_leaf.get(i)) {
+                *value = h.get(c as usize);
+            }
+            values.push(at_corners);
         }
         drop((corners, h));
         Self::from_parts(frame, beta, tree, values.done().fixed())

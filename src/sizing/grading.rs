@@ -24,8 +24,11 @@ pub(super) fn close_finite(corners: &mut Corners, h: &mut Column<f32>) {
 }
 
 fn mean_on(on: [u32; 4], h: &mut Column<f32>) -> f32 {
-    let [a, b, c, d] = on.map(|v| f64::from(h.get(v as usize)));
-    ((a + b + c + d) * 0.25) as f32
+    let mut sum = f64::from(h.get(on[0] as usize));
+    for &v in &on[1..] {
+        sum += f64::from(h.get(v as usize));
+    }
+    (sum * 0.25) as f32
 }
 
 /// The slope bound between corners of the same leaf.
@@ -115,7 +118,10 @@ impl Sweep<'_> {
         if !ids.iter().any(|&id| self.changed.get(id)) {
             return;
         }
-        let before = ids.map(|id| self.h.get(id as usize));
+        let mut before = [0.0; 8];
+        for (h, &id) in before.iter_mut().zip(&ids) {
+            *h = self.h.get(id as usize);
+        }
         let mut h = before;
         let step = self.beta * leaf.side();
         // Largest differences, by squared distance of corners in sides.

@@ -230,10 +230,12 @@ impl Maker<'_> {
 }
 
 /// Adds to the sums at a leaf's corners what its twelve edges bring there.
-#[inline]
+#[inline(always)]
 fn average(ids: &[u32; 8], weight: f32, h: &mut Column<f32>, sums: &mut Column<[f32; 2]>) {
-    let values = ids.map(|c| h.get(c as usize));
-    let mut here = ids.map(|c| sums.get(c as usize));
+    let (mut values, mut here) = ([0.0; 8], [[0.0; 2]; 8]);
+    for (k, &id) in ids.iter().enumerate() {
+        (values[k], here[k]) = (h.get(id as usize), sums.get(id as usize));
+    }
     for &(a, b, _) in &PAIRS[..N_EDGES] {
         let (a, b) = (a as usize, b as usize);
         for (to, from) in [(a, b), (b, a)] {
