@@ -20,3 +20,4 @@ mod size_files;
 mod sizes;
 mod snapshot;
 mod subdomains;
+mod zone;
