@@ -371,7 +371,10 @@ fn help_of(code: &str) -> &'static str {
             "`tetdb verify STORE` lists what is damaged; `tetdb resaturate STORE --repair` makes damaged sub-domains again, `--forget` drops a damaged previous version"
         }
         "memory" => "give more with --memory, or mesh a coarser surface",
-        "stopped" => "`tetdb resume STORE` goes on from the last finished step",
+        "stopped" if super::signals::has_store() => {
+            "`tetdb resume STORE` goes on from the last finished step"
+        }
+        "stopped" => "nothing was begun; run it again",
         "no-such-part" => "`tetdb info STORE` lists what there is",
         "no-such-store" => "check the path; `tetdb mesh SURFACE -o STORE` makes a store",
         "not-a-store" => "choose another path; what is there was not made by this program",

@@ -69,6 +69,7 @@ pub fn run(args: &MeshArgs, talk: &Talk) -> Result<u8, Failure> {
         true => replace::take_up(&path, is_same)?,
         false => None,
     };
+    signals::store_begins();
     let mut catalog = match begun {
         Some(catalog) => {
             talk.note(&format!("going on with {}", place.display()));
@@ -136,9 +137,11 @@ pub fn resume(args: &ResumeArgs, talk: &Talk) -> Result<u8, Failure> {
         let room = space.room(&input.surface)?;
         let prepared = pipeline::prepare(&input.surface, &options, background.as_ref(), &room)?;
         drop(background);
+        signals::store_begins();
         let surface = lent_or_given(&mut input, cap);
         pipeline::mesh_prepared(&mut catalog, surface, &options, prepared, &budget, &watch)
     } else {
+        signals::store_begins();
         pipeline::mesh(&mut catalog, &input.surface, &options, &budget, &watch)
     };
     let summary = made.map_err(|e| estimate::with_room(e.into(), &place, None))?;
@@ -176,7 +179,7 @@ pub(super) fn begin(args: &RunArgs, talk: &Talk) -> Result<(u64, String), Failur
     for out in &args.export {
         export::check_format(out)?;
     }
-    signals::listen();
+    signals::listen(talk.is_json());
     memory::cap(args.memory.as_deref())
 }
 

@@ -11,7 +11,7 @@ use super::info::{hex, share_below_two};
 use super::input::Space;
 use super::resaturate_sizes::{self, new_sizes};
 use super::talk::Talk;
-use super::{memory, mesh, store, verify};
+use super::{memory, mesh, signals, store, verify};
 use crate::audit::Level;
 use crate::catalog::{Catalog, CatalogError, Store, StoreState, Subdomain};
 use crate::pipeline::{self, Forecast, NewSizes, Options, Remade, ResaturateSummary, Resaturation};
@@ -20,6 +20,8 @@ use crate::store::Budget;
 pub fn run(args: &ResaturateArgs, talk: &Talk) -> Result<u8, Failure> {
     check(args)?;
     let (cap, _) = mesh::begin(&args.run, talk)?;
+    // What is read before the change ends at a signal all the same; a change is one commit.
+    signals::store_begins();
     let budget = Budget::new(cap);
     let mut open = store::open_finished(&args.store)?;
     if args.forget {

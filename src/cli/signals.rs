@@ -1,14 +1,23 @@
 //! Ctrl-C and SIGTERM end a run between two page accesses; a second one ends it at once.
 
-use std::sync::atomic::{AtomicI32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
+use std::time::Duration;
 
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
+use super::failure::Failure;
+use super::talk::Talk;
+use crate::store::StoreError;
+
 static RECEIVED: AtomicI32 = AtomicI32::new(0);
+/// Whether there is a store whose step under way must end in order.
+static HAS_STORE: AtomicBool = AtomicBool::new(false);
+/// What reads, validates and sizes a surface looks for signals here and there only; it has so long to end by itself.
+const PATIENCE: Duration = Duration::from_millis(1000);
 
 /// Listens from now on. Errors: the system refuses; the run then simply cannot be stopped gently.
-pub fn listen() {
+pub fn listen(is_json: bool) {
     let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) else {
         return;
     };
@@ -18,8 +27,28 @@ pub fn listen() {
                 std::process::exit(128 + signal);
             }
             crate::store::request_stop();
+            std::thread::spawn(move || end_early(is_json));
         }
     });
+}
+
+/// Ends the process if there is no store yet, and so nothing to lose.
+fn end_early(is_json: bool) {
+    std::thread::sleep(PATIENCE);
+    if !has_store() {
+        let stopped = Failure::from(StoreError::Stopped);
+        std::process::exit(Talk::new(is_json).fail(&stopped).into());
+    }
+}
+
+/// From now on there is a store: a step under way ends in order, however long that takes.
+pub fn store_begins() {
+    HAS_STORE.store(true, Ordering::SeqCst);
+}
+
+/// Whether there is a store to go on with.
+pub fn has_store() -> bool {
+    HAS_STORE.load(Ordering::SeqCst)
 }
 
 /// 128 + the signal that stopped the run.
