@@ -314,12 +314,6 @@ pub(super) fn chunk_bounds(part: &Subdomain, chunk: usize) -> Aabb {
     Aabb { low, high }
 }
 
-/// The box of a chunk of vertices.
-pub(super) fn vertex_bounds(part: &Subdomain, chunk: usize) -> Aabb {
-    let [low, high] = part.vertex_summaries()[chunk].bounds.map(Point::from_array);
-    Aabb { low, high }
-}
-
 /// How far the vertices of a chunk's tetrahedra can be from a point that one of them holds: not farther than its longest edge.
 pub(super) fn reach(part: &Subdomain, chunk: usize) -> f64 {
     /// More than what rounding takes from lengths.

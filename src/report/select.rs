@@ -1,16 +1,20 @@
 //! The tetrahedra of a selection, one after the other in the order of their ids.
 
+use std::collections::HashMap;
+use std::hash::BuildHasherDefault;
 use std::vec::IntoIter;
 
 use tetdb_schema::ids::TetId;
 
 use super::found::Found;
-use super::inquiry::{bounds_of, vertex_bounds, vertex_chunk};
+use super::frame::Spread;
+use super::inquiry::{bounds_of, reach, vertex_chunk};
+use super::locate::leaders;
 use super::marks::Marks;
 use super::selection::Selection;
 use super::{Inquiry, ReportError};
 use crate::catalog::Subdomain;
-use crate::geom::Aabb;
+use crate::geom::{Aabb, Point};
 
 /// The answers to [`Inquiry::select`]; holds one chunk's at a time. Ends after the first error.
 pub struct Selected<'a> {
@@ -89,7 +93,11 @@ impl Selected<'_> {
             let marked = marks
                 .as_ref()
                 .is_none_or(|m| m.any(summary.first, summary.count));
-            if marked && self.selection.may_be_among(rank, summary) {
+            if marked
+                && self.selection.may_be_among(rank, summary)
+                && (!self.selection.is_local()
+                    || is_led_near(&part.subdomain, &self.selection, chunk as usize))
+            {
                 chunks.push(chunk);
             }
         }
@@ -139,23 +147,75 @@ pub(super) fn found_in(
     rank: u32,
     chunk: u32,
 ) -> Result<Vec<Found>, ReportError> {
-    let mut place = 0;
+    let mut nearby = Nearby::default();
     let frame = inquiry.frame(rank, chunk, |part, local, tet| {
         marks.as_ref().is_none_or(|m| m.has(local))
             && TetId::new(part.id(), local).is_some_and(|id| selection.may_be(id, tet.region))
-            && (!selection.is_local() || selection.may_meet(&around(part, tet.nodes, &mut place)))
+            && (!selection.is_local() || nearby.may_meet(part, selection, chunk, tet.nodes))
     })?;
     let found = frame.tets.iter().map(|tet| frame.found(tet));
     Ok(found.filter(|found| selection.holds(found)).collect())
 }
 
-/// A box around the chunks the vertices are in, `place` being the chunk found last.
-fn around(part: &Subdomain, nodes: [u32; 4], place: &mut usize) -> Aabb {
-    nodes.iter().fold(Aabb::EMPTY, |sum, &v| {
-        let b = vertex_bounds(part, vertex_chunk(part, v, place));
-        Aabb {
-            low: sum.low.min(b.low),
-            high: sum.high.max(b.high),
+/// Which places of a chunk of tetrahedra matter to a selection: a tetrahedron that meets it has all its vertices as near as its longest edge is long.
+#[derive(Default)]
+struct Nearby {
+    /// For a chunk of vertices a box around those of its cells that are near enough; empty where none are.
+    boxes: HashMap<usize, Aabb, BuildHasherDefault<Spread>>,
+    place: usize,
+}
+
+impl Nearby {
+    /// What chunk `c` of vertices has for tetrahedra with edges not longer than `reach`.
+    fn of(&mut self, part: &Subdomain, selection: &Selection, reach: f64, c: usize) -> Aabb {
+        *self.boxes.entry(c).or_insert_with(|| {
+            let mut near = Aabb::EMPTY;
+            for cell in part.vertex_summaries()[c].cells() {
+                let [low, high] = cell.map(Point::from_array);
+                let widened = Aabb {
+                    low: low - reach,
+                    high: high + reach,
+                };
+                if selection.may_meet(&widened) {
+                    near = near.with(low).with(high);
+                }
+            }
+            near
+        })
+    }
+
+    /// Whether a tetrahedron of the chunk with these vertices may meet the selection.
+    fn may_meet(
+        &mut self,
+        part: &Subdomain,
+        selection: &Selection,
+        chunk: u32,
+        nodes: [u32; 4],
+    ) -> bool {
+        let reach = reach(part, chunk as usize);
+        let mut around = Aabb::EMPTY;
+        for v in nodes {
+            let c = vertex_chunk(part, v, &mut self.place);
+            let near = self.of(part, selection, reach, c);
+            if near.low.x > near.high.x {
+                return false;
+            }
+            around = around.with(near.low).with(near.high);
         }
+        selection.may_meet(&around)
+    }
+}
+
+/// Whether a vertex that leads tetrahedra of the chunk may be near enough to the selection.
+fn is_led_near(part: &Subdomain, selection: &Selection, chunk: usize) -> bool {
+    let leaders = leaders(part, chunk);
+    let first = part.vertex_chunk_of(leaders.start);
+    let last = part
+        .vertex_chunk_of(leaders.end.saturating_sub(1))
+        .max(first);
+    let (mut nearby, reach) = (Nearby::default(), reach(part, chunk));
+    (first..=last).any(|c| {
+        let near = nearby.of(part, selection, reach, c);
+        near.low.x <= near.high.x
     })
 }
