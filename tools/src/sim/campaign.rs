@@ -29,6 +29,14 @@ pub struct Reference {
     pub bytes_peak: u64,
 }
 
+/// A finished store and what an undisturbed change makes of it.
+pub struct Changed {
+    pub whole: Arc<SimDisk>,
+    pub digests: Digests,
+    pub calls: u64,
+    pub boundaries: u64,
+}
+
 /// The exit code the program has for an error.
 pub fn exit_code(error: PipelineError) -> u8 {
     match error {
@@ -79,6 +87,73 @@ impl Case {
         let end = ended(|| self.run(&disk));
         disk.set_trouble(Trouble::default());
         (disk, end)
+    }
+
+    /// The finished store, the same after a change, its digests, and the calls and boundaries the change took.
+    pub fn changed(&self, reference: &Reference) -> Changed {
+        let whole = SimDisk::new();
+        self.run(&whole).expect("a sound disk");
+        let disk = whole.copy();
+        disk.set_trouble(Trouble::default());
+        self.change(&disk).expect("a sound disk");
+        let (calls, boundaries) = (disk.calls(), disk.boundaries());
+        let digests = self.digests(&disk).expect("a sound disk");
+        assert_ne!(digests[0], reference.digests[0], "the change changes");
+        assert_eq!(digests[1], reference.digests[1], "interfaces stay");
+        Changed {
+            whole,
+            digests,
+            calls,
+            boundaries,
+        }
+    }
+
+    /// Changes the finished store with `trouble`, then again on the sound disk. Errors: what was wrong: a store in between, or another mesh.
+    pub fn change_troubled(
+        &self,
+        trouble: Trouble,
+        reference: &Reference,
+        changed: &Changed,
+    ) -> Result<bool, String> {
+        let disk = changed.whole.copy();
+        disk.set_trouble(trouble);
+        let end = ended(|| self.change(&disk));
+        disk.set_trouble(Trouble::default());
+        if let Some(wrong) = unclean(&end) {
+            return Err(wrong);
+        }
+        let is_new = self.is_changed(&disk, reference, changed)?;
+        if end == End::Done && !is_new {
+            return Err("said to be done, and is not".to_owned());
+        }
+        if !is_new {
+            match ended(|| self.change(&disk)) {
+                End::Done => {}
+                end => return Err(format!("again: {end:?}")),
+            }
+            if !self.is_changed(&disk, reference, changed)? {
+                return Err("again, and nothing has changed".to_owned());
+            }
+        }
+        Ok(is_new)
+    }
+
+    /// Whether a store is the new one, not the old. Errors: it is neither.
+    pub fn is_changed(
+        &self,
+        disk: &Arc<SimDisk>,
+        reference: &Reference,
+        changed: &Changed,
+    ) -> Result<bool, String> {
+        self.check(disk).map_err(|e| format!("check: {e}"))?;
+        let digests = self.digests(disk).map_err(|e| format!("digest: {e}"))?;
+        if digests == changed.digests {
+            return Ok(true);
+        }
+        match digests == reference.digests {
+            true => Ok(false),
+            false => Err(format!("neither the old mesh nor the new: {digests:?}")),
+        }
     }
 
     /// Goes on with a store. Errors: what was wrong with it, or with the mesh it became.

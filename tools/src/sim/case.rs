@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use tetdb::audit;
 use tetdb::catalog::{Catalog, CatalogError, Job, Store, StoreState};
-use tetdb::pipeline::{self, Options, PipelineError, Plan, Trial, silent};
+use tetdb::pipeline::{self, NewSizes, Options, PipelineError, Plan, Resaturation, Trial, silent};
 use tetdb::samples::SampleSpec;
 use tetdb::store::{Budget, DiskPath, StoreFile};
 use tetdb::surface::Surface;
@@ -90,6 +90,27 @@ impl Case {
         Ok(catalog.close()?)
     }
 
+    /// Makes two sub-domains of the finished store again, in finer tetrahedra: one step.
+    pub fn change(&self, disk: &Arc<SimDisk>) -> Ended {
+        let sizes = NewSizes {
+            field: None,
+            values: None,
+            factor: 0.8,
+            limits: [0.0, f64::INFINITY],
+            beta: self.options.sizes().expect("no options, no errors").beta(),
+            asked: "{}".to_owned(),
+        };
+        let what = Resaturation {
+            ranks: [2, 5].into(),
+            sizes: Some(sizes),
+            repair: false,
+        };
+        let mut catalog = Catalog::open_writable(self.store(disk))?;
+        let budget = Budget::new(self.budget);
+        pipeline::resaturate(&mut catalog, &self.options, &what, &budget, &silent)?;
+        Ok(catalog.close()?)
+    }
+
     /// The digests of a finished store, once from the catalog and once from all records.
     pub fn digests(&self, disk: &Arc<SimDisk>) -> Result<Digests, CatalogError> {
         let mut store = Store::open(self.store(disk))?;
@@ -110,8 +131,16 @@ impl Case {
         catalog.interfaces()?;
         catalog.topology()?;
         catalog.journal()?;
-        for file in catalog.files()? {
+        let parts = catalog.files()?.into_iter().map(|file| {
             let place = catalog.file_path(file.subdomain, file.generation);
+            (file.subdomain, place)
+        });
+        let mut files: Vec<(u32, DiskPath)> = parts.collect();
+        for leaf in catalog.coarse_leaves()? {
+            let place = catalog.coarse_path(leaf.rank, leaf.generation);
+            files.push((leaf.rank, place));
+        }
+        for (subdomain, place) in files {
             let mut values = 0u64;
             let mut torn = None;
             let mut opened = StoreFile::open_repaired(&place, 1 << 20, false)?;
@@ -123,14 +152,10 @@ impl Case {
                 torn.is_none()
             })?;
             if let Some(key) = torn {
-                return Err(content(
-                    &path,
-                    file.subdomain,
-                    format!("value {key:x} is torn"),
-                ));
+                return Err(content(&path, subdomain, format!("value {key:x} is torn")));
             }
             if values == 0 {
-                return Err(content(&path, file.subdomain, "its file is empty".into()));
+                return Err(content(&path, subdomain, "its file is empty".into()));
             }
         }
         let rows = catalog.subdomains()?;

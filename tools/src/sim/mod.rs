@@ -9,7 +9,7 @@ mod image;
 mod rng;
 mod state;
 
-pub use campaign::{End, Reference, exit_code, unclean};
+pub use campaign::{Changed, End, Reference, exit_code, unclean};
 pub use case::{Case, Digests, Ended};
 pub use disk::SimDisk;
 pub use image::Wreck;
