@@ -5,8 +5,8 @@ use std::time::Instant;
 
 use super::PipelineError;
 use super::resaturate::{Remade, ResaturateSummary};
-use super::run::{journal, totals_of, whole};
 use super::tree::{self, blob};
+use super::whole::{journal, totals_of, whole};
 use crate::catalog::{Catalog, CatalogError, Step, StoreState, SubdomainRow};
 use crate::store::PagerStats;
 

@@ -6,10 +6,11 @@ use std::time::Instant;
 
 use super::crew::crew;
 use super::leaf::Common;
-use super::run::{Run, journal};
+use super::run::Run;
 use super::stages::{StageFiles, Stages};
 use super::tree::{self, Part, PartMesh, blob};
 use super::watch::{Event, Watcher};
+use super::whole::journal;
 use super::{PipelineError, Plan};
 use crate::bisect::{self, CutPlan, CutReport, Opened, Zone};
 use crate::catalog::{CatalogError, NeighborRow, Stage, StoreState, TopologyRow};

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use tetdb_schema::digest::Digest;
 use tetdb_schema::ids::SubdomainId;
 
 use super::divide::{WORK, open_part};
@@ -14,7 +13,7 @@ use super::tree::PartMesh;
 use super::watch::Watcher;
 use super::{PipelineError, Plan};
 use crate::bisect::{Method, Zone};
-use crate::catalog::{CoarseRow, Form, InterfaceSide, RegionTotals, Sealed};
+use crate::catalog::{CoarseRow, Form, Sealed};
 use crate::geom::Aabb;
 use crate::mesh::{Mesh, Workspace};
 use crate::optimize::Mode;
@@ -151,86 +150,5 @@ impl Leaf {
             Some(path) => Ok(path.remove_file()?),
             None => Ok(()),
         }
-    }
-}
-
-/// Regions and interfaces of a sealed sub-domain, kept until all are there.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct SealedTotals {
-    pub regions: BTreeMap<u32, RegionTotals>,
-    pub interfaces: Vec<InterfaceSide>,
-}
-
-impl SealedTotals {
-    pub(super) fn of(sealed: &Sealed) -> Self {
-        Self {
-            regions: sealed.regions.clone(),
-            interfaces: sealed.interfaces.clone(),
-        }
-    }
-
-    /// Number of regions, three words of each, then five of each interface.
-    pub(super) fn to_bytes(&self) -> Vec<u8> {
-        let mut words = vec![self.regions.len() as u64];
-        for (&region, totals) in &self.regions {
-            words.extend([u64::from(region), totals.tets, totals.volume.to_bits()]);
-        }
-        for side in &self.interfaces {
-            let [a, b] = side.digest.lanes;
-            words.extend([u64::from(side.cut), u64::from(side.other), side.faces, a, b]);
-        }
-        words.into_iter().flat_map(u64::to_le_bytes).collect()
-    }
-
-    /// The inverse of [`SealedTotals::to_bytes`].
-    pub(super) fn from_bytes(bytes: &[u8]) -> Option<Self> {
-        let words: Vec<u64> = bytes
-            .chunks_exact(8)
-            .map(|b| u64::from_le_bytes(std::array::from_fn(|i| b[i])))
-            .collect();
-        let (&n, rest) = words.split_first()?;
-        let regions = rest.get(..(n as usize).checked_mul(3)?)?;
-        let mut totals = Self::default();
-        for r in regions.chunks_exact(3) {
-            let region = RegionTotals {
-                tets: r[1],
-                volume: f64::from_bits(r[2]),
-            };
-            totals.regions.insert(r[0] as u32, region);
-        }
-        for s in rest[regions.len()..].chunks_exact(5) {
-            totals.interfaces.push(InterfaceSide {
-                cut: s[0] as u32,
-                other: s[1] as u32,
-                faces: s[2],
-                digest: Digest {
-                    lanes: [s[3], s[4]],
-                },
-            });
-        }
-        Some(totals)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn totals_come_back_from_their_bytes() {
-        let mut totals = SealedTotals::default();
-        let region = RegionTotals {
-            tets: 17,
-            volume: 0.1,
-        };
-        totals.regions.insert(4, region);
-        totals.interfaces.push(InterfaceSide {
-            cut: 3,
-            other: 2,
-            faces: 9,
-            digest: Digest { lanes: [5, 6] },
-        });
-        assert_eq!(SealedTotals::from_bytes(&totals.to_bytes()), Some(totals));
-        assert_eq!(SealedTotals::from_bytes(&[9, 0, 0, 0, 0, 0, 0, 0]), None);
     }
 }

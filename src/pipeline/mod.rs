@@ -11,6 +11,7 @@
 //!
 //! It receives a surface, not a path, and prints nothing: it tells a [`Watcher`] what goes on.
 
+mod again;
 mod before;
 mod coarse;
 mod crew;
@@ -32,6 +33,7 @@ mod sizes;
 mod stages;
 mod tree;
 mod watch;
+mod whole;
 
 pub use before::{forget, undo};
 pub use coarse::{CoarseReport, coarse as coarse_mesh};

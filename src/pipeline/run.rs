@@ -9,15 +9,14 @@ use super::crew::crew;
 use super::divide::{DONE, WORK, read_owners};
 use super::estimate::n_subdomains;
 use super::held::Held;
-use super::leaf::{Common, Leaf, LeafJob, SealedTotals};
+use super::leaf::{Common, Leaf, LeafJob};
 use super::tree::{self, Part, PartMesh, blob};
 use super::watch::Watcher;
+use super::whole::{SealedTotals, Whole, journal, whole};
 use super::{Estimate, FineReport, Options, PipelineError, Plan, Prepared, prepare};
 use crate::bisect::{CutReport, load_of};
 use crate::boundary::RegionSummary;
-use crate::catalog::{
-    Catalog, CatalogError, InterfaceRow, JournalRow, Measure, RegionRow, StoreState,
-};
+use crate::catalog::{Catalog, CatalogError, RegionRow, StoreState};
 use crate::geom::{Aabb, HilbertFrame};
 use crate::mesh::{Mesh, Workspace, renumber};
 use crate::sizing::{SizeField, SizeSummary, TETS_PER_LOAD};
@@ -394,65 +393,6 @@ impl<'a> Run<'a> {
     }
 }
 
-/// What sub-domains sum up to.
-pub(super) struct Whole {
-    pub regions: Vec<RegionRow>,
-    /// By cut.
-    pub interfaces: BTreeMap<u32, Vec<InterfaceRow>>,
-}
-
-/// The whole from the totals of all `n` sub-domains; those in `changed` go first.
-pub(super) fn whole(
-    catalog: &mut Catalog,
-    n: u32,
-    changed: &BTreeMap<u32, SealedTotals>,
-) -> Result<Whole, PipelineError> {
-    let mut regions = catalog.regions()?;
-    for row in regions.iter_mut().filter(|r| r.filled) {
-        (row.tets, row.volume) = (0, 0.0);
-    }
-    let mut interfaces: BTreeMap<u32, Vec<InterfaceRow>> = BTreeMap::new();
-    for rank in 0..n {
-        let totals = match changed.get(&rank) {
-            Some(totals) => totals.clone(),
-            None => totals_of(catalog, blob::SEALED, rank)?,
-        };
-        for row in regions.iter_mut().filter(|r| r.filled) {
-            let here = totals.regions.get(&row.region).copied().unwrap_or_default();
-            row.tets += here.tets;
-            row.volume += here.volume;
-        }
-        // One side tells; verification compares it with the other.
-        for side in totals.interfaces.iter().filter(|s| rank < s.other) {
-            interfaces.entry(side.cut).or_default().push(InterfaceRow {
-                cut: side.cut,
-                low: rank,
-                high: side.other,
-                faces: side.faces,
-                digest: side.digest.lanes,
-            });
-        }
-    }
-    Ok(Whole {
-        regions,
-        interfaces,
-    })
-}
-
-/// The totals of a sub-domain, kept in the blobs that begin with `first`.
-pub(super) fn totals_of(
-    catalog: &mut Catalog,
-    first: u32,
-    rank: u32,
-) -> Result<SealedTotals, CatalogError> {
-    let bytes = catalog.blob(first + rank)?.unwrap_or_default();
-    SealedTotals::from_bytes(&bytes).ok_or_else(|| CatalogError::Content {
-        path: catalog.dir().to_owned(),
-        subdomain: rank,
-        what: "its totals are missing or damaged".to_owned(),
-    })
-}
-
 fn region_row(region: &RegionSummary) -> RegionRow {
     RegionRow {
         region: region.region,
@@ -460,26 +400,5 @@ fn region_row(region: &RegionSummary) -> RegionRow {
         tets: 0,
         filled: region.region != 0,
         labels: region.labels.clone(),
-    }
-}
-
-pub(super) fn journal(
-    state: StoreState,
-    step: &str,
-    clock: Instant,
-    measures: &[(&str, f64)],
-) -> JournalRow {
-    JournalRow {
-        state,
-        subdomain: Some(0),
-        step: step.to_owned(),
-        seconds: clock.elapsed().as_secs_f64(),
-        measures: measures
-            .iter()
-            .map(|&(name, value)| Measure {
-                name: name.to_owned(),
-                value,
-            })
-            .collect(),
     }
 }
