@@ -8,7 +8,7 @@ Each cut is a pair of exports: of a mesh in two sub-domains, and of the same sur
 made. In the mesh of one piece the interface of the other is a fake cut, which tells what chance and the surface do. Sizes must be
 uniform (such as in a box): they are taken as the median edge length.
 
-Printed for the true and the fake cuts, for each alone and for all together, over tetrahedra away from the surface (farther than
+Printed for the true and the fake cuts, all together, over tetrahedra away from the surface (farther than
 2 h) and near it:
 - Kolmogorov distances of quality and of metric edge length between tetrahedra nearer than 1 h to the interface (and at 3.5 to
   6.5 h, where the refined zone ended) and those farther than 8 h;
@@ -196,9 +196,6 @@ def main():
         with tempfile.TemporaryDirectory() as folder:
             looked.append(look(*make(sample, args.tetdb, pathlib.Path(folder))))
     cut, fake = zip(*looked)
-    for k, (c, f) in enumerate(looked if len(looked) > 1 else []):
-        judge(f"cut {k + 1}", [c])
-        judge(f"fake {k + 1}", [f])
     judge("cuts", cut)
     judge("fakes", fake)
 
