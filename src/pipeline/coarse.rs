@@ -31,6 +31,16 @@ pub fn coarse<P: Pages>(
     watch: &Watcher,
 ) -> Result<CoarseReport, PipelineError> {
     let kernel = triangulate(mesh, surface, room, watch);
+    recovered(mesh, kernel, options, watch)
+}
+
+/// The second half, for which the mesh's own facets suffice.
+pub(super) fn recovered<P: Pages>(
+    mesh: &mut Mesh<P>,
+    kernel: KernelStats,
+    options: &Options,
+    watch: &Watcher,
+) -> Result<CoarseReport, PipelineError> {
     watch(stage("recover the surface"));
     mesh.refresh_tet_of();
     let recovery = recover(mesh)?;
@@ -64,7 +74,7 @@ fn stage(stage: &'static str) -> Event {
 ///
 /// Vertices are numbered in the order of insertion, so that near vertices share pages; the number in the surface is
 /// kept as the owner's index.
-fn triangulate<P: Pages>(
+pub(super) fn triangulate<P: Pages>(
     mesh: &mut Mesh<P>,
     surface: &Surface,
     room: &Room,

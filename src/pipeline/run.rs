@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Instant;
 
-use super::coarse::{CoarseReport, coarse};
+use super::coarse::{CoarseReport, recovered, triangulate};
 use super::crew::crew;
 use super::divide::{DONE, WORK, read_owners};
 use super::estimate::n_subdomains;
@@ -147,8 +147,7 @@ impl<'a> Run<'a> {
             (open, coarse) = (Some(mesh), Some(report));
         }
         self.n = tree::n_subdomains(self.catalog)?;
-        if let Some(Cow::Owned(surface)) = self.surface.take() {
-            drop(surface);
+        if let Some(Cow::Owned(_)) = self.surface.take() {
             held = held.without_surface(self.options, budget)?;
             self.plan = held.plan;
         }
@@ -200,9 +199,16 @@ impl<'a> Run<'a> {
         let mut mesh = Mesh::new(Pager::new(self.plan.frames, Some(backing)));
         let scratch = self.catalog.scratch_dir()?;
         let room = Room::new(self.plan.buffers / 2, &scratch);
-        let surface = self.surface.take().unwrap_or_default();
-        let report = coarse(&mut mesh, &surface, self.options, &room, self.watch)?;
+        let mut surface = self.surface.take().unwrap_or_default();
+        let kernel = triangulate(&mut mesh, &surface, &room, self.watch);
         drop(room);
+        let label_names = surface.label_names.clone();
+        if let Cow::Owned(given) = &mut surface {
+            // All that is needed from here on is in the mesh.
+            *given = Surface::default();
+        }
+        self.surface = Some(surface);
+        let report = recovered(&mut mesh, kernel, self.options, self.watch)?;
         let space = Workspace {
             dir: &scratch,
             memory: self.plan.buffers / 2,
@@ -222,13 +228,13 @@ impl<'a> Run<'a> {
             load,
         };
         let (pages, frames_used) = (mesh.pages().stats(), mesh.pages().frames_used());
-        let field = self.field.to_bytes();
+        let (field, bounds) = (self.field.to_bytes(), self.bounds);
         self.catalog.commit(|step| {
             step.list_file(0, COARSE);
-            step.set_labels(&surface.label_names);
+            step.set_labels(&label_names);
             step.set_regions(&report.regions.list.iter().map(region_row).collect());
             step.set_blob(blob::SIZE_FIELD, &field);
-            step.set_blob(blob::BOUNDS, &tree::bounds_bytes(&surface.bounds()));
+            step.set_blob(blob::BOUNDS, &tree::bounds_bytes(&bounds));
             step.set_blob(blob::SUBDOMAINS, &n.to_le_bytes());
             step.set_blob(blob::PART, &part.to_bytes());
             step.set_state(StoreState::Coarse);
@@ -250,7 +256,6 @@ impl<'a> Run<'a> {
             ));
             Ok(())
         })?;
-        self.surface = Some(surface);
         let path = self.catalog.file_path(0, COARSE + WORK);
         mesh.pages_mut().next_generation(COARSE + WORK, path)?;
         Ok((mesh, report))

@@ -17,7 +17,7 @@
 //! far as a table of [`REMEMBERED`] corners knows it: neighbors have corners in common, so that a leaf takes about 5 bytes instead of 37.
 
 use std::fmt::Display;
-use std::io::Read;
+use std::io::{Read, Write};
 
 use super::SizingError;
 use super::field::SizeField;
@@ -55,46 +55,62 @@ impl Memory {
 impl SizeField {
     /// The field as bytes; equal fields give equal bytes.
     pub fn to_bytes(&self) -> Vec<u8> {
-        let n_leaves = self.values.len();
-        let mut cells = Vec::with_capacity(self.tree.blocks.len() + n_leaves);
-        let mut news = Vec::with_capacity(n_leaves);
-        let mut values: Vec<u8> = Vec::new();
-        let mut memory = Memory::new();
-        let mut stack = vec![(self.tree.root, Leaf::ROOT)];
-        while let Some((entry, cell)) = stack.pop() {
-            cells.push(u8::from(entry & LEAF != 0));
-            if entry & LEAF == 0 {
-                let block = self.tree.blocks[entry as usize];
-                stack.extend((0..8).rev().map(|i| (block[i], cell.child(i))));
-                continue;
+        let n_cells = (self.tree.blocks.len() + self.values.len()) as u32;
+        let mut n_values = 0;
+        self.each_leaf(|_, news| n_values += news.len() as u32);
+        let mut bytes = Vec::with_capacity(HEADER_BYTES);
+        bytes.extend(MAGIC);
+        let Frame { low, side } = self.frame;
+        for x in [low.x, low.y, low.z, side, self.beta] {
+            bytes.extend(x.to_le_bytes());
+        }
+        for n in [n_cells, self.values.len() as u32, n_values, 0] {
+            bytes.extend(n.to_le_bytes());
+        }
+        // Three ways through the octree, so that only what is packed is held.
+        let packed = (|| {
+            let mut frame = zstd::Encoder::new(bytes, 1)?;
+            for (number, _) in self.tree.cells() {
+                frame.write_all(&[u8::from(number.is_some())])?;
             }
-            let mut new = 0;
-            let corners = self.values.get((entry & !LEAF) as usize);
+            let mut done = Ok(());
+            self.each_leaf(|new, _| {
+                if done.is_ok() {
+                    done = frame.write_all(&[new]);
+                }
+            });
+            self.each_leaf(|_, news| {
+                for value in news {
+                    if done.is_ok() {
+                        done = frame.write_all(&value.to_le_bytes());
+                    }
+                }
+            });
+            done?;
+            frame.finish()
+        })();
+        packed.expect("memory is all it takes")
+    }
+
+    /// Calls `visit` with the byte of each leaf and its new values.
+    fn each_leaf(&self, mut visit: impl FnMut(u8, &[f32])) {
+        let mut memory = Memory::new();
+        for (number, cell) in self.tree.cells() {
+            let Some(number) = number else { continue };
+            let (mut new, mut values, mut n) = (0, [0.0; 8], 0);
+            let corners = self.values.get(number as usize);
             for (i, value) in corners.into_iter().enumerate() {
                 let slot = memory.slot(cell.corner(i));
                 let seen = (cell.corner(i), value);
                 if *slot != seen {
                     *slot = seen;
                     new |= 1 << i;
-                    values.extend(value.to_le_bytes());
+                    values[n] = value;
+                    n += 1;
                 }
             }
-            news.push(new);
+            visit(new, &values[..n]);
         }
-        let mut bytes = Vec::with_capacity(HEADER_BYTES + values.len());
-        bytes.extend(MAGIC);
-        let Frame { low, side } = self.frame;
-        for x in [low.x, low.y, low.z, side, self.beta] {
-            bytes.extend(x.to_le_bytes());
-        }
-        for n in [cells.len(), n_leaves, values.len() / 4, 0] {
-            bytes.extend((n as u32).to_le_bytes());
-        }
-        cells.append(&mut news);
-        cells.append(&mut values);
-        let frame = zstd::bulk::compress(&cells, 1).expect("memory is all it takes");
-        bytes.extend(frame);
-        bytes
     }
 
     /// Reads what [`SizeField::to_bytes`] wrote, checking all of it.
