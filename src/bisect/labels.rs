@@ -168,7 +168,7 @@ pub(super) fn is_constrained(tet: &Tet, i: usize, rim: &Rim) -> bool {
 }
 
 /// Layers beyond which nobody counts: two are asked for.
-pub const LAYERS_MOST: u32 = 3;
+const LAYERS_MOST: u32 = 3;
 
 /// The least number of tetrahedra, from face to face, between the interface and the first with a vertex out of the refined zone;
 /// [`LAYERS_MOST`] stands for more.

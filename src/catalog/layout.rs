@@ -63,7 +63,6 @@ impl Catalog {
             Ok(())
         })?;
         catalog.file.rename(CATALOG)?;
-        catalog.dir.sync_dir()?;
         // An empty directory that was taken over may be as new as the store.
         catalog.dir.folder().sync_dir()?;
         Ok(catalog)

@@ -1,21 +1,31 @@
 //! `--force`: a new store takes the place of an old one, and may be interrupted anywhere.
 //!
-//! `X.tetdb` is the old store until all of the new one is sealed in `X.tetdb-new`. Then the old one is renamed to `X.tetdb-old`, the new one takes
-//! its name, and the old one is removed. Whoever comes next finds out how far that was.
+//! `X.tetdb` is the old store until all of the new one is sealed in `X.tetdb.being-made`. Then the old one is renamed to
+//! `X.tetdb.being-replaced`, the new one takes its name, and the old one is removed. Whoever comes next finds out how far that was. The names
+//! are such as nobody gives to a copy of their own, for what bears them is renamed and removed.
 
 use std::path::{Path, PathBuf};
 
 use super::failure::Failure;
 use super::talk::Talk;
-use crate::catalog::{Catalog, Store, StoreState};
+use crate::catalog::{Catalog, CatalogError, Store, StoreState};
+use crate::store::DiskPath;
 
 /// Where the new store is made.
 pub fn new_of(path: &Path) -> PathBuf {
-    path.with_extension("tetdb-new")
+    beside(path, "being-made")
 }
 
 fn old_of(path: &Path) -> PathBuf {
-    path.with_extension("tetdb-old")
+    beside(path, "being-replaced")
+}
+
+/// The path with one more extension: stores with the same stem never meet.
+fn beside(path: &Path, extension: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".");
+    name.push(extension);
+    name.into()
 }
 
 /// How far the store at a path is; `None` where there is none that can be read.
@@ -50,7 +60,9 @@ pub fn settle(path: &Path, talk: &Talk) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Opens an unfinished replacement for writing if it is of this job, else removes what is there. Errors: the disk; another process writes it.
+/// Opens a replacement that was begun for writing if it is of this job, else removes it.
+///
+/// Errors: the disk; another process writes it; what is there is no store, or damaged: nothing is removed then.
 pub fn take_up(
     path: &Path,
     is_same: impl FnOnce(&mut Catalog) -> bool,
@@ -59,12 +71,15 @@ pub fn take_up(
     if !new.exists() {
         return Ok(None);
     }
-    if state(&new).is_some() {
-        let mut catalog = Catalog::open_writable(&new)?;
-        if is_same(&mut catalog) {
-            return Ok(Some(catalog));
-        }
+    let mut catalog = match Catalog::open_writable(&new) {
+        Ok(catalog) => catalog,
+        Err(CatalogError::NotOurs { .. }) if Catalog::is_vacant(&new) => return Ok(None),
+        Err(error) => return Err(error.into()),
+    };
+    if is_same(&mut catalog) {
+        return Ok(Some(catalog));
     }
+    drop(catalog);
     remove(&new)?;
     Ok(None)
 }
@@ -82,11 +97,29 @@ pub fn exchange(path: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Removes a store: a directory whose catalog carried our magic, or that this run made. Errors: the disk.
+/// Removes a store that this program made. Errors: the disk.
 pub fn remove(path: &Path) -> Result<(), Failure> {
-    std::fs::remove_dir_all(path).map_err(|e| Failure::new("io", e).at(path.display()))
+    Ok(DiskPath::from(path).remove_dir_all()?)
 }
 
+/// Errors: the disk.
 fn rename(from: &Path, to: &Path) -> Result<(), Failure> {
-    std::fs::rename(from, to).map_err(|e| Failure::new("io", e).at(to.display()))
+    Ok(DiskPath::from(from).rename(&to.into())?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stores_with_the_same_stem_have_names_of_their_own() {
+        let names = ["part.tetdb", "part.v1", "part.v2", "part", "a/part.tetdb"];
+        let mut beside: Vec<PathBuf> = (names.iter())
+            .flat_map(|name| [new_of(Path::new(name)), old_of(Path::new(name))])
+            .collect();
+        beside.sort();
+        beside.dedup();
+        assert_eq!(beside.len(), 2 * names.len());
+        assert_eq!(new_of(Path::new("a/part")), Path::new("a/part.being-made"));
+    }
 }

@@ -1,16 +1,17 @@
 //! One run that makes sub-domains again: jobs for workers, then one commit.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Instant;
 
 use super::before::{Before, VERSIONED};
-use super::crew::crew;
+use super::crew::each;
 use super::divide::read_owners;
 use super::keep::reopen;
 use super::leaf::{Common, Leaf, LeafJob};
 use super::resaturate::{Remade, ResaturateSummary, Resaturation, whole_field};
 use super::sizes::{Recorded, Values};
-use super::tree::{self, Part, blob};
+use super::tree::{self, PartMesh, blob};
 use super::watch::Watcher;
 use super::whole::{SealedTotals, journal, whole};
 use super::{Options, PipelineError, Plan};
@@ -27,9 +28,11 @@ pub(super) struct Again<'a> {
     options: &'a Options,
     what: &'a Resaturation,
     /// Of the whole.
-    pub field: SizeField,
+    pub field: Arc<SizeField>,
     /// Rows of what is made again, by rank.
     rows: Vec<(SubdomainRow, CoarseRow)>,
+    /// The latest generation of each sub-domain's files.
+    last: BTreeMap<u32, u32>,
     n: u32,
     clock: Instant,
 }
@@ -82,8 +85,14 @@ impl<'a> Again<'a> {
             })?;
             rows.push((row, kept));
         }
+        let mut last = BTreeMap::new();
+        for file in catalog.files()? {
+            let newest = last.entry(file.subdomain).or_insert(file.generation);
+            *newest = file.generation.max(*newest);
+        }
         Ok(Self {
-            field: whole_field(catalog, options)?,
+            field: Arc::new(whole_field(catalog, options)?),
+            last,
             n: tree::n_subdomains(catalog)?,
             catalog,
             options,
@@ -178,64 +187,61 @@ impl<'a> Again<'a> {
         let bounds = tree::bounds(self.catalog)?;
         let workers = plan.workers().min(self.rows.len()).max(1);
         let share = plan.shared_by(workers as u64);
-        let (mut jobs, mut made) = (Vec::with_capacity(self.rows.len()), BTreeMap::new());
-        for (rank, field) in fields.into_iter().rev() {
-            if let (Some(field), true) = (&field, self.what.sizes.is_some()) {
-                made.insert(rank, field.to_bytes());
-            }
-            jobs.push(self.job(rank, field, share)?);
-        }
+        let own_sizes = self.what.sizes.is_some();
+        let made: BTreeMap<u32, Vec<u8>> = (fields.iter())
+            .filter_map(|(&rank, field)| Some((rank, field.as_ref()?.to_bytes())))
+            .filter(|_| own_sizes)
+            .collect();
+        let parts = tree::parts(self.catalog, self.n)?;
+        let whole = Arc::clone(&self.field);
         let common = Common {
-            field: &self.field,
+            field: &whole,
             mode: self.options.mode()?,
             method: self.options.method,
             bounds,
         };
-        let mut leaves = BTreeMap::new();
-        crew(
-            jobs,
+        let mut state = (self, BTreeMap::new());
+        each(
+            &mut state,
+            fields.into_iter().collect(),
             workers,
             watch,
+            |(again, _), (rank, field)| again.job(parts[rank as usize], field, share),
             &|job: Job, watch| job.run(common, watch).map(Box::new),
-            &mut |leaf| {
+            |(_, leaves), leaf| {
                 leaf.remove_work()?;
                 leaves.insert(leaf.sealed.row.rank, *leaf);
-                Ok(Vec::new())
+                Ok(())
             },
         )?;
-        self.commit(leaves, &made)
+        let (again, leaves) = state;
+        again.commit(leaves, &made)
     }
 
     fn job(
         &mut self,
-        rank: u32,
+        part: PartMesh,
         field: Option<SizeField>,
         share: Plan,
     ) -> Result<Job, PipelineError> {
-        let part = Part {
-            first: rank,
-            count: 1,
-        };
+        let rank = part.part.first;
         let mut owners = BTreeMap::new();
-        for cut in part.cuts_above(self.n) {
+        for cut in part.part.cuts_above(self.n) {
             owners.insert(cut, read_owners(self.catalog, cut)?);
         }
         // The faces of cuts stay; with sizes of its own a sub-domain may be refined up to them.
         let zones = match field {
             Some(_) => Vec::new(),
-            None => tree::zones_above(self.catalog, part, self.n)?,
+            None => tree::zones_above(self.catalog, part.part, self.n)?,
         };
         let asked = self.rows.iter().find(|(row, _)| row.rank == rank);
         let (row, kept) = asked.expect("asked for");
         let (row, kept) = (row.clone(), *kept);
-        let files = self.catalog.files()?;
-        let generations = (files.iter().filter(|f| f.subdomain == rank)).map(|f| f.generation);
-        let last = generations.max().unwrap_or(0);
+        let last = self.last.get(&rank).copied().unwrap_or(0);
         let scratch = self.catalog.scratch_dir()?.join(format!("leaf-{rank}"));
         scratch.create_dir_all()?;
-        let parts = tree::parts(self.catalog, self.n)?;
         let leaf = LeafJob {
-            part: parts[rank as usize],
+            part,
             base: self.catalog.coarse_path(rank, kept.generation),
             work: self.catalog.file_path(rank, last + 1),
             sealed: self.catalog.file_path(rank, last + 2),

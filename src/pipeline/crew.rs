@@ -37,6 +37,33 @@ pub(super) fn crew<J: Send, D: Send>(
     })
 }
 
+/// Does a job for each of `items`, in their order; `commit` takes what was done, in whatever order it is finished.
+///
+/// Of thousands of jobs only the next few are drawn up, for each knows the owners of all faces of the cuts above it. `draw` and `commit` share
+/// `state`. Errors: the first of the three.
+pub(super) fn each<S, I, J: Send, D: Send>(
+    state: &mut S,
+    items: Vec<I>,
+    workers: usize,
+    watch: &Watcher,
+    draw: impl Fn(&mut S, I) -> Result<J, PipelineError>,
+    run: &(dyn Fn(J, &Watcher) -> Result<D, PipelineError> + Sync),
+    commit: impl Fn(&mut S, D) -> Result<(), PipelineError>,
+) -> Result<(), PipelineError> {
+    let mut items = items.into_iter();
+    let mut jobs = Vec::with_capacity(2 * workers);
+    for item in items.by_ref().take(2 * workers) {
+        jobs.push(draw(state, item)?);
+    }
+    // The last of the list is taken first.
+    jobs.reverse();
+    crew(jobs, workers, watch, run, &mut |done| {
+        commit(state, done)?;
+        let next = items.next().map(|item| draw(state, item));
+        Ok(next.transpose()?.into_iter().collect())
+    })
+}
+
 /// What a worker says.
 enum Told<D> {
     Progress(Event),

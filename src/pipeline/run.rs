@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::time::Instant;
 
 use super::coarse::{CoarseReport, recovered, triangulate};
-use super::crew::crew;
+use super::crew::each;
 use super::divide::{DONE, WORK, read_owners};
 use super::estimate::n_subdomains;
 use super::held::Held;
@@ -102,7 +102,6 @@ fn go_on(
     let run = Run {
         catalog,
         bounds: surface.bounds(),
-        surface: Some(surface),
         options,
         field: &field,
         plan: held.plan,
@@ -113,13 +112,11 @@ fn go_on(
         watch,
     };
     // Unwinding from a failed page access ends here; a step's commit is its last act, so nothing is half done.
-    attempt(|| run.steps(sizes, held, budget))?
+    attempt(|| run.steps(surface, sizes, held, budget))?
 }
 
 pub(super) struct Run<'a> {
     pub catalog: &'a mut Catalog,
-    /// Until the coarse mesh exists.
-    surface: Option<Cow<'a, Surface>>,
     pub options: &'a Options,
     pub field: &'a SizeField,
     pub plan: Plan,
@@ -136,18 +133,22 @@ pub(super) struct Run<'a> {
 impl<'a> Run<'a> {
     fn steps(
         mut self,
+        surface: Cow<Surface>,
         sizes: Option<SizeSummary>,
         mut held: Held,
         budget: &Budget,
     ) -> Result<Summary, PipelineError> {
         let mut open = None;
         let mut coarse = None;
+        let is_given = matches!(surface, Cow::Owned(_));
         if self.catalog.state()? < StoreState::Coarse {
-            let (mesh, report) = self.coarse_step()?;
+            let (mesh, report) = self.coarse_step(surface)?;
             (open, coarse) = (Some(mesh), Some(report));
+        } else {
+            drop(surface);
         }
         self.n = tree::n_subdomains(self.catalog)?;
-        if let Some(Cow::Owned(_)) = self.surface.take() {
+        if is_given {
             held = held.without_surface(self.options, budget)?;
             self.plan = held.plan;
         }
@@ -186,7 +187,10 @@ impl<'a> Run<'a> {
         })
     }
 
-    fn coarse_step(&mut self) -> Result<(Mesh, CoarseReport), PipelineError> {
+    fn coarse_step(
+        &mut self,
+        surface: Cow<Surface>,
+    ) -> Result<(Mesh, CoarseReport), PipelineError> {
         let clock = Instant::now();
         let path = self.catalog.file_path(0, COARSE);
         let backing = Backing {
@@ -199,15 +203,11 @@ impl<'a> Run<'a> {
         let mut mesh = Mesh::new(Pager::new(self.plan.frames, Some(backing)));
         let scratch = self.catalog.scratch_dir()?;
         let room = Room::new(self.plan.buffers / 2, &scratch);
-        let mut surface = self.surface.take().unwrap_or_default();
         let kernel = triangulate(&mut mesh, &surface, &room, self.watch);
         drop(room);
         let label_names = surface.label_names.clone();
-        if let Cow::Owned(given) = &mut surface {
-            // All that is needed from here on is in the mesh.
-            *given = Surface::default();
-        }
-        self.surface = Some(surface);
+        // All that is needed from here on is in the mesh.
+        drop(surface);
         let report = recovered(&mut mesh, kernel, self.options, self.watch)?;
         let space = Workspace {
             dir: &scratch,
@@ -283,24 +283,15 @@ impl<'a> Run<'a> {
             let leaf = job.finish(mesh, common, self.watch)?;
             return self.seal_step(leaf, summary);
         }
-        let workers = self.plan.workers().min(left.len());
-        // A job knows the owners of all faces of the cuts above it: of thousands only the next few are drawn up.
-        let mut left = left.into_iter();
-        let mut jobs = Vec::with_capacity(2 * workers);
-        for part in left.by_ref().take(2 * workers) {
-            jobs.push(self.job(part, workers as u64)?);
-        }
-        jobs.reverse();
-        crew(
-            jobs,
+        let (workers, watch) = (self.plan.workers().min(left.len()), self.watch);
+        each(
+            &mut (self, summary),
+            left,
             workers,
-            self.watch,
+            watch,
+            |(run, _), part| run.job(part, workers as u64),
             &|job: LeafJob, watch| job.run(common, watch).map(Box::new),
-            &mut |leaf| {
-                self.seal_step(*leaf, summary)?;
-                let next = left.next().map(|part| self.job(part, workers as u64));
-                Ok(next.transpose()?.into_iter().collect())
-            },
+            |(run, summary), leaf| run.seal_step(*leaf, summary),
         )
     }
 

@@ -84,8 +84,10 @@ pub(super) fn whole(
     changed: &BTreeMap<u32, SealedTotals>,
 ) -> Result<Whole, PipelineError> {
     let mut regions = catalog.regions()?;
-    for row in regions.iter_mut().filter(|r| r.filled) {
+    let mut row_of = BTreeMap::new();
+    for (i, row) in (0..).zip(&mut regions).filter(|(_, r)| r.filled) {
         (row.tets, row.volume) = (0, 0.0);
+        row_of.insert(row.region, i);
     }
     let mut interfaces: BTreeMap<u32, Vec<InterfaceRow>> = BTreeMap::new();
     for rank in 0..n {
@@ -93,8 +95,11 @@ pub(super) fn whole(
             Some(totals) => totals.clone(),
             None => totals_of(catalog, blob::SEALED, rank)?,
         };
-        for row in regions.iter_mut().filter(|r| r.filled) {
-            let here = totals.regions.get(&row.region).copied().unwrap_or_default();
+        for (region, here) in &totals.regions {
+            let Some(&i) = row_of.get(region) else {
+                continue;
+            };
+            let row: &mut RegionRow = &mut regions[i];
             row.tets += here.tets;
             row.volume += here.volume;
         }

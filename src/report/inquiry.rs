@@ -142,10 +142,7 @@ impl Inquiry {
             vertex_chunks: rows.iter().map(|r| u64::from(r.chunks[1])).sum(),
             ..Measures::default()
         };
-        let bounds = rows.iter().map(bounds_of).fold(Aabb::EMPTY, |sum, b| Aabb {
-            low: sum.low.min(b.low),
-            high: sum.high.max(b.high),
-        });
+        let bounds = (rows.iter().map(bounds_of)).fold(Aabb::EMPTY, Aabb::union);
         Ok(Self {
             store,
             tree: BoxTree::new(rows.len(), |i| bounds_of(&rows[i])),

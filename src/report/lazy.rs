@@ -41,10 +41,10 @@ impl Near {
             let nearness = nearness(&Aabb { low, high }, p);
             near.nearness = near.nearness.min(nearness);
             if nearness <= reach {
-                near.bounds = Aabb {
-                    low: near.bounds.low.min(low.max(p - reach)),
-                    high: near.bounds.high.max(high.min(p + reach)),
-                };
+                near.bounds = near.bounds.union(Aabb {
+                    low: low.max(p - reach),
+                    high: high.min(p + reach),
+                });
             }
         }
         near
@@ -259,10 +259,7 @@ fn may_hold(part: &mut Subdomain, w: &Waiting, lazy: &mut Lazy) -> Result<bool, 
         if nearness(&bounds, p) > lazy.reach || bounds.low.x > bounds.high.x {
             return Ok(false);
         }
-        around = Aabb {
-            low: around.low.min(bounds.low),
-            high: around.high.max(bounds.high),
-        };
+        around = around.union(bounds);
     }
     Ok(around.low.cmple(p).all() && p.cmple(around.high).all())
 }

@@ -16,12 +16,7 @@ pub(super) struct BoxTree {
 impl BoxTree {
     /// Over `n` items.
     pub fn new(n: usize, item: impl Fn(usize) -> Aabb) -> Self {
-        let around = |boxes: &mut dyn Iterator<Item = Aabb>| {
-            boxes.fold(Aabb::EMPTY, |sum, b| Aabb {
-                low: sum.low.min(b.low),
-                high: sum.high.max(b.high),
-            })
-        };
+        let around = |boxes: &mut dyn Iterator<Item = Aabb>| boxes.fold(Aabb::EMPTY, Aabb::union);
         let groups = n.div_ceil(FAN);
         let mut levels = Vec::new();
         let mut level: Vec<Aabb> = (0..groups)

@@ -152,6 +152,12 @@ impl DiskPath {
         self.told(self.disk.remove_dir_all(&self.path))
     }
 
+    /// Gives what is here another name in the same folder, to last.
+    pub fn rename(&self, to: &Self) -> Result<(), StoreError> {
+        to.told(self.disk.rename(&self.path, &to.path))?;
+        to.folder().sync_dir()
+    }
+
     /// Removes the file, if it is there.
     pub fn remove_file(&self) -> Result<(), StoreError> {
         match self.disk.remove_file(&self.path) {

@@ -126,13 +126,12 @@ impl StoreFile {
         }
     }
 
-    /// Gives the file another name in its folder, replacing what had it; readers see the old name or the new.
+    /// Gives the file another name in its folder, to last, replacing what had it; readers see the old name or the new.
     ///
     /// Errors: the system refuses.
     pub fn rename(&mut self, name: &str) -> Result<(), StoreError> {
         let to = self.path.folder().join(name);
-        let renamed = to.disk().rename(self.path.path(), to.path());
-        to.told(renamed)?;
+        self.path.rename(&to)?;
         self.path = to;
         Ok(())
     }

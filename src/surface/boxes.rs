@@ -126,13 +126,7 @@ fn enclose(boxes: &Fixed<Aabb>, group: usize, room: &Room) -> Fixed<Aabb> {
     let mut around = room.list();
     for first in (0..boxes.len()).step_by(group) {
         let group = first..(first + group).min(boxes.len());
-        around.push(group.fold(Aabb::EMPTY, |a, i| {
-            let b = boxes.get(i);
-            Aabb {
-                low: a.low.min(b.low),
-                high: a.high.max(b.high),
-            }
-        }));
+        around.push(group.fold(Aabb::EMPTY, |a, i| a.union(boxes.get(i))));
     }
     around.done().fixed()
 }

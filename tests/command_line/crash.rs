@@ -159,7 +159,10 @@ fn a_killed_replacement_is_taken_up() {
             .spawn()
             .expect("the program starts");
         // Until the coarse mesh is there, or the end.
-        while !place.path("a.tetdb-new/subdomain-00000-g1.redb").exists() {
+        while !place
+            .path("a.tetdb.being-made/subdomain-00000-g1.redb")
+            .exists()
+        {
             if child.try_wait().expect("the child can be asked").is_some() {
                 break;
             }
@@ -171,7 +174,7 @@ fn a_killed_replacement_is_taken_up() {
     };
     let whole = |place: &Place| {
         assert_eq!(place.digest("a.tetdb"), expected);
-        for left in ["a.tetdb-new", "a.tetdb-old"] {
+        for left in ["a.tetdb.being-made", "a.tetdb.being-replaced"] {
             assert!(!place.path(left).exists(), "{left} is still there");
         }
         std::fs::remove_dir_all(place.path("a.tetdb")).expect("the store can be removed");
@@ -194,11 +197,47 @@ fn a_killed_replacement_is_taken_up() {
         .run_line(&format!("{old} --force --optimize none"))
         .succeeds();
     assert_ne!(place.digest("a.tetdb"), expected);
-    assert!(!place.path("a.tetdb-new").exists());
+    assert!(!place.path("a.tetdb.being-made").exists());
     // Killed between two renames, and before the old one was gone.
-    for (from, to) in [("whole.tetdb", "a.tetdb-new"), ("a.tetdb", "a.tetdb-old")] {
+    for (from, to) in [
+        ("whole.tetdb", "a.tetdb.being-made"),
+        ("a.tetdb", "a.tetdb.being-replaced"),
+    ] {
         std::fs::rename(place.path(from), place.path(to)).expect("names can be changed");
     }
     place.run_line("resume a.tetdb").succeeds();
     whole(&place);
+}
+
+/// What happens to bear the name of a replacement and is no store is nobody's to remove; nor are copies a user keeps beside a store.
+#[test]
+fn a_replacement_removes_nothing_of_a_user() {
+    let place = Place::new();
+    place
+        .run_line("mesh sample:box,h=0.2 -o a.tetdb")
+        .succeeds();
+    let first = place.digest("a.tetdb");
+    let copies = ["a.tetdb-old", "a.tetdb-new"];
+    for copy in copies {
+        place
+            .run_line(&format!("mesh sample:box,h=0.2 -o {copy}"))
+            .succeeds();
+    }
+    let own = place.path("a.tetdb.being-made");
+    std::fs::create_dir(&own).expect("a folder");
+    std::fs::write(own.join("notes.txt"), "mine").expect("a file");
+    let again = "mesh sample:box,h=0.25 -o a.tetdb --force";
+    let done = place.run_line(&format!("{again} --json"));
+    assert_eq!(
+        (done.error()["code"].as_str(), done.exit()),
+        (Some("not-a-store"), Some(8))
+    );
+    assert!(own.join("notes.txt").exists());
+    assert_eq!(place.digest("a.tetdb"), first);
+    std::fs::remove_dir_all(&own).expect("the folder can be removed");
+    place.run_line(again).succeeds();
+    assert_ne!(place.digest("a.tetdb"), first);
+    for copy in copies {
+        assert_eq!(place.digest(copy), first, "{copy}");
+    }
 }
