@@ -7,6 +7,7 @@
 //! Source: C. L. Lawson, "Properties of n-dimensional triangulations" (1986); B. Joe, "Construction of
 //! three-dimensional Delaunay triangulations using local transformations" (1991).
 
+use super::pages::{Way, tets_of_page};
 use super::sphere::Sphere;
 use crate::geom::{Point, orient};
 use crate::mesh::anatomy::{EDGE_OF, FACES};
@@ -35,21 +36,19 @@ pub(super) struct Lawson {
 }
 
 impl Lawson {
-    /// One pass over all faces in id order; each flip is followed up at once.
-    pub(super) fn sweep<P: Pages>(&mut self, mesh: &mut Mesh<P>) {
-        let mut from = 0;
-        while let Some((t, tet)) = mesh.next_tet(from) {
-            from = t + 1;
-            if t & 1023 == 0 {
-                stop_if_requested();
-            }
-            self.check::<P, true>(mesh, t, &tet);
-            while let Some(t) = self.stack.pop() {
-                let tet = mesh.tet(t);
-                if tet.is_live() {
-                    self.check::<P, false>(mesh, t, &tet);
+    /// One pass over all faces, page by page; each flip is followed up at once.
+    pub(super) fn sweep<P: Pages>(&mut self, mesh: &mut Mesh<P>, way: Way) {
+        for page in way.tet_pages(mesh) {
+            stop_if_requested();
+            tets_of_page(mesh, page, |mesh, t, tet| {
+                self.check::<P, true>(mesh, t, &tet);
+                while let Some(t) = self.stack.pop() {
+                    let tet = mesh.tet(t);
+                    if tet.is_live() {
+                        self.check::<P, false>(mesh, t, &tet);
+                    }
                 }
-            }
+            });
         }
     }
 

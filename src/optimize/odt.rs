@@ -9,12 +9,13 @@
 //!
 //! Source: L. Chen and M. Holst, "Efficient mesh optimization schemes based on optimal Delaunay triangulations" (2011).
 
-use tetdb_schema::page::{SLOT_BITS, Slot, u32_le};
+use tetdb_schema::page::{RECORDS, SLOT_BITS, Slot, u32_le};
 
+use super::pages::{Way, tets_of_page};
 use super::smooth::is_free;
 use crate::geom::{Point, orient};
 use crate::mesh::anatomy::FACES;
-use crate::mesh::{Mesh, Tet};
+use crate::mesh::{Mesh, Tet, dense, sparse};
 use crate::reconnect::Ball;
 use crate::store::{Pages, kind, stop_if_requested};
 
@@ -32,16 +33,16 @@ pub(super) struct Moves {
 }
 
 /// Moves every free vertex once. Effects: the scratch pages are used and forgotten; no connection changes.
-pub(super) fn sweep<P: Pages>(mesh: &mut Mesh<P>) -> Moves {
+pub(super) fn sweep<P: Pages>(mesh: &mut Mesh<P>, way: Way) -> Moves {
     let pages = mesh.pages_mut();
     pages.clear::<{ kind::SCRATCH }>();
     let n = pages.n_pages::<{ kind::VERTICES }>();
     for _ in 0..n {
         pages.append_page::<{ kind::SCRATCH }>();
     }
-    gather(mesh);
-    let mut moves = displace(mesh);
-    restore(mesh, &mut moves);
+    gather(mesh, way);
+    let mut moves = displace(mesh, way.turned());
+    restore(mesh, way.turned(), &mut moves);
     mesh.pages_mut().clear::<{ kind::SCRATCH }>();
     moves
 }
@@ -67,39 +68,40 @@ fn set_four(slot: &mut Slot, numbers: [f64; 4]) {
 }
 
 /// Adds up circumcenters at all vertices; those of required and hull faces get a sum that is not a number.
-fn gather<P: Pages>(mesh: &mut Mesh<P>) {
-    let mut from = 0;
-    while let Some((t, tet)) = mesh.next_tet(from) {
-        from = t + 1;
-        if t & 1023 == 0 {
-            stop_if_requested();
-        }
-        let ends = mesh.ends(&tet);
-        let p = [ends[0].point, ends[1].point, ends[2].point, ends[3].point];
-        let size = |i: usize| f64::from(ends[i].h);
-        let sizes = (size(0) + size(1)) + (size(2) + size(3));
-        let weight = if sizes > 0.0 {
-            64.0 / (sizes * sizes * sizes)
-        } else {
-            1.0
-        };
-        let (u, v, w) = (p[1] - p[0], p[2] - p[0], p[3] - p[0]);
-        let (vw, wu, uv) = (v.cross(w), w.cross(u), u.cross(v));
-        let det = u.dot(vw) * weight;
-        let sum = (vw * u.dot(u) + wu * v.dot(v) + uv * w.dot(w)) * weight;
-        let at = [Point::ZERO, u, v, w];
-        for (i, corner) in at.into_iter().enumerate() {
-            if ends[i].fixed {
-                continue;
-            }
-            // Seen from another corner, the center is nearer by that corner's position.
-            let own = sum - corner * (2.0 * det);
-            let slot = mesh.pages_mut().write::<{ kind::SCRATCH }>(tet.vertex(i));
-            let [x, y, z, volume] = four(slot);
-            set_four(slot, [x + own.x, y + own.y, z + own.z, volume + det]);
-        }
-        pin(mesh, &tet);
+fn gather<P: Pages>(mesh: &mut Mesh<P>, way: Way) {
+    for page in way.tet_pages(mesh) {
+        stop_if_requested();
+        tets_of_page(mesh, page, |mesh, _, tet| add(mesh, &tet));
     }
+}
+
+#[inline(always)]
+fn add<P: Pages>(mesh: &mut Mesh<P>, tet: &Tet) {
+    let ends = mesh.ends(tet);
+    let p = [ends[0].point, ends[1].point, ends[2].point, ends[3].point];
+    let size = |i: usize| f64::from(ends[i].h);
+    let sizes = (size(0) + size(1)) + (size(2) + size(3));
+    let weight = if sizes > 0.0 {
+        64.0 / (sizes * sizes * sizes)
+    } else {
+        1.0
+    };
+    let (u, v, w) = (p[1] - p[0], p[2] - p[0], p[3] - p[0]);
+    let (vw, wu, uv) = (v.cross(w), w.cross(u), u.cross(v));
+    let det = u.dot(vw) * weight;
+    let sum = (vw * u.dot(u) + wu * v.dot(v) + uv * w.dot(w)) * weight;
+    let at = [Point::ZERO, u, v, w];
+    for (i, corner) in at.into_iter().enumerate() {
+        if ends[i].fixed {
+            continue;
+        }
+        // Seen from another corner, the center is nearer by that corner's position.
+        let own = sum - corner * (2.0 * det);
+        let slot = mesh.pages_mut().write::<{ kind::SCRATCH }>(tet.vertex(i));
+        let [x, y, z, volume] = four(slot);
+        set_four(slot, [x + own.x, y + own.y, z + own.z, volume + det]);
+    }
+    pin(mesh, tet);
 }
 
 /// Pins the vertices of required and hull faces.
@@ -120,9 +122,12 @@ fn pin<P: Pages>(mesh: &mut Mesh<P>, tet: &Tet) {
 }
 
 /// Moves the vertices whose sums are numbers and whose tag allows it.
-fn displace<P: Pages>(mesh: &mut Mesh<P>) -> Moves {
+fn displace<P: Pages>(mesh: &mut Mesh<P>, way: Way) -> Moves {
     let mut moves = Moves::default();
-    for v in mesh.vertex_ids() {
+    let n = mesh.pages_mut().n_pages::<{ kind::VERTICES }>();
+    let (per_page, end) = (RECORDS as u32, dense(mesh.vertex_ids_end()));
+    let of_page = |page: u32| page * per_page..end.min((page + 1) * per_page);
+    for v in way.pages(n).flat_map(of_page).map(sparse) {
         let [x, y, z, volume] = four(mesh.pages_mut().read::<{ kind::SCRATCH }>(v));
         let mut shift = Point::new(x, y, z) / (2.0 * volume);
         let moving = volume > 0.0 && shift.is_finite() && is_free(mesh, v);
@@ -151,46 +156,55 @@ fn is_positive<P: Pages>(mesh: &mut Mesh<P>, tet: &Tet) -> bool {
 }
 
 /// Takes vertices back until every tetrahedron is exactly positive; where all were taken back it is, as before.
-fn restore<P: Pages>(mesh: &mut Mesh<P>, moves: &mut Moves) {
+fn restore<P: Pages>(mesh: &mut Mesh<P>, way: Way, moves: &mut Moves) {
     let (mut ball, mut list) = (Ball::default(), Vec::new());
-    let mut from = 0;
-    while let Some((t, tet)) = mesh.next_tet(from) {
-        from = t + 1;
+    for page in way.tet_pages(mesh) {
+        tets_of_page(mesh, page, |mesh, t, tet| {
+            if !is_positive(mesh, &tet) {
+                list.push((t, tet));
+                take_back(mesh, &mut list, &mut ball, moves);
+            }
+        });
+    }
+}
+
+/// Takes vertices back until the tetrahedra of the list are positive, and those around the vertices too.
+fn take_back<P: Pages>(
+    mesh: &mut Mesh<P>,
+    list: &mut Vec<(u32, Tet)>,
+    ball: &mut Ball,
+    moves: &mut Moves,
+) {
+    // What is taken back here concerns tetrahedra near by; those passed already are in the list too.
+    while let Some((t, tet)) = list.pop() {
         if is_positive(mesh, &tet) {
             continue;
         }
-        list.push((t, tet));
-        // What is taken back here concerns tetrahedra near by; those passed already are in the list too.
-        while let Some((t, tet)) = list.pop() {
-            if is_positive(mesh, &tet) {
+        for i in 0..4 {
+            let v = tet.vertex(i);
+            let [x, y, z, flag] = four(mesh.pages_mut().read::<{ kind::SCRATCH }>(v));
+            if flag == 0.0 {
                 continue;
             }
-            for i in 0..4 {
-                let v = tet.vertex(i);
-                let [x, y, z, flag] = four(mesh.pages_mut().read::<{ kind::SCRATCH }>(v));
-                if flag == 0.0 {
-                    continue;
-                }
-                let old = Point::new(x, y, z);
-                let left = flag - STEP_BACK;
-                let p = if left > 0.0 {
-                    (mesh.point(v) + old) * 0.5
-                } else {
-                    moves.moved -= 1;
-                    moves.held += 1;
-                    old
-                };
-                mesh.set_point(v, p);
-                set_four(
-                    mesh.pages_mut().write::<{ kind::SCRATCH }>(v),
-                    [x, y, z, left],
-                );
-                assert!(
-                    ball.gather(mesh, v, t, usize::MAX),
-                    "tetrahedron {t} has vertex {v}"
-                );
-                list.extend(ball.tets.iter().copied().zip(ball.records.iter().copied()));
-            }
+            let old = Point::new(x, y, z);
+            let left = flag - STEP_BACK;
+            let p = if left > 0.0 {
+                (mesh.point(v) + old) * 0.5
+            } else {
+                moves.moved -= 1;
+                moves.held += 1;
+                old
+            };
+            mesh.set_point(v, p);
+            set_four(
+                mesh.pages_mut().write::<{ kind::SCRATCH }>(v),
+                [x, y, z, left],
+            );
+            assert!(
+                ball.gather(mesh, v, t, usize::MAX),
+                "tetrahedron {t} has vertex {v}"
+            );
+            list.extend(ball.tets.iter().copied().zip(ball.records.iter().copied()));
         }
     }
 }

@@ -10,6 +10,38 @@ use crate::mesh::anatomy::{MARK, VERTEX_MASK};
 use crate::mesh::{Mesh, Tet};
 use crate::store::Pages;
 
+/// Which way a pass goes through the pages.
+///
+/// A pass that begins where the one before it ended finds those pages still in memory. When all go the same way and one frame is missing, each
+/// reads every page again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Way {
+    Up,
+    Down,
+}
+
+impl Way {
+    pub(super) fn turned(self) -> Self {
+        match self {
+            Self::Up => Self::Down,
+            Self::Down => Self::Up,
+        }
+    }
+
+    /// The numbers of `n` pages.
+    pub(super) fn pages(self, n: u32) -> impl Iterator<Item = u32> {
+        (0..n).map(move |i| match self {
+            Self::Up => i,
+            Self::Down => n - 1 - i,
+        })
+    }
+
+    /// The pages of tetrahedra, as many as there are now.
+    pub(super) fn tet_pages<P: Pages>(self, mesh: &Mesh<P>) -> impl Iterator<Item = u32> + use<P> {
+        self.pages(mesh.tet_ids_end().div_ceil(SLOTS as u32))
+    }
+}
+
 /// Flags per page of tetrahedra.
 #[derive(Default)]
 pub(super) struct PageFlags {

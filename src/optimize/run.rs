@@ -2,7 +2,7 @@
 
 use super::lawson::{Lawson, LawsonStats};
 use super::odt;
-use super::pages::{PageFlags, clear_marks};
+use super::pages::{PageFlags, Way, clear_marks};
 use super::rescue::WORST;
 use super::rounds::{BAD, OperationCounts, Rounds};
 use crate::mesh::Mesh;
@@ -84,14 +84,16 @@ pub fn run_with<P: Pages>(
     lower_marks(mesh);
     mesh.refresh_tet_of();
     let mut lawson = Lawson::default();
-    lawson.sweep(mesh);
+    let mut way = Way::Up;
+    lawson.sweep(mesh, way);
     for sweep in 0..settings.odt_sweeps {
         tell("smooth", sweep, settings.odt_sweeps);
-        let moves = odt::sweep(mesh);
+        way = way.turned();
+        let moves = odt::sweep(mesh, way);
         report.odt_moves += moves.moved;
         report.odt_held += moves.held;
         tell("delaunay", sweep + 1, settings.odt_sweeps + 1);
-        lawson.sweep(mesh);
+        lawson.sweep(mesh, way);
     }
     report.flips = lawson.stats;
     if settings.mode == Mode::Full {

@@ -98,15 +98,17 @@ pub fn saturate<P: Pages>(
         let before = report.inserted;
         report.passes += 1;
         let end = dense(mesh.tet_ids_end());
-        let mut from = 0;
-        while from < end {
+        let n_blocks = end.div_ceil(BLOCK_TETS);
+        // Every other pass goes down: it begins with the pages that the pass before has left in memory.
+        let up = report.passes % 2 == 1;
+        for i in 0..n_blocks {
+            let from = BLOCK_TETS * if up { i } else { n_blocks - 1 - i };
             stop_if_requested();
             let to = end.min(from + BLOCK_TETS);
             if worker.active.take(from, to) {
                 worker.block(mesh, field, sparse(from), sparse(to - 1), &mut report);
                 progress(report.inserted);
             }
-            from = to;
         }
         if f64::from(mesh.n_tets()) > GROWTH * f64::from(numbered) {
             renumber(mesh, &worker.order, space)?;
