@@ -6,17 +6,31 @@
 
 use super::surface::CuttingSurface;
 use crate::geom::Point;
-use crate::mesh::anatomy::mark::IN_CORE;
-use crate::mesh::anatomy::{MARK, REQUIRED};
-use crate::mesh::{FaceRef, Mesh, Tet, VertexTag, dense, sparse};
+use crate::mesh::anatomy::REQUIRED;
+use crate::mesh::{FaceRef, Mesh, Tet, VertexTag, dense, next_id, sparse};
 use crate::store::{Pages, stop_if_requested};
 use tetdb_schema::page::NONE;
 
 /// Tetrahedra with a vertex nearer than this, in units of its h, belong to the core: wider than the cutting zone, so that
 /// what the interface is chosen from is optimized, narrower than the refined zone, so that all of it is final.
 const CORE: f64 = 2.2;
-/// In the host's scratch map: the vertex has this number in the core.
+/// In the host's scratch map, at a vertex: it has this number in the core.
 pub(super) const SHARED: u32 = 1 << 31;
+
+/// The host's scratch map from the extraction of the core to the end of the split, behind one word a vertex: what became of each
+/// tetrahedron, in the two highest bits, with a number.
+pub(super) mod fate {
+    use tetdb_schema::page::NONE;
+
+    /// Of neither side and not in the core: its id is not in use.
+    pub(in super::super) const UNUSED: u32 = NONE;
+    /// In the core, with its id there.
+    pub(in super::super) const IN_CORE: u32 = 1 << 30;
+    /// Left on the high side; without a bit: on the low one.
+    pub(in super::super) const HIGH: u32 = 1 << 31;
+    /// The bits.
+    pub(in super::super) const BITS: u32 = IN_CORE | HIGH;
+}
 
 /// Where a tetrahedron lies.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -33,25 +47,22 @@ impl Sides {
 }
 
 /// Sides of the vertices of `tet`, and the least distance in units of h.
+#[inline]
 pub(super) fn place<P: Pages>(
     mesh: &mut Mesh<P>,
     tet: &Tet,
-    surface: &dyn CuttingSurface,
+    surface: &impl CuttingSurface,
 ) -> (Sides, f64) {
     let mut sides = Sides {
         low: false,
         high: false,
     };
     let mut least = f64::INFINITY;
-    for v in tet.vertices() {
-        let (p, h) = mesh.point_and_size(v);
-        let s = surface.distance(p);
-        if s < 0.0 {
-            sides.low = true;
-        } else {
-            sides.high = true;
-        }
-        least = least.min(s.abs() / f64::from(h));
+    for end in mesh.ends(tet) {
+        let s = surface.distance(end.point);
+        sides.low |= s < 0.0;
+        sides.high |= s >= 0.0;
+        least = least.min(s.abs() / f64::from(end.h));
     }
     (sides, least)
 }
@@ -80,38 +91,52 @@ impl Rim {
     }
 }
 
-/// Whether `t` was copied into the core.
-pub(super) fn is_in_core(tet: &Tet) -> bool {
-    tet.node[IN_CORE] & MARK != 0
+/// Whether `t` was copied into the core, as the scratch map of [`extract`] tells.
+pub(super) fn is_in_core<P: Pages>(host: &mut Mesh<P>, t: u32) -> bool {
+    let base = dense(host.vertex_ids_end());
+    host.scratch(base + dense(t)) & fate::BITS == fate::IN_CORE
 }
 
 /// Copies the core of `host` into the empty `core`; tells the rim.
 ///
-/// Effects: marks the host's tetrahedra; its scratch map holds, for each vertex, the number in the core with [`SHARED`] or
-/// [`NONE`].
+/// Effects: the host's scratch map holds for each vertex the number in the core with [`SHARED`], or else how many were met before it in
+/// tetrahedra out of the core, or [`NONE`]; behind that the [`fate`] of each tetrahedron.
 pub(super) fn extract<P: Pages, Q: Pages>(
     host: &mut Mesh<P>,
     core: &mut Mesh<Q>,
-    surface: &dyn CuttingSurface,
+    surface: &impl CuttingSurface,
 ) -> Rim {
     host.clear_scratch();
     let base = dense(host.vertex_ids_end());
     for n in 0..base {
         host.set_scratch(n, NONE);
     }
-    let mut from = 0;
-    while let Some((t, tet)) = host.next_tet(from) {
-        from = t + 1;
+    let (mut at, mut met) = (base, 0);
+    let mut t = 0;
+    while t < host.tet_ids_end() {
         if t & 1023 == 0 {
             stop_if_requested();
         }
-        let (sides, least) = place(host, &tet, surface);
-        let inside = sides.crosses() || least <= CORE;
-        host.set_mark(t, IN_CORE, inside);
-        if inside {
-            let copy = copy_tet(host, core, t, &tet);
-            host.set_scratch(base + dense(t), copy);
-        }
+        let tet = host.tet(t);
+        let word = if tet.is_live() {
+            let (sides, least) = place(host, &tet, surface);
+            if sides.crosses() || least <= CORE {
+                fate::IN_CORE | copy_tet(host, core, t, &tet)
+            } else {
+                for v in tet.vertices() {
+                    if host.scratch(dense(v)) == NONE {
+                        host.set_scratch(dense(v), met);
+                        met += 1;
+                    }
+                }
+                if sides.high { fate::HIGH } else { 0 }
+            }
+        } else {
+            fate::UNUSED
+        };
+        host.set_scratch(at, word);
+        at += 1;
+        t = next_id(t);
     }
     // The copies still name the host's neighbors.
     let mut rim = Rim::default();
@@ -123,9 +148,9 @@ pub(super) fn extract<P: Pages, Q: Pages>(
             if !across.exists() {
                 continue;
             }
-            if is_in_core(&host.tet(across.tet())) {
-                let other = host.scratch(base + dense(across.tet()));
-                tet.neighbor[i] = FaceRef::new(other, across.face());
+            let word = host.scratch(base + dense(across.tet()));
+            if word & fate::BITS == fate::IN_CORE {
+                tet.neighbor[i] = FaceRef::new(word & !fate::BITS, across.face());
                 continue;
             }
             tet.neighbor[i] = FaceRef::NONE;
@@ -163,7 +188,7 @@ fn copy_tet<P: Pages, Q: Pages>(host: &mut Mesh<P>, core: &mut Mesh<Q>, t: u32, 
 
 fn copy_vertex<P: Pages, Q: Pages>(host: &mut Mesh<P>, core: &mut Mesh<Q>, v: u32) -> u32 {
     let known = host.scratch(dense(v));
-    if known != NONE {
+    if known != NONE && known & SHARED != 0 {
         return known & !SHARED;
     }
     let (p, h) = host.point_and_size(v);

@@ -66,7 +66,7 @@ pub struct InterfaceReport {
 /// Labels the core; tells the faces of the natural interface where they are wanted. Effects: its scratch map is used up; `tet_of` must be right.
 pub(super) fn choose<P: Pages>(
     core: &mut Mesh<P>,
-    surface: &dyn CuttingSurface,
+    surface: &impl CuttingSurface,
     rim: &Rim,
     steps: Steps,
     natural: Option<&mut Vec<[Point; 3]>>,
@@ -98,7 +98,7 @@ pub(super) fn choose<P: Pages>(
 const AT_ONCE: usize = 2;
 
 /// Cuts strip by strip; returns the most bytes held.
-fn minimum_cut<P: Pages>(core: &mut Mesh<P>, surface: &dyn CuttingSurface, free: &[u32]) -> u64 {
+fn minimum_cut<P: Pages>(core: &mut Mesh<P>, surface: &impl CuttingSurface, free: &[u32]) -> u64 {
     core.clear_scratch();
     for n in 0..dense(core.tet_ids_end()) {
         core.set_scratch(n, NONE);
@@ -139,7 +139,7 @@ fn minimum_cut<P: Pages>(core: &mut Mesh<P>, surface: &dyn CuttingSurface, free:
 /// Sorts along the longest direction in the surface, among three; returns the bytes held meanwhile.
 fn sort_along<P: Pages>(
     core: &mut Mesh<P>,
-    surface: &dyn CuttingSurface,
+    surface: &impl CuttingSurface,
     order: &mut Vec<u32>,
 ) -> u64 {
     let Some(&first) = order.first() else {
@@ -176,7 +176,7 @@ fn sort_along<P: Pages>(
 /// Makes the graph of a strip; what lies around it is source or sink.
 fn read_strip<P: Pages>(
     core: &mut Mesh<P>,
-    surface: &dyn CuttingSurface,
+    surface: &impl CuttingSurface,
     strip: &[u32],
     graph: &mut Graph,
 ) {
@@ -218,7 +218,7 @@ fn label_strip<P: Pages>(core: &mut Mesh<P>, strip: &[u32], graph: &Graph) {
 }
 
 /// The cost of a face as a whole number, the same from both sides: its corners are taken in the order of their coordinates.
-fn symmetric_cost(mut corners: [Point; 3], surface: &dyn CuttingSurface) -> u32 {
+fn symmetric_cost(mut corners: [Point; 3], surface: &impl CuttingSurface) -> u32 {
     corners.sort_unstable_by(|&a, &b| crate::geom::lex_cmp(a, b));
     (SCALE * face_cost(corners, surface)).round() as u32
 }

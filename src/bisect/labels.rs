@@ -42,7 +42,7 @@ pub(super) fn set_high<P: Pages>(core: &mut Mesh<P>, t: u32, high: bool) {
 /// At the rim the side is that of the rim face: the tetrahedron beyond has all its vertices there.
 pub(super) fn begin<P: Pages>(
     core: &mut Mesh<P>,
-    surface: &dyn CuttingSurface,
+    surface: &impl CuttingSurface,
     rim: &Rim,
 ) -> Vec<u32> {
     let mut free = Vec::new();
@@ -89,7 +89,7 @@ pub(super) fn triangle_quality([a, b, c]: [Point; 3]) -> f64 {
 const SHAPE_MAX: f64 = 20.0;
 
 /// Cost of a face on the interface: 1, and more for a bad shape or a slope.
-pub(super) fn face_cost(corners: [Point; 3], surface: &dyn CuttingSurface) -> f64 {
+pub(super) fn face_cost(corners: [Point; 3], surface: &impl CuttingSurface) -> f64 {
     let [a, b, c] = corners;
     let normal = (b - a).cross(c - a).normalize_or_zero();
     let shape = (triangle_quality(corners) - 1.0).min(SHAPE_MAX);
@@ -179,7 +179,7 @@ pub(super) fn layers_least<P: Pages, Q: Pages>(
     host: &mut Mesh<P>,
     core: &mut Mesh<Q>,
     rim: &Rim,
-    surface: &dyn CuttingSurface,
+    surface: &impl CuttingSurface,
 ) -> Option<u32> {
     core.clear_scratch();
     for n in 0..dense(core.tet_ids_end()) {
@@ -226,7 +226,7 @@ pub(super) fn layers_least<P: Pages, Q: Pages>(
             for across in onward.map(FaceRef::tet) {
                 if !beyond.contains(&across)
                     && !before.contains(&across)
-                    && !is_in_core(&host.tet(across))
+                    && !is_in_core(host, across)
                 {
                     next_beyond.insert(across);
                 }
@@ -239,7 +239,7 @@ pub(super) fn layers_least<P: Pages, Q: Pages>(
 }
 
 /// Whether all vertices of `tet` lie in the refined zone at its narrowest.
-fn is_in_zone<P: Pages>(mesh: &mut Mesh<P>, tet: &Tet, surface: &dyn CuttingSurface) -> bool {
+fn is_in_zone<P: Pages>(mesh: &mut Mesh<P>, tet: &Tet, surface: &impl CuttingSurface) -> bool {
     tet.vertices().into_iter().all(|v| {
         let (p, h) = mesh.point_and_size(v);
         surface.distance(p).abs() <= super::zone::WIDTH_MIN * f64::from(h)
@@ -252,7 +252,7 @@ fn is_in_zone<P: Pages>(mesh: &mut Mesh<P>, tet: &Tet, surface: &dyn CuttingSurf
 /// towards the zone's limit, a sphere may count that is not wholly within, and `frozen_hits` is what proves.
 pub(super) fn enclosed<P: Pages>(
     core: &mut Mesh<P>,
-    surface: &dyn CuttingSurface,
+    surface: &impl CuttingSurface,
     h: &dyn Fn(Point) -> f64,
 ) -> (u64, u64) {
     let (mut all, mut within) = (0, 0);

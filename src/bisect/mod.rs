@@ -13,6 +13,7 @@
 
 mod core;
 mod flow;
+mod inherit;
 mod interface;
 mod labels;
 mod load;

@@ -22,8 +22,8 @@ const PASSES_MAX: u32 = 10;
 const BALL_MAX: usize = 400;
 
 /// Scratch of the moves.
-pub(super) struct Moves<'a> {
-    surface: &'a dyn CuttingSurface,
+pub(super) struct Moves<'a, S> {
+    surface: &'a S,
     rim: &'a Rim,
     ball: Ball,
     around: Ball,
@@ -37,8 +37,8 @@ pub(super) struct Moves<'a> {
     pinched: BTreeSet<u32>,
 }
 
-impl<'a> Moves<'a> {
-    pub(super) fn new(surface: &'a dyn CuttingSurface, rim: &'a Rim) -> Self {
+impl<'a, S: CuttingSurface> Moves<'a, S> {
+    pub(super) fn new(surface: &'a S, rim: &'a Rim) -> Self {
         Self {
             surface,
             rim,

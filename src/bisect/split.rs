@@ -1,21 +1,24 @@
 //! Write a child: the host's tetrahedra of one side, those of the core with that label, joined at the rim.
+//!
+//! Vertices and tetrahedra get their final numbers before they are written: those of vertices by sorting along the curve, those of
+//! tetrahedra by counting, for they follow that of their first vertex. Each record is then written once, at its place. What is read
+//! for it is read in page order, and of the host's tetrahedra those of the child alone: the scratch map says which.
 
 use super::Opened;
-use super::core::{SHARED, copy_attribute, is_held, is_in_core, place, tet_ids};
+use super::core::{SHARED, copy_attribute, fate, is_held, tet_ids};
+use super::inherit::inherit;
 use super::labels::{interface_faces, is_high};
+use super::surface::CuttingSurface;
 use crate::geom::{Aabb, HilbertFrame, Point};
 use crate::mesh::anatomy::{FROZEN, REQUIRED};
-use crate::mesh::{FaceRef, InterfaceFace, Mesh, Tet, Workspace, dense, renumber};
-use crate::store::{Pages, Sorted, Sorter, StoreError, stop_if_requested};
+use crate::mesh::{FaceRef, InterfaceFace, Mesh, Tet, Workspace, dense, sparse};
+use crate::store::{Pages, Sorter, StoreError, stop_if_requested};
 use tetdb_schema::page::NONE;
 
-/// A required face of the child: its vertices ascending, and where it is.
-type FaceRecord = [u8; 16];
-/// A facet or interface face of the host: its vertices in the child ascending, its kind, its number.
-type ClaimRecord = [u8; 17];
-
-const FACET: u8 = 0;
-const INTERFACE: u8 = 1;
+/// A vertex of the child: its place along the curve, when it was met, where it comes from.
+type VertexRecord = [u8; 16];
+/// Of a vertex met in the host alone: after those of the core. Of a source: in the host.
+const OF_HOST: u32 = 1 << 31;
 
 /// Gives the vertices of the cut's interface their numbers, in the order of its faces; returns how many they are.
 pub(super) fn number_interface<P: Pages>(core: &mut Mesh<P>, cut: u32) -> u32 {
@@ -56,7 +59,11 @@ fn for_each_interface_face<P: Pages>(
     }
 }
 
-/// Writes one side into the empty `child` and numbers it along the curve. Errors: the disk, while sorting.
+/// Writes one side into the empty `child`, numbered along the curve: vertices in the order of their positions, tetrahedra in that of
+/// their first vertex, those of the core before others.
+///
+/// Effects: the core's scratch map is used up, that of the host holds the child's numbers in place of what led to them. Errors: the
+/// disk, while sorting.
 pub fn write_child<P: Pages, Q: Pages, R: Pages>(
     host: &mut Mesh<P>,
     core: &mut Mesh<Q>,
@@ -74,203 +81,296 @@ pub fn write_child<P: Pages, Q: Pages, R: Pages>(
         child,
         opened,
         high,
+        at_core: Vec::new(),
     };
-    split.begin();
-    split.copy_core();
-    split.copy_host();
-    split.link_host();
-    split.link_core();
-    split.tag_rim_vertices();
+    split.add_vertices(&HilbertFrame::new(bounds), space)?;
+    split.number_tets();
+    split.write_host();
+    split.write_core();
     split.new_interface();
-    split.inherit(space)?;
-    renumber(child, &HilbertFrame::new(bounds), space)
+    inherit(&mut split, space)
 }
 
-struct Split<'a, P: Pages, Q: Pages, R: Pages> {
-    host: &'a mut Mesh<P>,
-    core: &'a mut Mesh<Q>,
-    child: &'a mut Mesh<R>,
-    opened: &'a Opened,
-    high: bool,
+/// A child on its way.
+pub(super) struct Split<'a, P: Pages, Q: Pages, R: Pages> {
+    pub host: &'a mut Mesh<P>,
+    pub core: &'a mut Mesh<Q>,
+    pub child: &'a mut Mesh<R>,
+    pub opened: &'a Opened,
+    pub high: bool,
     /// Where the map of tetrahedra begins in each scratch map, behind that of vertices.
-    host_base: u32,
-    core_base: u32,
+    pub host_base: u32,
+    pub core_base: u32,
+    /// Tetrahedra out of the core with a required face whose vertices may all be in it.
+    pub at_core: Vec<u32>,
 }
 
 impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
-    fn begin(&mut self) {
-        for n in 0..self.host_base {
-            let word = self.host.scratch(n);
-            if word & SHARED == 0 {
-                self.host.set_scratch(n, NONE);
+    /// Bits of the fate of a tetrahedron that goes to this child.
+    fn fate(&self) -> u32 {
+        if self.high { fate::HIGH } else { 0 }
+    }
+
+    /// Whether a vertex of the host that the core does not have is on this side.
+    pub fn is_beside(&mut self, v: u32) -> bool {
+        let p = self.host.point(v);
+        (self.opened.zone.surface.distance(p) >= 0.0) == self.high
+    }
+
+    /// Adds all vertices of the child's tetrahedra; both scratch maps tell their numbers.
+    fn add_vertices(&mut self, order: &HilbertFrame, space: &Workspace) -> Result<(), StoreError> {
+        self.meet_core_vertices();
+        let mut sorter = Sorter::<16>::new(space.dir, space.memory);
+        for n in 0..self.core_base {
+            let (v, met) = (sparse(n), self.core.scratch(n));
+            if met != NONE && !is_held(self.core, v) {
+                sorter.push(record(order.index(self.core.point(v)), met, v))?;
             }
         }
+        for n in 0..self.host_base {
+            let (v, met) = (sparse(n), self.host.scratch(n));
+            if met == NONE {
+                continue;
+            }
+            if met & SHARED == 0 {
+                if self.is_beside(v) {
+                    let key = order.index(self.host.point(v));
+                    sorter.push(record(key, OF_HOST | met, OF_HOST | v))?;
+                }
+                continue;
+            }
+            // Vertices of the rim have in the core no tag of their own.
+            let (copy, met) = (met & !SHARED, self.core.scratch(dense(met & !SHARED)));
+            if met != NONE && is_held(self.core, copy) {
+                sorter.push(record(order.index(self.host.point(v)), met, OF_HOST | v))?;
+            }
+        }
+        for record in sorter.finish()? {
+            let source = word(&record?, 12);
+            if source & OF_HOST == 0 {
+                self.add_core_vertex(source);
+                continue;
+            }
+            let v = source & !OF_HOST;
+            let number = self.add_host_vertex(v);
+            let known = self.host.scratch(dense(v));
+            if known & SHARED == 0 {
+                self.host.set_scratch(dense(v), number);
+            } else {
+                self.core.set_scratch(dense(known & !SHARED), number);
+            }
+        }
+        Ok(())
+    }
+
+    /// Numbers the core's vertices as they are met in tetrahedra of this side; in its scratch map others have [`NONE`].
+    fn meet_core_vertices(&mut self) {
         self.core.clear_scratch();
         for n in 0..self.core_base {
             self.core.set_scratch(n, NONE);
         }
+        let mut met = 0;
+        for t in tet_ids(self.core) {
+            let tet = self.core.tet(t);
+            let ours = tet.is_live() && is_high(self.core, t) == self.high;
+            self.core
+                .set_scratch(self.core_base + dense(t), if ours { 0 } else { NONE });
+            if !ours {
+                continue;
+            }
+            for v in tet.vertices() {
+                if self.core.scratch(dense(v)) == NONE {
+                    self.core.set_scratch(dense(v), met);
+                    met += 1;
+                }
+            }
+        }
     }
 
-    /// The child's number of a vertex of the core.
-    fn core_vertex(&mut self, v: u32) -> u32 {
-        let known = self.core.scratch(dense(v));
-        if known != NONE {
-            return known;
-        }
+    fn add_core_vertex(&mut self, v: u32) -> u32 {
         let (p, h) = self.core.point_and_size(v);
-        let copy = self.child.add_vertex(p, h);
-        if !is_held(self.core, v) {
-            copy_attribute(self.core, v, self.child, copy);
-        }
-        self.core.set_scratch(dense(v), copy);
-        copy
+        let number = self.child.add_vertex(p, h);
+        copy_attribute(self.core, v, self.child, number);
+        self.core.set_scratch(dense(v), number);
+        number
     }
 
-    /// The child's number of a vertex of the host.
+    /// Adds a vertex of the host; the scratch maps are as before.
+    pub fn add_host_vertex(&mut self, v: u32) -> u32 {
+        let (p, h) = self.host.point_and_size(v);
+        let number = self.child.add_vertex(p, h);
+        copy_attribute(self.host, v, self.child, number);
+        number
+    }
+
+    /// The child's number of a vertex of one of the host's tetrahedra of this side.
+    #[inline]
     fn host_vertex(&mut self, v: u32) -> u32 {
         let known = self.host.scratch(dense(v));
-        if known == NONE {
-            let (p, h) = self.host.point_and_size(v);
-            let copy = self.child.add_vertex(p, h);
-            copy_attribute(self.host, v, self.child, copy);
-            self.host.set_scratch(dense(v), copy);
-            copy
-        } else if known & SHARED != 0 {
-            self.core_vertex(known & !SHARED)
-        } else {
-            known
+        if known & SHARED == 0 {
+            return known;
         }
-    }
-
-    /// The child's number of a vertex of the host that it already has.
-    fn known_vertex(&mut self, v: u32) -> Option<u32> {
-        let mut known = self.host.scratch(dense(v));
-        if known != NONE && known & SHARED != 0 {
-            known = self.core.scratch(dense(known & !SHARED));
+        let copy = known & !SHARED;
+        let number = self.core.scratch(dense(copy));
+        if number != NONE {
+            return number;
         }
-        (known != NONE).then_some(known)
+        // None of its tetrahedra in the core is on this side: the mesh is pinched there.
+        let number = self.add_host_vertex(v);
+        self.core.set_scratch(dense(copy), number);
+        self.child.set_scratch(dense(number), 0);
+        number
     }
 
-    fn add(&mut self, nodes: [u32; 4], region: u32) -> u32 {
-        let t = self.child.take_tet();
-        let tet = Tet {
-            node: nodes,
-            neighbor: [FaceRef::NONE; 4],
-        };
-        self.child.set_tet(t, tet);
-        self.child.set_tet_attribute(t, region, 0);
-        t
+    /// Whether the host's tetrahedron at position `n` goes to this child; then the number in the scratch map.
+    #[inline]
+    fn of_host(&mut self, n: u32) -> Option<u32> {
+        let word = self.host.scratch(self.host_base + n);
+        (word & fate::BITS == self.fate()).then_some(word & !fate::BITS)
     }
 
-    fn copy_core(&mut self) {
+    /// Puts into the scratch maps the child's number of each of its tetrahedra.
+    fn number_tets(&mut self) {
+        let fate = self.fate();
+        for n in 0..dense(self.child.vertex_ids_end()) {
+            self.child.set_scratch(n, 0);
+        }
+        // First the smallest number of a vertex, which is counted in the child's scratch map.
         for t in tet_ids(self.core) {
-            let tet = self.core.tet(t);
-            if !tet.is_live() || is_high(self.core, t) != self.high {
+            let place = self.core_base + dense(t);
+            if self.core.scratch(place) == NONE {
                 continue;
             }
-            let nodes =
-                std::array::from_fn(|i| self.core_vertex(tet.vertex(i)) | tet.node[i] & REQUIRED);
-            let (region, _) = self.core.tet_attribute(t);
-            let copy = self.add(nodes, region);
-            self.core.set_scratch(self.core_base + dense(t), copy);
+            let numbers = (self.core.tet(t).vertices()).map(|v| self.core.scratch(dense(v)));
+            let least = least(numbers);
+            self.core.set_scratch(place, least);
+            self.count(least);
         }
-    }
-
-    /// Whether a tetrahedron of the host, outside the core, belongs to the child.
-    fn is_ours(&mut self, tet: &Tet) -> bool {
-        if !tet.is_live() || is_in_core(tet) {
-            return false;
-        }
-        let (sides, _) = place(self.host, tet, &self.opened.zone.surface);
-        debug_assert!(!sides.crosses());
-        sides.high == self.high
-    }
-
-    fn copy_host(&mut self) {
-        for t in tet_ids(self.host) {
-            let tet = self.host.tet(t);
-            if !self.is_ours(&tet) {
-                continue;
-            }
-            let nodes =
-                std::array::from_fn(|i| self.host_vertex(tet.vertex(i)) | tet.node[i] & REQUIRED);
-            let (region, flags) = self.host.tet_attribute(t);
-            let copy = self.add(nodes, region);
-            if flags & FROZEN != 0 {
-                self.child.set_tet_attribute(copy, region, FROZEN);
-            }
-            self.host.set_scratch(self.host_base + dense(t), copy);
-            if t & 1023 == 0 {
+        for n in 0..dense(self.host.tet_ids_end()) {
+            if n & 1023 == 0 {
                 stop_if_requested();
             }
+            if self.of_host(n).is_some() {
+                let [a, b, c, d] = self.host.tet(sparse(n)).vertices();
+                let numbers = [
+                    self.host_vertex(a),
+                    self.host_vertex(b),
+                    self.host_vertex(c),
+                    self.host_vertex(d),
+                ];
+                let least = least(numbers);
+                self.host.set_scratch(self.host_base + n, fate | least);
+                self.count(least);
+            }
         }
+        let mut sum = 0;
+        for n in 0..dense(self.child.vertex_ids_end()) {
+            let count = self.child.scratch(n);
+            self.child.set_scratch(n, sum);
+            sum += count;
+        }
+        // Then the place among those with the same.
+        for t in tet_ids(self.core) {
+            let place = self.core_base + dense(t);
+            let least = self.core.scratch(place);
+            if least != NONE {
+                let number = self.next_of(least);
+                self.core.set_scratch(place, number);
+            }
+        }
+        for n in 0..dense(self.host.tet_ids_end()) {
+            if let Some(least) = self.of_host(n) {
+                let number = self.next_of(least);
+                self.host.set_scratch(self.host_base + n, fate | number);
+            }
+        }
+        self.child.clear_scratch();
+        self.child.take_tets(sum);
     }
 
-    fn link_host(&mut self) {
-        for t in tet_ids(self.host) {
-            let tet = self.host.tet(t);
-            if !self.is_ours(&tet) {
-                continue;
+    /// Counts a tetrahedron at its first vertex.
+    #[inline]
+    fn count(&mut self, first: u32) {
+        let n = self.child.scratch(dense(first));
+        self.child.set_scratch(dense(first), n + 1);
+    }
+
+    /// The next number of a tetrahedron with that first vertex.
+    #[inline]
+    fn next_of(&mut self, first: u32) -> u32 {
+        let n = self.child.scratch(dense(first));
+        self.child.set_scratch(dense(first), n + 1);
+        sparse(n)
+    }
+
+    fn write_host(&mut self) {
+        for n in 0..dense(self.host.tet_ids_end()) {
+            if n & 1023 == 0 {
+                stop_if_requested();
             }
-            let copy = self.host.scratch(self.host_base + dense(t));
-            for (i, across) in tet.neighbor.into_iter().enumerate() {
-                // Those across the rim are linked from the core.
-                if across.exists() && !is_in_core(&self.host.tet(across.tet())) {
-                    let other = self.host.scratch(self.host_base + dense(across.tet()));
-                    let other = FaceRef::new(other, across.face());
-                    self.child.set_neighbor(FaceRef::new(copy, i), other);
+            let Some(number) = self.of_host(n) else {
+                continue;
+            };
+            let tet = self.host.tet(sparse(n));
+            let mut copy = tet;
+            let (mut required, mut shared) = (0, 0);
+            for i in 0..4 {
+                required |= tet.node[i] & REQUIRED;
+                shared += self.host.scratch(dense(tet.vertex(i))) >> SHARED.trailing_zeros();
+                copy.node[i] = self.host_vertex(tet.vertex(i)) | tet.node[i] & REQUIRED;
+                let across = tet.neighbor[i];
+                if across.exists() {
+                    // Those across the rim are linked from the core.
+                    let other = self.of_host(dense(across.tet()));
+                    copy.neighbor[i] =
+                        other.map_or(FaceRef::NONE, |t| FaceRef::new(t, across.face()));
                 }
             }
+            if required != 0 && shared > 2 {
+                self.at_core.push(number);
+            }
+            let (region, flags) = self.host.tet_attribute(sparse(n));
+            self.child.place_tet(number, copy);
+            (self.child).set_tet_attribute(number, region, flags & FROZEN);
         }
     }
 
-    fn link_core(&mut self) {
+    fn write_core(&mut self) {
         for t in tet_ids(self.core) {
-            let tet = self.core.tet(t);
-            if !tet.is_live() || is_high(self.core, t) != self.high {
+            let number = self.core.scratch(self.core_base + dense(t));
+            if number == NONE {
                 continue;
             }
-            let copy = self.core.scratch(self.core_base + dense(t));
+            let tet = self.core.tet(t);
+            let mut copy = tet;
+            let mut flags = 0;
             for (i, across) in tet.neighbor.into_iter().enumerate() {
-                let here = FaceRef::new(copy, i);
+                let here = FaceRef::new(number, i);
+                let mut node = self.core.scratch(dense(tet.vertex(i))) | tet.node[i] & REQUIRED;
                 if across.exists() {
-                    if is_high(self.core, across.tet()) == self.high {
-                        let other = self.core.scratch(self.core_base + dense(across.tet()));
-                        let other = FaceRef::new(other, across.face());
-                        self.child.set_neighbor(here, other);
+                    let other = self.core.scratch(self.core_base + dense(across.tet()));
+                    if other == NONE {
+                        copy.neighbor[i] = FaceRef::NONE;
+                        node |= REQUIRED;
+                        flags = FROZEN;
                     } else {
-                        self.freeze(here);
+                        copy.neighbor[i] = FaceRef::new(other, across.face());
                     }
                 } else if let Some(beyond) = self.opened.rim.find(tet.face(i)) {
-                    let required = self.host.tet(beyond.tet()).is_required(beyond.face());
-                    let other = self.host.scratch(self.host_base + dense(beyond.tet()));
+                    let there = self.host.tet(beyond.tet());
+                    let other = self.of_host(dense(beyond.tet()));
+                    let other = other.expect("the rim is not free: both sides of it go together");
                     let other = FaceRef::new(other, beyond.face());
-                    self.child.link(here, other);
-                    self.child.set_required(here, required);
+                    copy.neighbor[i] = other;
+                    self.child.set_neighbor(other, here);
+                    node &= !REQUIRED;
+                    node |= there.node[beyond.face()] & REQUIRED;
                 }
+                copy.node[i] = node;
             }
-        }
-    }
-
-    /// Makes a face of the child an interface face.
-    fn freeze(&mut self, face: FaceRef) {
-        self.child.set_required(face, true);
-        let (region, _) = self.child.tet_attribute(face.tet());
-        self.child.set_tet_attribute(face.tet(), region, FROZEN);
-    }
-
-    /// Vertices of the rim have in the core no tag of their own.
-    fn tag_rim_vertices(&mut self) {
-        for v in self.host.vertex_ids() {
-            let known = self.host.scratch(dense(v));
-            if known == NONE || known & SHARED == 0 {
-                continue;
-            }
-            let copy = known & !SHARED;
-            let to = self.core.scratch(dense(copy));
-            if to != NONE && is_held(self.core, copy) {
-                copy_attribute(self.host, v, self.child, to);
-            }
+            let (region, _) = self.core.tet_attribute(t);
+            self.child.place_tet(number, copy);
+            self.child.set_tet_attribute(number, region, flags);
         }
     }
 
@@ -291,104 +391,22 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
             index += 1;
         });
     }
-
-    /// The host's facets and interface faces that have a tetrahedron in the child, and facets that have none anywhere.
-    fn inherit(&mut self, space: &Workspace) -> Result<(), StoreError> {
-        let mut claims = Sorter::<17>::new(space.dir, space.memory / 3);
-        for n in 0..self.host.n_facets() {
-            let facet = self.host.facet(n);
-            if facet.regions == [0, 0] {
-                // Between two empty regions: kept on the low side.
-                if !self.high {
-                    let mut copy = facet;
-                    copy.vertices = facet.vertices.map(|v| self.host_vertex(v));
-                    self.child.add_facet(copy);
-                }
-                continue;
-            }
-            self.claim(&mut claims, facet.vertices, FACET, n)?;
-        }
-        for n in 0..self.host.n_interface_faces() {
-            let face = self.host.interface_face(n);
-            self.claim(&mut claims, face.vertices, INTERFACE, n)?;
-        }
-        let mut faces = self.required_faces(space)?.peekable();
-        for claim in claims.finish()? {
-            let claim = claim?;
-            while let Some(face) =
-                faces.next_if(|f| f.as_ref().map_or(true, |f| f[..12] < claim[..12]))
-            {
-                face?;
-            }
-            let Some(Ok(face)) = faces.peek() else {
-                continue;
-            };
-            if face[..12] == claim[..12] {
-                let face = FaceRef(word(face, 12));
-                self.keep(claim[12], word(&claim, 13), face);
-            }
-        }
-        Ok(())
-    }
-
-    fn claim(
-        &mut self,
-        claims: &mut Sorter<17>,
-        vertices: [u32; 3],
-        kind: u8,
-        number: u32,
-    ) -> Result<(), StoreError> {
-        let [a, b, c] = vertices.map(|v| self.known_vertex(v));
-        let (Some(a), Some(b), Some(c)) = (a, b, c) else {
-            return Ok(());
-        };
-        let mut record: ClaimRecord = [0; 17];
-        put_sorted(&mut record, [a, b, c]);
-        record[12] = kind;
-        record[13..].copy_from_slice(&number.to_be_bytes());
-        claims.push(record)
-    }
-
-    fn required_faces(&mut self, space: &Workspace) -> Result<Sorted<16>, StoreError> {
-        let mut faces = Sorter::<16>::new(space.dir, space.memory / 3);
-        let mut from = 0;
-        while let Some((t, tet)) = self.child.next_tet(from) {
-            from = t + 1;
-            for i in (0..4).filter(|&i| tet.is_required(i)) {
-                let mut record: FaceRecord = [0; 16];
-                put_sorted(&mut record, tet.face(i));
-                record[12..].copy_from_slice(&FaceRef::new(t, i).0.to_be_bytes());
-                faces.push(record)?;
-            }
-        }
-        faces.finish()
-    }
-
-    fn keep(&mut self, kind: u8, number: u32, face: FaceRef) {
-        if kind == FACET {
-            let mut facet = self.host.facet(number);
-            for v in &mut facet.vertices {
-                *v = self.known_vertex(*v).expect("claimed with its vertices");
-            }
-            self.child.add_facet(facet);
-        } else {
-            let mut kept = self.host.interface_face(number);
-            for v in &mut kept.vertices {
-                *v = self.known_vertex(*v).expect("claimed with its vertices");
-            }
-            self.child.add_interface_face(kept);
-            self.freeze(face);
-        }
-    }
 }
 
-fn put_sorted(record: &mut [u8], mut vertices: [u32; 3]) {
-    vertices.sort_unstable();
-    for (bytes, v) in record.chunks_exact_mut(4).zip(vertices) {
-        bytes.copy_from_slice(&v.to_be_bytes());
-    }
+#[inline]
+fn least([a, b, c, d]: [u32; 4]) -> u32 {
+    a.min(b).min(c.min(d))
 }
 
-fn word(record: &[u8], at: usize) -> u32 {
+fn record(key: u64, met: u32, source: u32) -> VertexRecord {
+    let mut record: VertexRecord = [0; 16];
+    record[..8].copy_from_slice(&key.to_be_bytes());
+    record[8..12].copy_from_slice(&met.to_be_bytes());
+    record[12..].copy_from_slice(&source.to_be_bytes());
+    record
+}
+
+/// The number at byte `at` of a record.
+pub(super) fn word(record: &[u8], at: usize) -> u32 {
     u32::from_be_bytes([record[at], record[at + 1], record[at + 2], record[at + 3]])
 }

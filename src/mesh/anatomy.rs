@@ -39,8 +39,6 @@ pub mod mark {
     pub const STAYS: usize = 2;
     /// Dear operations were tried on it. Owner: optimization.
     pub const RESCUED: usize = 3;
-    /// It was copied into the core of a cut. Owner: bisection, from the extraction of the core to the end of the split.
-    pub const IN_CORE: usize = 3;
 }
 /// The vertex id of a node.
 pub const VERTEX_MASK: u32 = MARK - 1;

@@ -209,6 +209,25 @@ impl<P: Pages> Mesh<P> {
         Self::take::<{ kind::TETS }>(&mut self.pages, &mut self.state.tets, "tetrahedra")
     }
 
+    /// Takes the ids of `n` tetrahedra of a mesh that has none; each is then to be placed once, in any order.
+    pub fn take_tets(&mut self, n: u32) {
+        debug_assert_eq!(self.state.tets.fresh, 0);
+        self.state.tets = Arena {
+            fresh: sparse(n),
+            free_head: NONE,
+            n_live: n,
+        };
+    }
+
+    /// Writes a tetrahedron whose id was taken by [`Mesh::take_tets`].
+    #[inline]
+    pub fn place_tet(&mut self, t: u32, tet: Tet) {
+        while t >> SLOT_BITS >= self.pages.n_pages::<{ kind::TETS }>() {
+            self.pages.append_page::<{ kind::TETS }>();
+        }
+        self.set_tet(t, tet);
+    }
+
     /// Gives the id of `t` back. Effects: references to `t` dangle until relinked.
     pub fn free_tet(&mut self, t: u32) {
         let slot = self.pages.write::<{ kind::TETS }>(t);

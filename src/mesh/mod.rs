@@ -12,5 +12,5 @@ pub use anatomy::{FaceRef, Tet};
 pub use cursor::Mesh;
 pub use faces::{Facet, InterfaceFace};
 pub use renumber::{Workspace, renumber};
-pub use state::{MESH_STATE_WORDS, MeshState, dense, sparse};
+pub use state::{MESH_STATE_WORDS, MeshState, dense, next_id, sparse};
 pub use vertices::{End, VertexTag};

@@ -96,7 +96,7 @@ impl MeshState {
 
 /// The id after `id` within pages whose last two slots hold no record.
 #[inline]
-pub(super) fn next_id(id: u32) -> u32 {
+pub fn next_id(id: u32) -> u32 {
     if (id & SLOT_MASK) as usize == RECORDS - 1 {
         id + 3
     } else {
