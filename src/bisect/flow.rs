@@ -88,6 +88,11 @@ impl Graph {
         self.terminal.push(terminal);
     }
 
+    /// The capacity of arc `k` of a node, before [`Graph::cut`].
+    pub(super) fn capacity(&self, node: u32, k: usize) -> u32 {
+        self.residual[node as usize][k]
+    }
+
     /// Runs the flow and returns its value, the capacity of the cut. Afterwards [`Graph::is_source_side`] tells the sides.
     pub(super) fn cut(&mut self) -> u64 {
         let n = self.n_nodes();

@@ -79,13 +79,13 @@ pub(super) fn choose<P: Pages>(
         free_tets: free.len() as u64,
         ..InterfaceReport::default()
     };
-    let mut moves = Moves::new(surface, rim);
+    let mut moves = Moves::new(core, surface, rim);
     report.natural = measure(core, rim);
     report.natural.pinched = moves.count_pinched(core, &free);
     if steps.minimum_cut {
         report.bytes = minimum_cut(core, surface, &free);
     }
-    report.bytes += size_of_val(&free[..]) as u64;
+    report.bytes += size_of_val(&free[..]) as u64 + moves.bytes();
     report.minimum = measure(core, rim);
     report.minimum.pinched = moves.count_pinched(core, &free);
     report.moves = moves.run(core, &free, steps);
@@ -193,9 +193,14 @@ fn read_strip<P: Pages>(
             if !across.exists() {
                 continue;
             }
+            let node = core.scratch(dense(across.tet()));
+            if node != NONE && (node as usize) < graph.n_nodes() {
+                // Its own cost was found from the other side.
+                (neighbor[i], capacity[i]) = (node, graph.capacity(node, across.face()));
+                continue;
+            }
             let corners = tet.face(i).map(|v| core.point(v));
             let cost = symmetric_cost(corners, surface);
-            let node = core.scratch(dense(across.tet()));
             if node != NONE {
                 (neighbor[i], capacity[i]) = (node, cost);
             } else {

@@ -47,11 +47,12 @@ type Sized4 = ([Point; 4], [f64; 4]);
 
 /// Adds every piece of every tetrahedron to the sum of its lane; `empty` makes a sum.
 ///
-/// Which lane a tetrahedron goes to, and in which order, depends on the mesh alone; the caller adds the lanes up in order.
+/// `see` is shown the corners of all tetrahedra. Which lane a tetrahedron goes to, and in which order, depends on the mesh alone; the caller adds the lanes up in order.
 pub fn tally<P: Pages, T: Send>(
     mesh: &mut Mesh<P>,
     h: &SizeAt,
     empty: impl Fn() -> T,
+    see: &mut impl FnMut(Point),
     add: impl Fn(&mut T, &Piece) + Sync,
 ) -> [T; LANES] {
     let mut lanes: [(Vec<Sized4>, T); LANES] = std::array::from_fn(|_| (Vec::new(), empty()));
@@ -60,8 +61,10 @@ pub fn tally<P: Pages, T: Send>(
         let mut read = 0;
         while let Some((t, tet)) = mesh.next_tet(from).filter(|_| read < BLOCK * BLOCKS) {
             from = t + 1;
-            let points = mesh.points(&tet);
-            let sizes = std::array::from_fn(|i| f64::from(mesh.size(tet.vertex(i))));
+            let [a, b, c, d] = mesh.ends(&tet);
+            let points = [a.point, b.point, c.point, d.point];
+            let sizes = [a.h, b.h, c.h, d.h].map(f64::from);
+            points.into_iter().for_each(&mut *see);
             lanes[read / BLOCK % LANES].0.push((points, sizes));
             read += 1;
         }
@@ -129,6 +132,12 @@ fn longest(p: &[Point; 4]) -> (f64, [usize; 2]) {
 
 /// The load of the whole mesh.
 pub fn load_of<P: Pages>(mesh: &mut Mesh<P>, h: &SizeAt) -> f64 {
-    let sums = tally(mesh, h, || 0.0, |sum, piece| *sum += piece.load);
+    let sums = tally(
+        mesh,
+        h,
+        || 0.0,
+        &mut |_| (),
+        |sum, piece| *sum += piece.load,
+    );
     sums.into_iter().sum()
 }

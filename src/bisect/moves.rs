@@ -1,12 +1,10 @@
 //! Moves of tetrahedra from one side of the interface to the other.
 
-use std::collections::BTreeSet;
-
 use super::core::Rim;
 use super::interface::Steps;
 use super::labels::{face_cost, interface_faces, is_constrained, is_free, is_high, set_high};
 use super::surface::CuttingSurface;
-use crate::mesh::{Mesh, Tet};
+use crate::mesh::{Mesh, Tet, dense};
 use crate::reconnect::Ball;
 use crate::store::{Pages, stop_if_requested};
 
@@ -21,7 +19,14 @@ const PASSES_MAX: u32 = 10;
 /// Largest ball that is looked at.
 const BALL_MAX: usize = 400;
 
-/// Scratch of the moves.
+/// Notes about a vertex: no move of its ball to the low side gains, nor to the high side; a side is in several parts around it.
+const SETTLED: [u8; 2] = [1, 2];
+const PINCHED: u8 = 4;
+/// Notes about a tetrahedron: moving it alone does not gain; it is being moved.
+const SETTLED_TET: u8 = 1;
+const MOVED: u8 = 2;
+
+/// Scratch of the moves. Memory: one byte for each vertex and tetrahedron of the core.
 pub(super) struct Moves<'a, S> {
     surface: &'a S,
     rim: &'a Rim,
@@ -33,12 +38,14 @@ pub(super) struct Moves<'a, S> {
     vertices: Vec<u32>,
     part: Vec<u8>,
     stack: Vec<usize>,
-    /// Vertices around which a side is in several parts.
-    pinched: BTreeSet<u32>,
+    /// Notes by dense number. A move that did not gain is not tried again before a side changes that it was judged by.
+    of_vertices: Vec<u8>,
+    of_tets: Vec<u8>,
 }
 
 impl<'a, S: CuttingSurface> Moves<'a, S> {
-    pub(super) fn new(surface: &'a S, rim: &'a Rim) -> Self {
+    /// Nothing of `core` but sides may change from now on.
+    pub(super) fn new<P: Pages>(core: &Mesh<P>, surface: &'a S, rim: &'a Rim) -> Self {
         Self {
             surface,
             rim,
@@ -49,8 +56,14 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
             vertices: Vec::new(),
             part: Vec::new(),
             stack: Vec::new(),
-            pinched: BTreeSet::new(),
+            of_vertices: vec![0; dense(core.vertex_ids_end()) as usize],
+            of_tets: vec![0; dense(core.tet_ids_end()) as usize],
         }
+    }
+
+    /// Bytes of the notes.
+    pub(super) fn bytes(&self) -> u64 {
+        (self.of_vertices.len() + self.of_tets.len()) as u64
     }
 
     /// Moves until no move gains; returns how many were made.
@@ -60,19 +73,33 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
             let mut made = 0;
             if steps.vertex_moves {
                 for v in interface_vertices(core, free) {
-                    for high in [false, true] {
-                        made += u64::from(self.move_ball(core, v, high));
+                    for (high, settled) in [false, true].into_iter().zip(SETTLED) {
+                        if *self.of_vertex(v) & settled != 0 {
+                            continue;
+                        }
+                        if self.move_ball(core, v, high) {
+                            made += 1;
+                        } else {
+                            *self.of_vertex(v) |= settled;
+                        }
                     }
                 }
             }
             if steps.tet_moves {
                 for &t in free {
+                    if *self.of_tet(t) & SETTLED_TET != 0 {
+                        continue;
+                    }
                     let tet = core.tet(t);
                     if interface_faces(core, t, &tet).next().is_some() {
                         self.moved.clear();
                         self.moved.push(t);
                         let high = !is_high(core, t);
-                        made += u64::from(self.try_move(core, high));
+                        if self.try_move(core, high) {
+                            made += 1;
+                        } else {
+                            *self.of_tet(t) |= SETTLED_TET;
+                        }
                     }
                 }
             }
@@ -82,6 +109,16 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
             }
         }
         total
+    }
+
+    #[inline]
+    fn of_vertex(&mut self, v: u32) -> &mut u8 {
+        &mut self.of_vertices[dense(v) as usize]
+    }
+
+    #[inline]
+    fn of_tet(&mut self, t: u32) -> &mut u8 {
+        &mut self.of_tets[dense(t) as usize]
     }
 
     /// Puts all free tetrahedra around `v` on one side, if that gains.
@@ -100,18 +137,21 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
         !self.moved.is_empty() && self.try_move(core, high)
     }
 
-    /// Puts `moved` on the other side, or leaves them when that does not gain.
+    /// Puts `moved`, all on the other side, on side `high`, or leaves them when that does not gain.
     fn try_move<P: Pages>(&mut self, core: &mut Mesh<P>, high: bool) -> bool {
         self.list_beside(core);
-        let before = self.cost(core);
-        self.put(core, high);
-        let gain = before - self.cost(core);
+        let [before, after] = self.costs(core, high);
+        for k in 0..self.moved.len() {
+            *self.of_tet(self.moved[k]) &= !MOVED;
+        }
+        let gain = before - after;
         // Without a pinched vertex there is nothing more to gain than faces, which is told without looking at balls.
-        let may_mend = self.vertices.iter().any(|v| self.pinched.contains(v));
+        let is_pinched = |&v: &u32| self.of_vertices[dense(v) as usize] & PINCHED != 0;
+        let may_mend = self.vertices.iter().any(is_pinched);
         if gain < if may_mend { -PINCH } else { GAIN_MIN } {
-            self.put(core, !high);
             return false;
         }
+        self.put(core, high);
         let after = self.pinches(core);
         self.put(core, !high);
         let pinches = self.pinches(core);
@@ -119,6 +159,7 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
             return false;
         }
         self.put(core, high);
+        self.unsettle(core);
         if after > 0 || pinches > 0 {
             self.note_pinched(core);
         }
@@ -129,10 +170,37 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
     fn note_pinched<P: Pages>(&mut self, core: &mut Mesh<P>) {
         for k in 0..self.vertices.len() {
             let v = self.vertices[k];
-            if self.parts_around(core, v) > 0 {
-                self.pinched.insert(v);
-            } else {
-                self.pinched.remove(&v);
+            let is_pinched = self.parts_around(core, v) > 0;
+            let closed = self.around.closed;
+            let note = self.of_vertex(v);
+            if is_pinched != (*note & PINCHED != 0) {
+                *note ^= PINCHED;
+                if !closed {
+                    // It may have tetrahedra that are not reached from here through faces.
+                    self.of_vertices.iter_mut().for_each(|n| *n &= PINCHED);
+                    self.of_tets.fill(0);
+                }
+            }
+        }
+    }
+
+    /// Forgets what was settled by the sides of `moved`: the moves of what shares a vertex with tetrahedra around their vertices.
+    fn unsettle<P: Pages>(&mut self, core: &mut Mesh<P>) {
+        for k in 0..self.vertices.len() {
+            let v = self.vertices[k];
+            self.around.tets.clear();
+            for m in 0..self.moved.len() {
+                let t = self.moved[m];
+                if self.around.tets.contains(&t) || core.tet(t).local(v).is_none() {
+                    continue;
+                }
+                self.around.gather(core, v, t, usize::MAX);
+                for &t in &self.around.tets {
+                    self.of_tets[dense(t) as usize] &= !SETTLED_TET;
+                }
+                for v in self.around.records.iter().flat_map(Tet::vertices) {
+                    self.of_vertices[dense(v) as usize] &= PINCHED;
+                }
             }
         }
     }
@@ -143,14 +211,18 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
         }
     }
 
+    /// Lists what is beside `moved` and its vertices, and marks it as being moved.
     fn list_beside<P: Pages>(&mut self, core: &mut Mesh<P>) {
         self.beside.clear();
         self.vertices.clear();
+        for k in 0..self.moved.len() {
+            *self.of_tet(self.moved[k]) |= MOVED;
+        }
         for &t in &self.moved {
             let tet = core.tet(t);
             self.vertices.extend(tet.vertices());
             for across in tet.neighbor {
-                if across.exists() && !self.moved.contains(&across.tet()) {
+                if across.exists() && self.of_tets[dense(across.tet()) as usize] & MOVED == 0 {
                     self.beside.push(across.tet());
                 }
             }
@@ -161,36 +233,56 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
         }
     }
 
-    /// Cost of the faces of `moved`, and of `moved` and `beside` as over-constrained.
-    fn cost<P: Pages>(&self, core: &mut Mesh<P>) -> f64 {
-        let mut sum = 0.0;
+    /// Cost of the faces of `moved`, and of `moved` and `beside` as over-constrained: now, and with `moved` on side `high`.
+    fn costs<P: Pages>(&self, core: &mut Mesh<P>, high: bool) -> [f64; 2] {
+        let is_moved = |t: u32| self.of_tets[dense(t) as usize] & MOVED != 0;
+        let mut sums = [0.0; 2];
         for &t in &self.moved {
             let tet = core.tet(t);
-            for i in interface_faces(core, t, &tet) {
-                // A face between two of them would count twice, but both are on one side before and after.
-                sum += face_cost(tet.face(i).map(|v| core.point(v)), self.surface);
+            let mut cut = [0; 2];
+            for (i, across) in tet.neighbor.into_iter().enumerate() {
+                // A face between two of them is none of the interface, before and after.
+                if !across.exists() || is_moved(across.tet()) {
+                    continue;
+                }
+                let when = usize::from(is_high(core, across.tet()) != high);
+                sums[when] += face_cost(tet.face(i).map(|v| core.point(v)), self.surface);
+                cut[when] += u32::from(!tet.is_required(i));
             }
-            sum += self.crowding(core, t, &tet);
+            self.add_crowding(&mut sums, &tet, cut);
         }
         for &t in &self.beside {
             let tet = core.tet(t);
-            sum += self.crowding(core, t, &tet);
+            let own = is_high(core, t);
+            let mut cut = [0; 2];
+            for (i, across) in tet.neighbor.into_iter().enumerate() {
+                if !across.exists() || tet.is_required(i) {
+                    continue;
+                }
+                if is_moved(across.tet()) {
+                    cut[usize::from(high != own)] += 1;
+                } else if is_high(core, across.tet()) != own {
+                    cut = cut.map(|n| n + 1);
+                }
+            }
+            self.add_crowding(&mut sums, &tet, cut);
         }
-        sum
+        sums
     }
 
-    fn crowding<P: Pages>(&self, core: &mut Mesh<P>, t: u32, tet: &Tet) -> f64 {
-        let mut n = interface_faces(core, t, tet)
-            .filter(|&i| !tet.is_required(i))
-            .count();
-        if n == 0 {
-            return 0.0;
+    /// Adds what it costs that `tet` has so many faces on the interface that are not required, before and after.
+    fn add_crowding(&self, sums: &mut [f64; 2], tet: &Tet, cut: [u32; 2]) {
+        if cut == [0; 2] {
+            return;
         }
-        n += (0..4).filter(|&i| is_constrained(tet, i, self.rim)).count();
-        match n {
-            0 | 1 => 0.0,
-            2 => TWO,
-            _ => TWO + THREE,
+        let constrained = (0..4).filter(|&i| is_constrained(tet, i, self.rim));
+        let constrained = constrained.count() as u32;
+        for (sum, n) in sums.iter_mut().zip(cut).filter(|(_, n)| *n > 0) {
+            *sum += match n + constrained {
+                1 => 0.0,
+                2 => TWO,
+                _ => TWO + THREE,
+            };
         }
     }
 
@@ -255,16 +347,18 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
         parts[0] + parts[1] - 2
     }
 
-    /// Vertices around which a side is in several parts.
+    /// Notes and counts the vertices around which a side is in several parts.
     pub(super) fn count_pinched<P: Pages>(&mut self, core: &mut Mesh<P>, free: &[u32]) -> u64 {
-        self.pinched.clear();
+        self.of_vertices.iter_mut().for_each(|n| *n &= !PINCHED);
+        let mut pinched = 0;
         for v in interface_vertices(core, free) {
             let start = core.tet_of(v);
             if self.parts_too_many(core, v, start) > 0 {
-                self.pinched.insert(v);
+                *self.of_vertex(v) |= PINCHED;
+                pinched += 1;
             }
         }
-        self.pinched.len() as u64
+        pinched
     }
 }
 

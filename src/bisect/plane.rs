@@ -154,10 +154,22 @@ struct Grid {
 
 impl Grid {
     fn gather<P: Pages>(mesh: &mut Mesh<P>, h: &SizeAt) -> Self {
-        let bounds = bounds(mesh);
+        // Nearly always that of the tetrahedra: few vertices have none.
+        let around_all = bounds_of_vertices(mesh);
+        let (grid, around_tets) = Self::gather_in(mesh, h, around_all);
+        if around_tets == around_all {
+            return grid;
+        }
+        Self::gather_in(mesh, h, around_tets).0
+    }
+
+    /// Gathers on the cells of a box, which should be that of the corners of all tetrahedra; returns that too.
+    fn gather_in<P: Pages>(mesh: &mut Mesh<P>, h: &SizeAt, bounds: Aabb) -> (Self, Aabb) {
+        let mut seen = Aabb::EMPTY;
         let width = (bounds.high - bounds.low) / CELLS as f64;
         let empty = || vec![[0.0; 2]; CELLS * CELLS * CELLS];
-        let [mut cells, others @ ..] = tally(mesh, h, empty, |cells, piece| {
+        let see = &mut |p| seen = seen.with(p);
+        let [mut cells, others @ ..] = tally(mesh, h, empty, see, |cells, piece| {
             let middle = piece.points.iter().sum::<Point>() * 0.25;
             let at = ((middle - bounds.low) / width).to_array();
             let [x, y, z] = at.map(|c| (c as usize).min(CELLS - 1));
@@ -170,11 +182,12 @@ impl Grid {
                 *cell = [cell[0] + more[0], cell[1] + more[1]];
             }
         }
-        Self {
+        let grid = Self {
             low: bounds.low,
             width,
             cells,
-        }
+        };
+        (grid, seen)
     }
 
     /// Middles of the cells with something in them.
@@ -210,6 +223,19 @@ impl Grid {
         }
         ramps.sum_up()
     }
+}
+
+/// Ends of no position.
+const NOTHING: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
+
+#[inline]
+fn with([low, high]: [f64; 2], s: f64) -> [f64; 2] {
+    [low.min(s), high.max(s)]
+}
+
+fn bounds_of_vertices<P: Pages>(mesh: &mut Mesh<P>) -> Aabb {
+    let vertices = mesh.vertex_ids();
+    vertices.fold(Aabb::EMPTY, |bounds, v| bounds.with(mesh.point(v)))
 }
 
 fn bounds<P: Pages>(mesh: &mut Mesh<P>) -> Aabb {
@@ -362,24 +388,36 @@ impl Ramps {
 
 impl Spread {
     fn gather<P: Pages>(mesh: &mut Mesh<P>, h: &SizeAt, axis: Point) -> Self {
-        let mut ends = [f64::INFINITY, f64::NEG_INFINITY];
-        let mut from = 0;
-        while let Some((t, tet)) = mesh.next_tet(from) {
-            from = t + 1;
-            for p in mesh.points(&tet) {
-                let s = axis.dot(p);
-                ends = [ends[0].min(s), ends[1].max(s)];
-            }
+        let mut of_all = NOTHING;
+        for v in mesh.vertex_ids() {
+            of_all = with(of_all, axis.dot(mesh.point(v)));
         }
+        let (spread, of_tets) = Self::gather_between(mesh, h, axis, of_all);
+        if of_tets == of_all {
+            return spread;
+        }
+        Self::gather_between(mesh, h, axis, of_tets).0
+    }
+
+    /// Gathers between the ends, which should be those of the corners of all tetrahedra; returns these too.
+    fn gather_between<P: Pages>(
+        mesh: &mut Mesh<P>,
+        h: &SizeAt,
+        axis: Point,
+        ends: [f64; 2],
+    ) -> (Self, [f64; 2]) {
+        let mut seen = NOTHING;
         let empty = || Ramps::new(axis, ends);
-        let [mut ramps, others @ ..] = tally(mesh, h, empty, |ramps, piece| {
-            let at = piece.points.map(|p| axis.dot(p));
+        let see = &mut |p| seen = with(seen, axis.dot(p));
+        let [mut ramps, others @ ..] = tally(mesh, h, empty, see, |ramps, piece| {
+            let [a, b, c, d] = piece.points;
+            let at = [axis.dot(a), axis.dot(b), axis.dot(c), axis.dot(d)];
             let low = at[0].min(at[1]).min(at[2].min(at[3]));
             let high = at[0].max(at[1]).max(at[2].max(at[3]));
             ramps.add(low, high, piece.load, piece.load * piece.h);
         });
         others.iter().for_each(|other| ramps.add_all(other));
-        ramps.sum_up()
+        (ramps.sum_up(), seen)
     }
 
     /// Position below which the share `low` of the load lies.

@@ -66,12 +66,15 @@ impl Place for InZone<'_> {
         true
     }
 
-    fn reaches(&self, points: &[Point; 4], sizes: &[f64; 4]) -> bool {
-        let s = points.map(|p| self.zone.surface.distance(p));
-        let low = s.iter().fold(f64::INFINITY, |m, &s| m.min(s));
-        let high = s.iter().fold(f64::NEG_INFINITY, |m, &s| m.max(s));
-        let near = s.iter().zip(sizes).any(|(s, h)| s.abs() <= REACH * h);
-        near || (low < 0.0 && high > 0.0)
+    fn reaches(&self, points: &[Point; 4], sizes: &[f32; 4]) -> bool {
+        let (mut near, mut low, mut high) = (false, false, false);
+        for (&p, &h) in points.iter().zip(sizes) {
+            let s = self.zone.surface.distance(p);
+            near |= s.abs() <= REACH * f64::from(h);
+            low |= s < 0.0;
+            high |= s > 0.0;
+        }
+        near || (low && high)
     }
 
     fn stretch(&self, a: Point, b: Point) -> Option<[f64; 2]> {

@@ -40,6 +40,7 @@ impl Aabb {
     };
 
     /// The smallest box that also holds `p`.
+    #[inline]
     #[must_use]
     pub fn with(self, p: Point) -> Self {
         Self {

@@ -219,7 +219,7 @@ impl<P: Pages> Mesh<P> {
         };
     }
 
-    /// Writes a tetrahedron whose id was taken by [`Mesh::take_tets`].
+    /// Writes a tetrahedron whose id was taken by [`Mesh::take_tets`], or is to lie behind all.
     #[inline]
     pub fn place_tet(&mut self, t: u32, tet: Tet) {
         while t >> SLOT_BITS >= self.pages.n_pages::<{ kind::TETS }>() {

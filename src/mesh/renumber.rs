@@ -4,6 +4,7 @@
 //! sweep in id order touches every page again and again. New records are written behind the old ones in sorted order, then
 //! the old pages are dropped from the front.
 
+use super::anatomy::VERTEX_MASK;
 use super::cursor::Mesh;
 use super::state::{dense, sparse};
 use super::vertices::VertexTag;
@@ -30,7 +31,7 @@ pub fn renumber<P: Pages>(
 ) -> Result<(), StoreError> {
     mesh.clear_scratch();
     let n_vertices = renumber_vertices(mesh, order, space)?;
-    let n_tets = renumber_tets(mesh, space)?;
+    let n_tets = renumber_tets(mesh, n_vertices);
     for n in 0..mesh.n_facets() {
         let mut facet = mesh.facet(n);
         facet.vertices = facet.vertices.map(|v| mesh.scratch(dense(v)));
@@ -106,48 +107,65 @@ fn renumber_vertices<P: Pages>(
     Ok(n_new)
 }
 
-fn renumber_tets<P: Pages>(mesh: &mut Mesh<P>, space: &Workspace) -> Result<u32, StoreError> {
-    // The map of tetrahedra lies behind that of vertices.
-    let base = dense(mesh.vertex_ids_end());
-    // The vertices' new numbers follow the curve already: the smallest one of a tetrahedron is its place.
-    let mut sorter = Sorter::<8>::new(space.dir, space.memory);
-    let mut from = 0;
-    while let Some((t, mut tet)) = mesh.next_tet(from) {
-        from = t + 1;
-        let mut least = u32::MAX;
-        for (i, v) in tet.vertices().into_iter().enumerate() {
-            let new = mesh.scratch(dense(v));
-            tet.node[i] = tet.node[i] - v + new;
-            least = least.min(new);
+/// Sorts by counting: the vertices' new numbers follow the curve already, and the smallest one of a tetrahedron is its place.
+fn renumber_tets<P: Pages>(mesh: &mut Mesh<P>, n_vertices: u32) -> u32 {
+    // In the scratch map behind that of vertices: of each tetrahedron its first vertex, then its new number; of each vertex how many
+    // tetrahedra come before those it is the first of; of each new number the tetrahedron.
+    let numbers = dense(mesh.vertex_ids_end());
+    let n_ids = dense(mesh.tet_ids_end());
+    let before = numbers + n_ids;
+    let old = before + n_vertices;
+    for n in before..old {
+        mesh.set_scratch(n, 0);
+    }
+    for n in 0..n_ids {
+        let tet = mesh.tet(sparse(n));
+        let mut least = NONE;
+        if tet.is_live() {
+            for v in tet.vertices() {
+                least = least.min(mesh.scratch(dense(v)));
+            }
+            let count = mesh.scratch(before + dense(least));
+            mesh.set_scratch(before + dense(least), count + 1);
         }
-        mesh.set_tet(t, tet);
-        sorter.push((u64::from(least) << 32 | u64::from(t)).to_be_bytes())?;
+        mesh.set_scratch(numbers + n, least);
+    }
+    let mut n_new = 0;
+    for n in before..old {
+        let count = mesh.scratch(n);
+        mesh.set_scratch(n, n_new);
+        n_new += count;
+    }
+    for n in 0..n_ids {
+        let least = mesh.scratch(numbers + n);
+        if least != NONE {
+            let to = mesh.scratch(before + dense(least));
+            mesh.set_scratch(before + dense(least), to + 1);
+            mesh.set_scratch(numbers + n, sparse(to));
+            mesh.set_scratch(old + to, sparse(n));
+        }
     }
     let old_pages = mesh.pages().n_pages::<{ kind::TETS }>();
     let old_attributes = mesh.pages().n_pages::<{ kind::TET_ATTRIBUTES }>();
-    let mut n_new = 0;
-    for sorted in sorter.finish()? {
-        let t = u64::from_be_bytes(sorted?) as u32;
-        let to = sparse(n_new);
-        mesh.copy_record::<{ kind::TETS }>(t, (old_pages << SLOT_BITS) + to);
-        mesh.copy_attribute::<{ kind::TET_ATTRIBUTES }>(t, to, old_attributes);
-        mesh.set_scratch(base + dense(t), to);
-        n_new += 1;
+    for n in 0..n_new {
+        let t = mesh.scratch(old + n);
+        let mut tet = mesh.tet(t);
+        for node in &mut tet.node {
+            let v = *node & VERTEX_MASK;
+            *node = *node - v + mesh.scratch(dense(v));
+        }
+        for face in &mut tet.neighbor {
+            if face.exists() {
+                *face = FaceRef::new(mesh.scratch(numbers + dense(face.tet())), face.face());
+            }
+        }
+        mesh.place_tet((old_pages << SLOT_BITS) + sparse(n), tet);
+        mesh.copy_attribute::<{ kind::TET_ATTRIBUTES }>(t, sparse(n), old_attributes);
     }
     mesh.pages_mut().drop_front::<{ kind::TETS }>(old_pages);
     mesh.pages_mut()
         .drop_front::<{ kind::TET_ATTRIBUTES }>(old_attributes);
-    for n in 0..n_new {
-        let t = sparse(n);
-        let mut tet = mesh.tet(t);
-        for face in &mut tet.neighbor {
-            if face.exists() {
-                *face = FaceRef::new(mesh.scratch(base + dense(face.tet())), face.face());
-            }
-        }
-        mesh.set_tet(t, tet);
-    }
-    Ok(n_new)
+    n_new
 }
 
 #[cfg(test)]

@@ -62,8 +62,10 @@ impl Worker {
             let v = tet.vertices();
             let ends = mesh.ends(&tet);
             if field.place.is_partial() {
-                let points = ends.map(|end| end.point);
-                let sizes = ends.map(|end| f64::from(end.h));
+                // Spelled out, here and below: `map` on arrays is not always inlined.
+                let [a, b, c, d] = &ends;
+                let points = [a.point, b.point, c.point, d.point];
+                let sizes = [a.h, b.h, c.h, d.h];
                 if !field.place.reaches(&points, &sizes) {
                     continue;
                 }

@@ -68,7 +68,8 @@ pub struct RefineReport {
     pub out_of_place: u64,
     /// Cavities, made star-shaped and allowed where they lie, that held a tetrahedron frozen beside an interface.
     pub frozen_hits: u64,
-    /// Tetrahedra with two required faces or more when the passes ended: none of their edges could be divided.
+    /// Tetrahedra with two required faces or more when the passes ended: none of their edges could be divided. Not counted where
+    /// only a part of the mesh is divided.
     pub over_constrained: u64,
 }
 
@@ -122,7 +123,9 @@ pub fn saturate<P: Pages>(
     }
     // Every sweep that follows goes in id order: this costs 0.8 s and saves them 2.2 s on 4 M tetrahedra.
     renumber(mesh, &worker.order, space)?;
-    report.over_constrained = count_over_constrained(mesh);
+    if !field.place.is_partial() {
+        report.over_constrained = count_over_constrained(mesh);
+    }
     Ok(report)
 }
 

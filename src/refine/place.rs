@@ -10,7 +10,7 @@ pub trait Place {
     }
 
     /// Whether points that divide edges of this tetrahedron may be of use; `sizes` are those of its corners.
-    fn reaches(&self, _points: &[Point; 4], _sizes: &[f64; 4]) -> bool {
+    fn reaches(&self, _points: &[Point; 4], _sizes: &[f32; 4]) -> bool {
         true
     }
 

@@ -55,7 +55,7 @@ impl PagerStats {
 ///
 /// Is not: shared. Each worker owns its pager, so the hot path takes no lock.
 pub struct Pager {
-    /// `frames_max * SLOTS` slots are reserved; the vector grows within that and never moves.
+    /// `frames_max * SLOTS` slots, zero until a frame is taken: memory that is not touched is not there.
     frames: Vec<Slot>,
     frames_max: usize,
     free: Vec<u32>,
@@ -77,7 +77,7 @@ impl Pager {
             .unwrap_or(usize::MAX)
             .clamp(FRAMES_MIN, FRAMES_LIMIT);
         Self {
-            frames: Vec::with_capacity(frames_max * SLOTS),
+            frames: bytemuck::allocation::zeroed_vec(frames_max * SLOTS),
             frames_max,
             free: Vec::new(),
             tables: Default::default(),
@@ -232,7 +232,7 @@ impl Pager {
 
     fn load<const K: usize>(&mut self, page: u32, place: u32) -> u32 {
         stop_if_requested();
-        let frame = self.take_frame();
+        let (frame, _) = self.take_frame();
         let address = self.address(K, page);
         let file = match place {
             IN_WORK => self.work.as_mut(),
@@ -264,19 +264,17 @@ impl Pager {
         frame | RESIDENT | REFERENCED
     }
 
-    /// A frame nobody owns: a free one, a fresh one, or an evicted one.
-    fn take_frame(&mut self) -> u32 {
+    /// A frame nobody owns: a free one, a fresh one, which is zero, or an evicted one.
+    fn take_frame(&mut self) -> (u32, bool) {
         if let Some(frame) = self.free.pop() {
-            return frame;
+            return (frame, false);
         }
         if self.owners.len() < self.frames_max {
             let frame = self.owners.len() as u32;
             self.owners.push(NOBODY);
-            let len = self.owners.len() * SLOTS;
-            self.frames.resize(len, [u32_le::from_native(0); 8]);
-            return frame;
+            return (frame, true);
         }
-        self.evict()
+        (self.evict(), false)
     }
 
     fn evict(&mut self) -> u32 {
@@ -401,8 +399,10 @@ impl Pages for Pager {
 
     fn append_page<const K: usize>(&mut self) -> u32 {
         stop_if_requested();
-        let frame = self.take_frame();
-        self.frame(frame).fill([u32_le::from_native(0); 8]);
+        let (frame, is_zero) = self.take_frame();
+        if !is_zero {
+            self.frame(frame).fill([u32_le::from_native(0); 8]);
+        }
         let page = self.tables[K].len() as u32;
         self.tables[K].push(frame | RESIDENT | REFERENCED | DIRTY);
         self.owners[frame as usize] = (K as u8, page);
