@@ -12,6 +12,9 @@ use super::writer::RegionTotals;
 use super::{Corner, FacePairs, Paired, QUALITY_BINS, Shape, quality_bin, sorted_face};
 use crate::geom::Aabb;
 
+/// Tetrahedra whose corners are held at once.
+const PIECE: usize = 4096;
+
 /// What is summed over tetrahedra, in their order.
 pub(super) struct Totals {
     pub digest: Digest,
@@ -72,19 +75,15 @@ impl Totals {
     }
 
     /// Adds a chunk and returns its summary, but for what only its bytes and faces tell.
-    pub fn add(
+    ///
+    /// Errors: those of `corners_of`.
+    pub fn add<E>(
         &mut self,
         first: u32,
         tets: &[SealedTet],
-        corners: &[[Corner; 4]],
         rank: u32,
-    ) -> TetSummary {
-        // Shapes in parallel, sums in order: the same for any number of threads.
-        let shapes: Vec<Shape> = corners
-            .par_iter()
-            .with_min_len(1024)
-            .map(|c| Shape::of(c.map(|c| c.point)))
-            .collect();
+        mut corners_of: impl FnMut(&SealedTet) -> Result<[Corner; 4], E>,
+    ) -> Result<TetSummary, E> {
         let mut bounds = Aabb::EMPTY;
         let mut summary = TetSummary {
             bounds: [[0.0; 3]; 2],
@@ -98,28 +97,41 @@ impl Totals {
             bytes: 0,
             edge_max: 0.0,
         };
-        for (place, ((tet, corners), shape)) in (first..).zip(tets.iter().zip(corners).zip(&shapes))
-        {
-            self.digest
-                .add_tet(corners.map(|c| c.mix), tet.region, rank);
-            bounds = corners.iter().fold(bounds, |b, c| b.with(c.point));
-            self.add_shape(place, shape);
-            let region = self.regions.entry(tet.region).or_default();
-            region.tets += 1;
-            region.volume += shape.volume;
-            summary.volume += shape.volume;
-            summary.edge_max = summary.edge_max.max(rounded_up(shape.edge_max));
-            let q = shape.quality as f32;
-            summary.quality = [summary.quality[0].min(q), summary.quality[1].max(q)];
-            let [least, most] = summary.regions;
-            summary.regions = [least.min(tet.region), most.max(tet.region)];
-            for v in tet.nodes {
-                let [least, most] = summary.vertices;
-                summary.vertices = [least.min(v), most.max(v)];
+        // A piece at a time: the corners of a whole chunk would take ten times its bytes.
+        for (piece, first) in tets.chunks(PIECE).zip((first..).step_by(PIECE)) {
+            let corners: Vec<[Corner; 4]> = piece
+                .iter()
+                .map(&mut corners_of)
+                .collect::<Result<_, E>>()?;
+            // Shapes in parallel, sums in order: the same for any number of threads.
+            let shapes: Vec<Shape> = corners
+                .par_iter()
+                .with_min_len(1024)
+                .map(|c| Shape::of(c.map(|c| c.point)))
+                .collect();
+            let known = piece.iter().zip(&corners).zip(&shapes);
+            for (place, ((tet, corners), shape)) in (first..).zip(known) {
+                self.digest
+                    .add_tet(corners.map(|c| c.mix), tet.region, rank);
+                bounds = corners.iter().fold(bounds, |b, c| b.with(c.point));
+                self.add_shape(place, shape);
+                let region = self.regions.entry(tet.region).or_default();
+                region.tets += 1;
+                region.volume += shape.volume;
+                summary.volume += shape.volume;
+                summary.edge_max = summary.edge_max.max(rounded_up(shape.edge_max));
+                let q = shape.quality as f32;
+                summary.quality = [summary.quality[0].min(q), summary.quality[1].max(q)];
+                let [least, most] = summary.regions;
+                summary.regions = [least.min(tet.region), most.max(tet.region)];
+                for v in tet.nodes {
+                    let [least, most] = summary.vertices;
+                    summary.vertices = [least.min(v), most.max(v)];
+                }
             }
         }
         summary.bounds = array(&bounds);
-        summary
+        Ok(summary)
     }
 
     fn add_shape(&mut self, place: u32, shape: &Shape) {

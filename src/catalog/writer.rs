@@ -212,12 +212,11 @@ impl SealedWriter {
 
     fn put_tets(&mut self, chunk: Cut<SealedTet>) -> Result<(), CatalogError> {
         let cache = self.cache.as_mut().expect("vertices have ended");
-        let mut corners = Vec::with_capacity(chunk.records.len());
-        for tet in &chunk.records {
-            corners.push(cache.corners(&mut self.file, tet.nodes)?);
-        }
-        let rank = self.subdomain.rank();
-        let mut summary = self.totals.add(chunk.first, &chunk.records, &corners, rank);
+        let (rank, file) = (self.subdomain.rank(), &mut self.file);
+        let corners_of = |tet: &SealedTet| cache.corners(file, tet.nodes);
+        let mut summary = self
+            .totals
+            .add(chunk.first, &chunk.records, rank, corners_of)?;
         summary.open_faces = count_open(&mut self.pairs, &chunk.records);
         summary.bytes = chunk.bytes();
         self.tet_chunks.push(summary);

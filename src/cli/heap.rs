@@ -21,6 +21,34 @@ pub fn keep_little() {
     }
 }
 
+/// Gives back, from now on and every so often, the pages of smaller blocks in which nothing lies any more.
+///
+/// Blocks of all ages lie side by side in the one heap, so that its end hardly ever falls free: with a cap of 96 MiB and two threads 48 MiB
+/// of it were resident, most of them nobody's.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+#[allow(unsafe_code)]
+pub fn keep_sweeping() {
+    let sweep = || {
+        loop {
+            std::thread::sleep(EVERY);
+            // SAFETY: `malloc_trim` takes the allocator's own lock and touches no block in use.
+            unsafe {
+                libc::malloc_trim(0);
+            }
+        }
+    };
+    // Without the thread all works as well, with more memory.
+    let _ = std::thread::Builder::new().name("heap".into()).spawn(sweep);
+}
+
+/// A sweep takes milliseconds.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+const EVERY: std::time::Duration = std::time::Duration::from_millis(100);
+
 /// Other allocators are left as they are.
 #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
 pub fn keep_little() {}
+
+/// Other allocators are left as they are.
+#[cfg(not(all(target_os = "linux", target_env = "gnu")))]
+pub fn keep_sweeping() {}

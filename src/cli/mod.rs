@@ -46,6 +46,7 @@ pub use failure::{CODES, CodeRow};
 /// Runs the command line of this process and returns its exit code.
 pub fn run() -> ExitCode {
     heap::keep_little();
+    heap::keep_sweeping();
     let args = match Args::try_parse() {
         Ok(args) => args,
         Err(error) => return unparsed(&error),
