@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::core::Rim;
 use super::flow::{Graph, NOBODY};
-use super::labels::{InterfaceMeasures, begin, face_cost, is_free, is_high, measure, set_high};
+use super::labels::{InterfaceMeasures, Labels, face_cost, measure};
 use super::moves::Moves;
 use super::split::interface_points;
 use super::surface::CuttingSurface;
@@ -63,42 +63,47 @@ pub struct InterfaceReport {
     pub moves: u64,
 }
 
-/// Labels the core; tells the faces of the natural interface where they are wanted. Effects: its scratch map is used up; `tet_of` must be right.
+/// Chooses sides; tells the faces of the natural interface where they are wanted. Effects: its scratch map is used up; `tet_of` must be right.
 pub(super) fn choose<P: Pages>(
     core: &mut Mesh<P>,
     surface: &impl CuttingSurface,
     rim: &Rim,
     steps: Steps,
     natural: Option<&mut Vec<[Point; 3]>>,
-) -> InterfaceReport {
-    let free = begin(core, surface, rim);
+) -> (InterfaceReport, Labels) {
+    let (labels, free) = Labels::begin(core, surface, rim);
     if let Some(natural) = natural {
-        *natural = interface_points(core);
+        *natural = interface_points(core, &labels);
     }
     let mut report = InterfaceReport {
         free_tets: free.len() as u64,
         ..InterfaceReport::default()
     };
-    let mut moves = Moves::new(core, surface, rim);
-    report.natural = measure(core, rim);
+    let mut moves = Moves::new(core, labels, surface, rim);
+    report.natural = measure(core, &moves.labels, rim);
     report.natural.pinched = moves.count_pinched(core, &free);
     if steps.minimum_cut {
-        report.bytes = minimum_cut(core, surface, &free);
+        report.bytes = minimum_cut(core, &mut moves.labels, surface, &free);
     }
-    report.bytes += size_of_val(&free[..]) as u64 + moves.bytes();
-    report.minimum = measure(core, rim);
+    report.bytes += size_of_val(&free[..]) as u64 + moves.bytes() + moves.labels.bytes();
+    report.minimum = measure(core, &moves.labels, rim);
     report.minimum.pinched = moves.count_pinched(core, &free);
     report.moves = moves.run(core, &free, steps);
-    report.chosen = measure(core, rim);
+    report.chosen = measure(core, &moves.labels, rim);
     report.chosen.pinched = moves.count_pinched(core, &free);
-    report
+    (report, moves.labels)
 }
 
 /// Strips that are cut at once, each with a graph of its own.
 const AT_ONCE: usize = 2;
 
 /// Cuts strip by strip; returns the most bytes held.
-fn minimum_cut<P: Pages>(core: &mut Mesh<P>, surface: &impl CuttingSurface, free: &[u32]) -> u64 {
+fn minimum_cut<P: Pages>(
+    core: &mut Mesh<P>,
+    labels: &mut Labels,
+    surface: &impl CuttingSurface,
+    free: &[u32],
+) -> u64 {
     core.clear_scratch();
     for n in 0..dense(core.tet_ids_end()) {
         core.set_scratch(n, NONE);
@@ -123,13 +128,13 @@ fn minimum_cut<P: Pages>(core: &mut Mesh<P>, surface: &impl CuttingSurface, free
     for strips in kinds.iter().flat_map(|kind| kind.chunks(AT_ONCE)) {
         for (strip, graph) in strips.iter().zip(&mut graphs) {
             stop_if_requested();
-            read_strip(core, surface, strip, graph);
+            read_strip(core, labels, surface, strip, graph);
         }
         graphs[..strips.len()].par_iter_mut().for_each(|graph| {
             graph.cut();
         });
         for (strip, graph) in strips.iter().zip(&graphs) {
-            label_strip(core, strip, graph);
+            label_strip(labels, strip, graph);
         }
     }
     core.clear_scratch();
@@ -176,6 +181,7 @@ fn sort_along<P: Pages>(
 /// Makes the graph of a strip; what lies around it is source or sink.
 fn read_strip<P: Pages>(
     core: &mut Mesh<P>,
+    labels: &Labels,
     surface: &impl CuttingSurface,
     strip: &[u32],
     graph: &mut Graph,
@@ -204,7 +210,7 @@ fn read_strip<P: Pages>(
             if node != NONE {
                 (neighbor[i], capacity[i]) = (node, cost);
             } else {
-                terminal[usize::from(is_high(core, across.tet()))] += cost;
+                terminal[usize::from(labels.is_high(across.tet()))] += cost;
             }
         }
         graph.push(neighbor, capacity, terminal);
@@ -215,10 +221,10 @@ fn read_strip<P: Pages>(
 }
 
 /// Labels a strip as its graph was cut.
-fn label_strip<P: Pages>(core: &mut Mesh<P>, strip: &[u32], graph: &Graph) {
+fn label_strip(labels: &mut Labels, strip: &[u32], graph: &Graph) {
     for (node, &t) in strip.iter().enumerate() {
-        debug_assert!(is_free(core, t));
-        set_high(core, t, !graph.is_source_side(node as u32));
+        debug_assert!(labels.is_free(t));
+        labels.set_high(t, !graph.is_source_side(node as u32));
     }
 }
 

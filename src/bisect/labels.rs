@@ -13,68 +13,91 @@ use tetdb_schema::page::NONE;
 /// one face in a hundred less, and its spheres reach out of the refined zone.
 const FREE: f64 = 1.4;
 
-/// Bits of the attribute flags of the core's tetrahedra.
-const HIGH: u32 = 1 << 1;
-const MAY_CHANGE: u32 = 1 << 2;
+/// Bits of a label.
+const HIGH: u8 = 1;
+const MAY_CHANGE: u8 = 2;
 
-/// Which side `t` is on: `true` for the high one.
-#[inline]
-pub(super) fn is_high<P: Pages>(core: &mut Mesh<P>, t: u32) -> bool {
-    core.tet_attribute(t).1 & HIGH != 0
+/// Which side each tetrahedron of the core is on, and whether it may go to the other. Memory: a byte for each.
+pub(super) struct Labels {
+    /// By id.
+    of: Vec<u8>,
 }
 
-/// Whether `t` may go to either side.
-#[inline]
-pub(super) fn is_free<P: Pages>(core: &mut Mesh<P>, t: u32) -> bool {
-    core.tet_attribute(t).1 & MAY_CHANGE != 0
-}
-
-/// Puts `t` on a side.
-#[inline]
-pub(super) fn set_high<P: Pages>(core: &mut Mesh<P>, t: u32, high: bool) {
-    let (region, flags) = core.tet_attribute(t);
-    let flags = if high { flags | HIGH } else { flags & !HIGH };
-    core.set_tet_attribute(t, region, flags);
-}
-
-/// Labels every tetrahedron by the side of its middle; lists those of the cutting zone, in id order.
-///
-/// At the rim the side is that of the rim face: the tetrahedron beyond has all its vertices there.
-pub(super) fn begin<P: Pages>(
-    core: &mut Mesh<P>,
-    surface: &impl CuttingSurface,
-    rim: &Rim,
-) -> Vec<u32> {
-    let mut free = Vec::new();
-    for t in tet_ids(core) {
-        let tet = core.tet(t);
-        if !tet.is_live() {
-            continue;
-        }
-        let (sides, least) = place(core, &tet, surface);
-        let mut high = surface.distance(middle(core, &tet)) >= 0.0;
-        let mut may_change = sides.crosses() || least <= FREE;
-        for i in 0..4 {
-            if !tet.neighbor[i].exists() && rim.find(tet.face(i)).is_some() {
-                may_change = false;
-                high = surface.distance(core.point(tet.face(i)[0])) >= 0.0;
+impl Labels {
+    /// Labels every tetrahedron by the side of its middle; lists those of the cutting zone, in id order.
+    ///
+    /// At the rim the side is that of the rim face: the tetrahedron beyond has all its vertices there.
+    pub(super) fn begin<P: Pages>(
+        core: &mut Mesh<P>,
+        surface: &impl CuttingSurface,
+        rim: &Rim,
+    ) -> (Self, Vec<u32>) {
+        let mut of = vec![0; core.tet_ids_end() as usize];
+        let mut free = Vec::new();
+        for t in tet_ids(core) {
+            let tet = core.tet(t);
+            if !tet.is_live() {
+                continue;
+            }
+            let (sides, least) = place(core, &tet, surface);
+            let mut high = surface.distance(middle(core, &tet)) >= 0.0;
+            let mut may_change = sides.crosses() || least <= FREE;
+            for i in 0..4 {
+                if !tet.neighbor[i].exists() && rim.find(tet.face(i)).is_some() {
+                    may_change = false;
+                    high = surface.distance(core.point(tet.face(i)[0])) >= 0.0;
+                }
+            }
+            if !sides.crosses() {
+                // A middle that rounds to the other side must not tell another side than its vertices.
+                high = sides.high;
+            }
+            if may_change {
+                free.push(t);
+            }
+            let label = if high { HIGH } else { 0 } | if may_change { MAY_CHANGE } else { 0 };
+            of[t as usize] = label;
+            if t & 1023 == 0 {
+                stop_if_requested();
             }
         }
-        if !sides.crosses() {
-            // A middle that rounds to the other side must not tell another side than its vertices.
-            high = sides.high;
-        }
-        if may_change {
-            free.push(t);
-        }
-        let flags = if high { HIGH } else { 0 } | if may_change { MAY_CHANGE } else { 0 };
-        let (region, _) = core.tet_attribute(t);
-        core.set_tet_attribute(t, region, flags);
-        if t & 1023 == 0 {
-            stop_if_requested();
-        }
+        (Self { of }, free)
     }
-    free
+
+    /// Bytes held.
+    pub(super) fn bytes(&self) -> u64 {
+        self.of.len() as u64
+    }
+
+    /// Which side `t` is on: `true` for the high one.
+    #[inline]
+    pub(super) fn is_high(&self, t: u32) -> bool {
+        self.of[t as usize] & HIGH != 0
+    }
+
+    /// Whether `t` may go to either side.
+    #[inline]
+    pub(super) fn is_free(&self, t: u32) -> bool {
+        self.of[t as usize] & MAY_CHANGE != 0
+    }
+
+    /// Puts `t` on a side.
+    #[inline]
+    pub(super) fn set_high(&mut self, t: u32, high: bool) {
+        let label = &mut self.of[t as usize];
+        *label = if high { *label | HIGH } else { *label & !HIGH };
+    }
+
+    /// Faces of the interface at `tet`: local numbers.
+    #[inline]
+    pub(super) fn interface_faces(&self, t: u32, tet: &Tet) -> impl Iterator<Item = usize> + use<> {
+        let high = self.is_high(t);
+        let mut found = [false; 4];
+        for (i, across) in tet.neighbor.into_iter().enumerate() {
+            found[i] = across.exists() && self.is_high(across.tet()) != high;
+        }
+        (0..4).filter(move |&i| found[i])
+    }
 }
 
 /// Longest edge of a triangle over its inradius, 1 for the regular one.
@@ -117,32 +140,22 @@ impl InterfaceMeasures {
     }
 }
 
-/// Faces of the interface at `tet`: local numbers.
-pub(super) fn interface_faces<P: Pages>(
-    core: &mut Mesh<P>,
-    t: u32,
-    tet: &Tet,
-) -> impl Iterator<Item = usize> + use<P> {
-    let high = is_high(core, t);
-    let mut found = [false; 4];
-    for (i, across) in tet.neighbor.into_iter().enumerate() {
-        found[i] = across.exists() && is_high(core, across.tet()) != high;
-    }
-    (0..4).filter(move |&i| found[i])
-}
-
 /// Counts faces and over-constrained tetrahedra; pinched vertices are counted elsewhere.
-pub(super) fn measure<P: Pages>(core: &mut Mesh<P>, rim: &Rim) -> InterfaceMeasures {
+pub(super) fn measure<P: Pages>(
+    core: &mut Mesh<P>,
+    labels: &Labels,
+    rim: &Rim,
+) -> InterfaceMeasures {
     let mut measures = InterfaceMeasures::default();
     for t in tet_ids(core) {
         let tet = core.tet(t);
         if !tet.is_live() {
             continue;
         }
-        let high = is_high(core, t);
+        let high = labels.is_high(t);
         let mut constrained = 0;
         let mut cut = 0;
-        for i in interface_faces(core, t, &tet) {
+        for i in labels.interface_faces(t, &tet) {
             cut += 1;
             if !high {
                 measures.faces += 1;
@@ -178,6 +191,7 @@ const LAYERS_MOST: u32 = 3;
 pub(super) fn layers_least<P: Pages, Q: Pages>(
     host: &mut Mesh<P>,
     core: &mut Mesh<Q>,
+    labels: &Labels,
     rim: &Rim,
     surface: &impl CuttingSurface,
 ) -> Option<u32> {
@@ -188,7 +202,7 @@ pub(super) fn layers_least<P: Pages, Q: Pages>(
     let mut layer = Vec::new();
     for t in tet_ids(core) {
         let tet = core.tet(t);
-        if tet.is_live() && interface_faces(core, t, &tet).next().is_some() {
+        if tet.is_live() && labels.interface_faces(t, &tet).next().is_some() {
             core.set_scratch(dense(t), 1);
             layer.push(t);
         }
@@ -252,13 +266,14 @@ fn is_in_zone<P: Pages>(mesh: &mut Mesh<P>, tet: &Tet, surface: &impl CuttingSur
 /// towards the zone's limit, a sphere may count that is not wholly within, and `frozen_hits` is what proves.
 pub(super) fn enclosed<P: Pages>(
     core: &mut Mesh<P>,
+    labels: &Labels,
     surface: &impl CuttingSurface,
     h: &dyn Fn(Point) -> f64,
 ) -> (u64, u64) {
     let (mut all, mut within) = (0, 0);
     for t in tet_ids(core) {
         let tet = core.tet(t);
-        if !tet.is_live() || interface_faces(core, t, &tet).next().is_none() {
+        if !tet.is_live() || labels.interface_faces(t, &tet).next().is_none() {
             continue;
         }
         all += 1;

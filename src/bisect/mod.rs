@@ -69,6 +69,7 @@ pub struct Opened {
     pub zone: Zone,
     pub report: CutReport,
     rim: core::Rim,
+    labels: labels::Labels,
 }
 
 /// How a cut went.
@@ -187,13 +188,14 @@ pub fn choose<P: Pages, Q: Pages>(
     optimize::run_with(core, plan.optimize, &|_| {});
     seconds.core = clock.elapsed().as_secs_f64();
     let natural = faces.as_mut().map(|f| &mut f.natural);
-    let interface = interface::choose(core, &zone.surface, &rim, plan.method.steps, natural);
+    let (interface, labels) =
+        interface::choose(core, &zone.surface, &rim, plan.method.steps, natural);
     if let Some(faces) = faces {
-        faces.chosen = split::interface_points(core);
+        faces.chosen = split::interface_points(core, &labels);
     }
-    let vertices = split::number_interface(core, plan.cut);
-    let (z_tets, z_enclosed) = labels::enclosed(core, &zone.surface, plan.h);
-    let layers_least = labels::layers_least(host, core, &rim, &zone.surface);
+    let vertices = split::number_interface(core, &labels, plan.cut);
+    let (z_tets, z_enclosed) = labels::enclosed(core, &labels, &zone.surface, plan.h);
+    let layers_least = labels::layers_least(host, core, &labels, &rim, &zone.surface);
     seconds.interface = clock.elapsed().as_secs_f64() - seconds.core;
     Opened {
         zone,
@@ -208,5 +210,6 @@ pub fn choose<P: Pages, Q: Pages>(
             seconds,
         },
         rim,
+        labels,
     }
 }

@@ -2,7 +2,7 @@
 
 use super::core::Rim;
 use super::interface::Steps;
-use super::labels::{face_cost, interface_faces, is_constrained, is_free, is_high, set_high};
+use super::labels::{Labels, face_cost, is_constrained};
 use super::surface::CuttingSurface;
 use crate::mesh::{Mesh, Tet, dense};
 use crate::reconnect::Ball;
@@ -28,6 +28,8 @@ const MOVED: u8 = 2;
 
 /// Scratch of the moves. Memory: one byte for each vertex and tetrahedron of the core.
 pub(super) struct Moves<'a, S> {
+    /// The sides, as they are.
+    pub(super) labels: Labels,
     surface: &'a S,
     rim: &'a Rim,
     ball: Ball,
@@ -45,8 +47,14 @@ pub(super) struct Moves<'a, S> {
 
 impl<'a, S: CuttingSurface> Moves<'a, S> {
     /// Nothing of `core` but sides may change from now on.
-    pub(super) fn new<P: Pages>(core: &Mesh<P>, surface: &'a S, rim: &'a Rim) -> Self {
+    pub(super) fn new<P: Pages>(
+        core: &Mesh<P>,
+        labels: Labels,
+        surface: &'a S,
+        rim: &'a Rim,
+    ) -> Self {
         Self {
+            labels,
             surface,
             rim,
             ball: Ball::default(),
@@ -72,7 +80,7 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
         for _ in 0..PASSES_MAX {
             let mut made = 0;
             if steps.vertex_moves {
-                for v in interface_vertices(core, free) {
+                for v in self.interface_vertices(core, free) {
                     for (high, settled) in [false, true].into_iter().zip(SETTLED) {
                         if *self.of_vertex(v) & settled != 0 {
                             continue;
@@ -91,10 +99,10 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
                         continue;
                     }
                     let tet = core.tet(t);
-                    if interface_faces(core, t, &tet).next().is_some() {
+                    if self.labels.interface_faces(t, &tet).next().is_some() {
                         self.moved.clear();
                         self.moved.push(t);
-                        let high = !is_high(core, t);
+                        let high = !self.labels.is_high(t);
                         if self.try_move(core, high) {
                             made += 1;
                         } else {
@@ -130,7 +138,7 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
         self.moved.clear();
         for k in 0..self.ball.tets.len() {
             let t = self.ball.tets[k];
-            if is_high(core, t) != high && is_free(core, t) {
+            if self.labels.is_high(t) != high && self.labels.is_free(t) {
                 self.moved.push(t);
             }
         }
@@ -151,14 +159,14 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
         if gain < if may_mend { -PINCH } else { GAIN_MIN } {
             return false;
         }
-        self.put(core, high);
+        self.put(high);
         let after = self.pinches(core);
-        self.put(core, !high);
+        self.put(!high);
         let pinches = self.pinches(core);
         if after > pinches || gain + PINCH * f64::from(pinches - after) < GAIN_MIN {
             return false;
         }
-        self.put(core, high);
+        self.put(high);
         self.unsettle(core);
         if after > 0 || pinches > 0 {
             self.note_pinched(core);
@@ -205,9 +213,9 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
         }
     }
 
-    fn put<P: Pages>(&self, core: &mut Mesh<P>, high: bool) {
+    fn put(&mut self, high: bool) {
         for &t in &self.moved {
-            set_high(core, t, high);
+            self.labels.set_high(t, high);
         }
     }
 
@@ -245,7 +253,7 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
                 if !across.exists() || is_moved(across.tet()) {
                     continue;
                 }
-                let when = usize::from(is_high(core, across.tet()) != high);
+                let when = usize::from(self.labels.is_high(across.tet()) != high);
                 sums[when] += face_cost(tet.face(i).map(|v| core.point(v)), self.surface);
                 cut[when] += u32::from(!tet.is_required(i));
             }
@@ -253,7 +261,7 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
         }
         for &t in &self.beside {
             let tet = core.tet(t);
-            let own = is_high(core, t);
+            let own = self.labels.is_high(t);
             let mut cut = [0; 2];
             for (i, across) in tet.neighbor.into_iter().enumerate() {
                 if !across.exists() || tet.is_required(i) {
@@ -261,7 +269,7 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
                 }
                 if is_moved(across.tet()) {
                     cut[usize::from(high != own)] += 1;
-                } else if is_high(core, across.tet()) != own {
+                } else if self.labels.is_high(across.tet()) != own {
                     cut = cut.map(|n| n + 1);
                 }
             }
@@ -312,7 +320,7 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
         let n = self.around.tets.len();
         self.part.clear();
         for k in 0..n {
-            let high = is_high(core, self.around.tets[k]);
+            let high = self.labels.is_high(self.around.tets[k]);
             self.part.push(u8::from(high));
         }
         if self.part.iter().all(|&p| p == self.part[0]) {
@@ -351,7 +359,7 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
     pub(super) fn count_pinched<P: Pages>(&mut self, core: &mut Mesh<P>, free: &[u32]) -> u64 {
         self.of_vertices.iter_mut().for_each(|n| *n &= !PINCHED);
         let mut pinched = 0;
-        for v in interface_vertices(core, free) {
+        for v in self.interface_vertices(core, free) {
             let start = core.tet_of(v);
             if self.parts_too_many(core, v, start) > 0 {
                 *self.of_vertex(v) |= PINCHED;
@@ -360,18 +368,18 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
         }
         pinched
     }
-}
 
-/// Vertices of interface faces, ascending. An interface face has a free tetrahedron on one of its sides.
-fn interface_vertices<P: Pages>(core: &mut Mesh<P>, free: &[u32]) -> Vec<u32> {
-    let mut vertices = Vec::new();
-    for &t in free {
-        let tet = core.tet(t);
-        for i in interface_faces(core, t, &tet) {
-            vertices.extend(tet.face(i));
+    /// Vertices of interface faces, ascending. An interface face has a free tetrahedron on one of its sides.
+    fn interface_vertices<P: Pages>(&self, core: &mut Mesh<P>, free: &[u32]) -> Vec<u32> {
+        let mut vertices = Vec::new();
+        for &t in free {
+            let tet = core.tet(t);
+            for i in self.labels.interface_faces(t, &tet) {
+                vertices.extend(tet.face(i));
+            }
         }
+        vertices.sort_unstable();
+        vertices.dedup();
+        vertices
     }
-    vertices.sort_unstable();
-    vertices.dedup();
-    vertices
 }

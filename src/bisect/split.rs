@@ -7,7 +7,7 @@
 use super::Opened;
 use super::core::{SHARED, copy_attribute, fate, is_held, tet_ids};
 use super::inherit::inherit;
-use super::labels::{interface_faces, is_high};
+use super::labels::Labels;
 use super::surface::CuttingSurface;
 use crate::geom::{Aabb, HilbertFrame, Point};
 use crate::mesh::anatomy::{FROZEN, REQUIRED};
@@ -21,9 +21,9 @@ type VertexRecord = [u8; 16];
 const OF_HOST: u32 = 1 << 31;
 
 /// Gives the vertices of the cut's interface their numbers, in the order of its faces; returns how many they are.
-pub(super) fn number_interface<P: Pages>(core: &mut Mesh<P>, cut: u32) -> u32 {
+pub(super) fn number_interface<P: Pages>(core: &mut Mesh<P>, labels: &Labels, cut: u32) -> u32 {
     let mut vertices = 0;
-    for_each_interface_face(core, |core, tet, i| {
+    for_each_interface_face(core, labels, |core, tet, i| {
         for v in tet.face(i) {
             if !core.is_fixed(v) || is_held(core, v) {
                 core.set_interface_vertex(v, cut, vertices);
@@ -35,9 +35,9 @@ pub(super) fn number_interface<P: Pages>(core: &mut Mesh<P>, cut: u32) -> u32 {
 }
 
 /// The interface faces by their points, in id order.
-pub(super) fn interface_points<P: Pages>(core: &mut Mesh<P>) -> Vec<[Point; 3]> {
+pub(super) fn interface_points<P: Pages>(core: &mut Mesh<P>, labels: &Labels) -> Vec<[Point; 3]> {
     let mut points = Vec::new();
-    for_each_interface_face(core, |core, tet, i| {
+    for_each_interface_face(core, labels, |core, tet, i| {
         points.push(tet.face(i).map(|v| core.point(v)));
     });
     points
@@ -46,14 +46,15 @@ pub(super) fn interface_points<P: Pages>(core: &mut Mesh<P>) -> Vec<[Point; 3]> 
 /// Calls `visit` with every interface face, seen from its tetrahedron on the low side, in id order.
 fn for_each_interface_face<P: Pages>(
     core: &mut Mesh<P>,
+    labels: &Labels,
     mut visit: impl FnMut(&mut Mesh<P>, &Tet, usize),
 ) {
     for t in tet_ids(core) {
         let tet = core.tet(t);
-        if !tet.is_live() || is_high(core, t) {
+        if !tet.is_live() || labels.is_high(t) {
             continue;
         }
-        for i in interface_faces(core, t, &tet) {
+        for i in labels.interface_faces(t, &tet) {
             visit(core, &tet, i);
         }
     }
@@ -172,7 +173,7 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
         let mut met = 0;
         for t in tet_ids(self.core) {
             let tet = self.core.tet(t);
-            let ours = tet.is_live() && is_high(self.core, t) == self.high;
+            let ours = tet.is_live() && self.opened.labels.is_high(t) == self.high;
             self.core
                 .set_scratch(self.core_base + dense(t), if ours { 0 } else { NONE });
             if !ours {
@@ -377,7 +378,7 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
     fn new_interface(&mut self) {
         let (child, high, cut) = (&mut *self.child, self.high, self.opened.zone.cut);
         let mut index = 0;
-        for_each_interface_face(self.core, |core, tet, i| {
+        for_each_interface_face(self.core, &self.opened.labels, |core, tet, i| {
             let mut vertices = tet.face(i).map(|v| core.scratch(dense(v)));
             if high {
                 vertices.swap(1, 2);
