@@ -21,30 +21,37 @@ pub(super) fn insphere_sign(a: Point, b: Point, c: Point, d: Point, e: Point) ->
 }
 
 /// The differences where doubles hold them exactly, as they do for points near each other and not too near zero.
+///
+/// The unit is as small as the largest difference allows: what it is does not matter, if all are whole numbers of it.
 fn rounded_differences(points: [Point; 4], e: Point) -> Option<[[i64; 3]; 4]> {
-    let mut seen = [[0.0f64; 3]; 4];
-    let mut unit = i32::MAX;
-    let mut largest = 0.0f64;
+    let mut seen = [Point::ZERO; 4];
+    let mut largest = Point::ZERO;
+    let mut lost = Point::ZERO;
     for (seen, p) in seen.iter_mut().zip(points) {
         let x = p - e;
         // What rounding took away (T. J. Dekker, 1971).
         let e_virtual = p - x;
         let tail = (p - (x + e_virtual)) + (e_virtual - e);
-        if tail != Point::ZERO {
-            return None;
-        }
-        *seen = x.to_array();
-        largest = largest.max(x.abs().max_element());
-        for x in *seen {
-            unit = unit.min(parts(x).1);
-        }
+        lost += tail.abs();
+        *seen = x;
+        largest = largest.max(x.abs());
     }
-    if !(-1000..=900).contains(&unit) {
+    let exponent = (largest.max_element().to_bits() >> 52) as i32 - 1023;
+    // Not multiplied by less than one, which could lose bits of a very small difference.
+    if lost != Point::ZERO || !(-900..DIFFERENCE_BITS as i32).contains(&exponent) {
         return None;
     }
-    let per_unit = f64::from_bits(((1023 - unit) as u64) << 52);
-    let word = (1u64 << DIFFERENCE_BITS) as f64;
-    (largest * per_unit < word).then(|| seen.map(|p| p.map(|x| (x * per_unit) as i64)))
+    let shift = DIFFERENCE_BITS as i32 - 1 - exponent;
+    let per_unit = f64::from_bits(((1023 + shift) as u64) << 52);
+    let mut is_whole = true;
+    let whole = seen.map(|x| {
+        (x * per_unit).to_array().map(|x| {
+            let whole = x as i64;
+            is_whole &= whole as f64 == x;
+            whole
+        })
+    });
+    is_whole.then_some(whole)
 }
 
 /// The differences as whole numbers of the smallest unit any coordinate needs.
@@ -104,82 +111,90 @@ fn determinant_sign([a, b, c, d]: [[i64; 3]; 4]) -> Ordering {
     let (ac, bd) = (minor(a, c), minor(b, d));
     // Three products of 61 and 123 bits.
     let sum = |p: [(i64, i128); 3]| {
-        let [p, q, r] = p.map(|(x, y)| product(y, x));
-        add(add(p, q), r)
+        let [p, q, r] = p.map(|(x, y)| Triple::product(y, x));
+        p.plus(q).plus(r)
     };
-    let abc = sum([(a[2], bc), (-b[2], ac), (c[2], ab)]);
     let bcd = sum([(b[2], cd), (-c[2], bd), (d[2], bc)]);
-    let cda = sum([(c[2], da), (d[2], ac), (a[2], cd)]);
     let dab = sum([(d[2], ab), (a[2], bd), (b[2], da)]);
+    let minus_abc = sum([(-a[2], bc), (b[2], ac), (-c[2], ab)]);
+    let minus_cda = sum([(-c[2], da), (-d[2], ac), (-a[2], cd)]);
     let square = |p: [i64; 3]| {
         let [x, y, z] = p.map(|x| i128::from(x) * i128::from(x));
         (x + y + z) as u128
     };
-    let plus = add(lifted(square(c), dab), lifted(square(a), bcd));
-    let minus = add(lifted(square(d), abc), lifted(square(b), cda));
-    let difference = add(plus, negative(minus));
-    if difference[4] >> 63 != 0 {
-        Ordering::Less
-    } else if difference == [0; 5] {
-        Ordering::Equal
-    } else {
-        Ordering::Greater
+    let mut det = Columns::default();
+    det.add(square(a), bcd);
+    det.add(square(b), minus_cda);
+    det.add(square(c), dab);
+    det.add(square(d), minus_abc);
+    det.sign()
+}
+
+/// A whole number of three words, negative ones as complement.
+///
+/// Signs are as good as random here, and a branch on one is guessed wrong every other time: there is none.
+#[derive(Clone, Copy)]
+struct Triple {
+    low: u64,
+    high: i128,
+}
+
+impl Triple {
+    /// Product of numbers of 123 and 61 bits.
+    #[inline(always)]
+    fn product(a: i128, b: i64) -> Self {
+        let b = i128::from(b);
+        let low = i128::from(a as u64) * b;
+        let high = i128::from((a >> 64) as i64) * b;
+        Self {
+            low: low as u64,
+            high: high + (low >> 64),
+        }
+    }
+
+    #[inline(always)]
+    fn plus(self, other: Self) -> Self {
+        let (low, carry) = self.low.overflowing_add(other.low);
+        Self {
+            low,
+            high: self.high + other.high + i128::from(carry),
+        }
     }
 }
 
-/// A whole number of `N` words, least significant first, negative ones as complement.
-type Wide<const N: usize> = [u64; N];
+/// A sum of products of five words, as sums of their words: of a few dozen, each of 64 bits, so that none overflows.
+#[derive(Default)]
+struct Columns([i128; 5]);
 
-fn add<const N: usize>(a: Wide<N>, b: Wide<N>) -> Wide<N> {
-    let mut sum = [0; N];
-    let mut carry = false;
-    for i in 0..N {
-        let (s, c) = a[i].overflowing_add(b[i]);
-        let (s, d) = s.overflowing_add(u64::from(carry));
-        sum[i] = s;
-        carry = c | d;
+impl Columns {
+    /// Adds the product of a square of 124 bits and a determinant of three rows of 186.
+    #[inline(always)]
+    fn add(&mut self, square: u128, det: Triple) {
+        let squares = [square as u64, (square >> 64) as u64];
+        let (middle, high) = (det.high as u64, (det.high >> 64) as i64);
+        for (i, s) in squares.into_iter().enumerate() {
+            for (j, d) in [det.low, middle].into_iter().enumerate() {
+                let product = u128::from(s) * u128::from(d);
+                self.0[i + j] += i128::from(product as u64);
+                self.0[i + j + 1] += i128::from((product >> 64) as u64);
+            }
+            let product = i128::from(s) * i128::from(high);
+            self.0[i + 2] += i128::from(product as u64);
+            self.0[i + 3] += product >> 64;
+        }
     }
-    sum
-}
 
-fn negative<const N: usize>(a: Wide<N>) -> Wide<N> {
-    let mut one = [0; N];
-    one[0] = 1;
-    add(a.map(|word| !word), one)
-}
-
-/// Product of a number of up to 127 bits and a word.
-fn product(a: i128, b: i64) -> Wide<3> {
-    let (low, high) = (a.unsigned_abs() as u64, (a.unsigned_abs() >> 64) as u64);
-    let b_abs = u128::from(b.unsigned_abs());
-    let first = u128::from(low) * b_abs;
-    let second = u128::from(high) * b_abs + (first >> 64);
-    let wide = [first as u64, second as u64, (second >> 64) as u64];
-    if (a < 0) == (b < 0) {
-        wide
-    } else {
-        negative(wide)
-    }
-}
-
-/// Product of a square and a determinant of three rows.
-fn lifted(square: u128, det: Wide<3>) -> Wide<5> {
-    let is_negative = det[2] >> 63 != 0;
-    let det = if is_negative { negative(det) } else { det };
-    let mut wide = [0u64; 5];
-    for (i, s) in [square as u64, (square >> 64) as u64]
-        .into_iter()
-        .enumerate()
-    {
+    fn sign(&self) -> Ordering {
         let mut carry = 0;
-        for (j, d) in det.into_iter().enumerate() {
-            let sum = u128::from(s) * u128::from(d) + u128::from(wide[i + j]) + carry;
-            wide[i + j] = sum as u64;
+        let mut rest = 0;
+        let [low @ .., high] = self.0;
+        for column in low {
+            let sum = column + carry;
+            rest |= sum as u64;
             carry = sum >> 64;
         }
-        wide[i + 3] = carry as u64;
+        (high + carry).cmp(&0).then((rest > 0).cmp(&false))
     }
-    if is_negative { negative(wide) } else { wide }
 }
 
 #[cfg(test)]
