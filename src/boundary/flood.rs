@@ -3,9 +3,8 @@
 use std::collections::BTreeSet;
 
 use crate::geom::orient;
-use crate::mesh::{Mesh, sparse};
-use crate::store::{Pages, kind, stop_if_requested};
-use tetdb_schema::page::{SLOT_BITS, u32_le};
+use crate::mesh::Mesh;
+use crate::store::{Pages, stop_if_requested};
 
 /// The component that has the enclosing box.
 pub(super) const OUTSIDE: u32 = 1;
@@ -35,31 +34,33 @@ impl Flood {
             let (_, flags) = mesh.tet_attribute(t);
             mesh.set_tet_attribute(t, 0, flags);
         }
-        mesh.pages_mut().clear::<{ kind::SCRATCH }>();
+        mesh.clear_scratch();
         let mut flood = Self {
             components: vec![Component::default()],
         };
+        let mut stack = Stack::default();
         let outside = mesh.tet_of(0);
-        flood.fill(mesh, outside);
+        flood.fill(mesh, outside, &mut stack);
         let mut from = 0;
         while let Some((t, _)) = mesh.next_tet(from) {
             from = t + 1;
             if mesh.tet_attribute(t).0 == 0 {
-                flood.fill(mesh, t);
+                flood.fill(mesh, t, &mut stack);
             }
         }
-        mesh.pages_mut().clear::<{ kind::SCRATCH }>();
+        mesh.clear_scratch();
         flood
     }
 
-    fn fill<P: Pages>(&mut self, mesh: &mut Mesh<P>, first: u32) {
+    fn fill<P: Pages>(&mut self, mesh: &mut Mesh<P>, first: u32, stack: &mut Stack) {
         let component = self.components.len() as u32;
         let mut found = Component {
             side_first: u64::MAX,
             ..Component::default()
         };
-        let mut stack = Stack { len: 0 };
-        enter(mesh, first, component, &mut stack);
+        let (_, flags) = mesh.tet_attribute(first);
+        mesh.set_tet_attribute(first, component, flags);
+        stack.push(mesh, first);
         while let Some(t) = stack.pop(mesh) {
             if found.tets & 4095 == 0 {
                 stop_if_requested();
@@ -68,11 +69,13 @@ impl Flood {
             let [a, b, c, d] = mesh.points(&tet);
             found.volume += orient(a, b, c, d) / 6.0;
             found.tets += 1;
-            for i in 0..4 {
-                let across = tet.neighbor[i];
-                if across.exists() && !tet.is_required(i) && mesh.tet_attribute(across.tet()).0 == 0
-                {
-                    enter(mesh, across.tet(), component, &mut stack);
+            for (i, across) in tet.neighbor.into_iter().enumerate() {
+                if !across.exists() || tet.is_required(i) {
+                    continue;
+                }
+                if let (0, flags) = mesh.tet_attribute(across.tet()) {
+                    mesh.set_tet_attribute(across.tet(), component, flags);
+                    stack.push(mesh, across.tet());
                 }
             }
         }
@@ -88,33 +91,37 @@ impl Flood {
     }
 }
 
-fn enter<P: Pages>(mesh: &mut Mesh<P>, t: u32, component: u32, stack: &mut Stack) {
-    let (_, flags) = mesh.tet_attribute(t);
-    mesh.set_tet_attribute(t, component, flags);
-    stack.push(mesh, t);
-}
+/// Numbers that move between memory and scratch pages at a time.
+const BLOCK: usize = 1 << 14;
 
-/// A stack in scratch pages: a flood's front can be as large as the mesh.
+/// A stack whose top is in memory and the rest in scratch pages: a flood's front can be as large as the mesh.
+#[derive(Default)]
 struct Stack {
-    len: u32,
+    top: Vec<u32>,
+    /// Numbers in scratch pages: a multiple of [`BLOCK`].
+    n_below: u32,
 }
 
 impl Stack {
+    #[inline]
     fn push<P: Pages>(&mut self, mesh: &mut Mesh<P>, value: u32) {
-        let record = sparse(self.len / 8);
-        let pages = mesh.pages_mut();
-        while record >> SLOT_BITS >= pages.n_pages::<{ kind::SCRATCH }>() {
-            pages.append_page::<{ kind::SCRATCH }>();
+        if self.top.len() == 2 * BLOCK {
+            for value in self.top.drain(..BLOCK) {
+                mesh.set_scratch(self.n_below, value);
+                self.n_below += 1;
+            }
         }
-        pages.write::<{ kind::SCRATCH }>(record)[self.len as usize % 8] =
-            u32_le::from_native(value);
-        self.len += 1;
+        self.top.push(value);
     }
 
+    #[inline]
     fn pop<P: Pages>(&mut self, mesh: &mut Mesh<P>) -> Option<u32> {
-        self.len = self.len.checked_sub(1)?;
-        let record = sparse(self.len / 8);
-        let slot = mesh.pages_mut().read::<{ kind::SCRATCH }>(record);
-        Some(slot[self.len as usize % 8].to_native())
+        if self.top.is_empty() && self.n_below > 0 {
+            let first = self.n_below - BLOCK as u32;
+            self.top
+                .extend((first..self.n_below).map(|n| mesh.scratch(n)));
+            self.n_below = first;
+        }
+        self.top.pop()
     }
 }

@@ -3,9 +3,9 @@
 use std::collections::HashSet;
 
 use super::find::{Found, find_face};
-use super::space::{Paged, Space, edge_key};
+use super::space::{Paged, Space, edge_key, sorted};
 use super::walk::find_edge;
-use crate::mesh::Mesh;
+use crate::mesh::{FaceRef, Facet, Mesh};
 use crate::store::{Pages, stop_if_requested};
 
 /// What the mesh lacks.
@@ -19,7 +19,8 @@ pub(super) struct Missing {
     pub protected: HashSet<u64>,
 }
 
-/// Marks the facets that are faces as required and lists the rest. One short walk per facet.
+/// Marks the facets that are faces as required, with the face in place of their first region ([`face_at`]), and lists the rest. One short
+/// walk per facet.
 pub(super) fn map<P: Pages>(mesh: &mut Mesh<P>) -> Missing {
     let mut missing = Missing::default();
     let mut known: HashSet<u64> = HashSet::new();
@@ -28,10 +29,14 @@ pub(super) fn map<P: Pages>(mesh: &mut Mesh<P>) -> Missing {
         if n & 1023 == 0 {
             stop_if_requested();
         }
-        let f = mesh.facet(n).vertices;
+        let mut facet = mesh.facet(n);
+        let f = facet.vertices;
         let mut s = Paged(mesh, &none);
         if let Found::Face(face) = find_face(&mut s, f) {
             s.require(face);
+            // No region is known yet: the place serves whoever looks for the facet next.
+            facet.regions = [face.0, 0];
+            mesh.set_facet(n, facet);
             continue;
         }
         missing.facets.push(n);
@@ -47,4 +52,14 @@ pub(super) fn map<P: Pages>(mesh: &mut Mesh<P>) -> Missing {
         }
     }
     missing
+}
+
+/// The face of a facet that [`map`] has found, where flips have left it.
+pub(super) fn face_at<P: Pages>(mesh: &mut Mesh<P>, facet: &Facet) -> Option<FaceRef> {
+    let face = FaceRef(facet.regions[0]);
+    let tet = mesh.tet(face.tet());
+    let is_there = tet.is_live()
+        && tet.is_required(face.face())
+        && sorted(tet.face(face.face())) == sorted(facet.vertices);
+    is_there.then_some(face)
 }

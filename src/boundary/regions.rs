@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::error::BoundaryError;
 use super::find::{Found, find_face};
 use super::flood::{Flood, OUTSIDE};
+use super::map::face_at;
 use super::policy::{RegionPolicy, Walls};
 use super::recover::place;
 use super::space::Paged;
@@ -85,7 +86,9 @@ fn survey<P: Pages>(mesh: &mut Mesh<P>, flood: &mut Flood) -> Result<Walls, Boun
             stop_if_requested();
         }
         let mut facet = mesh.facet(n);
-        let Found::Face(face) = find_face(&mut Paged(mesh, &none), facet.vertices) else {
+        let known = face_at(mesh, &facet).map(Found::Face);
+        let found = || find_face(&mut Paged(mesh, &none), facet.vertices);
+        let Found::Face(face) = known.unwrap_or_else(found) else {
             return Err(BoundaryError::NotRecovered {
                 facets: vec![place(mesh, n)],
                 reason: "it is not a face of the mesh",
