@@ -13,7 +13,7 @@ use super::talk::Talk;
 use super::{background, config, estimate, export, info, memory, replace, signals, store, verify};
 use crate::catalog::{Catalog, CatalogError, Job, Store, StoreState};
 use crate::io::write::Selection;
-use crate::pipeline::{self, Options, Summary};
+use crate::pipeline::{self, Options, Prepared, Summary};
 use crate::store::Budget;
 use crate::surface::Surface;
 
@@ -36,22 +36,23 @@ pub fn run(args: &MeshArgs, talk: &Talk) -> Result<u8, Failure> {
     if !args.no_preflight {
         estimate::surface_fits(&input.surface, cap)?;
     }
-    input::validated(&input.surface, space)?;
-    talk.note(&format!(
-        "{} triangles and {} vertices, closed and free of defects ({:.1} s)",
-        input.surface.n_triangles(),
-        input.surface.n_vertices(),
-        clock.elapsed().as_secs_f64()
-    ));
-    talk.note(&format!("memory: {} ({whence})", memory::show(cap)));
-    let prepared = {
-        let background = background::read(&options, cap)?;
-        let room = space.room(&input.surface)?;
-        pipeline::prepare(&input.surface, &options, background.as_ref(), &room)?
-    };
-    if !args.no_preflight {
-        estimate::preflight(&prepared.estimate, cap, &path, talk)?;
-    }
+    let watch = |event| talk.progress(event);
+    let prepared = pipeline::ahead(&input.surface, &options, cap, &watch, |taken| {
+        let space = Space::Capped(cap - taken, &path);
+        input::validated(&input.surface, space)?;
+        talk.note(&format!(
+            "{} triangles and {} vertices, closed and free of defects ({:.1} s)",
+            input.surface.n_triangles(),
+            input.surface.n_vertices(),
+            clock.elapsed().as_secs_f64()
+        ));
+        talk.note(&format!("memory: {} ({whence})", memory::show(cap)));
+        let prepared = prepared(&input.surface, &options, cap, space)?;
+        if !args.no_preflight {
+            estimate::preflight(&prepared.estimate, cap, &path, talk)?;
+        }
+        Ok::<_, Failure>(prepared)
+    })?;
     // With --force the old store is only replaced once the new one is sealed.
     let replaces = path.exists() && !Catalog::is_vacant(&path);
     let place = match replaces {
@@ -63,7 +64,7 @@ pub fn run(args: &MeshArgs, talk: &Talk) -> Result<u8, Failure> {
         surfaces: input.sources.clone(),
         tool_version: env!("CARGO_PKG_VERSION").to_owned(),
     };
-    let needed = (prepared.estimate).disk_peak_bytes(cap, rayon::current_num_threads());
+    let needed = (prepared.0.estimate).disk_peak_bytes(cap, rayon::current_num_threads());
     let is_same = |begun: &mut Catalog| begun.job().is_ok_and(|begun| begun == job);
     let begun = match replaces {
         true => replace::take_up(&path, is_same)?,
@@ -78,7 +79,6 @@ pub fn run(args: &MeshArgs, talk: &Talk) -> Result<u8, Failure> {
         None => Catalog::create(&place, &job)?,
     };
     let budget = Budget::new(cap);
-    let watch = |event| talk.progress(event);
     let surface = lent_or_given(&mut input, cap);
     let made = if catalog.state()? < StoreState::Coarse {
         pipeline::mesh_prepared(&mut catalog, surface, &options, prepared, &budget, &watch)
@@ -133,10 +133,10 @@ pub fn resume(args: &ResumeArgs, talk: &Talk) -> Result<u8, Failure> {
     let watch = |event| talk.progress(event);
     let budget = Budget::new(cap);
     let made = if state < StoreState::Coarse {
-        let background = background::read(&options, cap)?;
-        let room = space.room(&input.surface)?;
-        let prepared = pipeline::prepare(&input.surface, &options, background.as_ref(), &room)?;
-        drop(background);
+        let prepared = pipeline::ahead(&input.surface, &options, cap, &watch, |taken| {
+            let space = Space::Capped(cap - taken, &args.store);
+            prepared(&input.surface, &options, cap, space)
+        })?;
         signals::store_begins();
         let surface = lent_or_given(&mut input, cap);
         pipeline::mesh_prepared(&mut catalog, surface, &options, prepared, &budget, &watch)
@@ -151,6 +151,19 @@ pub fn resume(args: &ResumeArgs, talk: &Talk) -> Result<u8, Failure> {
         replace::exchange(&args.store)?;
     }
     finish(&args.store, &input, &args.run, cap, Some(&summary), talk)
+}
+
+/// What sizes make of a surface, in the memory of `space`.
+fn prepared(
+    surface: &Surface,
+    options: &Options,
+    cap: u64,
+    space: Space,
+) -> Result<Prepared, Failure> {
+    let background = background::read(options, cap)?;
+    let room = space.room(surface)?;
+    let prepared = pipeline::prepare(surface, options, background.as_ref(), &room)?;
+    Ok(prepared)
 }
 
 /// The surface for the pipeline: given away when it is large against the cap, to be read again for verification.

@@ -3,7 +3,7 @@
 use super::watch::{Event, Watcher};
 use super::{Options, PipelineError};
 use crate::boundary::{RecoveryReport, Regions, fill_regions, recover};
-use crate::delaunay::{Kernel, KernelStats, enclose, insertion_key};
+use crate::delaunay::{Kernel, KernelStats, Rejected, enclose, insertion_key};
 use crate::geom::HilbertFrame;
 use crate::mesh::{Facet, Mesh, VertexTag};
 use crate::store::{Pages, Room, fail};
@@ -30,8 +30,21 @@ pub fn coarse<P: Pages>(
     room: &Room,
     watch: &Watcher,
 ) -> Result<CoarseReport, PipelineError> {
-    let kernel = triangulate(mesh, surface, room, watch);
+    let kernel = inserted(mesh, surface, room, watch);
     recovered(mesh, kernel, options, watch)
+}
+
+/// [`triangulate`] of a valid surface.
+pub(super) fn inserted<P: Pages>(
+    mesh: &mut Mesh<P>,
+    surface: &Surface,
+    room: &Room,
+    watch: &Watcher,
+) -> KernelStats {
+    triangulate(mesh, surface, room, watch).unwrap_or_else(|(i, why)| {
+        let p = surface.points[i as usize];
+        panic!("vertex {i} of the surface at {p} was refused: {why:?}")
+    })
 }
 
 /// The second half, for which the mesh's own facets suffice.
@@ -73,13 +86,13 @@ fn stage(stage: &'static str) -> Event {
 /// Inserts the surface's vertices and lists its facets.
 ///
 /// Vertices are numbered in the order of insertion, so that near vertices share pages; the number in the surface is
-/// kept as the owner's index.
+/// kept as the owner's index. Errors: a vertex that is refused, which no vertex of a valid surface is.
 pub(super) fn triangulate<P: Pages>(
     mesh: &mut Mesh<P>,
     surface: &Surface,
     room: &Room,
     watch: &Watcher,
-) -> KernelStats {
+) -> Result<KernelStats, (u32, Rejected)> {
     let bounds = surface.bounds();
     let frame = HilbertFrame::new(&bounds);
     let mut order = room.sorter::<12>();
@@ -101,9 +114,7 @@ pub(super) fn triangulate<P: Pages>(
         let v = mesh.add_vertex(p, 0.0);
         mesh.set_vertex_attribute(v, VertexTag::Surface, i);
         number.set(i as usize, v);
-        hint = kernel
-            .insert(mesh, v, p, hint)
-            .unwrap_or_else(|e| panic!("vertex {i} of the surface at {p} was refused: {e:?}"));
+        hint = kernel.insert(mesh, v, p, hint).map_err(|why| (i, why))?;
         if k % TELL_EVERY == 0 {
             watch(Event {
                 stage: "coarse mesh",
@@ -121,5 +132,5 @@ pub(super) fn triangulate<P: Pages>(
             regions: [0, 0],
         });
     }
-    kernel.stats
+    Ok(kernel.stats)
 }

@@ -6,12 +6,15 @@
 //! | `divide` | bisected | as often as there are sub-domains less one: refine a band, choose the interface, write two children |
 //! | `leaf` | sealed | each sub-domain alone: divide edges; optimize; sort, compress and seal |
 //!
+//! Inserting the surface's vertices may begin before there is a store (`ahead`).
+//!
 //! A finished store goes on: `resaturate` makes sub-domains again from their coarse leaves, with other sizes (`sizes`) or because they
 //! are damaged; `before` brings back what was.
 //!
 //! It receives a surface, not a path, and prints nothing: it tells a [`Watcher`] what goes on.
 
 mod again;
+mod ahead;
 mod before;
 mod coarse;
 mod crew;
@@ -35,6 +38,7 @@ mod tree;
 mod watch;
 mod whole;
 
+pub use ahead::{HeadStart, ahead};
 pub use before::{forget, undo};
 pub use coarse::{CoarseReport, coarse as coarse_mesh};
 pub use error::PipelineError;

@@ -4,7 +4,8 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Instant;
 
-use super::coarse::{CoarseReport, recovered, triangulate};
+use super::ahead::{HeadStart, ahead};
+use super::coarse::{CoarseReport, inserted, recovered};
 use super::crew::each;
 use super::divide::{DONE, WORK, read_owners};
 use super::estimate::n_subdomains;
@@ -53,17 +54,19 @@ pub fn mesh(
     budget: &Budget,
     watch: &Watcher,
 ) -> Result<Summary, PipelineError> {
-    let room = Room::new(
-        budget.cap().saturating_sub(surface.bytes() as u64),
-        catalog.scratch_dir()?,
-    );
+    let scratch = catalog.scratch_dir()?;
+    let left = budget.cap().saturating_sub(surface.bytes() as u64);
     match catalog.blob(blob::SIZE_FIELD)? {
         None => {
-            let prepared = prepare(surface, options, None, &room)?;
+            let (prepared, begun) = ahead(surface, options, budget.cap(), watch, |taken| {
+                let room = Room::new(left.saturating_sub(taken), scratch);
+                prepare(surface, options, None, &room)
+            })?;
             let surface = Cow::Borrowed(surface);
-            mesh_prepared(catalog, surface, options, prepared, budget, watch)
+            mesh_prepared(catalog, surface, options, (prepared, begun), budget, watch)
         }
         Some(bytes) => {
+            let room = Room::new(left, scratch);
             let field = attempt(|| SizeField::from_bytes_in(&bytes, &room))??;
             drop(bytes);
             let field = field.with_sources(&options.sizes()?, surface.bounds().diagonal())?;
@@ -73,7 +76,7 @@ pub fn mesh(
     }
 }
 
-/// [`mesh`] into a new store, with what [`prepare`] made of this surface and these options.
+/// [`mesh`] into a new store, with what [`prepare`] made of this surface and these options, and what [`ahead`] has made meanwhile.
 ///
 /// A surface that is given away is dropped once the coarse mesh exists, which leaves its memory to what follows.
 /// Errors: as [`mesh`].
@@ -81,23 +84,30 @@ pub fn mesh_prepared(
     catalog: &mut Catalog,
     surface: Cow<Surface>,
     options: &Options,
-    prepared: Prepared,
+    (prepared, begun): (Prepared, Option<HeadStart>),
     budget: &Budget,
     watch: &Watcher,
 ) -> Result<Summary, PipelineError> {
-    let start = (prepared.field, Some((prepared.sizes, prepared.estimate)));
+    let start = (
+        prepared.field,
+        Some((prepared.sizes, prepared.estimate, begun)),
+    );
     go_on(catalog, surface, options, start, budget, watch)
 }
+
+/// What is known of a mesh that is not begun.
+type New = (SizeSummary, Estimate, Option<HeadStart>);
 
 fn go_on(
     catalog: &mut Catalog,
     surface: Cow<Surface>,
     options: &Options,
-    (field, new): (SizeField, Option<(SizeSummary, Estimate)>),
+    (field, new): (SizeField, Option<New>),
     budget: &Budget,
     watch: &Watcher,
 ) -> Result<Summary, PipelineError> {
-    let (sizes, estimate) = new.unzip();
+    let (sizes, new) = new.map(|(sizes, e, begun)| (sizes, (e, begun))).unzip();
+    let (estimate, begun) = new.unzip();
     let held = Held::of(&surface, &field, options, budget)?;
     let run = Run {
         catalog,
@@ -112,7 +122,7 @@ fn go_on(
         watch,
     };
     // Unwinding from a failed page access ends here; a step's commit is its last act, so nothing is half done.
-    attempt(|| run.steps(surface, sizes, held, budget))?
+    attempt(|| run.steps((surface, begun.flatten()), sizes, held, budget))?
 }
 
 pub(super) struct Run<'a> {
@@ -133,7 +143,7 @@ pub(super) struct Run<'a> {
 impl<'a> Run<'a> {
     fn steps(
         mut self,
-        surface: Cow<Surface>,
+        (surface, begun): (Cow<Surface>, Option<HeadStart>),
         sizes: Option<SizeSummary>,
         mut held: Held,
         budget: &Budget,
@@ -142,10 +152,11 @@ impl<'a> Run<'a> {
         let mut coarse = None;
         let is_given = matches!(surface, Cow::Owned(_));
         if self.catalog.state()? < StoreState::Coarse {
-            let (mesh, report) = self.coarse_step(surface)?;
+            let begun = begun.filter(|begun| begun.bytes() <= self.plan.frames);
+            let (mesh, report) = self.coarse_step(surface, begun)?;
             (open, coarse) = (Some(mesh), Some(report));
         } else {
-            drop(surface);
+            drop((surface, begun));
         }
         self.n = tree::n_subdomains(self.catalog)?;
         if is_given {
@@ -190,6 +201,7 @@ impl<'a> Run<'a> {
     fn coarse_step(
         &mut self,
         surface: Cow<Surface>,
+        begun: Option<HeadStart>,
     ) -> Result<(Mesh, CoarseReport), PipelineError> {
         let clock = Instant::now();
         let path = self.catalog.file_path(0, COARSE);
@@ -200,11 +212,17 @@ impl<'a> Run<'a> {
             base: None,
             cache_bytes: self.plan.redb as usize,
         };
-        let mut mesh = Mesh::new(Pager::new(self.plan.frames, Some(backing)));
         let scratch = self.catalog.scratch_dir()?;
+        let head_start = begun.as_ref().map_or(0.0, |begun| begun.seconds);
         let room = Room::new(self.plan.buffers / 2, &scratch);
-        let kernel = triangulate(&mut mesh, &surface, &room, self.watch);
-        drop(room);
+        let (mut mesh, kernel) = match begun {
+            Some(begun) => begun.into_mesh(self.plan.frames, backing),
+            None => {
+                let mut mesh = Mesh::new(Pager::new(self.plan.frames, Some(backing)));
+                let kernel = inserted(&mut mesh, &surface, &room, self.watch);
+                (mesh, kernel)
+            }
+        };
         let label_names = surface.label_names.clone();
         // All that is needed from here on is in the mesh.
         drop(surface);
@@ -249,6 +267,7 @@ impl<'a> Run<'a> {
                     ),
                     ("missing_facets", f64::from(report.recovery.missing_facets)),
                     ("predicted_tets", predicted),
+                    ("head_start_s", head_start),
                     ("pages_read", pages.pages_read as f64),
                     ("pages_written", pages.pages_written as f64),
                     ("frames_used", frames_used as f64),

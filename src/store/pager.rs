@@ -70,12 +70,17 @@ pub struct Pager {
     stats: PagerStats,
 }
 
+/// Frames in a pool of `bytes`.
+fn frames_of(bytes: u64) -> usize {
+    usize::try_from(bytes / FRAME_BYTES as u64)
+        .unwrap_or(usize::MAX)
+        .clamp(FRAMES_MIN, FRAMES_LIMIT)
+}
+
 impl Pager {
     /// A pool of `bytes / 64 KiB` frames (at least 16) over `backing`; without one, more pages than frames are an error.
     pub fn new(bytes: u64, backing: Option<Backing>) -> Self {
-        let frames_max = usize::try_from(bytes / FRAME_BYTES as u64)
-            .unwrap_or(usize::MAX)
-            .clamp(FRAMES_MIN, FRAMES_LIMIT);
+        let frames_max = frames_of(bytes);
         Self {
             frames: bytemuck::allocation::zeroed_vec(frames_max * SLOTS),
             frames_max,
@@ -88,6 +93,20 @@ impl Pager {
             work: None,
             stats: PagerStats::default(),
         }
+    }
+
+    /// Uses no more than `bytes` for frames from now on, which must hold what it has; never more than it was made with.
+    pub fn limit(&mut self, bytes: u64) {
+        let limit = frames_of(bytes).min(self.frames.len() / SLOTS);
+        assert!(self.owners.len() <= limit, "more frames than it may use");
+        self.frames_max = limit;
+    }
+
+    /// [`Pager::limit`], and gives a pool that was made without one a place for pages that leave memory.
+    pub fn settle(&mut self, bytes: u64, backing: Backing) {
+        assert!(self.backing.is_none(), "its pages would be in two places");
+        self.limit(bytes);
+        self.backing = Some(backing);
     }
 
     /// Reads and writes so far.
