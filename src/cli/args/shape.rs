@@ -97,7 +97,7 @@ pub struct ShapeArgs {
     /// How finished sub-domains are kept [default: packed]
     #[arg(long, value_enum)]
     pub seal: Option<Seal>,
-    /// Number of sub-domains: auto, or a number [default: auto, one for each 4 million tetrahedra]
+    /// Number of sub-domains: auto, or a number [default: auto, one for each 2 million tetrahedra]
     #[arg(long, value_name = "N", alias = "domains")]
     pub subdomains: Option<String>,
     /// Keep the meshes before and after each cut is refined, and the interface before and after it is chosen, for `tetdb snapshot --stage`
