@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """tetdb and other meshers on the same surface, one thread each, in turn: speed and quality in one table.
 
-  peers.py SURFACE... [--tetdb PROGRAM] [--meshers tetdb,none,hxt,gmsh,tetgen] [--runs 3] [--no-measure] [--json FILE]
+  peers.py SURFACE... [--tetdb PROGRAM] [--meshers tetdb,none,hxt,gmsh,tetgen] [--runs 3] [--subdomains N] [--no-measure] [--json FILE]
 
 SURFACE: a file tetdb reads, or a sample (balls,count=100). `none` and `delaunay` are tetdb with that `--optimize`. Needs numpy,
 scipy, meshio, trimesh, and gmsh and tetgen (pip names) for those meshers.
@@ -113,10 +113,12 @@ def child(mesher, surface, out):
     print(json.dumps({"tets": len(tets), "cpu": cpu, "peak": peak}))
 
 
-def run_tetdb(program, surface, optimize, directory, keep):
+def run_tetdb(program, surface, optimize, subdomains, directory, keep):
     store = os.path.join(directory, "peer.tetdb")
     shutil.rmtree(store, ignore_errors=True)
     command = [program, "mesh", surface, "-o", store, "--threads", "1", "--no-verify", "--json", "--optimize", optimize]
+    if subdomains:
+        command += ["--subdomains", str(subdomains)]
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     told = json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL).stdout)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -250,7 +252,7 @@ def compare(surface, args, directory):
             try:
                 if mesher in ("tetdb", "none", "delaunay"):
                     keep = os.path.join(directory, "mesh.meshb") if turn == 0 and not args.no_measure else None
-                    runs[mesher].append(run_tetdb(args.tetdb, path, "full" if mesher == "tetdb" else mesher, directory, keep))
+                    runs[mesher].append(run_tetdb(args.tetdb, path, "full" if mesher == "tetdb" else mesher, args.subdomains, directory, keep))
                 else:
                     keep = os.path.join(directory, "mesh.npz") if turn == 0 and not args.no_measure else None
                     answer = subprocess.run([sys.executable, __file__, "--child", mesher, arrays, keep or "-"], check=True,
@@ -295,6 +297,7 @@ def main():
     parser.add_argument("--tetdb", default="tetdb")
     parser.add_argument("--meshers", default="tetdb,hxt,gmsh,tetgen", type=lambda text: text.split(","))
     parser.add_argument("--runs", default=3, type=int)
+    parser.add_argument("--subdomains", type=int, help="how many sub-domains tetdb makes; without it, as many as it would")
     parser.add_argument("--no-measure", action="store_true", help="speed only: measuring 10 M tetrahedra takes minutes and 6 GB")
     parser.add_argument("--timeout", default=3600, type=float)
     parser.add_argument("--json")
