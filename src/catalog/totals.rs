@@ -25,6 +25,9 @@ pub(super) struct Totals {
     pub cosines: [f64; 2],
     pub volume: f64,
     pub regions: BTreeMap<u32, RegionTotals>,
+    /// Of the piece at hand; kept, for memory that is asked for anew is cleared by the system each time.
+    corners: Vec<[Corner; 4]>,
+    shapes: Vec<Shape>,
 }
 
 /// Least and greatest coordinates.
@@ -71,6 +74,8 @@ impl Totals {
             cosines: [1.0, -1.0],
             volume: 0.0,
             regions: BTreeMap::new(),
+            corners: Vec::with_capacity(PIECE),
+            shapes: Vec::with_capacity(PIECE),
         }
     }
 
@@ -97,19 +102,22 @@ impl Totals {
             bytes: 0,
             edge_max: 0.0,
         };
+        let mut buffers = (
+            std::mem::take(&mut self.corners),
+            std::mem::take(&mut self.shapes),
+        );
+        let (corners, shapes) = (&mut buffers.0, &mut buffers.1);
         // A piece at a time: the corners of a whole chunk would take ten times its bytes.
         for (piece, first) in tets.chunks(PIECE).zip((first..).step_by(PIECE)) {
-            let corners: Vec<[Corner; 4]> = piece
-                .iter()
-                .map(&mut corners_of)
-                .collect::<Result<_, E>>()?;
+            corners.clear();
+            for tet in piece {
+                corners.push(corners_of(tet)?);
+            }
             // Shapes in parallel, sums in order: the same for any number of threads.
-            let shapes: Vec<Shape> = corners
-                .par_iter()
-                .with_min_len(1024)
+            (corners.par_iter().with_min_len(1024))
                 .map(|c| Shape::of(c.map(|c| c.point)))
-                .collect();
-            let known = piece.iter().zip(&corners).zip(&shapes);
+                .collect_into_vec(shapes);
+            let known = piece.iter().zip(&*corners).zip(&*shapes);
             for (place, ((tet, corners), shape)) in (first..).zip(known) {
                 self.digest
                     .add_tet(corners.map(|c| c.mix), tet.region, rank);
@@ -130,6 +138,7 @@ impl Totals {
                 }
             }
         }
+        (self.corners, self.shapes) = buffers;
         summary.bounds = array(&bounds);
         Ok(summary)
     }
