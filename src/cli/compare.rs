@@ -12,7 +12,7 @@ use crate::audit::{Population, Qualities, qualities};
 const DIFFERENT: u8 = 7;
 
 pub fn run(args: &CompareArgs, talk: &Talk) -> Result<u8, Failure> {
-    let (cap, _) = memory::cap(args.memory.as_deref())?;
+    let (cap, _) = memory::cap(args.read.memory.as_deref())?;
     let memory = (cap / 4).min(256 << 20) as usize;
     let mut found = Vec::with_capacity(2);
     for path in [&args.first, &args.second] {

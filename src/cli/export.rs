@@ -15,7 +15,7 @@ use crate::pipeline::Event;
 const MEMORY_MAX: u64 = 512 << 20;
 
 pub fn run(args: &ExportArgs, talk: &Talk) -> Result<u8, Failure> {
-    let (cap, _) = memory::cap(args.memory.as_deref())?;
+    let (cap, _) = memory::cap(args.read.memory.as_deref())?;
     let selection = Selection {
         subdomains: args.subdomain.iter().copied().collect(),
         pieces: args.pieces,

@@ -25,7 +25,7 @@ pub fn run(args: &ReportArgs, talk: &Talk) -> Result<u8, Failure> {
         let failure = Failure::new("unknown-format", what).at(args.output.display());
         return Err(failure.help(format!("end the name with {}", page::ENDINGS)));
     }
-    let (cap, _) = memory::cap(args.memory.as_deref())?;
+    let (cap, _) = memory::cap(args.read.memory.as_deref())?;
     let mut store = store::open_finished(&args.store)?;
     let title = args.store.file_stem().unwrap_or_default().to_string_lossy();
     let mut data = told(&args.store, store.catalog(), &title)?;

@@ -33,7 +33,7 @@ enum Subject {
 }
 
 pub fn run(args: &SnapshotArgs, talk: &Talk) -> Result<u8, Failure> {
-    let (cap, _) = memory::cap(args.memory.as_deref())?;
+    let (cap, _) = memory::cap(args.read.memory.as_deref())?;
     let pixels = pixels(&args.size)?;
     let subject = subject(args)?;
     let budget = Budget::new(cap);

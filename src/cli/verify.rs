@@ -15,7 +15,7 @@ use crate::store::attempt;
 use crate::surface::Surface;
 
 pub fn run(args: &VerifyArgs, talk: &Talk) -> Result<u8, Failure> {
-    let (cap, _) = memory::cap(args.memory.as_deref())?;
+    let (cap, _) = memory::cap(args.read.memory.as_deref())?;
     let mut open = store::open_finished(&args.store)?;
     // The store may be one that can only be read.
     let scratch = std::env::temp_dir().join("verify");

@@ -71,7 +71,7 @@ pub fn mesh(
             drop(bytes);
             let field = field.with_sources(&options.sizes()?, surface.bounds().diagonal())?;
             let surface = Cow::Borrowed(surface);
-            go_on(catalog, surface, options, (field, None), budget, watch)
+            go_on(catalog, surface, options, &field, None, budget, watch)
         }
     }
 }
@@ -88,41 +88,45 @@ pub fn mesh_prepared(
     budget: &Budget,
     watch: &Watcher,
 ) -> Result<Summary, PipelineError> {
-    let start = (
-        prepared.field,
-        Some((prepared.sizes, prepared.estimate, begun)),
-    );
-    go_on(catalog, surface, options, start, budget, watch)
+    let new = New {
+        sizes: prepared.sizes,
+        estimate: prepared.estimate,
+        begun,
+    };
+    let field = &prepared.field;
+    go_on(catalog, surface, options, field, Some(new), budget, watch)
 }
 
 /// What is known of a mesh that is not begun.
-type New = (SizeSummary, Estimate, Option<HeadStart>);
+struct New {
+    sizes: SizeSummary,
+    estimate: Estimate,
+    begun: Option<HeadStart>,
+}
 
 fn go_on(
     catalog: &mut Catalog,
     surface: Cow<Surface>,
     options: &Options,
-    (field, new): (SizeField, Option<New>),
+    field: &SizeField,
+    new: Option<New>,
     budget: &Budget,
     watch: &Watcher,
 ) -> Result<Summary, PipelineError> {
-    let (sizes, new) = new.map(|(sizes, e, begun)| (sizes, (e, begun))).unzip();
-    let (estimate, begun) = new.unzip();
-    let held = Held::of(&surface, &field, options, budget)?;
+    let held = Held::of(&surface, field, options, budget)?;
     let run = Run {
         catalog,
         bounds: surface.bounds(),
         options,
-        field: &field,
+        field,
         plan: held.plan,
         n: 1,
-        estimate,
         pages: PagerStats::default(),
         frames_used: 0,
         watch,
     };
     // Unwinding from a failed page access ends here; a step's commit is its last act, so nothing is half done.
-    attempt(|| run.steps((surface, begun.flatten()), sizes, held, budget))?
+    attempt(|| run.steps(surface, new, held, budget))?
 }
 
 pub(super) struct Run<'a> {
@@ -133,8 +137,6 @@ pub(super) struct Run<'a> {
     pub bounds: Aabb,
     /// Number of sub-domains there will be.
     pub n: u32,
-    /// Before the coarse mesh is made.
-    estimate: Option<Estimate>,
     pub pages: PagerStats,
     pub frames_used: usize,
     pub watch: &'a Watcher<'a>,
@@ -143,20 +145,20 @@ pub(super) struct Run<'a> {
 impl<'a> Run<'a> {
     fn steps(
         mut self,
-        (surface, begun): (Cow<Surface>, Option<HeadStart>),
-        sizes: Option<SizeSummary>,
+        surface: Cow<Surface>,
+        new: Option<New>,
         mut held: Held,
         budget: &Budget,
     ) -> Result<Summary, PipelineError> {
-        let mut open = None;
-        let mut coarse = None;
+        let (mut open, mut coarse, mut sizes) = (None, None, None);
         let is_given = matches!(surface, Cow::Owned(_));
-        if self.catalog.state()? < StoreState::Coarse {
-            let begun = begun.filter(|begun| begun.bytes() <= self.plan.frames);
-            let (mesh, report) = self.coarse_step(surface, begun)?;
-            (open, coarse) = (Some(mesh), Some(report));
+        let is_begun = self.catalog.state()? >= StoreState::Coarse;
+        if let Some(new) = new.filter(|_| !is_begun) {
+            let begun = new.begun.filter(|begun| begun.bytes() <= self.plan.frames);
+            let (mesh, report) = self.coarse_step(surface, &new.estimate, begun)?;
+            (open, coarse, sizes) = (Some(mesh), Some(report), Some(new.sizes));
         } else {
-            drop((surface, begun));
+            drop(surface);
         }
         self.n = tree::n_subdomains(self.catalog)?;
         if is_given {
@@ -201,6 +203,7 @@ impl<'a> Run<'a> {
     fn coarse_step(
         &mut self,
         surface: Cow<Surface>,
+        estimate: &Estimate,
         begun: Option<HeadStart>,
     ) -> Result<(Mesh, CoarseReport), PipelineError> {
         let clock = Instant::now();
@@ -234,8 +237,7 @@ impl<'a> Run<'a> {
         renumber(&mut mesh, &HilbertFrame::new(&self.bounds), &space)?;
         let load = self.load(&mut mesh);
         // Where vertices nearly touch, sizes at a point are next to nothing and the estimate knows no bound; the mesh's own load does.
-        let told = self.estimate.map_or(0.0, |e| e.tets());
-        let predicted = told.min(TETS_PER_LOAD * load);
+        let predicted = estimate.tets().min(TETS_PER_LOAD * load);
         let (n, _) = n_subdomains(predicted, self.options)?;
         mesh.pages_mut().end_generation();
         let part = PartMesh {

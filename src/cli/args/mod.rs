@@ -111,16 +111,27 @@ impl Command {
             Self::Check(a) => a.json,
             Self::Info(a) | Self::Digest(a) => a.json,
             Self::Query(a) => a.json,
-            Self::Verify(a) => a.json,
-            Self::Compare(a) => a.json,
-            Self::Export(a) => a.json,
+            Self::Verify(a) => a.read.json,
+            Self::Compare(a) => a.read.json,
+            Self::Export(a) => a.read.json,
             Self::RefineSurface(a) => a.json,
-            Self::Snapshot(a) => a.json,
-            Self::Report(a) => a.json,
+            Self::Snapshot(a) => a.read.json,
+            Self::Report(a) => a.read.json,
             Self::Sample(a) => a.json,
             Self::Completions(_) | Self::Man(_) => false,
         }
     }
+}
+
+/// How to read a store; none of this changes the answer.
+#[derive(Debug, clap::Args)]
+pub struct ReadArgs {
+    /// Most memory to hold
+    #[arg(long, value_name = "SIZE")]
+    pub memory: Option<String>,
+    /// Answer with one JSON object
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// How to run; none of this changes the mesh.

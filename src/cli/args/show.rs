@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::ValueEnum;
 
+use super::ReadArgs;
+
 /// What colors stand for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum ColorBy {
@@ -58,12 +60,8 @@ pub struct SnapshotArgs {
     /// Width and height in pixels
     #[arg(long, value_name = "WxH", default_value = "1600x1200")]
     pub size: String,
-    /// Most memory to hold
-    #[arg(long, value_name = "SIZE")]
-    pub memory: Option<String>,
-    /// Answer with one JSON object
-    #[arg(long)]
-    pub json: bool,
+    #[command(flatten)]
+    pub read: ReadArgs,
 }
 
 /// A page for any browser, in one file and without a network: numbers, tables, charts, and the mesh in space to turn and cut.
@@ -77,12 +75,8 @@ pub struct ReportArgs {
     /// The page to write: .html; one that is there is replaced
     #[arg(value_name = "OUT")]
     pub output: PathBuf,
-    /// Most memory to hold
-    #[arg(long, value_name = "SIZE")]
-    pub memory: Option<String>,
-    /// Answer with one JSON object
-    #[arg(long)]
-    pub json: bool,
+    #[command(flatten)]
+    pub read: ReadArgs,
 }
 
 #[derive(Debug, clap::Args)]

@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use super::ReadArgs;
+
 #[derive(Debug, clap::Args)]
 pub struct StoreArgs {
     /// The store, as `tetdb mesh` made it
@@ -27,12 +29,8 @@ pub struct VerifyArgs {
     /// The surface whose triangles must all be there [default: what the store was made from]
     #[arg(long, value_name = "SURFACE")]
     pub against: Vec<String>,
-    /// Most memory to hold
-    #[arg(long, value_name = "SIZE")]
-    pub memory: Option<String>,
-    /// Answer with one JSON object
-    #[arg(long)]
-    pub json: bool,
+    #[command(flatten)]
+    pub read: ReadArgs,
 }
 
 /// Two meshes side by side: tetrahedra by quality; those forced by the surface and those at interfaces apart.
@@ -47,12 +45,8 @@ pub struct CompareArgs {
     /// The other one
     #[arg(value_name = "B")]
     pub second: PathBuf,
-    /// Most memory to hold
-    #[arg(long, value_name = "SIZE")]
-    pub memory: Option<String>,
-    /// Answer with one JSON object
-    #[arg(long)]
-    pub json: bool,
+    #[command(flatten)]
+    pub read: ReadArgs,
 }
 
 #[derive(Debug, clap::Args)]
@@ -85,10 +79,6 @@ pub struct ExportArgs {
     /// Only faces between sub-domains (.vtu)
     #[arg(long)]
     pub interfaces: bool,
-    /// Most memory to hold
-    #[arg(long, value_name = "SIZE")]
-    pub memory: Option<String>,
-    /// Answer with one JSON object
-    #[arg(long)]
-    pub json: bool,
+    #[command(flatten)]
+    pub read: ReadArgs,
 }
