@@ -131,6 +131,8 @@ impl Catalog {
     fn check_format(&mut self) -> Result<(), CatalogError> {
         let key = RowKind::Format.key(0, 0);
         let Some(format) = self.bytes(key)? else {
+            // In a damaged file it may only not be found.
+            self.file.check()?;
             return Err(CatalogError::NotOurs {
                 path: self.dir().to_owned(),
                 reason: "its catalog has no format row",

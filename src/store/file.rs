@@ -32,6 +32,8 @@ pub struct StoreFile {
     handle: Option<Handle>,
     /// Kept between reads; dropped at each commit, because it shows the state before it.
     table: Option<ReadOnlyTable<u64, &'static [u8]>>,
+    /// What was found damaged: redb answers all further reads with an error that says nothing.
+    damage: Option<String>,
 }
 
 impl StoreFile {
@@ -65,6 +67,7 @@ impl StoreFile {
             handle: Some(Handle::Writer(Box::new(db.map_err(|e| e.at(path.path()))?))),
             path,
             table: None,
+            damage: None,
         };
         file.write(std::iter::empty())?;
         Ok(file)
@@ -93,6 +96,7 @@ impl StoreFile {
             handle: Some(handle.map_err(|e| e.at(path.path()))?),
             path,
             table: None,
+            damage: None,
         };
         // redb writes once more when it closes what it opened for writing. On a damaged tree it panics meanwhile, and again in what that
         // unwinds, which ends the process: so a damaged file is never closed.
@@ -156,7 +160,7 @@ impl StoreFile {
     ) -> Result<Option<T>, StoreError> {
         let table = self.table()?;
         let found = guarded(|| table.get(key).map(|v| v.map(|v| use_bytes(v.value()))));
-        found.map_err(|e| e.at(self.path.path()))
+        found.map_err(|e| self.failed(e))
     }
 
     /// Calls `visit` with every key and value of `keys`, ascending, until it returns `false`.
@@ -175,7 +179,24 @@ impl StoreFile {
             }
             Ok(())
         });
-        done.map_err(|e| e.at(self.path.path()))
+        done.map_err(|e| self.failed(e))
+    }
+
+    fn failed(&mut self, failure: Failure) -> StoreError {
+        let path = self.path.path();
+        match (failure, &self.damage) {
+            (Failure::Error(redb::Error::PreviousIo), Some(reason)) => StoreError::Damaged {
+                path: path.to_owned(),
+                reason: reason.clone(),
+            },
+            (failure, _) => {
+                let error = failure.at(path);
+                if let StoreError::Damaged { reason, .. } = &error {
+                    self.damage = Some(reason.clone());
+                }
+                error
+            }
+        }
     }
 
     /// Writes `values` in one durable commit. Ascending keys are fastest.
@@ -226,14 +247,19 @@ impl StoreFile {
         let mut builder = Database::builder();
         builder.set_cache_size(CHECK_CACHE_BYTES);
         let sound = guarded(|| open_private(&self.path, &builder)?.check_integrity());
-        match sound.map_err(|e| e.at(self.path())) {
-            Ok(true) => Ok(()),
-            Ok(false) | Err(StoreError::Damaged { .. }) => Err(StoreError::Damaged {
-                path: self.path().to_owned(),
-                reason: "its tree of pages does not match its checksums".to_owned(),
-            }),
-            Err(other) => Err(other),
+        match sound {
+            Ok(true) => return Ok(()),
+            // redb went on behind a page that cannot be read, and tells of that only that it was so.
+            Ok(false) | Err(Failure::Error(redb::Error::PreviousIo)) => {}
+            Err(failure) => match failure.at(self.path()) {
+                StoreError::Damaged { .. } => {}
+                other => return Err(other),
+            },
         }
+        Err(StoreError::Damaged {
+            path: self.path().to_owned(),
+            reason: "its tree of pages does not match its checksums".to_owned(),
+        })
     }
 
     /// Shrinks the file to what it holds, and closes it.
@@ -255,7 +281,7 @@ impl StoreFile {
                 };
                 Ok(txn.open_table(PAGES)?)
             });
-            self.table = Some(opened.map_err(|e| e.at(self.path.path()))?);
+            self.table = Some(opened.map_err(|e| self.failed(e))?);
         }
         Ok(self.table.as_ref().expect("just opened"))
     }
@@ -387,6 +413,37 @@ mod tests {
         })?;
         assert_eq!(keys, [3, 9]);
         assert!(StoreFile::create(&path, 0).is_err());
+        Ok(())
+    }
+
+    /// Of a damaged tree every read says that it is damaged, not only the first one.
+    #[test]
+    fn damage_stays_damage() -> Result<(), Box<dyn std::error::Error>> {
+        let dir = tempfile::tempdir()?;
+        let path = dir.path().join("a.redb");
+        let value = [7u8; 500];
+        let mut file = StoreFile::create(&path, 1 << 20)?;
+        file.write((0..40).map(|key| (key, &value[..])))?;
+        file.compact()?;
+        let good = std::fs::read(&path)?;
+        let (mut n_opened, mut n_damaged) = (0, 0);
+        for at in (4096..good.len()).step_by(61).filter(|&at| good[at] != 7) {
+            let mut bad = good.clone();
+            bad[at] ^= 0x10;
+            std::fs::write(&path, &bad)?;
+            let mut file = match StoreFile::open_repaired(&path, 1 << 16, false) {
+                Err(StoreError::Damaged { .. }) => continue,
+                other => other?,
+            };
+            n_opened += 1;
+            for key in 0..40 {
+                match file.read(key, <[u8]>::len) {
+                    Err(StoreError::Damaged { .. }) => n_damaged += 1,
+                    other => drop(other?),
+                }
+            }
+        }
+        assert!(n_opened > 0 && n_damaged > 0, "{n_opened} {n_damaged}");
         Ok(())
     }
 }
