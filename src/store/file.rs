@@ -182,6 +182,7 @@ impl StoreFile {
         done.map_err(|e| self.failed(e))
     }
 
+    /// What a read that failed means: behind damage that was found, redb's refusal to go on is that damage.
     fn failed(&mut self, failure: Failure) -> StoreError {
         let path = self.path.path();
         match (failure, &self.damage) {
@@ -247,19 +248,14 @@ impl StoreFile {
         let mut builder = Database::builder();
         builder.set_cache_size(CHECK_CACHE_BYTES);
         let sound = guarded(|| open_private(&self.path, &builder)?.check_integrity());
-        match sound {
-            Ok(true) => return Ok(()),
-            // redb went on behind a page that cannot be read, and tells of that only that it was so.
-            Ok(false) | Err(Failure::Error(redb::Error::PreviousIo)) => {}
-            Err(failure) => match failure.at(self.path()) {
-                StoreError::Damaged { .. } => {}
-                other => return Err(other),
-            },
+        match sound.map_err(|e| e.at(self.path())) {
+            Ok(true) => Ok(()),
+            Ok(false) | Err(StoreError::Damaged { .. }) => Err(StoreError::Damaged {
+                path: self.path().to_owned(),
+                reason: "its tree of pages does not match its checksums".to_owned(),
+            }),
+            Err(other) => Err(other),
         }
-        Err(StoreError::Damaged {
-            path: self.path().to_owned(),
-            reason: "its tree of pages does not match its checksums".to_owned(),
-        })
     }
 
     /// Shrinks the file to what it holds, and closes it.
