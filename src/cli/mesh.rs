@@ -269,7 +269,7 @@ fn tell(summary: &Summary, talk: &Talk) {
     if let Some(sizes) = &summary.sizes {
         talk.note(&sizes.to_string());
         for warning in &sizes.warnings {
-            talk.note(&format!("warning: {warning}"));
+            talk.warn(&warning.to_string());
         }
     }
 }

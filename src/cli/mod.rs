@@ -51,7 +51,7 @@ pub fn run() -> ExitCode {
         Ok(args) => args,
         Err(error) => return unparsed(&error),
     };
-    let talk = Talk::new(args.command.is_json());
+    let talk = Talk::with(args.command.is_json(), args.quiet);
     // redb may panic on a damaged tree, which is caught and told as damage; its own message would only confuse.
     std::panic::set_hook(Box::new(failure::remember_panic));
     let done = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {

@@ -16,6 +16,8 @@ const PLAIN_EVERY: Duration = Duration::from_secs(10);
 /// The voice of one command.
 pub struct Talk {
     json: bool,
+    /// Neither progress nor remarks.
+    quiet: bool,
     terminal: bool,
     bar: ProgressBar,
     state: RefCell<State>,
@@ -30,7 +32,12 @@ struct State {
 
 impl Talk {
     pub fn new(json: bool) -> Self {
-        let terminal = std::io::stderr().is_terminal() && !json;
+        Self::with(json, false)
+    }
+
+    /// One that tells of warnings and errors alone, if `quiet`.
+    pub fn with(json: bool, quiet: bool) -> Self {
+        let terminal = std::io::stderr().is_terminal() && !json && !quiet;
         let bar = if terminal {
             ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr_with_hz(10))
         } else {
@@ -39,6 +46,7 @@ impl Talk {
         let now = Instant::now();
         Self {
             json,
+            quiet,
             terminal,
             bar,
             state: RefCell::new(State {
@@ -56,6 +64,17 @@ impl Talk {
 
     /// A remark.
     pub fn note(&self, text: &str) {
+        if !self.quiet {
+            self.tell(text);
+        }
+    }
+
+    /// A remark that is never left out.
+    pub fn warn(&self, text: &str) {
+        self.tell(&format!("warning: {text}"));
+    }
+
+    fn tell(&self, text: &str) {
         if self.json {
             self.stderr_json(&serde_json::json!({ "note": text }));
         } else {
@@ -65,7 +84,7 @@ impl Talk {
 
     /// What an answer has cost, for programs.
     pub fn measures(&self, value: &serde_json::Value) {
-        if self.json {
+        if self.json && !self.quiet {
             self.stderr_json(&serde_json::json!({ "measures": value }));
         }
     }
@@ -85,6 +104,9 @@ impl Talk {
 
     /// Progress; called often.
     pub fn progress(&self, event: Event) {
+        if self.quiet {
+            return;
+        }
         let mut state = self.state.borrow_mut();
         let now = Instant::now();
         let new_stage = state.stage != event.stage;

@@ -76,6 +76,7 @@ impl SizeField {
             ranges: self.ranges(),
             least: self.frame.side / f64::from(1u32 << DEPTH),
             heap: BinaryHeap::new(),
+            crossed: Vec::new(),
             known: 0.0,
             volume: 0.0,
             cut: 0.0,
@@ -128,6 +129,8 @@ struct Sum<'a> {
     /// Side of the octree's finest cells.
     least: f64,
     heap: BinaryHeap<ByUnknown>,
+    /// Cells that the surface passes through and that are not divided: no vertex is near them, or they are the smallest.
+    crossed: Vec<Cell>,
     /// Load and volume of cells of which all is known.
     known: f64,
     volume: f64,
@@ -165,7 +168,7 @@ impl Sum<'_> {
     /// where a cell holds many parts of it. What the points tell is corrected by what they tell of the volume, which is known.
     fn of_rest(&self, rest: &[ByUnknown]) -> f64 {
         let (mut load, mut volume) = (0.0, self.volume);
-        let mut crossed = Vec::new();
+        let mut crossed: Vec<&Cell> = self.crossed.iter().collect();
         for ByUnknown(cell) in rest {
             if cell.is_crossed {
                 crossed.push(cell);
@@ -245,6 +248,10 @@ impl Sum<'_> {
             return 0.0;
         }
         if cell.unknown == 0.0 || cell.leaf.level == DEPTH {
+            if cell.is_crossed {
+                self.crossed.push(cell);
+                return 0.0;
+            }
             self.known += cell.load;
             self.volume += cell.volume;
             return 0.0;

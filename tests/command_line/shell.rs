@@ -58,3 +58,33 @@ fn every_command_has_a_manual_page() {
     }
     assert_eq!(place.run(&["man", "nothing"]).exit(), Some(2));
 }
+
+#[test]
+fn quiet_commands_tell_of_warnings_and_errors_alone() {
+    let place = Place::new();
+    let balls = "sample:balls,count=2,h=0.2";
+    let told = place.run(&["mesh", balls, "-o", "a.tetdb"]).succeeds();
+    let quiet = place
+        .run(&["mesh", balls, "-o", "b.tetdb", "--quiet"])
+        .succeeds();
+    assert!(!told.stderr().is_empty());
+    assert_eq!(quiet.stderr(), "");
+    let answer = quiet.stdout().replace("b.tetdb", "a.tetdb");
+    assert_eq!(
+        answer.lines().next(),
+        told.stdout().lines().next(),
+        "{answer}"
+    );
+    let warned = place.run(&["-q", "mesh", balls, "-o", "c.tetdb", "--hmax", "0.05"]);
+    let text = warned.succeeds().stderr();
+    assert!(
+        !text.is_empty() && text.lines().all(|l| l.starts_with("warning: ")),
+        "{text}"
+    );
+    let refused = place.run(&["info", "nothing.tetdb", "-q"]);
+    assert!(
+        refused.stderr().starts_with("error["),
+        "{}",
+        refused.stderr()
+    );
+}

@@ -32,6 +32,9 @@ pub use surface::{CheckArgs, RefineSurfaceArgs, SampleArgs};
     6 memory or disk, 7 the answer is no, 8 store unusable as it is, 130/143 stopped."
 )]
 pub struct Args {
+    /// Say nothing on stderr but warnings and errors
+    #[arg(long, short, global = true)]
+    pub quiet: bool,
     #[command(subcommand)]
     pub command: Command,
 }
