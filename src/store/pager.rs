@@ -12,7 +12,9 @@ use tetdb_schema::page::{
     u32_le,
 };
 
-use super::page_table::{DIRTY, FRAMES_LIMIT, IN_BASE, IN_WORK, PageTable, REFERENCED, RESIDENT};
+use super::page_table::{
+    DIRTY, FRAMES_LIMIT, IN_BASE, IN_WORK, PageTable, REFERENCED, RESIDENT, frame_of,
+};
 use super::{DiskPath, Pages, StoreError, StoreFile, fail, kind, stop_if_requested};
 
 /// Dirty pages written in one commit; a quarter of what redb's cache should hold.
@@ -161,13 +163,15 @@ impl Pager {
         }
     }
 
-    /// Ends a generation: writes every dirty page and closes the file, so that it may be listed. A file that is listed is not written to
-    /// again, not even by redb when it is closed: that would not be synced, and a loss of power could leave it torn.
+    /// Ends a generation: writes every dirty page, shrinks the file to what it holds and closes it, so that it may be listed. A file that is
+    /// listed is not written to again, not even by redb when it is closed: that would not be synced, and a loss of power could leave it torn.
     ///
     /// No page can be loaded until [`Pager::next_generation`]. Unwinds on errors.
     pub fn end_generation(&mut self) {
         self.flush();
-        self.work = None;
+        if let Some(Err(error)) = self.work.take().map(StoreFile::compact) {
+            fail(error);
+        }
     }
 
     /// Begins a generation, written to `path`, on what [`Pager::end_generation`] left; that one must have had no base of its own.
@@ -430,6 +434,7 @@ impl Pages for Pager {
     }
 
     fn drop_front<const K: usize>(&mut self, n: u32) {
+        self.unstore(K, n);
         let dropped = self.tables[K].drop_front(n as usize);
         self.release(dropped);
         self.first[K] += n;
@@ -443,12 +448,35 @@ impl Pages for Pager {
     }
 
     fn clear<const K: usize>(&mut self) {
+        self.unstore(K, self.n_pages::<K>());
         let dropped = std::mem::take(&mut self.tables[K]).frames();
         self.release(dropped);
     }
 }
 
 impl Pager {
+    /// Removes the first `n` pages of a kind from the file of this generation, which writes over their space. Unwinds on errors.
+    fn unstore(&mut self, kind: usize, n: u32) {
+        if self.work.is_none() {
+            return;
+        }
+        let mut keys = Vec::new();
+        for page in 0..n {
+            let entry = self.tables[kind].entry(page);
+            let place = frame_of(entry).map_or(entry, |frame| self.place(frame));
+            if place == IN_WORK {
+                let address = self.address(kind, page);
+                keys.push((page_key(address.kind, address.page), None));
+            }
+        }
+        let work = self.work.as_mut().expect("looked at above");
+        if !keys.is_empty()
+            && let Err(error) = work.change(keys.into_iter())
+        {
+            fail(error);
+        }
+    }
+
     /// Gives the frames of forgotten pages back.
     fn release(&mut self, frames: Vec<u32>) {
         for frame in frames {
@@ -456,5 +484,59 @@ impl Pager {
             self.owners[frame as usize] = NOBODY;
             self.free.push(frame);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PER_PAGE: u32 = 1 << SLOT_BITS;
+
+    fn fill(pager: &mut Pager, first: u32, n: u32) {
+        for page in first..first + n {
+            let page = match page {
+                page if page < pager.n_pages::<{ kind::TETS }>() => page,
+                _ => pager.append_page::<{ kind::TETS }>(),
+            };
+            pager.write::<{ kind::TETS }>(page * PER_PAGE)[0] = u32_le::from_native(page);
+        }
+    }
+
+    /// Pages written behind the old ones, which are then dropped, take their space: the file never holds much more than both.
+    #[test]
+    fn the_file_holds_no_pages_that_were_dropped() -> Result<(), Box<dyn std::error::Error>> {
+        const N: u32 = 400;
+        let dir = tempfile::tempdir()?;
+        let path = dir.path().join("pages");
+        let backing = Backing {
+            subdomain: 0,
+            generation: 1,
+            work_path: path.clone().into(),
+            base: None,
+            cache_bytes: 1 << 20,
+        };
+        let mut pager = Pager::new(32 * FRAME_BYTES as u64, Some(backing));
+        fill(&mut pager, 0, N);
+        let once = u64::from(N) * FRAME_BYTES as u64;
+        for _ in 0..6 {
+            fill(&mut pager, N, N);
+            pager.drop_front::<{ kind::TETS }>(N);
+            // A map that comes and goes, as long as half of the pages.
+            for _ in 0..N / 2 {
+                pager.append_page::<{ kind::SCRATCH }>();
+            }
+            pager.clear::<{ kind::SCRATCH }>();
+            assert!(std::fs::metadata(&path)?.len() < 3 * once);
+        }
+        pager.end_generation();
+        let kept = std::fs::metadata(&path)?.len();
+        assert!(kept < once + once / 8, "{kept} for {once}");
+        pager.next_generation(2, dir.path().join("more").into())?;
+        for page in 0..N {
+            let found = pager.read::<{ kind::TETS }>(page * PER_PAGE)[0].to_native();
+            assert_eq!(found, page + N);
+        }
+        Ok(())
     }
 }
