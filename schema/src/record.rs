@@ -141,7 +141,8 @@ impl SealedTet {
                 lead = i;
             }
         }
-        let [a, b, c, d] = LEAD[lead].map(|i| n[i]);
+        let [a, b, c, d] = LEAD[lead];
+        let [a, b, c, d] = [n[a], n[b], n[c], n[d]];
         let nodes = if b < c && b < d {
             [a, b, c, d]
         } else if c < d {

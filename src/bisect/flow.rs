@@ -10,9 +10,6 @@
 
 use std::collections::VecDeque;
 
-/// No node.
-pub(super) const NOBODY: u32 = u32::MAX;
-
 /// Which tree a node is in.
 #[derive(Clone, Copy, PartialEq, Eq, Default)]
 enum Root {
@@ -46,16 +43,50 @@ const NOWHERE: Place = Place {
     seen: 0,
 };
 
-/// A graph between a source and a sink. Memory: 60 bytes a node.
+/// An arc to a node, by which it is that node's arc too: the two of a pair are found from each other without a search.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) struct Arc(u32);
+
+impl Arc {
+    /// No arc.
+    pub(super) const NONE: Self = Self(u32::MAX);
+
+    /// The arc to `node`, whose arc `back` leads the other way.
+    pub(super) fn new(node: u32, back: usize) -> Self {
+        Self(node << 2 | back as u32)
+    }
+
+    #[inline]
+    fn node(self) -> u32 {
+        self.0 >> 2
+    }
+
+    #[inline]
+    fn back(self) -> usize {
+        (self.0 & 3) as usize
+    }
+}
+
+/// A node in one line of the cache: nearly every step needs its arcs and its place.
+#[derive(Clone, Copy)]
+#[repr(align(64))]
+struct Node {
+    arcs: [Arc; 4],
+    /// What still fits through each arc, towards the neighbor.
+    residual: [u32; 4],
+    /// What still fits from the source and to the sink.
+    terminal: [u32; 2],
+    place: Place,
+}
+
+const _: () = assert!(size_of::<Node>() == 64);
+
+/// A graph between a source and a sink. Memory: 64 bytes a node, and 8 for the queues.
+///
+/// Nodes that are near in the graph should have near numbers: the result is the same, the time is not.
 #[derive(Default)]
 pub(super) struct Graph {
-    /// Up to four neighbors.
-    neighbor: Vec<[u32; 4]>,
-    /// What still fits through each arc, towards the neighbor.
-    residual: Vec<[u32; 4]>,
-    /// What still fits from the source and to the sink.
-    terminal: Vec<[u32; 2]>,
-    places: Vec<Place>,
+    nodes: Vec<Node>,
     active: VecDeque<u32>,
     orphans: VecDeque<u32>,
     time: u32,
@@ -63,46 +94,43 @@ pub(super) struct Graph {
 
 impl Graph {
     pub(super) fn clear(&mut self) {
-        self.neighbor.clear();
-        self.residual.clear();
-        self.terminal.clear();
+        self.nodes.clear();
     }
 
     /// Bytes it has room for.
     pub(super) fn bytes(&self) -> u64 {
         let queues = (self.active.capacity() + self.orphans.capacity()) * size_of::<u32>();
-        let arcs = (self.neighbor.capacity() + self.residual.capacity()) * size_of::<[u32; 4]>();
-        let nodes = self.terminal.capacity() * size_of::<[u32; 2]>()
-            + self.places.capacity() * size_of::<Place>();
-        (queues + arcs + nodes) as u64
+        (queues + self.nodes.capacity() * size_of::<Node>()) as u64
     }
 
     pub(super) fn n_nodes(&self) -> usize {
-        self.neighbor.len()
+        self.nodes.len()
     }
 
-    /// Adds a node: its neighbors (each must name it too, with the same capacity) and its arcs from source and to sink.
-    pub(super) fn push(&mut self, neighbor: [u32; 4], capacity: [u32; 4], terminal: [u32; 2]) {
-        self.neighbor.push(neighbor);
-        self.residual.push(capacity);
-        self.terminal.push(terminal);
+    /// Adds a node: its arcs (the other of each pair has the same capacity) and what fits from source and to sink.
+    pub(super) fn push(&mut self, arcs: [Arc; 4], capacity: [u32; 4], terminal: [u32; 2]) {
+        self.nodes.push(Node {
+            arcs,
+            residual: capacity,
+            terminal,
+            place: NOWHERE,
+        });
     }
 
     /// The capacity of arc `k` of a node, before [`Graph::cut`].
     pub(super) fn capacity(&self, node: u32, k: usize) -> u32 {
-        self.residual[node as usize][k]
+        self.nodes[node as usize].residual[k]
     }
 
     /// Runs the flow and returns its value, the capacity of the cut. Afterwards [`Graph::is_source_side`] tells the sides.
     pub(super) fn cut(&mut self) -> u64 {
-        let n = self.n_nodes();
-        self.places.clear();
-        self.places.resize(n, NOWHERE);
         self.active.clear();
         self.time = 1;
         let mut value = 0;
-        for node in 0..n as u32 {
-            let [from, to] = &mut self.terminal[node as usize];
+        for number in 0..self.n_nodes() as u32 {
+            let node = &mut self.nodes[number as usize];
+            node.place = NOWHERE;
+            let [from, to] = &mut node.terminal;
             let through = (*from).min(*to);
             *from -= through;
             *to -= through;
@@ -112,12 +140,12 @@ impl Graph {
                 (0, _) => Root::Sink,
                 _ => Root::Source,
             };
-            let place = &mut self.places[node as usize];
+            let place = &mut node.place;
             (place.root, place.parent, place.distance) = (root, TERMINAL, 1);
-            self.activate(node);
+            self.activate(number);
         }
         while let Some(node) = self.active.pop_front() {
-            self.places[node as usize].active = false;
+            self.place_mut(node).active = false;
             // The same node goes on until nothing grows from it.
             while let Some((from, arc)) = self.grow(node) {
                 value += u64::from(self.augment(from, arc));
@@ -129,58 +157,70 @@ impl Graph {
 
     /// Whether the node is on the source's side of the cut nearest to the source.
     pub(super) fn is_source_side(&self, node: u32) -> bool {
-        self.places[node as usize].root == Root::Source
+        self.place(node).root == Root::Source
     }
 
+    #[inline]
+    fn place(&self, node: u32) -> Place {
+        self.nodes[node as usize].place
+    }
+
+    #[inline]
+    fn place_mut(&mut self, node: u32) -> &mut Place {
+        &mut self.nodes[node as usize].place
+    }
+
+    #[inline]
+    fn arc(&self, node: u32, k: usize) -> Arc {
+        self.nodes[node as usize].arcs[k]
+    }
+
+    /// What still fits through the arc that leads back along `arc`.
+    #[inline]
+    fn inward(&self, arc: Arc) -> u32 {
+        self.nodes[arc.node() as usize].residual[arc.back()]
+    }
+
+    #[inline]
     fn activate(&mut self, node: u32) {
-        let place = &mut self.places[node as usize];
+        let place = self.place_mut(node);
         if !place.active {
             place.active = true;
             self.active.push_back(node);
         }
     }
 
-    /// Which neighbor of `node` is `other`.
-    fn arc_to(&self, node: u32, other: u32) -> usize {
-        let found = self.neighbor[node as usize]
-            .iter()
-            .position(|&n| n == other);
-        found.expect("neighbors name each other")
-    }
-
-    /// What fits through arc `k` of `node` away from the terminal of the tree `root`.
-    fn outward(&self, node: u32, k: usize, root: Root) -> u32 {
-        if root == Root::Source {
-            return self.residual[node as usize][k];
-        }
-        let other = self.neighbor[node as usize][k];
-        self.residual[other as usize][self.arc_to(other, node)]
-    }
-
     /// Grows the tree from `node`; returns the arc, from the source's tree into the sink's, where they touch.
-    fn grow(&mut self, node: u32) -> Option<(u32, usize)> {
-        let place = self.places[node as usize];
+    fn grow(&mut self, number: u32) -> Option<(u32, usize)> {
+        let node = self.nodes[number as usize];
+        let place = node.place;
         if place.root == Root::Free {
             return None;
         }
-        for k in 0..4 {
-            let other = self.neighbor[node as usize][k];
-            if other == NOBODY || self.outward(node, k, place.root) == 0 {
+        for (k, arc) in node.arcs.into_iter().enumerate() {
+            if arc == Arc::NONE {
                 continue;
             }
-            let back = self.arc_to(other, node);
-            let there = &mut self.places[other as usize];
+            // What fits away from the terminal of the tree.
+            let outward = match place.root {
+                Root::Source => node.residual[k],
+                _ => self.inward(arc),
+            };
+            if outward == 0 {
+                continue;
+            }
+            let there = self.place_mut(arc.node());
             if there.root == Root::Free {
-                (there.root, there.parent) = (place.root, back as u8);
+                (there.root, there.parent) = (place.root, arc.back() as u8);
                 (there.distance, there.seen) = (place.distance + 1, place.seen);
-                self.activate(other);
+                self.activate(arc.node());
             } else if there.root != place.root {
                 return Some(match place.root {
-                    Root::Source => (node, k),
-                    _ => (other, back),
+                    Root::Source => (number, k),
+                    _ => (arc.node(), arc.back()),
                 });
             } else if there.seen <= place.seen && there.distance > place.distance + 1 {
-                there.parent = back as u8;
+                there.parent = arc.back() as u8;
                 (there.distance, there.seen) = (place.distance + 1, place.seen);
             }
         }
@@ -189,68 +229,69 @@ impl Graph {
 
     /// Fills the path through arc `arc` of `from`; what it saturates loses its parent.
     fn augment(&mut self, from: u32, arc: usize) -> u32 {
-        let to = self.neighbor[from as usize][arc];
-        let mut pushed = self.residual[from as usize][arc];
+        let to = self.arc(from, arc).node();
+        let mut pushed = self.nodes[from as usize].residual[arc];
         for start in [from, to] {
-            let mut node = start;
+            let mut at = start;
             loop {
-                let place = self.places[node as usize];
-                let side = usize::from(place.root == Root::Sink);
-                if place.parent == TERMINAL {
-                    pushed = pushed.min(self.terminal[node as usize][side]);
+                let node = &self.nodes[at as usize];
+                let side = usize::from(node.place.root == Root::Sink);
+                if node.place.parent == TERMINAL {
+                    pushed = pushed.min(node.terminal[side]);
                     break;
                 }
-                let k = usize::from(place.parent);
-                let parent = self.neighbor[node as usize][k];
+                let k = usize::from(node.place.parent);
+                let up = node.arcs[k];
                 pushed = pushed.min(if side == 0 {
-                    self.residual[parent as usize][self.arc_to(parent, node)]
+                    self.inward(up)
                 } else {
-                    self.residual[node as usize][k]
+                    node.residual[k]
                 });
-                node = parent;
+                at = up.node();
             }
         }
         self.push_through(from, arc, pushed);
         for start in [from, to] {
-            let mut node = start;
+            let mut at = start;
             loop {
-                let place = self.places[node as usize];
-                let side = usize::from(place.root == Root::Sink);
-                if place.parent == TERMINAL {
-                    self.terminal[node as usize][side] -= pushed;
-                    if self.terminal[node as usize][side] == 0 {
-                        self.orphan(node);
+                let node = &mut self.nodes[at as usize];
+                let side = usize::from(node.place.root == Root::Sink);
+                if node.place.parent == TERMINAL {
+                    node.terminal[side] -= pushed;
+                    if node.terminal[side] == 0 {
+                        self.orphan(at);
                     }
                     break;
                 }
-                let k = usize::from(place.parent);
-                let parent = self.neighbor[node as usize][k];
+                let k = usize::from(node.place.parent);
+                let up = node.arcs[k];
                 let left = if side == 0 {
-                    let arc = self.arc_to(parent, node);
-                    self.push_through(parent, arc, pushed);
-                    self.residual[parent as usize][arc]
+                    self.push_through(up.node(), up.back(), pushed)
                 } else {
-                    self.push_through(node, k, pushed);
-                    self.residual[node as usize][k]
+                    self.push_through(at, k, pushed)
                 };
                 if left == 0 {
-                    self.orphan(node);
+                    self.orphan(at);
                 }
-                node = parent;
+                at = up.node();
             }
         }
         pushed
     }
 
-    fn push_through(&mut self, from: u32, arc: usize, amount: u32) {
-        let to = self.neighbor[from as usize][arc];
-        let back = self.arc_to(to, from);
-        self.residual[from as usize][arc] -= amount;
-        self.residual[to as usize][back] += amount;
+    /// Returns what still fits.
+    #[inline]
+    fn push_through(&mut self, from: u32, k: usize, amount: u32) -> u32 {
+        let node = &mut self.nodes[from as usize];
+        let arc = node.arcs[k];
+        node.residual[k] -= amount;
+        let left = node.residual[k];
+        self.nodes[arc.node() as usize].residual[arc.back()] += amount;
+        left
     }
 
     fn orphan(&mut self, node: u32) {
-        self.places[node as usize].parent = ORPHAN;
+        self.place_mut(node).parent = ORPHAN;
         self.orphans.push_back(node);
     }
 
@@ -262,44 +303,45 @@ impl Graph {
     }
 
     /// Finds the nearest new parent for an orphan, or lets it go.
-    fn adopt(&mut self, node: u32) {
-        let root = self.places[node as usize].root;
+    fn adopt(&mut self, number: u32) {
+        let node = self.nodes[number as usize];
+        let root = node.place.root;
+        // What fits through arc `k` from the neighbor, seen from the terminal of the tree.
+        let fits = |graph: &Self, k: usize| match root {
+            Root::Source => graph.inward(node.arcs[k]) > 0,
+            _ => node.residual[k] > 0,
+        };
         let mut best = None::<(u32, usize)>;
-        for k in 0..4 {
-            let other = self.neighbor[node as usize][k];
-            if other == NOBODY || self.places[other as usize].root != root {
+        for (k, arc) in node.arcs.into_iter().enumerate() {
+            if arc == Arc::NONE || self.place(arc.node()).root != root || !fits(self, k) {
                 continue;
             }
-            let back = self.arc_to(other, node);
-            if self.outward(other, back, root) == 0 {
-                continue;
-            }
-            if let Some(distance) = self.distance(other)
+            if let Some(distance) = self.distance(arc.node())
                 && best.is_none_or(|(least, _)| distance < least)
             {
                 best = Some((distance, k));
             }
         }
         if let Some((distance, k)) = best {
-            let place = &mut self.places[node as usize];
-            (place.parent, place.distance, place.seen) = (k as u8, distance + 1, self.time);
+            let time = self.time;
+            let place = self.place_mut(number);
+            (place.parent, place.distance, place.seen) = (k as u8, distance + 1, time);
             return;
         }
-        for k in 0..4 {
-            let other = self.neighbor[node as usize][k];
-            if other == NOBODY || self.places[other as usize].root != root {
+        for (k, arc) in node.arcs.into_iter().enumerate() {
+            if arc == Arc::NONE || self.place(arc.node()).root != root {
                 continue;
             }
-            let back = self.arc_to(other, node);
-            if self.outward(other, back, root) > 0 {
-                self.activate(other);
+            if fits(self, k) {
+                self.activate(arc.node());
             }
-            if usize::from(self.places[other as usize].parent) == back {
-                self.orphan(other);
+            if usize::from(self.place(arc.node()).parent) == arc.back() {
+                self.orphan(arc.node());
             }
         }
-        let active = self.places[node as usize].active;
-        self.places[node as usize] = Place { active, ..NOWHERE };
+        let place = self.place_mut(number);
+        let active = place.active;
+        *place = Place { active, ..NOWHERE };
     }
 
     /// Arcs from `node` to the terminal of its tree, if it still leads there; remembered for this time.
@@ -307,28 +349,27 @@ impl Graph {
         let mut steps = 0;
         let mut at = node;
         let known = loop {
-            let place = self.places[at as usize];
+            let node = &mut self.nodes[at as usize];
+            let place = &mut node.place;
             if place.seen == self.time {
                 break place.distance;
             }
             match place.parent {
                 ORPHAN => return None,
                 TERMINAL => {
-                    let place = &mut self.places[at as usize];
                     (place.distance, place.seen) = (1, self.time);
                     break 1;
                 }
-                k => at = self.neighbor[at as usize][usize::from(k)],
+                k => at = node.arcs[usize::from(k)].node(),
             }
             steps += 1;
         };
         let distance = known + steps;
         let (mut at, mut left) = (node, distance);
-        while self.places[at as usize].seen != self.time {
-            let place = &mut self.places[at as usize];
-            (place.distance, place.seen) = (left, self.time);
-            let k = usize::from(place.parent);
-            at = self.neighbor[at as usize][k];
+        while self.place(at).seen != self.time {
+            let node = &mut self.nodes[at as usize];
+            (node.place.distance, node.place.seen) = (left, self.time);
+            at = node.arcs[usize::from(node.place.parent)].node();
             left -= 1;
         }
         Some(distance)
@@ -338,6 +379,9 @@ impl Graph {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// No node.
+    const NOBODY: u32 = u32::MAX;
 
     /// Least cut by trying all.
     fn by_trying(neighbor: &[[u32; 4]], capacity: &[[u32; 4]], terminal: &[[u32; 2]]) -> u64 {
@@ -391,7 +435,14 @@ mod tests {
                 .collect();
             let mut graph = Graph::default();
             for k in 0..n {
-                graph.push(neighbor[k], capacity[k], terminal[k]);
+                let arcs = neighbor[k].map(|other| {
+                    if other == NOBODY {
+                        return Arc::NONE;
+                    }
+                    let back = neighbor[other as usize].iter().position(|&b| b == k as u32);
+                    Arc::new(other, back.expect("neighbors name each other"))
+                });
+                graph.push(arcs, capacity[k], terminal[k]);
             }
             let value = graph.cut();
             assert_eq!(value, by_trying(&neighbor, &capacity, &terminal));

@@ -10,7 +10,7 @@
 use rayon::prelude::*;
 
 use super::core::Rim;
-use super::flow::{Graph, NOBODY};
+use super::flow::{Arc, Graph};
 use super::labels::{InterfaceMeasures, Labels, face_cost, measure};
 use super::moves::Moves;
 use super::split::interface_points;
@@ -124,21 +124,29 @@ fn minimum_cut<P: Pages>(
     for border in (length..free.len()).step_by(length) {
         kinds[2].push(&order[border - half..free.len().min(border + half)]);
     }
-    let mut graphs: Vec<Graph> = (0..strips.min(AT_ONCE)).map(|_| Graph::default()).collect();
+    let mut cuts: Vec<(Vec<u32>, Graph)> = Vec::new();
+    cuts.resize_with(strips.min(AT_ONCE), Default::default);
     for strips in kinds.iter().flat_map(|kind| kind.chunks(AT_ONCE)) {
-        for (strip, graph) in strips.iter().zip(&mut graphs) {
+        for (&strip, (tets, graph)) in strips.iter().zip(&mut cuts) {
             stop_if_requested();
-            read_strip(core, labels, surface, strip, graph);
+            // In id order, which follows the curve: what is near in space is near in the graph's memory. The least cut is one and the same.
+            tets.clear();
+            tets.extend_from_slice(strip);
+            tets.sort_unstable();
+            read_strip(core, labels, surface, tets, graph);
         }
-        graphs[..strips.len()].par_iter_mut().for_each(|graph| {
+        cuts[..strips.len()].par_iter_mut().for_each(|(_, graph)| {
             graph.cut();
         });
-        for (strip, graph) in strips.iter().zip(&graphs) {
-            label_strip(labels, strip, graph);
+        for (tets, graph) in &cuts[..strips.len()] {
+            label_strip(labels, tets, graph);
         }
     }
     core.clear_scratch();
-    size_of_val(&order[..]) as u64 + sorting.max(graphs.iter().map(Graph::bytes).sum())
+    let held = cuts
+        .iter()
+        .map(|(tets, graph)| 4 * tets.capacity() as u64 + graph.bytes());
+    size_of_val(&order[..]) as u64 + sorting.max(held.sum())
 }
 
 /// Sorts along the longest direction in the surface, among three; returns the bytes held meanwhile.
@@ -192,7 +200,7 @@ fn read_strip<P: Pages>(
     graph.clear();
     for &t in strip {
         let tet = core.tet(t);
-        let mut neighbor = [NOBODY; 4];
+        let mut arcs = [Arc::NONE; 4];
         let mut capacity = [0; 4];
         let mut terminal = [0; 2];
         for (i, across) in tet.neighbor.into_iter().enumerate() {
@@ -202,18 +210,19 @@ fn read_strip<P: Pages>(
             let node = core.scratch(dense(across.tet()));
             if node != NONE && (node as usize) < graph.n_nodes() {
                 // Its own cost was found from the other side.
-                (neighbor[i], capacity[i]) = (node, graph.capacity(node, across.face()));
+                arcs[i] = Arc::new(node, across.face());
+                capacity[i] = graph.capacity(node, across.face());
                 continue;
             }
             let corners = tet.face(i).map(|v| core.point(v));
             let cost = symmetric_cost(corners, surface);
             if node != NONE {
-                (neighbor[i], capacity[i]) = (node, cost);
+                (arcs[i], capacity[i]) = (Arc::new(node, across.face()), cost);
             } else {
                 terminal[usize::from(labels.is_high(across.tet()))] += cost;
             }
         }
-        graph.push(neighbor, capacity, terminal);
+        graph.push(arcs, capacity, terminal);
     }
     for &t in strip {
         core.set_scratch(dense(t), NONE);

@@ -74,20 +74,21 @@ pub fn tally<P: Pages, T: Send>(
         stop_if_requested();
         lanes.par_iter_mut().for_each(|(tets, sum)| {
             let mut stack = Vec::new();
-            for tet in tets.drain(..) {
-                divide(tet, h, &mut stack, &mut |piece| add(sum, piece));
+            for tet in &*tets {
+                divide(*tet, h, &mut stack, &mut |piece| add(sum, piece));
             }
+            tets.clear();
         });
     }
 }
 
 /// Calls `visit` with every piece of a tetrahedron; `stack` is empty before and after.
 fn divide(tet: Sized4, h: &SizeAt, stack: &mut Vec<Sized4>, visit: &mut impl FnMut(&Piece)) {
-    stack.push(tet);
-    while let Some((points, sizes)) = stack.pop() {
+    let mut next = Some(tet);
+    while let Some((points, sizes)) = next.take().or_else(|| stack.pop()) {
         let (edge, [i, j]) = longest(&points);
-        let least = sizes.iter().fold(f64::INFINITY, |m, &x| m.min(x));
-        let most = sizes.iter().fold(0.0, |m: f64, &x| m.max(x));
+        let least = (sizes[0].min(sizes[1])).min(sizes[2].min(sizes[3]));
+        let most = (sizes[0].max(sizes[1])).max(sizes[2].max(sizes[3]));
         let coarse = edge > EDGE_MAX * least || most > RATIO_MAX * least;
         let [a, b, c, d] = points;
         let volume = (b - a).cross(c - a).dot(d - a) / 6.0;
@@ -95,11 +96,13 @@ fn divide(tet: Sized4, h: &SizeAt, stack: &mut Vec<Sized4>, visit: &mut impl FnM
             let middle = (points[i] + points[j]) * 0.5;
             let size = h(middle);
             if volume > LOAD_MIN * least.min(size).powi(3) {
-                for end in [i, j] {
-                    let (mut p, mut s) = (points, sizes);
-                    (p[end], s[end]) = (middle, size);
-                    stack.push((p, s));
-                }
+                let half = |end: usize| {
+                    let (mut points, mut sizes) = (points, sizes);
+                    (points[end], sizes[end]) = (middle, size);
+                    (points, sizes)
+                };
+                stack.push(half(i));
+                next = Some(half(j));
                 continue;
             }
         }

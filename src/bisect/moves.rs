@@ -26,7 +26,7 @@ const PINCHED: u8 = 4;
 const SETTLED_TET: u8 = 1;
 const MOVED: u8 = 2;
 
-/// Scratch of the moves. Memory: one byte for each vertex and tetrahedron of the core.
+/// Scratch of the moves. Memory: one byte for each vertex of the core, three for each tetrahedron.
 pub(super) struct Moves<'a, S> {
     /// The sides, as they are.
     pub(super) labels: Labels,
@@ -43,6 +43,8 @@ pub(super) struct Moves<'a, S> {
     /// Notes by dense number. A move that did not gain is not tried again before a side changes that it was judged by.
     of_vertices: Vec<u8>,
     of_tets: Vec<u8>,
+    /// Of a tetrahedron of the ball `around`: its position there. Of any other: what it was in an earlier ball.
+    at: Vec<u16>,
 }
 
 impl<'a, S: CuttingSurface> Moves<'a, S> {
@@ -66,12 +68,13 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
             stack: Vec::new(),
             of_vertices: vec![0; dense(core.vertex_ids_end()) as usize],
             of_tets: vec![0; dense(core.tet_ids_end()) as usize],
+            at: vec![0; dense(core.tet_ids_end()) as usize],
         }
     }
 
     /// Bytes of the notes.
     pub(super) fn bytes(&self) -> u64 {
-        (self.of_vertices.len() + self.of_tets.len()) as u64
+        (self.of_vertices.len() + 3 * self.of_tets.len()) as u64
     }
 
     /// Moves until no move gains; returns how many were made.
@@ -326,6 +329,9 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
         if self.part.iter().all(|&p| p == self.part[0]) {
             return 0;
         }
+        for (k, &t) in self.around.tets.iter().enumerate() {
+            self.at[dense(t) as usize] = k as u16;
+        }
         // 0 and 1: not yet reached, low and high; 2: reached.
         let mut parts = [0; 2];
         for k in 0..n {
@@ -344,8 +350,9 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
                     if !across.exists() {
                         continue;
                     }
-                    let other = self.around.tets.iter().position(|&t| t == across.tet());
-                    if let Some(other) = other.filter(|&o| self.part[o] == side) {
+                    // Through a face at the vertex the way leads to another of its ball.
+                    let other = usize::from(self.at[dense(across.tet()) as usize]);
+                    if self.part[other] == side {
                         self.part[other] = 2;
                         self.stack.push(other);
                     }

@@ -107,15 +107,18 @@ pub fn choose<P: Pages>(
         set_sizes(mesh, h);
         return chosen;
     }
-    let axis = match choice {
+    let spread = match choice {
         PlaneChoice::Given(plane) => {
             return Spread::gather(mesh, h, plane.normal).at(plane.offset);
         }
-        PlaneChoice::Centroids => principal_axes(&centroid_moments(mesh, origin))[0],
+        PlaneChoice::Centroids => {
+            let axis = principal_axes(&centroid_moments(mesh, origin))[0];
+            Spread::gather(mesh, h, axis)
+        }
         PlaneChoice::Load | PlaneChoice::Volume => {
-            let grid = Grid::gather(mesh, h);
+            let (grid, mut along) = Grid::gather(mesh, h);
             let mut axes = principal_axes(&grid.moments().matrix()).to_vec();
-            axes.extend([Point::X, Point::Y, Point::Z]);
+            axes.extend(COORDINATES);
             // Fewest faces; of equals the first, but an axis along a coordinate is preferred where it costs a hundredth at most.
             let areas = axes.iter().map(|&axis| {
                 let spread = grid.spread(axis);
@@ -124,11 +127,14 @@ pub fn choose<P: Pages>(
             let scores = (0..)
                 .zip(areas)
                 .map(|(k, a)| if k < 3 { 1.01 * a } else { a });
-            let best = scores.zip(&axes).min_by(|a, b| a.0.total_cmp(&b.0));
-            *best.expect("there are axes").1
+            let best = scores.zip(0..).min_by(|a, b| a.0.total_cmp(&b.0));
+            let best: usize = best.expect("there are axes").1;
+            match best.checked_sub(3) {
+                Some(coordinate) => along.swap_remove(coordinate),
+                None => Spread::gather(mesh, h, axes[best]),
+            }
         }
     };
-    let spread = Spread::gather(mesh, h, axis);
     let chosen = spread.at(spread.quantile(low));
     shift(mesh, chosen, &spread)
 }
@@ -140,6 +146,10 @@ pub(super) fn set_sizes<P: Pages>(mesh: &mut Mesh<P>, h: &SizeAt) {
         mesh.set_size(v, h(p) as f32);
     }
 }
+
+/// Axes whose spreads are gathered with the grid: one of them is chosen more often than not, and dividing the mesh into pieces a second
+/// time costs more than three sums in place of one.
+const COORDINATES: [Point; 3] = [Point::X, Point::Y, Point::Z];
 
 /// Cells of the grid along each axis.
 const CELLS: usize = 48;
@@ -153,41 +163,60 @@ struct Grid {
 }
 
 impl Grid {
-    fn gather<P: Pages>(mesh: &mut Mesh<P>, h: &SizeAt) -> Self {
+    /// The grid, and the spreads along [`COORDINATES`].
+    fn gather<P: Pages>(mesh: &mut Mesh<P>, h: &SizeAt) -> (Self, Vec<Spread>) {
         // Nearly always that of the tetrahedra: few vertices have none.
         let around_all = bounds_of_vertices(mesh);
-        let (grid, around_tets) = Self::gather_in(mesh, h, around_all);
+        let (gathered, around_tets) = Self::gather_in(mesh, h, around_all);
         if around_tets == around_all {
-            return grid;
+            return gathered;
         }
         Self::gather_in(mesh, h, around_tets).0
     }
 
-    /// Gathers on the cells of a box, which should be that of the corners of all tetrahedra; returns that too.
-    fn gather_in<P: Pages>(mesh: &mut Mesh<P>, h: &SizeAt, bounds: Aabb) -> (Self, Aabb) {
+    /// Gathers in a box, which should be that of the corners of all tetrahedra; returns that too.
+    fn gather_in<P: Pages>(
+        mesh: &mut Mesh<P>,
+        h: &SizeAt,
+        bounds: Aabb,
+    ) -> ((Self, Vec<Spread>), Aabb) {
         let mut seen = Aabb::EMPTY;
         let width = (bounds.high - bounds.low) / CELLS as f64;
-        let empty = || vec![[0.0; 2]; CELLS * CELLS * CELLS];
+        let (low, high) = (bounds.low.to_array(), bounds.high.to_array());
+        let empty = || {
+            let along = [0, 1, 2].map(|k| Ramps::new(COORDINATES[k], [low[k], high[k]]));
+            (vec![[0.0; 2]; CELLS * CELLS * CELLS], along)
+        };
         let see = &mut |p| seen = seen.with(p);
-        let [mut cells, others @ ..] = tally(mesh, h, empty, see, |cells, piece| {
-            let middle = piece.points.iter().sum::<Point>() * 0.25;
-            let at = ((middle - bounds.low) / width).to_array();
-            let [x, y, z] = at.map(|c| (c as usize).min(CELLS - 1));
-            let cell = &mut cells[(z * CELLS + y) * CELLS + x];
-            cell[0] += piece.load;
-            cell[1] += piece.load * piece.h;
-        });
-        for other in &others {
-            for (cell, more) in cells.iter_mut().zip(other) {
+        let [(mut cells, mut along), others @ ..] =
+            tally(mesh, h, empty, see, |(cells, along), piece| {
+                let [a, b, c, d] = piece.points;
+                let middle = (a + b + c + d) * 0.25;
+                let section = piece.load * piece.h;
+                let at = (middle - bounds.low) / width;
+                let number = |c: f64| (c as usize).min(CELLS - 1);
+                let cell = (number(at.z) * CELLS + number(at.y)) * CELLS + number(at.x);
+                let cell = &mut cells[cell];
+                *cell = [cell[0] + piece.load, cell[1] + section];
+                let from = a.min(b).min(c.min(d)).to_array();
+                let to = a.max(b).max(c.max(d)).to_array();
+                for (k, ramps) in along.iter_mut().enumerate() {
+                    ramps.add(from[k], to[k], piece.load, section);
+                }
+            });
+        for (more_cells, more_along) in &others {
+            for (cell, more) in cells.iter_mut().zip(more_cells) {
                 *cell = [cell[0] + more[0], cell[1] + more[1]];
             }
+            (along.iter_mut().zip(more_along)).for_each(|(ramps, more)| ramps.add_all(more));
         }
         let grid = Self {
             low: bounds.low,
             width,
             cells,
         };
-        (grid, seen)
+        let along = along.into_iter().map(Ramps::sum_up).collect();
+        ((grid, along), seen)
     }
 
     /// Middles of the cells with something in them.

@@ -77,8 +77,8 @@ impl Place for InZone<'_> {
         near || (low && high)
     }
 
-    fn stretch(&self, a: Point, b: Point) -> Option<[f64; 2]> {
-        if both_in_one(self.earlier, self.h, a, b) {
+    fn stretch(&self, a: Point, b: Point, sizes: [f64; 2]) -> Option<[f64; 2]> {
+        if both_in_one(self.earlier, self.h, [a, b], sizes) {
             return None;
         }
         let surface = &self.zone.surface;
@@ -97,10 +97,26 @@ impl Place for InZone<'_> {
 }
 
 /// Whether one zone holds both ends of an edge: it was saturated there, and what optimization made of it since is final.
-fn both_in_one(zones: &[Zone], h: &dyn Fn(Point) -> f64, a: Point, b: Point) -> bool {
+///
+/// Rounded sizes tell most edges that are not without asking for those of the field.
+fn both_in_one(
+    zones: &[Zone],
+    h: &dyn Fn(Point) -> f64,
+    [a, b]: [Point; 2],
+    [near_a, near_b]: [f64; 2],
+) -> bool {
+    let may_be = |zone: &Zone| {
+        zone.is_final(a, near_a * ROUNDED_UP) && zone.is_final(b, near_b * ROUNDED_UP)
+    };
+    if !zones.iter().any(may_be) {
+        return false;
+    }
     let (ha, hb) = (h(a), h(b));
     (zones.iter()).any(|zone| zone.is_final(a, ha) && zone.is_final(b, hb))
 }
+
+/// Makes a size that was rounded to `f32` at least what it was.
+const ROUNDED_UP: f64 = 1.0 + 1e-6;
 
 /// Everywhere but in the zones of earlier cuts.
 pub struct OutsideZones<'a> {
@@ -109,8 +125,8 @@ pub struct OutsideZones<'a> {
 }
 
 impl Place for OutsideZones<'_> {
-    fn stretch(&self, a: Point, b: Point) -> Option<[f64; 2]> {
-        (!both_in_one(self.zones, self.h, a, b)).then_some([0.0, 1.0])
+    fn stretch(&self, a: Point, b: Point, sizes: [f64; 2]) -> Option<[f64; 2]> {
+        (!both_in_one(self.zones, self.h, [a, b], sizes)).then_some([0.0, 1.0])
     }
 
     fn admits(&self, _: Point, _: f64) -> bool {

@@ -123,7 +123,11 @@ impl Worker {
         if metric <= long || fixed && self.is_required(mesh, a, b, tet) {
             return;
         }
-        let Some([from, to]) = field.place.stretch(pa, pb) else {
+        let sizes = match field.lengths {
+            Lengths::Field => [ha, hb],
+            Lengths::Ends => [f64::INFINITY; 2],
+        };
+        let Some([from, to]) = field.place.stretch(pa, pb, sizes) else {
             return;
         };
         // An edge short enough is divided as it is everywhere; of a long one only the stretch counts, so that its

@@ -16,8 +16,8 @@ pub trait Place {
 
     /// The stretch of the way from `a` to `b` on which points are of use, as parameters in [0, 1]; `None` when there is none.
     ///
-    /// It may be too long, never too short.
-    fn stretch(&self, a: Point, b: Point) -> Option<[f64; 2]>;
+    /// It may be too long, never too short. `sizes` are the wanted lengths at the ends, rounded to `f32`, or infinite where they are not known.
+    fn stretch(&self, a: Point, b: Point, sizes: [f64; 2]) -> Option<[f64; 2]>;
 
     /// Whether a point with that wanted length is to be tried. Asked first: what it refuses costs nothing and is not counted.
     fn admits(&self, p: Point, h: f64) -> bool;
@@ -31,7 +31,7 @@ pub trait Place {
 pub struct Everywhere;
 
 impl Place for Everywhere {
-    fn stretch(&self, _: Point, _: Point) -> Option<[f64; 2]> {
+    fn stretch(&self, _: Point, _: Point, _: [f64; 2]) -> Option<[f64; 2]> {
         Some([0.0, 1.0])
     }
     fn admits(&self, _: Point, _: f64) -> bool {

@@ -25,6 +25,19 @@ const TURNS: [[usize; 4]; 12] = [
     [3, 1, 0, 2],
 ];
 
+/// Of the order in which the first node is that number `i` and the second number `j`: its place in [`TURNS`].
+const TURN_OF: [[u8; 4]; 4] = {
+    let (mut table, mut n) = ([[NO_TURN; 4]; 4], 0);
+    while n < TURNS.len() {
+        let [i, j, ..] = TURNS[n];
+        table[i][j] = n as u8;
+        n += 1;
+    }
+    table
+};
+/// One node cannot be two.
+const NO_TURN: u8 = u8::MAX;
+
 impl CoarseTet {
     /// The nodes turned as those of a sealed tetrahedron, and which of [`TURNS`] turns them back.
     fn turned(&self) -> (SealedTet, u8) {
@@ -33,10 +46,16 @@ impl CoarseTet {
             region: self.region,
         }
         .rotated();
-        let back = TURNS
-            .iter()
-            .position(|turn| turn.map(|i| turned.nodes[i]) == self.nodes);
-        (turned, back.expect("a rotation is even") as u8)
+        let [a, b, c, _] = turned.nodes;
+        let place = |node: u32| match node {
+            _ if node == a => 0,
+            _ if node == b => 1,
+            _ if node == c => 2,
+            _ => 3,
+        };
+        let back = TURN_OF[place(self.nodes[0])][place(self.nodes[1])];
+        assert!(back != NO_TURN, "a tetrahedron has four nodes");
+        (turned, back)
     }
 }
 
