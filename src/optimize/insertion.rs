@@ -1,9 +1,10 @@
 //! A new vertex in the cavity of a bad tetrahedron.
 //!
 //! The cavity is the one the Delaunay kernel would open; the vertex then goes to the best place found
-//! in it, which need not be Delaunay. Nothing is changed unless the worst tetrahedron of the ball of insertion
-//! is better than the worst of the cavity.
+//! in it, which need not be Delaunay. Nothing is changed unless the ball of insertion is better than the cavity: its worst
+//! tetrahedron, or the sum of what is missing.
 
+use super::missing::{GAIN, Missing};
 use super::quality::goodness;
 use super::smooth::{Star, raised};
 use crate::delaunay::{Kernel, Located};
@@ -19,6 +20,15 @@ const FACES_MAX: usize = 64;
 /// A new vertex must leave nothing worse than this: q = 10.
 const GOOD_MIN: f64 = 0.1;
 
+/// What must be better afterwards.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Better {
+    /// The worst goodness; searches stop at `enough`.
+    Worst { enough: f64 },
+    /// The sum of what is missing.
+    Sum,
+}
+
 /// Scratch of the insertion.
 #[derive(Default)]
 pub(super) struct Inserter {
@@ -33,7 +43,7 @@ impl Inserter {
         mesh: &mut Mesh<P>,
         t: u32,
         tet: &Tet,
-        enough: f64,
+        better: Better,
     ) -> bool {
         let points = mesh.points(tet);
         let middle = |e: usize| (points[EDGES[e][0]] + points[EDGES[e][1]]) * 0.5;
@@ -54,7 +64,7 @@ impl Inserter {
             if gathered.is_err() {
                 continue;
             }
-            if self.fill_if_better(mesh, tet, p, enough) {
+            if self.fill_if_better(mesh, tet, p, better) {
                 return true;
             }
             self.kernel.discard(mesh);
@@ -72,16 +82,16 @@ impl Inserter {
         mesh: &mut Mesh<P>,
         tet: &Tet,
         p: crate::geom::Point,
-        enough: f64,
+        better: Better,
     ) -> bool {
         if self.kernel.faces().len() > FACES_MAX {
             return false;
         }
-        let mut worst = f64::INFINITY;
+        let mut missing = Missing::default();
         let mut old = Vec::with_capacity(self.kernel.cavity().len());
         for &t in self.kernel.cavity() {
             let record = mesh.tet(t);
-            worst = worst.min(goodness(mesh.points(&record)));
+            missing.add(goodness(mesh.points(&record)));
             old.push((t, record.vertices()));
         }
         self.star.at = p;
@@ -89,7 +99,17 @@ impl Inserter {
         for face in self.kernel.faces() {
             self.star.faces.push(face.vertices.map(|v| mesh.point(v)));
         }
-        let Some((best, _)) = self.star.search(raised(worst).max(GOOD_MIN), enough) else {
+        let (floor, enough) = match better {
+            Better::Worst { enough } => {
+                self.star.bar = None;
+                (raised(missing.worst).max(GOOD_MIN), enough)
+            }
+            Better::Sum => {
+                self.star.bar = Some(missing.bar().at_least(GOOD_MIN));
+                (missing.sum + GAIN, 0.0)
+            }
+        };
+        let Some((best, _)) = self.star.search(floor, enough) else {
             return false;
         };
         let h = tet.vertices().map(|v| mesh.size(v));

@@ -43,7 +43,7 @@ impl Way {
 }
 
 /// Flags per page of tetrahedra.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct PageFlags {
     flags: Vec<bool>,
 }
@@ -60,7 +60,12 @@ impl PageFlags {
     /// Flags the page of `t`.
     #[inline]
     pub(super) fn raise(&mut self, t: u32) {
-        let page = (t >> SLOT_BITS) as usize;
+        self.raise_page(t >> SLOT_BITS);
+    }
+
+    /// Flags a page.
+    pub(super) fn raise_page(&mut self, page: u32) {
+        let page = page as usize;
         if page >= self.flags.len() {
             self.flags.resize(page + 1, false);
         }

@@ -1,8 +1,8 @@
 //! Operations that change the number of vertices, for the worst tetrahedra only.
 
 use super::collapse::Collapser;
-use super::insertion::Inserter;
-use super::rounds::{OperationCounts, Target};
+use super::insertion::{Better, Inserter};
+use super::rounds::{Means, OperationCounts, Target};
 use crate::mesh::{Mesh, Tet};
 use crate::store::Pages;
 
@@ -10,7 +10,7 @@ use crate::store::Pages;
 pub(super) const WORST: Target = Target {
     below: 1.0 / 3.0,
     enough: 0.5,
-    rescue: true,
+    means: Means::Vertices,
 };
 
 /// Scratch of collapse and insertion.
@@ -38,7 +38,7 @@ impl Rescue {
             changed.extend_from_slice(&self.collapser.replacement.new_tets);
             return true;
         }
-        if self.inserter.insert(mesh, t, tet, enough) {
+        if self.inserter.insert(mesh, t, tet, Better::Worst { enough }) {
             counts.vertices_inserted += 1;
             changed.extend_from_slice(self.inserter.new_tets());
             return true;

@@ -1,8 +1,9 @@
 //! Rounds over the pages that hold bad tetrahedra.
 
-use super::pages::{PageFlags, is_examined, reopen, tets_of_page};
+use super::pages::{PageFlags, clear_marks, is_examined, reopen, tets_of_page};
 use super::quality::{CONTENT, GOODNESS_WANTED, face_bound, goodness, is_below};
 use super::rescue::Rescue;
+use super::share::Share;
 use super::smooth::{Star, is_free, raised};
 use super::swap::Swapper;
 use crate::mesh::anatomy::MARK;
@@ -48,24 +49,37 @@ pub(super) struct Target {
     pub(super) below: f64,
     /// Searches for a position stop here.
     pub(super) enough: f64,
-    /// Whether vertices may be removed and added.
-    pub(super) rescue: bool,
+    pub(super) means: Means,
+}
+
+/// What may be done, and what it is judged by.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Means {
+    /// Connections change and vertices move where that raises the worst goodness.
+    Connections,
+    /// Vertices are removed and added, too.
+    Vertices,
+    /// All this where it lowers the sum of what is missing.
+    Sum,
 }
 
 /// The first aim: every tetrahedron of q ≥ 2, without changing the vertices' number.
 pub(super) const BAD: Target = Target {
     below: GOODNESS_WANTED,
     enough: GOODNESS_WANTED * 1.02,
-    rescue: false,
+    means: Means::Connections,
 };
 
 /// Scratch and queues of all rounds.
 pub(super) struct Rounds {
     /// Pages to look at.
     pub(super) flags: PageFlags,
+    /// Pages with marks.
+    marked: PageFlags,
     swapper: Swapper,
     star: Star,
     rescue: Rescue,
+    share: Share,
     /// The page's bad tetrahedra, worst first, then what its operations left bad.
     work: Vec<(f64, u32)>,
     changed: Vec<u32>,
@@ -83,9 +97,11 @@ impl Rounds {
     pub(super) fn new(flags: PageFlags) -> Self {
         Self {
             flags,
+            marked: PageFlags::default(),
             swapper: Swapper::default(),
             star: Star::default(),
             rescue: Rescue::default(),
+            share: Share::default(),
             work: Vec::new(),
             changed: Vec::new(),
             counts: OperationCounts::default(),
@@ -114,6 +130,23 @@ impl Rounds {
                 break;
             }
         }
+    }
+
+    /// Takes all marks down. Returns the pages that had any or are still to be looked at: no others hold anything below the target.
+    pub(super) fn finish<P: Pages>(&mut self, mesh: &mut Mesh<P>) -> PageFlags {
+        let mut pages = std::mem::take(&mut self.flags);
+        let mut from = 0;
+        while let Some(page) = self.marked.take_next(from) {
+            from = page + 1;
+            pages.raise_page(page);
+            tets_of_page(mesh, page, |mesh, t, tet| clear_marks(mesh, t, &tet));
+        }
+        pages
+    }
+
+    fn mark<P: Pages>(&mut self, mesh: &mut Mesh<P>, t: u32, note: usize) {
+        mesh.set_mark(t, note, true);
+        self.marked.raise(t);
     }
 
     fn page<P: Pages>(&mut self, mesh: &mut Mesh<P>, page: u32, target: Target) {
@@ -146,7 +179,7 @@ impl Rounds {
             self.counts.attacked += 1;
             self.changed.clear();
             if is_forced(mesh, &tet, good) || !self.attack(mesh, t, &tet, good, target) {
-                mesh.set_mark(t, EXAMINED, true);
+                self.mark(mesh, t, EXAMINED);
                 continue;
             }
             for k in 0..self.changed.len() {
@@ -181,6 +214,13 @@ impl Rounds {
         good: f64,
         target: Target,
     ) -> bool {
+        if target.means == Means::Sum {
+            let dear = tet.node[RESCUED] & MARK == 0;
+            if dear {
+                self.mark(mesh, t, RESCUED);
+            }
+            return (self.share).attack(mesh, t, tet, dear, &mut self.counts, &mut self.changed);
+        }
         if self.swapper.remove_best_edge(mesh, t, tet, good) {
             self.counts.edges_removed += 1;
             self.changed.extend_from_slice(&self.swapper.new_tets);
@@ -205,10 +245,10 @@ impl Rounds {
             }
         }
         // Rescue is dear: once a tetrahedron, whatever changes around it.
-        if !target.rescue || tet.node[RESCUED] & MARK != 0 {
+        if target.means == Means::Connections || tet.node[RESCUED] & MARK != 0 {
             return false;
         }
-        mesh.set_mark(t, RESCUED, true);
+        self.mark(mesh, t, RESCUED);
         self.rescue.attack(
             mesh,
             t,

@@ -5,6 +5,7 @@ use super::odt;
 use super::pages::{PageFlags, Way, clear_marks};
 use super::rescue::WORST;
 use super::rounds::{BAD, OperationCounts, Rounds};
+use super::share::SHARE;
 use crate::mesh::Mesh;
 use crate::store::Pages;
 
@@ -99,10 +100,13 @@ pub fn run_with<P: Pages>(
     if settings.mode == Mode::Full {
         let mut rounds = Rounds::new(PageFlags::all(mesh));
         rounds.run(mesh, BAD, &mut |done, total| tell("quality", done, total));
-        lower_marks(mesh);
-        rounds.flags = PageFlags::all(mesh);
+        let bad = rounds.finish(mesh);
+        rounds.flags.clone_from(&bad);
         rounds.run(mesh, WORST, &mut |done, total| tell("worst", done, total));
-        lower_marks(mesh);
+        rounds.finish(mesh);
+        rounds.flags = bad;
+        rounds.run(mesh, SHARE, &mut |done, total| tell("share", done, total));
+        rounds.finish(mesh);
         report.operations = rounds.counts;
     }
     report

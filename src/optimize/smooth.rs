@@ -1,5 +1,6 @@
 //! Moving one vertex so that the worst tetrahedron of its ball gets better.
 
+use super::missing::Bar;
 use super::quality::{CONTENT, face_bound, goodness};
 use crate::geom::Point;
 use crate::mesh::Mesh;
@@ -31,6 +32,8 @@ pub(super) struct Star {
     pub(super) at: Point,
     /// Face f of a tetrahedron makes it (v, f0, f1, f2), positive.
     pub(super) faces: Vec<[Point; 3]>,
+    /// With a bar, positions are judged by the sum of what is missing there and not by the worst goodness.
+    pub(super) bar: Option<Bar>,
 }
 
 impl Star {
@@ -56,11 +59,15 @@ impl Star {
         true
     }
 
-    /// The least goodness with the vertex at `p`, or any value of at most `floor` when it is not above `floor`.
+    /// What the star is worth with the vertex at `p`, its least goodness or the sum that its bar tells, or any value of at most `floor`
+    /// when it is not above `floor`.
     ///
     /// Effects: a face that decides early moves forward, to decide earlier next time.
     #[inline]
     pub(super) fn value(&mut self, p: Point, floor: f64) -> f64 {
+        if let Some(bar) = self.bar {
+            return self.sum(p, floor, bar);
+        }
         let mut least = f64::INFINITY;
         for k in 0..self.faces.len() {
             let [a, b, c] = self.faces[k];
@@ -76,7 +83,20 @@ impl Star {
         least
     }
 
-    /// Looks for a position whose worst goodness is above `floor`; stops early at `enough`.
+    fn sum(&mut self, p: Point, floor: f64, bar: Bar) -> f64 {
+        let mut sum = 0.0;
+        for k in 0..self.faces.len() {
+            let [a, b, c] = self.faces[k];
+            sum += bar.worth(goodness([p, a, b, c]));
+            if sum <= floor {
+                self.faces.swap(k, k / 2);
+                break;
+            }
+        }
+        sum
+    }
+
+    /// Looks for a position worth more than `floor`; stops early at `enough`.
     pub(super) fn search(&mut self, floor: f64, enough: f64) -> Option<(Point, f64)> {
         let n = self.faces.len() as f64;
         let mut middle = Point::ZERO;

@@ -1,5 +1,8 @@
 //! A cube with prescribed skin and a random inside: what optimization must reach and must not touch.
 
+use super::pages::PageFlags;
+use super::rounds::Rounds;
+use super::share::SHARE;
 use super::*;
 use crate::delaunay::{Kernel, enclose, insertion_key};
 use crate::geom::{Aabb, HilbertFrame, Point, orient};
@@ -255,6 +258,26 @@ fn running_again_never_makes_the_worst_worse() {
     checked(&mut mesh);
     let second = measure(&mut mesh);
     assert!(second.histogram.total() > 0 && first.histogram.total() > 0);
+}
+
+#[test]
+fn the_last_rounds_make_fewer_bad_ones_and_none_of_the_worst_worse() {
+    let mut mesh = cube(Mesh::new(FlatPages::default()), 8, 4);
+    run(&mut mesh, Mode::Delaunay, &|_| ());
+    let before = measure(&mut mesh);
+    let hull = checked(&mut mesh).0;
+    let mut rounds = Rounds::new(PageFlags::all(&mesh));
+    rounds.run(&mut mesh, SHARE, &mut |_, _| ());
+    rounds.finish(&mut mesh);
+    assert_eq!(checked(&mut mesh).0, hull);
+    let after = measure(&mut mesh);
+    let bad = |table: &QualityTable| table.histogram.total() - table.histogram.bins[0];
+    assert!(
+        4 * bad(&after) < bad(&before),
+        "{before:?} {after:?} {:?}",
+        rounds.counts
+    );
+    assert!(after.worst <= before.worst.max(4.0));
 }
 
 /// Not a test of anything: prints what tuning needs. `CUBE_N=60 cargo test --release optimize::tests::table -- --ignored --nocapture`

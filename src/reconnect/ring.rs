@@ -57,6 +57,32 @@ impl RingTriangulation {
         n: usize,
         floor: f64,
         forced: Forced,
+        cone: impl FnMut(usize, usize, usize) -> f64,
+    ) -> bool {
+        self.solve_by(n, floor, forced, f64::INFINITY, f64::min, cone)
+    }
+
+    /// Finds the triangulation whose cone values, none of them above zero, have the largest sum, if that is above `floor`.
+    ///
+    /// Else as [`RingTriangulation::solve`]; `worst` is the sum.
+    pub fn solve_sum(
+        &mut self,
+        n: usize,
+        floor: f64,
+        cone: impl FnMut(usize, usize, usize) -> f64,
+    ) -> bool {
+        self.solve_by(n, floor, Forced::Nothing, 0.0, |a, b| a + b, cone)
+    }
+
+    /// The triangulation of largest value above `floor`, where `join` makes one value of two and leaves what it joins with `nothing`.
+    #[inline(always)]
+    fn solve_by(
+        &mut self,
+        n: usize,
+        floor: f64,
+        forced: Forced,
+        nothing: f64,
+        join: impl Fn(f64, f64) -> f64,
         mut cone: impl FnMut(usize, usize, usize) -> f64,
     ) -> bool {
         assert!((3..=255).contains(&n), "a ring of {n} vertices");
@@ -66,7 +92,7 @@ impl RingTriangulation {
         self.apex.clear();
         self.apex.resize(n * n, 0);
         for i in 0..n - 1 {
-            self.best[i * n + i + 1] = f64::INFINITY;
+            self.best[i * n + i + 1] = nothing;
         }
         for width in 2..n {
             for i in 0..n - width {
@@ -77,9 +103,9 @@ impl RingTriangulation {
                 let mut best = floor;
                 let mut apex = None;
                 for k in i + 1..j {
-                    let parts = self.best[i * n + k].min(self.best[k * n + j]);
+                    let parts = join(self.best[i * n + k], self.best[k * n + j]);
                     if parts > best {
-                        let value = cone(i, k, j).min(parts);
+                        let value = join(cone(i, k, j), parts);
                         if value > best {
                             best = value;
                             apex = Some(k);

@@ -269,6 +269,20 @@ fn what_is_forced_is_there_and_the_worst_is_the_best_possible() {
     assert_eq!(solver.triangles.len(), 4);
     let above = best(&|_| true);
     assert!(!solver.solve(6, above, Forced::Nothing, cone));
+
+    // The largest sum of values, none of them above zero and some forbidden.
+    let lacking = |i: usize, j: usize, k: usize| match cone(i, j, k) {
+        value if value < 0.2 => f64::NEG_INFINITY,
+        value => value - 1.0,
+    };
+    let sum = |t: &Vec<[u8; 3]>| {
+        let of = |t: &[u8; 3]| lacking(t[0].into(), t[1].into(), t[2].into());
+        t.iter().map(of).sum::<f64>()
+    };
+    let most = (every.iter().map(|(_, t)| sum(t))).fold(f64::NEG_INFINITY, f64::max);
+    assert!(most.is_finite() && solver.solve_sum(6, -100.0, lacking));
+    assert!((solver.worst - most).abs() < 1e-12 && (sum(&solver.triangles) - most).abs() < 1e-12);
+    assert!(!solver.solve_sum(6, most + 1e-9, lacking));
 }
 
 #[test]
