@@ -11,6 +11,7 @@
 //!
 //! Source: the paper, section 1.1.
 
+mod axes;
 mod core;
 mod flow;
 mod inherit;
@@ -20,14 +21,17 @@ mod load;
 mod moves;
 mod plane;
 mod split;
+mod spread;
 mod surface;
 mod zone;
 
+pub use axes::principal_axes;
 pub use interface::{InterfaceReport, Steps};
 pub use labels::InterfaceMeasures;
 pub use load::{SizeAt, load_of};
-pub use plane::{ChosenPlane, PlaneChoice, choose as choose_plane, principal_axes};
+pub use plane::{PlaneChoice, choose as choose_plane};
 pub use split::write_child;
+pub use spread::ChosenPlane;
 pub use surface::{CuttingSurface, Plane};
 pub use zone::{OutsideZones, WIDTH_MIN, WIDTH_NOISE, Zone};
 

@@ -6,14 +6,14 @@
 //!
 //! Source: the paper, section 1.1, "Defining the cutting plane".
 
+use super::axes::{Moments, principal_axes};
 use super::load::{SizeAt, tally};
+use super::spread::{ChosenPlane, Ramps, Spread};
 use super::surface::{CuttingSurface, Plane};
 use crate::geom::{Aabb, Point};
 use crate::mesh::Mesh;
 use crate::store::Pages;
 
-/// Bins of a histogram along an axis.
-const BINS: usize = 4096;
 /// Positions tried on each side of the balanced one, and their distance in units of h: a plane that grazes a flat wall cuts
 /// its tetrahedra to slices.
 const SHIFTS: i32 = 6;
@@ -39,55 +39,6 @@ pub enum PlaneChoice {
     Volume,
     /// This one, as it is.
     Given(Plane),
-}
-
-/// A chosen plane, and what it promises.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ChosenPlane {
-    pub plane: Plane,
-    /// Load below the plane and in all.
-    pub load: [f64; 2],
-    /// Area in units of h²: ∫ h⁻² over the section.
-    pub area: f64,
-}
-
-/// Sums of first and second moments.
-#[derive(Clone, Copy, Default)]
-struct Moments {
-    weight: f64,
-    first: Point,
-    /// xx, yy, zz, xy, xz, yz.
-    second: [f64; 6],
-}
-
-impl Moments {
-    fn add(&mut self, p: Point, weight: f64) {
-        self.weight += weight;
-        self.first += p * weight;
-        let products = [
-            p.x * p.x,
-            p.y * p.y,
-            p.z * p.z,
-            p.x * p.y,
-            p.x * p.z,
-            p.y * p.z,
-        ];
-        for (sum, product) in self.second.iter_mut().zip(products) {
-            *sum += weight * product;
-        }
-    }
-
-    /// The matrix of central moments.
-    fn matrix(&self) -> [[f64; 3]; 3] {
-        let g = self.first / self.weight;
-        let s = self.second.map(|s| s / self.weight);
-        let (xy, xz, yz) = (s[3] - g.x * g.y, s[4] - g.x * g.z, s[5] - g.y * g.z);
-        [
-            [s[0] - g.x * g.x, xy, xz],
-            [xy, s[1] - g.y * g.y, yz],
-            [xz, yz, s[2] - g.z * g.z],
-        ]
-    }
 }
 
 /// Chooses the plane that leaves the share `low` of the load on its low side.
@@ -254,14 +205,6 @@ impl Grid {
     }
 }
 
-/// Ends of no position.
-const NOTHING: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
-
-#[inline]
-fn with([low, high]: [f64; 2], s: f64) -> [f64; 2] {
-    [low.min(s), high.max(s)]
-}
-
 fn bounds_of_vertices<P: Pages>(mesh: &mut Mesh<P>) -> Aabb {
     let vertices = mesh.vertex_ids();
     vertices.fold(Aabb::EMPTY, |bounds, v| bounds.with(mesh.point(v)))
@@ -288,203 +231,6 @@ fn centroid_moments<P: Pages>(mesh: &mut Mesh<P>, origin: Point) -> [[f64; 3]; 3
         moments.add(middle - origin, 1.0);
     }
     moments.matrix()
-}
-
-/// Unit eigenvectors of a symmetric matrix, the largest eigenvalue first, by Jacobi's rotations.
-///
-/// Their sign is such that the largest component (the first of equals) is positive.
-pub fn principal_axes(matrix: &[[f64; 3]; 3]) -> [Point; 3] {
-    let mut a = *matrix;
-    let mut v = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    for _ in 0..60 {
-        let off = a[0][1].abs() + a[0][2].abs() + a[1][2].abs();
-        if off <= 1e-300 {
-            break;
-        }
-        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
-            if a[p][q] == 0.0 {
-                continue;
-            }
-            let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
-            let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
-            let t = if theta == 0.0 { 1.0 } else { t };
-            let c = 1.0 / (t * t + 1.0).sqrt();
-            let s = t * c;
-            for row in &mut a {
-                let (x, y) = (row[p], row[q]);
-                (row[p], row[q]) = (c * x - s * y, s * x + c * y);
-            }
-            let (x, y) = (a[p], a[q]);
-            a[p] = std::array::from_fn(|k| c * x[k] - s * y[k]);
-            a[q] = std::array::from_fn(|k| s * x[k] + c * y[k]);
-            for row in &mut v {
-                let (x, y) = (row[p], row[q]);
-                (row[p], row[q]) = (c * x - s * y, s * x + c * y);
-            }
-        }
-    }
-    let mut order = [0, 1, 2];
-    order.sort_by(|&i, &j| a[j][j].total_cmp(&a[i][i]));
-    order.map(|k| {
-        let axis = Point::new(v[0][k], v[1][k], v[2][k]).normalize();
-        let largest =
-            axis.to_array().into_iter().fold(
-                0.0,
-                |m: f64, x| {
-                    if x.abs() > m.abs() + 1e-9 { x } else { m }
-                },
-            );
-        if largest < 0.0 { -axis } else { axis }
-    })
-}
-
-/// Load and section along one axis, by bins between the ends of the mesh.
-struct Spread {
-    axis: Point,
-    low: f64,
-    width: f64,
-    load: Vec<f64>,
-    /// ∫ h⁻² dV in the bin: over its width, the section in units of h².
-    section: Vec<f64>,
-}
-
-/// A [`Spread`] in the making: load and section of each bin less those of the bin before, so that a body changes four entries however
-/// many bins it covers.
-struct Ramps {
-    axis: Point,
-    low: f64,
-    width: f64,
-    steps: Vec<[f64; 2]>,
-}
-
-impl Ramps {
-    fn new(axis: Point, [low, high]: [f64; 2]) -> Self {
-        Self {
-            axis,
-            low,
-            width: (high - low) / BINS as f64,
-            steps: vec![[0.0; 2]; BINS + 2],
-        }
-    }
-
-    /// Spreads a body evenly over the bins between its ends.
-    fn add(&mut self, low: f64, high: f64, load: f64, section: f64) {
-        let low = ((low - self.low) / self.width).max(0.0);
-        let high = ((high - self.low) / self.width).min(BINS as f64);
-        let first = (low as usize).min(BINS - 1);
-        let last = (high as usize).min(BINS - 1).max(first);
-        let rate = 1.0 / (high - low).max(1e-9);
-        let mut step = |bin: usize, share: f64| {
-            let [a, b] = &mut self.steps[bin];
-            (*a, *b) = (*a + share * load, *b + share * section);
-        };
-        if first == last {
-            step(first, 1.0);
-            step(first + 1, -1.0);
-            return;
-        }
-        let (head, tail) = (first as f64 + 1.0 - low, high - last as f64);
-        step(first, rate * head);
-        step(first + 1, rate * (1.0 - head));
-        step(last, rate * (tail - 1.0));
-        step(last + 1, -rate * tail);
-    }
-
-    fn add_all(&mut self, other: &Self) {
-        for (step, more) in self.steps.iter_mut().zip(&other.steps) {
-            *step = [step[0] + more[0], step[1] + more[1]];
-        }
-    }
-
-    fn sum_up(self) -> Spread {
-        let (mut load, mut section) = (Vec::with_capacity(BINS), Vec::with_capacity(BINS));
-        let mut sum = [0.0; 2];
-        for step in &self.steps[..BINS] {
-            sum = [sum[0] + step[0], sum[1] + step[1]];
-            // Rounding leaves a little of either sign where there is nothing.
-            load.push(f64::max(sum[0], 0.0));
-            section.push(f64::max(sum[1], 0.0));
-        }
-        Spread {
-            axis: self.axis,
-            low: self.low,
-            width: self.width,
-            load,
-            section,
-        }
-    }
-}
-
-impl Spread {
-    fn gather<P: Pages>(mesh: &mut Mesh<P>, h: &SizeAt, axis: Point) -> Self {
-        let mut of_all = NOTHING;
-        for v in mesh.vertex_ids() {
-            of_all = with(of_all, axis.dot(mesh.point(v)));
-        }
-        let (spread, of_tets) = Self::gather_between(mesh, h, axis, of_all);
-        if of_tets == of_all {
-            return spread;
-        }
-        Self::gather_between(mesh, h, axis, of_tets).0
-    }
-
-    /// Gathers between the ends, which should be those of the corners of all tetrahedra; returns these too.
-    fn gather_between<P: Pages>(
-        mesh: &mut Mesh<P>,
-        h: &SizeAt,
-        axis: Point,
-        ends: [f64; 2],
-    ) -> (Self, [f64; 2]) {
-        let mut seen = NOTHING;
-        let empty = || Ramps::new(axis, ends);
-        let see = &mut |p| seen = with(seen, axis.dot(p));
-        let [mut ramps, others @ ..] = tally(mesh, h, empty, see, |ramps, piece| {
-            let [a, b, c, d] = piece.points;
-            let at = [axis.dot(a), axis.dot(b), axis.dot(c), axis.dot(d)];
-            let low = at[0].min(at[1]).min(at[2].min(at[3]));
-            let high = at[0].max(at[1]).max(at[2].max(at[3]));
-            ramps.add(low, high, piece.load, piece.load * piece.h);
-        });
-        others.iter().for_each(|other| ramps.add_all(other));
-        (ramps.sum_up(), seen)
-    }
-
-    /// Position below which the share `low` of the load lies.
-    fn quantile(&self, low: f64) -> f64 {
-        let wanted = low * self.load.iter().sum::<f64>();
-        let mut sum = 0.0;
-        for (bin, &load) in self.load.iter().enumerate() {
-            if sum + load >= wanted {
-                let part = if load > 0.0 {
-                    (wanted - sum) / load
-                } else {
-                    0.0
-                };
-                return self.low + (bin as f64 + part) * self.width;
-            }
-            sum += load;
-        }
-        self.low + BINS as f64 * self.width
-    }
-
-    /// The plane at `offset`, and what it promises.
-    fn at(&self, offset: f64) -> ChosenPlane {
-        let place = ((offset - self.low) / self.width).clamp(0.0, BINS as f64 - 1.0);
-        let bin = place as usize;
-        let below: f64 =
-            self.load[..bin].iter().sum::<f64>() + self.load[bin] * (place - bin as f64);
-        // Pieces are coarse: the section is taken over a fiftieth of the length.
-        let half = BINS / 100;
-        let window = &self.section[bin.saturating_sub(half)..(bin + half).min(BINS)];
-        ChosenPlane {
-            plane: Plane {
-                normal: self.axis,
-                offset,
-            },
-            load: [below, self.load.iter().sum()],
-            area: window.iter().sum::<f64>() / (window.len() as f64 * self.width),
-        }
-    }
 }
 
 /// Moves the plane a little where it would graze fixed vertices.
@@ -532,60 +278,4 @@ fn shift<P: Pages>(mesh: &mut Mesh<P>, chosen: ChosenPlane, spread: &Spread) -> 
     let mean = sizes / n_near as f64;
     let step = SHIFT.min(reach / mean) * mean * (best as f64 - f64::from(SHIFTS));
     spread.at(plane.offset + step)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn bodies_are_spread_over_the_bins_they_cover() {
-        let ends = [-1.0, BINS as f64 - 1.0];
-        let bodies = [
-            (-1.0, 2.5, 7.0),
-            (4.25, 4.75, 1.0),
-            (6.5, 9.0, 5.0),
-            (0.0, BINS as f64 - 1.0, 4095.0),
-        ];
-        let mut ramps = Ramps::new(Point::X, ends);
-        let mut other = Ramps::new(Point::X, ends);
-        for (k, &(low, high, load)) in bodies.iter().enumerate() {
-            let to = if k % 2 == 0 { &mut ramps } else { &mut other };
-            to.add(low, high, load, 2.0 * load);
-        }
-        ramps.add_all(&other);
-        let spread = ramps.sum_up();
-        for bin in 0..BINS {
-            let (from, to) = (bin as f64 - 1.0, bin as f64);
-            let parts = bodies.iter().map(|&(low, high, load)| {
-                (high.min(to) - low.max(from)).max(0.0) / (high - low) * load
-            });
-            let wanted: f64 = parts.sum();
-            assert!((spread.load[bin] - wanted).abs() < 1e-12, "bin {bin}");
-            assert!((spread.section[bin] - 2.0 * wanted).abs() < 1e-12);
-        }
-    }
-
-    #[test]
-    fn principal_axes_are_eigenvectors() {
-        let mut seed = 7u64;
-        let mut next = || {
-            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-            (seed >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-        };
-        for _ in 0..200 {
-            let [a, b, c, d, e, f] = std::array::from_fn(|_| next());
-            let m = [[a, d, e], [d, b, f], [e, f, c]];
-            let mut before = f64::INFINITY;
-            for axis in principal_axes(&m) {
-                let x = axis.to_array();
-                let y: [f64; 3] = std::array::from_fn(|i| (0..3).map(|j| m[i][j] * x[j]).sum());
-                let value: f64 = (0..3).map(|i| x[i] * y[i]).sum();
-                let error: f64 = (0..3).map(|i| (y[i] - value * x[i]).abs()).sum();
-                assert!(error < 1e-12, "{m:?} {axis} {error}");
-                assert!(value <= before + 1e-12);
-                before = value;
-            }
-        }
-    }
 }
