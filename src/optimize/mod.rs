@@ -11,7 +11,7 @@
 //! it would stop near 94 %.
 //!
 //! Invariants: a change is accepted only when the worst quality of what it replaces rises (1 to 4), or when fewer are bad and
-//! none falls below both the worst before and q = 4 (5); every new tetrahedron is exactly positive; required faces and vertices that are not free stay as they are. Work goes page by page of
+//! none falls below both the worst before and q = 3.5 (5); every new tetrahedron is exactly positive; required faces and vertices that are not free stay as they are. Work goes page by page of
 //! tetrahedra, in id order, whatever is resident: the result does not depend on paging.
 //!
 //! Source: the paper, section 1.1; L. Chen and J. Xu, "Optimal Delaunay triangulations" (2004); L. A. Freitag and
