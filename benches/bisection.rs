@@ -5,7 +5,6 @@
 //! a box whose sizes are graded 20:1 in so many sub-domains, planes placed by load and by volume.
 //! Wall seconds of one thread; the coarse mesh is not counted.
 
-use std::path::Path;
 use std::time::Instant;
 
 use tetdb::bisect::{self, CutPlan, CutReport, Method, PlaneChoice, Steps, load_of};
@@ -53,11 +52,12 @@ impl Bench {
         }
     }
 
-    fn pool(&self, name: &str, bytes: u64) -> Mesh {
+    fn pool(&self, made: Option<&str>, bytes: u64) -> Mesh {
         let backing = Backing {
             subdomain: 0,
             generation: 1,
-            work_path: self.dir.path().join(name).into(),
+            spill: self.dir.path().into(),
+            made: made.map(|name| self.dir.path().join(name).into()),
             base: None,
             cache_bytes: 16 << 20,
         };
@@ -71,7 +71,7 @@ impl Bench {
             memory: 64 << 20,
         };
         let bounds = self.surface.bounds();
-        let mut host = self.pool("host.redb", bytes / 2);
+        let mut host = self.pool(None, bytes / 2);
         let options = Options::default();
         pipeline::coarse_mesh(
             &mut host,
@@ -83,7 +83,7 @@ impl Bench {
         .expect("a mesh");
         renumber(&mut host, &tetdb::geom::HilbertFrame::new(&bounds), &space).expect("room");
         let clock = Instant::now();
-        let mut core = self.pool("core.redb", bytes / 4);
+        let mut core = self.pool(None, bytes / 4);
         let plan = CutPlan {
             cut: 1,
             low: 0.5,
@@ -97,7 +97,7 @@ impl Bench {
         let (mut digest, mut tets, mut pages) = (0u64, 0, 0);
         for high in [false, true] {
             let name = format!("child-{high}.redb");
-            let mut child = self.pool(&name, bytes / 4);
+            let mut child = self.pool(Some(&name), bytes / 4);
             bisect::write_child(
                 &mut host, &mut core, &mut child, &opened, high, &bounds, &space,
             )
@@ -110,10 +110,12 @@ impl Bench {
                 .iter()
                 .map(|e| e[1] as usize)
                 .sum::<usize>();
-            remove(child, &self.dir.path().join(name));
+            child.into_pages().finish();
+            // A pool without a dirty page made no file.
+            let _ = std::fs::remove_file(self.dir.path().join(name));
         }
         let stats = host.pages().stats();
-        let cut = Cut {
+        Cut {
             report: opened.report,
             seconds: clock.elapsed().as_secs_f64(),
             digest,
@@ -121,10 +123,7 @@ impl Bench {
             pages,
             pages_read: stats.pages_read,
             pages_written: stats.pages_written,
-        };
-        remove(host, &self.dir.path().join("host.redb"));
-        remove(core, &self.dir.path().join("core.redb"));
-        cut
+        }
     }
 }
 
@@ -139,12 +138,6 @@ fn sum(mesh: &mut Mesh, high: bool) -> u64 {
         sum = sum.wrapping_add(mix(all ^ u64::from(high)));
     }
     sum
-}
-
-fn remove(mesh: Mesh, path: &Path) {
-    mesh.into_pages().discard();
-    // A pool that held everything made no file.
-    let _ = std::fs::remove_file(path);
 }
 
 fn tell(name: &str, cut: &Cut) {

@@ -61,7 +61,8 @@ fn main() {
                 let backing = Backing {
                     subdomain: 0,
                     generation: 1,
-                    work_path: dir.path().join(format!("{percent}-{run}.redb")).into(),
+                    spill: dir.path().into(),
+                    made: None,
                     base: None,
                     cache_bytes: 16 << 20,
                 };

@@ -129,6 +129,13 @@ pub fn open_page(bytes: &[u8], address: PageAddress, frame: &mut [Slot]) -> Resu
         return Err(PageError::Length { address, found });
     }
     bytemuck::cast_slice_mut::<Slot, u8>(&mut frame[..SLOTS - 1]).copy_from_slice(bytes);
+    check_page(frame, address)
+}
+
+/// Checks a page that was read into a frame against its address.
+///
+/// Returns the generation that wrote it. Errors: any difference in checksum or header.
+pub fn check_page(frame: &[Slot], address: PageAddress) -> Result<u32, PageError> {
     let header = frame[HEADER_SLOT].map(u32_le::to_native);
     let found = u64::from(header[0]) | u64::from(header[1]) << 32;
     let expected = checksum(frame);

@@ -2,6 +2,8 @@
 //!
 //! A leaf has a file of its own, so that damage to a sealed sub-domain does not reach what mends it.
 
+use std::path::Path;
+
 use tetdb_schema::chunk::{ChunkAddress, ChunkRecord, Packer};
 use tetdb_schema::record::{CoarseFace, CoarseTet, CoarseVertex, Facet};
 
@@ -171,6 +173,11 @@ impl CoarseLeaf {
     /// Its row in the catalog.
     pub fn row(&self) -> &CoarseRow {
         &self.row
+    }
+
+    /// Where its file is.
+    pub fn path(&self) -> &Path {
+        self.file.path()
     }
 
     /// Compares its whole file with redb's checksums. Errors: damage.

@@ -232,7 +232,8 @@ fn paging_changes_nothing() {
     let backing = Backing {
         subdomain: 0,
         generation: 1,
-        work_path: dir.path().join("work.redb").into(),
+        spill: dir.path().into(),
+        made: None,
         base: None,
         cache_bytes: 4 << 20,
     };

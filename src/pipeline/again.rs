@@ -51,7 +51,8 @@ impl Job {
             let backing = Backing {
                 subdomain: self.kept.rank,
                 generation: self.leaf.generation,
-                work_path: self.leaf.work.clone(),
+                spill: self.leaf.scratch.clone(),
+                made: None,
                 base: None,
                 cache_bytes: share.redb as usize,
             };
@@ -186,7 +187,7 @@ impl<'a> Again<'a> {
         let _lease = budget.lease(leased, "the working mesh")?;
         let bounds = tree::bounds(self.catalog)?;
         let workers = plan.workers().min(self.rows.len()).max(1);
-        let share = plan.shared_by(workers as u64);
+        let share = plan.shared_by(workers as u64).without_file();
         let own_sizes = self.what.sizes.is_some();
         let made: BTreeMap<u32, Vec<u8>> = (fields.iter())
             .filter_map(|(&rank, field)| Some((rank, field.as_ref()?.to_bytes())))
@@ -209,7 +210,6 @@ impl<'a> Again<'a> {
             |(again, _), (rank, field)| again.job(parts[rank as usize], field, share),
             &|job: Job, watch| job.run(common, watch).map(Box::new),
             |(_, leaves), leaf| {
-                leaf.remove_work()?;
                 leaves.insert(leaf.sealed.row.rank, *leaf);
                 Ok(())
             },
@@ -243,7 +243,6 @@ impl<'a> Again<'a> {
         let leaf = LeafJob {
             part,
             base: self.catalog.coarse_path(rank, kept.generation),
-            work: self.catalog.file_path(rank, last + 1),
             sealed: self.catalog.file_path(rank, last + 2),
             generation: last + 2,
             // As it was.

@@ -222,7 +222,8 @@ mod tests {
         let backing = Backing {
             subdomain: 0,
             generation: 1,
-            work_path: dir.path().join("pages").into(),
+            spill: dir.path().into(),
+            made: None,
             base: None,
             cache_bytes: 1 << 20,
         };

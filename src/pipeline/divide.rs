@@ -19,16 +19,14 @@ use crate::optimize::Settings;
 use crate::store::{Backing, DiskPath, Pager, PagerStats, StoreFile, attempt};
 use crate::topology::{Neighbors, Owners};
 
-/// Generations a bisection is on: what it changes in place, and what it leaves.
-pub(super) const WORK: u32 = 1;
+/// Generations from a part to what is made of it.
 pub(super) const DONE: u32 = 2;
 
 /// What a worker needs to bisect a part.
 pub(super) struct CutJob {
     pub parent: PartMesh,
-    /// The part's file, the file of its changes, and those of its children.
+    /// The part's file, and those of its children.
     base: DiskPath,
-    work: DiskPath,
     made: [DiskPath; 2],
     scratch: DiskPath,
     /// Zones of the cuts above it.
@@ -67,22 +65,21 @@ impl CutJob {
 
     fn divide(&self, common: Common, watch: &Watcher) -> Result<Divided, PipelineError> {
         let clock = Instant::now();
-        let (part, generation) = (self.parent.part, self.parent.generation + WORK);
+        let part = self.parent.part;
         let space = Workspace {
             dir: &self.scratch,
             memory: self.share.buffers / 2,
         };
-        let backing = self.backing(part.first, generation, self.work.clone(), 2);
+        let backing = self.backing(part.first, None, 2);
         let mut host = open_part(
             self.parent,
             self.base.clone(),
             backing,
             self.share.frames / 2,
         )?;
-        let core_path = self.scratch.join("core.redb");
         let mut core = Mesh::new(Pager::new(
             self.share.frames / 4,
-            Some(self.backing(part.first, 0, core_path, 4)),
+            Some(self.backing(part.first, None, 4)),
         ));
         let plan = CutPlan {
             cut: part.cut(),
@@ -126,11 +123,6 @@ impl CutJob {
         }
         pages.add(host.pages().stats());
         let frames_used = host.pages().frames_used() + core.pages().frames_used();
-        for mesh in [host, core] {
-            if let Some(path) = mesh.into_pages().discard() {
-                path.remove_file()?;
-            }
-        }
         let Ok(children) = children.try_into() else {
             unreachable!("a cut has two sides");
         };
@@ -153,12 +145,10 @@ impl CutJob {
         common: Common,
         space: &Workspace,
     ) -> Result<(Child, PagerStats), PipelineError> {
-        let generation = self.parent.generation + DONE;
-        let backing = self.backing(part.first, generation, path.clone(), 2);
+        let backing = self.backing(part.first, Some(path.clone()), 2);
         let mut mesh = Mesh::new(Pager::new(self.share.frames / 4, Some(backing)));
         let high = part.first == opened.zone.cut;
         bisect::write_child(host, core, &mut mesh, opened, high, &common.bounds, space)?;
-        mesh.pages_mut().flush();
         let mut inherited = Vec::new();
         for n in 0..mesh.n_interface_faces() {
             let face = mesh.interface_face(n);
@@ -175,14 +165,12 @@ impl CutJob {
         let load = if high { all - below } else { below };
         let part_mesh = PartMesh {
             part,
-            generation,
+            generation: self.parent.generation + DONE,
             state: mesh.state(),
             extents: mesh.pages().extents(),
             load,
         };
-        let pager = mesh.into_pages();
-        let stats = pager.stats();
-        pager.discard();
+        let stats = mesh.into_pages().finish();
         let child = Child {
             mesh: part_mesh,
             inherited,
@@ -191,11 +179,12 @@ impl CutJob {
     }
 
     /// Where pages go that leave memory, with one part in `share` of redb's cache.
-    fn backing(&self, subdomain: u32, generation: u32, work_path: DiskPath, share: u64) -> Backing {
+    fn backing(&self, subdomain: u32, made: Option<DiskPath>, share: u64) -> Backing {
         Backing {
             subdomain,
-            generation,
-            work_path,
+            generation: self.parent.generation + DONE,
+            spill: self.scratch.clone(),
+            made,
             base: None,
             cache_bytes: (self.share.redb / share) as usize,
         }
@@ -248,7 +237,6 @@ impl Run<'_> {
         Ok(CutJob {
             parent,
             base: self.catalog.file_path(first, parent.generation),
-            work: self.catalog.file_path(first, parent.generation + WORK),
             made,
             scratch,
             zones: tree::zones_above(self.catalog, parent.part, self.n)?,

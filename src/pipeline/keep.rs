@@ -45,9 +45,9 @@ pub(super) fn reopen(
     frames: u64,
     space: &Workspace,
 ) -> Result<Mesh, PipelineError> {
-    let (rank, path) = (leaf.row().rank, backing.work_path.clone());
+    let (rank, path) = (leaf.row().rank, leaf.path().to_owned());
     let damaged = |what: &str| CatalogError::Content {
-        path: path.path().to_owned(),
+        path: path.clone(),
         subdomain: rank,
         what: format!("its coarse leaf has {what}"),
     };
@@ -151,7 +151,8 @@ mod tests {
             let backing = Backing {
                 subdomain: 3,
                 generation: 8,
-                work_path: scratch.join(format!("work-{frames}.redb")),
+                spill: scratch.clone(),
+                made: None,
                 base: None,
                 cache_bytes: 1 << 20,
             };

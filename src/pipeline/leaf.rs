@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use tetdb_schema::ids::SubdomainId;
 
-use super::divide::{WORK, open_part};
+use super::divide::open_part;
 use super::fine::{FineReport, fine};
 use super::keep::keep;
 use super::seal::{Target, seal};
@@ -24,9 +24,8 @@ use crate::topology::Owners;
 /// What a worker needs to make a sub-domain.
 pub(super) struct LeafJob {
     pub part: PartMesh,
-    /// The part's file, the file of its changes, the file to make.
+    /// The part's file, the file to make.
     pub base: DiskPath,
-    pub work: DiskPath,
     pub sealed: DiskPath,
     pub form: Form,
     /// Generation of the file to make.
@@ -62,7 +61,6 @@ pub(super) struct Leaf {
     pub fine: FineReport,
     pub pages: PagerStats,
     pub frames_used: usize,
-    pub work: Option<DiskPath>,
     pub seal_seconds: f64,
     pub clock: Instant,
 }
@@ -73,8 +71,9 @@ impl LeafJob {
         attempt(|| {
             let backing = Backing {
                 subdomain: self.part.part.first,
-                generation: self.part.generation + WORK,
-                work_path: self.work.clone(),
+                generation: self.generation,
+                spill: self.scratch.clone(),
+                made: None,
                 base: None,
                 cache_bytes: self.share.redb as usize,
             };
@@ -125,7 +124,7 @@ impl LeafJob {
         let seal_seconds = seal_clock.elapsed().as_secs_f64();
         let pager = mesh.into_pages();
         let (pages, frames_used) = (pager.stats(), pager.frames_used());
-        let work = pager.discard();
+        drop(pager);
         let _ = self.scratch.remove_dir_all();
         Ok(Leaf {
             part: self.part,
@@ -136,19 +135,8 @@ impl LeafJob {
             fine,
             pages,
             frames_used,
-            work,
             seal_seconds,
             clock,
         })
-    }
-}
-
-impl Leaf {
-    /// Removes the file of changes, which nobody needs any more.
-    pub(super) fn remove_work(&self) -> Result<(), PipelineError> {
-        match &self.work {
-            Some(path) => Ok(path.remove_file()?),
-            None => Ok(()),
-        }
     }
 }

@@ -109,7 +109,8 @@ mod tests {
             let backing = Backing {
                 subdomain: row.rank,
                 generation: row.generation + 1,
-                work_path: catalog.file_path(row.rank, row.generation + 1),
+                spill: dir.path().into(),
+                made: None,
                 base: Some(StoreFile::open_repaired(&path, 1 << 20, false)?),
                 cache_bytes: 1 << 20,
             };

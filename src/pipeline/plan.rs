@@ -68,6 +68,14 @@ impl Plan {
         }
     }
 
+    /// For a step that makes no file of pages: what redb would hold of it goes to frames.
+    pub fn without_file(self) -> Self {
+        Self {
+            frames: self.frames + self.redb,
+            ..self
+        }
+    }
+
     /// How many sub-domains can be made at once: a worker needs frames of its own.
     pub fn workers(&self) -> usize {
         let by_frames = (self.frames / FRAMES_OF_WORKER).max(1);

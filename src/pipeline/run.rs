@@ -7,7 +7,7 @@ use std::time::Instant;
 use super::ahead::{HeadStart, ahead};
 use super::coarse::{CoarseReport, inserted, recovered};
 use super::crew::each;
-use super::divide::{DONE, WORK, read_owners};
+use super::divide::{DONE, read_owners};
 use super::estimate::n_subdomains;
 use super::held::Held;
 use super::leaf::{Common, Leaf, LeafJob};
@@ -207,15 +207,15 @@ impl<'a> Run<'a> {
         begun: Option<HeadStart>,
     ) -> Result<(Mesh, CoarseReport), PipelineError> {
         let clock = Instant::now();
-        let path = self.catalog.file_path(0, COARSE);
+        let scratch = self.catalog.scratch_dir()?;
         let backing = Backing {
             subdomain: 0,
             generation: COARSE,
-            work_path: path,
+            spill: scratch.clone(),
+            made: None,
             base: None,
             cache_bytes: self.plan.redb as usize,
         };
-        let scratch = self.catalog.scratch_dir()?;
         let head_start = begun.as_ref().map_or(0.0, |begun| begun.seconds);
         let room = Room::new(self.plan.buffers / 2, &scratch);
         let (mut mesh, kernel) = match begun {
@@ -239,7 +239,8 @@ impl<'a> Run<'a> {
         // Where vertices nearly touch, sizes at a point are next to nothing and the estimate knows no bound; the mesh's own load does.
         let predicted = estimate.tets().min(TETS_PER_LOAD * load);
         let (n, _) = n_subdomains(predicted, self.options)?;
-        mesh.pages_mut().end_generation();
+        let path = self.catalog.file_path(0, COARSE);
+        mesh.pages_mut().end_generation(path, COARSE + DONE);
         let part = PartMesh {
             part: Part { first: 0, count: n },
             generation: COARSE,
@@ -277,8 +278,6 @@ impl<'a> Run<'a> {
             ));
             Ok(())
         })?;
-        let path = self.catalog.file_path(0, COARSE + WORK);
-        mesh.pages_mut().next_generation(COARSE + WORK, path)?;
         Ok((mesh, report))
     }
 
@@ -322,11 +321,10 @@ impl<'a> Run<'a> {
         for cut in part.part.cuts_above(self.n) {
             owners.insert(cut, read_owners(self.catalog, cut)?);
         }
-        let share = self.plan.shared_by(workers);
+        let share = self.plan.shared_by(workers).without_file();
         Ok(LeafJob {
             part,
             base: self.catalog.file_path(rank, part.generation),
-            work: self.catalog.file_path(rank, part.generation + WORK),
             sealed: self.catalog.file_path(rank, part.generation + DONE),
             generation: part.generation + DONE,
             form: self.options.form()?,
@@ -382,7 +380,6 @@ impl<'a> Run<'a> {
             step.append_journal(&row);
             Ok(())
         })?;
-        leaf.remove_work()?;
         summary.pages.add(leaf.pages);
         summary.frames_used = summary.frames_used.max(leaf.frames_used);
         summary.fine.insert(rank, leaf.fine);

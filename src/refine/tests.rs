@@ -84,7 +84,8 @@ fn the_same_points_whatever_the_pool() {
     let backing = Backing {
         subdomain: 0,
         generation: 1,
-        work_path: dir.path().join("work.redb").into(),
+        spill: dir.path().into(),
+        made: None,
         base: None,
         cache_bytes: 1 << 20,
     };

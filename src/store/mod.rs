@@ -21,6 +21,7 @@ mod real_disk;
 mod scratch;
 mod sort;
 mod space;
+mod spill;
 mod stop;
 
 pub use budget::{Budget, Lease};

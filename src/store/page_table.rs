@@ -8,9 +8,10 @@ pub(super) const DIRTY: u32 = 1 << 29;
 const FRAME_MASK: u32 = DIRTY - 1;
 /// An entry with these flags can be read at once, and with [`DIRTY`] changed at once.
 const READABLE: u32 = RESIDENT | REFERENCED;
-/// Entries of pages that are not resident.
+/// Entries of pages that are not resident: in the file the step began with, in the file it makes, or from here on in the spill.
 pub(super) const IN_BASE: u32 = 0;
-pub(super) const IN_WORK: u32 = 1;
+pub(super) const IN_MADE: u32 = 1;
+pub(super) const IN_SPILL: u32 = 2;
 /// Where the frame of a page seems to begin that cannot be accessed at once: beyond every pool.
 const BEYOND: u32 = !SLOT_MASK;
 /// Frames whose slots all have a position below [`BEYOND`]: 128 GiB.

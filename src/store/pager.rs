@@ -8,13 +8,14 @@
 
 use lru::LruCache;
 use tetdb_schema::page::{
-    FRAME_BYTES, PageAddress, SLOT_BITS, SLOTS, Slot, open_page, page_key, seal_page, stored_bytes,
-    u32_le,
+    FRAME_BYTES, PageAddress, SLOT_BITS, SLOTS, Slot, check_page, open_page, page_key, seal_page,
+    stored_bytes, u32_le,
 };
 
 use super::page_table::{
-    DIRTY, FRAMES_LIMIT, IN_BASE, IN_WORK, PageTable, REFERENCED, RESIDENT, frame_of,
+    DIRTY, FRAMES_LIMIT, IN_BASE, IN_MADE, IN_SPILL, PageTable, REFERENCED, RESIDENT, frame_of,
 };
+use super::spill::Spill;
 use super::{DiskPath, Pages, StoreError, StoreFile, fail, kind, stop_if_requested};
 
 /// Dirty pages written in one commit; a quarter of what redb's cache should hold.
@@ -28,11 +29,13 @@ pub struct Backing {
     pub subdomain: u32,
     /// Generation being written.
     pub generation: u32,
-    /// File of that generation; created by the first page that leaves memory.
-    pub work_path: DiskPath,
+    /// Folder of the scratch file for pages that leave memory; it must exist by then.
+    pub spill: DiskPath,
+    /// The file to make of this generation, where each page is written once: all but those of the scratch map go there instead.
+    pub made: Option<DiskPath>,
     /// The generation this step started from.
     pub base: Option<StoreFile>,
-    /// Bytes redb may cache per file.
+    /// Bytes redb may cache for a file that is written; half as many for one that is read.
     pub cache_bytes: usize,
 }
 
@@ -68,7 +71,8 @@ pub struct Pager {
     owners: Vec<(u8, u32)>,
     order: LruCache<u32, ()>,
     backing: Option<Backing>,
-    work: Option<StoreFile>,
+    made: Option<StoreFile>,
+    spill: Option<Spill>,
     stats: PagerStats,
 }
 
@@ -92,7 +96,8 @@ impl Pager {
             owners: Vec::new(),
             order: LruCache::unbounded(),
             backing,
-            work: None,
+            made: None,
+            spill: None,
             stats: PagerStats::default(),
         }
     }
@@ -148,61 +153,81 @@ impl Pager {
         }
     }
 
-    /// Writes every dirty page to the file of this generation; afterwards it and the base hold all.
-    ///
-    /// Unwinds on errors, as every access does.
-    pub fn flush(&mut self) {
+    /// Writes every dirty page to the file that is made, and closes it. Returns the traffic of all. Unwinds on errors.
+    pub fn finish(mut self) -> PagerStats {
         let mut dirty: Vec<u32> = (0..self.owners.len() as u32)
-            .filter(|&frame| {
-                self.owners[frame as usize] != NOBODY && self.entry(frame) & DIRTY != 0
-            })
+            .filter(|&frame| self.is_made(frame) && self.entry(frame) & DIRTY != 0)
             .collect();
         dirty.sort_unstable_by_key(|&frame| self.owners[frame as usize]);
         for batch in dirty.chunks(BATCH_PAGES_MAX) {
             self.write_back(batch);
         }
+        self.stats
     }
 
-    /// Ends a generation: writes every dirty page, shrinks the file to what it holds and closes it, so that it may be listed. A file that is
-    /// listed is not written to again, not even by redb when it is closed: that would not be synced, and a loss of power could leave it torn.
+    /// Ends a generation: writes all pages, wherever they are, to a file at `path` and goes on from it, as `generation`.
     ///
-    /// No page can be loaded until [`Pager::next_generation`]. Unwinds on errors.
-    pub fn end_generation(&mut self) {
-        self.flush();
-        if let Some(Err(error)) = self.work.take().map(StoreFile::compact) {
+    /// The file is closed when it is written: once it is listed it is not written to again, not even by redb when it is closed, for that would
+    /// not be synced, and a loss of power could leave it torn. Unwinds on errors.
+    pub fn end_generation(&mut self, path: DiskPath, generation: u32) {
+        let backing = self.backing.as_mut().expect("a pool with a store");
+        assert!(
+            backing.made.is_none(),
+            "its pages are in the file they make"
+        );
+        backing.made = Some(path.clone());
+        assert_eq!(self.tables[kind::SCRATCH].len(), 0, "a map of this step");
+        let n_batch = (self.frames_max / 4).clamp(1, BATCH_PAGES_MAX);
+        let mut batch = Vec::with_capacity(n_batch);
+        for kind in 0..self.tables.len() {
+            for page in 0..self.tables[kind].len() as u32 {
+                // What had to make room is written already.
+                if self.tables[kind].entry(page) == IN_MADE {
+                    continue;
+                }
+                batch.push(self.bring(kind, page));
+                if batch.len() == n_batch {
+                    self.write_back(&batch);
+                    batch.clear();
+                }
+            }
+        }
+        self.write_back(&batch);
+        self.spill = None;
+        if let Some(Err(error)) = self.made.take().map(StoreFile::compact) {
             fail(error);
         }
-    }
-
-    /// Begins a generation, written to `path`, on what [`Pager::end_generation`] left; that one must have had no base of its own.
-    ///
-    /// Errors: the file cannot be opened again.
-    pub fn next_generation(&mut self, generation: u32, path: DiskPath) -> Result<(), StoreError> {
-        assert!(self.work.is_none(), "the generation before has ended");
-        let backing = self.backing.as_mut().expect("a pool with a store");
-        assert!(backing.base.is_none(), "pages would be in three files");
-        let base = StoreFile::open_repaired(&backing.work_path, backing.cache_bytes / 2, false)?;
-        backing.base = Some(base);
+        let backing = self.backing.as_mut().expect("as above");
+        backing.made = None;
         backing.generation = generation;
-        backing.work_path = path;
+        match StoreFile::open_repaired(&path, backing.cache_bytes / 2, false) {
+            Ok(base) => backing.base = Some(base),
+            Err(error) => fail(error),
+        }
         for table in &mut self.tables {
             for page in 0..table.len() as u32 {
                 if table.entry(page) & RESIDENT == 0 {
                     table.set(page, IN_BASE);
-                } else {
-                    assert_eq!(table.entry(page) & DIRTY, 0, "flushed before");
                 }
             }
         }
         for frame in 0..self.owners.len() as u32 {
             self.set_place(frame, IN_BASE);
         }
-        Ok(())
     }
 
-    /// Closes the files without writing what is dirty; returns the path of this generation's file, if it was made.
-    pub fn discard(self) -> Option<DiskPath> {
-        self.work.map(|file| file.place().clone())
+    /// Makes a page the most recent one and returns its frame.
+    fn bring(&mut self, kind: usize, page: u32) -> u32 {
+        let entry = self.tables[kind].entry(page);
+        let entry = match frame_of(entry) {
+            Some(frame) => {
+                self.order.put(frame, ());
+                entry | REFERENCED
+            }
+            None => self.load(kind, page, entry),
+        };
+        self.tables[kind].set(page, entry);
+        frame_of(entry).expect("resident")
     }
 
     /// The entry of the page in `frame`.
@@ -230,7 +255,7 @@ impl Pager {
         let opened = if entry & RESIDENT != 0 {
             entry | flags
         } else {
-            self.load::<K>(page, entry) | flags
+            self.load(K, page, entry) | flags
         };
         self.tables[K].set(page, opened);
         self.tables[K].to_read(id)
@@ -253,36 +278,45 @@ impl Pager {
         unreachable!("a pool of {} frames holds four pages", self.frames_max)
     }
 
-    fn load<const K: usize>(&mut self, page: u32, place: u32) -> u32 {
+    fn load(&mut self, kind: usize, page: u32, place: u32) -> u32 {
         stop_if_requested();
         let (frame, _) = self.take_frame();
-        let address = self.address(K, page);
-        let file = match place {
-            IN_WORK => self.work.as_mut(),
-            _ => self.backing.as_mut().and_then(|b| b.base.as_mut()),
-        };
-        let file = file.expect("a page that is not resident is in a file");
+        let address = self.address(kind, page);
         let at = frame as usize * SLOTS;
         let slots = &mut self.frames[at..at + SLOTS];
-        let read = file.read(page_key(address.kind, address.page), |bytes| {
-            open_page(bytes, address, slots)
-        });
-        let path = || file.path().to_owned();
+        let file = match place {
+            IN_BASE => self.backing.as_mut().and_then(|b| b.base.as_mut()),
+            _ => self.made.as_mut(),
+        };
+        let (path, read) = match (place, file) {
+            (IN_SPILL.., _) => {
+                let spill = self.spill.as_ref().expect("a page is in it");
+                let read = spill.read(place - IN_SPILL, slots);
+                let path = spill.path().path();
+                (path, read.map(|()| Some(check_page(slots, address))))
+            }
+            (_, Some(file)) => {
+                let key = page_key(address.kind, address.page);
+                let read = file.read(key, |bytes| open_page(bytes, address, slots));
+                (file.path(), read)
+            }
+            (_, None) => unreachable!("a page that is not resident is in a file"),
+        };
         match read {
             Ok(Some(Ok(_))) => {}
             Ok(Some(Err(source))) => fail(StoreError::Page {
-                path: path(),
+                path: path.to_owned(),
                 source,
             }),
             Ok(None) => fail(StoreError::Missing {
-                path: path(),
+                path: path.to_owned(),
                 what: format!("page {address:?}"),
             }),
             Err(error) => fail(error),
         }
         self.stats.pages_read += 1;
         self.set_place(frame, place);
-        self.owners[frame as usize] = (K as u8, page);
+        self.owners[frame as usize] = (kind as u8, page);
         self.order.put(frame, ());
         frame | RESIDENT | REFERENCED
     }
@@ -311,26 +345,40 @@ impl Pager {
             self.order.put(frame, ());
         };
         if self.entry(frame) & DIRTY != 0 {
-            let mut batch = vec![frame];
-            batch.extend(self.cold_dirty_frames());
-            batch.sort_unstable_by_key(|&f| self.owners[f as usize]);
-            self.write_back(&batch);
+            if self.is_made(frame) {
+                let mut batch = vec![frame];
+                batch.extend(self.cold_dirty_frames());
+                batch.sort_unstable_by_key(|&f| self.owners[f as usize]);
+                self.write_back(&batch);
+            } else {
+                self.put_away(frame);
+            }
         }
         let place = self.place(frame);
         self.set_entry(frame, place);
         frame
     }
 
+    /// Whether the page in `frame` belongs to the file that is made.
+    fn is_made(&self, frame: u32) -> bool {
+        let kind = usize::from(self.owners[frame as usize].0);
+        let makes = self.backing.as_ref().is_some_and(|b| b.made.is_some());
+        makes && kind < kind::ALL.len() && kind != kind::SCRATCH
+    }
+
     /// The next victims that would have to be written, so that one commit serves many misses.
     fn cold_dirty_frames(&self) -> Vec<u32> {
         let n = (self.frames_max / 4).clamp(1, BATCH_PAGES_MAX - 1);
         let cold = self.order.iter().rev().map(|(&frame, ())| frame);
-        cold.filter(|&frame| self.entry(frame) & (REFERENCED | DIRTY) == DIRTY)
-            .take(n)
-            .collect()
+        cold.filter(|&frame| {
+            self.entry(frame) & (REFERENCED | DIRTY) == DIRTY && self.is_made(frame)
+        })
+        .take(n)
+        .collect()
     }
 
-    fn write_back(&mut self, batch: &[u32]) {
+    /// Writes a page to the spill.
+    fn put_away(&mut self, frame: u32) {
         let Some(backing) = &self.backing else {
             fail(StoreError::Budget {
                 what: "a mesh without a store",
@@ -338,9 +386,38 @@ impl Pager {
                 available: self.frames_max as u64 * FRAME_BYTES as u64,
             });
         };
-        if self.work.is_none() {
-            match StoreFile::create_unsynced(&backing.work_path, backing.cache_bytes) {
-                Ok(file) => self.work = Some(file),
+        let generation = backing.generation;
+        if self.spill.is_none() {
+            match Spill::create(&backing.spill) {
+                Ok(spill) => self.spill = Some(spill),
+                Err(error) => fail(error),
+            }
+        }
+        let (kind, page) = self.owners[frame as usize];
+        let address = self.address(usize::from(kind), page);
+        seal_page(self.frame(frame), address, generation);
+        let known = self.place(frame);
+        let spill = self.spill.as_mut().expect("created above");
+        let place = match known {
+            IN_SPILL.. => known - IN_SPILL,
+            _ => spill.take(),
+        };
+        let at = frame as usize * SLOTS;
+        if let Err(error) = spill.write(place, &self.frames[at..at + SLOTS]) {
+            fail(error);
+        }
+        self.stats.pages_written += 1;
+        self.set_entry(frame, self.entry(frame) & !DIRTY);
+        self.set_place(frame, IN_SPILL + place);
+    }
+
+    /// Writes pages to the file that is made, in one commit.
+    fn write_back(&mut self, batch: &[u32]) {
+        let backing = self.backing.as_ref().expect("it makes a file");
+        if self.made.is_none() {
+            let path = backing.made.as_ref().expect("it makes a file");
+            match StoreFile::create_unsynced(path, backing.cache_bytes) {
+                Ok(file) => self.made = Some(file),
                 Err(error) => fail(error),
             }
         }
@@ -357,20 +434,19 @@ impl Pager {
             let at = frame as usize * SLOTS;
             (key, stored_bytes(&frames[at..at + SLOTS]))
         });
-        let work = self.work.as_mut().expect("created above");
-        if let Err(error) = work.write(values) {
+        let made = self.made.as_mut().expect("created above");
+        if let Err(error) = made.write(values) {
             fail(error);
         }
         self.stats.pages_written += batch.len() as u64;
         self.stats.commits += 1;
         for &frame in batch {
             self.set_entry(frame, self.entry(frame) & !DIRTY);
-            self.set_place(frame, IN_WORK);
+            self.set_place(frame, IN_MADE);
         }
     }
 
-    /// The slot that is never stored remembers where the page is when it is clean: in this
-    /// generation's file or in the base.
+    /// The slot that no file counts on remembers where the page is when it is clean.
     fn set_place(&mut self, frame: u32, place: u32) {
         self.frame(frame)[SLOTS - 1][0] = u32_le::from_native(place);
     }
@@ -434,7 +510,7 @@ impl Pages for Pager {
     }
 
     fn drop_front<const K: usize>(&mut self, n: u32) {
-        self.unstore(K, n);
+        self.forget(K, n);
         let dropped = self.tables[K].drop_front(n as usize);
         self.release(dropped);
         self.first[K] += n;
@@ -448,32 +524,23 @@ impl Pages for Pager {
     }
 
     fn clear<const K: usize>(&mut self) {
-        self.unstore(K, self.n_pages::<K>());
+        self.forget(K, self.n_pages::<K>());
         let dropped = std::mem::take(&mut self.tables[K]).frames();
         self.release(dropped);
     }
 }
 
 impl Pager {
-    /// Removes the first `n` pages of a kind from the file of this generation, which writes over their space. Unwinds on errors.
-    fn unstore(&mut self, kind: usize, n: u32) {
-        if self.work.is_none() {
-            return;
-        }
-        let mut keys = Vec::new();
+    /// Leaves the places of the first `n` pages of a kind in the spill to others.
+    fn forget(&mut self, kind: usize, n: u32) {
+        let makes = self.backing.as_ref().is_some_and(|b| b.made.is_some());
+        assert!(kind == kind::SCRATCH || !makes, "written once, and kept");
         for page in 0..n {
             let entry = self.tables[kind].entry(page);
             let place = frame_of(entry).map_or(entry, |frame| self.place(frame));
-            if place == IN_WORK {
-                let address = self.address(kind, page);
-                keys.push((page_key(address.kind, address.page), None));
+            if let (IN_SPILL.., Some(spill)) = (place, &mut self.spill) {
+                spill.forget(place - IN_SPILL);
             }
-        }
-        let work = self.work.as_mut().expect("looked at above");
-        if !keys.is_empty()
-            && let Err(error) = work.change(keys.into_iter())
-        {
-            fail(error);
         }
     }
 
@@ -503,16 +570,17 @@ mod tests {
         }
     }
 
-    /// Pages written behind the old ones, which are then dropped, take their space: the file never holds much more than both.
+    /// Pages written behind the old ones, which are then dropped, take their places: files never hold more than both.
     #[test]
-    fn the_file_holds_no_pages_that_were_dropped() -> Result<(), Box<dyn std::error::Error>> {
+    fn files_hold_no_pages_that_were_dropped() -> Result<(), Box<dyn std::error::Error>> {
         const N: u32 = 400;
         let dir = tempfile::tempdir()?;
         let path = dir.path().join("pages");
         let backing = Backing {
             subdomain: 0,
             generation: 1,
-            work_path: path.clone().into(),
+            spill: dir.path().into(),
+            made: None,
             base: None,
             cache_bytes: 1 << 20,
         };
@@ -527,12 +595,11 @@ mod tests {
                 pager.append_page::<{ kind::SCRATCH }>();
             }
             pager.clear::<{ kind::SCRATCH }>();
-            assert!(std::fs::metadata(&path)?.len() < 3 * once);
+            assert!(pager.spill.as_ref().is_some_and(|s| s.end <= 2 * N + N / 2));
         }
-        pager.end_generation();
+        pager.end_generation(path.clone().into(), 2);
         let kept = std::fs::metadata(&path)?.len();
         assert!(kept < once + once / 8, "{kept} for {once}");
-        pager.next_generation(2, dir.path().join("more").into())?;
         for page in 0..N {
             let found = pager.read::<{ kind::TETS }>(page * PER_PAGE)[0].to_native();
             assert_eq!(found, page + N);

@@ -37,6 +37,11 @@ impl ScratchFile {
         self.path.told(self.file.read(at, out))
     }
 
+    /// Where it was made.
+    pub fn path(&self) -> &DiskPath {
+        &self.path
+    }
+
     /// Writes `bytes` from byte `at` on.
     pub fn write(&self, at: u64, bytes: &[u8]) -> Result<(), StoreError> {
         self.path.told(self.file.write(at, bytes))
