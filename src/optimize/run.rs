@@ -6,7 +6,7 @@ use super::pages::{PageFlags, Way, clear_marks};
 use super::rescue::WORST;
 use super::rounds::{BAD, OperationCounts, Rounds};
 use super::share::SHARE;
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, dense, sparse};
 use crate::store::Pages;
 
 /// How far to go.
@@ -80,10 +80,8 @@ pub fn run_with<P: Pages>(
 ) -> OptimizeReport {
     let mut report = OptimizeReport::default();
     let tell = |stage, done, total| progress(Progress { stage, done, total });
-    // Refinement leaves its own marks.
     tell("delaunay", 0, settings.odt_sweeps + 1);
-    lower_marks(mesh);
-    mesh.refresh_tet_of();
+    prepare(mesh);
     let mut lawson = Lawson::default();
     let mut way = Way::Up;
     lawson.sweep(mesh, way);
@@ -112,11 +110,15 @@ pub fn run_with<P: Pages>(
     report
 }
 
-/// Takes the marks of all tetrahedra down.
-fn lower_marks<P: Pages>(mesh: &mut Mesh<P>) {
-    let mut from = 0;
-    while let Some((t, tet)) = mesh.next_tet(from) {
-        from = t + 1;
-        clear_marks(mesh, t, &tet);
+/// Takes the marks down that refinement leaves, and points each vertex to its tetrahedron of smallest id.
+fn prepare<P: Pages>(mesh: &mut Mesh<P>) {
+    for t in (0..dense(mesh.tet_ids_end())).rev().map(sparse) {
+        let tet = mesh.tet(t);
+        if tet.is_live() {
+            clear_marks(mesh, t, &tet);
+            tet.vertices()
+                .into_iter()
+                .for_each(|v| mesh.set_tet_of(v, t));
+        }
     }
 }

@@ -44,10 +44,13 @@ const COARSE_TRIANGLE: f64 = 126.0;
 const ZONE_TET: f64 = 65.0;
 /// Width of a refined zone in wanted lengths.
 const ZONE_WIDTH: f64 = 8.0;
-/// Pages that leave memory take up this many times their size, for what is written in a commit is not written over; and
-/// never more than [`SPILLED_MAX`] times all pages. With caps of 64 and 96 MiB: 2.5 to 3.1.
-const SPILLED: f64 = 3.0;
-const SPILLED_MAX: f64 = 2.2;
+/// Pages that leave memory take up this many times what is missing of frames, for a page keeps its place while it is in memory; and never more
+/// than [`SPILLED_MAX`] times all pages. With caps from 64 to 256 MiB: 1.5 to 1.9, and up to 1.16.
+const SPILLED: f64 = 2.0;
+const SPILLED_MAX: f64 = 1.15;
+/// Bytes of runs for each tetrahedron of the sub-domain that is sorted to be sealed, and the share of buffers a sort takes before it writes runs.
+const SORTED_TET: f64 = 25.0;
+const SORT_SHARE: f64 = 0.25;
 
 /// Bytes of frames for each tetrahedron: 100 to 105.
 const FRAMES_TET: f64 = 102.0;
@@ -221,11 +224,24 @@ impl Estimate {
 
     /// Most bytes on disk while it is made with `cap` bytes of memory by so many threads.
     pub fn disk_peak_bytes(&self, cap: u64, threads: usize) -> u64 {
+        let (n, at_once) = (f64::from(self.subdomains), self.at_once(threads));
+        let (frames, buffers) = match Plan::new(cap, self.held_bytes(cap)) {
+            Ok(plan) => (plan.frames as f64, plan.buffers as f64),
+            Err(_) => (0.0, 0.0),
+        };
+        // A part's file goes when it is sealed: before the first is, and while the last are.
         let parts = COARSE_TRIANGLE * self.triangles as f64 + ZONE_TET * self.zone_tets();
-        let frames = Plan::new(cap, self.held_bytes(cap)).map_or(0, |plan| plan.frames) as f64;
+        let store = self.store_bytes() as f64;
+        let files = (parts + at_once / n * store).max(store + at_once / n * parts);
         let pages = self.pages_bytes(threads);
         let spilled = (SPILLED * (pages - frames)).clamp(0.0, SPILLED_MAX * pages);
-        self.store_bytes() + (parts + spilled) as u64
+        let sorted = SORTED_TET * self.tets() / n;
+        let runs = if sorted > buffers / at_once * SORT_SHARE {
+            sorted
+        } else {
+            0.0
+        };
+        (files + spilled + runs) as u64
     }
 
     /// Most bytes the process will hold with a cap of `cap`.
@@ -263,10 +279,14 @@ impl Estimate {
             + SECONDS_VERIFY * self.tets()
     }
 
-    /// Pages of the sub-domains made at one time.
+    /// Sub-domains made at one time.
+    fn at_once(&self, threads: usize) -> f64 {
+        f64::from(self.subdomains).min(threads.max(1) as f64)
+    }
+
+    /// Their pages.
     fn pages_bytes(&self, threads: usize) -> f64 {
-        let at_once = f64::from(self.subdomains).min(threads.max(1) as f64);
-        FRAMES_TET * self.tets() / f64::from(self.subdomains) * at_once
+        FRAMES_TET * self.tets() / f64::from(self.subdomains) * self.at_once(threads)
     }
 
     /// Tetrahedra of the refined zones of all cuts, were the domain a cube cut into cubes.

@@ -130,10 +130,12 @@ pub fn saturate<P: Pages>(
 }
 
 fn count_over_constrained<P: Pages>(mesh: &mut Mesh<P>) -> u64 {
-    let (mut n, mut from) = (0, 0);
-    while let Some((t, tet)) = mesh.next_tet(from) {
-        from = t + 1;
-        n += u64::from((0..4).filter(|&i| tet.is_required(i)).count() > 1);
+    let mut n = 0;
+    // Down, from the pages that are still in memory.
+    for t in (0..dense(mesh.tet_ids_end())).rev().map(sparse) {
+        let tet = mesh.tet(t);
+        let several = (0..4).filter(|&i| tet.is_required(i)).count() > 1;
+        n += u64::from(tet.is_live() && several);
     }
     n
 }
