@@ -1,7 +1,9 @@
 //! Edge collapse: a free vertex disappears into a neighbor.
 
-use super::quality::goodness;
-use super::smooth::{is_free, raised};
+use std::marker::PhantomData;
+
+use super::judge::Judge;
+use super::smooth::is_free;
 use crate::mesh::{Mesh, Tet};
 use crate::reconnect::{Ball, Replacement};
 use crate::store::Pages;
@@ -11,16 +13,17 @@ const BALL_MAX: usize = 64;
 
 /// Scratch of the search.
 #[derive(Default)]
-pub(super) struct Collapser {
+pub(super) struct Collapser<J> {
     ball: Ball,
     best_ball: Ball,
     new: Vec<[u32; 4]>,
     best_new: Vec<[u32; 4]>,
-    pub(super) replacement: Replacement,
+    replacement: Replacement,
+    judge: PhantomData<J>,
 }
 
-impl Collapser {
-    /// Collapses the edge of `t` that leaves the best worst goodness, if that is better than now.
+impl<J: Judge> Collapser<J> {
+    /// Collapses the edge of `t`, whose goodness is `own`, that is worth most, if any is worth enough.
     pub(super) fn collapse_best_edge<P: Pages>(
         &mut self,
         mesh: &mut Mesh<P>,
@@ -28,7 +31,7 @@ impl Collapser {
         tet: &Tet,
         own: f64,
     ) -> bool {
-        let mut best = raised(own);
+        let mut best = J::least(own);
         let mut found = false;
         for v in tet.vertices() {
             if !is_free(mesh, v)
@@ -38,10 +41,11 @@ impl Collapser {
             {
                 continue;
             }
+            let old = J::old(mesh, &self.ball.records);
             let mut taken = false;
             for w in tet.vertices().into_iter().filter(|&w| w != v) {
-                if let Some(worst) = self.try_onto(mesh, w, best) {
-                    best = worst;
+                if let Some(worth) = self.try_onto(mesh, w, old, best) {
+                    best = worth;
                     std::mem::swap(&mut self.new, &mut self.best_new);
                     taken = true;
                 }
@@ -52,32 +56,41 @@ impl Collapser {
             }
         }
         let ball = &self.best_ball;
-        let done = found
-            && self
-                .replacement
-                .apply(mesh, &ball.tets, &ball.records, &self.best_new);
+        let done =
+            found && (self.replacement).apply(mesh, &ball.tets, &ball.records, &self.best_new);
         if done {
             mesh.free_vertex(ball.v);
         }
         done
     }
 
-    /// The least goodness when the ball's vertex goes to `w`, if above `floor`; the new tetrahedra are then in `new`.
-    fn try_onto<P: Pages>(&mut self, mesh: &mut Mesh<P>, w: u32, floor: f64) -> Option<f64> {
+    /// What it is worth when the ball's vertex goes to `w`, if more than `best`; the new tetrahedra are then in `new`.
+    fn try_onto<P: Pages>(
+        &mut self,
+        mesh: &mut Mesh<P>,
+        w: u32,
+        old: J::Old,
+        best: f64,
+    ) -> Option<f64> {
         self.new.clear();
-        let mut least = f64::INFINITY;
-        for (record, &local) in self.ball.records.iter().zip(&self.ball.locals) {
-            if record.local(w).is_some() {
-                continue;
-            }
-            let mut node = record.vertices();
-            node[usize::from(local)] = w;
-            least = least.min(goodness(node.map(|v| mesh.point(v))));
-            if least <= floor {
-                return None;
-            }
-            self.new.push(node);
-        }
-        (!self.new.is_empty()).then_some(least)
+        let floor = J::floor(old, best);
+        let new = &mut self.new;
+        let tets = (self.ball.records.iter().zip(&self.ball.locals))
+            .filter(|(record, _)| record.local(w).is_none())
+            .map(|(record, &local)| {
+                let mut node = record.vertices();
+                node[usize::from(local)] = w;
+                new.push(node);
+                node.map(|v| mesh.point(v))
+            });
+        let number = J::number(old, floor, tets);
+        let better = J::worth(old, number) > best;
+        let allowed = better && J::allows(old, self.ball.tets.len(), number, self.new.len());
+        allowed.then(|| J::worth(old, number))
+    }
+
+    /// Tetrahedra made by the last success.
+    pub(super) fn new_tets(&self) -> &[u32] {
+        &self.replacement.new_tets
     }
 }

@@ -20,6 +20,7 @@
 
 mod collapse;
 mod insertion;
+mod judge;
 mod lawson;
 mod measure;
 mod missing;

@@ -2,6 +2,7 @@
 
 use super::collapse::Collapser;
 use super::insertion::{Better, Inserter};
+use super::judge::Worst;
 use super::rounds::{Means, OperationCounts, Target};
 use crate::mesh::{Mesh, Tet};
 use crate::store::Pages;
@@ -16,7 +17,7 @@ pub(super) const WORST: Target = Target {
 /// Scratch of collapse and insertion.
 #[derive(Default)]
 pub(super) struct Rescue {
-    collapser: Collapser,
+    collapser: Collapser<Worst>,
     inserter: Inserter,
 }
 
@@ -35,7 +36,7 @@ impl Rescue {
     ) -> bool {
         if self.collapser.collapse_best_edge(mesh, t, tet, good) {
             counts.edges_collapsed += 1;
-            changed.extend_from_slice(&self.collapser.replacement.new_tets);
+            changed.extend_from_slice(self.collapser.new_tets());
             return true;
         }
         if self.inserter.insert(mesh, t, tet, Better::Worst { enough }) {

@@ -1,5 +1,6 @@
 //! Rounds over the pages that hold bad tetrahedra.
 
+use super::judge::Worst;
 use super::pages::{PageFlags, clear_marks, is_examined, reopen, tets_of_page};
 use super::quality::{CONTENT, GOODNESS_WANTED, face_bound, goodness, is_below};
 use super::rescue::Rescue;
@@ -76,7 +77,7 @@ pub(super) struct Rounds {
     pub(super) flags: PageFlags,
     /// Pages with marks.
     marked: PageFlags,
-    swapper: Swapper,
+    swapper: Swapper<Worst>,
     star: Star,
     rescue: Rescue,
     share: Share,
@@ -219,16 +220,23 @@ impl Rounds {
             if dear {
                 self.mark(mesh, t, RESCUED);
             }
-            return (self.share).attack(mesh, t, tet, dear, &mut self.counts, &mut self.changed);
+            return (self.share).attack(
+                mesh,
+                t,
+                (tet, good),
+                dear,
+                &mut self.counts,
+                &mut self.changed,
+            );
         }
         if self.swapper.remove_best_edge(mesh, t, tet, good) {
             self.counts.edges_removed += 1;
-            self.changed.extend_from_slice(&self.swapper.new_tets);
+            self.changed.extend_from_slice(self.swapper.new_tets());
             return true;
         }
         if self.swapper.swap_best_face(mesh, t, tet, good) {
             self.counts.faces_swapped += 1;
-            self.changed.extend_from_slice(&self.swapper.new_tets);
+            self.changed.extend_from_slice(self.swapper.new_tets());
             return true;
         }
         for (i, v) in tet.vertices().into_iter().enumerate() {

@@ -1,28 +1,31 @@
 //! The best reconnection around a bad tetrahedron: one of its edges removed, or one of its faces swapped.
 
+use std::marker::PhantomData;
+
+use super::judge::Judge;
 use super::quality::goodness;
-use super::smooth::raised;
 use crate::geom::Point;
 use crate::mesh::{FaceRef, Mesh, Tet};
-use crate::reconnect::{FaceSwap, Forced, RingTriangulation, Shell, remove_edge};
+use crate::reconnect::{FaceSwap, RingTriangulation, Shell, remove_edge};
 use crate::store::Pages;
 
 /// Longest ring: 9 finds 1 % fewer removals than 12 and costs a third less.
 const RING_MAX: usize = 10;
 
-/// Scratch of the search; after success [`Swapper::new_tets`] lists what was made.
+/// Scratch of the search.
 #[derive(Default)]
-pub(super) struct Swapper {
+pub(super) struct Swapper<J> {
     shell: Shell,
     triangulation: RingTriangulation,
     /// The best so far.
     best_shell: Shell,
     best_triangulation: RingTriangulation,
-    pub(super) new_tets: Vec<u32>,
+    new_tets: Vec<u32>,
+    judge: PhantomData<J>,
 }
 
-impl Swapper {
-    /// Removes the edge of `t` that leaves the best worst goodness, if that is better than now.
+impl<J: Judge> Swapper<J> {
+    /// Removes the edge of `t`, whose goodness is `own`, that is worth most to remove, if any is worth enough.
     pub(super) fn remove_best_edge<P: Pages>(
         &mut self,
         mesh: &mut Mesh<P>,
@@ -30,36 +33,31 @@ impl Swapper {
         tet: &Tet,
         own: f64,
     ) -> bool {
-        // Nothing at or below what `t` itself has can be an improvement.
-        let mut best = raised(own);
+        let mut best = J::least(own);
         let mut found = false;
         for e in 0..6 {
-            if let Some(worst) = self.try_edge(mesh, t, tet, e, best) {
-                best = worst;
+            if let Some(worth) = self.try_edge(mesh, t, tet, e, best) {
+                best = worth;
                 found = true;
                 std::mem::swap(&mut self.shell, &mut self.best_shell);
                 std::mem::swap(&mut self.triangulation, &mut self.best_triangulation);
             }
         }
         if found {
-            remove_edge(
-                mesh,
-                &self.best_shell,
-                &self.best_triangulation,
-                &mut self.new_tets,
-            );
+            let (shell, triangulation) = (&self.best_shell, &self.best_triangulation);
+            remove_edge(mesh, shell, triangulation, &mut self.new_tets);
         }
         found
     }
 
-    /// The best worst goodness without edge `e`, if above `floor`.
+    /// What it is worth to remove edge `e`, if more than `best`.
     fn try_edge<P: Pages>(
         &mut self,
         mesh: &mut Mesh<P>,
         t: u32,
         tet: &Tet,
         e: usize,
-        floor: f64,
+        best: f64,
     ) -> Option<f64> {
         let shell = &mut self.shell;
         if !shell.gather_from(mesh, t, tet, e, RING_MAX) || !shell.closed || shell.required {
@@ -71,20 +69,20 @@ impl Swapper {
             *point = mesh.point(v);
         }
         let (a, b) = (mesh.point(shell.a), mesh.point(shell.b));
-        // The worst of the shell is at most that of `t`, and the floor is above it already.
+        let old = J::old(mesh, &shell.records);
+        let floor = J::floor(old, best);
         let cone = |i: usize, j: usize, k: usize| {
-            let above = goodness([ring[i], ring[j], ring[k], b]);
+            let above = J::with(old, J::NOTHING, goodness([ring[i], ring[j], ring[k], b]));
             if above <= floor {
                 return f64::NEG_INFINITY;
             }
-            let below = goodness([a, ring[i], ring[j], ring[k]]);
-            if above < below { above } else { below }
+            J::with(old, above, goodness([a, ring[i], ring[j], ring[k]]))
         };
-        let solved = self.triangulation.solve(n, floor, Forced::Nothing, cone);
-        solved.then_some(self.triangulation.worst)
+        let solved = J::solve(&mut self.triangulation, n, floor, cone);
+        solved.then(|| J::worth(old, self.triangulation.worst))
     }
 
-    /// Swaps the face of `t` that leaves the best worst goodness, if that is better than now.
+    /// Swaps the face of `t`, whose goodness is `own`, that is worth most to swap, if any is worth enough.
     pub(super) fn swap_best_face<P: Pages>(
         &mut self,
         mesh: &mut Mesh<P>,
@@ -92,22 +90,19 @@ impl Swapper {
         tet: &Tet,
         own: f64,
     ) -> bool {
-        let mut best = raised(own);
+        let mut best = J::least(own);
         let mut found = None;
         for i in 0..4 {
             let Some(swap) = FaceSwap::gather_from(mesh, FaceRef::new(t, i), tet) else {
                 continue;
             };
+            let other = mesh.tet(tet.neighbor[i].tet());
+            let old = J::old(mesh, &[*tet, other]);
             let (p, q, [x, y, z]) = swap.points(mesh);
-            let mut least = f64::INFINITY;
-            for (x, y) in [(x, y), (y, z), (z, x)] {
-                least = least.min(goodness([p, q, x, y]));
-                if least <= best {
-                    break;
-                }
-            }
-            if least > best {
-                best = least;
+            let tets = [(x, y), (y, z), (z, x)].map(|(x, y)| [p, q, x, y]);
+            let worth = J::worth(old, J::number(old, J::floor(old, best), tets));
+            if worth > best {
+                best = worth;
                 found = Some(swap);
             }
         }
@@ -117,5 +112,10 @@ impl Swapper {
         self.new_tets.clear();
         self.new_tets.extend(swap.apply(mesh));
         true
+    }
+
+    /// Tetrahedra made by the last success.
+    pub(super) fn new_tets(&self) -> &[u32] {
+        &self.new_tets
     }
 }
