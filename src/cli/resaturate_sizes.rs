@@ -14,7 +14,6 @@ use crate::catalog::Store;
 use crate::io::read::read_lengths;
 use crate::pipeline::{self, NewSizes, Options, Values};
 use crate::sizing::{SizeField, SizingError};
-use crate::store::Room;
 
 /// The options the store was made with. Errors: they cannot be read.
 pub fn options_of(open: &mut Store, path: &Path) -> Result<Options, Failure> {
@@ -116,9 +115,11 @@ fn field(
     if all.hgrad.is_none() {
         all.hgrad.clone_from(&options.hgrad);
     }
-    let input = store::surface_of(open, &[], Space::Boundless, talk)?;
+    let dir = open.catalog().dir().to_owned();
+    let space = Space::Capped(cap, &dir);
+    let input = store::surface_of(open, &[], space, talk)?;
     let background = background::read(&all, cap)?;
-    let room = Room::boundless();
+    let room = space.room(&input.surface)?;
     let prepared = pipeline::prepare(&input.surface, &all, background.as_ref(), &room)?;
     talk.note(&prepared.sizes.to_string());
     Ok(prepared.field)

@@ -153,7 +153,7 @@ fn prepare_in(
     };
     let (field, mut sizes) = match early {
         Some(built) => built,
-        None => built(&region_sizes(&domain, &asked)?)?,
+        None => built(&region_sizes(&domain, &asked, room)?)?,
     };
     if background.is_some() {
         sizes.source = format!("--size-field, {}", sizes.source);
@@ -253,13 +253,16 @@ impl Estimate {
     pub fn memory_full_bytes(&self, threads: usize) -> u64 {
         let pages = self.pages_bytes(threads);
         let buffers = (BUFFERS_TET * self.tets()).min(BUFFERS_MAX);
-        let beside = BESIDE_TET / FRAMES_TET * pages + BESIDE_TRIANGLE * self.triangles as f64;
+        // All triangles while the coarse mesh is made, later those of the sub-domains at hand.
+        let triangles = BESIDE_TRIANGLE * self.triangles as f64;
+        let share = self.at_once(threads) / f64::from(self.subdomains);
+        let beside = BESIDE_TET / FRAMES_TET * pages + share * triangles;
         // A part that is opened again is read through a cache.
         let cache = match self.subdomains {
             1 => 0.0,
             _ => ZONE_TET * self.zone_tets().min(1e6),
         };
-        (PROGRAM + buffers + pages + beside + cache) as u64
+        (PROGRAM + buffers + (pages + beside + cache).max(triangles)) as u64
     }
 
     /// The smallest cap under which all steps find room.

@@ -2,6 +2,7 @@
 
 use super::PipelineError;
 use crate::sizing::{Domain, Region, RegionSize, SizeOptions, SizingError};
+use crate::store::Room;
 use crate::surface::Surface;
 
 /// What `sizes` asks of regions of `domain`.
@@ -10,6 +11,7 @@ use crate::surface::Surface;
 pub(super) fn region_sizes<'a>(
     domain: &Domain<'a>,
     sizes: &SizeOptions,
+    room: &Room,
 ) -> Result<Vec<Region<'a>>, PipelineError> {
     let diagonal = domain.seeker.surface().bounds().diagonal();
     let one = |size: &RegionSize| {
@@ -18,7 +20,7 @@ pub(super) fn region_sizes<'a>(
         let Domain {
             seeker, volumes, ..
         } = *domain;
-        Ok(Region::new(seeker, volumes, is_here, h, sizes.beta()))
+        Ok(Region::new(seeker, volumes, is_here, h, sizes.beta(), room))
     };
     sizes.regions.iter().map(one).collect()
 }

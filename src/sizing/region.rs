@@ -22,13 +22,14 @@ pub struct Region<'a> {
 }
 
 impl<'a> Region<'a> {
-    /// Length `h` in the volumes that `is_here` names, for a field of slope `beta`.
+    /// Length `h` in the volumes that `is_here` names, for a field of slope `beta`. A scratch file that fails unwinds.
     pub fn new(
         seeker: &'a Seeker<'a>,
         volumes: &'a Volumes,
         is_here: Vec<bool>,
         h: f64,
         beta: f64,
+        room: &Room,
     ) -> Self {
         let is_border = |t: u32| {
             let [front, back] = volumes.of_side[t as usize].map(|v| is_here[v as usize]);
@@ -37,7 +38,7 @@ impl<'a> Region<'a> {
         Self {
             seeker,
             volumes,
-            border: Seeker::of(seeker.surface(), &Room::boundless(), is_border),
+            border: Seeker::of(seeker.surface(), room, is_border),
             is_here,
             h,
             beta,
