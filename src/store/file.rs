@@ -145,11 +145,6 @@ impl StoreFile {
         self.path.path()
     }
 
-    /// The same, with the disk.
-    pub fn place(&self) -> &DiskPath {
-        &self.path
-    }
-
     /// Calls `use_bytes` with the value of `key`, or returns `None` when there is none.
     ///
     /// Effects: none on the file. Errors: reads that fail, and damage redb notices.

@@ -7,37 +7,19 @@
 //! given a second chance. A list touched at each change of page costs 70 % (measured), a bit a few.
 
 use lru::LruCache;
-use tetdb_schema::page::{
-    FRAME_BYTES, PageAddress, SLOT_BITS, SLOTS, Slot, check_page, open_page, page_key, seal_page,
-    stored_bytes, u32_le,
-};
+use tetdb_schema::page::{FRAME_BYTES, PageAddress, SLOT_BITS, SLOTS, Slot, u32_le};
 
 use super::page_table::{
-    DIRTY, FRAMES_LIMIT, IN_BASE, IN_MADE, IN_SPILL, PageTable, REFERENCED, RESIDENT, frame_of,
+    DIRTY, FRAMES_LIMIT, IN_BASE, IN_MADE, PageTable, REFERENCED, RESIDENT, frame_of,
 };
-use super::spill::Spill;
-use super::{DiskPath, Pages, StoreError, StoreFile, fail, kind, stop_if_requested};
+use super::places::{Backing, Places};
+use super::{DiskPath, Pages, StoreError, fail, kind, stop_if_requested};
 
 /// Dirty pages written in one commit; a quarter of what redb's cache should hold.
 const BATCH_PAGES_MAX: usize = 256;
 /// Owner of a frame that holds no page.
 const NOBODY: (u8, u32) = (u8::MAX, u32::MAX);
 const FRAMES_MIN: usize = 16;
-
-/// Where pages go that leave memory, and where pages come from that were there before.
-pub struct Backing {
-    pub subdomain: u32,
-    /// Generation being written.
-    pub generation: u32,
-    /// Folder of the scratch file for pages that leave memory; it must exist by then.
-    pub spill: DiskPath,
-    /// The file to make of this generation, where each page is written once: all but those of the scratch map go there instead.
-    pub made: Option<DiskPath>,
-    /// The generation this step started from.
-    pub base: Option<StoreFile>,
-    /// Bytes redb may cache for a file that is written; half as many for one that is read.
-    pub cache_bytes: usize,
-}
 
 /// Page traffic so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -70,9 +52,7 @@ pub struct Pager {
     /// Kind and page of each frame, or [`NOBODY`].
     owners: Vec<(u8, u32)>,
     order: LruCache<u32, ()>,
-    backing: Option<Backing>,
-    made: Option<StoreFile>,
-    spill: Option<Spill>,
+    places: Places,
     stats: PagerStats,
 }
 
@@ -95,9 +75,7 @@ impl Pager {
             first: Default::default(),
             owners: Vec::new(),
             order: LruCache::unbounded(),
-            backing,
-            made: None,
-            spill: None,
+            places: Places::new(backing),
             stats: PagerStats::default(),
         }
     }
@@ -111,9 +89,9 @@ impl Pager {
 
     /// [`Pager::limit`], and gives a pool that was made without one a place for pages that leave memory.
     pub fn settle(&mut self, bytes: u64, backing: Backing) {
-        assert!(self.backing.is_none(), "its pages would be in two places");
+        assert!(!self.places.exist(), "its pages would be in two places");
         self.limit(bytes);
-        self.backing = Some(backing);
+        self.places = Places::new(Some(backing));
     }
 
     /// Reads and writes so far.
@@ -148,7 +126,7 @@ impl Pager {
     fn address(&self, kind: usize, page: u32) -> PageAddress {
         PageAddress {
             kind: kind::ALL[kind],
-            subdomain: self.backing.as_ref().map_or(0, |b| b.subdomain),
+            subdomain: self.places.subdomain(),
             page: self.first[kind] + page,
         }
     }
@@ -170,12 +148,7 @@ impl Pager {
     /// The file is closed when it is written: once it is listed it is not written to again, not even by redb when it is closed, for that would
     /// not be synced, and a loss of power could leave it torn. Unwinds on errors.
     pub fn end_generation(&mut self, path: DiskPath, generation: u32) {
-        let backing = self.backing.as_mut().expect("a pool with a store");
-        assert!(
-            backing.made.is_none(),
-            "its pages are in the file they make"
-        );
-        backing.made = Some(path.clone());
+        self.places.begin_file(path);
         assert_eq!(self.tables[kind::SCRATCH].len(), 0, "a map of this step");
         let n_batch = (self.frames_max / 4).clamp(1, BATCH_PAGES_MAX);
         let mut batch = Vec::with_capacity(n_batch);
@@ -193,17 +166,7 @@ impl Pager {
             }
         }
         self.write_back(&batch);
-        self.spill = None;
-        if let Some(Err(error)) = self.made.take().map(StoreFile::compact) {
-            fail(error);
-        }
-        let backing = self.backing.as_mut().expect("as above");
-        backing.made = None;
-        backing.generation = generation;
-        match StoreFile::open_repaired(&path, backing.cache_bytes / 2, false) {
-            Ok(base) => backing.base = Some(base),
-            Err(error) => fail(error),
-        }
+        told(self.places.end_file(generation));
         for table in &mut self.tables {
             for page in 0..table.len() as u32 {
                 if table.entry(page) & RESIDENT == 0 {
@@ -284,36 +247,7 @@ impl Pager {
         let address = self.address(kind, page);
         let at = frame as usize * SLOTS;
         let slots = &mut self.frames[at..at + SLOTS];
-        let file = match place {
-            IN_BASE => self.backing.as_mut().and_then(|b| b.base.as_mut()),
-            _ => self.made.as_mut(),
-        };
-        let (path, read) = match (place, file) {
-            (IN_SPILL.., _) => {
-                let spill = self.spill.as_ref().expect("a page is in it");
-                let read = spill.read(place - IN_SPILL, slots);
-                let path = spill.path().path();
-                (path, read.map(|()| Some(check_page(slots, address))))
-            }
-            (_, Some(file)) => {
-                let key = page_key(address.kind, address.page);
-                let read = file.read(key, |bytes| open_page(bytes, address, slots));
-                (file.path(), read)
-            }
-            (_, None) => unreachable!("a page that is not resident is in a file"),
-        };
-        match read {
-            Ok(Some(Ok(_))) => {}
-            Ok(Some(Err(source))) => fail(StoreError::Page {
-                path: path.to_owned(),
-                source,
-            }),
-            Ok(None) => fail(StoreError::Missing {
-                path: path.to_owned(),
-                what: format!("page {address:?}"),
-            }),
-            Err(error) => fail(error),
-        }
+        told(self.places.read(place, address, slots));
         self.stats.pages_read += 1;
         self.set_place(frame, place);
         self.owners[frame as usize] = (kind as u8, page);
@@ -361,9 +295,8 @@ impl Pager {
 
     /// Whether the page in `frame` belongs to the file that is made.
     fn is_made(&self, frame: u32) -> bool {
-        let kind = usize::from(self.owners[frame as usize].0);
-        let makes = self.backing.as_ref().is_some_and(|b| b.made.is_some());
-        makes && kind < kind::ALL.len() && kind != kind::SCRATCH
+        let owner = self.owners[frame as usize];
+        owner != NOBODY && self.places.makes(usize::from(owner.0))
     }
 
     /// The next victims that would have to be written, so that one commit serves many misses.
@@ -379,71 +312,52 @@ impl Pager {
 
     /// Writes a page to the spill.
     fn put_away(&mut self, frame: u32) {
-        let Some(backing) = &self.backing else {
+        if !self.places.exist() {
             fail(StoreError::Budget {
                 what: "a mesh without a store",
                 needed: (self.owners.len() as u64 + 1) * FRAME_BYTES as u64,
                 available: self.frames_max as u64 * FRAME_BYTES as u64,
             });
-        };
-        let generation = backing.generation;
-        if self.spill.is_none() {
-            match Spill::create(&backing.spill) {
-                Ok(spill) => self.spill = Some(spill),
-                Err(error) => fail(error),
-            }
         }
-        let (kind, page) = self.owners[frame as usize];
-        let address = self.address(usize::from(kind), page);
-        seal_page(self.frame(frame), address, generation);
-        let known = self.place(frame);
-        let spill = self.spill.as_mut().expect("created above");
-        let place = match known {
-            IN_SPILL.. => known - IN_SPILL,
-            _ => spill.take(),
-        };
+        let (address, place) = (self.address_of(frame), self.place(frame));
         let at = frame as usize * SLOTS;
-        if let Err(error) = spill.write(place, &self.frames[at..at + SLOTS]) {
-            fail(error);
-        }
+        let slots = &mut self.frames[at..at + SLOTS];
+        let place = told(self.places.put_away(place, address, slots));
         self.stats.pages_written += 1;
-        self.set_entry(frame, self.entry(frame) & !DIRTY);
-        self.set_place(frame, IN_SPILL + place);
+        self.is_at(frame, place);
     }
 
     /// Writes pages to the file that is made, in one commit.
     fn write_back(&mut self, batch: &[u32]) {
-        let backing = self.backing.as_ref().expect("it makes a file");
-        if self.made.is_none() {
-            let path = backing.made.as_ref().expect("it makes a file");
-            match StoreFile::create_unsynced(path, backing.cache_bytes) {
-                Ok(file) => self.made = Some(file),
-                Err(error) => fail(error),
-            }
-        }
-        let generation = backing.generation;
-        let mut keys = Vec::with_capacity(batch.len());
         for &frame in batch {
-            let (kind, page) = self.owners[frame as usize];
-            let address = self.address(usize::from(kind), page);
-            keys.push(page_key(address.kind, address.page));
-            seal_page(self.frame(frame), address, generation);
-        }
-        let frames = &self.frames;
-        let values = batch.iter().zip(keys).map(|(&frame, key)| {
+            let address = self.address_of(frame);
             let at = frame as usize * SLOTS;
-            (key, stored_bytes(&frames[at..at + SLOTS]))
-        });
-        let made = self.made.as_mut().expect("created above");
-        if let Err(error) = made.write(values) {
-            fail(error);
+            self.places.seal(address, &mut self.frames[at..at + SLOTS]);
         }
+        let addresses: Vec<PageAddress> = batch.iter().map(|&f| self.address_of(f)).collect();
+        let frames = &self.frames;
+        let pages = addresses.into_iter().zip(batch).map(|(address, &frame)| {
+            let at = frame as usize * SLOTS;
+            (address, &frames[at..at + SLOTS])
+        });
+        told(self.places.write(pages));
         self.stats.pages_written += batch.len() as u64;
         self.stats.commits += 1;
         for &frame in batch {
-            self.set_entry(frame, self.entry(frame) & !DIRTY);
-            self.set_place(frame, IN_MADE);
+            self.is_at(frame, IN_MADE);
         }
+    }
+
+    /// Where the page in `frame` is stored.
+    fn address_of(&self, frame: u32) -> PageAddress {
+        let (kind, page) = self.owners[frame as usize];
+        self.address(usize::from(kind), page)
+    }
+
+    /// The page in `frame` is at `place` as it is.
+    fn is_at(&mut self, frame: u32, place: u32) {
+        self.set_entry(frame, self.entry(frame) & !DIRTY);
+        self.set_place(frame, place);
     }
 
     /// The slot that no file counts on remembers where the page is when it is clean.
@@ -533,14 +447,11 @@ impl Pages for Pager {
 impl Pager {
     /// Leaves the places of the first `n` pages of a kind in the spill to others.
     fn forget(&mut self, kind: usize, n: u32) {
-        let makes = self.backing.as_ref().is_some_and(|b| b.made.is_some());
-        assert!(kind == kind::SCRATCH || !makes, "written once, and kept");
+        assert!(!self.places.makes(kind), "written once, and kept");
         for page in 0..n {
             let entry = self.tables[kind].entry(page);
             let place = frame_of(entry).map_or(entry, |frame| self.place(frame));
-            if let (IN_SPILL.., Some(spill)) = (place, &mut self.spill) {
-                spill.forget(place - IN_SPILL);
-            }
+            self.places.forget(place);
         }
     }
 
@@ -552,6 +463,11 @@ impl Pager {
             self.free.push(frame);
         }
     }
+}
+
+/// What was done with a file. Unwinds on errors.
+fn told<T>(done: Result<T, StoreError>) -> T {
+    done.unwrap_or_else(|error| fail(error))
 }
 
 #[cfg(test)]
@@ -595,7 +511,7 @@ mod tests {
                 pager.append_page::<{ kind::SCRATCH }>();
             }
             pager.clear::<{ kind::SCRATCH }>();
-            assert!(pager.spill.as_ref().is_some_and(|s| s.end <= 2 * N + N / 2));
+            assert!((1..=2 * N + N / 2).contains(&pager.places.spilled()));
         }
         pager.end_generation(path.clone().into(), 2);
         let kept = std::fs::metadata(&path)?.len();
