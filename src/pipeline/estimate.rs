@@ -40,6 +40,8 @@ const COARSE_FILE_LEAST: f64 = 30e3;
 const CATALOG_LEAST: f64 = 100e3;
 /// Bytes of the coarse mesh on disk for each triangle: 120 to 130.
 const COARSE_TRIANGLE: f64 = 126.0;
+/// Pages of the coarse mesh while it is numbered anew, over those before.
+const RENUMBERED: f64 = 1.8;
 /// Bytes of a bisected part on disk for each tetrahedron of its refined zones, in the box in four parts.
 const ZONE_TET: f64 = 65.0;
 /// Width of a refined zone in wanted lengths.
@@ -233,15 +235,26 @@ impl Estimate {
         let parts = COARSE_TRIANGLE * self.triangles as f64 + ZONE_TET * self.zone_tets();
         let store = self.store_bytes() as f64;
         let files = (parts + at_once / n * store).max(store + at_once / n * parts);
-        let pages = self.pages_bytes(threads);
-        let spilled = (SPILLED * (pages - frames)).clamp(0.0, SPILLED_MAX * pages);
+        let spilled = spilled(self.pages_bytes(threads), frames);
         let sorted = SORTED_TET * self.tets() / n;
-        let runs = if sorted > buffers / at_once * SORT_SHARE {
-            sorted
-        } else {
-            0.0
+        let runs = match sorted > buffers / at_once * SORT_SHARE {
+            true => sorted,
+            false => 0.0,
         };
-        (files + spilled + runs) as u64
+        (files + spilled + runs).max(self.first_cut_bytes(frames)) as u64
+    }
+
+    /// Most bytes on disk during the first cut: the coarse mesh, the same with the refined zone as pages, and the two parts.
+    fn first_cut_bytes(&self, frames: f64) -> f64 {
+        if self.subdomains == 1 {
+            return 0.0;
+        }
+        let side = self.counts.inner_vertices.cbrt().max(1.0);
+        let zone = (ZONE_WIDTH / side).min(1.0) * self.tets();
+        let coarse = COARSE_TRIANGLE * self.triangles as f64;
+        let pages = RENUMBERED * coarse + FRAMES_TET * zone;
+        // Half of the frames are for the parts.
+        2.0 * coarse + ZONE_TET * zone + spilled(pages, 0.5 * frames)
     }
 
     /// Most bytes the process will hold with a cap of `cap`.
@@ -299,6 +312,11 @@ impl Estimate {
         let shared = 3.0 * (1.0 - 1.0 / n.cbrt());
         (ZONE_WIDTH / side * shared).min(1.0) * self.tets()
     }
+}
+
+/// Bytes of the scratch file for so many bytes of pages with so many of frames.
+fn spilled(pages: f64, frames: f64) -> f64 {
+    (SPILLED * (pages - frames)).clamp(0.0, SPILLED_MAX * pages)
 }
 
 /// The smallest cap under which this surface may be meshed, as far as it alone tells: the size field needs a little more.
