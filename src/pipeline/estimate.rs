@@ -41,7 +41,7 @@ const CATALOG_LEAST: f64 = 100e3;
 /// Bytes of the coarse mesh on disk for each triangle: 120 to 130.
 const COARSE_TRIANGLE: f64 = 126.0;
 /// Pages of the coarse mesh while it is numbered anew, over those before.
-const RENUMBERED: f64 = 1.8;
+const RENUMBERED: f64 = 1.6;
 /// Bytes of a bisected part on disk for each tetrahedron of its refined zones, in the box in four parts.
 const ZONE_TET: f64 = 65.0;
 /// Width of a refined zone in wanted lengths.
