@@ -38,8 +38,9 @@ const PAGES_RECORD: f64 = 40.05;
 const FILE_LEAST: f64 = 50e3;
 const COARSE_FILE_LEAST: f64 = 30e3;
 const CATALOG_LEAST: f64 = 100e3;
-/// Bytes of the coarse mesh on disk for each triangle: 120 to 130.
-const COARSE_TRIANGLE: f64 = 126.0;
+/// Bytes of the coarse mesh on disk for each triangle, and for each side of one that is filled: 120 to 130 with one side, 195 with both.
+const COARSE_TRIANGLE: f64 = 57.0;
+const COARSE_SIDE: f64 = 69.0;
 /// Pages of the coarse mesh while it is numbered anew, over those before.
 const RENUMBERED: f64 = 1.6;
 /// Bytes of a bisected part on disk for each tetrahedron of its refined zones, in the box in four parts.
@@ -76,6 +77,8 @@ const SECONDS_VERIFY: f64 = 0.42e-6;
 pub struct Estimate {
     pub counts: Counts,
     pub triangles: u64,
+    /// Sides of triangles in a filled region.
+    sides: u64,
     pub vertices: f64,
     pub subdomains: u32,
     /// What was asked for, when that was more than the mesh allows.
@@ -178,10 +181,14 @@ impl Estimate {
             Mode::Full => 1.0,
         };
         let (subdomains, subdomains_asked) = n_subdomains(counts.tets(), options)?;
+        let sides = (0..surface.n_triangles())
+            .flat_map(|t| domain.volumes.of_side[t])
+            .filter(|&v| domain.filled[v as usize]);
         let sizes_bytes = (field.n_leaves() * size_of::<[f32; 8]>()) as u64;
         Ok(Self {
             counts,
             triangles: surface.n_triangles() as u64,
+            sides: sides.count() as u64,
             vertices: surface.n_vertices() as f64 + counts.inner_vertices,
             subdomains,
             subdomains_asked,
@@ -232,7 +239,7 @@ impl Estimate {
             Err(_) => (0.0, 0.0),
         };
         // A part's file goes when it is sealed: before the first is, and while the last are.
-        let parts = COARSE_TRIANGLE * self.triangles as f64 + ZONE_TET * self.zone_tets();
+        let parts = self.coarse_mesh_bytes() + ZONE_TET * self.zone_tets();
         let store = self.store_bytes() as f64;
         let files = (parts + at_once / n * store).max(store + at_once / n * parts);
         let spilled = spilled(self.pages_bytes(threads), frames);
@@ -244,6 +251,11 @@ impl Estimate {
         (files + spilled + runs).max(self.first_cut_bytes(frames)) as u64
     }
 
+    /// Bytes of the coarse mesh on disk.
+    fn coarse_mesh_bytes(&self) -> f64 {
+        COARSE_TRIANGLE * self.triangles as f64 + COARSE_SIDE * self.sides as f64
+    }
+
     /// Most bytes on disk during the first cut: the coarse mesh, the same with the refined zone as pages, and the two parts.
     fn first_cut_bytes(&self, frames: f64) -> f64 {
         if self.subdomains == 1 {
@@ -251,7 +263,7 @@ impl Estimate {
         }
         let side = self.counts.inner_vertices.cbrt().max(1.0);
         let zone = (ZONE_WIDTH / side).min(1.0) * self.tets();
-        let coarse = COARSE_TRIANGLE * self.triangles as f64;
+        let coarse = self.coarse_mesh_bytes();
         let pages = RENUMBERED * coarse + FRAMES_TET * zone;
         // Half of the frames are for the parts.
         2.0 * coarse + ZONE_TET * zone + spilled(pages, 0.5 * frames)
