@@ -8,15 +8,16 @@
 use std::time::Instant;
 
 use tetdb::bisect::{self, CutPlan, CutReport, Method, PlaneChoice, Steps, load_of};
-use tetdb::catalog::{Catalog, Job};
 use tetdb::geom::{Point, mix};
 use tetdb::mesh::{Mesh, Workspace, renumber};
 use tetdb::optimize::{Mode, Settings};
 use tetdb::pipeline::{self, Options, silent};
 use tetdb::samples::SampleSpec;
 use tetdb::sizing::{SizeField, SizeOptions, TETS_PER_LOAD};
-use tetdb::store::{Backing, Budget, Pager, Room, attempt};
+use tetdb::storage::{Backing, Budget, Pager, ScratchSpace, attempt};
+use tetdb::store::Catalog;
 use tetdb::surface::Surface;
+use tetdb_schema::catalog::Job;
 
 /// Bytes of pages per tetrahedron of a finished mesh, its vertices included.
 const BYTES_PER_TET: f64 = 42.0;
@@ -77,7 +78,7 @@ impl Bench {
             &mut host,
             &self.surface,
             &options,
-            &Room::boundless(),
+            &ScratchSpace::boundless(),
             &silent,
         )
         .expect("a mesh");
@@ -268,7 +269,7 @@ fn main() {
         &mut mesh,
         &bench.surface,
         &Options::default(),
-        &Room::boundless(),
+        &ScratchSpace::boundless(),
         &silent,
     )
     .expect("a mesh");

@@ -11,7 +11,7 @@ use tetdb::delaunay::{Kernel, enclose, insertion_key};
 use tetdb::geom::{Aabb, HilbertFrame, Point, orient_sign};
 use tetdb::mesh::Mesh;
 use tetdb::samples::SampleSpec;
-use tetdb::store::{Backing, FlatPages, Pager, Pages, Sorter};
+use tetdb::storage::{Backing, FlatPages, Pager, Pages, Sorter};
 
 fn main() {
     let words: Vec<String> = std::env::args()

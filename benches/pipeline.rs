@@ -10,13 +10,14 @@ use std::path::Path;
 use std::time::Instant;
 
 use tetdb::bisect::Method;
-use tetdb::catalog::{Catalog, Job, Store};
 use tetdb::geom::Point;
 use tetdb::pipeline::{self, Event, Options};
 use tetdb::refine::Lengths;
 use tetdb::samples::SampleSpec;
-use tetdb::store::Budget;
+use tetdb::storage::Budget;
+use tetdb::store::Catalog;
 use tetdb::surface::Surface;
+use tetdb_schema::catalog::Job;
 use tetdb_schema::record::{SealedVertex, tag};
 
 /// Seconds per stage; what passes between two words of the watcher belongs to the stage of the first.
@@ -48,8 +49,8 @@ impl Stages {
 
 /// Share of edges of about the wanted length, among those a layer away from the surface.
 fn share_of_unit_edges(store: &Path) -> f64 {
-    let mut store = Store::open(store).expect("what was just written");
-    let mut subdomain = store.subdomain(0).expect("the only one");
+    let mut store = Catalog::open(store).expect("what was just written");
+    let mut subdomain = store.open_subdomain(0, 16 << 20).expect("the only one");
     let vertices: Vec<SealedVertex> = subdomain.vertices().map(|v| v.expect("sound")).collect();
     let tets: Vec<[u32; 4]> = (subdomain.tets().map(|t| t.expect("sound").1.nodes)).collect();
     let mut near: Vec<bool> = vertices.iter().map(|v| v.tag == tag::SURFACE).collect();

@@ -4,13 +4,13 @@
 //! CPU second of all threads.
 
 use tetdb::audit::{Level, VerifyOptions, verify};
-use tetdb::catalog::{
-    Catalog, FacePairs, Job, Paired, SealedWriter, Store, StoreState, sorted_face,
-};
 use tetdb::delaunay::{Kernel, enclose};
 use tetdb::geom::{Aabb, HilbertFrame, Point};
 use tetdb::mesh::Mesh;
-use tetdb::store::FlatPages;
+use tetdb::sealed::{FacePairs, Paired, SealedWriter, sorted_face};
+use tetdb::storage::FlatPages;
+use tetdb::store::Catalog;
+use tetdb_schema::catalog::{Job, StoreState};
 use tetdb_schema::chunk::{ChunkRecord, Decoder, Packer};
 use tetdb_schema::digest::mix;
 use tetdb_schema::ids::SubdomainId;
@@ -215,7 +215,7 @@ fn store(vertices: &[SealedVertex], tets: &[SealedTet]) {
             temp_dir: dir.path().to_owned(),
         };
         let start = cpu_seconds();
-        let report = Store::open(&path)
+        let report = Catalog::open(&path)
             .and_then(|mut s| verify(&mut s, None, &options))
             .expect("undamaged");
         let seconds = cpu_seconds() - start;

@@ -8,13 +8,14 @@ use std::path::Path;
 
 use tetdb::audit::{self, Level, Report, VerifyOptions};
 use tetdb::bisect::{CutReport, Method, Plane, PlaneChoice, choose_plane};
-use tetdb::catalog::{Catalog, Job, Store};
 use tetdb::geom::{Point, mix};
 use tetdb::mesh::Mesh;
 use tetdb::pipeline::{self, Options, PipelineError, silent};
 use tetdb::samples::SampleSpec;
-use tetdb::store::{Budget, FlatPages, Room};
+use tetdb::storage::{Budget, FlatPages, ScratchSpace};
+use tetdb::store::Catalog;
 use tetdb::surface::Surface;
+use tetdb_schema::catalog::Job;
 
 fn sample(words: &str) -> Surface {
     let made = SampleSpec::parse(words).and_then(|spec| spec.make());
@@ -46,7 +47,7 @@ fn mesh_cut_by<T>(
 }
 
 fn verified(path: &Path, surface: &Surface) -> Report {
-    let mut store = Store::open(path).expect("what was just written");
+    let mut store = Catalog::open(path).expect("what was just written");
     let verify = VerifyOptions {
         level: Level::Delaunay,
         memory_bytes: 64 << 20,
@@ -177,7 +178,7 @@ fn papers_plane(surface: &Surface) -> (Mesh<FlatPages>, Plane) {
         &mut mesh,
         surface,
         &Options::default(),
-        &Room::boundless(),
+        &ScratchSpace::boundless(),
         &silent,
     )
     .expect("a mesh");

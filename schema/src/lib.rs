@@ -1,6 +1,7 @@
 #![forbid(unsafe_code)]
 #![doc = include_str!("../README.md")]
 
+pub mod catalog;
 pub mod chunk;
 pub mod digest;
 pub mod ids;

@@ -4,7 +4,7 @@ use tetdb_schema::ids::{Owner, VertexId};
 use tetdb_schema::record::{NO_TET, SealedFacet};
 
 use super::{Finding, Offender, Report};
-use crate::catalog::Corner;
+use crate::sealed::Corner;
 use crate::surface::Surface;
 
 /// The input and what of it has been seen. Memory: three bits a triangle.

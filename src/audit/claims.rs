@@ -3,8 +3,9 @@
 use std::iter::Peekable;
 use std::path::Path;
 
-use crate::catalog::{CatalogError, sorted_face};
-use crate::store::{Sorted, Sorter, StoreError};
+use crate::sealed::sorted_face;
+use crate::storage::{Sorted, Sorter, StorageError};
+use crate::store::StoreError;
 
 /// Tetrahedron, vertices ascending, parity, kind: 4 + 12 + 1 + 1 bytes.
 const BYTES: usize = 18;
@@ -54,7 +55,7 @@ impl Claims {
         vertices: [u32; 3],
         turned: bool,
         kind: u8,
-    ) -> Result<(), StoreError> {
+    ) -> Result<(), StorageError> {
         let (face, odd) = sorted_face(vertices);
         let mut record = [0; BYTES];
         record[..4].copy_from_slice(&tet.to_be_bytes());
@@ -66,7 +67,7 @@ impl Claims {
         self.sorter.push(record)
     }
 
-    pub(super) fn finish(self) -> Result<SortedClaims, StoreError> {
+    pub(super) fn finish(self) -> Result<SortedClaims, StorageError> {
         Ok(SortedClaims {
             claims: self.sorter.finish()?.peekable(),
         })
@@ -75,7 +76,7 @@ impl Claims {
 
 impl SortedClaims {
     /// The next claim of a tetrahedron below `end`.
-    pub(super) fn next_below(&mut self, end: u32) -> Result<Option<Claim>, CatalogError> {
+    pub(super) fn next_below(&mut self, end: u32) -> Result<Option<Claim>, StoreError> {
         let next = self
             .claims
             .next_if(|r| r.as_ref().is_ok_and(|r| word(r, 0) < end) || r.is_err());

@@ -7,8 +7,10 @@
 use tetdb_schema::ids::{Owner, VertexId};
 use tetdb_schema::record::NO_TET;
 
-use crate::catalog::{CatalogError, Corner, QUALITY_BINS, Shape, Store, Subdomain, quality_bin};
 use crate::optimize::is_forcing;
+use crate::sealed::{Corner, Shape, Subdomain, quality_bin};
+use crate::store::{Catalog, StoreError};
+use tetdb_schema::catalog::QUALITY_BINS;
 
 /// Tetrahedra by quality.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
@@ -48,10 +50,10 @@ pub struct Qualities {
 /// largest.
 ///
 /// Errors: damage, and failures of the disk.
-pub fn qualities(store: &mut Store, memory_bytes: usize) -> Result<Qualities, CatalogError> {
+pub fn qualities(store: &mut Catalog, memory_bytes: usize) -> Result<Qualities, StoreError> {
     let mut found = Qualities::default();
-    for row in store.catalog().subdomains()? {
-        let mut part = Subdomain::open(store.catalog(), row.rank, memory_bytes)?;
+    for row in store.subdomains()? {
+        let mut part = store.open_subdomain(row.rank, memory_bytes)?;
         found.subdomains += 1;
         found.interface_faces += row.interface_faces;
         let forced = forced_by_face(&mut part)?;
@@ -97,7 +99,7 @@ impl Bits {
     }
 }
 
-fn forced_by_face(part: &mut Subdomain) -> Result<Bits, CatalogError> {
+fn forced_by_face(part: &mut Subdomain) -> Result<Bits, StoreError> {
     let mut forced = Bits::new(part.row().tets);
     for chunk in 0..part.row().chunks[2] {
         for facet in part.facet_chunk(chunk)?.records {
@@ -112,7 +114,7 @@ fn forced_by_face(part: &mut Subdomain) -> Result<Bits, CatalogError> {
     Ok(forced)
 }
 
-fn interface_vertices(part: &mut Subdomain) -> Result<Bits, CatalogError> {
+fn interface_vertices(part: &mut Subdomain) -> Result<Bits, StoreError> {
     let mut vertices = Bits::new(part.row().vertices);
     for chunk in 0..part.row().chunks[3] {
         for face in part.interface_chunk(chunk)?.records {

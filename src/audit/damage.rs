@@ -3,8 +3,10 @@
 //! The mesh itself is read by [`verify`](super::verify), chunk by chunk; here every file that counts is, also those that are only kept:
 //! coarse leaves, previous versions, stages.
 
-use crate::catalog::{CatalogError, CoarseLeaf, CoarseRow, Store, Subdomain, SubdomainRow};
-use crate::store::stop_if_requested;
+use crate::sealed::CoarseSnapshot;
+use crate::storage::check_cancelled;
+use crate::store::{Catalog, StoreError};
+use tetdb_schema::catalog::{CoarseRow, SubdomainRow};
 
 /// For chunks and what redb holds of a file.
 const MEMORY_BYTES: usize = 8 << 20;
@@ -14,9 +16,9 @@ const LISTED_MAX: usize = 1000;
 /// What is damaged in the files of sub-domains, coarse leaves, previous versions and stages, in that order; nothing in a sound store.
 ///
 /// Errors: a damaged catalog, which tells what files there are; failures of the disk that are no damage.
-pub fn damage(store: &mut Store) -> Result<Vec<CatalogError>, CatalogError> {
-    let mut found = Found(Vec::new());
-    for row in store.catalog().subdomains()? {
+pub fn damage(store: &mut Catalog) -> Result<Vec<StoreError>, StoreError> {
+    let mut found = DamageFound(Vec::new());
+    for row in store.subdomains()? {
         found.of_part(store, row)?;
     }
     found.of_kept(store)?;
@@ -24,19 +26,19 @@ pub fn damage(store: &mut Store) -> Result<Vec<CatalogError>, CatalogError> {
 }
 
 /// The same of the files that are no part of the mesh. Errors: as [`damage`].
-pub(super) fn damage_of_kept(store: &mut Store) -> Result<Vec<CatalogError>, CatalogError> {
-    let mut found = Found(Vec::new());
+pub(super) fn damage_of_kept(store: &mut Catalog) -> Result<Vec<StoreError>, StoreError> {
+    let mut found = DamageFound(Vec::new());
     found.of_kept(store)?;
     Ok(found.0)
 }
 
-struct Found(Vec<CatalogError>);
+struct DamageFound(Vec<StoreError>);
 
-impl Found {
+impl DamageFound {
     /// Takes damage; hands other errors on. Whether there was none.
-    fn note<T>(&mut self, read: Result<T, CatalogError>) -> Result<bool, CatalogError> {
-        stop_if_requested();
-        match read {
+    fn note<T, E: Into<StoreError>>(&mut self, read: Result<T, E>) -> Result<bool, StoreError> {
+        check_cancelled();
+        match read.map_err(E::into) {
             Ok(_) => Ok(true),
             Err(error) if error.is_damage() => {
                 if self.0.len() < LISTED_MAX {
@@ -48,24 +50,24 @@ impl Found {
         }
     }
 
-    fn of_kept(&mut self, store: &mut Store) -> Result<(), CatalogError> {
-        for row in store.catalog().coarse_leaves()? {
+    fn of_kept(&mut self, store: &mut Catalog) -> Result<(), StoreError> {
+        for row in store.coarse_snapshots()? {
             self.of_leaf(store, row)?;
         }
-        for row in store.catalog().before()? {
+        for row in store.before()? {
             self.of_part(store, row)?;
         }
-        for stage in store.catalog().stages()? {
+        for stage in store.stages()? {
             self.of_part(store, stage.row)?;
         }
         Ok(())
     }
 
-    fn of_part(&mut self, store: &mut Store, row: SubdomainRow) -> Result<(), CatalogError> {
+    fn of_part(&mut self, store: &mut Catalog, row: SubdomainRow) -> Result<(), StoreError> {
         let [tets, vertices, facets, faces, ..] = row.chunks;
-        let mut part = match Subdomain::open_row(store.catalog(), row, MEMORY_BYTES) {
+        let mut part = match store.open_row(row, MEMORY_BYTES) {
             Ok(part) => part,
-            Err(error) => return self.note::<()>(Err(error)).map(drop),
+            Err(error) => return self.note::<(), _>(Err(error)).map(drop),
         };
         let mut is_sound = true;
         for chunk in 0..vertices {
@@ -87,11 +89,11 @@ impl Found {
         Ok(())
     }
 
-    fn of_leaf(&mut self, store: &mut Store, row: CoarseRow) -> Result<(), CatalogError> {
-        let path = store.catalog().coarse_path(row.rank, row.generation);
-        let mut leaf = match CoarseLeaf::open_at(&path, row, MEMORY_BYTES) {
+    fn of_leaf(&mut self, store: &mut Catalog, row: CoarseRow) -> Result<(), StoreError> {
+        let path = store.coarse_path(row.rank, row.generation);
+        let mut leaf = match CoarseSnapshot::open(&path, row, MEMORY_BYTES) {
             Ok(leaf) => leaf,
-            Err(error) => return self.note::<()>(Err(error)).map(drop),
+            Err(error) => return self.note::<(), _>(Err(error)).map(drop),
         };
         let mut is_sound = true;
         for chunk in leaf.vertices() {

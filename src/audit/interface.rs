@@ -8,8 +8,10 @@ use tetdb_schema::record::InterfaceFace;
 
 use super::claims::word;
 use super::{Finding, Offender, Report};
-use crate::catalog::{CatalogError, Corner, InterfaceRow};
-use crate::store::{Sorter, StoreError};
+use crate::sealed::Corner;
+use crate::storage::{Sorter, StorageError};
+use crate::store::StoreError;
+use tetdb_schema::catalog::InterfaceRow;
 
 /// Cut, index, sub-domain, other, three vertex ids in their turn, sum of the coordinate mixes.
 const BYTES: usize = 48;
@@ -35,7 +37,7 @@ impl Interfaces {
         subdomain: u32,
         face: &InterfaceFace,
         corners: &[Corner; 3],
-    ) -> Result<(), StoreError> {
+    ) -> Result<(), StorageError> {
         let mixes = corners.map(|c| c.mix);
         let (low, high) = (subdomain.min(face.other), subdomain.max(face.other));
         let sides = self.sides.entry((face.cut, low, high)).or_default();
@@ -69,7 +71,7 @@ impl Interfaces {
         self,
         rows: &[InterfaceRow],
         report: &mut Report,
-    ) -> Result<(), CatalogError> {
+    ) -> Result<(), StoreError> {
         let mut group: Vec<[u8; BYTES]> = Vec::new();
         for record in self.sorter.finish()? {
             let record = record?;

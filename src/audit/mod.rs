@@ -32,7 +32,8 @@ pub use report::{Finding, Level, Offender, Report};
 
 use tetdb_schema::digest::Digest;
 
-use crate::catalog::{CatalogError, Store, Subdomain};
+use crate::storage::StorageError;
+use crate::store::{Catalog, StoreError};
 use crate::surface::Surface;
 
 /// How to verify.
@@ -50,16 +51,16 @@ pub struct VerifyOptions {
 ///
 /// Errors: damage, and failures of the disk; an invalid mesh is a [`Report`] that says so.
 pub fn verify(
-    store: &mut Store,
+    store: &mut Catalog,
     surface: Option<&Surface>,
     options: &VerifyOptions,
-) -> Result<Report, CatalogError> {
+) -> Result<Report, StoreError> {
     let scratch = Scratch::new(&options.temp_dir)?;
     let mut audit = pass::Audit::new(surface, options, &scratch.path);
-    let rows = store.catalog().subdomains()?;
+    let rows = store.subdomains()?;
     for row in &rows {
         let memory = options.memory_bytes / 4;
-        let mut part = Subdomain::open(store.catalog(), row.rank, memory)?;
+        let mut part = store.open_subdomain(row.rank, memory)?;
         audit.subdomain(&mut part)?;
         // Damage of chunks is told with their places by now; what is left is in the tree between them.
         part.check()?;
@@ -68,18 +69,18 @@ pub fn verify(
     if let Some(first) = damage::damage_of_kept(store)?.into_iter().next() {
         return Err(first);
     }
-    let interfaces = store.catalog().interfaces()?;
-    let regions = store.catalog().regions()?;
+    let interfaces = store.interfaces()?;
+    let regions = store.regions()?;
     audit.finish(&interfaces, &regions)
 }
 
 /// The digests of all tetrahedra and of all interface faces, recomputed from the chunks.
 ///
 /// Errors: damage, and failures of the disk.
-pub fn digest(store: &mut Store, memory_bytes: usize) -> Result<[Digest; 2], CatalogError> {
+pub fn digest(store: &mut Catalog, memory_bytes: usize) -> Result<[Digest; 2], StoreError> {
     let mut both = [Digest::default(); 2];
-    for row in store.catalog().subdomains()? {
-        let mut part = Subdomain::open(store.catalog(), row.rank, memory_bytes)?;
+    for row in store.subdomains()? {
+        let mut part = store.open_subdomain(row.rank, memory_bytes)?;
         for chunk in 0..part.tet_summaries().len() {
             for tet in part.tet_chunk(chunk as u32)?.records {
                 let corners = part.corners(tet.nodes)?;
@@ -101,15 +102,12 @@ struct Scratch {
 }
 
 impl Scratch {
-    fn new(parent: &Path) -> Result<Self, CatalogError> {
+    fn new(parent: &Path) -> Result<Self, StoreError> {
         use std::sync::atomic::{AtomicU32, Ordering};
         static NUMBER: AtomicU32 = AtomicU32::new(0);
         let number = NUMBER.fetch_add(1, Ordering::Relaxed);
         let path = parent.join(format!("verify-{}-{number}", std::process::id()));
-        std::fs::create_dir_all(&path).map_err(|source| CatalogError::Io {
-            path: path.clone(),
-            source,
-        })?;
+        std::fs::create_dir_all(&path).map_err(|e| StorageError::io(&path, e))?;
         Ok(Self { path })
     }
 }

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use super::claims::word;
-use crate::catalog::CatalogError;
-use crate::store::{Sorter, StoreError, stop_if_requested};
+use crate::storage::{Sorter, StorageError, check_cancelled};
+use crate::store::StoreError;
 
 /// Vertices ascending, reference, opposite vertex, region, parity, mark.
 const BYTES: usize = 26;
@@ -35,7 +35,7 @@ impl OpenSides {
         }
     }
 
-    pub(super) fn push(&mut self, side: &Side) -> Result<(), StoreError> {
+    pub(super) fn push(&mut self, side: &Side) -> Result<(), StorageError> {
         let mut record = [0; BYTES];
         let [a, b, c] = side.face;
         let words = [a, b, c, side.reference, side.apex, side.region];
@@ -50,11 +50,11 @@ impl OpenSides {
     /// Calls `visit` with the sides of each face, faces ascending.
     pub(super) fn for_each_face(
         self,
-        mut visit: impl FnMut(&[Side]) -> Result<(), CatalogError>,
-    ) -> Result<(), CatalogError> {
+        mut visit: impl FnMut(&[Side]) -> Result<(), StoreError>,
+    ) -> Result<(), StoreError> {
         let mut sides: Vec<Side> = Vec::new();
         for record in self.sorter.finish()? {
-            stop_if_requested();
+            check_cancelled();
             let record = record?;
             let side = Side {
                 face: [0, 1, 2].map(|i| word(&record, i)),

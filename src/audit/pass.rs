@@ -13,11 +13,12 @@ use super::claims::{Claims, FACET, INTERFACE, SortedClaims};
 use super::interface::Interfaces;
 use super::pairing::{OpenSides, Side};
 use super::{Finding, Level, Offender, Report, VerifyOptions};
-use crate::catalog::{
-    CatalogError, Corner, FacePairs, InterfaceRow, Paired, RegionRow, Subdomain, sorted_face,
-};
 use crate::geom::{Point, insphere, orient};
-use crate::store::stop_if_requested;
+use crate::sealed::SealedError;
+use crate::sealed::{Corner, FacePairs, Paired, Subdomain, sorted_face};
+use crate::storage::check_cancelled;
+use crate::store::StoreError;
+use tetdb_schema::catalog::{InterfaceRow, RegionRow};
 
 /// Volumes that agree this well, relative to the sum of what was added, are the same: sums of
 /// millions of terms lose some six of sixteen digits at most.
@@ -74,7 +75,7 @@ impl<'a> Audit<'a> {
         self.options.level >= level
     }
 
-    pub(super) fn subdomain(&mut self, part: &mut Subdomain) -> Result<(), CatalogError> {
+    pub(super) fn subdomain(&mut self, part: &mut Subdomain) -> Result<(), StoreError> {
         let row = part.row().clone();
         let report = &mut self.report;
         report.subdomains += 1;
@@ -110,13 +111,13 @@ impl<'a> Audit<'a> {
         &mut self,
         part: &mut Subdomain,
         used: &mut [u64],
-    ) -> Result<SortedClaims, CatalogError> {
+    ) -> Result<SortedClaims, StoreError> {
         let rank = part.id().rank();
         let mut claims = Claims::new(self.scratch, self.options.memory_bytes / 8);
         let (chunks, total) = (part.row().chunks[2], part.row().facets);
         let mut n = 0;
         for chunk in 0..chunks {
-            stop_if_requested();
+            check_cancelled();
             for facet in part.facet_chunk(chunk)?.records {
                 n += 1;
                 let corners = part.corners(facet.vertices)?;
@@ -144,7 +145,7 @@ impl<'a> Audit<'a> {
         &mut self,
         part: &mut Subdomain,
         claims: &mut Claims,
-    ) -> Result<(), CatalogError> {
+    ) -> Result<(), StoreError> {
         let rank = part.id().rank();
         let (chunks, total) = (part.row().chunks[3], part.row().interface_faces);
         let mut n = 0;
@@ -176,23 +177,23 @@ impl<'a> Audit<'a> {
         part: &mut Subdomain,
         claims: &mut SortedClaims,
         used: &mut [u64],
-    ) -> Result<[Digest; 2], CatalogError> {
+    ) -> Result<[Digest; 2], StoreError> {
         let rank = part.id().rank();
         let mut digest = [Digest::default(); 2];
         let mut open = OpenSides::new(self.scratch, self.options.memory_bytes / 4);
         let mut expected = 0;
         for chunk in 0..part.tet_summaries().len() {
-            stop_if_requested();
+            check_cancelled();
             let chunk = part.tet_chunk(chunk as u32)?;
             if chunk.first != expected {
-                return Err(CatalogError::Content {
+                return Err(StoreError::Sealed(SealedError::Content {
                     path: part.path().to_owned(),
                     subdomain: rank,
                     what: format!(
                         "a chunk of tetrahedra starts at {}, expected {expected}",
                         chunk.first
                     ),
-                });
+                }));
             }
             expected += chunk.records.len() as u32;
             let tets = &chunk.records;
@@ -244,7 +245,7 @@ impl<'a> Audit<'a> {
         claims: &mut SortedClaims,
         first: u32,
         tets: &[SealedTet],
-    ) -> Result<Vec<[u8; 4]>, CatalogError> {
+    ) -> Result<Vec<[u8; 4]>, StoreError> {
         let mut marks = vec![[0; 4]; tets.len()];
         while let Some(claim) = claims.next_below(first + tets.len() as u32)? {
             let place = (claim.tet - first) as usize;
@@ -259,12 +260,7 @@ impl<'a> Audit<'a> {
         Ok(marks)
     }
 
-    fn stray(
-        &mut self,
-        part: &mut Subdomain,
-        tet: u32,
-        face: &[u32; 3],
-    ) -> Result<(), CatalogError> {
+    fn stray(&mut self, part: &mut Subdomain, tet: u32, face: &[u32; 3]) -> Result<(), StoreError> {
         let corners = part.corners(*face)?;
         if self.level(Level::Topology) {
             let finding = Finding::StrayFacet;
@@ -309,7 +305,7 @@ impl<'a> Audit<'a> {
         corners: &[[Corner; 4]],
         marks: &[[u8; 4]],
         open: &mut OpenSides,
-    ) -> Result<(), CatalogError> {
+    ) -> Result<(), StoreError> {
         self.pairs.clear();
         let mut inner = Vec::with_capacity(tets.len() * 2);
         for (t, tet) in tets.iter().enumerate() {
@@ -408,7 +404,7 @@ impl<'a> Audit<'a> {
     }
 
     /// A face that its chunk left open, with all its sides.
-    fn open_face(&mut self, part: &mut Subdomain, sides: &[Side]) -> Result<(), CatalogError> {
+    fn open_face(&mut self, part: &mut Subdomain, sides: &[Side]) -> Result<(), StoreError> {
         let rank = part.id().rank();
         let tet = sides[0].reference / 4;
         match sides {
@@ -449,7 +445,7 @@ impl<'a> Audit<'a> {
         Ok(())
     }
 
-    fn unused(&mut self, part: &mut Subdomain, used: &[u64]) -> Result<(), CatalogError> {
+    fn unused(&mut self, part: &mut Subdomain, used: &[u64]) -> Result<(), StoreError> {
         for v in 0..part.row().vertices as u32 {
             if used[v as usize / 64] >> (v % 64) & 1 == 0 {
                 let corner = part.corner(v)?;
@@ -467,7 +463,7 @@ impl<'a> Audit<'a> {
         mut self,
         interfaces: &[InterfaceRow],
         regions: &[RegionRow],
-    ) -> Result<Report, CatalogError> {
+    ) -> Result<Report, StoreError> {
         if self.level(Level::Topology) {
             self.interfaces.finish(interfaces, &mut self.report)?;
         }
@@ -507,15 +503,15 @@ impl<'a> Audit<'a> {
 }
 
 /// The chunks hold as many records as the catalog counts.
-fn counted(part: &Subdomain, what: &str, found: u64, total: u64) -> Result<(), CatalogError> {
+fn counted(part: &Subdomain, what: &str, found: u64, total: u64) -> Result<(), StoreError> {
     if found == total {
         return Ok(());
     }
-    Err(CatalogError::Content {
+    Err(StoreError::Sealed(SealedError::Content {
         path: part.path().to_owned(),
         subdomain: part.id().rank(),
         what: format!("its chunks hold {found} {what}, the catalog counts {total}"),
-    })
+    }))
 }
 
 fn mark(used: &mut [u64], vertices: &[u32]) {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use tetdb_schema::ids::VertexId;
 
-use crate::catalog::Corner;
+use crate::sealed::Corner;
 
 /// Offenders kept for each kind of finding; all are counted.
 const OFFENDERS_KEPT: u64 = 10;

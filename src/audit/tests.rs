@@ -4,8 +4,10 @@ use tetdb_schema::ids::{Owner, SubdomainId, VertexId};
 use tetdb_schema::record::{FACES, NO_TET, SealedFacet, SealedTet, SealedVertex, tag};
 
 use super::*;
-use crate::catalog::{Catalog, Job, SealedWriter, StoreState};
 use crate::geom::Point;
+use crate::sealed::SealedWriter;
+use crate::store::Catalog;
+use tetdb_schema::catalog::{Job, StoreState};
 
 type Outcome = Result<(), Box<dyn std::error::Error>>;
 
@@ -99,7 +101,7 @@ fn boundary(points: &[[f64; 3]], tets: &[([u32; 4], u32)]) -> (Vec<SealedFacet>,
     (facets, surface)
 }
 
-fn verified(draft: &Draft, level: Level) -> Result<Report, CatalogError> {
+fn verified(draft: &Draft, level: Level) -> Result<Report, StoreError> {
     let dir = tempfile::tempdir().expect("a folder for the test");
     let path = dir.path().join("a.tetdb");
     let mut catalog = Catalog::create(&path, &Job::default())?;
@@ -131,7 +133,7 @@ fn verified(draft: &Draft, level: Level) -> Result<Report, CatalogError> {
         Ok(())
     })?;
     catalog.close()?;
-    let mut store = Store::open(&path)?;
+    let mut store = Catalog::open(&path)?;
     let [tets, faces] = digest(&mut store, 1 << 20)?;
     assert_eq!([tets, faces], store.digest()?);
     let options = VerifyOptions {
@@ -229,13 +231,13 @@ fn each_fault_is_found_by_its_name() -> Outcome {
 fn two_subdomains_verify_and_a_changed_interface_is_found() -> Outcome {
     let dir = tempfile::tempdir()?;
     let path = dir.path().join("two.tetdb");
-    crate::catalog::two_subdomains(&path)?;
+    crate::store::two_subdomains(&path)?;
     let options = VerifyOptions {
         level: Level::Delaunay,
         memory_bytes: 4 << 20,
         temp_dir: dir.path().to_owned(),
     };
-    let report = verify(&mut Store::open(&path)?, None, &options)?;
+    let report = verify(&mut Catalog::open(&path)?, None, &options)?;
     assert!(report.valid, "{report:?}");
     assert_eq!((report.subdomains, report.interface_faces), (2, 2));
     let mut catalog = Catalog::open_writable(&path)?;
@@ -246,7 +248,7 @@ fn two_subdomains_verify_and_a_changed_interface_is_found() -> Outcome {
         Ok(())
     })?;
     catalog.close()?;
-    let report = verify(&mut Store::open(&path)?, None, &options)?;
+    let report = verify(&mut Catalog::open(&path)?, None, &options)?;
     assert_eq!(report.count(Finding::CatalogDiffers), 1);
     Ok(())
 }

@@ -8,7 +8,7 @@ use super::surface::CuttingSurface;
 use crate::geom::Point;
 use crate::mesh::anatomy::REQUIRED;
 use crate::mesh::{FaceRef, Mesh, Tet, VertexTag, dense, next_id, sparse};
-use crate::store::{Pages, stop_if_requested};
+use crate::storage::{Pages, check_cancelled};
 use tetdb_schema::page::NONE;
 
 /// Tetrahedra with a vertex nearer than this, in units of its h, belong to the core: wider than the cutting zone, so that
@@ -78,11 +78,11 @@ pub(super) struct RimFace {
 
 /// Where the core was cut out, ascending by vertices.
 #[derive(Default)]
-pub(super) struct Rim {
+pub(super) struct CoreRim {
     pub faces: Vec<RimFace>,
 }
 
-impl Rim {
+impl CoreRim {
     /// The host's face at the core's face with these vertices, if it is one of the rim.
     pub(super) fn find(&self, mut vertices: [u32; 3]) -> Option<FaceRef> {
         vertices.sort_unstable();
@@ -105,7 +105,7 @@ pub(super) fn extract<P: Pages, Q: Pages>(
     host: &mut Mesh<P>,
     core: &mut Mesh<Q>,
     surface: &impl CuttingSurface,
-) -> Rim {
+) -> CoreRim {
     host.clear_scratch();
     let base = dense(host.vertex_ids_end());
     for n in 0..base {
@@ -115,7 +115,7 @@ pub(super) fn extract<P: Pages, Q: Pages>(
     let mut t = 0;
     while t < host.tet_ids_end() {
         if t & 1023 == 0 {
-            stop_if_requested();
+            check_cancelled();
         }
         let tet = host.tet(t);
         let word = if tet.is_live() {
@@ -139,7 +139,7 @@ pub(super) fn extract<P: Pages, Q: Pages>(
         t = next_id(t);
     }
     // The copies still name the host's neighbors.
-    let mut rim = Rim::default();
+    let mut rim = CoreRim::default();
     let mut from = 0;
     while let Some((t, mut tet)) = core.next_tet(from) {
         from = t + 1;

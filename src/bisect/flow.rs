@@ -25,7 +25,7 @@ const ORPHAN: u8 = 5;
 
 /// What a node is in its tree.
 #[derive(Clone, Copy)]
-struct Place {
+struct FlowPlace {
     root: Root,
     /// Number of the neighbor that is its parent, [`TERMINAL`] or [`ORPHAN`].
     parent: u8,
@@ -35,7 +35,7 @@ struct Place {
     seen: u32,
 }
 
-const NOWHERE: Place = Place {
+const NOWHERE: FlowPlace = FlowPlace {
     root: Root::Free,
     parent: ORPHAN,
     active: false,
@@ -76,7 +76,7 @@ struct Node {
     residual: [u32; 4],
     /// What still fits from the source and to the sink.
     terminal: [u32; 2],
-    place: Place,
+    place: FlowPlace,
 }
 
 const _: () = assert!(size_of::<Node>() == 64);
@@ -161,12 +161,12 @@ impl Graph {
     }
 
     #[inline]
-    fn place(&self, node: u32) -> Place {
+    fn place(&self, node: u32) -> FlowPlace {
         self.nodes[node as usize].place
     }
 
     #[inline]
-    fn place_mut(&mut self, node: u32) -> &mut Place {
+    fn place_mut(&mut self, node: u32) -> &mut FlowPlace {
         &mut self.nodes[node as usize].place
     }
 
@@ -341,7 +341,7 @@ impl Graph {
         }
         let place = self.place_mut(number);
         let active = place.active;
-        *place = Place { active, ..NOWHERE };
+        *place = FlowPlace { active, ..NOWHERE };
     }
 
     /// Arcs from `node` to the terminal of its tree, if it still leads there; remembered for this time.
@@ -384,7 +384,7 @@ mod tests {
     const NOBODY: u32 = u32::MAX;
 
     /// Least cut by trying all.
-    fn by_trying(neighbor: &[[u32; 4]], capacity: &[[u32; 4]], terminal: &[[u32; 2]]) -> u64 {
+    fn brute_force(neighbor: &[[u32; 4]], capacity: &[[u32; 4]], terminal: &[[u32; 2]]) -> u64 {
         let n = neighbor.len();
         (0..1u32 << n)
             .map(|set| {
@@ -445,7 +445,7 @@ mod tests {
                 graph.push(arcs, capacity[k], terminal[k]);
             }
             let value = graph.cut();
-            assert_eq!(value, by_trying(&neighbor, &capacity, &terminal));
+            assert_eq!(value, brute_force(&neighbor, &capacity, &terminal));
             let mut sum = 0;
             for k in 0..n {
                 let here = graph.is_source_side(k as u32);

@@ -7,7 +7,7 @@ use super::core::SHARED;
 use super::split::{Split, word};
 use crate::mesh::anatomy::FROZEN;
 use crate::mesh::{FaceRef, Workspace, dense};
-use crate::store::{Pages, Sorted, Sorter, StoreError};
+use crate::storage::{Pages, Sorted, Sorter, StorageError};
 use tetdb_schema::page::NONE;
 
 /// A required face of the child: its vertices ascending, and where it is.
@@ -24,7 +24,7 @@ const INTERFACE: u8 = 1;
 pub(super) fn inherit<P: Pages, Q: Pages, R: Pages>(
     split: &mut Split<P, Q, R>,
     space: &Workspace,
-) -> Result<(), StoreError> {
+) -> Result<(), StorageError> {
     let mut claims = Sorter::<18>::new(space.dir, space.memory / 3);
     let mut loose = None;
     for n in 0..split.host.n_facets() {
@@ -96,7 +96,7 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
         vertices: [u32; 3],
         kind: u8,
         number: u32,
-    ) -> Result<(), StoreError> {
+    ) -> Result<(), StorageError> {
         let Some((vertices, in_core)) = self.known_face(vertices) else {
             return Ok(());
         };
@@ -132,7 +132,7 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
     }
 
     /// The child's required faces whose three vertices the core has.
-    fn required_faces(&mut self, space: &Workspace) -> Result<Sorted<16>, StoreError> {
+    fn required_faces(&mut self, space: &Workspace) -> Result<Sorted<16>, StorageError> {
         let mut faces = Sorter::<16>::new(space.dir, space.memory / 3);
         for n in 0..dense(self.core.tet_ids_end()) {
             let number = self.core.scratch(self.core_base + n);
@@ -147,7 +147,7 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
         faces.finish()
     }
 
-    fn push_required(&mut self, faces: &mut Sorter<16>, t: u32) -> Result<(), StoreError> {
+    fn push_required(&mut self, faces: &mut Sorter<16>, t: u32) -> Result<(), StorageError> {
         let tet = self.child.tet(t);
         for i in (0..4).filter(|&i| tet.is_required(i)) {
             let mut record: FaceRecord = [0; 16];

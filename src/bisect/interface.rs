@@ -9,7 +9,7 @@
 
 use rayon::prelude::*;
 
-use super::core::Rim;
+use super::core::CoreRim;
 use super::flow::{Arc, Graph};
 use super::labels::{InterfaceMeasures, Labels, face_cost, measure};
 use super::moves::Moves;
@@ -17,7 +17,7 @@ use super::split::interface_points;
 use super::surface::CuttingSurface;
 use crate::geom::Point;
 use crate::mesh::{Mesh, dense};
-use crate::store::{Pages, stop_if_requested};
+use crate::storage::{Pages, check_cancelled};
 use tetdb_schema::page::NONE;
 
 /// Nodes of a graph that is cut at once; wider interfaces are cut strip by strip. Of 593,000 tetrahedra, strips of 400,000 choose 46,024 faces in
@@ -67,7 +67,7 @@ pub struct InterfaceReport {
 pub(super) fn choose<P: Pages>(
     core: &mut Mesh<P>,
     surface: &impl CuttingSurface,
-    rim: &Rim,
+    rim: &CoreRim,
     steps: Steps,
     natural: Option<&mut Vec<[Point; 3]>>,
 ) -> (InterfaceReport, Labels) {
@@ -128,7 +128,7 @@ fn minimum_cut<P: Pages>(
     cuts.resize_with(strips.min(AT_ONCE), Default::default);
     for strips in kinds.iter().flat_map(|kind| kind.chunks(AT_ONCE)) {
         for (&strip, (tets, graph)) in strips.iter().zip(&mut cuts) {
-            stop_if_requested();
+            check_cancelled();
             // In id order, which follows the curve: what is near in space is near in the graph's memory. The least cut is one and the same.
             tets.clear();
             tets.extend_from_slice(strip);

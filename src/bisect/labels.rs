@@ -2,11 +2,11 @@
 
 use std::collections::BTreeSet;
 
-use super::core::{Rim, is_in_core, middle, place, tet_ids};
+use super::core::{CoreRim, is_in_core, middle, place, tet_ids};
 use super::surface::CuttingSurface;
 use crate::geom::Point;
 use crate::mesh::{FaceRef, Mesh, Tet, dense};
-use crate::store::{Pages, stop_if_requested};
+use crate::storage::{Pages, check_cancelled};
 use tetdb_schema::page::NONE;
 
 /// Tetrahedra with a vertex nearer than this, in units of its h, may go to either side: the cutting zone. At 2.5 the interface has
@@ -30,7 +30,7 @@ impl Labels {
     pub(super) fn begin<P: Pages>(
         core: &mut Mesh<P>,
         surface: &impl CuttingSurface,
-        rim: &Rim,
+        rim: &CoreRim,
     ) -> (Self, Vec<u32>) {
         let mut of = vec![0; core.tet_ids_end() as usize];
         let mut free = Vec::new();
@@ -58,7 +58,7 @@ impl Labels {
             let label = if high { HIGH } else { 0 } | if may_change { MAY_CHANGE } else { 0 };
             of[t as usize] = label;
             if t & 1023 == 0 {
-                stop_if_requested();
+                check_cancelled();
             }
         }
         (Self { of }, free)
@@ -144,7 +144,7 @@ impl InterfaceMeasures {
 pub(super) fn measure<P: Pages>(
     core: &mut Mesh<P>,
     labels: &Labels,
-    rim: &Rim,
+    rim: &CoreRim,
 ) -> InterfaceMeasures {
     let mut measures = InterfaceMeasures::default();
     for t in tet_ids(core) {
@@ -176,7 +176,7 @@ pub(super) fn measure<P: Pages>(
 }
 
 /// Whether face `i` is required for ever, not only as a part of the rim.
-pub(super) fn is_constrained(tet: &Tet, i: usize, rim: &Rim) -> bool {
+pub(super) fn is_constrained(tet: &Tet, i: usize, rim: &CoreRim) -> bool {
     tet.is_required(i) && (tet.neighbor[i].exists() || rim.find(tet.face(i)).is_none())
 }
 
@@ -192,7 +192,7 @@ pub(super) fn layers_least<P: Pages, Q: Pages>(
     host: &mut Mesh<P>,
     core: &mut Mesh<Q>,
     labels: &Labels,
-    rim: &Rim,
+    rim: &CoreRim,
     surface: &impl CuttingSurface,
 ) -> Option<u32> {
     core.clear_scratch();
@@ -213,7 +213,7 @@ pub(super) fn layers_least<P: Pages, Q: Pages>(
     // Tetrahedra of the host in the layer at hand and the one before: a way never leads farther back.
     let (mut beyond, mut before) = (BTreeSet::new(), BTreeSet::new());
     for n in 1..=LAYERS_MOST {
-        stop_if_requested();
+        check_cancelled();
         let mut next = Vec::new();
         let mut next_beyond = BTreeSet::new();
         for t in layer {

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use crate::geom::Point;
 use crate::mesh::Mesh;
 use crate::sizing::load_of_tet;
-use crate::store::{Pages, stop_if_requested};
+use crate::storage::{Pages, check_cancelled};
 
 /// Longest edge of a piece in units of its smallest h: a narrow dip of a field graded by 1.3 per unit length is not stepped over, and the load is known where it lies.
 const EDGE_MAX: f64 = 5.0;
@@ -71,7 +71,7 @@ pub fn tally<P: Pages, T: Send>(
         if read == 0 {
             return lanes.map(|(_, sum)| sum);
         }
-        stop_if_requested();
+        check_cancelled();
         lanes.par_iter_mut().for_each(|(tets, sum)| {
             let mut stack = Vec::new();
             for tet in &*tets {

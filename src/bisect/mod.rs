@@ -41,7 +41,7 @@ use crate::geom::{Aabb, Point};
 use crate::mesh::{Mesh, Workspace};
 use crate::optimize::{self, Settings};
 use crate::refine::{Field, Lengths, RefineReport, saturate};
-use crate::store::{Pages, StoreError};
+use crate::storage::{Pages, StorageError};
 
 /// Ways to go, for comparing what each part of the method brings; the default is the method.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -72,7 +72,7 @@ pub struct CutPlan<'a> {
 pub struct Opened {
     pub zone: Zone,
     pub report: CutReport,
-    rim: core::Rim,
+    rim: core::CoreRim,
     labels: labels::Labels,
 }
 
@@ -127,7 +127,7 @@ pub fn open<P: Pages, Q: Pages>(
     plan: &CutPlan,
     space: &Workspace,
     progress: &dyn Fn(&'static str, u64),
-) -> Result<Opened, StoreError> {
+) -> Result<Opened, StorageError> {
     let refined = refine(host, plan, space, progress)?;
     Ok(choose(host, core, plan, refined, None, progress))
 }
@@ -140,7 +140,7 @@ pub fn refine<P: Pages>(
     plan: &CutPlan,
     space: &Workspace,
     progress: &dyn Fn(&'static str, u64),
-) -> Result<Refined, StoreError> {
+) -> Result<Refined, StorageError> {
     let clock = Instant::now();
     let mut seconds = StageSeconds::default();
     progress("choose a plane", 0);

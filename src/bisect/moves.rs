@@ -1,12 +1,12 @@
 //! Moves of tetrahedra from one side of the interface to the other.
 
-use super::core::Rim;
+use super::core::CoreRim;
 use super::interface::Steps;
 use super::labels::{Labels, face_cost, is_constrained};
 use super::surface::CuttingSurface;
 use crate::mesh::{Mesh, Tet, dense};
 use crate::reconnect::Ball;
-use crate::store::{Pages, stop_if_requested};
+use crate::storage::{Pages, check_cancelled};
 
 /// Costs beside those of faces: a tetrahedron with two constrained faces, one with three, a side in two parts around a vertex.
 const TWO: f64 = 2.0;
@@ -31,7 +31,7 @@ pub(super) struct Moves<'a, S> {
     /// The sides, as they are.
     pub(super) labels: Labels,
     surface: &'a S,
-    rim: &'a Rim,
+    rim: &'a CoreRim,
     ball: Ball,
     around: Ball,
     /// Tetrahedra being moved, then those beside them.
@@ -53,7 +53,7 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
         core: &Mesh<P>,
         labels: Labels,
         surface: &'a S,
-        rim: &'a Rim,
+        rim: &'a CoreRim,
     ) -> Self {
         Self {
             labels,
@@ -134,7 +134,7 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
 
     /// Puts all free tetrahedra around `v` on one side, if that gains.
     fn move_ball<P: Pages>(&mut self, core: &mut Mesh<P>, v: u32, high: bool) -> bool {
-        stop_if_requested();
+        check_cancelled();
         if !self.ball.gather_of(core, v, BALL_MAX) {
             return false;
         }

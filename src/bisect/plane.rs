@@ -12,7 +12,7 @@ use super::spread::{ChosenPlane, Ramps, Spread};
 use super::surface::{CuttingSurface, Plane};
 use crate::geom::{Aabb, Point};
 use crate::mesh::Mesh;
-use crate::store::Pages;
+use crate::storage::Pages;
 
 /// Positions tried on each side of the balanced one, and their distance in units of h: a plane that grazes a flat wall cuts
 /// its tetrahedra to slices.

@@ -12,7 +12,7 @@ use super::surface::CuttingSurface;
 use crate::geom::{Aabb, HilbertFrame, Point};
 use crate::mesh::anatomy::{FROZEN, REQUIRED};
 use crate::mesh::{FaceRef, InterfaceFace, Mesh, Tet, Workspace, dense, sparse};
-use crate::store::{Pages, Sorter, StoreError, stop_if_requested};
+use crate::storage::{Pages, Sorter, StorageError, check_cancelled};
 use tetdb_schema::page::NONE;
 
 /// A vertex of the child: its place along the curve, when it was met, where it comes from.
@@ -73,7 +73,7 @@ pub fn write_child<P: Pages, Q: Pages, R: Pages>(
     high: bool,
     bounds: &Aabb,
     space: &Workspace,
-) -> Result<(), StoreError> {
+) -> Result<(), StorageError> {
     let mut split = Split {
         host_base: dense(host.vertex_ids_end()),
         core_base: dense(core.vertex_ids_end()),
@@ -119,7 +119,11 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
     }
 
     /// Adds all vertices of the child's tetrahedra; both scratch maps tell their numbers.
-    fn add_vertices(&mut self, order: &HilbertFrame, space: &Workspace) -> Result<(), StoreError> {
+    fn add_vertices(
+        &mut self,
+        order: &HilbertFrame,
+        space: &Workspace,
+    ) -> Result<(), StorageError> {
         self.meet_core_vertices();
         let mut sorter = Sorter::<16>::new(space.dir, space.memory);
         for n in 0..self.core_base {
@@ -249,7 +253,7 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
         }
         for n in 0..dense(self.host.tet_ids_end()) {
             if n & 1023 == 0 {
-                stop_if_requested();
+                check_cancelled();
             }
             if self.of_host(n).is_some() {
                 let [a, b, c, d] = self.host.tet(sparse(n)).vertices();
@@ -307,7 +311,7 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
     fn write_host(&mut self) {
         for n in 0..dense(self.host.tet_ids_end()) {
             if n & 1023 == 0 {
-                stop_if_requested();
+                check_cancelled();
             }
             let Some(number) = self.of_host(n) else {
                 continue;

@@ -4,7 +4,7 @@ use super::load::{SizeAt, tally};
 use super::surface::Plane;
 use crate::geom::Point;
 use crate::mesh::Mesh;
-use crate::store::Pages;
+use crate::storage::Pages;
 
 /// Bins of a histogram along an axis.
 const BINS: usize = 4096;

@@ -6,7 +6,7 @@
 
 use super::surface::{CuttingSurface, Plane};
 use crate::geom::{Point, mix};
-use crate::refine::Place;
+use crate::refine::PlacementRule;
 
 /// Half the width of the zone at its narrowest, in units of the wanted length. Circumspheres of a saturated mesh have radii below
 /// 1.03 h, and interface vertices stay within 1.4 h: from 3.5 on no later vertex reaches a tetrahedron at the interface.
@@ -61,7 +61,7 @@ pub(super) struct InZone<'a> {
 /// the size may grow on the way.
 const REACH: f64 = 1.3 * (WIDTH_MIN + WIDTH_NOISE);
 
-impl Place for InZone<'_> {
+impl PlacementRule for InZone<'_> {
     fn is_partial(&self) -> bool {
         true
     }
@@ -124,7 +124,7 @@ pub struct OutsideZones<'a> {
     pub h: &'a dyn Fn(Point) -> f64,
 }
 
-impl Place for OutsideZones<'_> {
+impl PlacementRule for OutsideZones<'_> {
     fn stretch(&self, a: Point, b: Point, sizes: [f64; 2]) -> Option<[f64; 2]> {
         (!both_in_one(self.zones, self.h, [a, b], sizes)).then_some([0.0, 1.0])
     }

@@ -13,10 +13,10 @@ use super::find::Outcome;
 use super::flips::Flipper;
 use super::patch::Patch;
 use super::space::{Space, edge_key};
-use super::target::Target;
+use super::target::RecoveryTarget;
 use super::walk::{Exit, exit_vertex, shell};
 use crate::geom::Dyadic;
-use crate::store::Pages;
+use crate::storage::Pages;
 
 /// Points on one segment.
 const POINTS_MAX: usize = 2000;
@@ -46,7 +46,7 @@ impl<P: Pages> Patch<'_, P> {
             let h = *chain.last().expect("starts with a");
             // Flips are tried before each point.
             let effort = self.effort;
-            let mut flipper = Flipper::new(self, Target::Edge(h, b));
+            let mut flipper = Flipper::new(self, RecoveryTarget::Edge(h, b));
             flipper.work = effort.flip_work;
             let flipped = flipper.recover_edge(h, b, effort.flip_level);
             let next = match exit_vertex(self, h, b) {

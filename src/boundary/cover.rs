@@ -12,10 +12,10 @@ use super::exact::ExactPoint;
 use super::flips::Flipper;
 use super::patch::Patch;
 use super::space::{Space, edge_key};
-use super::target::Target;
+use super::target::RecoveryTarget;
 use super::walk::{find_edge, shell};
 use crate::geom::Dyadic;
-use crate::store::Pages;
+use crate::storage::Pages;
 
 /// Points in one facet.
 const POINTS_MAX: usize = 5000;
@@ -66,7 +66,7 @@ impl<P: Pages> Patch<'_, P> {
                         return Err(Trouble::TooMuch);
                     }
                     let effort = self.effort;
-                    let mut flipper = Flipper::new(self, Target::Face(f));
+                    let mut flipper = Flipper::new(self, RecoveryTarget::Face(f));
                     flipper.work = effort.flip_work;
                     if flipper.remove_edge(t, above, below, effort.flip_level) {
                         flipper.keep();

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use super::flips::Flipper;
 use super::space::Space;
-use super::target::Target;
+use super::target::RecoveryTarget;
 use super::walk::{Exit, crossings, edge_at, find_edge, opposite, shell};
 use crate::mesh::FaceRef;
 
@@ -13,7 +13,7 @@ const CROSSINGS_MAX: usize = 400;
 
 /// Where facet `a b c` stands.
 #[derive(Clone, Debug)]
-pub(super) enum Found {
+pub(super) enum SearchResult {
     /// It is this face.
     Face(FaceRef),
     /// Edge `a b` is there, the face is not; the tetrahedron whose inside it enters from that edge, if one.
@@ -22,21 +22,21 @@ pub(super) enum Found {
 }
 
 /// Looks for the face `a b c` around its edge `a b`.
-pub(super) fn find_face<S: Space>(s: &mut S, [a, b, c]: [u32; 3]) -> Found {
+pub(super) fn find_face<S: Space>(s: &mut S, [a, b, c]: [u32; 3]) -> SearchResult {
     let Some(t) = find_edge(s, a, b) else {
-        return Found::Nothing;
+        return SearchResult::Nothing;
     };
     let mut at = t;
     loop {
         let tet = s.tet(at);
         let Some((x, y)) = opposite(&tet, a, b) else {
-            return Found::Nothing;
+            return SearchResult::Nothing;
         };
         if tet.vertex(x) == c {
-            return Found::Face(FaceRef::new(at, y));
+            return SearchResult::Face(FaceRef::new(at, y));
         }
         if tet.vertex(y) == c {
-            return Found::Face(FaceRef::new(at, x));
+            return SearchResult::Face(FaceRef::new(at, x));
         }
         let across = s.across(at, x);
         at = across.tet();
@@ -45,14 +45,14 @@ pub(super) fn find_face<S: Space>(s: &mut S, [a, b, c]: [u32; 3]) -> Found {
         }
     }
     let Some(around) = shell(s, t, a, b) else {
-        return Found::Edge(None);
+        return SearchResult::Edge(None);
     };
     let n = around.ring.len();
     let entered = (0..n).find(|&i| {
         let (x, y) = (around.ring[i], around.ring[(i + 1) % n]);
         s.orient([a, b, x, c]) > 0.0 && s.orient([a, b, c, y]) > 0.0
     });
-    Found::Edge(entered.map(|i| around.tets[i]))
+    SearchResult::Edge(entered.map(|i| around.tets[i]))
 }
 
 /// The edges that cross facet `f`, whose own edges all exist; starts in `t`, which it cuts.
@@ -209,8 +209,8 @@ impl<S: Space> Flipper<'_, S> {
         loop {
             self.keep();
             let t = match find_face(self.s, f) {
-                Found::Face(_) => return Outcome::Recovered,
-                Found::Edge(Some(t)) => t,
+                SearchResult::Face(_) => return Outcome::Recovered,
+                SearchResult::Edge(Some(t)) => t,
                 _ => return Outcome::Stuck,
             };
             let Some(edges) = crossing_edges(self.s, f, t, CROSSINGS_MAX) else {
@@ -232,8 +232,8 @@ impl<S: Space> Flipper<'_, S> {
                 neutral < NEUTRAL_MAX * n
                     && self.work > 0
                     && self.try_neutral(t, c, d, |s| match find_face(s, f) {
-                        Found::Face(_) => true,
-                        Found::Edge(Some(t)) => {
+                        SearchResult::Face(_) => true,
+                        SearchResult::Edge(Some(t)) => {
                             crossing_edges(s, f, t, n).is_some_and(|now| now.len() <= n)
                         }
                         _ => false,
@@ -252,7 +252,7 @@ impl<S: Space> Flipper<'_, S> {
             return false;
         };
         let mark = self.mark();
-        let target = std::mem::replace(&mut self.target, Target::Free);
+        let target = std::mem::replace(&mut self.target, RecoveryTarget::Free);
         let removed = self.remove_edge(t, c, d, 0);
         self.target = target;
         if removed && !good(self.s) {

@@ -12,8 +12,8 @@
 
 use super::polygon::triangulate;
 use super::space::Space;
-use super::target::Target;
-use super::walk::{Shell, edge_at, find_edge, shell};
+use super::target::RecoveryTarget;
+use super::walk::{EdgeRing, edge_at, find_edge, shell};
 use crate::mesh::FaceRef;
 use crate::mesh::anatomy::EDGES;
 
@@ -24,13 +24,13 @@ const RING_MAX: usize = 20;
 struct Done {
     old: Vec<u32>,
     quads: Vec<[u32; 4]>,
-    made: Vec<u32>,
+    shapes: Vec<u32>,
 }
 
 /// A surgeon for one target after another.
 pub(super) struct Flipper<'a, S: Space> {
     pub s: &'a mut S,
-    pub target: Target,
+    pub target: RecoveryTarget,
     log: Vec<Done>,
     /// Ring searches left for this target.
     pub work: u32,
@@ -39,7 +39,7 @@ pub(super) struct Flipper<'a, S: Space> {
 }
 
 impl<'a, S: Space> Flipper<'a, S> {
-    pub(super) fn new(s: &'a mut S, target: Target) -> Self {
+    pub(super) fn new(s: &'a mut S, target: RecoveryTarget) -> Self {
         Self {
             s,
             target,
@@ -62,15 +62,15 @@ impl<'a, S: Space> Flipper<'a, S> {
 
     fn apply(&mut self, old: Vec<u32>, new: &[[u32; 4]]) {
         let quads = old.iter().map(|&t| self.s.tet(t).vertices()).collect();
-        let made = self.s.replace(&old, new);
-        self.log.push(Done { old, quads, made });
+        let shapes = self.s.replace(&old, new);
+        self.log.push(Done { old, quads, shapes });
     }
 
     /// Takes back what was done after `mark`, ids included.
     pub(super) fn undo(&mut self, mark: usize) {
         while self.log.len() > mark {
             let done = self.log.pop().expect("longer than the mark");
-            let back = self.s.replace(&done.made, &done.quads);
+            let back = self.s.replace(&done.shapes, &done.quads);
             assert_eq!(back, done.old, "ids are reused last freed first");
         }
     }
@@ -153,7 +153,7 @@ impl<'a, S: Space> Flipper<'a, S> {
     }
 
     /// Edges from `c` or `d` to the ring beyond which the neighbors on the ring see each other.
-    fn in_the_way(&mut self, around: &Shell, c: u32, d: u32) -> Vec<(u32, u32, u32)> {
+    fn in_the_way(&mut self, around: &EdgeRing, c: u32, d: u32) -> Vec<(u32, u32, u32)> {
         let n = around.ring.len();
         let mut found = Vec::new();
         for i in 0..n {
@@ -201,7 +201,7 @@ impl<'a, S: Space> Flipper<'a, S> {
     }
 
     /// Replaces the shell by the best valid, allowed triangulation of its ring.
-    fn triangulate_ring(&mut self, around: &Shell, c: u32, d: u32) -> bool {
+    fn triangulate_ring(&mut self, around: &EdgeRing, c: u32, d: u32) -> bool {
         let ring = &around.ring;
         let n = ring.len();
         if !(3..=RING_MAX).contains(&n) {
@@ -231,7 +231,7 @@ impl<'a, S: Space> Flipper<'a, S> {
 }
 
 /// The worse of the two tetrahedra over a ring triangle: volume over cubed edge; 0 when it may not be.
-fn shape<S: Space>(s: &mut S, target: Target, [x, y, z]: [u32; 3], c: u32, d: u32) -> f64 {
+fn shape<S: Space>(s: &mut S, target: RecoveryTarget, [x, y, z]: [u32; 3], c: u32, d: u32) -> f64 {
     let up = s.orient([x, y, z, d]);
     if up <= 0.0 {
         return 0.0;

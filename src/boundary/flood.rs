@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::geom::orient;
 use crate::mesh::Mesh;
-use crate::store::{Pages, stop_if_requested};
+use crate::storage::{Pages, check_cancelled};
 
 /// The component that has the enclosing box.
 pub(super) const OUTSIDE: u32 = 1;
@@ -63,7 +63,7 @@ impl Flood {
         stack.push(mesh, first);
         while let Some(t) = stack.pop(mesh) {
             if found.tets & 4095 == 0 {
-                stop_if_requested();
+                check_cancelled();
             }
             let tet = mesh.tet(t);
             let [a, b, c, d] = mesh.points(&tet);

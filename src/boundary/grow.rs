@@ -10,7 +10,7 @@ use super::patch::Patch;
 use super::space::{Space, edge_key};
 use super::walk::swapped;
 use crate::mesh::anatomy::EDGES;
-use crate::store::Pages;
+use crate::storage::Pages;
 
 /// Larger cavities are not tried.
 const CAVITY_MAX: usize = 300;

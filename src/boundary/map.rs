@@ -2,17 +2,17 @@
 
 use std::collections::HashSet;
 
-use super::find::{Found, find_face};
-use super::space::{Paged, Space, edge_key, sorted};
+use super::find::{SearchResult, find_face};
+use super::space::{PagedSpace, Space, edge_key, sorted};
 use super::walk::find_edge;
 use crate::mesh::{FaceRef, Facet, Mesh};
-use crate::store::{Pages, stop_if_requested};
+use crate::storage::{Pages, check_cancelled};
 
 /// What the mesh lacks.
 ///
 /// Held in memory: a few dozen bytes per missing facet. Order: that of the facets.
 #[derive(Debug, Default)]
-pub(super) struct Missing {
+pub(super) struct MissingFacets {
     pub facets: Vec<u32>,
     pub segments: Vec<(u32, u32)>,
     /// Segments of missing facets that exist: no required face protects them yet.
@@ -21,18 +21,18 @@ pub(super) struct Missing {
 
 /// Marks the facets that are faces as required, with the face in place of their first region ([`face_at`]), and lists the rest. One short
 /// walk per facet.
-pub(super) fn map<P: Pages>(mesh: &mut Mesh<P>) -> Missing {
-    let mut missing = Missing::default();
+pub(super) fn map<P: Pages>(mesh: &mut Mesh<P>) -> MissingFacets {
+    let mut missing = MissingFacets::default();
     let mut known: HashSet<u64> = HashSet::new();
     let none = HashSet::new();
     for n in 0..mesh.n_facets() {
         if n & 1023 == 0 {
-            stop_if_requested();
+            check_cancelled();
         }
         let mut facet = mesh.facet(n);
         let f = facet.vertices;
-        let mut s = Paged(mesh, &none);
-        if let Found::Face(face) = find_face(&mut s, f) {
+        let mut s = PagedSpace(mesh, &none);
+        if let SearchResult::Face(face) = find_face(&mut s, f) {
             s.require(face);
             // No region is known yet: the place serves whoever looks for the facet next.
             facet.regions = [face.0, 0];

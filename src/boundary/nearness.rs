@@ -4,7 +4,7 @@ use std::fmt;
 
 use crate::geom::{Aabb, Point};
 use crate::mesh::{Facet, Mesh};
-use crate::store::Pages;
+use crate::storage::Pages;
 
 /// Triangles looked at; pairs of more would take long, and the first show what is wrong.
 const LOOKED_AT_MAX: usize = 256;

@@ -10,7 +10,7 @@ use super::space::{Space, edge_key, sorted};
 use crate::geom::Dyadic;
 use crate::geom::{Point, orient};
 use crate::mesh::{FaceRef, Mesh, Tet, VertexTag};
-use crate::store::Pages;
+use crate::storage::Pages;
 use tetdb_schema::page::NONE;
 
 /// Marks a neighbor that was not brought in yet; the rest is a position in the list of borders.
@@ -88,11 +88,11 @@ impl<'m, P: Pages> Patch<'m, P> {
             return l;
         }
         let t = self.mesh.tet_of(v);
-        self.bring_in(t);
+        self.fault_in(t);
         self.local[&v]
     }
 
-    fn bring_in(&mut self, id: u32) {
+    fn fault_in(&mut self, id: u32) {
         let record = self.mesh.tet(id);
         let t = self.tets.len() as u32;
         let mut tet = record;
@@ -364,7 +364,7 @@ impl<P: Pages> Space for Patch<'_, P> {
         let n = self.tets[t as usize].neighbor[i];
         if n.exists() && n.0 & BORDER != 0 {
             let outside = self.borders[(n.0 & !BORDER) as usize].outside;
-            self.bring_in(outside.tet());
+            self.fault_in(outside.tet());
         }
         self.tets[t as usize].neighbor[i]
     }

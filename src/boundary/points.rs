@@ -4,15 +4,15 @@ use std::collections::{HashMap, HashSet};
 
 use super::chain::Trouble;
 use super::effort::{EFFORTS, Effort};
-use super::find::{Found, find_face};
-use super::map::Missing;
+use super::find::{SearchResult, find_face};
+use super::map::MissingFacets;
 use super::patch::Patch;
 use super::report::RecoveryReport;
-use super::space::{Paged, Space, edge_key, sorted};
-use super::suppress::Skin;
+use super::space::{PagedSpace, Space, edge_key, sorted};
+use super::suppress::CavitySkin;
 use super::walk::{find_edge, shell};
 use crate::mesh::{FaceRef, Mesh};
-use crate::store::{Pages, stop_if_requested};
+use crate::storage::{Pages, check_cancelled};
 
 /// Times the facets left are tried again after others succeeded.
 const ROUNDS_MAX: usize = 4;
@@ -20,7 +20,7 @@ const ROUNDS_MAX: usize = 4;
 /// Recovers the missing facets, patch by patch; returns those left with their trouble.
 pub(super) fn recover_by_points<P: Pages>(
     mesh: &mut Mesh<P>,
-    missing: &mut Missing,
+    missing: &mut MissingFacets,
     report: &mut RecoveryReport,
 ) -> Vec<(u32, Trouble)> {
     let mut troubles = Vec::new();
@@ -29,7 +29,7 @@ pub(super) fn recover_by_points<P: Pages>(
         troubles.clear();
         let mut left = Vec::new();
         for group in groups(mesh, &missing.facets, &mut missing.protected) {
-            stop_if_requested();
+            check_cancelled();
             report.patches += 1;
             let mut outcome = Err(Trouble::TooMuch);
             for effort in EFFORTS {
@@ -73,7 +73,7 @@ fn groups<P: Pages>(
     for (i, &n) in facets.iter().enumerate() {
         let [a, b, c] = mesh.facet(n).vertices;
         for (p, q) in [(a, b), (b, c), (c, a)] {
-            if find_edge(&mut Paged(mesh, &none), p, q).is_some() {
+            if find_edge(&mut PagedSpace(mesh, &none), p, q).is_some() {
                 protected.insert(edge_key(p, q));
                 continue;
             }
@@ -106,9 +106,9 @@ fn recover_group<P: Pages>(
         once.reverse();
     }
     let mut patch = Patch::new(mesh, protected, effort);
-    let mut skin = Skin {
+    let mut skin = CavitySkin {
         facets: once.iter().map(|f| f.map(|v| patch.vertex(v))).collect(),
-        ..Skin::default()
+        ..CavitySkin::default()
     };
     let outcome = build(&mut patch, &mut skin);
     let named = |trouble| match trouble {
@@ -132,9 +132,9 @@ fn recover_group<P: Pages>(
     report.steiner = report.steiner.saturating_add_signed(added as i32);
     let none = HashSet::new();
     for f in corners {
-        let mut s = Paged(mesh, &none);
+        let mut s = PagedSpace(mesh, &none);
         match find_face(&mut s, f) {
-            Found::Face(face) => s.require(face),
+            SearchResult::Face(face) => s.require(face),
             _ => panic!("facet {f:?} was recovered and is not there"),
         }
     }
@@ -142,7 +142,7 @@ fn recover_group<P: Pages>(
 }
 
 /// Chains, faces, suppression; returns how many vertices were on the surface for a while.
-fn build<P: Pages>(patch: &mut Patch<'_, P>, skin: &mut Skin) -> Result<u32, Trouble> {
+fn build<P: Pages>(patch: &mut Patch<'_, P>, skin: &mut CavitySkin) -> Result<u32, Trouble> {
     let mut chains: HashMap<(u32, u32), Vec<u32>> = HashMap::new();
     let facets = skin.facets.clone();
     let mut on_segments: Vec<u32> = Vec::new();

@@ -4,16 +4,16 @@ use std::time::Instant;
 
 use super::chain::Trouble;
 use super::error::{BoundaryError, FacetPlace};
-use super::find::{Found, Outcome, find_face};
+use super::find::{Outcome, SearchResult, find_face};
 use super::flips::Flipper;
-use super::map::{Missing, map};
+use super::map::{MissingFacets, map};
 use super::nearness::narrowest;
 use super::points::recover_by_points;
 use super::report::RecoveryReport;
-use super::space::{Paged, Space, edge_key};
-use super::target::Target;
+use super::space::{PagedSpace, Space, edge_key};
+use super::target::RecoveryTarget;
 use crate::mesh::Mesh;
-use crate::store::{Pages, stop_if_requested};
+use crate::storage::{Pages, check_cancelled};
 
 /// How deep edge removals may nest, pass after pass, and the ring searches a target may cost then.
 const LEVELS: [(u32, u32); 3] = [(0, 40), (1, 80), (2, 160)];
@@ -83,15 +83,19 @@ pub(super) fn place<P: Pages>(mesh: &mut Mesh<P>, n: u32) -> FacetPlace {
     }
 }
 
-fn flip_segments<P: Pages>(mesh: &mut Mesh<P>, missing: &mut Missing, report: &mut RecoveryReport) {
+fn flip_segments<P: Pages>(
+    mesh: &mut Mesh<P>,
+    missing: &mut MissingFacets,
+    report: &mut RecoveryReport,
+) {
     for (level, work) in LEVELS {
         loop {
             let before = missing.segments.len();
             let mut left = Vec::new();
             for (a, b) in std::mem::take(&mut missing.segments) {
-                stop_if_requested();
-                let mut s = Paged(mesh, &missing.protected);
-                let mut flipper = Flipper::new(&mut s, Target::Edge(a, b));
+                check_cancelled();
+                let mut s = PagedSpace(mesh, &missing.protected);
+                let mut flipper = Flipper::new(&mut s, RecoveryTarget::Edge(a, b));
                 flipper.work = work;
                 let outcome = flipper.recover_edge(a, b, level);
                 report.flips += flipper.flips;
@@ -114,21 +118,25 @@ fn flip_segments<P: Pages>(mesh: &mut Mesh<P>, missing: &mut Missing, report: &m
     }
 }
 
-fn flip_facets<P: Pages>(mesh: &mut Mesh<P>, missing: &mut Missing, report: &mut RecoveryReport) {
+fn flip_facets<P: Pages>(
+    mesh: &mut Mesh<P>,
+    missing: &mut MissingFacets,
+    report: &mut RecoveryReport,
+) {
     for (level, work) in LEVELS {
         loop {
             let before = missing.facets.len();
             let mut left = Vec::new();
             for n in std::mem::take(&mut missing.facets) {
-                stop_if_requested();
+                check_cancelled();
                 let f = mesh.facet(n).vertices;
-                let mut s = Paged(mesh, &missing.protected);
-                let mut flipper = Flipper::new(&mut s, Target::Face(f));
+                let mut s = PagedSpace(mesh, &missing.protected);
+                let mut flipper = Flipper::new(&mut s, RecoveryTarget::Face(f));
                 flipper.work = work;
                 let outcome = flipper.recover_face(f, level);
                 report.flips += flipper.flips;
                 match find_face(&mut s, f) {
-                    Found::Face(face) if outcome == Outcome::Recovered => {
+                    SearchResult::Face(face) if outcome == Outcome::Recovered => {
                         s.require(face);
                         report.facets_by_flips += 1;
                     }

@@ -3,16 +3,16 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::error::BoundaryError;
-use super::find::{Found, find_face};
+use super::find::{SearchResult, find_face};
 use super::flood::{Flood, OUTSIDE};
 use super::map::face_at;
 use super::policy::{RegionPolicy, Walls};
 use super::recover::place;
-use super::space::Paged;
+use super::space::PagedSpace;
 use crate::delaunay::Kernel;
 use crate::geom::Point;
 use crate::mesh::{Mesh, VertexTag};
-use crate::store::{Pages, stop_if_requested};
+use crate::storage::{Pages, check_cancelled};
 use tetdb_schema::page::NONE;
 
 /// A volume enclosed by facets.
@@ -83,12 +83,12 @@ fn survey<P: Pages>(mesh: &mut Mesh<P>, flood: &mut Flood) -> Result<Walls, Boun
     let none = std::collections::HashSet::new();
     for n in 0..mesh.n_facets() {
         if n & 1023 == 0 {
-            stop_if_requested();
+            check_cancelled();
         }
         let mut facet = mesh.facet(n);
-        let known = face_at(mesh, &facet).map(Found::Face);
-        let found = || find_face(&mut Paged(mesh, &none), facet.vertices);
-        let Found::Face(face) = known.unwrap_or_else(found) else {
+        let known = face_at(mesh, &facet).map(SearchResult::Face);
+        let found = || find_face(&mut PagedSpace(mesh, &none), facet.vertices);
+        let SearchResult::Face(face) = known.unwrap_or_else(found) else {
             return Err(BoundaryError::NotRecovered {
                 facets: vec![place(mesh, n)],
                 reason: "it is not a face of the mesh",

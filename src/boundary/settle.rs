@@ -19,7 +19,7 @@ use super::suppress::half_space;
 use super::walk::ball;
 use crate::geom::Dyadic;
 use crate::geom::Point;
-use crate::store::Pages;
+use crate::storage::Pages;
 
 /// Times all vertices are moved: room grows by a factor each time.
 const ROUNDS_MAX: usize = 60;

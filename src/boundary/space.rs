@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use crate::geom::{Point, orient};
 use crate::mesh::anatomy::{FACES, REQUIRED};
 use crate::mesh::{FaceRef, Mesh, Tet};
-use crate::store::Pages;
+use crate::storage::Pages;
 
 /// A tetrahedral complex whose parts can be replaced.
 ///
@@ -51,7 +51,7 @@ pub(super) trait Space {
                 } else {
                     sides.push(Side {
                         key: sorted(tet.face(i)),
-                        made: u32::MAX,
+                        shapes: u32::MAX,
                         outside: across,
                         required: tet.is_required(i),
                     });
@@ -67,13 +67,13 @@ pub(super) trait Space {
             for (i, f) in FACES.iter().enumerate() {
                 sides.push(Side {
                     key: sorted(f.map(|j| quad[j])),
-                    made: (k * 4 + i) as u32,
+                    shapes: (k * 4 + i) as u32,
                     outside: FaceRef::NONE,
                     required: false,
                 });
             }
         }
-        sides.sort_unstable_by_key(|s| (s.key, s.made));
+        sides.sort_unstable_by_key(|s| (s.key, s.shapes));
         let mut records: Vec<Tet> = new
             .iter()
             .map(|&node| Tet {
@@ -81,31 +81,31 @@ pub(super) trait Space {
                 neighbor: [FaceRef::NONE; 4],
             })
             .collect();
-        let place = |made: u32| (made as usize / 4, made as usize % 4);
-        let name = |made: u32| FaceRef::new(ids[made as usize / 4], made as usize % 4);
+        let place = |shapes: u32| (shapes as usize / 4, shapes as usize % 4);
+        let name = |shapes: u32| FaceRef::new(ids[shapes as usize / 4], shapes as usize % 4);
         for pair in sides.chunks(2) {
             let [a, b] = pair else {
                 panic!("face {:?} of a replaced cavity has one side", pair[0].key)
             };
             assert!(
-                a.key == b.key && a.made != u32::MAX,
+                a.key == b.key && a.shapes != u32::MAX,
                 "a replaced cavity does not fill its room: {:?} {:?}",
                 a.key,
                 b.key
             );
-            let (k, i) = place(a.made);
-            if b.made == u32::MAX {
+            let (k, i) = place(a.shapes);
+            if b.shapes == u32::MAX {
                 records[k].neighbor[i] = b.outside;
                 if b.required {
                     records[k].node[i] |= REQUIRED;
                 }
                 if b.outside.exists() {
-                    self.set_across(b.outside, name(a.made));
+                    self.set_across(b.outside, name(a.shapes));
                 }
             } else {
-                let (l, j) = place(b.made);
-                records[k].neighbor[i] = name(b.made);
-                records[l].neighbor[j] = name(a.made);
+                let (l, j) = place(b.shapes);
+                records[k].neighbor[i] = name(b.shapes);
+                records[l].neighbor[j] = name(a.shapes);
                 if inner.contains(&a.key) {
                     records[k].node[i] |= REQUIRED;
                     records[l].node[j] |= REQUIRED;
@@ -137,10 +137,10 @@ pub(super) trait Space {
     }
 }
 
-/// A face of a replaced cavity, seen from outside (`made == MAX`) or from a new tetrahedron.
+/// A face of a replaced cavity, seen from outside (`shapes == MAX`) or from a new tetrahedron.
 struct Side {
     key: [u32; 3],
-    made: u32,
+    shapes: u32,
     outside: FaceRef,
     required: bool,
 }
@@ -159,13 +159,13 @@ pub(super) fn edge_key(a: u32, b: u32) -> u64 {
 }
 
 /// The paged mesh as a space; all vertices are where their coordinates say.
-pub(super) struct Paged<'m, P: Pages>(
+pub(super) struct PagedSpace<'m, P: Pages>(
     pub &'m mut Mesh<P>,
     /// Edges that must stay.
     pub &'m HashSet<u64>,
 );
 
-impl<P: Pages> Space for Paged<'_, P> {
+impl<P: Pages> Space for PagedSpace<'_, P> {
     #[inline]
     fn tet(&mut self, t: u32) -> Tet {
         self.0.tet(t)

@@ -7,7 +7,7 @@ use super::patch::Patch;
 use super::space::Space;
 use super::walk::swapped;
 use crate::mesh::Tet;
-use crate::store::Pages;
+use crate::storage::Pages;
 
 /// An outer face of a cavity, as a tetrahedron of the cavity and the vertex opposite the face.
 pub(super) type Outer = (Tet, usize);

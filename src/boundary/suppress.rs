@@ -21,15 +21,15 @@ use super::kernel::HalfSpace;
 use super::patch::Patch;
 use super::polygon::triangulate;
 use super::space::{Space, sorted};
-use super::target::Target;
+use super::target::RecoveryTarget;
 use super::walk::{ball, edge_at, swapped};
 use crate::geom::Point;
 use crate::mesh::FaceRef;
-use crate::store::Pages;
+use crate::storage::Pages;
 
 /// The facets of a patch and the faces that make them up.
 #[derive(Default)]
-pub(super) struct Skin {
+pub(super) struct CavitySkin {
     /// Corners of each facet.
     pub facets: Vec<[u32; 3]>,
     /// Sorted face to its facet and itself in the facet's direction.
@@ -75,7 +75,7 @@ impl<P: Pages> Patch<'_, P> {
                 let Some(t) = edge_at(self, t, x, v) else {
                     continue;
                 };
-                let mut flipper = Flipper::new(self, Target::Free);
+                let mut flipper = Flipper::new(self, RecoveryTarget::Free);
                 flipper.work = 1;
                 thinner |= flipper.remove_edge(t, x, v, 0);
             }
@@ -86,7 +86,7 @@ impl<P: Pages> Patch<'_, P> {
     }
 
     /// Takes vertex `x` off the surface. Returns the number of vertices that replace it.
-    pub(super) fn suppress(&mut self, skin: &mut Skin, x: u32) -> Result<u32, Trouble> {
+    pub(super) fn suppress(&mut self, skin: &mut CavitySkin, x: u32) -> Result<u32, Trouble> {
         self.thin_out(x);
         let ball = ball(self, x);
         let fans = self.fans(skin, x, &ball)?;
@@ -204,7 +204,7 @@ impl<P: Pages> Patch<'_, P> {
     }
 
     /// The fans of the facets around `x`.
-    fn fans(&mut self, skin: &Skin, x: u32, ball: &[u32]) -> Result<Vec<Fan>, Trouble> {
+    fn fans(&mut self, skin: &CavitySkin, x: u32, ball: &[u32]) -> Result<Vec<Fan>, Trouble> {
         let mut edges: BTreeMap<usize, BTreeMap<u32, u32>> = BTreeMap::new();
         for &t in ball {
             let tet = self.tet(t);
@@ -250,7 +250,13 @@ impl<P: Pages> Patch<'_, P> {
     }
 
     /// Moves `x` along the surface onto a vertex all fans share.
-    fn collapse_on_surface(&mut self, skin: &mut Skin, x: u32, ball: &[u32], fans: &[Fan]) -> bool {
+    fn collapse_on_surface(
+        &mut self,
+        skin: &mut CavitySkin,
+        x: u32,
+        ball: &[u32],
+        fans: &[Fan],
+    ) -> bool {
         let candidates: Vec<u32> = match fans {
             [fan] => fan.polygon.clone(),
             _ => vec![
@@ -326,7 +332,7 @@ impl<P: Pages> Patch<'_, P> {
     /// Forgets the faces at `x`, marks the new ones.
     fn renew_skin(
         &mut self,
-        skin: &mut Skin,
+        skin: &mut CavitySkin,
         x: u32,
         fans: &[Fan],
         faces: &[Vec<[u32; 3]>],
@@ -349,7 +355,7 @@ impl<P: Pages> Patch<'_, P> {
     }
 
     /// Marks the faces of `tets` that are in the skin.
-    pub(super) fn require_known(&mut self, skin: &Skin, tets: &[u32]) {
+    pub(super) fn require_known(&mut self, skin: &CavitySkin, tets: &[u32]) {
         for &t in tets {
             let tet = self.tet(t);
             for i in 0..4 {

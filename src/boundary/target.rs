@@ -4,14 +4,14 @@ use super::space::Space;
 
 /// The missing part; nothing new may cross it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Target {
+pub(super) enum RecoveryTarget {
     Edge(u32, u32),
     Face([u32; 3]),
     /// Nothing is in the way of anything.
     Free,
 }
 
-impl Target {
+impl RecoveryTarget {
     /// Whether the new edge `x y`, with its faces to `c` and `d`, keeps clear of the target.
     pub(super) fn allows_edge<S: Space>(self, s: &mut S, x: u32, y: u32, [c, d]: [u32; 2]) -> bool {
         match self {

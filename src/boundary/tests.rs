@@ -1,6 +1,6 @@
 //! Made surfaces with known difficulties, and the real ones when they are at hand.
 
 mod build;
-mod made;
 mod oracle;
 mod real;
+mod shapes;

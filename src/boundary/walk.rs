@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use super::space::Space;
 use crate::mesh::{FaceRef, Tet};
-use crate::store::stop_if_requested;
+use crate::storage::check_cancelled;
 
 /// Steps towards a direction inside one ball before all of it is searched.
 const TURNS_MAX: u32 = 400;
@@ -71,7 +71,7 @@ fn leaves_cone<S: Space>(s: &mut S, tet: &Tet, i: usize, b: u32, turn: u32) -> O
 
 /// All tetrahedra that have `v`.
 pub(super) fn ball<S: Space>(s: &mut S, v: u32) -> Vec<u32> {
-    stop_if_requested();
+    check_cancelled();
     let first = s.tet_of(v);
     let mut seen: HashSet<u32> = HashSet::from([first]);
     let mut all = vec![first];
@@ -109,7 +109,7 @@ pub(super) fn edge_at<S: Space>(s: &mut S, t: u32, a: u32, b: u32) -> Option<u32
 ///
 /// Invariant: `tets[i]` has the vertices `c, d, ring[i], ring[i + 1]`, positive in this order.
 #[derive(Clone, Debug)]
-pub(super) struct Shell {
+pub(super) struct EdgeRing {
     pub tets: Vec<u32>,
     pub ring: Vec<u32>,
     /// Whether a required face has the edge.
@@ -130,10 +130,10 @@ pub(super) fn opposite(tet: &Tet, c: u32, d: u32) -> Option<(usize, usize)> {
 }
 
 /// The shell of the edge `c d` of tetrahedron `t`; `None` when it reaches the hull.
-pub(super) fn shell<S: Space>(s: &mut S, t: u32, c: u32, d: u32) -> Option<Shell> {
+pub(super) fn shell<S: Space>(s: &mut S, t: u32, c: u32, d: u32) -> Option<EdgeRing> {
     // Every flip and every search comes by here.
-    stop_if_requested();
-    let mut shell = Shell {
+    check_cancelled();
+    let mut shell = EdgeRing {
         tets: Vec::new(),
         ring: Vec::new(),
         required: false,

@@ -7,10 +7,10 @@ use super::grow::{Grown, Obstacle};
 use super::kernel::center;
 use super::patch::Patch;
 use super::space::{Space, sorted};
-use super::suppress::{Fan, Skin, half_space};
+use super::suppress::{CavitySkin, Fan, half_space};
 use super::walk::swapped;
 use crate::geom::{Dyadic, Point};
-use crate::store::Pages;
+use crate::storage::Pages;
 
 /// A place nearer than this to the planes around it, in units of the wedge, is second choice.
 const ROOM_MIN: f64 = 1e-3;
@@ -40,7 +40,7 @@ pub(super) struct Wedge {
 impl<P: Pages> Patch<'_, P> {
     pub(super) fn wedges(
         &mut self,
-        skin: &Skin,
+        skin: &CavitySkin,
         x: u32,
         ball: &[u32],
         fans: &[Fan],

@@ -6,9 +6,9 @@ use serde_json::json;
 
 use super::args::CheckArgs;
 use super::check_report::Findings;
+use super::console::Console;
 use super::failure::Failure;
 use super::input::{self, Input, Space};
-use super::talk::Talk;
 use crate::io::write;
 use crate::surface::{Repair, Surface, repair};
 
@@ -24,17 +24,17 @@ struct Mended {
     before: (usize, usize, u64),
 }
 
-pub fn run(args: &CheckArgs, talk: &Talk) -> Result<u8, Failure> {
+pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
     // Options are checked before anything is read.
     let weld_share = args.weld.as_deref().map(share).transpose()?;
     if let Some(out) = &args.write {
         refuse_input(out, &args.surfaces)?;
     }
-    let mut input = input::load(&args.surfaces, Space::Boundless, talk)?;
+    let mut input = input::load(&args.surfaces, Space::Boundless, console)?;
     let mended = args.repair.then(|| mend(&mut input, weld_share));
     let findings = Findings::of(&input.surface, input.turned);
-    let written = write_files(args, &input.surface, &findings, talk)?;
-    if talk.is_json() {
+    let written = write_files(args, &input.surface, &findings, console)?;
+    if console.is_json() {
         let mut answer = findings.json();
         if let Some(mended) = &mended {
             answer["repair"] = mended.json();
@@ -42,12 +42,12 @@ pub fn run(args: &CheckArgs, talk: &Talk) -> Result<u8, Failure> {
         for (field, value) in written {
             answer[field] = value;
         }
-        talk.answer(&answer);
+        console.answer(&answer);
     } else {
         if let Some(mended) = &mended {
-            mended.print(talk);
+            mended.print(console);
         }
-        findings.print(&args.surfaces, mended.is_some(), talk);
+        findings.print(&args.surfaces, mended.is_some(), console);
     }
     Ok(if findings.is_valid() { 0 } else { 3 })
 }
@@ -109,9 +109,9 @@ impl Mended {
         })
     }
 
-    fn print(&self, talk: &Talk) {
+    fn print(&self, console: &Console) {
         let (triangles, vertices, n_defects) = self.before;
-        talk.line(&format!(
+        console.line(&format!(
             "before: {triangles} triangles, {vertices} vertices, {n_defects} defects"
         ));
         let done = &self.done;
@@ -122,7 +122,7 @@ impl Mended {
             ),
             _ => String::new(),
         };
-        talk.line(&format!(
+        console.line(&format!(
             "repair: {joined}{} triangles without area and {} repeated ones dropped, {} divided at T-junctions, {} turned",
             done.collapsed_dropped, done.repeated_dropped, done.divided, done.turned
         ));
@@ -134,7 +134,7 @@ fn write_files(
     args: &CheckArgs,
     surface: &Surface,
     findings: &Findings,
-    talk: &Talk,
+    console: &Console,
 ) -> Result<Vec<(&'static str, serde_json::Value)>, Failure> {
     let mut fields = Vec::new();
     if let Some(out) = &args.write {
@@ -143,9 +143,9 @@ fn write_files(
             0 => "validated again, free of defects".to_owned(),
             n => format!("validated again, still with {n} defects"),
         };
-        talk.note(&format!("wrote {}: {state}", out.display()));
+        console.note(&format!("wrote {}: {state}", out.display()));
         if !report.labels_kept {
-            talk.note("note: this format has no place for the labels");
+            console.note("note: this format has no place for the labels");
         }
         fields.push((
             "written",
@@ -158,13 +158,13 @@ fn write_files(
         let mut file = None;
         if defects.is_empty() {
             // A file without cells is one that some programs cannot read.
-            talk.note(&format!(
+            console.note(&format!(
                 "no triangle is defective: {} was not written",
                 out.display()
             ));
         } else {
             n = write::defects(surface, defects, out)?;
-            talk.note(&format!(
+            console.note(&format!(
                 "wrote {n} defective triangles to {}",
                 out.display()
             ));

@@ -3,10 +3,10 @@
 use serde_json::{Value, json};
 
 use super::check_expected;
-use super::talk::Talk;
+use super::console::Console;
 use crate::surface::{
-    Closing, Defect, Fitness, Rim, Surface, Validation, closing, fitness, rims, show, show_number,
-    validate,
+    BoundaryLoop, Closing, Defect, Fitness, Surface, Validation, boundary_loops, closing, fitness,
+    show, show_number, validate,
 };
 
 /// Defects of one kind, holes and junctions listed for people.
@@ -21,7 +21,7 @@ pub struct Findings<'a> {
     surface: &'a Surface,
     turned: usize,
     pub validation: Validation,
-    rims: Vec<Rim>,
+    boundary_loops: Vec<BoundaryLoop>,
     closing: Vec<Closing>,
     fitness: Fitness,
     /// Tetrahedra with default sizes, roughly; none for an open surface.
@@ -38,7 +38,7 @@ impl<'a> Findings<'a> {
         Self {
             surface,
             turned,
-            rims: rims(surface, &validation.closedness),
+            boundary_loops: boundary_loops(surface, &validation.closedness),
             closing: if is_closed {
                 Vec::new()
             } else {
@@ -70,7 +70,7 @@ impl<'a> Findings<'a> {
         let (surface, found, edges) = (self.surface, &self.validation, &self.validation.closedness);
         let point = |v: u32| surface.points[v as usize].to_array();
         let open_loops: Vec<Value> = self
-            .rims
+            .boundary_loops
             .iter()
             .map(|rim| {
                 json!({ "edges": rim.n_edges, "length": rim.length, "triangle": rim.triangle, "at": rim.at.to_array() })
@@ -100,9 +100,9 @@ impl<'a> Findings<'a> {
     }
 
     /// The same for people; `surfaces` are the words of the command line.
-    pub fn print(&self, surfaces: &[String], is_repaired: bool, talk: &Talk) {
+    pub fn print(&self, surfaces: &[String], is_repaired: bool, console: &Console) {
         let edges = &self.validation.closedness;
-        talk.line(&format!(
+        console.line(&format!(
             "{} triangles, {} vertices, {} edges, {} part(s)",
             self.surface.n_triangles(),
             self.surface.n_vertices(),
@@ -110,28 +110,28 @@ impl<'a> Findings<'a> {
             edges.n_components
         ));
         if !edges.two_sided.is_empty() {
-            talk.line(&format!(
+            console.line(&format!(
                 "{} triangles are given from both sides: each pair is one facet between two regions",
                 2 * edges.two_sided.len()
             ));
         }
-        self.print_defects(talk);
+        self.print_defects(console);
         if !edges.is_closed() {
-            self.print_openness(surfaces, talk);
+            self.print_openness(surfaces, console);
         }
-        self.print_fitness(talk);
+        self.print_fitness(console);
         for advice in self.advice() {
-            talk.line(&format!("advice: {advice}"));
+            console.line(&format!("advice: {advice}"));
         }
         if self.is_valid() {
-            talk.line("closed and free of defects: it can be meshed");
+            console.line("closed and free of defects: it can be meshed");
         } else {
-            self.print_help(surfaces, is_repaired, talk);
+            self.print_help(surfaces, is_repaired, console);
         }
     }
 
     /// Kind by kind, some of each.
-    fn print_defects(&self, talk: &Talk) {
+    fn print_defects(&self, console: &Console) {
         let same_kind = |a: &Defect, b: &Defect| a.code() == b.code();
         for kind in self.validation.defects.chunk_by(same_kind) {
             let code = kind[0].code();
@@ -143,26 +143,26 @@ impl<'a> Findings<'a> {
                 Defect::SelfIntersection { .. } => self.validation.n_intersections,
                 _ => kind.len() as u64,
             };
-            talk.line(&format!("{code}: {n}"));
+            console.line(&format!("{code}: {n}"));
             for defect in kind.iter().take(LISTED) {
                 let at = defect
                     .at()
                     .map_or(String::new(), |p| format!(", near {}", show(p)));
-                talk.line(&format!("  {defect}{at}"));
+                console.line(&format!("  {defect}{at}"));
             }
-            tell_rest(n, talk);
+            tell_rest(n, console);
         }
     }
 
-    fn print_openness(&self, surfaces: &[String], talk: &Talk) {
+    fn print_openness(&self, surfaces: &[String], console: &Console) {
         let open = &self.validation.closedness.open;
-        talk.line(&format!(
+        console.line(&format!(
             "{} open edges around {} hole(s):",
             open.len(),
-            self.rims.len()
+            self.boundary_loops.len()
         ));
-        for rim in self.rims.iter().take(LISTED) {
-            talk.line(&format!(
+        for rim in self.boundary_loops.iter().take(LISTED) {
+            console.line(&format!(
                 "  {} edges, length {}, at triangle {} near {}",
                 rim.n_edges,
                 short(rim.length),
@@ -170,32 +170,32 @@ impl<'a> Findings<'a> {
                 show(rim.at)
             ));
         }
-        tell_rest(self.rims.len() as u64, talk);
+        tell_rest(self.boundary_loops.len() as u64, console);
         let junctions = &self.validation.t_junctions;
         if !junctions.is_empty() {
-            talk.line(&format!("{} T-junction(s):", junctions.len()));
+            console.line(&format!("{} T-junction(s):", junctions.len()));
         }
         for junction in junctions.iter().take(LISTED) {
             let how = match junction.distance {
                 0.0 => "exactly".to_owned(),
                 distance => format!("but for {distance:.1e}"),
             };
-            talk.line(&format!(
+            console.line(&format!(
                 "  a vertex at {} lies on an open edge of triangle {}, {how}",
                 show(junction.at),
                 junction.triangle
             ));
         }
-        tell_rest(junctions.len() as u64, talk);
-        self.print_closing(surfaces, talk);
+        tell_rest(junctions.len() as u64, console);
+        self.print_closing(surfaces, console);
     }
 
-    fn print_closing(&self, surfaces: &[String], talk: &Talk) {
+    fn print_closing(&self, surfaces: &[String], console: &Console) {
         let Some(last) = self.closing.last() else {
             return;
         };
         let Some(closes) = self.closes() else {
-            talk.line(&format!(
+            console.line(&format!(
                 "no repair closes it: {} edges stay open even when points nearer than {:e} of the box diagonal are joined",
                 last.open_edges, last.share
             ));
@@ -206,7 +206,7 @@ impl<'a> Findings<'a> {
             Some(0) | None => "and no defect is left".to_owned(),
             Some(n) => format!("and {n} other defects are left"),
         };
-        talk.line(&if closes.share > 0.0 {
+        console.line(&if closes.share > 0.0 {
             format!(
                 "all close if points nearer than {:e} of the box diagonal ({:.3e}) are joined, {left}: `tetdb check {surfaces} --repair --weld {:e} --write OUT`",
                 closes.share, closes.distance, closes.share
@@ -216,12 +216,12 @@ impl<'a> Findings<'a> {
         });
     }
 
-    fn print_fitness(&self, talk: &Talk) {
+    fn print_fitness(&self, console: &Console) {
         let f = &self.fitness;
         if self.surface.n_triangles() == 0 {
             return;
         }
-        talk.line(&format!(
+        console.line(&format!(
             "shapes: {:.3} % of the triangles have an angle below 5 degrees (least {:.4}); edges {} to {}, median {}",
             100.0 * f.small_angle_share,
             f.angle_least_degrees,
@@ -230,7 +230,7 @@ impl<'a> Findings<'a> {
             short(f.edge_median)
         ));
         if let (Some(tets), Some(share)) = (self.tets_expected, self.forced_share()) {
-            talk.line(&format!(
+            console.line(&format!(
                 "mesh: about {} tetrahedra with default sizes; at least {:.2} % of them stand on one of {} triangles whose shape alone makes quality 2 or worse",
                 rounded(tets),
                 100.0 * share,
@@ -263,7 +263,7 @@ impl<'a> Findings<'a> {
         advice
     }
 
-    fn print_help(&self, surfaces: &[String], is_repaired: bool, talk: &Talk) {
+    fn print_help(&self, surfaces: &[String], is_repaired: bool, console: &Console) {
         let Some(first) = self.validation.defects.first() else {
             return;
         };
@@ -280,7 +280,7 @@ impl<'a> Findings<'a> {
         } else {
             first.help().to_owned()
         };
-        talk.line(&format!("help: {help}"));
+        console.line(&format!("help: {help}"));
     }
 }
 
@@ -295,9 +295,9 @@ fn defect_json(defect: &Defect) -> Value {
     value
 }
 
-fn tell_rest(n: u64, talk: &Talk) {
+fn tell_rest(n: u64, console: &Console) {
     if n > LISTED as u64 {
-        talk.line(&format!("  ... {n} in all; --json lists them"));
+        console.line(&format!("  ... {n} in all; --json lists them"));
     }
 }
 

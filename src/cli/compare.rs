@@ -3,15 +3,15 @@
 use serde_json::json;
 
 use super::args::CompareArgs;
+use super::console::Console;
 use super::failure::Failure;
-use super::talk::Talk;
 use super::{memory, store};
 use crate::audit::{Population, Qualities, qualities};
 
 /// Exit code when the meshes differ.
 const DIFFERENT: u8 = 7;
 
-pub fn run(args: &CompareArgs, talk: &Talk) -> Result<u8, Failure> {
+pub fn run(args: &CompareArgs, console: &Console) -> Result<u8, Failure> {
     let (cap, _) = memory::cap(args.read.memory.as_deref())?;
     let memory = (cap / 4).min(256 << 20) as usize;
     let mut found = Vec::with_capacity(2);
@@ -24,14 +24,14 @@ pub fn run(args: &CompareArgs, talk: &Talk) -> Result<u8, Failure> {
         unreachable!("two stores were read");
     };
     let same = digest_a == digest_b;
-    if talk.is_json() {
-        talk.answer(&json!({
+    if console.is_json() {
+        console.answer(&json!({
             "schema": 1, "same": same, "first": a, "second": b,
             "digests": [digest_a[0].to_string(), digest_b[0].to_string()],
         }));
     } else {
-        print(a, b, talk);
-        talk.line(if same {
+        print(a, b, console);
+        console.line(if same {
             "the meshes are the same, bit by bit"
         } else {
             "the meshes differ"
@@ -40,13 +40,13 @@ pub fn run(args: &CompareArgs, talk: &Talk) -> Result<u8, Failure> {
     Ok(if same { 0 } else { DIFFERENT })
 }
 
-fn print(a: &Qualities, b: &Qualities, talk: &Talk) {
-    talk.line(&format!(
+fn print(a: &Qualities, b: &Qualities, console: &Console) {
+    console.line(&format!(
         "{:<14} {:>14} {:>9} {:>14} {:>9} {:>9}",
         "", "first", "", "second", "", "change"
     ));
     let count = |name: &str, a: u64, b: u64| {
-        talk.line(&format!(
+        console.line(&format!(
             "{name:<14} {a:>14} {:>9} {b:>14} {:>9} {}",
             "",
             "",
@@ -61,15 +61,15 @@ fn print(a: &Qualities, b: &Qualities, talk: &Talk) {
         ("forced", &a.forced, &b.forced),
         ("at interfaces", &a.at_interface, &b.at_interface),
     ] {
-        population(name, a, b, talk);
+        population(name, a, b, console);
     }
 }
 
-fn population(name: &str, a: &Population, b: &Population, talk: &Talk) {
+fn population(name: &str, a: &Population, b: &Population, console: &Console) {
     if a.tets + b.tets == 0 {
         return;
     }
-    talk.line(&format!(
+    console.line(&format!(
         "{name:<14} {:>14} {:>9} {:>14} {:>9} {}",
         a.tets,
         "",
@@ -82,7 +82,7 @@ fn population(name: &str, a: &Population, b: &Population, talk: &Talk) {
             11 => "inf".to_owned(),
             to => to.to_string(),
         };
-        talk.line(&format!(
+        console.line(&format!(
             "  [{:>2}, {to:>3}[   {:>14} {:>8.4}% {:>14} {:>8.4}% {:>+8.4}",
             bin + 1,
             a.bins[bin],
@@ -92,7 +92,7 @@ fn population(name: &str, a: &Population, b: &Population, talk: &Talk) {
             100.0 * (b.share(bin) - a.share(bin))
         ));
     }
-    talk.line(&format!(
+    console.line(&format!(
         "  {:<12} {:>14.3} {:>9} {:>14.3}",
         "worst", a.worst, "", b.worst
     ));

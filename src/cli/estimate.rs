@@ -5,25 +5,25 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 
 use super::args::EstimateArgs;
+use super::console::Console;
 use super::failure::Failure;
 use super::input::Space;
-use super::talk::Talk;
 use super::{background, config, input, memory};
 use crate::pipeline::{self, Estimate};
-use crate::store::available_bytes;
+use crate::storage::available_bytes;
 use crate::surface::Surface;
 
 /// A mesh is refused when less than this share of the disk it is expected to take is free: predictions may be that far off.
 const REFUSED_BELOW: f64 = 0.7;
 
-pub fn run(args: &EstimateArgs, talk: &Talk) -> Result<u8, Failure> {
+pub fn run(args: &EstimateArgs, console: &Console) -> Result<u8, Failure> {
     let options = config::options(&args.shape)?;
     options.sizes()?;
     let (cap, whence) = memory::cap(args.memory.as_deref())?;
     let threads = args.threads.unwrap_or_else(rayon::current_num_threads);
     let store = args.output.as_deref().unwrap_or(Path::new("."));
     let space = Space::Capped(cap, store);
-    let input = input::load_valid(&args.surfaces, space, talk)?;
+    let input = input::load_valid(&args.surfaces, space, console)?;
     let background = background::read(&options, cap)?;
     let room = space.room(&input.surface)?;
     let prepared = pipeline::prepare(&input.surface, &options, background.as_ref(), &room)?;
@@ -32,8 +32,8 @@ pub fn run(args: &EstimateArgs, talk: &Talk) -> Result<u8, Failure> {
     let disk = estimate.disk_peak_bytes(cap, threads);
     let fits_memory = cap >= estimate.memory_least_bytes();
     let fits_disk = disk_free.is_none_or(|free| free >= disk);
-    if talk.is_json() {
-        talk.answer(&json!({
+    if console.is_json() {
+        console.answer(&json!({
             "schema": 1,
             "tets": round(estimate.tets()),
             "vertices": round(estimate.vertices),
@@ -54,11 +54,11 @@ pub fn run(args: &EstimateArgs, talk: &Talk) -> Result<u8, Failure> {
         }));
         return Ok(0);
     }
-    talk.line(&prepared.sizes.to_string());
+    console.line(&prepared.sizes.to_string());
     for warning in &prepared.sizes.warnings {
-        talk.line(&format!("warning: {warning}"));
+        console.line(&format!("warning: {warning}"));
     }
-    talk.line(&format!(
+    console.line(&format!(
         "about {} tetrahedra and {} vertices from {} triangles, in {}",
         round(estimate.tets()),
         round(estimate.vertices),
@@ -68,7 +68,7 @@ pub fn run(args: &EstimateArgs, talk: &Talk) -> Result<u8, Failure> {
             n => format!("{n} sub-domains"),
         }
     ));
-    talk.line(&format!(
+    console.line(&format!(
         "memory: {} with a cap of {} ({whence}); the smallest cap is {}, and more than {} brings nothing",
         memory::show(estimate.memory_bytes(cap, threads)),
         memory::show(cap),
@@ -78,16 +78,16 @@ pub fn run(args: &EstimateArgs, talk: &Talk) -> Result<u8, Failure> {
     let free = disk_free.map_or(String::new(), |free| {
         format!("; {} are free", memory::show(free))
     });
-    talk.line(&format!(
+    console.line(&format!(
         "disk: {} while it is made, {} for the finished store{free}",
         memory::show(disk),
         memory::show(estimate.store_bytes()),
     ));
-    talk.line(&format!(
+    console.line(&format!(
         "time: about {:.0} s on {threads} threads of a 2.6 GHz server; needles in the surface make it more",
         estimate.seconds(threads).max(1.0)
     ));
-    talk.line(match (fits_memory, fits_disk) {
+    console.line(match (fits_memory, fits_disk) {
         (true, true) => "fits: yes",
         (true, false) => "fits: no, the disk is too small",
         (false, true) => "fits: no, the memory cap is too small",
@@ -112,7 +112,12 @@ pub fn surface_fits(surface: &Surface, cap: u64) -> Result<(), Failure> {
 }
 
 /// Refuses a mesh that memory or disk cannot hold, before anything is written.
-pub fn preflight(estimate: &Estimate, cap: u64, store: &Path, talk: &Talk) -> Result<(), Failure> {
+pub fn preflight(
+    estimate: &Estimate,
+    cap: u64,
+    store: &Path,
+    console: &Console,
+) -> Result<(), Failure> {
     let least = estimate.memory_least_bytes();
     if cap < least {
         let message = format!(
@@ -139,7 +144,7 @@ pub fn preflight(estimate: &Estimate, cap: u64, store: &Path, talk: &Talk) -> Re
             .help("`tetdb estimate SURFACE` tells what a mesh takes; ask for longer edges (--hsiz), give more --memory, or put the store on another disk with -o"));
     }
     if free < needed {
-        talk.note(&format!(
+        console.note(&format!(
             "warning: the mesh may need {} of disk while it is made; {} are free",
             memory::show(needed),
             memory::show(free)

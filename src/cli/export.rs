@@ -5,8 +5,8 @@ use std::path::Path;
 use serde_json::json;
 
 use super::args::ExportArgs;
+use super::console::Console;
 use super::failure::Failure;
-use super::talk::Talk;
 use super::{memory, store};
 use crate::io::write::{self, Content, ENDINGS, ExportReport, MeshFormat, Selection};
 use crate::pipeline::Event;
@@ -14,7 +14,7 @@ use crate::pipeline::Event;
 /// A writer holds no more than this, however large the cap.
 const MEMORY_MAX: u64 = 512 << 20;
 
-pub fn run(args: &ExportArgs, talk: &Talk) -> Result<u8, Failure> {
+pub fn run(args: &ExportArgs, console: &Console) -> Result<u8, Failure> {
     let (cap, _) = memory::cap(args.read.memory.as_deref())?;
     let selection = Selection {
         subdomains: args.subdomain.iter().copied().collect(),
@@ -39,10 +39,10 @@ pub fn run(args: &ExportArgs, talk: &Talk) -> Result<u8, Failure> {
     }
     let mut reports = Vec::new();
     for out in &args.out {
-        reports.push(write(&args.store, out, &selection, cap, talk)?);
+        reports.push(write(&args.store, out, &selection, cap, console)?);
     }
-    if talk.is_json() {
-        talk.answer(&json!({ "schema": 1, "exports": reports }));
+    if console.is_json() {
+        console.answer(&json!({ "schema": 1, "exports": reports }));
     }
     Ok(0)
 }
@@ -66,21 +66,21 @@ pub fn write(
     out: &Path,
     selection: &Selection,
     cap: u64,
-    talk: &Talk,
+    console: &Console,
 ) -> Result<ExportReport, Failure> {
     let mut store = store::open_finished(path)?;
     let memory = (cap / 2).min(MEMORY_MAX) as usize;
     let report = write::export(&mut store, out, selection, memory, &|done, total| {
-        talk.progress(Event {
+        console.progress(Event {
             stage: "export",
             done,
             total: Some(total),
             unit: "records",
         });
     })?;
-    talk.done();
+    console.done();
     for (file, bytes) in &report.files {
-        talk.note(&format!(
+        console.note(&format!(
             "wrote {} ({})",
             file.display(),
             memory::show(*bytes)

@@ -3,12 +3,13 @@
 use std::sync::Mutex;
 
 use crate::boundary::BoundaryError;
-use crate::catalog::CatalogError;
 use crate::io::read::ReadError;
 use crate::io::write::WriteError;
 use crate::pipeline::PipelineError;
-use crate::report::ReportError;
+use crate::query::QueryError;
+use crate::sealed::SealedError;
 use crate::sizing::SizingError;
+use crate::storage::StorageError;
 use crate::store::StoreError;
 use crate::surface::SurfaceError;
 
@@ -283,48 +284,49 @@ impl From<SurfaceError> for Failure {
     }
 }
 
+impl From<StorageError> for Failure {
+    fn from(e: StorageError) -> Self {
+        let code = match &e {
+            StorageError::Busy { .. } => "busy",
+            StorageError::Full { .. } => "disk-full",
+            StorageError::Damaged { .. }
+            | StorageError::Page { .. }
+            | StorageError::Missing { .. } => "damaged",
+            StorageError::Budget { .. } | StorageError::TooMany { .. } => "memory",
+            StorageError::Cancelled => "stopped",
+            _ => "io",
+        };
+        Self::new(code, &e).help(help_of(code))
+    }
+}
+
 impl From<StoreError> for Failure {
     fn from(e: StoreError) -> Self {
-        let code = match &e {
-            StoreError::Busy { .. } => "busy",
-            StoreError::Full { .. } => "disk-full",
-            StoreError::Damaged { .. } | StoreError::Page { .. } | StoreError::Missing { .. } => {
-                "damaged"
-            }
-            StoreError::Budget { .. } | StoreError::TooMany { .. } => "memory",
-            StoreError::Stopped => "stopped",
-            _ => "io",
-        };
-        Self::new(code, &e).help(help_of(code))
-    }
-}
-
-impl From<CatalogError> for Failure {
-    fn from(e: CatalogError) -> Self {
         let code = match e {
-            CatalogError::Store(inner) => return inner.into(),
-            CatalogError::Busy { .. } => "busy",
-            CatalogError::NotFound { .. } => "no-such-store",
-            CatalogError::NoSubdomain { .. } => "no-such-part",
-            CatalogError::NotOurs { .. } => "not-a-store",
-            CatalogError::Finished { .. } => "store-exists",
-            CatalogError::Unfinished { .. } | CatalogError::NotSealed { .. } => "store-unfinished",
-            CatalogError::NoCoarseLeaf { .. } => "no-coarse-leaf",
-            CatalogError::Format { .. } => "store-format",
-            CatalogError::Row { .. }
-            | CatalogError::Chunk { .. }
-            | CatalogError::Content { .. } => "damaged",
-            _ => "io",
+            StoreError::Storage(inner) => return inner.into(),
+            StoreError::Sealed(SealedError::Storage(inner)) => return inner.into(),
+            StoreError::Busy { .. } => "busy",
+            StoreError::NotFound { .. } => "no-such-store",
+            StoreError::NoSubdomain { .. } => "no-such-part",
+            StoreError::NotOurs { .. } => "not-a-store",
+            StoreError::Finished { .. } => "store-exists",
+            StoreError::Unfinished { .. } | StoreError::Sealed(SealedError::NotSealed { .. }) => {
+                "store-unfinished"
+            }
+            StoreError::NoCoarseSnapshot { .. } => "no-coarse-leaf",
+            StoreError::Format { .. } => "store-format",
+            StoreError::Row { .. }
+            | StoreError::Sealed(SealedError::Chunk { .. })
+            | StoreError::Sealed(SealedError::Content { .. }) => "damaged",
         };
         Self::new(code, &e).help(help_of(code))
     }
 }
 
-impl From<ReportError> for Failure {
-    fn from(e: ReportError) -> Self {
+impl From<QueryError> for Failure {
+    fn from(e: QueryError) -> Self {
         match e {
-            ReportError::Catalog(e) => e.into(),
-            ReportError::Store(e) => e.into(),
+            QueryError::Store(e) => e.into(),
             other => Self::new("no-such-part", other).help(help_of("no-such-part")),
         }
     }
@@ -349,8 +351,8 @@ impl From<PipelineError> for Failure {
             PipelineError::Surface(e) => e.into(),
             PipelineError::Boundary(e) => e.into(),
             PipelineError::Sizing(e) => e.into(),
-            PipelineError::Catalog(e) => e.into(),
             PipelineError::Store(e) => e.into(),
+            PipelineError::Storage(e) => e.into(),
             PipelineError::NothingFilled { .. } => Self::new("nothing-filled", &e)
                 .help("try --regions all, and look at the surface with `tetdb check SURFACE`"),
             PipelineError::NothingToUndo { .. } => {

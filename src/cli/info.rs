@@ -6,34 +6,35 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use super::args::StoreArgs;
+use super::console::Console;
 use super::failure::Failure;
 use super::memory;
-use super::talk::Talk;
-use crate::catalog::{QualityRow, Store, StoreState, SubdomainRow};
 use crate::pipeline;
+use crate::store::Catalog;
+use tetdb_schema::catalog::{QualityRow, StoreState, SubdomainRow};
 
 /// Regions listed for people.
 const REGIONS_LISTED: usize = 12;
 /// Sub-domains listed for people.
 const SUBDOMAINS_LISTED: usize = 32;
 
-pub fn run(args: &StoreArgs, talk: &Talk) -> Result<u8, Failure> {
-    if talk.is_json() {
-        talk.answer(&object(&args.store)?);
+pub fn run(args: &StoreArgs, console: &Console) -> Result<u8, Failure> {
+    if console.is_json() {
+        console.answer(&object(&args.store)?);
     } else {
-        print(&args.store, talk)?;
+        print(&args.store, console)?;
     }
     Ok(0)
 }
 
 /// Everything, for programs.
 pub fn object(path: &Path) -> Result<Value, Failure> {
-    let mut store = Store::open(path)?;
-    let catalog = store.catalog();
+    let mut store = Catalog::open(path)?;
+    let catalog = &mut store;
     let (state, job) = (catalog.state()?, catalog.job()?);
     let rows = catalog.subdomains()?;
     let topology = catalog.topology()?;
-    let coarse = catalog.coarse_leaves()?;
+    let coarse = catalog.coarse_snapshots()?;
     let coarse_of = |rank| coarse.iter().find(|c| c.rank == rank).map(|c| c.bytes);
     let mut sizes = BTreeMap::new();
     for row in &rows {
@@ -88,22 +89,22 @@ pub fn hex(digest: [u64; 2]) -> String {
 }
 
 /// The same for people.
-pub fn print(path: &Path, talk: &Talk) -> Result<(), Failure> {
-    let mut store = Store::open(path)?;
-    let catalog = store.catalog();
+pub fn print(path: &Path, console: &Console) -> Result<(), Failure> {
+    let mut store = Catalog::open(path)?;
+    let catalog = &mut store;
     let (state, job) = (catalog.state()?, catalog.job()?);
     let surfaces: Vec<&str> = job.surfaces.iter().map(|s| s.path.as_str()).collect();
-    talk.line(&format!(
+    console.line(&format!(
         "{}: {}, from {}",
         path.display(),
         words(state),
         surfaces.join(", ")
     ));
     for row in catalog.journal()? {
-        talk.line(&format!("  {:<28} {:>9.2} s", row.step, row.seconds));
+        console.line(&format!("  {:<28} {:>9.2} s", row.step, row.seconds));
     }
     if !state.is_finished() {
-        talk.line(&format!(
+        console.line(&format!(
             "`tetdb resume {}` goes on with it",
             path.display()
         ));
@@ -115,7 +116,7 @@ pub fn print(path: &Path, talk: &Talk) -> Result<(), Failure> {
         rows.iter().map(|r| r.tets).sum::<u64>(),
         rows.iter().map(|r| r.bytes).sum::<u64>(),
     );
-    talk.line(&format!(
+    console.line(&format!(
         "{tets} tetrahedra, {} vertices, {} input triangles in {} sub-domain(s); {} on disk, {:.2} bytes per tetrahedron",
         rows.iter().map(|r| r.vertices).sum::<u64>(),
         rows.iter().map(|r| r.facets).sum::<u64>(),
@@ -123,23 +124,23 @@ pub fn print(path: &Path, talk: &Talk) -> Result<(), Failure> {
         memory::show(bytes),
         bytes as f64 / tets.max(1) as f64
     ));
-    let coarse: u64 = catalog.coarse_leaves()?.iter().map(|c| c.bytes).sum();
+    let coarse: u64 = catalog.coarse_snapshots()?.iter().map(|c| c.bytes).sum();
     if coarse > 0 {
-        talk.line(&format!(
+        console.line(&format!(
             "coarse leaves, from which sub-domains can be made again: {}, {:.2} bytes per tetrahedron",
             memory::show(coarse),
             coarse as f64 / tets.max(1) as f64
         ));
     }
     let own = catalog.file_bytes()?;
-    talk.line(&format!(
+    console.line(&format!(
         "catalog, with the wanted sizes: {}, {:.2} bytes per tetrahedron",
         memory::show(own),
         own as f64 / tets.max(1) as f64
     ));
     let before = catalog.before()?;
     if !before.is_empty() {
-        talk.line(&format!(
+        console.line(&format!(
             "previous version of {} sub-domain(s), for `tetdb resaturate --undo`: {}",
             before.len(),
             memory::show(before.iter().map(|r| r.bytes).sum())
@@ -150,13 +151,13 @@ pub fn print(path: &Path, talk: &Talk) -> Result<(), Failure> {
         for row in rows.iter().take(SUBDOMAINS_LISTED) {
             let neighbors = topology.iter().find(|t| t.subdomain == row.rank);
             let neighbors = neighbors.map_or(0, |t| t.neighbors.len());
-            talk.line(&format!(
+            console.line(&format!(
                 "  sub-domain {:>4}: {:>10} tetrahedra, {:>7} interface faces, {neighbors} neighbor(s), worst q {:.3}",
                 row.rank, row.tets, row.interface_faces, row.quality.worst
             ));
         }
         if rows.len() > SUBDOMAINS_LISTED {
-            talk.line(&format!("  ... {} sub-domains in all", rows.len()));
+            console.line(&format!("  ... {} sub-domains in all", rows.len()));
         }
     }
     for region in regions.iter().take(REGIONS_LISTED) {
@@ -168,19 +169,19 @@ pub fn print(path: &Path, talk: &Talk) -> Result<(), Failure> {
         } else {
             ("-".to_owned(), "empty".to_owned())
         };
-        talk.line(&format!(
+        console.line(&format!(
             "  region {name:>4}: volume {:.6e}, {what}, {} label(s) around it",
             region.volume,
             region.labels.len()
         ));
     }
     if regions.len() > REGIONS_LISTED {
-        talk.line(&format!("  ... {} regions in all", regions.len()));
+        console.line(&format!("  ... {} regions in all", regions.len()));
     }
     for line in quality_lines(&merged(rows.iter().map(|r| &r.quality))) {
-        talk.line(&line);
+        console.line(&line);
     }
-    talk.line(&format!("digest {}", digest(&rows)));
+    console.line(&format!("digest {}", digest(&rows)));
     Ok(())
 }
 

@@ -5,14 +5,14 @@ use std::path::{Path, PathBuf};
 
 use xxhash_rust::xxh3::Xxh3;
 
+use super::console::Console;
 use super::estimate;
 use super::failure::Failure;
-use super::talk::Talk;
-use crate::catalog::SurfaceSource;
 use crate::io::read::read_surface;
 use crate::samples::{PREFIX, SampleSpec};
-use crate::store::{Room, attempt};
+use crate::storage::{ScratchSpace, attempt};
 use crate::surface::{Surface, Validation, orient_alike_in, validate_in};
+use tetdb_schema::catalog::SurfaceSource;
 
 /// A surface, read and turned one way, and where it came from.
 pub struct Input {
@@ -33,22 +33,22 @@ pub enum Space<'a> {
 
 impl Space<'_> {
     /// What there is beside a surface.
-    pub fn room(self, surface: &Surface) -> Result<Room, Failure> {
+    pub fn room(self, surface: &Surface) -> Result<ScratchSpace, Failure> {
         match self {
-            Self::Boundless => Ok(Room::boundless()),
+            Self::Boundless => Ok(ScratchSpace::boundless()),
             Self::Capped(cap, store) => {
                 let folder = estimate::folder_of(store).ok_or_else(|| {
                     Failure::new("io", "there is no folder above it").at(store.display())
                 })?;
                 let bytes = cap.saturating_sub(surface.bytes() as u64);
-                Ok(Room::new(bytes, &folder))
+                Ok(ScratchSpace::new(bytes, &folder))
             }
         }
     }
 }
 
 /// Reads files or makes a sample.
-pub fn load(arguments: &[String], space: Space, talk: &Talk) -> Result<Input, Failure> {
+pub fn load(arguments: &[String], space: Space, console: &Console) -> Result<Input, Failure> {
     let samples = arguments.iter().filter(|a| a.starts_with(PREFIX)).count();
     let mut input = match (samples, arguments) {
         (1, [word]) => made(word)?,
@@ -61,14 +61,14 @@ pub fn load(arguments: &[String], space: Space, talk: &Talk) -> Result<Input, Fa
         }
     };
     for note in &input.surface.notes {
-        talk.note(&format!("note: {note}"));
+        console.note(&format!("note: {note}"));
     }
     input.surface.shrink();
     let room = space.room(&input.surface)?;
     let orientation = attempt(|| orient_alike_in(&mut input.surface, &room))?;
     input.turned = orientation.flipped.len();
     if input.turned > 0 {
-        talk.note(&format!(
+        console.note(&format!(
             "note: {} triangles were turned to run like their neighbors",
             input.turned
         ));
@@ -77,8 +77,8 @@ pub fn load(arguments: &[String], space: Space, talk: &Talk) -> Result<Input, Fa
 }
 
 /// [`load`], and refuse a surface with defects.
-pub fn load_valid(arguments: &[String], space: Space, talk: &Talk) -> Result<Input, Failure> {
-    let input = load(arguments, space, talk)?;
+pub fn load_valid(arguments: &[String], space: Space, console: &Console) -> Result<Input, Failure> {
+    let input = load(arguments, space, console)?;
     validated(&input.surface, space)?;
     Ok(input)
 }

@@ -7,49 +7,50 @@ use std::time::Instant;
 use serde_json::json;
 
 use super::args::{MeshArgs, ResumeArgs, RunArgs};
+use super::console::Console;
 use super::failure::Failure;
 use super::input::{self, Input, Space};
-use super::talk::Talk;
 use super::{background, config, estimate, export, info, memory, replace, signals, store, verify};
-use crate::catalog::{Catalog, CatalogError, Job, Store, StoreState};
 use crate::io::write::Selection;
 use crate::pipeline::{self, Options, Prepared, Summary};
-use crate::store::Budget;
+use crate::storage::Budget;
+use crate::store::{Catalog, StoreError};
 use crate::surface::Surface;
+use tetdb_schema::catalog::{Job, StoreState};
 
 /// A surface that takes more than this part of the cap is not kept while the mesh is refined.
 const SURFACE_KEPT: u64 = 8;
 
-pub fn run(args: &MeshArgs, talk: &Talk) -> Result<u8, Failure> {
+pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
     let options = config::options(&args.shape)?;
     // Sizes are checked before anything is read.
     options.sizes()?;
-    let (cap, whence) = begin(&args.run, talk)?;
+    let (cap, whence) = begin(&args.run, console)?;
     let path = output(args);
-    replace::settle(&path, talk)?;
-    if let Some(exit) = already_there(&path, args, &options, talk)? {
+    replace::settle(&path, console)?;
+    if let Some(exit) = already_there(&path, args, &options, console)? {
         return Ok(exit);
     }
     let clock = Instant::now();
     let space = Space::Capped(cap, &path);
-    let mut input = input::load(&args.surfaces, space, talk)?;
+    let mut input = input::load(&args.surfaces, space, console)?;
     if !args.no_preflight {
         estimate::surface_fits(&input.surface, cap)?;
     }
-    let watch = |event| talk.progress(event);
+    let watch = |event| console.progress(event);
     let prepared = pipeline::ahead(&input.surface, &options, cap, &watch, |taken| {
         let space = Space::Capped(cap - taken, &path);
         input::validated(&input.surface, space)?;
-        talk.note(&format!(
+        console.note(&format!(
             "{} triangles and {} vertices, closed and free of defects ({:.1} s)",
             input.surface.n_triangles(),
             input.surface.n_vertices(),
             clock.elapsed().as_secs_f64()
         ));
-        talk.note(&format!("memory: {} ({whence})", memory::show(cap)));
+        console.note(&format!("memory: {} ({whence})", memory::show(cap)));
         let prepared = prepared(&input.surface, &options, cap, space)?;
         if !args.no_preflight {
-            estimate::preflight(&prepared.estimate, cap, &path, talk)?;
+            estimate::preflight(&prepared.estimate, cap, &path, console)?;
         }
         Ok::<_, Failure>(prepared)
     })?;
@@ -73,7 +74,7 @@ pub fn run(args: &MeshArgs, talk: &Talk) -> Result<u8, Failure> {
     signals::store_begins();
     let mut catalog = match begun {
         Some(catalog) => {
-            talk.note(&format!("going on with {}", place.display()));
+            console.note(&format!("going on with {}", place.display()));
             catalog
         }
         None => Catalog::create(&place, &job)?,
@@ -95,42 +96,42 @@ pub fn run(args: &MeshArgs, talk: &Talk) -> Result<u8, Failure> {
         }
         other => other.map_err(|e| estimate::with_room(e, &place, Some(needed)))?,
     };
-    tell(&summary, talk);
+    tell(&summary, console);
     catalog.close()?;
     if replaces {
         replace::exchange(&path)?;
     }
-    finish(&path, &input, &args.run, cap, Some(&summary), talk)
+    finish(&path, &input, &args.run, cap, Some(&summary), console)
 }
 
-pub fn resume(args: &ResumeArgs, talk: &Talk) -> Result<u8, Failure> {
-    let (cap, _) = begin(&args.run, talk)?;
-    replace::settle(&args.store, talk)?;
+pub fn resume(args: &ResumeArgs, console: &Console) -> Result<u8, Failure> {
+    let (cap, _) = begin(&args.run, console)?;
+    replace::settle(&args.store, console)?;
     // A run with --force was interrupted: what it replaces is finished.
     let replaces = replace::is_begun(&args.store);
     let place = match replaces {
         true => replace::new_of(&args.store),
         false => args.store.clone(),
     };
-    let mut reader = Store::open(&place)?;
-    let state = reader.catalog().state()?;
+    let mut reader = Catalog::open(&place)?;
+    let state = reader.state()?;
     let space = Space::Capped(cap, &args.store);
-    let mut input = store::surface_of(&mut reader, &[], space, talk)?;
-    let job = reader.catalog().job()?;
+    let mut input = store::surface_of(&mut reader, &[], space, console)?;
+    let job = reader.job()?;
     drop(reader);
     if state.is_finished() {
         if replaces {
             replace::exchange(&args.store)?;
         }
-        talk.note(&format!("{} is already finished", args.store.display()));
-        return finish(&args.store, &input, &args.run, cap, None, talk);
+        console.note(&format!("{} is already finished", args.store.display()));
+        return finish(&args.store, &input, &args.run, cap, None, console);
     }
     let options: Options = serde_json::from_str(&job.options).map_err(|e| {
         Failure::new("damaged", format!("the job's options cannot be read: {e}"))
             .at(place.display())
     })?;
     let mut catalog = Catalog::open_writable(&place)?;
-    let watch = |event| talk.progress(event);
+    let watch = |event| console.progress(event);
     let budget = Budget::new(cap);
     let made = if state < StoreState::Coarse {
         let prepared = pipeline::ahead(&input.surface, &options, cap, &watch, |taken| {
@@ -145,12 +146,12 @@ pub fn resume(args: &ResumeArgs, talk: &Talk) -> Result<u8, Failure> {
         pipeline::mesh(&mut catalog, &input.surface, &options, &budget, &watch)
     };
     let summary = made.map_err(|e| estimate::with_room(e.into(), &place, None))?;
-    tell(&summary, talk);
+    tell(&summary, console);
     catalog.close()?;
     if replaces {
         replace::exchange(&args.store)?;
     }
-    finish(&args.store, &input, &args.run, cap, Some(&summary), talk)
+    finish(&args.store, &input, &args.run, cap, Some(&summary), console)
 }
 
 /// What sizes make of a surface, in the memory of `space`.
@@ -175,7 +176,7 @@ fn lent_or_given(input: &mut Input, cap: u64) -> Cow<'_, Surface> {
 }
 
 /// Threads, signals, and the cap.
-pub(super) fn begin(args: &RunArgs, talk: &Talk) -> Result<(u64, String), Failure> {
+pub(super) fn begin(args: &RunArgs, console: &Console) -> Result<(u64, String), Failure> {
     if let Some(threads) = args.threads {
         if threads == 0 {
             return Err(
@@ -186,13 +187,13 @@ pub(super) fn begin(args: &RunArgs, talk: &Talk) -> Result<(u64, String), Failur
             .num_threads(threads)
             .build_global();
         if built.is_err() {
-            talk.note("note: the thread pool was already running");
+            console.note("note: the thread pool was already running");
         }
     }
     for out in &args.export {
         export::check_format(out)?;
     }
-    signals::listen(talk.is_json());
+    signals::listen(console.is_json());
     memory::cap(args.memory.as_deref())
 }
 
@@ -213,24 +214,24 @@ fn already_there(
     path: &Path,
     args: &MeshArgs,
     options: &Options,
-    talk: &Talk,
+    console: &Console,
 ) -> Result<Option<u8>, Failure> {
     if !path.exists() {
         return Ok(None);
     }
-    let mut store = match Store::open(path) {
+    let mut store = match Catalog::open(path) {
         Ok(store) => store,
-        Err(CatalogError::NotOurs { .. }) if Catalog::is_vacant(path) => return Ok(None),
+        Err(StoreError::NotOurs { .. }) if Catalog::is_vacant(path) => return Ok(None),
         Err(error) => return Err(error.into()),
     };
-    let catalog = store.catalog();
+    let catalog = &mut store;
     let (state, job) = (catalog.state()?, catalog.job()?);
     drop(store);
     if args.force {
         return Ok(None);
     }
     if !state.is_finished() {
-        return Err(CatalogError::Unfinished {
+        return Err(StoreError::Unfinished {
             path: path.to_owned(),
         }
         .into());
@@ -242,34 +243,34 @@ fn already_there(
         o == *options
     });
     let cap = memory::cap(args.run.memory.as_deref())?.0;
-    let input = input::load(&args.surfaces, Space::Capped(cap, path), talk)?;
+    let input = input::load(&args.surfaces, Space::Capped(cap, path), console)?;
     if !same_options || job.surfaces != input.sources {
-        return Err(CatalogError::Finished {
+        return Err(StoreError::Finished {
             path: path.to_owned(),
         }
         .into());
     }
-    talk.note(&format!(
+    console.note(&format!(
         "{} already holds the finished mesh of this surface with these options",
         path.display()
     ));
-    write_exports(path, &args.run, cap, talk)?;
-    info::print(path, talk)?;
+    write_exports(path, &args.run, cap, console)?;
+    info::print(path, console)?;
     Ok(Some(0))
 }
 
-fn tell(summary: &Summary, talk: &Talk) {
-    talk.done();
+fn tell(summary: &Summary, console: &Console) {
+    console.done();
     if let Some(asked) = summary.subdomains_asked {
-        talk.note(&format!(
+        console.note(&format!(
             "note: {asked} sub-domains were asked for; the mesh is made in {}, for one of fewer than 25,000 tetrahedra would be all refined zone",
             summary.subdomains
         ));
     }
     if let Some(sizes) = &summary.sizes {
-        talk.note(&sizes.to_string());
+        console.note(&sizes.to_string());
         for warning in &sizes.warnings {
-            talk.warn(&warning.to_string());
+            console.warn(&warning.to_string());
         }
     }
 }
@@ -281,7 +282,7 @@ fn finish(
     args: &RunArgs,
     cap: u64,
     summary: Option<&Summary>,
-    talk: &Talk,
+    console: &Console,
 ) -> Result<u8, Failure> {
     if !args.no_verify {
         let report = {
@@ -290,14 +291,14 @@ fn finish(
             let surface = match input.surface.n_triangles() {
                 0 => {
                     let space = Space::Capped(cap, path);
-                    again = store::surface_of(&mut store, &[], space, talk)?;
+                    again = store::surface_of(&mut store, &[], space, console)?;
                     &again.surface
                 }
                 _ => &input.surface,
             };
             verify::check(
                 &mut store,
-                talk,
+                console,
                 Some(surface),
                 cap,
                 crate::audit::Level::Delaunay,
@@ -306,7 +307,7 @@ fn finish(
         if !report.valid {
             return Err(verify::invalid(&report, path));
         }
-        talk.note(&verify::sentence(&report));
+        console.note(&verify::sentence(&report));
         let mut catalog = Catalog::open_writable(path)?;
         if catalog.state()? < StoreState::Verified {
             catalog.commit(|step| {
@@ -316,8 +317,8 @@ fn finish(
         }
         catalog.close()?;
     }
-    write_exports(path, args, cap, talk)?;
-    if talk.is_json() {
+    write_exports(path, args, cap, console)?;
+    if console.is_json() {
         let mut answer = info::object(path)?;
         answer["memory_cap_bytes"] = json!(cap);
         answer["peak_bytes"] = json!(memory::peak());
@@ -326,11 +327,11 @@ fn finish(
             answer["pages_written"] = json!(s.pages.pages_written);
             answer["frames_used"] = json!(s.frames_used);
         }
-        talk.answer(&answer);
+        console.answer(&answer);
     } else {
-        info::print(path, talk)?;
+        info::print(path, console)?;
         if let Some(peak) = memory::peak() {
-            talk.line(&format!(
+            console.line(&format!(
                 "peak memory {} of {}",
                 memory::show(peak),
                 memory::show(cap)
@@ -344,10 +345,10 @@ pub(super) fn write_exports(
     path: &Path,
     args: &RunArgs,
     cap: u64,
-    talk: &Talk,
+    console: &Console,
 ) -> Result<(), Failure> {
     for out in &args.export {
-        export::write(path, out, &Selection::default(), cap, talk)?;
+        export::write(path, out, &Selection::default(), cap, console)?;
     }
     Ok(())
 }

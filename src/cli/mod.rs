@@ -7,6 +7,7 @@ mod check_expected;
 mod check_report;
 mod compare;
 mod config;
+mod console;
 mod digest;
 mod estimate;
 mod export;
@@ -29,7 +30,6 @@ mod shell;
 mod signals;
 mod snapshot;
 mod store;
-mod talk;
 mod verify;
 
 use std::process::ExitCode;
@@ -38,8 +38,8 @@ use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser};
 
 use args::{Args, Command};
+use console::Console;
 use failure::Failure;
-use talk::Talk;
 
 pub use failure::{CODES, CodeRow};
 
@@ -51,16 +51,16 @@ pub fn run() -> ExitCode {
         Ok(args) => args,
         Err(error) => return unparsed(&error),
     };
-    let talk = Talk::with(args.command.is_json(), args.quiet);
+    let console = Console::with(args.command.is_json(), args.quiet);
     // redb may panic on a damaged tree, which is caught and told as damage; its own message would only confuse.
     std::panic::set_hook(Box::new(failure::remember_panic));
     let done = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
-        dispatch(&args.command, &talk)
+        dispatch(&args.command, &console)
     }));
     let exit = match done {
         Ok(Ok(exit)) => exit,
-        Ok(Err(failure)) => talk.fail(&failure),
-        Err(_) => talk.fail(&failure::last_panic()),
+        Ok(Err(failure)) => console.fail(&failure),
+        Err(_) => console.fail(&failure::last_panic()),
     };
     ExitCode::from(exit)
 }
@@ -78,31 +78,31 @@ fn unparsed(error: &clap::Error) -> ExitCode {
     let message = text.strip_prefix("error: ").unwrap_or(text).trim_end();
     let command = std::env::args().nth(1).filter(|c| is_command(c));
     let help = format!("`tetdb {} --help`", command.unwrap_or_default()).replace("  ", " ");
-    ExitCode::from(Talk::new(is_json).fail(&Failure::new("usage", message).help(help)))
+    ExitCode::from(Console::new(is_json).fail(&Failure::new("usage", message).help(help)))
 }
 
 fn is_command(word: &str) -> bool {
     Args::command().find_subcommand(word).is_some()
 }
 
-fn dispatch(command: &Command, talk: &Talk) -> Result<u8, Failure> {
+fn dispatch(command: &Command, console: &Console) -> Result<u8, Failure> {
     match command {
-        Command::Mesh(args) => mesh::run(args, talk),
-        Command::Estimate(args) => estimate::run(args, talk),
-        Command::Resume(args) => mesh::resume(args, talk),
-        Command::Resaturate(args) => resaturate::run(args, talk),
-        Command::Check(args) => check::run(args, talk),
-        Command::Info(args) => info::run(args, talk),
-        Command::Query(args) => query::run(args, talk),
-        Command::Verify(args) => verify::run(args, talk),
-        Command::Compare(args) => compare::run(args, talk),
-        Command::Digest(args) => digest::run(args, talk),
-        Command::Export(args) => export::run(args, talk),
-        Command::RefineSurface(args) => refine_surface::run(args, talk),
-        Command::Snapshot(args) => snapshot::run(args, talk),
-        Command::Report(args) => report::run(args, talk),
-        Command::Sample(args) => sample::run(args, talk),
+        Command::Mesh(args) => mesh::run(args, console),
+        Command::Estimate(args) => estimate::run(args, console),
+        Command::Resume(args) => mesh::resume(args, console),
+        Command::Resaturate(args) => resaturate::run(args, console),
+        Command::Check(args) => check::run(args, console),
+        Command::Info(args) => info::run(args, console),
+        Command::Query(args) => query::run(args, console),
+        Command::Verify(args) => verify::run(args, console),
+        Command::Compare(args) => compare::run(args, console),
+        Command::Digest(args) => digest::run(args, console),
+        Command::Export(args) => export::run(args, console),
+        Command::RefineSurface(args) => refine_surface::run(args, console),
+        Command::Snapshot(args) => snapshot::run(args, console),
+        Command::Report(args) => report::run(args, console),
+        Command::Sample(args) => sample::run(args, console),
         Command::Completions(args) => shell::completions(args),
-        Command::Man(args) => shell::man(args, talk),
+        Command::Man(args) => shell::man(args, console),
     }
 }

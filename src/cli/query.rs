@@ -5,14 +5,14 @@ use std::io::{BufRead, BufReader, stdin};
 use std::path::Path;
 
 use super::args::QueryArgs;
+use super::console::Console;
 use super::failure::Failure;
 use super::query_ask::{bad, point, selection};
-use super::query_rows::{Column, FileSink, Row, Sink, Writer};
-use super::talk::Talk;
+use super::query_rows::{FileSink, QueryColumn, Row, Sink, Writer};
 use super::{memory, store};
 use crate::geom::Point;
-use crate::report::{Found, Inquiry, Ordered, ReportError, VARIABLES};
-use crate::store::{Budget, attempt};
+use crate::query::{Hit, Ordered, QueryError, QuerySession, VARIABLES};
+use crate::storage::{Budget, attempt};
 
 /// Memory of a point on its way to its answer.
 const POINT_BYTES: u64 = 512;
@@ -21,13 +21,13 @@ const QUALITY: usize = 0;
 /// Points answered together, at most.
 const POINTS_MAX: u64 = 1 << 17;
 
-pub fn run(args: &QueryArgs, talk: &Talk) -> Result<u8, Failure> {
+pub fn run(args: &QueryArgs, console: &Console) -> Result<u8, Failure> {
     let (cap, _) = memory::cap(args.memory.as_deref())?;
     let budget = Budget::new(cap);
     let columns = columns(args)?;
     let order = order(args)?;
     let open = store::open_finished(&args.store)?;
-    let mut inquiry = Inquiry::open(open, &budget)?;
+    let mut inquiry = QuerySession::open(open, &budget)?;
     let lease = budget.lease(cap / 8, "answers")?;
     attempt(|| -> Result<u8, Failure> {
         let n = if args.point.is_empty() && args.points.is_none() {
@@ -49,25 +49,25 @@ pub fn run(args: &QueryArgs, talk: &Talk) -> Result<u8, Failure> {
                 }
                 None => put(inquiry.select(selection)?, args.limit, &mut writer)?,
             };
-            end(writer, talk)?;
+            end(writer, console)?;
             n
         } else {
             let mut writer = writer(args, columns, cap)?;
             let n = locate(args, &mut inquiry, lease.bytes(), &mut writer)?;
-            end(writer, talk)?;
+            end(writer, console)?;
             n
         };
-        tell(n, &inquiry, talk);
+        tell(n, &inquiry, console);
         Ok(0)
     })?
 }
 
 /// Whether so many answers are held at once without a thought.
 fn few(limit: Option<u64>, memory: u64) -> bool {
-    limit.is_some_and(|n| n.saturating_mul(2 * size_of::<Found>() as u64) <= memory)
+    limit.is_some_and(|n| n.saturating_mul(2 * size_of::<Hit>() as u64) <= memory)
 }
 
-fn writer(args: &QueryArgs, columns: Vec<Column>, cap: u64) -> Result<Writer, Failure> {
+fn writer(args: &QueryArgs, columns: Vec<QueryColumn>, cap: u64) -> Result<Writer, Failure> {
     let sink = match &args.output {
         Some(out) => {
             let file = FileSink::new(out, &columns, cap / 16)?;
@@ -80,19 +80,19 @@ fn writer(args: &QueryArgs, columns: Vec<Column>, cap: u64) -> Result<Writer, Fa
     Ok(Writer::new(sink, columns))
 }
 
-fn end(writer: Writer, talk: &Talk) -> Result<(), Failure> {
+fn end(writer: Writer, console: &Console) -> Result<(), Failure> {
     if let Some((path, bytes)) = writer.finish()? {
         let size = memory::show(bytes);
-        talk.note(&format!("wrote {} ({size})", path.display()));
+        console.note(&format!("wrote {} ({size})", path.display()));
     }
     Ok(())
 }
 
-fn tell(n: u64, inquiry: &Inquiry, talk: &Talk) {
+fn tell(n: u64, inquiry: &QuerySession, console: &Console) {
     let measures = inquiry.measures();
-    talk.measures(&serde_json::json!({ "found": n, "chunks": measures }));
-    if !talk.is_json() {
-        talk.note(&format!(
+    console.measures(&serde_json::json!({ "found": n, "chunks": measures }));
+    if !console.is_json() {
+        console.note(&format!(
             "{n} found; read {} of {} chunks of tetrahedra, {} of {} of vertices",
             measures.tet_chunks_read,
             measures.tet_chunks,
@@ -102,7 +102,7 @@ fn tell(n: u64, inquiry: &Inquiry, talk: &Talk) {
     }
 }
 
-fn columns(args: &QueryArgs) -> Result<Vec<Column>, Failure> {
+fn columns(args: &QueryArgs) -> Result<Vec<QueryColumn>, Failure> {
     let of_points = !args.point.is_empty() || args.points.is_some();
     let default = match args.json || args.output.is_some() {
         true => "id,subdomain,region,quality,volume,vertices,points",
@@ -118,12 +118,12 @@ fn columns(args: &QueryArgs) -> Result<Vec<Column>, Failure> {
                 VARIABLES.join(", ")
             )
         };
-        Column::named(name).ok_or_else(|| bad("--select", name, &known()))
+        QueryColumn::named(name).ok_or_else(|| bad("--select", name, &known()))
     });
     let mut columns = columns.collect::<Result<Vec<_>, _>>()?;
     if of_points {
-        columns.insert(0, Column::Point);
-        columns.push(Column::Barycentric);
+        columns.insert(0, QueryColumn::Point);
+        columns.push(QueryColumn::Barycentric);
     }
     Ok(columns)
 }
@@ -145,7 +145,7 @@ fn order(args: &QueryArgs) -> Result<Option<(usize, bool)>, Failure> {
 }
 
 fn put(
-    found: impl Iterator<Item = Result<Found, ReportError>>,
+    found: impl Iterator<Item = Result<Hit, QueryError>>,
     limit: Option<u64>,
     writer: &mut Writer,
 ) -> Result<u64, Failure> {
@@ -167,7 +167,7 @@ fn put(
 /// Answers points in blocks that fit the memory. Returns how many are in the mesh.
 fn locate(
     args: &QueryArgs,
-    inquiry: &mut Inquiry,
+    inquiry: &mut QuerySession,
     memory: u64,
     writer: &mut Writer,
 ) -> Result<u64, Failure> {

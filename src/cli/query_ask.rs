@@ -4,7 +4,7 @@ use super::args::QueryArgs;
 use super::failure::Failure;
 use crate::expr::{ExprError, Expression, Kind};
 use crate::geom::{Aabb, Point};
-use crate::report::{Inquiry, ReportError, Selection, Solid, VARIABLES};
+use crate::query::{QueryError, QuerySession, Selection, Solid, VARIABLES};
 
 /// An option's value that makes no sense.
 pub fn bad(option: &str, found: &str, expected: &str) -> Failure {
@@ -61,7 +61,7 @@ fn list<T: std::str::FromStr>(option: &str, text: &str, expected: &str) -> Resul
 const RANKS: &str = "numbers such as 0,3";
 
 /// The selection of these arguments. Errors: what has no meaning, what the store does not have.
-pub fn selection(args: &QueryArgs, inquiry: &mut Inquiry) -> Result<Selection, Failure> {
+pub fn selection(args: &QueryArgs, inquiry: &mut QuerySession) -> Result<Selection, Failure> {
     let mut selection = Selection {
         solids: solids(args)?,
         inside: args.inside,
@@ -159,12 +159,12 @@ pub fn condition(text: &str) -> Result<Expression, Failure> {
 }
 
 /// A label by its name or, where nothing is called so, its number.
-fn label(inquiry: &Inquiry, name: &str) -> Result<u32, Failure> {
+fn label(inquiry: &QuerySession, name: &str) -> Result<u32, Failure> {
     let known = inquiry.labels();
     let by_name = known.iter().position(|label| label == name);
     let place = by_name.or_else(|| name.parse().ok().filter(|&n| n < known.len()));
     place.map(|n| n as u32).ok_or_else(|| {
-        ReportError::NoLabel {
+        QueryError::NoLabel {
             name: name.to_owned(),
             known: known.to_vec(),
         }

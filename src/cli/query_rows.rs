@@ -8,11 +8,11 @@ use tetdb_schema::ids::VertexId;
 
 use super::failure::Failure;
 use crate::io::write::{NpyField, NpyTable, SelectedTet, SelectedVtu, TextFile};
-use crate::report::{Found, Located, VARIABLES};
+use crate::query::{Hit, Located, VARIABLES};
 
 /// A column of the answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Column {
+pub enum QueryColumn {
     /// Of a question about points: the point, and the shares of the corners.
     Point,
     Barycentric,
@@ -26,7 +26,7 @@ pub enum Column {
 const REGION: usize = 1;
 const SUBDOMAIN: usize = 2;
 
-impl Column {
+impl QueryColumn {
     /// The column of this name.
     pub fn named(name: &str) -> Option<Self> {
         Some(match name {
@@ -83,52 +83,52 @@ impl Column {
 
 /// An answer: a tetrahedron, or a point and perhaps its tetrahedron.
 pub struct Row {
-    pub found: Option<Found>,
+    pub found: Option<Hit>,
     pub located: Option<Located>,
 }
 
 /// A value of a row.
-enum Cell {
+enum CellValue {
     Text(String),
-    Whole(i64),
+    Totals(i64),
     Number(f64),
     /// Nothing is there.
     Missing,
 }
 
 impl Row {
-    fn cells(&self, column: Column) -> Vec<Cell> {
-        let numbers = |list: &[f64]| list.iter().map(|&x| Cell::Number(x)).collect();
+    fn cells(&self, column: QueryColumn) -> Vec<CellValue> {
+        let numbers = |list: &[f64]| list.iter().map(|&x| CellValue::Number(x)).collect();
         let located = self.located.as_ref();
-        if let (Column::Point, Some(located)) = (column, located) {
+        if let (QueryColumn::Point, Some(located)) = (column, located) {
             return numbers(&located.point.to_array());
         }
         let Some(found) = &self.found else {
-            return (0..column.width()).map(|_| Cell::Missing).collect();
+            return (0..column.width()).map(|_| CellValue::Missing).collect();
         };
         match column {
-            Column::Point => Vec::new(),
-            Column::Barycentric => numbers(&located.map_or([f64::NAN; 4], |l| l.barycentric)),
-            Column::Id => vec![Cell::Text(found.id.to_string())],
-            Column::Vertices => found.vertices.map(vertex).map(Cell::Text).into(),
-            Column::Points => numbers(&found.corners.map(|c| c.to_array()).concat()),
-            Column::Variable(v) if column.is_whole() => {
-                vec![Cell::Whole(found.values()[v] as i64)]
+            QueryColumn::Point => Vec::new(),
+            QueryColumn::Barycentric => numbers(&located.map_or([f64::NAN; 4], |l| l.barycentric)),
+            QueryColumn::Id => vec![CellValue::Text(found.id.to_string())],
+            QueryColumn::Vertices => found.vertices.map(vertex).map(CellValue::Text).into(),
+            QueryColumn::Points => numbers(&found.corners.map(|c| c.to_array()).concat()),
+            QueryColumn::Variable(v) if column.is_whole() => {
+                vec![CellValue::Totals(found.values()[v] as i64)]
             }
-            Column::Variable(v) => vec![Cell::Number(found.values()[v])],
+            QueryColumn::Variable(v) => vec![CellValue::Number(found.values()[v])],
         }
     }
 
-    fn object(&self, columns: &[Column]) -> Value {
+    fn object(&self, columns: &[QueryColumn]) -> Value {
         let mut object = Map::new();
         object.insert("schema".to_owned(), json!(1));
         for &column in columns {
             let mut values: Vec<Value> = self.cells(column).into_iter().map(value).collect();
             let value = match column {
-                Column::Points if self.found.is_some() => {
+                QueryColumn::Points if self.found.is_some() => {
                     values.chunks(3).map(|c| Value::from(c.to_vec())).collect()
                 }
-                _ if self.found.is_none() && column != Column::Point => Value::Null,
+                _ if self.found.is_none() && column != QueryColumn::Point => Value::Null,
                 _ if column.width() == 1 => values.remove(0),
                 _ => Value::from(values),
             };
@@ -138,23 +138,25 @@ impl Row {
     }
 
     /// As NumPy's row.
-    fn bytes(&self, columns: &[Column], bytes: &mut Vec<u8>) {
+    fn bytes(&self, columns: &[QueryColumn], bytes: &mut Vec<u8>) {
         bytes.clear();
         for &column in columns {
             match (column, &self.found) {
-                (Column::Id, found) => {
+                (QueryColumn::Id, found) => {
                     let id = found.map_or(-1, |f| f.id.number() as i64);
                     bytes.extend_from_slice(&id.to_le_bytes());
                 }
-                (Column::Vertices, found) => {
+                (QueryColumn::Vertices, found) => {
                     let ids = found.map_or([-1; 4], |f| f.vertices.map(|v| v as i64));
                     bytes.extend(ids.iter().flat_map(|v| v.to_le_bytes()));
                 }
                 _ => bytes.extend(self.cells(column).iter().flat_map(|cell| match cell {
-                    Cell::Whole(n) => n.to_le_bytes(),
-                    Cell::Number(x) => x.to_le_bytes(),
-                    Cell::Text(_) | Cell::Missing if column.is_whole() => (-1i64).to_le_bytes(),
-                    Cell::Text(_) | Cell::Missing => f64::NAN.to_le_bytes(),
+                    CellValue::Totals(n) => n.to_le_bytes(),
+                    CellValue::Number(x) => x.to_le_bytes(),
+                    CellValue::Text(_) | CellValue::Missing if column.is_whole() => {
+                        (-1i64).to_le_bytes()
+                    }
+                    CellValue::Text(_) | CellValue::Missing => f64::NAN.to_le_bytes(),
                 })),
             }
         }
@@ -165,12 +167,12 @@ fn vertex(number: u64) -> String {
     VertexId::from_number(number).map_or_else(|| number.to_string(), |id| id.to_string())
 }
 
-fn value(cell: Cell) -> Value {
+fn value(cell: CellValue) -> Value {
     match cell {
-        Cell::Text(text) => text.into(),
-        Cell::Whole(n) => n.into(),
-        Cell::Number(x) => x.into(),
-        Cell::Missing => Value::Null,
+        CellValue::Text(text) => text.into(),
+        CellValue::Totals(n) => n.into(),
+        CellValue::Number(x) => x.into(),
+        CellValue::Missing => Value::Null,
     }
 }
 
@@ -201,7 +203,7 @@ pub enum FileSink {
 
 impl FileSink {
     /// The kind of file a name's ending tells. Errors: it tells none; the folder cannot be written.
-    pub fn new(out: &Path, columns: &[Column], memory: u64) -> Result<Self, Failure> {
+    pub fn new(out: &Path, columns: &[QueryColumn], memory: u64) -> Result<Self, Failure> {
         let ending = out.extension().and_then(|e| e.to_str()).unwrap_or_default();
         let mut file = match ending.to_ascii_lowercase().as_str() {
             "csv" => Self::Values(TextFile::new(out)?),
@@ -224,7 +226,12 @@ impl FileSink {
         Ok(file)
     }
 
-    fn put(&mut self, row: &Row, columns: &[Column], bytes: &mut Vec<u8>) -> Result<(), Failure> {
+    fn put(
+        &mut self,
+        row: &Row,
+        columns: &[QueryColumn],
+        bytes: &mut Vec<u8>,
+    ) -> Result<(), Failure> {
         match self {
             Self::Values(file) => file.line(&values(row, columns))?,
             Self::Objects(file) => file.line(&row.object(columns).to_string())?,
@@ -250,7 +257,7 @@ impl FileSink {
     }
 }
 
-fn selected(found: &Found) -> SelectedTet {
+fn selected(found: &Hit) -> SelectedTet {
     SelectedTet {
         id: found.id.number(),
         subdomain: found.id.subdomain().rank(),
@@ -261,55 +268,55 @@ fn selected(found: &Found) -> SelectedTet {
     }
 }
 
-fn heads(columns: &[Column]) -> String {
+fn heads(columns: &[QueryColumn]) -> String {
     let names = columns.iter().flat_map(|&column| {
         let name = column.name();
         let one = column.width() == 1;
         (0..column.width()).map(move |i| match (one, column) {
             (true, _) => name.to_owned(),
-            (_, Column::Point) => format!("point_{}", ["x", "y", "z"][i]),
-            (_, Column::Points) => format!("{}{}", ["x", "y", "z"][i % 3], i / 3),
+            (_, QueryColumn::Point) => format!("point_{}", ["x", "y", "z"][i]),
+            (_, QueryColumn::Points) => format!("{}{}", ["x", "y", "z"][i % 3], i / 3),
             _ => format!("{name}{i}"),
         })
     });
     names.collect::<Vec<_>>().join(",")
 }
 
-fn values(row: &Row, columns: &[Column]) -> String {
+fn values(row: &Row, columns: &[QueryColumn]) -> String {
     let cells = columns.iter().flat_map(|&c| row.cells(c));
     let words = cells.map(|cell| match cell {
-        Cell::Text(text) => text,
-        Cell::Whole(n) => n.to_string(),
-        Cell::Number(x) => x.to_string(),
-        Cell::Missing => String::new(),
+        CellValue::Text(text) => text,
+        CellValue::Totals(n) => n.to_string(),
+        CellValue::Number(x) => x.to_string(),
+        CellValue::Missing => String::new(),
     });
     words.collect::<Vec<_>>().join(",")
 }
 
 /// A line of a table; all rows have the widths of the head.
-fn line(columns: &[Column], row: Option<&Row>) -> String {
+fn line(columns: &[QueryColumn], row: Option<&Row>) -> String {
     let mut line = String::new();
     for &column in columns {
         let text = match row {
             None => column.name().to_owned(),
             Some(row) => {
                 let words = row.cells(column).into_iter().map(|cell| match cell {
-                    Cell::Text(text) => text,
-                    Cell::Whole(n) => n.to_string(),
-                    Cell::Number(x) => shown(x),
-                    Cell::Missing => "-".to_owned(),
+                    CellValue::Text(text) => text,
+                    CellValue::Totals(n) => n.to_string(),
+                    CellValue::Number(x) => shown(x),
+                    CellValue::Missing => "-".to_owned(),
                 });
                 words.collect::<Vec<_>>().join(" ")
             }
         };
         let width = match column {
-            Column::Id => 14,
-            Column::Point => 32,
-            Column::Barycentric => 38,
-            Column::Vertices => 48,
-            Column::Points => 120,
+            QueryColumn::Id => 14,
+            QueryColumn::Point => 32,
+            QueryColumn::Barycentric => 38,
+            QueryColumn::Vertices => 48,
+            QueryColumn::Points => 120,
             _ if column.is_whole() => 9,
-            Column::Variable(_) => 12,
+            QueryColumn::Variable(_) => 12,
         };
         line += &format!("{text:>width$}  ");
     }
@@ -319,14 +326,14 @@ fn line(columns: &[Column], row: Option<&Row>) -> String {
 /// Writes rows; to the standard output until it is closed.
 pub struct Writer {
     sink: Sink,
-    columns: Vec<Column>,
+    columns: Vec<QueryColumn>,
     out: std::io::BufWriter<std::io::Stdout>,
     bytes: Vec<u8>,
     closed: bool,
 }
 
 impl Writer {
-    pub fn new(sink: Sink, columns: Vec<Column>) -> Self {
+    pub fn new(sink: Sink, columns: Vec<QueryColumn>) -> Self {
         let out = std::io::BufWriter::new(std::io::stdout());
         let mut writer = Self {
             sink,

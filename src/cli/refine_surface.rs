@@ -3,16 +3,20 @@
 use serde_json::json;
 
 use super::args::RefineSurfaceArgs;
+use super::console::Console;
 use super::failure::Failure;
 use super::input::{self, Space};
-use super::talk::Talk;
 use crate::io::write;
 use crate::sizing::{SizeField, SizeOptions};
 use crate::surface::split;
 
-pub fn run(args: &RefineSurfaceArgs, talk: &Talk) -> Result<u8, Failure> {
+pub fn run(args: &RefineSurfaceArgs, console: &Console) -> Result<u8, Failure> {
     let options = SizeOptions::parse(Some(&args.hsiz), None, None, args.hgrad.as_deref())?;
-    let input = input::load_valid(std::slice::from_ref(&args.surface), Space::Boundless, talk)?;
+    let input = input::load_valid(
+        std::slice::from_ref(&args.surface),
+        Space::Boundless,
+        console,
+    )?;
     let surface = input.surface;
     let wanted = (options.hsiz).map_or(f64::INFINITY, |l| l.resolve(surface.bounds().diagonal()));
     // Where the surface is finer than asked for, sizes grow from its edges as inside a mesh.
@@ -21,13 +25,13 @@ pub fn run(args: &RefineSurfaceArgs, talk: &Talk) -> Result<u8, Failure> {
     input::validated(&fine, Space::Boundless)?;
     write::surface(&fine, &args.output)?;
     let (triangles, vertices) = (fine.n_triangles(), fine.n_vertices());
-    if talk.is_json() {
-        talk.answer(&json!({
+    if console.is_json() {
+        console.answer(&json!({
             "schema": 1, "file": args.output.display().to_string(), "triangles": triangles, "vertices": vertices,
             "triangles_before": surface.n_triangles(), "report": report,
         }));
     } else {
-        talk.note(&format!(
+        console.note(&format!(
             "wrote {triangles} triangles ({} before) and {vertices} vertices to {}; new vertices are at most {:e} off the triangles they divide",
             surface.n_triangles(),
             args.output.display(),

@@ -6,10 +6,11 @@
 
 use std::path::{Path, PathBuf};
 
+use super::console::Console;
 use super::failure::Failure;
-use super::talk::Talk;
-use crate::catalog::{Catalog, CatalogError, Store, StoreState};
-use crate::store::DiskPath;
+use crate::storage::DiskPath;
+use crate::store::{Catalog, StoreError};
+use tetdb_schema::catalog::StoreState;
 
 /// Where the new store is made.
 pub fn new_of(path: &Path) -> PathBuf {
@@ -31,7 +32,7 @@ fn beside(path: &Path, extension: &str) -> PathBuf {
 /// How far the store at a path is; `None` where there is none that can be read.
 fn state(path: &Path) -> Option<StoreState> {
     path.is_dir()
-        .then(|| Store::open(path).ok()?.catalog().state().ok())
+        .then(|| Catalog::open(path).ok()?.state().ok())
         .flatten()
 }
 
@@ -41,11 +42,11 @@ pub fn is_begun(path: &Path) -> bool {
 }
 
 /// Brings to its end what an interrupted exchange left: the names are right afterwards. Errors: the disk.
-pub fn settle(path: &Path, talk: &Talk) -> Result<(), Failure> {
+pub fn settle(path: &Path, console: &Console) -> Result<(), Failure> {
     let (new, old) = (new_of(path), old_of(path));
     if !path.exists() && state(&new).is_some_and(StoreState::is_finished) {
         rename(&new, path)?;
-        talk.note(&format!(
+        console.note(&format!(
             "{} was finished as {}, and has its place now",
             path.display(),
             new.display()
@@ -73,7 +74,7 @@ pub fn take_up(
     }
     let mut catalog = match Catalog::open_writable(&new) {
         Ok(catalog) => catalog,
-        Err(CatalogError::NotOurs { .. }) if Catalog::is_vacant(&new) => return Ok(None),
+        Err(StoreError::NotOurs { .. }) if Catalog::is_vacant(&new) => return Ok(None),
         Err(error) => return Err(error.into()),
     };
     if is_same(&mut catalog) {

@@ -5,21 +5,23 @@ use std::collections::BTreeMap;
 use serde_json::{Value, json};
 
 use super::args::ReportArgs;
+use super::console::Console;
 use super::failure::Failure;
-use super::talk::Talk;
 use super::{info, memory, store};
-use crate::catalog::{Catalog, JournalRow, QUALITY_BINS};
-use crate::io::page::{self, Page, Surface};
 use crate::pipeline::Event;
-use crate::report::{Cross, Inquiry, Patch, SceneCut, Statistics};
-use crate::store::{Budget, attempt};
+use crate::query::QuerySession;
+use crate::storage::{Budget, attempt};
+use crate::store::Catalog;
+use crate::view::page::{self, Page, Surface};
+use crate::view::{Cross, Patch, SceneCut, Statistics};
+use tetdb_schema::catalog::{JournalRow, QUALITY_BINS};
 
 /// Qualities from here on have the last color, as in pictures.
 const QUALITY_MOST: f32 = 3.0;
 /// Regions whose labels are named.
 const LABELS_NAMED: usize = 24;
 
-pub fn run(args: &ReportArgs, talk: &Talk) -> Result<u8, Failure> {
+pub fn run(args: &ReportArgs, console: &Console) -> Result<u8, Failure> {
     if !page::is_page(&args.output) {
         let what = "a report is a page for a browser, and its name must say so";
         let failure = Failure::new("unknown-format", what).at(args.output.display());
@@ -28,15 +30,15 @@ pub fn run(args: &ReportArgs, talk: &Talk) -> Result<u8, Failure> {
     let (cap, _) = memory::cap(args.read.memory.as_deref())?;
     let mut store = store::open_finished(&args.store)?;
     let title = args.store.file_stem().unwrap_or_default().to_string_lossy();
-    let mut data = told(&args.store, store.catalog(), &title)?;
+    let mut data = told(&args.store, &mut store, &title)?;
     // Text and tables of the page have the rest.
     let (mut inquiry, budget) = (
-        Inquiry::open(store, &Budget::new(cap / 2))?,
+        QuerySession::open(store, &Budget::new(cap / 2))?,
         Budget::new(cap / 8 * 3),
     );
     let tell = |stage, done, total, unit| {
         let total = Some(total);
-        talk.progress(Event {
+        console.progress(Event {
             stage,
             done,
             total,
@@ -58,22 +60,28 @@ pub fn run(args: &ReportArgs, talk: &Talk) -> Result<u8, Failure> {
         )?;
         data["statistics"] = json!(statistics);
         let bytes = page.finish(&data)?;
-        talk.done();
-        tell_all(args, &inquiry, &data["scene"], bytes, talk);
+        console.done();
+        tell_all(args, &inquiry, &data["scene"], bytes, console);
         Ok(0)
     })?
 }
 
-fn tell_all(args: &ReportArgs, inquiry: &Inquiry, scene: &Value, bytes: u64, talk: &Talk) {
+fn tell_all(
+    args: &ReportArgs,
+    inquiry: &QuerySession,
+    scene: &Value,
+    bytes: u64,
+    console: &Console,
+) {
     let file = args.output.display();
-    if talk.is_json() {
+    if console.is_json() {
         let shown = |name: &str| json!({ "of": scene[name]["of"], "shown": scene[name]["shown"] });
-        talk.answer(&json!({
+        console.answer(&json!({
             "schema": 1, "file": file.to_string(), "bytes": bytes, "boundary": shown("boundary"),
             "interfaces": shown("interfaces"), "chunks": inquiry.measures(),
         }));
     } else {
-        talk.note(&format!("wrote {file} ({})", memory::show(bytes)));
+        console.note(&format!("wrote {file} ({})", memory::show(bytes)));
     }
 }
 
@@ -118,8 +126,9 @@ fn told(path: &std::path::Path, catalog: &mut Catalog, title: &str) -> Result<Va
     let interfaces: Vec<Value> = interfaces
         .map(|i| json!([i.cut, i.low, i.high, i.faces]))
         .collect();
-    let sum =
-        |part: &dyn Fn(&crate::catalog::SubdomainRow) -> u64| rows.iter().map(part).sum::<u64>();
+    let sum = |part: &dyn Fn(&tetdb_schema::catalog::SubdomainRow) -> u64| {
+        rows.iter().map(part).sum::<u64>()
+    };
     Ok(json!({
         "title": title, "store": path.display().to_string(), "state": state, "version": job.tool_version,
         "surfaces": job.surfaces.iter().map(|s| s.path.as_str()).collect::<Vec<_>>(),
@@ -188,7 +197,7 @@ fn steps(journal: &[JournalRow]) -> Value {
 
 /// Adds all surfaces to the page; returns what is told of them.
 fn surfaces(
-    (inquiry, budget): (&mut Inquiry, &Budget),
+    (inquiry, budget): (&mut QuerySession, &Budget),
     page: &mut Page,
     statistics: &Statistics,
     tell: &dyn Fn(u64, u64),

@@ -6,45 +6,46 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use super::args::ResaturateArgs;
+use super::console::Console;
 use super::failure::Failure;
 use super::info::{hex, share_below_two};
 use super::input::Space;
 use super::resaturate_sizes::{self, new_sizes};
-use super::talk::Talk;
 use super::{memory, mesh, signals, store, verify};
 use crate::audit::Level;
-use crate::catalog::{Catalog, CatalogError, Store, StoreState, Subdomain};
 use crate::pipeline::{self, Forecast, NewSizes, Options, Remade, ResaturateSummary, Resaturation};
-use crate::store::Budget;
+use crate::storage::Budget;
+use crate::store::{Catalog, StoreError};
+use tetdb_schema::catalog::StoreState;
 
-pub fn run(args: &ResaturateArgs, talk: &Talk) -> Result<u8, Failure> {
+pub fn run(args: &ResaturateArgs, console: &Console) -> Result<u8, Failure> {
     check(args)?;
-    let (cap, _) = mesh::begin(&args.run, talk)?;
+    let (cap, _) = mesh::begin(&args.run, console)?;
     // What is read before the change ends at a signal all the same; a change is one commit.
     signals::store_begins();
     let budget = Budget::new(cap);
     let mut open = store::open_finished(&args.store)?;
     if args.forget {
         drop(open);
-        return forget(&args.store, talk);
+        return forget(&args.store, console);
     }
     if args.undo {
         drop(open);
         let mut catalog = Catalog::open_writable(&args.store)?;
         let summary = pipeline::undo(&mut catalog)?;
         catalog.close()?;
-        return finish(args, &summary, cap, talk);
+        return finish(args, &summary, cap, console);
     }
     let options = resaturate_sizes::options_of(&mut open, &args.store)?;
-    let sizes = new_sizes(args, &mut open, &options, cap, talk)?;
+    let sizes = new_sizes(args, &mut open, &options, cap, console)?;
     let ranks = ranks(args, &mut open, &options, sizes.as_ref(), &budget)?;
     if ranks.is_empty() {
-        talk.note(match args.repair {
+        console.note(match args.repair {
             true => "no sub-domain is damaged",
             false => "no sub-domain would have other sizes",
         });
-        if talk.is_json() {
-            talk.answer(&json!({ "schema": 1, "subdomains": [] }));
+        if console.is_json() {
+            console.answer(&json!({ "schema": 1, "subdomains": [] }));
         }
         return Ok(0);
     }
@@ -54,17 +55,17 @@ pub fn run(args: &ResaturateArgs, talk: &Talk) -> Result<u8, Failure> {
         repair: args.repair,
     };
     if args.dry_run {
-        let list = pipeline::forecast(open.catalog(), &options, &what, &budget)?;
-        tell_forecast(&list, talk);
+        let list = pipeline::forecast(&mut open, &options, &what, &budget)?;
+        tell_forecast(&list, console);
         return Ok(0);
     }
     drop(open);
     let mut catalog = Catalog::open_writable(&args.store)?;
-    let watch = |event| talk.progress(event);
+    let watch = |event| console.progress(event);
     let summary = pipeline::resaturate(&mut catalog, &options, &what, &budget, &watch)?;
-    talk.done();
+    console.done();
     catalog.close()?;
-    finish(args, &summary, cap, talk)
+    finish(args, &summary, cap, console)
 }
 
 /// Refuses what makes no sense together, before anything is read.
@@ -96,25 +97,23 @@ fn check(args: &ResaturateArgs) -> Result<(), Failure> {
 /// Which sub-domains to make again.
 fn ranks(
     args: &ResaturateArgs,
-    open: &mut Store,
+    open: &mut Catalog,
     options: &Options,
     sizes: Option<&NewSizes>,
     budget: &Budget,
 ) -> Result<BTreeSet<u32>, Failure> {
     match sizes {
-        Some(sizes) if args.changed => {
-            Ok(pipeline::changed(open.catalog(), options, sizes, budget)?)
-        }
+        Some(sizes) if args.changed => Ok(pipeline::changed(open, options, sizes, budget)?),
         _ if args.repair && args.subdomain.is_empty() => damaged(open),
         _ => Ok(args.subdomain.iter().copied().collect()),
     }
 }
 
 /// The sub-domains of which something cannot be read.
-fn damaged(open: &mut Store) -> Result<BTreeSet<u32>, Failure> {
+fn damaged(open: &mut Catalog) -> Result<BTreeSet<u32>, Failure> {
     let mut ranks = BTreeSet::new();
-    for row in open.catalog().subdomains()? {
-        match read_all(open.catalog(), row.rank) {
+    for row in open.subdomains()? {
+        match read_all(open, row.rank) {
             Err(error) if error.is_damage() => drop(ranks.insert(row.rank)),
             other => other?,
         }
@@ -122,41 +121,41 @@ fn damaged(open: &mut Store) -> Result<BTreeSet<u32>, Failure> {
     Ok(ranks)
 }
 
-fn read_all(catalog: &mut Catalog, rank: u32) -> Result<(), CatalogError> {
+fn read_all(catalog: &mut Catalog, rank: u32) -> Result<(), StoreError> {
     /// For chunks and what redb holds of the file.
     const MEMORY_BYTES: usize = 8 << 20;
-    let mut part = Subdomain::open(catalog, rank, MEMORY_BYTES)?;
+    let mut part = catalog.open_subdomain(rank, MEMORY_BYTES)?;
     part.vertex_chunks().try_for_each(|c| c.map(drop))?;
     part.tet_chunks().try_for_each(|c| c.map(drop))?;
     part.facet_chunks().try_for_each(|c| c.map(drop))?;
     part.interface_chunks().try_for_each(|c| c.map(drop))?;
-    part.check()
+    Ok(part.check()?)
 }
 
-fn forget(path: &Path, talk: &Talk) -> Result<u8, Failure> {
+fn forget(path: &Path, console: &Console) -> Result<u8, Failure> {
     let mut catalog = Catalog::open_writable(path)?;
     let n = pipeline::forget(&mut catalog)?;
     catalog.close()?;
-    if talk.is_json() {
-        talk.answer(&json!({ "schema": 1, "forgotten": n }));
+    if console.is_json() {
+        console.answer(&json!({ "schema": 1, "forgotten": n }));
     } else {
-        talk.line(&format!(
+        console.line(&format!(
             "dropped the previous version of {n} sub-domain(s)"
         ));
     }
     Ok(0)
 }
 
-fn tell_forecast(list: &[Forecast], talk: &Talk) {
-    if talk.is_json() {
+fn tell_forecast(list: &[Forecast], console: &Console) {
+    if console.is_json() {
         let list: Vec<Value> = (list.iter())
             .map(|f| json!({ "id": f.rank, "tets": f.tets, "predicted_tets": f.predicted.round() }))
             .collect();
-        talk.answer(&json!({ "schema": 1, "dry_run": true, "subdomains": list }));
+        console.answer(&json!({ "schema": 1, "dry_run": true, "subdomains": list }));
         return;
     }
     for f in list {
-        talk.line(&format!(
+        console.line(&format!(
             "sub-domain {:>4}: {:>10} tetrahedra, about {:.3e} to expect",
             f.rank, f.tets, f.predicted
         ));
@@ -168,17 +167,17 @@ fn finish(
     args: &ResaturateArgs,
     summary: &ResaturateSummary,
     cap: u64,
-    talk: &Talk,
+    console: &Console,
 ) -> Result<u8, Failure> {
     if !args.run.no_verify {
-        prove(&args.store, cap, talk)?;
+        prove(&args.store, cap, console)?;
     }
-    mesh::write_exports(&args.store, &args.run, cap, talk)?;
-    let mut open = Store::open(&args.store)?;
-    let all = open.catalog().subdomains()?.len();
+    mesh::write_exports(&args.store, &args.run, cap, console)?;
+    let mut open = Catalog::open(&args.store)?;
+    let all = open.subdomains()?.len();
     let [digest, _] = open.digest()?;
-    if talk.is_json() {
-        talk.answer(&json!({
+    if console.is_json() {
+        console.answer(&json!({
             "schema": 1, "store": args.store.display().to_string(), "digest": digest.to_string(),
             "subdomains": summary.parts.iter().map(object).collect::<Vec<_>>(),
             "unchanged": all - summary.parts.len(),
@@ -190,7 +189,7 @@ fn finish(
     }
     for part in &summary.parts {
         let (old, new) = (&part.before, &part.after);
-        talk.line(&format!(
+        console.line(&format!(
             "sub-domain {}: {} -> {} tetrahedra; {:.2} -> {:.2} % of quality below 2; worst {:.3} -> {:.3}",
             new.rank,
             old.tets,
@@ -200,17 +199,17 @@ fn finish(
             old.quality.worst,
             new.quality.worst
         ));
-        talk.line(&match old.digest == new.digest {
+        console.line(&match old.digest == new.digest {
             true => format!("  digest {} as before", hex(new.digest)),
             false => format!("  digest {} -> {}", hex(old.digest), hex(new.digest)),
         });
-        talk.line(&format!(
+        console.line(&format!(
             "  {} interface faces as before, digest {}",
             new.interface_faces,
             hex(new.interface_digest)
         ));
     }
-    talk.line(&format!(
+    console.line(&format!(
         "{} other sub-domain(s) as before; digest of all {digest}",
         all - summary.parts.len()
     ));
@@ -229,15 +228,15 @@ fn object(part: &Remade) -> Value {
 }
 
 /// Verifies the whole store, against its surface if that is still there.
-fn prove(path: &Path, cap: u64, talk: &Talk) -> Result<(), Failure> {
+fn prove(path: &Path, cap: u64, console: &Console) -> Result<(), Failure> {
     let report = {
         let mut open = store::open_finished(path)?;
-        let surface = store::surface_of(&mut open, &[], Space::Boundless, talk).ok();
+        let surface = store::surface_of(&mut open, &[], Space::Boundless, console).ok();
         let surface = surface.as_ref().map(|input| &input.surface);
         if surface.is_none() {
-            talk.note("note: the surface is not where it was; the mesh is verified without it");
+            console.note("note: the surface is not where it was; the mesh is verified without it");
         }
-        verify::check(&mut open, talk, surface, cap, Level::Delaunay)?
+        verify::check(&mut open, console, surface, cap, Level::Delaunay)?
     };
     if !report.valid {
         let failure = verify::invalid(&report, path);
@@ -246,7 +245,7 @@ fn prove(path: &Path, cap: u64, talk: &Talk) -> Result<(), Failure> {
             path.display()
         )));
     }
-    talk.note(&verify::sentence(&report));
+    console.note(&verify::sentence(&report));
     let mut catalog = Catalog::open_writable(path)?;
     catalog.commit(|step| {
         step.set_state(StoreState::Verified);

@@ -6,18 +6,18 @@ use serde_json::json;
 
 use super::args::ResaturateArgs;
 use super::args::SizeArgs;
+use super::console::Console;
 use super::failure::Failure;
 use super::input::Space;
-use super::talk::Talk;
 use super::{background, config, store};
-use crate::catalog::Store;
 use crate::io::read::read_lengths;
 use crate::pipeline::{self, NewSizes, Options, Values};
 use crate::sizing::{SizeField, SizingError};
+use crate::store::Catalog;
 
 /// The options the store was made with. Errors: they cannot be read.
-pub fn options_of(open: &mut Store, path: &Path) -> Result<Options, Failure> {
-    let job = open.catalog().job()?;
+pub fn options_of(open: &mut Catalog, path: &Path) -> Result<Options, Failure> {
+    let job = open.job()?;
     serde_json::from_str(&job.options).map_err(|e| {
         Failure::new("damaged", format!("the job's options cannot be read: {e}")).at(path.display())
     })
@@ -33,10 +33,10 @@ pub fn are_given(args: &ResaturateArgs) -> bool {
 /// Errors: sizes without a meaning; files that cannot be read; a surface that is not what it was, where its edges are needed.
 pub fn new_sizes(
     args: &ResaturateArgs,
-    open: &mut Store,
+    open: &mut Catalog,
     options: &Options,
     cap: u64,
-    talk: &Talk,
+    console: &Console,
 ) -> Result<Option<NewSizes>, Failure> {
     if !are_given(args) {
         return Ok(None);
@@ -77,7 +77,7 @@ pub fn new_sizes(
         sizes.limits = limits(open, args)?;
         sizes.values = Some(values(Path::new(file), open, args, cap)?);
     } else if args.sizes != SizeArgs::default() {
-        sizes.field = Some(field(open, &mut asked, options, cap, talk)?);
+        sizes.field = Some(field(open, &mut asked, options, cap, console)?);
     }
     asked.size_field = lengths.or(asked.size_field);
     let asked = serde_json::to_value(&asked).unwrap_or_default();
@@ -102,11 +102,11 @@ fn factor(text: Option<&str>) -> Result<f64, Failure> {
 
 /// The field of the whole surface with other options, but the regions and the gradation it was made with.
 fn field(
-    open: &mut Store,
+    open: &mut Catalog,
     asked: &mut Options,
     options: &Options,
     cap: u64,
-    talk: &Talk,
+    console: &Console,
 ) -> Result<SizeField, Failure> {
     background::identify(asked)?;
     let mut all = asked.clone();
@@ -115,19 +115,19 @@ fn field(
     if all.hgrad.is_none() {
         all.hgrad.clone_from(&options.hgrad);
     }
-    let dir = open.catalog().dir().to_owned();
+    let dir = open.dir().to_owned();
     let space = Space::Capped(cap, &dir);
-    let input = store::surface_of(open, &[], space, talk)?;
+    let input = store::surface_of(open, &[], space, console)?;
     let background = background::read(&all, cap)?;
     let room = space.room(&input.surface)?;
     let prepared = pipeline::prepare(&input.surface, &all, background.as_ref(), &room)?;
-    talk.note(&prepared.sizes.to_string());
+    console.note(&prepared.sizes.to_string());
     Ok(prepared.field)
 }
 
 /// `--hmin` and `--hmax` of lengths one by one; shares are of the box of all sub-domains.
-fn limits(open: &mut Store, args: &ResaturateArgs) -> Result<[f64; 2], Failure> {
-    let rows = open.catalog().subdomains()?;
+fn limits(open: &mut Catalog, args: &ResaturateArgs) -> Result<[f64; 2], Failure> {
+    let rows = open.subdomains()?;
     let side = |axis: usize| {
         let low = rows.iter().map(|r| r.bounds[0][axis]);
         let high = rows.iter().map(|r| r.bounds[1][axis]);
@@ -153,12 +153,12 @@ fn limits(open: &mut Store, args: &ResaturateArgs) -> Result<[f64; 2], Failure> 
 /// Lengths for the tetrahedra or the vertices of the named sub-domains: their number tells.
 fn values(
     file: &Path,
-    open: &mut Store,
+    open: &mut Catalog,
     args: &ResaturateArgs,
     cap: u64,
 ) -> Result<Values, Failure> {
     let lengths = read_lengths(file, cap / 4)?;
-    let catalog = open.catalog();
+    let catalog = open;
     // What is not as many as either is told of as wrong for both later.
     match args.subdomain[..] {
         [rank] if lengths.len() as u64 == catalog.subdomain(rank)?.vertices => {

@@ -3,28 +3,28 @@
 use serde_json::json;
 
 use super::args::SampleArgs;
+use super::console::Console;
 use super::failure::Failure;
 use super::input::{self, Space};
-use super::talk::Talk;
 use crate::io::write;
 use crate::samples::PREFIX;
 
-pub fn run(args: &SampleArgs, talk: &Talk) -> Result<u8, Failure> {
+pub fn run(args: &SampleArgs, console: &Console) -> Result<u8, Failure> {
     let word = if args.sample.starts_with(PREFIX) {
         args.sample.clone()
     } else {
         format!("{PREFIX}{}", args.sample)
     };
-    let surface = input::load(&[word], Space::Boundless, talk)?.surface;
+    let surface = input::load(&[word], Space::Boundless, console)?.surface;
     write::surface(&surface, &args.output)?;
     let (triangles, vertices) = (surface.n_triangles(), surface.n_vertices());
-    if talk.is_json() {
+    if console.is_json() {
         let file = args.output.display().to_string();
-        talk.answer(
+        console.answer(
             &json!({ "schema": 1, "file": file, "triangles": triangles, "vertices": vertices }),
         );
     } else {
-        talk.note(&format!(
+        console.note(&format!(
             "wrote {triangles} triangles and {vertices} vertices to {}",
             args.output.display()
         ));

@@ -6,8 +6,8 @@ use std::path::Path;
 use clap::{Command, CommandFactory};
 
 use super::args::{Args, CompletionsArgs, ManArgs};
+use super::console::Console;
 use super::failure::Failure;
-use super::talk::Talk;
 
 pub fn completions(args: &CompletionsArgs) -> Result<u8, Failure> {
     let mut script = Vec::new();
@@ -16,14 +16,14 @@ pub fn completions(args: &CompletionsArgs) -> Result<u8, Failure> {
     Ok(0)
 }
 
-pub fn man(args: &ManArgs, talk: &Talk) -> Result<u8, Failure> {
+pub fn man(args: &ManArgs, console: &Console) -> Result<u8, Failure> {
     let mut root = Args::command();
     root.build();
     if let Some(dir) = &args.dir {
         for command in std::iter::once(&root).chain(pages(&root)) {
             let path = dir.join(format!("{}.1", name(command)));
             std::fs::write(&path, page(command)?).map_err(|e| unwritable(&path, &e))?;
-            talk.note(&format!("wrote {}", path.display()));
+            console.note(&format!("wrote {}", path.display()));
         }
         return Ok(0);
     }

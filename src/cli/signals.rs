@@ -6,9 +6,9 @@ use std::time::Duration;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
+use super::console::Console;
 use super::failure::Failure;
-use super::talk::Talk;
-use crate::store::StoreError;
+use crate::storage::StorageError;
 
 static RECEIVED: AtomicI32 = AtomicI32::new(0);
 /// Whether there is a store whose step under way must end in order.
@@ -26,7 +26,7 @@ pub fn listen(is_json: bool) {
             if RECEIVED.swap(signal, Ordering::Relaxed) != 0 {
                 std::process::exit(128 + signal);
             }
-            crate::store::request_stop();
+            crate::storage::request_stop();
             std::thread::spawn(move || end_early(is_json));
         }
     });
@@ -36,8 +36,8 @@ pub fn listen(is_json: bool) {
 fn end_early(is_json: bool) {
     std::thread::sleep(PATIENCE);
     if !has_store() {
-        let stopped = Failure::from(StoreError::Stopped);
-        std::process::exit(Talk::new(is_json).fail(&stopped).into());
+        let stopped = Failure::from(StorageError::Cancelled);
+        std::process::exit(Console::new(is_json).fail(&stopped).into());
     }
 }
 

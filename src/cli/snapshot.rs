@@ -3,15 +3,16 @@
 use std::path::Path;
 
 use super::args::{ColorBy, SnapshotArgs};
+use super::console::Console;
 use super::failure::Failure;
 use super::query_ask::{bad, condition, numbers};
-use super::talk::Talk;
 use super::{memory, store};
-use crate::catalog::Stage;
 use crate::geom::{Aabb, Point};
-use crate::io::picture::{Bar, Frame, Picture, Rgb, category, scale};
-use crate::report::{Clip, Extent, Inquiry, Piece, Section, Selection, Shell, View};
-use crate::store::{Budget, attempt};
+use crate::query::{QuerySession, Selection};
+use crate::storage::{Budget, attempt};
+use crate::view::picture::{ColorBar, Picture, PictureFrame, Rgb, category, scale};
+use crate::view::{Clip, Extent, Piece, Section, ShellView, View};
+use tetdb_schema::catalog::Stage;
 
 /// Qualities from here on have the last color: few are worse, and the others should differ.
 const QUALITY_MOST: f32 = 3.0;
@@ -29,10 +30,10 @@ enum Subject {
     Cut,
     /// The same of a mesh that was kept.
     Stage(u32, Stage),
-    Surface(Shell),
+    Surface(ShellView),
 }
 
-pub fn run(args: &SnapshotArgs, talk: &Talk) -> Result<u8, Failure> {
+pub fn run(args: &SnapshotArgs, console: &Console) -> Result<u8, Failure> {
     let (cap, _) = memory::cap(args.read.memory.as_deref())?;
     let pixels = pixels(&args.size)?;
     let subject = subject(args)?;
@@ -45,8 +46,8 @@ pub fn run(args: &SnapshotArgs, talk: &Talk) -> Result<u8, Failure> {
     let share = Budget::new(budget.available() * 3 / 4);
     let store = store::open_finished(&args.store)?;
     let mut inquiry = match subject {
-        Subject::Stage(cut, stage) => Inquiry::open_stage(store, cut, stage, &share)?,
-        _ => Inquiry::open(store, &share)?,
+        Subject::Stage(cut, stage) => QuerySession::open_stage(store, cut, stage, &share)?,
+        _ => QuerySession::open(store, &share)?,
     };
     attempt(|| -> Result<u8, Failure> {
         let (section, view) = pieces(args, subject, &mut inquiry, budget.available() / 8)?;
@@ -56,7 +57,7 @@ pub fn run(args: &SnapshotArgs, talk: &Talk) -> Result<u8, Failure> {
             let expected = "a plane that cuts tetrahedra of the mesh";
             return Err(bad("--plane", plane, expected));
         }
-        let frame = Frame {
+        let frame = PictureFrame {
             pixels,
             bounds: extent.bounds,
             edge: f64::from(extent.size[0].midpoint(extent.size[1])) * 0.5,
@@ -74,8 +75,8 @@ pub fn run(args: &SnapshotArgs, talk: &Talk) -> Result<u8, Failure> {
             picture.line(line)?;
         }
         let bytes = picture.finish()?;
-        talk.done();
-        tell(args, &inquiry, &extent, bytes, talk);
+        console.done();
+        tell(args, &inquiry, &extent, bytes, console);
         Ok(0)
     })?
 }
@@ -83,9 +84,9 @@ pub fn run(args: &SnapshotArgs, talk: &Talk) -> Result<u8, Failure> {
 /// What is asked for. Errors: options that have no meaning.
 fn subject(args: &SnapshotArgs) -> Result<Subject, Failure> {
     let subject = if args.surface {
-        Subject::Surface(Shell::Boundary)
+        Subject::Surface(ShellView::Boundary)
     } else if let Some(rank) = args.shell {
-        Subject::Surface(Shell::Subdomain(rank))
+        Subject::Surface(ShellView::Subdomain(rank))
     } else if let Some(text) = &args.stage {
         let expected =
             "a cut and what to show of it, such as 1:coarse, 1:refined, 1:natural or 1:interface";
@@ -94,8 +95,8 @@ fn subject(args: &SnapshotArgs) -> Result<Subject, Failure> {
             Some(match what.trim() {
                 "coarse" => Subject::Stage(cut, Stage::Coarse),
                 "refined" => Subject::Stage(cut, Stage::Refined),
-                "natural" => Subject::Surface(Shell::Natural(cut)),
-                "interface" => Subject::Surface(Shell::Chosen(cut)),
+                "natural" => Subject::Surface(ShellView::Natural(cut)),
+                "interface" => Subject::Surface(ShellView::Chosen(cut)),
                 _ => return None,
             })
         });
@@ -119,7 +120,7 @@ fn subject(args: &SnapshotArgs) -> Result<Subject, Failure> {
 fn pieces(
     args: &SnapshotArgs,
     subject: Subject,
-    inquiry: &mut Inquiry,
+    inquiry: &mut QuerySession,
     memory: u64,
 ) -> Result<(Section, View), Failure> {
     let dir = std::env::temp_dir();
@@ -131,8 +132,10 @@ fn pieces(
             Some(text) => direction(text)?,
             None => match shell {
                 // An interface is nearly flat: it is seen from the side it faces, at a slant.
-                Shell::Natural(cut) | Shell::Chosen(cut) => slanted(inquiry.normal_of(cut)?),
-                Shell::Boundary | Shell::Subdomain(_) => FROM,
+                ShellView::Natural(cut) | ShellView::Chosen(cut) => {
+                    slanted(inquiry.normal_of(cut)?)
+                }
+                ShellView::Boundary | ShellView::Subdomain(_) => FROM,
             },
         };
         let view = View::new((bounds.low + bounds.high) * 0.5, from);
@@ -179,7 +182,7 @@ fn draw(
     // Faces seen from the side get less light; what is seen from behind is the inside.
     let flat = matches!(
         subject,
-        Subject::Surface(Shell::Natural(_) | Shell::Chosen(_))
+        Subject::Surface(ShellView::Natural(_) | ShellView::Chosen(_))
     );
     let color = if piece.facing >= 0.0 || flat {
         color.lit(0.5 + 0.5 * piece.facing.abs())
@@ -199,11 +202,11 @@ fn draw(
 }
 
 /// Whether colors stand for several kinds.
-fn are_many(by: ColorBy, subject: Subject, inquiry: &Inquiry) -> bool {
+fn are_many(by: ColorBy, subject: Subject, inquiry: &QuerySession) -> bool {
     match by {
         _ if !matches!(
             subject,
-            Subject::Cut | Subject::Surface(Shell::Boundary | Shell::Subdomain(_))
+            Subject::Cut | Subject::Surface(ShellView::Boundary | ShellView::Subdomain(_))
         ) =>
         {
             false
@@ -214,16 +217,22 @@ fn are_many(by: ColorBy, subject: Subject, inquiry: &Inquiry) -> bool {
     }
 }
 
-fn tell(args: &SnapshotArgs, inquiry: &Inquiry, extent: &Extent, bytes: u64, talk: &Talk) {
+fn tell(
+    args: &SnapshotArgs,
+    inquiry: &QuerySession,
+    extent: &Extent,
+    bytes: u64,
+    console: &Console,
+) {
     let measures = inquiry.measures();
-    if talk.is_json() {
-        talk.answer(&serde_json::json!({
+    if console.is_json() {
+        console.answer(&serde_json::json!({
             "schema": 1, "file": args.output.display().to_string(), "bytes": bytes, "pieces": extent.n,
             "quality": extent.quality, "size": extent.size, "chunks": measures,
         }));
         return;
     }
-    talk.note(&format!(
+    console.note(&format!(
         "wrote {} ({}): {} pieces; read {} of {} chunks of tetrahedra",
         args.output.display(),
         memory::show(bytes),
@@ -285,13 +294,13 @@ fn thinnest(bounds: &Aabb) -> Point {
     }
 }
 
-fn bar(by: ColorBy, extent: &Extent) -> Option<Bar> {
+fn bar(by: ColorBy, extent: &Extent) -> Option<ColorBar> {
     let [least, most] = match by {
         ColorBy::Quality => [1.0, QUALITY_MOST],
         ColorBy::Size => extent.size,
         ColorBy::Subdomain | ColorBy::Region => return None,
     };
-    Some(Bar {
+    Some(ColorBar {
         least: f64::from(least),
         most: f64::from(most),
     })

@@ -2,15 +2,15 @@
 
 use std::path::Path;
 
+use super::console::Console;
 use super::failure::Failure;
 use super::input::{self, Input, Space};
-use super::talk::Talk;
-use crate::catalog::Store;
+use crate::store::Catalog;
 
 /// Opens a store that is finished. Errors: `store-unfinished` says how to go on.
-pub fn open_finished(path: &Path) -> Result<Store, Failure> {
-    let mut store = Store::open(path)?;
-    let state = store.catalog().state()?;
+pub fn open_finished(path: &Path) -> Result<Catalog, Failure> {
+    let mut store = Catalog::open(path)?;
+    let state = store.state()?;
     if !state.is_finished() {
         return Err(Failure::new(
             "store-unfinished",
@@ -25,18 +25,18 @@ pub fn open_finished(path: &Path) -> Result<Store, Failure> {
 ///
 /// Errors: `surface-changed` when a file is not what it was.
 pub fn surface_of(
-    store: &mut Store,
+    store: &mut Catalog,
     given: &[String],
     space: Space,
-    talk: &Talk,
+    console: &Console,
 ) -> Result<Input, Failure> {
-    let job = store.catalog().job()?;
+    let job = store.job()?;
     let arguments: Vec<String> = if given.is_empty() {
         job.surfaces.iter().map(|s| s.path.clone()).collect()
     } else {
         given.to_vec()
     };
-    let input = input::load(&arguments, space, talk)?;
+    let input = input::load(&arguments, space, console)?;
     if given.is_empty() {
         for (then, now) in job.surfaces.iter().zip(&input.sources) {
             if (then.bytes, then.hash) != (now.bytes, now.hash) {

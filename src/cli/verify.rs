@@ -5,25 +5,25 @@ use std::path::Path;
 use serde_json::json;
 
 use super::args::VerifyArgs;
+use super::console::Console;
 use super::failure::Failure;
 use super::input::Space;
-use super::talk::Talk;
 use super::{memory, store};
 use crate::audit::{self, Level, Report, VerifyOptions};
-use crate::catalog::{CatalogError, Store};
-use crate::store::attempt;
+use crate::storage::attempt;
+use crate::store::{Catalog, StoreError};
 use crate::surface::Surface;
 
-pub fn run(args: &VerifyArgs, talk: &Talk) -> Result<u8, Failure> {
+pub fn run(args: &VerifyArgs, console: &Console) -> Result<u8, Failure> {
     let (cap, _) = memory::cap(args.read.memory.as_deref())?;
     let mut open = store::open_finished(&args.store)?;
     // The store may be one that can only be read.
     let scratch = std::env::temp_dir().join("verify");
     let space = Space::Capped(cap, &scratch);
-    let surface = match store::surface_of(&mut open, &args.against, space, talk) {
+    let surface = match store::surface_of(&mut open, &args.against, space, console) {
         Ok(input) => Some(input.surface),
         Err(failure) if args.against.is_empty() && failure.code == "unreadable-file" => {
-            talk.note("note: the surface is not where it was; the mesh is verified without it (give it with --against)");
+            console.note("note: the surface is not where it was; the mesh is verified without it (give it with --against)");
             None
         }
         Err(failure) => return Err(failure),
@@ -33,24 +33,24 @@ pub fn run(args: &VerifyArgs, talk: &Talk) -> Result<u8, Failure> {
     } else {
         Level::Geometry
     };
-    let report = check(&mut open, talk, surface.as_ref(), cap, level)?;
-    if talk.is_json() {
+    let report = check(&mut open, console, surface.as_ref(), cap, level)?;
+    if console.is_json() {
         let mut answer = serde_json::to_value(&report).unwrap_or_default();
         answer["schema"] = json!(1);
-        talk.answer(&answer);
+        console.answer(&answer);
         return Ok(if report.valid { 0 } else { 7 });
     }
     if !report.valid {
         return Err(invalid(&report, &args.store));
     }
-    talk.line(&sentence(&report));
+    console.line(&sentence(&report));
     Ok(0)
 }
 
 /// Verifies within `cap`, less what the surface holds. What is damaged is listed, all of it.
 pub fn check(
-    store: &mut Store,
-    talk: &Talk,
+    store: &mut Catalog,
+    console: &Console,
     surface: Option<&Surface>,
     cap: u64,
     level: Level,
@@ -63,7 +63,7 @@ pub fn check(
         temp_dir: std::env::temp_dir(),
     };
     let verified = attempt(|| audit::verify(store, surface, &options));
-    let error = match verified.map_err(CatalogError::from) {
+    let error = match verified.map_err(StoreError::from) {
         Ok(Ok(report)) => return Ok(report),
         Ok(Err(error)) | Err(error) => error,
     };
@@ -71,7 +71,7 @@ pub fn check(
         && let Ok(Ok(list)) = attempt(|| audit::damage(store))
     {
         list.iter()
-            .for_each(|damage| talk.note(&damage.to_string()));
+            .for_each(|damage| console.note(&damage.to_string()));
     }
     Err(error.into())
 }

@@ -9,7 +9,7 @@ use crate::geom::{Point, Seen, in_sphere_perturbed, insphere_filtered, orient};
 use crate::mesh::anatomy::mark::{IN_CAVITY, STAYS};
 use crate::mesh::anatomy::{FACES, MARK, REQUIRED, VERTEX_MASK};
 use crate::mesh::{FaceRef, Mesh, Tet};
-use crate::store::{Pages, stop_if_requested};
+use crate::storage::{Pages, check_cancelled};
 
 /// A larger cavity is refused: nothing a size field asks for is so large.
 const CAVITY_MAX: usize = 1 << 20;
@@ -400,7 +400,7 @@ impl Kernel {
     ///
     /// Returns one of them. Effects: ids of the cavity are used again first; attributes and `tet_of` are not written.
     pub fn fill<P: Pages>(&mut self, mesh: &mut Mesh<P>, v: u32) -> u32 {
-        stop_if_requested();
+        check_cancelled();
         self.stats.inserted += 1;
         self.stats.cavity_tets += self.cavity.len() as u64;
         self.stats.cavity_largest = self.stats.cavity_largest.max(self.cavity.len() as u64);

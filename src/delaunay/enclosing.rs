@@ -3,7 +3,7 @@
 use crate::geom::{Aabb, Point, in_sphere_perturbed, orient};
 use crate::mesh::anatomy::FACES;
 use crate::mesh::{FaceRef, Mesh, Tet, VertexTag};
-use crate::store::Pages;
+use crate::storage::Pages;
 
 /// Half side of the box in units of the longest side of what it encloses. Far enough that surface
 /// triangles are hardly ever lost to the box vertices, near enough to keep sphere determinants small.

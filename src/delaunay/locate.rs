@@ -4,7 +4,7 @@ use super::cavity::{Kernel, Rejected};
 use crate::geom::{Point, orient};
 use crate::mesh::anatomy::FACES;
 use crate::mesh::{Mesh, Tet};
-use crate::store::Pages;
+use crate::storage::Pages;
 
 /// A walk longer than this is lost: a mesh of 2^30 tetrahedra has about 1000 along an axis.
 const STEPS_MAX: u32 = 100_000;

@@ -3,7 +3,7 @@
 use super::*;
 use crate::geom::{Aabb, Point, in_sphere_perturbed, orient};
 use crate::mesh::{FaceRef, Mesh, Tet};
-use crate::store::{FlatPages, Pager, Pages};
+use crate::storage::{FlatPages, Pager, Pages};
 
 /// Deterministic pseudo-random numbers in [0, 1).
 fn random(seed: u64) -> impl FnMut() -> f64 {

@@ -1,6 +1,4 @@
 //! Mesh files in and out, streamed. Only this room and the command line know formats.
 
-pub mod page;
-pub mod picture;
 pub mod read;
 pub mod write;

@@ -5,7 +5,7 @@ use tetdb_schema::page::{NONE, RECORDS, SLOT_BITS, SLOT_MASK, SLOTS, u32_le};
 use super::anatomy::mark::IN_CAVITY;
 use super::anatomy::{FaceRef, MARK, REQUIRED, Tet, VERTEX_MASK};
 use super::state::{Arena, MeshState, dense, next_id, sparse};
-use crate::store::{Pager, Pages, StoreError, fail, kind};
+use crate::storage::{Pager, Pages, StorageError, kind, raise};
 
 /// Cursor over one sub-domain's paged arrays: tetrahedra, vertices, their attributes, facets.
 ///
@@ -107,7 +107,7 @@ impl<P: Pages> Mesh<P> {
         }
         let id = arena.fresh;
         if id >= VERTEX_MASK - SLOTS as u32 {
-            fail(StoreError::TooMany { what });
+            raise(StorageError::TooMany { what });
         }
         if id >> SLOT_BITS == pages.n_pages::<K>() {
             pages.append_page::<K>();

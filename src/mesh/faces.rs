@@ -4,7 +4,7 @@ use tetdb_schema::page::u32_le;
 
 use super::cursor::Mesh;
 use super::state::sparse;
-use crate::store::{Pages, kind};
+use crate::storage::{Pages, kind};
 
 /// A triangle of the input (or of an interface) and what lies on its two sides.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -3,8 +3,8 @@
 pub mod anatomy;
 mod cursor;
 mod faces;
-mod kept;
 mod renumber;
+mod snapshot;
 mod state;
 mod vertices;
 

@@ -10,7 +10,7 @@ use super::state::{dense, sparse};
 use super::vertices::VertexTag;
 use super::{FaceRef, MeshState};
 use crate::geom::HilbertFrame;
-use crate::store::{DiskPath, Pages, Sorter, StoreError, kind};
+use crate::storage::{DiskPath, Pages, Sorter, StorageError, kind};
 use tetdb_schema::page::{NONE, SLOT_BITS};
 
 /// Where sorting may put its runs, and how many bytes it may hold.
@@ -28,7 +28,7 @@ pub fn renumber<P: Pages>(
     mesh: &mut Mesh<P>,
     order: &HilbertFrame,
     space: &Workspace,
-) -> Result<(), StoreError> {
+) -> Result<(), StorageError> {
     mesh.clear_scratch();
     let n_vertices = renumber_vertices(mesh, order, space)?;
     let n_tets = renumber_tets(mesh, n_vertices);
@@ -69,7 +69,7 @@ fn renumber_vertices<P: Pages>(
     mesh: &mut Mesh<P>,
     order: &HilbertFrame,
     space: &Workspace,
-) -> Result<u32, StoreError> {
+) -> Result<u32, StorageError> {
     let end = dense(mesh.vertex_ids_end());
     for n in 0..end {
         mesh.set_scratch(n, NONE);
@@ -173,7 +173,7 @@ mod tests {
     use super::*;
     use crate::delaunay::{Kernel, enclose};
     use crate::geom::{Aabb, Point};
-    use crate::store::{FlatPages, Pager};
+    use crate::storage::{FlatPages, Pager};
 
     /// The mesh as a set: sorted coordinates, neighbors' apexes, attribute.
     fn shape<P: Pages>(mesh: &mut Mesh<P>) -> Vec<String> {

@@ -6,7 +6,7 @@ use super::Tet;
 use super::cursor::{Mesh, WORD_ZERO};
 use super::state::{dense, sparse};
 use crate::geom::Point;
-use crate::store::{Pages, kind};
+use crate::storage::{Pages, kind};
 
 /// Where a vertex comes from; the numbers are stored.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -2,11 +2,11 @@
 
 use std::marker::PhantomData;
 
-use super::judge::Judge;
+use super::objective::Objective;
 use super::smooth::is_free;
 use crate::mesh::{Mesh, Tet};
 use crate::reconnect::{Ball, Replacement};
-use crate::store::Pages;
+use crate::storage::Pages;
 
 /// Largest ball that is collapsed.
 const BALL_MAX: usize = 64;
@@ -19,10 +19,10 @@ pub(super) struct Collapser<J> {
     new: Vec<[u32; 4]>,
     best_new: Vec<[u32; 4]>,
     replacement: Replacement,
-    judge: PhantomData<J>,
+    objective: PhantomData<J>,
 }
 
-impl<J: Judge> Collapser<J> {
+impl<J: Objective> Collapser<J> {
     /// Collapses the edge of `t`, whose goodness is `own`, that is worth most, if any is worth enough.
     pub(super) fn collapse_best_edge<P: Pages>(
         &mut self,

@@ -4,14 +4,14 @@
 //! in it, which need not be Delaunay. Nothing is changed unless the ball of insertion is better than the cavity: its worst
 //! tetrahedron, or the sum of what is missing.
 
-use super::missing::{GAIN, Missing};
-use super::quality::goodness;
+use super::deficit::{Deficit, GAIN};
+use super::quality::inverse_quality;
 use super::smooth::{Star, raised};
 use crate::delaunay::{Kernel, Located};
 use crate::mesh::anatomy::EDGES;
 use crate::mesh::{Mesh, Tet};
 use crate::reconnect::Inherited;
-use crate::store::Pages;
+use crate::storage::Pages;
 
 /// A cavity that meets more vertices while it grows, the same one more than once, or has more outer faces is left alone.
 const VERTICES_MAX: u32 = 64;
@@ -87,11 +87,11 @@ impl Inserter {
         if self.kernel.faces().len() > FACES_MAX {
             return false;
         }
-        let mut missing = Missing::default();
+        let mut deficit = Deficit::default();
         let mut old = Vec::with_capacity(self.kernel.cavity().len());
         for &t in self.kernel.cavity() {
             let record = mesh.tet(t);
-            missing.add(goodness(mesh.points(&record)));
+            deficit.add(inverse_quality(mesh.points(&record)));
             old.push((t, record.vertices()));
         }
         self.star.at = p;
@@ -102,11 +102,11 @@ impl Inserter {
         let (floor, enough) = match better {
             Better::Worst { enough } => {
                 self.star.bar = None;
-                (raised(missing.worst).max(GOOD_MIN), enough)
+                (raised(deficit.worst).max(GOOD_MIN), enough)
             }
             Better::Sum => {
-                self.star.bar = Some(missing.bar().at_least(GOOD_MIN));
-                (missing.sum + GAIN, 0.0)
+                self.star.bar = Some(deficit.bar().at_least(GOOD_MIN));
+                (deficit.sum + GAIN, 0.0)
             }
         };
         let Some((best, _)) = self.star.search(floor, enough) else {

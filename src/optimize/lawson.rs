@@ -13,7 +13,7 @@ use crate::geom::{Point, orient};
 use crate::mesh::anatomy::{EDGE_OF, FACES};
 use crate::mesh::{FaceRef, Mesh, Tet};
 use crate::reconnect::{FaceSwap, Forced, RingTriangulation, Shell, remove_edge};
-use crate::store::{Pages, stop_if_requested};
+use crate::storage::{Pages, check_cancelled};
 
 /// Flips done and faces met that could not be flipped (some of them later could).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -39,7 +39,7 @@ impl Lawson {
     /// One pass over all faces, page by page; each flip is followed up at once.
     pub(super) fn sweep<P: Pages>(&mut self, mesh: &mut Mesh<P>, way: Way) {
         for page in way.tet_pages(mesh) {
-            stop_if_requested();
+            check_cancelled();
             tets_of_page(mesh, page, |mesh, t, tet| {
                 self.check::<P, true>(mesh, t, &tet);
                 while let Some(t) = self.stack.pop() {

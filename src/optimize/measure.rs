@@ -4,7 +4,7 @@ use super::sphere::Sphere;
 use crate::geom::Point;
 use crate::mesh::anatomy::EDGES;
 use crate::mesh::{Mesh, Tet};
-use crate::store::{Pages, stop_if_requested};
+use crate::storage::{Pages, check_cancelled};
 
 use super::quality::quality;
 
@@ -78,7 +78,7 @@ pub fn measure<P: Pages>(mesh: &mut Mesh<P>) -> QualityTable {
     while let Some((t, tet)) = mesh.next_tet(from) {
         from = t + 1;
         if t & 1023 == 0 {
-            stop_if_requested();
+            check_cancelled();
         }
         let p = mesh.points(&tet);
         let q = quality(p);

@@ -18,27 +18,27 @@
 //! C. Ollivier-Gooch, "Tetrahedral mesh improvement using swapping and smoothing" (1997); B. M. Klingner and
 //! J. R. Shewchuk, "Aggressive tetrahedral mesh improvement" (2007).
 
+mod bad_fraction;
 mod collapse;
+mod deficit;
 mod insertion;
-mod judge;
 mod lawson;
 mod measure;
-mod missing;
+mod objective;
 mod odt;
 mod pages;
 mod quality;
-mod rescue;
 mod rounds;
 mod run;
-mod share;
 mod smooth;
 mod sphere;
 mod swap;
 #[cfg(test)]
 mod tests;
+mod vertex_operations;
 
 pub use lawson::LawsonStats;
 pub use measure::{Histogram, QualityTable, measure};
-pub use quality::{GOODNESS_WANTED, goodness, is_forcing, quality};
+pub use quality::{GOODNESS_WANTED, inverse_quality, is_forcing, quality};
 pub use rounds::OperationCounts;
 pub use run::{Mode, OptimizeReport, Progress, Settings, run, run_with};

@@ -17,7 +17,7 @@ use crate::geom::{Point, orient};
 use crate::mesh::anatomy::FACES;
 use crate::mesh::{Mesh, Tet, dense, sparse};
 use crate::reconnect::Ball;
-use crate::store::{Pages, kind, stop_if_requested};
+use crate::storage::{Pages, check_cancelled, kind};
 
 /// Longest move in units of h: longer ones make tetrahedra that do not stay positive, shorter ones need more sweeps.
 const MOVE_MAX: f64 = 0.3;
@@ -70,7 +70,7 @@ fn set_four(slot: &mut Slot, numbers: [f64; 4]) {
 /// Adds up circumcenters at all vertices; those of required and hull faces get a sum that is not a number.
 fn gather<P: Pages>(mesh: &mut Mesh<P>, way: Way) {
     for page in way.tet_pages(mesh) {
-        stop_if_requested();
+        check_cancelled();
         tets_of_page(mesh, page, |mesh, _, tet| add(mesh, &tet));
     }
 }

@@ -8,7 +8,7 @@ use tetdb_schema::page::{SLOT_BITS, SLOTS};
 use crate::mesh::anatomy::mark::EXAMINED;
 use crate::mesh::anatomy::{MARK, VERTEX_MASK};
 use crate::mesh::{Mesh, Tet};
-use crate::store::Pages;
+use crate::storage::Pages;
 
 /// Which way a pass goes through the pages.
 ///

@@ -37,7 +37,7 @@ fn parts([a, b, c, d]: [Point; 4]) -> Parts {
 
 /// 1/q of an exactly positive tetrahedron, `f64::NEG_INFINITY` of any other.
 #[inline(always)]
-pub fn goodness(points: [Point; 4]) -> f64 {
+pub fn inverse_quality(points: [Point; 4]) -> f64 {
     let p = parts(points);
     // The rounding error of `det` is below 1e-14 of the cube of the longest edge.
     if p.det * p.det <= 1e-24 * (p.longest_squared * p.longest_squared * p.longest_squared)
@@ -96,7 +96,7 @@ pub(super) fn is_below(points: [Point; 4], wanted: f64) -> bool {
 
 /// Quality q of a tetrahedron: at least 1, infinite when it is not positive.
 pub fn quality(points: [Point; 4]) -> f64 {
-    let good = goodness(points);
+    let good = inverse_quality(points);
     if good > 0.0 {
         1.0 / good
     } else {
@@ -130,7 +130,7 @@ mod tests {
         };
         for _ in 0..2000 {
             let p = [0; 4].map(|_| Point::new(next(), next(), next()));
-            let good = goodness(p);
+            let good = inverse_quality(p);
             if (good - 0.5).abs() > 1e-9 {
                 assert_eq!(is_below(p, 0.5), good < 0.5);
             }

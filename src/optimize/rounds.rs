@@ -1,16 +1,16 @@
 //! Rounds over the pages that hold bad tetrahedra.
 
-use super::judge::Worst;
+use super::bad_fraction::BadFraction;
+use super::objective::Worst;
 use super::pages::{PageFlags, clear_marks, is_examined, reopen, tets_of_page};
-use super::quality::{CONTENT, GOODNESS_WANTED, face_bound, goodness, is_below};
-use super::rescue::Rescue;
-use super::share::Share;
+use super::quality::{CONTENT, GOODNESS_WANTED, face_bound, inverse_quality, is_below};
 use super::smooth::{Star, is_free, raised};
 use super::swap::Swapper;
+use super::vertex_operations::VertexOperations;
 use crate::mesh::anatomy::MARK;
 use crate::mesh::anatomy::mark::{EXAMINED, RESCUED};
 use crate::mesh::{Mesh, Tet};
-use crate::store::{Pages, stop_if_requested};
+use crate::storage::{Pages, check_cancelled};
 
 /// Rounds end after this many even if they still gain.
 const ROUNDS_MAX: u32 = 8;
@@ -45,7 +45,7 @@ impl OperationCounts {
 
 /// What a round aims at.
 #[derive(Clone, Copy)]
-pub(super) struct Target {
+pub(super) struct RoundGoal {
     /// Tetrahedra below this goodness are attacked.
     pub(super) below: f64,
     /// Searches for a position stop here.
@@ -65,7 +65,7 @@ pub(super) enum Means {
 }
 
 /// The first aim: every tetrahedron of q ≥ 2, without changing the vertices' number.
-pub(super) const BAD: Target = Target {
+pub(super) const BAD: RoundGoal = RoundGoal {
     below: GOODNESS_WANTED,
     enough: GOODNESS_WANTED * 1.02,
     means: Means::Connections,
@@ -79,8 +79,8 @@ pub(super) struct Rounds {
     marked: PageFlags,
     swapper: Swapper<Worst>,
     star: Star,
-    rescue: Rescue,
-    share: Share,
+    rescue: VertexOperations,
+    share: BadFraction,
     /// The page's bad tetrahedra, worst first, then what its operations left bad.
     work: Vec<(f64, u32)>,
     changed: Vec<u32>,
@@ -101,8 +101,8 @@ impl Rounds {
             marked: PageFlags::default(),
             swapper: Swapper::default(),
             star: Star::default(),
-            rescue: Rescue::default(),
-            share: Share::default(),
+            rescue: VertexOperations::default(),
+            share: BadFraction::default(),
             work: Vec::new(),
             changed: Vec::new(),
             counts: OperationCounts::default(),
@@ -113,7 +113,7 @@ impl Rounds {
     pub(super) fn run<P: Pages>(
         &mut self,
         mesh: &mut Mesh<P>,
-        target: Target,
+        target: RoundGoal,
         progress: &mut dyn FnMut(u32, u32),
     ) {
         for _ in 0..ROUNDS_MAX {
@@ -150,15 +150,15 @@ impl Rounds {
         self.marked.raise(t);
     }
 
-    fn page<P: Pages>(&mut self, mesh: &mut Mesh<P>, page: u32, target: Target) {
-        stop_if_requested();
+    fn page<P: Pages>(&mut self, mesh: &mut Mesh<P>, page: u32, target: RoundGoal) {
+        check_cancelled();
         let mut work = std::mem::take(&mut self.work);
         work.clear();
         tets_of_page(mesh, page, |mesh, t, tet| {
             if !is_examined(&tet) {
                 let points = mesh.points(&tet);
                 if is_below(points, target.below) {
-                    work.push((goodness(points), t));
+                    work.push((inverse_quality(points), t));
                 }
             }
         });
@@ -173,7 +173,7 @@ impl Rounds {
             if !tet.is_live() || is_examined(&tet) {
                 continue;
             }
-            let good = goodness(mesh.points(&tet));
+            let good = inverse_quality(mesh.points(&tet));
             if good >= target.below {
                 continue;
             }
@@ -213,7 +213,7 @@ impl Rounds {
         t: u32,
         tet: &Tet,
         good: f64,
-        target: Target,
+        target: RoundGoal,
     ) -> bool {
         if target.means == Means::Sum {
             let dear = tet.node[RESCUED] & MARK == 0;

@@ -1,13 +1,13 @@
 //! The schedule.
 
+use super::bad_fraction::SHARE;
 use super::lawson::{Lawson, LawsonStats};
 use super::odt;
 use super::pages::{PageFlags, Way, clear_marks};
-use super::rescue::WORST;
 use super::rounds::{BAD, OperationCounts, Rounds};
-use super::share::SHARE;
+use super::vertex_operations::WORST;
 use crate::mesh::{Mesh, dense, sparse};
-use crate::store::Pages;
+use crate::storage::Pages;
 
 /// How far to go.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,11 +1,11 @@
 //! Moving one vertex so that the worst tetrahedron of its ball gets better.
 
-use super::missing::Bar;
-use super::quality::{CONTENT, face_bound, goodness};
+use super::deficit::AcceptanceFloor;
+use super::quality::{CONTENT, face_bound, inverse_quality};
 use crate::geom::Point;
 use crate::mesh::Mesh;
 use crate::reconnect::Ball;
-use crate::store::Pages;
+use crate::storage::Pages;
 
 /// Positions tried on the way to the average of the star.
 const FRACTIONS: [f64; 5] = [0.1, 0.25, 0.45, 0.7, 1.0];
@@ -33,7 +33,7 @@ pub(super) struct Star {
     /// Face f of a tetrahedron makes it (v, f0, f1, f2), positive.
     pub(super) faces: Vec<[Point; 3]>,
     /// With a bar, positions are judged by the sum of what is missing there and not by the worst goodness.
-    pub(super) bar: Option<Bar>,
+    pub(super) bar: Option<AcceptanceFloor>,
 }
 
 impl Star {
@@ -71,7 +71,7 @@ impl Star {
         let mut least = f64::INFINITY;
         for k in 0..self.faces.len() {
             let [a, b, c] = self.faces[k];
-            let good = goodness([p, a, b, c]);
+            let good = inverse_quality([p, a, b, c]);
             if good <= floor {
                 self.faces.swap(k, k / 2);
                 return good;
@@ -83,11 +83,11 @@ impl Star {
         least
     }
 
-    fn sum(&mut self, p: Point, floor: f64, bar: Bar) -> f64 {
+    fn sum(&mut self, p: Point, floor: f64, bar: AcceptanceFloor) -> f64 {
         let mut sum = 0.0;
         for k in 0..self.faces.len() {
             let [a, b, c] = self.faces[k];
-            sum += bar.worth(goodness([p, a, b, c]));
+            sum += bar.worth(inverse_quality([p, a, b, c]));
             if sum <= floor {
                 self.faces.swap(k, k / 2);
                 break;

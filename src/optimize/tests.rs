@@ -1,13 +1,13 @@
 //! A cube with prescribed skin and a random inside: what optimization must reach and must not touch.
 
+use super::bad_fraction::SHARE;
 use super::pages::PageFlags;
 use super::rounds::Rounds;
-use super::share::SHARE;
 use super::*;
 use crate::delaunay::{Kernel, enclose, insertion_key};
 use crate::geom::{Aabb, HilbertFrame, Point, orient};
 use crate::mesh::{FaceRef, Mesh, Tet, VertexTag};
-use crate::store::{Backing, FlatPages, Pager, Pages};
+use crate::storage::{Backing, FlatPages, Pager, Pages};
 
 /// Deterministic pseudo-random numbers in [0, 1).
 fn random(seed: u64) -> impl FnMut() -> f64 {

@@ -1,8 +1,9 @@
 use thiserror::Error;
 
 use crate::boundary::BoundaryError;
-use crate::catalog::CatalogError;
+use crate::sealed::SealedError;
 use crate::sizing::SizingError;
+use crate::storage::StorageError;
 use crate::store::StoreError;
 use crate::surface::SurfaceError;
 
@@ -17,9 +18,9 @@ pub enum PipelineError {
     #[error(transparent)]
     Sizing(#[from] SizingError),
     #[error(transparent)]
-    Catalog(#[from] CatalogError),
-    #[error(transparent)]
     Store(#[from] StoreError),
+    #[error(transparent)]
+    Storage(#[from] StorageError),
     /// An option that was checked before has no meaning any more.
     #[error("option {option}: '{value}' is not known")]
     Option { option: &'static str, value: String },
@@ -44,4 +45,10 @@ pub enum PipelineError {
     /// All tetrahedra came to lie on one side of a cut.
     #[error("cut {cut} leaves no tetrahedron on one side: ask for fewer sub-domains")]
     EmptyPart { cut: u32 },
+}
+
+impl From<SealedError> for PipelineError {
+    fn from(error: SealedError) -> Self {
+        Self::from(StoreError::from(error))
+    }
 }

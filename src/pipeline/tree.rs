@@ -4,13 +4,14 @@
 //! right, and the tree follows from the number of sub-domains alone.
 
 use crate::bisect::{Plane, Zone};
-use crate::catalog::{Catalog, CatalogError};
 use crate::geom::{Aabb, Point};
 use crate::mesh::{MESH_STATE_WORDS, MeshState};
-use crate::store::kind;
+use crate::sealed::SealedError;
+use crate::storage::kind;
+use crate::store::{Catalog, StoreError};
 
 /// Numbers of the catalog's blobs.
-pub(super) mod blob {
+pub(in crate::pipeline) mod blob {
     pub const SIZE_FIELD: u32 = 1;
     /// How many sub-domains there will be.
     pub const SUBDOMAINS: u32 = 3;
@@ -37,18 +38,18 @@ pub(super) mod blob {
 
 /// Ranks `first..first + count`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Part {
+pub(in crate::pipeline) struct TreePart {
     pub first: u32,
     pub count: u32,
 }
 
-impl Part {
+impl TreePart {
     /// The cut that divides it: the first rank of its high child.
-    pub(super) fn cut(self) -> u32 {
+    pub(in crate::pipeline) fn cut(self) -> u32 {
         self.first + self.count / 2
     }
 
-    pub(super) fn children(self) -> [Self; 2] {
+    pub(in crate::pipeline) fn children(self) -> [Self; 2] {
         let low = self.count / 2;
         [
             Self {
@@ -63,12 +64,12 @@ impl Part {
     }
 
     /// Share of the load that belongs to the low child.
-    pub(super) fn low_share(self) -> f64 {
+    pub(in crate::pipeline) fn low_share(self) -> f64 {
         f64::from(self.count / 2) / f64::from(self.count)
     }
 
     /// The cuts above it, from the top, in a tree of `n` sub-domains.
-    pub(super) fn cuts_above(self, n: u32) -> Vec<u32> {
+    pub(in crate::pipeline) fn cuts_above(self, n: u32) -> Vec<u32> {
         let mut cuts = Vec::new();
         let mut at = Self { first: 0, count: n };
         while at != self {
@@ -82,8 +83,8 @@ impl Part {
 
 /// A part's working mesh, as its file holds it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct PartMesh {
-    pub part: Part,
+pub(in crate::pipeline) struct PartMesh {
+    pub part: TreePart,
     pub generation: u32,
     pub state: MeshState,
     pub extents: [[u32; 2]; kind::ALL.len()],
@@ -94,7 +95,7 @@ pub(super) struct PartMesh {
 const PART_WORDS: usize = 4 + MESH_STATE_WORDS + 2 * kind::ALL.len();
 
 impl PartMesh {
-    pub(super) fn to_bytes(self) -> Vec<u8> {
+    pub(in crate::pipeline) fn to_bytes(self) -> Vec<u8> {
         let load = self.load.to_bits();
         let head = [
             self.part.count,
@@ -118,7 +119,7 @@ impl PartMesh {
         }
         let (state, extents) = words[4..].split_at(MESH_STATE_WORDS);
         Some(Self {
-            part: Part {
+            part: TreePart {
                 first,
                 count: words[0],
             },
@@ -131,14 +132,17 @@ impl PartMesh {
 }
 
 /// How many sub-domains there will be, once that is decided.
-pub(super) fn n_subdomains(catalog: &mut Catalog) -> Result<u32, CatalogError> {
+pub(in crate::pipeline) fn n_subdomains(catalog: &mut Catalog) -> Result<u32, StoreError> {
     let bytes = catalog.blob(blob::SUBDOMAINS)?.unwrap_or_default();
     let word = bytes.first_chunk().map(|&b| u32::from_le_bytes(b));
     Ok(word.unwrap_or(1))
 }
 
 /// All parts, in order of rank.
-pub(super) fn parts(catalog: &mut Catalog, n: u32) -> Result<Vec<PartMesh>, CatalogError> {
+pub(in crate::pipeline) fn parts(
+    catalog: &mut Catalog,
+    n: u32,
+) -> Result<Vec<PartMesh>, StoreError> {
     let mut parts = Vec::new();
     let mut first = 0;
     while first < n {
@@ -150,14 +154,14 @@ pub(super) fn parts(catalog: &mut Catalog, n: u32) -> Result<Vec<PartMesh>, Cata
     Ok(parts)
 }
 
-pub(super) fn bounds_bytes(bounds: &Aabb) -> Vec<u8> {
+pub(in crate::pipeline) fn bounds_bytes(bounds: &Aabb) -> Vec<u8> {
     let corners = [bounds.low, bounds.high].map(|p| p.to_array());
     let numbers = corners.into_iter().flatten();
     numbers.flat_map(f64::to_le_bytes).collect()
 }
 
 /// The box of the surface.
-pub(super) fn bounds(catalog: &mut Catalog) -> Result<Aabb, CatalogError> {
+pub(in crate::pipeline) fn bounds(catalog: &mut Catalog) -> Result<Aabb, StoreError> {
     let bytes = catalog.blob(blob::BOUNDS)?.unwrap_or_default();
     let mut numbers = bytes
         .chunks_exact(8)
@@ -172,15 +176,15 @@ pub(super) fn bounds(catalog: &mut Catalog) -> Result<Aabb, CatalogError> {
     }
 }
 
-fn damaged(catalog: &Catalog, first: u32) -> CatalogError {
-    CatalogError::Content {
+fn damaged(catalog: &Catalog, first: u32) -> StoreError {
+    StoreError::Sealed(SealedError::Content {
         path: catalog.dir().to_owned(),
         subdomain: first,
         what: "its row in the bisection tree is missing or damaged".to_owned(),
-    }
+    })
 }
 
-pub(super) fn plane_bytes(plane: &Plane) -> Vec<u8> {
+pub(in crate::pipeline) fn plane_bytes(plane: &Plane) -> Vec<u8> {
     let [x, y, z] = plane.normal.to_array();
     [x, y, z, plane.offset]
         .into_iter()
@@ -189,11 +193,11 @@ pub(super) fn plane_bytes(plane: &Plane) -> Vec<u8> {
 }
 
 /// The zones of the cuts above `part`.
-pub(super) fn zones_above(
+pub(in crate::pipeline) fn zones_above(
     catalog: &mut Catalog,
-    part: Part,
+    part: TreePart,
     n: u32,
-) -> Result<Vec<Zone>, CatalogError> {
+) -> Result<Vec<Zone>, StoreError> {
     let mut zones = Vec::new();
     for cut in part.cuts_above(n) {
         let bytes = catalog.blob(blob::CUT + cut)?.unwrap_or_default();
@@ -220,7 +224,7 @@ mod tests {
         for n in [1, 2, 3, 5, 7, 100, 4096] {
             let mut leaves = 0;
             let mut cuts = Vec::new();
-            let mut stack = vec![Part { first: 0, count: n }];
+            let mut stack = vec![TreePart { first: 0, count: n }];
             while let Some(part) = stack.pop() {
                 if part.count == 1 {
                     assert_eq!(part.first, leaves);

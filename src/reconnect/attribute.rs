@@ -2,7 +2,7 @@
 
 use crate::mesh::Mesh;
 use crate::mesh::anatomy::EDGES;
-use crate::store::Pages;
+use crate::storage::Pages;
 
 /// Flag bits that belong to the six edges.
 pub(super) const EDGE_FLAGS: u32 = 0x3F;

@@ -1,7 +1,7 @@
 //! All tetrahedra around a vertex.
 
 use crate::mesh::{FaceRef, Mesh, Tet};
-use crate::store::Pages;
+use crate::storage::Pages;
 
 /// Up to this many tetrahedra are found again by looking through the list.
 const LISTED_MAX: usize = 48;

@@ -6,7 +6,7 @@ use super::attribute::Inherited;
 use super::{RingTriangulation, Shell};
 use crate::mesh::anatomy::REQUIRED;
 use crate::mesh::{FaceRef, Mesh, Tet};
-use crate::store::Pages;
+use crate::storage::Pages;
 
 /// Replaces the closed `shell` by the tetrahedra of `triangulation`, listed in `new_tets`: first those with b, then those with a.
 ///

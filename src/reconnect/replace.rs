@@ -6,7 +6,7 @@
 use super::attribute::Inherited;
 use crate::mesh::anatomy::{FACES, REQUIRED};
 use crate::mesh::{FaceRef, Mesh, Tet};
-use crate::store::Pages;
+use crate::storage::Pages;
 
 /// Scratch of a replacement; meant to be used again.
 #[derive(Default)]

@@ -4,7 +4,7 @@ use super::attribute::EDGE_FLAGS;
 use crate::geom::Point;
 use crate::mesh::anatomy::EDGES;
 use crate::mesh::{Mesh, Tet};
-use crate::store::Pages;
+use crate::storage::Pages;
 
 /// `COMPLETE[i][j] = [k, l]` such that `i j k l` is an even permutation of `0 1 2 3`.
 const COMPLETE: [[[u8; 2]; 4]; 4] = [

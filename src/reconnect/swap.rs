@@ -4,7 +4,7 @@ use super::attribute::Inherited;
 use crate::geom::{Point, orient};
 use crate::mesh::anatomy::{FACES, REQUIRED};
 use crate::mesh::{FaceRef, Mesh, Tet};
-use crate::store::Pages;
+use crate::storage::Pages;
 
 /// The two tetrahedra of a face, copied out of the mesh.
 ///

@@ -4,7 +4,7 @@ use super::*;
 use crate::delaunay::{Kernel, enclose};
 use crate::geom::{Aabb, Point, orient};
 use crate::mesh::{FaceRef, Mesh, Tet};
-use crate::store::FlatPages;
+use crate::storage::FlatPages;
 
 type Flat = Mesh<FlatPages>;
 

@@ -5,7 +5,7 @@ use crate::geom::{Point, mix};
 use crate::mesh::anatomy::mark::EXAMINED;
 use crate::mesh::anatomy::{EDGE_OF, EDGES, MARK};
 use crate::mesh::{End, Mesh};
-use crate::store::Pages;
+use crate::storage::Pages;
 
 /// Edges longer than this, in units of the wanted length, are divided.
 const LONG: f64 = std::f64::consts::SQRT_2;

@@ -6,7 +6,7 @@ use crate::delaunay::{Located, Rejected};
 use crate::geom::Point;
 use crate::mesh::Mesh;
 use crate::mesh::anatomy::FROZEN;
-use crate::store::Pages;
+use crate::storage::Pages;
 
 /// Least distance to a vertex, in units of the mean of both wanted lengths.
 const FILTER: f64 = std::f64::consts::FRAC_1_SQRT_2;

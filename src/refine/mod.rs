@@ -16,11 +16,11 @@ use crate::delaunay::Kernel;
 use crate::geom::{Aabb, HilbertFrame, Point};
 use crate::mesh::{Mesh, Workspace, dense, renumber, sparse};
 use crate::reconnect::Shell;
-use crate::store::{Pages, StoreError, stop_if_requested};
+use crate::storage::{Pages, StorageError, check_cancelled};
 
 use candidates::Candidate;
 use insert::Recent;
-pub use place::{Everywhere, Place};
+pub use place::{Everywhere, PlacementRule};
 
 /// Tetrahedra of one block. Small enough that a block's candidates fit a small lease, large enough that
 /// sorting along the curve pays; the mesh depends on it, so it is a constant of the format of results.
@@ -49,7 +49,7 @@ pub struct Field<'a> {
     /// Wanted edge length at a position.
     pub h: &'a dyn Fn(Point) -> f64,
     /// Where points may go.
-    pub place: &'a dyn Place,
+    pub place: &'a dyn PlacementRule,
     /// Box of the mesh, which fixes the order along the curve.
     pub bounds: Aabb,
 }
@@ -82,7 +82,7 @@ pub fn saturate<P: Pages>(
     field: &Field,
     space: &Workspace,
     progress: &mut dyn FnMut(u64),
-) -> Result<RefineReport, StoreError> {
+) -> Result<RefineReport, StorageError> {
     let mut report = RefineReport::default();
     let mut worker = Worker {
         kernel: Kernel::default(),
@@ -104,7 +104,7 @@ pub fn saturate<P: Pages>(
         let up = report.passes % 2 == 1;
         for i in 0..n_blocks {
             let from = BLOCK_TETS * if up { i } else { n_blocks - 1 - i };
-            stop_if_requested();
+            check_cancelled();
             let to = end.min(from + BLOCK_TETS);
             if worker.active.take(from, to) {
                 worker.block(mesh, field, sparse(from), sparse(to - 1), &mut report);

@@ -3,8 +3,8 @@
 use crate::geom::Point;
 
 /// A part of space in which edges are divided.
-pub trait Place {
-    /// Whether [`Place::reaches`] is worth asking: most tetrahedra are out of reach.
+pub trait PlacementRule {
+    /// Whether [`PlacementRule::reaches`] is worth asking: most tetrahedra are out of reach.
     fn is_partial(&self) -> bool {
         false
     }
@@ -30,7 +30,7 @@ pub trait Place {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Everywhere;
 
-impl Place for Everywhere {
+impl PlacementRule for Everywhere {
     fn stretch(&self, _: Point, _: Point, _: [f64; 2]) -> Option<[f64; 2]> {
         Some([0.0, 1.0])
     }

@@ -2,7 +2,7 @@ use super::*;
 use crate::delaunay::enclose;
 use crate::geom::orient;
 use crate::mesh::VertexTag;
-use crate::store::{Backing, Pager, kind};
+use crate::storage::{Backing, Pager, kind};
 
 /// A cube of fixed corners, divided until edges have length `h`.
 fn cube(h: f64, pager: Pager) -> (Mesh<Pager>, RefineReport) {

@@ -1,9 +1,9 @@
 //! Sizes from a background mesh: linear in its tetrahedra, nothing wanted outside of it.
 
 use super::SizingError;
-use super::wishes::Wish;
+use super::constraints::SizeConstraint;
 use crate::geom::{Aabb, Point};
-use crate::store::Room;
+use crate::storage::ScratchSpace;
 use crate::surface::BoxTree;
 
 /// Sizes in a cell are taken as equal when they differ by less than this share.
@@ -37,7 +37,7 @@ pub struct BackgroundMesh {
 impl BackgroundMesh {
     /// Shape: `h` runs parallel to `points`, which `tets` index; sizes are above zero.
     pub fn new(points: Vec<Point>, tets: Vec<[u32; 4]>, h: Vec<f64>) -> Self {
-        let room = &Room::boundless();
+        let room = &ScratchSpace::boundless();
         let bounds = Aabb::around(points.iter().copied());
         let around = |t: u32| Aabb::around(tets[t as usize].map(|v| points[v as usize]));
         let tree = BoxTree::new(&bounds, tets.len() as u32, room, |_| true, around);
@@ -132,7 +132,7 @@ fn shares([a, b, c, d]: [Point; 4], p: Point) -> Option<[f64; 4]> {
     holds.then(|| shares.map(|s| s.clamp(0.0, 1.0)))
 }
 
-impl Wish for BackgroundMesh {
+impl SizeConstraint for BackgroundMesh {
     fn h(&self, p: Point) -> Result<f64, SizingError> {
         Ok(self.at(p).unwrap_or(f64::INFINITY))
     }

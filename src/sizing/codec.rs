@@ -21,10 +21,10 @@ use std::io::{Read, Write};
 
 use super::SizingError;
 use super::field::SizeField;
-use super::seeds::Frame;
+use super::seeds::OctreeFrame;
 use super::tree::{DEPTH, LEAF, Leaf, Tree};
 use crate::geom::{Point, mix};
-use crate::store::{Fixed, List, Room};
+use crate::storage::{FrozenSpillVec, ScratchSpace, SpillVecBuilder};
 
 const MAGIC: &[u8; 8] = b"TETDBSZ2";
 const HEADER_BYTES: usize = 64;
@@ -60,7 +60,7 @@ impl SizeField {
         self.each_leaf(|_, news| n_values += news.len() as u32);
         let mut bytes = Vec::with_capacity(HEADER_BYTES);
         bytes.extend(MAGIC);
-        let Frame { low, side } = self.frame;
+        let OctreeFrame { low, side } = self.frame;
         for x in [low.x, low.y, low.z, side, self.beta] {
             bytes.extend(x.to_le_bytes());
         }
@@ -118,14 +118,14 @@ impl SizeField {
     /// # Errors
     /// [`SizingError::Damaged`] names what is wrong.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, SizingError> {
-        Self::from_bytes_in(bytes, &Room::boundless())
+        Self::from_bytes_in(bytes, &ScratchSpace::boundless())
     }
 
     /// [`SizeField::from_bytes`] with values that go to a scratch file where their share of `room` is too small.
     ///
     /// # Errors
     /// As there. A scratch file that fails unwinds.
-    pub fn from_bytes_in(bytes: &[u8], room: &Room) -> Result<Self, SizingError> {
+    pub fn from_bytes_in(bytes: &[u8], room: &ScratchSpace) -> Result<Self, SizingError> {
         if bytes.len() < HEADER_BYTES {
             return Err(damaged("length", bytes.len(), "at least 64"));
         }
@@ -159,7 +159,12 @@ impl SizeField {
         let (news, values) = rest.split_at(n_leaves);
         let leaves = room.list_within(Self::share_of(room.cap()));
         let (tree, values) = read_tree(cells, news, values, leaves)?;
-        Ok(Self::from_parts(Frame { low, side }, beta, tree, values))
+        Ok(Self::from_parts(
+            OctreeFrame { low, side },
+            beta,
+            tree,
+            values,
+        ))
     }
 }
 
@@ -168,8 +173,8 @@ fn read_tree(
     cells: &[u8],
     news: &[u8],
     values: &[u8],
-    mut leaves: List<[f32; 8]>,
-) -> Result<(Tree, Fixed<[f32; 8]>), SizingError> {
+    mut leaves: SpillVecBuilder<[f32; 8]>,
+) -> Result<(Tree, FrozenSpillVec<[f32; 8]>), SizingError> {
     let mut values = values.chunks_exact(4).map(|b| f32::from_le_bytes(array(b)));
     let mut tree = Tree {
         root: LEAF,

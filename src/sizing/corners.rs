@@ -9,7 +9,7 @@
 //! ```
 
 use super::tree::{LATTICE, Leaf, Tree};
-use crate::store::{Column, Room, StoreError, fail};
+use crate::storage::{ScratchSpace, SpillVec, StorageError, raise};
 
 /// A hanging corner and the four corners (an edge's two, twice) whose mean it takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
@@ -70,18 +70,18 @@ impl Hanging {
 /// Corners of a tree.
 pub(super) struct Corners {
     /// Corner numbers of each leaf, in the octants' order.
-    pub(super) of_leaf: Column<[u32; 8]>,
+    pub(super) of_leaf: SpillVec<[u32; 8]>,
     pub(super) n_corners: usize,
     /// Sorted by level, each corner once.
-    pub(super) hanging: Column<Hanging>,
+    pub(super) hanging: SpillVec<Hanging>,
 }
 
 impl Corners {
     /// A disk that fails unwinds.
-    pub(super) fn of(tree: &Tree, room: &Room) -> Self {
+    pub(super) fn of(tree: &Tree, room: &ScratchSpace) -> Self {
         let numbered = number_corners(tree, room);
-        let (mut of_leaf, n_corners) = numbered.unwrap_or_else(|e| fail(e));
-        let hanging = find_hanging(tree, &mut of_leaf, room).unwrap_or_else(|e| fail(e));
+        let (mut of_leaf, n_corners) = numbered.unwrap_or_else(|e| raise(e));
+        let hanging = find_hanging(tree, &mut of_leaf, room).unwrap_or_else(|e| raise(e));
         Self {
             of_leaf,
             n_corners,
@@ -91,7 +91,10 @@ impl Corners {
 }
 
 /// Numbers corners along the Morton curve, so that near corners are near in memory.
-fn number_corners(tree: &Tree, room: &Room) -> Result<(Column<[u32; 8]>, usize), StoreError> {
+fn number_corners(
+    tree: &Tree,
+    room: &ScratchSpace,
+) -> Result<(SpillVec<[u32; 8]>, usize), StorageError> {
     let mut keys = room.sorter::<12>();
     let mut n_leaves = 0;
     for (i, leaf) in tree.leaves().enumerate() {
@@ -143,9 +146,9 @@ fn morton(p: [u32; 3]) -> u64 {
 
 fn find_hanging(
     tree: &Tree,
-    of_leaf: &mut Column<[u32; 8]>,
-    room: &Room,
-) -> Result<Column<Hanging>, StoreError> {
+    of_leaf: &mut SpillVec<[u32; 8]>,
+    room: &ScratchSpace,
+) -> Result<SpillVec<Hanging>, StorageError> {
     let mut found = room.sorter::<24>();
     for (i, leaf) in tree.leaves().enumerate() {
         let ids = of_leaf.get(i);

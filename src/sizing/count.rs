@@ -7,14 +7,14 @@ use rayon::prelude::*;
 
 use super::closed::TETS_PER_LOAD;
 use super::field::SizeField;
-use super::integral::{Domain, Skin};
+use super::integral::{Domain, SurfaceSkin};
 use crate::geom::Point;
 
 /// How near to the surface vertices come. No vertex is inserted nearer than 0.25 h to a triangle or 0.71 h to a vertex, but those a
 /// little farther away take up the room as well. With 0.1 and 0.3 h from triangles thin plates of large triangles have a sixth more
 /// and a third fewer tetrahedra; with 0.5 and 0.6 h from vertices half of 42 surfaces are off by more than 3.4 and 4.5 %, and
 /// with 0.55 a thin knot of 1,700 tetrahedra by 16 %.
-const SKIN: Skin = Skin {
+const SKIN: SurfaceSkin = SurfaceSkin {
     triangles: 0.2,
     vertices: 0.57,
 };
@@ -32,7 +32,7 @@ const CHUNK: usize = 4096;
 
 /// Numbers to expect of a mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Counts {
+pub struct TetCounts {
     /// Away from the surface, with all steps of optimization.
     pub inner_tets: f64,
     /// That stand on the surface's triangles, edges and vertices.
@@ -41,7 +41,7 @@ pub struct Counts {
     pub inner_vertices: f64,
 }
 
-impl Counts {
+impl TetCounts {
     pub fn tets(&self) -> f64 {
         self.inner_tets + self.surface_tets
     }
@@ -52,7 +52,7 @@ impl SizeField {
     ///
     /// Measured on 28 surfaces: within 4 % for half of them, within 16 % for all but those of a thousand
     /// tetrahedra and of thin needles alone, which may have a third more than is told.
-    pub fn counts(&self, domain: &Domain) -> Counts {
+    pub fn counts(&self, domain: &Domain) -> TetCounts {
         let load = self.load(domain, SKIN);
         let inner_tets = TETS_PER_LOAD * load;
         let (sides, angles) = domain.sides_and_angles();
@@ -60,7 +60,7 @@ impl SizeField {
         let flat = (2.0 / std::f64::consts::PI * angles - 1.5 * sides).max(0.5 * sides);
         // No more edges are crossed than there are tetrahedra to cross them.
         let crossed = (TETS_PER_CROSSING * self.needles(domain)).min(inner_tets);
-        Counts {
+        TetCounts {
             inner_tets,
             surface_tets: flat + crossed,
             inner_vertices: VERTICES_PER_LOAD * load,

@@ -1,17 +1,17 @@
 //! The size field: built once, read from every thread.
 
 use super::closed::{divide_parameters, metric_length};
+use super::constraints::{SizeConstraint, SizeConstraints};
 use super::corners::Corners;
 use super::options::SizeOptions;
-use super::seeds::{Frame, seeds_of};
+use super::seeds::{OctreeFrame, seeds_of};
 use super::sources::ResolvedSource;
 use super::summary::SizeSummary;
 use super::tree::{DEPTH, LATTICE, LEAF, Leaf, Tree, octant_of};
 use super::values::Maker;
-use super::wishes::{Wish, Wishes};
 use super::{SizingError, summary};
 use crate::geom::{Point, lex_cmp};
-use crate::store::{Column, Fixed, Room};
+use crate::storage::{FrozenSpillVec, ScratchSpace, SpillVec};
 use std::cmp::Ordering;
 
 /// Levels that one look into the jump table replaces: 32,768 entries of 8 bytes stay in cache.
@@ -41,11 +41,11 @@ const WIDTHS_INVERSE: [f64; DEPTH as usize + 1] = {
 /// Outside the surface's box the value of the nearest point of a slightly larger cube.
 #[derive(Clone, Debug)]
 pub struct SizeField {
-    pub(super) frame: Frame,
+    pub(super) frame: OctreeFrame,
     pub(super) beta: f64,
     pub(super) tree: Tree,
     /// Values at the corners of each leaf, in units of the cube's side: one half cache line.
-    pub(super) values: Fixed<[f32; 8]>,
+    pub(super) values: FrozenSpillVec<[f32; 8]>,
     jump: Jump,
     /// Lattice cells per input unit.
     per_lattice: f64,
@@ -56,7 +56,7 @@ pub struct SizeField {
 /// Sizes besides those of the surface's edges and the options.
 #[derive(Clone, Copy, Default)]
 pub struct Further<'a> {
-    pub wishes: &'a [&'a dyn Wish],
+    pub constraints: &'a [&'a dyn SizeConstraint],
     /// One for each vertex of the surface.
     pub at_vertices: Option<&'a [f64]>,
 }
@@ -78,7 +78,7 @@ impl SizeField {
         triangles: &[[u32; 3]],
         options: &SizeOptions,
     ) -> Result<Self, SizingError> {
-        let room = Room::boundless();
+        let room = ScratchSpace::boundless();
         Ok(Self::build_with(points, triangles, options, &Further::default(), &room)?.0)
     }
 
@@ -86,13 +86,13 @@ impl SizeField {
     ///
     /// # Errors
     /// As [`SizeField::build`]; a wish that is no size somewhere in the surface's box. A scratch file that fails unwinds
-    /// ([`attempt`](crate::store::attempt)).
+    /// ([`attempt`](crate::storage::attempt)).
     pub fn build_with(
         points: &[Point],
         triangles: &[[u32; 3]],
         options: &SizeOptions,
         further: &Further,
-        room: &Room,
+        room: &ScratchSpace,
     ) -> Result<(Self, SizeSummary), SizingError> {
         let (frame, bounds, mut seeds) = seeds_of(points, triangles, room)?;
         if let Some(h) = further.at_vertices {
@@ -100,22 +100,22 @@ impl SizeField {
         }
         let targets = options.resolve(bounds.diagonal())?;
         let scaled = targets.scaled(1.0 / frame.side);
-        let mut list = further.wishes.to_vec();
-        list.extend(options.formula.iter().map(|f| f as &dyn Wish));
-        let wishes = Wishes {
+        let mut list = further.constraints.to_vec();
+        list.extend(options.formula.iter().map(|f| f as &dyn SizeConstraint));
+        let constraints = SizeConstraints {
             list: &list,
             frame,
             bounds,
             least: scaled.hmin.unwrap_or(0.0),
         };
-        let tree = Tree::build(&seeds, &scaled, &wishes)?;
+        let tree = Tree::build(&seeds, &scaled, &constraints)?;
         let mut corners = Corners::of(&tree, room);
         let mut maker = Maker {
             tree: &tree,
             corners: &mut corners,
             seeds: &seeds,
             beta: scaled.beta,
-            wishes: &wishes,
+            constraints: &constraints,
             room,
         };
         let h = maker.values(&scaled)?;
@@ -142,12 +142,12 @@ impl SizeField {
 
     /// The field of these sizes at the corners of leaves.
     pub(super) fn of_corners(
-        frame: Frame,
+        frame: OctreeFrame,
         beta: f64,
         tree: Tree,
         mut corners: Corners,
-        mut h: Column<f32>,
-        room: &Room,
+        mut h: SpillVec<f32>,
+        room: &ScratchSpace,
     ) -> Self {
         let mut values = room.list_within(Self::share_of(room.cap()));
         for i in 0..corners.of_leaf.len() {
@@ -166,7 +166,12 @@ impl SizeField {
         (bytes / SHARE).max(SHARE_MIN)
     }
 
-    pub(super) fn from_parts(frame: Frame, beta: f64, tree: Tree, values: Fixed<[f32; 8]>) -> Self {
+    pub(super) fn from_parts(
+        frame: OctreeFrame,
+        beta: f64,
+        tree: Tree,
+        values: FrozenSpillVec<[f32; 8]>,
+    ) -> Self {
         let jump = Jump::new(&tree);
         Self {
             frame,

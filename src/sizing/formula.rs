@@ -1,7 +1,7 @@
 //! Sizes by an expression in x, y and z.
 
 use super::SizingError;
-use super::wishes::Wish;
+use super::constraints::SizeConstraint;
 use crate::expr::{Expression, Kind};
 use crate::geom::Point;
 
@@ -41,7 +41,7 @@ impl PartialEq for Formula {
     }
 }
 
-impl Wish for Formula {
+impl SizeConstraint for Formula {
     fn h(&self, p: Point) -> Result<f64, SizingError> {
         let h = self.expression.number(&p.to_array());
         // Sizes are kept in single precision, in units of the surface's extent.

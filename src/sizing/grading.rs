@@ -4,7 +4,7 @@ use super::bits::Bits;
 use super::corners::Corners;
 use super::tree::{Leaf, Tree};
 use super::values::PAIRS;
-use crate::store::{Column, stop_if_requested};
+use crate::storage::{SpillVec, check_cancelled};
 
 /// Rounds of grading and closing hanging corners. The last ones change little; each costs as much as
 /// the first.
@@ -13,7 +13,7 @@ const GRADE_ROUNDS: u32 = 4;
 /// with more room, and at 1.001 every round finds something left to lower.
 const EXCESS_MAX: f32 = 1.01;
 /// Gives hanging corners their means, where these are known.
-pub(super) fn close_finite(corners: &mut Corners, h: &mut Column<f32>) {
+pub(super) fn close_finite(corners: &mut Corners, h: &mut SpillVec<f32>) {
     for k in 0..corners.hanging.len() {
         let hanging = corners.hanging.get(k);
         let mean = mean_on(hanging.on, h);
@@ -23,7 +23,7 @@ pub(super) fn close_finite(corners: &mut Corners, h: &mut Column<f32>) {
     }
 }
 
-fn mean_on(on: [u32; 4], h: &mut Column<f32>) -> f32 {
+fn mean_on(on: [u32; 4], h: &mut SpillVec<f32>) -> f32 {
     let mut sum = f64::from(h.get(on[0] as usize));
     for &v in &on[1..] {
         sum += f64::from(h.get(v as usize));
@@ -43,14 +43,14 @@ impl Grading<'_> {
     ///
     /// The result is the largest such function below the given values, whatever the order. Sweeps go forward and backward by turns, for
     /// what is lowered is carried along by the sweep that goes its way.
-    pub(super) fn grade(&mut self, h: &mut Column<f32>) {
+    pub(super) fn grade(&mut self, h: &mut SpillVec<f32>) {
         // Corners whose neighbors have not been looked at since they were lowered.
         let mut changed = Bits::new(h.len());
         changed.set_all();
         let mut next = Bits::new(h.len());
         let mut is_backward = false;
         loop {
-            stop_if_requested();
+            check_cancelled();
             let mut sweep = Sweep {
                 of_leaf: &mut self.corners.of_leaf,
                 h,
@@ -78,7 +78,7 @@ impl Grading<'_> {
     ///
     /// A mean above its graded value lowers the largest of the corners it is taken from, none of them
     /// below that value: so the smallest value of all stays what it is.
-    pub(super) fn grade_closed(&mut self, h: &mut Column<f32>) {
+    pub(super) fn grade_closed(&mut self, h: &mut SpillVec<f32>) {
         for _ in 0..GRADE_ROUNDS {
             self.grade(h);
             let mut changed = false;
@@ -103,8 +103,8 @@ impl Grading<'_> {
 
 /// One way through all leaves.
 struct Sweep<'a> {
-    of_leaf: &'a mut Column<[u32; 8]>,
-    h: &'a mut Column<f32>,
+    of_leaf: &'a mut SpillVec<[u32; 8]>,
+    h: &'a mut SpillVec<f32>,
     changed: &'a mut Bits,
     next: &'a mut Bits,
     beta: f64,
@@ -167,7 +167,7 @@ fn relax_once(h: &mut [f32; 8], steps: &[f64; 4]) -> bool {
 
 /// The level at which to cut the values of some corners so that their mean becomes `wanted`, which is
 /// below the present mean.
-fn level_for_mean(on: &[u32], h: &mut Column<f32>, wanted: f32) -> f32 {
+fn level_for_mean(on: &[u32], h: &mut SpillVec<f32>, wanted: f32) -> f32 {
     let mut values = [f64::INFINITY; 4];
     for (value, &corner) in values.iter_mut().zip(on) {
         *value = f64::from(h.get(corner as usize));

@@ -32,7 +32,7 @@ const SHARE_SIZES: f64 = 0.02;
 
 /// How near to the surface no vertex comes, in units of h.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Skin {
+pub struct SurfaceSkin {
     /// To triangles, and to vertices.
     pub triangles: f64,
     pub vertices: f64,
@@ -47,7 +47,7 @@ pub struct Domain<'a> {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Cell {
+struct IntegrationCell {
     leaf: Leaf,
     /// The octree's entry at this cell or above it.
     entry: u32,
@@ -68,7 +68,7 @@ impl SizeField {
     /// Load of the points of `domain` that are outside the skin of its surface.
     ///
     /// Accuracy: about one part in a hundred. The same bits on every machine and for any number of threads.
-    pub fn load(&self, domain: &Domain, skin: Skin) -> f64 {
+    pub fn load(&self, domain: &Domain, skin: SurfaceSkin) -> f64 {
         let mut sum = Sum {
             field: self,
             domain,
@@ -82,7 +82,7 @@ impl SizeField {
             cut: 0.0,
             sizes: 0.0,
         };
-        sum.add(Cell {
+        sum.add(IntegrationCell {
             leaf: Leaf::ROOT,
             entry: self.tree.root,
             is_inside: false,
@@ -124,13 +124,13 @@ fn range(values: &[f32; 8]) -> [f32; 2] {
 struct Sum<'a> {
     field: &'a SizeField,
     domain: &'a Domain<'a>,
-    skin: Skin,
+    skin: SurfaceSkin,
     ranges: Vec<[f32; 2]>,
     /// Side of the octree's finest cells.
     least: f64,
     heap: BinaryHeap<ByUnknown>,
     /// Cells that the surface passes through and that are not divided: no vertex is near them, or they are the smallest.
-    crossed: Vec<Cell>,
+    crossed: Vec<IntegrationCell>,
     /// Load and volume of cells of which all is known.
     known: f64,
     volume: f64,
@@ -168,7 +168,7 @@ impl Sum<'_> {
     /// where a cell holds many parts of it. What the points tell is corrected by what they tell of the volume, which is known.
     fn of_rest(&self, rest: &[ByUnknown]) -> f64 {
         let (mut load, mut volume) = (0.0, self.volume);
-        let mut crossed: Vec<&Cell> = self.crossed.iter().collect();
+        let mut crossed: Vec<&IntegrationCell> = self.crossed.iter().collect();
         for ByUnknown(cell) in rest {
             if cell.is_crossed {
                 crossed.push(cell);
@@ -192,7 +192,7 @@ impl Sum<'_> {
     }
 
     /// Volume and load of a cell's filled part by the mean of some points in it.
-    fn drawn(&self, cell: &Cell, points: u64) -> [f64; 2] {
+    fn drawn(&self, cell: &IntegrationCell, points: u64) -> [f64; 2] {
         let (field, skin) = (self.field, self.skin);
         let Domain {
             seeker,
@@ -226,7 +226,7 @@ impl Sum<'_> {
         sum.map(|x| x * width * width * width / points as f64)
     }
 
-    fn child(&self, cell: &Cell, octant: usize) -> Cell {
+    fn child(&self, cell: &IntegrationCell, octant: usize) -> IntegrationCell {
         let leaf = cell.leaf.child(octant);
         let entry = match cell.entry & LEAF {
             0 => {
@@ -234,7 +234,7 @@ impl Sum<'_> {
             }
             _ => cell.entry,
         };
-        Cell {
+        IntegrationCell {
             leaf,
             entry,
             ..*cell
@@ -242,7 +242,7 @@ impl Sum<'_> {
     }
 
     /// Keeps a cell whose place is set. Returns the load that went into the heap.
-    fn add(&mut self, mut cell: Cell) -> f64 {
+    fn add(&mut self, mut cell: IntegrationCell) -> f64 {
         if !self.look(&mut cell) {
             self.volume += cell.volume;
             return 0.0;
@@ -261,7 +261,7 @@ impl Sum<'_> {
         cell.load
     }
 
-    fn count(&mut self, cell: &Cell, sign: f64) {
+    fn count(&mut self, cell: &IntegrationCell, sign: f64) {
         match cell.is_cut {
             true => self.cut += sign * cell.unknown * cell.unknown,
             false => self.sizes += sign * cell.unknown,
@@ -269,7 +269,7 @@ impl Sum<'_> {
     }
 
     /// Finds out about a cell; false when no vertices are added in it.
-    fn look(&self, cell: &mut Cell) -> bool {
+    fn look(&self, cell: &mut IntegrationCell) -> bool {
         let field = self.field;
         let width = cell.leaf.side() * field.frame.side;
         let middle =
@@ -286,7 +286,7 @@ impl Sum<'_> {
                 volumes,
                 filled,
             } = *self.domain;
-            let Skin {
+            let SurfaceSkin {
                 triangles,
                 vertices,
             } = self.skin;
@@ -332,7 +332,7 @@ impl Sum<'_> {
     }
 
     /// Bounds on the sizes in a cell.
-    fn sizes(&self, cell: &Cell, middle: Point, reach: f64) -> [f64; 2] {
+    fn sizes(&self, cell: &IntegrationCell, middle: Point, reach: f64) -> [f64; 2] {
         let field = self.field;
         let [low, high] = match cell.entry & LEAF {
             0 => self.ranges[cell.entry as usize],
@@ -374,7 +374,7 @@ impl Sum<'_> {
 }
 
 /// Cells by what is unknown of them, then by place.
-struct ByUnknown(Cell);
+struct ByUnknown(IntegrationCell);
 
 impl ByUnknown {
     fn place(&self) -> ([u32; 3], u32) {

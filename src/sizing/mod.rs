@@ -5,7 +5,7 @@
 //! fine only where sizes differ (`tree`); values on its corners, interpolated from the surface's edges,
 //! joined to the wanted interior size and graded (`values`); trilinear between them (`field`). Boxes, spheres and
 //! cylinders with sizes of their own are formulas beside it (`sources`); expressions (`formula`), sizes of regions (`region`) and of background meshes
-//! (`background`) are brought into the octree when it is made (`wishes`). The least of all counts.
+//! (`background`) are brought into the octree when it is made (`constraints`). The least of all counts.
 //!
 //! How much there is to mesh follows from the field and the surface: the load of what is inside (`integral`), tetrahedra and
 //! vertices to expect (`count`).
@@ -15,12 +15,13 @@
 //!
 //! In memory: about 37 bytes per leaf when built, about four times that while building. `balls,count=1000` has 107,000 leaves, 4.2 MB, 8 bytes for each of
 //! its 506,000 triangles. Of these only the octree's 5 bytes per leaf and, while building, 8 per vertex must be held: the rest is in arrays that go
-//! to scratch files where the room given is too small (`store::Room`). The room and the number of threads change nothing of the field.
+//! to scratch files where the room given is too small (`store::ScratchSpace`). The room and the number of threads change nothing of the field.
 
 mod background;
 mod bits;
 mod closed;
 mod codec;
+mod constraints;
 mod corners;
 mod count;
 mod error;
@@ -36,7 +37,6 @@ mod sources;
 mod summary;
 mod tree;
 mod values;
-mod wishes;
 mod within;
 
 #[cfg(test)]
@@ -44,13 +44,13 @@ mod tests;
 
 pub use background::{Background, BackgroundMesh};
 pub use closed::{TETS_PER_LOAD, divide_parameters, load_of_tet, metric_length};
-pub use count::Counts;
+pub use constraints::SizeConstraint;
+pub use count::TetCounts;
 pub use error::SizingError;
 pub use field::{Further, SizeField};
 pub use formula::Formula;
-pub use integral::{Domain, Skin};
+pub use integral::{Domain, SurfaceSkin};
 pub use options::{Length, RegionSize, SizeOptions};
 pub use region::Region;
 pub use sources::{Shape, SizeSource};
 pub use summary::{Range, SizeSummary, SizeWarning};
-pub use wishes::Wish;

@@ -1,9 +1,9 @@
 //! One size for some of the volumes a surface encloses.
 
 use super::SizingError;
-use super::wishes::Wish;
+use super::constraints::SizeConstraint;
 use crate::geom::Point;
-use crate::store::Room;
+use crate::storage::ScratchSpace;
 use crate::surface::{Seeker, Volumes};
 
 /// Cells at the border of a region are at most this many of its lengths wide.
@@ -29,7 +29,7 @@ impl<'a> Region<'a> {
         is_here: Vec<bool>,
         h: f64,
         beta: f64,
-        room: &Room,
+        room: &ScratchSpace,
     ) -> Self {
         let is_border = |t: u32| {
             let [front, back] = volumes.of_side[t as usize].map(|v| is_here[v as usize]);
@@ -50,7 +50,7 @@ impl<'a> Region<'a> {
     }
 }
 
-impl Wish for Region<'_> {
+impl SizeConstraint for Region<'_> {
     fn h(&self, p: Point) -> Result<f64, SizingError> {
         if self.holds(p) {
             return Ok(self.h);

@@ -2,16 +2,16 @@
 
 use super::SizingError;
 use crate::geom::{Aabb, Point};
-use crate::store::Room;
+use crate::storage::ScratchSpace;
 
 /// The cube of the octree: `low` corner and `side`, in input units.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Frame {
+pub(super) struct OctreeFrame {
     pub(super) low: Point,
     pub(super) side: f64,
 }
 
-impl Frame {
+impl OctreeFrame {
     /// A cube around the box, larger by 2^-10 so that points on the box are inside it.
     pub(super) fn around(bounds: &Aabb) -> Self {
         let extent = (bounds.high - bounds.low).max_element();
@@ -27,7 +27,7 @@ impl Frame {
 #[derive(Debug)]
 pub(super) struct Seeds<'a> {
     points: &'a [Point],
-    frame: Frame,
+    frame: OctreeFrame,
     per_side: f64,
     /// By vertex; zero where no triangle has it.
     h: Vec<f64>,
@@ -80,11 +80,11 @@ impl Seeds<'_> {
 pub(super) fn seeds_of<'a>(
     points: &'a [Point],
     triangles: &[[u32; 3]],
-    room: &Room,
-) -> Result<(Frame, Aabb, Seeds<'a>), SizingError> {
+    room: &ScratchSpace,
+) -> Result<(OctreeFrame, Aabb, Seeds<'a>), SizingError> {
     let corners = triangles.iter().flatten().map(|&v| points[v as usize]);
     let bounds = Aabb::around(corners);
-    let frame = Frame::around(&bounds);
+    let frame = OctreeFrame::around(&bounds);
     let at_once = usize::try_from(room.available() / 4 / 24).unwrap_or(usize::MAX);
     let at_once = at_once.clamp(1 << 16, points.len().max(1 << 16));
     let mut h = vec![0.0; points.len()];

@@ -3,7 +3,7 @@
 use super::field::SizeField;
 use super::options::{Length, SizeOptions, Targets};
 use super::seeds::Seeds;
-use crate::store::{Room, fail};
+use crate::storage::{ScratchSpace, raise};
 use std::fmt;
 
 /// Below this share of the surface's median edge, an interior size is warned about: the surface is
@@ -78,7 +78,7 @@ pub(super) fn of(
     seeds: &Seeds,
     targets: &Targets,
     options: &SizeOptions,
-    room: &Room,
+    room: &ScratchSpace,
 ) -> SizeSummary {
     let side = field.frame.side;
     let all = seeds.vertices().map(|v| (seeds.h(v) * side, 1.0));
@@ -111,7 +111,7 @@ pub(super) fn of(
 }
 
 /// Lowest, weighted median and highest of a list of positive numbers with weights that is not empty.
-fn weighted_range(list: impl Iterator<Item = (f64, f64)>, room: &Room) -> Range {
+fn weighted_range(list: impl Iterator<Item = (f64, f64)>, room: &ScratchSpace) -> Range {
     let mut sorter = room.sorter::<16>();
     let mut total = 0.0;
     for (x, weight) in list {
@@ -119,7 +119,7 @@ fn weighted_range(list: impl Iterator<Item = (f64, f64)>, room: &Room) -> Range 
         // Positive numbers sort as their bits do.
         let key = u128::from(x.to_bits()) << 64 | u128::from(weight.to_bits());
         let pushed = sorter.push(key.to_be_bytes());
-        pushed.unwrap_or_else(|e| fail(e));
+        pushed.unwrap_or_else(|e| raise(e));
     }
     let mut sum = 0.0;
     let mut range = Range {
@@ -127,8 +127,8 @@ fn weighted_range(list: impl Iterator<Item = (f64, f64)>, room: &Room) -> Range 
         median: f64::NAN,
         high: 0.0,
     };
-    for key in sorter.finish().unwrap_or_else(|e| fail(e)) {
-        let key = u128::from_be_bytes(key.unwrap_or_else(|e| fail(e)));
+    for key in sorter.finish().unwrap_or_else(|e| raise(e)) {
+        let key = u128::from_be_bytes(key.unwrap_or_else(|e| raise(e)));
         let [x, weight] = [(key >> 64) as u64, key as u64].map(f64::from_bits);
         let is_below = sum < 0.5 * total;
         sum += weight;

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::geom::Point;
-use crate::store::Room;
+use crate::storage::ScratchSpace;
 use crate::surface::{Seeker, Surface, Volumes};
 
 /// A small generator for test points; the seed is printed by what fails.
@@ -188,7 +188,7 @@ fn interior_size_is_joined_to_the_surface() {
 fn steep_surfaces_are_followed() {
     let steep = graded(50.0, 60);
     let field = build(&steep, &SizeOptions::default());
-    let (_, _, seeds) = seeds::seeds_of(&steep.0, &steep.1, &Room::boundless()).unwrap();
+    let (_, _, seeds) = seeds::seeds_of(&steep.0, &steep.1, &ScratchSpace::boundless()).unwrap();
     let all: Vec<u32> = seeds.vertices().collect();
     let side = field.frame.side;
     let (mut near, mut ratio_low, mut ratio_high) = (0, f64::INFINITY, 0.0f64);
@@ -273,7 +273,11 @@ fn equal_bits_in_a_room_too_small() {
         (&steep, options(Some("5%"), Some("0.5%"), Some("9%"))),
         (&even, formula("0.02 + 0.1*abs(x - 0.4)")),
     ] {
-        let [wide, narrow] = [Room::boundless(), Room::new(1 << 16, dir.path())].map(|room| {
+        let [wide, narrow] = [
+            ScratchSpace::boundless(),
+            ScratchSpace::new(1 << 16, dir.path()),
+        ]
+        .map(|room| {
             let (points, triangles) = surface;
             let further = Further::default();
             SizeField::build_with(points, triangles, &options, &further, &room).unwrap()
@@ -289,7 +293,8 @@ fn equal_bits_in_a_room_too_small() {
             let p = sampled.point();
             assert_eq!(wide.0.h(p).to_bits(), narrow.0.h(p).to_bits());
         }
-        let read = SizeField::from_bytes_in(&wide.0.to_bytes(), &Room::new(1 << 16, dir.path()));
+        let read =
+            SizeField::from_bytes_in(&wide.0.to_bytes(), &ScratchSpace::new(1 << 16, dir.path()));
         assert_eq!(read.unwrap().to_bytes(), wide.0.to_bytes());
     }
     assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
@@ -408,7 +413,7 @@ fn loads_are_integrals() {
                 .map(|&p| field.h(p).powi(-3))
                 .sum();
             let expected = sum / points.len() as f64;
-            let skin = Skin {
+            let skin = SurfaceSkin {
                 triangles: skin,
                 vertices: 0.0,
             };
@@ -470,7 +475,7 @@ fn summaries_say_where_sizes_came_from() {
         &triangles,
         &asked,
         &Further::default(),
-        &Room::boundless(),
+        &ScratchSpace::boundless(),
     )
     .unwrap();
     let text = summary.to_string();

@@ -4,9 +4,9 @@
 //! integer lattice of 2^20 per axis; octants and corners are numbered x + 2y + 4z.
 
 use super::SizingError;
+use super::constraints::SizeConstraints;
 use super::options::Targets;
 use super::seeds::Seeds;
-use super::wishes::Wishes;
 use crate::geom::Point;
 use rayon::prelude::*;
 
@@ -91,14 +91,14 @@ impl Tree {
     pub(super) fn build(
         seeds: &Seeds,
         targets: &Targets,
-        wishes: &Wishes,
+        constraints: &SizeConstraints,
     ) -> Result<Self, SizingError> {
         let all: Vec<u32> = seeds.vertices().collect();
         let shape = shape_of(Leaf::ROOT, &all, seeds, targets);
         drop(all);
         let mut tree = Self::from_shape(&shape);
         drop(shape);
-        wishes.refine(&mut tree)?;
+        constraints.refine(&mut tree)?;
         tree.balance()?;
         Ok(tree.numbered())
     }

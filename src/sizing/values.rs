@@ -2,14 +2,14 @@
 
 use super::SizingError;
 use super::bits::Bits;
+use super::constraints::SizeConstraints;
 use super::corners::Corners;
 use super::grading::{Grading, bound, close_finite};
 use super::options::Targets;
 use super::seeds::Seeds;
 use super::tree::{LATTICE, Leaf, Tree};
-use super::wishes::Wishes;
 use crate::geom::Point;
-use crate::store::{Column, Room, fail, stop_if_requested};
+use crate::storage::{ScratchSpace, SpillVec, check_cancelled, raise};
 
 /// Rounds of averaging that smooth what was filled in. The graph is shallow (cells grow with the
 /// distance to the surface), so values are within 2 % of the limit after these.
@@ -47,14 +47,14 @@ pub(super) struct Maker<'a> {
     pub corners: &'a mut Corners,
     pub seeds: &'a Seeds<'a>,
     pub beta: f64,
-    pub wishes: &'a Wishes<'a>,
-    pub room: &'a Room,
+    pub constraints: &'a SizeConstraints<'a>,
+    pub room: &'a ScratchSpace,
 }
 
 impl Maker<'_> {
     /// Sizes at all corners, in units of the root's side, no steeper than the gradation along any line
     /// between two corners of a leaf.
-    pub(super) fn values(&mut self, targets: &Targets) -> Result<Column<f32>, SizingError> {
+    pub(super) fn values(&mut self, targets: &Targets) -> Result<SpillVec<f32>, SizingError> {
         let (mut gathered, nearest) = self.gather(targets.any());
         let cones = nearest.map(|nearest| self.cones(&mut gathered, nearest));
         let mut h = match targets.hsiz {
@@ -67,20 +67,21 @@ impl Maker<'_> {
                 h.set(i, wanted.max(lower.get(i)).min(upper.get(i)));
             }
         }
-        self.wishes.lower(self.tree, self.corners, &mut h)?;
+        self.constraints.lower(self.tree, self.corners, &mut h)?;
         self.grading().grade_closed(&mut h);
         Ok(h)
     }
 
     /// Sizes at all corners that are those of the wishes, joined to the seeds' sizes by the gradation: near the seeds neither
     /// finer nor coarser than it allows. Where nothing is wished, what is wished around it.
-    pub(super) fn values_within(&mut self) -> Result<Column<f32>, SizingError> {
+    pub(super) fn values_within(&mut self) -> Result<SpillVec<f32>, SizingError> {
         let (mut gathered, nearest) = self.gather(true);
         let cones = nearest.map(|nearest| self.cones(&mut gathered, nearest));
         drop(gathered);
-        let mut wished = self.room.column(self.corners.n_corners, f32::INFINITY);
-        self.wishes.lower(self.tree, self.corners, &mut wished)?;
-        let mut h = self.fill(wished);
+        let mut constrained = self.room.column(self.corners.n_corners, f32::INFINITY);
+        self.constraints
+            .lower(self.tree, self.corners, &mut constrained)?;
+        let mut h = self.fill(constrained);
         if let Some([mut lower, mut upper]) = cones {
             for i in 0..h.len() {
                 h.change(i, |h| *h = h.max(lower.get(i)).min(upper.get(i)));
@@ -94,19 +95,19 @@ impl Maker<'_> {
     /// and, when asked for, distances from there to the nearest of these seeds.
     ///
     /// Seeds are taken leaf by leaf, those of a leaf in their order. What falls on a hanging corner is handed to the corners it hangs on.
-    fn gather(&mut self, with_nearest: bool) -> (Column<f32>, Option<Column<f64>>) {
+    fn gather(&mut self, with_nearest: bool) -> (SpillVec<f32>, Option<SpillVec<f64>>) {
         let (tree, seeds, n) = (self.tree, self.seeds, self.corners.n_corners);
         let mut by_leaf = self.room.sorter::<8>();
         for v in seeds.vertices() {
             let (leaf, _) = tree.leaf_at(lattice_cell(seeds.at(v)));
             let key = u64::from(leaf) << 32 | u64::from(v);
-            by_leaf.push(key.to_be_bytes()).unwrap_or_else(|e| fail(e));
+            by_leaf.push(key.to_be_bytes()).unwrap_or_else(|e| raise(e));
         }
-        let by_leaf = by_leaf.finish().unwrap_or_else(|e| fail(e));
+        let by_leaf = by_leaf.finish().unwrap_or_else(|e| raise(e));
         let mut sums = self.room.column(n, [0.0f64; 2]);
         let mut nearest = with_nearest.then(|| self.room.column(n, f64::INFINITY));
         for key in by_leaf {
-            let key = u64::from_be_bytes(key.unwrap_or_else(|e| fail(e)));
+            let key = u64::from_be_bytes(key.unwrap_or_else(|e| raise(e)));
             let (at, h) = (seeds.at(key as u32), seeds.h(key as u32));
             let cell = lattice_cell(at);
             let (number, level) = tree.leaf_at(cell);
@@ -154,7 +155,7 @@ impl Maker<'_> {
 
     /// Fills the corners that have no value: fronts of averages of their neighbors, then averaging of all
     /// filled ones among themselves, which tends to the harmonic interpolation.
-    fn fill(&mut self, gathered: Column<f32>) -> Column<f32> {
+    fn fill(&mut self, gathered: SpillVec<f32>) -> SpillVec<f32> {
         let mut h = gathered;
         let mut is_open = Bits::new(h.len());
         for i in 0..h.len() {
@@ -177,7 +178,7 @@ impl Maker<'_> {
         let mut sums = self.room.column(h.len(), [0.0f32; 2]);
         let mut smooth = 0;
         while smooth < FILL_ROUNDS {
-            stop_if_requested();
+            check_cancelled();
             sums.fill([0.0; 2]);
             for k in 0..open.len() {
                 let [leaf, weight] = open.get(k);
@@ -211,7 +212,11 @@ impl Maker<'_> {
     }
 
     /// What the gradation allows beside sizes at some corners, each at a distance from where it holds: the least, the most.
-    fn cones(&mut self, gathered: &mut Column<f32>, mut nearest: Column<f64>) -> [Column<f32>; 2] {
+    fn cones(
+        &mut self,
+        gathered: &mut SpillVec<f32>,
+        mut nearest: SpillVec<f64>,
+    ) -> [SpillVec<f32>; 2] {
         [-1.0f32, 1.0].map(|sign| {
             let mut cone = self.room.column(gathered.len(), f32::INFINITY);
             for i in 0..cone.len() {
@@ -231,7 +236,7 @@ impl Maker<'_> {
 
 /// Adds to the sums at a leaf's corners what its twelve edges bring there.
 #[inline(always)]
-fn average(ids: &[u32; 8], weight: f32, h: &mut Column<f32>, sums: &mut Column<[f32; 2]>) {
+fn average(ids: &[u32; 8], weight: f32, h: &mut SpillVec<f32>, sums: &mut SpillVec<[f32; 2]>) {
     let (mut values, mut here) = ([0.0; 8], [[0.0; 2]; 8]);
     for (k, &id) in ids.iter().enumerate() {
         (values[k], here[k]) = (h.get(id as usize), sums.get(id as usize));

@@ -1,18 +1,18 @@
 //! Sizes of a part that is meshed again: wanted lengths inside, the fixed faces around it as they are.
 
 use super::SizingError;
+use super::constraints::{SizeConstraint, SizeConstraints};
 use super::corners::Corners;
 use super::field::SizeField;
 use super::options::Targets;
 use super::seeds::seeds_of;
 use super::tree::Tree;
 use super::values::Maker;
-use super::wishes::{Wish, Wishes};
 use crate::geom::Point;
-use crate::store::Room;
+use crate::storage::ScratchSpace;
 
 impl SizeField {
-    /// The field of `wish` inside a skin that stays: triangles index points.
+    /// The field of `constraint` inside a skin that stays: triangles index points.
     ///
     /// Near the skin lengths are those of its edges, away from it they tend to the wish as the slope `beta` allows, to smaller ones as
     /// well as to larger ones. Where the wish is infinite (outside of what it knows) sizes are those around it.
@@ -22,13 +22,13 @@ impl SizeField {
     pub fn within(
         points: &[Point],
         triangles: &[[u32; 3]],
-        wish: &dyn Wish,
+        constraint: &dyn SizeConstraint,
         beta: f64,
     ) -> Result<Self, SizingError> {
-        let room = &Room::boundless();
+        let room = &ScratchSpace::boundless();
         let (frame, bounds, seeds) = seeds_of(points, triangles, room)?;
-        let wishes = Wishes {
-            list: &[wish],
+        let constraints = SizeConstraints {
+            list: &[constraint],
             frame,
             bounds,
             least: 0.0,
@@ -40,14 +40,14 @@ impl SizeField {
             hmax: None,
             beta,
         };
-        let tree = Tree::build(&seeds, &along_skin, &wishes)?;
+        let tree = Tree::build(&seeds, &along_skin, &constraints)?;
         let mut corners = Corners::of(&tree, room);
         let mut maker = Maker {
             tree: &tree,
             corners: &mut corners,
             seeds: &seeds,
             beta,
-            wishes: &wishes,
+            constraints: &constraints,
             room,
         };
         let h = maker.values_within()?;
@@ -61,7 +61,7 @@ mod tests {
 
     struct Constant(f64);
 
-    impl Wish for Constant {
+    impl SizeConstraint for Constant {
         fn h(&self, _: Point) -> Result<f64, SizingError> {
             Ok(self.0)
         }
@@ -95,22 +95,25 @@ mod tests {
     fn sizes_go_from_the_skin_to_the_wish_at_the_slope() {
         let (points, triangles) = skin();
         let beta = 1.3f64.ln();
-        for wish in [0.03, 0.1, 0.2] {
-            let field = SizeField::within(&points, &triangles, &Constant(wish), beta);
+        for constraint in [0.03, 0.1, 0.2] {
+            let field = SizeField::within(&points, &triangles, &Constant(constraint), beta);
             let field = field.expect("a good skin");
             let middle = field.h(Point::splat(0.5));
             let reach = 0.5 * beta;
-            let expected = wish.clamp(0.11 - reach, 0.11 + reach);
-            assert!((middle / expected - 1.0).abs() < 0.15, "{wish}: {middle}");
+            let expected = constraint.clamp(0.11 - reach, 0.11 + reach);
+            assert!(
+                (middle / expected - 1.0).abs() < 0.15,
+                "{constraint}: {middle}"
+            );
             for y in [0.21, 0.5, 0.77] {
                 let at_skin = field.h(Point::new(0.0, y, 0.45));
-                assert!((0.08..0.14).contains(&at_skin), "{wish}: {at_skin}");
+                assert!((0.08..0.14).contains(&at_skin), "{constraint}: {at_skin}");
             }
             let mut before = None::<f64>;
             for i in 0..=200 {
                 let h = field.h(Point::new(f64::from(i) * 0.005, 0.5, 0.5));
                 if let Some(before) = before {
-                    assert!((h - before).abs() < 1.75 * beta * 0.005, "{wish} {i}");
+                    assert!((h - before).abs() < 1.75 * beta * 0.005, "{constraint} {i}");
                 }
                 before = Some(h);
             }

@@ -1,68 +1,76 @@
-use std::io::ErrorKind;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use tetdb_schema::page::PageError;
 use thiserror::Error;
 
-/// What can go wrong between memory and disk.
+use crate::sealed::SealedError;
+use crate::storage::StorageError;
+
+/// Errors of opening, reading and changing a store.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum StoreError {
-    /// The operating system or redb refused a read or write.
-    #[error("{path}: {source}")]
-    Database {
-        path: PathBuf,
-        #[source]
-        source: Box<redb::Error>,
-    },
-    /// The file is open for writing elsewhere.
-    #[error("{path} is being written by another process")]
+    /// Another process writes the store.
+    #[error("{path} is being written by another process; wait for it, or stop it")]
     Busy { path: PathBuf },
-    /// The disk has no room for what must be written.
-    #[error("no space left to write {path}")]
-    Full { path: PathBuf },
-    /// redb could not follow its own tree.
-    #[error("{path} is damaged: {reason}")]
-    Damaged { path: PathBuf, reason: String },
-    /// A page is not what its address says.
-    #[error("{path} is damaged: {source}")]
-    Page {
+    /// There is nothing at this path.
+    #[error("there is no store at {path}")]
+    NotFound { path: PathBuf },
+    /// There is something else at this path.
+    #[error("{path} exists and is not a store: {reason}")]
+    NotOurs { path: PathBuf, reason: &'static str },
+    /// A finished store is already there.
+    #[error("{path} is already a finished store")]
+    Finished { path: PathBuf },
+    /// A store is there whose creation was interrupted.
+    #[error("{path} is an unfinished store")]
+    Unfinished { path: PathBuf },
+    /// The store is of another format version.
+    #[error("{path} has format version {found}, this program reads version {expected}")]
+    Format {
         path: PathBuf,
-        #[source]
-        source: PageError,
+        expected: u16,
+        found: u16,
     },
-    /// A page that must exist does not.
-    #[error("{path} is damaged: {what} is missing")]
-    Missing { path: PathBuf, what: String },
-    /// A file operation outside redb failed.
-    #[error("{path}: {source}")]
-    Io {
+    /// The catalog lists no such sub-domain.
+    #[error("{path} has no sub-domain {subdomain}")]
+    NoSubdomain { path: PathBuf, subdomain: u32 },
+    /// The sub-domain's coarse snapshot was not kept.
+    #[error(
+        "{path} has no coarse snapshot of sub-domain {subdomain}, from which it could be meshed again"
+    )]
+    NoCoarseSnapshot { path: PathBuf, subdomain: u32 },
+    /// A row of the catalog cannot be what was written.
+    #[error("{path} is damaged: catalog row {key:016x} {reason}")]
+    Row {
         path: PathBuf,
-        #[source]
-        source: std::io::Error,
+        key: u64,
+        reason: String,
     },
-    /// The ledger has no bytes left for a demand.
-    #[error("{what} needs {needed} bytes, the memory budget has {available} left")]
-    Budget {
-        what: &'static str,
-        needed: u64,
-        available: u64,
-    },
-    /// More records than 30-bit ids can name.
-    #[error("a sub-domain cannot hold more than 2^30 {what}")]
-    TooMany { what: &'static str },
-    /// The user asked to stop; the step in flight is lost, everything before it is kept.
-    #[error("stopped")]
-    Stopped,
+    /// The file of a sub-domain.
+    #[error(transparent)]
+    Sealed(#[from] SealedError),
+    /// The files of the store.
+    #[error(transparent)]
+    Storage(StorageError),
 }
 
 impl StoreError {
-    /// Wraps a failed operation on `path`.
-    pub(crate) fn io(path: &Path, source: std::io::Error) -> Self {
-        let path = path.to_owned();
-        match source.kind() {
-            ErrorKind::StorageFull | ErrorKind::QuotaExceeded => Self::Full { path },
-            _ => Self::Io { path, source },
+    /// Whether what is on disk is not what was written.
+    pub fn is_damage(&self) -> bool {
+        match self {
+            Self::Row { .. } => true,
+            Self::Sealed(error) => error.is_damage(),
+            Self::Storage(error) => error.is_damage(),
+            _ => false,
+        }
+    }
+}
+
+impl From<StorageError> for StoreError {
+    fn from(error: StorageError) -> Self {
+        match error {
+            StorageError::Busy { path } => Self::Busy { path },
+            other => Self::Storage(other),
         }
     }
 }

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::geom::{Aabb, HilbertFrame, Point};
-use crate::store::{Fixed, Room, fail};
+use crate::storage::{FrozenSpillVec, ScratchSpace, raise};
 
 /// Things in one leaf.
 const LEAF: usize = 4;
@@ -19,11 +19,11 @@ const AT_ONCE: usize = 1 << 16;
 #[derive(Clone, Debug)]
 pub struct BoxTree {
     /// Numbers in curve order.
-    pub order: Fixed<u32>,
+    pub order: FrozenSpillVec<u32>,
     /// Their boxes, in the same order.
-    pub boxes: Fixed<Aabb>,
+    pub boxes: FrozenSpillVec<Aabb>,
     /// `levels[0]` are the leaves; a node of level k + 1 holds `ARITY` nodes of level k.
-    pub levels: Vec<Fixed<Aabb>>,
+    pub levels: Vec<FrozenSpillVec<Aabb>>,
 }
 
 impl BoxTree {
@@ -33,7 +33,7 @@ impl BoxTree {
     pub fn new(
         bounds: &Aabb,
         n: u32,
-        room: &Room,
+        room: &ScratchSpace,
         keep: impl Fn(u32) -> bool + Sync,
         box_of: impl Fn(u32) -> Aabb + Sync,
     ) -> Self {
@@ -53,17 +53,17 @@ impl BoxTree {
                 })
                 .collect();
             for key in keys {
-                sorter.push(key).unwrap_or_else(|e| fail(e));
+                sorter.push(key).unwrap_or_else(|e| raise(e));
             }
         }
-        let mut sorted = sorter.finish().unwrap_or_else(|e| fail(e));
+        let mut sorted = sorter.finish().unwrap_or_else(|e| raise(e));
         let (mut order, mut boxes) = (room.list(), room.list());
         loop {
             let some: Vec<u32> = sorted
                 .by_ref()
                 .take(AT_ONCE)
                 .map(|key| {
-                    let key = key.unwrap_or_else(|e| fail(e));
+                    let key = key.unwrap_or_else(|e| raise(e));
                     u32::from_be_bytes([key[8], key[9], key[10], key[11]])
                 })
                 .collect();
@@ -122,7 +122,11 @@ impl BoxTree {
     }
 }
 
-fn enclose(boxes: &Fixed<Aabb>, group: usize, room: &Room) -> Fixed<Aabb> {
+fn enclose(
+    boxes: &FrozenSpillVec<Aabb>,
+    group: usize,
+    room: &ScratchSpace,
+) -> FrozenSpillVec<Aabb> {
     let mut around = room.list();
     for first in (0..boxes.len()).step_by(group) {
         let group = first..(first + group).min(boxes.len());

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::{BoxTree, Surface};
 use crate::geom::Aabb;
-use crate::store::Room;
+use crate::storage::ScratchSpace;
 
 /// Leaves one task handles.
 const BLOCK: usize = 256;
@@ -18,7 +18,7 @@ const FOUND_MAX: u64 = 10_000_000;
 /// A tree over the triangles that `keep` accepts.
 pub(super) fn tree_of(
     surface: &Surface,
-    room: &Room,
+    room: &ScratchSpace,
     keep: impl Fn(u32) -> bool + Sync,
 ) -> BoxTree {
     let box_of = |t: u32| Aabb::around(surface.corners(t));

@@ -3,8 +3,8 @@
 use rayon::prelude::*;
 
 use super::Surface;
-use super::rims::{in_line, open_groups};
-use crate::store::{Column, Room, fail};
+use super::boundary_loops::{in_line, open_groups};
+use crate::storage::{ScratchSpace, SpillVec, raise};
 
 /// What edges alone tell about a surface.
 ///
@@ -43,7 +43,7 @@ impl Closedness {
 
 /// Looks at the edges of a surface. Near-linear: two sorts; memory 16 bytes per triangle and 12 per edge use.
 pub fn closedness(surface: &Surface) -> Closedness {
-    Facets::of(surface, &Room::boundless()).closedness(surface)
+    Facets::of(surface, &ScratchSpace::boundless()).closedness(surface)
 }
 
 /// The triangles that count: collapsed ones and repetitions set apart.
@@ -52,7 +52,7 @@ pub(super) struct Facets {
     pub duplicates: Vec<[u32; 2]>,
     pub two_sided: Vec<[u32; 2]>,
     /// Uses of edges by facets, sorted by edge.
-    uses: Column<EdgeUse>,
+    uses: SpillVec<EdgeUse>,
     /// Per triangle: not the first of its vertices, or a vertex repeated.
     pub is_left_out: Vec<bool>,
 }
@@ -114,7 +114,7 @@ pub(super) fn same_direction(surface: &Surface, a: EdgeUse, b: EdgeUse) -> bool 
 
 impl Facets {
     /// A scratch file that fails unwinds.
-    pub fn of(surface: &Surface, room: &Room) -> Self {
+    pub fn of(surface: &Surface, room: &ScratchSpace) -> Self {
         let degenerate: Vec<(u32, bool)> = (0..surface.n_triangles() as u32)
             .into_par_iter()
             .filter_map(|t| collapse(surface, t).map(|repeated| (t, repeated)))
@@ -136,12 +136,12 @@ impl Facets {
                     half: 4 * t + k,
                 };
                 let pushed = sorter.push(edge_use.to_bytes());
-                pushed.unwrap_or_else(|e| fail(e));
+                pushed.unwrap_or_else(|e| raise(e));
             }
         }
         let mut uses = room.list();
-        for bytes in sorter.finish().unwrap_or_else(|e| fail(e)) {
-            uses.push(EdgeUse::from_bytes(bytes.unwrap_or_else(|e| fail(e))));
+        for bytes in sorter.finish().unwrap_or_else(|e| raise(e)) {
+            uses.push(EdgeUse::from_bytes(bytes.unwrap_or_else(|e| raise(e))));
         }
         let uses = uses.done();
         Self {
@@ -218,7 +218,7 @@ fn collapse(surface: &Surface, t: u32) -> Option<bool> {
 fn repetitions(
     surface: &Surface,
     is_left_out: &mut [bool],
-    room: &Room,
+    room: &ScratchSpace,
 ) -> (Vec<[u32; 2]>, Vec<[u32; 2]>) {
     let mut sorter = room.sorter::<16>();
     for (t, triangle) in (0u32..).zip(&surface.triangles) {
@@ -230,14 +230,14 @@ fn repetitions(
                 place.copy_from_slice(&x.to_be_bytes());
             }
             let pushed = sorter.push(record);
-            pushed.unwrap_or_else(|e| fail(e));
+            pushed.unwrap_or_else(|e| raise(e));
         }
     }
     let (mut duplicates, mut two_sided) = (Vec::new(), Vec::new());
     // Of the set at hand: its vertices, the first triangle, the first one of the other orientation.
     let mut set = None::<([u8; 12], u32, Option<u32>)>;
-    for key in sorter.finish().unwrap_or_else(|e| fail(e)) {
-        let key = key.unwrap_or_else(|e| fail(e));
+    for key in sorter.finish().unwrap_or_else(|e| raise(e)) {
+        let key = key.unwrap_or_else(|e| raise(e));
         let [vertices @ .., a, b, c, d] = key;
         let t = u32::from_be_bytes([a, b, c, d]);
         let Some((_, first, opposite)) = set.as_mut().filter(|set| set.0 == vertices) else {

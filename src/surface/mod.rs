@@ -3,12 +3,13 @@
 //! Reading order: [`triangles`](Surface) (what a surface is), `weld` (how readers build one),
 //! `edges` (which triangles meet where), `orientation` (turning triangles the same way), `contact`
 //! (how two triangles touch), `boxes` and `broad` (which pairs to look at), `validate` (all of it together),
-//! `defect` (what can be wrong and what to do about it), `rims` (where it is open), `near` and `repair`
+//! `defect` (what can be wrong and what to do about it), `boundary_loops` (where it is open), `near` and `repair`
 //! (mending on demand), `fitness` (what mesh its triangles allow), `split` (finer triangles of the same surface),
 //! `seek` (distances and what lies above), `volumes` (what is enclosed).
 //!
 //! Is not: file formats (`io`), which volumes are filled (`boundary`).
 
+mod boundary_loops;
 mod boxes;
 mod broad;
 mod contact;
@@ -19,7 +20,6 @@ mod near;
 mod orientation;
 mod point_tree;
 mod repair;
-mod rims;
 mod seek;
 mod split;
 mod triangles;
@@ -30,6 +30,7 @@ mod weld;
 #[cfg(test)]
 mod tests;
 
+pub use boundary_loops::{BoundaryLoop, TJunction, boundary_loops, t_junctions};
 pub use boxes::BoxTree;
 pub use contact::{Contact, ContactKind, contact};
 pub use defect::{Defect, SurfaceError};
@@ -39,7 +40,6 @@ pub use fitness::{Fitness, fitness};
 pub use near::weld_near;
 pub use orientation::{Orientation, orient_alike, orient_alike_in};
 pub use repair::{Closing, Repair, closing, repair};
-pub use rims::{Rim, TJunction, rims, t_junctions};
 pub use seek::{Crossing, Seeker};
 pub use split::{SplitReport, split};
 pub use triangles::{Note, NoteKind, SourceFile, Surface};

@@ -32,7 +32,7 @@ pub(super) fn n_near(surface: &Surface, distance: f64) -> usize {
 
 /// For each point the one it goes to, or itself.
 fn new_ids(surface: &Surface, distance: f64) -> Vec<u32> {
-    let mut kept = Kept::new(surface.bounds().low, distance);
+    let mut kept = Retained::new(surface.bounds().low, distance);
     let points = &surface.points;
     (0..points.len() as u32)
         .map(|v| kept.find_or_keep(v, points))
@@ -44,7 +44,7 @@ fn count_joined(new_ids: &[u32]) -> usize {
 }
 
 /// The points kept so far, in cubes [`CUBE`] times as wide as the distance: what is near lies in at most eight of them, mostly in one.
-struct Kept {
+struct Retained {
     low: Point,
     distance: f64,
     /// Last point of each cube.
@@ -53,7 +53,7 @@ struct Kept {
     before: Vec<u32>,
 }
 
-impl Kept {
+impl Retained {
     fn new(low: Point, distance: f64) -> Self {
         Self {
             low,

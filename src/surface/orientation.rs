@@ -2,7 +2,7 @@
 
 use super::Surface;
 use super::edges::{Facets, Groups, same_direction};
-use crate::store::Room;
+use crate::storage::ScratchSpace;
 
 /// What [`orient_alike`] did.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -22,13 +22,13 @@ pub struct Orientation {
 /// facet's second triangle turns with its first. Effects: exchanges two corners of a turned triangle;
 /// ids, labels and vertices stay.
 pub fn orient_alike(surface: &mut Surface) -> Orientation {
-    orient_alike_in(surface, &Room::boundless())
+    orient_alike_in(surface, &ScratchSpace::boundless())
 }
 
 /// [`orient_alike`] in a room: of a surface that has nothing to be turned, 5 bytes a triangle are held beside it.
 ///
 /// A scratch file that fails unwinds.
-pub fn orient_alike_in(surface: &mut Surface, room: &Room) -> Orientation {
+pub fn orient_alike_in(surface: &mut Surface, room: &ScratchSpace) -> Orientation {
     let mut facets = Facets::of(surface, room);
     if let Some(n_patches) = patches_of_one_way(surface, &mut facets) {
         return Orientation {

@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 
 use super::Surface;
+use super::boundary_loops::{TJunction, has_near_junctions, t_junctions};
 use super::edges::{Closedness, Facets, closedness};
 use super::near::{n_near, weld_near};
 use super::orientation::orient_alike;
-use super::rims::{TJunction, has_near_junctions, t_junctions};
 use super::validate::validate;
 use super::weld::drop_unused_points;
-use crate::store::Room;
+use crate::storage::ScratchSpace;
 
 /// Shares of the box diagonal that [`closing`] tries after none.
 const CLOSING_SHARES: [f64; 7] = [1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3];
@@ -61,7 +61,7 @@ fn mend(surface: &mut Surface, weld: Option<f64>, to_close: bool) -> Repair {
 
 /// Drops triangles without area and repeated ones.
 fn drop_useless(surface: &mut Surface, done: &mut Repair) {
-    let facets = Facets::of(surface, &Room::boundless());
+    let facets = Facets::of(surface, &ScratchSpace::boundless());
     let mut drop = vec![false; surface.n_triangles()];
     for &(t, _) in &facets.degenerate {
         drop[t as usize] = true;

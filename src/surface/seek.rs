@@ -3,7 +3,7 @@
 use super::broad::tree_of;
 use super::{BoxTree, Surface};
 use crate::geom::{Aabb, Point};
-use crate::store::Room;
+use crate::storage::ScratchSpace;
 
 /// A triangle met by a line along z.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,13 +34,17 @@ pub struct Seeker<'a> {
 
 impl<'a> Seeker<'a> {
     pub fn new(surface: &'a Surface) -> Self {
-        Self::of(surface, &Room::boundless(), |_| true)
+        Self::of(surface, &ScratchSpace::boundless(), |_| true)
     }
 
     /// Sees the triangles that `keep` accepts alone.
     ///
     /// A scratch file that fails unwinds, here and later.
-    pub fn of(surface: &'a Surface, room: &Room, keep: impl Fn(u32) -> bool + Sync) -> Self {
+    pub fn of(
+        surface: &'a Surface,
+        room: &ScratchSpace,
+        keep: impl Fn(u32) -> bool + Sync,
+    ) -> Self {
         let tree = tree_of(surface, room, keep);
         Self { surface, tree }
     }

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::geom::Point;
-use crate::store::Room;
+use crate::storage::ScratchSpace;
 
 /// Corners of the unit cube as bits x, y, z; two triangles for each side, seen from outside.
 const CUBE: [[u32; 3]; 12] = [
@@ -443,8 +443,11 @@ fn holes_are_listed_the_longest_first() {
     triangles.remove(11);
     triangles.drain(..2);
     let surface = build(triangles);
-    let rims = rims(&surface, &closedness(&surface));
-    let lengths: Vec<(usize, f64)> = rims.iter().map(|r| (r.n_edges, r.length)).collect();
+    let boundary_loops = boundary_loops(&surface, &closedness(&surface));
+    let lengths: Vec<(usize, f64)> = boundary_loops
+        .iter()
+        .map(|r| (r.n_edges, r.length))
+        .collect();
     // The hole of two triangles and that of one meet in a corner or not at all.
     let total: f64 = lengths.iter().map(|l| l.1).sum();
     assert!(
@@ -495,7 +498,7 @@ fn a_room_too_small_changes_nothing() {
     let apart = build(triangles.into_iter().skip(12).take(12 * 99));
     for surface in [crossing, apart] {
         // The triangles alone take more than that.
-        let narrow = Room::new(16 << 10, dir.path());
+        let narrow = ScratchSpace::new(16 << 10, dir.path());
         assert!(surface.bytes() as u64 > narrow.cap());
         let validation = validate(&surface);
         assert_eq!(validate_in(&surface, &narrow), validation);

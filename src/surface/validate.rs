@@ -1,11 +1,11 @@
 //! Exact validation: everything that keeps a surface from bounding volumes, found and listed.
 
+use super::boundary_loops::{JUNCTION_SHARE, TJunction, t_junctions};
 use super::broad::tree_of;
 use super::contact::{ContactKind, contact};
 use super::edges::{Closedness, Facets};
-use super::rims::{JUNCTION_SHARE, TJunction, t_junctions};
 use super::{Defect, Surface, SurfaceError};
-use crate::store::Room;
+use crate::storage::ScratchSpace;
 
 /// Self-intersections listed at most; all are counted.
 const LISTED_MAX: usize = 100_000;
@@ -63,13 +63,13 @@ impl Validation {
 /// Near-linear time where boxes of triangles overlap few others; about 150 bytes per triangle. Same
 /// result for any number of threads. Orientation is no defect: see [`Closedness::n_inconsistent`].
 pub fn validate(surface: &Surface) -> Validation {
-    validate_in(surface, &Room::boundless())
+    validate_in(surface, &ScratchSpace::boundless())
 }
 
 /// [`validate`] in a room: 6 bytes a triangle are held beside the surface, the rest goes to scratch files where the room is too small.
 ///
-/// A scratch file that fails unwinds ([`attempt`](crate::store::attempt)).
-pub fn validate_in(surface: &Surface, room: &Room) -> Validation {
+/// A scratch file that fails unwinds ([`attempt`](crate::storage::attempt)).
+pub fn validate_in(surface: &Surface, room: &ScratchSpace) -> Validation {
     let mut facets = Facets::of(surface, room);
     let closedness = facets.closedness(surface);
     let t_junctions = match closedness.is_closed() {

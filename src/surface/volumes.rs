@@ -14,7 +14,7 @@ use super::Surface;
 use super::edges::{EdgeUse, Facets, Groups};
 use super::seek::Seeker;
 use crate::geom::{Point, orient_sign};
-use crate::store::Room;
+use crate::storage::ScratchSpace;
 
 /// The number of the unbounded volume.
 pub const OUTSIDE: u32 = 0;
@@ -42,11 +42,11 @@ pub struct Volumes {
 impl Volumes {
     /// Errors: none; sides at open edges are joined, so an open surface encloses nothing.
     pub fn of(seeker: &Seeker) -> Self {
-        Self::of_in(seeker, &Room::boundless())
+        Self::of_in(seeker, &ScratchSpace::boundless())
     }
 
     /// [`Volumes::of`] in a room: 21 bytes a triangle are held at most. A scratch file that fails unwinds.
-    pub fn of_in(seeker: &Seeker, room: &Room) -> Self {
+    pub fn of_in(seeker: &Seeker, room: &ScratchSpace) -> Self {
         let surface = seeker.surface();
         let n = surface.n_triangles();
         let mut facets = Facets::of(surface, room);

@@ -9,7 +9,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use serde_json::Value;
-use tetdb::catalog::Store;
+use tetdb::store::Catalog;
 use tetdb_schema::record::tag;
 
 use super::place::{Done, Place};
@@ -164,8 +164,10 @@ fn half_the_size_changes_one_part_only_and_can_be_undone() {
 
 /// The median length of edges in units of the lengths wanted at their ends, of those farther than twice that from all faces that stay.
 fn metric_median(place: &Place, rank: u32) -> f64 {
-    let mut store = Store::open(place.path("a.tetdb")).expect("a finished store");
-    let mut part = store.subdomain(rank).expect("a sealed sub-domain");
+    let mut store = Catalog::open(place.path("a.tetdb")).expect("a finished store");
+    let mut part = store
+        .open_subdomain(rank, 16 << 20)
+        .expect("a sealed sub-domain");
     let vertices: Vec<_> = part.vertices().map(|v| v.expect("no damage")).collect();
     let skin: Vec<[f64; 3]> = (vertices.iter())
         .filter(|v| v.tag == tag::SURFACE || v.tag == tag::INTERFACE)

@@ -7,7 +7,8 @@
 
 use std::collections::BTreeSet;
 
-use tetdb::catalog::{CoarseLeaf, Store, Subdomain};
+use tetdb::sealed::Subdomain;
+use tetdb::store::Catalog;
 
 use super::place::Place;
 
@@ -29,8 +30,8 @@ fn sorted<const N: usize>(mut corners: [Position; N]) -> [Position; N] {
 fn frozen(place: &Place, rank: u32) -> (BTreeSet<Tet>, BTreeSet<Face>) {
     /// The flag of the attribute that says so.
     const FROZEN: u32 = 1;
-    let mut store = Store::open(place.path("a.tetdb")).expect("a store");
-    let mut leaf = CoarseLeaf::open(store.catalog(), rank, 1 << 20).expect("it was kept");
+    let mut store = Catalog::open(place.path("a.tetdb")).expect("a store");
+    let mut leaf = store.open_coarse(rank, 1 << 20).expect("it was kept");
     let vertices: Vec<Position> = (leaf.vertices())
         .flat_map(|chunk| chunk.expect("sound").records)
         .map(|v| bits(v.point))
@@ -47,8 +48,10 @@ fn frozen(place: &Place, rank: u32) -> (BTreeSet<Tet>, BTreeSet<Face>) {
 }
 
 fn part(place: &Place, rank: u32) -> Subdomain {
-    let mut store = Store::open(place.path("a.tetdb")).expect("a store");
-    store.subdomain(rank).expect("it is finished")
+    let mut store = Catalog::open(place.path("a.tetdb")).expect("a store");
+    store
+        .open_subdomain(rank, 16 << 20)
+        .expect("it is finished")
 }
 
 /// All tetrahedra of a sub-domain, and those with a face on an interface.

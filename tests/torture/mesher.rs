@@ -9,13 +9,14 @@ use std::time::Duration;
 
 use tetdb::audit::{self, Level, VerifyOptions};
 use tetdb::boundary::{BoundaryError, RecoveryReport, RegionPolicy, fill_regions, recover};
-use tetdb::catalog::{Catalog, Job, Store};
 use tetdb::delaunay::{Kernel, enclose, insertion_key};
 use tetdb::geom::{HilbertFrame, orient};
 use tetdb::mesh::{FaceRef, Facet, Mesh, VertexTag};
 use tetdb::pipeline::{self, Options, PipelineError};
-use tetdb::store::{Budget, FlatPages};
+use tetdb::storage::{Budget, FlatPages};
+use tetdb::store::Catalog;
 use tetdb::surface::{Surface, orient_alike, validate};
+use tetdb_schema::catalog::Job;
 
 use super::shape::Shape;
 
@@ -108,7 +109,7 @@ pub fn whole(shape: &Shape, optimize: &str) -> Outcome {
         Err(error) => return Outcome::GaveUp(error.to_string()),
     };
     catalog.close().expect("the store can be closed");
-    let mut store = Store::open(&path).expect("the store was just made");
+    let mut store = Catalog::open(&path).expect("the store was just made");
     let options = VerifyOptions {
         level: Level::Delaunay,
         memory_bytes: 64 << 20,

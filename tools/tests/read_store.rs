@@ -3,10 +3,11 @@
 //! Why: a store must be readable by programs that do not have the mesher.
 //! How: a small mesh in two sub-domains, read by the example and by the library; the example's text names no `tetdb::`.
 
-use tetdb::catalog::{Catalog, Job, Store};
 use tetdb::pipeline::{self, Options};
 use tetdb::samples::SampleSpec;
-use tetdb::store::Budget;
+use tetdb::storage::Budget;
+use tetdb::store::Catalog;
+use tetdb_schema::catalog::Job;
 
 #[path = "../examples/read_store.rs"]
 mod example;
@@ -44,8 +45,8 @@ fn check(seal: &str) -> Result<String, Box<dyn std::error::Error>> {
     catalog.close()?;
 
     let found = example::read(&path)?;
-    let mut store = Store::open(&path)?;
-    let rows = store.catalog().subdomains()?;
+    let mut store = Catalog::open(&path)?;
+    let rows = store.subdomains()?;
     assert_eq!(found.subdomains, 2);
     assert_eq!(found.subdomains, rows.len());
     assert_eq!(found.tets, rows.iter().map(|r| r.tets).sum::<u64>());

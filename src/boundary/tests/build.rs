@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use crate::delaunay::{Kernel, enclose, insertion_key};
 use crate::geom::{Aabb, HilbertFrame, Point, orient};
 use crate::mesh::{FaceRef, Facet, Mesh, VertexTag};
-use crate::store::{FlatPages, Pages};
+use crate::storage::{FlatPages, Pages};
 
 /// The Delaunay mesh of `points` in its box, with `triangles` as facets.
 pub fn delaunay(points: &[Point], triangles: &[[u32; 3]]) -> Mesh<FlatPages> {

@@ -23,7 +23,7 @@ fn orientations_of_exact_points_are_those_of_exact_numbers() {
         });
         // Points over three corners lie in one plane, over all four mostly not.
         let planar = k % 2 == 0;
-        let made: Vec<(Point, Option<ExactPoint>, Exact)> = (0..4)
+        let shapes: Vec<(Point, Option<ExactPoint>, Exact)> = (0..4)
             .map(|i| {
                 let turn = if planar { 3 } else { 4 };
                 let pick = |j: usize| corners[(i + j) % turn];
@@ -56,10 +56,10 @@ fn orientations_of_exact_points_are_those_of_exact_numbers() {
             })
             .collect();
         let placed = [0, 1, 2, 3].map(|i| Placed {
-            point: made[i].0,
-            exact: made[i].1.as_ref(),
+            point: shapes[i].0,
+            exact: shapes[i].1.as_ref(),
         });
-        let truth = orient_truth(&[0, 1, 2, 3].map(|i| made[i].2.clone()));
+        let truth = orient_truth(&[0, 1, 2, 3].map(|i| shapes[i].2.clone()));
         let found = orient_placed(placed).partial_cmp(&0.0);
         assert_eq!(found, Some(truth), "case {k}");
         assert!(!planar || truth == Ordering::Equal, "case {k}");

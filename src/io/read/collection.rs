@@ -50,7 +50,7 @@ fn the_collection_reads_and_validates_as_its_index_says() {
     for row in index.lines().skip(1) {
         let column: Vec<&str> = row.split('\t').collect();
         let (name, class) = (column[0], column[8]);
-        let mut fail = |what: String| wrong.push(format!("{name}: {what}"));
+        let mut raise = |what: String| wrong.push(format!("{name}: {what}"));
         let start = Instant::now();
         let surface = read_surface(&[folder.join(name)]);
         let read_ms = start.elapsed().as_secs_f64() * 1e3;
@@ -59,7 +59,7 @@ fn the_collection_reads_and_validates_as_its_index_says() {
             Err(e) => {
                 println!("{name:34} error[{}]: {e}; {}", e.code(), e.place());
                 if class != "invalid" || !fitting(column[9]).contains(&e.code()) {
-                    fail(format!("refused: {e}"));
+                    raise(format!("refused: {e}"));
                 }
                 continue;
             }
@@ -105,7 +105,7 @@ fn the_collection_reads_and_validates_as_its_index_says() {
             || !same(column[5], t as i64)
             || !same(parts, c.n_components as i64)
         {
-            fail(format!("counts {v} {t} {}", c.n_components));
+            raise(format!("counts {v} {t} {}", c.n_components));
         }
         if class == "invalid" {
             println!("    index: {}", column[9]);
@@ -114,10 +114,10 @@ fn the_collection_reads_and_validates_as_its_index_says() {
                     .iter()
                     .any(|code| codes.iter().any(|(c, _)| c == code))
             }) {
-                fail(format!("found {codes:?}"));
+                raise(format!("found {codes:?}"));
             }
         } else if !found.is_valid() || c.n_inconsistent > 0 || !same(column[7], genus) {
-            fail(format!(
+            raise(format!(
                 "found {codes:?}, {} edges of one direction, genus {genus}",
                 c.n_inconsistent
             ));

@@ -6,7 +6,7 @@ use crate::surface::SurfaceError;
 
 /// A place in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Place {
+pub struct FilePlace {
     /// The file as it was named.
     pub file: String,
     pub spot: Spot,
@@ -15,15 +15,15 @@ pub struct Place {
 /// Where in a file: lines for text (from 1), bytes for binary (from 0).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Spot {
-    Whole,
+    Totals,
     Line(u64),
     Byte(u64),
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for FilePlace {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.spot {
-            Spot::Whole => write!(f, "{}", self.file),
+            Spot::Totals => write!(f, "{}", self.file),
             Spot::Line(n) => write!(f, "{}, line {n}", self.file),
             Spot::Byte(n) => write!(f, "{}, byte {n}", self.file),
         }
@@ -35,58 +35,61 @@ impl fmt::Display for Place {
 #[non_exhaustive]
 pub enum ReadError {
     #[error("the file cannot be read: {reason}")]
-    Unreadable { place: Place, reason: String },
+    Unreadable { place: FilePlace, reason: String },
     #[error("the format of the file is not known")]
-    UnknownFormat { place: Place },
+    UnknownFormat { place: FilePlace },
     #[error("the file ends too early: expected {expected}, found {found}")]
     Truncated {
-        place: Place,
+        place: FilePlace,
         expected: String,
         found: String,
     },
     #[error("expected {expected}, found {found}")]
     Unexpected {
-        place: Place,
+        place: FilePlace,
         expected: String,
         found: String,
     },
     #[error("expected a finite number as {what}, found {found}")]
     NotANumber {
-        place: Place,
+        place: FilePlace,
         what: &'static str,
         found: String,
     },
     #[error("vertex number {index} is out of range, expected {low} to {high}")]
     IndexOutOfRange {
-        place: Place,
+        place: FilePlace,
         index: i64,
         low: i64,
         high: i64,
     },
     #[error("the number of {what} cannot be right: {declared} declared, {found}")]
     CountMismatch {
-        place: Place,
+        place: FilePlace,
         what: &'static str,
         declared: String,
         found: String,
     },
     #[error("a coordinate is too large to compute with exactly: {found:e}, expected below 1e30")]
-    CoordinateRange { place: Place, found: f64 },
+    CoordinateRange { place: FilePlace, found: f64 },
     #[error("{what} cannot be read")]
-    Unsupported { place: Place, what: String },
+    Unsupported { place: FilePlace, what: String },
     #[error("the file holds no triangles")]
-    Empty { place: Place },
+    Empty { place: FilePlace },
     #[error("{what} would take {needed} bytes of memory, more than the {limit} there are for them")]
     TooLarge {
-        place: Place,
+        place: FilePlace,
         what: &'static str,
         needed: u64,
         limit: u64,
     },
     #[error("no file of sizes or no mesh lies beside it: expected {expected}")]
-    Alone { place: Place, expected: String },
+    Alone { place: FilePlace, expected: String },
     #[error("{source}")]
-    Surface { place: Place, source: SurfaceError },
+    Surface {
+        place: FilePlace,
+        source: SurfaceError,
+    },
 }
 
 impl ReadError {
@@ -110,7 +113,7 @@ impl ReadError {
     }
 
     /// Where it happened.
-    pub fn place(&self) -> &Place {
+    pub fn place(&self) -> &FilePlace {
         match self {
             Self::Unreadable { place, .. }
             | Self::UnknownFormat { place }

@@ -2,7 +2,7 @@
 
 use std::io::{BufRead, Cursor, Read};
 
-use super::error::{Place, ReadError, Spot};
+use super::error::{FilePlace, ReadError, Spot};
 use crate::geom::Point;
 use crate::surface::{SurfaceBuilder, SurfaceError};
 
@@ -69,7 +69,7 @@ impl<R: BufRead> Feed<R> {
         &self.file
     }
 
-    pub fn place(&self) -> Place {
+    pub fn place(&self) -> FilePlace {
         place(&self.file, self.binary, self.offset, self.line)
     }
 
@@ -421,9 +421,9 @@ impl<R: BufRead> Feed<R> {
     pub fn finish(&self, builder: &mut SurfaceBuilder) -> Result<()> {
         if builder.n_file_triangles() == 0 {
             return Err(ReadError::Empty {
-                place: Place {
+                place: FilePlace {
                     file: self.file.clone(),
-                    spot: Spot::Whole,
+                    spot: Spot::Totals,
                 },
             });
         }
@@ -467,19 +467,19 @@ impl<R: BufRead> Feed<R> {
     }
 }
 
-fn place(file: &str, binary: bool, offset: u64, line: u64) -> Place {
+fn place(file: &str, binary: bool, offset: u64, line: u64) -> FilePlace {
     let spot = if binary {
         Spot::Byte(offset)
     } else {
         Spot::Line(line)
     };
-    Place {
+    FilePlace {
         file: file.to_owned(),
         spot,
     }
 }
 
-fn broken(place: Place, error: &std::io::Error) -> ReadError {
+fn broken(place: FilePlace, error: &std::io::Error) -> ReadError {
     ReadError::Unreadable {
         place,
         reason: error.to_string(),

@@ -8,14 +8,14 @@ use std::io::BufRead;
 
 use super::feed::{Feed, name};
 use super::gmsh_numbers::{NodeTags, Numbers, Role, need_element_type};
-use super::{ReadError, Result, Target};
+use super::{ReadError, Result, SurfaceSink};
 use crate::geom::Point;
 use crate::surface::NoteKind;
 
 /// What the sections of one file build up together.
 struct Mesh<'a, 'b, R> {
     numbers: Numbers<R>,
-    target: &'a mut Target<'b>,
+    target: &'a mut SurfaceSink<'b>,
     nodes: NodeTags,
     /// Names of the surface groups.
     names: HashMap<i64, String>,
@@ -26,7 +26,7 @@ struct Mesh<'a, 'b, R> {
     n_solids: u64,
 }
 
-pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut Target) -> Result<()> {
+pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
     feed.need_keyword("$MeshFormat")?;
     feed.need_word("the format's version")?;
     let version = match feed.word() {

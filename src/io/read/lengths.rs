@@ -5,7 +5,7 @@
 use std::io::{BufRead, Read};
 use std::path::Path;
 
-use super::error::{Place, ReadError, Spot};
+use super::error::{FilePlace, ReadError, Spot};
 use super::feed::Result;
 use super::open_plain;
 
@@ -18,7 +18,7 @@ const HEAD_MAX: usize = 1 << 16;
 /// # Errors
 /// What is no such file, not one-dimensional, not of 4 or 8 byte floating point numbers; the place of what is no length.
 pub fn read_lengths(path: &Path, limit: u64) -> Result<Vec<f64>> {
-    let place = |spot| Place {
+    let place = |spot| FilePlace {
         file: path.display().to_string(),
         spot,
     };
@@ -91,7 +91,7 @@ pub fn read_lengths(path: &Path, limit: u64) -> Result<Vec<f64>> {
     let needed = n.saturating_mul(8);
     if needed > limit {
         return Err(ReadError::TooLarge {
-            place: place(Spot::Whole),
+            place: place(Spot::Totals),
             what: "the lengths",
             needed,
             limit,
@@ -109,7 +109,7 @@ pub fn read_lengths(path: &Path, limit: u64) -> Result<Vec<f64>> {
         };
         if !(h.is_normal() && h > 0.0) {
             return Err(ReadError::Unexpected {
-                place: place(Spot::Whole),
+                place: place(Spot::Totals),
                 expected: "a length above zero".to_owned(),
                 found: format!("{h} as number {i}"),
             });
@@ -119,7 +119,7 @@ pub fn read_lengths(path: &Path, limit: u64) -> Result<Vec<f64>> {
     if !from.fill_buf().is_ok_and(<[u8]>::is_empty) {
         let found = "more bytes".to_owned();
         return Err(unexpected(
-            Spot::Whole,
+            Spot::Totals,
             "the end of the file behind its last number",
             found,
         ));

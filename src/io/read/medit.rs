@@ -3,7 +3,7 @@
 use std::io::BufRead;
 
 use super::feed::Feed;
-use super::{ReadError, Result, Target};
+use super::{ReadError, Result, SurfaceSink};
 use crate::geom::Point;
 use crate::surface::NoteKind;
 
@@ -16,7 +16,7 @@ const SOLIDS: [&str; 5] = [
     "TetrahedraP2",
 ];
 
-pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut Target) -> Result<()> {
+pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
     feed.comment = Some(b'#');
     feed.need_keyword("MeshVersionFormatted")?;
     feed.integer("the version")?;
@@ -55,7 +55,7 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut Target) -> Result
     feed.finish(target.builder)
 }
 
-fn read_vertices<R: BufRead>(feed: &mut Feed<R>, target: &mut Target) -> Result<u64> {
+fn read_vertices<R: BufRead>(feed: &mut Feed<R>, target: &mut SurfaceSink) -> Result<u64> {
     let n = feed.count("vertices", 8)?;
     for i in 0..n {
         if feed.at_end()? {
@@ -73,7 +73,7 @@ fn read_faces<R: BufRead>(
     what: &'static str,
     n_corners: usize,
     n_vertices: u64,
-    target: &mut Target,
+    target: &mut SurfaceSink,
 ) -> Result<()> {
     let n = feed.count(what, 2 * (n_corners as u64 + 1))?;
     let mut labels = RefLabels::default();
@@ -98,7 +98,7 @@ pub(super) struct RefLabels {
 }
 
 impl RefLabels {
-    pub fn of(&mut self, reference: i64, target: &mut Target) -> u32 {
+    pub fn of(&mut self, reference: i64, target: &mut SurfaceSink) -> u32 {
         match self.last {
             Some((known, label)) if known == reference => label,
             _ => {
@@ -114,7 +114,7 @@ impl RefLabels {
 fn skip_section<R: BufRead>(
     feed: &mut Feed<R>,
     keyword: &str,
-    target: &mut Target,
+    target: &mut SurfaceSink,
 ) -> Result<bool> {
     let solid = SOLIDS.iter().find(|s| s.eq_ignore_ascii_case(keyword));
     let mut first = true;

@@ -13,7 +13,7 @@ use std::io::BufRead;
 
 use super::feed::Feed;
 use super::medit::RefLabels;
-use super::{ReadError, Result, Target};
+use super::{ReadError, Result, SurfaceSink};
 use crate::geom::Point;
 use crate::surface::NoteKind;
 
@@ -136,7 +136,7 @@ impl<R: BufRead> Numbers<R> {
     }
 }
 
-pub(super) fn read<R: BufRead>(feed: Feed<R>, target: &mut Target) -> Result<()> {
+pub(super) fn read<R: BufRead>(feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
     let mut numbers = Numbers::open(feed)?;
     let mut n_vertices = 0;
     numbers.sections(|numbers, keyword| read_section(numbers, keyword, &mut n_vertices, target))?;
@@ -161,7 +161,7 @@ fn read_section<R: BufRead>(
     numbers: &mut Numbers<R>,
     keyword: i64,
     n_vertices: &mut u64,
-    target: &mut Target,
+    target: &mut SurfaceSink,
 ) -> Result<()> {
     let int = numbers.integer_bytes();
     match keyword {
@@ -212,7 +212,7 @@ fn read_faces<R: BufRead>(
     what: &'static str,
     n_corners: usize,
     n_vertices: u64,
-    target: &mut Target,
+    target: &mut SurfaceSink,
 ) -> Result<()> {
     let bytes = numbers.integer_bytes() * (n_corners as u64 + 1);
     let n = numbers.count(what, bytes)?;

@@ -27,7 +27,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
-pub use error::{Place, ReadError, Spot};
+pub use error::{FilePlace, ReadError, Spot};
 use feed::{Feed, Result};
 pub use lengths::read_lengths;
 pub use sizes::{read_sizes, size_files};
@@ -93,7 +93,7 @@ impl Format {
 }
 
 /// What the readers share: the surface being built and how this file's labels are called.
-pub(crate) struct Target<'a> {
+pub(crate) struct SurfaceSink<'a> {
     builder: &'a mut SurfaceBuilder,
     /// The file's name without folder and extension: the label of triangles that have none.
     stem: String,
@@ -101,7 +101,7 @@ pub(crate) struct Target<'a> {
     prefix: Option<String>,
 }
 
-impl Target<'_> {
+impl SurfaceSink<'_> {
     /// The id of label `name`, or of the file's own label when it is empty.
     fn label(&mut self, name: &str) -> u32 {
         match (&self.prefix, name.is_empty()) {
@@ -128,7 +128,7 @@ pub fn read_surface(paths: &[PathBuf]) -> Result<Surface> {
         let stem = stem(path);
         let prefix = (paths.len() > 1).then(|| unique(&stem, &prefixes));
         prefixes.extend(prefix.clone());
-        let mut target = Target {
+        let mut target = SurfaceSink {
             builder: &mut builder,
             stem,
             prefix,
@@ -142,9 +142,9 @@ pub fn read_surface(paths: &[PathBuf]) -> Result<Surface> {
     if extent > 0.0 && extent < EXTENT_MIN {
         let file = paths.first().map(|p| p.display().to_string());
         return Err(ReadError::Surface {
-            place: Place {
+            place: FilePlace {
                 file: file.unwrap_or_default(),
-                spot: Spot::Whole,
+                spot: Spot::Totals,
             },
             source: SurfaceError::TooSmall { extent },
         });
@@ -160,7 +160,7 @@ pub fn read_surface(paths: &[PathBuf]) -> Result<Surface> {
 /// As [`read_surface`].
 pub fn read_memory(format: Format, file: &str, bytes: &[u8]) -> Result<Surface> {
     let mut builder = SurfaceBuilder::new();
-    let mut target = Target {
+    let mut target = SurfaceSink {
         builder: &mut builder,
         stem: stem(Path::new(file)),
         prefix: None,
@@ -200,9 +200,9 @@ fn open(path: &Path) -> Result<Feed<BufReader<File>>> {
 fn open_plain(path: &Path) -> Result<(BufReader<File>, u64)> {
     let name = path.to_string_lossy();
     let unreadable = |reason: String| ReadError::Unreadable {
-        place: Place {
+        place: FilePlace {
             file: name.to_string(),
-            spot: Spot::Whole,
+            spot: Spot::Totals,
         },
         reason,
     };
@@ -214,15 +214,15 @@ fn open_plain(path: &Path) -> Result<(BufReader<File>, u64)> {
     Ok((BufReader::with_capacity(BUFFER_BYTES, file), meta.len()))
 }
 
-fn read_file(path: &Path, target: &mut Target) -> Result<()> {
+fn read_file(path: &Path, target: &mut SurfaceSink) -> Result<()> {
     let feed = open(path)?;
     let format = match Format::of_extension(path) {
         Some(format) => format,
         None => {
             let mut head = Vec::new();
-            let place = Place {
+            let place = FilePlace {
                 file: feed.file().to_owned(),
-                spot: Spot::Whole,
+                spot: Spot::Totals,
             };
             // A second look at the file, because the first bytes are still needed by the reader.
             let sniff = File::open(path).and_then(|f| f.take(64).read_to_end(&mut head));
@@ -243,13 +243,13 @@ fn read_feed<R: BufRead>(
     format: Format,
     feed: Feed<R>,
     nodes: Option<&Path>,
-    target: &mut Target,
+    target: &mut SurfaceSink,
 ) -> Result<()> {
     if feed.len == 0 {
         return Err(ReadError::Empty {
-            place: Place {
+            place: FilePlace {
                 file: feed.file().to_owned(),
-                spot: Spot::Whole,
+                spot: Spot::Totals,
             },
         });
     }

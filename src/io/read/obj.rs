@@ -6,7 +6,7 @@
 use std::io::BufRead;
 
 use super::feed::{Feed, parse, quote};
-use super::{ReadError, Result, Target};
+use super::{ReadError, Result, SurfaceSink};
 use crate::geom::Point;
 use crate::surface::NoteKind;
 
@@ -27,13 +27,13 @@ impl Names {
     }
 }
 
-pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut Target) -> Result<()> {
+pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
     let mut names = Names::default();
     let mut label = None;
     let mut line = Vec::new();
     let mut corners = Vec::new();
     // Vertex numbers beyond those known when they were named, each larger than the one before.
-    let mut ahead: Vec<(u32, super::Place)> = Vec::new();
+    let mut ahead: Vec<(u32, super::FilePlace)> = Vec::new();
     let mut n_lines_points = 0;
     loop {
         let place = feed.place();
@@ -143,7 +143,7 @@ fn read_logical_line<R: BufRead>(feed: &mut Feed<R>, line: &mut Vec<u8>) -> Resu
 }
 
 /// The 0-based vertex of one corner, `known` being the number of vertices so far.
-fn corner(word: &[u8], known: u32, place: &super::Place) -> Result<u32> {
+fn corner(word: &[u8], known: u32, place: &super::FilePlace) -> Result<u32> {
     let number = word.split(|&b| b == b'/').next().unwrap_or_default();
     let index: i64 = parse(number).ok_or_else(|| not_a_number(place, "a vertex number", word))?;
     let zero_based = if index > 0 {
@@ -162,7 +162,7 @@ fn corner(word: &[u8], known: u32, place: &super::Place) -> Result<u32> {
     }
 }
 
-fn unexpected(place: &super::Place, expected: &str, found: &[u8]) -> ReadError {
+fn unexpected(place: &super::FilePlace, expected: &str, found: &[u8]) -> ReadError {
     ReadError::Unexpected {
         place: place.clone(),
         expected: expected.to_owned(),
@@ -170,7 +170,7 @@ fn unexpected(place: &super::Place, expected: &str, found: &[u8]) -> ReadError {
     }
 }
 
-fn not_a_number(place: &super::Place, what: &'static str, found: &[u8]) -> ReadError {
+fn not_a_number(place: &super::FilePlace, what: &'static str, found: &[u8]) -> ReadError {
     ReadError::NotANumber {
         place: place.clone(),
         what,

@@ -6,10 +6,10 @@
 use std::io::BufRead;
 
 use super::feed::Feed;
-use super::{Result, Target};
+use super::{Result, SurfaceSink};
 use crate::geom::Point;
 
-pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut Target) -> Result<()> {
+pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
     feed.comment = Some(b'#');
     feed.need_word("`OFF`")?;
     let header = feed.word().to_ascii_uppercase();

@@ -3,7 +3,7 @@
 use std::io::BufRead;
 
 use super::feed::{Feed, parse};
-use super::{ReadError, Result, Target};
+use super::{ReadError, Result, SurfaceSink};
 use crate::geom::Point;
 
 #[derive(Clone, Copy, PartialEq)]
@@ -71,7 +71,7 @@ struct Header {
     elements: Vec<Element>,
 }
 
-pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut Target) -> Result<()> {
+pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
     let header = read_header(&mut feed)?;
     feed.binary = header.encoding != Encoding::Text;
     let n_vertices = header
@@ -276,7 +276,7 @@ fn read_vertices<R: BufRead>(
     encoding: Encoding,
     element: &Element,
     n: u64,
-    target: &mut Target,
+    target: &mut SurfaceSink,
 ) -> Result<()> {
     let axis = |p: &Property| {
         ["x", "y", "z"]
@@ -312,7 +312,7 @@ fn read_faces<R: BufRead>(
     element: &Element,
     n: u64,
     n_vertices: i64,
-    target: &mut Target,
+    target: &mut SurfaceSink,
 ) -> Result<()> {
     let is_corners = |p: &Property| {
         p.count.is_some() && matches!(p.name.as_str(), "vertex_indices" | "vertex_index")

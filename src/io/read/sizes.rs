@@ -6,7 +6,7 @@
 use std::io::BufRead;
 use std::path::{Path, PathBuf};
 
-use super::error::{Place, ReadError, Spot};
+use super::error::{FilePlace, ReadError, Spot};
 use super::feed::{Feed, Result};
 use super::meditb::{DIMENSION, Numbers, TETRAHEDRA, VERTICES};
 use super::open;
@@ -30,9 +30,9 @@ pub fn size_files(path: &Path) -> Result<(PathBuf, Option<PathBuf>)> {
         let all = endings.map(|e| path.with_extension(e));
         all.into_iter().find(|p| p.is_file())
     };
-    let place = || Place {
+    let place = || FilePlace {
         file: path.display().to_string(),
-        spot: Spot::Whole,
+        spot: Spot::Totals,
     };
     let extension = path.extension().unwrap_or_default().to_string_lossy();
     match extension.to_ascii_lowercase().as_str() {
@@ -75,9 +75,9 @@ pub fn read_sizes(path: &Path, limit: u64) -> Result<Background> {
     }
     if h.len() != solid.points.len() {
         return Err(ReadError::CountMismatch {
-            place: Place {
+            place: FilePlace {
                 file: sizes.display().to_string(),
-                spot: Spot::Whole,
+                spot: Spot::Totals,
             },
             what: "sizes",
             declared: h.len().to_string(),
@@ -317,7 +317,7 @@ fn binary_solid<R: BufRead>(feed: Feed<R>, solid: &mut Solid) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sizing::Wish;
+    use crate::sizing::SizeConstraint;
 
     const POINTS: [[f64; 3]; 4] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     const SIZES: [f64; 4] = [0.25, 0.5, 0.125, 1.0];

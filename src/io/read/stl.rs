@@ -7,14 +7,14 @@
 use std::io::BufRead;
 
 use super::feed::{self, Feed};
-use super::{ReadError, Result, Target};
+use super::{ReadError, Result, SurfaceSink};
 use crate::geom::Point;
 use crate::surface::NoteKind;
 
 const HEADER: usize = 84;
 const RECORD: u64 = 50;
 
-pub(super) fn read<R: BufRead>(feed: Feed<R>, target: &mut Target) -> Result<()> {
+pub(super) fn read<R: BufRead>(feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
     let (head, n_head, feed) = feed.with_head::<HEADER>()?;
     let n = u32::from_le_bytes([head[80], head[81], head[82], head[83]]);
     let expected = HEADER as u64 + RECORD * u64::from(n);
@@ -61,7 +61,7 @@ fn wrong_length<R: BufRead>(mut feed: Feed<R>, n_head: usize, n: u32, expected: 
     }
 }
 
-fn read_binary<R: BufRead>(mut feed: Feed<R>, n: u32, target: &mut Target) -> Result<()> {
+fn read_binary<R: BufRead>(mut feed: Feed<R>, n: u32, target: &mut SurfaceSink) -> Result<()> {
     feed.binary = true;
     feed.skip_bytes(HEADER as u64)?;
     let label = target.label("");
@@ -79,7 +79,7 @@ fn read_binary<R: BufRead>(mut feed: Feed<R>, n: u32, target: &mut Target) -> Re
     feed.finish(target.builder)
 }
 
-fn read_text<R: BufRead>(mut feed: Feed<R>, target: &mut Target) -> Result<()> {
+fn read_text<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
     let mut line = Vec::new();
     let mut pending = false; // a word is taken and not yet looked at
     while pending || feed.next_word()? {
@@ -133,7 +133,7 @@ fn is(word: &[u8], keyword: &str) -> bool {
 }
 
 /// One facet after its first word; the normal is passed over unread.
-fn read_facet<R: BufRead>(feed: &mut Feed<R>, label: u32, target: &mut Target) -> Result<()> {
+fn read_facet<R: BufRead>(feed: &mut Feed<R>, label: u32, target: &mut SurfaceSink) -> Result<()> {
     for _ in 0..4 {
         feed.need_word("a normal and `outer loop`")?;
     }

@@ -8,7 +8,7 @@ use std::io::BufRead;
 use std::path::Path;
 
 use super::feed::{Feed, parse};
-use super::{ReadError, Result, Target, open};
+use super::{ReadError, Result, SurfaceSink, open};
 use crate::surface::NoteKind;
 
 /// The two layouts of the facet part.
@@ -31,7 +31,7 @@ pub(super) fn read<R: BufRead>(
     mut feed: Feed<R>,
     kind: Kind,
     nodes: Option<&Path>,
-    target: &mut Target,
+    target: &mut SurfaceSink,
 ) -> Result<()> {
     feed.comment = Some(b'#');
     let numbering = match read_points(&mut feed, target)? {
@@ -75,7 +75,7 @@ pub(super) fn read<R: BufRead>(
 fn read_node_file<R: BufRead>(
     feed: &Feed<R>,
     nodes: Option<&Path>,
-    target: &mut Target,
+    target: &mut SurfaceSink,
 ) -> Result<Numbering> {
     let Some(path) = nodes else {
         return Err(feed.unsupported("points in a separate .node file"));
@@ -89,7 +89,10 @@ fn read_node_file<R: BufRead>(
 }
 
 /// The point part; `None` when it says that the points are elsewhere.
-fn read_points<R: BufRead>(feed: &mut Feed<R>, target: &mut Target) -> Result<Option<Numbering>> {
+fn read_points<R: BufRead>(
+    feed: &mut Feed<R>,
+    target: &mut SurfaceSink,
+) -> Result<Option<Numbering>> {
     let n = feed.integer("the number of points")?;
     if n == 0 {
         feed.skip_line()?;
@@ -154,7 +157,7 @@ fn add<R: BufRead>(
     feed: &Feed<R>,
     corners: &[u32],
     marker: i64,
-    target: &mut Target,
+    target: &mut SurfaceSink,
 ) -> Result<()> {
     let label = if marker == 0 {
         target.label("")
@@ -168,7 +171,7 @@ fn add<R: BufRead>(
 fn read_facet<R: BufRead>(
     feed: &mut Feed<R>,
     numbering: Numbering,
-    target: &mut Target,
+    target: &mut SurfaceSink,
 ) -> Result<bool> {
     let n_polygons = feed.count("polygons", 4)?;
     let rest = rest_of_line(feed)?;

@@ -9,7 +9,7 @@ use super::Result;
 use super::draft::Draft;
 use super::merged::{Merged, Tet};
 use super::stream::{Stream, word32, word64};
-use crate::store::{Sorted, Sorter};
+use crate::storage::{Sorted, Sorter};
 
 /// The element's face opposite each of its nodes.
 const SIDE_OPPOSITE: [u8; 4] = [3, 4, 2, 1];

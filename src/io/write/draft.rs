@@ -1,6 +1,6 @@
 //! Files in the making: a folder beside the output, removed whatever happens; rename when all are whole.
 
-use crate::store::available_bytes;
+use crate::storage::available_bytes;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-use crate::catalog::CatalogError;
+use crate::sealed::SealedError;
+use crate::storage::StorageError;
 use crate::store::StoreError;
 
 /// Errors of writing meshes and surfaces.
@@ -44,7 +45,7 @@ pub enum WriteError {
     },
     /// The store cannot be read as it is: damaged, unfinished, busy.
     #[error(transparent)]
-    Store(CatalogError),
+    Store(StoreError),
 }
 
 impl WriteError {
@@ -88,7 +89,7 @@ impl WriteError {
             Self::Store(error) if error.is_damage() => {
                 "see what is left with `tetdb verify`; copy the store again or mesh the surface again"
             }
-            Self::Store(CatalogError::Store(StoreError::Stopped)) => "run the command again",
+            Self::Store(StoreError::Storage(StorageError::Cancelled)) => "run the command again",
             Self::Store(_) => "look at the store with `tetdb info`",
         }
     }
@@ -104,32 +105,44 @@ impl WriteError {
 }
 
 /// The word for a store that cannot be read.
-fn word_of(error: &CatalogError) -> &'static str {
+fn word_of(error: &StoreError) -> &'static str {
     match error {
-        CatalogError::Store(StoreError::Stopped) => "stopped",
-        CatalogError::NotFound { .. } | CatalogError::NoSubdomain { .. } => "no-such-store",
-        CatalogError::NotOurs { .. } => "not-a-store",
-        CatalogError::Unfinished { .. } | CatalogError::NotSealed { .. } => "store-unfinished",
-        CatalogError::Format { .. } => "store-format",
-        _ if error.is_damage() => "damaged",
-        _ if error.exit_code() == 5 => "busy",
-        _ => "io",
-    }
-}
-
-impl From<CatalogError> for WriteError {
-    fn from(error: CatalogError) -> Self {
-        match error {
-            CatalogError::Store(StoreError::Full { path }) => Self::DiskFull { path },
-            CatalogError::Store(StoreError::Io { path, source })
-            | CatalogError::Io { path, source } => Self::Io { path, source },
-            other => Self::Store(other),
+        StoreError::Storage(StorageError::Cancelled) => "stopped",
+        StoreError::NotFound { .. } | StoreError::NoSubdomain { .. } => "no-such-store",
+        StoreError::NotOurs { .. } => "not-a-store",
+        StoreError::Unfinished { .. } | StoreError::Sealed(SealedError::NotSealed { .. }) => {
+            "store-unfinished"
         }
+        StoreError::Format { .. } => "store-format",
+        _ if error.is_damage() => "damaged",
+        StoreError::Busy { .. } => "busy",
+        _ => "io",
     }
 }
 
 impl From<StoreError> for WriteError {
     fn from(error: StoreError) -> Self {
-        Self::from(CatalogError::from(error))
+        match error {
+            StoreError::Storage(error) | StoreError::Sealed(SealedError::Storage(error)) => {
+                Self::from(error)
+            }
+            other => Self::Store(other),
+        }
+    }
+}
+
+impl From<StorageError> for WriteError {
+    fn from(error: StorageError) -> Self {
+        match error {
+            StorageError::Full { path } => Self::DiskFull { path },
+            StorageError::Io { path, source } => Self::Io { path, source },
+            other => Self::Store(other.into()),
+        }
+    }
+}
+
+impl From<SealedError> for WriteError {
+    fn from(error: SealedError) -> Self {
+        Self::from(StoreError::from(error))
     }
 }

@@ -8,7 +8,7 @@ use tetdb_schema::record::{InterfaceFace, NO_TET, SealedFacet};
 use super::Result;
 use super::numbering::PartNumbers;
 use super::stream::{Records, scratch, word32, word64};
-use crate::store::Sorter;
+use crate::storage::Sorter;
 
 const BYTES: usize = 61;
 
@@ -76,7 +76,7 @@ impl Face {
 }
 
 /// The sub-domain whose faces are collected, with what the merged mesh knows of it.
-pub(super) struct Part<'a> {
+pub(super) struct FaceSource<'a> {
     pub rank: u32,
     pub numbers: &'a PartNumbers,
     /// Number of its first tetrahedron.
@@ -102,7 +102,7 @@ impl FaceSorter {
     ///
     /// A triangle between two sub-domains is in both: the one with its filled side, or with its front when both sides are
     /// filled, has the word, unless it is not written. Errors: the disk.
-    pub fn push(&mut self, f: &SealedFacet, part: &Part) -> Result<()> {
+    pub fn push(&mut self, f: &SealedFacet, part: &FaceSource) -> Result<()> {
         let preferred = usize::from(f.regions[0] == 0);
         let here = [preferred, 1 - preferred];
         let Some(&side) = here.iter().find(|&&side| f.tets[side] != NO_TET) else {
@@ -121,7 +121,12 @@ impl FaceSorter {
     }
 
     /// Adds an interface face of a sub-domain, under a label. Errors: the disk.
-    pub fn push_interface(&mut self, f: &InterfaceFace, label: u32, part: &Part) -> Result<()> {
+    pub fn push_interface(
+        &mut self,
+        f: &InterfaceFace,
+        label: u32,
+        part: &FaceSource,
+    ) -> Result<()> {
         let face = Face {
             key: INTERFACE | u64::from(f.cut) << 32 | u64::from(f.index),
             vertices: f.vertices.map(|v| part.numbers.of(v)),

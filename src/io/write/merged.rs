@@ -7,11 +7,14 @@ use std::path::{Path, PathBuf};
 use tetdb_schema::ids::TetId;
 use tetdb_schema::record::SealedVertex;
 
-use super::faces::{FaceSorter, Faces, Part};
+use super::faces::{FaceSorter, FaceSource, Faces};
 use super::numbering::Numbering;
 use super::{Result, WriteError};
-use crate::catalog::{Catalog, CatalogError, Shape, Store, Subdomain, SubdomainRow};
-use crate::store::stop_if_requested;
+use crate::sealed::SealedError;
+use crate::sealed::{Shape, Subdomain};
+use crate::storage::check_cancelled;
+use crate::store::{Catalog, StoreError};
+use tetdb_schema::catalog::SubdomainRow;
 
 /// Counts records and tells.
 pub(super) struct Progress<'a> {
@@ -28,7 +31,7 @@ impl<'a> Progress<'a> {
 
     /// Counts `n` more records; the place where a request to stop is heard.
     fn advance(&self, n: usize) {
-        stop_if_requested();
+        check_cancelled();
         let done = self.done.get() + n as u64;
         self.done.set(done);
         (self.tell)(done, self.total.get().max(done));
@@ -80,7 +83,7 @@ impl Scope<'_> {
 ///
 /// Shape: `parts` by rank. Each pass reads every chunk once and holds a quarter of the memory.
 pub(super) struct Merged<'a> {
-    store: &'a mut Store,
+    store: &'a mut Catalog,
     parts: Vec<SubdomainRow>,
     numbering: Numbering,
     faces: Faces,
@@ -95,13 +98,13 @@ impl<'a> Merged<'a> {
     ///
     /// Errors: a store that is not finished, damage, the disk.
     pub fn open(
-        store: &'a mut Store,
+        store: &'a mut Catalog,
         scope: Scope,
         dir: &Path,
         memory: usize,
         progress: Progress<'a>,
     ) -> Result<Self> {
-        let catalog = store.catalog();
+        let catalog = &mut *store;
         let mut parts = catalog.subdomains()?;
         parts.retain(|row| scope.holds(row.rank));
         let label_names = catalog.labels()?;
@@ -112,12 +115,12 @@ impl<'a> Merged<'a> {
         let mut tet_first = 0;
         for (p, row) in parts.iter().enumerate() {
             let numbers = numbering.part(p)?;
-            let part = Part {
+            let part = FaceSource {
                 rank: row.rank,
                 numbers: &numbers,
                 tet_first,
             };
-            let mut from = Subdomain::open(store.catalog(), row.rank, memory / 4)?;
+            let mut from = store.open_subdomain(row.rank, memory / 4)?;
             collect_faces(&mut from, &part, scope, first_label, &mut sorter)?;
             tet_first += row.tets;
         }
@@ -213,12 +216,12 @@ impl<'a> Merged<'a> {
     ) -> Result<()> {
         for (p, row) in self.parts.iter().enumerate() {
             let numbers = self.numbering.part(p)?;
-            let mut part = Subdomain::open(self.store.catalog(), row.rank, self.memory / 4)?;
+            let mut part = self.store.open_subdomain(row.rank, self.memory / 4)?;
             for chunk in part.vertex_chunks() {
                 let chunk = chunk?;
                 let end = u64::from(chunk.first) + chunk.records.len() as u64;
                 if end > row.vertices {
-                    return Err(too_many_vertices(self.store.catalog(), row, end).into());
+                    return Err(too_many_vertices(self.store, row, end).into());
                 }
                 for (local, vertex) in (chunk.first..).zip(&chunk.records) {
                     if let Some(number) = numbers.own(local) {
@@ -244,7 +247,7 @@ impl<'a> Merged<'a> {
     fn pass(&mut self, quality: bool, mut each: impl FnMut(&Tet) -> Result<()>) -> Result<()> {
         for (p, row) in self.parts.iter().enumerate() {
             let numbers = self.numbering.part(p)?;
-            let mut part = Subdomain::open(self.store.catalog(), row.rank, self.memory / 4)?;
+            let mut part = self.store.open_subdomain(row.rank, self.memory / 4)?;
             let mut expected = 0;
             for chunk in 0..part.tet_summaries().len() {
                 let chunk = part.tet_chunk(chunk as u32)?;
@@ -284,7 +287,7 @@ impl<'a> Merged<'a> {
     pub fn regions(&mut self) -> Result<BTreeSet<u32>> {
         let mut regions = BTreeSet::new();
         for row in &self.parts {
-            let mut part = Subdomain::open(self.store.catalog(), row.rank, self.memory / 4)?;
+            let mut part = self.store.open_subdomain(row.rank, self.memory / 4)?;
             for chunk in 0..part.tet_summaries().len() {
                 let [least, greatest] = part.tet_summaries()[chunk].regions;
                 regions.extend([least, greatest]);
@@ -298,16 +301,16 @@ impl<'a> Merged<'a> {
     }
 }
 
-fn damaged(part: &Subdomain, found: u32, expected: u32) -> CatalogError {
-    CatalogError::Content {
+fn damaged(part: &Subdomain, found: u32, expected: u32) -> StoreError {
+    StoreError::Sealed(SealedError::Content {
         path: part.path().to_owned(),
         subdomain: part.id().rank(),
         what: format!("tetrahedron {found} stands where {expected} was expected"),
-    }
+    })
 }
 
-fn too_many_vertices(catalog: &Catalog, row: &SubdomainRow, end: u64) -> CatalogError {
-    CatalogError::Content {
+fn too_many_vertices(catalog: &Catalog, row: &SubdomainRow, end: u64) -> StoreError {
+    StoreError::Sealed(SealedError::Content {
         path: catalog
             .file_path(row.rank, row.generation)
             .path()
@@ -317,14 +320,14 @@ fn too_many_vertices(catalog: &Catalog, row: &SubdomainRow, end: u64) -> Catalog
             "a chunk ends at vertex {end}, the catalog counts {}",
             row.vertices
         ),
-    }
+    })
 }
 
 /// Hands the faces of a sub-domain that `scope` lists to `sorter`; interface faces are labelled by the sub-domain behind
 /// them, from `first_label` on.
 fn collect_faces(
     from: &mut Subdomain,
-    part: &Part,
+    part: &FaceSource,
     scope: Scope,
     first_label: u32,
     sorter: &mut FaceSorter,
@@ -333,11 +336,11 @@ fn collect_faces(
     let path = from.path().to_owned();
     let checked = |vertices: [u32; 3]| match vertices.iter().any(|&v| u64::from(v) >= n_vertices) {
         false => Ok(()),
-        true => Err(CatalogError::Content {
+        true => Err(StoreError::Sealed(SealedError::Content {
             path: path.clone(),
             subdomain: part.rank,
             what: format!("a face names vertices {vertices:?}"),
-        }),
+        })),
     };
     if scope.faces != FaceSet::Interfaces {
         for facet in from.facets() {

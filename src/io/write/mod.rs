@@ -43,8 +43,8 @@ pub use npy::{NpyField, NpyTable, TextFile, bytes};
 pub use selected::{SelectedTet, SelectedVtu};
 pub use surface::{SurfaceReport, surface};
 
-use crate::catalog::{CatalogError, Store};
-use crate::store::attempt;
+use crate::storage::attempt;
+use crate::store::{Catalog, StoreError};
 use draft::Draft;
 use merged::{FaceSet, Merged, Progress, Scope};
 
@@ -140,7 +140,7 @@ pub enum Content {
 /// Holds about `memory_bytes`, and tells progress as (done, total) in records read. The files depend on the
 /// mesh alone. Errors: [`WriteError`]; no file of `out`'s name is touched before all are whole.
 pub fn export(
-    store: &mut Store,
+    store: &mut Catalog,
     out: &Path,
     selection: &Selection,
     memory_bytes: usize,
@@ -157,10 +157,10 @@ pub fn export(
         ));
     }
     attempt(|| {
-        let catalog = store.catalog();
+        let catalog = &mut *store;
         let path = catalog.dir().to_owned();
         if !catalog.state()?.is_finished() {
-            return Err(CatalogError::Unfinished { path }.into());
+            return Err(StoreError::Unfinished { path }.into());
         }
         for &rank in &selection.subdomains {
             store.subdomain(rank)?;
@@ -204,7 +204,7 @@ pub fn export(
 
 /// What was written.
 #[derive(Clone, Copy, Default)]
-struct Counts {
+struct FileCounts {
     vertices: u64,
     tets: u64,
     triangles: u64,
@@ -217,8 +217,8 @@ fn write(
     mesh: &mut Merged,
     draft: &mut Draft,
     out: &Path,
-) -> Result<Counts> {
-    let mut counts = Counts {
+) -> Result<FileCounts> {
+    let mut counts = FileCounts {
         vertices: mesh.n_vertices(),
         tets: mesh.n_tets(),
         triangles: mesh.n_faces(),

@@ -10,8 +10,9 @@ use tetdb_schema::ids::{Owner, SubdomainId, VertexId};
 
 use super::Result;
 use super::stream::{Records, scratch, word32, word64};
-use crate::catalog::{CatalogError, Store, Subdomain};
-use crate::store::{Sorted, Sorter};
+use crate::sealed::SealedError;
+use crate::storage::{Sorted, Sorter};
+use crate::store::{Catalog, StoreError};
 
 /// Bytes of a record of the table: local number, then dense number.
 const ENTRY: usize = 12;
@@ -61,7 +62,12 @@ impl Numbering {
     /// Numbers the vertices of all sub-domains; `parts` are their ranks and numbers of vertices.
     ///
     /// Holds about `memory` bytes. Errors: damage, the disk.
-    pub fn new(store: &mut Store, parts: &[(u32, u64)], dir: &Path, memory: usize) -> Result<Self> {
+    pub fn new(
+        store: &mut Catalog,
+        parts: &[(u32, u64)],
+        dir: &Path,
+        memory: usize,
+    ) -> Result<Self> {
         let mut numbering = Self {
             firsts: Vec::with_capacity(parts.len()),
             shared: vec![0; parts.len()],
@@ -85,7 +91,7 @@ impl Numbering {
     /// Finds vertices with equal ids. A place is (part, local, group, whether another part numbers it).
     fn group(
         &mut self,
-        store: &mut Store,
+        store: &mut Catalog,
         parts: &[(u32, u64)],
         by_id: Sorted<16>,
         places: &mut Sorter<17>,
@@ -168,14 +174,14 @@ impl Numbering {
 
 /// All vertices that another sub-domain may also have, as (id, place in `parts`, local).
 pub(super) fn candidates(
-    store: &mut Store,
+    store: &mut Catalog,
     parts: &[(u32, u64)],
     dir: &Path,
     memory: usize,
 ) -> Result<Sorted<16>> {
     let mut sorter = Sorter::new(dir, memory as u64 / 4);
     for (p, &(rank, _)) in (0u32..).zip(parts) {
-        let mut part = Subdomain::open(store.catalog(), rank, memory / 4)?;
+        let mut part = store.open_subdomain(rank, memory / 4)?;
         let own = SubdomainId::new(rank).map(Owner::Subdomain);
         for (local, vertex) in (0u32..).zip(part.vertices()) {
             let id = vertex?.id;
@@ -223,11 +229,11 @@ fn carry(groups: Sorted<17>, dir: &Path, memory: usize, table: &Path) -> Result<
     stream.finish()
 }
 
-fn twice(store: &mut Store, rank: u32, id: u64) -> super::WriteError {
-    CatalogError::Content {
-        path: store.catalog().dir().to_owned(),
+fn twice(store: &mut Catalog, rank: u32, id: u64) -> super::WriteError {
+    StoreError::Sealed(SealedError::Content {
+        path: store.dir().to_owned(),
         subdomain: rank,
         what: format!("two vertices have the id {id}"),
-    }
+    })
     .into()
 }

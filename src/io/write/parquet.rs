@@ -19,10 +19,11 @@ use tetdb_schema::ids::TetId;
 
 use super::draft::Draft;
 use super::pieces::piece_path;
-use super::{Counts, Result, Selection, WriteError};
-use crate::catalog::{Shape, Store, Subdomain};
+use super::{FileCounts, Result, Selection, WriteError};
 use crate::geom::Point;
-use crate::store::stop_if_requested;
+use crate::sealed::{Shape, Subdomain};
+use crate::storage::check_cancelled;
+use crate::store::Catalog;
 
 /// Rows of a group: small enough that a place is in few of them, large enough for columns to pack well.
 const GROUP_ROWS: usize = 65_536;
@@ -74,7 +75,7 @@ impl Table {
         &mut self,
         columns: impl FnOnce(&mut Group) -> std::result::Result<(), ParquetError>,
     ) -> Result<()> {
-        stop_if_requested();
+        check_cancelled();
         let written = self.writer.next_row_group().and_then(|mut group| {
             columns(&mut group)?;
             group.close().map(drop)
@@ -100,21 +101,21 @@ fn column<T: DataType>(
 }
 
 pub(super) fn write(
-    store: &mut Store,
+    store: &mut Catalog,
     draft: &mut Draft,
     out: &Path,
     selection: &Selection,
     memory: usize,
     tell: &dyn Fn(u64, u64),
-) -> Result<Counts> {
-    let mut rows = store.catalog().subdomains()?;
+) -> Result<FileCounts> {
+    let mut rows = store.subdomains()?;
     if !selection.subdomains.is_empty() {
         rows.retain(|row| selection.subdomains.contains(&row.rank));
     }
     let all: u64 = rows.iter().map(|row| row.tets).sum();
-    let mut counts = Counts::default();
+    let mut counts = FileCounts::default();
     for row in rows {
-        let mut part = Subdomain::open(store.catalog(), row.rank, memory / 2)?;
+        let mut part = store.open_subdomain(row.rank, memory / 2)?;
         let piece = piece_path(out, row.rank, "parquet");
         let mut table = Table::create(draft, &piece, TETS, row.tets * 32)?;
         let mut tets = Tets::default();

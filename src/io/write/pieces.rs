@@ -8,17 +8,17 @@ use std::path::{Path, PathBuf};
 use super::draft::Draft;
 use super::merged::{FaceSet, Merged, Progress, Scope};
 use super::stream::Stream;
-use super::{Counts, MeshFormat, Result, Selection, WriteError};
-use crate::catalog::Store;
+use super::{FileCounts, MeshFormat, Result, Selection, WriteError};
+use crate::store::Catalog;
 
 pub(super) fn write(
-    store: &mut Store,
+    store: &mut Catalog,
     draft: &mut Draft,
     out: &Path,
     selection: &Selection,
     memory: usize,
     tell: &dyn Fn(u64, u64),
-) -> Result<Counts> {
+) -> Result<FileCounts> {
     let format = MeshFormat::of_extension(out).expect("the format was told from the name");
     let (parallel, extension) = match format {
         MeshFormat::Pvtu => (true, "vtu"),
@@ -27,12 +27,12 @@ pub(super) fn write(
             out.extension().and_then(|e| e.to_str()).unwrap_or_default(),
         ),
     };
-    let mut rows = store.catalog().subdomains()?;
+    let mut rows = store.subdomains()?;
     if !selection.subdomains.is_empty() {
         rows.retain(|row| selection.subdomains.contains(&row.rank));
     }
     let all: u64 = rows.iter().map(|row| row.tets).sum();
-    let (mut counts, mut pieces) = (Counts::default(), Vec::new());
+    let (mut counts, mut pieces) = (FileCounts::default(), Vec::new());
     for row in rows {
         let piece = piece_path(out, row.rank, extension);
         let scope = Scope {

@@ -11,7 +11,7 @@ use super::npy::length;
 use super::stream::{Records, Stream, scratch, word, word64};
 use super::vtu::TETRA;
 use super::vtu_layout::{Array, Group, Index, Layout};
-use crate::store::{Sorted, Sorter};
+use crate::storage::{Sorted, Sorter};
 
 /// Region, sub-domain, quality, number.
 const CELL: usize = 4 + 4 + 8 + 8;

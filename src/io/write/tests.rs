@@ -9,10 +9,12 @@ use tetdb_schema::record::{
 };
 
 use super::*;
-use crate::catalog::{Catalog, Job, SealedWriter, StoreState, two_subdomains};
 use crate::geom::Point;
 use crate::io::read::read_surface;
+use crate::sealed::SealedWriter;
+use crate::store::{Catalog, two_subdomains};
 use crate::surface::{Surface, SurfaceBuilder};
+use tetdb_schema::catalog::{Job, StoreState};
 
 type Outcome<T = ()> = std::result::Result<T, Box<dyn std::error::Error>>;
 
@@ -312,7 +314,7 @@ fn two_subdomains_become_one_mesh_in_every_format() -> Outcome {
     let dir = tempfile::tempdir()?;
     let path = dir.path().join("two.tetdb");
     two_subdomains(&path)?;
-    let mut store = Store::open(&path)?;
+    let mut store = Catalog::open(&path)?;
     for name in ["a.vtu", "a.mesh", "a.meshb", "a.msh", "a.inp"] {
         let out = dir.path().join(name);
         std::fs::write(&out, b"what was there before")?;
@@ -349,7 +351,7 @@ fn shared_vertices_are_one_and_the_boundary_is_whole() -> Outcome {
     let dir = tempfile::tempdir()?;
     let (n, path) = (6, dir.path().join("cubes.tetdb"));
     cubes(&path, n)?;
-    let mut store = Store::open(&path)?;
+    let mut store = Catalog::open(&path)?;
     let out = dir.path().join("c.vtu");
     let report = export(&mut store, &out, &Selection::default(), 1 << 20, &quiet)?;
     let counts = [(n + 1).pow(3), 6 * n.pow(3), 12 * n * n].map(u64::from);
@@ -395,7 +397,7 @@ fn boundaries_read_back_as_the_surface() -> Outcome {
     let dir = tempfile::tempdir()?;
     let path = dir.path().join("cubes.tetdb");
     cubes(&path, 4)?;
-    let mut store = Store::open(&path)?;
+    let mut store = Catalog::open(&path)?;
     let triangles = |s: &Surface| {
         let corners = |t: u32| s.corners(t).map(|p| p.to_array().map(f64::to_bits));
         (0..s.n_triangles() as u32).map(corners).collect::<Vec<_>>()
@@ -446,7 +448,7 @@ fn files_do_not_depend_on_the_memory() -> Outcome {
     let dir = tempfile::tempdir()?;
     let path = dir.path().join("cubes.tetdb");
     cubes(&path, 20)?;
-    let mut store = Store::open(&path)?;
+    let mut store = Catalog::open(&path)?;
     for name in ["m.vtu", "m.meshb", "m.inp"] {
         let out = dir.path().join(name);
         let mut files = Vec::new();
@@ -468,7 +470,7 @@ fn progress_ends_at_its_total() -> Outcome {
         let told = std::cell::RefCell::new(Vec::new());
         let tell = |done, total| told.borrow_mut().push((done, total));
         export(
-            &mut Store::open(&path)?,
+            &mut Catalog::open(&path)?,
             &dir.path().join(name),
             &Selection::default(),
             1 << 20,
@@ -486,7 +488,7 @@ fn what_cannot_be_written_leaves_nothing() -> Outcome {
     let dir = tempfile::tempdir()?;
     let path = dir.path().join("two.tetdb");
     two_subdomains(&path)?;
-    let mut store = Store::open(&path)?;
+    let mut store = Catalog::open(&path)?;
     let mut code = |name: &str| {
         let error = export(
             &mut store,

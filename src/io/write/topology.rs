@@ -10,9 +10,11 @@ use std::path::Path;
 use super::draft::Draft;
 use super::numbering::candidates;
 use super::stream::{Stream, word32};
-use super::{Counts, Result};
-use crate::catalog::{CatalogError, NeighborRow, Store, Subdomain};
-use crate::store::{Sorted, Sorter};
+use super::{FileCounts, Result};
+use crate::sealed::SealedError;
+use crate::storage::{Sorted, Sorter};
+use crate::store::{Catalog, StoreError};
+use tetdb_schema::catalog::NeighborRow;
 
 /// A pair's vertex: low, high, order, number in low, number in high.
 type SharedVertices = Sorted<24>;
@@ -20,17 +22,17 @@ type SharedVertices = Sorted<24>;
 type SharedFaces = Sorted<21>;
 
 pub(super) fn write(
-    store: &mut Store,
+    store: &mut Catalog,
     draft: &mut Draft,
     out: &Path,
     memory: usize,
-) -> Result<Counts> {
-    let rows = store.catalog().subdomains()?;
+) -> Result<FileCounts> {
+    let rows = store.subdomains()?;
     let ranks: Vec<_> = rows.iter().map(|row| (row.rank, row.vertices)).collect();
     let dir = draft.dir().to_owned();
     let vertices = shared_vertices(store, &ranks, &dir, memory)?;
     let faces = shared_faces(store, &ranks, &dir, memory)?;
-    let neighbors: BTreeMap<u32, Vec<NeighborRow>> = (store.catalog().topology()?.into_iter())
+    let neighbors: BTreeMap<u32, Vec<NeighborRow>> = (store.topology()?.into_iter())
         .map(|row| (row.subdomain, row.neighbors))
         .collect();
     let path = draft.create(out, 0)?;
@@ -54,12 +56,12 @@ pub(super) fn write(
     pairs(store, &mut stream, vertices, faces)?;
     stream.text("\n]}\n");
     stream.finish()?;
-    Ok(Counts::default())
+    Ok(FileCounts::default())
 }
 
 /// For each pair its lists. Every pair with a face shares vertices, so that faces never run ahead.
 fn pairs(
-    store: &mut Store,
+    store: &mut Catalog,
     stream: &mut Stream,
     vertices: SharedVertices,
     faces: SharedFaces,
@@ -119,18 +121,18 @@ fn lists(stream: &mut Stream, lists: &[Vec<u32>; 2]) -> Result<()> {
     Ok(())
 }
 
-fn unequal(store: &mut Store, low: u32, high: u32) -> super::WriteError {
-    CatalogError::Content {
-        path: store.catalog().dir().to_owned(),
+fn unequal(store: &mut Catalog, low: u32, high: u32) -> super::WriteError {
+    StoreError::Sealed(SealedError::Content {
+        path: store.dir().to_owned(),
         subdomain: low,
         what: format!("the faces shared with sub-domain {high} are not the same on both sides"),
-    }
+    })
     .into()
 }
 
 /// Vertices by pair, those of one pair in an order that both sides know.
 fn shared_vertices(
-    store: &mut Store,
+    store: &mut Catalog,
     ranks: &[(u32, u64)],
     dir: &Path,
     memory: usize,
@@ -167,14 +169,14 @@ fn shared_vertices(
 
 /// Interface faces by pair.
 fn shared_faces(
-    store: &mut Store,
+    store: &mut Catalog,
     ranks: &[(u32, u64)],
     dir: &Path,
     memory: usize,
 ) -> Result<SharedFaces> {
     let mut sorter = Sorter::<21>::new(dir, memory as u64 / 4);
     for &(rank, _) in ranks {
-        let mut part = Subdomain::open(store.catalog(), rank, memory / 4)?;
+        let mut part = store.open_subdomain(rank, memory / 4)?;
         for face in part.interfaces() {
             let face = face?;
             let mut record = [0; 21];

@@ -12,7 +12,7 @@ use super::draft::Draft;
 use super::merged::Merged;
 use super::stream::{Records, scratch, word64};
 use super::vtu_layout::{Array, Group, Index, Layout};
-use crate::store::{Sorted, Sorter};
+use crate::storage::{Sorted, Sorter};
 
 /// VTK's number of a triangle.
 const TRIANGLE: u8 = 5;

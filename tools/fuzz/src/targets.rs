@@ -4,7 +4,7 @@
 //! Bytes that cannot have been written are also given a valid head and checksum, or only the checksum would be tested.
 
 use tetdb::io::read::{Format, read_memory};
-use tetdb::store::kind;
+use tetdb::storage::kind;
 use tetdb::surface::{orient_alike, validate};
 use tetdb_schema::chunk::{
     ChunkAddress, ChunkKind, ChunkRecord, Decoder, HEAD_BYTES, RangeSummary, TetSummary,

@@ -3,8 +3,8 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
-use tetdb::catalog::{Catalog, CatalogError};
 use tetdb::pipeline::PipelineError;
+use tetdb::store::{Catalog, StoreError};
 
 use super::{Case, Digests, SimDisk, Trouble, Wreck};
 
@@ -40,9 +40,19 @@ pub struct Changed {
 /// The exit code the program has for an error.
 pub fn exit_code(error: PipelineError) -> u8 {
     match error {
-        PipelineError::Catalog(e) => e.exit_code(),
-        PipelineError::Store(e) => CatalogError::from(e).exit_code(),
+        PipelineError::Store(e) => store_exit_code(&e),
+        PipelineError::Storage(e) => store_exit_code(&e.into()),
         _ => 3,
+    }
+}
+
+fn store_exit_code(error: &StoreError) -> u8 {
+    match error {
+        StoreError::Busy { .. } => 5,
+        StoreError::NotFound { .. } | StoreError::NoSubdomain { .. } => 3,
+        e if e.is_damage() => 4,
+        StoreError::Storage(_) => 6,
+        _ => 8,
     }
 }
 

@@ -3,11 +3,13 @@
 use std::sync::Arc;
 
 use tetdb::audit;
-use tetdb::catalog::{Catalog, CatalogError, Job, Store, StoreState};
 use tetdb::pipeline::{self, NewSizes, Options, PipelineError, Plan, Resaturation, Trial, silent};
 use tetdb::samples::SampleSpec;
-use tetdb::store::{Budget, DiskPath, StoreFile};
+use tetdb::sealed::SealedError;
+use tetdb::storage::{Budget, DiskPath, StoreFile};
+use tetdb::store::{Catalog, StoreError};
 use tetdb::surface::Surface;
+use tetdb_schema::catalog::{Job, StoreState};
 use tetdb_schema::digest::Digest;
 use tetdb_schema::page::STORED_BYTES;
 use xxhash_rust::xxh3::{Xxh3, xxh3_64};
@@ -112,8 +114,8 @@ impl Case {
     }
 
     /// The digests of a finished store, once from the catalog and once from all records.
-    pub fn digests(&self, disk: &Arc<SimDisk>) -> Result<Digests, CatalogError> {
-        let mut store = Store::open(self.store(disk))?;
+    pub fn digests(&self, disk: &Arc<SimDisk>) -> Result<Digests, StoreError> {
+        let mut store = Catalog::open(self.store(disk))?;
         let told = store.digest()?.map(|d| d.to_string());
         let found = audit::digest(&mut store, 16 << 20)?.map(|d| d.to_string());
         assert_eq!(told, found, "the catalog and the records disagree");
@@ -121,7 +123,7 @@ impl Case {
     }
 
     /// Opens a store in whatever state, for writing, and reads every row and every value of the files it lists.
-    pub fn check(&self, disk: &Arc<SimDisk>) -> Result<StoreState, CatalogError> {
+    pub fn check(&self, disk: &Arc<SimDisk>) -> Result<StoreState, StoreError> {
         let path = self.store(disk);
         let mut catalog = Catalog::open_writable(&path)?;
         let state = catalog.state()?;
@@ -136,7 +138,7 @@ impl Case {
             (file.subdomain, place)
         });
         let mut files: Vec<(u32, DiskPath)> = parts.collect();
-        for leaf in catalog.coarse_leaves()? {
+        for leaf in catalog.coarse_snapshots()? {
             let place = catalog.coarse_path(leaf.rank, leaf.generation);
             files.push((leaf.rank, place));
         }
@@ -160,7 +162,7 @@ impl Case {
         }
         let rows = catalog.subdomains()?;
         drop(catalog);
-        let mut store = Store::open(&path)?;
+        let mut store = Catalog::open(&path)?;
         let found = audit::digest(&mut store, 4 << 20)?;
         let mut told = [Digest::default(); 2];
         for row in rows {
@@ -180,12 +182,12 @@ impl Case {
     }
 }
 
-fn content(path: &DiskPath, subdomain: u32, what: String) -> CatalogError {
-    CatalogError::Content {
+fn content(path: &DiskPath, subdomain: u32, what: String) -> StoreError {
+    StoreError::Sealed(SealedError::Content {
         path: path.path().to_owned(),
         subdomain,
         what,
-    }
+    })
 }
 
 /// Whether a page or chunk matches its checksum.

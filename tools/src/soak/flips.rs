@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use serde_json::Value;
-use tetdb::store::StoreFile;
+use tetdb::storage::StoreFile;
 
 use super::Item;
 use crate::sim::Rng;

@@ -78,7 +78,7 @@ fn off_good_and_bad() {
     assert_eq!(bad("4 0 0", ""), ("count-mismatch", Spot::Line(2)));
     assert_eq!(
         refuse(Format::Off, "OFF\n0 0 0\n"),
-        ("empty-surface", Spot::Whole)
+        ("empty-surface", Spot::Totals)
     );
     assert_eq!(
         refuse(Format::Off, "hello"),
@@ -144,6 +144,6 @@ fn obj_good_and_bad() {
     assert_eq!(bad("v 1 0 0", "v 1 0"), ("unexpected-text", Spot::Line(2)));
     assert_eq!(
         refuse(Format::Obj, vertices),
-        ("empty-surface", Spot::Whole)
+        ("empty-surface", Spot::Totals)
     );
 }

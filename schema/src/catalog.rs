@@ -1,0 +1,246 @@
+//! Rows of the catalog, archived with `rkyv`.
+
+use rkyv::{Archive, Deserialize, Serialize};
+
+/// Bins of the quality table: [1,2[, [2,3[ .. [9,10[, [10,inf[.
+pub const QUALITY_BINS: usize = 10;
+
+/// How far a store is.
+#[derive(
+    Archive,
+    Serialize,
+    Deserialize,
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    serde::Serialize,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum StoreState {
+    /// The job is known, nothing is imported.
+    New,
+    /// The surface is in the store.
+    Imported,
+    /// The coarse mesh contains the surface.
+    Coarse,
+    /// The coarse mesh is cut into sub-domains.
+    Bisected,
+    /// All sub-domains are sealed.
+    Sealed,
+    /// The certificate was checked.
+    Verified,
+}
+
+impl StoreState {
+    /// Whether the mesh is complete.
+    pub fn is_finished(self) -> bool {
+        self >= Self::Sealed
+    }
+}
+
+/// How far a sub-domain is.
+#[derive(
+    Archive,
+    Serialize,
+    Deserialize,
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    serde::Serialize,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum SubdomainState {
+    Coarse,
+    Saturated,
+    /// Finished, and kept as working pages.
+    Optimized,
+    /// Finished, and packed into chunks.
+    Sealed,
+}
+
+/// What was asked for; written by the first commit.
+#[derive(Archive, Serialize, Deserialize, Clone, Debug, PartialEq, Default, serde::Serialize)]
+pub struct Job {
+    /// All options as one JSON object.
+    pub options: String,
+    pub surfaces: Vec<SurfaceSource>,
+    /// Version of the program that made the store.
+    pub tool_version: String,
+}
+
+/// A file the surface was read from, or the sample that made it.
+#[derive(Archive, Serialize, Deserialize, Clone, Debug, PartialEq, Default, serde::Serialize)]
+pub struct SurfaceSource {
+    /// Absolute path, or `sample:...`.
+    pub path: String,
+    pub bytes: u64,
+    /// xxh3-128 of the content, low half first.
+    pub hash: [u64; 2],
+}
+
+/// A region of the volume.
+#[derive(Archive, Serialize, Deserialize, Clone, Debug, PartialEq, serde::Serialize)]
+pub struct RegionRow {
+    pub region: u32,
+    pub volume: f64,
+    pub tets: u64,
+    pub filled: bool,
+    /// Labels of the facets around it, ascending.
+    pub labels: Vec<u32>,
+}
+
+/// Qualities of a sub-domain.
+#[derive(Archive, Serialize, Deserialize, Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct QualityRow {
+    /// Tetrahedra with q in [1,2[, [2,3[ .. [9,10[, [10,inf[.
+    pub bins: [u64; QUALITY_BINS],
+    /// Greatest q and the tetrahedron that has it (the first of several).
+    pub worst: f64,
+    pub worst_tet: u32,
+    /// Least and greatest dihedral angle in radians.
+    pub dihedral: [f64; 2],
+}
+
+/// A sub-domain.
+#[derive(Archive, Serialize, Deserialize, Clone, Debug, PartialEq, serde::Serialize)]
+pub struct SubdomainRow {
+    pub rank: u32,
+    /// The generation of its file that counts.
+    pub generation: u32,
+    pub state: SubdomainState,
+    pub tets: u64,
+    pub vertices: u64,
+    pub facets: u64,
+    pub interface_faces: u64,
+    /// Chunks of tetrahedra, vertices, facets, interface faces, and then blocks of their summaries.
+    pub chunks: [u32; 8],
+    pub digest: [u64; 2],
+    pub interface_digest: [u64; 2],
+    pub quality: QualityRow,
+    /// Sum of the volumes in the sealed order.
+    pub volume: f64,
+    pub bounds: [[f64; 3]; 2],
+    /// Length of the file.
+    pub bytes: u64,
+}
+
+/// A file of the store that counts.
+#[derive(
+    Archive,
+    Serialize,
+    Deserialize,
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    serde::Serialize,
+)]
+pub struct FileRow {
+    pub subdomain: u32,
+    pub generation: u32,
+}
+
+/// A coarse leaf: the working mesh a sub-domain was made from, kept.
+#[derive(Archive, Serialize, Deserialize, Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct CoarseRow {
+    pub rank: u32,
+    /// The generation in the name of its file.
+    pub generation: u32,
+    pub tets: u64,
+    pub vertices: u64,
+    pub facets: u64,
+    pub interface_faces: u64,
+    /// Chunks of tetrahedra, vertices, facets, interface faces.
+    pub chunks: [u32; 4],
+    /// Length of the file.
+    pub bytes: u64,
+}
+
+/// An interface: the faces two sub-domains share because of one cut.
+#[derive(Archive, Serialize, Deserialize, Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct InterfaceRow {
+    pub cut: u32,
+    /// Ranks, the lower one first.
+    pub low: u32,
+    pub high: u32,
+    pub faces: u64,
+    /// Digest of the faces; the same from both sides.
+    pub digest: [u64; 2],
+}
+
+/// Who neighbors a sub-domain.
+#[derive(Archive, Serialize, Deserialize, Clone, Debug, PartialEq, serde::Serialize)]
+pub struct TopologyRow {
+    pub subdomain: u32,
+    /// By rank.
+    pub neighbors: Vec<NeighborRow>,
+}
+
+/// A neighbor and how many faces are shared with it.
+#[derive(Archive, Serialize, Deserialize, Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct NeighborRow {
+    pub subdomain: u32,
+    pub faces: u64,
+}
+
+/// One step that was done.
+#[derive(Archive, Serialize, Deserialize, Clone, Debug, PartialEq, serde::Serialize)]
+pub struct JournalRow {
+    /// The state of the store after it.
+    pub state: StoreState,
+    pub subdomain: Option<u32>,
+    /// What was done.
+    pub step: String,
+    pub seconds: f64,
+    pub measures: Vec<Measure>,
+}
+
+/// A number worth remembering, its unit last in its name.
+#[derive(Archive, Serialize, Deserialize, Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Measure {
+    pub name: String,
+    pub value: f64,
+}
+
+/// What a bisection had before it, and after its zone was refined.
+#[derive(
+    Archive,
+    Serialize,
+    Deserialize,
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    serde::Serialize,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum Stage {
+    Coarse,
+    Refined,
+}
+
+/// A mesh on its way, kept to be looked at; it is no part of the finished mesh.
+#[derive(Archive, Serialize, Deserialize, Clone, Debug, PartialEq, serde::Serialize)]
+pub struct StageRow {
+    pub cut: u32,
+    pub stage: Stage,
+    /// The plane of the cut: `normal · x = offset`.
+    pub normal: [f64; 3],
+    pub offset: f64,
+    /// Its file, as that of a sealed sub-domain; `rank` is the number of the cut.
+    pub row: SubdomainRow,
+}

@@ -1,0 +1,152 @@
+//! A working mesh as records to keep: all of it in its own order, less what follows from the rest.
+//!
+//! Left out are neighbors, which are matched again; wanted lengths and `tet_of`, which whoever goes on with the mesh sets anew.
+
+use tetdb_schema::record::{self, CoarseFace, CoarseTet, CoarseVertex};
+
+use super::anatomy::{MARK, REQUIRED, VERTEX_MASK};
+use super::cursor::Mesh;
+use super::state::{dense, sparse};
+use super::{FaceRef, Facet, InterfaceFace, Tet, Workspace};
+use crate::storage::{Pages, Sorter, StorageError, check_cancelled};
+
+/// A face with its vertices ascending, and where it is.
+type FaceRecord = [u8; 16];
+
+impl<P: Pages> Mesh<P> {
+    /// Whether ids have no gaps, as they have none after [`renumber`](super::renumber): only such a mesh can be kept.
+    pub fn is_dense(&self) -> bool {
+        dense(self.tet_ids_end()) == self.n_tets()
+            && dense(self.vertex_ids_end()) == self.n_vertices()
+    }
+
+    /// Tetrahedron number `n` of a mesh without gaps.
+    pub fn snapshot_tet(&mut self, n: u32) -> CoarseTet {
+        let t = sparse(n);
+        let tet = self.tet(t);
+        let (region, flags) = self.tet_attribute(t);
+        let mut bits = 0;
+        for (i, word) in tet.node.into_iter().enumerate() {
+            bits |= u8::from(word & REQUIRED != 0) << i | u8::from(word & MARK != 0) << (4 + i);
+        }
+        CoarseTet {
+            nodes: tet.vertices().map(dense),
+            bits,
+            region,
+            flags,
+        }
+    }
+
+    /// Vertex number `n` of a mesh without gaps.
+    pub fn snapshot_vertex(&mut self, n: u32) -> CoarseVertex {
+        let (point, (tag, owner)) = (self.point(sparse(n)), self.vertex_words(sparse(n)));
+        CoarseVertex {
+            point: point.to_array(),
+            tag,
+            owner,
+        }
+    }
+
+    /// Facet number `n`.
+    pub fn snapshot_facet(&mut self, n: u32) -> record::Facet {
+        let facet = self.facet(n);
+        record::Facet {
+            vertices: facet.vertices.map(dense),
+            label: facet.label,
+            triangle: facet.input,
+            regions: facet.regions,
+        }
+    }
+
+    /// Interface face number `n`.
+    pub fn snapshot_face(&mut self, n: u32) -> CoarseFace {
+        let face = self.interface_face(n);
+        CoarseFace {
+            vertices: face.vertices.map(dense),
+            cut: face.cut,
+            index: face.index,
+            side: face.side,
+        }
+    }
+
+    /// Adds a vertex as it was kept; whether it is fixed follows from its tag.
+    pub fn add_snapshot_vertex(&mut self, vertex: &CoarseVertex) {
+        let v = self.add_vertex(crate::geom::Point::from_array(vertex.point), 0.0);
+        if (vertex.tag, vertex.owner) != (0, 0) {
+            self.set_vertex_words(v, vertex.tag, vertex.owner);
+        }
+    }
+
+    /// Adds a tetrahedron as it was kept, its neighbors unknown. Its vertices are there: `false` when one is not.
+    pub fn add_snapshot_tet(&mut self, tet: &CoarseTet) -> bool {
+        let n_vertices = self.n_vertices();
+        if tet.nodes.iter().any(|&v| v >= n_vertices) {
+            return false;
+        }
+        let t = self.take_tet();
+        let bit = |i: usize, flag: u32| if tet.bits >> i & 1 != 0 { flag } else { 0 };
+        let node = std::array::from_fn(|i| {
+            sparse(tet.nodes[i]) & VERTEX_MASK | bit(i, REQUIRED) | bit(4 + i, MARK)
+        });
+        let neighbor = [FaceRef::NONE; 4];
+        self.set_tet(t, Tet { node, neighbor });
+        self.set_tet_attribute(t, tet.region, tet.flags);
+        true
+    }
+
+    /// Adds a facet as it was kept.
+    pub fn add_snapshot_facet(&mut self, facet: &record::Facet) {
+        self.add_facet(Facet {
+            vertices: facet.vertices.map(sparse),
+            label: facet.label,
+            input: facet.triangle,
+            regions: facet.regions,
+        });
+    }
+
+    /// Adds an interface face as it was kept.
+    pub fn add_snapshot_face(&mut self, face: &CoarseFace) {
+        self.add_interface_face(InterfaceFace {
+            vertices: face.vertices.map(sparse),
+            cut: face.cut,
+            index: face.index,
+            side: face.side,
+        });
+    }
+
+    /// Makes neighbors of all pairs of tetrahedra with a common face. Errors: the disk, while sorting.
+    pub fn match_neighbors(&mut self, space: &Workspace) -> Result<(), StorageError> {
+        let mut faces = Sorter::<16>::new(space.dir, space.memory);
+        let mut from = 0;
+        while let Some((t, tet)) = self.next_tet(from) {
+            from = t + 1;
+            for i in 0..4 {
+                let mut vertices = tet.face(i);
+                vertices.sort_unstable();
+                let mut record: FaceRecord = [0; 16];
+                let words = vertices.into_iter().chain([FaceRef::new(t, i).0]);
+                for (bytes, word) in record.chunks_exact_mut(4).zip(words) {
+                    bytes.copy_from_slice(&word.to_be_bytes());
+                }
+                faces.push(record)?;
+            }
+            if t & 1023 == 0 {
+                check_cancelled();
+            }
+        }
+        let place = |face: &FaceRecord| {
+            FaceRef(u32::from_be_bytes([face[12], face[13], face[14], face[15]]))
+        };
+        let mut open = None::<FaceRecord>;
+        for face in faces.finish()? {
+            let face = face?;
+            match open.take() {
+                Some(before) if before[..12] == face[..12] => {
+                    self.link(place(&before), place(&face));
+                }
+                _ => open = Some(face),
+            }
+        }
+        Ok(())
+    }
+}

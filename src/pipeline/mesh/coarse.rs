@@ -1,0 +1,137 @@
+//! The coarse mesh: the Delaunay mesh of the surface's vertices with every triangle of it, emptied outside.
+
+use crate::boundary::{RecoveryReport, Regions, fill_regions, recover};
+use crate::delaunay::{Kernel, KernelStats, Rejected, enclose, insertion_key};
+use crate::geom::HilbertFrame;
+use crate::mesh::{Facet, Mesh, VertexTag};
+use crate::pipeline::error::PipelineError;
+use crate::pipeline::plan::Options;
+use crate::pipeline::progress::{Event, Watcher};
+use crate::storage::{Pages, ScratchSpace, raise};
+use crate::surface::Surface;
+
+/// What the coarse step did.
+#[derive(Clone, Debug)]
+pub struct CoarseReport {
+    pub kernel: KernelStats,
+    pub recovery: RecoveryReport,
+    pub regions: Regions,
+}
+
+/// Points between two words to the watcher.
+const TELL_EVERY: usize = 4096;
+
+/// Builds the coarse mesh of a valid surface into an empty mesh.
+///
+/// Errors: triangles that cannot be recovered; regions of which none is filled. Pages and scratch files that fail unwind.
+pub fn coarse<P: Pages>(
+    mesh: &mut Mesh<P>,
+    surface: &Surface,
+    options: &Options,
+    room: &ScratchSpace,
+    watch: &Watcher,
+) -> Result<CoarseReport, PipelineError> {
+    let kernel = inserted(mesh, surface, room, watch);
+    recovered(mesh, kernel, options, watch)
+}
+
+/// [`triangulate`] of a valid surface.
+pub(in crate::pipeline) fn inserted<P: Pages>(
+    mesh: &mut Mesh<P>,
+    surface: &Surface,
+    room: &ScratchSpace,
+    watch: &Watcher,
+) -> KernelStats {
+    triangulate(mesh, surface, room, watch).unwrap_or_else(|(i, why)| {
+        let p = surface.points[i as usize];
+        panic!("vertex {i} of the surface at {p} was refused: {why:?}")
+    })
+}
+
+/// The second half, for which the mesh's own facets suffice.
+pub(in crate::pipeline) fn recovered<P: Pages>(
+    mesh: &mut Mesh<P>,
+    kernel: KernelStats,
+    options: &Options,
+    watch: &Watcher,
+) -> Result<CoarseReport, PipelineError> {
+    watch(stage("recover the surface"));
+    mesh.refresh_tet_of();
+    let recovery = recover(mesh)?;
+    watch(stage("color the regions"));
+    let regions = fill_regions(mesh, &options.regions()?)?;
+    if mesh.n_tets() == 0 {
+        return Err(PipelineError::NothingFilled {
+            policy: options
+                .regions
+                .clone()
+                .unwrap_or_else(|| "parity".to_owned()),
+        });
+    }
+    Ok(CoarseReport {
+        kernel,
+        recovery,
+        regions,
+    })
+}
+
+fn stage(stage: &'static str) -> Event {
+    Event {
+        stage,
+        done: 0,
+        total: None,
+        unit: "",
+    }
+}
+
+/// Inserts the surface's vertices and lists its facets.
+///
+/// Vertices are numbered in the order of insertion, so that near vertices share pages; the number in the surface is
+/// kept as the owner's index. Errors: a vertex that is refused, which no vertex of a valid surface is.
+pub(in crate::pipeline) fn triangulate<P: Pages>(
+    mesh: &mut Mesh<P>,
+    surface: &Surface,
+    room: &ScratchSpace,
+    watch: &Watcher,
+) -> Result<KernelStats, (u32, Rejected)> {
+    let bounds = surface.bounds();
+    let frame = HilbertFrame::new(&bounds);
+    let mut order = room.sorter::<12>();
+    for (i, &p) in (0u32..).zip(&surface.points) {
+        let mut record = [0; 12];
+        record[..8].copy_from_slice(&insertion_key(&frame, p).to_be_bytes());
+        record[8..].copy_from_slice(&i.to_be_bytes());
+        order.push(record).unwrap_or_else(|e| raise(e));
+    }
+    let order = order.finish().unwrap_or_else(|e| raise(e));
+    let mut kernel = Kernel::default();
+    let mut hint = enclose(mesh, &bounds);
+    let total = surface.points.len();
+    let mut number = room.column(total, 0u32);
+    for (k, record) in order.enumerate() {
+        let record = record.unwrap_or_else(|e| raise(e));
+        let i = u32::from_be_bytes([record[8], record[9], record[10], record[11]]);
+        let p = surface.points[i as usize];
+        let v = mesh.add_vertex(p, 0.0);
+        mesh.set_vertex_attribute(v, VertexTag::Surface, i);
+        number.set(i as usize, v);
+        hint = kernel.insert(mesh, v, p, hint).map_err(|why| (i, why))?;
+        if k % TELL_EVERY == 0 {
+            watch(Event {
+                stage: "coarse mesh",
+                done: k as u64,
+                total: Some(total as u64),
+                unit: "vertices",
+            });
+        }
+    }
+    for (n, (corners, &label)) in surface.triangles.iter().zip(&surface.labels).enumerate() {
+        mesh.add_facet(Facet {
+            vertices: corners.map(|c| number.get(c as usize)),
+            label,
+            input: n as u64,
+            regions: [0, 0],
+        });
+    }
+    Ok(kernel.stats)
+}

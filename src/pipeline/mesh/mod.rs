@@ -1,0 +1,16 @@
+//! One run: the coarse mesh, the bisections, each sub-domain to its final density.
+
+pub(super) mod coarse;
+pub(super) mod coarse_snapshot;
+pub(super) mod divide;
+mod head_start;
+mod run;
+mod saturate;
+mod stages;
+pub(super) mod subdomain;
+
+pub use coarse::{CoarseReport, coarse as coarse_mesh};
+pub use head_start::{HeadStart, ahead};
+pub use run::{Summary, mesh, mesh_prepared};
+pub use saturate::FineReport;
+pub use stages::stage_faces;

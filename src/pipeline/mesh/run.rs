@@ -1,0 +1,425 @@
+//! All steps of one run.
+
+use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::Instant;
+
+use super::FineReport;
+use super::coarse::{CoarseReport, inserted, recovered};
+use super::divide::{DONE, read_owners};
+use super::head_start::{HeadStart, ahead};
+use super::subdomain::{Common, FinishedSubdomain, SubdomainJob};
+use crate::bisect::{CutReport, load_of};
+use crate::boundary::RegionSummary;
+use crate::geom::{Aabb, HilbertFrame};
+use crate::mesh::{Mesh, Workspace, renumber};
+use crate::pipeline::error::PipelineError;
+use crate::pipeline::plan::estimate::n_subdomains;
+use crate::pipeline::plan::leases::Leases;
+use crate::pipeline::plan::{Estimate, Options, Plan, Prepared, prepare};
+use crate::pipeline::progress::Watcher;
+use crate::pipeline::seal::totals::{SealedTotals, Totals, journal, whole};
+use crate::pipeline::tree::{self, PartMesh, TreePart, blob};
+use crate::pipeline::workers::map_bounded;
+use crate::sizing::{SizeField, SizeSummary, TETS_PER_LOAD};
+use crate::storage::{Backing, Budget, DiskPath, Pager, PagerStats, ScratchSpace, attempt};
+use crate::store::{Catalog, StoreError};
+use crate::surface::Surface;
+use tetdb_schema::catalog::{RegionRow, StoreState};
+
+/// Generation of the coarse mesh.
+const COARSE: u32 = 1;
+
+/// What a run did; a part is absent when an earlier run had done its step.
+#[derive(Clone, Debug)]
+pub struct Summary {
+    pub coarse: Option<CoarseReport>,
+    pub sizes: Option<SizeSummary>,
+    /// The bisections of this run, in order.
+    pub cuts: Vec<CutReport>,
+    /// What refinement and optimization did to the sub-domains of this run, by rank.
+    pub fine: BTreeMap<u32, FineReport>,
+    pub subdomains: u32,
+    /// What was asked for, when that was more than the mesh allows.
+    pub subdomains_asked: Option<u32>,
+    pub pages: PagerStats,
+    pub frames_used: usize,
+}
+
+/// Meshes `surface`, which must be valid, into the store of `catalog`, going on from where the store stands.
+///
+/// The result depends on surface and options alone: not on the budget, threads, or how often it was interrupted.
+/// Effects: commits one step after the other. Errors: the store stands at its last step.
+pub fn mesh(
+    catalog: &mut Catalog,
+    surface: &Surface,
+    options: &Options,
+    budget: &Budget,
+    watch: &Watcher,
+) -> Result<Summary, PipelineError> {
+    let scratch = catalog.scratch_dir()?;
+    let left = budget.cap().saturating_sub(surface.bytes() as u64);
+    match catalog.blob(blob::SIZE_FIELD)? {
+        None => {
+            let (prepared, begun) = ahead(surface, options, budget.cap(), watch, |taken| {
+                let room = ScratchSpace::new(left.saturating_sub(taken), scratch);
+                prepare(surface, options, None, &room)
+            })?;
+            let surface = Cow::Borrowed(surface);
+            mesh_prepared(catalog, surface, options, (prepared, begun), budget, watch)
+        }
+        Some(bytes) => {
+            let room = ScratchSpace::new(left, scratch);
+            let field = attempt(|| SizeField::from_bytes_in(&bytes, &room))??;
+            drop(bytes);
+            let field = field.with_sources(&options.sizes()?, surface.bounds().diagonal())?;
+            let surface = Cow::Borrowed(surface);
+            go_on(catalog, surface, options, &field, None, budget, watch)
+        }
+    }
+}
+
+/// [`mesh`] into a new store, with what [`prepare`] made of this surface and these options, and what [`ahead`] has made meanwhile.
+///
+/// A surface that is given away is dropped once the coarse mesh exists, which leaves its memory to what follows.
+/// Errors: as [`mesh`].
+pub fn mesh_prepared(
+    catalog: &mut Catalog,
+    surface: Cow<Surface>,
+    options: &Options,
+    (prepared, begun): (Prepared, Option<HeadStart>),
+    budget: &Budget,
+    watch: &Watcher,
+) -> Result<Summary, PipelineError> {
+    let new = New {
+        sizes: prepared.sizes,
+        estimate: prepared.estimate,
+        begun,
+    };
+    let field = &prepared.field;
+    go_on(catalog, surface, options, field, Some(new), budget, watch)
+}
+
+/// What is known of a mesh that is not begun.
+struct New {
+    sizes: SizeSummary,
+    estimate: Estimate,
+    begun: Option<HeadStart>,
+}
+
+fn go_on(
+    catalog: &mut Catalog,
+    surface: Cow<Surface>,
+    options: &Options,
+    field: &SizeField,
+    new: Option<New>,
+    budget: &Budget,
+    watch: &Watcher,
+) -> Result<Summary, PipelineError> {
+    let held = Leases::of(&surface, field, options, budget)?;
+    let run = Run {
+        catalog,
+        bounds: surface.bounds(),
+        options,
+        field,
+        plan: held.plan,
+        n: 1,
+        pages: PagerStats::default(),
+        frames_used: 0,
+        watch,
+    };
+    // Unwinding from a failed page access ends here; a step's commit is its last act, so nothing is half done.
+    attempt(|| run.steps(surface, new, held, budget))?
+}
+
+pub(in crate::pipeline) struct Run<'a> {
+    pub catalog: &'a mut Catalog,
+    pub options: &'a Options,
+    pub field: &'a SizeField,
+    pub plan: Plan,
+    pub bounds: Aabb,
+    /// Number of sub-domains there will be.
+    pub n: u32,
+    pub pages: PagerStats,
+    pub frames_used: usize,
+    pub watch: &'a Watcher<'a>,
+}
+
+impl<'a> Run<'a> {
+    fn steps(
+        mut self,
+        surface: Cow<Surface>,
+        new: Option<New>,
+        mut held: Leases,
+        budget: &Budget,
+    ) -> Result<Summary, PipelineError> {
+        let (mut open, mut coarse, mut sizes) = (None, None, None);
+        let is_given = matches!(surface, Cow::Owned(_));
+        let is_begun = self.catalog.state()? >= StoreState::Coarse;
+        if let Some(new) = new.filter(|_| !is_begun) {
+            let begun = new.begun.filter(|begun| begun.bytes() <= self.plan.frames);
+            let (mesh, report) = self.coarse_step(surface, &new.estimate, begun)?;
+            (open, coarse, sizes) = (Some(mesh), Some(report), Some(new.sizes));
+        } else {
+            drop(surface);
+        }
+        self.n = tree::n_subdomains(self.catalog)?;
+        if is_given {
+            held = held.without_surface(self.options, budget)?;
+            self.plan = held.plan;
+        }
+        // Pages of the coarse mesh that are still resident would take the frames of the others.
+        open = open.filter(|_| self.n == 1);
+        let cuts = self.divide_all()?;
+        let mut summary = Summary {
+            coarse,
+            sizes,
+            cuts,
+            fine: BTreeMap::new(),
+            subdomains: self.n,
+            subdomains_asked: self
+                .options
+                .subdomain_count()?
+                .filter(|&asked| asked > self.n),
+            pages: PagerStats::default(),
+            frames_used: self.frames_used,
+        };
+        let sealed: BTreeSet<u32> = self.catalog.subdomains()?.iter().map(|r| r.rank).collect();
+        let mut left = tree::parts(self.catalog, self.n)?;
+        left.retain(|p| !sealed.contains(&p.part.first));
+        self.leaves(left, open, &mut summary)?;
+        self.close()?;
+        summary.pages.add(self.pages);
+        Ok(summary)
+    }
+
+    /// What is the same for all workers.
+    pub(in crate::pipeline) fn common(&self) -> Result<Common<'a>, PipelineError> {
+        Ok(Common {
+            field: self.field,
+            mode: self.options.mode()?,
+            method: self.options.method,
+            bounds: self.bounds,
+        })
+    }
+
+    fn coarse_step(
+        &mut self,
+        surface: Cow<Surface>,
+        estimate: &Estimate,
+        begun: Option<HeadStart>,
+    ) -> Result<(Mesh, CoarseReport), PipelineError> {
+        let clock = Instant::now();
+        let scratch = self.catalog.scratch_dir()?;
+        let backing = Backing {
+            subdomain: 0,
+            generation: COARSE,
+            spill: scratch.clone(),
+            made: None,
+            base: None,
+            cache_bytes: self.plan.redb as usize,
+        };
+        let head_start = begun.as_ref().map_or(0.0, |begun| begun.seconds);
+        let room = ScratchSpace::new(self.plan.buffers / 2, &scratch);
+        let (mut mesh, kernel) = match begun {
+            Some(begun) => begun.into_mesh(self.plan.frames, backing),
+            None => {
+                let mut mesh = Mesh::new(Pager::new(self.plan.frames, Some(backing)));
+                let kernel = inserted(&mut mesh, &surface, &room, self.watch);
+                (mesh, kernel)
+            }
+        };
+        let label_names = surface.label_names.clone();
+        // All that is needed from here on is in the mesh.
+        drop(surface);
+        let report = recovered(&mut mesh, kernel, self.options, self.watch)?;
+        let space = Workspace {
+            dir: &scratch,
+            memory: self.plan.buffers / 2,
+        };
+        renumber(&mut mesh, &HilbertFrame::new(&self.bounds), &space)?;
+        let load = self.load(&mut mesh);
+        // Where vertices nearly touch, sizes at a point are next to nothing and the estimate knows no bound; the mesh's own load does.
+        let predicted = estimate.tets().min(TETS_PER_LOAD * load);
+        let (n, _) = n_subdomains(predicted, self.options)?;
+        let path = self.catalog.file_path(0, COARSE);
+        mesh.pages_mut().end_generation(path, COARSE + DONE);
+        let part = PartMesh {
+            part: TreePart { first: 0, count: n },
+            generation: COARSE,
+            state: mesh.state(),
+            extents: mesh.pages().extents(),
+            load,
+        };
+        let (pages, frames_used) = (mesh.pages().stats(), mesh.pages().frames_used());
+        let (field, bounds) = (self.field.to_bytes(), self.bounds);
+        self.catalog.commit(|step| {
+            step.list_file(0, COARSE);
+            step.set_labels(&label_names);
+            step.set_regions(&report.regions.list.iter().map(region_row).collect());
+            step.set_blob(blob::SIZE_FIELD, &field);
+            step.set_blob(blob::BOUNDS, &tree::bounds_bytes(&bounds));
+            step.set_blob(blob::SUBDOMAINS, &n.to_le_bytes());
+            step.set_blob(blob::PART, &part.to_bytes());
+            step.set_state(StoreState::Coarse);
+            step.append_journal(&journal(
+                StoreState::Coarse,
+                "coarse mesh",
+                clock,
+                &[
+                    (
+                        "missing_segments",
+                        f64::from(report.recovery.missing_segments),
+                    ),
+                    ("missing_facets", f64::from(report.recovery.missing_facets)),
+                    ("predicted_tets", predicted),
+                    ("head_start_s", head_start),
+                    ("pages_read", pages.pages_read as f64),
+                    ("pages_written", pages.pages_written as f64),
+                    ("frames_used", frames_used as f64),
+                ],
+            ));
+            Ok(())
+        })?;
+        Ok((mesh, report))
+    }
+
+    /// The load of the coarse mesh. Effects: sets the sizes of its vertices.
+    fn load(&self, mesh: &mut Mesh) -> f64 {
+        for v in mesh.vertex_ids() {
+            let p = mesh.point(v);
+            mesh.set_size(v, self.field.h(p) as f32);
+        }
+        load_of(mesh, &|p| self.field.h(p))
+    }
+
+    /// Makes the sub-domains that are left, as many at once as there are threads and memory for.
+    fn leaves(
+        &mut self,
+        left: Vec<PartMesh>,
+        open: Option<Mesh>,
+        summary: &mut Summary,
+    ) -> Result<(), PipelineError> {
+        let common = self.common()?;
+        if let (Some(mesh), [part]) = (open, &left[..]) {
+            let job = self.job(*part, 1)?;
+            let leaf = job.finish(mesh, common, self.watch)?;
+            return self.seal_step(leaf, summary);
+        }
+        let (workers, watch) = (self.plan.workers().min(left.len()), self.watch);
+        map_bounded(
+            &mut (self, summary),
+            left,
+            workers,
+            watch,
+            |(run, _), part| run.job(part, workers as u64),
+            &|job: SubdomainJob, watch| job.run(common, watch).map(Box::new),
+            |(run, summary), leaf| run.seal_step(*leaf, summary),
+        )
+    }
+
+    fn job(&mut self, part: PartMesh, workers: u64) -> Result<SubdomainJob, PipelineError> {
+        let rank = part.part.first;
+        let mut owners = BTreeMap::new();
+        for cut in part.part.cuts_above(self.n) {
+            owners.insert(cut, read_owners(self.catalog, cut)?);
+        }
+        let share = self.plan.shared_by(workers).without_file();
+        Ok(SubdomainJob {
+            part,
+            base: self.catalog.file_path(rank, part.generation),
+            sealed: self.catalog.file_path(rank, part.generation + DONE),
+            generation: part.generation + DONE,
+            form: self.options.form()?,
+            field: None,
+            kept: (!self.options.drop_coarse)
+                .then(|| self.catalog.coarse_path(rank, part.generation)),
+            scratch: self.scratch(&format!("leaf-{rank}"))?,
+            zones: tree::zones_above(self.catalog, part.part, self.n)?,
+            owners,
+            share,
+        })
+    }
+
+    /// A scratch folder of this name.
+    pub(in crate::pipeline) fn scratch(&mut self, name: &str) -> Result<DiskPath, StoreError> {
+        let path = self.catalog.scratch_dir()?.join(name);
+        path.create_dir_all()?;
+        Ok(path)
+    }
+
+    /// Commits a finished sub-domain.
+    fn seal_step(
+        &mut self,
+        leaf: FinishedSubdomain,
+        summary: &mut Summary,
+    ) -> Result<(), PipelineError> {
+        let (rank, generation) = (leaf.part.part.first, leaf.part.generation);
+        let refine = &leaf.fine.refine;
+        let measures = [
+            ("predicted_tets", TETS_PER_LOAD * leaf.part.load),
+            ("coarse_tets", f64::from(leaf.part.state.n_tets())),
+            ("keep_s", leaf.keep_s),
+            ("inserted_vertices", refine.inserted as f64),
+            ("over_constrained_tets", refine.over_constrained as f64),
+            ("zone_rejects", refine.out_of_place as f64),
+            ("frozen_hits", refine.frozen_hits as f64),
+            ("pages_read", leaf.pages.pages_read as f64),
+            ("pages_written", leaf.pages.pages_written as f64),
+            ("frames_used", leaf.frames_used as f64),
+            ("refine_s", leaf.fine.seconds[0]),
+            ("optimize_s", leaf.fine.seconds[1]),
+            ("seal_s", leaf.seal_seconds),
+        ];
+        // A finished sub-domain leaves the state of the whole as it is until the last one.
+        let state = self.catalog.state()?;
+        let mut row = journal(state, "saturate, optimize, seal", leaf.clock, &measures);
+        row.subdomain = Some(rank);
+        let totals = SealedTotals::of(&leaf.sealed).to_bytes();
+        self.catalog.commit(|step| {
+            step.set_subdomain(&leaf.sealed.row);
+            step.set_blob(blob::SEALED + rank, &totals);
+            step.list_file(rank, leaf.generation);
+            step.unlist_file(rank, generation);
+            if let Some(kept) = &leaf.kept {
+                step.list_coarse(kept);
+            }
+            step.append_journal(&row);
+            Ok(())
+        })?;
+        summary.pages.add(leaf.pages);
+        summary.frames_used = summary.frames_used.max(leaf.frames_used);
+        summary.fine.insert(rank, leaf.fine);
+        Ok(())
+    }
+
+    /// Everything is sealed: regions and interfaces of the whole.
+    fn close(&mut self) -> Result<(), PipelineError> {
+        let Totals {
+            regions,
+            interfaces,
+        } = whole(self.catalog, self.n, &BTreeMap::new())?;
+        let scratch = self.catalog.scratch_dir()?;
+        self.catalog.commit(|step| {
+            step.set_regions(&regions);
+            for (&cut, rows) in &interfaces {
+                step.set_interfaces(cut, rows);
+            }
+            step.set_state(StoreState::Sealed);
+            Ok(())
+        })?;
+        // Nothing in it counts; what cannot be removed now goes when the store is next opened for writing.
+        let _ = scratch.remove_dir_all();
+        Ok(())
+    }
+}
+
+fn region_row(region: &RegionSummary) -> RegionRow {
+    RegionRow {
+        region: region.region,
+        volume: region.volume,
+        tets: 0,
+        filled: region.region != 0,
+        labels: region.labels.clone(),
+    }
+}

@@ -1,0 +1,148 @@
+//! One sub-domain: saturated, optimized and sealed alone, by a worker of its own.
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use tetdb_schema::ids::SubdomainId;
+
+use super::coarse_snapshot::keep;
+use super::divide::open_part;
+use super::saturate::{FineReport, fine};
+use crate::bisect::{Method, Zone};
+use crate::geom::Aabb;
+use crate::mesh::{Mesh, Workspace};
+use crate::optimize::Mode;
+use crate::pipeline::error::PipelineError;
+use crate::pipeline::plan::Plan;
+use crate::pipeline::progress::Watcher;
+use crate::pipeline::seal::compact::{SealTarget, seal};
+use crate::pipeline::tree::PartMesh;
+use crate::sealed::{Form, Sealed};
+use crate::sizing::SizeField;
+use crate::storage::{Backing, DiskPath, PagerStats, attempt};
+use crate::topology::Owners;
+use tetdb_schema::catalog::CoarseRow;
+
+/// What a worker needs to make a sub-domain.
+pub(in crate::pipeline) struct SubdomainJob {
+    pub part: PartMesh,
+    /// The part's file, the file to make.
+    pub base: DiskPath,
+    pub sealed: DiskPath,
+    pub form: Form,
+    /// Generation of the file to make.
+    pub generation: u32,
+    /// A size field of its own, in place of that of the whole.
+    pub field: Option<SizeField>,
+    /// Where to keep the coarse leaf, if it is to be kept.
+    pub kept: Option<DiskPath>,
+    pub scratch: DiskPath,
+    pub zones: Vec<Zone>,
+    /// Owners of the faces around it, by cut.
+    pub owners: BTreeMap<u32, Owners>,
+    pub share: Plan,
+}
+
+/// What is the same for all sub-domains.
+#[derive(Clone, Copy)]
+pub(in crate::pipeline) struct Common<'a> {
+    pub field: &'a SizeField,
+    pub mode: Mode,
+    pub method: Method,
+    pub bounds: Aabb,
+}
+
+/// A finished sub-domain; its file is not yet listed.
+pub(in crate::pipeline) struct FinishedSubdomain {
+    pub part: PartMesh,
+    pub generation: u32,
+    pub sealed: Sealed,
+    pub kept: Option<CoarseRow>,
+    /// Seconds it took to keep the coarse leaf.
+    pub keep_s: f64,
+    pub fine: FineReport,
+    pub pages: PagerStats,
+    pub frames_used: usize,
+    pub seal_seconds: f64,
+    pub clock: Instant,
+}
+
+impl SubdomainJob {
+    /// Does the whole job; a failed page access ends here.
+    pub(in crate::pipeline) fn run(
+        self,
+        common: Common,
+        watch: &Watcher,
+    ) -> Result<FinishedSubdomain, PipelineError> {
+        attempt(|| {
+            let backing = Backing {
+                subdomain: self.part.part.first,
+                generation: self.generation,
+                spill: self.scratch.clone(),
+                made: None,
+                base: None,
+                cache_bytes: self.share.redb as usize,
+            };
+            let mesh = open_part(self.part, self.base.clone(), backing, self.share.frames)?;
+            self.finish(mesh, common, watch)
+        })?
+    }
+
+    /// The same for a mesh already open.
+    pub(in crate::pipeline) fn finish(
+        self,
+        mut mesh: Mesh,
+        common: Common,
+        watch: &Watcher,
+    ) -> Result<FinishedSubdomain, PipelineError> {
+        let clock = Instant::now();
+        let space = Workspace {
+            dir: &self.scratch,
+            memory: self.share.buffers / 2,
+        };
+        let (rank, coarse) = (self.part.part.first, self.part.generation);
+        let kept = match &self.kept {
+            Some(path) => Some(keep(&mut mesh, path, rank, coarse, self.share.buffers)?),
+            None => None,
+        };
+        let keep_s = clock.elapsed().as_secs_f64();
+        let fine = fine(
+            &mut mesh,
+            self.field.as_ref().unwrap_or(common.field),
+            common,
+            &self.zones,
+            &space,
+            watch,
+        )?;
+        let generation = self.generation;
+        let target = SealTarget {
+            path: &self.sealed,
+            form: self.form,
+            scratch: &self.scratch,
+            subdomain: SubdomainId::new(rank).expect("fewer parts than ranks"),
+            generation,
+            memory: self.share.buffers,
+            bounds: common.bounds,
+            owners: Some(&self.owners),
+        };
+        let seal_clock = Instant::now();
+        let sealed = seal(&mut mesh, &target, watch)?;
+        let seal_seconds = seal_clock.elapsed().as_secs_f64();
+        let pager = mesh.into_pages();
+        let (pages, frames_used) = (pager.stats(), pager.frames_used());
+        drop(pager);
+        let _ = self.scratch.remove_dir_all();
+        Ok(FinishedSubdomain {
+            part: self.part,
+            generation,
+            sealed,
+            kept,
+            keep_s,
+            fine,
+            pages,
+            frames_used,
+            seal_seconds,
+            clock,
+        })
+    }
+}

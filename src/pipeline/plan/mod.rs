@@ -1,0 +1,11 @@
+//! What is decided before anything is written: options, sizes and what they predict, the shares of the memory cap.
+
+pub(super) mod estimate;
+pub(super) mod leases;
+mod memory;
+mod options;
+mod regions;
+
+pub use estimate::{Estimate, Prepared, least_for, prepare};
+pub use memory::{MEMORY_MIN, Plan};
+pub use options::{Options, Trial};

@@ -1,0 +1,178 @@
+use serde::{Deserialize, Serialize};
+
+use super::Plan;
+use crate::bisect::Method;
+use crate::boundary::RegionPolicy;
+use crate::optimize::Mode;
+use crate::pipeline::error::PipelineError;
+use crate::sealed::Form;
+use crate::sizing::{Formula, RegionSize, SizeOptions, SizeSource, SizingError};
+
+/// Sub-domains smaller than this are nearly all refined zone: more are not made.
+const TETS_MIN: f64 = 25_000.0;
+
+/// What decides the mesh, besides the surface; stored with the job. Memory and threads are not here: they do not.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Options {
+    /// Wanted sizes as typed: lengths, or `1%` of the box diagonal.
+    pub hsiz: Option<String>,
+    pub hmin: Option<String>,
+    pub hmax: Option<String>,
+    pub hgrad: Option<String>,
+    /// Sizes in boxes, spheres and cylinders, as typed.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub size_box: Vec<String>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub size_sphere: Vec<String>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub size_cylinder: Vec<String>,
+    /// Sizes of regions, as typed.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub size_region: Vec<String>,
+    /// A length as an expression in x, y and z.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_expr: Option<String>,
+    /// A file of sizes at the vertices of a mesh; stored with its full path.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_field: Option<String>,
+    /// What the files of `size_field` hold, as 32 hex digits: found by the program, so that a changed file is noticed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_field_hash: Option<String>,
+    /// `parity`, `all`, `outer`, `by-orientation`.
+    pub regions: Option<String>,
+    /// `none`, `delaunay`, `full`.
+    pub optimize: Option<String>,
+    /// `auto` or a number.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub subdomains: Option<String>,
+    /// Whether sub-domains are made for good: what they were made from is not kept. It does not shape the mesh.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub drop_coarse: bool,
+    /// `packed`, `none`: whether finished sub-domains are packed into chunks or kept as working pages. It does not shape the mesh.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seal: Option<String>,
+    /// Whether meshes on their way are kept to be looked at; the finished mesh is the same.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub keep_stages: bool,
+    /// For comparisons by a program. It is not stored: a run that is resumed makes cuts as usual.
+    #[serde(skip)]
+    pub method: Method,
+    /// For tests by a program. Not stored either: how many sub-domains there will be is, once that is decided.
+    #[serde(skip)]
+    pub trial: Trial,
+}
+
+/// What makes of a small mesh a test of what happens to large ones.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Trial {
+    /// As many sub-domains as are asked for, however small they are.
+    pub subdomains_small: bool,
+    /// Frames and buffers that are not shares of the cap: with very few, pages leave memory and sorts have runs.
+    pub plan: Option<Plan>,
+}
+
+impl Options {
+    /// Sizes, parsed.
+    ///
+    /// Errors: the option and the value that make no sense.
+    pub fn sizes(&self) -> Result<SizeOptions, SizingError> {
+        let text = |o: &'_ Option<String>| o.clone();
+        let [hsiz, hmin, hmax, hgrad] = [&self.hsiz, &self.hmin, &self.hmax, &self.hgrad].map(text);
+        let mut sizes = SizeOptions::parse(
+            hsiz.as_deref(),
+            hmin.as_deref(),
+            hmax.as_deref(),
+            hgrad.as_deref(),
+        )?;
+        let boxes = self.size_box.iter().map(|t| SizeSource::parse_box(t));
+        let spheres = self.size_sphere.iter().map(|t| SizeSource::parse_sphere(t));
+        let cylinders = self
+            .size_cylinder
+            .iter()
+            .map(|t| SizeSource::parse_cylinder(t));
+        sizes.sources = boxes
+            .chain(spheres)
+            .chain(cylinders)
+            .collect::<Result<_, _>>()?;
+        sizes.formula = self.size_expr.as_deref().map(Formula::parse).transpose()?;
+        let regions = self.size_region.iter().map(|t| RegionSize::parse(t));
+        sizes.regions = regions.collect::<Result<_, _>>()?;
+        Ok(sizes)
+    }
+
+    /// The number of sub-domains asked for; `None` for one that follows from the predicted size of the mesh.
+    ///
+    /// Errors: a text that is neither `auto` nor a number from 1.
+    pub fn subdomain_count(&self) -> Result<Option<u32>, PipelineError> {
+        match self.subdomains.as_deref() {
+            None | Some("auto") => Ok(None),
+            Some(text) => match text.parse() {
+                Ok(n) if n > 0 => Ok(Some(n)),
+                _ => Err(PipelineError::Option {
+                    option: "--subdomains",
+                    value: text.to_owned(),
+                }),
+            },
+        }
+    }
+
+    /// Fewest tetrahedra of a sub-domain.
+    pub(in crate::pipeline) fn subdomain_tets_min(&self) -> f64 {
+        match self.trial.subdomains_small {
+            true => 1.0,
+            false => TETS_MIN,
+        }
+    }
+
+    /// Which regions are filled; `None` when the word is not known.
+    pub fn region_policy(&self) -> Option<RegionPolicy> {
+        Some(match self.regions.as_deref().unwrap_or("parity") {
+            "parity" => RegionPolicy::Parity,
+            "all" => RegionPolicy::All,
+            "outer" => RegionPolicy::Outer,
+            "by-orientation" => RegionPolicy::ByOrientation,
+            _ => return None,
+        })
+    }
+
+    /// How far to optimize; `None` when the word is not known.
+    pub fn optimize_mode(&self) -> Option<Mode> {
+        Some(match self.optimize.as_deref().unwrap_or("full") {
+            "none" => Mode::None,
+            "delaunay" => Mode::Delaunay,
+            "full" => Mode::Full,
+            _ => return None,
+        })
+    }
+
+    /// The form of finished sub-domains.
+    ///
+    /// Errors: a word that is not known.
+    pub fn form(&self) -> Result<Form, PipelineError> {
+        match self.seal.as_deref().unwrap_or("packed") {
+            "packed" => Ok(Form::Sealed),
+            "none" => Ok(Form::Pages),
+            _ => Err(unknown("--seal", &self.seal)),
+        }
+    }
+
+    /// [`Options::region_policy`], or an error that names the word.
+    pub(in crate::pipeline) fn regions(&self) -> Result<RegionPolicy, PipelineError> {
+        self.region_policy()
+            .ok_or_else(|| unknown("--regions", &self.regions))
+    }
+
+    /// [`Options::optimize_mode`], or an error that names the word.
+    pub(in crate::pipeline) fn mode(&self) -> Result<Mode, PipelineError> {
+        self.optimize_mode()
+            .ok_or_else(|| unknown("--optimize", &self.optimize))
+    }
+}
+
+fn unknown(option: &'static str, value: &Option<String>) -> PipelineError {
+    PipelineError::Option {
+        option,
+        value: value.clone().unwrap_or_default(),
+    }
+}

@@ -1,0 +1,143 @@
+//! Sub-domains made again from their coarse leaves, each alone; what lies around them stays as it is.
+//!
+//! Workers write new files beside the old ones; when all are done, one commit lists the new files and remembers the old as the previous
+//! version. A run that is killed leaves the old mesh or the new one.
+
+use std::collections::BTreeSet;
+
+use super::run::RemeshRun;
+use super::sizes::{NewSizes, Recorded, predicted};
+use crate::pipeline::error::PipelineError;
+use crate::pipeline::mesh::FineReport;
+use crate::pipeline::plan::Options;
+use crate::pipeline::progress::Watcher;
+use crate::pipeline::tree::{self, blob};
+use crate::sizing::SizeField;
+use crate::storage::{Budget, PagerStats, attempt};
+use crate::store::{Catalog, StoreError};
+use tetdb_schema::catalog::SubdomainRow;
+
+/// What to make again.
+#[derive(Clone, Debug)]
+pub struct Resaturation {
+    pub ranks: BTreeSet<u32>,
+    /// `None`: with the sizes that are recorded.
+    pub sizes: Option<NewSizes>,
+    /// The file of each is damaged: it must become what the catalog says it was, and is no previous version.
+    pub repair: bool,
+}
+
+/// A sub-domain before and after.
+#[derive(Clone, Debug)]
+pub struct Remade {
+    pub before: SubdomainRow,
+    pub after: SubdomainRow,
+    /// `None` where an older version came back.
+    pub fine: Option<FineReport>,
+}
+
+/// What a run did, by rank.
+#[derive(Clone, Debug)]
+pub struct ResaturateSummary {
+    pub parts: Vec<Remade>,
+    pub pages: PagerStats,
+    pub frames_used: usize,
+}
+
+/// What would be made again.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Forecast {
+    pub rank: u32,
+    pub tets: u64,
+    /// Tetrahedra to expect.
+    pub predicted: f64,
+}
+
+/// Makes sub-domains of a finished store again, in one step.
+///
+/// The result depends on the store and the sizes alone. Interfaces and all other sub-domains stay as they are. Effects: one commit; the
+/// replaced files stay as the previous version, the one before goes. Errors: a sub-domain that is not there or whose coarse leaf
+/// was not kept; sizes that make no sense. The store is then as it was.
+pub fn resaturate(
+    catalog: &mut Catalog,
+    options: &Options,
+    what: &Resaturation,
+    budget: &Budget,
+    watch: &Watcher,
+) -> Result<ResaturateSummary, PipelineError> {
+    let mut again = RemeshRun::open(catalog, options, what)?;
+    attempt(|| {
+        let fields = again.fields(budget)?;
+        again.run(fields, budget, watch)
+    })?
+}
+
+/// What [`resaturate`] would make, without making it. Errors: as there.
+pub fn forecast(
+    catalog: &mut Catalog,
+    options: &Options,
+    what: &Resaturation,
+    budget: &Budget,
+) -> Result<Vec<Forecast>, PipelineError> {
+    let mut again = RemeshRun::open(catalog, options, what)?;
+    attempt(|| {
+        let memory = budget.available() / 4;
+        let mut list = Vec::new();
+        for (rank, new) in again.fields(budget)? {
+            let recorded = Recorded {
+                whole: &again.field,
+            };
+            let old = recorded.own(again.catalog, rank)?;
+            let old = old.as_ref().unwrap_or(&again.field);
+            let tets = again.catalog.subdomain(rank)?.tets;
+            let predicted = match &new {
+                Some(new) => predicted(again.catalog, rank, [old, new], memory)?,
+                None => tets as f64,
+            };
+            list.push(Forecast {
+                rank,
+                tets,
+                predicted,
+            });
+        }
+        Ok(list)
+    })?
+}
+
+/// The sub-domains that `sizes` would make otherwise than they are. Errors: damage; sizes that make no sense.
+pub fn changed(
+    catalog: &mut Catalog,
+    options: &Options,
+    sizes: &NewSizes,
+    budget: &Budget,
+) -> Result<BTreeSet<u32>, PipelineError> {
+    let field = whole_field(catalog, options)?;
+    let recorded = Recorded { whole: &field };
+    let mut ranks = BTreeSet::new();
+    for row in catalog.subdomains()? {
+        let memory = budget.available() / 4;
+        if attempt(|| recorded.differs(catalog, row.rank, sizes, memory))?? {
+            ranks.insert(row.rank);
+        }
+    }
+    Ok(ranks)
+}
+
+/// What was asked for when a sub-domain was last made again with other sizes; `None` for one with those of the whole.
+///
+/// Errors: a damaged catalog.
+pub fn asked(catalog: &mut Catalog, rank: u32) -> Result<Option<String>, StoreError> {
+    let bytes = catalog.blob(blob::ASKED + rank)?;
+    Ok(bytes.map(|bytes| String::from_utf8_lossy(&bytes).into_owned()))
+}
+
+/// The recorded field of the whole.
+pub(in crate::pipeline) fn whole_field(
+    catalog: &mut Catalog,
+    options: &Options,
+) -> Result<SizeField, PipelineError> {
+    let bytes = catalog.blob(blob::SIZE_FIELD)?.unwrap_or_default();
+    let diagonal = tree::bounds(catalog)?.diagonal();
+    let field = SizeField::from_bytes(&bytes)?;
+    Ok(field.with_sources(&options.sizes()?, diagonal)?)
+}

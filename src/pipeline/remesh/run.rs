@@ -1,0 +1,359 @@
+//! One run that makes sub-domains again: jobs for workers, then one commit.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::previous::{Previous, VERSIONED};
+use super::resaturate::{Remade, ResaturateSummary, Resaturation, whole_field};
+use super::sizes::{Recorded, Values};
+use crate::mesh::Workspace;
+use crate::pipeline::error::PipelineError;
+use crate::pipeline::mesh::coarse_snapshot::reopen;
+use crate::pipeline::mesh::divide::read_owners;
+use crate::pipeline::mesh::subdomain::{Common, FinishedSubdomain, SubdomainJob};
+use crate::pipeline::plan::{Options, Plan};
+use crate::pipeline::progress::Watcher;
+use crate::pipeline::seal::totals::{SealedTotals, journal, whole};
+use crate::pipeline::tree::{self, PartMesh, blob};
+use crate::pipeline::workers::map_bounded;
+use crate::sealed::SealedError;
+use crate::sealed::{CoarseSnapshot, Form};
+use crate::sizing::{BackgroundMesh, SizeField};
+use crate::storage::{Backing, Budget, DiskPath, PagerStats, attempt};
+use crate::store::{Catalog, StoreError};
+use tetdb_schema::catalog::{CoarseRow, StoreState, SubdomainRow};
+
+/// One run.
+pub(in crate::pipeline) struct RemeshRun<'a> {
+    pub catalog: &'a mut Catalog,
+    options: &'a Options,
+    what: &'a Resaturation,
+    /// Of the whole.
+    pub field: Arc<SizeField>,
+    /// Rows of what is made again, by rank.
+    rows: Vec<(SubdomainRow, CoarseRow)>,
+    /// The latest generation of each sub-domain's files.
+    last: BTreeMap<u32, u32>,
+    n: u32,
+    clock: Instant,
+}
+
+/// A sub-domain to be made again.
+struct Job {
+    leaf: SubdomainJob,
+    kept: CoarseRow,
+    path: DiskPath,
+}
+
+impl Job {
+    fn run(self, common: Common, watch: &Watcher) -> Result<FinishedSubdomain, PipelineError> {
+        attempt(|| {
+            let share = self.leaf.share;
+            let backing = Backing {
+                subdomain: self.kept.rank,
+                generation: self.leaf.generation,
+                spill: self.leaf.scratch.clone(),
+                made: None,
+                base: None,
+                cache_bytes: share.redb as usize,
+            };
+            let space = Workspace {
+                dir: &self.leaf.scratch,
+                memory: share.buffers / 2,
+            };
+            let cache = (share.redb / 2) as usize;
+            let mut kept = CoarseSnapshot::open(&self.path, self.kept, cache)?;
+            let mesh = reopen(&mut kept, backing, share.frames, &space)?;
+            drop(kept);
+            self.leaf.finish(mesh, common, watch)
+        })?
+    }
+}
+
+impl<'a> RemeshRun<'a> {
+    pub fn open(
+        catalog: &'a mut Catalog,
+        options: &'a Options,
+        what: &'a Resaturation,
+    ) -> Result<Self, PipelineError> {
+        let clock = Instant::now();
+        let mut rows = Vec::new();
+        for &rank in &what.ranks {
+            let row = catalog.subdomain(rank)?;
+            let kept = catalog.coarse_snapshot(rank)?;
+            let kept = kept.ok_or_else(|| StoreError::NoCoarseSnapshot {
+                path: catalog.dir().to_owned(),
+                subdomain: rank,
+            })?;
+            rows.push((row, kept));
+        }
+        let mut last = BTreeMap::new();
+        for file in catalog.files()? {
+            let newest = last.entry(file.subdomain).or_insert(file.generation);
+            *newest = file.generation.max(*newest);
+        }
+        Ok(Self {
+            field: Arc::new(whole_field(catalog, options)?),
+            last,
+            n: tree::n_subdomains(catalog)?,
+            catalog,
+            options,
+            what,
+            rows,
+            clock,
+        })
+    }
+
+    /// The field of each sub-domain that is made again; `None` for that of the whole.
+    pub fn fields(
+        &mut self,
+        budget: &Budget,
+    ) -> Result<BTreeMap<u32, Option<SizeField>>, PipelineError> {
+        let recorded = Recorded { whole: &self.field };
+        let memory = budget.available() / 4;
+        let mut fields = BTreeMap::new();
+        let values = self.what.sizes.as_ref().and_then(|s| s.values.as_ref());
+        if let Some(values) = values {
+            self.count(values)?;
+        }
+        let _lease = match &self.what.sizes {
+            Some(_) => Some(budget.lease(self.field_bytes(values), "building size fields")?),
+            None => None,
+        };
+        let mut from = 0;
+        for (row, _) in &self.rows {
+            let field = match &self.what.sizes {
+                Some(sizes) => {
+                    let made = recorded.made_new(self.catalog, row.rank, sizes, from, memory)?;
+                    from += row.tets as usize;
+                    Some(made)
+                }
+                None => recorded.own(self.catalog, row.rank)?,
+            };
+            fields.insert(row.rank, field);
+        }
+        Ok(fields)
+    }
+
+    /// What it takes to build one field after the other.
+    fn field_bytes(&self, values: Option<&Values>) -> u64 {
+        /// Bytes of the octree while it is built, for each face of a skin.
+        const SKIN_FACE: u64 = 300;
+        let one = |(row, kept): &(SubdomainRow, CoarseRow)| {
+            let skin = 24 * kept.vertices + SKIN_FACE * (kept.facets + kept.interface_faces);
+            match values {
+                Some(_) => skin + BackgroundMesh::bytes(row.vertices, row.tets),
+                None => skin,
+            }
+        };
+        let most = self.rows.iter().map(one).max().unwrap_or(0);
+        most + values.map_or(0, Values::bytes)
+    }
+
+    /// Refuses lengths that are not one for each.
+    fn count(&self, values: &Values) -> Result<(), PipelineError> {
+        let tets: u64 = self.rows.iter().map(|(row, _)| row.tets).sum();
+        let vertices = match &self.rows[..] {
+            [(row, _)] => row.vertices,
+            _ => 0,
+        };
+        let (found, expected) = match values {
+            Values::Tets(h) => (h.len() as u64, tets),
+            Values::Vertices(h) => (h.len() as u64, vertices),
+        };
+        match found == expected {
+            true => Ok(()),
+            false => Err(PipelineError::SizeCount {
+                found,
+                tets,
+                vertices,
+            }),
+        }
+    }
+
+    pub fn run(
+        &mut self,
+        fields: BTreeMap<u32, Option<SizeField>>,
+        budget: &Budget,
+        watch: &Watcher,
+    ) -> Result<ResaturateSummary, PipelineError> {
+        let of = |field: &SizeField| field.bytes() as u64;
+        let own: u64 = fields.values().flatten().map(of).sum();
+        let asked = self.what.sizes.as_ref().and_then(|s| s.field.as_ref());
+        // Those of the sub-domains are held as bytes, too, until they are committed.
+        let held = 2 * own + of(&self.field) + asked.map_or(0, of);
+        let _fields = budget.lease(held, "the size fields")?;
+        let plan = Plan::new(budget.cap(), held)?;
+        let leased = plan.frames + plan.redb + plan.redb / 2 + plan.buffers;
+        let _lease = budget.lease(leased, "the working mesh")?;
+        let bounds = tree::bounds(self.catalog)?;
+        let workers = plan.workers().min(self.rows.len()).max(1);
+        let share = plan.shared_by(workers as u64).without_file();
+        let own_sizes = self.what.sizes.is_some();
+        let made: BTreeMap<u32, Vec<u8>> = (fields.iter())
+            .filter_map(|(&rank, field)| Some((rank, field.as_ref()?.to_bytes())))
+            .filter(|_| own_sizes)
+            .collect();
+        let parts = tree::parts(self.catalog, self.n)?;
+        let whole = Arc::clone(&self.field);
+        let common = Common {
+            field: &whole,
+            mode: self.options.mode()?,
+            method: self.options.method,
+            bounds,
+        };
+        let mut state = (self, BTreeMap::new());
+        map_bounded(
+            &mut state,
+            fields.into_iter().collect(),
+            workers,
+            watch,
+            |(again, _), (rank, field)| again.job(parts[rank as usize], field, share),
+            &|job: Job, watch| job.run(common, watch).map(Box::new),
+            |(_, leaves), leaf| {
+                leaves.insert(leaf.sealed.row.rank, *leaf);
+                Ok(())
+            },
+        )?;
+        let (again, leaves) = state;
+        again.commit(leaves, &made)
+    }
+
+    fn job(
+        &mut self,
+        part: PartMesh,
+        field: Option<SizeField>,
+        share: Plan,
+    ) -> Result<Job, PipelineError> {
+        let rank = part.part.first;
+        let mut owners = BTreeMap::new();
+        for cut in part.part.cuts_above(self.n) {
+            owners.insert(cut, read_owners(self.catalog, cut)?);
+        }
+        // The faces of cuts stay; with sizes of its own a sub-domain may be refined up to them.
+        let zones = match field {
+            Some(_) => Vec::new(),
+            None => tree::zones_above(self.catalog, part.part, self.n)?,
+        };
+        let asked = self.rows.iter().find(|(row, _)| row.rank == rank);
+        let (row, kept) = asked.expect("asked for");
+        let (row, kept) = (row.clone(), *kept);
+        let last = self.last.get(&rank).copied().unwrap_or(0);
+        let scratch = self.catalog.scratch_dir()?.join(format!("leaf-{rank}"));
+        scratch.create_dir_all()?;
+        let leaf = SubdomainJob {
+            part,
+            base: self.catalog.coarse_path(rank, kept.generation),
+            sealed: self.catalog.file_path(rank, last + 2),
+            generation: last + 2,
+            // As it was.
+            form: Form::of(row.state).unwrap_or_default(),
+            field,
+            kept: None,
+            scratch,
+            zones,
+            owners,
+            share,
+        };
+        Ok(Job {
+            leaf,
+            kept,
+            path: self.catalog.coarse_path(rank, kept.generation),
+        })
+    }
+
+    fn commit(
+        &mut self,
+        leaves: BTreeMap<u32, FinishedSubdomain>,
+        made: &BTreeMap<u32, Vec<u8>>,
+    ) -> Result<ResaturateSummary, PipelineError> {
+        let (mut totals, mut old_blobs) = (BTreeMap::new(), Vec::new());
+        for (row, _) in &self.rows {
+            let (rank, sealed) = (row.rank, &leaves[&row.rank].sealed);
+            assert_eq!(
+                sealed.row.interface_digest, row.interface_digest,
+                "the interfaces of sub-domain {rank} have changed"
+            );
+            if self.what.repair && sealed.row.digest != row.digest {
+                return Err(StoreError::Sealed(SealedError::Content {
+                    path: self.catalog.dir().to_owned(),
+                    subdomain: rank,
+                    what: "made again it is not what the catalog says it was".to_owned(),
+                })
+                .into());
+            }
+            totals.insert(rank, SealedTotals::of(sealed));
+            for (now, then) in VERSIONED {
+                old_blobs.push((then + rank, self.catalog.blob(now + rank)?));
+            }
+        }
+        let regions = whole(self.catalog, self.n, &totals)?.regions;
+        let dropped = Previous::of(self.catalog)?;
+        let (what, rows, clock) = (self.what, &self.rows, self.clock);
+        let asked = what.sizes.as_ref().map(|sizes| sizes.asked.as_bytes());
+        let step_name = match what.repair {
+            true => "repair",
+            false => "resaturate",
+        };
+        self.catalog.commit(|step| {
+            if !what.repair {
+                dropped.drop(step);
+                for (number, bytes) in &old_blobs {
+                    if let Some(bytes) = bytes {
+                        step.set_blob(*number, bytes);
+                    }
+                }
+            }
+            for (row, _) in rows {
+                let (rank, leaf) = (row.rank, &leaves[&row.rank]);
+                step.list_file(rank, leaf.generation);
+                step.set_subdomain(&leaf.sealed.row);
+                step.set_blob(blob::SEALED + rank, &totals[&rank].to_bytes());
+                match what.repair {
+                    true => step.unlist_file(rank, row.generation),
+                    false => step.set_before(row),
+                }
+                if let (Some(field), Some(asked)) = (made.get(&rank), asked) {
+                    step.set_blob(blob::FIELD + rank, field);
+                    step.set_blob(blob::ASKED + rank, asked);
+                }
+                let refine = &leaf.fine.refine;
+                let measures = [
+                    ("tets_before", row.tets as f64),
+                    ("tets", leaf.sealed.row.tets as f64),
+                    ("inserted_vertices", refine.inserted as f64),
+                    ("frozen_hits", refine.frozen_hits as f64),
+                    ("pages_read", leaf.pages.pages_read as f64),
+                    ("pages_written", leaf.pages.pages_written as f64),
+                ];
+                let since = if leaves.len() == 1 { clock } else { leaf.clock };
+                let mut journal = journal(StoreState::Sealed, step_name, since, &measures);
+                journal.subdomain = Some(rank);
+                step.append_journal(&journal);
+            }
+            step.set_regions(&regions);
+            step.set_state(StoreState::Sealed);
+            Ok(())
+        })?;
+        if let Ok(scratch) = self.catalog.scratch_dir() {
+            // Nothing in it counts.
+            let _ = scratch.remove_dir_all();
+        }
+        let mut summary = ResaturateSummary {
+            parts: Vec::new(),
+            pages: PagerStats::default(),
+            frames_used: 0,
+        };
+        for ((before, _), leaf) in self.rows.iter().zip(leaves.into_values()) {
+            summary.pages.add(leaf.pages);
+            summary.frames_used = summary.frames_used.max(leaf.frames_used);
+            summary.parts.push(Remade {
+                before: before.clone(),
+                after: leaf.sealed.row,
+                fine: Some(leaf.fine),
+            });
+        }
+        Ok(summary)
+    }
+}

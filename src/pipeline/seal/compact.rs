@@ -1,0 +1,327 @@
+//! Seal a finished working mesh: renumber along the Hilbert curve, drop neighbors, compress.
+//!
+//! Everything is a stream or an external sort, so a mesh of any size passes through a small lease:
+//! 1. vertices sorted along the curve; their places become their numbers (a scratch map holds old → new);
+//! 2. tetrahedra sorted by their new numbers, smallest vertex first, which follows the curve too;
+//! 3. their required faces sorted by vertices and joined with the facets, which so learn their tetrahedra.
+
+use std::collections::BTreeMap;
+
+use tetdb_schema::ids::{Owner, SubdomainId, VertexId};
+use tetdb_schema::leaf::TetPlace;
+use tetdb_schema::page::NONE;
+use tetdb_schema::record::{InterfaceFace, SealedFacet, SealedTet, SealedVertex, tag};
+
+use super::neighbors::Neighbors;
+use crate::geom::{Aabb, HilbertFrame};
+use crate::mesh::anatomy::FACES;
+use crate::mesh::{Mesh, VertexTag, dense};
+use crate::pipeline::error::PipelineError;
+use crate::pipeline::progress::{Event, Watcher};
+use crate::sealed::{Form, Sealed, SealedWriter, sorted_face};
+use crate::storage::{DiskPath, Pages, Sorted, Sorter, check_cancelled};
+use crate::topology::Owners;
+
+/// Where and how to seal.
+pub(in crate::pipeline) struct SealTarget<'a> {
+    pub path: &'a DiskPath,
+    pub form: Form,
+    pub scratch: &'a DiskPath,
+    pub subdomain: SubdomainId,
+    pub generation: u32,
+    /// Bytes for sort runs and for the writer together.
+    pub memory: u64,
+    pub bounds: Aabb,
+    /// Owners of the faces of the cuts around it, by cut; without them interface faces are left out.
+    pub owners: Option<&'a BTreeMap<u32, Owners>>,
+}
+
+/// Writes `mesh` to `target`, in the order and under the numbers of a sealed sub-domain whatever the form. Effects: the mesh's scratch map is used up; `tet_of` must be right for all vertices.
+pub(in crate::pipeline) fn seal<P: Pages>(
+    mesh: &mut Mesh<P>,
+    target: &SealTarget,
+    watch: &Watcher,
+) -> Result<Sealed, PipelineError> {
+    let mut writer = SealedWriter::create_as(
+        target.form,
+        target.path,
+        target.subdomain,
+        target.generation,
+        (target.memory / 2) as usize,
+    )?;
+    mesh.clear_scratch();
+    vertices(mesh, target, &mut writer, watch)?;
+    let mut neighbors = match target.form {
+        Form::Sealed => None,
+        Form::Pages => Some(Neighbors::of(sort_tets(mesh, target)?, target)?),
+    };
+    let order = sort_tets(mesh, target)?;
+    let faces = tets(
+        order,
+        mesh.n_tets(),
+        &mut neighbors,
+        target,
+        &mut writer,
+        watch,
+    )?;
+    facets(mesh, faces, target, &mut writer)?;
+    mesh.clear_scratch();
+    Ok(writer.finish()?)
+}
+
+fn tell(watch: &Watcher, stage: &'static str, done: u64, total: u32) {
+    if done.is_multiple_of(65_536) {
+        check_cancelled();
+        watch(Event {
+            stage,
+            done,
+            total: Some(u64::from(total)),
+            unit: "records",
+        });
+    }
+}
+
+fn vertices<P: Pages>(
+    mesh: &mut Mesh<P>,
+    target: &SealTarget,
+    writer: &mut SealedWriter,
+    watch: &Watcher,
+) -> Result<(), PipelineError> {
+    let frame = HilbertFrame::new(&target.bounds);
+    let mut sorter = Sorter::<12>::new(target.scratch, target.memory / 4);
+    for v in mesh.vertex_ids() {
+        // A surface vertex between two empty regions has no tetrahedron, but its facets are listed.
+        if mesh.tet_of(v) == NONE && mesh.vertex_attribute(v).0 != VertexTag::Surface {
+            continue;
+        }
+        let mut record = [0; 12];
+        record[..8].copy_from_slice(&frame.index(mesh.point(v)).to_be_bytes());
+        record[8..].copy_from_slice(&v.to_be_bytes());
+        sorter.push(record)?;
+    }
+    for (local, record) in sorter.finish()?.enumerate() {
+        let v = word(&record?, 8);
+        let local = local as u32;
+        mesh.set_scratch(dense(v), local);
+        let (point, h) = mesh.point_and_size(v);
+        let (vertex_tag, owner_index) = mesh.vertex_attribute(v);
+        let (tag, id) = match vertex_tag {
+            VertexTag::Surface => {
+                let id = VertexId {
+                    owner: Owner::Surface,
+                    index: owner_index,
+                };
+                (tag::SURFACE, id.number())
+            }
+            VertexTag::Interface => {
+                let (cut, index) = mesh.interface_vertex(v);
+                let owner = Owner::Cut(cut);
+                (tag::INTERFACE, VertexId { owner, index }.number())
+            }
+            VertexTag::Steiner => (tag::STEINER, SealedVertex::own_id(target.subdomain, local)),
+            _ => (tag::FREE, SealedVertex::own_id(target.subdomain, local)),
+        };
+        writer.push_vertex(SealedVertex {
+            point: point.to_array(),
+            h,
+            tag,
+            id,
+        })?;
+        tell(watch, "seal vertices", u64::from(local), mesh.n_vertices());
+    }
+    Ok(())
+}
+
+/// Nodes, region and flags of a tetrahedron, 4 + 1 + 1 big-endian words, and a mask of its required faces.
+pub(in crate::pipeline) type TetRecord = [u8; 25];
+
+fn sort_tets<P: Pages>(
+    mesh: &mut Mesh<P>,
+    target: &SealTarget,
+) -> Result<Sorted<25>, PipelineError> {
+    let mut sorter = Sorter::<25>::new(target.scratch, target.memory / 4);
+    let mut from = 0;
+    while let Some((t, tet)) = mesh.next_tet(from) {
+        from = t + 1;
+        let [a, b, c, d] = tet.vertices();
+        let nodes = [a, b, c, d].map(|v| mesh.scratch(dense(v)));
+        let (region, flags) = mesh.tet_attribute(t);
+        let rotated = SealedTet { nodes, region }.rotated();
+        let mut record: TetRecord = [0; 25];
+        for (i, node) in rotated.nodes.into_iter().enumerate() {
+            record[4 * i..4 * i + 4].copy_from_slice(&node.to_be_bytes());
+            let old = nodes.iter().position(|&n| n == node).unwrap_or(0);
+            record[24] |= u8::from(tet.is_required(old)) << i;
+        }
+        record[16..20].copy_from_slice(&region.to_be_bytes());
+        record[20..24].copy_from_slice(&flags.to_be_bytes());
+        sorter.push(record)?;
+    }
+    Ok(sorter.finish()?)
+}
+
+/// A required face: its vertices ascending, the tetrahedron, and whether ascending order is odd in it.
+type FaceRecord = [u8; 17];
+
+fn tets(
+    order: Sorted<25>,
+    n_tets: u32,
+    neighbors: &mut Option<Neighbors>,
+    target: &SealTarget,
+    writer: &mut SealedWriter,
+    watch: &Watcher,
+) -> Result<Sorted<17>, PipelineError> {
+    let mut faces = Sorter::<17>::new(target.scratch, target.memory / 4);
+    for (t, record) in order.enumerate() {
+        let record = record?;
+        let nodes = nodes(&record);
+        let region = word(&record, 16);
+        match neighbors {
+            None => writer.push_tet(nodes, region)?,
+            Some(neighbors) => {
+                let place = TetPlace {
+                    neighbors: neighbors.next()?,
+                    required: record[24],
+                    flags: word(&record, 20),
+                };
+                writer.push_placed_tet(SealedTet { nodes, region }, &place)?;
+            }
+        }
+        for i in (0..4).filter(|i| record[24] >> i & 1 != 0) {
+            let (face, odd) = sorted_face(FACES[i].map(|k| nodes[k]));
+            faces.push(face_record(face, t as u32, odd))?;
+        }
+        tell(watch, "seal tetrahedra", t as u64, n_tets);
+    }
+    Ok(faces.finish()?)
+}
+
+fn face_record(face: [u32; 3], number: u32, odd: bool) -> FaceRecord {
+    let mut record: FaceRecord = [0; 17];
+    for (i, v) in face.into_iter().enumerate() {
+        record[4 * i..4 * i + 4].copy_from_slice(&v.to_be_bytes());
+    }
+    record[12..16].copy_from_slice(&number.to_be_bytes());
+    record[16] = u8::from(odd);
+    record
+}
+
+/// What claims a required face.
+const FACET: u8 = 0;
+const INTERFACE: u8 = 1;
+/// Vertices ascending, number, parity, kind.
+type ClaimRecord = [u8; 18];
+
+/// Joins facets and interface faces with the faces of tetrahedra; all ascend by their sorted vertices.
+fn facets<P: Pages>(
+    mesh: &mut Mesh<P>,
+    faces: Sorted<17>,
+    target: &SealTarget,
+    writer: &mut SealedWriter,
+) -> Result<(), PipelineError> {
+    let mut sorter = Sorter::<18>::new(target.scratch, target.memory / 4);
+    for n in 0..mesh.n_facets() {
+        let vertices = mesh.facet(n).vertices.map(|v| mesh.scratch(dense(v)));
+        sorter.push(claim_record(vertices, n, FACET))?;
+    }
+    let n_interface_faces = target.owners.map_or(0, |_| mesh.n_interface_faces());
+    for n in 0..n_interface_faces {
+        let face = mesh.interface_face(n);
+        let vertices = face.vertices.map(|v| mesh.scratch(dense(v)));
+        sorter.push(claim_record(vertices, n, INTERFACE))?;
+    }
+    let mut faces = faces.peekable();
+    // A face may be both a facet and an interface face: what was read stays at hand.
+    let (mut at, mut sides) = ([0; 12], [NONE; 2]);
+    // Of a facet given from both sides the first one names the tetrahedra.
+    let mut is_named = [false; 2];
+    for claim in sorter.finish()? {
+        let claim = claim?;
+        if claim[..12] != at || sides == [NONE; 2] {
+            (sides, is_named) = ([NONE; 2], [false; 2]);
+            at.copy_from_slice(&claim[..12]);
+            while let Some(face) =
+                faces.next_if(|f| f.as_ref().map_or(true, |f| f[..12] <= claim[..12]))
+            {
+                let face = face?;
+                if face[..12] == claim[..12] {
+                    sides[usize::from(face[16])] = word(&face, 12);
+                }
+            }
+        }
+        // A tetrahedron sees its face from inside turn as the facet does when it lies behind it.
+        let odd = usize::from(claim[16]);
+        let tets = match std::mem::replace(&mut is_named[usize::from(claim[17])], true) {
+            true => [NONE; 2],
+            false => [sides[1 - odd], sides[odd]],
+        };
+        let number = word(&claim, 12);
+        if claim[17] == FACET {
+            push_facet(mesh, number, tets, writer)?;
+        } else {
+            push_interface_face(mesh, number, tets[1], target, writer)?;
+        }
+    }
+    Ok(())
+}
+
+fn claim_record(vertices: [u32; 3], number: u32, kind: u8) -> ClaimRecord {
+    let (face, odd) = sorted_face(vertices);
+    let mut record: ClaimRecord = [0; 18];
+    record[..17].copy_from_slice(&face_record(face, number, odd));
+    record[17] = kind;
+    record
+}
+
+fn push_facet<P: Pages>(
+    mesh: &mut Mesh<P>,
+    number: u32,
+    tets: [u32; 2],
+    writer: &mut SealedWriter,
+) -> Result<(), PipelineError> {
+    let facet = mesh.facet(number);
+    writer.push_facet(SealedFacet {
+        vertices: facet.vertices.map(|v| mesh.scratch(dense(v))),
+        label: facet.label,
+        triangle: facet.input,
+        regions: facet.regions,
+        tets,
+    })?;
+    Ok(())
+}
+
+fn push_interface_face<P: Pages>(
+    mesh: &mut Mesh<P>,
+    number: u32,
+    tet: u32,
+    target: &SealTarget,
+    writer: &mut SealedWriter,
+) -> Result<(), PipelineError> {
+    let face = mesh.interface_face(number);
+    let owners = target.owners.and_then(|o| o.get(&face.cut));
+    let other = owners.and_then(|o| o.other(face.index, face.side));
+    let (Some(other), true) = (other, tet != NONE) else {
+        panic!(
+            "face {} of cut {} has no owner on the other side, or no tetrahedron in sub-domain {}",
+            face.index, face.cut, target.subdomain
+        );
+    };
+    writer.push_interface_face(InterfaceFace {
+        vertices: face.vertices.map(|v| mesh.scratch(dense(v))),
+        cut: face.cut,
+        index: face.index,
+        other,
+        tet,
+    })?;
+    Ok(())
+}
+
+/// The nodes of a tetrahedron, rotated.
+pub(in crate::pipeline) fn nodes(record: &TetRecord) -> [u32; 4] {
+    [0, 4, 8, 12].map(|at| word(record, at))
+}
+
+pub(in crate::pipeline) fn word(record: &[u8], at: usize) -> u32 {
+    let bytes = [record[at], record[at + 1], record[at + 2], record[at + 3]];
+    u32::from_be_bytes(bytes)
+}

@@ -1,0 +1,171 @@
+//! Neighbors of tetrahedra that have just got new numbers: faces sorted by vertices and matched, then sorted back.
+
+use tetdb_schema::page::NONE;
+
+use super::compact::{SealTarget, TetRecord, nodes, word};
+use crate::mesh::anatomy::FACES;
+use crate::pipeline::error::PipelineError;
+use crate::sealed::sorted_face;
+use crate::storage::{Sorted, Sorter, check_cancelled};
+
+/// The four neighbors of each tetrahedron in turn.
+pub(in crate::pipeline) struct Neighbors {
+    /// A face, as 4 · tetrahedron + face, and the one on its other side, where there is one.
+    links: std::iter::Peekable<Sorted<8>>,
+    tet: u32,
+}
+
+impl Neighbors {
+    /// Of tetrahedra in their new order. Errors: the disk.
+    pub fn of(order: Sorted<25>, target: &SealTarget) -> Result<Self, PipelineError> {
+        let memory = target.memory / 4;
+        let mut faces = Sorter::<16>::new(target.scratch, memory);
+        for (t, record) in order.enumerate() {
+            let record: TetRecord = record?;
+            let nodes = nodes(&record);
+            for (i, corners) in FACES.into_iter().enumerate() {
+                let (face, _) = sorted_face(corners.map(|k| nodes[k]));
+                let [a, b, c] = face;
+                faces.push(words([a, b, c, (t as u32) << 2 | i as u32]))?;
+            }
+            if t & 0xffff == 0 {
+                check_cancelled();
+            }
+        }
+        let mut links = Sorter::<8>::new(target.scratch, memory);
+        let mut open = None::<[u8; 16]>;
+        for face in faces.finish()? {
+            let face: [u8; 16] = face?;
+            match open.take() {
+                Some(before) if before[..12] == face[..12] => {
+                    let (a, b) = (word(&before, 12), word(&face, 12));
+                    links.push(words([a, b]))?;
+                    links.push(words([b, a]))?;
+                }
+                _ => open = Some(face),
+            }
+        }
+        Ok(Self {
+            links: links.finish()?.peekable(),
+            tet: 0,
+        })
+    }
+
+    /// Those of the next tetrahedron. Errors: the disk.
+    pub fn next(&mut self) -> Result<[u32; 4], PipelineError> {
+        let mut four = [NONE; 4];
+        let tet = self.tet;
+        let is_here = |link: &Result<[u8; 8], _>| match link {
+            Ok(link) => word(link, 0) >> 2 == tet,
+            Err(_) => true,
+        };
+        while let Some(link) = self.links.next_if(is_here) {
+            let link = link?;
+            four[(word(&link, 0) & 3) as usize] = word(&link, 4);
+        }
+        self.tet += 1;
+        Ok(four)
+    }
+}
+
+/// Big-endian, so that bytes sort as numbers do.
+fn words<const N: usize, const M: usize>(words: [u32; N]) -> [u8; M] {
+    let mut record = [0; M];
+    for (bytes, word) in record.chunks_exact_mut(4).zip(words) {
+        bytes.copy_from_slice(&word.to_be_bytes());
+    }
+    record
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::{FaceRef, Mesh, MeshState, dense, sparse};
+    use crate::pipeline::mesh;
+    use crate::pipeline::plan::{Options, Trial};
+    use crate::samples::SampleSpec;
+    use crate::sealed::Form;
+    use crate::storage::{Backing, Budget, Pager, StoreFile};
+    use crate::store::Catalog;
+    use tetdb_schema::catalog::Job;
+
+    /// Pages kept as they are worked with are a working mesh.
+    #[test]
+    fn kept_pages_open_as_a_working_mesh() -> Result<(), Box<dyn std::error::Error>> {
+        let dir = tempfile::tempdir()?;
+        let surface = SampleSpec::parse("box,h=0.12")?.make()?.into();
+        let options = Options {
+            subdomains: Some("2".to_owned()),
+            seal: Some("none".to_owned()),
+            trial: Trial {
+                subdomains_small: true,
+                plan: None,
+            },
+            ..Options::default()
+        };
+        let mut catalog = Catalog::create(dir.path().join("a.tetdb"), &Job::default())?;
+        let budget = Budget::new(256 << 20);
+        mesh(&mut catalog, &surface, &options, &budget, &|_| {})?;
+        for row in catalog.subdomains()? {
+            assert_eq!(Form::of(row.state), Some(Form::Pages));
+            let path = catalog.file_path(row.rank, row.generation);
+            let backing = Backing {
+                subdomain: row.rank,
+                generation: row.generation + 1,
+                spill: dir.path().into(),
+                made: None,
+                base: Some(StoreFile::open_repaired(&path, 1 << 20, false)?),
+                cache_bytes: 1 << 20,
+            };
+            let mut pager = Pager::new(1 << 24, Some(backing));
+            let [tets, vertices, facets, faces, ..] = row.chunks;
+            let beside = |pages: u32| pages.div_ceil(4);
+            let extents = [
+                tets,
+                beside(tets),
+                vertices,
+                beside(vertices),
+                facets,
+                faces,
+                0,
+            ];
+            pager.adopt(extents.map(|n| [0, n]));
+            let counts = [row.tets, row.vertices, row.facets, row.interface_faces];
+            let words: Vec<u32> = (counts.iter())
+                .flat_map(|&n| [sparse(n as u32), NONE, n as u32])
+                .collect();
+            let state = MeshState::from_words(words.try_into().expect("four arenas"));
+            let mut mesh = Mesh::with_state(pager, state);
+
+            let (mut open, mut required, mut from, mut n) = (0, 0, 0, 0);
+            while let Some((t, tet)) = mesh.next_tet(from) {
+                from = t + 1;
+                n += 1;
+                let points = mesh.points(&tet);
+                assert!(crate::geom::orient(points[0], points[1], points[2], points[3]) > 0.0);
+                assert_eq!(mesh.tet_attribute(t).0, 1);
+                for i in 0..4 {
+                    required += u64::from(tet.is_required(i));
+                    let face = tet.neighbor[i];
+                    if !face.exists() {
+                        assert!(tet.is_required(i), "an open face that nothing asks for");
+                        open += 1;
+                        continue;
+                    }
+                    let other = mesh.tet(face.tet());
+                    assert_eq!(other.neighbor[face.face()], FaceRef::new(t, i));
+                    let [mut a, mut b] = [tet.face(i), other.face(face.face())];
+                    a.sort_unstable();
+                    b.sort_unstable();
+                    assert_eq!(a, b);
+                }
+            }
+            assert_eq!(n, row.tets);
+            assert_eq!(open, row.facets + row.interface_faces);
+            assert_eq!(required, open);
+            let fixed = (mesh.vertex_ids()).filter(|&v| mesh.is_fixed(v)).count();
+            assert!(fixed > 0 && fixed < dense(mesh.vertex_ids_end()) as usize);
+        }
+        Ok(())
+    }
+}

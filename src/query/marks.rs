@@ -1,0 +1,127 @@
+//! Which tetrahedra of a sub-domain have a face on input triangles or on an interface: a bit for each.
+
+use super::selection::Selection;
+use super::{QueryError, QuerySession};
+use crate::sealed::SealedError;
+use crate::storage::{Lease, check_cancelled};
+use crate::store::StoreError;
+use tetdb_schema::record::NO_TET;
+
+/// A bit for each tetrahedron of a sub-domain.
+pub(crate) struct Marks {
+    bits: Vec<u64>,
+    _lease: Lease,
+}
+
+impl Marks {
+    pub fn has(&self, local: u32) -> bool {
+        self.bits[local as usize / 64] >> (local % 64) & 1 != 0
+    }
+
+    /// Whether any of `count` tetrahedra from `first` on is marked.
+    pub fn any(&self, first: u32, count: u32) -> bool {
+        let (mut at, end) = (first, first + count);
+        while at < end {
+            if at % 64 == 0 && end - at >= 64 {
+                if self.bits[at as usize / 64] != 0 {
+                    return true;
+                }
+                at += 64;
+            } else if self.has(at) {
+                return true;
+            } else {
+                at += 1;
+            }
+        }
+        false
+    }
+
+    /// Only what the other has too.
+    fn and(&mut self, other: &Self) {
+        for (own, other) in self.bits.iter_mut().zip(&other.bits) {
+            *own &= other;
+        }
+    }
+}
+
+impl QuerySession {
+    /// The tetrahedra of a sub-domain that suit labels and interface, or `None` where neither is asked for.
+    ///
+    /// Errors: damage; a budget that has not a bit for each.
+    pub(crate) fn marks(
+        &mut self,
+        rank: u32,
+        selection: &Selection,
+    ) -> Result<Option<Marks>, QueryError> {
+        let mut marks = None;
+        if let Some(labels) = &selection.labels {
+            marks = Some(self.on_labels(rank, labels)?);
+        }
+        if let Some(pair) = selection.interface {
+            let other = if pair[0] == rank { pair[1] } else { pair[0] };
+            let faces = self.on_interface(rank, other)?;
+            match &mut marks {
+                Some(marks) => marks.and(&faces),
+                None => marks = Some(faces),
+            }
+        }
+        Ok(marks)
+    }
+
+    fn blank(&mut self, rank: u32) -> Result<Marks, QueryError> {
+        let words = self.part(rank)?.subdomain.row().tets.div_ceil(64);
+        let lease = self.budget.lease(words * 8, "a bit for each tetrahedron")?;
+        Ok(Marks {
+            bits: vec![0; words as usize],
+            _lease: lease,
+        })
+    }
+
+    fn on_labels(&mut self, rank: u32, labels: &[u32]) -> Result<Marks, QueryError> {
+        let mut marks = self.blank(rank)?;
+        for chunk in 0..self.part(rank)?.subdomain.row().chunks[2] {
+            check_cancelled();
+            self.count_faces();
+            let part = &mut self.part(rank)?.subdomain;
+            for facet in part.facet_chunk(chunk)?.records {
+                if !labels.contains(&facet.label) {
+                    continue;
+                }
+                for tet in facet.tets.into_iter().filter(|&t| t != NO_TET) {
+                    set(&mut marks, tet, part)?;
+                }
+            }
+        }
+        Ok(marks)
+    }
+
+    fn on_interface(&mut self, rank: u32, other: u32) -> Result<Marks, QueryError> {
+        let mut marks = self.blank(rank)?;
+        for chunk in 0..self.part(rank)?.subdomain.row().chunks[3] {
+            check_cancelled();
+            self.count_faces();
+            let part = &mut self.part(rank)?.subdomain;
+            for face in part.interface_chunk(chunk)?.records {
+                if face.other == other {
+                    set(&mut marks, face.tet, part)?;
+                }
+            }
+        }
+        Ok(marks)
+    }
+}
+
+fn set(marks: &mut Marks, tet: u32, part: &crate::sealed::Subdomain) -> Result<(), StoreError> {
+    if u64::from(tet) >= part.row().tets {
+        return Err(StoreError::Sealed(SealedError::Content {
+            path: part.path().to_owned(),
+            subdomain: part.id().rank(),
+            what: format!(
+                "a face names tetrahedron {tet}, there are {}",
+                part.row().tets
+            ),
+        }));
+    }
+    marks.bits[tet as usize / 64] |= 1 << (tet % 64);
+    Ok(())
+}

@@ -1,0 +1,160 @@
+//! Numbers, conditions, orders; how little is read.
+
+use super::*;
+
+#[test]
+fn numbers_and_conditions_select_what_they_say() -> Outcome {
+    for made in [grid(6, 3)?, real()?] {
+        let all = made.all()?;
+        let mut inquiry = made.inquiry(64 << 20)?;
+        let none = Selection::default;
+        expect(&mut inquiry, &all, none(), |_| true)?;
+        let selection = Selection {
+            subdomains: Some(vec![1]),
+            ..none()
+        };
+        let n = expect(&mut inquiry, &all, selection, |t| {
+            t.id.subdomain().rank() == 1
+        })?;
+        assert!(n > 0);
+        let selection = Selection {
+            regions: Some(vec![2, 7]),
+            ..none()
+        };
+        expect(&mut inquiry, &all, selection, |t| t.region == 2)?;
+        for text in [
+            "quality > 1.5 and region = 1",
+            "x < 0.25 or z > 0.75 and subdomain in [1]",
+            "edge_max > 0.07 and angle_min < 40",
+            "volume*6 < edge_min^3",
+            "quality > 1e6",
+        ] {
+            let condition = Expression::parse(text, &VARIABLES)?;
+            let selection = Selection {
+                condition: Some(condition.clone()),
+                ..none()
+            };
+            expect(&mut inquiry, &all, selection, |t| {
+                condition.truth(&t.values())
+            })?;
+        }
+        let three = [all[0].id, all[all.len() / 2].id, all[all.len() - 1].id];
+        let selection = Selection {
+            tets: Some(three.to_vec()),
+            ..none()
+        };
+        expect(&mut inquiry, &all, selection, |t| three.contains(&t.id))?;
+        assert_eq!(inquiry.tet(three[1])?, all[all.len() / 2]);
+    }
+    Ok(())
+}
+
+#[test]
+fn answers_are_sorted_by_any_variable() -> Outcome {
+    let made = grid(6, 2)?;
+    let mut all = made.all()?;
+    let mut inquiry = made.inquiry(64 << 20)?;
+    for (variable, descending) in [(4, false), (4, true), (0, true), (3, false)] {
+        let dir = made.dir.path();
+        // Little memory: runs go to the disk.
+        let ordered = Ordered::new(
+            inquiry.select(Selection::default())?,
+            variable,
+            descending,
+            dir,
+            1 << 16,
+        )?;
+        let found: Vec<Hit> = ordered.collect::<Result<_, _>>()?;
+        all.sort_by(|a, b| {
+            let (x, y) = (a.values()[variable], b.values()[variable]);
+            let by_value = x.total_cmp(&y);
+            let by_value = if descending {
+                by_value.reverse()
+            } else {
+                by_value
+            };
+            by_value.then(a.id.cmp(&b.id))
+        });
+        assert_eq!(found, all);
+    }
+    Ok(())
+}
+
+#[test]
+fn the_worst_and_the_best_are_found_without_a_look_at_all() -> Outcome {
+    for made in [grid(6, 2)?, real()?] {
+        let all = made.all()?;
+        for (text, greatest, limit) in [
+            ("true", true, 7),
+            ("true", false, 1),
+            ("x > 0.3", true, 100),
+            ("quality < 1.3", true, 5),
+            ("x > 99", true, 5),
+            ("true", true, 0),
+            ("y > 0.5", false, 1_000_000),
+        ] {
+            let condition = Expression::parse(text, &VARIABLES)?;
+            let mut expected: Vec<Hit> = all
+                .iter()
+                .copied()
+                .filter(|t| condition.truth(&t.values()))
+                .collect();
+            let key = |t: &Hit| {
+                if greatest {
+                    -t.shape.quality
+                } else {
+                    t.shape.quality
+                }
+            };
+            expected.sort_by(|a, b| key(a).total_cmp(&key(b)).then(a.id.cmp(&b.id)));
+            expected.truncate(limit);
+            let selection = Selection {
+                condition: Some(condition),
+                ..Selection::default()
+            };
+            let mut inquiry = made.inquiry(64 << 20)?;
+            let found = inquiry.extreme(&selection, greatest, limit)?;
+            assert_eq!(found, expected, "{text}");
+            // A single one is found in the chunk that promises most, but for a promise hardly kept.
+            let measures = inquiry.measures();
+            assert!(
+                limit > 1 || measures.tet_chunks_read <= 2,
+                "{text}: {measures:?}"
+            );
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn only_chunks_that_matter_are_read() -> Outcome {
+    let made = real_of("box,h=0.035")?;
+    let all = made.all()?;
+    let mut inquiry = made.inquiry(64 << 20)?;
+    let chunks = inquiry.measures();
+    assert!(chunks.tet_chunks >= 4, "{chunks:?}");
+    let nowhere = Selection {
+        solids: vec![Solid::Sphere {
+            center: Point::splat(-9.0),
+            radius: 1.0,
+        }],
+        ..Selection::default()
+    };
+    assert_eq!(inquiry.select(nowhere)?.count(), 0);
+    let never = Selection {
+        condition: Some(Expression::parse("quality > 1e6 or x > 17", &VARIABLES)?),
+        ..Selection::default()
+    };
+    assert_eq!(inquiry.select(never)?.count(), 0);
+    inquiry.locate(&[Point::splat(-1.0)])?;
+    assert_eq!(inquiry.measures().tet_chunks_read, 0);
+    let center = all[all.len() / 3].centroid();
+    inquiry.locate(&[center])?;
+    let read = inquiry.measures();
+    assert!(read.tet_chunks_read <= 2, "{read:?}");
+    assert!(
+        read.vertex_chunks_read < chunks.vertex_chunks / 2,
+        "{read:?}"
+    );
+    Ok(())
+}

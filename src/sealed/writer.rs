@@ -1,0 +1,375 @@
+//! Makes the file of a finished sub-domain: vertices, then tetrahedra, then faces, each a stream.
+
+use std::collections::BTreeMap;
+
+use tetdb_schema::chunk::{
+    ChunkKind, ChunkRecord, Packer, RangeSummary, TetSummary, VertexSummary,
+};
+use tetdb_schema::digest::Digest;
+use tetdb_schema::ids::{SubdomainId, TetId};
+use tetdb_schema::leaf::TetPlace;
+use tetdb_schema::page::NONE;
+use tetdb_schema::record::{InterfaceFace, SealedFacet, SealedTet, SealedVertex};
+
+use super::SealedError;
+use super::batch::Batch;
+use super::form::{Cut, Cutter};
+use super::totals::{Totals, array, count_open};
+use super::{FacePairs, Form, VertexCache};
+use crate::geom::{Aabb, Point};
+use crate::storage::{DiskPath, StoreFile};
+use tetdb_schema::catalog::SubdomainRow;
+
+/// One side of an interface as this sub-domain has it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct InterfaceSide {
+    pub cut: u32,
+    /// The sub-domain on the other side.
+    pub other: u32,
+    pub faces: u64,
+    pub digest: Digest,
+}
+
+/// What a region has in this sub-domain.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct RegionTotals {
+    pub tets: u64,
+    /// Summed in the sealed order.
+    pub volume: f64,
+}
+
+/// What was sealed.
+#[derive(Clone, Debug)]
+pub struct Sealed {
+    /// The row to put into the catalog.
+    pub row: SubdomainRow,
+    pub regions: BTreeMap<u32, RegionTotals>,
+    /// By cut, then by the other sub-domain.
+    pub interfaces: Vec<InterfaceSide>,
+}
+
+/// Writes one sub-domain, once.
+///
+/// Order of calls: all vertices, all tetrahedra, then facets and interface faces. The file holds
+/// nothing that counts until [`SealedWriter::finish`] returns and the catalog lists it.
+/// Memory: about the bytes given, for redb's cache, the batch and decoded vertices.
+pub struct SealedWriter {
+    path: DiskPath,
+    file: StoreFile,
+    subdomain: SubdomainId,
+    generation: u32,
+    memory_bytes: usize,
+    batch: Batch,
+    form: Form,
+    vertices: Cutter<SealedVertex>,
+    vertex_chunks: Vec<VertexSummary>,
+    cache: Option<VertexCache>,
+    tets: Cutter<SealedTet>,
+    tet_chunks: Vec<TetSummary>,
+    facets: Cutter<SealedFacet>,
+    facet_chunks: Vec<RangeSummary<false>>,
+    faces: Cutter<InterfaceFace>,
+    face_chunks: Vec<RangeSummary<true>>,
+    pairs: FacePairs,
+    totals: Totals,
+    interfaces: BTreeMap<(u32, u32), (u64, Digest)>,
+}
+
+impl SealedWriter {
+    /// Starts the file of `subdomain` in `generation` at `path`, which must not exist.
+    ///
+    /// Errors: the file cannot be made.
+    pub fn create(
+        path: impl Into<DiskPath>,
+        subdomain: SubdomainId,
+        generation: u32,
+        memory_bytes: usize,
+    ) -> Result<Self, SealedError> {
+        Self::create_as(Form::Sealed, path, subdomain, generation, memory_bytes)
+    }
+
+    /// The same in either form. Errors: as [`SealedWriter::create`].
+    pub fn create_as(
+        form: Form,
+        path: impl Into<DiskPath>,
+        subdomain: SubdomainId,
+        generation: u32,
+        memory_bytes: usize,
+    ) -> Result<Self, SealedError> {
+        let path = path.into();
+        let file = StoreFile::create_unsynced(&path, memory_bytes / 2)?;
+        let name = path.path().to_owned();
+        let io = |e| SealedError::io(&name, e);
+        let rank = subdomain.rank();
+        Ok(Self {
+            path,
+            file,
+            subdomain,
+            generation,
+            memory_bytes,
+            batch: Batch::of(memory_bytes),
+            form,
+            vertices: Cutter::new(form, rank, generation).map_err(io)?,
+            vertex_chunks: Vec::new(),
+            cache: None,
+            tets: Cutter::new(form, rank, generation).map_err(io)?,
+            tet_chunks: Vec::new(),
+            facets: Cutter::new(form, rank, generation).map_err(io)?,
+            facet_chunks: Vec::new(),
+            faces: Cutter::new(form, rank, generation).map_err(io)?,
+            face_chunks: Vec::new(),
+            pairs: FacePairs::new(SealedTet::COUNT_MAX),
+            totals: Totals::new(),
+            interfaces: BTreeMap::new(),
+        })
+    }
+
+    /// The next vertex; its number is its place in the stream.
+    ///
+    /// Errors: the disk.
+    pub fn push_vertex(&mut self, vertex: SealedVertex) -> Result<(), SealedError> {
+        assert!(self.cache.is_none(), "vertices come before tetrahedra");
+        let rank = self.subdomain.rank();
+        let cut = self.vertices.push(vertex, |v| v.to_working(rank));
+        if let Some(chunk) = cut.map_err(self.io())? {
+            self.put_vertices(chunk)?;
+        }
+        Ok(())
+    }
+
+    fn io(&self) -> impl Fn(std::io::Error) -> SealedError + use<> {
+        let path = self.path.path().to_owned();
+        move |e| SealedError::io(&path, e)
+    }
+
+    fn put_vertices(&mut self, chunk: Cut<SealedVertex>) -> Result<(), SealedError> {
+        let points = chunk.records.iter().map(|v| Point::from_array(v.point));
+        let bounds = Aabb::around(points);
+        self.totals.bounds = self.totals.bounds.with(bounds.low).with(bounds.high);
+        let (bounds, points) = (array(&bounds), chunk.records.iter().map(|v| v.point));
+        self.vertex_chunks.push(VertexSummary {
+            cells: VertexSummary::cells_of(&bounds, points),
+            bounds,
+            first: chunk.first,
+            count: chunk.records.len() as u32,
+        });
+        self.put(chunk.values)
+    }
+
+    /// Ends the stream of vertices: from now on they can be read.
+    fn end_vertices(&mut self) -> Result<(), SealedError> {
+        if self.cache.is_some() {
+            return Ok(());
+        }
+        while let Some(chunk) = self.vertices.cut().map_err(self.io())? {
+            self.put_vertices(chunk)?;
+        }
+        self.batch.flush(&mut self.file)?;
+        let firsts = self.vertex_chunks.iter().map(|s| s.first).collect();
+        let cache = VertexCache::new(
+            self.form,
+            (self.subdomain.rank(), self.generation),
+            firsts,
+            self.vertices.count() as u32,
+            self.memory_bytes / 4,
+        );
+        self.cache = Some(cache.map_err(self.io())?);
+        Ok(())
+    }
+
+    /// The next tetrahedron; its number is its place in the stream. Positive, and stored rotated.
+    ///
+    /// Smallest when they come sorted by their rotated nodes ([`SealedTet::rotated`]).
+    /// Errors: the disk; a vertex that was not pushed.
+    pub fn push_tet(&mut self, nodes: [u32; 4], region: u32) -> Result<(), SealedError> {
+        let place = TetPlace {
+            neighbors: [NONE; 4],
+            required: 0,
+            flags: 0,
+        };
+        let tet = SealedTet { nodes, region }.rotated();
+        self.push_placed_tet(tet, &place)
+    }
+
+    /// The next tetrahedron, rotated, with what a working page tells of it; chunks do not. Errors: as [`SealedWriter::push_tet`].
+    pub fn push_placed_tet(&mut self, tet: SealedTet, place: &TetPlace) -> Result<(), SealedError> {
+        debug_assert_eq!(tet, tet.rotated());
+        self.end_vertices()?;
+        assert!(
+            self.tets.count() < u64::from(TetId::LOCAL_MAX),
+            "sub-domain {} has more tetrahedra than ids",
+            self.subdomain
+        );
+        let cut = self.tets.push(tet, |tet| tet.to_working(place));
+        if let Some(chunk) = cut.map_err(self.io())? {
+            self.put_tets(chunk)?;
+        }
+        Ok(())
+    }
+
+    fn put_tets(&mut self, chunk: Cut<SealedTet>) -> Result<(), SealedError> {
+        let cache = self.cache.as_mut().expect("vertices have ended");
+        let (rank, file) = (self.subdomain.rank(), &mut self.file);
+        let corners_of = |tet: &SealedTet| cache.corners(file, tet.nodes);
+        let mut summary = self
+            .totals
+            .add(chunk.first, &chunk.records, rank, corners_of)?;
+        summary.open_faces = count_open(&mut self.pairs, &chunk.records);
+        summary.bytes = chunk.bytes();
+        self.tet_chunks.push(summary);
+        self.put(chunk.values)
+    }
+
+    fn put(&mut self, values: Vec<(u64, Vec<u8>)>) -> Result<(), SealedError> {
+        for (key, value) in values {
+            self.batch.push(&mut self.file, key, value)?;
+        }
+        Ok(())
+    }
+
+    /// The next facet.
+    ///
+    /// Errors: the disk.
+    pub fn push_facet(&mut self, facet: SealedFacet) -> Result<(), SealedError> {
+        let cut = self.facets.push(facet, SealedFacet::to_working);
+        if let Some(chunk) = cut.map_err(self.io())? {
+            self.put_facets(chunk)?;
+        }
+        Ok(())
+    }
+
+    fn put_facets(&mut self, chunk: Cut<SealedFacet>) -> Result<(), SealedError> {
+        self.facet_chunks.push(RangeSummary {
+            first: chunk.first,
+            count: chunk.records.len() as u32,
+        });
+        self.put(chunk.values)
+    }
+
+    /// The next interface face.
+    ///
+    /// Errors: the disk; a vertex that was not pushed.
+    pub fn push_interface_face(&mut self, face: InterfaceFace) -> Result<(), SealedError> {
+        self.end_vertices()?;
+        let cache = self.cache.as_mut().expect("vertices have ended");
+        let corners = cache.corners(&mut self.file, face.vertices)?;
+        let side = self.interfaces.entry((face.cut, face.other)).or_default();
+        side.0 += 1;
+        side.1.add_face(corners.map(|c| c.mix), face.cut);
+        let rank = self.subdomain.rank();
+        let cut = self.faces.push(face, |face| face.to_working(rank));
+        if let Some(chunk) = cut.map_err(self.io())? {
+            self.put_faces(chunk)?;
+        }
+        Ok(())
+    }
+
+    fn put_faces(&mut self, chunk: Cut<InterfaceFace>) -> Result<(), SealedError> {
+        self.face_chunks.push(RangeSummary {
+            first: chunk.first,
+            count: chunk.records.len() as u32,
+        });
+        self.put(chunk.values)
+    }
+
+    fn put_summaries<R: ChunkRecord>(&mut self, summaries: &[R]) -> Result<u32, SealedError> {
+        let io = self.io();
+        let mut packer = Packer::new(self.subdomain.rank(), self.generation).map_err(&io)?;
+        let mut blocks = Vec::new();
+        for &summary in summaries {
+            blocks.extend(packer.push(summary).map_err(&io)?);
+        }
+        while let Some(block) = packer.cut().map_err(&io)? {
+            blocks.push(block);
+        }
+        for block in blocks {
+            self.batch
+                .push(&mut self.file, block.address.key(), block.value)?;
+        }
+        Ok(packer.chunks())
+    }
+
+    /// Writes what is left, shrinks the file and closes it.
+    ///
+    /// Errors: the disk.
+    pub fn finish(mut self) -> Result<Sealed, SealedError> {
+        let io = self.io();
+        self.end_vertices()?;
+        while let Some(chunk) = self.tets.cut().map_err(&io)? {
+            self.put_tets(chunk)?;
+        }
+        while let Some(chunk) = self.facets.cut().map_err(&io)? {
+            self.put_facets(chunk)?;
+        }
+        while let Some(chunk) = self.faces.cut().map_err(&io)? {
+            self.put_faces(chunk)?;
+        }
+        let tets = std::mem::take(&mut self.tet_chunks);
+        let vertices = std::mem::take(&mut self.vertex_chunks);
+        let facets = std::mem::take(&mut self.facet_chunks);
+        let faces = std::mem::take(&mut self.face_chunks);
+        let blocks = [
+            self.put_summaries(&tets)?,
+            self.put_summaries(&vertices)?,
+            self.put_summaries(&facets)?,
+            self.put_summaries(&faces)?,
+        ];
+        self.batch.flush(&mut self.file)?;
+        self.file.compact()?;
+        let bytes = self.path.bytes()?;
+        let mut interface_digest = Digest::default();
+        let mut interfaces = Vec::with_capacity(self.interfaces.len());
+        for ((cut, other), (faces, digest)) in self.interfaces {
+            interface_digest.merge(&digest);
+            interfaces.push(InterfaceSide {
+                cut,
+                other,
+                faces,
+                digest,
+            });
+        }
+        let totals = self.totals;
+        let chunks = [
+            self.tets.chunks(),
+            self.vertices.chunks(),
+            self.facets.chunks(),
+            self.faces.chunks(),
+        ];
+        let mut both = [0; 8];
+        both[..4].copy_from_slice(&chunks);
+        both[4..].copy_from_slice(&blocks);
+        let row = SubdomainRow {
+            rank: self.subdomain.rank(),
+            generation: self.generation,
+            state: self.form.state(),
+            tets: self.tets.count(),
+            vertices: self.vertices.count(),
+            facets: self.facets.count(),
+            interface_faces: self.faces.count(),
+            chunks: both,
+            digest: totals.digest.lanes,
+            interface_digest: interface_digest.lanes,
+            quality: totals.quality(),
+            volume: totals.volume,
+            bounds: array(&totals.bounds),
+            bytes,
+        };
+        Ok(Sealed {
+            row,
+            regions: totals.regions,
+            interfaces,
+        })
+    }
+}
+
+/// The kinds of chunks in the order of [`SubdomainRow::chunks`].
+pub(super) const CHUNK_KINDS: [ChunkKind; 8] = [
+    ChunkKind::Tets,
+    ChunkKind::Vertices,
+    ChunkKind::Facets,
+    ChunkKind::InterfaceFaces,
+    ChunkKind::TetSummaries,
+    ChunkKind::VertexSummaries,
+    ChunkKind::FacetSummaries,
+    ChunkKind::InterfaceSummaries,
+];

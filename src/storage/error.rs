@@ -1,0 +1,76 @@
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+use tetdb_schema::page::PageError;
+use thiserror::Error;
+
+/// What can go wrong between memory and disk.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum StorageError {
+    /// The operating system or redb refused a read or write.
+    #[error("{path}: {source}")]
+    Database {
+        path: PathBuf,
+        #[source]
+        source: Box<redb::Error>,
+    },
+    /// The file is open for writing elsewhere.
+    #[error("{path} is being written by another process")]
+    Busy { path: PathBuf },
+    /// The disk has no room for what must be written.
+    #[error("no space left to write {path}")]
+    Full { path: PathBuf },
+    /// redb could not follow its own tree.
+    #[error("{path} is damaged: {reason}")]
+    Damaged { path: PathBuf, reason: String },
+    /// A page is not what its address says.
+    #[error("{path} is damaged: {source}")]
+    Page {
+        path: PathBuf,
+        #[source]
+        source: PageError,
+    },
+    /// A page that must exist does not.
+    #[error("{path} is damaged: {what} is missing")]
+    Missing { path: PathBuf, what: String },
+    /// A file operation outside redb failed.
+    #[error("{path}: {source}")]
+    Io {
+        path: PathBuf,
+        #[source]
+        source: std::io::Error,
+    },
+    /// The ledger has no bytes left for a demand.
+    #[error("{what} needs {needed} bytes, the memory budget has {available} left")]
+    Budget {
+        what: &'static str,
+        needed: u64,
+        available: u64,
+    },
+    /// More records than 30-bit ids can name.
+    #[error("a sub-domain cannot hold more than 2^30 {what}")]
+    TooMany { what: &'static str },
+    /// The user asked to stop; the step in flight is lost, everything before it is kept.
+    #[error("stopped")]
+    Cancelled,
+}
+
+impl StorageError {
+    /// Whether what is on disk is not what was written.
+    pub fn is_damage(&self) -> bool {
+        matches!(
+            self,
+            Self::Damaged { .. } | Self::Page { .. } | Self::Missing { .. }
+        )
+    }
+
+    /// Wraps a failed operation on `path`.
+    pub(crate) fn io(path: &Path, source: std::io::Error) -> Self {
+        let path = path.to_owned();
+        match source.kind() {
+            ErrorKind::StorageFull | ErrorKind::QuotaExceeded => Self::Full { path },
+            _ => Self::Io { path, source },
+        }
+    }
+}

@@ -1,0 +1,525 @@
+//! The frame pool: pages resident in memory, the rest in the sub-domain's file.
+//!
+//! The hot path reads one word, where the page's frame begins, adds the slot, and is within the pool or not: a page
+//! that needs anything first has a beginning beyond it. It touches no list. Recency is one bit of the
+//! page's entry, set by the first access after it was cleared. The `lru` crate orders frames
+//! only when a page is missed: the least recent frame without the bit is evicted, one with the bit is
+//! given a second chance. A list touched at each change of page costs 70 % (measured), a bit a few.
+
+use lru::LruCache;
+use tetdb_schema::page::{FRAME_BYTES, PageAddress, SLOT_BITS, SLOTS, Slot, u32_le};
+
+use super::page_table::{
+    DIRTY, FRAMES_LIMIT, IN_BASE, IN_MADE, PageTable, REFERENCED, RESIDENT, frame_of,
+};
+use super::places::{Backing, Places};
+use super::{DiskPath, Pages, StorageError, check_cancelled, kind, raise};
+
+/// Dirty pages written in one commit; a quarter of what redb's cache should hold.
+const BATCH_PAGES_MAX: usize = 256;
+/// Owner of a frame that holds no page.
+const NOBODY: (u8, u32) = (u8::MAX, u32::MAX);
+const FRAMES_MIN: usize = 16;
+
+/// Page traffic so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PagerStats {
+    pub pages_read: u64,
+    pub pages_written: u64,
+    pub commits: u64,
+}
+
+impl PagerStats {
+    /// Adds the traffic of another pager.
+    pub fn add(&mut self, other: Self) {
+        self.pages_read += other.pages_read;
+        self.pages_written += other.pages_written;
+        self.commits += other.commits;
+    }
+}
+
+/// Pages of one sub-domain under a fixed number of frames.
+///
+/// Is not: shared. Each worker owns its pager, so the hot path takes no lock.
+pub struct Pager {
+    /// `frames_max * SLOTS` slots, zero until a frame is taken: memory that is not touched is not there.
+    frames: Vec<Slot>,
+    frames_max: usize,
+    free: Vec<u32>,
+    tables: [PageTable; kind::ALL.len()],
+    /// Number in the file of each kind's first page; grows when pages are dropped from the front.
+    first: [u32; kind::ALL.len()],
+    /// Kind and page of each frame, or [`NOBODY`].
+    owners: Vec<(u8, u32)>,
+    order: LruCache<u32, ()>,
+    places: Places,
+    stats: PagerStats,
+}
+
+/// Frames in a pool of `bytes`.
+fn frames_of(bytes: u64) -> usize {
+    usize::try_from(bytes / FRAME_BYTES as u64)
+        .unwrap_or(usize::MAX)
+        .clamp(FRAMES_MIN, FRAMES_LIMIT)
+}
+
+impl Pager {
+    /// A pool of `bytes / 64 KiB` frames (at least 16) over `backing`; without one, more pages than frames are an error.
+    pub fn new(bytes: u64, backing: Option<Backing>) -> Self {
+        let frames_max = frames_of(bytes);
+        Self {
+            frames: bytemuck::allocation::zeroed_vec(frames_max * SLOTS),
+            frames_max,
+            free: Vec::new(),
+            tables: Default::default(),
+            first: Default::default(),
+            owners: Vec::new(),
+            order: LruCache::unbounded(),
+            places: Places::new(backing),
+            stats: PagerStats::default(),
+        }
+    }
+
+    /// Uses no more than `bytes` for frames from now on, which must hold what it has; never more than it was made with.
+    pub fn limit(&mut self, bytes: u64) {
+        let limit = frames_of(bytes).min(self.frames.len() / SLOTS);
+        assert!(self.owners.len() <= limit, "more frames than it may use");
+        self.frames_max = limit;
+    }
+
+    /// [`Pager::limit`], and gives a pool that was made without one a place for pages that leave memory.
+    pub fn settle(&mut self, bytes: u64, backing: Backing) {
+        assert!(!self.places.exist(), "its pages would be in two places");
+        self.limit(bytes);
+        self.places = Places::new(Some(backing));
+    }
+
+    /// Reads and writes so far.
+    pub fn stats(&self) -> PagerStats {
+        self.stats
+    }
+
+    /// Frames the pool may use.
+    pub fn frames_max(&self) -> usize {
+        self.frames_max
+    }
+
+    /// Frames touched so far.
+    pub fn frames_used(&self) -> usize {
+        self.owners.len()
+    }
+
+    /// Declares what the base file holds: [`Pager::extents`] of the pager that wrote it.
+    pub fn adopt(&mut self, extents: [[u32; 2]; kind::ALL.len()]) {
+        for (kind, [first, n]) in extents.into_iter().enumerate() {
+            self.first[kind] = first;
+            self.tables[kind] = PageTable::in_base(n as usize);
+        }
+    }
+
+    /// Number in the file of the first page of each kind, and how many there are.
+    pub fn extents(&self) -> [[u32; 2]; kind::ALL.len()] {
+        std::array::from_fn(|kind| [self.first[kind], self.tables[kind].len() as u32])
+    }
+
+    /// Where a page is stored.
+    fn address(&self, kind: usize, page: u32) -> PageAddress {
+        PageAddress {
+            kind: kind::ALL[kind],
+            subdomain: self.places.subdomain(),
+            page: self.first[kind] + page,
+        }
+    }
+
+    /// Writes every dirty page to the file that is made, and closes it. Returns the traffic of all. Unwinds on errors.
+    pub fn finish(mut self) -> PagerStats {
+        let mut dirty: Vec<u32> = (0..self.owners.len() as u32)
+            .filter(|&frame| self.is_made(frame) && self.entry(frame) & DIRTY != 0)
+            .collect();
+        dirty.sort_unstable_by_key(|&frame| self.owners[frame as usize]);
+        for batch in dirty.chunks(BATCH_PAGES_MAX) {
+            self.write_back(batch);
+        }
+        self.stats
+    }
+
+    /// Ends a generation: writes all pages, wherever they are, to a file at `path` and goes on from it, as `generation`.
+    ///
+    /// The file is closed when it is written: once it is listed it is not written to again, not even by redb when it is closed, for that would
+    /// not be synced, and a loss of power could leave it torn. Unwinds on errors.
+    pub fn end_generation(&mut self, path: DiskPath, generation: u32) {
+        self.places.begin_file(path);
+        assert_eq!(self.tables[kind::SCRATCH].len(), 0, "a map of this step");
+        let n_batch = (self.frames_max / 4).clamp(1, BATCH_PAGES_MAX);
+        let mut batch = Vec::with_capacity(n_batch);
+        for kind in 0..self.tables.len() {
+            for page in 0..self.tables[kind].len() as u32 {
+                // What had to make room is written already.
+                if self.tables[kind].entry(page) == IN_MADE {
+                    continue;
+                }
+                batch.push(self.fault_in(kind, page));
+                if batch.len() == n_batch {
+                    self.write_back(&batch);
+                    batch.clear();
+                }
+            }
+        }
+        self.write_back(&batch);
+        told(self.places.end_file(generation));
+        for table in &mut self.tables {
+            for page in 0..table.len() as u32 {
+                if table.entry(page) & RESIDENT == 0 {
+                    table.set(page, IN_BASE);
+                }
+            }
+        }
+        for frame in 0..self.owners.len() as u32 {
+            self.set_place(frame, IN_BASE);
+        }
+    }
+
+    /// Makes a page the most recent one and returns its frame.
+    fn fault_in(&mut self, kind: usize, page: u32) -> u32 {
+        let entry = self.tables[kind].entry(page);
+        let entry = match frame_of(entry) {
+            Some(frame) => {
+                self.order.put(frame, ());
+                entry | REFERENCED
+            }
+            None => self.load(kind, page, entry),
+        };
+        self.tables[kind].set(page, entry);
+        frame_of(entry).expect("resident")
+    }
+
+    /// The entry of the page in `frame`.
+    fn entry(&self, frame: u32) -> u32 {
+        let (kind, page) = self.owners[frame as usize];
+        self.tables[usize::from(kind)].entry(page)
+    }
+
+    fn set_entry(&mut self, frame: u32, entry: u32) {
+        let (kind, page) = self.owners[frame as usize];
+        self.tables[usize::from(kind)].set(page, entry);
+    }
+
+    fn frame(&mut self, frame: u32) -> &mut [Slot] {
+        let at = frame as usize * SLOTS;
+        &mut self.frames[at..at + SLOTS]
+    }
+
+    /// Makes the page of `id` readable (or writable) and returns the position of `id` in the pool.
+    #[cold]
+    #[inline(never)]
+    fn open_slow<const K: usize>(&mut self, id: u32, flags: u32) -> usize {
+        let page = id >> SLOT_BITS;
+        let entry = self.tables[K].entry(page);
+        let opened = if entry & RESIDENT != 0 {
+            entry | flags
+        } else {
+            self.load(K, page, entry) | flags
+        };
+        self.tables[K].set(page, opened);
+        self.tables[K].to_read(id)
+    }
+
+    /// Makes the pages of four records readable together and returns the positions of the records.
+    #[cold]
+    #[inline(never)]
+    fn open_four_slow<const K: usize>(&mut self, ids: [u32; 4]) -> [usize; 4] {
+        // One may push another out only while the bits of recency are taken down all around, which happens once.
+        for _ in 0..ids.len() {
+            for id in ids {
+                self.open_slow::<K>(id, REFERENCED);
+            }
+            let at = ids.map(|id| self.tables[K].to_read(id));
+            if at.iter().all(|&at| at < self.frames.len()) {
+                return at;
+            }
+        }
+        unreachable!("a pool of {} frames holds four pages", self.frames_max)
+    }
+
+    fn load(&mut self, kind: usize, page: u32, place: u32) -> u32 {
+        check_cancelled();
+        let (frame, _) = self.take_frame();
+        let address = self.address(kind, page);
+        let at = frame as usize * SLOTS;
+        let slots = &mut self.frames[at..at + SLOTS];
+        told(self.places.read(place, address, slots));
+        self.stats.pages_read += 1;
+        self.set_place(frame, place);
+        self.owners[frame as usize] = (kind as u8, page);
+        self.order.put(frame, ());
+        frame | RESIDENT | REFERENCED
+    }
+
+    /// A frame nobody owns: a free one, a fresh one, which is zero, or an evicted one.
+    fn take_frame(&mut self) -> (u32, bool) {
+        if let Some(frame) = self.free.pop() {
+            return (frame, false);
+        }
+        if self.owners.len() < self.frames_max {
+            let frame = self.owners.len() as u32;
+            self.owners.push(NOBODY);
+            return (frame, true);
+        }
+        (self.evict(), false)
+    }
+
+    fn evict(&mut self) -> u32 {
+        let frame = loop {
+            let (frame, ()) = self.order.pop_lru().expect("frames in use are ordered");
+            let entry = self.entry(frame);
+            if entry & REFERENCED == 0 {
+                break frame;
+            }
+            self.set_entry(frame, entry & !REFERENCED);
+            self.order.put(frame, ());
+        };
+        if self.entry(frame) & DIRTY != 0 {
+            if self.is_made(frame) {
+                let mut batch = vec![frame];
+                batch.extend(self.cold_dirty_frames());
+                batch.sort_unstable_by_key(|&f| self.owners[f as usize]);
+                self.write_back(&batch);
+            } else {
+                self.spill(frame);
+            }
+        }
+        let place = self.place(frame);
+        self.set_entry(frame, place);
+        frame
+    }
+
+    /// Whether the page in `frame` belongs to the file that is made.
+    fn is_made(&self, frame: u32) -> bool {
+        let owner = self.owners[frame as usize];
+        owner != NOBODY && self.places.makes(usize::from(owner.0))
+    }
+
+    /// The next victims that would have to be written, so that one commit serves many misses.
+    fn cold_dirty_frames(&self) -> Vec<u32> {
+        let n = (self.frames_max / 4).clamp(1, BATCH_PAGES_MAX - 1);
+        let cold = self.order.iter().rev().map(|(&frame, ())| frame);
+        cold.filter(|&frame| {
+            self.entry(frame) & (REFERENCED | DIRTY) == DIRTY && self.is_made(frame)
+        })
+        .take(n)
+        .collect()
+    }
+
+    /// Writes a page to the spill.
+    fn spill(&mut self, frame: u32) {
+        if !self.places.exist() {
+            raise(StorageError::Budget {
+                what: "a mesh without a store",
+                needed: (self.owners.len() as u64 + 1) * FRAME_BYTES as u64,
+                available: self.frames_max as u64 * FRAME_BYTES as u64,
+            });
+        }
+        let (address, place) = (self.address_of(frame), self.place(frame));
+        let at = frame as usize * SLOTS;
+        let slots = &mut self.frames[at..at + SLOTS];
+        let place = told(self.places.spill(place, address, slots));
+        self.stats.pages_written += 1;
+        self.is_at(frame, place);
+    }
+
+    /// Writes pages to the file that is made, in one commit.
+    fn write_back(&mut self, batch: &[u32]) {
+        for &frame in batch {
+            let address = self.address_of(frame);
+            let at = frame as usize * SLOTS;
+            self.places.seal(address, &mut self.frames[at..at + SLOTS]);
+        }
+        let addresses: Vec<PageAddress> = batch.iter().map(|&f| self.address_of(f)).collect();
+        let frames = &self.frames;
+        let pages = addresses.into_iter().zip(batch).map(|(address, &frame)| {
+            let at = frame as usize * SLOTS;
+            (address, &frames[at..at + SLOTS])
+        });
+        told(self.places.write(pages));
+        self.stats.pages_written += batch.len() as u64;
+        self.stats.commits += 1;
+        for &frame in batch {
+            self.is_at(frame, IN_MADE);
+        }
+    }
+
+    /// Where the page in `frame` is stored.
+    fn address_of(&self, frame: u32) -> PageAddress {
+        let (kind, page) = self.owners[frame as usize];
+        self.address(usize::from(kind), page)
+    }
+
+    /// The page in `frame` is at `place` as it is.
+    fn is_at(&mut self, frame: u32, place: u32) {
+        self.set_entry(frame, self.entry(frame) & !DIRTY);
+        self.set_place(frame, place);
+    }
+
+    /// The slot that no file counts on remembers where the page is when it is clean.
+    fn set_place(&mut self, frame: u32, place: u32) {
+        self.frame(frame)[SLOTS - 1][0] = u32_le::from_native(place);
+    }
+
+    fn place(&mut self, frame: u32) -> u32 {
+        self.frame(frame)[SLOTS - 1][0].to_native()
+    }
+}
+
+impl Pages for Pager {
+    #[inline(always)]
+    fn read<const K: usize>(&mut self, id: u32) -> &Slot {
+        let at = self.tables[K].to_read(id);
+        if at < self.frames.len() {
+            return &self.frames[at];
+        }
+        let at = self.open_slow::<K>(id, REFERENCED);
+        &self.frames[at]
+    }
+
+    #[inline(always)]
+    fn read_four<const K: usize>(&mut self, ids: [u32; 4]) -> [&Slot; 4] {
+        let table = &self.tables[K];
+        let (a, b) = (table.to_read(ids[0]), table.to_read(ids[1]));
+        let (c, d) = (table.to_read(ids[2]), table.to_read(ids[3]));
+        let n = self.frames.len();
+        if a < n && b < n && c < n && d < n {
+            let frames = &self.frames;
+            return [&frames[a], &frames[b], &frames[c], &frames[d]];
+        }
+        let [a, b, c, d] = self.open_four_slow::<K>(ids);
+        let frames = &self.frames;
+        [&frames[a], &frames[b], &frames[c], &frames[d]]
+    }
+
+    #[inline(always)]
+    fn write<const K: usize>(&mut self, id: u32) -> &mut Slot {
+        let at = self.tables[K].to_write(id);
+        if at < self.frames.len() {
+            return &mut self.frames[at];
+        }
+        let at = self.open_slow::<K>(id, REFERENCED | DIRTY);
+        &mut self.frames[at]
+    }
+
+    fn n_pages<const K: usize>(&self) -> u32 {
+        self.tables[K].len() as u32
+    }
+
+    fn append_page<const K: usize>(&mut self) -> u32 {
+        check_cancelled();
+        let (frame, is_zero) = self.take_frame();
+        if !is_zero {
+            self.frame(frame).fill([u32_le::from_native(0); 8]);
+        }
+        let page = self.tables[K].len() as u32;
+        self.tables[K].push(frame | RESIDENT | REFERENCED | DIRTY);
+        self.owners[frame as usize] = (K as u8, page);
+        self.order.put(frame, ());
+        page
+    }
+
+    fn drop_front<const K: usize>(&mut self, n: u32) {
+        self.forget(K, n);
+        let dropped = self.tables[K].drop_front(n as usize);
+        self.release(dropped);
+        self.first[K] += n;
+        for (_, page) in self
+            .owners
+            .iter_mut()
+            .filter(|(kind, _)| usize::from(*kind) == K)
+        {
+            *page -= n;
+        }
+    }
+
+    fn clear<const K: usize>(&mut self) {
+        self.forget(K, self.n_pages::<K>());
+        let dropped = std::mem::take(&mut self.tables[K]).frames();
+        self.release(dropped);
+    }
+}
+
+impl Pager {
+    /// Leaves the places of the first `n` pages of a kind in the spill to others.
+    fn forget(&mut self, kind: usize, n: u32) {
+        assert!(!self.places.makes(kind), "written once, and kept");
+        for page in 0..n {
+            let entry = self.tables[kind].entry(page);
+            let place = frame_of(entry).map_or(entry, |frame| self.place(frame));
+            self.places.forget(place);
+        }
+    }
+
+    /// Gives the frames of forgotten pages back.
+    fn release(&mut self, frames: Vec<u32>) {
+        for frame in frames {
+            self.order.pop(&frame);
+            self.owners[frame as usize] = NOBODY;
+            self.free.push(frame);
+        }
+    }
+}
+
+/// What was done with a file. Unwinds on errors.
+fn told<T>(done: Result<T, StorageError>) -> T {
+    done.unwrap_or_else(|error| raise(error))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PER_PAGE: u32 = 1 << SLOT_BITS;
+
+    fn fill(pager: &mut Pager, first: u32, n: u32) {
+        for page in first..first + n {
+            let page = match page {
+                page if page < pager.n_pages::<{ kind::TETS }>() => page,
+                _ => pager.append_page::<{ kind::TETS }>(),
+            };
+            pager.write::<{ kind::TETS }>(page * PER_PAGE)[0] = u32_le::from_native(page);
+        }
+    }
+
+    /// Pages written behind the old ones, which are then dropped, take their places: files never hold more than both.
+    #[test]
+    fn files_hold_no_pages_that_were_dropped() -> Result<(), Box<dyn std::error::Error>> {
+        const N: u32 = 400;
+        let dir = tempfile::tempdir()?;
+        let path = dir.path().join("pages");
+        let backing = Backing {
+            subdomain: 0,
+            generation: 1,
+            spill: dir.path().into(),
+            made: None,
+            base: None,
+            cache_bytes: 1 << 20,
+        };
+        let mut pager = Pager::new(32 * FRAME_BYTES as u64, Some(backing));
+        fill(&mut pager, 0, N);
+        let once = u64::from(N) * FRAME_BYTES as u64;
+        for _ in 0..6 {
+            fill(&mut pager, N, N);
+            pager.drop_front::<{ kind::TETS }>(N);
+            // A map that comes and goes, as long as half of the pages.
+            for _ in 0..N / 2 {
+                pager.append_page::<{ kind::SCRATCH }>();
+            }
+            pager.clear::<{ kind::SCRATCH }>();
+            assert!((1..=2 * N + N / 2).contains(&pager.places.spilled()));
+        }
+        pager.end_generation(path.clone().into(), 2);
+        let kept = std::fs::metadata(&path)?.len();
+        assert!(kept < once + once / 8, "{kept} for {once}");
+        for page in 0..N {
+            let found = pager.read::<{ kind::TETS }>(page * PER_PAGE)[0].to_native();
+            assert_eq!(found, page + N);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,58 @@
+//! A file that nobody else sees and that is gone with the process.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use redb::StorageBackend;
+
+use super::{DiskPath, StorageError};
+
+/// Numbers files within the process.
+static FILES: AtomicU64 = AtomicU64::new(0);
+
+/// Read and written at any place, by any thread.
+pub(super) struct ScratchFile {
+    file: Box<dyn StorageBackend>,
+    path: DiskPath,
+    /// Its name is gone already.
+    is_nameless: bool,
+}
+
+impl ScratchFile {
+    /// A new file in `dir`, which must exist. Errors: the disk.
+    pub fn create(dir: &DiskPath) -> Result<Self, StorageError> {
+        let number = FILES.fetch_add(1, Ordering::Relaxed);
+        let path = dir.join(format!(".tetdb-scratch-{}-{number}", std::process::id()));
+        let file = path.told(path.disk().create(path.path()))?;
+        // Where a file without a name lives on while it is open, a run that is killed leaves nothing.
+        let is_nameless = cfg!(unix) && path.remove_file().is_ok();
+        Ok(Self {
+            file,
+            path,
+            is_nameless,
+        })
+    }
+
+    /// Fills `out` from byte `at` on, all of which must have been written.
+    pub fn read(&self, at: u64, out: &mut [u8]) -> Result<(), StorageError> {
+        self.path.told(self.file.read(at, out))
+    }
+
+    /// Where it was made.
+    pub fn path(&self) -> &DiskPath {
+        &self.path
+    }
+
+    /// Writes `bytes` from byte `at` on.
+    pub fn write(&self, at: u64, bytes: &[u8]) -> Result<(), StorageError> {
+        self.path.told(self.file.write(at, bytes))
+    }
+}
+
+impl Drop for ScratchFile {
+    fn drop(&mut self) {
+        if !self.is_nameless {
+            // It holds nothing that counts.
+            let _ = self.path.remove_file();
+        }
+    }
+}

@@ -1,0 +1,58 @@
+//! Pages that left memory in the middle of a step, in a file that nobody else sees and that ends with the pool.
+//!
+//! A step is done again from its beginning after a crash, so what it puts away meanwhile has no reader but itself: it needs neither a tree nor
+//! commits. A page goes from its frame to the file and back with one copy each way, where redb makes three.
+
+use tetdb_schema::page::{FRAME_BYTES, Slot};
+
+use super::scratch::ScratchFile;
+use super::{DiskPath, StorageError};
+
+/// Places of one frame each in a scratch file.
+pub(super) struct Spill {
+    file: ScratchFile,
+    /// Places below the end that hold nothing.
+    free: Vec<u32>,
+    pub end: u32,
+}
+
+impl Spill {
+    /// An empty file in `dir`, which must exist. Errors: the disk.
+    pub fn create(dir: &DiskPath) -> Result<Self, StorageError> {
+        Ok(Self {
+            file: ScratchFile::create(dir)?,
+            free: Vec::new(),
+            end: 0,
+        })
+    }
+
+    /// A place that holds nothing.
+    pub fn take(&mut self) -> u32 {
+        self.free.pop().unwrap_or_else(|| {
+            self.end += 1;
+            self.end - 1
+        })
+    }
+
+    /// Forgets what is at `place`, which may be written over.
+    pub fn forget(&mut self, place: u32) {
+        self.free.push(place);
+    }
+
+    /// Writes a frame. Errors: the disk.
+    pub fn write(&self, place: u32, frame: &[Slot]) -> Result<(), StorageError> {
+        let at = u64::from(place) * FRAME_BYTES as u64;
+        self.file.write(at, bytemuck::cast_slice(frame))
+    }
+
+    /// Reads a frame that was written. Errors: the disk.
+    pub fn read(&self, place: u32, frame: &mut [Slot]) -> Result<(), StorageError> {
+        let at = u64::from(place) * FRAME_BYTES as u64;
+        self.file.read(at, bytemuck::cast_slice_mut(frame))
+    }
+
+    /// Where the file was made.
+    pub fn path(&self) -> &DiskPath {
+        self.file.path()
+    }
+}

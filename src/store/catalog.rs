@@ -1,0 +1,502 @@
+//! The directory of a store: made, opened, its files named and, when nobody lists them, removed.
+
+use std::path::Path;
+
+use rkyv::api::high::{HighDeserializer, HighValidator};
+use rkyv::bytecheck::CheckBytes;
+use rkyv::rancor;
+use rkyv::{Archive, Deserialize};
+use tetdb_schema::digest::Digest;
+use tetdb_schema::page::FORMAT_VERSION;
+
+use super::rows::{self, RowKind};
+use super::{Step, StoreError};
+use crate::sealed::{CoarseSnapshot, Form, SealedError, Subdomain};
+use crate::storage::{DiskPath, StoreFile};
+use tetdb_schema::catalog::{
+    CoarseRow, FileRow, InterfaceRow, Job, JournalRow, RegionRow, StageRow, StoreState,
+    SubdomainRow, TopologyRow,
+};
+
+/// First bytes of the format row; the version follows as two bytes.
+const MAGIC: &[u8; 8] = b"TETDBCAT";
+/// The catalog is small: its redb cache need not be large.
+const CACHE_BYTES: usize = 2 << 20;
+const CATALOG: &str = "catalog.redb";
+/// The catalog until its first commit: a catalog that can be seen has its job.
+const CATALOG_NEW: &str = "catalog.redb-new";
+/// Folder of sorted runs; everything in it is scratch.
+const SCRATCH: &str = "scratch";
+
+/// The catalog of a store, open for reading or for writing.
+///
+/// Many processes may read, or one may write. Changes happen in [`Catalog::commit`] only.
+pub struct Catalog {
+    dir: DiskPath,
+    file: StoreFile,
+    writable: bool,
+    journal_rows: u32,
+}
+
+impl Catalog {
+    /// Makes a new store: the directory, the catalog, the job.
+    ///
+    /// An empty directory is taken over. Errors: [`StoreError::Finished`], [`StoreError::Unfinished`],
+    /// [`StoreError::NotOurs`] or [`StoreError::Busy`] say what is already there.
+    pub fn create(dir: impl Into<DiskPath>, job: &Job) -> Result<Self, StoreError> {
+        let dir = dir.into();
+        refuse_existing(&dir)?;
+        dir.create_dir_all()?;
+        let draft = dir.join(CATALOG_NEW);
+        draft.remove_file()?;
+        let file = StoreFile::create(&draft, CACHE_BYTES)?;
+        let mut catalog = Self {
+            dir,
+            file,
+            writable: true,
+            journal_rows: 0,
+        };
+        catalog.commit(|step| {
+            let mut format = MAGIC.to_vec();
+            format.extend_from_slice(&FORMAT_VERSION.to_le_bytes());
+            step.put_bytes(RowKind::Format.key(0, 0), &format);
+            step.set_state(StoreState::New);
+            step.set_job(job);
+            Ok(())
+        })?;
+        catalog.file.rename(CATALOG)?;
+        // An empty directory that was taken over may be as new as the store.
+        catalog.dir.folder().sync_dir()?;
+        Ok(catalog)
+    }
+
+    /// Whether `dir` is a directory where a store can be made: empty, or left by a run that was killed before its first commit.
+    pub fn is_vacant(dir: impl Into<DiskPath>) -> bool {
+        let names = dir.into().list();
+        names.is_ok_and(|names| names.iter().all(|name| name == CATALOG_NEW))
+    }
+
+    /// Opens a store for reading; other processes may read it as well.
+    ///
+    /// Errors: [`StoreError::NotFound`], [`StoreError::NotOurs`], [`StoreError::Busy`] while it is written, [`StoreError::Format`].
+    pub fn open(dir: impl Into<DiskPath>) -> Result<Self, StoreError> {
+        Self::open_as(dir.into(), false)
+    }
+
+    /// Opens a store for writing, alone, and removes files that an interrupted step left.
+    ///
+    /// Errors: as [`Catalog::open`]; [`StoreError::Busy`] also while another process reads it.
+    pub fn open_writable(dir: impl Into<DiskPath>) -> Result<Self, StoreError> {
+        let mut catalog = Self::open_as(dir.into(), true)?;
+        catalog.purge()?;
+        Ok(catalog)
+    }
+
+    fn open_as(dir: DiskPath, writable: bool) -> Result<Self, StoreError> {
+        let path = dir.join(CATALOG);
+        if !dir.exists() {
+            return Err(StoreError::NotFound {
+                path: dir.path().to_owned(),
+            });
+        }
+        if !path.is_file() {
+            let reason = match dir.join(CATALOG_NEW).exists() {
+                true => "its making was interrupted at the start; `tetdb mesh` begins it again",
+                false => "it has no catalog",
+            };
+            return Err(StoreError::NotOurs {
+                path: dir.path().to_owned(),
+                reason,
+            });
+        }
+        let mut catalog = Self {
+            dir,
+            file: StoreFile::open_repaired(&path, CACHE_BYTES, writable)?,
+            writable,
+            journal_rows: 0,
+        };
+        catalog.check_format()?;
+        if !writable {
+            // A file opened for writing has been checked.
+            catalog.file.check()?;
+        }
+        let file = &mut catalog.file;
+        let mut journal_rows = 0;
+        file.scan(RowKind::Journal.keys(), |_, _| {
+            journal_rows += 1;
+            true
+        })?;
+        catalog.journal_rows = journal_rows;
+        Ok(catalog)
+    }
+
+    fn check_format(&mut self) -> Result<(), StoreError> {
+        let key = RowKind::Format.key(0, 0);
+        let Some(format) = self.bytes(key)? else {
+            // In a damaged file it may only not be found.
+            self.file.check()?;
+            return Err(StoreError::NotOurs {
+                path: self.dir().to_owned(),
+                reason: "its catalog has no format row",
+            });
+        };
+        let version = format.strip_prefix(MAGIC).and_then(|v| v.try_into().ok());
+        let Some(version) = version.map(u16::from_le_bytes) else {
+            return Err(StoreError::NotOurs {
+                path: self.dir().to_owned(),
+                reason: "its catalog is another program's",
+            });
+        };
+        if version != FORMAT_VERSION {
+            return Err(StoreError::Format {
+                path: self.dir().to_owned(),
+                expected: FORMAT_VERSION,
+                found: version,
+            });
+        }
+        Ok(())
+    }
+
+    /// The directory of the store.
+    pub fn dir(&self) -> &Path {
+        self.dir.path()
+    }
+
+    /// Where the file of a sub-domain in a generation is, whether it exists or not.
+    pub fn file_path(&self, subdomain: u32, generation: u32) -> DiskPath {
+        let file = FileRow {
+            subdomain,
+            generation,
+        };
+        self.dir.join(named(SUBDOMAIN, file))
+    }
+
+    /// Where the file of a coarse leaf in a generation is, whether it exists or not.
+    pub fn coarse_path(&self, subdomain: u32, generation: u32) -> DiskPath {
+        let file = FileRow {
+            subdomain,
+            generation,
+        };
+        self.dir.join(named(COARSE, file))
+    }
+
+    /// A folder for sorted runs, made when it is not there; removed when the store is next opened for writing.
+    ///
+    /// Errors: the folder cannot be made.
+    pub fn scratch_dir(&self) -> Result<DiskPath, StoreError> {
+        let path = self.dir.join(SCRATCH);
+        path.create_dir_all()?;
+        Ok(path)
+    }
+
+    /// One atomic step: files first, then the rows `describe` sets, in one commit; then files no longer listed go.
+    ///
+    /// Errors: what `describe` returns, before anything is written; failures of the commit, after which the
+    /// store is as it was before the step.
+    pub fn commit(
+        &mut self,
+        describe: impl FnOnce(&mut Step) -> Result<(), StoreError>,
+    ) -> Result<(), StoreError> {
+        assert!(
+            self.writable,
+            "{} is open for reading only",
+            self.dir().display()
+        );
+        let mut step = Step::new(self.journal_rows);
+        describe(&mut step)?;
+        for file in &step.listed {
+            self.file_path(file.subdomain, file.generation)
+                .sync_file()?;
+        }
+        for file in &step.coarse_listed {
+            self.coarse_path(file.subdomain, file.generation)
+                .sync_file()?;
+        }
+        self.dir.sync_dir()?;
+        let changes = step.changes.iter();
+        self.file.change(changes.map(|(&k, v)| (k, v.as_deref())))?;
+        self.journal_rows = step.journal_rows;
+        for file in &step.unlisted {
+            self.file_path(file.subdomain, file.generation)
+                .remove_file()?;
+        }
+        for file in &step.coarse_unlisted {
+            self.coarse_path(file.subdomain, file.generation)
+                .remove_file()?;
+        }
+        Ok(())
+    }
+
+    /// Removes sub-domain files the catalog does not list, and scratch.
+    fn purge(&mut self) -> Result<(), StoreError> {
+        let listed = self.files()?;
+        let coarse: Vec<FileRow> = (self.coarse_snapshots()?.iter())
+            .map(|row| FileRow {
+                subdomain: row.rank,
+                generation: row.generation,
+            })
+            .collect();
+        for name in self.dir.list()? {
+            let path = self.dir.join(&name);
+            let is_stray = |kind, listed: &[FileRow]| {
+                parsed(kind, &name).is_some_and(|file| !listed.contains(&file))
+            };
+            if is_stray(SUBDOMAIN, &listed) || is_stray(COARSE, &coarse) {
+                path.remove_file()?;
+            } else if name == SCRATCH {
+                path.remove_dir_all()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// How far the store is.
+    pub fn state(&mut self) -> Result<StoreState, StoreError> {
+        let state = self.row(RowKind::State.key(0, 0))?;
+        state.ok_or_else(|| self.missing(RowKind::State.key(0, 0)))
+    }
+
+    /// What was asked for.
+    pub fn job(&mut self) -> Result<Job, StoreError> {
+        let job = self.row(RowKind::Job.key(0, 0))?;
+        job.ok_or_else(|| self.missing(RowKind::Job.key(0, 0)))
+    }
+
+    /// Names of the labels; a facet's label is a position here.
+    pub fn labels(&mut self) -> Result<Vec<String>, StoreError> {
+        Ok(self.row(RowKind::Labels.key(0, 0))?.unwrap_or_default())
+    }
+
+    /// The regions, as they were set.
+    pub fn regions(&mut self) -> Result<Vec<RegionRow>, StoreError> {
+        Ok(self.row(RowKind::Regions.key(0, 0))?.unwrap_or_default())
+    }
+
+    /// All sub-domains by rank.
+    pub fn subdomains(&mut self) -> Result<Vec<SubdomainRow>, StoreError> {
+        self.rows(RowKind::Subdomain)
+    }
+
+    /// One sub-domain.
+    ///
+    /// Errors: [`StoreError::NoSubdomain`].
+    pub fn subdomain(&mut self, rank: u32) -> Result<SubdomainRow, StoreError> {
+        let row = self.row(RowKind::Subdomain.key(0, rank))?;
+        row.ok_or_else(|| StoreError::NoSubdomain {
+            path: self.dir().to_owned(),
+            subdomain: rank,
+        })
+    }
+
+    /// Opens a sealed sub-domain with `memory_bytes` for redb's cache and decoded vertices.
+    ///
+    /// Errors: [`StoreError::NoSubdomain`]; unfinished; damage.
+    pub fn open_subdomain(
+        &mut self,
+        rank: u32,
+        memory_bytes: usize,
+    ) -> Result<Subdomain, StoreError> {
+        let row = self.subdomain(rank)?;
+        self.open_row(row, memory_bytes)
+    }
+
+    /// The same of a row at hand, which may be that of a [`StageRow`]. Errors: unfinished; damage.
+    pub fn open_row(
+        &self,
+        row: SubdomainRow,
+        memory_bytes: usize,
+    ) -> Result<Subdomain, StoreError> {
+        let path = self.file_path(row.rank, row.generation);
+        Ok(Subdomain::open(&path, row, memory_bytes)?)
+    }
+
+    /// Opens the coarse snapshot of a sub-domain with `cache_bytes` for redb.
+    ///
+    /// Errors: [`StoreError::NoCoarseSnapshot`]; damage.
+    pub fn open_coarse(
+        &mut self,
+        rank: u32,
+        cache_bytes: usize,
+    ) -> Result<CoarseSnapshot, StoreError> {
+        let row = self.coarse_snapshot(rank)?;
+        let row = row.ok_or_else(|| StoreError::NoCoarseSnapshot {
+            path: self.dir().to_owned(),
+            subdomain: rank,
+        })?;
+        let path = self.coarse_path(rank, row.generation);
+        Ok(CoarseSnapshot::open(&path, row, cache_bytes)?)
+    }
+
+    /// The digest of the tetrahedra and of the interface faces, from the rows of the sub-domains.
+    ///
+    /// A face counts in each of its two sub-domains. Errors: a damaged catalog, unfinished sub-domains.
+    pub fn digest(&mut self) -> Result<[Digest; 2], StoreError> {
+        let mut both = [Digest::default(); 2];
+        for row in self.subdomains()? {
+            if Form::of(row.state).is_none() {
+                return Err(StoreError::Sealed(SealedError::NotSealed {
+                    path: self.dir().to_owned(),
+                    subdomain: row.rank,
+                }));
+            }
+            both[0].merge(&Digest { lanes: row.digest });
+            both[1].merge(&Digest {
+                lanes: row.interface_digest,
+            });
+        }
+        Ok(both)
+    }
+
+    /// What the sub-domains of the last change were before it, by rank.
+    pub fn before(&mut self) -> Result<Vec<SubdomainRow>, StoreError> {
+        self.rows(RowKind::Previous)
+    }
+
+    /// The files that count, by sub-domain and generation.
+    pub fn files(&mut self) -> Result<Vec<FileRow>, StoreError> {
+        self.rows(RowKind::File)
+    }
+
+    /// The coarse leaves that were kept, by sub-domain.
+    pub fn coarse_snapshots(&mut self) -> Result<Vec<CoarseRow>, StoreError> {
+        self.rows(RowKind::Coarse)
+    }
+
+    /// The coarse leaf of one sub-domain, if it was kept.
+    pub fn coarse_snapshot(&mut self, rank: u32) -> Result<Option<CoarseRow>, StoreError> {
+        self.row(RowKind::Coarse.key(0, rank))
+    }
+
+    /// The interfaces by cut, then by ranks.
+    pub fn interfaces(&mut self) -> Result<Vec<InterfaceRow>, StoreError> {
+        let rows: Vec<Vec<InterfaceRow>> = self.rows(RowKind::Interface)?;
+        Ok(rows.into_iter().flatten().collect())
+    }
+
+    /// Who neighbors whom, by sub-domain.
+    pub fn topology(&mut self) -> Result<Vec<TopologyRow>, StoreError> {
+        self.rows(RowKind::Topology)
+    }
+
+    /// Meshes that were kept to be looked at, the coarse ones first, by cut.
+    pub fn stages(&mut self) -> Result<Vec<StageRow>, StoreError> {
+        self.rows(RowKind::Stage)
+    }
+
+    /// All steps done so far, in order.
+    pub fn journal(&mut self) -> Result<Vec<JournalRow>, StoreError> {
+        self.rows(RowKind::Journal)
+    }
+
+    /// Bytes kept under a number with [`Step::set_blob`], or `None`.
+    pub fn blob(&mut self, number: u32) -> Result<Option<Vec<u8>>, StoreError> {
+        let mut whole = None::<Vec<u8>>;
+        for piece in 0.. {
+            let Some(bytes) = self.bytes(RowKind::Blob.key(number, piece))? else {
+                break;
+            };
+            whole.get_or_insert_default().extend_from_slice(&bytes);
+        }
+        Ok(whole)
+    }
+
+    /// Bytes of the catalog's file.
+    pub fn file_bytes(&self) -> Result<u64, StoreError> {
+        Ok(self.dir.join(CATALOG).bytes()?)
+    }
+
+    /// Shrinks the catalog to what it holds, and closes it.
+    pub fn close(self) -> Result<(), StoreError> {
+        Ok(self.file.compact()?)
+    }
+
+    fn missing(&self, key: u64) -> StoreError {
+        self.damaged_row(key, "is missing".to_owned())
+    }
+
+    fn damaged_row(&self, key: u64, reason: String) -> StoreError {
+        StoreError::Row {
+            path: self.file.path().to_owned(),
+            key,
+            reason,
+        }
+    }
+
+    fn bytes(&mut self, key: u64) -> Result<Option<Vec<u8>>, StoreError> {
+        let read = self.file.read(key, |value| {
+            rows::checked_bytes(key, value).map(<[u8]>::to_vec)
+        })?;
+        read.transpose().map_err(|e| self.damaged_row(key, e))
+    }
+
+    fn row<T>(&mut self, key: u64) -> Result<Option<T>, StoreError>
+    where
+        T: Archive,
+        T::Archived: for<'a> CheckBytes<HighValidator<'a, rancor::Error>>
+            + Deserialize<T, HighDeserializer<rancor::Error>>,
+    {
+        let read = self.file.read(key, |value| rows::decode(key, value))?;
+        read.transpose().map_err(|e| self.damaged_row(key, e))
+    }
+
+    fn rows<T>(&mut self, kind: RowKind) -> Result<Vec<T>, StoreError>
+    where
+        T: Archive,
+        T::Archived: for<'a> CheckBytes<HighValidator<'a, rancor::Error>>
+            + Deserialize<T, HighDeserializer<rancor::Error>>,
+    {
+        let mut all = Vec::new();
+        let mut wrong = None;
+        self.file.scan(kind.keys(), |key, value| {
+            match rows::decode(key, value) {
+                Ok(row) => all.push(row),
+                Err(reason) => wrong = Some((key, reason)),
+            }
+            wrong.is_none()
+        })?;
+        match wrong {
+            Some((key, reason)) => Err(self.damaged_row(key, reason)),
+            None => Ok(all),
+        }
+    }
+}
+
+/// Says what is in the way of a new store, if anything is.
+fn refuse_existing(dir: &DiskPath) -> Result<(), StoreError> {
+    let path = dir.path().to_owned();
+    if !dir.exists() {
+        return Ok(());
+    }
+    if !dir.is_dir() {
+        let reason = "it is a file";
+        return Err(StoreError::NotOurs { path, reason });
+    }
+    if Catalog::is_vacant(dir) {
+        return Ok(());
+    }
+    match Catalog::open(dir)?.state()?.is_finished() {
+        true => Err(StoreError::Finished { path }),
+        false => Err(StoreError::Unfinished { path }),
+    }
+}
+
+/// First words of the names of files.
+const SUBDOMAIN: &str = "subdomain";
+const COARSE: &str = "coarse";
+
+fn named(kind: &str, file: FileRow) -> String {
+    format!("{kind}-{:05}-g{}.redb", file.subdomain, file.generation)
+}
+
+fn parsed(kind: &str, name: &str) -> Option<FileRow> {
+    let (subdomain, generation) = name
+        .strip_prefix(kind)?
+        .strip_prefix('-')?
+        .strip_suffix(".redb")?
+        .split_once("-g")?;
+    let file = FileRow {
+        subdomain: subdomain.parse().ok()?,
+        generation: generation.parse().ok()?,
+    };
+    (named(kind, file) == name).then_some(file)
+}

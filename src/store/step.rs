@@ -1,0 +1,179 @@
+//! What one step changes in the catalog.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::rows::{self, RowKind};
+use tetdb_schema::catalog::{
+    CoarseRow, FileRow, InterfaceRow, Job, JournalRow, RegionRow, StageRow, StoreState,
+    SubdomainRow, TopologyRow,
+};
+
+/// Length of the pieces a blob is cut into; with 16 bytes of redb and 8 of checksum within 64 KiB.
+const BLOB_PIECE: usize = 65_536 - 24;
+
+/// Rows to set and remove, files to list and forget; applied together by [`crate::store::Catalog::commit`].
+pub struct Step {
+    pub(super) changes: BTreeMap<u64, Option<Vec<u8>>>,
+    pub(super) listed: BTreeSet<FileRow>,
+    pub(super) unlisted: BTreeSet<FileRow>,
+    /// The same for coarse leaves.
+    pub(super) coarse_listed: BTreeSet<FileRow>,
+    pub(super) coarse_unlisted: BTreeSet<FileRow>,
+    pub(super) journal_rows: u32,
+}
+
+impl Step {
+    pub(super) fn new(journal_rows: u32) -> Self {
+        Self {
+            changes: BTreeMap::new(),
+            listed: BTreeSet::new(),
+            unlisted: BTreeSet::new(),
+            coarse_listed: BTreeSet::new(),
+            coarse_unlisted: BTreeSet::new(),
+            journal_rows,
+        }
+    }
+
+    pub(super) fn put_bytes(&mut self, key: u64, bytes: &[u8]) {
+        self.changes
+            .insert(key, Some(rows::guarded_bytes(key, bytes)));
+    }
+
+    fn put<T>(&mut self, key: u64, row: &T)
+    where
+        T: for<'a> rkyv::Serialize<
+                rkyv::api::high::HighSerializer<
+                    rkyv::util::AlignedVec,
+                    rkyv::ser::allocator::ArenaHandle<'a>,
+                    rkyv::rancor::Error,
+                >,
+            >,
+    {
+        self.changes.insert(key, Some(rows::encode(key, row)));
+    }
+
+    /// How far the store is after this step.
+    pub fn set_state(&mut self, state: StoreState) {
+        self.put(RowKind::State.key(0, 0), &state);
+    }
+
+    /// What was asked for.
+    pub fn set_job(&mut self, job: &Job) {
+        self.put(RowKind::Job.key(0, 0), job);
+    }
+
+    /// Names of the labels.
+    pub fn set_labels(&mut self, labels: &Vec<String>) {
+        self.put(RowKind::Labels.key(0, 0), labels);
+    }
+
+    /// The regions.
+    pub fn set_regions(&mut self, regions: &Vec<RegionRow>) {
+        self.put(RowKind::Regions.key(0, 0), regions);
+    }
+
+    /// A sub-domain, new or changed.
+    pub fn set_subdomain(&mut self, row: &SubdomainRow) {
+        self.put(RowKind::Subdomain.key(0, row.rank), row);
+    }
+
+    /// What a sub-domain was before its last change; its file must stay listed.
+    pub fn set_before(&mut self, row: &SubdomainRow) {
+        self.put(RowKind::Previous.key(0, row.rank), row);
+    }
+
+    /// Forgets what a sub-domain was before.
+    pub fn remove_before(&mut self, rank: u32) {
+        self.changes.insert(RowKind::Previous.key(0, rank), None);
+    }
+
+    /// Forgets a sub-domain.
+    pub fn remove_subdomain(&mut self, rank: u32) {
+        self.changes.insert(RowKind::Subdomain.key(0, rank), None);
+    }
+
+    /// A file counts from now on; it is synced before the commit.
+    pub fn list_file(&mut self, subdomain: u32, generation: u32) {
+        let file = FileRow {
+            subdomain,
+            generation,
+        };
+        self.put(RowKind::File.key(subdomain, generation), &file);
+        self.unlisted.remove(&file);
+        self.listed.insert(file);
+    }
+
+    /// A file no longer counts; it is removed after the commit.
+    pub fn unlist_file(&mut self, subdomain: u32, generation: u32) {
+        let file = FileRow {
+            subdomain,
+            generation,
+        };
+        self.changes
+            .insert(RowKind::File.key(subdomain, generation), None);
+        self.listed.remove(&file);
+        self.unlisted.insert(file);
+    }
+
+    /// A coarse leaf counts from now on; its file is synced before the commit.
+    pub fn list_coarse(&mut self, row: &CoarseRow) {
+        self.put(RowKind::Coarse.key(0, row.rank), row);
+        self.coarse_listed.insert(FileRow {
+            subdomain: row.rank,
+            generation: row.generation,
+        });
+    }
+
+    /// Forgets a coarse leaf; its file is removed after the commit.
+    pub fn drop_coarse(&mut self, row: &CoarseRow) {
+        self.changes.insert(RowKind::Coarse.key(0, row.rank), None);
+        self.coarse_unlisted.insert(FileRow {
+            subdomain: row.rank,
+            generation: row.generation,
+        });
+    }
+
+    /// All interfaces of one cut.
+    pub fn set_interfaces(&mut self, cut: u32, interfaces: &Vec<InterfaceRow>) {
+        self.put(RowKind::Interface.key(0, cut), interfaces);
+    }
+
+    /// The neighbors of one sub-domain.
+    pub fn set_topology(&mut self, row: &TopologyRow) {
+        self.put(RowKind::Topology.key(0, row.subdomain), row);
+    }
+
+    /// A mesh kept to be looked at.
+    pub fn set_stage(&mut self, stage: &StageRow) {
+        self.put(RowKind::Stage.key(stage.stage as u32, stage.cut), stage);
+    }
+
+    /// Appends to the journal.
+    pub fn append_journal(&mut self, row: &JournalRow) {
+        self.put(RowKind::Journal.key(0, self.journal_rows), row);
+        self.journal_rows += 1;
+    }
+
+    /// Keeps bytes under a number below 2^24, such as the size field.
+    ///
+    /// Replaces a blob of any length: the piece after its last is removed, and reading stops there.
+    pub fn set_blob(&mut self, number: u32, bytes: &[u8]) {
+        let mut pieces = 0;
+        for piece in bytes.chunks(BLOB_PIECE) {
+            self.put_bytes(RowKind::Blob.key(number, pieces), piece);
+            pieces += 1;
+        }
+        if pieces == 0 {
+            self.put_bytes(RowKind::Blob.key(number, 0), &[]);
+            pieces = 1;
+        }
+        self.changes.insert(RowKind::Blob.key(number, pieces), None);
+    }
+
+    /// Forgets a blob of so many bytes.
+    pub fn remove_blob(&mut self, number: u32, bytes: usize) {
+        for piece in 0..=bytes.div_ceil(BLOB_PIECE) as u32 {
+            self.changes.insert(RowKind::Blob.key(number, piece), None);
+        }
+    }
+}

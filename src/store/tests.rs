@@ -1,0 +1,279 @@
+//! A hand-made store of two sub-domains with an interface; opening, stepping, purging, damage.
+
+use tetdb_schema::ids::{Owner, SubdomainId, VertexId};
+use tetdb_schema::record::{FACES, InterfaceFace, NO_TET, SealedFacet, SealedVertex, tag};
+
+use super::*;
+use crate::sealed::{SealedWriter, Shape};
+
+type Outcome = Result<(), Box<dyn std::error::Error>>;
+
+fn job() -> Job {
+    Job {
+        options: "{}".to_owned(),
+        tool_version: "0".to_owned(),
+        ..Job::default()
+    }
+}
+
+fn no_error<T>(result: Result<T, StoreError>) -> StoreError {
+    match result {
+        Ok(_) => panic!("an error was expected"),
+        Err(e) => e,
+    }
+}
+
+#[test]
+fn what_is_in_the_way_of_a_new_store_is_named() -> Outcome {
+    let dir = tempfile::tempdir()?;
+    let path = dir.path().join("a.tetdb");
+    let mut catalog = Catalog::create(&path, &job())?;
+    assert!(matches!(
+        no_error(Catalog::open(&path)),
+        StoreError::Busy { .. }
+    ));
+    assert!(matches!(
+        no_error(Catalog::create(&path, &job())),
+        StoreError::Busy { .. }
+    ));
+    assert_eq!(catalog.state()?, StoreState::New);
+    catalog.close()?;
+    let found = no_error(Catalog::create(&path, &job()));
+    assert!(matches!(found, StoreError::Unfinished { .. }), "{found}");
+    let mut catalog = Catalog::open_writable(&path)?;
+    catalog.commit(|step| {
+        step.set_state(StoreState::Sealed);
+        Ok(())
+    })?;
+    drop(catalog);
+    let found = no_error(Catalog::create(&path, &job()));
+    assert!(matches!(found, StoreError::Finished { .. }), "{found}");
+    let readers = (Catalog::open(&path)?, Catalog::open(&path)?);
+    assert!(matches!(
+        no_error(Catalog::open_writable(&path)),
+        StoreError::Busy { .. }
+    ));
+    drop(readers);
+    let found = no_error(Catalog::create(dir.path(), &job()));
+    assert!(matches!(found, StoreError::NotOurs { .. }), "{found}");
+    let found = no_error(Catalog::open(dir.path().join("b")));
+    assert!(matches!(found, StoreError::NotFound { .. }), "{found}");
+    std::fs::create_dir(dir.path().join("empty"))?;
+    Catalog::create(dir.path().join("empty"), &job())?.close()?;
+    Ok(())
+}
+
+#[test]
+fn a_step_flips_rows_and_forgets_files_together() -> Outcome {
+    let dir = tempfile::tempdir()?;
+    let path = dir.path().join("a.tetdb");
+    let mut catalog = Catalog::create(&path, &job())?;
+    let (old, new) = (catalog.file_path(3, 1), catalog.file_path(3, 2));
+    std::fs::write(old.path(), b"old")?;
+    catalog.commit(|step| {
+        step.list_file(3, 1);
+        step.set_blob(1, &vec![7; 200_000]);
+        Ok(())
+    })?;
+    std::fs::write(new.path(), b"new")?;
+    let journal = JournalRow {
+        state: StoreState::Coarse,
+        subdomain: Some(3),
+        step: "saturate".to_owned(),
+        seconds: 1.5,
+        measures: vec![],
+    };
+    catalog.commit(|step| {
+        step.list_file(3, 2);
+        step.unlist_file(3, 1);
+        step.append_journal(&journal);
+        step.append_journal(&journal);
+        step.set_blob(1, &[7; 100_000]);
+        Ok(())
+    })?;
+    assert!(!old.exists() && new.exists());
+    // A catalog whose writer was killed opens for reading as it stood.
+    let killed = dir.path().join("killed.tetdb");
+    std::fs::create_dir(&killed)?;
+    std::fs::copy(path.join("catalog.redb"), killed.join("catalog.redb"))?;
+    assert_eq!(Catalog::open(&killed)?.journal()?.len(), 2);
+    // Killed between writing a file and listing it.
+    let torn = catalog.file_path(4, 1);
+    std::fs::write(torn.path(), b"torn")?;
+    std::fs::write(path.join("notes.txt"), b"mine")?;
+    catalog.scratch_dir()?;
+    drop(catalog);
+    let mut catalog = Catalog::open_writable(&path)?;
+    assert!(!torn.exists() && new.exists() && path.join("notes.txt").exists());
+    assert_eq!(
+        catalog.files()?,
+        [FileRow {
+            subdomain: 3,
+            generation: 2
+        }]
+    );
+    assert_eq!(catalog.journal()?, [journal.clone(), journal]);
+    assert_eq!(catalog.blob(1)?, Some(vec![7; 100_000]));
+    assert_eq!(catalog.blob(2)?, None);
+    assert!(
+        no_error(catalog.commit(|step| {
+            step.list_file(9, 9);
+            Ok(())
+        }))
+        .to_string()
+        .contains("subdomain-00009-g9")
+    );
+    Ok(())
+}
+
+/// Two tetrahedra in each of two sub-domains, joined by the face of vertices 1 2 3.
+pub(crate) fn two_subdomains(path: &std::path::Path) -> Result<(), StoreError> {
+    let mut catalog = Catalog::create(path, &job())?;
+    let points = [
+        [0.0, 0.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [0.0, 0.0, 1.0],
+        [1.0, 1.0, 1.0],
+    ];
+    // Of each sub-domain: vertices, the tetrahedron, the face shared with the other one.
+    let parts = [
+        ([0, 1, 2, 3], [0u32, 1, 2, 3], 0usize),
+        ([4, 1, 2, 3], [0, 1, 3, 2], 0),
+    ];
+    let mut sealed = Vec::new();
+    for (rank, (vertices, nodes, shared)) in (0u32..).zip(parts) {
+        let id = SubdomainId::new(rank).expect("small");
+        let file = catalog.file_path(rank, 1);
+        let mut writer = SealedWriter::create(&file, id, 1, 4 << 20)?;
+        for v in vertices {
+            writer.push_vertex(SealedVertex {
+                point: points[v],
+                h: 1.0,
+                tag: tag::SURFACE,
+                id: VertexId {
+                    owner: Owner::Surface,
+                    index: v as u32,
+                }
+                .number(),
+            })?;
+        }
+        writer.push_tet(nodes, 1)?;
+        let nodes = tetdb_schema::record::SealedTet { nodes, region: 1 }
+            .rotated()
+            .nodes;
+        for (i, corners) in FACES.iter().enumerate() {
+            let face = corners.map(|c| nodes[c]);
+            if i == shared {
+                writer.push_interface_face(InterfaceFace {
+                    vertices: face,
+                    cut: 1,
+                    index: 0,
+                    other: 1 - rank,
+                    tet: 0,
+                })?;
+            } else {
+                writer.push_facet(SealedFacet {
+                    vertices: face,
+                    label: 0,
+                    triangle: u64::from(rank) * 3 + i as u64 - 1,
+                    regions: [0, 1],
+                    tets: [NO_TET, 0],
+                })?;
+            }
+        }
+        sealed.push(writer.finish()?);
+    }
+    let side = sealed[0].interfaces[0];
+    assert_eq!(side.digest, sealed[1].interfaces[0].digest);
+    catalog.commit(|step| {
+        step.set_labels(&vec!["label_0".to_owned()]);
+        for part in &sealed {
+            step.list_file(part.row.rank, 1);
+            step.set_subdomain(&part.row);
+        }
+        step.set_interfaces(
+            1,
+            &vec![InterfaceRow {
+                cut: 1,
+                low: 0,
+                high: 1,
+                faces: side.faces,
+                digest: side.digest.lanes,
+            }],
+        );
+        step.set_state(StoreState::Sealed);
+        Ok(())
+    })?;
+    catalog.close()
+}
+
+#[test]
+fn a_store_of_two_subdomains_reads_back() -> Outcome {
+    let dir = tempfile::tempdir()?;
+    let path = dir.path().join("two.tetdb");
+    two_subdomains(&path)?;
+    let mut store = Catalog::open(&path)?;
+    let mut other = Catalog::open(&path)?;
+    assert_eq!(store.digest()?, other.digest()?);
+    assert!(matches!(
+        no_error(store.subdomain(2)),
+        StoreError::NoSubdomain { .. }
+    ));
+    let mut volume = 0.0;
+    for rank in 0..2 {
+        let mut part = store.open_subdomain(rank, 1 << 20)?;
+        let tets = part.tets().collect::<Result<Vec<_>, _>>()?;
+        assert_eq!(tets.len(), 1);
+        assert_eq!(tets[0].0.to_string(), format!("{rank}:0"));
+        assert_eq!(part.vertices().count(), 4);
+        assert_eq!(part.facets().count(), 3);
+        let face = part.interfaces().next().ok_or("an interface face")??;
+        assert_eq!((face.cut, face.other), (1, 1 - rank));
+        let corners = part.corners(tets[0].1.nodes)?;
+        volume += Shape::of(corners.map(|c| c.point)).volume;
+        assert!(part.corner(4).is_err());
+        assert!(part.row().bytes < 200_000, "{}", part.row().bytes);
+    }
+    assert!((volume - 0.5).abs() < 1e-12);
+    Ok(())
+}
+
+#[test]
+fn a_damaged_file_is_an_error_that_names_the_place() -> Outcome {
+    let dir = tempfile::tempdir()?;
+    let path = dir.path().join("two.tetdb");
+    two_subdomains(&path)?;
+    let file = path.join("subdomain-00001-g1.redb");
+    let bytes = std::fs::read(&file)?;
+    let read = || -> Result<(), StoreError> {
+        let mut part = Catalog::open(&path)?.open_subdomain(1, 1 << 20)?;
+        part.tets().try_for_each(|t| t.map(drop))?;
+        part.vertices().try_for_each(|t| t.map(drop))?;
+        part.facets().try_for_each(|t| t.map(drop))?;
+        Ok(part.interfaces().try_for_each(|t| t.map(drop))?)
+    };
+    read()?;
+    let mut found = 0;
+    for place in (0..bytes.len()).step_by(bytes.len() / 300) {
+        let mut torn = bytes.clone();
+        torn[place] ^= 0x10;
+        std::fs::write(&file, &torn)?;
+        found += usize::from(read().is_err());
+    }
+    // The payloads of all chunks, found by their magic: the file also holds copies that no longer count.
+    let mut torn = bytes.clone();
+    for at in 0..bytes.len() - 50 {
+        if bytes[at..].starts_with(b"TETC") {
+            torn[at + 42] ^= 1;
+        }
+    }
+    std::fs::write(&file, &torn)?;
+    let error = no_error(read());
+    assert!(error.is_damage());
+    assert!(error.to_string().contains("sub-domain 1"), "{error}");
+    assert!(found > 0);
+    std::fs::remove_file(&file)?;
+    assert!(no_error(read()).is_damage());
+    Ok(())
+}

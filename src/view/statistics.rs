@@ -1,0 +1,154 @@
+//! What all tetrahedra together are like: one pass over a store.
+
+use rayon::prelude::*;
+use tetdb_schema::record::FACES;
+
+use super::sample::{EdgeLengths, EdgeSample, SAMPLE_BYTES};
+use crate::geom::Point;
+use crate::query::checked_chunk;
+use crate::query::{QueryError, QuerySession};
+use crate::sealed::{Corner, Shape};
+use crate::storage::{Budget, check_cancelled};
+
+/// Bins of quality: fiftieths from 1 to 3, the last with all beyond.
+const QUALITY_BINS: usize = 101;
+const QUALITY_PER_UNIT: f64 = 50.0;
+/// Bins of dihedral angles, two degrees each.
+const ANGLE_BINS: usize = 90;
+/// Tetrahedra with their corners that are at hand at once: those of a chunk.
+const CHUNK_BYTES: u64 = 32_768 * size_of::<[Corner; 4]>() as u64;
+
+/// Counts in bins of equal width from `least` on; the last bin has all beyond.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Histogram {
+    pub least: f64,
+    pub width: f64,
+    pub bins: Vec<u64>,
+}
+
+/// The result of a pass.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Statistics {
+    pub tets: u64,
+    pub quality: Histogram,
+    pub quality_mean: f64,
+    /// All six dihedral angles of each tetrahedron, in degrees.
+    pub angles: Histogram,
+    /// Least and greatest mean of a tetrahedron's longest and shortest edge.
+    pub size: [f64; 2],
+    pub edges: EdgeLengths,
+}
+
+/// Counts of some tetrahedra; whole numbers and extremes, so that any order gives the same.
+#[derive(Clone)]
+struct BinCounts {
+    quality: Vec<u64>,
+    angles: Vec<u64>,
+    /// Sum of q in units of 2⁻³², which no order of adding changes.
+    sum: u128,
+    size: [f64; 2],
+}
+
+impl BinCounts {
+    fn none() -> Self {
+        Self {
+            quality: vec![0; QUALITY_BINS],
+            angles: vec![0; ANGLE_BINS],
+            sum: 0,
+            size: [f64::INFINITY, 0.0],
+        }
+    }
+
+    fn add(mut self, corners: &[Corner; 4]) -> Self {
+        let points = corners.map(|c| c.point);
+        let quality = Shape::of(points).quality;
+        let bin = ((quality - 1.0) * QUALITY_PER_UNIT) as usize;
+        self.quality[bin.min(QUALITY_BINS - 1)] += 1;
+        self.sum += (quality.min(1e6) * 2f64.powi(32)) as u128;
+        let [a, b, c, d] = points;
+        let lengths = [b - a, c - a, d - a, c - b, d - b, d - c].map(Point::length);
+        let least = lengths.into_iter().fold(f64::INFINITY, f64::min);
+        let size = 0.5 * (least + lengths.into_iter().fold(0.0, f64::max));
+        self.size = [self.size[0].min(size), self.size[1].max(size)];
+        let normals = FACES.map(|f| {
+            let [a, b, c] = f.map(|i| points[i]);
+            (b - a).cross(c - a).normalize_or_zero()
+        });
+        for i in 0..4 {
+            for j in 0..i {
+                let cosine = -normals[i].dot(normals[j]);
+                let degrees = cosine.clamp(-1.0, 1.0).acos().to_degrees();
+                self.angles[((degrees / 2.0) as usize).min(ANGLE_BINS - 1)] += 1;
+            }
+        }
+        self
+    }
+
+    fn and(mut self, other: Self) -> Self {
+        let pairs = [
+            (&mut self.quality, &other.quality),
+            (&mut self.angles, &other.angles),
+        ];
+        for (own, other) in pairs {
+            own.iter_mut().zip(other).for_each(|(a, b)| *a += b);
+        }
+        self.sum += other.sum;
+        let [least, most] = other.size;
+        self.size = [self.size[0].min(least), self.size[1].max(most)];
+        self
+    }
+}
+
+impl QuerySession {
+    /// Measures every tetrahedron, with some ten MiB of `budget`; tells how many are done.
+    ///
+    /// Errors: damage; a budget too small.
+    pub fn statistics(
+        &mut self,
+        budget: &Budget,
+        tell: &dyn Fn(u64, u64),
+    ) -> Result<Statistics, QueryError> {
+        let _lease = budget.lease(SAMPLE_BYTES + CHUNK_BYTES, "a sample of edges")?;
+        let total: u64 = self.rows.iter().map(|r| r.tets).sum();
+        let (mut done, mut counts, mut sample) = (0, BinCounts::none(), EdgeSample::new());
+        let mut corners = Vec::new();
+        for rank in 0..self.rows.len() {
+            let (rank, chunks) = (self.rows[rank].rank, self.rows[rank].chunks[0]);
+            for chunk in 0..chunks {
+                check_cancelled();
+                self.count_tets();
+                let part = &mut self.part(rank)?.subdomain;
+                let records = checked_chunk(part, chunk)?.records;
+                corners.clear();
+                for tet in &records {
+                    let found = part.corners(tet.nodes)?;
+                    sample.add(&found);
+                    corners.push(found);
+                }
+                let found = corners
+                    .par_chunks(1024)
+                    .map(|some| some.iter().fold(BinCounts::none(), BinCounts::add))
+                    .reduce(BinCounts::none, BinCounts::and);
+                counts = counts.and(found);
+                done += records.len() as u64;
+                tell(done, total);
+            }
+        }
+        Ok(Statistics {
+            tets: total,
+            quality: Histogram {
+                least: 1.0,
+                width: 1.0 / QUALITY_PER_UNIT,
+                bins: counts.quality,
+            },
+            quality_mean: counts.sum as f64 / 2f64.powi(32) / total.max(1) as f64,
+            angles: Histogram {
+                least: 0.0,
+                width: 2.0,
+                bins: counts.angles,
+            },
+            size: counts.size,
+            edges: sample.finish(),
+        })
+    }
+}
