@@ -2,38 +2,63 @@
 #![deny(unsafe_code)]
 #![doc = include_str!("README.md")]
 
-// Floor 0.
-pub mod expr;
-pub mod geom;
-// Floor 1.
-pub mod storage;
-// Floor 2.
-pub mod mesh;
-pub mod sealed;
-pub mod surface;
-// Floor 3.
-pub mod delaunay;
-pub mod reconnect;
-pub mod samples;
-pub mod sizing;
-pub mod store;
-// Floor 4.
-pub mod boundary;
-pub mod optimize;
-pub mod refine;
+#[doc(inline)]
+pub use api::{
+    Answers, Bytes, CODES, CancelToken, CodeRow, Error, Event, Existing, ExportOptions, Exported,
+    Length, Mesher, Optimize, Order, Prediction, Query, Regions, Remesh, Remeshed, Seal, Settings,
+    Sizes, Store, Subdomains, Summary, Surface, Verification, VerifyLevel,
+};
 
-// Floor 5.
-pub mod bisect;
-pub mod topology;
-// Floor 6.
-pub mod audit;
-pub mod pipeline;
-pub mod query;
-// Floor 7.
-pub mod io;
-// Floor 8.
-pub mod view;
-// Floor 9.
-pub mod api;
+/// What the front door hands out of the modules below: sub-domains and their records, hits of a query.
+pub mod data {
+    pub use crate::query::Hit;
+    pub use crate::sealed::{Chunk, Chunks, Corner, SealedError, Shape, Subdomain};
+    pub use glam::DVec3;
+    pub use tetdb_schema as schema;
+}
+
+#[cfg(feature = "internals")]
+pub use house::*;
+#[cfg(not(feature = "internals"))]
+use house::*;
+
+/// The modules, from the ground up; a module imports only from those above its group's line.
+#[path = "."]
+mod house {
+    // Floor 0.
+    pub mod expr;
+    pub mod geom;
+    // Floor 1.
+    pub mod storage;
+    // Floor 2.
+    pub mod mesh;
+    pub mod sealed;
+    pub mod surface;
+    // Floor 3.
+    pub mod delaunay;
+    pub mod reconnect;
+    pub mod samples;
+    pub mod sizing;
+    pub mod store;
+    // Floor 4.
+    pub mod boundary;
+    pub mod optimize;
+    pub mod refine;
+    // Floor 5.
+    pub mod bisect;
+    pub mod topology;
+    // Floor 6.
+    pub mod audit;
+    pub mod pipeline;
+    pub mod query;
+    // Floor 7.
+    pub mod io;
+    // Floor 8.
+    pub mod view;
+    // Floor 9.
+    pub mod api;
+}
+
 // Floor 10.
+#[cfg(feature = "cli")]
 pub mod cli;

@@ -1,1 +1,45 @@
-//! The front door.
+//! The front door: whoever calls it gets validation, refusal before anything is written, the job on record, verification and resume.
+//!
+//! Reading order: `surface`, `sizes` and `options` (what is asked for), `settings` (memory, threads, cancelling, progress), `mesher`
+//! (a new store), `store` (a finished one), `ask` (questions), `remesh` (sub-domains again), `show` (files, pictures, the page),
+//! `error`. Private: `job` (what is put on record), `preflight` (what is refused before it begins), `replace` (one store in the place of
+//! another), `guard` (nothing unwinds into the caller).
+
+mod ask;
+mod codes;
+pub(crate) mod error;
+mod from_errors;
+pub(crate) mod guard;
+pub(crate) mod job;
+mod memory;
+mod mesher;
+mod options;
+pub(crate) mod preflight;
+pub(crate) mod remesh;
+pub(crate) mod replace;
+mod resume;
+mod settings;
+pub(crate) mod show;
+mod sizes;
+pub(crate) mod store;
+pub(crate) mod surface;
+pub(crate) mod verify;
+
+pub use crate::storage::CancelToken;
+pub use ask::{Answers, Order, Query};
+pub use codes::{CODES, CodeRow};
+pub use error::Error;
+pub(crate) use guard::guarded;
+pub use memory::{Bytes, peak_bytes};
+pub(crate) use memory::{default_cap, show_bytes};
+pub(crate) use mesher::predict;
+pub use mesher::{Existing, Mesher, Prediction};
+pub use options::{Optimize, Regions, Seal, Subdomains};
+pub use remesh::{Remesh, Remeshed};
+pub(crate) use resume::resume_reported;
+pub use settings::{Event, Settings};
+pub use show::{ExportOptions, Exported};
+pub use sizes::{Length, Sizes};
+pub use store::{Store, Summary};
+pub use surface::Surface;
+pub use verify::{Verification, VerifyLevel};

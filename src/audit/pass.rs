@@ -16,7 +16,7 @@ use super::{Finding, Level, Offender, Report, VerifyOptions};
 use crate::geom::{Point, insphere, orient};
 use crate::sealed::SealedError;
 use crate::sealed::{Corner, FacePairs, Paired, Subdomain, sorted_face};
-use crate::storage::check_cancelled;
+use crate::storage::{check_cancelled, parallel};
 use crate::store::StoreError;
 use tetdb_schema::catalog::{InterfaceRow, RegionRow};
 
@@ -275,14 +275,16 @@ impl<'a> Audit<'a> {
     }
 
     fn orientations(&mut self, rank: u32, first: u32, corners: &[[Corner; 4]]) {
-        let volumes: Vec<f64> = corners
-            .par_iter()
-            .with_min_len(1024)
-            .map(|c| {
-                let [a, b, c, d] = c.map(|c| c.point);
-                orient(a, b, c, d)
-            })
-            .collect();
+        let volumes: Vec<f64> = parallel(|| {
+            corners
+                .par_iter()
+                .with_min_len(1024)
+                .map(|c| {
+                    let [a, b, c, d] = c.map(|c| c.point);
+                    orient(a, b, c, d)
+                })
+                .collect()
+        });
         for (i, &six_volumes) in volumes.iter().enumerate() {
             self.report.volume += six_volumes / 6.0;
             if six_volumes <= 0.0 {
@@ -345,16 +347,18 @@ impl<'a> Audit<'a> {
             self.agree(rank, number, [marks[a][i], marks[b][j]], regions, &c);
         }
         if self.level(Level::Delaunay) {
-            let tested = inner
-                .par_iter()
-                .with_min_len(1024)
-                .filter(|p| marks[p.a as usize / 4][p.a as usize % 4] == 0)
-                .map(|p| {
-                    let [a, b, c, d] = corners[p.a as usize / 4].map(|c| c.point);
-                    let apex = corners[p.b as usize / 4][p.b as usize % 4].point;
-                    (1, u64::from(insphere(a, b, c, d, apex) <= 0.0))
-                })
-                .reduce(|| (0, 0), |x, y| (x.0 + y.0, x.1 + y.1));
+            let tested = parallel(|| {
+                inner
+                    .par_iter()
+                    .with_min_len(1024)
+                    .filter(|p| marks[p.a as usize / 4][p.a as usize % 4] == 0)
+                    .map(|p| {
+                        let [a, b, c, d] = corners[p.a as usize / 4].map(|c| c.point);
+                        let apex = corners[p.b as usize / 4][p.b as usize % 4].point;
+                        (1, u64::from(insphere(a, b, c, d, apex) <= 0.0))
+                    })
+                    .reduce(|| (0, 0), |x, y| (x.0 + y.0, x.1 + y.1))
+            });
             self.report.delaunay_tested += tested.0;
             self.report.delaunay_faces += tested.1;
         }

@@ -17,7 +17,7 @@ use super::split::interface_points;
 use super::surface::CuttingSurface;
 use crate::geom::Point;
 use crate::mesh::{Mesh, dense};
-use crate::storage::{Pages, check_cancelled};
+use crate::storage::{Pages, check_cancelled, parallel};
 use tetdb_schema::page::NONE;
 
 /// Nodes of a graph that is cut at once; wider interfaces are cut strip by strip. Of 593,000 tetrahedra, strips of 400,000 choose 46,024 faces in
@@ -135,8 +135,10 @@ fn minimum_cut<P: Pages>(
             tets.sort_unstable();
             read_strip(core, labels, surface, tets, graph);
         }
-        cuts[..strips.len()].par_iter_mut().for_each(|(_, graph)| {
-            graph.cut();
+        parallel(|| {
+            cuts[..strips.len()].par_iter_mut().for_each(|(_, graph)| {
+                graph.cut();
+            })
         });
         for (tets, graph) in &cuts[..strips.len()] {
             label_strip(labels, tets, graph);

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use crate::geom::Point;
 use crate::mesh::Mesh;
 use crate::sizing::load_of_tet;
-use crate::storage::{Pages, check_cancelled};
+use crate::storage::{Pages, check_cancelled, parallel};
 
 /// Longest edge of a piece in units of its smallest h: a narrow dip of a field graded by 1.3 per unit length is not stepped over, and the load is known where it lies.
 const EDGE_MAX: f64 = 5.0;
@@ -72,12 +72,14 @@ pub fn tally<P: Pages, T: Send>(
             return lanes.map(|(_, sum)| sum);
         }
         check_cancelled();
-        lanes.par_iter_mut().for_each(|(tets, sum)| {
-            let mut stack = Vec::new();
-            for tet in &*tets {
-                divide(*tet, h, &mut stack, &mut |piece| add(sum, piece));
-            }
-            tets.clear();
+        parallel(|| {
+            lanes.par_iter_mut().for_each(|(tets, sum)| {
+                let mut stack = Vec::new();
+                for tet in &*tets {
+                    divide(*tet, h, &mut stack, &mut |piece| add(sum, piece));
+                }
+                tets.clear();
+            })
         });
     }
 }

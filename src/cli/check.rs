@@ -8,7 +8,8 @@ use super::args::CheckArgs;
 use super::check_report::Findings;
 use super::console::Console;
 use super::failure::Failure;
-use super::input::{self, Input, Space};
+use super::input::{self, Space};
+use crate::api;
 use crate::io::write;
 use crate::surface::{Repair, Surface, repair};
 
@@ -32,8 +33,8 @@ pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
     }
     let mut input = input::load(&args.surfaces, Space::Boundless, console)?;
     let mended = args.repair.then(|| mend(&mut input, weld_share));
-    let findings = Findings::of(&input.surface, input.turned);
-    let written = write_files(args, &input.surface, &findings, console)?;
+    let findings = Findings::of(&input.inner, input.turned);
+    let written = write_files(args, &input.inner, &findings, console)?;
     if console.is_json() {
         let mut answer = findings.json();
         if let Some(mended) = &mended {
@@ -81,8 +82,8 @@ fn refuse_input(out: &Path, surfaces: &[String]) -> Result<(), Failure> {
     })
 }
 
-fn mend(input: &mut Input, weld_share: Option<f64>) -> Mended {
-    let surface = &mut input.surface;
+fn mend(input: &mut api::Surface, weld_share: Option<f64>) -> Mended {
+    let surface = &mut input.inner;
     let n_defects = crate::surface::validate(surface).n_defects;
     let before = (surface.n_triangles(), surface.n_vertices(), n_defects);
     let weld_distance = weld_share.map(|share| share * surface.bounds().diagonal());

@@ -5,18 +5,19 @@ use serde_json::json;
 use super::args::CompareArgs;
 use super::console::Console;
 use super::failure::Failure;
-use super::{memory, store};
+use super::memory;
+use crate::api::store::open_finished;
 use crate::audit::{Population, Qualities, qualities};
 
 /// Exit code when the meshes differ.
 const DIFFERENT: u8 = 7;
 
 pub fn run(args: &CompareArgs, console: &Console) -> Result<u8, Failure> {
-    let (cap, _) = memory::cap(args.read.memory.as_deref())?;
+    let cap = memory::cap(args.read.memory.as_deref())?;
     let memory = (cap / 4).min(256 << 20) as usize;
     let mut found = Vec::with_capacity(2);
     for path in [&args.first, &args.second] {
-        let mut open = store::open_finished(path)?;
+        let mut open = open_finished(path)?;
         let digest = open.digest()?;
         found.push((digest, qualities(&mut open, memory)?));
     }

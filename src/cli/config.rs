@@ -3,8 +3,8 @@
 use clap::ValueEnum;
 
 use super::args::{Optimize, Regions, ShapeArgs, SizeArgs};
-use super::background;
 use super::failure::Failure;
+use crate::api::job::identify_sizes;
 use crate::pipeline::Options;
 
 /// The options of a run: the file's, then the command line's over them, then the defaults.
@@ -48,7 +48,7 @@ pub fn options(args: &ShapeArgs) -> Result<Options, Failure> {
     }
     options.subdomain_count()?;
     options.form()?;
-    background::identify(&mut options)?;
+    identify_sizes(&mut options)?;
     Ok(options)
 }
 

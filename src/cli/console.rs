@@ -1,33 +1,37 @@
 //! Everything that is printed: data on stdout, talk on stderr.
 
-use std::cell::RefCell;
 use std::io::{IsTerminal, Write};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 
 use super::failure::Failure;
-use crate::pipeline::Event;
+use crate::api::{Bytes, Event, Settings};
+use crate::storage::CancelToken;
 
 /// Without a terminal, progress is one line in so much time.
 const PLAIN_EVERY: Duration = Duration::from_secs(10);
 
-/// The voice of one command.
+/// Where everything that is printed goes through; clones print to the same terminal.
+#[derive(Clone)]
 pub struct Console {
     json: bool,
     /// Neither progress nor remarks.
     quiet: bool,
     terminal: bool,
     bar: ProgressBar,
-    state: RefCell<State>,
+    state: Arc<Mutex<State>>,
+    cancel: CancelToken,
 }
 
 struct State {
     stage: String,
     /// When the stage began.
     since: Instant,
-    told: Instant,
+    /// When progress was last printed.
+    printed: Instant,
 }
 
 impl Console {
@@ -35,7 +39,7 @@ impl Console {
         Self::with(json, false)
     }
 
-    /// One that tells of warnings and errors alone, if `quiet`.
+    /// One that prints warnings and errors alone, if `quiet`.
     pub fn with(json: bool, quiet: bool) -> Self {
         let terminal = std::io::stderr().is_terminal() && !json && !quiet;
         let bar = if terminal {
@@ -49,11 +53,44 @@ impl Console {
             quiet,
             terminal,
             bar,
-            state: RefCell::new(State {
+            state: Arc::new(Mutex::new(State {
                 stage: String::new(),
                 since: now,
-                told: now,
-            }),
+                printed: now,
+            })),
+            cancel: CancelToken::new(),
+        }
+    }
+
+    /// What ends the runs of this command.
+    pub fn cancel(&self) -> &CancelToken {
+        &self.cancel
+    }
+
+    /// How a run works: with this much memory and so many threads, where they are given; it reports here.
+    pub fn settings(&self, memory: Option<u64>, threads: Option<usize>) -> Settings {
+        let console = self.clone();
+        let mut settings = Settings::new().cancel(&self.cancel);
+        if let Some(bytes) = memory {
+            settings = settings.memory(Bytes(bytes));
+        }
+        if let Some(n) = threads {
+            settings = settings.threads(n);
+        }
+        settings.progress(move |event| console.hear(event))
+    }
+
+    fn hear(&self, event: &Event) {
+        match *event {
+            Event::Progress {
+                stage,
+                done,
+                total,
+                unit,
+            } => self.progress(stage, done, total, unit),
+            Event::Note(ref text) => self.note(text),
+            Event::Warning(ref text) => self.warn(text),
+            Event::StoreBegun(_) => super::signals::store_begins(),
         }
     }
 
@@ -65,16 +102,16 @@ impl Console {
     /// A remark.
     pub fn note(&self, text: &str) {
         if !self.quiet {
-            self.tell(text);
+            self.print(text);
         }
     }
 
     /// A remark that is never left out.
     pub fn warn(&self, text: &str) {
-        self.tell(&format!("warning: {text}"));
+        self.print(&format!("warning: {text}"));
     }
 
-    fn tell(&self, text: &str) {
+    fn print(&self, text: &str) {
         if self.json {
             self.stderr_json(&serde_json::json!({ "note": text }));
         } else {
@@ -103,50 +140,46 @@ impl Console {
     }
 
     /// Progress; called often.
-    pub fn progress(&self, event: Event) {
+    pub fn progress(&self, stage: &'static str, done: u64, total: Option<u64>, unit: &'static str) {
         if self.quiet {
             return;
         }
-        let mut state = self.state.borrow_mut();
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         let now = Instant::now();
-        let new_stage = state.stage != event.stage;
+        let new_stage = state.stage != stage;
         if new_stage {
-            event.stage.clone_into(&mut state.stage);
+            stage.clone_into(&mut state.stage);
             state.since = now;
         }
         if self.terminal {
             if new_stage {
                 self.bar.reset();
-                self.bar.set_style(style(event.total.is_some()));
-                self.bar.set_message(event.stage.to_owned());
+                self.bar.set_style(style(total.is_some()));
+                self.bar.set_message(stage.to_owned());
             }
-            if let Some(total) = event.total {
+            if let Some(total) = total {
                 self.bar.set_length(total);
             }
-            self.bar.set_position(event.done);
-        } else if now - state.told >= PLAIN_EVERY {
-            state.told = now;
+            self.bar.set_position(done);
+        } else if now - state.printed >= PLAIN_EVERY {
+            state.printed = now;
             let seconds = (now - state.since).as_secs_f64();
             // Where several work side by side stages alternate, and a stage just begun has no rate.
-            let rate = (seconds > 1.0).then(|| event.done as f64 / seconds);
-            let eta = event
-                .total
+            let rate = (seconds > 1.0).then(|| done as f64 / seconds);
+            let eta = total
                 .zip(rate)
-                .filter(|_| event.done > 0)
-                .map(|(t, rate)| t.saturating_sub(event.done) as f64 / rate);
+                .filter(|_| done > 0)
+                .map(|(t, rate)| t.saturating_sub(done) as f64 / rate);
             if self.json {
                 self.stderr_json(&serde_json::json!({
-                    "progress": { "stage": event.stage, "done": event.done, "total": event.total,
-                        "unit": event.unit, "per_s": rate, "eta_s": eta }
+                    "progress": { "stage": stage, "done": done, "total": total,
+                        "unit": unit, "per_s": rate, "eta_s": eta }
                 }));
             } else {
-                let of = event.total.map_or(String::new(), |t| format!(" of {t}"));
+                let of = total.map_or(String::new(), |t| format!(" of {t}"));
                 let eta = eta.map_or(String::new(), |s| format!(", {s:.0} s to go"));
                 let rate = rate.map_or(String::new(), |r| format!(", {r:.0} per second"));
-                eprintln!(
-                    "{}: {}{of} {}{rate}{eta}",
-                    event.stage, event.done, event.unit
-                );
+                eprintln!("{}: {}{of} {}{rate}{eta}", stage, done, unit);
             }
         }
     }
@@ -156,7 +189,7 @@ impl Console {
         self.bar.finish_and_clear();
     }
 
-    /// Tells an error and returns its exit code.
+    /// Prints an error and returns its exit code.
     pub fn fail(&self, failure: &Failure) -> u8 {
         self.done();
         let exit = failure.exit();

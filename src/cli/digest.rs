@@ -5,10 +5,10 @@ use serde_json::json;
 use super::args::StoreArgs;
 use super::console::Console;
 use super::failure::Failure;
-use super::store;
+use crate::api::store::open_finished;
 
 pub fn run(args: &StoreArgs, console: &Console) -> Result<u8, Failure> {
-    let mut store = store::open_finished(&args.store)?;
+    let mut store = open_finished(&args.store)?;
     let [tets, interfaces] = store.digest()?;
     if console.is_json() {
         console.answer(&json!({ "schema": 1, "digest": tets.to_string(), "interface_digest": interfaces.to_string() }));

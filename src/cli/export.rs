@@ -7,15 +7,12 @@ use serde_json::json;
 use super::args::ExportArgs;
 use super::console::Console;
 use super::failure::Failure;
-use super::{memory, store};
-use crate::io::write::{self, Content, ENDINGS, ExportReport, MeshFormat, Selection};
-use crate::pipeline::Event;
-
-/// A writer holds no more than this, however large the cap.
-const MEMORY_MAX: u64 = 512 << 20;
+use super::memory;
+use crate::api::{Exported, Settings, show};
+use crate::io::write::{Content, ENDINGS, MeshFormat, Selection};
 
 pub fn run(args: &ExportArgs, console: &Console) -> Result<u8, Failure> {
-    let (cap, _) = memory::cap(args.read.memory.as_deref())?;
+    let settings = console.settings(memory::asked(args.read.memory.as_deref())?, None);
     let selection = Selection {
         subdomains: args.subdomain.iter().copied().collect(),
         pieces: args.pieces,
@@ -39,7 +36,7 @@ pub fn run(args: &ExportArgs, console: &Console) -> Result<u8, Failure> {
     }
     let mut reports = Vec::new();
     for out in &args.out {
-        reports.push(write(&args.store, out, &selection, cap, console)?);
+        reports.push(write(&args.store, out, &selection, &settings, console)?);
     }
     if console.is_json() {
         console.answer(&json!({ "schema": 1, "exports": reports }));
@@ -65,26 +62,17 @@ pub fn write(
     path: &Path,
     out: &Path,
     selection: &Selection,
-    cap: u64,
+    settings: &Settings,
     console: &Console,
-) -> Result<ExportReport, Failure> {
-    let mut store = store::open_finished(path)?;
-    let memory = (cap / 2).min(MEMORY_MAX) as usize;
-    let report = write::export(&mut store, out, selection, memory, &|done, total| {
-        console.progress(Event {
-            stage: "export",
-            done,
-            total: Some(total),
-            unit: "records",
-        });
-    })?;
+) -> Result<Exported, Failure> {
+    let exported = show::export(path, out, selection, settings)?;
     console.done();
-    for (file, bytes) in &report.files {
+    for (file, bytes) in &exported.files {
         console.note(&format!(
             "wrote {} ({})",
             file.display(),
             memory::show(*bytes)
         ));
     }
-    Ok(report)
+    Ok(exported)
 }

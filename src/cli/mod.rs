@@ -1,7 +1,6 @@
 //! What the user typed, what it means, one file per command.
 
 mod args;
-mod background;
 mod check;
 mod check_expected;
 mod check_report;
@@ -21,7 +20,6 @@ mod query;
 mod query_ask;
 mod query_rows;
 mod refine_surface;
-mod replace;
 mod report;
 mod resaturate;
 mod resaturate_sizes;
@@ -29,7 +27,6 @@ mod sample;
 mod shell;
 mod signals;
 mod snapshot;
-mod store;
 mod verify;
 
 use std::process::ExitCode;
@@ -40,6 +37,8 @@ use clap::{CommandFactory, Parser};
 use args::{Args, Command};
 use console::Console;
 use failure::Failure;
+
+use crate::api::guarded;
 
 pub use failure::{CODES, CodeRow};
 
@@ -52,20 +51,18 @@ pub fn run() -> ExitCode {
         Err(error) => return unparsed(&error),
     };
     let console = Console::with(args.command.is_json(), args.quiet);
-    // redb may panic on a damaged tree, which is caught and told as damage; its own message would only confuse.
-    std::panic::set_hook(Box::new(failure::remember_panic));
-    let done = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
-        dispatch(&args.command, &console)
-    }));
+    let settings = console.settings(None, None);
+    // A panic of redb on a damaged tree is damage; its own message would only confuse.
+    let done = guarded(&settings, || Ok(dispatch(&args.command, &console)));
     let exit = match done {
         Ok(Ok(exit)) => exit,
         Ok(Err(failure)) => console.fail(&failure),
-        Err(_) => console.fail(&failure::last_panic()),
+        Err(error) => console.fail(&error.into()),
     };
     ExitCode::from(exit)
 }
 
-/// Tells what is wrong with the command line; help and version are no errors and go to stdout.
+/// Says what is wrong with the command line; help and version are no errors and go to stdout.
 fn unparsed(error: &clap::Error) -> ExitCode {
     let is_help = error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand;
     if is_help || !error.use_stderr() {

@@ -7,9 +7,10 @@ use std::path::Path;
 use super::args::QueryArgs;
 use super::console::Console;
 use super::failure::Failure;
+use super::memory;
 use super::query_ask::{bad, point, selection};
 use super::query_rows::{FileSink, QueryColumn, Row, Sink, Writer};
-use super::{memory, store};
+use crate::api::store::open_finished;
 use crate::geom::Point;
 use crate::query::{Hit, Ordered, QueryError, QuerySession, VARIABLES};
 use crate::storage::{Budget, attempt};
@@ -22,11 +23,11 @@ const QUALITY: usize = 0;
 const POINTS_MAX: u64 = 1 << 17;
 
 pub fn run(args: &QueryArgs, console: &Console) -> Result<u8, Failure> {
-    let (cap, _) = memory::cap(args.memory.as_deref())?;
+    let cap = memory::cap(args.memory.as_deref())?;
     let budget = Budget::new(cap);
     let columns = columns(args)?;
     let order = order(args)?;
-    let open = store::open_finished(&args.store)?;
+    let open = open_finished(&args.store)?;
     let mut inquiry = QuerySession::open(open, &budget)?;
     let lease = budget.lease(cap / 8, "answers")?;
     attempt(|| -> Result<u8, Failure> {

@@ -17,7 +17,7 @@ pub fn run(args: &RefineSurfaceArgs, console: &Console) -> Result<u8, Failure> {
         Space::Boundless,
         console,
     )?;
-    let surface = input.surface;
+    let surface = input.inner;
     let wanted = (options.hsiz).map_or(f64::INFINITY, |l| l.resolve(surface.bounds().diagonal()));
     // Where the surface is finer than asked for, sizes grow from its edges as inside a mesh.
     let field = SizeField::build(&surface.points, &surface.triangles, &options)?;

@@ -7,8 +7,8 @@ use serde_json::{Value, json};
 use super::args::ReportArgs;
 use super::console::Console;
 use super::failure::Failure;
-use super::{info, memory, store};
-use crate::pipeline::Event;
+use super::{info, memory};
+use crate::api::store::open_finished;
 use crate::query::QuerySession;
 use crate::storage::{Budget, attempt};
 use crate::store::Catalog;
@@ -27,8 +27,8 @@ pub fn run(args: &ReportArgs, console: &Console) -> Result<u8, Failure> {
         let failure = Failure::new("unknown-format", what).at(args.output.display());
         return Err(failure.help(format!("end the name with {}", page::ENDINGS)));
     }
-    let (cap, _) = memory::cap(args.read.memory.as_deref())?;
-    let mut store = store::open_finished(&args.store)?;
+    let cap = memory::cap(args.read.memory.as_deref())?;
+    let mut store = open_finished(&args.store)?;
     let title = args.store.file_stem().unwrap_or_default().to_string_lossy();
     let mut data = told(&args.store, &mut store, &title)?;
     // Text and tables of the page have the rest.
@@ -37,13 +37,7 @@ pub fn run(args: &ReportArgs, console: &Console) -> Result<u8, Failure> {
         Budget::new(cap / 8 * 3),
     );
     let tell = |stage, done, total, unit| {
-        let total = Some(total);
-        console.progress(Event {
-            stage,
-            done,
-            total,
-            unit,
-        });
+        console.progress(stage, done, Some(total), unit);
     };
     attempt(|| -> Result<u8, Failure> {
         let statistics = inquiry.statistics(&budget, &|done, total| {

@@ -9,22 +9,24 @@ use super::args::ResaturateArgs;
 use super::console::Console;
 use super::failure::Failure;
 use super::info::{hex, share_below_two};
-use super::input::Space;
 use super::resaturate_sizes::{self, new_sizes};
-use super::{memory, mesh, signals, store, verify};
-use crate::audit::Level;
+use super::{memory, mesh, signals};
+use crate::api::job::options_of;
+use crate::api::remesh::{damaged, verify_changed};
+use crate::api::store::open_finished;
+use crate::api::{Remesh, Settings};
 use crate::pipeline::{self, Forecast, NewSizes, Options, Remade, ResaturateSummary, Resaturation};
 use crate::storage::Budget;
-use crate::store::{Catalog, StoreError};
-use tetdb_schema::catalog::StoreState;
+use crate::store::Catalog;
 
 pub fn run(args: &ResaturateArgs, console: &Console) -> Result<u8, Failure> {
     check(args)?;
-    let (cap, _) = mesh::begin(&args.run, console)?;
+    let settings = mesh::begin(&args.run, console)?;
+    let cap = settings.cap()?;
     // What is read before the change ends at a signal all the same; a change is one commit.
     signals::store_begins();
     let budget = Budget::new(cap);
-    let mut open = store::open_finished(&args.store)?;
+    let mut open = open_finished(&args.store)?;
     if args.forget {
         drop(open);
         return forget(&args.store, console);
@@ -34,10 +36,13 @@ pub fn run(args: &ResaturateArgs, console: &Console) -> Result<u8, Failure> {
         let mut catalog = Catalog::open_writable(&args.store)?;
         let summary = pipeline::undo(&mut catalog)?;
         catalog.close()?;
-        return finish(args, &summary, cap, console);
+        if !args.run.no_verify {
+            verify_changed(&args.store, &settings)?;
+        }
+        return finish(args, &summary, &settings, console);
     }
-    let options = resaturate_sizes::options_of(&mut open, &args.store)?;
-    let sizes = new_sizes(args, &mut open, &options, cap, console)?;
+    let options = options_of(&open.job()?, &args.store)?;
+    let sizes = new_sizes(args, &mut open, &options, &settings)?;
     let ranks = ranks(args, &mut open, &options, sizes.as_ref(), &budget)?;
     if ranks.is_empty() {
         console.note(match args.repair {
@@ -49,23 +54,28 @@ pub fn run(args: &ResaturateArgs, console: &Console) -> Result<u8, Failure> {
         }
         return Ok(0);
     }
-    let what = Resaturation {
-        ranks,
-        sizes,
-        repair: args.repair,
-    };
     if args.dry_run {
+        let what = Resaturation {
+            ranks,
+            sizes,
+            repair: args.repair,
+        };
         let list = pipeline::forecast(&mut open, &options, &what, &budget)?;
-        tell_forecast(&list, console);
+        print_forecast(&list, console);
         return Ok(0);
     }
     drop(open);
-    let mut catalog = Catalog::open_writable(&args.store)?;
-    let watch = |event| console.progress(event);
-    let summary = pipeline::resaturate(&mut catalog, &options, &what, &budget, &watch)?;
+    let ranks: Vec<u32> = ranks.into_iter().collect();
+    let mut remesh = Remesh::new(args.store.clone(), settings.clone())
+        .subdomains(&ranks)
+        .prepared_sizes(sizes)
+        .verify(!args.run.no_verify);
+    if args.repair {
+        remesh = remesh.repair();
+    }
+    let summary = remesh.run_reported()?;
     console.done();
-    catalog.close()?;
-    finish(args, &summary, cap, console)
+    finish(args, &summary, &settings, console)
 }
 
 /// Refuses what makes no sense together, before anything is read.
@@ -104,32 +114,9 @@ fn ranks(
 ) -> Result<BTreeSet<u32>, Failure> {
     match sizes {
         Some(sizes) if args.changed => Ok(pipeline::changed(open, options, sizes, budget)?),
-        _ if args.repair && args.subdomain.is_empty() => damaged(open),
+        _ if args.repair && args.subdomain.is_empty() => Ok(damaged(open)?),
         _ => Ok(args.subdomain.iter().copied().collect()),
     }
-}
-
-/// The sub-domains of which something cannot be read.
-fn damaged(open: &mut Catalog) -> Result<BTreeSet<u32>, Failure> {
-    let mut ranks = BTreeSet::new();
-    for row in open.subdomains()? {
-        match read_all(open, row.rank) {
-            Err(error) if error.is_damage() => drop(ranks.insert(row.rank)),
-            other => other?,
-        }
-    }
-    Ok(ranks)
-}
-
-fn read_all(catalog: &mut Catalog, rank: u32) -> Result<(), StoreError> {
-    /// For chunks and what redb holds of the file.
-    const MEMORY_BYTES: usize = 8 << 20;
-    let mut part = catalog.open_subdomain(rank, MEMORY_BYTES)?;
-    part.vertex_chunks().try_for_each(|c| c.map(drop))?;
-    part.tet_chunks().try_for_each(|c| c.map(drop))?;
-    part.facet_chunks().try_for_each(|c| c.map(drop))?;
-    part.interface_chunks().try_for_each(|c| c.map(drop))?;
-    Ok(part.check()?)
 }
 
 fn forget(path: &Path, console: &Console) -> Result<u8, Failure> {
@@ -146,7 +133,7 @@ fn forget(path: &Path, console: &Console) -> Result<u8, Failure> {
     Ok(0)
 }
 
-fn tell_forecast(list: &[Forecast], console: &Console) {
+fn print_forecast(list: &[Forecast], console: &Console) {
     if console.is_json() {
         let list: Vec<Value> = (list.iter())
             .map(|f| json!({ "id": f.rank, "tets": f.tets, "predicted_tets": f.predicted.round() }))
@@ -162,17 +149,15 @@ fn tell_forecast(list: &[Forecast], console: &Console) {
     }
 }
 
-/// Verifies, exports, tells.
+/// Exports, and what changed.
 fn finish(
     args: &ResaturateArgs,
     summary: &ResaturateSummary,
-    cap: u64,
+    settings: &Settings,
     console: &Console,
 ) -> Result<u8, Failure> {
-    if !args.run.no_verify {
-        prove(&args.store, cap, console)?;
-    }
-    mesh::write_exports(&args.store, &args.run, cap, console)?;
+    mesh::write_exports(&args.store, &args.run, settings, console)?;
+    let cap = settings.cap()?;
     let mut open = Catalog::open(&args.store)?;
     let all = open.subdomains()?.len();
     let [digest, _] = open.digest()?;
@@ -225,31 +210,4 @@ fn object(part: &Remade) -> Value {
         "quality_before": old.quality, "quality": new.quality, "bytes": new.bytes,
         "inserted_vertices": part.fine.as_ref().map(|fine| fine.refine.inserted),
     })
-}
-
-/// Verifies the whole store, against its surface if that is still there.
-fn prove(path: &Path, cap: u64, console: &Console) -> Result<(), Failure> {
-    let report = {
-        let mut open = store::open_finished(path)?;
-        let surface = store::surface_of(&mut open, &[], Space::Boundless, console).ok();
-        let surface = surface.as_ref().map(|input| &input.surface);
-        if surface.is_none() {
-            console.note("note: the surface is not where it was; the mesh is verified without it");
-        }
-        verify::check(&mut open, console, surface, cap, Level::Delaunay)?
-    };
-    if !report.valid {
-        let failure = verify::invalid(&report, path);
-        return Err(failure.help(format!(
-            "`tetdb resaturate {} --undo` brings back what was before",
-            path.display()
-        )));
-    }
-    console.note(&verify::sentence(&report));
-    let mut catalog = Catalog::open_writable(path)?;
-    catalog.commit(|step| {
-        step.set_state(StoreState::Verified);
-        Ok(())
-    })?;
-    Ok(catalog.close()?)
 }

@@ -6,22 +6,15 @@ use serde_json::json;
 
 use super::args::ResaturateArgs;
 use super::args::SizeArgs;
-use super::console::Console;
+use super::config;
 use super::failure::Failure;
-use super::input::Space;
-use super::{background, config, store};
+use crate::api::Settings;
+use crate::api::job::identify_sizes;
+use crate::api::remesh::whole_field;
 use crate::io::read::read_lengths;
-use crate::pipeline::{self, NewSizes, Options, Values};
-use crate::sizing::{SizeField, SizingError};
+use crate::pipeline::{NewSizes, Options, Values};
+use crate::sizing::SizingError;
 use crate::store::Catalog;
-
-/// The options the store was made with. Errors: they cannot be read.
-pub fn options_of(open: &mut Catalog, path: &Path) -> Result<Options, Failure> {
-    let job = open.job()?;
-    serde_json::from_str(&job.options).map_err(|e| {
-        Failure::new("damaged", format!("the job's options cannot be read: {e}")).at(path.display())
-    })
-}
 
 /// Whether any sizes are asked for.
 pub fn are_given(args: &ResaturateArgs) -> bool {
@@ -35,8 +28,7 @@ pub fn new_sizes(
     args: &ResaturateArgs,
     open: &mut Catalog,
     options: &Options,
-    cap: u64,
-    console: &Console,
+    settings: &Settings,
 ) -> Result<Option<NewSizes>, Failure> {
     if !are_given(args) {
         return Ok(None);
@@ -75,9 +67,10 @@ pub fn new_sizes(
             .help("leave the other options away"));
         }
         sizes.limits = limits(open, args)?;
-        sizes.values = Some(values(Path::new(file), open, args, cap)?);
+        sizes.values = Some(values(Path::new(file), open, args, settings.cap()?)?);
     } else if args.sizes != SizeArgs::default() {
-        sizes.field = Some(field(open, &mut asked, options, cap, console)?);
+        identify_sizes(&mut asked)?;
+        sizes.field = Some(whole_field(open, asked.clone(), options, settings)?);
     }
     asked.size_field = lengths.or(asked.size_field);
     let asked = serde_json::to_value(&asked).unwrap_or_default();
@@ -98,31 +91,6 @@ fn factor(text: Option<&str>) -> Result<f64, Failure> {
         }
         .into()),
     }
-}
-
-/// The field of the whole surface with other options, but the regions and the gradation it was made with.
-fn field(
-    open: &mut Catalog,
-    asked: &mut Options,
-    options: &Options,
-    cap: u64,
-    console: &Console,
-) -> Result<SizeField, Failure> {
-    background::identify(asked)?;
-    let mut all = asked.clone();
-    all.regions.clone_from(&options.regions);
-    all.optimize.clone_from(&options.optimize);
-    if all.hgrad.is_none() {
-        all.hgrad.clone_from(&options.hgrad);
-    }
-    let dir = open.dir().to_owned();
-    let space = Space::Capped(cap, &dir);
-    let input = store::surface_of(open, &[], space, console)?;
-    let background = background::read(&all, cap)?;
-    let room = space.room(&input.surface)?;
-    let prepared = pipeline::prepare(&input.surface, &all, background.as_ref(), &room)?;
-    console.note(&prepared.sizes.to_string());
-    Ok(prepared.field)
 }
 
 /// `--hmin` and `--hmax` of lengths one by one; shares are of the box of all sub-domains.

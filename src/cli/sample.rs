@@ -15,7 +15,7 @@ pub fn run(args: &SampleArgs, console: &Console) -> Result<u8, Failure> {
     } else {
         format!("{PREFIX}{}", args.sample)
     };
-    let surface = input::load(&[word], Space::Boundless, console)?.surface;
+    let surface = input::load(&[word], Space::Boundless, console)?.inner;
     write::surface(&surface, &args.output)?;
     let (triangles, vertices) = (surface.n_triangles(), surface.n_vertices());
     if console.is_json() {

@@ -56,7 +56,7 @@ fn page(command: &Command) -> Result<Vec<u8>, Failure> {
     let rendered = clap_mangen::Man::new(command.clone())
         .title(name(command))
         .render(&mut text);
-    rendered.map_err(|e| Failure::internal(e.to_string()))?;
+    rendered.map_err(|e| Failure::new("internal", e))?;
     Ok(text)
 }
 

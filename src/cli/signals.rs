@@ -17,16 +17,17 @@ static HAS_STORE: AtomicBool = AtomicBool::new(false);
 const PATIENCE: Duration = Duration::from_millis(1000);
 
 /// Listens from now on. Errors: the system refuses; the run then simply cannot be stopped gently.
-pub fn listen(is_json: bool) {
+pub fn listen(console: &Console) {
     let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) else {
         return;
     };
+    let (token, is_json) = (console.cancel().clone(), console.is_json());
     std::thread::spawn(move || {
         for signal in signals.forever() {
             if RECEIVED.swap(signal, Ordering::Relaxed) != 0 {
                 std::process::exit(128 + signal);
             }
-            crate::storage::request_stop();
+            token.cancel();
             std::thread::spawn(move || end_early(is_json));
         }
     });

@@ -5,8 +5,9 @@ use std::path::Path;
 use super::args::{ColorBy, SnapshotArgs};
 use super::console::Console;
 use super::failure::Failure;
+use super::memory;
 use super::query_ask::{bad, condition, numbers};
-use super::{memory, store};
+use crate::api::store::open_finished;
 use crate::geom::{Aabb, Point};
 use crate::query::{QuerySession, Selection};
 use crate::storage::{Budget, attempt};
@@ -34,7 +35,7 @@ enum Subject {
 }
 
 pub fn run(args: &SnapshotArgs, console: &Console) -> Result<u8, Failure> {
-    let (cap, _) = memory::cap(args.read.memory.as_deref())?;
+    let cap = memory::cap(args.read.memory.as_deref())?;
     let pixels = pixels(&args.size)?;
     let subject = subject(args)?;
     let budget = Budget::new(cap);
@@ -44,7 +45,7 @@ pub fn run(args: &SnapshotArgs, console: &Console) -> Result<u8, Failure> {
     )?;
     // The inquiry takes three quarters of what it is given.
     let share = Budget::new(budget.available() * 3 / 4);
-    let store = store::open_finished(&args.store)?;
+    let store = open_finished(&args.store)?;
     let mut inquiry = match subject {
         Subject::Stage(cut, stage) => QuerySession::open_stage(store, cut, stage, &share)?,
         _ => QuerySession::open(store, &share)?,

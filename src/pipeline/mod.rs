@@ -25,7 +25,10 @@ pub use mesh::{
     CoarseReport, FineReport, HeadStart, Summary, ahead, coarse_mesh, mesh, mesh_prepared,
     stage_faces,
 };
-pub use plan::{Estimate, MEMORY_MIN, Options, Plan, Prepared, Trial, least_for, prepare};
+pub use plan::{
+    Estimate, MEMORY_MIN, Options, Plan, Prepared, RECIPE, Trial, least_for, prepare, recipe_of,
+    record_recipe,
+};
 pub use progress::{Event, Watcher, silent};
 pub use remesh::{
     Forecast, NewSizes, Remade, ResaturateSummary, Resaturation, Values, asked, changed, forecast,

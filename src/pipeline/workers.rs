@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use super::error::PipelineError;
 use super::progress::{Event, Watcher};
+use crate::storage::RunContext;
 
 /// Milliseconds between two words of one worker.
 const TELL_EVERY: u128 = 100;
@@ -16,7 +17,7 @@ const TELL_EVERY: u128 = 100;
 ///
 /// Threads of their own, not tasks of the pool: a task that waits for a sort would take up another job meanwhile, and its memory.
 /// Errors: the first of `run` and `commit`; what others finish after it is not committed.
-pub(in crate::pipeline) fn work_off<J: Send, D: Send>(
+pub(crate) fn work_off<J: Send, D: Send>(
     jobs: Vec<J>,
     workers: usize,
     watch: &Watcher,
@@ -28,7 +29,11 @@ pub(in crate::pipeline) fn work_off<J: Send, D: Send>(
     std::thread::scope(|scope| {
         for _ in 0..workers {
             let (list, tell) = (&list, tell.clone());
-            scope.spawn(move || work(list, run, &tell));
+            let context = RunContext::current();
+            scope.spawn(move || match context {
+                Some(context) => context.enter(|| work(list, run, &tell)),
+                None => work(list, run, &tell),
+            });
         }
         drop(tell);
         let result = listen(&list, &hear, watch, commit);
@@ -41,7 +46,7 @@ pub(in crate::pipeline) fn work_off<J: Send, D: Send>(
 ///
 /// Of thousands of jobs only the next few are drawn up, for each knows the owners of all faces of the cuts above it. `draw` and `commit` share
 /// `state`. Errors: the first of the three.
-pub(in crate::pipeline) fn map_bounded<S, I, J: Send, D: Send>(
+pub(crate) fn map_bounded<S, I, J: Send, D: Send>(
     state: &mut S,
     items: Vec<I>,
     workers: usize,

@@ -10,6 +10,7 @@ use tetdb_schema::record::{FACES, SealedTet};
 use super::writer::RegionTotals;
 use super::{Corner, FacePairs, Paired, Shape, quality_bin, sorted_face};
 use crate::geom::Aabb;
+use crate::storage::parallel;
 use tetdb_schema::catalog::QUALITY_BINS;
 use tetdb_schema::catalog::QualityRow;
 
@@ -115,9 +116,11 @@ impl Totals {
                 corners.push(corners_of(tet)?);
             }
             // Shapes in parallel, sums in order: the same for any number of threads.
-            (corners.par_iter().with_min_len(1024))
-                .map(|c| Shape::of(c.map(|c| c.point)))
-                .collect_into_vec(shapes);
+            parallel(|| {
+                (corners.par_iter().with_min_len(1024))
+                    .map(|c| Shape::of(c.map(|c| c.point)))
+                    .collect_into_vec(shapes)
+            });
             let known = piece.iter().zip(&*corners).zip(&*shapes);
             for (place, ((tet, corners), shape)) in (first..).zip(known) {
                 self.digest

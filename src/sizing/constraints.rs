@@ -16,7 +16,7 @@ use super::corners::Corners;
 use super::seeds::OctreeFrame;
 use super::tree::{CELLS_PER_SIZE, DEPTH, LATTICE, Leaf, Tree};
 use crate::geom::{Aabb, Point};
-use crate::storage::SpillVec;
+use crate::storage::{SpillVec, parallel};
 
 /// Levels down to which every cell is asked.
 const LEVELS_ASKED: u32 = 5;
@@ -78,13 +78,14 @@ impl SizeConstraints<'_> {
             if some.is_empty() {
                 break;
             }
-            let shapes: Result<Vec<Vec<bool>>, _> = some
-                .into_par_iter()
-                .map(|(number, cell)| match number {
-                    Some(_) => self.shape_of(cell),
-                    None => Ok(vec![true]),
-                })
-                .collect();
+            let shapes: Result<Vec<Vec<bool>>, _> = parallel(|| {
+                some.into_par_iter()
+                    .map(|(number, cell)| match number {
+                        Some(_) => self.shape_of(cell),
+                        None => Ok(vec![true]),
+                    })
+                    .collect()
+            });
             all.extend(shapes?.into_iter().flatten());
             if all.len() > CELLS_MAX {
                 return Err(SizingError::TooLarge {
@@ -108,7 +109,7 @@ impl SizeConstraints<'_> {
         }
         let part = |octant: usize| self.shape_of(cell.child(octant));
         let parts: Result<Vec<Vec<bool>>, _> = match cell.level < 3 {
-            true => (0..8).into_par_iter().map(part).collect(),
+            true => parallel(|| (0..8).into_par_iter().map(part).collect()),
             false => (0..8).map(part).collect(),
         };
         let parts = parts?;
@@ -186,7 +187,7 @@ impl SizeConstraints<'_> {
         h: &mut SpillVec<f32>,
     ) -> Result<(), SizingError> {
         let constrained: Result<Vec<f64>, _> =
-            places.par_iter().map(|&(_, at)| self.h(at)).collect();
+            parallel(|| places.par_iter().map(|&(_, at)| self.h(at)).collect());
         for ((id, _), constrained) in places.drain(..).zip(constrained?) {
             h.change(id as usize, |h| *h = h.min(constrained as f32));
         }

@@ -9,6 +9,7 @@ use super::closed::TETS_PER_LOAD;
 use super::field::SizeField;
 use super::integral::{Domain, SurfaceSkin};
 use crate::geom::Point;
+use crate::storage::parallel;
 
 /// How near to the surface vertices come. No vertex is inserted nearer than 0.25 h to a triangle or 0.71 h to a vertex, but those a
 /// little farther away take up the room as well. With 0.1 and 0.3 h from triangles thin plates of large triangles have a sixth more
@@ -70,7 +71,7 @@ impl SizeField {
     /// Wanted lengths along the surface's edges beyond what an edge of ordinary length has, per filled side.
     fn needles(&self, domain: &Domain) -> f64 {
         let surface = domain.seeker.surface();
-        let h: Vec<f64> = surface.points.par_iter().map(|&p| self.h(p)).collect();
+        let h: Vec<f64> = parallel(|| surface.points.par_iter().map(|&p| self.h(p)).collect());
         let steepest = 0.5 * NEEDLE_FROM * 3f64.sqrt() * self.beta();
         let over = |t: usize| {
             let corners = surface.triangles[t];
@@ -100,10 +101,12 @@ impl SizeField {
 /// The sum over triangles, the same for any number of threads.
 fn summed(n: usize, of: impl Fn(usize) -> f64 + Sync) -> f64 {
     let starts: Vec<usize> = (0..n).step_by(CHUNK).collect();
-    let sums: Vec<f64> = starts
-        .into_par_iter()
-        .map(|start| (start..(start + CHUNK).min(n)).map(&of).sum())
-        .collect();
+    let sums: Vec<f64> = parallel(|| {
+        starts
+            .into_par_iter()
+            .map(|start| (start..(start + CHUNK).min(n)).map(&of).sum())
+            .collect()
+    });
     sums.iter().sum()
 }
 

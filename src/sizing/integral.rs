@@ -13,6 +13,7 @@ use rayon::prelude::*;
 use super::field::SizeField;
 use super::tree::{DEPTH, LEAF, Leaf, octant_of};
 use crate::geom::{Point, mix};
+use crate::storage::parallel;
 use crate::surface::{Seeker, Volumes};
 
 /// Cells looked at, at most: a quarter of a second. With a quarter of them eight surfaces come within a hundredth of the sum.
@@ -178,10 +179,12 @@ impl Sum<'_> {
             }
         }
         let each = POINTS.div_ceil(crossed.len().max(1)) as u64;
-        let drawn: Vec<[f64; 2]> = crossed
-            .into_par_iter()
-            .map(|cell| self.drawn(cell, each))
-            .collect();
+        let drawn: Vec<[f64; 2]> = parallel(|| {
+            crossed
+                .into_par_iter()
+                .map(|cell| self.drawn(cell, each))
+                .collect()
+        });
         let [found, at_surface] = (drawn.iter()).fold([0.0; 2], |s, d| [s[0] + d[0], s[1] + d[1]]);
         let expected = self.domain.volume() - volume;
         let factor = match found > 0.0 {

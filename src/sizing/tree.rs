@@ -8,6 +8,7 @@ use super::constraints::SizeConstraints;
 use super::options::Targets;
 use super::seeds::Seeds;
 use crate::geom::Point;
+use crate::storage::parallel;
 use rayon::prelude::*;
 
 /// Levels below the root: sizes from 1 to 1e-6 of the surface's extent.
@@ -303,7 +304,7 @@ fn shape_of(cell: Leaf, near: &[u32], seeds: &Seeds, targets: &Targets) -> Vec<b
         shape_of(child, &near, seeds, targets)
     };
     let parts: Vec<Vec<bool>> = if near.len() >= PARALLEL_SEEDS {
-        (0..8).into_par_iter().map(part).collect()
+        parallel(|| (0..8).into_par_iter().map(part).collect())
     } else {
         (0..8).map(part).collect()
     };

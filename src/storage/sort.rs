@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::slice::ParallelSliceMut;
 
-use super::{DiskPath, StorageError, check_cancelled};
+use super::{DiskPath, StorageError, check_cancelled, parallel};
 
 /// Numbers run files within the process.
 static RUNS: AtomicU64 = AtomicU64::new(0);
@@ -82,7 +82,8 @@ impl<const N: usize> Sorter<N> {
 
     fn spill(&mut self) -> Result<(), StorageError> {
         check_cancelled();
-        self.records.par_sort_unstable_by(order);
+        let records = &mut self.records;
+        parallel(|| records.par_sort_unstable_by(order));
         let number = RUNS.fetch_add(1, Ordering::Relaxed);
         let path = self
             .dir
@@ -105,7 +106,8 @@ impl<const N: usize> Sorter<N> {
     /// Ends pushing. Errors: the disk.
     pub fn finish(mut self) -> Result<Sorted<N>, StorageError> {
         if self.runs.is_empty() {
-            self.records.par_sort_unstable_by(order);
+            let records = &mut self.records;
+            parallel(|| records.par_sort_unstable_by(order));
             return Ok(Sorted {
                 memory: std::mem::take(&mut self.records).into_iter(),
                 heap: BinaryHeap::new(),

@@ -44,6 +44,15 @@ impl Catalog {
     /// An empty directory is taken over. Errors: [`StoreError::Finished`], [`StoreError::Unfinished`],
     /// [`StoreError::NotOurs`] or [`StoreError::Busy`] say what is already there.
     pub fn create(dir: impl Into<DiskPath>, job: &Job) -> Result<Self, StoreError> {
+        Self::create_with(dir, job, |_| ())
+    }
+
+    /// [`Catalog::create`], with more rows in the first commit.
+    pub fn create_with(
+        dir: impl Into<DiskPath>,
+        job: &Job,
+        describe: impl FnOnce(&mut Step),
+    ) -> Result<Self, StoreError> {
         let dir = dir.into();
         refuse_existing(&dir)?;
         dir.create_dir_all()?;
@@ -62,6 +71,7 @@ impl Catalog {
             step.put_bytes(RowKind::Format.key(0, 0), &format);
             step.set_state(StoreState::New);
             step.set_job(job);
+            describe(step);
             Ok(())
         })?;
         catalog.file.rename(CATALOG)?;

@@ -7,6 +7,7 @@ use super::Surface;
 use super::edges::{Closedness, Groups};
 use super::point_tree::PointTree;
 use crate::geom::{Aabb, Point};
+use crate::storage::parallel;
 
 /// Vertices as near as this to an open edge count as lying on it, as a share of the box diagonal.
 ///
@@ -135,7 +136,7 @@ pub fn t_junctions(
         found
     };
     let open = closedness.open.par_iter();
-    open.flat_map_iter(on_open_edge).collect()
+    parallel(|| open.flat_map_iter(on_open_edge).collect())
 }
 
 /// For each of the ascending `distances`, whether [`t_junctions`] would find more than the vertices exactly in line.
@@ -180,8 +181,10 @@ pub(super) fn has_near_junctions(
     };
     let either = |a: Vec<bool>, b: Vec<bool>| a.iter().zip(b).map(|(a, b)| *a || b).collect();
     let open = closedness.open.par_iter();
-    open.map(beside)
-        .reduce(|| vec![false; distances.len()], either)
+    parallel(|| {
+        open.map(beside)
+            .reduce(|| vec![false; distances.len()], either)
+    })
 }
 
 /// How far `p` is from the inside of the segment, unless it is farther than `distance_max`, or as near to an end.

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::geom::{Aabb, HilbertFrame, Point};
-use crate::storage::{FrozenSpillVec, ScratchSpace, raise};
+use crate::storage::{FrozenSpillVec, ScratchSpace, parallel, raise};
 
 /// Things in one leaf.
 const LEAF: usize = 4;
@@ -41,17 +41,18 @@ impl BoxTree {
         let mut sorter = room.sorter::<12>();
         for first in (0..n).step_by(AT_ONCE) {
             let some = first..n.min(first.saturating_add(AT_ONCE as u32));
-            let keys: Vec<[u8; 12]> = some
-                .into_par_iter()
-                .filter(|&i| keep(i))
-                .map(|i| {
-                    let Aabb { low, high } = box_of(i);
-                    let mut key = [0; 12];
-                    key[..8].copy_from_slice(&frame.index((low + high) * 0.5).to_be_bytes());
-                    key[8..].copy_from_slice(&i.to_be_bytes());
-                    key
-                })
-                .collect();
+            let keys: Vec<[u8; 12]> = parallel(|| {
+                some.into_par_iter()
+                    .filter(|&i| keep(i))
+                    .map(|i| {
+                        let Aabb { low, high } = box_of(i);
+                        let mut key = [0; 12];
+                        key[..8].copy_from_slice(&frame.index((low + high) * 0.5).to_be_bytes());
+                        key[8..].copy_from_slice(&i.to_be_bytes());
+                        key
+                    })
+                    .collect()
+            });
             for key in keys {
                 sorter.push(key).unwrap_or_else(|e| raise(e));
             }
@@ -70,7 +71,7 @@ impl BoxTree {
             if some.is_empty() {
                 break;
             }
-            let around: Vec<Aabb> = some.par_iter().map(|&i| box_of(i)).collect();
+            let around: Vec<Aabb> = parallel(|| some.par_iter().map(|&i| box_of(i)).collect());
             some.into_iter().for_each(|i| order.push(i));
             around.into_iter().for_each(|b| boxes.push(b));
         }

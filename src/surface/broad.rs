@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::{BoxTree, Surface};
 use crate::geom::Aabb;
-use crate::storage::ScratchSpace;
+use crate::storage::{ScratchSpace, parallel};
 
 /// Leaves one task handles.
 const BLOCK: usize = 256;
@@ -46,25 +46,27 @@ impl BoxTree {
         for round in (0..n_leaves).step_by(ROUND) {
             let end = (round + ROUND).min(n_leaves);
             let starts: Vec<usize> = (round..end).step_by(BLOCK).collect();
-            let found: Vec<(Vec<T>, u64)> = starts
-                .into_par_iter()
-                .map(|start| {
-                    let (mut out, mut n) = (Vec::new(), 0);
-                    let mut keep = |a, b| {
-                        if let Some(result) = test(a, b) {
-                            n += 1;
-                            if out.len() < BLOCK_LISTED_MAX {
-                                out.push(result);
+            let found: Vec<(Vec<T>, u64)> = parallel(|| {
+                starts
+                    .into_par_iter()
+                    .map(|start| {
+                        let (mut out, mut n) = (Vec::new(), 0);
+                        let mut keep = |a, b| {
+                            if let Some(result) = test(a, b) {
+                                n += 1;
+                                if out.len() < BLOCK_LISTED_MAX {
+                                    out.push(result);
+                                }
                             }
+                        };
+                        let mut stack = Vec::new();
+                        for leaf in start..(start + BLOCK).min(end) {
+                            self.pairs_of_leaf(leaf, &mut stack, &mut keep);
                         }
-                    };
-                    let mut stack = Vec::new();
-                    for leaf in start..(start + BLOCK).min(end) {
-                        self.pairs_of_leaf(leaf, &mut stack, &mut keep);
-                    }
-                    (out, n)
-                })
-                .collect();
+                        (out, n)
+                    })
+                    .collect()
+            });
             for (block, n) in found {
                 n_found += n;
                 let room = listed_max - listed.len();

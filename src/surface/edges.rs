@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::Surface;
 use super::boundary_loops::{in_line, open_groups};
-use crate::storage::{ScratchSpace, SpillVec, raise};
+use crate::storage::{ScratchSpace, SpillVec, parallel, raise};
 
 /// What edges alone tell about a surface.
 ///
@@ -115,10 +115,12 @@ pub(super) fn same_direction(surface: &Surface, a: EdgeUse, b: EdgeUse) -> bool 
 impl Facets {
     /// A scratch file that fails unwinds.
     pub fn of(surface: &Surface, room: &ScratchSpace) -> Self {
-        let degenerate: Vec<(u32, bool)> = (0..surface.n_triangles() as u32)
-            .into_par_iter()
-            .filter_map(|t| collapse(surface, t).map(|repeated| (t, repeated)))
-            .collect();
+        let degenerate: Vec<(u32, bool)> = parallel(|| {
+            (0..surface.n_triangles() as u32)
+                .into_par_iter()
+                .filter_map(|t| collapse(surface, t).map(|repeated| (t, repeated)))
+                .collect()
+        });
         let mut is_left_out = vec![false; surface.n_triangles()];
         for &(t, repeated) in &degenerate {
             is_left_out[t as usize] = repeated;

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::Surface;
 use super::edges::{Closedness, Groups};
+use crate::storage::parallel;
 
 /// Angles below this many degrees count as small.
 const SMALL_ANGLE_DEGREES: f64 = 5.0;
@@ -61,14 +62,18 @@ pub fn fitness(surface: &Surface, closedness: &Closedness) -> Fitness {
         n_hopeless: 0,
     };
     // Least and sum are free of the order of triangles, so the answer is the same for any number of threads.
-    let all = (0..n as u32)
-        .into_par_iter()
-        .map(|t| shape(surface, t))
-        .reduce(|| none, join);
-    let mut lengths: Vec<f64> = (0..n as u32)
-        .into_par_iter()
-        .flat_map_iter(|t| edge_lengths(surface, t))
-        .collect();
+    let all = parallel(|| {
+        (0..n as u32)
+            .into_par_iter()
+            .map(|t| shape(surface, t))
+            .reduce(|| none, join)
+    });
+    let mut lengths: Vec<f64> = parallel(|| {
+        (0..n as u32)
+            .into_par_iter()
+            .flat_map_iter(|t| edge_lengths(surface, t))
+            .collect()
+    });
     let middle = lengths.len() / 2;
     let (_, median, _) = lengths.select_nth_unstable_by(middle, f64::total_cmp);
     Fitness {

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use crate::geom::{Aabb, HilbertFrame, Point};
+use crate::storage::parallel;
 
 /// Points of one leaf, and children of one node.
 const ARITY: usize = 8;
@@ -18,9 +19,11 @@ impl PointTree {
     /// A tree over numbered points.
     pub fn new(mut points: Vec<(u32, Point)>) -> Self {
         let frame = HilbertFrame::new(&Aabb::around(points.iter().map(|p| p.1)));
-        points.par_sort_by_cached_key(|&(id, p)| (frame.index(p), id));
+        parallel(|| points.par_sort_by_cached_key(|&(id, p)| (frame.index(p), id)));
         let around = |group: &[(u32, Point)]| Aabb::around(group.iter().map(|p| p.1));
-        let mut levels = vec![points.par_chunks(ARITY).map(around).collect::<Vec<_>>()];
+        let mut levels = vec![parallel(|| {
+            points.par_chunks(ARITY).map(around).collect::<Vec<_>>()
+        })];
         while let Some(last) = levels.last()
             && last.len() > 1
         {

@@ -8,7 +8,7 @@ use crate::geom::Point;
 use crate::query::checked_chunk;
 use crate::query::{QueryError, QuerySession};
 use crate::sealed::{Corner, Shape};
-use crate::storage::{Budget, check_cancelled};
+use crate::storage::{Budget, check_cancelled, parallel};
 
 /// Bins of quality: fiftieths from 1 to 3, the last with all beyond.
 const QUALITY_BINS: usize = 101;
@@ -125,10 +125,12 @@ impl QuerySession {
                     sample.add(&found);
                     corners.push(found);
                 }
-                let found = corners
-                    .par_chunks(1024)
-                    .map(|some| some.iter().fold(BinCounts::none(), BinCounts::add))
-                    .reduce(BinCounts::none, BinCounts::and);
+                let found = parallel(|| {
+                    corners
+                        .par_chunks(1024)
+                        .map(|some| some.iter().fold(BinCounts::none(), BinCounts::add))
+                        .reduce(BinCounts::none, BinCounts::and)
+                });
                 counts = counts.and(found);
                 done += records.len() as u64;
                 tell(done, total);

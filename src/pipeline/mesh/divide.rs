@@ -23,10 +23,10 @@ use crate::topology::{Neighbors, Owners};
 use tetdb_schema::catalog::{NeighborRow, Stage, StoreState, TopologyRow};
 
 /// Generations from a part to what is made of it.
-pub(in crate::pipeline) const DONE: u32 = 2;
+pub(crate) const DONE: u32 = 2;
 
 /// What a worker needs to bisect a part.
-pub(in crate::pipeline) struct CutJob {
+pub(crate) struct CutJob {
     pub parent: PartMesh,
     /// The part's file, and those of its children.
     base: DiskPath,
@@ -40,7 +40,7 @@ pub(in crate::pipeline) struct CutJob {
 }
 
 /// A part in two; its files are not yet listed.
-pub(in crate::pipeline) struct Divided {
+pub(crate) struct Divided {
     parent: PartMesh,
     opened: Opened,
     stages: Stages,
@@ -59,11 +59,7 @@ struct Child {
 
 impl CutJob {
     /// Does the whole job; a failed page access ends here.
-    pub(in crate::pipeline) fn run(
-        self,
-        common: Common,
-        watch: &Watcher,
-    ) -> Result<Divided, PipelineError> {
+    pub(crate) fn run(self, common: Common, watch: &Watcher) -> Result<Divided, PipelineError> {
         let divided = attempt(|| self.divide(common, watch))??;
         // Empty by now; thousands of cuts would leave as many folders.
         let _ = self.scratch.remove_dir_all();
@@ -200,7 +196,7 @@ impl CutJob {
 
 impl Run<'_> {
     /// Bisects until no part has more than one sub-domain, as many parts at once as there are threads and memory for.
-    pub(in crate::pipeline) fn divide_all(&mut self) -> Result<Vec<CutReport>, PipelineError> {
+    pub(crate) fn divide_all(&mut self) -> Result<Vec<CutReport>, PipelineError> {
         let mut whole = tree::parts(self.catalog, self.n)?;
         whole.retain(|p| p.part.count > 1);
         let workers = self.plan.workers();
@@ -357,7 +353,7 @@ impl Run<'_> {
 }
 
 /// Opens a part's mesh from the file `base`.
-pub(in crate::pipeline) fn open_part(
+pub(crate) fn open_part(
     part: PartMesh,
     base: DiskPath,
     mut backing: Backing,
@@ -374,7 +370,7 @@ pub(in crate::pipeline) fn open_part(
 }
 
 /// The owners of a cut's faces.
-pub(in crate::pipeline) fn read_owners(
+pub(crate) fn read_owners(
     catalog: &mut crate::store::Catalog,
     cut: u32,
 ) -> Result<Owners, StoreError> {

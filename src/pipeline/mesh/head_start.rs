@@ -14,7 +14,9 @@ use crate::delaunay::KernelStats;
 use crate::mesh::Mesh;
 use crate::pipeline::plan::{Options, Plan};
 use crate::pipeline::progress::{Event, Watcher};
-use crate::storage::{Backing, Pager, ScratchSpace, StorageError, attempt, raise};
+use crate::storage::{
+    Backing, Pager, ScratchSpace, StorageError, attempt, in_place_scope, n_threads, raise,
+};
 use crate::surface::Surface;
 
 /// Bytes of frames for each vertex: 6.4 to 7.2 tetrahedra, the vertex and its attribute. What takes more is left for later.
@@ -34,21 +36,17 @@ pub struct HeadStart {
     mesh: Mesh,
     kernel: KernelStats,
     /// What it took.
-    pub(in crate::pipeline) seconds: f64,
+    pub(crate) seconds: f64,
 }
 
 impl HeadStart {
     /// Bytes of frames it holds.
-    pub(in crate::pipeline) fn bytes(&self) -> u64 {
+    pub(crate) fn bytes(&self) -> u64 {
         frames_bytes(&self.mesh)
     }
 
     /// The mesh, with a place for pages that leave memory and `bytes` for frames, which must hold it.
-    pub(in crate::pipeline) fn into_mesh(
-        mut self,
-        bytes: u64,
-        backing: Backing,
-    ) -> (Mesh, KernelStats) {
+    pub(crate) fn into_mesh(mut self, bytes: u64, backing: Backing) -> (Mesh, KernelStats) {
         self.mesh.pages_mut().settle(bytes, backing);
         (self.mesh, self.kernel)
     }
@@ -71,7 +69,7 @@ impl HeadStartShare {
     fn of(surface: &Surface, options: &Options, cap: u64) -> Option<Self> {
         let [points, triangles] = [surface.n_vertices(), surface.n_triangles()].map(|n| n as u64);
         // Sizes from a file may take half of the memory for themselves.
-        if rayon::current_num_threads() < 2 || triangles == 0 || options.size_field.is_some() {
+        if n_threads() < 2 || triangles == 0 || options.size_field.is_some() {
             return None;
         }
         let frames = FRAMES_VERTEX * points + FRAMES_TRIANGLE * triangles + FRAMES_LEAST;
@@ -107,7 +105,7 @@ pub fn ahead<T, E>(
     let is_vain = AtomicBool::new(false);
     let made = Mutex::new(None);
     let (tell, hear) = channel();
-    let looked = rayon::in_place_scope(|scope| {
+    let looked = in_place_scope(|scope| {
         let (made, is_vain, share) = (&made, &is_vain, &share);
         scope.spawn(move |_| {
             let start = begin(surface, share, is_vain, tell);

@@ -24,7 +24,7 @@ use crate::topology::Owners;
 use tetdb_schema::catalog::CoarseRow;
 
 /// What a worker needs to make a sub-domain.
-pub(in crate::pipeline) struct SubdomainJob {
+pub(crate) struct SubdomainJob {
     pub part: PartMesh,
     /// The part's file, the file to make.
     pub base: DiskPath,
@@ -45,7 +45,7 @@ pub(in crate::pipeline) struct SubdomainJob {
 
 /// What is the same for all sub-domains.
 #[derive(Clone, Copy)]
-pub(in crate::pipeline) struct Common<'a> {
+pub(crate) struct Common<'a> {
     pub field: &'a SizeField,
     pub mode: Mode,
     pub method: Method,
@@ -53,7 +53,7 @@ pub(in crate::pipeline) struct Common<'a> {
 }
 
 /// A finished sub-domain; its file is not yet listed.
-pub(in crate::pipeline) struct FinishedSubdomain {
+pub(crate) struct FinishedSubdomain {
     pub part: PartMesh,
     pub generation: u32,
     pub sealed: Sealed,
@@ -69,7 +69,7 @@ pub(in crate::pipeline) struct FinishedSubdomain {
 
 impl SubdomainJob {
     /// Does the whole job; a failed page access ends here.
-    pub(in crate::pipeline) fn run(
+    pub(crate) fn run(
         self,
         common: Common,
         watch: &Watcher,
@@ -89,7 +89,7 @@ impl SubdomainJob {
     }
 
     /// The same for a mesh already open.
-    pub(in crate::pipeline) fn finish(
+    pub(crate) fn finish(
         self,
         mut mesh: Mesh,
         common: Common,

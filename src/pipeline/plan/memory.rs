@@ -1,6 +1,6 @@
 //! How the cap is shared out before the first byte is read.
 
-use crate::storage::StorageError;
+use crate::storage::{StorageError, n_threads};
 
 /// No run fits less: fewer frames than this thrash.
 pub const MEMORY_MIN: u64 = 64 << 20;
@@ -79,7 +79,7 @@ impl Plan {
     /// How many sub-domains can be made at once: a worker needs frames of its own.
     pub fn workers(&self) -> usize {
         let by_frames = (self.frames / FRAMES_OF_WORKER).max(1);
-        rayon::current_num_threads().min(usize::try_from(by_frames).unwrap_or(usize::MAX))
+        n_threads().min(usize::try_from(by_frames).unwrap_or(usize::MAX))
     }
 }
 

@@ -4,8 +4,10 @@ pub(super) mod estimate;
 pub(super) mod leases;
 mod memory;
 mod options;
+mod recipe;
 mod regions;
 
 pub use estimate::{Estimate, Prepared, least_for, prepare};
 pub use memory::{MEMORY_MIN, Plan};
 pub use options::{Options, Trial};
+pub use recipe::{RECIPE, recipe_of, record_recipe};

@@ -132,7 +132,7 @@ pub fn asked(catalog: &mut Catalog, rank: u32) -> Result<Option<String>, StoreEr
 }
 
 /// The recorded field of the whole.
-pub(in crate::pipeline) fn whole_field(
+pub(crate) fn whole_field(
     catalog: &mut Catalog,
     options: &Options,
 ) -> Result<SizeField, PipelineError> {

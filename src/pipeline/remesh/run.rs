@@ -25,7 +25,7 @@ use crate::store::{Catalog, StoreError};
 use tetdb_schema::catalog::{CoarseRow, StoreState, SubdomainRow};
 
 /// One run.
-pub(in crate::pipeline) struct RemeshRun<'a> {
+pub(crate) struct RemeshRun<'a> {
     pub catalog: &'a mut Catalog,
     options: &'a Options,
     what: &'a Resaturation,

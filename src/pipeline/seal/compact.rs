@@ -23,7 +23,7 @@ use crate::storage::{DiskPath, Pages, Sorted, Sorter, check_cancelled};
 use crate::topology::Owners;
 
 /// Where and how to seal.
-pub(in crate::pipeline) struct SealTarget<'a> {
+pub(crate) struct SealTarget<'a> {
     pub path: &'a DiskPath,
     pub form: Form,
     pub scratch: &'a DiskPath,
@@ -37,7 +37,7 @@ pub(in crate::pipeline) struct SealTarget<'a> {
 }
 
 /// Writes `mesh` to `target`, in the order and under the numbers of a sealed sub-domain whatever the form. Effects: the mesh's scratch map is used up; `tet_of` must be right for all vertices.
-pub(in crate::pipeline) fn seal<P: Pages>(
+pub(crate) fn seal<P: Pages>(
     mesh: &mut Mesh<P>,
     target: &SealTarget,
     watch: &Watcher,
@@ -133,7 +133,7 @@ fn vertices<P: Pages>(
 }
 
 /// Nodes, region and flags of a tetrahedron, 4 + 1 + 1 big-endian words, and a mask of its required faces.
-pub(in crate::pipeline) type TetRecord = [u8; 25];
+pub(crate) type TetRecord = [u8; 25];
 
 fn sort_tets<P: Pages>(
     mesh: &mut Mesh<P>,
@@ -317,11 +317,11 @@ fn push_interface_face<P: Pages>(
 }
 
 /// The nodes of a tetrahedron, rotated.
-pub(in crate::pipeline) fn nodes(record: &TetRecord) -> [u32; 4] {
+pub(crate) fn nodes(record: &TetRecord) -> [u32; 4] {
     [0, 4, 8, 12].map(|at| word(record, at))
 }
 
-pub(in crate::pipeline) fn word(record: &[u8], at: usize) -> u32 {
+pub(crate) fn word(record: &[u8], at: usize) -> u32 {
     let bytes = [record[at], record[at + 1], record[at + 2], record[at + 3]];
     u32::from_be_bytes(bytes)
 }

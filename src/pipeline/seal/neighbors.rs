@@ -9,7 +9,7 @@ use crate::sealed::sorted_face;
 use crate::storage::{Sorted, Sorter, check_cancelled};
 
 /// The four neighbors of each tetrahedron in turn.
-pub(in crate::pipeline) struct Neighbors {
+pub(crate) struct Neighbors {
     /// A face, as 4 · tetrahedron + face, and the one on its other side, where there is one.
     links: std::iter::Peekable<Sorted<8>>,
     tet: u32,

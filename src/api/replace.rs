@@ -1,4 +1,4 @@
-//! `--force`: a new store takes the place of an old one, and may be interrupted anywhere.
+//! A new store takes the place of an old one, and may be interrupted anywhere.
 //!
 //! `X.tetdb` is the old store until all of the new one is sealed in `X.tetdb.being-made`. Then the old one is renamed to
 //! `X.tetdb.being-replaced`, the new one takes its name, and the old one is removed. Whoever comes next finds out how far that was. The names
@@ -6,14 +6,13 @@
 
 use std::path::{Path, PathBuf};
 
-use super::console::Console;
-use super::failure::Failure;
+use super::{Error, Settings};
 use crate::storage::DiskPath;
 use crate::store::{Catalog, StoreError};
 use tetdb_schema::catalog::StoreState;
 
-/// Where the new store is made.
-pub fn new_of(path: &Path) -> PathBuf {
+/// Where the new store is built.
+pub(crate) fn new_of(path: &Path) -> PathBuf {
     beside(path, "being-made")
 }
 
@@ -37,16 +36,16 @@ fn state(path: &Path) -> Option<StoreState> {
 }
 
 /// Whether a replacement of the store at `path` was begun and not brought to its end.
-pub fn is_begun(path: &Path) -> bool {
+pub(crate) fn is_begun(path: &Path) -> bool {
     state(&new_of(path)).is_some()
 }
 
 /// Brings to its end what an interrupted exchange left: the names are right afterwards. Errors: the disk.
-pub fn settle(path: &Path, console: &Console) -> Result<(), Failure> {
+pub(crate) fn settle(path: &Path, settings: &Settings) -> Result<(), Error> {
     let (new, old) = (new_of(path), old_of(path));
     if !path.exists() && state(&new).is_some_and(StoreState::is_finished) {
         rename(&new, path)?;
-        console.note(&format!(
+        settings.note(format!(
             "{} was finished as {}, and has its place now",
             path.display(),
             new.display()
@@ -64,10 +63,10 @@ pub fn settle(path: &Path, console: &Console) -> Result<(), Failure> {
 /// Opens a replacement that was begun for writing if it is of this job, else removes it.
 ///
 /// Errors: the disk; another process writes it; what is there is no store, or damaged: nothing is removed then.
-pub fn take_up(
+pub(crate) fn take_up(
     path: &Path,
     is_same: impl FnOnce(&mut Catalog) -> bool,
-) -> Result<Option<Catalog>, Failure> {
+) -> Result<Option<Catalog>, Error> {
     let new = new_of(path);
     if !new.exists() {
         return Ok(None);
@@ -86,7 +85,7 @@ pub fn take_up(
 }
 
 /// The new store, which is sealed and closed, takes its place. Errors: the disk.
-pub fn exchange(path: &Path) -> Result<(), Failure> {
+pub(crate) fn exchange(path: &Path) -> Result<(), Error> {
     let (new, old) = (new_of(path), old_of(path));
     if path.exists() {
         rename(path, &old)?;
@@ -99,12 +98,12 @@ pub fn exchange(path: &Path) -> Result<(), Failure> {
 }
 
 /// Removes a store that this program made. Errors: the disk.
-pub fn remove(path: &Path) -> Result<(), Failure> {
+pub(crate) fn remove(path: &Path) -> Result<(), Error> {
     Ok(DiskPath::from(path).remove_dir_all()?)
 }
 
 /// Errors: the disk.
-fn rename(from: &Path, to: &Path) -> Result<(), Failure> {
+fn rename(from: &Path, to: &Path) -> Result<(), Error> {
     Ok(DiskPath::from(from).rename(&to.into())?)
 }
 

@@ -1,0 +1,164 @@
+//! Errors of the modules below as [`Error`]s.
+
+use super::error::{Error, Remedy};
+use crate::boundary::BoundaryError;
+use crate::io::read::ReadError;
+use crate::io::write::WriteError;
+use crate::pipeline::PipelineError;
+use crate::query::QueryError;
+use crate::samples::SampleError;
+use crate::sealed::SealedError;
+use crate::sizing::SizingError;
+use crate::storage::StorageError;
+use crate::store::StoreError;
+use crate::surface::SurfaceError;
+
+impl From<ReadError> for Error {
+    fn from(e: ReadError) -> Self {
+        Self::new(e.code(), &e).at(e.place()).with_help(e.help())
+    }
+}
+
+impl From<WriteError> for Error {
+    fn from(e: WriteError) -> Self {
+        let error = Self::new(e.code(), &e).with_help(e.help());
+        match e.place() {
+            Some(path) => error.at(path.display()),
+            None => error,
+        }
+    }
+}
+
+impl From<SurfaceError> for Error {
+    fn from(e: SurfaceError) -> Self {
+        let error = Self::new(e.code(), &e).with_help(e.help());
+        match &e {
+            SurfaceError::Invalid { defect, n_defects } => {
+                let more = match n_defects.saturating_sub(1) {
+                    0 => String::new(),
+                    n => format!(" (and {n} more defects)"),
+                };
+                error.at(defect.place() + &more)
+            }
+            _ => error,
+        }
+    }
+}
+
+impl From<SampleError> for Error {
+    fn from(e: SampleError) -> Self {
+        Self::new("bad-sample", e)
+            .with_help("for example balls,count=100 or box,h=0.1")
+            .with_remedy(Remedy::General)
+    }
+}
+
+impl From<StorageError> for Error {
+    fn from(e: StorageError) -> Self {
+        let code = match &e {
+            StorageError::Busy { .. } => "busy",
+            StorageError::Full { .. } => "disk-full",
+            StorageError::Damaged { .. }
+            | StorageError::Page { .. }
+            | StorageError::Missing { .. } => "damaged",
+            StorageError::Budget { .. } | StorageError::TooMany { .. } => "memory",
+            StorageError::Cancelled => "stopped",
+            _ => "io",
+        };
+        with_general_help(code, &e)
+    }
+}
+
+impl From<SealedError> for Error {
+    fn from(e: SealedError) -> Self {
+        StoreError::from(e).into()
+    }
+}
+
+impl From<StoreError> for Error {
+    fn from(e: StoreError) -> Self {
+        let code = match e {
+            StoreError::Storage(inner) => return inner.into(),
+            StoreError::Sealed(SealedError::Storage(inner)) => return inner.into(),
+            StoreError::Busy { .. } => "busy",
+            StoreError::NotFound { .. } => "no-such-store",
+            StoreError::NoSubdomain { .. } => "no-such-part",
+            StoreError::NotOurs { .. } => "not-a-store",
+            StoreError::Finished { .. } => "store-exists",
+            StoreError::Unfinished { .. } => "store-unfinished",
+            StoreError::NoCoarseSnapshot { .. } => "no-coarse-leaf",
+            StoreError::Format { .. } => "store-format",
+            StoreError::Sealed(SealedError::NotSealed { .. }) => "store-unfinished",
+            StoreError::Row { .. } | StoreError::Sealed(_) => "damaged",
+        };
+        with_general_help(code, &e)
+    }
+}
+
+impl From<QueryError> for Error {
+    fn from(e: QueryError) -> Self {
+        match e {
+            QueryError::Store(e) => e.into(),
+            other => with_general_help("no-such-part", &other),
+        }
+    }
+}
+
+impl From<SizingError> for Error {
+    fn from(e: SizingError) -> Self {
+        Self::new("bad-size", e).with_help("a size is a length in the surface's units, such as 0.5, or a share of its box diagonal, such as 1%")
+    }
+}
+
+impl From<BoundaryError> for Error {
+    fn from(e: BoundaryError) -> Self {
+        Self::new("unrecovered-triangles", &e)
+            .with_help("look at these triangles; a finer or better shaped surface there helps")
+            .with_remedy(Remedy::General)
+    }
+}
+
+impl From<PipelineError> for Error {
+    fn from(e: PipelineError) -> Self {
+        match e {
+            PipelineError::Surface(e) => e.into(),
+            PipelineError::Boundary(e) => e.into(),
+            PipelineError::Sizing(e) => e.into(),
+            PipelineError::Store(e) => e.into(),
+            PipelineError::Storage(e) => e.into(),
+            PipelineError::NothingFilled { .. } => Self::new("nothing-filled", &e)
+                .with_help("fill all regions, and look at the surface")
+                .with_remedy(Remedy::General),
+            PipelineError::NothingToUndo { .. } => Self::new("nothing-to-undo", &e)
+                .with_help("only the last change can be undone, once, and not after its old version was dropped")
+                .with_remedy(Remedy::General),
+            PipelineError::SizeCount { .. } => Self::new("count-mismatch", &e)
+                .with_help("give one length for each, in the order of the exported arrays")
+                .with_remedy(Remedy::General),
+            other => Self::new("usage", other),
+        }
+    }
+}
+
+fn with_general_help(code: &'static str, e: &impl ToString) -> Error {
+    let help = match code {
+        "busy" => "wait for the other process, or stop it",
+        "disk-full" => "free some space, then resume",
+        "damaged" => {
+            "verify the store to see what is damaged; damaged sub-domains can be meshed again"
+        }
+        "memory" => "allow more memory, or mesh a coarser surface",
+        "stopped" => "resume goes on from the last finished step",
+        "no-such-store" => "check the path",
+        "not-a-store" => "choose another path; what is there was not written by tetdb",
+        "store-exists" => "choose another path, or allow it to be replaced",
+        "no-coarse-leaf" => "mesh the surface again and keep the coarse snapshots",
+        "store-unfinished" => "resume goes on with it",
+        "store-format" => "use the version of tetdb that wrote the store, or mesh again",
+        "no-such-part" => "the store's summary lists its parts",
+        _ => "check the path and its permissions",
+    };
+    Error::new(code, e.to_string())
+        .with_help(help)
+        .with_remedy(Remedy::General)
+}

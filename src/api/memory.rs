@@ -1,0 +1,109 @@
+//! How much memory a run may hold, and how much there is.
+
+use std::fmt;
+
+use crate::pipeline::MEMORY_MIN;
+
+/// Share of the free memory that is taken when nothing is asked for.
+const DEFAULT_SHARE: f64 = 0.6;
+/// What is assumed where the system does not say.
+const UNKNOWN_FREE: u64 = 4 << 30;
+
+/// A number of bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Bytes(
+    /// How many.
+    pub u64,
+);
+
+impl Bytes {
+    /// `n` times 2^20.
+    pub const fn mib(n: u64) -> Self {
+        Self(n << 20)
+    }
+
+    /// `n` times 2^30.
+    pub const fn gib(n: u64) -> Self {
+        Self(n << 30)
+    }
+}
+
+impl fmt::Display for Bytes {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&show_bytes(self.0))
+    }
+}
+
+/// Bytes in the unit a person would use.
+pub(crate) fn show_bytes(bytes: u64) -> String {
+    let b = bytes as f64;
+    match bytes {
+        0..=0xfffff => format!("{:.0} KiB", b / 1024.0),
+        0x10_0000..=0x3fff_ffff => format!("{:.0} MiB", b / 1048576.0),
+        _ => format!("{:.1} GiB", b / 1073741824.0),
+    }
+}
+
+/// The cap where none is given, and in words where it comes from.
+pub(crate) fn default_cap() -> (u64, String) {
+    let (free, whence) = free();
+    let bytes = (free as f64 * DEFAULT_SHARE) as u64;
+    let words = format!("60 % of the {} {whence}", show_bytes(free));
+    (bytes.max(MEMORY_MIN), words)
+}
+
+/// Free bytes of the system, or of the control group if that is less.
+fn free() -> (u64, &'static str) {
+    let system = std::fs::read_to_string("/proc/meminfo")
+        .ok()
+        .and_then(|text| {
+            let line = text.lines().find(|l| l.starts_with("MemAvailable:"))?;
+            Some(line.split_whitespace().nth(1)?.parse::<u64>().ok()? * 1024)
+        });
+    let system = system.unwrap_or(UNKNOWN_FREE);
+    match group_free() {
+        Some(group) if group < system => (group, "free in this control group"),
+        _ => (system, "free in this machine"),
+    }
+}
+
+fn group_free() -> Option<u64> {
+    let number = |path: String| {
+        std::fs::read_to_string(path)
+            .ok()?
+            .trim()
+            .parse::<u64>()
+            .ok()
+    };
+    let groups = std::fs::read_to_string("/proc/self/cgroup").ok()?;
+    for line in groups.lines() {
+        let mut parts = line.splitn(3, ':');
+        let (_, kinds, path) = (parts.next()?, parts.next()?, parts.next()?);
+        let (limit, used) = if kinds.is_empty() {
+            let base = format!("/sys/fs/cgroup{path}");
+            (
+                number(format!("{base}/memory.max")),
+                number(format!("{base}/memory.current")),
+            )
+        } else if kinds.split(',').any(|k| k == "memory") {
+            let base = format!("/sys/fs/cgroup/memory{path}");
+            (
+                number(format!("{base}/memory.limit_in_bytes")),
+                number(format!("{base}/memory.usage_in_bytes")),
+            )
+        } else {
+            continue;
+        };
+        if let (Some(limit), Some(used)) = (limit, used) {
+            return Some(limit.saturating_sub(used));
+        }
+    }
+    None
+}
+
+/// The most this process has ever held, in bytes, where the system tells.
+pub fn peak_bytes() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = text.lines().find(|l| l.starts_with("VmHWM:"))?;
+    Some(line.split_whitespace().nth(1)?.parse::<u64>().ok()? * 1024)
+}

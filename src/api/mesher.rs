@@ -1,0 +1,480 @@
+//! A new store from a surface.
+
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use super::preflight::{self, preflight, scratch_beside, with_free_space};
+use super::{
+    Bytes, Error, Event, Optimize, Regions, Seal, Settings, Sizes, Store, Subdomains, Surface,
+    Verification, guarded, job, replace, verify,
+};
+use crate::audit::Level;
+use crate::pipeline::{self, Estimate, Options, Prepared, RECIPE};
+use crate::storage::{Budget, CancelToken, attempt, n_threads};
+use crate::store::{Catalog, StoreError};
+use crate::surface;
+use tetdb_schema::catalog::StoreState;
+
+/// A surface that takes more than this part of the cap is not kept while the mesh is refined.
+const SURFACE_KEPT: u64 = 8;
+
+/// What to do with a store that is already at the path.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Existing {
+    /// The finished mesh of the same job is returned as it is; anything else is refused.
+    #[default]
+    Keep,
+    /// It is replaced, once the new store is finished.
+    Replace,
+}
+
+/// Meshes a surface into a new store: validated, refused before anything is written, on record, resumable, verified.
+///
+/// ```
+/// # let dir = tempfile::tempdir()?;
+/// # let path = dir.path().join("box.tetdb");
+/// use tetdb::{Length, Mesher, Sizes, Surface};
+///
+/// let store = Mesher::new(Surface::sample("box,h=0.5")?)
+///     .sizes(Sizes::interior(Length::share_of_diagonal(0.2)))
+///     .create(&path)?;
+/// assert!(store.summary().n_tets > 0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Mesher {
+    surface: Surface,
+    options: Options,
+    settings: Settings,
+    existing: Existing,
+    preflight: bool,
+    verify: bool,
+}
+
+/// What to expect of a mesh, before it is begun.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Prediction {
+    /// Tetrahedra.
+    pub tets: f64,
+    /// Vertices.
+    pub vertices: f64,
+    /// Sub-domains.
+    pub subdomains: u32,
+    /// Of the finished store.
+    pub store: Bytes,
+    /// Of disk while it is meshed.
+    pub disk_peak: Bytes,
+    /// The smallest cap that would do.
+    pub memory_least: Bytes,
+    /// Seconds on a server of 2.6 GHz.
+    pub seconds: f64,
+}
+
+/// What a run left at its path.
+pub(crate) struct Created {
+    pub path: PathBuf,
+    /// `None` where the finished mesh of this job was there already.
+    pub summary: Option<pipeline::Summary>,
+    pub was_there: bool,
+}
+
+impl Mesher {
+    /// With the sizes of the surface's own edges and all other defaults.
+    pub fn new(surface: Surface) -> Self {
+        let options = Options {
+            regions: Some(Regions::default().word().to_owned()),
+            optimize: Some(Optimize::default().word().to_owned()),
+            ..Options::default()
+        };
+        Self::of_options(surface, options)
+    }
+
+    pub(crate) fn of_options(surface: Surface, options: Options) -> Self {
+        Self {
+            surface,
+            options,
+            settings: Settings::new(),
+            existing: Existing::default(),
+            preflight: true,
+            verify: true,
+        }
+    }
+
+    /// Wanted edge lengths.
+    pub fn sizes(mut self, sizes: Sizes) -> Self {
+        let old = std::mem::replace(&mut self.options, sizes.options);
+        self.options.regions = old.regions;
+        self.options.optimize = old.optimize;
+        self.options.subdomains = old.subdomains;
+        self.options.seal = old.seal;
+        self.options.drop_coarse = old.drop_coarse;
+        self.options.keep_stages = old.keep_stages;
+        self
+    }
+
+    /// Which regions are filled.
+    pub fn regions(mut self, regions: Regions) -> Self {
+        self.options.regions = Some(regions.word().to_owned());
+        self
+    }
+
+    /// Into how many sub-domains the mesh is divided.
+    pub fn subdomains(mut self, n: Subdomains) -> Self {
+        self.options.subdomains = match n {
+            Subdomains::Auto => None,
+            Subdomains::Exactly(n) => Some(n.to_string()),
+        };
+        self
+    }
+
+    /// How far tetrahedra are improved.
+    pub fn optimize(mut self, optimize: Optimize) -> Self {
+        self.options.optimize = Some(optimize.word().to_owned());
+        self
+    }
+
+    /// How finished sub-domains are kept.
+    pub fn seal(mut self, seal: Seal) -> Self {
+        self.options.seal = (seal != Seal::default()).then(|| seal.word().to_owned());
+        self
+    }
+
+    /// Whether what sub-domains are meshed from is kept, so that they can be meshed again. Default: it is.
+    pub fn keep_coarse(mut self, keep: bool) -> Self {
+        self.options.drop_coarse = !keep;
+        self
+    }
+
+    /// Whether meshes on the way (before each cut, with its zone refined) are kept to be looked at. Default: they are not.
+    pub fn keep_stages(mut self, keep: bool) -> Self {
+        self.options.keep_stages = keep;
+        self
+    }
+
+    /// How the run works, all at once.
+    pub fn settings(mut self, settings: Settings) -> Self {
+        self.settings = settings;
+        self
+    }
+
+    /// Caps what the run holds; see [`Settings::memory`].
+    pub fn memory(mut self, cap: Bytes) -> Self {
+        self.settings = self.settings.memory(cap);
+        self
+    }
+
+    /// Threads of the run; see [`Settings::threads`].
+    pub fn threads(mut self, n: usize) -> Self {
+        self.settings = self.settings.threads(n);
+        self
+    }
+
+    /// The run ends soon after this token is cancelled.
+    pub fn cancel(mut self, token: &CancelToken) -> Self {
+        self.settings = self.settings.cancel(token);
+        self
+    }
+
+    /// Is called with each [`Event`]; see [`Settings::progress`].
+    pub fn progress(mut self, listener: impl Fn(&Event) + Send + Sync + 'static) -> Self {
+        self.settings = self.settings.progress(listener);
+        self
+    }
+
+    /// What becomes of a store that is already there.
+    pub fn existing(mut self, existing: Existing) -> Self {
+        self.existing = existing;
+        self
+    }
+
+    /// Whether the finished mesh is verified against the surface. Default: it is.
+    pub fn verify(mut self, verify: bool) -> Self {
+        self.verify = verify;
+        self
+    }
+
+    /// Whether a mesh that memory or disk are not expected to hold is refused. Default: it is.
+    pub(crate) fn preflight(mut self, preflight: bool) -> Self {
+        self.preflight = preflight;
+        self
+    }
+
+    /// What to expect of the mesh; nothing is written. Errors: sizes that make no sense, a surface with defects.
+    pub fn predict(&self) -> Result<Prediction, Error> {
+        guarded(&self.settings, || {
+            let cap = self.settings.cap()?;
+            let mut options = self.options.clone();
+            job::identify_sizes(&mut options)?;
+            let scratch = scratch_beside(&self.surface.inner, cap, Path::new("."))?;
+            let surface = &self.surface.inner;
+            attempt(|| surface::validate_in(surface, &scratch))?.accept()?;
+            let prepared = predict(surface, &options, cap, Path::new("."))?;
+            Ok(Prediction::of(&prepared.estimate, cap, n_threads()))
+        })
+    }
+
+    /// Meshes into a new store at `path` and opens it.
+    ///
+    /// Errors: a surface with defects, options that make no sense, too little memory or disk are refused before anything is written. A
+    /// run that is cancelled, killed or ends at a full disk leaves a store that [`Store::resume`] goes on with.
+    pub fn create(self, path: impl AsRef<Path>) -> Result<Store, Error> {
+        let settings = self.settings.clone();
+        let created = self.create_reported(path.as_ref())?;
+        Store::open_with(created.path, settings)
+    }
+
+    /// [`Mesher::create`], and what the run did.
+    pub(crate) fn create_reported(mut self, path: &Path) -> Result<Created, Error> {
+        let settings = self.settings.clone();
+        guarded(&settings, || self.run(path, &settings))
+    }
+
+    fn run(&mut self, path: &Path, settings: &Settings) -> Result<Created, Error> {
+        self.options.sizes()?;
+        self.options.subdomain_count()?;
+        job::identify_sizes(&mut self.options)?;
+        let cap = settings.cap()?;
+        replace::settle(path, settings)?;
+        if self.is_there(path)? {
+            return Ok(Created {
+                path: path.to_owned(),
+                summary: None,
+                was_there: true,
+            });
+        }
+        if self.preflight {
+            preflight::surface_fits(&self.surface.inner, cap)?;
+        }
+        let prepared = self.prepare(path, cap, settings)?;
+        let summary = self.mesh(path, cap, prepared, settings)?;
+        report(&summary, settings);
+        if self.verify {
+            let surface = match self.surface.n_triangles() {
+                0 => None,
+                _ => Some(&self.surface.inner),
+            };
+            verify_new(path, surface, cap, settings)?;
+        }
+        Ok(Created {
+            path: path.to_owned(),
+            summary: Some(summary),
+            was_there: false,
+        })
+    }
+
+    /// Refuses early what is no store or an unfinished one, before a surface is read for it.
+    pub(crate) fn check_path(path: &Path, existing: Existing) -> Result<(), Error> {
+        if !path.exists() || existing == Existing::Replace {
+            return Ok(());
+        }
+        match Catalog::open(path) {
+            Err(StoreError::NotOurs { .. }) if Catalog::is_vacant(path) => Ok(()),
+            Err(error) => Err(error.into()),
+            Ok(mut catalog) => match catalog.state()?.is_finished() {
+                true => Ok(()),
+                false => {
+                    let path = path.to_owned();
+                    Err(StoreError::Unfinished { path }.into())
+                }
+            },
+        }
+    }
+
+    /// Whether the finished mesh of this job is at `path` already. Errors: something is in the way.
+    fn is_there(&self, path: &Path) -> Result<bool, Error> {
+        if !path.exists() {
+            return Ok(false);
+        }
+        let mut catalog = match Catalog::open(path) {
+            Ok(catalog) => catalog,
+            Err(StoreError::NotOurs { .. }) if Catalog::is_vacant(path) => return Ok(false),
+            Err(error) => return Err(error.into()),
+        };
+        let (state, job) = (catalog.state()?, catalog.job()?);
+        drop(catalog);
+        let path = path.to_owned();
+        match self.existing {
+            Existing::Replace => Ok(false),
+            _ if !state.is_finished() => Err(StoreError::Unfinished { path }.into()),
+            _ if job::is_same(&job, &self.options, &self.surface.sources) => Ok(true),
+            _ => Err(StoreError::Finished { path }.into()),
+        }
+    }
+
+    /// Validates, builds the size field and looks whether everything fits; inserts vertices meanwhile.
+    fn prepare(
+        &self,
+        path: &Path,
+        cap: u64,
+        settings: &Settings,
+    ) -> Result<(Prepared, Option<pipeline::HeadStart>), Error> {
+        let (clock, surface) = (Instant::now(), &self.surface.inner);
+        let watch = settings.watcher();
+        pipeline::ahead(surface, &self.options, cap, &watch, |taken| {
+            let left = cap - taken;
+            let scratch = scratch_beside(surface, left, path)?;
+            attempt(|| surface::validate_in(surface, &scratch))?.accept()?;
+            settings.note(format!(
+                "{} triangles and {} vertices, closed and free of defects ({:.1} s)",
+                surface.n_triangles(),
+                surface.n_vertices(),
+                clock.elapsed().as_secs_f64()
+            ));
+            settings.note(format!("memory: {}", settings.cap_in_words()));
+            let prepared = predict(surface, &self.options, left, path)?;
+            if self.preflight {
+                preflight(&prepared.estimate, cap, path, settings)?;
+            }
+            Ok::<_, Error>(prepared)
+        })
+    }
+
+    /// Everything from the first commit to the last.
+    fn mesh(
+        &mut self,
+        path: &Path,
+        cap: u64,
+        prepared: (Prepared, Option<pipeline::HeadStart>),
+        settings: &Settings,
+    ) -> Result<pipeline::Summary, Error> {
+        // The old store is only replaced once the new one is sealed.
+        let replaces = path.exists() && !Catalog::is_vacant(path);
+        let place = match replaces {
+            true => replace::new_of(path),
+            false => path.to_owned(),
+        };
+        let needed = prepared.0.estimate.disk_peak_bytes(cap, n_threads());
+        let mut catalog = self.begin(path, &place, replaces, settings)?;
+        settings.say(&Event::StoreBegun(place.clone()));
+        let budget = Budget::new(cap);
+        let watch = settings.watcher();
+        let (options, surface) = (&self.options, lent_or_given(&mut self.surface.inner, cap));
+        let made = if catalog.state()? < StoreState::Coarse {
+            pipeline::mesh_prepared(&mut catalog, surface, options, prepared, &budget, &watch)
+        } else {
+            drop(prepared);
+            pipeline::mesh(&mut catalog, &surface, options, &budget, &watch)
+        };
+        let summary = match made.map_err(Error::from) {
+            // A refused surface or option leaves nothing to resume.
+            Err(error) if matches!(error.exit_code(), 2 | 3) => {
+                drop(catalog);
+                replace::remove(&place)?;
+                return Err(error);
+            }
+            other => other.map_err(|e| with_free_space(e, &place, Some(needed)))?,
+        };
+        catalog.close()?;
+        if replaces {
+            replace::exchange(path)?;
+        }
+        Ok(summary)
+    }
+
+    /// The catalog of the new store, or of the same replacement that was begun before.
+    fn begin(
+        &self,
+        path: &Path,
+        place: &Path,
+        replaces: bool,
+        settings: &Settings,
+    ) -> Result<Catalog, Error> {
+        let job = job::job(&self.options, &self.surface.sources);
+        let is_same = |begun: &mut Catalog| {
+            begun.job().is_ok_and(|begun| begun == job)
+                && pipeline::recipe_of(begun).is_ok_and(|recipe| recipe == RECIPE)
+        };
+        if replaces && let Some(catalog) = replace::take_up(path, is_same)? {
+            settings.note(format!("going on with {}", place.display()));
+            return Ok(catalog);
+        }
+        let catalog = Catalog::create_with(place, &job, pipeline::record_recipe)?;
+        self.surface.keep_in(place)?;
+        Ok(catalog)
+    }
+}
+
+/// What is worth knowing of a run.
+pub(super) fn report(summary: &pipeline::Summary, settings: &Settings) {
+    if let Some(asked) = summary.subdomains_asked {
+        settings.note(format!(
+            "note: {asked} sub-domains were asked for, the mesh has {}: one of fewer than 25,000 tetrahedra would be all refined zone",
+            summary.subdomains
+        ));
+    }
+    if let Some(sizes) = &summary.sizes {
+        settings.note(sizes.to_string());
+        for warning in &sizes.warnings {
+            settings.warn(warning.to_string());
+        }
+    }
+}
+
+/// The size field of a surface and what it predicts, within `cap`.
+pub(crate) fn predict(
+    surface: &surface::Surface,
+    options: &Options,
+    cap: u64,
+    store: &Path,
+) -> Result<Prepared, Error> {
+    let background = job::read_background(options, cap)?;
+    let scratch = scratch_beside(surface, cap, store)?;
+    Ok(pipeline::prepare(
+        surface,
+        options,
+        background.as_ref(),
+        &scratch,
+    )?)
+}
+
+/// The surface for the pipeline: given away when it is large against the cap, to be read again for verification.
+pub(super) fn lent_or_given(surface: &mut surface::Surface, cap: u64) -> Cow<'_, surface::Surface> {
+    match surface.bytes() as u64 > cap / SURFACE_KEPT {
+        true => Cow::Owned(std::mem::take(surface)),
+        false => Cow::Borrowed(surface),
+    }
+}
+
+/// Verifies a mesh against its surface, which is read again where it is not at hand, and puts on record that it was.
+pub(super) fn verify_new(
+    path: &Path,
+    surface: Option<&surface::Surface>,
+    cap: u64,
+    settings: &Settings,
+) -> Result<Verification, Error> {
+    let mut catalog = Catalog::open(path)?;
+    let again;
+    let surface = match surface {
+        Some(surface) => surface,
+        None => {
+            let sources = catalog.job()?.surfaces;
+            let scratch = scratch_beside(&surface::Surface::default(), cap, path)?;
+            again = Surface::of_record(&sources, path, &scratch)?;
+            &again.inner
+        }
+    };
+    let report = verify::check(&mut catalog, settings, Some(surface), cap, Level::Delaunay)?;
+    drop(catalog);
+    if !report.valid {
+        return Err(verify::invalid(&report, path));
+    }
+    settings.note(verify::sentence(&report));
+    verify::record(path)?;
+    Ok(Verification { report })
+}
+
+impl Prediction {
+    fn of(estimate: &Estimate, cap: u64, threads: usize) -> Self {
+        Self {
+            tets: estimate.tets(),
+            vertices: estimate.vertices,
+            subdomains: estimate.subdomains,
+            store: Bytes(estimate.store_bytes()),
+            disk_peak: Bytes(estimate.disk_peak_bytes(cap, threads)),
+            memory_least: Bytes(estimate.memory_least_bytes()),
+            seconds: estimate.seconds(threads),
+        }
+    }
+}

@@ -1,0 +1,279 @@
+//! Sub-domains of a finished store meshed again; what lies around them stays as it is.
+
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+
+use serde_json::json;
+
+use super::mesher::predict;
+use super::preflight::scratch_beside;
+use super::store::open_finished;
+use super::{Error, Settings, Sizes, Store, Surface, guarded, job, verify};
+use crate::audit::Level;
+use crate::pipeline::{self, NewSizes, Options, RECIPE, ResaturateSummary, Resaturation, Values};
+use crate::sizing::SizeField;
+use crate::store::{Catalog, StoreError};
+use tetdb_schema::catalog::SubdomainRow;
+
+/// What is to be meshed again, and how; begun by [`Store::remesh`].
+///
+/// ```
+/// # let dir = tempfile::tempdir()?;
+/// # let path = dir.path().join("box.tetdb");
+/// # let store = tetdb::Mesher::new(tetdb::Surface::sample("box,h=0.25")?).create(&path)?;
+/// let before = store.summary().n_tets;
+/// let remeshed = store.remesh().subdomains(&[0]).scaled(0.5).run()?;
+/// assert!(remeshed.store.summary().n_tets > before);
+/// let store = remeshed.store.undo()?;
+/// assert_eq!(store.summary().n_tets, before);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Remesh {
+    path: PathBuf,
+    settings: Settings,
+    ranks: BTreeSet<u32>,
+    sizes: Option<Sizes>,
+    lengths: Option<Values>,
+    factor: f64,
+    prepared: Option<NewSizes>,
+    repair: bool,
+    verify: bool,
+}
+
+/// What was meshed again.
+pub struct Remeshed {
+    /// The store as it is now.
+    pub store: Store,
+    /// Each sub-domain before and after, by rank.
+    pub subdomains: Vec<[SubdomainRow; 2]>,
+}
+
+impl Remesh {
+    pub(crate) fn new(path: PathBuf, settings: Settings) -> Self {
+        Self {
+            path,
+            settings,
+            ranks: BTreeSet::new(),
+            sizes: None,
+            lengths: None,
+            factor: 1.0,
+            prepared: None,
+            repair: false,
+            verify: true,
+        }
+    }
+
+    /// Which sub-domains, by rank.
+    pub fn subdomains(mut self, ranks: &[u32]) -> Self {
+        self.ranks = ranks.iter().copied().collect();
+        self
+    }
+
+    /// With these sizes in place of those on record.
+    pub fn sizes(mut self, sizes: Sizes) -> Self {
+        self.sizes = Some(sizes);
+        self
+    }
+
+    /// With one length for each tetrahedron of the sub-domains, by rank, in the order in which they are read.
+    pub fn lengths_of_tets(mut self, lengths: Vec<f64>) -> Self {
+        self.lengths = Some(Values::Tets(lengths));
+        self
+    }
+
+    /// With one length for each vertex of the only sub-domain, in the order in which they are read.
+    pub fn lengths_of_vertices(mut self, lengths: Vec<f64>) -> Self {
+        self.lengths = Some(Values::Vertices(lengths));
+        self
+    }
+
+    /// All lengths times `factor`: 0.5 gives edges half as long.
+    pub fn scaled(mut self, factor: f64) -> Self {
+        self.factor = factor;
+        self
+    }
+
+    /// The files are damaged: the sub-domains must become what the catalog says they were. Without a list, all that are damaged.
+    pub fn repair(mut self) -> Self {
+        self.repair = true;
+        self
+    }
+
+    /// Whether the changed mesh is verified. Default: it is.
+    pub fn verify(mut self, verify: bool) -> Self {
+        self.verify = verify;
+        self
+    }
+
+    /// With sizes that a caller in this crate has prepared.
+    pub(crate) fn prepared_sizes(mut self, sizes: Option<NewSizes>) -> Self {
+        self.prepared = sizes;
+        self
+    }
+
+    /// Meshes them again in one step, verifies, and opens the store. The result depends on store and sizes alone.
+    ///
+    /// Errors: `no-such-part`, `no-coarse-leaf`; sizes that make no sense; `store-recipe` where a repair is to give what another recipe
+    /// gave. The store is then as it was.
+    pub fn run(self) -> Result<Remeshed, Error> {
+        let (path, settings) = (self.path.clone(), self.settings.clone());
+        let parts = self.run_reported()?.parts.into_iter();
+        Ok(Remeshed {
+            store: Store::open_with(path, settings)?,
+            subdomains: parts.map(|part| [part.before, part.after]).collect(),
+        })
+    }
+
+    /// [`Remesh::run`], and what it did.
+    pub(crate) fn run_reported(self) -> Result<ResaturateSummary, Error> {
+        let settings = self.settings.clone();
+        guarded(&settings, || {
+            let summary = self.change()?;
+            if self.verify {
+                verify_changed(&self.path, &self.settings)?;
+            }
+            Ok(summary)
+        })
+    }
+
+    fn change(&self) -> Result<ResaturateSummary, Error> {
+        let mut open = open_finished(&self.path)?;
+        let options = job::options_of(&open.job()?, &self.path)?;
+        let ranks = match self.repair && self.ranks.is_empty() {
+            true => damaged(&mut open)?,
+            false => self.ranks.clone(),
+        };
+        check_recipe(&mut open, self.repair, &self.settings)?;
+        let sizes = match &self.prepared {
+            Some(sizes) => Some(sizes.clone()),
+            None => self.new_sizes(&mut open, &options)?,
+        };
+        drop(open);
+        let what = Resaturation {
+            ranks,
+            sizes,
+            repair: self.repair,
+        };
+        let mut catalog = Catalog::open_writable(&self.path)?;
+        let (budget, watch) = (self.settings.budget()?, self.settings.watcher());
+        let summary = pipeline::resaturate(&mut catalog, &options, &what, &budget, &watch)?;
+        catalog.close()?;
+        Ok(summary)
+    }
+
+    fn new_sizes(&self, open: &mut Catalog, options: &Options) -> Result<Option<NewSizes>, Error> {
+        if self.sizes.is_none() && self.lengths.is_none() && self.factor == 1.0 {
+            return Ok(None);
+        }
+        if !(self.factor.is_normal() && self.factor > 0.0) {
+            let message = format!(
+                "a factor of {} scales nothing, expected one above zero",
+                self.factor
+            );
+            return Err(Error::new("bad-size", message));
+        }
+        let asked = self.sizes.clone().unwrap_or_default().options;
+        let beta = match &asked.hgrad {
+            Some(_) => asked.sizes()?.beta(),
+            None => options.sizes()?.beta(),
+        };
+        let field = match &self.sizes {
+            Some(_) => Some(whole_field(open, asked.clone(), options, &self.settings)?),
+            None => None,
+        };
+        let asked = serde_json::to_value(&asked).unwrap_or_default();
+        Ok(Some(NewSizes {
+            field,
+            values: self.lengths.clone(),
+            factor: self.factor,
+            limits: [0.0, f64::INFINITY],
+            beta,
+            asked: json!({ "options": asked, "refine_by": self.factor }).to_string(),
+        }))
+    }
+}
+
+/// The field of the whole surface with other options, but the regions and the gradation it was made with.
+pub(crate) fn whole_field(
+    open: &mut Catalog,
+    mut all: Options,
+    options: &Options,
+    settings: &Settings,
+) -> Result<SizeField, Error> {
+    job::identify_sizes(&mut all)?;
+    all.regions.clone_from(&options.regions);
+    all.optimize.clone_from(&options.optimize);
+    if all.hgrad.is_none() {
+        all.hgrad.clone_from(&options.hgrad);
+    }
+    let (dir, cap) = (open.dir().to_owned(), settings.cap()?);
+    let scratch = scratch_beside(&crate::surface::Surface::default(), cap, &dir)?;
+    let surface = Surface::of_record(&open.job()?.surfaces, &dir, &scratch)?;
+    drop(scratch);
+    let prepared = predict(&surface.inner, &all, cap, &dir)?;
+    settings.note(prepared.sizes.to_string());
+    Ok(prepared.field)
+}
+
+/// A repair must give what the recipe of then gave; any other change only says that the recipe is another.
+pub(crate) fn check_recipe(
+    open: &mut Catalog,
+    is_repair: bool,
+    settings: &Settings,
+) -> Result<(), Error> {
+    if is_repair {
+        return job::check_recipe(open);
+    }
+    let found = pipeline::recipe_of(open)?;
+    if found != RECIPE {
+        settings.note(format!(
+            "note: the store was begun by version {found} of the recipe; what is meshed now follows version {RECIPE}"
+        ));
+    }
+    Ok(())
+}
+
+/// The sub-domains of which something cannot be read.
+pub(crate) fn damaged(open: &mut Catalog) -> Result<BTreeSet<u32>, Error> {
+    let mut ranks = BTreeSet::new();
+    for row in open.subdomains()? {
+        match read_all(open, row.rank) {
+            Err(error) if error.is_damage() => drop(ranks.insert(row.rank)),
+            other => other?,
+        }
+    }
+    Ok(ranks)
+}
+
+fn read_all(catalog: &mut Catalog, rank: u32) -> Result<(), StoreError> {
+    /// For chunks and what redb holds of the file.
+    const MEMORY_BYTES: usize = 8 << 20;
+    let mut part = catalog.open_subdomain(rank, MEMORY_BYTES)?;
+    part.vertex_chunks().try_for_each(|c| c.map(drop))?;
+    part.tet_chunks().try_for_each(|c| c.map(drop))?;
+    part.facet_chunks().try_for_each(|c| c.map(drop))?;
+    part.interface_chunks().try_for_each(|c| c.map(drop))?;
+    Ok(part.check()?)
+}
+
+/// Verifies a changed store, against its surface if that is still there, and puts it on record.
+pub(crate) fn verify_changed(path: &std::path::Path, settings: &Settings) -> Result<(), Error> {
+    let report = {
+        let mut open = open_finished(path)?;
+        let sources = open.job()?.surfaces;
+        let cap = settings.cap()?;
+        let scratch = crate::storage::ScratchSpace::boundless();
+        let surface = Surface::of_record(&sources, path, &scratch).ok();
+        if surface.is_none() {
+            settings.note("note: the surface is not where it was; the mesh is verified without it");
+        }
+        let surface = surface.as_ref().map(|surface| &surface.inner);
+        verify::check(&mut open, settings, surface, cap, Level::Delaunay)?
+    };
+    if !report.valid {
+        return Err(verify::invalid(&report, path).with_help("undo brings back what was before"));
+    }
+    settings.note(verify::sentence(&report));
+    verify::record(path)
+}

@@ -1,0 +1,94 @@
+//! An interrupted run goes on.
+
+use std::path::Path;
+
+use super::mesher::{Created, lent_or_given, predict, report, verify_new};
+use super::preflight::{scratch_beside, with_free_space};
+use super::{Error, Event, Settings, Surface, guarded, job, replace};
+use crate::pipeline;
+use crate::storage::Budget;
+use crate::store::Catalog;
+use crate::surface;
+use tetdb_schema::catalog::StoreState;
+
+/// Goes on with the store at `path`, and verifies it if `verify`.
+pub(crate) fn resume_reported(
+    path: &Path,
+    settings: &Settings,
+    verify: bool,
+) -> Result<Created, Error> {
+    guarded(settings, || run(path, settings, verify))
+}
+
+fn run(path: &Path, settings: &Settings, verify: bool) -> Result<Created, Error> {
+    let cap = settings.cap()?;
+    replace::settle(path, settings)?;
+    // A run that replaces a store was interrupted: what it replaces is finished.
+    let replaces = replace::is_begun(path);
+    let place = match replaces {
+        true => replace::new_of(path),
+        false => path.to_owned(),
+    };
+    let mut reader = Catalog::open(&place)?;
+    let (state, job) = (reader.state()?, reader.job()?);
+    if !state.is_finished() {
+        job::check_recipe(&mut reader)?;
+    }
+    drop(reader);
+    let scratch = scratch_beside(&surface::Surface::default(), cap, path)?;
+    let mut surface = Surface::of_record(&job.surfaces, &place, &scratch)?;
+    drop(scratch);
+    surface
+        .notes()
+        .into_iter()
+        .for_each(|note| settings.note(format!("note: {note}")));
+    let summary = match state.is_finished() {
+        true => {
+            settings.note(format!("{} is already finished", path.display()));
+            None
+        }
+        false => {
+            let options = job::options_of(&job, &place)?;
+            Some(go_on(&place, &options, &mut surface, cap, settings)?)
+        }
+    };
+    if replaces {
+        replace::exchange(path)?;
+    }
+    if verify {
+        let at_hand = Some(&surface.inner).filter(|s| s.n_triangles() > 0);
+        verify_new(path, at_hand, cap, settings)?;
+    }
+    Ok(Created {
+        path: path.to_owned(),
+        was_there: summary.is_none(),
+        summary,
+    })
+}
+
+fn go_on(
+    place: &Path,
+    options: &pipeline::Options,
+    surface: &mut Surface,
+    cap: u64,
+    settings: &Settings,
+) -> Result<pipeline::Summary, Error> {
+    let mut catalog = Catalog::open_writable(place)?;
+    let (watch, budget) = (settings.watcher(), Budget::new(cap));
+    let made = if catalog.state()? < StoreState::Coarse {
+        let inner = &surface.inner;
+        let prepared = pipeline::ahead(inner, options, cap, &watch, |taken| {
+            predict(inner, options, cap - taken, place)
+        })?;
+        settings.say(&Event::StoreBegun(place.to_owned()));
+        let surface = lent_or_given(&mut surface.inner, cap);
+        pipeline::mesh_prepared(&mut catalog, surface, options, prepared, &budget, &watch)
+    } else {
+        settings.say(&Event::StoreBegun(place.to_owned()));
+        pipeline::mesh(&mut catalog, &surface.inner, options, &budget, &watch)
+    };
+    let summary = made.map_err(|e| with_free_space(e.into(), place, None))?;
+    report(&summary, settings);
+    catalog.close()?;
+    Ok(summary)
+}

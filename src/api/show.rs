@@ -1,0 +1,103 @@
+//! Files for other programs.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use super::store::open_finished;
+use super::{Error, Settings, Store, guarded};
+use crate::io::write::{self, Content, Selection};
+
+/// A writer holds no more than this, however large the cap.
+const MEMORY_MAX: u64 = 512 << 20;
+
+/// What of a mesh is written; by default all of it, in one file.
+#[derive(Clone, Debug, Default)]
+pub struct ExportOptions {
+    selection: Selection,
+}
+
+/// What was written.
+#[derive(Clone, Debug, serde::Serialize)]
+#[non_exhaustive]
+pub struct Exported {
+    /// Each file with its length in bytes.
+    pub files: Vec<(PathBuf, u64)>,
+    /// Vertices.
+    pub vertices: u64,
+    /// Tetrahedra.
+    pub tets: u64,
+    /// Boundary faces.
+    pub triangles: u64,
+}
+
+impl ExportOptions {
+    /// All of the mesh, in one file.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Only these sub-domains; what bounds them towards others is boundary.
+    pub fn subdomains(mut self, ranks: &[u32]) -> Self {
+        self.selection.subdomains = ranks.iter().copied().collect::<BTreeSet<_>>();
+        self
+    }
+
+    /// Each sub-domain in a file of its own.
+    pub fn pieces(mut self) -> Self {
+        self.selection.pieces = true;
+        self
+    }
+
+    /// Only input triangles and interface faces; `.vtu` alone.
+    pub fn boundary(mut self) -> Self {
+        self.selection.content = Content::Boundary;
+        self
+    }
+
+    /// Only interface faces; `.vtu` alone.
+    pub fn interfaces(mut self) -> Self {
+        self.selection.content = Content::Interfaces;
+        self
+    }
+}
+
+impl Store {
+    /// Writes the mesh for another program, in the format the ending of `out` names: `.vtu`, `.pvtu`, `.mesh`, `.meshb`, `.msh`, `.inp`,
+    /// `.npy`, `.json` (who neighbors whom), and `.parquet` with that feature.
+    ///
+    /// Streamed; nothing has its name before it is whole. Errors: `unknown-format`, `format-limit`, `disk-full`; damage.
+    pub fn export(
+        &self,
+        out: impl AsRef<Path>,
+        options: &ExportOptions,
+    ) -> Result<Exported, Error> {
+        guarded(self.settings(), || {
+            export(
+                self.path(),
+                out.as_ref(),
+                &options.selection,
+                self.settings(),
+            )
+        })
+    }
+}
+
+/// Writes one file, and what belongs to it.
+pub(crate) fn export(
+    store: &Path,
+    out: &Path,
+    selection: &Selection,
+    settings: &Settings,
+) -> Result<Exported, Error> {
+    let mut catalog = open_finished(store)?;
+    let memory = (settings.cap()? / 2).min(MEMORY_MAX) as usize;
+    let report = write::export(&mut catalog, out, selection, memory, &|done, total| {
+        settings.count("export", done, total, "records");
+    })?;
+    Ok(Exported {
+        files: report.files,
+        vertices: report.vertices,
+        tets: report.tets,
+        triangles: report.triangles,
+    })
+}

@@ -1,0 +1,266 @@
+//! A finished store.
+
+use std::path::{Path, PathBuf};
+
+use super::guard::guarded_in;
+use super::{Error, Query, Remesh, Settings, Verification, VerifyLevel, guarded, verify};
+use super::{Surface, preflight::scratch_beside, resume::resume_reported};
+use crate::audit::Level;
+use crate::pipeline;
+use crate::query::QuerySession;
+use crate::sealed::Subdomain;
+use crate::storage::RunContext;
+use crate::store::{Catalog, StoreError};
+use tetdb_schema::catalog::{InterfaceRow, RegionRow, StoreState, SubdomainRow};
+
+/// Memory of one open sub-domain: half for the database, half for decoded vertices.
+const SUBDOMAIN_BYTES: usize = 16 << 20;
+
+/// A finished store, open for reading. Others may read it at the same time.
+///
+/// ```
+/// # let dir = tempfile::tempdir()?;
+/// # let path = dir.path().join("box.tetdb");
+/// # tetdb::Mesher::new(tetdb::Surface::sample("box,h=0.5")?).create(&path)?;
+/// let mut store = tetdb::Store::open(&path)?;
+/// println!("{} tetrahedra, digest {}", store.summary().n_tets, store.summary().digest);
+///
+/// let mut part = store.subdomain(0)?;
+/// for chunk in part.tet_chunks() {
+///     for tet in chunk?.records {
+///         assert_eq!(tet.nodes.len(), 4);
+///     }
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Store {
+    path: PathBuf,
+    settings: Settings,
+    context: RunContext,
+    summary: Summary,
+    session: Option<QuerySession>,
+}
+
+/// What a store holds, in numbers.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Summary {
+    /// Tetrahedra.
+    pub n_tets: u64,
+    /// Vertices; one shared by several sub-domains counts in each.
+    pub n_vertices: u64,
+    /// Bytes of the sub-domains' files.
+    pub bytes: u64,
+    /// One number for the mesh, the same for equal meshes: 32 hexadecimal digits.
+    pub digest: String,
+    /// Whether a verification is on record.
+    pub is_verified: bool,
+    /// The greatest q = √6/12 · longest edge / inradius; 1 is regular.
+    pub worst_quality: f64,
+    /// Names of the labels; a label is a position here.
+    pub labels: Vec<String>,
+    /// Regions by number, empty ones among them.
+    pub regions: Vec<RegionRow>,
+    /// Sub-domains by rank.
+    pub subdomains: Vec<SubdomainRow>,
+    /// Which sub-domains share how many faces, by cut.
+    pub interfaces: Vec<InterfaceRow>,
+}
+
+impl Store {
+    /// Opens a finished store. Errors: `no-such-store`, `not-a-store`, `store-unfinished`, `damaged`, `busy`.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, Error> {
+        Self::open_with(path, Settings::new())
+    }
+
+    /// The same, with settings for all that follows.
+    pub fn open_with(path: impl AsRef<Path>, settings: Settings) -> Result<Self, Error> {
+        let path = path.as_ref().to_owned();
+        let context = RunContext::new(settings.n_threads(), settings.cancel.clone());
+        let summary = guarded_in(&context, || Summary::of(&mut open_finished(&path)?))?;
+        Ok(Self {
+            path,
+            settings,
+            context,
+            summary,
+            session: None,
+        })
+    }
+
+    /// Goes on with an interrupted run, verifies the mesh and opens the store; one that is finished is only verified.
+    ///
+    /// The mesh is that of a run that was never interrupted. Errors: `surface-changed`; `store-recipe` when a version with another recipe
+    /// began it; as [`Mesher::create`](super::Mesher::create).
+    pub fn resume(path: impl AsRef<Path>, settings: Settings) -> Result<Self, Error> {
+        let created = resume_reported(path.as_ref(), &settings, true)?;
+        Self::open_with(created.path, settings)
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    pub(super) fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// What it holds, in numbers.
+    pub fn summary(&self) -> &Summary {
+        &self.summary
+    }
+
+    /// A sub-domain for reading chunk by chunk, without copies beyond the chunk.
+    ///
+    /// Errors: `no-such-part`; damage.
+    pub fn subdomain(&self, rank: u32) -> Result<Subdomain, Error> {
+        guarded_in(&self.context, || {
+            Ok(Catalog::open(&self.path)?.open_subdomain(rank, SUBDOMAIN_BYTES)?)
+        })
+    }
+
+    /// Begins a question about tetrahedra.
+    pub fn query(&mut self) -> Query<'_> {
+        Query::new(self)
+    }
+
+    /// The tetrahedron that holds each point, the first by id where several do; `None` outside of the mesh.
+    ///
+    /// Shape: the answer runs parallel to `points`. Errors: damage; too little memory.
+    pub fn locate(&mut self, points: &[[f64; 3]]) -> Result<Vec<Option<crate::query::Hit>>, Error> {
+        self.with_session(|session| {
+            let points: Vec<_> = points
+                .iter()
+                .map(|p| crate::geom::Point::from_array(*p))
+                .collect();
+            Ok(session
+                .locate(&points)?
+                .into_iter()
+                .map(|located| located.found)
+                .collect())
+        })
+    }
+
+    /// Verifies the mesh with exact signs, against its surface where that is still at hand.
+    ///
+    /// Errors: damage; an invalid mesh is an answer.
+    pub fn verify(&self, level: VerifyLevel) -> Result<Verification, Error> {
+        guarded_in(&self.context, || {
+            let cap = self.settings.cap()?;
+            let mut catalog = open_finished(&self.path)?;
+            let sources = catalog.job()?.surfaces;
+            let scratch = scratch_beside(
+                &crate::surface::Surface::default(),
+                cap,
+                &std::env::temp_dir().join("verify"),
+            )?;
+            let surface = match Surface::of_record(&sources, &self.path, &scratch) {
+                Ok(surface) => Some(surface.inner),
+                Err(error) if error.code() == "unreadable-file" => {
+                    self.settings.note(
+                        "note: the surface is not where it was; the mesh is verified without it",
+                    );
+                    None
+                }
+                Err(error) => return Err(error),
+            };
+            let level = match level {
+                VerifyLevel::Geometry => Level::Geometry,
+                VerifyLevel::Delaunay => Level::Delaunay,
+            };
+            let report = verify::check(&mut catalog, &self.settings, surface.as_ref(), cap, level)?;
+            Ok(Verification { report })
+        })
+    }
+
+    /// Sub-domains of it again, with other sizes or because they are damaged.
+    pub fn remesh(self) -> Remesh {
+        Remesh::new(self.path, self.settings)
+    }
+
+    /// Brings back what the last [`Store::remesh`] replaced. Errors: `nothing-to-undo`.
+    pub fn undo(self) -> Result<Self, Error> {
+        let Self { path, settings, .. } = self;
+        guarded(&settings, || {
+            let mut catalog = Catalog::open_writable(&path)?;
+            pipeline::undo(&mut catalog)?;
+            Ok(catalog.close()?)
+        })?;
+        Self::open_with(path, settings)
+    }
+
+    /// Drops what the last [`Store::remesh`] replaced, which cannot be undone then. Returns the number of sub-domains.
+    pub fn forget_previous(&mut self) -> Result<usize, Error> {
+        self.session = None;
+        guarded_in(&self.context, || {
+            let mut catalog = Catalog::open_writable(&self.path)?;
+            let n = pipeline::forget(&mut catalog)?;
+            catalog.close()?;
+            Ok(n)
+        })
+    }
+
+    /// Does `work` with the session that answers questions, which stays open.
+    pub(super) fn with_session<T>(
+        &mut self,
+        work: impl FnOnce(&mut QuerySession) -> Result<T, Error>,
+    ) -> Result<T, Error> {
+        let Self {
+            path,
+            settings,
+            context,
+            session,
+            ..
+        } = self;
+        guarded_in(context, || {
+            if session.is_none() {
+                *session = Some(QuerySession::open(
+                    open_finished(path)?,
+                    &settings.budget()?,
+                )?);
+            }
+            work(session.as_mut().expect("it was opened above"))
+        })
+    }
+
+    pub(super) fn context_and_session(
+        &mut self,
+    ) -> Result<(&RunContext, &mut QuerySession), Error> {
+        self.with_session(|_| Ok(()))?;
+        Ok((
+            &self.context,
+            self.session.as_mut().expect("it was opened above"),
+        ))
+    }
+}
+
+impl Summary {
+    fn of(catalog: &mut Catalog) -> Result<Self, Error> {
+        let subdomains = catalog.subdomains()?;
+        let worst = subdomains.iter().map(|r| r.quality.worst);
+        Ok(Self {
+            n_tets: subdomains.iter().map(|r| r.tets).sum(),
+            n_vertices: subdomains.iter().map(|r| r.vertices).sum(),
+            bytes: subdomains.iter().map(|r| r.bytes).sum(),
+            digest: catalog.digest()?[0].to_string(),
+            is_verified: catalog.state()? == StoreState::Verified,
+            worst_quality: worst.fold(0.0, f64::max),
+            labels: catalog.labels()?,
+            regions: catalog.regions()?,
+            interfaces: catalog.interfaces()?,
+            subdomains,
+        })
+    }
+}
+
+/// Opens a store that is finished. Errors: `store-unfinished`.
+pub(crate) fn open_finished(path: &Path) -> Result<Catalog, Error> {
+    let mut catalog = Catalog::open(path)?;
+    match catalog.state()?.is_finished() {
+        true => Ok(catalog),
+        false => Err(StoreError::Unfinished {
+            path: path.to_owned(),
+        }
+        .into()),
+    }
+}

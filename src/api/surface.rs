@@ -1,0 +1,277 @@
+//! The surface that is meshed.
+
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use tetdb_schema::catalog::SurfaceSource;
+use xxhash_rust::xxh3::Xxh3;
+
+use super::error::{Error, Remedy};
+use super::{Settings, guarded};
+use crate::geom::Point;
+use crate::io::read::read_surface;
+use crate::io::write;
+use crate::samples::{PREFIX, SampleSpec};
+use crate::storage::{ScratchSpace, attempt};
+use crate::surface::{self, SurfaceBuilder, orient_alike_in};
+
+/// A triangle surface with labels, read or given, all triangles turned like their neighbors.
+///
+/// Is not: validated; that happens before a mesh is begun.
+#[derive(Clone, Debug)]
+pub struct Surface {
+    pub(crate) inner: surface::Surface,
+    pub(crate) sources: Vec<SurfaceSource>,
+    /// Triangles that were turned round.
+    pub(crate) turned: usize,
+}
+
+/// What stands for the path of a surface that was given as arrays: a file in the store.
+pub(crate) const IN_STORE: &str = "store:surface.obj";
+
+impl Surface {
+    /// Reads files as one surface, each file a label unless it has labels of its own.
+    ///
+    /// STL, PLY, OBJ, OFF, MEDIT, Gmsh and TetGen files. Errors: what cannot be read, with its line or byte.
+    pub fn read<P: AsRef<Path>>(files: impl IntoIterator<Item = P>) -> Result<Self, Error> {
+        let paths: Vec<PathBuf> = files.into_iter().map(|p| p.as_ref().to_owned()).collect();
+        guarded(&Settings::new(), || {
+            Self::read_in(&paths)?.oriented(&ScratchSpace::boundless())
+        })
+    }
+
+    /// A surface of `points` and `triangles`, each three positions in `points`, counter-clockwise seen from outside or all the other way.
+    ///
+    /// Shape: `labels`, if given, runs parallel to `triangles`; a name each. The store keeps a copy of such a surface.
+    /// Errors: `index-out-of-range`, `not-a-number`, `count-mismatch` name the triangle or the point.
+    pub fn from_arrays(
+        points: &[[f64; 3]],
+        triangles: &[[u32; 3]],
+        labels: Option<&[&str]>,
+    ) -> Result<Self, Error> {
+        if let Some(labels) = labels.filter(|labels| labels.len() != triangles.len()) {
+            let message = format!("{} labels for {} triangles", labels.len(), triangles.len());
+            return Err(
+                Error::new("count-mismatch", message).with_help("give one label for each triangle")
+            );
+        }
+        guarded(&Settings::new(), || {
+            Self::built(points, triangles, labels)?.oriented(&ScratchSpace::boundless())
+        })
+    }
+
+    /// A generated surface such as `balls,count=100,seed=1` or `box,h=0.1`.
+    ///
+    /// Errors: `bad-sample` names what is wrong.
+    pub fn sample(spec: &str) -> Result<Self, Error> {
+        guarded(&Settings::new(), || {
+            Self::generated(&format!("{PREFIX}{}", spec.trim_start_matches(PREFIX)))?
+                .oriented(&ScratchSpace::boundless())
+        })
+    }
+
+    /// Number of triangles.
+    pub fn n_triangles(&self) -> usize {
+        self.inner.n_triangles()
+    }
+
+    /// Number of vertices, those with the same coordinates counted once.
+    pub fn n_vertices(&self) -> usize {
+        self.inner.n_vertices()
+    }
+
+    /// Low and high corner of the smallest box around it.
+    pub fn bounds(&self) -> [[f64; 3]; 2] {
+        let bounds = self.inner.bounds();
+        [bounds.low, bounds.high].map(|p| p.to_array())
+    }
+
+    /// Names of the labels.
+    pub fn labels(&self) -> &[String] {
+        &self.inner.label_names
+    }
+
+    /// Whether it can be meshed. Errors: the first of the worst defects, with its place and the number of all.
+    pub fn validate(&self) -> Result<(), Error> {
+        guarded(&Settings::new(), || {
+            surface::validate(&self.inner).accept()?;
+            Ok(())
+        })
+    }
+
+    /// Reads files, or one sample, within a scratch space.
+    pub(crate) fn load(words: &[String]) -> Result<Self, Error> {
+        let samples = words.iter().filter(|word| word.starts_with(PREFIX)).count();
+        match (samples, words) {
+            (1, [word]) => Self::generated(word),
+            (0, _) => Self::read_in(&words.iter().map(PathBuf::from).collect::<Vec<_>>()),
+            _ => Err(
+                Error::new("usage", "a sample cannot be joined with other surfaces")
+                    .with_help("write it to a file first")
+                    .with_remedy(Remedy::General),
+            ),
+        }
+    }
+
+    /// Turns all triangles like their neighbors.
+    pub(crate) fn oriented(mut self, scratch: &ScratchSpace) -> Result<Self, Error> {
+        self.inner.shrink();
+        let orientation = attempt(|| orient_alike_in(&mut self.inner, scratch))?;
+        self.turned = orientation.flipped.len();
+        Ok(self)
+    }
+
+    /// What is worth knowing of how it was read.
+    pub(crate) fn notes(&self) -> Vec<String> {
+        let mut notes: Vec<String> = self.inner.notes.iter().map(ToString::to_string).collect();
+        if self.turned > 0 {
+            notes.push(format!(
+                "{} triangles were turned to run like their neighbors",
+                self.turned
+            ));
+        }
+        notes
+    }
+
+    /// Puts a copy of a surface that came from no file into the store's folder. Errors: the disk.
+    pub(crate) fn keep_in(&self, store: &Path) -> Result<(), Error> {
+        if self.sources.iter().any(|source| source.path == IN_STORE) {
+            write::surface(&self.inner, &in_store(store))?;
+        }
+        Ok(())
+    }
+
+    /// The surface a store at `store` was made from, as it was read then.
+    ///
+    /// Errors: `unreadable-file`; `surface-changed` when a file is not what it was.
+    pub(crate) fn of_record(
+        sources: &[SurfaceSource],
+        store: &Path,
+        scratch: &ScratchSpace,
+    ) -> Result<Self, Error> {
+        let mut surface = match sources {
+            [only] if only.path == IN_STORE => {
+                let mut surface = Self::read_in(&[in_store(store)])?;
+                surface.sources = vec![given(&surface.inner)];
+                surface
+            }
+            _ => Self::load(&sources.iter().map(|s| s.path.clone()).collect::<Vec<_>>())?,
+        };
+        for (then, now) in sources.iter().zip(&surface.sources) {
+            if (then.bytes, then.hash) != (now.bytes, now.hash) {
+                return Err(Error::new(
+                    "surface-changed",
+                    "the surface is not the one the store was begun with",
+                )
+                .at(&now.path)
+                .with_help("put the old file back, or name the surface to compare with")
+                .with_remedy(Remedy::General));
+            }
+        }
+        surface = surface.oriented(scratch)?;
+        Ok(surface)
+    }
+
+    fn of(inner: surface::Surface, sources: Vec<SurfaceSource>) -> Self {
+        Self {
+            inner,
+            sources,
+            turned: 0,
+        }
+    }
+
+    fn generated(word: &str) -> Result<Self, Error> {
+        let spec = SampleSpec::parse(word)?;
+        let source = SurfaceSource {
+            path: spec.canonical(),
+            bytes: 0,
+            hash: [0; 2],
+        };
+        Ok(Self::of(spec.make()?.into(), vec![source]))
+    }
+
+    fn read_in(paths: &[PathBuf]) -> Result<Self, Error> {
+        let inner = read_surface(paths)?;
+        let sources: Result<_, Error> = paths.iter().map(|p| source(p)).collect();
+        Ok(Self::of(inner, sources?))
+    }
+
+    fn built(
+        points: &[[f64; 3]],
+        triangles: &[[u32; 3]],
+        labels: Option<&[&str]>,
+    ) -> Result<Self, Error> {
+        let mut builder = SurfaceBuilder::new();
+        builder.begin_file("arrays");
+        for (i, point) in points.iter().enumerate() {
+            if point.iter().any(|x| !x.is_finite()) {
+                return Err(
+                    Error::new("not-a-number", "a coordinate is not a finite number")
+                        .at(format!("point {i}")),
+                );
+            }
+            builder.vertex(Point::from_array(*point))?;
+        }
+        for (i, triangle) in triangles.iter().enumerate() {
+            let name = labels.map_or("surface", |labels| labels[i]);
+            let label = builder.label(name);
+            builder.triangle(*triangle, label)?;
+        }
+        builder.end_file()?;
+        let inner = builder.finish();
+        let source = given(&inner);
+        Ok(Self::of(inner, vec![source]))
+    }
+}
+
+/// What identifies a surface that came from no file.
+fn given(surface: &surface::Surface) -> SurfaceSource {
+    let mut hash = Xxh3::new();
+    for x in surface.points.iter().flat_map(|p| p.to_array()) {
+        hash.update(&x.to_le_bytes());
+    }
+    for (t, triangle) in (0u32..).zip(&surface.triangles) {
+        triangle.iter().for_each(|v| hash.update(&v.to_le_bytes()));
+        hash.update(surface.label_name(t).as_bytes());
+    }
+    SurfaceSource {
+        path: IN_STORE.to_owned(),
+        bytes: 0,
+        hash: halves(&hash),
+    }
+}
+
+/// Where a store keeps the copy of a surface that came from no file.
+pub(crate) fn in_store(store: &Path) -> PathBuf {
+    store.join(IN_STORE.trim_start_matches("store:"))
+}
+
+/// What identifies a file later: absolute path, length, hash.
+pub(crate) fn source(path: &Path) -> Result<SurfaceSource, Error> {
+    let io = |e: std::io::Error| {
+        Error::new("unreadable-file", format!("the file cannot be read: {e}")).at(path.display())
+    };
+    let absolute = std::path::absolute(path).map_err(io)?;
+    let mut file = std::fs::File::open(path).map_err(io)?;
+    let mut hash = Xxh3::new();
+    let (mut buffer, mut bytes) = (vec![0; 1 << 16], 0);
+    loop {
+        let n = file.read(&mut buffer).map_err(io)?;
+        if n == 0 {
+            break;
+        }
+        bytes += n as u64;
+        hash.update(&buffer[..n]);
+    }
+    Ok(SurfaceSource {
+        path: absolute.to_string_lossy().into_owned(),
+        bytes,
+        hash: halves(&hash),
+    })
+}
+
+/// Low half first.
+fn halves(hash: &Xxh3) -> [u64; 2] {
+    let digest = hash.digest128();
+    [digest as u64, (digest >> 64) as u64]
+}

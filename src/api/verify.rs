@@ -1,0 +1,135 @@
+//! Is it a valid mesh of its surface?
+
+use std::path::Path;
+
+use super::Settings;
+use super::error::{Error, Remedy};
+use crate::audit::{self, Level, Report, VerifyOptions};
+use crate::storage::attempt;
+use crate::store::{Catalog, StoreError};
+use crate::surface::Surface;
+use tetdb_schema::catalog::StoreState;
+
+/// How much is checked, each level with all before it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum VerifyLevel {
+    /// Positive volumes, faces paired, input triangles present, interfaces alike on both sides.
+    #[default]
+    Geometry,
+    /// Also how many free faces are locally Delaunay.
+    Delaunay,
+}
+
+/// What a verification found.
+#[derive(Clone, Debug)]
+pub struct Verification {
+    pub(crate) report: Report,
+}
+
+impl Verification {
+    /// Whether nothing is wrong.
+    pub fn is_valid(&self) -> bool {
+        self.report.valid
+    }
+
+    /// Tetrahedra that were checked.
+    pub fn n_tets(&self) -> u64 {
+        self.report.tets
+    }
+
+    /// Kinds of what is wrong, in words, with how often each occurs.
+    pub fn findings(&self) -> Vec<(String, u64)> {
+        let findings = self.report.findings.iter();
+        findings.map(|(f, &n)| (format!("{f:?}"), n)).collect()
+    }
+}
+
+/// Verifies within `cap`, less what the surface holds. What is damaged is noted, all of it.
+pub(crate) fn check(
+    store: &mut Catalog,
+    settings: &Settings,
+    surface: Option<&Surface>,
+    cap: u64,
+    level: Level,
+) -> Result<Report, Error> {
+    let held = surface.map_or(0, Surface::bytes) as u64;
+    let memory = cap.saturating_sub(held).min(1 << 30) / 2;
+    let options = VerifyOptions {
+        level,
+        memory_bytes: memory as usize,
+        temp_dir: std::env::temp_dir(),
+    };
+    let verified = attempt(|| audit::verify(store, surface, &options));
+    let error = match verified.map_err(StoreError::from) {
+        Ok(Ok(report)) => return Ok(report),
+        Ok(Err(error)) | Err(error) => error,
+    };
+    if error.is_damage()
+        && let Ok(Ok(list)) = attempt(|| audit::damage(store))
+    {
+        list.iter()
+            .for_each(|damage| settings.note(damage.to_string()));
+    }
+    Err(error.into())
+}
+
+/// A valid report in one line.
+pub(crate) fn sentence(report: &Report) -> String {
+    let mut text = format!(
+        "verified: {} tetrahedra, all positive by exact signs; {} inner faces paired",
+        report.tets, report.inner_faces
+    );
+    if report.against_input {
+        text += &format!(
+            "; all {} input triangles present, no vertex added on the surface",
+            report.triangles_present + report.triangles_unfilled
+        );
+    }
+    if report.delaunay_tested > 0 {
+        text += &format!(
+            "; {:.3} % of free faces locally Delaunay",
+            100.0 * report.delaunay_share()
+        );
+    }
+    text
+}
+
+/// The error for an invalid mesh.
+pub(crate) fn invalid(report: &Report, path: &Path) -> Error {
+    let findings: Vec<String> = report
+        .findings
+        .iter()
+        .map(|(f, n)| format!("{n} x {f:?}"))
+        .collect();
+    let first = report.offenders.first();
+    Error::new(
+        "invalid-mesh",
+        format!(
+            "{} is not a valid mesh: {}",
+            path.display(),
+            findings.join(", ")
+        ),
+    )
+    .at(first.map_or_else(String::new, |o| {
+        format!(
+            "{} {} {:?}",
+            o.tet.as_deref().unwrap_or("-"),
+            o.what,
+            o.points
+        )
+    }))
+    .with_help("a full verification lists examples of each kind")
+    .with_remedy(Remedy::General)
+}
+
+/// Puts on record that a finished store was verified.
+pub(crate) fn record(path: &Path) -> Result<(), Error> {
+    let mut catalog = Catalog::open_writable(path)?;
+    if catalog.state()? < StoreState::Verified {
+        catalog.commit(|step| {
+            step.set_state(StoreState::Verified);
+            Ok(())
+        })?;
+    }
+    Ok(catalog.close()?)
+}

@@ -1,0 +1,222 @@
+//! What belongs to one run and to no other in the process: its threads, its token, its panics.
+//!
+//! The context is an attribute of a thread: the caller's while a call lasts, that of the run's own pool, and of the workers it starts.
+//! Parallel work goes through [`parallel`], which sends it to the pool of the run instead of the process's.
+
+use std::cell::RefCell;
+use std::panic::PanicHookInfo;
+use std::sync::{Arc, Condvar, Mutex, Once, OnceLock, PoisonError};
+
+use rayon::{Scope, ThreadPool, ThreadPoolBuilder};
+
+use super::CancelToken;
+
+thread_local! {
+    static CURRENT: RefCell<Option<RunContext>> = const { RefCell::new(None) };
+}
+
+/// The context of one run. Clones are the same run.
+#[derive(Clone)]
+pub struct RunContext {
+    run: Arc<Run>,
+    /// `None` on the pool's own threads, which are where parallel work belongs already.
+    pool: Option<Arc<Pool>>,
+}
+
+struct Run {
+    cancel: CancelToken,
+    panic: Mutex<Option<CaughtPanic>>,
+}
+
+/// A panic inside a run.
+#[derive(Clone, Debug)]
+pub struct CaughtPanic {
+    /// The message and where it came from.
+    pub message: String,
+    /// redb asserts what it reads: a damaged tree ends there.
+    pub is_in_redb: bool,
+}
+
+/// Threads, begun when they are first needed and ended with the run.
+struct Pool {
+    n_threads: usize,
+    run: Arc<Run>,
+    threads: OnceLock<Option<ThreadPool>>,
+    left: Arc<(Mutex<usize>, Condvar)>,
+}
+
+impl RunContext {
+    /// A run with `n_threads` threads of its own, which ends when `cancel` says so.
+    pub fn new(n_threads: usize, cancel: CancelToken) -> Self {
+        catch_messages();
+        let run = Arc::new(Run {
+            cancel,
+            panic: Mutex::new(None),
+        });
+        let pool = Pool {
+            n_threads: n_threads.max(1),
+            run: Arc::clone(&run),
+            threads: OnceLock::new(),
+            left: Arc::default(),
+        };
+        Self {
+            run,
+            pool: Some(Arc::new(pool)),
+        }
+    }
+
+    /// The context of this thread, for a thread it starts.
+    pub fn current() -> Option<Self> {
+        CURRENT.with_borrow(Clone::clone)
+    }
+
+    /// Does `work` as part of this run.
+    pub fn enter<T>(&self, work: impl FnOnce() -> T) -> T {
+        struct Restore(Option<RunContext>);
+        impl Drop for Restore {
+            fn drop(&mut self) {
+                CURRENT.set(self.0.take());
+            }
+        }
+        let _restore = Restore(CURRENT.replace(Some(self.clone())));
+        work()
+    }
+
+    /// The first panic of the run, which is then forgotten.
+    pub fn take_panic(&self) -> Option<CaughtPanic> {
+        let mut panic = (self.run.panic.lock()).unwrap_or_else(PoisonError::into_inner);
+        panic.take()
+    }
+
+    #[inline]
+    pub(super) fn is_current_cancelled() -> bool {
+        CURRENT.with_borrow(|current| {
+            current
+                .as_ref()
+                .is_some_and(|c| c.run.cancel.is_cancelled())
+        })
+    }
+}
+
+impl Pool {
+    /// `None` where the system gives no threads: the caller's does all the work then.
+    fn threads(&self) -> Option<&ThreadPool> {
+        let begin = || {
+            let (run, left) = (Arc::clone(&self.run), Arc::clone(&self.left));
+            let gone = Arc::clone(&self.left);
+            let built = ThreadPoolBuilder::new()
+                .num_threads(self.n_threads)
+                .start_handler(move |_| {
+                    let run = Arc::clone(&run);
+                    CURRENT.set(Some(RunContext { run, pool: None }));
+                    *left.0.lock().unwrap_or_else(PoisonError::into_inner) += 1;
+                })
+                .exit_handler(move |_| {
+                    *gone.0.lock().unwrap_or_else(PoisonError::into_inner) -= 1;
+                    gone.1.notify_all();
+                })
+                .build();
+            built.ok()
+        };
+        self.threads.get_or_init(begin).as_ref()
+    }
+}
+
+impl Drop for Pool {
+    /// Waits for the threads: none is left when a run has ended.
+    fn drop(&mut self) {
+        if let Some(threads) = self.threads.take() {
+            // A thread that has not begun yet is counted only when it does.
+            threads.as_ref().map(|pool| pool.broadcast(|_| ()));
+            drop(threads);
+            let left = self.left.0.lock().unwrap_or_else(PoisonError::into_inner);
+            drop(self.left.1.wait_while(left, |n| *n > 0));
+        }
+    }
+}
+
+/// Does `work` where its parallel parts belong: in the pool of this run.
+pub fn parallel<T: Send>(work: impl FnOnce() -> T + Send) -> T {
+    let pool = RunContext::current().and_then(|context| context.pool);
+    match pool.as_ref().and_then(|pool| pool.threads()) {
+        Some(threads) => threads.install(work),
+        None => work(),
+    }
+}
+
+/// A scope whose tasks go to the pool of this run; `work` itself stays on this thread.
+pub fn in_place_scope<'scope, T>(work: impl FnOnce(&Scope<'scope>) -> T) -> T {
+    let pool = RunContext::current().and_then(|context| context.pool);
+    match pool.as_ref().and_then(|pool| pool.threads()) {
+        Some(threads) => threads.in_place_scope(work),
+        None => rayon::in_place_scope(work),
+    }
+}
+
+/// Threads of this run.
+pub fn n_threads() -> usize {
+    let pool = RunContext::current().and_then(|context| context.pool);
+    pool.map_or_else(rayon::current_num_threads, |pool| pool.n_threads)
+}
+
+/// From now on the message of a panic inside a run goes to the run; all others go where they went before.
+fn catch_messages() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        let before = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |info| match RunContext::current() {
+            Some(context) => context.run.remember(info),
+            None => before(info),
+        }));
+    });
+}
+
+impl Run {
+    fn remember(&self, info: &PanicHookInfo) {
+        let file = info.location().map_or("", std::panic::Location::file);
+        let mut panic = self.panic.lock().unwrap_or_else(PoisonError::into_inner);
+        panic.get_or_insert_with(|| CaughtPanic {
+            message: info.to_string(),
+            is_in_redb: std::path::Path::new(file)
+                .iter()
+                .any(|part| part.to_string_lossy().starts_with("redb-")),
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rayon::prelude::*;
+
+    use super::*;
+    use crate::storage::{StorageError, attempt, check_cancelled};
+
+    #[test]
+    fn a_token_ends_its_own_run_and_no_other() {
+        let tokens = [CancelToken::new(), CancelToken::new()];
+        let runs = tokens.clone().map(|token| RunContext::new(2, token));
+        tokens[0].cancel();
+        let look =
+            || attempt(|| parallel(|| (0..4).into_par_iter().for_each(|_| check_cancelled())));
+        assert!(matches!(runs[0].enter(look), Err(StorageError::Cancelled)));
+        assert!(runs[1].enter(look).is_ok());
+        assert!(look().is_ok(), "what is no run is not cancelled");
+        tokens[0].reset();
+        assert!(runs[0].enter(look).is_ok());
+    }
+
+    #[test]
+    fn a_panic_is_kept_by_its_run_and_no_thread_is_left() {
+        let run = RunContext::new(3, CancelToken::new());
+        let left = Arc::clone(&run.pool.as_ref().expect("it has a pool").left);
+        let ended = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+            run.enter(|| parallel(|| panic!("a broken invariant")))
+        }));
+        assert!(ended.is_err());
+        let panic = run.take_panic().expect("it was caught");
+        assert!(panic.message.contains("a broken invariant") && !panic.is_in_redb);
+        assert_eq!(run.enter(n_threads), 3);
+        drop(run);
+        assert_eq!(*left.0.lock().expect("nobody panics with it"), 0);
+    }
+}
