@@ -4,9 +4,10 @@
 
 #[doc(inline)]
 pub use api::{
-    Answers, Bytes, CODES, CancelToken, CodeRow, Error, Event, Existing, ExportOptions, Exported,
-    Length, Mesher, Optimize, Order, Prediction, Query, Regions, Remesh, Remeshed, Seal, Settings,
-    Sizes, Store, Subdomains, Summary, Surface, Verification, VerifyLevel,
+    Answers, Bytes, CODES, CancelToken, CheckReport, CodeRow, ColorBy, Error, Event, Existing,
+    ExportOptions, Exported, Length, Mesher, Optimize, Order, Prediction, Query, Regions, Remesh,
+    Remeshed, Seal, Settings, Sizes, Snapped, Snapshot, Store, Subdomains, Summary, Surface,
+    Verification, VerifyLevel,
 };
 
 /// What the front door hands out of the modules below: sub-domains and their records, hits of a query.
@@ -24,6 +25,8 @@ use house::*;
 
 /// The modules, from the ground up; a module imports only from those above its group's line.
 #[path = "."]
+// The lists of names at the head of each module are for those who have `internals`, too.
+#[cfg_attr(not(feature = "internals"), allow(unused_imports))]
 mod house {
     // Floor 0.
     pub mod expr;

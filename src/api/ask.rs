@@ -199,7 +199,7 @@ impl Iterator for Answers<'_> {
     }
 }
 
-fn condition_of(text: &str) -> Result<Expression, Error> {
+pub(super) fn condition_of(text: &str) -> Result<Expression, Error> {
     let wrong = |error: ExprError| {
         Error::new("bad-expression", &error)
             .at(format!("character {} of {text}", error.at + 1))

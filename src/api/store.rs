@@ -173,6 +173,11 @@ impl Store {
         })
     }
 
+    /// Whether another store holds the same mesh, bit for bit, in the same sub-domains.
+    pub fn is_same_mesh(&self, other: &Self) -> bool {
+        self.summary.digest == other.summary.digest
+    }
+
     /// Sub-domains of it again, with other sizes or because they are damaged.
     pub fn remesh(self) -> Remesh {
         Remesh::new(self.path, self.settings)

@@ -7,13 +7,14 @@ use tetdb_schema::catalog::SurfaceSource;
 use xxhash_rust::xxh3::Xxh3;
 
 use super::error::{Error, Remedy};
-use super::{Settings, guarded};
+use super::{Length, Settings, guarded};
 use crate::geom::Point;
 use crate::io::read::read_surface;
 use crate::io::write;
 use crate::samples::{PREFIX, SampleSpec};
+use crate::sizing::{SizeField, SizeOptions};
 use crate::storage::{ScratchSpace, attempt};
-use crate::surface::{self, SurfaceBuilder, orient_alike_in};
+use crate::surface::{self, SplitReport, SurfaceBuilder, orient_alike_in, split};
 
 /// A triangle surface with labels, read or given, all triangles turned like their neighbors.
 ///
@@ -24,6 +25,60 @@ pub struct Surface {
     pub(crate) sources: Vec<SurfaceSource>,
     /// Triangles that were turned round.
     pub(crate) turned: usize,
+}
+
+/// What is wrong with a surface, and what its triangles allow.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct CheckReport {
+    /// Each defect as the error it would be, some hundred at most.
+    pub defects: Vec<Error>,
+    /// All defects.
+    pub n_defects: u64,
+    /// Edges with one triangle.
+    pub n_open_edges: usize,
+    /// Triangles with an angle of less than five degrees.
+    pub n_small_angles: usize,
+    /// Triangles on which no tetrahedron can have q < 2.
+    pub n_forcing_triangles: usize,
+    /// Least, median and greatest edge length.
+    pub edges: [f64; 3],
+    /// Enclosed volume, of a closed surface.
+    pub volume: Option<f64>,
+}
+
+impl CheckReport {
+    /// Whether it can be meshed.
+    pub fn is_valid(&self) -> bool {
+        self.n_defects == 0
+    }
+
+    fn of(validation: &surface::Validation, fitness: &surface::Fitness) -> Self {
+        let defects = validation.defects.iter();
+        let defects = defects.map(|d| Error::new(d.code(), d).at(d.place()).with_help(d.help()));
+        Self {
+            defects: defects.collect(),
+            n_defects: validation.n_defects,
+            n_open_edges: validation.closedness.open.len(),
+            n_small_angles: fitness.small_angles as usize,
+            n_forcing_triangles: fitness.forcing_triangles as usize,
+            edges: [fitness.edge_min, fitness.edge_median, fitness.edge_max],
+            volume: fitness.volume,
+        }
+    }
+}
+
+/// Points are joined up to this share of the box diagonal at most: beyond it a surface loses its shape.
+pub(crate) const WELD_SHARE_MAX: f64 = 0.01;
+
+/// Divides triangles until their edges are as short as `options` want them; where the surface is finer, sizes grow from its edges.
+pub(crate) fn refine(
+    surface: &surface::Surface,
+    options: &SizeOptions,
+) -> Result<(surface::Surface, SplitReport), Error> {
+    let wanted = (options.hsiz).map_or(f64::INFINITY, |l| l.resolve(surface.bounds().diagonal()));
+    let field = SizeField::build(&surface.points, &surface.triangles, options)?;
+    Ok(split(surface, &|p| field.h(p).min(wanted))?)
 }
 
 /// What stands for the path of a surface that was given as arrays: a file in the store.
@@ -95,6 +150,53 @@ impl Surface {
     pub fn validate(&self) -> Result<(), Error> {
         guarded(&Settings::new(), || {
             surface::validate(&self.inner).accept()?;
+            Ok(())
+        })
+    }
+
+    /// All that is wrong with it, and what its triangles allow. Is not: an error, however much is wrong.
+    pub fn check(&self) -> Result<CheckReport, Error> {
+        guarded(&Settings::new(), || {
+            let validation = surface::validate(&self.inner);
+            let fitness = surface::fitness(&self.inner, &validation.closedness);
+            Ok(CheckReport::of(&validation, &fitness))
+        })
+    }
+
+    /// Without triangles of no area and repeated ones, divided where vertices lie exactly on open edges, turned alike; and points nearer
+    /// than `weld`, a share of the box diagonal up to 0.01, joined.
+    pub fn repaired(mut self, weld: Option<f64>) -> Result<Self, Error> {
+        if let Some(share) = weld.filter(|share| !(*share > 0.0 && *share <= WELD_SHARE_MAX)) {
+            let message = format!(
+                "{share} is not a share of the box diagonal, expected above 0 and at most {WELD_SHARE_MAX}"
+            );
+            return Err(Error::new("bad-size", message));
+        }
+        guarded(&Settings::new(), || {
+            let distance = weld.map(|share| share * self.inner.bounds().diagonal());
+            surface::repair(&mut self.inner, distance);
+            self.sources = vec![given(&self.inner)];
+            Ok(self)
+        })
+    }
+
+    /// The same surface in triangles with edges of `h` at most, where they are longer; new vertices lie on the old triangles.
+    ///
+    /// Errors: defects; a length without a meaning.
+    pub fn refined(mut self, h: Length) -> Result<Self, Error> {
+        guarded(&Settings::new(), || {
+            surface::validate(&self.inner).accept()?;
+            let options = SizeOptions::parse(Some(&h.to_string()), None, None, None)?;
+            (self.inner, _) = refine(&self.inner, &options)?;
+            self.sources = vec![given(&self.inner)];
+            Ok(self)
+        })
+    }
+
+    /// Writes it as `.stl`, `.off`, `.obj` or `.ply`. Errors: `unknown-format`, `lossy-format`; the disk.
+    pub fn write(&self, out: impl AsRef<Path>) -> Result<(), Error> {
+        guarded(&Settings::new(), || {
+            write::surface(&self.inner, out.as_ref())?;
             Ok(())
         })
     }

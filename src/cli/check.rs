@@ -10,11 +10,9 @@ use super::console::Console;
 use super::failure::Failure;
 use super::input::{self, Space};
 use crate::api;
+use crate::api::surface::WELD_SHARE_MAX;
 use crate::io::write;
 use crate::surface::{Repair, Surface, repair};
-
-/// Points are joined up to this share of the box diagonal at most: beyond it a surface loses its shape.
-const WELD_SHARE_MAX: f64 = 0.01;
 
 /// A repair that was made.
 struct Mended {

@@ -6,9 +6,9 @@ use super::args::RefineSurfaceArgs;
 use super::console::Console;
 use super::failure::Failure;
 use super::input::{self, Space};
+use crate::api::surface::refine;
 use crate::io::write;
-use crate::sizing::{SizeField, SizeOptions};
-use crate::surface::split;
+use crate::sizing::SizeOptions;
 
 pub fn run(args: &RefineSurfaceArgs, console: &Console) -> Result<u8, Failure> {
     let options = SizeOptions::parse(Some(&args.hsiz), None, None, args.hgrad.as_deref())?;
@@ -18,10 +18,7 @@ pub fn run(args: &RefineSurfaceArgs, console: &Console) -> Result<u8, Failure> {
         console,
     )?;
     let surface = input.inner;
-    let wanted = (options.hsiz).map_or(f64::INFINITY, |l| l.resolve(surface.bounds().diagonal()));
-    // Where the surface is finer than asked for, sizes grow from its edges as inside a mesh.
-    let field = SizeField::build(&surface.points, &surface.triangles, &options)?;
-    let (fine, report) = split(&surface, &|p| field.h(p).min(wanted))?;
+    let (fine, report) = refine(&surface, &options)?;
     input::validated(&fine, Space::Boundless)?;
     write::surface(&fine, &args.output)?;
     let (triangles, vertices) = (fine.n_triangles(), fine.n_vertices());
