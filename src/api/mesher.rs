@@ -340,7 +340,8 @@ impl Mesher {
         settings: &Settings,
     ) -> Result<pipeline::Summary, Error> {
         // The old store is only replaced once the new one is sealed.
-        let replaces = path.exists() && !Catalog::is_vacant(path);
+        let replaces =
+            self.existing == Existing::Replace && path.exists() && !Catalog::is_vacant(path);
         let place = match replaces {
             true => replace::new_of(path),
             false => path.to_owned(),

@@ -88,8 +88,9 @@ impl RunContext {
         panic.take()
     }
 
+    /// Whether the run of this thread is to end.
     #[inline]
-    pub(super) fn is_current_cancelled() -> bool {
+    pub fn is_current_cancelled() -> bool {
         CURRENT.with_borrow(|current| {
             current
                 .as_ref()
