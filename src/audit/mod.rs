@@ -18,6 +18,7 @@ mod claims;
 mod compare;
 mod damage;
 mod interface;
+mod options;
 mod pairing;
 mod pass;
 mod report;
@@ -28,6 +29,7 @@ use std::path::{Path, PathBuf};
 
 pub use compare::{Population, Qualities, qualities};
 pub use damage::damage;
+pub use options::VerifyOptions;
 pub use report::{Finding, Level, Offender, Report};
 
 use tetdb_schema::digest::Digest;
@@ -35,17 +37,6 @@ use tetdb_schema::digest::Digest;
 use crate::storage::StorageError;
 use crate::store::{Catalog, StoreError};
 use crate::surface::Surface;
-
-/// How to verify.
-#[derive(Clone, Debug)]
-pub struct VerifyOptions {
-    /// The last of the levels to check; those before it are checked too.
-    pub level: Level,
-    /// Bytes for caches, sort buffers and tables together; the tables alone take some 8 MiB.
-    pub memory_bytes: usize,
-    /// Folder for sorted runs; made and removed again below it.
-    pub temp_dir: PathBuf,
-}
 
 /// Checks a sealed store, against its input when that is given.
 ///

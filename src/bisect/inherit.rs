@@ -3,8 +3,8 @@
 //! A facet with a vertex that only one child has lies in that child, with all its tetrahedra. Only those at the core, whose vertices both
 //! may have, are looked up among the required faces there.
 
+use super::child::{Split, word};
 use super::core::SHARED;
-use super::split::{Split, word};
 use crate::mesh::anatomy::FROZEN;
 use crate::mesh::{FaceRef, Workspace, dense};
 use crate::storage::{Pages, Sorted, Sorter, StorageError};

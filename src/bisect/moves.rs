@@ -1,7 +1,6 @@
 //! Moves of tetrahedra from one side of the interface to the other.
 
 use super::core::CoreRim;
-use super::interface::Steps;
 use super::labels::{Labels, face_cost, is_constrained};
 use super::surface::CuttingSurface;
 use crate::mesh::{Mesh, Tet, dense};
@@ -388,5 +387,23 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
         vertices.sort_unstable();
         vertices.dedup();
         vertices
+    }
+}
+
+/// Steps of the choice, for comparing what each brings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Steps {
+    pub minimum_cut: bool,
+    pub vertex_moves: bool,
+    pub tet_moves: bool,
+}
+
+impl Default for Steps {
+    fn default() -> Self {
+        Self {
+            minimum_cut: true,
+            vertex_moves: true,
+            tet_moves: true,
+        }
     }
 }

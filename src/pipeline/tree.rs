@@ -5,9 +5,10 @@
 
 use crate::bisect::{Plane, Zone};
 use crate::geom::{Aabb, Point};
-use crate::mesh::{MESH_STATE_WORDS, MeshState};
+use crate::mesh::{MESH_STATE_WORDS, Mesh, MeshState};
+use crate::pipeline::error::PipelineError;
 use crate::sealed::SealedError;
-use crate::storage::kind;
+use crate::storage::{Backing, DiskPath, Pager, StoreFile, kind};
 use crate::store::{Catalog, StoreError};
 
 /// Numbers of the catalog's blobs.
@@ -213,6 +214,26 @@ pub(in crate::pipeline) fn zones_above(
         zones.push(Zone { cut, surface });
     }
     Ok(zones)
+}
+
+/// Generations from a part to what is made of it.
+pub(in crate::pipeline) const DONE: u32 = 2;
+
+/// Opens a part's mesh from the file `base`.
+pub(in crate::pipeline) fn open_part(
+    part: PartMesh,
+    base: DiskPath,
+    mut backing: Backing,
+    frames: u64,
+) -> Result<Mesh, PipelineError> {
+    backing.base = Some(StoreFile::open_repaired(
+        &base,
+        backing.cache_bytes / 2,
+        false,
+    )?);
+    let mut pager = Pager::new(frames, Some(backing));
+    pager.adopt(part.extents);
+    Ok(Mesh::with_state(pager, part.state))
 }
 
 #[cfg(test)]

@@ -225,3 +225,28 @@ fn hangs(
         on,
     })
 }
+
+/// Pairs of corners of a cell with the squared distance in sides: all 28 of them.
+pub(super) const PAIRS: [(u8, u8, u8); 28] = pairs();
+
+const fn pairs() -> [(u8, u8, u8); 28] {
+    let mut list = [(0, 0, 0); 28];
+    let mut n = 0;
+    let mut distance2 = 1;
+    while distance2 <= 3 {
+        let mut a = 0u8;
+        while a < 8 {
+            let mut b = a + 1;
+            while b < 8 {
+                if (a ^ b).count_ones() == distance2 {
+                    list[n] = (a, b, distance2 as u8);
+                    n += 1;
+                }
+                b += 1;
+            }
+            a += 1;
+        }
+        distance2 += 1;
+    }
+    list
+}

@@ -3,7 +3,7 @@
 use super::SizingError;
 use super::bits::Bits;
 use super::constraints::SizeConstraints;
-use super::corners::Corners;
+use super::corners::{Corners, PAIRS};
 use super::grading::{Grading, bound, close_finite};
 use super::options::Targets;
 use super::seeds::Seeds;
@@ -14,32 +14,8 @@ use crate::storage::{ScratchSpace, SpillVec, check_cancelled, raise};
 /// Rounds of averaging that smooth what was filled in. The graph is shallow (cells grow with the
 /// distance to the surface), so values are within 2 % of the limit after these.
 const FILL_ROUNDS: u32 = 60;
-/// Pairs of corners of a cell with the squared distance in sides: all 28 of them.
-pub(super) const PAIRS: [(u8, u8, u8); 28] = pairs();
 /// The twelve edges of a cell come first in `PAIRS`.
 const N_EDGES: usize = 12;
-
-const fn pairs() -> [(u8, u8, u8); 28] {
-    let mut list = [(0, 0, 0); 28];
-    let mut n = 0;
-    let mut distance2 = 1;
-    while distance2 <= 3 {
-        let mut a = 0u8;
-        while a < 8 {
-            let mut b = a + 1;
-            while b < 8 {
-                if (a ^ b).count_ones() == distance2 {
-                    list[n] = (a, b, distance2 as u8);
-                    n += 1;
-                }
-                b += 1;
-            }
-            a += 1;
-        }
-        distance2 += 1;
-    }
-    list
-}
 
 /// What sizes at corners are made from.
 pub(super) struct Maker<'a> {

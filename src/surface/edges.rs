@@ -1,9 +1,10 @@
 //! Which triangles meet at which edges: holes, repeated and collapsed triangles, parts.
 
 use rayon::prelude::*;
+use robust::Coord;
 
 use super::Surface;
-use super::boundary_loops::{in_line, open_groups};
+use crate::geom::Point;
 use crate::storage::{ScratchSpace, SpillVec, raise};
 
 /// What edges alone tell about a surface.
@@ -290,4 +291,45 @@ impl Groups {
         let (a, b) = (self.root(a), self.root(b));
         self.parent[a.max(b) as usize] = a.min(b);
     }
+}
+
+/// For each open edge the number of its connected group, counted in order of first appearance.
+pub(super) fn open_groups(open: &[(u32, [u32; 2])]) -> Vec<u32> {
+    let vertices = ends(open);
+    let place = |v: u32| {
+        let found = vertices.binary_search(&v);
+        found.expect("every end is in the list") as u32
+    };
+    let mut groups = Groups::new(vertices.len());
+    for (_, [a, b]) in open {
+        groups.join(place(*a), place(*b));
+    }
+    let mut numbers = vec![u32::MAX; vertices.len()];
+    let mut n = 0;
+    open.iter()
+        .map(|(_, [a, _])| {
+            let number = &mut numbers[groups.root(place(*a)) as usize];
+            if *number == u32::MAX {
+                *number = n;
+                n += 1;
+            }
+            *number
+        })
+        .collect()
+}
+
+/// The vertices of open edges, ascending.
+pub(super) fn ends(open: &[(u32, [u32; 2])]) -> Vec<u32> {
+    let mut vertices: Vec<u32> = open.iter().flat_map(|(_, v)| *v).collect();
+    vertices.sort_unstable();
+    vertices.dedup();
+    vertices
+}
+
+/// Whether three points lie on a line, exactly.
+pub(super) fn in_line(a: Point, b: Point, c: Point) -> bool {
+    let flat = |axis: fn(Point) -> Coord<f64>| robust::orient2d(axis(a), axis(b), axis(c)) == 0.0;
+    flat(|p| Coord { x: p.x, y: p.y })
+        && flat(|p| Coord { x: p.y, y: p.z })
+        && flat(|p| Coord { x: p.z, y: p.x })
 }

@@ -5,8 +5,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use super::Result;
 use super::draft::Draft;
+use super::error::Result;
 use super::merged::{Merged, Tet};
 use super::stream::{Stream, word32, word64};
 use crate::storage::{Sorted, Sorter};

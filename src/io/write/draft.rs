@@ -5,7 +5,7 @@ use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use super::{Result, WriteError};
+use super::error::{Result, WriteError};
 
 /// Numbers drafts within the process.
 static NUMBER: AtomicU32 = AtomicU32::new(0);

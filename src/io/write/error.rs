@@ -146,3 +146,6 @@ impl From<SealedError> for WriteError {
         Self::from(StoreError::from(error))
     }
 }
+
+/// What writers return.
+pub(super) type Result<T> = std::result::Result<T, WriteError>;

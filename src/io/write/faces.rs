@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use tetdb_schema::record::{InterfaceFace, NO_TET, SealedFacet};
 
-use super::Result;
+use super::error::Result;
 use super::numbering::PartNumbers;
 use super::stream::{Records, scratch, word32, word64};
 use crate::storage::Sorter;

@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 use tetdb_schema::ids::TetId;
 use tetdb_schema::record::SealedVertex;
 
+use super::error::{Result, WriteError};
 use super::faces::{FaceSorter, FaceSource, Faces};
 use super::numbering::Numbering;
-use super::{Result, WriteError};
 use crate::sealed::SealedError;
 use crate::sealed::{Shape, Subdomain};
 use crate::storage::check_cancelled;

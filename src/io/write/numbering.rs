@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use tetdb_schema::ids::{Owner, SubdomainId, VertexId};
 
-use super::Result;
+use super::error::Result;
 use super::stream::{Records, scratch, word32, word64};
 use crate::sealed::SealedError;
 use crate::storage::{Sorted, Sorter};

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use super::dispatch;
 use super::draft::Draft;
 use super::merged::{FaceSet, Merged, Progress, Scope};
 use super::stream::Stream;
@@ -47,7 +48,7 @@ pub(super) fn write(
             tell(counts.tets + (share * row.tets as f64) as u64, all);
         };
         let mut mesh = Merged::open(store, scope, &dir, memory, Progress::new(&told))?;
-        let made = super::write(format, selection.content, &mut mesh, draft, &piece)?;
+        let made = dispatch::write(format, selection.content, &mut mesh, draft, &piece)?;
         fs::remove_dir_all(&dir).map_err(|e| WriteError::io(&dir, e))?;
         counts.vertices += made.vertices;
         counts.tets += made.tets;

@@ -5,8 +5,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::Result;
 use super::draft::Draft;
+use super::error::Result;
 use super::npy::length;
 use super::stream::{Records, Stream, scratch, word, word64};
 use super::vtu::TETRA;

@@ -4,7 +4,7 @@ use std::fs::{File, OpenOptions};
 use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use super::{Result, WriteError};
+use super::error::{Result, WriteError};
 
 /// Bytes gathered before a write.
 const BUFFER_BYTES: usize = 256 << 10;

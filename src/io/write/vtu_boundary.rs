@@ -7,8 +7,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::Result;
 use super::draft::Draft;
+use super::error::Result;
 use super::merged::Merged;
 use super::stream::{Records, scratch, word64};
 use super::vtu_layout::{Array, Group, Index, Layout};

@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::time::Instant;
 
+use super::common::Common;
+use super::owners::read_owners;
 use super::run::Run;
 use super::stages::{StageFiles, Stages};
-use super::subdomain::Common;
 use crate::bisect::{self, CutPlan, CutReport, Opened, Zone};
 use crate::mesh::{Mesh, Workspace};
 use crate::optimize::Settings;
@@ -14,16 +15,13 @@ use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::Plan;
 use crate::pipeline::progress::{Event, Watcher};
 use crate::pipeline::seal::totals::journal;
-use crate::pipeline::tree::{self, PartMesh, TreePart, blob};
+use crate::pipeline::tree::{self, DONE, PartMesh, TreePart, blob, open_part};
 use crate::pipeline::workers::work_off;
 use crate::sealed::SealedError;
-use crate::storage::{Backing, DiskPath, Pager, PagerStats, StoreFile, attempt};
+use crate::storage::{Backing, DiskPath, Pager, PagerStats, attempt};
 use crate::store::StoreError;
 use crate::topology::{Neighbors, Owners};
 use tetdb_schema::catalog::{NeighborRow, Stage, StoreState, TopologyRow};
-
-/// Generations from a part to what is made of it.
-pub(in crate::pipeline) const DONE: u32 = 2;
 
 /// What a worker needs to bisect a part.
 pub(in crate::pipeline) struct CutJob {
@@ -354,38 +352,6 @@ impl Run<'_> {
         self.frames_used = self.frames_used.max(divided.frames_used);
         Ok([low.mesh, high.mesh])
     }
-}
-
-/// Opens a part's mesh from the file `base`.
-pub(in crate::pipeline) fn open_part(
-    part: PartMesh,
-    base: DiskPath,
-    mut backing: Backing,
-    frames: u64,
-) -> Result<Mesh, PipelineError> {
-    backing.base = Some(StoreFile::open_repaired(
-        &base,
-        backing.cache_bytes / 2,
-        false,
-    )?);
-    let mut pager = Pager::new(frames, Some(backing));
-    pager.adopt(part.extents);
-    Ok(Mesh::with_state(pager, part.state))
-}
-
-/// The owners of a cut's faces.
-pub(in crate::pipeline) fn read_owners(
-    catalog: &mut crate::store::Catalog,
-    cut: u32,
-) -> Result<Owners, StoreError> {
-    let bytes = catalog.blob(blob::OWNERS + cut)?.unwrap_or_default();
-    Owners::from_bytes(&bytes).ok_or_else(|| {
-        StoreError::Sealed(SealedError::Content {
-            path: catalog.dir().to_owned(),
-            subdomain: cut,
-            what: format!("the table of owners of cut {cut} is damaged"),
-        })
-    })
 }
 
 fn neighbors_of(rows: &[TopologyRow]) -> Neighbors {

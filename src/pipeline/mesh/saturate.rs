@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use super::subdomain::Common;
+use super::common::Common;
 use crate::bisect::{OutsideZones, Zone};
 use crate::mesh::{Mesh, Workspace};
 use crate::optimize::{self, OptimizeReport};

@@ -6,17 +6,16 @@ use std::time::Instant;
 use tetdb_schema::ids::SubdomainId;
 
 use super::coarse_snapshot::keep;
-use super::divide::open_part;
+use super::common::Common;
 use super::saturate::{FineReport, fine};
-use crate::bisect::{Method, Zone};
-use crate::geom::Aabb;
+use crate::bisect::Zone;
 use crate::mesh::{Mesh, Workspace};
-use crate::optimize::Mode;
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::Plan;
 use crate::pipeline::progress::Watcher;
-use crate::pipeline::seal::compact::{SealTarget, seal};
-use crate::pipeline::tree::PartMesh;
+use crate::pipeline::seal::compact::seal;
+use crate::pipeline::seal::target::SealTarget;
+use crate::pipeline::tree::{PartMesh, open_part};
 use crate::sealed::{Form, Sealed};
 use crate::sizing::SizeField;
 use crate::storage::{Backing, DiskPath, PagerStats, attempt};
@@ -41,15 +40,6 @@ pub(in crate::pipeline) struct SubdomainJob {
     /// Owners of the faces around it, by cut.
     pub owners: BTreeMap<u32, Owners>,
     pub share: Plan,
-}
-
-/// What is the same for all sub-domains.
-#[derive(Clone, Copy)]
-pub(in crate::pipeline) struct Common<'a> {
-    pub field: &'a SizeField,
-    pub mode: Mode,
-    pub method: Method,
-    pub bounds: Aabb,
 }
 
 /// A finished sub-domain; its file is not yet listed.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use super::resaturate::{Remade, ResaturateSummary};
+use super::summary::{Remade, ResaturateSummary};
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::seal::totals::{journal, totals_of, whole};
 use crate::pipeline::tree::{self, blob};

@@ -5,44 +5,16 @@
 
 use std::collections::BTreeSet;
 
-use super::run::RemeshRun;
+use super::request::Resaturation;
+use super::run::{RemeshRun, whole_field};
 use super::sizes::{NewSizes, Recorded, predicted};
+use super::summary::ResaturateSummary;
 use crate::pipeline::error::PipelineError;
-use crate::pipeline::mesh::FineReport;
 use crate::pipeline::plan::Options;
 use crate::pipeline::progress::Watcher;
-use crate::pipeline::tree::{self, blob};
-use crate::sizing::SizeField;
-use crate::storage::{Budget, PagerStats, attempt};
+use crate::pipeline::tree::blob;
+use crate::storage::{Budget, attempt};
 use crate::store::{Catalog, StoreError};
-use tetdb_schema::catalog::SubdomainRow;
-
-/// What to make again.
-#[derive(Clone, Debug)]
-pub struct Resaturation {
-    pub ranks: BTreeSet<u32>,
-    /// `None`: with the sizes that are recorded.
-    pub sizes: Option<NewSizes>,
-    /// The file of each is damaged: it must become what the catalog says it was, and is no previous version.
-    pub repair: bool,
-}
-
-/// A sub-domain before and after.
-#[derive(Clone, Debug)]
-pub struct Remade {
-    pub before: SubdomainRow,
-    pub after: SubdomainRow,
-    /// `None` where an older version came back.
-    pub fine: Option<FineReport>,
-}
-
-/// What a run did, by rank.
-#[derive(Clone, Debug)]
-pub struct ResaturateSummary {
-    pub parts: Vec<Remade>,
-    pub pages: PagerStats,
-    pub frames_used: usize,
-}
 
 /// What would be made again.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -129,15 +101,4 @@ pub fn changed(
 pub fn asked(catalog: &mut Catalog, rank: u32) -> Result<Option<String>, StoreError> {
     let bytes = catalog.blob(blob::ASKED + rank)?;
     Ok(bytes.map(|bytes| String::from_utf8_lossy(&bytes).into_owned()))
-}
-
-/// The recorded field of the whole.
-pub(in crate::pipeline) fn whole_field(
-    catalog: &mut Catalog,
-    options: &Options,
-) -> Result<SizeField, PipelineError> {
-    let bytes = catalog.blob(blob::SIZE_FIELD)?.unwrap_or_default();
-    let diagonal = tree::bounds(catalog)?.diagonal();
-    let field = SizeField::from_bytes(&bytes)?;
-    Ok(field.with_sources(&options.sizes()?, diagonal)?)
 }

@@ -5,13 +5,15 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::previous::{Previous, VERSIONED};
-use super::resaturate::{Remade, ResaturateSummary, Resaturation, whole_field};
+use super::request::Resaturation;
 use super::sizes::{Recorded, Values};
+use super::summary::{Remade, ResaturateSummary};
 use crate::mesh::Workspace;
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::mesh::coarse_snapshot::reopen;
-use crate::pipeline::mesh::divide::read_owners;
-use crate::pipeline::mesh::subdomain::{Common, FinishedSubdomain, SubdomainJob};
+use crate::pipeline::mesh::common::Common;
+use crate::pipeline::mesh::owners::read_owners;
+use crate::pipeline::mesh::subdomain::{FinishedSubdomain, SubdomainJob};
 use crate::pipeline::plan::{Options, Plan};
 use crate::pipeline::progress::Watcher;
 use crate::pipeline::seal::totals::{SealedTotals, journal, whole};
@@ -356,4 +358,15 @@ impl<'a> RemeshRun<'a> {
         }
         Ok(summary)
     }
+}
+
+/// The recorded field of the whole.
+pub(in crate::pipeline) fn whole_field(
+    catalog: &mut Catalog,
+    options: &Options,
+) -> Result<SizeField, PipelineError> {
+    let bytes = catalog.blob(blob::SIZE_FIELD)?.unwrap_or_default();
+    let diagonal = tree::bounds(catalog)?.diagonal();
+    let field = SizeField::from_bytes(&bytes)?;
+    Ok(field.with_sources(&options.sizes()?, diagonal)?)
 }

@@ -5,36 +5,21 @@
 //! 2. tetrahedra sorted by their new numbers, smallest vertex first, which follows the curve too;
 //! 3. their required faces sorted by vertices and joined with the facets, which so learn their tetrahedra.
 
-use std::collections::BTreeMap;
-
-use tetdb_schema::ids::{Owner, SubdomainId, VertexId};
+use tetdb_schema::ids::{Owner, VertexId};
 use tetdb_schema::leaf::TetPlace;
 use tetdb_schema::page::NONE;
 use tetdb_schema::record::{InterfaceFace, SealedFacet, SealedTet, SealedVertex, tag};
 
 use super::neighbors::Neighbors;
-use crate::geom::{Aabb, HilbertFrame};
+use super::records::{TetRecord, nodes, word};
+use super::target::SealTarget;
+use crate::geom::HilbertFrame;
 use crate::mesh::anatomy::FACES;
 use crate::mesh::{Mesh, VertexTag, dense};
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::progress::{Event, Watcher};
 use crate::sealed::{Form, Sealed, SealedWriter, sorted_face};
-use crate::storage::{DiskPath, Pages, Sorted, Sorter, check_cancelled};
-use crate::topology::Owners;
-
-/// Where and how to seal.
-pub(in crate::pipeline) struct SealTarget<'a> {
-    pub path: &'a DiskPath,
-    pub form: Form,
-    pub scratch: &'a DiskPath,
-    pub subdomain: SubdomainId,
-    pub generation: u32,
-    /// Bytes for sort runs and for the writer together.
-    pub memory: u64,
-    pub bounds: Aabb,
-    /// Owners of the faces of the cuts around it, by cut; without them interface faces are left out.
-    pub owners: Option<&'a BTreeMap<u32, Owners>>,
-}
+use crate::storage::{Pages, Sorted, Sorter, check_cancelled};
 
 /// Writes `mesh` to `target`, in the order and under the numbers of a sealed sub-domain whatever the form. Effects: the mesh's scratch map is used up; `tet_of` must be right for all vertices.
 pub(in crate::pipeline) fn seal<P: Pages>(
@@ -131,9 +116,6 @@ fn vertices<P: Pages>(
     }
     Ok(())
 }
-
-/// Nodes, region and flags of a tetrahedron, 4 + 1 + 1 big-endian words, and a mask of its required faces.
-pub(in crate::pipeline) type TetRecord = [u8; 25];
 
 fn sort_tets<P: Pages>(
     mesh: &mut Mesh<P>,
@@ -314,14 +296,4 @@ fn push_interface_face<P: Pages>(
         tet,
     })?;
     Ok(())
-}
-
-/// The nodes of a tetrahedron, rotated.
-pub(in crate::pipeline) fn nodes(record: &TetRecord) -> [u32; 4] {
-    [0, 4, 8, 12].map(|at| word(record, at))
-}
-
-pub(in crate::pipeline) fn word(record: &[u8], at: usize) -> u32 {
-    let bytes = [record[at], record[at + 1], record[at + 2], record[at + 3]];
-    u32::from_be_bytes(bytes)
 }

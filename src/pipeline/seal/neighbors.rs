@@ -2,7 +2,8 @@
 
 use tetdb_schema::page::NONE;
 
-use super::compact::{SealTarget, TetRecord, nodes, word};
+use super::records::{TetRecord, nodes, word};
+use super::target::SealTarget;
 use crate::mesh::anatomy::FACES;
 use crate::pipeline::error::PipelineError;
 use crate::sealed::sorted_face;
