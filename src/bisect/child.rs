@@ -7,7 +7,7 @@ use super::surface::CuttingSurface;
 use crate::geom::HilbertFrame;
 use crate::mesh::anatomy::{FROZEN, REQUIRED};
 use crate::mesh::{FaceRef, InterfaceFace, Mesh, Workspace, dense, sparse};
-use crate::storage::{Pages, Sorter, StorageError, check_cancelled};
+use crate::storage::{Pages, Sorter, StorageError, check_cancelled, sort_record};
 use tetdb_schema::page::NONE;
 
 /// A child on its way.
@@ -43,11 +43,16 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
         space: &Workspace,
     ) -> Result<(), StorageError> {
         self.meet_core_vertices();
-        let mut sorter = Sorter::<16>::new(space.dir, space.memory);
+        let mut sorter = Sorter::new(space.dir, space.memory);
         for n in 0..self.core_base {
             let (v, met) = (sparse(n), self.core.scratch(n));
             if met != NONE && !is_held(self.core, v) {
-                sorter.push(record(order.index(self.core.point(v)), met, v))?;
+                let key = order.index(self.core.point(v));
+                sorter.push(ChildVertex {
+                    key,
+                    met,
+                    source: v,
+                })?;
             }
         }
         for n in 0..self.host_base {
@@ -58,18 +63,22 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
             if met & SHARED == 0 {
                 if self.is_beside(v) {
                     let key = order.index(self.host.point(v));
-                    sorter.push(record(key, OF_HOST | met, OF_HOST | v))?;
+                    let met = OF_HOST | met;
+                    let source = OF_HOST | v;
+                    sorter.push(ChildVertex { key, met, source })?;
                 }
                 continue;
             }
             // Vertices of the rim have in the core no tag of their own.
             let (copy, met) = (met & !SHARED, self.core.scratch(dense(met & !SHARED)));
             if met != NONE && is_held(self.core, copy) {
-                sorter.push(record(order.index(self.host.point(v)), met, OF_HOST | v))?;
+                let key = order.index(self.host.point(v));
+                let source = OF_HOST | v;
+                sorter.push(ChildVertex { key, met, source })?;
             }
         }
-        for record in sorter.finish()? {
-            let source = word(&record?, 12);
+        for vertex in sorter.finish()? {
+            let source = vertex?.source;
             if source & OF_HOST == 0 {
                 self.add_core_vertex(source);
                 continue;
@@ -316,8 +325,17 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
     }
 }
 
-/// A vertex of the child: its place along the curve, when it was met, where it comes from.
-type VertexRecord = [u8; 16];
+sort_record! {
+    /// A vertex of the child.
+    struct ChildVertex {
+        /// Its place along the curve.
+        key: u64,
+        /// When it was met; [`OF_HOST`] when in the host alone.
+        met: u32,
+        /// Where it comes from: its id, [`OF_HOST`] when that is one of the host.
+        source: u32,
+    }
+}
 
 /// Of a vertex met in the host alone: after those of the core. Of a source: in the host.
 const OF_HOST: u32 = 1 << 31;
@@ -325,17 +343,4 @@ const OF_HOST: u32 = 1 << 31;
 #[inline]
 fn least([a, b, c, d]: [u32; 4]) -> u32 {
     a.min(b).min(c.min(d))
-}
-
-fn record(key: u64, met: u32, source: u32) -> VertexRecord {
-    let mut record: VertexRecord = [0; 16];
-    record[..8].copy_from_slice(&key.to_be_bytes());
-    record[8..12].copy_from_slice(&met.to_be_bytes());
-    record[12..].copy_from_slice(&source.to_be_bytes());
-    record
-}
-
-/// The number at byte `at` of a record.
-pub(super) fn word(record: &[u8], at: usize) -> u32 {
-    u32::from_be_bytes([record[at], record[at + 1], record[at + 2], record[at + 3]])
 }

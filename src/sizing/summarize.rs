@@ -5,7 +5,7 @@ use super::length::Length;
 use super::options::{SizeOptions, Targets};
 use super::seeds::Seeds;
 use super::summary::{Range, SizeSummary, SizeWarning};
-use crate::storage::{ScratchSpace, raise};
+use crate::storage::{ScratchSpace, raise, sort_record};
 
 impl SizeField {
     /// What the field is like, and where its sizes came from. A scratch file that fails unwinds.
@@ -47,15 +47,21 @@ impl SizeField {
     }
 }
 
+sort_record! {
+    /// A number and its weight.
+    struct Weighted {
+        x: f64,
+        weight: f64,
+    }
+}
+
 /// Lowest, weighted median and highest of a list of positive numbers with weights that is not empty.
 fn weighted_range(list: impl Iterator<Item = (f64, f64)>, room: &ScratchSpace) -> Range {
-    let mut sorter = room.sorter::<16>();
+    let mut sorter = room.sorter::<Weighted>();
     let mut total = 0.0;
     for (x, weight) in list {
         total += weight;
-        // Positive numbers sort as their bits do.
-        let key = u128::from(x.to_bits()) << 64 | u128::from(weight.to_bits());
-        let pushed = sorter.push(key.to_be_bytes());
+        let pushed = sorter.push(Weighted { x, weight });
         pushed.unwrap_or_else(|e| raise(e));
     }
     let mut sum = 0.0;
@@ -64,9 +70,8 @@ fn weighted_range(list: impl Iterator<Item = (f64, f64)>, room: &ScratchSpace) -
         median: f64::NAN,
         high: 0.0,
     };
-    for key in sorter.finish().unwrap_or_else(|e| raise(e)) {
-        let key = u128::from_be_bytes(key.unwrap_or_else(|e| raise(e)));
-        let [x, weight] = [(key >> 64) as u64, key as u64].map(f64::from_bits);
+    for next in sorter.finish().unwrap_or_else(|e| raise(e)) {
+        let Weighted { x, weight } = next.unwrap_or_else(|e| raise(e));
         let is_below = sum < 0.5 * total;
         sum += weight;
         if is_below && sum >= 0.5 * total {

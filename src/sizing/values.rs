@@ -9,13 +9,21 @@ use super::options::Targets;
 use super::seeds::Seeds;
 use super::tree::{LATTICE, Leaf, Tree};
 use crate::geom::Point;
-use crate::storage::{ScratchSpace, SpillVec, check_cancelled, raise};
+use crate::storage::{ScratchSpace, SpillVec, check_cancelled, raise, sort_record};
 
 /// Rounds of averaging that smooth what was filled in. The graph is shallow (cells grow with the
 /// distance to the surface), so values are within 2 % of the limit after these.
 const FILL_ROUNDS: u32 = 60;
 /// The twelve edges of a cell come first in `PAIRS`.
 const N_EDGES: usize = 12;
+
+sort_record! {
+    /// A seed and the leaf that holds it.
+    struct LeafSeed {
+        leaf: u32,
+        seed: u32,
+    }
+}
 
 /// What sizes at corners are made from.
 pub(super) struct Maker<'a> {
@@ -73,18 +81,18 @@ impl Maker<'_> {
     /// Seeds are taken leaf by leaf, those of a leaf in their order. What falls on a hanging corner is handed to the corners it hangs on.
     fn gather(&mut self, with_nearest: bool) -> (SpillVec<f32>, Option<SpillVec<f64>>) {
         let (tree, seeds, n) = (self.tree, self.seeds, self.corners.n_corners);
-        let mut by_leaf = self.room.sorter::<8>();
+        let mut by_leaf = self.room.sorter::<LeafSeed>();
         for v in seeds.vertices() {
             let (leaf, _) = tree.leaf_at(lattice_cell(seeds.at(v)));
-            let key = u64::from(leaf) << 32 | u64::from(v);
-            by_leaf.push(key.to_be_bytes()).unwrap_or_else(|e| raise(e));
+            let pushed = by_leaf.push(LeafSeed { leaf, seed: v });
+            pushed.unwrap_or_else(|e| raise(e));
         }
         let by_leaf = by_leaf.finish().unwrap_or_else(|e| raise(e));
         let mut sums = self.room.column(n, [0.0f64; 2]);
         let mut nearest = with_nearest.then(|| self.room.column(n, f64::INFINITY));
-        for key in by_leaf {
-            let key = u64::from_be_bytes(key.unwrap_or_else(|e| raise(e)));
-            let (at, h) = (seeds.at(key as u32), seeds.h(key as u32));
+        for next in by_leaf {
+            let LeafSeed { seed, .. } = next.unwrap_or_else(|e| raise(e));
+            let (at, h) = (seeds.at(seed), seeds.h(seed));
             let cell = lattice_cell(at);
             let (number, level) = tree.leaf_at(cell);
             let anchor = cell.map(|x| x & !((LATTICE >> level) - 1));

@@ -7,7 +7,7 @@ use crate::mesh::{Facet, Mesh, VertexTag};
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::Options;
 use crate::pipeline::progress::{Event, Watcher};
-use crate::storage::{Pages, ScratchSpace, raise};
+use crate::storage::{Keyed, Pages, ScratchSpace, raise};
 use crate::surface::Surface;
 
 /// What the coarse step did.
@@ -96,12 +96,11 @@ pub(in crate::pipeline) fn triangulate<P: Pages>(
 ) -> Result<KernelStats, (u32, Rejected)> {
     let bounds = surface.bounds();
     let frame = HilbertFrame::new(&bounds);
-    let mut order = room.sorter::<12>();
+    let mut order = room.sorter::<Keyed>();
     for (i, &p) in (0u32..).zip(&surface.points) {
-        let mut record = [0; 12];
-        record[..8].copy_from_slice(&insertion_key(&frame, p).to_be_bytes());
-        record[8..].copy_from_slice(&i.to_be_bytes());
-        order.push(record).unwrap_or_else(|e| raise(e));
+        let key = insertion_key(&frame, p);
+        let pushed = order.push(Keyed { key, id: i });
+        pushed.unwrap_or_else(|e| raise(e));
     }
     let order = order.finish().unwrap_or_else(|e| raise(e));
     let mut kernel = Kernel::default();
@@ -109,8 +108,7 @@ pub(in crate::pipeline) fn triangulate<P: Pages>(
     let total = surface.points.len();
     let mut number = room.column(total, 0u32);
     for (k, record) in order.enumerate() {
-        let record = record.unwrap_or_else(|e| raise(e));
-        let i = u32::from_be_bytes([record[8], record[9], record[10], record[11]]);
+        let i = record.unwrap_or_else(|e| raise(e)).id;
         let p = surface.points[i as usize];
         let v = mesh.add_vertex(p, 0.0);
         mesh.set_vertex_attribute(v, VertexTag::Surface, i);

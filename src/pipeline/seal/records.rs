@@ -1,14 +1,57 @@
 //! What is sorted while a sub-domain is sealed.
 
-/// Nodes, region and flags of a tetrahedron, 4 + 1 + 1 big-endian words, and a mask of its required faces.
-pub(in crate::pipeline) type TetRecord = [u8; 25];
+use crate::storage::sort_record;
 
-/// The nodes of a tetrahedron, rotated.
-pub(in crate::pipeline) fn nodes(record: &TetRecord) -> [u32; 4] {
-    [0, 4, 8, 12].map(|at| word(record, at))
+sort_record! {
+    /// A tetrahedron by its new numbers.
+    pub(in crate::pipeline) struct TetRecord {
+        /// Rotated: the least comes first.
+        pub nodes: [u32; 4],
+        pub region: u32,
+        pub flags: u32,
+        /// Bit i: face i is required.
+        pub required: u8,
+    }
 }
 
-pub(in crate::pipeline) fn word(record: &[u8], at: usize) -> u32 {
-    let bytes = [record[at], record[at + 1], record[at + 2], record[at + 3]];
-    u32::from_be_bytes(bytes)
+sort_record! {
+    /// A required face of a tetrahedron.
+    pub(in crate::pipeline) struct RequiredFace {
+        /// Ascending.
+        pub vertices: [u32; 3],
+        pub tet: u32,
+        /// Whether ascending order is odd in the tetrahedron.
+        pub odd: bool,
+    }
+}
+
+sort_record! {
+    /// A facet or an interface face, which is a required face of its tetrahedra.
+    pub(in crate::pipeline) struct Claim {
+        /// Ascending.
+        pub vertices: [u32; 3],
+        pub number: u32,
+        /// Whether ascending order is odd in it.
+        pub odd: bool,
+        /// An interface face, not a facet.
+        pub at_interface: bool,
+    }
+}
+
+sort_record! {
+    /// A face of a tetrahedron.
+    pub(in crate::pipeline) struct TetFace {
+        /// Ascending.
+        pub vertices: [u32; 3],
+        /// 4 · tetrahedron + face.
+        pub place: u32,
+    }
+}
+
+sort_record! {
+    /// Two sides of a face, each as 4 · tetrahedron + face.
+    pub(in crate::pipeline) struct Link {
+        pub from: u32,
+        pub to: u32,
+    }
 }
