@@ -26,11 +26,42 @@ sort_record! {
     }
 }
 
+/// Two sub-domains at a cut.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct CutPair {
+    cut: u32,
+    low: u32,
+    high: u32,
+}
+
+/// The interface faces of a pair.
+#[derive(Clone, Copy, Default, PartialEq)]
+struct SharedFaces {
+    count: u64,
+    digest: Digest,
+}
+
 /// All interface faces of all sub-domains, and the digests by cut and pair, from either side.
 pub(super) struct Interfaces {
     sorter: Sorter<FaceSide>,
-    /// By cut, lower and higher rank: faces and digest from the lower and from the higher side.
-    sides: BTreeMap<(u32, u32, u32), [(u64, Digest); 2]>,
+    /// From the lower and from the higher side.
+    sides: BTreeMap<CutPair, [SharedFaces; 2]>,
+}
+
+impl CutPair {
+    fn of(row: &InterfaceRow) -> Self {
+        let &InterfaceRow { cut, low, high, .. } = row;
+        Self { cut, low, high }
+    }
+}
+
+impl SharedFaces {
+    fn of(row: &InterfaceRow) -> Self {
+        Self {
+            count: row.faces,
+            digest: Digest { lanes: row.digest },
+        }
+    }
 }
 
 impl Interfaces {
@@ -50,10 +81,11 @@ impl Interfaces {
     ) -> Result<(), StorageError> {
         let mixes = corners.map(|c| c.mix);
         let (low, high) = (subdomain.min(face.other), subdomain.max(face.other));
-        let sides = self.sides.entry((face.cut, low, high)).or_default();
+        let cut = face.cut;
+        let sides = self.sides.entry(CutPair { cut, low, high }).or_default();
         let side = &mut sides[usize::from(subdomain != low)];
-        side.0 += 1;
-        side.1.add_face(mixes, face.cut);
+        side.count += 1;
+        side.digest.add_face(mixes, face.cut);
         let mut ids = corners.map(|c| c.id);
         let least = (0..3).min_by_key(|&i| ids[i]).unwrap_or(0);
         ids.rotate_left(least);
@@ -91,23 +123,18 @@ impl Interfaces {
         if !group.is_empty() {
             compare_sides(&group, report);
         }
-        let mut expected: BTreeMap<_, _> = rows
+        let mut expected: BTreeMap<CutPair, SharedFaces> = rows
             .iter()
-            .map(|r| {
-                (
-                    (r.cut, r.low, r.high),
-                    (r.faces, Digest { lanes: r.digest }),
-                )
-            })
+            .map(|row| (CutPair::of(row), SharedFaces::of(row)))
             .collect();
-        for (key, sides) in self.sides {
-            let row = expected.remove(&key);
+        for (pair, sides) in self.sides {
+            let row = expected.remove(&pair);
             if sides[0] != sides[1] || row != Some(sides[0]) {
-                differs(key, report);
+                differs(pair, report);
             }
         }
-        for key in expected.into_keys() {
-            differs(key, report);
+        for pair in expected.into_keys() {
+            differs(pair, report);
         }
         Ok(())
     }
@@ -133,7 +160,7 @@ fn unmatched(side: &FaceSide, what: String, report: &mut Report) {
     });
 }
 
-fn differs((cut, low, high): (u32, u32, u32), report: &mut Report) {
+fn differs(CutPair { cut, low, high }: CutPair, report: &mut Report) {
     let finding = Finding::CatalogDiffers;
     report.find(finding, || {
         let what = format!(
