@@ -53,11 +53,11 @@ pub fn verify(
         let memory = options.memory_bytes / 4;
         let mut part = store.open_subdomain(row.rank, memory)?;
         audit.subdomain(&mut part)?;
-        // Damage of chunks is told with their places by now; what is left is in the tree between them.
+        // Damage of chunks was reported with their places by now; what is left is in the tree between them.
         part.check()?;
     }
     // What is only kept is no part of the mesh, but who wants it one day must not learn of its damage then.
-    if let Some(first) = damage::damage_of_kept(store)?.into_iter().next() {
+    if let Some(first) = damage::damage_of_snapshots(store)?.into_iter().next() {
         return Err(first);
     }
     let interfaces = store.interfaces()?;

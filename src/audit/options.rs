@@ -11,6 +11,6 @@ pub struct VerifyOptions {
     pub level: Level,
     /// Bytes for caches, sort buffers and tables together; the tables alone take some 8 MiB.
     pub memory_bytes: usize,
-    /// Folder for sorted runs; made and removed again below it.
+    /// Folder for sorted runs, which are in a folder of their own below it while they are needed.
     pub temp_dir: PathBuf,
 }

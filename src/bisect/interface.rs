@@ -9,7 +9,7 @@
 
 use rayon::prelude::*;
 
-use super::core::CoreRim;
+use super::core::CoreBoundary;
 use super::flow::{Arc, Graph};
 use super::interface_faces::interface_points;
 use super::labels::{InterfaceMeasures, Labels, face_cost, measure};
@@ -49,7 +49,7 @@ pub struct InterfaceReport {
 pub(super) fn choose<P: Pages>(
     core: &mut Mesh<P>,
     surface: &impl CuttingSurface,
-    rim: &CoreRim,
+    rim: &CoreBoundary,
     steps: Steps,
     natural: Option<&mut Vec<[Point; 3]>>,
 ) -> (InterfaceReport, Labels) {

@@ -92,7 +92,7 @@ pub struct InterfaceFaces {
 
 /// Refines the zone of a cut in `host` and chooses the interface in `core`, which must be empty.
 ///
-/// `progress` is told a stage and what was done of it. Effects: all ids of `host` may change. Errors: the disk.
+/// `progress` receives a stage and how much of it is done. Effects: all ids of `host` may change. Errors: the disk.
 pub fn open<P: Pages, Q: Pages>(
     host: &mut Mesh<P>,
     core: &mut Mesh<Q>,

@@ -1,6 +1,6 @@
 //! A sub-domain between the choice of its interface and its two children.
 
-use super::core::CoreRim;
+use super::core::CoreBoundary;
 use super::labels::Labels;
 use super::report::CutReport;
 use super::zone::Zone;
@@ -9,6 +9,6 @@ use super::zone::Zone;
 pub struct Opened {
     pub zone: Zone,
     pub report: CutReport,
-    pub(super) rim: CoreRim,
+    pub(super) rim: CoreBoundary,
     pub(super) labels: Labels,
 }

@@ -10,7 +10,7 @@ pub struct CutReport {
     pub plane: ChosenPlane,
     pub refine: RefineReport,
     pub interface: InterfaceReport,
-    /// Interface vertices the cut made, which bear its number.
+    /// Interface vertices of the cut, which bear its number.
     pub vertices: u32,
     /// Tetrahedra with a face on the interface, and those whose circumsphere lies in the refined zone.
     pub z_tets: u64,

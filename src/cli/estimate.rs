@@ -122,7 +122,7 @@ pub fn preflight(
     if cap < least {
         let message = format!(
             "the surface and its size field take {}: with a cap of {} too little is left for the mesh",
-            memory::show(estimate.held_bytes(cap)),
+            memory::show(estimate.resident_bytes(cap)),
             memory::show(cap)
         );
         let help = format!("give at least --memory {}MiB", least.div_ceil(1 << 20));

@@ -59,7 +59,7 @@ impl Kernel {
         &self.cavity
     }
 
-    /// Tetrahedra made by the last [`Kernel::fill`].
+    /// Tetrahedra created by the last [`Kernel::fill`].
     pub fn new_tets(&self) -> &[u32] {
         &self.new_tets
     }

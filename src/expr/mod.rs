@@ -1,4 +1,4 @@
-//! The small typed expression language of sizes and queries. This room knows no mesh.
+//! The small typed expression language of sizes and queries. This module knows no mesh.
 //!
 //! | what | how |
 //! |---|---|

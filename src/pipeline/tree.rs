@@ -26,7 +26,7 @@ pub(in crate::pipeline) mod blob {
     pub const OWNERS: u32 = 3 << 20;
     /// Of each sealed sub-domain: regions and interfaces.
     pub const SEALED: u32 = 4 << 20;
-    /// Of each sub-domain made again with other sizes: its size field, and in words what was asked for.
+    /// Of each sub-domain meshed again with other sizes: its size field, and in words what was asked for.
     pub const FIELD: u32 = 5 << 20;
     pub const ASKED: u32 = 6 << 20;
     /// The last three as they were before the last change.

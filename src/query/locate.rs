@@ -202,7 +202,7 @@ fn search_frame(searched: &Searched, search: &mut Search) {
         let tet = &frame.tets[i];
         if !search.settled {
             let id = frame.id(tet);
-            search.look(id, &frame.corners(tet), || frame.found(tet));
+            search.look(id, &frame.corners(tet), || frame.hit(tet));
         }
     });
 }

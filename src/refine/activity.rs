@@ -3,7 +3,7 @@
 use crate::mesh::{Mesh, dense};
 use crate::storage::Pages;
 
-/// Which pages have had tetrahedra made since they were last examined: one byte a page.
+/// Which pages have had new tetrahedra since they were last examined: one byte a page.
 pub(super) struct Activity {
     pages: Vec<bool>,
 }

@@ -24,7 +24,7 @@ const JITTER_FROM: f64 = 2.0;
 const JITTER: f64 = 0.4;
 /// Largest shell that is looked at for required faces.
 const SHELL_MAX: usize = 64;
-/// Edges gathered before their candidates are made and inserted; bounds the memory of a block.
+/// Edges gathered before their candidates are computed and inserted; bounds the memory of a block.
 const EDGES_MAX: usize = 1 << 19;
 
 impl Worker {
@@ -196,7 +196,7 @@ fn division(f: f64, r: f64) -> f64 {
     f - skew * f * (1.0 - f)
 }
 
-/// Three numbers in [-1, 1) made of the bits of a position.
+/// Three numbers in [-1, 1) from the bits of a position.
 fn jitter(p: Point) -> Point {
     let mut state = p
         .to_array()

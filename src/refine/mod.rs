@@ -38,12 +38,12 @@ const BLOCK_TETS: u32 = 32 * 2046;
 const PASSES_MAX: u32 = 40;
 
 /// A mesh that has grown so much since it was numbered along the curve is numbered again: below, a sweep over its pages
-/// jumps between layers made in different passes; above, sorting costs more than it saves.
+/// jumps between layers created in different passes; above, sorting costs more than it saves.
 const GROWTH: f64 = 1.5;
 
 /// Divides edges until none is left to divide.
 ///
-/// The mesh must hold filled regions only, sizes set at all its vertices. `progress` is told the number of vertices
+/// The mesh must hold filled regions only, sizes set at all its vertices. `progress` receives the number of vertices
 /// inserted so far. Effects: new vertices and tetrahedra; all ids may change; `tet_of` is not kept up. Errors: the disk.
 pub fn saturate<P: Pages>(
     mesh: &mut Mesh<P>,

@@ -70,7 +70,7 @@ pub struct SealedWriter {
 impl SealedWriter {
     /// Starts the file of `subdomain` in `generation` at `path`, which must not exist.
     ///
-    /// Errors: the file cannot be made.
+    /// Errors: the file cannot be created.
     pub fn create(
         path: impl Into<DiskPath>,
         subdomain: SubdomainId,

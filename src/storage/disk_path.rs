@@ -66,22 +66,22 @@ impl DiskPath {
     pub fn bytes(&self) -> Result<u64, StorageError> {
         match self.disk.entry(&self.path) {
             Some(Entry::File(bytes)) => Ok(bytes),
-            _ => self.told(Err(io::ErrorKind::NotFound.into())),
+            _ => self.at_path(Err(io::ErrorKind::NotFound.into())),
         }
     }
 
     /// Makes the folder, and those above it that are missing, to last.
     pub fn create_dir_all(&self) -> Result<(), StorageError> {
-        self.told(self.make_dirs())
+        self.at_path(self.create_dirs())
     }
 
-    fn make_dirs(&self) -> io::Result<()> {
+    fn create_dirs(&self) -> io::Result<()> {
         if self.is_dir() {
             return Ok(());
         }
         let folder = self.folder();
         if folder.path != self.path {
-            folder.make_dirs()?;
+            folder.create_dirs()?;
         }
         match self.disk.create_dir(&self.path) {
             Ok(()) => self.disk.sync_dir(&folder.path),
@@ -95,12 +95,12 @@ impl DiskPath {
 
     /// Removes the folder with all that is in it.
     pub fn remove_dir_all(&self) -> Result<(), StorageError> {
-        self.told(self.disk.remove_dir_all(&self.path))
+        self.at_path(self.disk.remove_dir_all(&self.path))
     }
 
     /// Gives what is here another name in the same folder, to last.
     pub fn rename(&self, to: &Self) -> Result<(), StorageError> {
-        to.told(self.disk.rename(&self.path, &to.path))?;
+        to.at_path(self.disk.rename(&self.path, &to.path))?;
         to.folder().sync_dir()
     }
 
@@ -108,27 +108,27 @@ impl DiskPath {
     pub fn remove_file(&self) -> Result<(), StorageError> {
         match self.disk.remove_file(&self.path) {
             Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(()),
-            removed => self.told(removed),
+            removed => self.at_path(removed),
         }
     }
 
     /// Makes the content of the closed file last.
     pub fn sync_file(&self) -> Result<(), StorageError> {
-        self.told(self.disk.sync_file(&self.path))
+        self.at_path(self.disk.sync_file(&self.path))
     }
 
     /// Makes the names in the folder last.
     pub fn sync_dir(&self) -> Result<(), StorageError> {
-        self.told(self.disk.sync_dir(&self.path))
+        self.at_path(self.disk.sync_dir(&self.path))
     }
 
     /// Names in the folder.
     pub fn list(&self) -> Result<Vec<String>, StorageError> {
-        self.told(self.disk.list(&self.path))
+        self.at_path(self.disk.list(&self.path))
     }
 
     /// What was done here, with the path in its error.
-    pub(super) fn told<T>(&self, done: io::Result<T>) -> Result<T, StorageError> {
+    pub(super) fn at_path<T>(&self, done: io::Result<T>) -> Result<T, StorageError> {
         done.map_err(|e| StorageError::io(&self.path, e))
     }
 }

@@ -1,4 +1,4 @@
-//! Pages, cache, budget, transactions. This room knows bytes and records, not geometry.
+//! Pages, cache, budget, transactions. This module knows bytes and records, not geometry.
 //!
 //! # How failure travels
 //! A record is read some twenty million times a second, and nearly always from a resident frame. The

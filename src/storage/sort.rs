@@ -98,7 +98,7 @@ impl<R: SortRecord> Sorter<R> {
             }
             out.flush()
         });
-        run.path.told(written)?;
+        run.path.at_path(written)?;
         self.runs.push(run);
         self.records.clear();
         Ok(())
@@ -127,7 +127,7 @@ impl<R: SortRecord> Sorter<R> {
         for (k, run) in self.runs.drain(..).enumerate() {
             let file = run
                 .path
-                .told(run.path.disk().open_stream(run.path.path()))?;
+                .at_path(run.path.disk().open_stream(run.path.path()))?;
             let mut reader = RunReader {
                 bytes: BufReader::with_capacity(buffer, file),
                 run,
@@ -152,7 +152,7 @@ impl RunReader {
         match self.bytes.read_exact(record.as_mut()) {
             Ok(()) => Ok(Some(record)),
             Err(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => Ok(None),
-            Err(e) => self.run.path.told(Err(e)),
+            Err(e) => self.run.path.at_path(Err(e)),
         }
     }
 }

@@ -39,6 +39,6 @@ pub(super) fn write(
         MeshFormat::Parquet => unreachable!("its pieces are written elsewhere"),
         MeshFormat::Topology => unreachable!("the topology is no mesh"),
     }
-    mesh.tell_end();
+    mesh.report_end();
     Ok(counts)
 }

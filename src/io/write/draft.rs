@@ -42,7 +42,7 @@ impl Draft {
 
     /// A new file that will become `out`, expected to need `bytes`.
     ///
-    /// Errors: less than that is free; the file cannot be made.
+    /// Errors: less than that is free; the file cannot be created.
     pub fn create(&mut self, out: &Path, bytes: u64) -> Result<PathBuf> {
         if let Some(available) = available_bytes(&self.dir).filter(|&free| free < bytes) {
             return Err(WriteError::NoSpace {

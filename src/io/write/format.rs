@@ -51,5 +51,5 @@ impl MeshFormat {
 pub const ENDINGS: &str = if cfg!(feature = "parquet") {
     ".vtu, .pvtu, .mesh, .meshb, .msh, .inp, .npy, .parquet or .json"
 } else {
-    ".vtu, .pvtu, .mesh, .meshb, .msh, .inp, .npy or .json (.parquet needs a build with `--features parquet`)"
+    ".vtu, .pvtu, .mesh, .meshb, .msh, .inp, .npy or .json (.parquet needs a build with the feature `parquet`)"
 };

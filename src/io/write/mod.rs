@@ -4,7 +4,7 @@
 //! local) order, a vertex that several sub-domains share once, and every input triangle that bounds
 //! a filled region as a boundary face, in the order of the input. Or each sub-domain becomes a mesh of its own, numbered as in the
 //! store, and the faces that it shares with others are boundary faces too. All is streamed: memory does not
-//! grow with the mesh. Files are made in a folder beside their place and renamed when they are whole
+//! grow with the mesh. Files are written in a folder beside their place and renamed when they are whole
 //! and synced. Coordinates are never rounded.
 //!
 //! Reading order: [`export`] (what is written, in which format), `pieces` (a file for each sub-domain), `merged` (sub-domains as one mesh),
@@ -58,14 +58,14 @@ use merged::{FaceSet, Merged, Progress, Scope};
 
 /// Writes what `selection` says of the finished mesh of `store` to `out` in the format its extension tells, replacing what is there.
 ///
-/// Holds about `memory_bytes`, and tells progress as (done, total) in records read. The files depend on the
+/// Holds about `memory_bytes`, and reports progress as (done, total) in records read. The files depend on the
 /// mesh alone. Errors: [`WriteError`]; no file of `out`'s name is touched before all are whole.
 pub fn export(
     store: &mut Catalog,
     out: &Path,
     selection: &Selection,
     memory_bytes: usize,
-    tell: &dyn Fn(u64, u64),
+    report: &dyn Fn(u64, u64),
 ) -> Result<ExportReport> {
     let unknown = |known| WriteError::UnknownFormat {
         path: out.to_owned(),
@@ -91,13 +91,13 @@ pub fn export(
             MeshFormat::Topology => topology::write(store, &mut draft, out, memory_bytes)?,
             #[cfg(feature = "parquet")]
             MeshFormat::Parquet => {
-                parquet::write(store, &mut draft, out, selection, memory_bytes, tell)?
+                parquet::write(store, &mut draft, out, selection, memory_bytes, report)?
             }
             MeshFormat::Pvtu => {
-                pieces::write(store, &mut draft, out, selection, memory_bytes, tell)?
+                pieces::write(store, &mut draft, out, selection, memory_bytes, report)?
             }
             _ if selection.pieces => {
-                pieces::write(store, &mut draft, out, selection, memory_bytes, tell)?
+                pieces::write(store, &mut draft, out, selection, memory_bytes, report)?
             }
             _ => {
                 let scope = Scope {
@@ -108,7 +108,7 @@ pub fn export(
                         Content::Interfaces => FaceSet::Interfaces,
                     },
                 };
-                let progress = Progress::new(tell);
+                let progress = Progress::new(report);
                 let dir = draft.dir().to_owned();
                 let mut mesh = Merged::open(store, scope, &dir, memory_bytes, progress)?;
                 dispatch::write(format, selection.content, &mut mesh, &mut draft, out)?

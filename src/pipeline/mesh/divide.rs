@@ -100,11 +100,11 @@ impl CutJob {
         };
         let mut stages = Stages::default();
         if let Some(kept) = &self.kept {
-            kept.keep(&mut host, Stage::Coarse, &mut stages, watch)?;
+            kept.save(&mut host, Stage::Coarse, &mut stages, watch)?;
         }
         let refined = bisect::refine(&mut host, &plan, &space, &progress)?;
         if let Some(kept) = &self.kept {
-            kept.keep(&mut host, Stage::Refined, &mut stages, watch)?;
+            kept.save(&mut host, Stage::Refined, &mut stages, watch)?;
         }
         let faces = self.kept.as_ref().map(|_| &mut stages.faces);
         let opened = bisect::choose(&mut host, &mut core, &plan, refined, faces, &progress);

@@ -19,7 +19,7 @@ use crate::pipeline::plan::estimate::n_subdomains;
 use crate::pipeline::plan::leases::Leases;
 use crate::pipeline::plan::{Estimate, Options, Plan, Prepared, prepare};
 use crate::pipeline::progress::Watcher;
-use crate::pipeline::seal::totals::{SealedTotals, Totals, journal, whole};
+use crate::pipeline::seal::totals::{SealedTotals, Totals, journal, sum_totals};
 use crate::pipeline::tree::{self, DONE, PartMesh, TreePart, blob};
 use crate::pipeline::workers::map_bounded;
 use crate::sizing::{SizeField, SizeSummary, TETS_PER_LOAD};
@@ -399,7 +399,7 @@ impl<'a> Run<'a> {
         let Totals {
             regions,
             interfaces,
-        } = whole(self.catalog, self.n, &BTreeMap::new())?;
+        } = sum_totals(self.catalog, self.n, &BTreeMap::new())?;
         let scratch = self.catalog.scratch_dir()?;
         self.catalog.commit(|step| {
             step.set_regions(&regions);

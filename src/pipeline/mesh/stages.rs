@@ -59,7 +59,7 @@ impl StageFiles {
     }
 
     /// Seals the mesh as it is. Effects: its scratch map is used up. Errors: the disk.
-    pub(in crate::pipeline) fn keep<P: Pages>(
+    pub(in crate::pipeline) fn save<P: Pages>(
         &self,
         mesh: &mut Mesh<P>,
         stage: Stage,

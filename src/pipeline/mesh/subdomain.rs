@@ -5,9 +5,9 @@ use std::time::Instant;
 
 use tetdb_schema::ids::SubdomainId;
 
-use super::coarse_snapshot::keep;
+use super::coarse_snapshot::save;
 use super::common::Common;
-use super::saturate::{FineReport, fine};
+use super::saturate::{FineReport, saturate_and_optimize};
 use crate::bisect::Zone;
 use crate::mesh::{Mesh, Workspace};
 use crate::pipeline::error::PipelineError;
@@ -33,7 +33,7 @@ pub(in crate::pipeline) struct SubdomainJob {
     pub generation: u32,
     /// A size field of its own, in place of that of the whole.
     pub field: Option<SizeField>,
-    /// Where to keep the coarse leaf, if it is to be kept.
+    /// Where to keep the coarse snapshot, if it is to be kept.
     pub kept: Option<DiskPath>,
     pub scratch: DiskPath,
     pub zones: Vec<Zone>,
@@ -48,7 +48,7 @@ pub(in crate::pipeline) struct FinishedSubdomain {
     pub generation: u32,
     pub sealed: Sealed,
     pub kept: Option<CoarseRow>,
-    /// Seconds it took to keep the coarse leaf.
+    /// Seconds it took to keep the coarse snapshot.
     pub keep_s: f64,
     pub fine: FineReport,
     pub pages: PagerStats,
@@ -92,11 +92,11 @@ impl SubdomainJob {
         };
         let (rank, coarse) = (self.part.part.first, self.part.generation);
         let kept = match &self.kept {
-            Some(path) => Some(keep(&mut mesh, path, rank, coarse, self.share.buffers)?),
+            Some(path) => Some(save(&mut mesh, path, rank, coarse, self.share.buffers)?),
             None => None,
         };
         let keep_s = clock.elapsed().as_secs_f64();
-        let fine = fine(
+        let fine = saturate_and_optimize(
             &mut mesh,
             self.field.as_ref().unwrap_or(common.field),
             common,

@@ -1,4 +1,4 @@
-//! Sub-domains made again from their coarse leaves, each alone; what lies around them stays as it is.
+//! Sub-domains meshed again from their coarse snapshots, each alone; what lies around them stays as it is.
 //!
 //! Workers write new files beside the old ones; when all are done, one commit lists the new files and remembers the old as the previous
 //! version. A run that is killed leaves the old mesh or the new one.
@@ -6,7 +6,7 @@
 use std::collections::BTreeSet;
 
 use super::request::Resaturation;
-use super::run::{RemeshRun, whole_field};
+use super::run::{RemeshRun, recorded_field};
 use super::sizes::{NewSizes, Recorded, predicted};
 use super::summary::ResaturateSummary;
 use crate::pipeline::error::PipelineError;
@@ -16,7 +16,7 @@ use crate::pipeline::tree::blob;
 use crate::storage::{Budget, attempt};
 use crate::store::{Catalog, StoreError};
 
-/// What would be made again.
+/// What would be meshed again.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Forecast {
     pub rank: u32,
@@ -25,10 +25,10 @@ pub struct Forecast {
     pub predicted: f64,
 }
 
-/// Makes sub-domains of a finished store again, in one step.
+/// Meshes sub-domains of a finished store again, in one step.
 ///
 /// The result depends on the store and the sizes alone. Interfaces and all other sub-domains stay as they are. Effects: one commit; the
-/// replaced files stay as the previous version, the one before goes. Errors: a sub-domain that is not there or whose coarse leaf
+/// replaced files stay as the previous version, the one before goes. Errors: a sub-domain that is not there or whose coarse snapshot
 /// was not kept; sizes that make no sense. The store is then as it was.
 pub fn resaturate(
     catalog: &mut Catalog,
@@ -83,7 +83,7 @@ pub fn changed(
     sizes: &NewSizes,
     budget: &Budget,
 ) -> Result<BTreeSet<u32>, PipelineError> {
-    let field = whole_field(catalog, options)?;
+    let field = recorded_field(catalog, options)?;
     let recorded = Recorded { whole: &field };
     let mut ranks = BTreeSet::new();
     for row in catalog.subdomains()? {
@@ -95,7 +95,7 @@ pub fn changed(
     Ok(ranks)
 }
 
-/// What was asked for when a sub-domain was last made again with other sizes; `None` for one with those of the whole.
+/// What was asked for when a sub-domain was last meshed again with other sizes; `None` for one with those of the whole.
 ///
 /// Errors: a damaged catalog.
 pub fn asked(catalog: &mut Catalog, rank: u32) -> Result<Option<String>, StoreError> {

@@ -54,7 +54,7 @@ pub(in crate::pipeline) fn seal<P: Pages>(
     Ok(writer.finish()?)
 }
 
-fn tell(watch: &Watcher, stage: &'static str, done: u64, total: u32) {
+fn report_progress(watch: &Watcher, stage: &'static str, done: u64, total: u32) {
     if done.is_multiple_of(65_536) {
         check_cancelled();
         watch(Event {
@@ -110,7 +110,7 @@ fn vertices<P: Pages>(
             tag,
             id,
         })?;
-        tell(watch, "seal vertices", u64::from(local), mesh.n_vertices());
+        report_progress(watch, "seal vertices", u64::from(local), mesh.n_vertices());
     }
     Ok(())
 }
@@ -174,7 +174,7 @@ fn tets(
             let tet = t as u32;
             faces.push(RequiredFace { vertices, tet, odd })?;
         }
-        tell(watch, "seal tetrahedra", t as u64, n_tets);
+        report_progress(watch, "seal tetrahedra", t as u64, n_tets);
     }
     Ok(faces.finish()?)
 }

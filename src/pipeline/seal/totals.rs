@@ -78,7 +78,7 @@ pub(in crate::pipeline) struct Totals {
 }
 
 /// The whole from the totals of all `n` sub-domains; those in `changed` go first.
-pub(in crate::pipeline) fn whole(
+pub(in crate::pipeline) fn sum_totals(
     catalog: &mut Catalog,
     n: u32,
     changed: &BTreeMap<u32, SealedTotals>,
