@@ -12,7 +12,7 @@ use crate::storage::{Backing, DiskPath, Pager, StoreFile, kind};
 use crate::store::{Catalog, StoreError};
 
 /// Numbers of the catalog's blobs.
-pub(in crate::pipeline) mod blob {
+pub(crate) mod blob {
     pub const SIZE_FIELD: u32 = 1;
     /// How many sub-domains there will be.
     pub const SUBDOMAINS: u32 = 3;
@@ -39,18 +39,18 @@ pub(in crate::pipeline) mod blob {
 
 /// Ranks `first..first + count`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::pipeline) struct TreePart {
+pub(crate) struct TreePart {
     pub first: u32,
     pub count: u32,
 }
 
 impl TreePart {
     /// The cut that divides it: the first rank of its high child.
-    pub(in crate::pipeline) fn cut(self) -> u32 {
+    pub(crate) fn cut(self) -> u32 {
         self.first + self.count / 2
     }
 
-    pub(in crate::pipeline) fn children(self) -> [Self; 2] {
+    pub(crate) fn children(self) -> [Self; 2] {
         let low = self.count / 2;
         [
             Self {
@@ -65,12 +65,12 @@ impl TreePart {
     }
 
     /// Share of the load that belongs to the low child.
-    pub(in crate::pipeline) fn low_share(self) -> f64 {
+    pub(crate) fn low_share(self) -> f64 {
         f64::from(self.count / 2) / f64::from(self.count)
     }
 
     /// The cuts above it, from the top, in a tree of `n` sub-domains.
-    pub(in crate::pipeline) fn cuts_above(self, n: u32) -> Vec<u32> {
+    pub(crate) fn cuts_above(self, n: u32) -> Vec<u32> {
         let mut cuts = Vec::new();
         let mut at = Self { first: 0, count: n };
         while at != self {
@@ -84,7 +84,7 @@ impl TreePart {
 
 /// A part's working mesh, as its file holds it.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::pipeline) struct PartMesh {
+pub(crate) struct PartMesh {
     pub part: TreePart,
     pub generation: u32,
     pub state: MeshState,
@@ -96,7 +96,7 @@ pub(in crate::pipeline) struct PartMesh {
 const PART_WORDS: usize = 4 + MESH_STATE_WORDS + 2 * kind::ALL.len();
 
 impl PartMesh {
-    pub(in crate::pipeline) fn to_bytes(self) -> Vec<u8> {
+    pub(crate) fn to_bytes(self) -> Vec<u8> {
         let load = self.load.to_bits();
         let head = [
             self.part.count,
@@ -133,17 +133,14 @@ impl PartMesh {
 }
 
 /// How many sub-domains there will be, once that is decided.
-pub(in crate::pipeline) fn n_subdomains(catalog: &mut Catalog) -> Result<u32, StoreError> {
+pub(crate) fn n_subdomains(catalog: &mut Catalog) -> Result<u32, StoreError> {
     let bytes = catalog.blob(blob::SUBDOMAINS)?.unwrap_or_default();
     let word = bytes.first_chunk().map(|&b| u32::from_le_bytes(b));
     Ok(word.unwrap_or(1))
 }
 
 /// All parts, in order of rank.
-pub(in crate::pipeline) fn parts(
-    catalog: &mut Catalog,
-    n: u32,
-) -> Result<Vec<PartMesh>, StoreError> {
+pub(crate) fn parts(catalog: &mut Catalog, n: u32) -> Result<Vec<PartMesh>, StoreError> {
     let mut parts = Vec::new();
     let mut first = 0;
     while first < n {
@@ -155,14 +152,14 @@ pub(in crate::pipeline) fn parts(
     Ok(parts)
 }
 
-pub(in crate::pipeline) fn bounds_bytes(bounds: &Aabb) -> Vec<u8> {
+pub(crate) fn bounds_bytes(bounds: &Aabb) -> Vec<u8> {
     let corners = [bounds.low, bounds.high].map(|p| p.to_array());
     let numbers = corners.into_iter().flatten();
     numbers.flat_map(f64::to_le_bytes).collect()
 }
 
 /// The box of the surface.
-pub(in crate::pipeline) fn bounds(catalog: &mut Catalog) -> Result<Aabb, StoreError> {
+pub(crate) fn bounds(catalog: &mut Catalog) -> Result<Aabb, StoreError> {
     let bytes = catalog.blob(blob::BOUNDS)?.unwrap_or_default();
     let mut numbers = bytes
         .chunks_exact(8)
@@ -185,7 +182,7 @@ fn damaged(catalog: &Catalog, first: u32) -> StoreError {
     })
 }
 
-pub(in crate::pipeline) fn plane_bytes(plane: &Plane) -> Vec<u8> {
+pub(crate) fn plane_bytes(plane: &Plane) -> Vec<u8> {
     let [x, y, z] = plane.normal.to_array();
     [x, y, z, plane.offset]
         .into_iter()
@@ -194,7 +191,7 @@ pub(in crate::pipeline) fn plane_bytes(plane: &Plane) -> Vec<u8> {
 }
 
 /// The zones of the cuts above `part`.
-pub(in crate::pipeline) fn zones_above(
+pub(crate) fn zones_above(
     catalog: &mut Catalog,
     part: TreePart,
     n: u32,
@@ -217,10 +214,10 @@ pub(in crate::pipeline) fn zones_above(
 }
 
 /// Generations from a part to what is made of it.
-pub(in crate::pipeline) const DONE: u32 = 2;
+pub(crate) const DONE: u32 = 2;
 
 /// Opens a part's mesh from the file `base`.
-pub(in crate::pipeline) fn open_part(
+pub(crate) fn open_part(
     part: PartMesh,
     base: DiskPath,
     mut backing: Backing,

@@ -16,7 +16,7 @@ const TELL_EVERY: u128 = 100;
 ///
 /// Threads of their own, not tasks of the pool: a task that waits for a sort would take up another job meanwhile, and its memory.
 /// Errors: the first of `run` and `commit`; what others finish after it is not committed.
-pub(in crate::pipeline) fn work_off<J: Send, D: Send>(
+pub(crate) fn work_off<J: Send, D: Send>(
     jobs: Vec<J>,
     workers: usize,
     watch: &Watcher,
@@ -41,7 +41,7 @@ pub(in crate::pipeline) fn work_off<J: Send, D: Send>(
 ///
 /// Of thousands of jobs only the next few are drawn up, for each knows the owners of all faces of the cuts above it. `draw` and `commit` share
 /// `state`. Errors: the first of the three.
-pub(in crate::pipeline) fn map_bounded<S, I, J: Send, D: Send>(
+pub(crate) fn map_bounded<S, I, J: Send, D: Send>(
     state: &mut S,
     items: Vec<I>,
     workers: usize,

@@ -36,7 +36,7 @@ pub fn coarse<P: Pages>(
 }
 
 /// [`triangulate`] of a valid surface.
-pub(in crate::pipeline) fn inserted<P: Pages>(
+pub(crate) fn inserted<P: Pages>(
     mesh: &mut Mesh<P>,
     surface: &Surface,
     scratch: &ScratchSpace,
@@ -49,7 +49,7 @@ pub(in crate::pipeline) fn inserted<P: Pages>(
 }
 
 /// The second half, for which the mesh's own facets suffice.
-pub(in crate::pipeline) fn recovered<P: Pages>(
+pub(crate) fn recovered<P: Pages>(
     mesh: &mut Mesh<P>,
     kernel: KernelStats,
     options: &Options,
@@ -88,7 +88,7 @@ fn stage(stage: &'static str) -> Event {
 ///
 /// Vertices are numbered in the order of insertion, so that near vertices share pages; the number in the surface is
 /// kept as the owner's index. Errors: a vertex that is refused, which no vertex of a valid surface is.
-pub(in crate::pipeline) fn triangulate<P: Pages>(
+pub(crate) fn triangulate<P: Pages>(
     mesh: &mut Mesh<P>,
     surface: &Surface,
     scratch: &ScratchSpace,

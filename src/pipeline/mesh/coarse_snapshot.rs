@@ -9,7 +9,7 @@ use crate::store::StoreError;
 use tetdb_schema::catalog::CoarseRow;
 
 /// Writes the working mesh of sub-domain `rank`, which has no gaps, to `path`. Errors: the disk.
-pub(in crate::pipeline) fn save<P: Pages>(
+pub(crate) fn save<P: Pages>(
     mesh: &mut Mesh<P>,
     path: &DiskPath,
     rank: u32,
@@ -42,7 +42,7 @@ pub(in crate::pipeline) fn save<P: Pages>(
 /// Opens a kept mesh as it was: the same ids, in the same order.
 ///
 /// Not restored are sizes and `tet_of`, which the fine step sets anew. Errors: damage; the disk.
-pub(in crate::pipeline) fn reopen(
+pub(crate) fn reopen(
     snapshot: &mut CoarseSnapshot,
     backing: Backing,
     frames: u64,

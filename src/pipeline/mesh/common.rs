@@ -7,7 +7,7 @@ use crate::sizing::SizeField;
 
 /// What is the same for all sub-domains.
 #[derive(Clone, Copy)]
-pub(in crate::pipeline) struct Common<'a> {
+pub(crate) struct Common<'a> {
     pub field: &'a SizeField,
     pub mode: Mode,
     pub method: Method,

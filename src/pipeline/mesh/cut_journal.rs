@@ -8,7 +8,7 @@ use crate::storage::PagerStats;
 use tetdb_schema::catalog::{JournalRow, StoreState};
 
 /// A cut as its row of the journal describes it.
-pub(in crate::pipeline) struct CutJournal<'a> {
+pub(crate) struct CutJournal<'a> {
     pub cut: u32,
     /// The child on the low side.
     pub subdomain: u32,

@@ -19,7 +19,7 @@ use crate::storage::{Backing, DiskPath, Pager, PagerStats, attempt};
 use tetdb_schema::catalog::{Stage, StoreState};
 
 /// What a worker needs to bisect a part.
-pub(in crate::pipeline) struct CutJob {
+pub(crate) struct CutJob {
     pub parent: PartMesh,
     /// The part's file, and those of its children.
     base: DiskPath,
@@ -33,7 +33,7 @@ pub(in crate::pipeline) struct CutJob {
 }
 
 /// A part in two; its files are not yet listed.
-pub(in crate::pipeline) struct Divided {
+pub(crate) struct Divided {
     parent: PartMesh,
     opened: Opened,
     stages: Stages,
@@ -52,11 +52,7 @@ struct Child {
 
 impl CutJob {
     /// Does the whole job; a failed page access ends here.
-    pub(in crate::pipeline) fn run(
-        self,
-        common: Common,
-        watch: &Watcher,
-    ) -> Result<Divided, PipelineError> {
+    pub(crate) fn run(self, common: Common, watch: &Watcher) -> Result<Divided, PipelineError> {
         let divided = attempt(|| self.divide(common, watch))??;
         // Empty by now; thousands of cuts would leave as many folders.
         let _ = self.scratch.remove_dir_all();
@@ -197,7 +193,7 @@ impl CutJob {
 
 impl Run<'_> {
     /// Bisects until no part has more than one sub-domain, as many parts at once as there are threads and memory for.
-    pub(in crate::pipeline) fn divide_all(&mut self) -> Result<Vec<CutReport>, PipelineError> {
+    pub(crate) fn divide_all(&mut self) -> Result<Vec<CutReport>, PipelineError> {
         let mut whole = tree::parts(self.catalog, self.n)?;
         whole.retain(|p| p.part.count > 1);
         let workers = self.plan.workers();

@@ -34,21 +34,17 @@ pub struct HeadStart {
     mesh: Mesh,
     kernel: KernelStats,
     /// What it took.
-    pub(in crate::pipeline) seconds: f64,
+    pub(crate) seconds: f64,
 }
 
 impl HeadStart {
     /// Bytes of frames it holds.
-    pub(in crate::pipeline) fn bytes(&self) -> u64 {
+    pub(crate) fn bytes(&self) -> u64 {
         frames_bytes(&self.mesh)
     }
 
     /// The mesh, with a place for pages that leave memory and `bytes` for frames, which must hold it.
-    pub(in crate::pipeline) fn into_mesh(
-        mut self,
-        bytes: u64,
-        backing: Backing,
-    ) -> (Mesh, KernelStats) {
+    pub(crate) fn into_mesh(mut self, bytes: u64, backing: Backing) -> (Mesh, KernelStats) {
         self.mesh.pages_mut().settle(bytes, backing);
         (self.mesh, self.kernel)
     }

@@ -11,7 +11,7 @@ use tetdb_schema::catalog::{NeighborRow, TopologyRow};
 
 /// An interface face of an earlier cut that a child took over from its parent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(in crate::pipeline) struct InheritedFace {
+pub(crate) struct InheritedFace {
     pub cut: u32,
     /// Number in the cut.
     pub index: u32,
@@ -20,7 +20,7 @@ pub(in crate::pipeline) struct InheritedFace {
 }
 
 /// A cut as far as neighbors are concerned.
-pub(in crate::pipeline) struct NewCut<'a> {
+pub(crate) struct NewCut<'a> {
     pub cut: u32,
     /// Faces of its interface.
     pub faces: u32,
@@ -32,7 +32,7 @@ pub(in crate::pipeline) struct NewCut<'a> {
 }
 
 /// What a cut changes in the catalog's tables of owners and neighbors.
-pub(in crate::pipeline) struct TopologyChange {
+pub(crate) struct TopologyChange {
     /// By cut.
     owners: BTreeMap<u32, Owners>,
     rows: Vec<TopologyRow>,
@@ -95,10 +95,7 @@ impl TopologyChange {
 }
 
 /// The owners of a cut's faces.
-pub(in crate::pipeline) fn read_owners(
-    catalog: &mut Catalog,
-    cut: u32,
-) -> Result<Owners, StoreError> {
+pub(crate) fn read_owners(catalog: &mut Catalog, cut: u32) -> Result<Owners, StoreError> {
     let bytes = catalog.blob(blob::OWNERS + cut)?.unwrap_or_default();
     Owners::from_bytes(&bytes).ok_or_else(|| {
         StoreError::Sealed(SealedError::Content {

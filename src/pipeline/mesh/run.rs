@@ -133,7 +133,7 @@ fn go_on(
     attempt(|| run.steps(surface, new, held, budget))?
 }
 
-pub(in crate::pipeline) struct Run<'a> {
+pub(crate) struct Run<'a> {
     pub catalog: &'a mut Catalog,
     pub options: &'a Options,
     pub field: &'a SizeField,
@@ -195,7 +195,7 @@ impl<'a> Run<'a> {
     }
 
     /// What is the same for all workers.
-    pub(in crate::pipeline) fn common(&self) -> Result<Common<'a>, PipelineError> {
+    pub(crate) fn common(&self) -> Result<Common<'a>, PipelineError> {
         Ok(Common {
             field: self.field,
             mode: self.options.mode()?,
@@ -343,7 +343,7 @@ impl<'a> Run<'a> {
     }
 
     /// A scratch folder of this name.
-    pub(in crate::pipeline) fn scratch(&mut self, name: &str) -> Result<DiskPath, StoreError> {
+    pub(crate) fn scratch(&mut self, name: &str) -> Result<DiskPath, StoreError> {
         let path = self.catalog.scratch_dir()?.join(name);
         path.create_dir_all()?;
         Ok(path)

@@ -22,7 +22,7 @@ pub struct FineReport {
 }
 
 /// Divides and optimizes a coarse mesh; no vertex is added in `zones`, which are final.
-pub(in crate::pipeline) fn saturate_and_optimize<P: Pages>(
+pub(crate) fn saturate_and_optimize<P: Pages>(
     mesh: &mut Mesh<P>,
     field: &SizeField,
     common: Common,

@@ -21,7 +21,7 @@ use tetdb_schema::catalog::{Stage, StageRow};
 const FIRST: u32 = 1 << 30;
 
 /// Where the stages of one cut go.
-pub(in crate::pipeline) struct StageFiles {
+pub(crate) struct StageFiles {
     cut: u32,
     paths: [DiskPath; 2],
     scratch: DiskPath,
@@ -31,7 +31,7 @@ pub(in crate::pipeline) struct StageFiles {
 
 /// The stages of one cut; their files are not yet listed.
 #[derive(Default)]
-pub(in crate::pipeline) struct Stages {
+pub(crate) struct Stages {
     sealed: Vec<(Stage, Sealed)>,
     pub faces: InterfaceFaces,
 }
@@ -41,7 +41,7 @@ fn generation(stage: Stage) -> u32 {
 }
 
 impl StageFiles {
-    pub(in crate::pipeline) fn new(
+    pub(crate) fn new(
         catalog: &Catalog,
         cut: u32,
         scratch: &DiskPath,
@@ -59,7 +59,7 @@ impl StageFiles {
     }
 
     /// Seals the mesh as it is. Effects: its scratch map is used up. Errors: the disk.
-    pub(in crate::pipeline) fn save<P: Pages>(
+    pub(crate) fn save<P: Pages>(
         &self,
         mesh: &mut Mesh<P>,
         stage: Stage,
@@ -84,7 +84,7 @@ impl StageFiles {
 
 impl Stages {
     /// Lists the files.
-    pub(in crate::pipeline) fn describe(&self, zone: &Zone, step: &mut Step) {
+    pub(crate) fn describe(&self, zone: &Zone, step: &mut Step) {
         if self.sealed.is_empty() {
             return;
         }

@@ -23,7 +23,7 @@ use crate::topology::Owners;
 use tetdb_schema::catalog::CoarseRow;
 
 /// What a worker needs to make a sub-domain.
-pub(in crate::pipeline) struct SubdomainJob {
+pub(crate) struct SubdomainJob {
     pub part: PartMesh,
     /// The part's file, the file to make.
     pub base: DiskPath,
@@ -43,7 +43,7 @@ pub(in crate::pipeline) struct SubdomainJob {
 }
 
 /// A finished sub-domain; its file is not yet listed.
-pub(in crate::pipeline) struct FinishedSubdomain {
+pub(crate) struct FinishedSubdomain {
     pub part: PartMesh,
     pub generation: u32,
     pub sealed: Sealed,
@@ -59,7 +59,7 @@ pub(in crate::pipeline) struct FinishedSubdomain {
 
 impl SubdomainJob {
     /// Does the whole job; a failed page access ends here.
-    pub(in crate::pipeline) fn run(
+    pub(crate) fn run(
         self,
         common: Common,
         watch: &Watcher,
@@ -79,7 +79,7 @@ impl SubdomainJob {
     }
 
     /// The same for a mesh already open.
-    pub(in crate::pipeline) fn finish(
+    pub(crate) fn finish(
         self,
         mut mesh: Mesh,
         common: Common,

@@ -357,7 +357,7 @@ fn least_to_prepare(surface: &Surface) -> u64 {
 }
 
 /// How many sub-domains a mesh of so many tetrahedra is made in, and what was asked for when that is more.
-pub(in crate::pipeline) fn n_subdomains(
+pub(crate) fn n_subdomains(
     tets: f64,
     options: &Options,
 ) -> Result<(u32, Option<u32>), PipelineError> {

@@ -11,7 +11,7 @@ use crate::surface::Surface;
 const LEFT_BEHIND: usize = 8;
 
 /// What the ledger has given to a run, and how it is shared out.
-pub(in crate::pipeline) struct Leases {
+pub(crate) struct Leases {
     pub plan: Plan,
     surface: Lease,
     surface_bytes: usize,

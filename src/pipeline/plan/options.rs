@@ -118,7 +118,7 @@ impl Options {
     }
 
     /// Fewest tetrahedra of a sub-domain.
-    pub(in crate::pipeline) fn subdomain_tets_min(&self) -> f64 {
+    pub(crate) fn subdomain_tets_min(&self) -> f64 {
         match self.trial.subdomains_small {
             true => 1.0,
             false => TETS_MIN,
@@ -158,13 +158,13 @@ impl Options {
     }
 
     /// [`Options::region_policy`], or an error that names the word.
-    pub(in crate::pipeline) fn regions(&self) -> Result<RegionPolicy, PipelineError> {
+    pub(crate) fn regions(&self) -> Result<RegionPolicy, PipelineError> {
         self.region_policy()
             .ok_or_else(|| unknown("--regions", &self.regions))
     }
 
     /// [`Options::optimize_mode`], or an error that names the word.
-    pub(in crate::pipeline) fn mode(&self) -> Result<Mode, PipelineError> {
+    pub(crate) fn mode(&self) -> Result<Mode, PipelineError> {
         self.optimize_mode()
             .ok_or_else(|| unknown("--optimize", &self.optimize))
     }

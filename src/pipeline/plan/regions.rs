@@ -8,7 +8,7 @@ use crate::surface::Surface;
 /// What `sizes` asks of regions of `domain`.
 ///
 /// Errors: a number or label that no filled region has.
-pub(in crate::pipeline) fn region_sizes<'a>(
+pub(crate) fn region_sizes<'a>(
     domain: &Domain<'a>,
     sizes: &SizeOptions,
     scratch: &ScratchSpace,

@@ -79,14 +79,14 @@ pub fn forget(catalog: &mut Catalog) -> Result<usize, PipelineError> {
 }
 
 /// Blobs of which there is a previous version: where they are, where those are.
-pub(in crate::pipeline) const VERSIONED: [(u32, u32); 3] = [
+pub(crate) const VERSIONED: [(u32, u32); 3] = [
     (blob::SEALED, blob::SEALED_BEFORE),
     (blob::FIELD, blob::FIELD_BEFORE),
     (blob::ASKED, blob::ASKED_BEFORE),
 ];
 
 /// The previous version, and the lengths of its blobs.
-pub(in crate::pipeline) struct Previous {
+pub(crate) struct Previous {
     pub rows: Vec<SubdomainRow>,
     blobs: Vec<(u32, usize)>,
 }

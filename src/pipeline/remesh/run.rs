@@ -27,7 +27,7 @@ use crate::store::{Catalog, StoreError};
 use tetdb_schema::catalog::{CoarseRow, StoreState, SubdomainRow};
 
 /// One run.
-pub(in crate::pipeline) struct RemeshRun<'a> {
+pub(crate) struct RemeshRun<'a> {
     pub catalog: &'a mut Catalog,
     options: &'a Options,
     what: &'a Resaturation,
@@ -361,7 +361,7 @@ impl<'a> RemeshRun<'a> {
 }
 
 /// The recorded field of the whole.
-pub(in crate::pipeline) fn recorded_field(
+pub(crate) fn recorded_field(
     catalog: &mut Catalog,
     options: &Options,
 ) -> Result<SizeField, PipelineError> {

@@ -26,7 +26,7 @@ pub enum Values {
 
 impl Values {
     /// Memory held, in bytes.
-    pub(in crate::pipeline) fn bytes(&self) -> u64 {
+    pub(crate) fn bytes(&self) -> u64 {
         let (Self::Tets(h) | Self::Vertices(h)) = self;
         8 * h.len() as u64
     }
@@ -62,7 +62,7 @@ impl SizeConstraint for Scaled<'_> {
 }
 
 /// Fields as the catalog has them.
-pub(in crate::pipeline) struct Recorded<'a> {
+pub(crate) struct Recorded<'a> {
     pub whole: &'a SizeField,
 }
 
@@ -156,7 +156,7 @@ impl Recorded<'_> {
 }
 
 /// Tetrahedra to expect of a sub-domain made with `field`: so many times those it has as its load is larger.
-pub(in crate::pipeline) fn predicted(
+pub(crate) fn predicted(
     catalog: &mut Catalog,
     rank: u32,
     [old, new]: [&SizeField; 2],

@@ -22,7 +22,7 @@ use crate::sealed::{Form, Sealed, SealedWriter, sorted_face};
 use crate::storage::{Keyed, Pages, Sorted, Sorter, check_cancelled};
 
 /// Writes `mesh` to `target`, in the order and under the numbers of a sealed sub-domain whatever the form. Effects: the mesh's scratch map is used up; `tet_of` must be right for all vertices.
-pub(in crate::pipeline) fn seal<P: Pages>(
+pub(crate) fn seal<P: Pages>(
     mesh: &mut Mesh<P>,
     target: &SealTarget,
     watch: &Watcher,

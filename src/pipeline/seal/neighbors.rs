@@ -10,7 +10,7 @@ use crate::sealed::sorted_face;
 use crate::storage::{Sorted, Sorter, check_cancelled};
 
 /// The four neighbors of each tetrahedron in turn.
-pub(in crate::pipeline) struct Neighbors {
+pub(crate) struct Neighbors {
     /// Of every face with another side.
     links: std::iter::Peekable<Sorted<Link>>,
     tet: u32,

@@ -4,7 +4,7 @@ use crate::storage::sort_record;
 
 sort_record! {
     /// A tetrahedron by its new numbers.
-    pub(in crate::pipeline) struct TetRecord {
+    pub(crate) struct TetRecord {
         /// Rotated: the least comes first.
         pub nodes: [u32; 4],
         pub region: u32,
@@ -16,7 +16,7 @@ sort_record! {
 
 sort_record! {
     /// A required face of a tetrahedron.
-    pub(in crate::pipeline) struct RequiredFace {
+    pub(crate) struct RequiredFace {
         /// Ascending.
         pub vertices: [u32; 3],
         pub tet: u32,
@@ -27,7 +27,7 @@ sort_record! {
 
 sort_record! {
     /// A facet or an interface face, which is a required face of its tetrahedra.
-    pub(in crate::pipeline) struct Claim {
+    pub(crate) struct Claim {
         /// Ascending.
         pub vertices: [u32; 3],
         pub number: u32,
@@ -40,7 +40,7 @@ sort_record! {
 
 sort_record! {
     /// A face of a tetrahedron.
-    pub(in crate::pipeline) struct TetFace {
+    pub(crate) struct TetFace {
         /// Ascending.
         pub vertices: [u32; 3],
         /// 4 · tetrahedron + face.
@@ -50,7 +50,7 @@ sort_record! {
 
 sort_record! {
     /// Two sides of a face, each as 4 · tetrahedron + face.
-    pub(in crate::pipeline) struct Link {
+    pub(crate) struct Link {
         pub from: u32,
         pub to: u32,
     }

@@ -10,7 +10,7 @@ use crate::storage::DiskPath;
 use crate::topology::Owners;
 
 /// Where and how to seal.
-pub(in crate::pipeline) struct SealTarget<'a> {
+pub(crate) struct SealTarget<'a> {
     pub path: &'a DiskPath,
     pub form: Form,
     pub scratch: &'a DiskPath,

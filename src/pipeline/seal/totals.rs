@@ -14,13 +14,13 @@ use tetdb_schema::catalog::{InterfaceRow, JournalRow, Measure, RegionRow, StoreS
 
 /// Regions and interfaces of a sealed sub-domain, kept until all are there.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(in crate::pipeline) struct SealedTotals {
+pub(crate) struct SealedTotals {
     pub regions: BTreeMap<u32, RegionTotals>,
     pub interfaces: Vec<InterfaceSide>,
 }
 
 impl SealedTotals {
-    pub(in crate::pipeline) fn of(sealed: &Sealed) -> Self {
+    pub(crate) fn of(sealed: &Sealed) -> Self {
         Self {
             regions: sealed.regions.clone(),
             interfaces: sealed.interfaces.clone(),
@@ -28,7 +28,7 @@ impl SealedTotals {
     }
 
     /// Number of regions, three words of each, then five of each interface.
-    pub(in crate::pipeline) fn to_bytes(&self) -> Vec<u8> {
+    pub(crate) fn to_bytes(&self) -> Vec<u8> {
         let mut words = vec![self.regions.len() as u64];
         for (&region, totals) in &self.regions {
             words.extend([u64::from(region), totals.tets, totals.volume.to_bits()]);
@@ -41,7 +41,7 @@ impl SealedTotals {
     }
 
     /// The inverse of [`SealedTotals::to_bytes`].
-    pub(in crate::pipeline) fn from_bytes(bytes: &[u8]) -> Option<Self> {
+    pub(crate) fn from_bytes(bytes: &[u8]) -> Option<Self> {
         let words: Vec<u64> = bytes
             .chunks_exact(8)
             .map(|b| u64::from_le_bytes(std::array::from_fn(|i| b[i])))
@@ -71,14 +71,14 @@ impl SealedTotals {
 }
 
 /// What sub-domains sum up to.
-pub(in crate::pipeline) struct Totals {
+pub(crate) struct Totals {
     pub regions: Vec<RegionRow>,
     /// By cut.
     pub interfaces: BTreeMap<u32, Vec<InterfaceRow>>,
 }
 
 /// The whole from the totals of all `n` sub-domains; those in `changed` go first.
-pub(in crate::pipeline) fn sum_totals(
+pub(crate) fn sum_totals(
     catalog: &mut Catalog,
     n: u32,
     changed: &BTreeMap<u32, SealedTotals>,
@@ -121,7 +121,7 @@ pub(in crate::pipeline) fn sum_totals(
 }
 
 /// The totals of a sub-domain, kept in the blobs that begin with `first`.
-pub(in crate::pipeline) fn totals_of(
+pub(crate) fn totals_of(
     catalog: &mut Catalog,
     first: u32,
     rank: u32,
@@ -137,7 +137,7 @@ pub(in crate::pipeline) fn totals_of(
 }
 
 /// A row of the journal for a step that began at `clock`.
-pub(in crate::pipeline) fn journal(
+pub(crate) fn journal(
     state: StoreState,
     step: &str,
     clock: Instant,
