@@ -54,7 +54,7 @@ pub struct VertexCache {
 impl VertexCache {
     /// A cache for a sub-domain of this form whose vertex chunks start at `firsts`.
     ///
-    /// Errors: the decoder cannot be made.
+    /// Errors: the decoder cannot be created.
     pub fn new(
         form: Form,
         (subdomain, generation): (u32, u32),

@@ -14,7 +14,7 @@ use tetdb_schema::record::{InterfaceFace, SealedFacet, SealedTet, SealedVertex};
 use super::SealedError;
 use super::batch::Batch;
 use super::form::{Cut, Cutter};
-use super::totals::{Totals, array, count_open};
+use super::totals::{RegionTotals, Totals, array, count_open};
 use super::{FacePairs, Form, VertexCache};
 use crate::geom::{Aabb, Point};
 use crate::storage::{DiskPath, StoreFile};
@@ -28,14 +28,6 @@ pub struct InterfaceSide {
     pub other: u32,
     pub faces: u64,
     pub digest: Digest,
-}
-
-/// What a region has in this sub-domain.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub struct RegionTotals {
-    pub tets: u64,
-    /// Summed in the sealed order.
-    pub volume: f64,
 }
 
 /// What was sealed.
@@ -78,7 +70,7 @@ pub struct SealedWriter {
 impl SealedWriter {
     /// Starts the file of `subdomain` in `generation` at `path`, which must not exist.
     ///
-    /// Errors: the file cannot be made.
+    /// Errors: the file cannot be created.
     pub fn create(
         path: impl Into<DiskPath>,
         subdomain: SubdomainId,

@@ -61,7 +61,7 @@ impl StoreFile {
     ) -> Result<Self, StorageError> {
         let mut builder = Database::builder();
         builder.set_cache_size(cache_bytes);
-        let file = path.told(path.disk().create(path.path()))?;
+        let file = path.at_path(path.disk().create(path.path()))?;
         let db = guarded(|| builder.create_with_backend(backend(file)));
         let mut file = Self {
             handle: Some(Handle::Writer(Box::new(db.map_err(|e| e.at(path.path()))?))),
@@ -282,7 +282,7 @@ impl Drop for StoreFile {
     fn drop(&mut self) {
         self.table = None;
         let handle = self.handle.take();
-        // redb looks at its tree once more when it closes. What it may find was told already, or is found by who opens the file next.
+        // redb looks at its tree once more when it closes. What it may find was reported already, or is found by who opens the file next.
         let _ = caught(|| drop(handle));
     }
 }

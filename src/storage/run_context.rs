@@ -9,7 +9,7 @@ use std::sync::{Arc, Condvar, Mutex, Once, OnceLock, PoisonError};
 
 use rayon::{Scope, ThreadPool, ThreadPoolBuilder};
 
-use super::CancelToken;
+use super::cancel_token::CancelToken;
 
 thread_local! {
     static CURRENT: RefCell<Option<RunContext>> = const { RefCell::new(None) };

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use bytemuck::Pod;
 
 use super::paged_vec::{FRAMES_MIN, PAGE_BYTES, PagedVec, SharedPagedVec, per_page};
-use super::{Budget, DiskPath, Lease, Sorter, StorageError};
+use super::{Budget, DiskPath, Lease, SortRecord, Sorter, StorageError};
 
 /// Memory for arrays and sorts, and a folder for those it does not hold.
 #[derive(Clone)]
@@ -99,7 +99,7 @@ impl ScratchSpace {
     }
 
     /// Sorts in a quarter of what is left.
-    pub fn sorter<const N: usize>(&self) -> Sorter<N> {
+    pub fn sorter<R: SortRecord>(&self) -> Sorter<R> {
         match &self.dir {
             Some(dir) => Sorter::new(dir, self.available() / 4),
             None => Sorter::new("", u64::MAX),

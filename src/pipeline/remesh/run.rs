@@ -5,16 +5,18 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::previous::{Previous, VERSIONED};
-use super::resaturate::{Remade, ResaturateSummary, Resaturation, whole_field};
+use super::request::Resaturation;
 use super::sizes::{Recorded, Values};
+use super::summary::{Remade, ResaturateSummary};
 use crate::mesh::Workspace;
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::mesh::coarse_snapshot::reopen;
-use crate::pipeline::mesh::divide::read_owners;
-use crate::pipeline::mesh::subdomain::{Common, FinishedSubdomain, SubdomainJob};
+use crate::pipeline::mesh::common::Common;
+use crate::pipeline::mesh::owners::read_owners;
+use crate::pipeline::mesh::subdomain::{FinishedSubdomain, SubdomainJob};
 use crate::pipeline::plan::{Options, Plan};
 use crate::pipeline::progress::Watcher;
-use crate::pipeline::seal::totals::{SealedTotals, journal, whole};
+use crate::pipeline::seal::totals::{SealedTotals, journal, sum_totals};
 use crate::pipeline::tree::{self, PartMesh, blob};
 use crate::pipeline::workers::map_bounded;
 use crate::sealed::SealedError;
@@ -94,7 +96,7 @@ impl<'a> RemeshRun<'a> {
             *newest = file.generation.max(*newest);
         }
         Ok(Self {
-            field: Arc::new(whole_field(catalog, options)?),
+            field: Arc::new(recorded_field(catalog, options)?),
             last,
             n: tree::n_subdomains(catalog)?,
             catalog,
@@ -125,7 +127,7 @@ impl<'a> RemeshRun<'a> {
         for (row, _) in &self.rows {
             let field = match &self.what.sizes {
                 Some(sizes) => {
-                    let made = recorded.made_new(self.catalog, row.rank, sizes, from, memory)?;
+                    let made = recorded.build_new(self.catalog, row.rank, sizes, from, memory)?;
                     from += row.tets as usize;
                     Some(made)
                 }
@@ -279,7 +281,7 @@ impl<'a> RemeshRun<'a> {
                 return Err(StoreError::Sealed(SealedError::Content {
                     path: self.catalog.dir().to_owned(),
                     subdomain: rank,
-                    what: "made again it is not what the catalog says it was".to_owned(),
+                    what: "meshed again, it is not what the catalog says it was".to_owned(),
                 })
                 .into());
             }
@@ -288,7 +290,7 @@ impl<'a> RemeshRun<'a> {
                 old_blobs.push((then + rank, self.catalog.blob(now + rank)?));
             }
         }
-        let regions = whole(self.catalog, self.n, &totals)?.regions;
+        let regions = sum_totals(self.catalog, self.n, &totals)?.regions;
         let dropped = Previous::of(self.catalog)?;
         let (what, rows, clock) = (self.what, &self.rows, self.clock);
         let asked = what.sizes.as_ref().map(|sizes| sizes.asked.as_bytes());
@@ -312,7 +314,7 @@ impl<'a> RemeshRun<'a> {
                 step.set_blob(blob::SEALED + rank, &totals[&rank].to_bytes());
                 match what.repair {
                     true => step.unlist_file(rank, row.generation),
-                    false => step.set_before(row),
+                    false => step.set_previous(row),
                 }
                 if let (Some(field), Some(asked)) = (made.get(&rank), asked) {
                     step.set_blob(blob::FIELD + rank, field);
@@ -356,4 +358,15 @@ impl<'a> RemeshRun<'a> {
         }
         Ok(summary)
     }
+}
+
+/// The recorded field of the whole.
+pub(crate) fn recorded_field(
+    catalog: &mut Catalog,
+    options: &Options,
+) -> Result<SizeField, PipelineError> {
+    let bytes = catalog.blob(blob::SIZE_FIELD)?.unwrap_or_default();
+    let diagonal = tree::bounds(catalog)?.diagonal();
+    let field = SizeField::from_bytes(&bytes)?;
+    Ok(field.with_sources(&options.sizes()?, diagonal)?)
 }
