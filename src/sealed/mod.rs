@@ -4,6 +4,8 @@
 //! summary of every chunk. Reading streams, so memory stays bounded whatever the size of the sub-domain. The coarse snapshot a
 //! sub-domain was meshed from is kept beside it in the same way. Is not: the list of what counts, which is the catalog's.
 
+#![warn(missing_docs)]
+
 mod batch;
 mod coarse_snapshot;
 mod error;

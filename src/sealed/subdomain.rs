@@ -29,7 +29,9 @@ pub struct Subdomain {
 
 /// Decoded records; the first has number `first`.
 pub struct Chunk<R> {
+    /// Number of the first record in the sub-domain.
     pub first: u32,
+    /// The records, in order.
     pub records: Vec<R>,
 }
 

@@ -172,6 +172,7 @@ impl Totals {
 /// What a region has in this sub-domain.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct RegionTotals {
+    /// Its tetrahedra.
     pub tets: u64,
     /// Summed in the sealed order.
     pub volume: f64,

@@ -23,10 +23,13 @@ use tetdb_schema::catalog::SubdomainRow;
 /// One side of an interface as this sub-domain has it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InterfaceSide {
+    /// Number of the cut, from 1.
     pub cut: u32,
     /// The sub-domain on the other side.
     pub other: u32,
+    /// How many faces there are.
     pub faces: u64,
+    /// Of the faces, seen from this side.
     pub digest: Digest,
 }
 
@@ -35,6 +38,7 @@ pub struct InterfaceSide {
 pub struct Sealed {
     /// The row to put into the catalog.
     pub row: SubdomainRow,
+    /// Of each region with tetrahedra here, by number.
     pub regions: BTreeMap<u32, RegionTotals>,
     /// By cut, then by the other sub-domain.
     pub interfaces: Vec<InterfaceSide>,

@@ -53,6 +53,7 @@ pub trait Disk: Debug + Send + Sync {
 /// What has a name on a disk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Entry {
+    /// A folder.
     Folder,
     /// A file of this many bytes.
     File(u64),

@@ -7,6 +7,8 @@
 //! turns that back into a value. A step is atomic, so what it leaves half-done in memory is dropped
 //! with it. Nothing but [`attempt`] may catch such an unwinding. A request to stop travels the same way.
 
+#![warn(missing_docs)]
+
 mod backend;
 mod budget;
 mod cancel;

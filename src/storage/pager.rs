@@ -24,8 +24,11 @@ const FRAMES_MIN: usize = 16;
 /// Page traffic so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PagerStats {
+    /// Pages that came from a file.
     pub pages_read: u64,
+    /// Pages that went to a file.
     pub pages_written: u64,
+    /// Transactions of redb.
     pub commits: u64,
 }
 

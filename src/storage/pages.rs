@@ -6,12 +6,19 @@ use tetdb_schema::page::Slot;
 pub mod kind {
     use tetdb_schema::page::PageKind;
 
+    /// Nodes and neighbors of tetrahedra.
     pub const TETS: usize = 0;
+    /// Region and flags of tetrahedra.
     pub const TET_ATTRIBUTES: usize = 1;
+    /// Positions, lengths and a tetrahedron of each vertex.
     pub const VERTICES: usize = 2;
+    /// Tag and owner of vertices.
     pub const VERTEX_ATTRIBUTES: usize = 3;
+    /// Input triangles.
     pub const FACETS: usize = 4;
+    /// Faces shared with other sub-domains.
     pub const INTERFACE_FACES: usize = 5;
+    /// A map for a step's own use; it is never stored in a result.
     pub const SCRATCH: usize = 6;
     /// The page kinds in that order.
     pub const ALL: [PageKind; 7] = [

@@ -10,6 +10,7 @@ use super::{DiskPath, StorageError, StoreFile, kind};
 
 /// What a pool begins with, and what it is to make.
 pub struct Backing {
+    /// Rank of the sub-domain whose pages these are.
     pub subdomain: u32,
     /// Generation being written.
     pub generation: u32,
