@@ -15,9 +15,11 @@ use tetdb_schema::catalog::QUALITY_BINS;
 /// Tetrahedra by quality.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Population {
+    /// Number of tetrahedra.
     pub tets: u64,
     /// Tetrahedra with q in [1,2[, [2,3[ .. [9,10[, [10,inf[.
     pub bins: [u64; QUALITY_BINS],
+    /// Largest quality q; 0 without tetrahedra.
     pub worst: f64,
 }
 
@@ -37,10 +39,15 @@ impl Population {
 /// The populations of a mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Qualities {
+    /// Number of sub-domains.
     pub subdomains: u64,
+    /// Number of interface faces, each counted once.
     pub interface_faces: u64,
+    /// All tetrahedra.
     pub all: Population,
+    /// Those the input does not force.
     pub unforced: Population,
+    /// Those the input forces: all vertices are on the surface, or a facet is too badly shaped for a good tetrahedron.
     pub forced: Population,
     /// With a vertex on an interface.
     pub at_interface: Population,

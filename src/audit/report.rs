@@ -64,28 +64,38 @@ pub enum Finding {
 /// One example of a finding.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Offender {
+    /// The kind of fault.
     pub finding: Finding,
+    /// Rank of the sub-domain where it was found, if there is one.
     pub subdomain: Option<u32>,
     /// Its tetrahedron, `7:1048211`.
     pub tet: Option<String>,
     /// Ids of the vertices, parallel to `points`.
     pub vertices: Vec<String>,
+    /// Positions of the vertices.
     pub points: Vec<[f64; 3]>,
+    /// What was expected and what was found, as a sentence.
     pub what: String,
 }
 
 /// The result of a verification.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
+    /// How much was checked.
     pub level: Level,
     /// Whether nothing was found.
     pub valid: bool,
     /// Whether the mesh was compared with its input.
     pub against_input: bool,
+    /// Number of sub-domains checked.
     pub subdomains: u64,
+    /// Number of tetrahedra.
     pub tets: u64,
+    /// Number of vertices, those on interfaces counted once.
     pub vertices: u64,
+    /// Number of facets.
     pub facets: u64,
+    /// Number of interface faces, each counted once.
     pub interface_faces: u64,
     /// Faces between two tetrahedra of one sub-domain.
     pub inner_faces: u64,
@@ -93,15 +103,21 @@ pub struct Report {
     pub boundary_faces: u64,
     /// Input triangles that are in the mesh with a filled side, without one, and not at all.
     pub triangles_present: u64,
+    /// Input triangles that are faces of the mesh, without a filled side.
     pub triangles_unfilled: u64,
+    /// Input triangles that are no faces of the mesh.
     pub triangles_missing: u64,
     /// Sum over the tetrahedra in order, and over the boundary.
     pub volume: f64,
+    /// Volume enclosed by the boundary, by the divergence theorem; in cubed input units.
     pub volume_within_boundary: f64,
     /// Inner faces that are no facets: tested, and with an empty sphere.
     pub delaunay_tested: u64,
+    /// Those of the tested faces that have an empty sphere.
     pub delaunay_faces: u64,
+    /// Digest of the whole mesh.
     pub digest: String,
+    /// Digest of the interfaces alone.
     pub interface_digest: String,
     /// How often each kind was found.
     pub findings: BTreeMap<Finding, u64>,

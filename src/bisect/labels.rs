@@ -122,6 +122,7 @@ pub(super) fn face_cost(corners: [Point; 3], surface: &impl CuttingSurface) -> f
 /// What an interface is like.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct InterfaceMeasures {
+    /// Number of faces.
     pub faces: u64,
     /// Sum of the faces' qualities (longest edge over inradius, 1 is regular).
     pub quality_sum: f64,

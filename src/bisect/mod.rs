@@ -53,8 +53,11 @@ use crate::storage::{Pages, StorageError};
 /// Ways to go, for comparing what each part of the method brings; the default is the method.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Method {
+    /// How the wanted length of an edge is found.
     pub lengths: Lengths,
+    /// How the cutting plane is chosen.
     pub plane: PlaneChoice,
+    /// Steps of the choice of the interface.
     pub steps: Steps,
 }
 
@@ -65,6 +68,7 @@ pub struct CutPlan<'a> {
     pub cut: u32,
     /// Share of the load that belongs on the low side.
     pub low: f64,
+    /// Which variant of the method is used.
     pub method: Method,
     /// Zones of the cuts above it.
     pub earlier: &'a [Zone],
@@ -72,11 +76,13 @@ pub struct CutPlan<'a> {
     pub h: &'a SizeAt<'a>,
     /// Box of the whole mesh.
     pub bounds: Aabb,
+    /// Settings of the optimization of the core.
     pub optimize: Settings,
 }
 
 /// A sub-domain whose zone is refined.
 pub struct Refined {
+    /// The zone that was refined.
     pub zone: Zone,
     plane: ChosenPlane,
     refine: RefineReport,
@@ -86,7 +92,9 @@ pub struct Refined {
 /// Faces of an interface as points, seen from the low side: before and after the choice.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct InterfaceFaces {
+    /// Faces before the choice.
     pub natural: Vec<[Point; 3]>,
+    /// Faces of the chosen interface.
     pub chosen: Vec<[Point; 3]>,
 }
 

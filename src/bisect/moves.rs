@@ -393,8 +393,11 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
 /// Steps of the choice, for comparing what each brings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Steps {
+    /// Whether the interface starts from a minimum cut.
     pub minimum_cut: bool,
+    /// Whether it is improved by moving all tetrahedra around a vertex to the other side.
     pub vertex_moves: bool,
+    /// Whether it is improved by moving single tetrahedra to the other side.
     pub tet_moves: bool,
 }
 

@@ -7,26 +7,34 @@ use crate::refine::RefineReport;
 /// How a cut went.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CutReport {
+    /// The plane and the load on its sides.
     pub plane: ChosenPlane,
+    /// What the saturation of the zone did.
     pub refine: RefineReport,
+    /// What the choice of the interface did.
     pub interface: InterfaceReport,
     /// Interface vertices of the cut, which bear its number.
     pub vertices: u32,
     /// Tetrahedra with a face on the interface, and those whose circumsphere lies in the refined zone.
     pub z_tets: u64,
+    /// Those of them whose circumsphere lies in the refined zone.
     pub z_enclosed: u64,
     /// Tetrahedra, from face to face, between the interface and the first with a vertex out of the refined zone, at least; three
     /// stands for more.
     pub layers_least: Option<u32>,
+    /// Wall time of each stage.
     pub seconds: StageSeconds,
 }
 
 /// Wall time of the stages of a cut.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StageSeconds {
+    /// Choosing the plane.
     pub plane: f64,
+    /// Saturating the refined zone.
     pub zone: f64,
     /// Copying the core out and optimizing it.
     pub core: f64,
+    /// Choosing the interface.
     pub interface: f64,
 }

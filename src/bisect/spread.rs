@@ -12,6 +12,7 @@ const BINS: usize = 4096;
 /// A chosen plane, and what it promises.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChosenPlane {
+    /// The cutting plane.
     pub plane: Plane,
     /// Load below the plane and in all.
     pub load: [f64; 2],

@@ -22,6 +22,7 @@ pub trait CuttingSurface {
 pub struct Plane {
     /// Of length 1.
     pub normal: Point,
+    /// Signed distance from the origin, in input units.
     pub offset: f64,
 }
 

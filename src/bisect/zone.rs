@@ -21,6 +21,7 @@ const WAVELENGTH: f64 = 1.5;
 pub struct Zone {
     /// Number of the cut: makes its noise its own.
     pub cut: u32,
+    /// The plane in the middle of the zone.
     pub surface: Plane,
 }
 
@@ -120,7 +121,9 @@ const ROUNDED_UP: f64 = 1.0 + 1e-6;
 
 /// Everywhere but in the zones of earlier cuts.
 pub struct OutsideZones<'a> {
+    /// Zones of earlier cuts.
     pub zones: &'a [Zone],
+    /// Wanted edge length at a position.
     pub h: &'a dyn Fn(Point) -> f64,
 }
 

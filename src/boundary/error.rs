@@ -30,6 +30,7 @@ pub enum BoundaryError {
     NotRecovered {
         /// Never empty.
         facets: Vec<FacetPlace>,
+        /// Why they could not be, in a few words.
         reason: &'static str,
         /// The narrowest place around them.
         nearness: Option<Nearness>,
@@ -39,10 +40,15 @@ pub enum BoundaryError {
     VertexOnFacet {
         /// Index of the vertex in the surface.
         owner: u32,
+        /// Position of the vertex.
         point: Point,
+        /// The triangle it lies on.
         facet: Box<FacetPlace>,
     },
     /// The volume outside is not separated from this seed or region.
     #[error("the surface does not close: {what}")]
-    Leak { what: String },
+    Leak {
+        /// Which seed, region or side is not separated.
+        what: String,
+    },
 }

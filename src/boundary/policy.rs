@@ -27,6 +27,7 @@ pub enum RegionPolicy {
 /// The volumes a policy chooses.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Filled {
+    /// Numbers of the chosen volumes.
     pub volumes: BTreeSet<u32>,
     /// Parity was contradictory (shared walls), so all were chosen.
     pub all_instead_of_parity: bool,

@@ -22,6 +22,7 @@ pub struct RegionSummary {
     pub region: u32,
     /// In cubed input units.
     pub volume: f64,
+    /// Number of tetrahedra in it.
     pub tets: u32,
     /// Facets around it.
     pub facets: u32,

@@ -3,6 +3,7 @@ use std::time::Duration;
 /// What recovery found and did.
 #[derive(Clone, Debug, Default)]
 pub struct RecoveryReport {
+    /// Facets of the input.
     pub facets: u32,
     /// Facets the Delaunay mesh does not have.
     pub missing_facets: u32,
@@ -20,8 +21,12 @@ pub struct RecoveryReport {
     pub points_on_surface: u32,
     /// Steiner points left, all inside volumes.
     pub steiner: u32,
+    /// Flips done.
     pub flips: u64,
+    /// Time to find what is missing.
     pub map_time: Duration,
+    /// Time to recover by flips.
     pub flip_time: Duration,
+    /// Time to recover with vertices on the surface, which are then moved into the volumes.
     pub point_time: Duration,
 }

@@ -30,17 +30,24 @@ pub struct CavityFace {
     pub outside: FaceRef,
     /// The face from the inside: a tetrahedron of the cavity.
     pub inside: FaceRef,
+    /// Whether the face is required.
     pub required: bool,
 }
 
 /// Work done so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct KernelStats {
+    /// Points inserted.
     pub inserted: u64,
+    /// Faces crossed while locating.
     pub walk_steps: u64,
+    /// Tetrahedra of all cavities.
     pub cavity_tets: u64,
+    /// Tetrahedra of the largest cavity.
     pub cavity_largest: u64,
+    /// Insphere tests.
     pub sphere_tests: u64,
+    /// Cavities that had to be made smaller to be star-shaped.
     pub shrunk: u64,
 }
 
@@ -62,6 +69,7 @@ pub struct Kernel {
     pub(super) outer: Vec<u32>,
     pub(super) suspects: Vec<u32>,
     pub(super) turn: u32,
+    /// Work done since the kernel was created.
     pub stats: KernelStats,
 }
 
@@ -88,7 +96,10 @@ impl Default for Kernel {
 /// Where a walk ended.
 #[derive(Clone, Copy, Debug)]
 pub struct Located {
+    /// Index of the tetrahedron.
     pub tet: u32,
+    /// Its vertices and neighbors.
     pub record: Tet,
+    /// Positions of its vertices.
     pub points: [Point; 4],
 }

@@ -6,5 +6,6 @@
 pub struct ExprError {
     /// Byte of the text where the fault was found; its length when something is missing at the end.
     pub at: usize,
+    /// What is wrong, as a sentence.
     pub message: String,
 }

@@ -6,7 +6,9 @@ use super::{machine, ranges};
 /// What an expression is: a number or a truth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
+    /// A number.
     Number,
+    /// True or false.
     Truth,
 }
 

@@ -7,7 +7,9 @@ pub type Point = glam::DVec3;
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Aabb {
+    /// Least coordinate on each axis.
     pub low: Point,
+    /// Greatest coordinate on each axis.
     pub high: Point,
 }
 

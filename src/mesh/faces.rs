@@ -9,7 +9,9 @@ use crate::storage::{Pages, kind};
 /// A triangle of the input (or of an interface) and what lies on its two sides.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Facet {
+    /// Vertex ids; their order gives the normal.
     pub vertices: [u32; 3],
+    /// Label of the triangle in the input.
     pub label: u32,
     /// Number of the triangle in the input.
     pub input: u64,
@@ -24,6 +26,7 @@ pub struct InterfaceFace {
     pub vertices: [u32; 3],
     /// Number of the cut, 1.., and of the face in it.
     pub cut: u32,
+    /// Number of the face within its cut.
     pub index: u32,
     /// Which side of the cut the sub-domain is on: 0 low, 1 high.
     pub side: u32,

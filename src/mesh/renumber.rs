@@ -16,7 +16,9 @@ use tetdb_schema::page::{NONE, SLOT_BITS};
 /// Where sorting may put its runs, and how many bytes it may hold.
 #[derive(Clone, Copy, Debug)]
 pub struct Workspace<'a> {
+    /// Directory for the runs.
     pub dir: &'a DiskPath,
+    /// Most bytes to hold.
     pub memory: u64,
 }
 

@@ -12,16 +12,22 @@ use crate::storage::{Pages, kind};
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u32)]
 pub enum VertexTag {
+    /// Added inside a volume by refinement; may be moved.
     Free = 0,
+    /// Vertex of the input.
     Surface = 1,
+    /// On an interface.
     Interface = 2,
+    /// Added by boundary recovery.
     Steiner = 3,
+    /// Corner of the box around the input, dropped after coloring.
     EnclosingBox = 4,
 }
 
 /// A vertex as the end of an edge.
 #[derive(Clone, Copy, Debug)]
 pub struct End {
+    /// Its position.
     pub point: Point,
     /// Wanted edge length.
     pub h: f32,

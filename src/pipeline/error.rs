@@ -11,40 +11,65 @@ use crate::surface::SurfaceError;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum PipelineError {
+    /// The surface is not valid.
     #[error(transparent)]
     Surface(#[from] SurfaceError),
+    /// The surface did not become the boundary of volumes.
     #[error(transparent)]
     Boundary(#[from] BoundaryError),
+    /// The sizes are not usable.
     #[error(transparent)]
     Sizing(#[from] SizingError),
+    /// The store could not be read or written.
     #[error(transparent)]
     Store(#[from] StoreError),
+    /// Pages could not be read, written or held.
     #[error(transparent)]
     Storage(#[from] StorageError),
     /// An option that was checked before has no meaning any more.
     #[error("option {option}: '{value}' is not known")]
-    Option { option: &'static str, value: String },
+    Option {
+        /// Name of the option.
+        option: &'static str,
+        /// The value it was given.
+        value: String,
+    },
     /// The sizes of a file were not handed in.
     #[error("the sizes of {file} must be read before the mesh is begun")]
-    SizeField { file: String },
+    SizeField {
+        /// The file of sizes.
+        file: String,
+    },
     /// Nothing is enclosed by the surface under the chosen rule for regions.
     #[error("no region is filled: the surface encloses nothing under the rule {policy}")]
-    NothingFilled { policy: String },
+    NothingFilled {
+        /// The rule for regions.
+        policy: String,
+    },
     /// There is no version of before to go back to.
     #[error("{path} keeps no previous version of any sub-domain")]
-    NothingToUndo { path: std::path::PathBuf },
+    NothingToUndo {
+        /// Directory of the store.
+        path: std::path::PathBuf,
+    },
     /// Sizes for the tetrahedra or vertices of sub-domains that have another number of them.
     #[error(
         "{found} lengths for {tets} tetrahedra or {vertices} vertices: expected one for each, in the order of the .npy export"
     )]
     SizeCount {
+        /// Number of lengths given.
         found: u64,
+        /// Tetrahedra of the sub-domains.
         tets: u64,
+        /// Vertices of the sub-domains.
         vertices: u64,
     },
     /// All tetrahedra came to lie on one side of a cut.
     #[error("cut {cut} leaves no tetrahedron on one side: ask for fewer sub-domains")]
-    EmptyPart { cut: u32 },
+    EmptyPart {
+        /// Number of the cut, from 1.
+        cut: u32,
+    },
 }
 
 impl From<SealedError> for PipelineError {

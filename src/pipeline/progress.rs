@@ -7,6 +7,7 @@ pub struct Event {
     pub done: u64,
     /// Work there is in all, where that is known.
     pub total: Option<u64>,
+    /// What `done` and `total` count.
     pub unit: &'static str,
 }
 

@@ -10,20 +10,37 @@ use crate::store::StoreError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum QueryError {
+    /// The store could not be read.
     #[error(transparent)]
     Store(#[from] StoreError),
     /// The store has no such tetrahedron.
     #[error("there is no tetrahedron {id}")]
-    NoTet { id: TetId },
+    NoTet {
+        /// The id asked for.
+        id: TetId,
+    },
     /// The store has no such vertex.
     #[error("there is no vertex {id}")]
-    NoVertex { id: VertexId },
+    NoVertex {
+        /// The id asked for.
+        id: VertexId,
+    },
     /// The store has no such label.
     #[error("there is no label {name:?}; there are {}", known.join(", "))]
-    NoLabel { name: String, known: Vec<String> },
+    NoLabel {
+        /// The label asked for.
+        name: String,
+        /// The labels of the store.
+        known: Vec<String>,
+    },
     /// No stage of the cut was kept.
     #[error("no stage of cut {cut} is in the store; {}", cuts(kept))]
-    NoStage { cut: u32, kept: Vec<u32> },
+    NoStage {
+        /// Number of the cut, from 1.
+        cut: u32,
+        /// Cuts of which stages were kept.
+        kept: Vec<u32>,
+    },
     /// The two sub-domains share no face.
     #[error("sub-domains {0} and {1} have no interface")]
     NoInterface(u32, u32),

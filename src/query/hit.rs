@@ -25,11 +25,15 @@ pub const VARIABLES: [&str; 11] = [
 /// A tetrahedron that was asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
+    /// Its id.
     pub id: TetId,
+    /// Number of its region.
     pub region: u32,
     /// Lasting ids of its vertices, as numbers; positive volume in this order.
     pub vertices: [u64; 4],
+    /// Positions of its vertices, parallel to `vertices`.
     pub corners: [Point; 4],
+    /// Its quality, volume, edges and angles.
     pub shape: Shape,
 }
 

@@ -18,6 +18,7 @@ const FEW: usize = 16;
 /// A point and the tetrahedron that holds it; of several, which then have it on a face, the one with the least id.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Located {
+    /// The point asked for.
     pub point: Point,
     /// `None` outside the mesh.
     pub found: Option<Hit>,

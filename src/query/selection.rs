@@ -18,6 +18,7 @@ pub struct Selection {
     pub inside: bool,
     /// Their sub-domain is one of these ranks.
     pub subdomains: Option<Vec<u32>>,
+    /// Their region is one of these.
     pub regions: Option<Vec<u32>>,
     /// They are among these.
     pub tets: Option<Vec<TetId>>,
@@ -27,6 +28,7 @@ pub struct Selection {
     pub touching_surface: bool,
     /// They have a face on the interface of these two sub-domains.
     pub interface: Option<[u32; 2]>,
+    /// They share a vertex, an edge or a face with these.
     pub sharing: Option<Sharing>,
     /// A truth about the [`VARIABLES`](super::VARIABLES).
     pub condition: Option<Expression>,

@@ -30,11 +30,13 @@ const SUMMARY_BYTES: u64 = 256;
 pub struct Measures {
     /// Chunks of tetrahedra read, and of vertices; one read twice counts twice.
     pub tet_chunks_read: u64,
+    /// Chunks of vertices read.
     pub vertex_chunks_read: u64,
     /// Chunks of facets and interface faces read.
     pub face_chunks_read: u64,
     /// Chunks of tetrahedra and of vertices in the store.
     pub tet_chunks: u64,
+    /// Chunks of vertices in the store.
     pub vertex_chunks: u64,
 }
 

@@ -11,14 +11,20 @@ use crate::geom::{Aabb, Dyadic, Point, orient_sign};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Solid {
+    /// An axis-aligned box.
     Box(Aabb),
+    /// A full sphere.
     Sphere {
+        /// Its center.
         center: Point,
+        /// Its radius, in input units.
         radius: f64,
     },
     /// The plane through a point, orthogonal to a direction that is not zero.
     Plane {
+        /// A point of the plane.
         point: Point,
+        /// The direction orthogonal to it; any length but zero.
         normal: Point,
     },
 }

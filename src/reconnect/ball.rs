@@ -9,7 +9,9 @@ const LISTED_MAX: usize = 48;
 /// The ball of a vertex, copied out of the mesh; its buffers are meant to be used again.
 #[derive(Clone, Debug, Default)]
 pub struct Ball {
+    /// Id of the vertex.
     pub v: u32,
+    /// Indices of the tetrahedra around it.
     pub tets: Vec<u32>,
     /// Parallel to `tets`.
     pub records: Vec<Tet>,

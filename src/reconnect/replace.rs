@@ -15,6 +15,7 @@ pub struct Replacement {
     faces: Vec<([u32; 3], u32)>,
     /// Outer faces: what is beyond, and the required bit.
     outer: Vec<(FaceRef, u32)>,
+    /// Indices of the tetrahedra created by the last replacement.
     pub new_tets: Vec<u32>,
 }
 

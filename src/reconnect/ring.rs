@@ -9,6 +9,7 @@
 /// What a triangulation must have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Forced {
+    /// Any triangulation will do.
     Nothing,
     /// The chord between two positions of the ring.
     Diagonal(usize, usize),

@@ -27,13 +27,17 @@ const COMPLETE: [[[u8; 2]; 4]; 4] = [
 /// ```
 #[derive(Clone, Debug, Default)]
 pub struct Shell {
+    /// Id of one end of the edge.
     pub a: u32,
+    /// Id of the other end.
     pub b: u32,
+    /// Indices of the tetrahedra around the edge, in order.
     pub tets: Vec<u32>,
     /// Parallel to `tets`.
     pub records: Vec<Tet>,
     /// Parallel to `tets`: local numbers of a, b, `ring[i]`, `ring[i + 1]`.
     pub locals: Vec<[u8; 4]>,
+    /// Ids of the vertices around the edge, in order.
     pub ring: Vec<u32>,
     /// Whether the tetrahedra go all the way around.
     pub closed: bool,

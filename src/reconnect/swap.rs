@@ -17,7 +17,9 @@ use crate::storage::Pages;
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct FaceSwap {
+    /// Id of the vertex on one side of the face.
     pub p: u32,
+    /// Id of the vertex on the other side.
     pub q: u32,
     /// Counter-clockwise seen from q.
     pub face: [u32; 3],

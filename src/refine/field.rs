@@ -16,6 +16,7 @@ pub enum Lengths {
 
 /// What is wanted where, and where points may go.
 pub struct Field<'a> {
+    /// How the wanted length of an edge is found.
     pub lengths: Lengths,
     /// Wanted edge length at a position.
     pub h: &'a dyn Fn(Point) -> f64,

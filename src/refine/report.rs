@@ -3,8 +3,11 @@
 /// What saturation did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RefineReport {
+    /// Passes over the mesh.
     pub passes: u32,
+    /// Points tried.
     pub candidates: u64,
+    /// Points inserted.
     pub inserted: u64,
     /// Too near to a vertex or a required face.
     pub near: u64,

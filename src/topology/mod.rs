@@ -11,6 +11,7 @@ use std::collections::BTreeMap;
 /// Owners of the faces of one cut. Shape: `faces[i]` = the parts on the low and on the high side of face `i`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Owners {
+    /// Names of the parts on the low and on the high side of each face.
     pub faces: Vec<[u32; 2]>,
 }
 

@@ -75,8 +75,11 @@ impl ClusterCell {
 /// Shape: `triangles[i]` = places in `points`; `tags[i]` runs parallel to it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Patch<T> {
+    /// Positions of the vertices.
     pub points: Vec<Point>,
+    /// Vertices of each triangle.
     pub triangles: Vec<[u32; 3]>,
+    /// Value of each triangle.
     pub tags: Vec<T>,
     /// Side of the cells vertices were joined in; 0 where none were.
     pub cell: f64,

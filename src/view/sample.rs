@@ -29,6 +29,7 @@ struct Edge {
 pub struct EdgeLengths {
     /// Edges looked at, and about how many there are (exact when all were looked at).
     pub edges: u64,
+    /// About how many edges the mesh has.
     pub of_about: u64,
     /// Those with both ends on the input.
     pub given: u64,
@@ -38,6 +39,7 @@ pub struct EdgeLengths {
     pub given_bins: Vec<u64>,
     /// Of the edges with a new end: median, and share in [1/√2, √2].
     pub median: f64,
+    /// Share of them whose length is within [1/√2, √2] of the wanted one.
     pub share_near: f64,
 }
 

@@ -19,17 +19,22 @@ const CUTS: u32 = 9;
 /// A triangle of the boundary, or between two regions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ClippedSkin {
+    /// Rank of the sub-domain.
     pub subdomain: u32,
     /// The filled region it bounds.
     pub region: u32,
+    /// Label of the input triangle.
     pub label: u32,
 }
 
 /// A triangle of a cut.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cross {
+    /// Rank of the sub-domain.
     pub subdomain: u32,
+    /// Number of the region.
     pub region: u32,
+    /// Quality q of the tetrahedron.
     pub quality: f32,
     /// Mean length of the tetrahedron's longest and shortest edge.
     pub size: f32,
@@ -42,7 +47,9 @@ pub struct Cross {
 pub struct SceneCut {
     /// 0, 1 or 2 for x, y or z.
     pub axis: u32,
+    /// Coordinate of the plane on that axis.
     pub at: f64,
+    /// The triangles of the cut.
     pub patch: Patch<Cross>,
 }
 

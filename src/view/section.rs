@@ -84,13 +84,17 @@ impl View {
 pub struct Piece {
     /// Its corners in the plane, in input units, to the right and up; the fourth is meant where `n` is 4.
     pub corners: [[f64; 2]; 4],
+    /// Number of corners, 3 or 4.
     pub n: usize,
     /// Heights of the corners over the plane, towards the viewer.
     pub heights: [f64; 4],
     /// How much it faces the viewer, 0 to 1 (1 in a section); of a shell, less than 0 seen from behind.
     pub facing: f32,
+    /// Rank of the sub-domain.
     pub subdomain: u32,
+    /// Number of the region.
     pub region: u32,
+    /// Quality q of the tetrahedron.
     pub quality: f32,
     /// Mean length of the tetrahedron's longest and shortest edge.
     pub size: f32,
@@ -99,10 +103,13 @@ pub struct Piece {
 /// What all pieces together are.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Extent {
+    /// Number of pieces.
     pub n: u64,
     /// Low and high corner in the plane.
     pub bounds: [[f64; 2]; 2],
+    /// Least and greatest quality q.
     pub quality: [f32; 2],
+    /// Least and greatest size.
     pub size: [f32; 2],
 }
 
@@ -123,6 +130,7 @@ sort_record! {
 
 /// The pieces of a cut, far ones first.
 pub struct Section {
+    /// What all pieces together are.
     pub extent: Extent,
     sorted: Sorted<DeepPiece>,
 }

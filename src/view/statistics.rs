@@ -21,21 +21,28 @@ const CHUNK_BYTES: u64 = 32_768 * size_of::<[Corner; 4]>() as u64;
 /// Counts in bins of equal width from `least` on; the last bin has all beyond.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Histogram {
+    /// Lower end of the first bin.
     pub least: f64,
+    /// Width of a bin.
     pub width: f64,
+    /// Count of each bin.
     pub bins: Vec<u64>,
 }
 
 /// The result of a pass.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Statistics {
+    /// Number of tetrahedra.
     pub tets: u64,
+    /// Tetrahedra by quality q.
     pub quality: Histogram,
+    /// Mean quality q.
     pub quality_mean: f64,
     /// All six dihedral angles of each tetrahedron, in degrees.
     pub angles: Histogram,
     /// Least and greatest mean of a tetrahedron's longest and shortest edge.
     pub size: [f64; 2],
+    /// Edges by length, against the wanted one.
     pub edges: EdgeLengths,
 }
 

@@ -9,14 +9,18 @@ use crate::surface::SurfaceError;
 pub struct FilePlace {
     /// The file as it was named.
     pub file: String,
+    /// The place in it.
     pub spot: Spot,
 }
 
 /// Where in a file: lines for text (from 1), bytes for binary (from 0).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Spot {
+    /// No one place: the file as a whole.
     Totals,
+    /// A line, from 1.
     Line(u64),
+    /// A byte, from 0.
     Byte(u64),
 }
 
@@ -34,60 +38,122 @@ impl fmt::Display for FilePlace {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReadError {
+    /// The file cannot be opened or read.
     #[error("the file cannot be read: {reason}")]
-    Unreadable { place: FilePlace, reason: String },
+    Unreadable {
+        /// Where in the file.
+        place: FilePlace,
+        /// What the operating system said.
+        reason: String,
+    },
+    /// Neither the name nor the first bytes tell the format.
     #[error("the format of the file is not known")]
-    UnknownFormat { place: FilePlace },
+    UnknownFormat {
+        /// Where in the file.
+        place: FilePlace,
+    },
+    /// The file ends too early.
     #[error("the file ends too early: expected {expected}, found {found}")]
     Truncated {
+        /// Where in the file.
         place: FilePlace,
+        /// What should have come.
         expected: String,
+        /// What came instead.
         found: String,
     },
+    /// Something else stands where the format asks for a word, a number or an end.
     #[error("expected {expected}, found {found}")]
     Unexpected {
+        /// Where in the file.
         place: FilePlace,
+        /// What should stand there.
         expected: String,
+        /// What stands there.
         found: String,
     },
+    /// A number is not a number, or not finite.
     #[error("expected a finite number as {what}, found {found}")]
     NotANumber {
+        /// Where in the file.
         place: FilePlace,
+        /// What the number is for.
         what: &'static str,
+        /// What stands there.
         found: String,
     },
+    /// A vertex number names no vertex.
     #[error("vertex number {index} is out of range, expected {low} to {high}")]
     IndexOutOfRange {
+        /// Where in the file.
         place: FilePlace,
+        /// The number found.
         index: i64,
+        /// Least number allowed.
         low: i64,
+        /// Greatest number allowed.
         high: i64,
     },
+    /// A declared number cannot be right.
     #[error("the number of {what} cannot be right: {declared} declared, {found}")]
     CountMismatch {
+        /// Where in the file.
         place: FilePlace,
+        /// What is counted.
         what: &'static str,
+        /// The declared number.
         declared: String,
+        /// Why it cannot be right.
         found: String,
     },
+    /// A coordinate is too large to compute with exactly.
     #[error("a coordinate is too large to compute with exactly: {found:e}, expected below 1e30")]
-    CoordinateRange { place: FilePlace, found: f64 },
+    CoordinateRange {
+        /// Where in the file.
+        place: FilePlace,
+        /// The coordinate.
+        found: f64,
+    },
+    /// The file uses a part of its format that is not read.
     #[error("{what} cannot be read")]
-    Unsupported { place: FilePlace, what: String },
+    Unsupported {
+        /// Where in the file.
+        place: FilePlace,
+        /// The part.
+        what: String,
+    },
+    /// The file holds no triangles.
     #[error("the file holds no triangles")]
-    Empty { place: FilePlace },
+    Empty {
+        /// Where in the file.
+        place: FilePlace,
+    },
+    /// What the file holds does not fit into the memory allowed. Units: bytes.
     #[error("{what} would take {needed} bytes of memory, more than the {limit} there are for them")]
     TooLarge {
+        /// Where in the file.
         place: FilePlace,
+        /// What would take the memory.
         what: &'static str,
+        /// Memory it would take.
         needed: u64,
+        /// Memory allowed.
         limit: u64,
     },
+    /// Sizes without the mesh they belong to, or a mesh without sizes.
     #[error("no file of sizes or no mesh lies beside it: expected {expected}")]
-    Alone { place: FilePlace, expected: String },
+    Alone {
+        /// Where in the file.
+        place: FilePlace,
+        /// The file that was looked for.
+        expected: String,
+    },
+    /// The triangles do not make a surface.
     #[error("{source}")]
     Surface {
+        /// Where in the file.
         place: FilePlace,
+        /// What is wrong with them.
         source: SurfaceError,
     },
 }

@@ -42,14 +42,23 @@ use crate::surface::{Surface, SurfaceBuilder, SurfaceError};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Format {
+    /// STL, text or binary.
     Stl,
+    /// OFF, the Object File Format.
     Off,
+    /// Wavefront OBJ.
     Obj,
+    /// PLY, text or binary.
     Ply,
+    /// Medit text, `.mesh`.
     Medit,
+    /// Medit binary, `.meshb`.
     MeditBinary,
+    /// Gmsh, `.msh`.
     Gmsh,
+    /// TetGen `.smesh`.
     TetgenSmesh,
+    /// TetGen `.poly`.
     TetgenPoly,
 }
 

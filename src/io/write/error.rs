@@ -14,32 +14,54 @@ use crate::store::StoreError;
 pub enum WriteError {
     /// The name does not end as a format does.
     #[error("{path}: its ending names no known format, expected {known}")]
-    UnknownFormat { path: PathBuf, known: &'static str },
+    UnknownFormat {
+        /// The file to be written.
+        path: PathBuf,
+        /// The known endings.
+        known: &'static str,
+    },
     /// The format has only single precision, the surface needs double.
     #[error("{path}: this format would round the coordinates of vertex {vertex}")]
-    Lossy { path: PathBuf, vertex: u32 },
+    Lossy {
+        /// The file to be written.
+        path: PathBuf,
+        /// Index of the first vertex that would be rounded.
+        vertex: u32,
+    },
     /// The format's numbers are too small.
     #[error("{path}: this format holds at most {limit} {what}, found {found}")]
     TooLarge {
+        /// The file to be written.
         path: PathBuf,
+        /// What is counted.
         what: &'static str,
+        /// The most the format holds.
         limit: u64,
+        /// How many there are.
         found: u64,
     },
     /// The file will not fit. Units: bytes.
     #[error("{path}: no space for it, {needed} bytes are needed and {available} are free")]
     NoSpace {
+        /// The file to be written.
         path: PathBuf,
+        /// Bytes needed.
         needed: u64,
+        /// Bytes free.
         available: u64,
     },
     /// The disk filled up while the file was written.
     #[error("{path}: no space left to write it")]
-    DiskFull { path: PathBuf },
+    DiskFull {
+        /// The file to be written.
+        path: PathBuf,
+    },
     /// A file operation failed.
     #[error("{path}: {source}")]
     Io {
+        /// The file to be written.
         path: PathBuf,
+        /// What the operating system said.
         #[source]
         source: std::io::Error,
     },

@@ -29,8 +29,11 @@ pub(super) fn head(kind: &str, rows: u64, inner: &str) -> Vec<u8> {
 /// A field of a structured array: name, type of a number such as `<f8`, and numbers in a row (`4, 3`) where there are several.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NpyField {
+    /// Name of the field.
     pub name: &'static str,
+    /// Type of its numbers, such as `<f8`.
     pub kind: &'static str,
+    /// How many numbers it has, such as `4, 3`; empty for one.
     pub shape: &'static str,
 }
 

@@ -7,7 +7,9 @@ use std::path::PathBuf;
 pub struct ExportReport {
     /// Each file with its length in bytes.
     pub files: Vec<(PathBuf, u64)>,
+    /// Vertices written.
     pub vertices: u64,
+    /// Tetrahedra written.
     pub tets: u64,
     /// Boundary faces.
     pub triangles: u64,

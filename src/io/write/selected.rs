@@ -21,11 +21,15 @@ const CELL: usize = 4 + 4 + 8 + 8;
 pub struct SelectedTet {
     /// Its lasting id as a number.
     pub id: u64,
+    /// Rank of its sub-domain.
     pub subdomain: u32,
+    /// Number of its region.
     pub region: u32,
+    /// Its quality q.
     pub quality: f64,
     /// Lasting ids of its vertices; positive volume in this order.
     pub vertices: [u64; 4],
+    /// Positions of its vertices, parallel to `vertices`.
     pub corners: [[f64; 3]; 4],
 }
 

@@ -9,6 +9,7 @@ pub struct Selection {
     pub subdomains: BTreeSet<u32>,
     /// Each sub-domain in a file of its own.
     pub pieces: bool,
+    /// Which elements are written.
     pub content: Content,
 }
 

@@ -13,6 +13,7 @@ type Write = fn(&Surface, &mut Stream) -> Result<()>;
 /// What was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct SurfaceReport {
+    /// Length of the file in bytes.
     pub bytes: u64,
     /// Whether the format has a place for the labels there are.
     pub labels_kept: bool,

@@ -13,8 +13,11 @@ use crate::surface::Surface;
 /// What the coarse step did.
 #[derive(Clone, Debug)]
 pub struct CoarseReport {
+    /// Work of the Delaunay insertion.
     pub kernel: KernelStats,
+    /// What boundary recovery did.
     pub recovery: RecoveryReport,
+    /// The volumes and which of them are filled.
     pub regions: Regions,
 }
 

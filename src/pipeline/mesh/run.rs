@@ -34,16 +34,21 @@ const COARSE: u32 = 1;
 /// What a run did; a part is absent when an earlier run had done its step.
 #[derive(Clone, Debug)]
 pub struct Summary {
+    /// The coarse mesh of the whole domain.
     pub coarse: Option<CoarseReport>,
+    /// The size field.
     pub sizes: Option<SizeSummary>,
     /// The bisections of this run, in order.
     pub cuts: Vec<CutReport>,
     /// What refinement and optimization did to the sub-domains of this run, by rank.
     pub fine: BTreeMap<u32, FineReport>,
+    /// Sub-domains of the mesh.
     pub subdomains: u32,
     /// What was asked for, when that was more than the mesh allows.
     pub subdomains_asked: Option<u32>,
+    /// Pages read and written.
     pub pages: PagerStats,
+    /// Most pages held in memory at once.
     pub frames_used: usize,
 }
 

@@ -15,7 +15,9 @@ use crate::storage::Pages;
 /// What the fine step did.
 #[derive(Clone, Debug)]
 pub struct FineReport {
+    /// What the division of edges did.
     pub refine: RefineReport,
+    /// What the optimization did.
     pub optimize: OptimizeReport,
     /// What refinement and optimization took.
     pub seconds: [f64; 2],

@@ -78,11 +78,15 @@ const SECONDS_VERIFY: f64 = 0.42e-6;
 /// What to expect of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
+    /// Predicted tetrahedra.
     pub counts: TetCounts,
+    /// Triangles of the surface.
     pub triangles: u64,
     /// Sides of triangles in a filled region.
     sides: u64,
+    /// Predicted vertices.
     pub vertices: f64,
+    /// Sub-domains the mesh will have.
     pub subdomains: u32,
     /// What was asked for, when that was more than the mesh allows.
     pub subdomains_asked: Option<u32>,
@@ -100,8 +104,11 @@ pub struct Estimate {
 /// A size field and what it makes expect: everything before the first step.
 #[derive(Clone, Debug)]
 pub struct Prepared {
+    /// The size field.
     pub field: SizeField,
+    /// What the size field was built from, and its extremes.
     pub sizes: SizeSummary,
+    /// The predicted mesh.
     pub estimate: Estimate,
 }
 
@@ -211,6 +218,7 @@ impl Estimate {
         })
     }
 
+    /// Predicted number of tetrahedra.
     pub fn tets(&self) -> f64 {
         self.counts.tets()
     }

@@ -17,14 +17,19 @@ const TETS_MIN: f64 = 25_000.0;
 pub struct Options {
     /// Wanted sizes as typed: lengths, or `1%` of the box diagonal.
     pub hsiz: Option<String>,
+    /// Least wanted length, as typed.
     pub hmin: Option<String>,
+    /// Greatest wanted length, as typed.
     pub hmax: Option<String>,
+    /// Gradation, as typed.
     pub hgrad: Option<String>,
     /// Sizes in boxes, spheres and cylinders, as typed.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub size_box: Vec<String>,
+    /// Sizes in spheres, as typed.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub size_sphere: Vec<String>,
+    /// Sizes in cylinders, as typed.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub size_cylinder: Vec<String>,
     /// Sizes of regions, as typed.

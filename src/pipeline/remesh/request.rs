@@ -7,6 +7,7 @@ use super::sizes::NewSizes;
 /// What to make again.
 #[derive(Clone, Debug)]
 pub struct Resaturation {
+    /// Ranks of the sub-domains.
     pub ranks: BTreeSet<u32>,
     /// `None`: with the sizes that are recorded.
     pub sizes: Option<NewSizes>,

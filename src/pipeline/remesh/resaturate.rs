@@ -19,7 +19,9 @@ use crate::store::{Catalog, StoreError};
 /// What would be meshed again.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Forecast {
+    /// Rank of the sub-domain.
     pub rank: u32,
+    /// Tetrahedra it has now.
     pub tets: u64,
     /// Tetrahedra to expect.
     pub predicted: f64,

@@ -9,8 +9,11 @@ const STEPS: f64 = 65535.0;
 ///
 /// Shape: `triangles[i]` = places in `points`, which are numbered by their first use; each of `channels` has a number for each triangle.
 pub struct Surface<'a> {
+    /// Positions of the vertices.
     pub points: &'a [Point],
+    /// Vertices of each triangle.
     pub triangles: &'a [[u32; 3]],
+    /// Numbers of the triangles, a list for each channel.
     pub channels: &'a [Vec<u32>],
 }
 

@@ -37,7 +37,9 @@ const EDGE_PIXELS_MIN: f64 = 4.0;
 /// A bar of colors from the least value up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ColorBar {
+    /// Value of the first color.
     pub least: f64,
+    /// Value of the last color.
     pub most: f64,
 }
 
@@ -50,6 +52,7 @@ pub struct PictureFrame {
     pub bounds: [[f64; 2]; 2],
     /// Mean length of an edge in those units: how fine what is drawn is.
     pub edge: f64,
+    /// The color bar beside the picture, if there is one.
     pub bar: Option<ColorBar>,
     /// Whether colors stand for kinds, of which there are several: those named with [`Picture::kind`] are listed.
     pub kinds: bool,
