@@ -91,6 +91,12 @@ impl Step {
             .expect("bash starts");
         let answer = fs::read_to_string(&log).unwrap_or_default();
         assert_eq!(status.code(), Some(self.exit), "$ {command}\n{answer}");
+        let finds_nothing =
+            |line: &str| line.starts_with("0 found") || line.contains("\"found\":0}");
+        assert!(
+            !answer.lines().any(finds_nothing),
+            "$ {command}\nfinds nothing"
+        );
         let mut lines: VecDeque<&str> = answer.lines().collect();
         for shown in &self.shown {
             let found = lines.iter().position(|line| is_like(line, shown));

@@ -1,4 +1,4 @@
-//! JSON.md tells every key that is answered, and no other.
+//! The guide's chapter on scripting names every key that is answered, and no other.
 //!
 //! Why: scripts are written from that page.
 //! How: each section's commands are run; the keys of what they answer, over all runs of a section, must be those of its tables.
@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::place::Place;
 
-const PAGE: &str = include_str!("../../JSON.md");
+const PAGE: &str = include_str!("../../src/guide/scripting.md");
 /// Keys below these are of anybody's making.
 const FREE: [&str; 4] = [
     "options",
@@ -109,7 +109,7 @@ fn documented(section: &str) -> BTreeSet<String> {
         let cell = row.split(" |").next().unwrap_or_default();
         keys.extend(cell.trim_matches('`').split("`, `").map(str::to_owned));
     }
-    assert!(!keys.is_empty(), "JSON.md tells nothing of {section}");
+    assert!(!keys.is_empty(), "the chapter says nothing of {section}");
     keys
 }
 
@@ -193,7 +193,7 @@ fn every_key_is_told_and_no_other() {
     let untold: Vec<&String> = said.difference(&talk).collect();
     assert!(
         untold.is_empty(),
-        "stderr says what JSON.md does not: {untold:?}"
+        "keys on stderr that the chapter does not name: {untold:?}"
     );
     let unsaid = talk
         .difference(&said)
@@ -208,7 +208,7 @@ fn same(section: &str, mut found: BTreeSet<String>) {
     let missing: Vec<&String> = told.difference(&found).collect();
     assert!(
         untold.is_empty() && missing.is_empty(),
-        "{section}: JSON.md does not tell {untold:?}, and tells {missing:?}, which no run answered"
+        "{section}: the chapter does not name {untold:?}, and names {missing:?}, which no run answered"
     );
 }
 
@@ -222,6 +222,6 @@ fn every_command_has_a_section() {
         let is_silent = ["help", "completions", "man"].contains(&name);
         let is_told = PAGE.contains(&format!("## `tetdb {name}`"))
             || ["mesh", "resume"].contains(&name) && PAGE.contains(&format!("`{name}`"));
-        assert!(is_silent || is_told, "JSON.md has no section on {name}");
+        assert!(is_silent || is_told, "the chapter has no section on {name}");
     }
 }
