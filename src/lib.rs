@@ -18,6 +18,10 @@ pub mod data {
     pub use tetdb_schema as schema;
 }
 
+// Its text alone: nothing of it is in a program.
+#[cfg(doc)]
+pub mod guide;
+
 #[cfg(feature = "internals")]
 pub use house::*;
 #[cfg(not(feature = "internals"))]

@@ -171,7 +171,7 @@ chapters! {
     resaturation: 5,
     pictures: 10,
     scripting: 5,
-    library: 1,
+    library: 0,
     errors: 2,
 }
 
