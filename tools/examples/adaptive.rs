@@ -10,7 +10,7 @@ use tetdb::Store;
 use tetdb::data::DVec3;
 
 const ROUNDS: usize = 3;
-const TOLERANCE: f64 = 0.02;
+const TOLERANCE: f64 = 0.005;
 
 /// A step across a sphere around `center`.
 fn front(point: DVec3, center: DVec3, radius: f64) -> f64 {

@@ -34,15 +34,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     let settings = Settings::new()
         .cancel(&token)
         .progress(move |event| match event {
-            Event::Progress {
-                stage: now,
-                done,
-                total,
-                unit,
-            } => {
+            // `done` of `total` comes with it, many times a second.
+            Event::Progress { stage: now, .. } => {
                 let mut last = stage.lock().expect("no listener panics");
                 if std::mem::replace(&mut *last, *now) != *now {
-                    println!("{now}: {done} of {total:?} {unit}");
+                    println!("working: {now}");
                 }
             }
             Event::Note(text) | Event::Warning(text) => println!("{text}"),
