@@ -151,7 +151,7 @@ fn mesh_sorted(mesh: Mesh, points: &[Point], dir: &Path, pool: u64) -> (f64, Mes
     let started = cpu_seconds();
     let bounds = Aabb::around(points.iter().copied());
     let frame = HilbertFrame::new(&bounds);
-    let mut sorter = Sorter::<32>::new(dir, pool / 8);
+    let mut sorter = Sorter::<[u8; 32]>::new(dir, pool / 8);
     for &p in points {
         let mut record = [0; 32];
         record[..8].copy_from_slice(&insertion_key(&frame, p).to_be_bytes());

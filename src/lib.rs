@@ -1,5 +1,6 @@
 // One exception, two calls of the C library: `cli::heap`.
 #![deny(unsafe_code)]
+#![warn(missing_docs)]
 #![doc = include_str!("README.md")]
 
 #[doc(inline)]

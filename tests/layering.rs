@@ -1,11 +1,16 @@
-//! A room imports only from lower floors, never from its own.
+//! A room imports only from lower floors, never from its own; inside a room, files form no circle.
 //!
 //! Why: the topology kernel must not come to know formats, nor the store geometry, one convenient import at a time.
-//! How: every `crate::ROOM` in the sources, tests left out, is looked up in the house below.
+//! How: every `crate::ROOM` in the sources, tests left out, is looked up in the house below. Inside a room, every path is followed through
+//! the re-exports to the file that defines its end.
 
-use std::collections::BTreeSet;
+mod sources;
+
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
+
+use sources::{sources, src, without_tests};
 
 /// Rooms from the lowest floor up.
 const HOUSE: &[&[&str]] = &[
@@ -24,6 +29,9 @@ const HOUSE: &[&[&str]] = &[
 
 /// Files and modules at the top of the crate that are no rooms.
 const NOT_ROOMS: &[&str] = &["lib", "main", "guide"];
+
+/// Rooms whose files still form circles. A room that no longer does must leave this list.
+const WITH_CIRCLES: &[&str] = &["cli", "optimize"];
 
 fn floor(room: &str) -> Option<usize> {
     HOUSE.iter().position(|rooms| rooms.contains(&room))
@@ -60,6 +68,72 @@ fn rooms_import_only_from_lower_floors() {
 }
 
 #[test]
+fn files_of_a_room_form_no_circle() {
+    let modules = Modules::read();
+    let graph = modules.graph();
+    let n_edges: usize = graph.values().map(BTreeSet::len).sum();
+    assert!(
+        n_edges > 200,
+        "only {n_edges} imports between the files of a room found: does the test still read the sources?"
+    );
+    let found = circles(&graph);
+    let rooms: BTreeSet<&str> = found.iter().flatten().map(|file| first(file)).collect();
+    for room in WITH_CIRCLES {
+        assert!(rooms.contains(room), "{room} has no circles any more");
+    }
+    let new: Vec<_> = found
+        .iter()
+        .filter(|files| files.iter().all(|f| !WITH_CIRCLES.contains(&first(f))))
+        .map(|files| describe(files, &graph))
+        .collect();
+    assert!(
+        new.is_empty(),
+        "{} circles of files inside a room:\n{}",
+        new.len(),
+        new.join("\n")
+    );
+}
+
+#[test]
+fn circles_are_found_through_reexports() {
+    let modules = Modules::from_texts([
+        (
+            "a",
+            "mod b;\nmod c;\nmod d;\npub use b::{B, other as renamed};\nuse c::Hidden;",
+        ),
+        ("a::b", "use super::c::C;\nfn f() { crate::a::d::g() }"),
+        ("a::c", "use crate::a::renamed;"),
+        ("a::d", "use super::Hidden;\nuse super::super::e::E;"),
+        ("e", "pub struct E;"),
+    ]);
+    let files = |names: &[&str]| names.iter().map(|n| n.to_string()).collect();
+    let found = circles(&modules.graph());
+    assert_eq!(
+        found,
+        [files(&["a::b", "a::c", "a::d"])] as [BTreeSet<String>; 1]
+    );
+}
+
+#[test]
+fn the_readme_names_every_room_and_no_file_that_is_not_there() {
+    let text = fs::read_to_string(src().join("README.md")).expect("src/README.md is readable");
+    for room in HOUSE.iter().copied().flatten() {
+        assert!(
+            text.contains(&format!("[`{room}`]")),
+            "src/README.md does not name {room}"
+        );
+    }
+    let spans: Vec<&str> = text.split('`').skip(1).step_by(2).collect();
+    for file in spans
+        .iter()
+        .filter(|s| s.ends_with(".rs") || s.ends_with(".md"))
+    {
+        let found = src().join(file).exists() || src().join("..").join(file).exists();
+        assert!(found, "src/README.md names {file}, which does not exist");
+    }
+}
+
+#[test]
 fn every_room_is_a_module_of_the_crate() {
     let lib = fs::read_to_string(src().join("lib.rs")).expect("src/lib.rs is readable");
     let declared: BTreeSet<&str> = lib
@@ -83,51 +157,11 @@ fn imports_are_found_however_they_are_written() {
     );
 }
 
-fn src() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
-}
-
-/// All Rust files below `dir`, test files left out.
-fn sources(dir: &Path) -> Vec<PathBuf> {
-    let mut found = Vec::new();
-    for entry in fs::read_dir(dir).expect("a source folder is readable") {
-        let path = entry.expect("a folder entry is readable").path();
-        let is_tests = path.file_stem().is_some_and(|stem| stem == "tests");
-        if is_tests {
-            continue;
-        } else if path.is_dir() {
-            found.extend(sources(&path));
-        } else if path.extension().is_some_and(|e| e == "rs") {
-            found.push(path);
-        }
-    }
-    found
-}
-
 /// The folder (or file) directly below `src`.
 fn room_of(path: &Path) -> Option<String> {
     let first = path.strip_prefix(src()).ok()?.iter().next()?;
     let room = Path::new(first).file_stem()?.to_string_lossy().into_owned();
     (!NOT_ROOMS.contains(&room.as_str())).then_some(room)
-}
-
-/// The text without comments, up to the tests at its foot.
-fn without_tests(text: &str) -> String {
-    let mut lines = Vec::new();
-    let mut rest = text.lines().peekable();
-    while let Some(line) = rest.next() {
-        let code = line.split("//").next().unwrap_or_default();
-        // A module with a body; `mod tests;` only names a file.
-        let ends = code.trim() == "#[cfg(test)]"
-            && rest
-                .peek()
-                .is_some_and(|next| next.starts_with("mod ") && next.contains('{'));
-        if ends {
-            break;
-        }
-        lines.push(code);
-    }
-    lines.join("\n")
 }
 
 /// First names after `crate::`, also inside braces.
@@ -172,4 +206,288 @@ fn name(text: &str) -> String {
     text.chars()
         .take_while(|c| c.is_alphanumeric() || *c == '_')
         .collect()
+}
+
+/// A module by its path from the crate's root, `pipeline::mesh::run`, with what it imports and the other paths in it.
+#[derive(Default)]
+struct Module {
+    /// Name here -> path as it is written, of every `use`.
+    uses: BTreeMap<String, Vec<String>>,
+    paths: Vec<Vec<String>>,
+}
+
+/// What a path leads to.
+enum Target {
+    Module(String),
+    /// Something defined in the file of this module.
+    ItemOf(String),
+}
+
+/// Every module of the crate that is a file.
+struct Modules(BTreeMap<String, Module>);
+
+impl Modules {
+    fn read() -> Self {
+        let root = src();
+        let texts: Vec<(String, String)> = sources(&root)
+            .iter()
+            .filter(|path| room_of(path).is_some())
+            .map(|path| {
+                let text = fs::read_to_string(path).expect("a source file is readable");
+                (
+                    module_of(path.strip_prefix(&root).expect("it is below src")),
+                    text,
+                )
+            })
+            .collect();
+        Self::from_texts(texts.iter().map(|(m, t)| (m.as_str(), t.as_str())))
+    }
+
+    fn from_texts<'a>(texts: impl IntoIterator<Item = (&'a str, &'a str)>) -> Self {
+        let modules = texts.into_iter().map(|(name, text)| {
+            let (uses, rest) = split_uses(&without_tests(text));
+            let module = Module {
+                uses: uses.iter().flat_map(|u| use_tree(u)).collect(),
+                paths: paths(&rest),
+            };
+            (name.to_owned(), module)
+        });
+        Self(modules.collect())
+    }
+
+    /// File -> files of the same room it takes something from, by the paths of their modules.
+    fn graph(&self) -> BTreeMap<String, BTreeSet<String>> {
+        let mut graph = BTreeMap::new();
+        for (name, module) in &self.0 {
+            // What only passes on a name of its own children needs nothing from them: these paths count where
+            // they are used.
+            let used = module
+                .uses
+                .values()
+                .filter(|path| !self.is_child(name, &path[0]));
+            let inner = module.uses.iter().filter(|(alias, path)| {
+                self.is_child(name, &path[0]) && module.paths.iter().any(|p| p[0] == **alias)
+            });
+            let all = used.chain(inner.map(|(_, path)| path)).chain(&module.paths);
+            let to: BTreeSet<String> = all
+                .filter_map(|path| self.file_of(name, path))
+                .filter(|to| to != name && first(to) == first(name))
+                .collect();
+            graph.insert(name.clone(), to);
+        }
+        graph
+    }
+
+    fn is_child(&self, module: &str, name: &str) -> bool {
+        self.0.contains_key(&join(module, name))
+    }
+
+    fn file_of(&self, from: &str, path: &[String]) -> Option<String> {
+        match self.resolve(from, path)? {
+            Target::ItemOf(module) => Some(module),
+            // A folder's own name stands for nothing yet: what is taken from it is another path.
+            Target::Module(m) if self.0.keys().any(|k| k.starts_with(&format!("{m}::"))) => None,
+            Target::Module(module) => Some(module),
+        }
+    }
+
+    fn resolve(&self, from: &str, path: &[String]) -> Option<Target> {
+        let rest = &path[1..];
+        match path[0].as_str() {
+            "crate" => self.walk("", rest),
+            "self" => self.walk(from, rest),
+            "super" => {
+                let parent = from.rsplit_once("::").map_or("", |(parent, _)| parent);
+                match rest.first().map(String::as_str) {
+                    Some("super") => self.resolve(parent, rest),
+                    _ => self.walk(parent, rest),
+                }
+            }
+            name if self.is_child(from, name) => self.walk(&join(from, name), rest),
+            name => {
+                let used = self.0.get(from)?.uses.get(name)?;
+                self.continue_from(from, used, rest)
+            }
+        }
+    }
+
+    fn walk(&self, module: &str, path: &[String]) -> Option<Target> {
+        let Some(name) = path.first() else {
+            return Some(Target::Module(module.to_owned()));
+        };
+        let used = self.0.get(module).and_then(|m| m.uses.get(name));
+        match used {
+            Some(used) => self.continue_from(module, used, &path[1..]),
+            None if self.is_child(module, name) => self.walk(&join(module, name), &path[1..]),
+            None if self.0.contains_key(module) => Some(Target::ItemOf(module.to_owned())),
+            None => None,
+        }
+    }
+
+    fn continue_from(&self, module: &str, used: &[String], rest: &[String]) -> Option<Target> {
+        // `use name;` and an outer crate's name lead nowhere in this crate.
+        let known = ["crate", "self", "super"].contains(&used[0].as_str());
+        if !known && !self.is_child(module, &used[0]) {
+            return None;
+        }
+        match self.resolve(module, used)? {
+            Target::Module(m) => self.walk(&m, rest),
+            item => Some(item),
+        }
+    }
+}
+
+fn join(module: &str, name: &str) -> String {
+    if module.is_empty() {
+        name.to_owned()
+    } else {
+        format!("{module}::{name}")
+    }
+}
+
+fn first(module: &str) -> &str {
+    module.split("::").next().unwrap_or(module)
+}
+
+/// `mesh/run.rs` -> `mesh::run`, `mesh/mod.rs` -> `mesh`.
+fn module_of(path: &Path) -> String {
+    let names: Vec<_> = path
+        .with_extension("")
+        .iter()
+        .map(|n| n.to_string_lossy().into_owned())
+        .collect();
+    let names = names.strip_suffix(&["mod".to_owned()]).unwrap_or(&names);
+    names.join("::")
+}
+
+/// The trees of all `use`, and the text without them.
+fn split_uses(text: &str) -> (Vec<String>, String) {
+    let (mut uses, mut rest) = (Vec::new(), String::new());
+    let mut inside: Option<String> = None;
+    for line in text.lines() {
+        let line = line.trim();
+        let start = line
+            .find("use ")
+            .filter(|&at| at == 0 || line.starts_with("pub") && line[..at].ends_with([' ', ')']));
+        match (&mut inside, start) {
+            (Some(tree), _) => tree.push_str(line),
+            (None, Some(at)) => inside = Some(line[at + "use ".len()..].to_owned()),
+            (None, None) => {
+                rest.push_str(line);
+                rest.push('\n');
+            }
+        }
+        if let Some(tree) = inside.take_if(|tree| tree.ends_with(';')) {
+            uses.push(tree.trim_end_matches(';').to_owned());
+        }
+    }
+    (uses, rest)
+}
+
+/// Name -> path for every leaf of `a::{b, c::{d, e as f}}`.
+fn use_tree(tree: &str) -> Vec<(String, Vec<String>)> {
+    let tree = tree.trim();
+    if let Some((prefix, list)) = tree.split_once('{') {
+        let list = list.strip_suffix('}').expect("a list ends with its brace");
+        let prefix = path(prefix);
+        return split_list(list)
+            .into_iter()
+            .flat_map(use_tree)
+            .map(|(name, rest)| match rest.as_slice() {
+                [own] if own == "self" => {
+                    (prefix.last().cloned().unwrap_or_default(), prefix.clone())
+                }
+                _ => (name, [prefix.clone(), rest].concat()),
+            })
+            .collect();
+    }
+    let (tree, alias) = tree.split_once(" as ").unwrap_or((tree, ""));
+    let path = path(tree);
+    let Some(last) = path.last() else {
+        return Vec::new();
+    };
+    let name = if alias.is_empty() { last } else { alias.trim() };
+    vec![(name.to_owned(), path.clone())]
+}
+
+/// The parts between the commas that are in no inner braces.
+fn split_list(list: &str) -> Vec<&str> {
+    let (mut depth, mut start, mut parts) = (0, 0, Vec::new());
+    for (i, c) in list.char_indices() {
+        match c {
+            '{' => depth += 1,
+            '}' => depth -= 1,
+            ',' if depth == 0 => {
+                parts.push(&list[start..i]);
+                start = i + 1;
+            }
+            _ => {}
+        }
+    }
+    parts.push(&list[start..]);
+    parts.retain(|part| !part.trim().is_empty());
+    parts
+}
+
+fn path(text: &str) -> Vec<String> {
+    text.split("::")
+        .map(|n| n.trim().to_owned())
+        .filter(|n| !n.is_empty())
+        .collect()
+}
+
+/// Every path and name in code.
+fn paths(text: &str) -> Vec<Vec<String>> {
+    text.split(|c: char| !(c.is_alphanumeric() || c == '_' || c == ':'))
+        .map(path)
+        .filter(|p| !p.is_empty())
+        .collect()
+}
+
+/// The largest groups of files that all lead to each other.
+fn circles(graph: &BTreeMap<String, BTreeSet<String>>) -> Vec<BTreeSet<String>> {
+    let reach: BTreeMap<&String, BTreeSet<&String>> =
+        graph.keys().map(|f| (f, reached(f, graph))).collect();
+    let mut found: Vec<BTreeSet<String>> = Vec::new();
+    for (file, others) in &reach {
+        let circle: BTreeSet<String> = others
+            .iter()
+            .filter(|o| reach[*o].contains(file))
+            .map(|o| (*o).clone())
+            .collect();
+        if !circle.is_empty() && !found.contains(&circle) {
+            found.push(circle);
+        }
+    }
+    found
+}
+
+fn reached<'a>(
+    file: &'a String,
+    graph: &'a BTreeMap<String, BTreeSet<String>>,
+) -> BTreeSet<&'a String> {
+    let (mut reached, mut open) = (BTreeSet::new(), vec![file]);
+    while let Some(next) = open.pop() {
+        for to in &graph[next] {
+            if reached.insert(to) {
+                open.push(to);
+            }
+        }
+    }
+    reached
+}
+
+fn describe(files: &BTreeSet<String>, graph: &BTreeMap<String, BTreeSet<String>>) -> String {
+    let lines = files.iter().map(|file| {
+        let to: Vec<&str> = graph[file]
+            .intersection(files)
+            .map(String::as_str)
+            .collect();
+        format!("    {file} -> {}", to.join(", "))
+    });
+    format!(
+        "  circle of {}:\n{}",
+        files.len(),
+        lines.collect::<Vec<_>>().join("\n")
+    )
 }

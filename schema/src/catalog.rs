@@ -58,7 +58,9 @@ impl StoreState {
 )]
 #[serde(rename_all = "snake_case")]
 pub enum SubdomainState {
+    /// Its coarse mesh exists.
     Coarse,
+    /// No edge is left to divide.
     Saturated,
     /// Finished, and kept as working pages.
     Optimized,
@@ -71,16 +73,18 @@ pub enum SubdomainState {
 pub struct Job {
     /// All options as one JSON object.
     pub options: String,
+    /// What the surface was read from, in order.
     pub surfaces: Vec<SurfaceSource>,
-    /// Version of the program that made the store.
+    /// Version of the program that created the store.
     pub tool_version: String,
 }
 
-/// A file the surface was read from, or the sample that made it.
+/// A file the surface was read from, or the sample that generated it.
 #[derive(Archive, Serialize, Deserialize, Clone, Debug, PartialEq, Default, serde::Serialize)]
 pub struct SurfaceSource {
     /// Absolute path, or `sample:...`.
     pub path: String,
+    /// Length of the content in bytes.
     pub bytes: u64,
     /// xxh3-128 of the content, low half first.
     pub hash: [u64; 2],
@@ -89,9 +93,13 @@ pub struct SurfaceSource {
 /// A region of the volume.
 #[derive(Archive, Serialize, Deserialize, Clone, Debug, PartialEq, serde::Serialize)]
 pub struct RegionRow {
+    /// Its number.
     pub region: u32,
+    /// In cubed input units.
     pub volume: f64,
+    /// Its tetrahedra in all sub-domains.
     pub tets: u64,
+    /// Whether it is meshed; else it is empty space.
     pub filled: bool,
     /// Labels of the facets around it, ascending.
     pub labels: Vec<u32>,
@@ -104,6 +112,7 @@ pub struct QualityRow {
     pub bins: [u64; QUALITY_BINS],
     /// Greatest q and the tetrahedron that has it (the first of several).
     pub worst: f64,
+    /// Its number in the sub-domain.
     pub worst_tet: u32,
     /// Least and greatest dihedral angle in radians.
     pub dihedral: [f64; 2],
@@ -112,21 +121,31 @@ pub struct QualityRow {
 /// A sub-domain.
 #[derive(Archive, Serialize, Deserialize, Clone, Debug, PartialEq, serde::Serialize)]
 pub struct SubdomainRow {
+    /// Its number, from 0.
     pub rank: u32,
     /// The generation of its file that counts.
     pub generation: u32,
+    /// How far it is.
     pub state: SubdomainState,
+    /// Tetrahedra.
     pub tets: u64,
+    /// Vertices, those shared with others included.
     pub vertices: u64,
+    /// Facets.
     pub facets: u64,
+    /// Faces shared with other sub-domains.
     pub interface_faces: u64,
     /// Chunks of tetrahedra, vertices, facets, interface faces, and then blocks of their summaries.
     pub chunks: [u32; 8],
+    /// Of its tetrahedra, as in [`Digest`](crate::digest::Digest).
     pub digest: [u64; 2],
+    /// The same of its interface faces.
     pub interface_digest: [u64; 2],
+    /// Qualities of its tetrahedra.
     pub quality: QualityRow,
     /// Sum of the volumes in the sealed order.
     pub volume: f64,
+    /// Low and high corner of the box around its vertices.
     pub bounds: [[f64; 3]; 2],
     /// Length of the file.
     pub bytes: u64,
@@ -147,19 +166,26 @@ pub struct SubdomainRow {
     serde::Serialize,
 )]
 pub struct FileRow {
+    /// Rank of the sub-domain.
     pub subdomain: u32,
+    /// Generation in the name of the file.
     pub generation: u32,
 }
 
-/// A coarse leaf: the working mesh a sub-domain was made from, kept.
+/// A coarse snapshot: the working mesh a sub-domain was meshed from, kept.
 #[derive(Archive, Serialize, Deserialize, Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct CoarseRow {
+    /// Rank of the sub-domain.
     pub rank: u32,
     /// The generation in the name of its file.
     pub generation: u32,
+    /// Tetrahedra.
     pub tets: u64,
+    /// Vertices.
     pub vertices: u64,
+    /// Facets.
     pub facets: u64,
+    /// Faces on interfaces.
     pub interface_faces: u64,
     /// Chunks of tetrahedra, vertices, facets, interface faces.
     pub chunks: [u32; 4],
@@ -170,10 +196,13 @@ pub struct CoarseRow {
 /// An interface: the faces two sub-domains share because of one cut.
 #[derive(Archive, Serialize, Deserialize, Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct InterfaceRow {
+    /// Number of the cut, from 1.
     pub cut: u32,
     /// Ranks, the lower one first.
     pub low: u32,
+    /// The higher rank.
     pub high: u32,
+    /// How many faces there are.
     pub faces: u64,
     /// Digest of the faces; the same from both sides.
     pub digest: [u64; 2],
@@ -182,6 +211,7 @@ pub struct InterfaceRow {
 /// Who neighbors a sub-domain.
 #[derive(Archive, Serialize, Deserialize, Clone, Debug, PartialEq, serde::Serialize)]
 pub struct TopologyRow {
+    /// Its rank.
     pub subdomain: u32,
     /// By rank.
     pub neighbors: Vec<NeighborRow>,
@@ -190,7 +220,9 @@ pub struct TopologyRow {
 /// A neighbor and how many faces are shared with it.
 #[derive(Archive, Serialize, Deserialize, Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct NeighborRow {
+    /// Rank of the neighbor.
     pub subdomain: u32,
+    /// Faces shared with it.
     pub faces: u64,
 }
 
@@ -199,17 +231,22 @@ pub struct NeighborRow {
 pub struct JournalRow {
     /// The state of the store after it.
     pub state: StoreState,
+    /// The sub-domain it was done to; `None`: the whole store.
     pub subdomain: Option<u32>,
     /// What was done.
     pub step: String,
+    /// How long it took.
     pub seconds: f64,
+    /// Figures of the step.
     pub measures: Vec<Measure>,
 }
 
 /// A number worth remembering, its unit last in its name.
 #[derive(Archive, Serialize, Deserialize, Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Measure {
+    /// In `snake_case`; a unit is its last part.
     pub name: String,
+    /// The number.
     pub value: f64,
 }
 
@@ -229,17 +266,22 @@ pub struct Measure {
 )]
 #[serde(rename_all = "snake_case")]
 pub enum Stage {
+    /// Before it.
     Coarse,
+    /// After its zone was refined.
     Refined,
 }
 
 /// A mesh on its way, kept to be looked at; it is no part of the finished mesh.
 #[derive(Archive, Serialize, Deserialize, Clone, Debug, PartialEq, serde::Serialize)]
 pub struct StageRow {
+    /// Number of the cut, from 1.
     pub cut: u32,
+    /// When it was kept.
     pub stage: Stage,
     /// The plane of the cut: `normal · x = offset`.
     pub normal: [f64; 3],
+    /// See `normal`, which has length 1.
     pub offset: f64,
     /// Its file, as that of a sealed sub-domain; `rank` is the number of the cut.
     pub row: SubdomainRow,

@@ -25,6 +25,7 @@ pub const fn vertex_mix([x, y, z]: [f64; 3]) -> u64 {
 /// Two lanes of wrapping sums. `Default` is the digest of nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub struct Digest {
+    /// Sums of two independent mixes of every element.
     pub lanes: [u64; 2],
 }
 

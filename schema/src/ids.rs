@@ -16,7 +16,9 @@ const OWNER_SUBDOMAINS: u32 = 1 << 20;
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("{text:?} is not {expected}")]
 pub struct IdError {
+    /// The text as it was given.
     pub text: String,
+    /// What was expected in its place.
     pub expected: &'static str,
 }
 
@@ -119,7 +121,7 @@ impl FromStr for TetId {
     }
 }
 
-/// Who made a vertex, and so who numbers it.
+/// Who created a vertex, and so who numbers it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Owner {
     /// The welded input.
@@ -156,6 +158,7 @@ impl Owner {
 /// A vertex, the same in every sub-domain that uses it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct VertexId {
+    /// Who numbers it.
     pub owner: Owner,
     /// Number within the owner.
     pub index: u32,

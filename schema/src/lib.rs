@@ -1,4 +1,5 @@
 #![forbid(unsafe_code)]
+#![deny(missing_docs)]
 #![doc = include_str!("../README.md")]
 
 pub mod catalog;

@@ -40,13 +40,21 @@ const _: () = assert!(STORED_BYTES + 16 <= 65_536);
 #[repr(u8)]
 #[non_exhaustive]
 pub enum PageKind {
+    /// Tetrahedra: nodes and neighbors.
     Tets = 1,
+    /// Regions and flags of tetrahedra.
     TetAttributes = 2,
+    /// Vertices: positions, lengths, a tetrahedron of each.
     Vertices = 3,
+    /// Tags and owners of vertices.
     VertexAttributes = 4,
+    /// Input triangles.
     Facets = 5,
+    /// Faces shared with other sub-domains.
     InterfaceFaces = 6,
+    /// A map for a step's own use; never a result.
     Scratch = 7,
+    /// The tetrahedra on both sides of facets.
     FacetTets = 8,
 }
 
@@ -58,8 +66,11 @@ pub const fn page_key(kind: PageKind, page: u32) -> u64 {
 /// Where a page belongs; a page found anywhere else is damage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PageAddress {
+    /// What it holds.
     pub kind: PageKind,
+    /// Rank of the sub-domain.
     pub subdomain: u32,
+    /// Number among the pages of its kind, from 0.
     pub page: u32,
 }
 
@@ -67,19 +78,34 @@ pub struct PageAddress {
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum PageError {
+    /// Too short or too long.
     #[error("page {address:?}: expected {STORED_BYTES} bytes, found {found}")]
-    Length { address: PageAddress, found: usize },
+    Length {
+        /// Where the page belongs.
+        address: PageAddress,
+        /// Bytes of the value.
+        found: usize,
+    },
+    /// The content is not what was written.
     #[error("page {address:?}: checksum {found:016x} does not match its content ({expected:016x})")]
     Checksum {
+        /// Where the page belongs.
         address: PageAddress,
+        /// Computed from the content.
         expected: u64,
+        /// As stored.
         found: u64,
     },
+    /// The page belongs elsewhere, or is of another format.
     #[error("page {address:?}: the header names {field} {found}, expected {expected}")]
     Header {
+        /// Where the page belongs.
         address: PageAddress,
+        /// Which entry of the header.
         field: &'static str,
+        /// By its address.
         expected: u32,
+        /// As stored.
         found: u32,
     },
 }

@@ -6,20 +6,25 @@ use crate::page::{NONE, Slot, u32_le};
 /// A tetrahedron of a working page, as stored: marks and required bits are still in the nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Tet {
+    /// Vertex ids with the required bits of the faces and the mark of the tetrahedron.
     pub node: [u32; 4],
+    /// Face references across the four faces.
     pub neighbor: [u32; 4],
 }
 
 /// Region and flags of a working tetrahedron.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct TetAttribute {
+    /// Number of its region.
     pub region: u32,
+    /// Bits; what they mean is the mesher's.
     pub flags: u32,
 }
 
 /// A vertex of a working page.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vertex {
+    /// Position.
     pub point: [f64; 3],
     /// Wanted edge length; 0 where it is not yet known.
     pub h: f32,
@@ -30,7 +35,9 @@ pub struct Vertex {
 /// A facet of a working page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Facet {
+    /// Vertex ids in the order of the input triangle.
     pub vertices: [u32; 3],
+    /// Number of its label.
     pub label: u32,
     /// Number of the input triangle.
     pub triangle: u64,
@@ -125,6 +132,7 @@ pub const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 pub struct SealedTet {
     /// Vertex numbers in the sub-domain; positive volume in this order.
     pub nodes: [u32; 4],
+    /// Number of its region.
     pub region: u32,
 }
 
@@ -154,31 +162,36 @@ impl SealedTet {
     }
 }
 
-/// A tetrahedron of a coarse leaf, the working mesh a sub-domain is made from; its number is its place.
+/// A tetrahedron of a coarse snapshot, the working mesh a sub-domain is meshed from; its number is its place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct CoarseTet {
     /// Vertex numbers in the leaf, in the working mesh's order.
     pub nodes: [u32; 4],
     /// Bits 0..4: face i is required. Bits 4..8: the mark of node i.
     pub bits: u8,
+    /// Number of its region.
     pub region: u32,
     /// Flags of its attribute.
     pub flags: u32,
 }
 
-/// A vertex of a coarse leaf; its number is its place. Its wanted length follows from the size field.
+/// A vertex of a coarse snapshot; its number is its place. Its wanted length follows from the size field.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct CoarseVertex {
+    /// Position.
     pub point: [f64; 3],
     /// The words of its attribute: tag (and the cut it lies on), index within the owner.
     pub tag: u32,
+    /// Number within the owner.
     pub owner: u32,
 }
 
-/// An interface face of a coarse leaf.
+/// An interface face of a coarse snapshot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct CoarseFace {
+    /// Vertex numbers in the snapshot, in the working mesh's order.
     pub vertices: [u32; 3],
+    /// Number of the cut, from 1.
     pub cut: u32,
     /// Number of the face in the cut.
     pub index: u32,
@@ -188,16 +201,22 @@ pub struct CoarseFace {
 
 /// What a vertex is to the mesh.
 pub mod tag {
+    /// Added inside; may move and vanish.
     pub const FREE: u32 = 0;
+    /// A vertex of the input surface.
     pub const SURFACE: u32 = 1;
+    /// On an interface: final since its cut.
     pub const INTERFACE: u32 = 2;
+    /// Added by boundary recovery.
     pub const STEINER: u32 = 3;
+    /// A corner of the box around everything, while the coarse mesh is built.
     pub const ENCLOSING: u32 = 4;
 }
 
 /// A vertex of a sealed sub-domain; its number is its place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SealedVertex {
+    /// Position.
     pub point: [f64; 3],
     /// Wanted edge length.
     pub h: f32,
@@ -223,6 +242,7 @@ impl SealedVertex {
 pub struct SealedFacet {
     /// Vertex numbers in the sub-domain, in the order of the input triangle.
     pub vertices: [u32; 3],
+    /// Number of its label.
     pub label: u32,
     /// Number of the input triangle.
     pub triangle: u64,
@@ -239,6 +259,7 @@ pub struct InterfaceFace {
     pub vertices: [u32; 3],
     /// Number of the cut, 1.., and of the face in it: the same in both sub-domains.
     pub cut: u32,
+    /// Number of the face in the cut.
     pub index: u32,
     /// The sub-domain on the other side.
     pub other: u32,

@@ -48,6 +48,13 @@ pub struct Answers<'s> {
     left: usize,
 }
 
+impl Store {
+    /// Begins a question about tetrahedra.
+    pub fn query(&mut self) -> Query<'_> {
+        Query::new(self)
+    }
+}
+
 impl<'s> Query<'s> {
     pub(super) fn new(store: &'s mut Store) -> Self {
         Self {

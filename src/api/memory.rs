@@ -52,19 +52,48 @@ pub(crate) fn default_cap() -> (u64, String) {
     (bytes.max(MEMORY_MIN), words)
 }
 
-/// Free bytes of the system, or of the control group if that is less.
+/// Free bytes of the system, of the control group, or of what the process may take, whichever is least.
 fn free() -> (u64, &'static str) {
-    let system = std::fs::read_to_string("/proc/meminfo")
-        .ok()
-        .and_then(|text| {
-            let line = text.lines().find(|l| l.starts_with("MemAvailable:"))?;
-            Some(line.split_whitespace().nth(1)?.parse::<u64>().ok()? * 1024)
-        });
-    let system = system.unwrap_or(UNKNOWN_FREE);
-    match group_free() {
-        Some(group) if group < system => (group, "free in this control group"),
-        _ => (system, "free in this machine"),
-    }
+    let system = field("/proc/meminfo", "MemAvailable:").unwrap_or(UNKNOWN_FREE);
+    let of_process = |limit, used| {
+        let used = field("/proc/self/status", used)?;
+        Some(limit_of(limit)?.saturating_sub(used + BESIDE_CAP))
+    };
+    let all = [
+        (Some(system), "free in this machine"),
+        (group_free(), "free in this control group"),
+        (
+            of_process("Max address space", "VmSize:"),
+            "left of this process's limit of address space",
+        ),
+        (
+            of_process("Max data size", "VmData:"),
+            "left of this process's limit of data",
+        ),
+    ];
+    let known = all
+        .into_iter()
+        .filter_map(|(bytes, words)| Some((bytes?, words)));
+    known
+        .min_by_key(|(bytes, _)| *bytes)
+        .expect("the first is always known")
+}
+
+/// What a process holds beside its cap: code and stacks.
+const BESIDE_CAP: u64 = 32 << 20;
+
+/// A line of a file of the system that counts in KiB, in bytes.
+fn field(file: &str, name: &str) -> Option<u64> {
+    let text = std::fs::read_to_string(file).ok()?;
+    let line = text.lines().find(|line| line.starts_with(name))?;
+    Some(line.split_whitespace().nth(1)?.parse::<u64>().ok()? * 1024)
+}
+
+/// The limit the system enforces on this process; `None` where there is none.
+fn limit_of(name: &str) -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/self/limits").ok()?;
+    let line = text.lines().find(|line| line.starts_with(name))?;
+    line[name.len()..].split_whitespace().next()?.parse().ok()
 }
 
 fn group_free() -> Option<u64> {
@@ -101,9 +130,7 @@ fn group_free() -> Option<u64> {
     None
 }
 
-/// The most this process has ever held, in bytes, where the system tells.
+/// The most this process has ever held, in bytes, where the system says.
 pub fn peak_bytes() -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = text.lines().find(|l| l.starts_with("VmHWM:"))?;
-    Some(line.split_whitespace().nth(1)?.parse::<u64>().ok()? * 1024)
+    field("/proc/self/status", "VmHWM:")
 }

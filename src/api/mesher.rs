@@ -248,7 +248,17 @@ impl Mesher {
             preflight::surface_fits(&self.surface.inner, cap)?;
         }
         let prepared = self.prepare(path, cap, settings)?;
-        let summary = self.mesh(path, cap, prepared, settings)?;
+        let summary = match self.mesh(path, cap, prepared, settings) {
+            // Another run was faster: what it left decides.
+            Err(error) if error.code() == "store-exists" && self.is_there(path)? => {
+                return Ok(Created {
+                    path: path.to_owned(),
+                    summary: None,
+                    was_there: true,
+                });
+            }
+            other => other?,
+        };
         report(&summary, settings);
         if self.verify {
             let surface = match self.surface.n_triangles() {
@@ -340,7 +350,8 @@ impl Mesher {
         settings: &Settings,
     ) -> Result<pipeline::Summary, Error> {
         // The old store is only replaced once the new one is sealed.
-        let replaces = path.exists() && !Catalog::is_vacant(path);
+        let replaces =
+            self.existing == Existing::Replace && path.exists() && !Catalog::is_vacant(path);
         let place = match replaces {
             true => replace::new_of(path),
             false => path.to_owned(),

@@ -25,6 +25,7 @@ pub(crate) mod show;
 mod sizes;
 pub(crate) mod store;
 pub(crate) mod surface;
+pub(crate) mod targets;
 pub(crate) mod verify;
 
 pub use crate::storage::CancelToken;

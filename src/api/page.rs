@@ -6,6 +6,7 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use super::store::open_finished;
+use super::targets::{check_target, inputs_of};
 use super::{Error, Settings, Store, guarded};
 
 use crate::query::{Measures, QuerySession};
@@ -35,6 +36,7 @@ impl Store {
     /// Returns the length of the file. Errors: `unknown-format`; damage; the disk.
     pub fn report(&self, out: impl AsRef<Path>) -> Result<u64, Error> {
         guarded(self.settings(), || {
+            check_target(out.as_ref(), &inputs_of(self.path()))?;
             Ok(write_page(self.path(), out.as_ref(), self.settings())?.bytes)
         })
     }

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::ask::condition_of;
 use super::store::open_finished;
+use super::targets::{check_target, inputs_of};
 use super::{Error, Settings, Store, guarded};
 use crate::expr::Expression;
 use crate::geom::{Aabb, Point};
@@ -187,6 +188,7 @@ impl Store {
     /// Errors: `unknown-format`, `bad-query`, `no-such-part`; damage; the disk.
     pub fn snapshot(&self, out: impl AsRef<Path>, snapshot: &Snapshot) -> Result<Snapped, Error> {
         guarded(self.settings(), || {
+            check_target(out.as_ref(), &inputs_of(self.path()))?;
             take(self.path(), out.as_ref(), snapshot, self.settings())
         })
     }

@@ -50,7 +50,7 @@ pub(crate) fn preflight(
     if cap < least {
         let message = format!(
             "the surface and its size field take {}: with a cap of {} too little is left for the mesh",
-            show_bytes(estimate.held_bytes(cap)),
+            show_bytes(estimate.resident_bytes(cap)),
             show_bytes(cap)
         );
         return Err(Error::new("memory", message).with_remedy(Remedy::Memory(least)));

@@ -49,6 +49,36 @@ pub struct Remeshed {
     pub subdomains: Vec<[SubdomainRow; 2]>,
 }
 
+impl Store {
+    /// Sub-domains of it again, with other sizes or because they are damaged.
+    pub fn remesh(self) -> Remesh {
+        let (path, settings) = self.into_parts();
+        Remesh::new(path, settings)
+    }
+
+    /// Brings back what the last [`Store::remesh`] replaced. Errors: `nothing-to-undo`.
+    pub fn undo(self) -> Result<Self, Error> {
+        let (path, settings) = self.into_parts();
+        guarded(&settings, || {
+            let mut catalog = Catalog::open_writable(&path)?;
+            pipeline::undo(&mut catalog)?;
+            Ok(catalog.close()?)
+        })?;
+        Self::open_with(path, settings)
+    }
+
+    /// Drops what the last [`Store::remesh`] replaced, which cannot be undone then. Returns the number of sub-domains.
+    pub fn forget_previous(&mut self) -> Result<usize, Error> {
+        self.close_session();
+        guarded(self.settings(), || {
+            let mut catalog = Catalog::open_writable(self.path())?;
+            let n = pipeline::forget(&mut catalog)?;
+            catalog.close()?;
+            Ok(n)
+        })
+    }
+}
+
 impl Remesh {
     pub(crate) fn new(path: PathBuf, settings: Settings) -> Self {
         Self {
@@ -179,7 +209,12 @@ impl Remesh {
             None => options.sizes()?.beta(),
         };
         let field = match &self.sizes {
-            Some(_) => Some(whole_field(open, asked.clone(), options, &self.settings)?),
+            Some(_) => Some(field_of_surface(
+                open,
+                asked.clone(),
+                options,
+                &self.settings,
+            )?),
             None => None,
         };
         let asked = serde_json::to_value(&asked).unwrap_or_default();
@@ -195,7 +230,7 @@ impl Remesh {
 }
 
 /// The field of the whole surface with other options, but the regions and the gradation it was made with.
-pub(crate) fn whole_field(
+pub(crate) fn field_of_surface(
     open: &mut Catalog,
     mut all: Options,
     options: &Options,

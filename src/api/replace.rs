@@ -88,7 +88,13 @@ pub(crate) fn take_up(
 pub(crate) fn exchange(path: &Path) -> Result<(), Error> {
     let (new, old) = (new_of(path), old_of(path));
     if path.exists() {
+        // A store whose writer lives is not replaced; while this one is held, no writer begins.
+        let held = match Catalog::open_writable(path) {
+            Err(error @ StoreError::Busy { .. }) => return Err(error.into()),
+            other => other.ok(),
+        };
         rename(path, &old)?;
+        drop(held);
     }
     rename(&new, path)?;
     if old.exists() {

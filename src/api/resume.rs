@@ -4,12 +4,23 @@ use std::path::Path;
 
 use super::mesher::{Created, lent_or_given, predict, report, verify_new};
 use super::preflight::{scratch_beside, with_free_space};
-use super::{Error, Event, Settings, Surface, guarded, job, replace};
+use super::{Error, Event, Settings, Store, Surface, guarded, job, replace};
 use crate::pipeline;
 use crate::storage::Budget;
 use crate::store::Catalog;
 use crate::surface;
 use tetdb_schema::catalog::StoreState;
+
+impl Store {
+    /// Goes on with an interrupted run, verifies the mesh and opens the store; one that is finished is only verified.
+    ///
+    /// The mesh is that of a run that was never interrupted. Errors: `surface-changed`; `store-recipe` when a version with another recipe
+    /// began it; as [`Mesher::create`](super::Mesher::create).
+    pub fn resume(path: impl AsRef<Path>, settings: Settings) -> Result<Self, Error> {
+        let created = resume_reported(path.as_ref(), &settings, true)?;
+        Self::open_with(created.path, settings)
+    }
+}
 
 /// Goes on with the store at `path`, and verifies it if `verify`.
 pub(crate) fn resume_reported(

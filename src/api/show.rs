@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use super::store::open_finished;
+use super::targets::{check_target, inputs_of};
 use super::{Error, Settings, Store, guarded};
 use crate::io::write::{self, Content, Selection};
 
@@ -65,13 +66,14 @@ impl Store {
     /// Writes the mesh for another program, in the format the ending of `out` names: `.vtu`, `.pvtu`, `.mesh`, `.meshb`, `.msh`, `.inp`,
     /// `.npy`, `.json` (who neighbors whom), and `.parquet` with that feature.
     ///
-    /// Streamed; nothing has its name before it is whole. Errors: `unknown-format`, `format-limit`, `disk-full`; damage.
+    /// Streamed; nothing has its name before it is whole. Errors: `usage` for a folder or the surface the store was made from; `unknown-format`, `format-limit`, `disk-full`; damage.
     pub fn export(
         &self,
         out: impl AsRef<Path>,
         options: &ExportOptions,
     ) -> Result<Exported, Error> {
         guarded(self.settings(), || {
+            check_target(out.as_ref(), &inputs_of(self.path()))?;
             export(
                 self.path(),
                 out.as_ref(),

@@ -3,10 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use super::guard::guarded_in;
-use super::{Error, Query, Remesh, Settings, Verification, VerifyLevel, guarded, verify};
-use super::{Surface, preflight::scratch_beside, resume::resume_reported};
+use super::preflight::scratch_beside;
+use super::{Error, Settings, Surface, Verification, VerifyLevel, verify};
 use crate::audit::Level;
-use crate::pipeline;
 use crate::query::QuerySession;
 use crate::sealed::Subdomain;
 use crate::storage::RunContext;
@@ -87,18 +86,14 @@ impl Store {
         })
     }
 
-    /// Goes on with an interrupted run, verifies the mesh and opens the store; one that is finished is only verified.
-    ///
-    /// The mesh is that of a run that was never interrupted. Errors: `surface-changed`; `store-recipe` when a version with another recipe
-    /// began it; as [`Mesher::create`](super::Mesher::create).
-    pub fn resume(path: impl AsRef<Path>, settings: Settings) -> Result<Self, Error> {
-        let created = resume_reported(path.as_ref(), &settings, true)?;
-        Self::open_with(created.path, settings)
-    }
-
     /// Where it is.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// Takes it apart: its path and its settings.
+    pub(super) fn into_parts(self) -> (PathBuf, Settings) {
+        (self.path, self.settings)
     }
 
     pub(super) fn settings(&self) -> &Settings {
@@ -117,11 +112,6 @@ impl Store {
         guarded_in(&self.context, || {
             Ok(Catalog::open(&self.path)?.open_subdomain(rank, SUBDOMAIN_BYTES)?)
         })
-    }
-
-    /// Begins a question about tetrahedra.
-    pub fn query(&mut self) -> Query<'_> {
-        Query::new(self)
     }
 
     /// The tetrahedron that holds each point, the first by id where several do; `None` outside of the mesh.
@@ -178,31 +168,9 @@ impl Store {
         self.summary.digest == other.summary.digest
     }
 
-    /// Sub-domains of it again, with other sizes or because they are damaged.
-    pub fn remesh(self) -> Remesh {
-        Remesh::new(self.path, self.settings)
-    }
-
-    /// Brings back what the last [`Store::remesh`] replaced. Errors: `nothing-to-undo`.
-    pub fn undo(self) -> Result<Self, Error> {
-        let Self { path, settings, .. } = self;
-        guarded(&settings, || {
-            let mut catalog = Catalog::open_writable(&path)?;
-            pipeline::undo(&mut catalog)?;
-            Ok(catalog.close()?)
-        })?;
-        Self::open_with(path, settings)
-    }
-
-    /// Drops what the last [`Store::remesh`] replaced, which cannot be undone then. Returns the number of sub-domains.
-    pub fn forget_previous(&mut self) -> Result<usize, Error> {
+    /// Closes the session that answers questions; it is opened again when the next is asked.
+    pub(super) fn close_session(&mut self) {
         self.session = None;
-        guarded_in(&self.context, || {
-            let mut catalog = Catalog::open_writable(&self.path)?;
-            let n = pipeline::forget(&mut catalog)?;
-            catalog.close()?;
-            Ok(n)
-        })
     }
 
     /// Does `work` with the session that answers questions, which stays open.

@@ -4,41 +4,35 @@ use std::iter::Peekable;
 use std::path::Path;
 
 use crate::sealed::sorted_face;
-use crate::storage::{Sorted, Sorter, StorageError};
+use crate::storage::{Sorted, Sorter, StorageError, sort_record};
 use crate::store::StoreError;
-
-/// Tetrahedron, vertices ascending, parity, kind: 4 + 12 + 1 + 1 bytes.
-const BYTES: usize = 18;
 
 /// What makes a face required.
 pub(super) const FACET: u8 = 1;
 /// See [`FACET`].
 pub(super) const INTERFACE: u8 = 2;
 
-/// A face that a tetrahedron is said to have.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Claim {
-    pub tet: u32,
-    pub face: [u32; 3],
-    /// Parity of the face as seen from outside the tetrahedron.
-    pub odd: bool,
-    /// [`FACET`] or [`INTERFACE`].
-    pub kind: u8,
+sort_record! {
+    /// A face that a tetrahedron is said to have.
+    pub(super) struct Claim {
+        pub tet: u32,
+        /// Vertices ascending.
+        pub face: [u32; 3],
+        /// Parity of the face as seen from outside the tetrahedron.
+        pub odd: bool,
+        /// [`FACET`] or [`INTERFACE`].
+        pub kind: u8,
+    }
 }
 
 /// Claims under collection.
 pub(super) struct Claims {
-    sorter: Sorter<BYTES>,
+    sorter: Sorter<Claim>,
 }
 
 /// Claims by tetrahedron.
 pub(super) struct SortedClaims {
-    claims: Peekable<Sorted<BYTES>>,
-}
-
-pub(super) fn word(record: &[u8], place: usize) -> u32 {
-    let bytes = record[4 * place..][..4].try_into();
-    u32::from_be_bytes(bytes.expect("four bytes"))
+    claims: Peekable<Sorted<Claim>>,
 }
 
 impl Claims {
@@ -57,14 +51,13 @@ impl Claims {
         kind: u8,
     ) -> Result<(), StorageError> {
         let (face, odd) = sorted_face(vertices);
-        let mut record = [0; BYTES];
-        record[..4].copy_from_slice(&tet.to_be_bytes());
-        for (bytes, v) in record[4..16].chunks_exact_mut(4).zip(face) {
-            bytes.copy_from_slice(&v.to_be_bytes());
-        }
-        record[16] = u8::from(odd != turned);
-        record[17] = kind;
-        self.sorter.push(record)
+        let odd = odd != turned;
+        self.sorter.push(Claim {
+            tet,
+            face,
+            odd,
+            kind,
+        })
     }
 
     pub(super) fn finish(self) -> Result<SortedClaims, StorageError> {
@@ -77,17 +70,7 @@ impl Claims {
 impl SortedClaims {
     /// The next claim of a tetrahedron below `end`.
     pub(super) fn next_below(&mut self, end: u32) -> Result<Option<Claim>, StoreError> {
-        let next = self
-            .claims
-            .next_if(|r| r.as_ref().is_ok_and(|r| word(r, 0) < end) || r.is_err());
-        let Some(record) = next.transpose()? else {
-            return Ok(None);
-        };
-        Ok(Some(Claim {
-            tet: word(&record, 0),
-            face: [1, 2, 3].map(|i| word(&record, i)),
-            odd: record[16] != 0,
-            kind: record[17],
-        }))
+        let is_below = |claim: &Result<Claim, _>| claim.as_ref().map_or(true, |c| c.tet < end);
+        Ok(self.claims.next_if(is_below).transpose()?)
     }
 }

@@ -1,7 +1,7 @@
 //! Whatever cannot be read as it was written, all of it, with its places.
 //!
 //! The mesh itself is read by [`verify`](super::verify), chunk by chunk; here every file that counts is, also those that are only kept:
-//! coarse leaves, previous versions, stages.
+//! coarse snapshots, previous versions, stages.
 
 use crate::sealed::CoarseSnapshot;
 use crate::storage::check_cancelled;
@@ -13,7 +13,7 @@ const MEMORY_BYTES: usize = 8 << 20;
 /// More are not listed.
 const LISTED_MAX: usize = 1000;
 
-/// What is damaged in the files of sub-domains, coarse leaves, previous versions and stages, in that order; nothing in a sound store.
+/// What is damaged in the files of sub-domains, coarse snapshots, previous versions and stages, in that order; nothing in a sound store.
 ///
 /// Errors: a damaged catalog, which tells what files there are; failures of the disk that are no damage.
 pub fn damage(store: &mut Catalog) -> Result<Vec<StoreError>, StoreError> {
@@ -21,14 +21,14 @@ pub fn damage(store: &mut Catalog) -> Result<Vec<StoreError>, StoreError> {
     for row in store.subdomains()? {
         found.of_part(store, row)?;
     }
-    found.of_kept(store)?;
+    found.of_snapshots(store)?;
     Ok(found.0)
 }
 
 /// The same of the files that are no part of the mesh. Errors: as [`damage`].
-pub(super) fn damage_of_kept(store: &mut Catalog) -> Result<Vec<StoreError>, StoreError> {
+pub(super) fn damage_of_snapshots(store: &mut Catalog) -> Result<Vec<StoreError>, StoreError> {
     let mut found = DamageFound(Vec::new());
-    found.of_kept(store)?;
+    found.of_snapshots(store)?;
     Ok(found.0)
 }
 
@@ -50,11 +50,11 @@ impl DamageFound {
         }
     }
 
-    fn of_kept(&mut self, store: &mut Catalog) -> Result<(), StoreError> {
+    fn of_snapshots(&mut self, store: &mut Catalog) -> Result<(), StoreError> {
         for row in store.coarse_snapshots()? {
-            self.of_leaf(store, row)?;
+            self.of_snapshot(store, row)?;
         }
-        for row in store.before()? {
+        for row in store.previous()? {
             self.of_part(store, row)?;
         }
         for stage in store.stages()? {
@@ -82,14 +82,14 @@ impl DamageFound {
         for chunk in 0..faces {
             is_sound &= self.note(part.interface_chunk(chunk))?;
         }
-        // Damage of chunks is told with their places by now; what is left is in the tree between them.
+        // Damage of chunks was reported with their places by now; what is left is in the tree between them.
         if is_sound {
             self.note(part.check())?;
         }
         Ok(())
     }
 
-    fn of_leaf(&mut self, store: &mut Catalog, row: CoarseRow) -> Result<(), StoreError> {
+    fn of_snapshot(&mut self, store: &mut Catalog, row: CoarseRow) -> Result<(), StoreError> {
         let path = store.coarse_path(row.rank, row.generation);
         let mut leaf = match CoarseSnapshot::open(&path, row, MEMORY_BYTES) {
             Ok(leaf) => leaf,

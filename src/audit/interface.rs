@@ -6,21 +6,62 @@ use std::path::Path;
 use tetdb_schema::digest::Digest;
 use tetdb_schema::record::InterfaceFace;
 
-use super::claims::word;
 use super::{Finding, Offender, Report};
 use crate::sealed::Corner;
-use crate::storage::{Sorter, StorageError};
+use crate::storage::{Sorter, StorageError, sort_record};
 use crate::store::StoreError;
 use tetdb_schema::catalog::InterfaceRow;
 
-/// Cut, index, sub-domain, other, three vertex ids in their turn, sum of the coordinate mixes.
-const BYTES: usize = 48;
+sort_record! {
+    /// An interface face of one sub-domain.
+    struct FaceSide {
+        cut: u32,
+        index: u32,
+        subdomain: u32,
+        other: u32,
+        /// Vertex ids in their turn as seen from the lower side, the least first.
+        ids: [u64; 3],
+        /// Of the mixes of the vertices' coordinates.
+        sum: u64,
+    }
+}
+
+/// Two sub-domains at a cut.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct CutPair {
+    cut: u32,
+    low: u32,
+    high: u32,
+}
+
+/// The interface faces of a pair.
+#[derive(Clone, Copy, Default, PartialEq)]
+struct SharedFaces {
+    count: u64,
+    digest: Digest,
+}
 
 /// All interface faces of all sub-domains, and the digests by cut and pair, from either side.
 pub(super) struct Interfaces {
-    sorter: Sorter<BYTES>,
-    /// By cut, lower and higher rank: faces and digest from the lower and from the higher side.
-    sides: BTreeMap<(u32, u32, u32), [(u64, Digest); 2]>,
+    sorter: Sorter<FaceSide>,
+    /// From the lower and from the higher side.
+    sides: BTreeMap<CutPair, [SharedFaces; 2]>,
+}
+
+impl CutPair {
+    fn of(row: &InterfaceRow) -> Self {
+        let &InterfaceRow { cut, low, high, .. } = row;
+        Self { cut, low, high }
+    }
+}
+
+impl SharedFaces {
+    fn of(row: &InterfaceRow) -> Self {
+        Self {
+            count: row.faces,
+            digest: Digest { lanes: row.digest },
+        }
+    }
 }
 
 impl Interfaces {
@@ -40,10 +81,11 @@ impl Interfaces {
     ) -> Result<(), StorageError> {
         let mixes = corners.map(|c| c.mix);
         let (low, high) = (subdomain.min(face.other), subdomain.max(face.other));
-        let sides = self.sides.entry((face.cut, low, high)).or_default();
+        let cut = face.cut;
+        let sides = self.sides.entry(CutPair { cut, low, high }).or_default();
         let side = &mut sides[usize::from(subdomain != low)];
-        side.0 += 1;
-        side.1.add_face(mixes, face.cut);
+        side.count += 1;
+        side.digest.add_face(mixes, face.cut);
         let mut ids = corners.map(|c| c.id);
         let least = (0..3).min_by_key(|&i| ids[i]).unwrap_or(0);
         ids.rotate_left(least);
@@ -52,18 +94,14 @@ impl Interfaces {
             ids.swap(1, 2);
         }
         let sum = mixes.iter().fold(0u64, |s, &m| s.wrapping_add(m));
-        let mut record = [0; BYTES];
-        let words = [face.cut, face.index, subdomain, face.other];
-        for (bytes, word) in record[..16].chunks_exact_mut(4).zip(words) {
-            bytes.copy_from_slice(&word.to_be_bytes());
-        }
-        for (bytes, v) in record[16..]
-            .chunks_exact_mut(8)
-            .zip([ids[0], ids[1], ids[2], sum])
-        {
-            bytes.copy_from_slice(&v.to_be_bytes());
-        }
-        self.sorter.push(record)
+        self.sorter.push(FaceSide {
+            cut: face.cut,
+            index: face.index,
+            subdomain,
+            other: face.other,
+            ids,
+            sum,
+        })
     }
 
     /// Matches the faces and compares the digests with the catalog's rows.
@@ -72,65 +110,57 @@ impl Interfaces {
         rows: &[InterfaceRow],
         report: &mut Report,
     ) -> Result<(), StoreError> {
-        let mut group: Vec<[u8; BYTES]> = Vec::new();
-        for record in self.sorter.finish()? {
-            let record = record?;
-            if group.first().is_some_and(|g| g[..8] != record[..8]) {
-                judge(&group, report);
+        let mut group: Vec<FaceSide> = Vec::new();
+        for side in self.sorter.finish()? {
+            let side = side?;
+            let is_other = |first: &FaceSide| (first.cut, first.index) != (side.cut, side.index);
+            if group.first().is_some_and(is_other) {
+                compare_sides(&group, report);
                 group.clear();
             }
-            group.push(record);
+            group.push(side);
         }
         if !group.is_empty() {
-            judge(&group, report);
+            compare_sides(&group, report);
         }
-        let mut expected: BTreeMap<_, _> = rows
+        let mut expected: BTreeMap<CutPair, SharedFaces> = rows
             .iter()
-            .map(|r| {
-                (
-                    (r.cut, r.low, r.high),
-                    (r.faces, Digest { lanes: r.digest }),
-                )
-            })
+            .map(|row| (CutPair::of(row), SharedFaces::of(row)))
             .collect();
-        for (key, sides) in self.sides {
-            let row = expected.remove(&key);
+        for (pair, sides) in self.sides {
+            let row = expected.remove(&pair);
             if sides[0] != sides[1] || row != Some(sides[0]) {
-                differs(key, report);
+                differs(pair, report);
             }
         }
-        for key in expected.into_keys() {
-            differs(key, report);
+        for pair in expected.into_keys() {
+            differs(pair, report);
         }
         Ok(())
     }
 }
 
-fn judge(group: &[[u8; BYTES]], report: &mut Report) {
+fn compare_sides(group: &[FaceSide], report: &mut Report) {
     let [a, b] = group else {
         let count = group.len();
         return unmatched(&group[0], format!("{count} faces instead of 2"), report);
     };
-    if word(a, 2) != word(b, 3) || word(a, 3) != word(b, 2) {
+    if a.subdomain != b.other || a.other != b.subdomain {
         unmatched(a, "its sub-domains do not name each other".into(), report);
-    } else if a[16..] != b[16..] {
+    } else if (a.ids, a.sum) != (b.ids, b.sum) {
         unmatched(a, "its vertices differ between the sides".into(), report);
     }
 }
 
-fn unmatched(record: &[u8; BYTES], what: String, report: &mut Report) {
+fn unmatched(side: &FaceSide, what: String, report: &mut Report) {
     let finding = Finding::UnmatchedInterface;
     report.find(finding, || {
-        let what = format!(
-            "face {} of cut {}: {what}",
-            word(record, 1),
-            word(record, 0)
-        );
-        Offender::new(finding, Some(word(record, 2)), what)
+        let what = format!("face {} of cut {}: {what}", side.index, side.cut);
+        Offender::new(finding, Some(side.subdomain), what)
     });
 }
 
-fn differs((cut, low, high): (u32, u32, u32), report: &mut Report) {
+fn differs(CutPair { cut, low, high }: CutPair, report: &mut Report) {
     let finding = Finding::CatalogDiffers;
     report.find(finding, || {
         let what = format!(

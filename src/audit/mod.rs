@@ -18,6 +18,7 @@ mod claims;
 mod compare;
 mod damage;
 mod interface;
+mod options;
 mod pairing;
 mod pass;
 mod report;
@@ -28,6 +29,7 @@ use std::path::{Path, PathBuf};
 
 pub use compare::{Population, Qualities, qualities};
 pub use damage::damage;
+pub use options::VerifyOptions;
 pub use report::{Finding, Level, Offender, Report};
 
 use tetdb_schema::digest::Digest;
@@ -35,17 +37,6 @@ use tetdb_schema::digest::Digest;
 use crate::storage::StorageError;
 use crate::store::{Catalog, StoreError};
 use crate::surface::Surface;
-
-/// How to verify.
-#[derive(Clone, Debug)]
-pub struct VerifyOptions {
-    /// The last of the levels to check; those before it are checked too.
-    pub level: Level,
-    /// Bytes for caches, sort buffers and tables together; the tables alone take some 8 MiB.
-    pub memory_bytes: usize,
-    /// Folder for sorted runs; made and removed again below it.
-    pub temp_dir: PathBuf,
-}
 
 /// Checks a sealed store, against its input when that is given.
 ///
@@ -62,11 +53,11 @@ pub fn verify(
         let memory = options.memory_bytes / 4;
         let mut part = store.open_subdomain(row.rank, memory)?;
         audit.subdomain(&mut part)?;
-        // Damage of chunks is told with their places by now; what is left is in the tree between them.
+        // Damage of chunks was reported with their places by now; what is left is in the tree between them.
         part.check()?;
     }
     // What is only kept is no part of the mesh, but who wants it one day must not learn of its damage then.
-    if let Some(first) = damage::damage_of_kept(store)?.into_iter().next() {
+    if let Some(first) = damage::damage_of_snapshots(store)?.into_iter().next() {
         return Err(first);
     }
     let interfaces = store.interfaces()?;

@@ -2,30 +2,28 @@
 
 use std::path::Path;
 
-use super::claims::word;
-use crate::storage::{Sorter, StorageError, check_cancelled};
+use crate::storage::{Sorter, StorageError, check_cancelled, sort_record};
 use crate::store::StoreError;
 
-/// Vertices ascending, reference, opposite vertex, region, parity, mark.
-const BYTES: usize = 26;
-
-/// One side of a face.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Side {
-    pub face: [u32; 3],
-    pub odd: bool,
-    /// Face reference: 4 * tetrahedron + face.
-    pub reference: u32,
-    /// The vertex of the tetrahedron that is not on the face.
-    pub apex: u32,
-    pub region: u32,
-    /// Bits of `claims`: what makes the face required.
-    pub mark: u8,
+sort_record! {
+    /// One side of a face.
+    pub(super) struct Side {
+        /// Vertices ascending.
+        pub face: [u32; 3],
+        /// Face reference: 4 * tetrahedron + face.
+        pub reference: u32,
+        /// The vertex of the tetrahedron that is not on the face.
+        pub apex: u32,
+        pub region: u32,
+        pub odd: bool,
+        /// Bits of `claims`: what makes the face required.
+        pub mark: u8,
+    }
 }
 
 /// Open sides under collection.
 pub(super) struct OpenSides {
-    sorter: Sorter<BYTES>,
+    sorter: Sorter<Side>,
 }
 
 impl OpenSides {
@@ -36,15 +34,7 @@ impl OpenSides {
     }
 
     pub(super) fn push(&mut self, side: &Side) -> Result<(), StorageError> {
-        let mut record = [0; BYTES];
-        let [a, b, c] = side.face;
-        let words = [a, b, c, side.reference, side.apex, side.region];
-        for (bytes, word) in record.chunks_exact_mut(4).zip(words) {
-            bytes.copy_from_slice(&word.to_be_bytes());
-        }
-        record[24] = u8::from(side.odd);
-        record[25] = side.mark;
-        self.sorter.push(record)
+        self.sorter.push(*side)
     }
 
     /// Calls `visit` with the sides of each face, faces ascending.
@@ -53,17 +43,9 @@ impl OpenSides {
         mut visit: impl FnMut(&[Side]) -> Result<(), StoreError>,
     ) -> Result<(), StoreError> {
         let mut sides: Vec<Side> = Vec::new();
-        for record in self.sorter.finish()? {
+        for side in self.sorter.finish()? {
             check_cancelled();
-            let record = record?;
-            let side = Side {
-                face: [0, 1, 2].map(|i| word(&record, i)),
-                reference: word(&record, 3),
-                apex: word(&record, 4),
-                region: word(&record, 5),
-                odd: record[24] != 0,
-                mark: record[25],
-            };
+            let side = side?;
             if sides.first().is_some_and(|s| s.face != side.face) {
                 visit(&sides)?;
                 sides.clear();

@@ -69,7 +69,7 @@ pub(super) fn place<P: Pages>(
 
 /// A face where the core was cut out.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-pub(super) struct RimFace {
+pub(super) struct BoundaryFace {
     /// Vertices in the core, ascending.
     pub vertices: [u32; 3],
     /// The tetrahedron of the host on the other side.
@@ -78,11 +78,11 @@ pub(super) struct RimFace {
 
 /// Where the core was cut out, ascending by vertices.
 #[derive(Default)]
-pub(super) struct CoreRim {
-    pub faces: Vec<RimFace>,
+pub(super) struct CoreBoundary {
+    pub faces: Vec<BoundaryFace>,
 }
 
-impl CoreRim {
+impl CoreBoundary {
     /// The host's face at the core's face with these vertices, if it is one of the rim.
     pub(super) fn find(&self, mut vertices: [u32; 3]) -> Option<FaceRef> {
         vertices.sort_unstable();
@@ -105,7 +105,7 @@ pub(super) fn extract<P: Pages, Q: Pages>(
     host: &mut Mesh<P>,
     core: &mut Mesh<Q>,
     surface: &impl CuttingSurface,
-) -> CoreRim {
+) -> CoreBoundary {
     host.clear_scratch();
     let base = dense(host.vertex_ids_end());
     for n in 0..base {
@@ -139,7 +139,7 @@ pub(super) fn extract<P: Pages, Q: Pages>(
         t = next_id(t);
     }
     // The copies still name the host's neighbors.
-    let mut rim = CoreRim::default();
+    let mut rim = CoreBoundary::default();
     let mut from = 0;
     while let Some((t, mut tet)) = core.next_tet(from) {
         from = t + 1;
@@ -162,7 +162,7 @@ pub(super) fn extract<P: Pages, Q: Pages>(
                 }
             }
             vertices.sort_unstable();
-            rim.faces.push(RimFace {
+            rim.faces.push(BoundaryFace {
                 vertices,
                 host: across,
             });

@@ -3,17 +3,35 @@
 //! A facet with a vertex that only one child has lies in that child, with all its tetrahedra. Only those at the core, whose vertices both
 //! may have, are looked up among the required faces there.
 
+use super::child::Split;
 use super::core::SHARED;
-use super::split::{Split, word};
 use crate::mesh::anatomy::FROZEN;
 use crate::mesh::{FaceRef, Workspace, dense};
-use crate::storage::{Pages, Sorted, Sorter, StorageError};
+use crate::storage::{Pages, Sorted, Sorter, StorageError, sort_record};
 use tetdb_schema::page::NONE;
 
-/// A required face of the child: its vertices ascending, and where it is.
-type FaceRecord = [u8; 16];
-/// A facet or interface face of the host: its vertices in the child ascending, its kind, its number, whether it must be looked up.
-type ClaimRecord = [u8; 18];
+sort_record! {
+    /// A required face of the child.
+    struct RequiredFace {
+        /// Ascending.
+        vertices: [u32; 3],
+        /// A [`FaceRef`].
+        place: u32,
+    }
+}
+
+sort_record! {
+    /// A facet or interface face of the host.
+    struct Claim {
+        /// In the child, ascending.
+        vertices: [u32; 3],
+        /// [`FACET`] or [`INTERFACE`].
+        kind: u8,
+        number: u32,
+        /// The core has all its vertices, so that its place must be looked up.
+        in_core: bool,
+    }
+}
 
 const FACET: u8 = 0;
 const INTERFACE: u8 = 1;
@@ -25,7 +43,7 @@ pub(super) fn inherit<P: Pages, Q: Pages, R: Pages>(
     split: &mut Split<P, Q, R>,
     space: &Workspace,
 ) -> Result<(), StorageError> {
-    let mut claims = Sorter::<18>::new(space.dir, space.memory / 3);
+    let mut claims = Sorter::new(space.dir, space.memory / 3);
     let mut loose = None;
     for n in 0..split.host.n_facets() {
         let facet = split.host.facet(n);
@@ -48,20 +66,19 @@ pub(super) fn inherit<P: Pages, Q: Pages, R: Pages>(
     let mut faces = split.required_faces(space)?.peekable();
     for claim in claims.finish()? {
         let claim = claim?;
-        let (kind, number) = (claim[12], word(&claim, 13));
-        if claim[17] == 0 {
-            split.keep(kind, number, None);
+        if !claim.in_core {
+            split.inherit_face(claim, None);
             continue;
         }
-        while let Some(face) = faces.next_if(|f| f.as_ref().map_or(true, |f| f[..12] < claim[..12]))
-        {
+        let is_before = |face: &RequiredFace| face.vertices < claim.vertices;
+        while let Some(face) = faces.next_if(|f| f.as_ref().map_or(true, is_before)) {
             face?;
         }
         let Some(Ok(face)) = faces.peek() else {
             continue;
         };
-        if face[..12] == claim[..12] {
-            split.keep(kind, number, Some(FaceRef(word(face, 12))));
+        if face.vertices == claim.vertices {
+            split.inherit_face(claim, Some(FaceRef(face.place)));
         }
     }
     Ok(())
@@ -92,20 +109,21 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
 
     fn claim(
         &mut self,
-        claims: &mut Sorter<18>,
+        claims: &mut Sorter<Claim>,
         vertices: [u32; 3],
         kind: u8,
         number: u32,
     ) -> Result<(), StorageError> {
-        let Some((vertices, in_core)) = self.known_face(vertices) else {
+        let Some((mut vertices, in_core)) = self.known_face(vertices) else {
             return Ok(());
         };
-        let mut record: ClaimRecord = [0; 18];
-        put_sorted(&mut record, vertices);
-        record[12] = kind;
-        record[13..17].copy_from_slice(&number.to_be_bytes());
-        record[17] = u8::from(in_core);
-        claims.push(record)
+        vertices.sort_unstable();
+        claims.push(Claim {
+            vertices,
+            kind,
+            number,
+            in_core,
+        })
     }
 
     /// Makes room behind the host's scratch map for the numbers of vertices without tetrahedra; returns where.
@@ -132,8 +150,8 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
     }
 
     /// The child's required faces whose three vertices the core has.
-    fn required_faces(&mut self, space: &Workspace) -> Result<Sorted<16>, StorageError> {
-        let mut faces = Sorter::<16>::new(space.dir, space.memory / 3);
+    fn required_faces(&mut self, space: &Workspace) -> Result<Sorted<RequiredFace>, StorageError> {
+        let mut faces = Sorter::new(space.dir, space.memory / 3);
         for n in 0..dense(self.core.tet_ids_end()) {
             let number = self.core.scratch(self.core_base + n);
             if number != NONE {
@@ -147,27 +165,31 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
         faces.finish()
     }
 
-    fn push_required(&mut self, faces: &mut Sorter<16>, t: u32) -> Result<(), StorageError> {
+    fn push_required(
+        &mut self,
+        faces: &mut Sorter<RequiredFace>,
+        t: u32,
+    ) -> Result<(), StorageError> {
         let tet = self.child.tet(t);
         for i in (0..4).filter(|&i| tet.is_required(i)) {
-            let mut record: FaceRecord = [0; 16];
-            put_sorted(&mut record, tet.face(i));
-            record[12..].copy_from_slice(&FaceRef::new(t, i).0.to_be_bytes());
-            faces.push(record)?;
+            let mut vertices = tet.face(i);
+            vertices.sort_unstable();
+            let place = FaceRef::new(t, i).0;
+            faces.push(RequiredFace { vertices, place })?;
         }
         Ok(())
     }
 
     /// Takes a facet or interface face over; `face` is where it is, for one that was at the core.
-    fn keep(&mut self, kind: u8, number: u32, face: Option<FaceRef>) {
+    fn inherit_face(&mut self, claim: Claim, face: Option<FaceRef>) {
         let known = "claimed with its vertices";
-        if kind == FACET {
-            let mut facet = self.host.facet(number);
+        if claim.kind == FACET {
+            let mut facet = self.host.facet(claim.number);
             facet.vertices = self.known_face(facet.vertices).expect(known).0;
             self.child.add_facet(facet);
             return;
         }
-        let mut kept = self.host.interface_face(number);
+        let mut kept = self.host.interface_face(claim.number);
         kept.vertices = self.known_face(kept.vertices).expect(known).0;
         self.child.add_interface_face(kept);
         // What was copied out of the host is frozen already.
@@ -175,12 +197,5 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
             let (region, _) = self.child.tet_attribute(face.tet());
             self.child.set_tet_attribute(face.tet(), region, FROZEN);
         }
-    }
-}
-
-fn put_sorted(record: &mut [u8], mut vertices: [u32; 3]) {
-    vertices.sort_unstable();
-    for (bytes, v) in record.chunks_exact_mut(4).zip(vertices) {
-        bytes.copy_from_slice(&v.to_be_bytes());
     }
 }

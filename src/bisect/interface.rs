@@ -9,11 +9,11 @@
 
 use rayon::prelude::*;
 
-use super::core::CoreRim;
+use super::core::CoreBoundary;
 use super::flow::{Arc, Graph};
+use super::interface_faces::interface_points;
 use super::labels::{InterfaceMeasures, Labels, face_cost, measure};
-use super::moves::Moves;
-use super::split::interface_points;
+use super::moves::{Moves, Steps};
 use super::surface::CuttingSurface;
 use crate::geom::Point;
 use crate::mesh::{Mesh, dense};
@@ -27,24 +27,6 @@ const STRIP: usize = 100_000;
 const BORDER: usize = 8;
 /// Capacities are costs in this fraction.
 const SCALE: f64 = 256.0;
-
-/// Steps of the choice, for comparing what each brings.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Steps {
-    pub minimum_cut: bool,
-    pub vertex_moves: bool,
-    pub tet_moves: bool,
-}
-
-impl Default for Steps {
-    fn default() -> Self {
-        Self {
-            minimum_cut: true,
-            vertex_moves: true,
-            tet_moves: true,
-        }
-    }
-}
 
 /// How the interface came about.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -67,7 +49,7 @@ pub struct InterfaceReport {
 pub(super) fn choose<P: Pages>(
     core: &mut Mesh<P>,
     surface: &impl CuttingSurface,
-    rim: &CoreRim,
+    rim: &CoreBoundary,
     steps: Steps,
     natural: Option<&mut Vec<[Point; 3]>>,
 ) -> (InterfaceReport, Labels) {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::core::{CoreRim, is_in_core, middle, place, tet_ids};
+use super::core::{CoreBoundary, is_in_core, middle, place, tet_ids};
 use super::surface::CuttingSurface;
 use crate::geom::Point;
 use crate::mesh::{FaceRef, Mesh, Tet, dense};
@@ -30,7 +30,7 @@ impl Labels {
     pub(super) fn begin<P: Pages>(
         core: &mut Mesh<P>,
         surface: &impl CuttingSurface,
-        rim: &CoreRim,
+        rim: &CoreBoundary,
     ) -> (Self, Vec<u32>) {
         let mut of = vec![0; core.tet_ids_end() as usize];
         let mut free = Vec::new();
@@ -144,7 +144,7 @@ impl InterfaceMeasures {
 pub(super) fn measure<P: Pages>(
     core: &mut Mesh<P>,
     labels: &Labels,
-    rim: &CoreRim,
+    rim: &CoreBoundary,
 ) -> InterfaceMeasures {
     let mut measures = InterfaceMeasures::default();
     for t in tet_ids(core) {
@@ -176,7 +176,7 @@ pub(super) fn measure<P: Pages>(
 }
 
 /// Whether face `i` is required for ever, not only as a part of the rim.
-pub(super) fn is_constrained(tet: &Tet, i: usize, rim: &CoreRim) -> bool {
+pub(super) fn is_constrained(tet: &Tet, i: usize, rim: &CoreBoundary) -> bool {
     tet.is_required(i) && (tet.neighbor[i].exists() || rim.find(tet.face(i)).is_none())
 }
 
@@ -192,7 +192,7 @@ pub(super) fn layers_least<P: Pages, Q: Pages>(
     host: &mut Mesh<P>,
     core: &mut Mesh<Q>,
     labels: &Labels,
-    rim: &CoreRim,
+    rim: &CoreBoundary,
     surface: &impl CuttingSurface,
 ) -> Option<u32> {
     core.clear_scratch();

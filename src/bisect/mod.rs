@@ -12,24 +12,31 @@
 //! Source: the paper, section 1.1.
 
 mod axes;
+mod child;
 mod core;
 mod flow;
 mod inherit;
 mod interface;
+mod interface_faces;
 mod labels;
 mod load;
 mod moves;
+mod opened;
 mod plane;
+mod report;
 mod split;
 mod spread;
 mod surface;
 mod zone;
 
 pub use axes::principal_axes;
-pub use interface::{InterfaceReport, Steps};
+pub use interface::InterfaceReport;
 pub use labels::InterfaceMeasures;
 pub use load::{SizeAt, load_of};
+pub use moves::Steps;
+pub use opened::Opened;
 pub use plane::{PlaneChoice, choose as choose_plane};
+pub use report::{CutReport, StageSeconds};
 pub use split::write_child;
 pub use spread::ChosenPlane;
 pub use surface::{CuttingSurface, Plane};
@@ -68,41 +75,6 @@ pub struct CutPlan<'a> {
     pub optimize: Settings,
 }
 
-/// A sub-domain cut open: its interface is chosen, the children are not yet written.
-pub struct Opened {
-    pub zone: Zone,
-    pub report: CutReport,
-    rim: core::CoreRim,
-    labels: labels::Labels,
-}
-
-/// How a cut went.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CutReport {
-    pub plane: ChosenPlane,
-    pub refine: RefineReport,
-    pub interface: InterfaceReport,
-    /// Interface vertices the cut made, which bear its number.
-    pub vertices: u32,
-    /// Tetrahedra with a face on the interface, and those whose circumsphere lies in the refined zone.
-    pub z_tets: u64,
-    pub z_enclosed: u64,
-    /// Tetrahedra, from face to face, between the interface and the first with a vertex out of the refined zone, at least; three
-    /// stands for more.
-    pub layers_least: Option<u32>,
-    pub seconds: StageSeconds,
-}
-
-/// Wall time of the stages of a cut.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct StageSeconds {
-    pub plane: f64,
-    pub zone: f64,
-    /// Copying the core out and optimizing it.
-    pub core: f64,
-    pub interface: f64,
-}
-
 /// A sub-domain whose zone is refined.
 pub struct Refined {
     pub zone: Zone,
@@ -120,7 +92,7 @@ pub struct InterfaceFaces {
 
 /// Refines the zone of a cut in `host` and chooses the interface in `core`, which must be empty.
 ///
-/// `progress` is told a stage and what was done of it. Effects: all ids of `host` may change. Errors: the disk.
+/// `progress` receives a stage and how much of it is done. Effects: all ids of `host` may change. Errors: the disk.
 pub fn open<P: Pages, Q: Pages>(
     host: &mut Mesh<P>,
     core: &mut Mesh<Q>,
@@ -195,9 +167,9 @@ pub fn choose<P: Pages, Q: Pages>(
     let (interface, labels) =
         interface::choose(core, &zone.surface, &rim, plan.method.steps, natural);
     if let Some(faces) = faces {
-        faces.chosen = split::interface_points(core, &labels);
+        faces.chosen = interface_faces::interface_points(core, &labels);
     }
-    let vertices = split::number_interface(core, &labels, plan.cut);
+    let vertices = interface_faces::number_interface(core, &labels, plan.cut);
     let (z_tets, z_enclosed) = labels::enclosed(core, &labels, &zone.surface, plan.h);
     let layers_least = labels::layers_least(host, core, &labels, &rim, &zone.surface);
     seconds.interface = clock.elapsed().as_secs_f64() - seconds.core;

@@ -1,7 +1,6 @@
 //! Moves of tetrahedra from one side of the interface to the other.
 
-use super::core::CoreRim;
-use super::interface::Steps;
+use super::core::CoreBoundary;
 use super::labels::{Labels, face_cost, is_constrained};
 use super::surface::CuttingSurface;
 use crate::mesh::{Mesh, Tet, dense};
@@ -31,7 +30,7 @@ pub(super) struct Moves<'a, S> {
     /// The sides, as they are.
     pub(super) labels: Labels,
     surface: &'a S,
-    rim: &'a CoreRim,
+    rim: &'a CoreBoundary,
     ball: Ball,
     around: Ball,
     /// Tetrahedra being moved, then those beside them.
@@ -53,7 +52,7 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
         core: &Mesh<P>,
         labels: Labels,
         surface: &'a S,
-        rim: &'a CoreRim,
+        rim: &'a CoreBoundary,
     ) -> Self {
         Self {
             labels,
@@ -77,7 +76,7 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
         (self.of_vertices.len() + 3 * self.of_tets.len()) as u64
     }
 
-    /// Moves until no move gains; returns how many were made.
+    /// Moves until no move gains; returns how many moves there were.
     pub(super) fn run<P: Pages>(&mut self, core: &mut Mesh<P>, free: &[u32], steps: Steps) -> u64 {
         let mut total = 0;
         for _ in 0..PASSES_MAX {
@@ -156,7 +155,7 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
             *self.of_tet(self.moved[k]) &= !MOVED;
         }
         let gain = before - after;
-        // Without a pinched vertex there is nothing more to gain than faces, which is told without looking at balls.
+        // Without a pinched vertex there is nothing more to gain than faces, which the counts say without looking at balls.
         let is_pinched = |&v: &u32| self.of_vertices[dense(v) as usize] & PINCHED != 0;
         let may_mend = self.vertices.iter().any(is_pinched);
         if gain < if may_mend { -PINCH } else { GAIN_MIN } {
@@ -388,5 +387,23 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
         vertices.sort_unstable();
         vertices.dedup();
         vertices
+    }
+}
+
+/// Steps of the choice, for comparing what each brings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Steps {
+    pub minimum_cut: bool,
+    pub vertex_moves: bool,
+    pub tet_moves: bool,
+}
+
+impl Default for Steps {
+    fn default() -> Self {
+        Self {
+            minimum_cut: true,
+            vertex_moves: true,
+            tet_moves: true,
+        }
     }
 }

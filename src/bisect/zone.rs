@@ -35,7 +35,7 @@ impl Zone {
         WIDTH_MIN + WIDTH_NOISE * noise(foot / cell, seed)
     }
 
-    /// Whether no vertex may be added at `p` once the cut is made. At its noisy limit the zone still has holes that
+    /// Whether no vertex may be added at `p` after the cut. At its noisy limit the zone still has holes that
     /// only its surroundings, once refined, let one fill; a tetrahedron at the interface reaches nowhere near there.
     #[inline]
     pub fn is_final(&self, p: Point, h: f64) -> bool {
@@ -50,7 +50,7 @@ impl Zone {
     }
 }
 
-/// The zone of the cut at hand, without what earlier cuts have made final.
+/// The zone of the cut at hand, without what earlier cuts have settled.
 pub(super) struct InZone<'a> {
     pub zone: &'a Zone,
     pub earlier: &'a [Zone],

@@ -1,6 +1,6 @@
 //! `check`: can a surface be meshed, what would mend it, what mesh does it allow?
 
-use std::path::Path;
+use std::path::PathBuf;
 
 use serde_json::json;
 
@@ -11,6 +11,7 @@ use super::failure::Failure;
 use super::input::{self, Space};
 use crate::api;
 use crate::api::surface::WELD_SHARE_MAX;
+use crate::api::targets::check_target;
 use crate::io::write;
 use crate::surface::{Repair, Surface, repair};
 
@@ -26,8 +27,9 @@ struct Mended {
 pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
     // Options are checked before anything is read.
     let weld_share = args.weld.as_deref().map(share).transpose()?;
-    if let Some(out) = &args.write {
-        refuse_input(out, &args.surfaces)?;
+    let inputs: Vec<PathBuf> = args.surfaces.iter().map(PathBuf::from).collect();
+    for out in args.write.iter().chain(&args.write_bad) {
+        check_target(out, &inputs)?;
     }
     let mut input = input::load(&args.surfaces, Space::Boundless, console)?;
     let mended = args.repair.then(|| mend(&mut input, weld_share));
@@ -62,22 +64,6 @@ fn share(text: &str) -> Result<f64, Failure> {
         )
         .help("for example --weld 1e-6; `tetdb check SURFACE` says what would close an open surface")),
     }
-}
-
-/// The surface that is read is never replaced: what a repair drops would be lost.
-fn refuse_input(out: &Path, surfaces: &[String]) -> Result<(), Failure> {
-    let Ok(out) = out.canonicalize() else {
-        return Ok(());
-    };
-    let same = surfaces
-        .iter()
-        .find(|name| Path::new(name).canonicalize().is_ok_and(|path| path == out));
-    same.map_or(Ok(()), |name| {
-        Err(
-            Failure::new("usage", format!("--write names the surface itself, {name}"))
-                .help("write the repaired surface to another file"),
-        )
-    })
 }
 
 fn mend(input: &mut api::Surface, weld_share: Option<f64>) -> Mended {

@@ -23,7 +23,15 @@ pub struct Console {
     terminal: bool,
     bar: ProgressBar,
     state: Arc<Mutex<State>>,
+    answer: Arc<Mutex<Answer>>,
     cancel: CancelToken,
+}
+
+/// What became of the standard output.
+#[derive(Default)]
+struct Answer {
+    bytes: u64,
+    refused: Option<std::io::Error>,
 }
 
 struct State {
@@ -58,6 +66,7 @@ impl Console {
                 since: now,
                 printed: now,
             })),
+            answer: Arc::default(),
             cancel: CancelToken::new(),
         }
     }
@@ -128,8 +137,41 @@ impl Console {
 
     /// One line of the answer.
     pub fn line(&self, text: &str) {
-        // A closed stdout ends the answer quietly.
-        let _ = writeln!(std::io::stdout(), "{text}");
+        self.write(format!("{text}\n").as_bytes());
+    }
+
+    /// Bytes of the answer. Returns whether anybody still takes them.
+    pub fn write(&self, bytes: &[u8]) -> bool {
+        let mut answer = self.answer.lock().unwrap_or_else(PoisonError::into_inner);
+        if answer.refused.is_none() {
+            match std::io::stdout().write_all(bytes) {
+                Ok(()) => answer.bytes += bytes.len() as u64,
+                Err(error) => answer.refused = Some(error),
+            }
+        }
+        answer.refused.is_none()
+    }
+
+    /// Ends the answer. Errors: it could not be written, and not because its reader has enough.
+    pub fn end_answer(&self) -> Result<(), Failure> {
+        let mut answer = self.answer.lock().unwrap_or_else(PoisonError::into_inner);
+        if let (None, Err(error)) = (&answer.refused, std::io::stdout().flush()) {
+            answer.refused = Some(error);
+        }
+        match answer.refused.take() {
+            Some(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+                let code = match error.kind() {
+                    std::io::ErrorKind::StorageFull => "disk-full",
+                    _ => "io",
+                };
+                let message = format!(
+                    "the answer could not be written to the standard output: {error}; of it {} bytes were",
+                    answer.bytes
+                );
+                Err(Failure::new(code, message).help("send it to a disk with more space"))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// The whole answer for programs.

@@ -8,6 +8,7 @@ use super::args::ExportArgs;
 use super::console::Console;
 use super::failure::Failure;
 use super::memory;
+use crate::api::targets::{check_target, inputs_of};
 use crate::api::{Exported, Settings, show};
 use crate::io::write::{Content, ENDINGS, MeshFormat, Selection};
 
@@ -33,6 +34,12 @@ pub fn run(args: &ExportArgs, console: &Console) -> Result<u8, Failure> {
                     .help("end the name with .vtu"),
             );
         }
+    }
+    if !args.force {
+        let inputs = inputs_of(&args.store);
+        args.out
+            .iter()
+            .try_for_each(|out| check_target(out, &inputs))?;
     }
     let mut reports = Vec::new();
     for out in &args.out {

@@ -66,7 +66,7 @@ pub fn object(path: &Path) -> Result<Value, Failure> {
         "vertices": rows.iter().map(|r| r.vertices).sum::<u64>(),
         "bytes": rows.iter().map(|r| r.bytes).sum::<u64>(),
         "coarse_bytes": coarse.iter().map(|c| c.bytes).sum::<u64>(),
-        "previous_bytes": catalog.before()?.iter().map(|r| r.bytes).sum::<u64>(),
+        "previous_bytes": catalog.previous()?.iter().map(|r| r.bytes).sum::<u64>(),
         "catalog_bytes": catalog.file_bytes()?, "digest": digest(&rows),
         "stages": stages, "subdomains": subdomains, "interfaces": catalog.interfaces()?, "journal": catalog.journal()?,
     }))
@@ -138,7 +138,7 @@ pub fn print(path: &Path, console: &Console) -> Result<(), Failure> {
         memory::show(own),
         own as f64 / tets.max(1) as f64
     ));
-    let before = catalog.before()?;
+    let before = catalog.previous()?;
     if !before.is_empty() {
         console.line(&format!(
             "previous version of {} sub-domain(s), for `tetdb resaturate --undo`: {}",

@@ -8,7 +8,8 @@ use super::args::{MeshArgs, ResumeArgs, RunArgs};
 use super::console::Console;
 use super::failure::Failure;
 use super::input::{self, Space};
-use super::{config, export, info, memory, signals};
+use super::{config, export, info, memory};
+use crate::api::targets::check_target;
 use crate::api::{Existing, Mesher, Settings, resume_reported};
 use crate::io::write::Selection;
 use crate::pipeline::Summary;
@@ -18,6 +19,11 @@ pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
     // Sizes are checked before anything is read.
     options.sizes()?;
     let settings = begin(&args.run, console)?;
+    if !args.force {
+        let files = args.surfaces.iter().chain(&args.shape.sizes.size_field);
+        let inputs: Vec<PathBuf> = files.map(PathBuf::from).collect();
+        (args.run.export.iter()).try_for_each(|out| check_target(out, &inputs))?;
+    }
     let path = output(args);
     let existing = match args.force {
         true => Existing::Replace,
@@ -76,7 +82,6 @@ pub(super) fn begin(args: &RunArgs, console: &Console) -> Result<Settings, Failu
     for out in &args.export {
         export::check_format(out)?;
     }
-    signals::listen(console);
     let cap = memory::asked(args.memory.as_deref())?;
     Ok(console.settings(cap, args.threads))
 }

@@ -53,7 +53,9 @@ pub fn run() -> ExitCode {
     let console = Console::with(args.command.is_json(), args.quiet);
     let settings = console.settings(None, None);
     // A panic of redb on a damaged tree is damage; its own message would only confuse.
+    signals::listen(&console);
     let done = guarded(&settings, || Ok(dispatch(&args.command, &console)));
+    let done = done.map(|done| console.end_answer().and(done));
     let exit = match done {
         Ok(Ok(exit)) => exit,
         Ok(Err(failure)) => console.fail(&failure),
@@ -83,6 +85,9 @@ fn is_command(word: &str) -> bool {
 }
 
 fn dispatch(command: &Command, console: &Console) -> Result<u8, Failure> {
+    if writes_files(command) {
+        signals::end_in_order();
+    }
     match command {
         Command::Mesh(args) => mesh::run(args, console),
         Command::Estimate(args) => estimate::run(args, console),
@@ -99,7 +104,19 @@ fn dispatch(command: &Command, console: &Console) -> Result<u8, Failure> {
         Command::Snapshot(args) => snapshot::run(args, console),
         Command::Report(args) => report::run(args, console),
         Command::Sample(args) => sample::run(args, console),
-        Command::Completions(args) => shell::completions(args),
+        Command::Completions(args) => shell::completions(args, console),
         Command::Man(args) => shell::man(args, console),
     }
+}
+
+/// Whether a command that ended at once would leave something half done from the start.
+fn writes_files(command: &Command) -> bool {
+    matches!(
+        command,
+        Command::Resaturate(_)
+            | Command::Export(_)
+            | Command::Snapshot(_)
+            | Command::Report(_)
+            | Command::Query(_)
+    )
 }

@@ -11,6 +11,7 @@ use super::memory;
 use super::query_ask::{bad, point, selection};
 use super::query_rows::{FileSink, QueryColumn, Row, Sink, Writer};
 use crate::api::store::open_finished;
+use crate::api::targets::{check_target, inputs_of};
 use crate::geom::Point;
 use crate::query::{Hit, Ordered, QueryError, QuerySession, VARIABLES};
 use crate::storage::{Budget, attempt};
@@ -23,6 +24,9 @@ const QUALITY: usize = 0;
 const POINTS_MAX: u64 = 1 << 17;
 
 pub fn run(args: &QueryArgs, console: &Console) -> Result<u8, Failure> {
+    if let Some(out) = &args.output {
+        check_target(out, &inputs_of(&args.store))?;
+    }
     let cap = memory::cap(args.memory.as_deref())?;
     let budget = Budget::new(cap);
     let columns = columns(args)?;
@@ -33,7 +37,7 @@ pub fn run(args: &QueryArgs, console: &Console) -> Result<u8, Failure> {
     attempt(|| -> Result<u8, Failure> {
         let n = if args.point.is_empty() && args.points.is_none() {
             let selection = selection(args, &mut inquiry)?;
-            let mut writer = writer(args, columns, cap)?;
+            let mut writer = writer(args, columns, cap, console)?;
             let n = match order {
                 Some((QUALITY, descending))
                     if few(args.limit, lease.bytes()) && inquiry.has_extremes(&selection) =>
@@ -53,7 +57,7 @@ pub fn run(args: &QueryArgs, console: &Console) -> Result<u8, Failure> {
             end(writer, console)?;
             n
         } else {
-            let mut writer = writer(args, columns, cap)?;
+            let mut writer = writer(args, columns, cap, console)?;
             let n = locate(args, &mut inquiry, lease.bytes(), &mut writer)?;
             end(writer, console)?;
             n
@@ -68,7 +72,12 @@ fn few(limit: Option<u64>, memory: u64) -> bool {
     limit.is_some_and(|n| n.saturating_mul(2 * size_of::<Hit>() as u64) <= memory)
 }
 
-fn writer(args: &QueryArgs, columns: Vec<QueryColumn>, cap: u64) -> Result<Writer, Failure> {
+fn writer(
+    args: &QueryArgs,
+    columns: Vec<QueryColumn>,
+    cap: u64,
+    console: &Console,
+) -> Result<Writer, Failure> {
     let sink = match &args.output {
         Some(out) => {
             let file = FileSink::new(out, &columns, cap / 16)?;
@@ -78,7 +87,7 @@ fn writer(args: &QueryArgs, columns: Vec<QueryColumn>, cap: u64) -> Result<Write
         None if args.csv => Sink::Values,
         None => Sink::Table,
     };
-    Ok(Writer::new(sink, columns))
+    Ok(Writer::new(sink, columns, console))
 }
 
 fn end(writer: Writer, console: &Console) -> Result<(), Failure> {

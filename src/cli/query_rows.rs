@@ -1,11 +1,11 @@
 //! Answers of a query as rows of named cells, and where they go: a table, values, objects, files.
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value, json};
 use tetdb_schema::ids::VertexId;
 
+use super::console::Console;
 use super::failure::Failure;
 use crate::io::write::{NpyField, NpyTable, SelectedTet, SelectedVtu, TextFile};
 use crate::query::{Hit, Located, VARIABLES};
@@ -323,22 +323,27 @@ fn line(columns: &[QueryColumn], row: Option<&Row>) -> String {
     line.trim_end().to_owned()
 }
 
+/// Lines are collected to so many bytes.
+const LINES_BYTES: usize = 8 << 10;
+
 /// Writes rows; to the standard output until it is closed.
 pub struct Writer {
     sink: Sink,
     columns: Vec<QueryColumn>,
-    out: std::io::BufWriter<std::io::Stdout>,
+    console: Console,
+    /// Lines on their way to the standard output.
+    lines: String,
     bytes: Vec<u8>,
     closed: bool,
 }
 
 impl Writer {
-    pub fn new(sink: Sink, columns: Vec<QueryColumn>) -> Self {
-        let out = std::io::BufWriter::new(std::io::stdout());
+    pub fn new(sink: Sink, columns: Vec<QueryColumn>, console: &Console) -> Self {
         let mut writer = Self {
             sink,
             columns,
-            out,
+            console: console.clone(),
+            lines: String::new(),
             bytes: Vec::new(),
             closed: false,
         };
@@ -351,7 +356,16 @@ impl Writer {
     }
 
     fn print(&mut self, text: &str) {
-        self.closed |= writeln!(self.out, "{text}").is_err();
+        self.lines += text;
+        self.lines.push('\n');
+        if self.lines.len() > LINES_BYTES {
+            self.flush();
+        }
+    }
+
+    fn flush(&mut self) {
+        self.closed |= !self.console.write(self.lines.as_bytes());
+        self.lines.clear();
     }
 
     /// Writes a row; `false` when nobody listens any more.
@@ -371,7 +385,7 @@ impl Writer {
 
     /// Ends the answer; of a file, returns its name and length.
     pub fn finish(mut self) -> Result<Option<(PathBuf, u64)>, Failure> {
-        let _ = self.out.flush();
+        self.flush();
         match self.sink {
             Sink::File(file, path) => Ok(Some((path, file.finish()?))),
             _ => Ok(None),

@@ -1,5 +1,7 @@
 //! `refine-surface`: the same surface in finer triangles.
 
+use std::path::PathBuf;
+
 use serde_json::json;
 
 use super::args::RefineSurfaceArgs;
@@ -7,11 +9,15 @@ use super::console::Console;
 use super::failure::Failure;
 use super::input::{self, Space};
 use crate::api::surface::refine;
+use crate::api::targets::check_target;
 use crate::io::write;
 use crate::sizing::SizeOptions;
 
 pub fn run(args: &RefineSurfaceArgs, console: &Console) -> Result<u8, Failure> {
     let options = SizeOptions::parse(Some(&args.hsiz), None, None, args.hgrad.as_deref())?;
+    if !args.force {
+        check_target(&args.output, &[PathBuf::from(&args.surface)])?;
+    }
     let input = input::load_valid(
         std::slice::from_ref(&args.surface),
         Space::Boundless,

@@ -7,8 +7,10 @@ use super::console::Console;
 use super::failure::Failure;
 use super::memory;
 use crate::api::page::write_page;
+use crate::api::targets::{check_target, inputs_of};
 
 pub fn run(args: &ReportArgs, console: &Console) -> Result<u8, Failure> {
+    check_target(&args.output, &inputs_of(&args.store))?;
     let settings = console.settings(memory::asked(args.read.memory.as_deref())?, None);
     let written = write_page(&args.store, &args.output, &settings)?;
     console.done();

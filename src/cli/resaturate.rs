@@ -10,7 +10,7 @@ use super::console::Console;
 use super::failure::Failure;
 use super::info::{hex, share_below_two};
 use super::resaturate_sizes::{self, new_sizes};
-use super::{memory, mesh, signals};
+use super::{memory, mesh};
 use crate::api::job::options_of;
 use crate::api::remesh::{damaged, verify_changed};
 use crate::api::store::open_finished;
@@ -23,8 +23,6 @@ pub fn run(args: &ResaturateArgs, console: &Console) -> Result<u8, Failure> {
     check(args)?;
     let settings = mesh::begin(&args.run, console)?;
     let cap = settings.cap()?;
-    // What is read before the change ends at a signal all the same; a change is one commit.
-    signals::store_begins();
     let budget = Budget::new(cap);
     let mut open = open_finished(&args.store)?;
     if args.forget {

@@ -10,7 +10,7 @@ use super::config;
 use super::failure::Failure;
 use crate::api::Settings;
 use crate::api::job::identify_sizes;
-use crate::api::remesh::whole_field;
+use crate::api::remesh::field_of_surface;
 use crate::io::read::read_lengths;
 use crate::pipeline::{NewSizes, Options, Values};
 use crate::sizing::SizingError;
@@ -70,7 +70,7 @@ pub fn new_sizes(
         sizes.values = Some(values(Path::new(file), open, args, settings.cap()?)?);
     } else if args.sizes != SizeArgs::default() {
         identify_sizes(&mut asked)?;
-        sizes.field = Some(whole_field(open, asked.clone(), options, settings)?);
+        sizes.field = Some(field_of_surface(open, asked.clone(), options, settings)?);
     }
     asked.size_field = lengths.or(asked.size_field);
     let asked = serde_json::to_value(&asked).unwrap_or_default();

@@ -6,6 +6,7 @@ use super::args::SampleArgs;
 use super::console::Console;
 use super::failure::Failure;
 use super::input::{self, Space};
+use crate::api::targets::check_target;
 use crate::io::write;
 use crate::samples::PREFIX;
 
@@ -15,6 +16,7 @@ pub fn run(args: &SampleArgs, console: &Console) -> Result<u8, Failure> {
     } else {
         format!("{PREFIX}{}", args.sample)
     };
+    check_target(&args.output, &[])?;
     let surface = input::load(&[word], Space::Boundless, console)?.inner;
     write::surface(&surface, &args.output)?;
     let (triangles, vertices) = (surface.n_triangles(), surface.n_vertices());

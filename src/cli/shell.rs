@@ -1,6 +1,5 @@
 //! `completions` and `man`: what shells and manual readers want to know of the command line.
 
-use std::io::Write;
 use std::path::Path;
 
 use clap::{Command, CommandFactory};
@@ -9,10 +8,10 @@ use super::args::{Args, CompletionsArgs, ManArgs};
 use super::console::Console;
 use super::failure::Failure;
 
-pub fn completions(args: &CompletionsArgs) -> Result<u8, Failure> {
+pub fn completions(args: &CompletionsArgs, console: &Console) -> Result<u8, Failure> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut Args::command(), "tetdb", &mut script);
-    print(&script);
+    console.write(&script);
     Ok(0)
 }
 
@@ -35,7 +34,7 @@ pub fn man(args: &ManArgs, console: &Console) -> Result<u8, Failure> {
                 Failure::new("usage", format!("there is no command {word}")).help("`tetdb --help`")
             })?,
     };
-    print(&page(command)?);
+    console.write(&page(command)?);
     Ok(0)
 }
 
@@ -64,9 +63,4 @@ fn unwritable(path: &Path, error: &std::io::Error) -> Failure {
     Failure::new("io", error)
         .at(path.display())
         .help("give a folder that exists with --dir")
-}
-
-/// To the standard output; where that is closed, nobody listens.
-fn print(bytes: &[u8]) {
-    let _ = std::io::stdout().write_all(bytes);
 }

@@ -11,8 +11,10 @@ use super::failure::Failure;
 use crate::storage::StorageError;
 
 static RECEIVED: AtomicI32 = AtomicI32::new(0);
-/// Whether there is a store whose step under way must end in order.
+/// Whether there is a store that can be resumed.
 static HAS_STORE: AtomicBool = AtomicBool::new(false);
+/// Whether what is under way must end in order: a step of a store, a file that is half written.
+static IN_ORDER: AtomicBool = AtomicBool::new(false);
 /// What reads, validates and sizes a surface looks for signals here and there only; it has so long to end by itself.
 const PATIENCE: Duration = Duration::from_millis(1000);
 
@@ -33,10 +35,10 @@ pub fn listen(console: &Console) {
     });
 }
 
-/// Ends the process if there is no store yet, and so nothing to lose.
+/// Ends the process if nothing is under way that would leave something behind.
 fn end_early(is_json: bool) {
     std::thread::sleep(PATIENCE);
-    if !has_store() {
+    if !IN_ORDER.load(Ordering::SeqCst) {
         let stopped = Failure::from(StorageError::Cancelled);
         std::process::exit(Console::new(is_json).fail(&stopped).into());
     }
@@ -45,6 +47,12 @@ fn end_early(is_json: bool) {
 /// From now on there is a store: a step under way ends in order, however long that takes.
 pub fn store_begins() {
     HAS_STORE.store(true, Ordering::SeqCst);
+    end_in_order();
+}
+
+/// From now on something is under way that would leave something behind.
+pub fn end_in_order() {
+    IN_ORDER.store(true, Ordering::SeqCst);
 }
 
 /// Whether there is a store to go on with.

@@ -6,12 +6,14 @@ use super::failure::Failure;
 use super::memory;
 use super::query_ask::{bad, condition, numbers};
 use crate::api::picture::take;
+use crate::api::targets::{check_target, inputs_of};
 use crate::api::{self, Snapped, Snapshot};
 
 /// Least and greatest side of a picture in pixels.
 const SIDE: std::ops::RangeInclusive<u32> = 64..=16_384;
 
 pub fn run(args: &SnapshotArgs, console: &Console) -> Result<u8, Failure> {
+    check_target(&args.output, &inputs_of(&args.store))?;
     let settings = console.settings(memory::asked(args.read.memory.as_deref())?, None);
     let snapshot = snapshot(args)?;
     let snapped = take(&args.store, &args.output, &snapshot, &settings)?;

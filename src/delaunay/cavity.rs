@@ -3,8 +3,7 @@
 //! Gathering only marks; [`Kernel::discard`] takes the marks back and [`Kernel::fill`] makes the
 //! change. Between the two a caller may look at the outer faces and decide.
 
-use super::links::Links;
-use super::locate::Located;
+use super::kernel::{CavityFace, Kernel, Located, Rejected};
 use crate::geom::{Point, Seen, in_sphere_perturbed, insphere_filtered, orient};
 use crate::mesh::anatomy::mark::{IN_CAVITY, STAYS};
 use crate::mesh::anatomy::{FACES, MARK, REQUIRED, VERTEX_MASK};
@@ -13,87 +12,6 @@ use crate::storage::{Pages, check_cancelled};
 
 /// A larger cavity is refused: nothing a size field asks for is so large.
 const CAVITY_MAX: usize = 1 << 20;
-
-/// Why a point was not inserted; the mesh is as before.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Rejected {
-    /// The walk left the mesh or started nowhere.
-    Outside,
-    /// The point is this vertex, bit by bit.
-    Duplicate(u32),
-    /// No star-shaped cavity keeps the required faces.
-    Blocked,
-    /// A vertex would lose its last tetrahedron.
-    Buries,
-    /// The cavity has more than a million tetrahedra.
-    TooLarge,
-    /// The caller refused a vertex of the cavity.
-    Refused,
-}
-
-/// An outer face of the cavity.
-#[derive(Clone, Copy, Debug)]
-pub struct CavityFace {
-    /// Vertex ids, counter-clockwise seen from outside the cavity.
-    pub vertices: [u32; 3],
-    /// The face from the other side.
-    pub outside: FaceRef,
-    /// The face from the inside: a tetrahedron of the cavity.
-    pub inside: FaceRef,
-    pub required: bool,
-}
-
-/// Work done so far.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct KernelStats {
-    pub inserted: u64,
-    pub walk_steps: u64,
-    pub cavity_tets: u64,
-    pub cavity_largest: u64,
-    pub sphere_tests: u64,
-    pub shrunk: u64,
-}
-
-/// Scratch of the insertion kernel; one per worker.
-pub struct Kernel {
-    cavity: Vec<u32>,
-    /// The face through which each tetrahedron of the cavity was entered.
-    entries: Vec<FaceRef>,
-    /// The vertex each tetrahedron of the cavity brought in; none for the first.
-    apexes: Vec<u32>,
-    /// Outer faces that the point does not see from inside.
-    blind: Vec<u32>,
-    /// Local numbers of the outer faces' vertices, if they were given already.
-    locals: Vec<[u8; 3]>,
-    numbered: bool,
-    faces: Vec<CavityFace>,
-    links: Links,
-    new_tets: Vec<u32>,
-    outer: Vec<u32>,
-    suspects: Vec<u32>,
-    pub(super) turn: u32,
-    pub stats: KernelStats,
-}
-
-impl Default for Kernel {
-    fn default() -> Self {
-        Self {
-            cavity: Vec::new(),
-            entries: Vec::new(),
-            apexes: Vec::new(),
-            blind: Vec::new(),
-            locals: Vec::new(),
-            numbered: false,
-            faces: Vec::new(),
-            links: Links::new(),
-            new_tets: Vec::new(),
-            outer: Vec::new(),
-            suspects: Vec::new(),
-            turn: 1,
-            stats: KernelStats::default(),
-        }
-    }
-}
 
 impl Kernel {
     /// Inserts `p` as vertex `v` into a mesh without required faces; returns one of its tetrahedra.
@@ -141,7 +59,7 @@ impl Kernel {
         &self.cavity
     }
 
-    /// Tetrahedra made by the last [`Kernel::fill`].
+    /// Tetrahedra created by the last [`Kernel::fill`].
     pub fn new_tets(&self) -> &[u32] {
         &self.new_tets
     }

@@ -1,21 +1,13 @@
 //! Find the tetrahedron of a point by walking through faces.
 
-use super::cavity::{Kernel, Rejected};
+use super::kernel::{Kernel, Located, Rejected};
 use crate::geom::{Point, orient};
+use crate::mesh::Mesh;
 use crate::mesh::anatomy::FACES;
-use crate::mesh::{Mesh, Tet};
 use crate::storage::Pages;
 
 /// A walk longer than this is lost: a mesh of 2^30 tetrahedra has about 1000 along an axis.
 const STEPS_MAX: u32 = 100_000;
-
-/// Where a walk ended.
-#[derive(Clone, Copy, Debug)]
-pub struct Located {
-    pub tet: u32,
-    pub record: Tet,
-    pub points: [Point; 4],
-}
 
 impl Kernel {
     /// The tetrahedron that holds `p` (in its interior or on its boundary), walking from `hint`.

@@ -9,13 +9,13 @@
 
 mod cavity;
 mod enclosing;
+mod kernel;
 mod links;
 mod locate;
 mod order;
 #[cfg(test)]
 mod tests;
 
-pub use cavity::{CavityFace, Kernel, KernelStats, Rejected};
 pub use enclosing::enclose;
-pub use locate::Located;
+pub use kernel::{CavityFace, Kernel, KernelStats, Located, Rejected};
 pub use order::insertion_key;

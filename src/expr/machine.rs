@@ -1,58 +1,6 @@
 //! What operations do: postfix on a short stack of numbers. A truth is 1 or 0.
 
-use super::Expression;
-
-/// A function of one number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Unary {
-    Abs,
-    Ceil,
-    Cos,
-    Exp,
-    Floor,
-    Log,
-    Negate,
-    Not,
-    Round,
-    Sign,
-    Sin,
-    Sqrt,
-    Tan,
-}
-
-/// A function of two.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Binary {
-    Add,
-    And,
-    Divide,
-    Equal,
-    Greater,
-    GreaterEqual,
-    Less,
-    LessEqual,
-    Max,
-    Min,
-    Multiply,
-    NotEqual,
-    Or,
-    Power,
-    Subtract,
-}
-
-/// An operation: takes its values from the top of the stack, leaves one.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Op {
-    Constant(f64),
-    /// The value at a position.
-    Variable(usize),
-    Unary(Unary),
-    Binary(Binary),
-    /// Whether the value is in the list of this number.
-    In(usize),
-    /// Truth, number, number: the first of the numbers where the truth holds.
-    If,
-}
+use super::op::{Binary, Op, STACK_MAX, Unary};
 
 impl Unary {
     pub(super) fn of(self, x: f64) -> f64 {
@@ -105,7 +53,7 @@ fn truth(is: bool) -> f64 {
 
 /// Runs `ops`, which the parser has counted: the stack neither overflows nor runs empty, and one value is left.
 pub(super) fn run(ops: &[Op], lists: &[Vec<f64>], values: &[f64]) -> f64 {
-    let mut stack = [0.0; Expression::STACK_MAX];
+    let mut stack = [0.0; STACK_MAX];
     let mut n = 0;
     for op in ops {
         match *op {

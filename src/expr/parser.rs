@@ -1,6 +1,6 @@
 //! Words to operations: precedence climbing, kinds checked on the way.
 
-use super::machine::{Binary, Op, Unary};
+use super::op::{Binary, Op, Unary};
 use super::words::{Word, fault, next_word};
 use super::{ExprError, Expression, Kind};
 
@@ -99,8 +99,17 @@ struct Parser<'a> {
     depth: usize,
 }
 
+impl Expression {
+    /// Reads `text`; `variables` are the names it may use, by position.
+    ///
+    /// Errors: the first fault and its place.
+    pub fn parse(text: &str, variables: &[&str]) -> Result<Self, ExprError> {
+        parse(text, variables)
+    }
+}
+
 /// Reads a whole text.
-pub(super) fn parse(text: &str, variables: &[&str]) -> Result<Expression, ExprError> {
+fn parse(text: &str, variables: &[&str]) -> Result<Expression, ExprError> {
     if text.len() > Expression::TEXT_MAX {
         let most = Expression::TEXT_MAX;
         return Err(fault(0, format!("it is longer than {most} bytes")));

@@ -3,8 +3,7 @@
 //! Rounding is monotone, so the ends of the intervals of sums, products, quotients and roots, rounded as values are,
 //! hold all rounded values. Of the other functions nothing is claimed.
 
-use super::Expression;
-use super::machine::{Binary, Op, Unary};
+use super::op::{Binary, Op, STACK_MAX, Unary};
 
 /// The values that can occur: numbers from `low` to `high`, and NaN perhaps. Of a truth, 0 and 1 are such numbers.
 #[derive(Clone, Copy, Debug)]
@@ -52,7 +51,7 @@ impl Range {
 
 /// See [`Expression::may_hold`].
 pub(super) fn may_hold(ops: &[Op], lists: &[Vec<f64>], ranges: &[[f64; 2]]) -> bool {
-    let mut stack = [ANY; Expression::STACK_MAX];
+    let mut stack = [ANY; STACK_MAX];
     let mut n = 0;
     for op in ops {
         match *op {

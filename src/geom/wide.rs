@@ -16,7 +16,7 @@ const COORDINATE_BITS: i32 = 126;
 /// Sign of the sphere determinant of [`insphere`](super::insphere); `None` when the differences need more than a word.
 pub(super) fn insphere_sign(a: Point, b: Point, c: Point, d: Point, e: Point) -> Option<Ordering> {
     let seen =
-        rounded_differences([a, b, c, d], e).or_else(|| whole_differences([a, b, c, d, e]))?;
+        rounded_differences([a, b, c, d], e).or_else(|| integer_differences([a, b, c, d, e]))?;
     Some(determinant_sign(seen))
 }
 
@@ -56,7 +56,7 @@ fn rounded_differences(points: [Point; 4], e: Point) -> Option<[[i64; 3]; 4]> {
 
 /// The differences as whole numbers of the smallest unit any coordinate needs.
 #[cold]
-fn whole_differences(points: [Point; 5]) -> Option<[[i64; 3]; 4]> {
+fn integer_differences(points: [Point; 5]) -> Option<[[i64; 3]; 4]> {
     let points = points.map(|p| p.to_array().map(parts));
     let unit = points.iter().flatten().map(|p| p.1).min()?;
     let mut whole = [[0i128; 3]; 5];

@@ -1,4 +1,4 @@
-//! Mesh files in and out, streamed. Only this room and the command line know formats.
+//! Mesh files in and out, streamed. Only this module and the command line know formats.
 
 pub mod read;
 pub mod write;

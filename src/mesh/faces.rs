@@ -17,7 +17,7 @@ pub struct Facet {
     pub regions: [u32; 2],
 }
 
-/// A face on an interface, and which cut made it.
+/// A face on an interface, and of which cut.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct InterfaceFace {
     /// Counter-clockwise seen from outside the sub-domain.

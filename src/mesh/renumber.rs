@@ -10,7 +10,7 @@ use super::state::{dense, sparse};
 use super::vertices::VertexTag;
 use super::{FaceRef, MeshState};
 use crate::geom::HilbertFrame;
-use crate::storage::{DiskPath, Pages, Sorter, StorageError, kind};
+use crate::storage::{DiskPath, Keyed, Pages, Sorter, StorageError, kind};
 use tetdb_schema::page::{NONE, SLOT_BITS};
 
 /// Where sorting may put its runs, and how many bytes it may hold.
@@ -53,17 +53,6 @@ pub fn renumber<P: Pages>(
     Ok(())
 }
 
-fn record(key: u64, id: u32) -> [u8; 12] {
-    let mut record = [0; 12];
-    record[..8].copy_from_slice(&key.to_be_bytes());
-    record[8..].copy_from_slice(&id.to_be_bytes());
-    record
-}
-
-fn id_of(record: [u8; 12]) -> u32 {
-    u32::from_be_bytes([record[8], record[9], record[10], record[11]])
-}
-
 /// Leaves the new number of each vertex in the scratch map, at its old dense number.
 fn renumber_vertices<P: Pages>(
     mesh: &mut Mesh<P>,
@@ -81,20 +70,21 @@ fn renumber_vertices<P: Pages>(
             mesh.set_scratch(dense(v), 0);
         }
     }
-    let mut sorter = Sorter::<12>::new(space.dir, space.memory);
+    let mut sorter = Sorter::new(space.dir, space.memory);
     for n in 0..end {
         let v = sparse(n);
         // A surface vertex may have no tetrahedron, when its facets lie between empty regions.
         if mesh.scratch(n) == NONE && mesh.vertex_attribute(v).0 != VertexTag::Surface {
             continue;
         }
-        sorter.push(record(order.index(mesh.point(v)), v))?;
+        let key = order.index(mesh.point(v));
+        sorter.push(Keyed { key, id: v })?;
     }
     let old_pages = mesh.pages().n_pages::<{ kind::VERTICES }>();
     let old_attributes = mesh.pages().n_pages::<{ kind::VERTEX_ATTRIBUTES }>();
     let mut n_new = 0;
     for sorted in sorter.finish()? {
-        let v = id_of(sorted?);
+        let v = sorted?.id;
         let to = sparse(n_new);
         mesh.copy_record::<{ kind::VERTICES }>(v, (old_pages << SLOT_BITS) + to);
         mesh.copy_attribute::<{ kind::VERTEX_ATTRIBUTES }>(v, to, old_attributes);

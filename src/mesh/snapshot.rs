@@ -8,10 +8,17 @@ use super::anatomy::{MARK, REQUIRED, VERTEX_MASK};
 use super::cursor::Mesh;
 use super::state::{dense, sparse};
 use super::{FaceRef, Facet, InterfaceFace, Tet, Workspace};
-use crate::storage::{Pages, Sorter, StorageError, check_cancelled};
+use crate::storage::{Pages, Sorter, StorageError, check_cancelled, sort_record};
 
-/// A face with its vertices ascending, and where it is.
-type FaceRecord = [u8; 16];
+sort_record! {
+    /// A face of a tetrahedron.
+    struct SortedFace {
+        /// Ascending.
+        vertices: [u32; 3],
+        /// A [`FaceRef`].
+        place: u32,
+    }
+}
 
 impl<P: Pages> Mesh<P> {
     /// Whether ids have no gaps, as they have none after [`renumber`](super::renumber): only such a mesh can be kept.
@@ -116,33 +123,26 @@ impl<P: Pages> Mesh<P> {
 
     /// Makes neighbors of all pairs of tetrahedra with a common face. Errors: the disk, while sorting.
     pub fn match_neighbors(&mut self, space: &Workspace) -> Result<(), StorageError> {
-        let mut faces = Sorter::<16>::new(space.dir, space.memory);
+        let mut faces = Sorter::new(space.dir, space.memory);
         let mut from = 0;
         while let Some((t, tet)) = self.next_tet(from) {
             from = t + 1;
             for i in 0..4 {
                 let mut vertices = tet.face(i);
                 vertices.sort_unstable();
-                let mut record: FaceRecord = [0; 16];
-                let words = vertices.into_iter().chain([FaceRef::new(t, i).0]);
-                for (bytes, word) in record.chunks_exact_mut(4).zip(words) {
-                    bytes.copy_from_slice(&word.to_be_bytes());
-                }
-                faces.push(record)?;
+                let place = FaceRef::new(t, i).0;
+                faces.push(SortedFace { vertices, place })?;
             }
             if t & 1023 == 0 {
                 check_cancelled();
             }
         }
-        let place = |face: &FaceRecord| {
-            FaceRef(u32::from_be_bytes([face[12], face[13], face[14], face[15]]))
-        };
-        let mut open = None::<FaceRecord>;
+        let mut open = None::<SortedFace>;
         for face in faces.finish()? {
             let face = face?;
             match open.take() {
-                Some(before) if before[..12] == face[..12] => {
-                    self.link(place(&before), place(&face));
+                Some(before) if before.vertices == face.vertices => {
+                    self.link(FaceRef(before.place), FaceRef(face.place));
                 }
                 _ => open = Some(face),
             }

@@ -127,7 +127,7 @@ impl<P: Pages> Mesh<P> {
         self.pages.read::<{ kind::VERTICES }>(v)[6].to_native() & FIXED != 0
     }
 
-    /// A tetrahedron that has `v`, as last told; see [`Mesh::set_tet_of`].
+    /// A tetrahedron that has `v`, as last set; see [`Mesh::set_tet_of`].
     #[inline]
     pub fn tet_of(&mut self, v: u32) -> u32 {
         self.pages.read::<{ kind::VERTICES }>(v)[7].to_native()

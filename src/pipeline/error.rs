@@ -28,7 +28,7 @@ pub enum PipelineError {
     #[error("the sizes of {file} must be read before the mesh is begun")]
     SizeField { file: String },
     /// Nothing is enclosed by the surface under the chosen rule for regions.
-    #[error("no region is filled: the surface encloses nothing under --regions {policy}")]
+    #[error("no region is filled: the surface encloses nothing under the rule {policy}")]
     NothingFilled { policy: String },
     /// There is no version of before to go back to.
     #[error("{path} keeps no previous version of any sub-domain")]

@@ -10,7 +10,7 @@ pub struct Event {
     pub unit: &'static str,
 }
 
-/// Is told [`Event`]s, often; it must be quick.
+/// Receives [`Event`]s, often; it must be quick.
 pub type Watcher<'a> = dyn Fn(Event) + 'a;
 
 /// The watcher that does nothing.

@@ -5,9 +5,10 @@
 
 use crate::bisect::{Plane, Zone};
 use crate::geom::{Aabb, Point};
-use crate::mesh::{MESH_STATE_WORDS, MeshState};
+use crate::mesh::{MESH_STATE_WORDS, Mesh, MeshState};
+use crate::pipeline::error::PipelineError;
 use crate::sealed::SealedError;
-use crate::storage::kind;
+use crate::storage::{Backing, DiskPath, Pager, StoreFile, kind};
 use crate::store::{Catalog, StoreError};
 
 /// Numbers of the catalog's blobs.
@@ -27,7 +28,7 @@ pub(crate) mod blob {
     pub const OWNERS: u32 = 3 << 20;
     /// Of each sealed sub-domain: regions and interfaces.
     pub const SEALED: u32 = 4 << 20;
-    /// Of each sub-domain made again with other sizes: its size field, and in words what was asked for.
+    /// Of each sub-domain meshed again with other sizes: its size field, and in words what was asked for.
     pub const FIELD: u32 = 5 << 20;
     pub const ASKED: u32 = 6 << 20;
     /// The last three as they were before the last change.
@@ -212,6 +213,26 @@ pub(crate) fn zones_above(
         zones.push(Zone { cut, surface });
     }
     Ok(zones)
+}
+
+/// Generations from a part to what is made of it.
+pub(crate) const DONE: u32 = 2;
+
+/// Opens a part's mesh from the file `base`.
+pub(crate) fn open_part(
+    part: PartMesh,
+    base: DiskPath,
+    mut backing: Backing,
+    frames: u64,
+) -> Result<Mesh, PipelineError> {
+    backing.base = Some(StoreFile::open_repaired(
+        &base,
+        backing.cache_bytes / 2,
+        false,
+    )?);
+    let mut pager = Pager::new(frames, Some(backing));
+    pager.adopt(part.extents);
+    Ok(Mesh::with_state(pager, part.state))
 }
 
 #[cfg(test)]

@@ -113,7 +113,7 @@ impl DecodedChunk {
     }
 
     /// A tetrahedron with all that is known of it.
-    pub fn found(&self, tet: &FrameTet) -> Hit {
+    pub fn hit(&self, tet: &FrameTet) -> Hit {
         Hit::new(self.id(tet), tet.region, self.ids(tet), self.corners(tet))
     }
 

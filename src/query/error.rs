@@ -42,7 +42,7 @@ impl From<StorageError> for QueryError {
 
 fn cuts(kept: &[u32]) -> String {
     if kept.is_empty() {
-        return "it was made without --keep-stages".to_owned();
+        return "none was kept".to_owned();
     }
     let mut cuts: Vec<u32> = kept.to_vec();
     cuts.sort_unstable();

@@ -15,42 +15,13 @@ use tetdb_schema::record::SealedTet;
 use super::decoded::Spread;
 use super::hit::Hit;
 use super::locate::{Candidate, Search, leaders};
+use super::near::{Near, nearness};
 use super::session::{checked_chunk, vertex_chunk};
 use super::{QueryError, QuerySession};
 use crate::geom::{Aabb, Point};
 use crate::sealed::Subdomain;
 use crate::storage::check_cancelled;
 use crate::store::StoreError;
-
-/// What a chunk of vertices has near a point, as far as its summary tells.
-#[derive(Clone, Copy)]
-pub(super) struct Near {
-    /// The distance of the nearest cell that has vertices; where the point is in one, a negative number, the less the more central.
-    pub nearness: f64,
-    /// Around all places within reach where there may be vertices; empty where there are none.
-    bounds: Aabb,
-}
-
-impl Near {
-    pub(super) fn of(part: &Subdomain, chunk: usize, p: Point, reach: f64) -> Self {
-        let mut near = Self {
-            nearness: f64::INFINITY,
-            bounds: Aabb::EMPTY,
-        };
-        for cell in part.vertex_summaries()[chunk].cells() {
-            let [low, high] = cell.map(Point::from_array);
-            let nearness = nearness(&Aabb { low, high }, p);
-            near.nearness = near.nearness.min(nearness);
-            if nearness <= reach {
-                near.bounds = near.bounds.union(Aabb {
-                    low: low.max(p - reach),
-                    high: high.min(p + reach),
-                });
-            }
-        }
-        near
-    }
-}
 
 /// A tetrahedron that may hold the point, and the chunks of its vertices.
 struct Waiting {
@@ -263,14 +234,4 @@ fn may_hold(part: &mut Subdomain, w: &Waiting, lazy: &mut Lazy) -> Result<bool, 
         around = around.union(bounds);
     }
     Ok(around.low.cmple(p).all() && p.cmple(around.high).all())
-}
-
-/// The distance of a point from a box; within it, a negative number, the less the more central it is.
-fn nearness(bounds: &Aabb, p: Point) -> f64 {
-    let outside = (p - p.clamp(bounds.low, bounds.high)).length();
-    if outside > 0.0 {
-        return outside;
-    }
-    let (center, extent) = ((bounds.low + bounds.high) * 0.5, bounds.high - bounds.low);
-    ((p - center).abs() - extent * 0.5).max_element()
 }

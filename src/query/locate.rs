@@ -6,7 +6,7 @@ use tetdb_schema::ids::TetId;
 
 use super::decoded::Searched;
 use super::hit::Hit;
-use super::lazy::Near;
+use super::near::Near;
 use super::session::{bounds_of, chunk_bounds, reach};
 use super::{QueryError, QuerySession};
 use crate::geom::{Aabb, HilbertFrame, Point, orient};
@@ -202,7 +202,7 @@ fn search_frame(searched: &Searched, search: &mut Search) {
         let tet = &frame.tets[i];
         if !search.settled {
             let id = frame.id(tet);
-            search.look(id, &frame.corners(tet), || frame.found(tet));
+            search.look(id, &frame.corners(tet), || frame.hit(tet));
         }
     });
 }

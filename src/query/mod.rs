@@ -18,6 +18,7 @@ mod hit;
 mod lazy;
 mod locate;
 mod marks;
+mod near;
 mod order;
 mod select;
 mod selection;

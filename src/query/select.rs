@@ -153,7 +153,7 @@ pub(super) fn hits_in(
             && TetId::new(part.id(), local).is_some_and(|id| selection.may_be(id, tet.region))
             && (!selection.is_local() || nearby.may_meet(part, selection, chunk, tet.nodes))
     })?;
-    let found = frame.tets.iter().map(|tet| frame.found(tet));
+    let found = frame.tets.iter().map(|tet| frame.hit(tet));
     Ok(found.filter(|found| selection.holds(found)).collect())
 }
 

@@ -1,4 +1,4 @@
-//! What is asked for, and what of it can be told from summaries.
+//! What is asked for, and what of it follows from summaries.
 
 use tetdb_schema::chunk::TetSummary;
 use tetdb_schema::ids::{Owner, TetId};

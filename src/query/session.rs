@@ -1,6 +1,6 @@
 //! What is held open while questions are answered, within a budget.
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use lru::LruCache;
 use tetdb_schema::ids::TetId;
@@ -89,7 +89,7 @@ pub struct QuerySession {
     bounds: Aabb,
     parts: LruCache<u32, OpenSubdomain>,
     parts_max: usize,
-    frames: LruCache<(u32, u32), Rc<Searched>>,
+    frames: LruCache<(u32, u32), Arc<Searched>>,
     frames_bytes: usize,
     frames_bytes_max: usize,
     pub(crate) budget: Budget,
@@ -237,13 +237,13 @@ impl QuerySession {
     }
 
     /// A whole chunk, decoded.
-    pub(super) fn searched(&mut self, rank: u32, chunk: u32) -> Result<Rc<Searched>, QueryError> {
+    pub(super) fn searched(&mut self, rank: u32, chunk: u32) -> Result<Arc<Searched>, QueryError> {
         if let Some(frame) = self.frames.get(&(rank, chunk)) {
-            return Ok(Rc::clone(frame));
+            return Ok(Arc::clone(frame));
         }
-        let searched = Rc::new(Searched::new(self.frame(rank, chunk, |_, _, _| true)?));
+        let searched = Arc::new(Searched::new(self.frame(rank, chunk, |_, _, _| true)?));
         self.frames_bytes += searched.bytes();
-        self.frames.put((rank, chunk), Rc::clone(&searched));
+        self.frames.put((rank, chunk), Arc::clone(&searched));
         while self.frames_bytes > self.frames_bytes_max && self.frames.len() > 1 {
             if let Some((_, old)) = self.frames.pop_lru() {
                 self.frames_bytes -= old.bytes();

@@ -31,7 +31,7 @@ impl Fixture {
         self.dir.path().join("a.tetdb")
     }
 
-    fn inquiry(&self, cap: u64) -> Outcome<QuerySession> {
+    fn session(&self, cap: u64) -> Outcome<QuerySession> {
         Ok(QuerySession::open(
             Catalog::open(self.path())?,
             &Budget::new(cap),
@@ -133,12 +133,12 @@ fn ids(found: impl IntoIterator<Item = Result<Hit, QueryError>>) -> Outcome<Vec<
 
 /// Asks, and compares with a look at all.
 fn expect(
-    inquiry: &mut QuerySession,
+    session: &mut QuerySession,
     all: &[Hit],
     selection: Selection,
     holds: impl Fn(&Hit) -> bool,
 ) -> Outcome<usize> {
-    let found = ids(inquiry.select(selection.clone())?)?;
+    let found = ids(session.select(selection.clone())?)?;
     let expected: Vec<TetId> = all.iter().filter(|t| holds(t)).map(|t| t.id).collect();
     assert_eq!(found, expected, "{selection:?}");
     Ok(found.len())

@@ -1,6 +1,8 @@
 //! Points that divide long edges.
 
-use super::{Field, Lengths, Worker};
+use super::candidate::Candidate;
+use super::field::{Field, Lengths};
+use super::worker::Worker;
 use crate::geom::{Point, mix};
 use crate::mesh::anatomy::mark::EXAMINED;
 use crate::mesh::anatomy::{EDGE_OF, EDGES, MARK};
@@ -22,19 +24,8 @@ const JITTER_FROM: f64 = 2.0;
 const JITTER: f64 = 0.4;
 /// Largest shell that is looked at for required faces.
 const SHELL_MAX: usize = 64;
-/// Edges gathered before their candidates are made and inserted; bounds the memory of a block.
+/// Edges gathered before their candidates are computed and inserted; bounds the memory of a block.
 const EDGES_MAX: usize = 1 << 19;
-
-/// A point to insert.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Candidate {
-    pub point: Point,
-    pub h: f32,
-    /// A tetrahedron that had the divided edge.
-    pub tet: u32,
-    /// Length class (long first), then the position along the curve.
-    key: u64,
-}
 
 impl Worker {
     /// Gathers the edges of unexamined tetrahedra from id `from` on, at most up to `last`, and marks those examined.
@@ -205,7 +196,7 @@ fn division(f: f64, r: f64) -> f64 {
     f - skew * f * (1.0 - f)
 }
 
-/// Three numbers in [-1, 1) made of the bits of a position.
+/// Three numbers in [-1, 1) from the bits of a position.
 fn jitter(p: Point) -> Point {
     let mut state = p
         .to_array()

@@ -8,19 +8,28 @@
 //! Source: the paper, section 1.1; constants from F. Hecht's rule (BAMG) and measurement: a filter of 1/√2 with
 //! a threshold of √2 makes edges of mean length 1.0 and about 10.2 tetrahedra per unit of ∫ h⁻³.
 
+mod activity;
+mod candidate;
 mod candidates;
+mod field;
 mod insert;
 mod place;
+mod recent;
+mod report;
+mod worker;
 
 use crate::delaunay::Kernel;
-use crate::geom::{Aabb, HilbertFrame, Point};
+use crate::geom::HilbertFrame;
 use crate::mesh::{Mesh, Workspace, dense, renumber, sparse};
 use crate::reconnect::Shell;
 use crate::storage::{Pages, StorageError, check_cancelled};
 
-use candidates::Candidate;
-use insert::Recent;
+use activity::Activity;
+pub use field::{Field, Lengths};
 pub use place::{Everywhere, PlacementRule};
+use recent::Recent;
+pub use report::RefineReport;
+use worker::Worker;
 
 /// Tetrahedra of one block. Small enough that a block's candidates fit a small lease, large enough that
 /// sorting along the curve pays; the mesh depends on it, so it is a constant of the format of results.
@@ -29,53 +38,12 @@ const BLOCK_TETS: u32 = 32 * 2046;
 const PASSES_MAX: u32 = 40;
 
 /// A mesh that has grown so much since it was numbered along the curve is numbered again: below, a sweep over its pages
-/// jumps between layers made in different passes; above, sorting costs more than it saves.
+/// jumps between layers created in different passes; above, sorting costs more than it saves.
 const GROWTH: f64 = 1.5;
-
-/// Where the wanted length at a point that divides an edge comes from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Lengths {
-    /// From the size field.
-    #[default]
-    Field,
-    /// Interpolated between the ends of the edge, hence from the vertices of the coarse mesh: the paper's way, section 1.1.
-    /// Kept for comparison: what the vertices of the surface do not know is never seen.
-    Ends,
-}
-
-/// What is wanted where, and where points may go.
-pub struct Field<'a> {
-    pub lengths: Lengths,
-    /// Wanted edge length at a position.
-    pub h: &'a dyn Fn(Point) -> f64,
-    /// Where points may go.
-    pub place: &'a dyn PlacementRule,
-    /// Box of the mesh, which fixes the order along the curve.
-    pub bounds: Aabb,
-}
-
-/// What saturation did.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct RefineReport {
-    pub passes: u32,
-    pub candidates: u64,
-    pub inserted: u64,
-    /// Too near to a vertex or a required face.
-    pub near: u64,
-    /// No cavity that keeps the required faces, or a walk that left the mesh.
-    pub blocked: u64,
-    /// Refused for nothing but their place.
-    pub out_of_place: u64,
-    /// Cavities, made star-shaped and allowed where they lie, that held a tetrahedron frozen beside an interface.
-    pub frozen_hits: u64,
-    /// Tetrahedra with two required faces or more when the passes ended: none of their edges could be divided. Not counted where
-    /// only a part of the mesh is divided.
-    pub over_constrained: u64,
-}
 
 /// Divides edges until none is left to divide.
 ///
-/// The mesh must hold filled regions only, sizes set at all its vertices. `progress` is told the number of vertices
+/// The mesh must hold filled regions only, sizes set at all its vertices. `progress` receives the number of vertices
 /// inserted so far. Effects: new vertices and tetrahedra; all ids may change; `tet_of` is not kept up. Errors: the disk.
 pub fn saturate<P: Pages>(
     mesh: &mut Mesh<P>,
@@ -140,19 +108,6 @@ fn count_over_constrained<P: Pages>(mesh: &mut Mesh<P>) -> u64 {
     n
 }
 
-struct Worker {
-    kernel: Kernel,
-    order: HilbertFrame,
-    /// Scratch: (edge as ordered pair, a tetrahedron that has it).
-    edges: Vec<(u64, u32)>,
-    candidates: Vec<Candidate>,
-    recent: Recent,
-    shell: Shell,
-    active: Activity,
-    /// A tetrahedron in use, where a walk can start when its own start is gone.
-    last: u32,
-}
-
 impl Worker {
     /// Divides the long edges of the unexamined tetrahedra with ids `first..=last`.
     fn block<P: Pages>(
@@ -175,39 +130,6 @@ impl Worker {
             }
             self.candidates = candidates;
         }
-    }
-}
-
-/// Which pages have had tetrahedra made since they were last examined: one byte a page.
-struct Activity {
-    pages: Vec<bool>,
-}
-
-impl Activity {
-    fn all<P: Pages>(mesh: &Mesh<P>) -> Self {
-        let pages = dense(mesh.tet_ids_end()).div_ceil(2046) as usize;
-        Self {
-            pages: vec![true; pages],
-        }
-    }
-
-    fn touch(&mut self, tet: u32) {
-        let page = (dense(tet) / 2046) as usize;
-        if page >= self.pages.len() {
-            self.pages.resize(page + 1, false);
-        }
-        self.pages[page] = true;
-    }
-
-    /// Whether any page of the dense range is active; clears them.
-    fn take(&mut self, from: u32, to: u32) -> bool {
-        let (first, end) = ((from / 2046) as usize, to.div_ceil(2046) as usize);
-        let end = end.min(self.pages.len());
-        let mut any = false;
-        for page in &mut self.pages[first.min(end)..end] {
-            any |= std::mem::take(page);
-        }
-        any
     }
 }
 

@@ -1,6 +1,7 @@
 use super::*;
 use crate::delaunay::enclose;
 use crate::geom::orient;
+use crate::geom::{Aabb, Point};
 use crate::mesh::VertexTag;
 use crate::storage::{Backing, Pager, kind};
 

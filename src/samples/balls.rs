@@ -3,9 +3,9 @@
 use super::SampleError;
 use super::boxes::{box_triangles, push_box};
 use super::build::Builder;
+use super::build::triangles_checked;
 use super::random::{Random, cube_root, power};
 use super::sample::Sample;
-use super::spec::triangles_checked;
 use super::sphere::{Ball, Spheres, sphere_pieces, sphere_triangles};
 use crate::geom::{Aabb, Point};
 

@@ -10,8 +10,8 @@
 
 use super::SampleError;
 use super::build::Builder;
+use super::build::triangles_checked;
 use super::sample::Sample;
-use super::spec::triangles_checked;
 use crate::geom::{Aabb, Point};
 
 /// A box `box,x=X,y=Y,z=Z,h=H` with a corner at the origin; one label per face.

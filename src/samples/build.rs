@@ -1,6 +1,6 @@
 //! Collecting points and triangles, welding the points that two patches share.
 
-use super::Sample;
+use super::{Sample, SampleError};
 use crate::geom::Point;
 use std::collections::HashMap;
 
@@ -68,3 +68,19 @@ impl Builder {
         self.sample
     }
 }
+
+/// Refuses a surface too large to be made in memory.
+pub(super) fn triangles_checked(name: &'static str, n_triangles: f64) -> Result<(), SampleError> {
+    // Written so that a NaN is refused too.
+    if n_triangles <= TRIANGLES_MAX as f64 {
+        return Ok(());
+    }
+    Err(SampleError::TooMany {
+        name,
+        found: n_triangles,
+        expected: TRIANGLES_MAX,
+    })
+}
+
+/// Above this a sample is refused: it is made in memory, about 40 bytes per triangle.
+const TRIANGLES_MAX: u64 = 100_000_000;

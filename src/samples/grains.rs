@@ -6,10 +6,10 @@
 use super::SampleError;
 use super::boxes::{box_triangles, push_box};
 use super::build::Builder;
+use super::build::triangles_checked;
 use super::hull::convex_hull;
 use super::random::{Random, cube_root};
 use super::sample::Sample;
-use super::spec::triangles_checked;
 use crate::geom::{Aabb, Point};
 
 /// Points of a grain: 42.5 on average, which makes 81 triangles.

@@ -5,8 +5,8 @@
 
 use super::SampleError;
 use super::build::Builder;
+use super::build::triangles_checked;
 use super::sample::Sample;
-use super::spec::triangles_checked;
 use super::trig::sin_cos_turns;
 use crate::geom::Point;
 use std::f64::consts::TAU;

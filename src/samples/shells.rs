@@ -3,8 +3,8 @@
 use super::SampleError;
 use super::boxes::{box_triangles, push_box};
 use super::build::Builder;
+use super::build::triangles_checked;
 use super::sample::Sample;
-use super::spec::triangles_checked;
 use super::sphere::{Ball, Spheres, sphere_pieces, sphere_triangles};
 use crate::geom::{Aabb, Point};
 

@@ -13,8 +13,6 @@ use std::str::FromStr;
 pub const PREFIX: &str = "sample:";
 /// The samples there are.
 pub const SAMPLES: &[&str] = &["balls", "box", "grains", "knot", "shells", "sphere"];
-/// Above this a sample is refused: it is made in memory, about 40 bytes per triangle.
-const TRIANGLES_MAX: u64 = 100_000_000;
 
 /// A sample that can be made.
 #[derive(Clone, Debug, PartialEq)]
@@ -191,19 +189,6 @@ fn parse_shells(rest: &str) -> Result<SampleKind, SampleError> {
     };
     let h = keys.length("h", 0.4 / count as f64)?;
     Ok(SampleKind::Shells { count, kind, h })
-}
-
-/// Refuses a surface too large to be made in memory.
-pub(super) fn triangles_checked(name: &'static str, n_triangles: f64) -> Result<(), SampleError> {
-    // Written so that a NaN is refused too.
-    if n_triangles <= TRIANGLES_MAX as f64 {
-        return Ok(());
-    }
-    Err(SampleError::TooMany {
-        name,
-        found: n_triangles,
-        expected: TRIANGLES_MAX,
-    })
 }
 
 /// The `key=value` pairs of one sample, keys known and given once.

@@ -9,8 +9,8 @@
 //! ```
 
 use super::build::Builder;
+use super::build::triangles_checked;
 use super::sample::Sample;
-use super::spec::triangles_checked;
 use super::{SampleError, random::Random};
 use crate::geom::Point;
 use std::collections::{BTreeMap, HashMap};

@@ -1,4 +1,4 @@
-//! Coarse leaves: the working meshes that sub-domains are made from, kept so that they can be made again.
+//! Coarse snapshots: the working meshes that sub-domains are meshed from, kept so that they can be meshed again.
 //!
 //! A leaf has a file of its own, so that damage to a sealed sub-domain does not reach what mends it.
 
@@ -14,7 +14,7 @@ use super::subdomain::Chunks;
 use crate::storage::{DiskPath, StoreFile};
 use tetdb_schema::catalog::CoarseRow;
 
-/// Writes a coarse leaf, once: vertices, tetrahedra, facets and interface faces, each in the working mesh's order.
+/// Writes a coarse snapshot, once: vertices, tetrahedra, facets and interface faces, each in the working mesh's order.
 ///
 /// The file holds nothing that counts until the catalog lists it. Memory: about the bytes given.
 pub struct CoarseWriter {
@@ -32,7 +32,7 @@ pub struct CoarseWriter {
 impl CoarseWriter {
     /// Starts the file of `rank` in `generation` at `path`, which must not exist.
     ///
-    /// Errors: the file cannot be made.
+    /// Errors: the file cannot be created.
     pub fn create(
         path: &DiskPath,
         rank: u32,
@@ -128,7 +128,7 @@ fn end<R: ChunkRecord>(
     }
 }
 
-/// A coarse leaf open for reading.
+/// A coarse snapshot open for reading.
 pub struct CoarseSnapshot {
     row: CoarseRow,
     file: StoreFile,
@@ -143,7 +143,7 @@ impl CoarseSnapshot {
             return Err(SealedError::Content {
                 path: path.path().to_owned(),
                 subdomain: row.rank,
-                what: "the file of its coarse leaf is missing".to_owned(),
+                what: "the file of its coarse snapshot is missing".to_owned(),
             });
         }
         let file = StoreFile::open_repaired(path, cache_bytes, false)?;

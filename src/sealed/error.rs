@@ -11,19 +11,29 @@ use crate::storage::StorageError;
 pub enum SealedError {
     /// The sub-domain is not sealed yet.
     #[error("sub-domain {subdomain} of {path} is not finished")]
-    NotSealed { path: PathBuf, subdomain: u32 },
+    NotSealed {
+        /// The file or folder.
+        path: PathBuf,
+        /// Rank of the sub-domain.
+        subdomain: u32,
+    },
     /// A chunk is not what its address says.
     #[error("{path} is damaged: {source}")]
     Chunk {
+        /// The file or folder.
         path: PathBuf,
+        /// What the cause was.
         #[source]
         source: ChunkError,
     },
     /// Parts of a sub-domain that contradict each other, or a missing one.
     #[error("{path} is damaged: sub-domain {subdomain}, {what}")]
     Content {
+        /// The file or folder.
         path: PathBuf,
+        /// Rank of the sub-domain.
         subdomain: u32,
+        /// What of it.
         what: String,
     },
     /// The file itself.

@@ -4,6 +4,8 @@
 //! summary of every chunk. Reading streams, so memory stays bounded whatever the size of the sub-domain. The coarse snapshot a
 //! sub-domain was meshed from is kept beside it in the same way. Is not: the list of what counts, which is the catalog's.
 
+#![warn(missing_docs)]
+
 mod batch;
 mod coarse_snapshot;
 mod error;
@@ -21,5 +23,6 @@ pub use face_pairs::{FacePairs, Paired, sorted_face};
 pub use form::Form;
 pub use shape::{Shape, quality_bin};
 pub use subdomain::{Chunk, Chunks, Subdomain};
+pub use totals::RegionTotals;
 pub use vertex_cache::{Corner, VertexCache};
-pub use writer::{InterfaceSide, RegionTotals, Sealed, SealedWriter};
+pub use writer::{InterfaceSide, Sealed, SealedWriter};

@@ -9,6 +9,7 @@ use crate::geom::Point;
 /// Units: volume in cubed lengths of the input. Not exact: validity is decided by `geom::orient`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shape {
+    /// Of the tetrahedron, with its sign.
     pub volume: f64,
     /// q = (sqrt(6)/12) * longest edge / inradius; infinite when the volume is not positive.
     pub quality: f64,

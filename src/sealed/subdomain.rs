@@ -13,7 +13,7 @@ use super::SealedError;
 use super::form::Loader;
 use super::writer::CHUNK_KINDS;
 use super::{Corner, Form, VertexCache};
-use crate::storage::{DiskPath, StoreFile};
+use crate::storage::{DiskPath, RunContext, StorageError, StoreFile};
 use tetdb_schema::catalog::SubdomainRow;
 
 /// A finished sub-domain open for reading, whatever its form.
@@ -29,7 +29,9 @@ pub struct Subdomain {
 
 /// Decoded records; the first has number `first`.
 pub struct Chunk<R> {
+    /// Number of the first record in the sub-domain.
     pub first: u32,
+    /// The records, in order.
     pub records: Vec<R>,
 }
 
@@ -308,6 +310,9 @@ impl<R: ChunkRecord> Chunks<'_, R> {
     }
 
     fn load(&mut self) -> Result<Chunk<R>, SealedError> {
+        if RunContext::is_current_cancelled() {
+            return Err(StorageError::Cancelled.into());
+        }
         let mut records = Vec::new();
         let first = self.loader.load(self.file, self.address, &mut records)?;
         Ok(Chunk { first, records })

@@ -7,7 +7,6 @@ use tetdb_schema::chunk::TetSummary;
 use tetdb_schema::digest::Digest;
 use tetdb_schema::record::{FACES, SealedTet};
 
-use super::writer::RegionTotals;
 use super::{Corner, FacePairs, Paired, Shape, quality_bin, sorted_face};
 use crate::geom::Aabb;
 use crate::storage::parallel;
@@ -168,4 +167,13 @@ impl Totals {
             dihedral: [angle(self.cosines[1]), angle(self.cosines[0])],
         }
     }
+}
+
+/// What a region has in this sub-domain.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct RegionTotals {
+    /// Its tetrahedra.
+    pub tets: u64,
+    /// Summed in the sealed order.
+    pub volume: f64,
 }

@@ -18,11 +18,13 @@ const NOT_RESIDENT: u32 = u32::MAX;
 /// A vertex as an algorithm wants it.
 #[derive(Clone, Copy, Debug)]
 pub struct Corner {
+    /// Its position.
     pub point: Point,
     /// Its mix in the digest.
     pub mix: u64,
     /// Its name for ever, as a number.
     pub id: u64,
+    /// One of [`tag`](tetdb_schema::record::tag).
     pub tag: u32,
     /// The edge length wanted there; 0 where none was.
     pub h: f32,
@@ -54,7 +56,7 @@ pub struct VertexCache {
 impl VertexCache {
     /// A cache for a sub-domain of this form whose vertex chunks start at `firsts`.
     ///
-    /// Errors: the decoder cannot be made.
+    /// Errors: the decoder cannot be created.
     pub fn new(
         form: Form,
         (subdomain, generation): (u32, u32),

@@ -14,7 +14,7 @@ use tetdb_schema::record::{InterfaceFace, SealedFacet, SealedTet, SealedVertex};
 use super::SealedError;
 use super::batch::Batch;
 use super::form::{Cut, Cutter};
-use super::totals::{Totals, array, count_open};
+use super::totals::{RegionTotals, Totals, array, count_open};
 use super::{FacePairs, Form, VertexCache};
 use crate::geom::{Aabb, Point};
 use crate::storage::{DiskPath, StoreFile};
@@ -23,19 +23,14 @@ use tetdb_schema::catalog::SubdomainRow;
 /// One side of an interface as this sub-domain has it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InterfaceSide {
+    /// Number of the cut, from 1.
     pub cut: u32,
     /// The sub-domain on the other side.
     pub other: u32,
+    /// How many faces there are.
     pub faces: u64,
+    /// Of the faces, seen from this side.
     pub digest: Digest,
-}
-
-/// What a region has in this sub-domain.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub struct RegionTotals {
-    pub tets: u64,
-    /// Summed in the sealed order.
-    pub volume: f64,
 }
 
 /// What was sealed.
@@ -43,6 +38,7 @@ pub struct RegionTotals {
 pub struct Sealed {
     /// The row to put into the catalog.
     pub row: SubdomainRow,
+    /// Of each region with tetrahedra here, by number.
     pub regions: BTreeMap<u32, RegionTotals>,
     /// By cut, then by the other sub-domain.
     pub interfaces: Vec<InterfaceSide>,
@@ -78,7 +74,7 @@ pub struct SealedWriter {
 impl SealedWriter {
     /// Starts the file of `subdomain` in `generation` at `path`, which must not exist.
     ///
-    /// Errors: the file cannot be made.
+    /// Errors: the file cannot be created.
     pub fn create(
         path: impl Into<DiskPath>,
         subdomain: SubdomainId,

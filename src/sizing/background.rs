@@ -1,7 +1,7 @@
 //! Sizes from a background mesh: linear in its tetrahedra, nothing wanted outside of it.
 
 use super::SizingError;
-use super::constraints::SizeConstraint;
+use super::constraint::SizeConstraint;
 use crate::geom::{Aabb, Point};
 use crate::storage::ScratchSpace;
 use crate::surface::BoxTree;

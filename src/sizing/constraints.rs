@@ -12,6 +12,7 @@ use rayon::prelude::*;
 
 use super::SizingError;
 use super::bits::Bits;
+use super::constraint::SizeConstraint;
 use super::corners::Corners;
 use super::seeds::OctreeFrame;
 use super::tree::{CELLS_PER_SIZE, DEPTH, LATTICE, Leaf, Tree};
@@ -26,20 +27,6 @@ const CELLS_AT_ONCE: usize = 1 << 16;
 const CELLS_MAX: usize = 1 << 28;
 /// Wishes between corners may be off what lies between their values by this share.
 const BEND_MAX: f64 = 0.1;
-
-/// A wanted size as a function of position.
-pub trait SizeConstraint: Sync {
-    /// The size wanted at `p`, in input units; infinite for none.
-    ///
-    /// Errors: a value that is no size, and where.
-    fn h(&self, p: Point) -> Result<f64, SizingError>;
-
-    /// Whether a cube must be divided for this wish; `None` when only its values tell.
-    fn divides(&self, middle: Point, width: f64) -> Option<bool> {
-        let _ = (middle, width);
-        None
-    }
-}
 
 /// Wishes for one surface, in its box.
 pub(super) struct SizeConstraints<'a> {

@@ -9,39 +9,21 @@
 //! ```
 
 use super::tree::{LATTICE, Leaf, Tree};
-use crate::storage::{ScratchSpace, SpillVec, StorageError, raise};
+use crate::storage::{Keyed, ScratchSpace, SpillVec, StorageError, raise, sort_record};
 
-/// A hanging corner and the four corners (an edge's two, twice) whose mean it takes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-pub(super) struct Hanging {
-    /// Level of the smaller leaf: coarser ones come first.
-    pub(super) level: u32,
-    pub(super) corner: u32,
-    pub(super) on: [u32; 4],
+sort_record! {
+    /// A hanging corner and the four corners (an edge's two, twice) whose mean it takes.
+    #[derive(Eq, bytemuck::Pod, bytemuck::Zeroable)]
+    #[repr(C)]
+    pub(super) struct Hanging {
+        /// Level of the smaller leaf: coarser ones come first.
+        pub(super) level: u32,
+        pub(super) corner: u32,
+        pub(super) on: [u32; 4],
+    }
 }
 
 impl Hanging {
-    /// As bytes that sort by level, then by corner.
-    fn to_bytes(self) -> [u8; 24] {
-        let [a, b, c, d] = self.on;
-        let mut bytes = [0; 24];
-        let places = bytes.chunks_exact_mut(4);
-        for (place, x) in places.zip([self.level, self.corner, a, b, c, d]) {
-            place.copy_from_slice(&x.to_be_bytes());
-        }
-        bytes
-    }
-
-    fn from_bytes(b: [u8; 24]) -> Self {
-        let number = |i: usize| u32::from_be_bytes([b[i], b[i + 1], b[i + 2], b[i + 3]]);
-        Self {
-            level: number(0),
-            corner: number(4),
-            on: [number(8), number(12), number(16), number(20)],
-        }
-    }
-
     /// Whether it is in the middle of an edge; else of a face.
     fn on_edge(&self) -> bool {
         self.on[0] == self.on[2]
@@ -95,15 +77,15 @@ fn number_corners(
     tree: &Tree,
     room: &ScratchSpace,
 ) -> Result<(SpillVec<[u32; 8]>, usize), StorageError> {
-    let mut keys = room.sorter::<12>();
+    let mut keys = room.sorter::<Keyed>();
     let mut n_leaves = 0;
     for (i, leaf) in tree.leaves().enumerate() {
         n_leaves += 1;
         for c in 0..8 {
-            let mut key = [0; 12];
-            key[..8].copy_from_slice(&morton(leaf.corner(c)).to_be_bytes());
-            key[8..].copy_from_slice(&((8 * i + c) as u32).to_be_bytes());
-            keys.push(key)?;
+            keys.push(Keyed {
+                key: morton(leaf.corner(c)),
+                id: (8 * i + c) as u32,
+            })?;
         }
     }
     let keys = keys.finish()?;
@@ -111,7 +93,10 @@ fn number_corners(
     let mut n_corners = 0u32;
     let mut last = None;
     for key in keys {
-        let (corner, slot) = word_and(key?);
+        let Keyed {
+            key: corner,
+            id: slot,
+        } = key?;
         if last != Some(corner) {
             n_corners += 1;
             last = Some(corner);
@@ -120,14 +105,6 @@ fn number_corners(
         of_leaf.change(slot as usize / 8, |ids| ids[slot as usize % 8] = number);
     }
     Ok((of_leaf, n_corners as usize))
-}
-
-/// A number of eight bytes and one of four.
-#[inline]
-fn word_and(key: [u8; 12]) -> (u64, u32) {
-    let [a, b, c, d, e, f, g, h, slot @ ..] = key;
-    let number = u64::from_be_bytes([a, b, c, d, e, f, g, h]);
-    (number, u32::from_be_bytes(slot))
 }
 
 /// Interleaves the bits of a lattice position, 21 per axis.
@@ -149,7 +126,7 @@ fn find_hanging(
     of_leaf: &mut SpillVec<[u32; 8]>,
     room: &ScratchSpace,
 ) -> Result<SpillVec<Hanging>, StorageError> {
-    let mut found = room.sorter::<24>();
+    let mut found = room.sorter::<Hanging>();
     for (i, leaf) in tree.leaves().enumerate() {
         let ids = of_leaf.get(i);
         for cell in leaf.outer_neighbors() {
@@ -159,15 +136,15 @@ fn find_hanging(
             let ids_large = of_leaf.get(larger as usize);
             for (c, &id) in ids.iter().enumerate() {
                 if let Some(hanging) = hangs(&leaf, c, id, &large, &ids_large) {
-                    found.push(hanging.to_bytes())?;
+                    found.push(hanging)?;
                 }
             }
         }
     }
     let mut hanging = room.list();
     let mut last = None;
-    for bytes in found.finish()? {
-        let next = Hanging::from_bytes(bytes?);
+    for next in found.finish()? {
+        let next = next?;
         if last != Some(next.corner) {
             hanging.push(next);
             last = Some(next.corner);
@@ -224,4 +201,29 @@ fn hangs(
         corner: id,
         on,
     })
+}
+
+/// Pairs of corners of a cell with the squared distance in sides: all 28 of them.
+pub(super) const PAIRS: [(u8, u8, u8); 28] = pairs();
+
+const fn pairs() -> [(u8, u8, u8); 28] {
+    let mut list = [(0, 0, 0); 28];
+    let mut n = 0;
+    let mut distance2 = 1;
+    while distance2 <= 3 {
+        let mut a = 0u8;
+        while a < 8 {
+            let mut b = a + 1;
+            while b < 8 {
+                if (a ^ b).count_ones() == distance2 {
+                    list[n] = (a, b, distance2 as u8);
+                    n += 1;
+                }
+                b += 1;
+            }
+            a += 1;
+        }
+        distance2 += 1;
+    }
+    list
 }

@@ -1,7 +1,9 @@
 //! The size field: built once, read from every thread.
 
+use super::SizingError;
 use super::closed::{divide_parameters, metric_length};
-use super::constraints::{SizeConstraint, SizeConstraints};
+use super::constraint::SizeConstraint;
+use super::constraints::SizeConstraints;
 use super::corners::Corners;
 use super::options::SizeOptions;
 use super::seeds::{OctreeFrame, seeds_of};
@@ -9,7 +11,6 @@ use super::sources::ResolvedSource;
 use super::summary::SizeSummary;
 use super::tree::{DEPTH, LATTICE, LEAF, Leaf, Tree, octant_of};
 use super::values::Maker;
-use super::{SizingError, summary};
 use crate::geom::{Point, lex_cmp};
 use crate::storage::{FrozenSpillVec, ScratchSpace, SpillVec};
 use std::cmp::Ordering;
@@ -108,7 +109,7 @@ impl SizeField {
             bounds,
             least: scaled.hmin.unwrap_or(0.0),
         };
-        let tree = Tree::build(&seeds, &scaled, &constraints)?;
+        let tree = Tree::build(&seeds, &scaled, |tree| constraints.refine(tree))?;
         let mut corners = Corners::of(&tree, room);
         let mut maker = Maker {
             tree: &tree,
@@ -121,7 +122,7 @@ impl SizeField {
         let h = maker.values(&scaled)?;
         let field = Self::of_corners(frame, targets.beta, tree, corners, h, room)
             .with_sources(options, bounds.diagonal())?;
-        let summary = summary::of(&field, &seeds, &targets, options, room);
+        let summary = field.summary(&seeds, &targets, options, room);
         Ok((field, summary))
     }
 

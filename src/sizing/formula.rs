@@ -1,7 +1,7 @@
 //! Sizes by an expression in x, y and z.
 
 use super::SizingError;
-use super::constraints::SizeConstraint;
+use super::constraint::SizeConstraint;
 use crate::expr::{Expression, Kind};
 use crate::geom::Point;
 

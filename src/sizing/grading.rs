@@ -1,9 +1,8 @@
 //! Sizes that grow no steeper than the gradation allows.
 
 use super::bits::Bits;
-use super::corners::Corners;
+use super::corners::{Corners, PAIRS};
 use super::tree::{Leaf, Tree};
-use super::values::PAIRS;
 use crate::storage::{SpillVec, check_cancelled};
 
 /// Rounds of grading and closing hanging corners. The last ones change little; each costs as much as

@@ -1,7 +1,7 @@
 //! One size for some of the volumes a surface encloses.
 
 use super::SizingError;
-use super::constraints::SizeConstraint;
+use super::constraint::SizeConstraint;
 use crate::geom::Point;
 use crate::storage::ScratchSpace;
 use crate::surface::{Seeker, Volumes};

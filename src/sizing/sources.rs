@@ -4,7 +4,7 @@
 //! between the two it changes with the slope of the gradation: the minimum with the octree keeps that slope.
 
 use super::SizingError;
-use super::options::Length;
+use super::length::Length;
 use crate::geom::Point;
 
 /// A convex region, closed.

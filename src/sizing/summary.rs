@@ -1,14 +1,6 @@
 //! What a user is told about sizes.
 
-use super::field::SizeField;
-use super::options::{Length, SizeOptions, Targets};
-use super::seeds::Seeds;
-use crate::storage::{ScratchSpace, raise};
 use std::fmt;
-
-/// Below this share of the surface's median edge, an interior size is warned about: the surface is
-/// not divided, so that large triangles would stand against small tetrahedra.
-const FAR_BELOW: f64 = 0.4;
 
 /// Lowest, median and highest of some lengths, in input units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,100 +63,4 @@ impl fmt::Display for SizeSummary {
             self.source, self.field.median, self.field.low, self.field.high
         )
     }
-}
-
-pub(super) fn of(
-    field: &SizeField,
-    seeds: &Seeds,
-    targets: &Targets,
-    options: &SizeOptions,
-    room: &ScratchSpace,
-) -> SizeSummary {
-    let side = field.frame.side;
-    let all = seeds.vertices().map(|v| (seeds.h(v) * side, 1.0));
-    let surface = weighted_range(all, room);
-    let middles = field.tree.leaves().enumerate().map(|(i, leaf)| {
-        let values = field.values.get(i);
-        let mean = values.iter().map(|&h| f64::from(h)).sum::<f64>() / 8.0;
-        (mean * side, leaf.side() * leaf.side() * leaf.side())
-    });
-    let median = weighted_range(middles, room).median;
-    let (low, high) = field.range();
-    let wanted = [("--hsiz", targets.hsiz), ("--hmax", targets.hmax)];
-    let warnings = wanted.into_iter().filter_map(|(option, wanted)| {
-        let wanted = wanted.filter(|&h| h < FAR_BELOW * surface.median)?;
-        Some(SizeWarning::FarBelowSurface {
-            option,
-            wanted,
-            surface_median: surface.median,
-        })
-    });
-    SizeSummary {
-        source: source_of(options, targets),
-        surface,
-        field: Range { low, median, high },
-        beta: targets.beta,
-        n_leaves: field.n_leaves(),
-        bytes: field.bytes(),
-        warnings: warnings.collect(),
-    }
-}
-
-/// Lowest, weighted median and highest of a list of positive numbers with weights that is not empty.
-fn weighted_range(list: impl Iterator<Item = (f64, f64)>, room: &ScratchSpace) -> Range {
-    let mut sorter = room.sorter::<16>();
-    let mut total = 0.0;
-    for (x, weight) in list {
-        total += weight;
-        // Positive numbers sort as their bits do.
-        let key = u128::from(x.to_bits()) << 64 | u128::from(weight.to_bits());
-        let pushed = sorter.push(key.to_be_bytes());
-        pushed.unwrap_or_else(|e| raise(e));
-    }
-    let mut sum = 0.0;
-    let mut range = Range {
-        low: f64::INFINITY,
-        median: f64::NAN,
-        high: 0.0,
-    };
-    for key in sorter.finish().unwrap_or_else(|e| raise(e)) {
-        let key = u128::from_be_bytes(key.unwrap_or_else(|e| raise(e)));
-        let [x, weight] = [(key >> 64) as u64, key as u64].map(f64::from_bits);
-        let is_below = sum < 0.5 * total;
-        sum += weight;
-        if is_below && sum >= 0.5 * total {
-            range.median = x;
-        }
-        (range.low, range.high) = (range.low.min(x), x);
-    }
-    range
-}
-
-fn source_of(options: &SizeOptions, targets: &Targets) -> String {
-    let mut parts = Vec::new();
-    let named = [
-        ("--hsiz", options.hsiz, targets.hsiz),
-        ("--hmin", options.hmin, targets.hmin),
-        ("--hmax", options.hmax, targets.hmax),
-    ];
-    for (name, asked, length) in named {
-        match (asked, length) {
-            (Some(Length::Percent(share)), Some(h)) => {
-                parts.push(format!("{name} {share}% = {h:.4}"));
-            }
-            (Some(_), Some(h)) => parts.push(format!("{name} {h}")),
-            _ => {}
-        }
-    }
-    if !options.sources.is_empty() {
-        parts.push(format!("{} shapes", options.sources.len()));
-    }
-    if !options.regions.is_empty() {
-        parts.push(format!("{} regions", options.regions.len()));
-    }
-    if options.formula.is_some() {
-        parts.push("--size-expr".to_owned());
-    }
-    parts.push("the surface's edges".to_owned());
-    format!("{}, --hgrad {}", parts.join(", "), options.hgrad)
 }

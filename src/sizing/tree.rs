@@ -4,7 +4,6 @@
 //! integer lattice of 2^20 per axis; octants and corners are numbered x + 2y + 4z.
 
 use super::SizingError;
-use super::constraints::SizeConstraints;
 use super::options::Targets;
 use super::seeds::Seeds;
 use crate::geom::Point;
@@ -88,18 +87,18 @@ pub(super) struct Tree {
 }
 
 impl Tree {
-    /// The balanced octree for these seeds and wanted sizes (all in units of the root's side).
+    /// The balanced octree for these seeds and wanted sizes (all in units of the root's side), divided further before it is balanced.
     pub(super) fn build(
         seeds: &Seeds,
         targets: &Targets,
-        constraints: &SizeConstraints,
+        divide_further: impl FnOnce(&mut Self) -> Result<(), SizingError>,
     ) -> Result<Self, SizingError> {
         let all: Vec<u32> = seeds.vertices().collect();
         let shape = shape_of(Leaf::ROOT, &all, seeds, targets);
         drop(all);
         let mut tree = Self::from_shape(&shape);
         drop(shape);
-        constraints.refine(&mut tree)?;
+        divide_further(&mut tree)?;
         tree.balance()?;
         Ok(tree.numbered())
     }

@@ -3,42 +3,26 @@
 use super::SizingError;
 use super::bits::Bits;
 use super::constraints::SizeConstraints;
-use super::corners::Corners;
+use super::corners::{Corners, PAIRS};
 use super::grading::{Grading, bound, close_finite};
 use super::options::Targets;
 use super::seeds::Seeds;
 use super::tree::{LATTICE, Leaf, Tree};
 use crate::geom::Point;
-use crate::storage::{ScratchSpace, SpillVec, check_cancelled, raise};
+use crate::storage::{ScratchSpace, SpillVec, check_cancelled, raise, sort_record};
 
 /// Rounds of averaging that smooth what was filled in. The graph is shallow (cells grow with the
 /// distance to the surface), so values are within 2 % of the limit after these.
 const FILL_ROUNDS: u32 = 60;
-/// Pairs of corners of a cell with the squared distance in sides: all 28 of them.
-pub(super) const PAIRS: [(u8, u8, u8); 28] = pairs();
 /// The twelve edges of a cell come first in `PAIRS`.
 const N_EDGES: usize = 12;
 
-const fn pairs() -> [(u8, u8, u8); 28] {
-    let mut list = [(0, 0, 0); 28];
-    let mut n = 0;
-    let mut distance2 = 1;
-    while distance2 <= 3 {
-        let mut a = 0u8;
-        while a < 8 {
-            let mut b = a + 1;
-            while b < 8 {
-                if (a ^ b).count_ones() == distance2 {
-                    list[n] = (a, b, distance2 as u8);
-                    n += 1;
-                }
-                b += 1;
-            }
-            a += 1;
-        }
-        distance2 += 1;
+sort_record! {
+    /// A seed and the leaf that holds it.
+    struct LeafSeed {
+        leaf: u32,
+        seed: u32,
     }
-    list
 }
 
 /// What sizes at corners are made from.
@@ -97,18 +81,18 @@ impl Maker<'_> {
     /// Seeds are taken leaf by leaf, those of a leaf in their order. What falls on a hanging corner is handed to the corners it hangs on.
     fn gather(&mut self, with_nearest: bool) -> (SpillVec<f32>, Option<SpillVec<f64>>) {
         let (tree, seeds, n) = (self.tree, self.seeds, self.corners.n_corners);
-        let mut by_leaf = self.room.sorter::<8>();
+        let mut by_leaf = self.room.sorter::<LeafSeed>();
         for v in seeds.vertices() {
             let (leaf, _) = tree.leaf_at(lattice_cell(seeds.at(v)));
-            let key = u64::from(leaf) << 32 | u64::from(v);
-            by_leaf.push(key.to_be_bytes()).unwrap_or_else(|e| raise(e));
+            let pushed = by_leaf.push(LeafSeed { leaf, seed: v });
+            pushed.unwrap_or_else(|e| raise(e));
         }
         let by_leaf = by_leaf.finish().unwrap_or_else(|e| raise(e));
         let mut sums = self.room.column(n, [0.0f64; 2]);
         let mut nearest = with_nearest.then(|| self.room.column(n, f64::INFINITY));
-        for key in by_leaf {
-            let key = u64::from_be_bytes(key.unwrap_or_else(|e| raise(e)));
-            let (at, h) = (seeds.at(key as u32), seeds.h(key as u32));
+        for next in by_leaf {
+            let LeafSeed { seed, .. } = next.unwrap_or_else(|e| raise(e));
+            let (at, h) = (seeds.at(seed), seeds.h(seed));
             let cell = lattice_cell(at);
             let (number, level) = tree.leaf_at(cell);
             let anchor = cell.map(|x| x & !((LATTICE >> level) - 1));

@@ -1,7 +1,8 @@
 //! Sizes of a part that is meshed again: wanted lengths inside, the fixed faces around it as they are.
 
 use super::SizingError;
-use super::constraints::{SizeConstraint, SizeConstraints};
+use super::constraint::SizeConstraint;
+use super::constraints::SizeConstraints;
 use super::corners::Corners;
 use super::field::SizeField;
 use super::options::Targets;
@@ -40,7 +41,7 @@ impl SizeField {
             hmax: None,
             beta,
         };
-        let tree = Tree::build(&seeds, &along_skin, &constraints)?;
+        let tree = Tree::build(&seeds, &along_skin, |tree| constraints.refine(tree))?;
         let mut corners = Corners::of(&tree, room);
         let mut maker = Maker {
             tree: &tree,

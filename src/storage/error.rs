@@ -11,46 +11,74 @@ pub enum StorageError {
     /// The operating system or redb refused a read or write.
     #[error("{path}: {source}")]
     Database {
+        /// The file or folder.
         path: PathBuf,
+        /// What the cause was.
         #[source]
         source: Box<redb::Error>,
     },
     /// The file is open for writing elsewhere.
     #[error("{path} is being written by another process")]
-    Busy { path: PathBuf },
+    Busy {
+        /// The file or folder.
+        path: PathBuf,
+    },
     /// The disk has no room for what must be written.
     #[error("no space left to write {path}")]
-    Full { path: PathBuf },
+    Full {
+        /// The file or folder.
+        path: PathBuf,
+    },
     /// redb could not follow its own tree.
     #[error("{path} is damaged: {reason}")]
-    Damaged { path: PathBuf, reason: String },
+    Damaged {
+        /// The file or folder.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
     /// A page is not what its address says.
     #[error("{path} is damaged: {source}")]
     Page {
+        /// The file or folder.
         path: PathBuf,
+        /// What the cause was.
         #[source]
         source: PageError,
     },
     /// A page that must exist does not.
     #[error("{path} is damaged: {what} is missing")]
-    Missing { path: PathBuf, what: String },
+    Missing {
+        /// The file or folder.
+        path: PathBuf,
+        /// What should be there.
+        what: String,
+    },
     /// A file operation outside redb failed.
     #[error("{path}: {source}")]
     Io {
+        /// The file or folder.
         path: PathBuf,
+        /// What the cause was.
         #[source]
         source: std::io::Error,
     },
     /// The ledger has no bytes left for a demand.
     #[error("{what} needs {needed} bytes, the memory budget has {available} left")]
     Budget {
+        /// What needs the bytes.
         what: &'static str,
+        /// Bytes asked for.
         needed: u64,
+        /// Bytes left.
         available: u64,
     },
     /// More records than 30-bit ids can name.
     #[error("a sub-domain cannot hold more than 2^30 {what}")]
-    TooMany { what: &'static str },
+    TooMany {
+        /// Kind of the records.
+        what: &'static str,
+    },
     /// The user asked to stop; the step in flight is lost, everything before it is kept.
     #[error("stopped")]
     Cancelled,

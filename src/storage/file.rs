@@ -61,7 +61,7 @@ impl StoreFile {
     ) -> Result<Self, StorageError> {
         let mut builder = Database::builder();
         builder.set_cache_size(cache_bytes);
-        let file = path.told(path.disk().create(path.path()))?;
+        let file = path.at_path(path.disk().create(path.path()))?;
         let db = guarded(|| builder.create_with_backend(backend(file)));
         let mut file = Self {
             handle: Some(Handle::Writer(Box::new(db.map_err(|e| e.at(path.path()))?))),
@@ -81,13 +81,21 @@ impl StoreFile {
         cache_bytes: usize,
         writable: bool,
     ) -> Result<Self, StorageError> {
-        let path = path.into();
+        let access = match writable {
+            true => Access::Write,
+            false => Access::Share,
+        };
+        Self::open_for(path.into(), cache_bytes, access)
+    }
+
+    fn open_for(path: DiskPath, cache_bytes: usize, access: Access) -> Result<Self, StorageError> {
         let mut builder = Database::builder();
         builder.set_cache_size(cache_bytes);
         // redb follows its tree of free pages while it opens.
-        let handle = guarded(|| match writable {
-            true => open_writable(&path, &builder).map(|db| Handle::Writer(Box::new(db))),
-            false => match path.disk().open_shared(path.path(), &builder) {
+        let handle = guarded(|| match access {
+            Access::Write => open_writable(&path, &builder).map(|db| Handle::Writer(Box::new(db))),
+            Access::Private => open_private(&path, &builder).map(|db| Handle::Writer(Box::new(db))),
+            Access::Share => match path.disk().open_shared(path.path(), &builder) {
                 Some(db) => db.map(|db| Handle::Reader(Box::new(db))),
                 None => open_private(&path, &builder).map(|db| Handle::Writer(Box::new(db))),
             },
@@ -109,8 +117,8 @@ impl StoreFile {
         Ok(file)
     }
 
-    /// Opens an existing file as [`StoreFile::open`] does, also one whose writer was killed: that is first opened for
-    /// writing, which repairs it.
+    /// Opens an existing file as [`StoreFile::open`] does, also one whose writer was killed: to be read, that is repaired in memory,
+    /// so that neither the right to write nor space on the disk is needed.
     ///
     /// Errors: as [`StoreFile::open`].
     pub fn open_repaired(
@@ -123,8 +131,7 @@ impl StoreFile {
             Err(StorageError::Database { source, .. })
                 if !writable && matches!(*source, redb::Error::RepairAborted) =>
             {
-                drop(Self::open(path, cache_bytes, true)?);
-                Self::open(path, cache_bytes, false)
+                Self::open_for(path.clone(), cache_bytes, Access::Private)
             }
             other => other,
         }
@@ -282,9 +289,20 @@ impl Drop for StoreFile {
     fn drop(&mut self) {
         self.table = None;
         let handle = self.handle.take();
-        // redb looks at its tree once more when it closes. What it may find was told already, or is found by who opens the file next.
+        // redb looks at its tree once more when it closes. What it may find was reported already, or is found by who opens the file next.
         let _ = caught(|| drop(handle));
     }
+}
+
+/// For what a file is opened.
+#[derive(Clone, Copy)]
+enum Access {
+    /// To be changed, by nobody else.
+    Write,
+    /// To be read, beside other readers.
+    Share,
+    /// To be read, with what redb changes kept in memory.
+    Private,
 }
 
 /// Opens what is there; an empty file is none of redb's, which would begin a database in it.

@@ -10,7 +10,7 @@ const FRAME_MASK: u32 = DIRTY - 1;
 const READABLE: u32 = RESIDENT | REFERENCED;
 /// Entries of pages that are not resident: in the file the step began with, in the file it makes, or from here on in the spill.
 pub(super) const IN_BASE: u32 = 0;
-pub(super) const IN_MADE: u32 = 1;
+pub(super) const IN_OUTPUT: u32 = 1;
 pub(super) const IN_SPILL: u32 = 2;
 /// Where the frame of a page seems to begin that cannot be accessed at once: beyond every pool.
 const BEYOND: u32 = !SLOT_MASK;

@@ -72,6 +72,7 @@ const DIRTY: u8 = 2;
 pub(super) struct PagedVec<T> {
     file: Arc<ScratchFile>,
     initial: T,
+    /// Elements.
     pub len: usize,
     /// By page: its frame, and whether it is stored.
     table: Vec<u32>,

@@ -10,7 +10,7 @@ use lru::LruCache;
 use tetdb_schema::page::{FRAME_BYTES, PageAddress, SLOT_BITS, SLOTS, Slot, u32_le};
 
 use super::page_table::{
-    DIRTY, FRAMES_LIMIT, IN_BASE, IN_MADE, PageTable, REFERENCED, RESIDENT, frame_of,
+    DIRTY, FRAMES_LIMIT, IN_BASE, IN_OUTPUT, PageTable, REFERENCED, RESIDENT, frame_of,
 };
 use super::places::{Backing, Places};
 use super::{DiskPath, Pages, StorageError, check_cancelled, kind, raise};
@@ -24,8 +24,11 @@ const FRAMES_MIN: usize = 16;
 /// Page traffic so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PagerStats {
+    /// Pages that came from a file.
     pub pages_read: u64,
+    /// Pages that went to a file.
     pub pages_written: u64,
+    /// Transactions of redb.
     pub commits: u64,
 }
 
@@ -80,14 +83,14 @@ impl Pager {
         }
     }
 
-    /// Uses no more than `bytes` for frames from now on, which must hold what it has; never more than it was made with.
+    /// Uses no more than `bytes` for frames from now on, which must hold what it has; never more than it was created with.
     pub fn limit(&mut self, bytes: u64) {
         let limit = frames_of(bytes).min(self.frames.len() / SLOTS);
         assert!(self.owners.len() <= limit, "more frames than it may use");
         self.frames_max = limit;
     }
 
-    /// [`Pager::limit`], and gives a pool that was made without one a place for pages that leave memory.
+    /// [`Pager::limit`], and gives a pool that was created without one a place for pages that leave memory.
     pub fn settle(&mut self, bytes: u64, backing: Backing) {
         assert!(!self.places.exist(), "its pages would be in two places");
         self.limit(bytes);
@@ -131,10 +134,10 @@ impl Pager {
         }
     }
 
-    /// Writes every dirty page to the file that is made, and closes it. Returns the traffic of all. Unwinds on errors.
+    /// Writes every dirty page to the output file, and closes it. Returns the traffic of all. Unwinds on errors.
     pub fn finish(mut self) -> PagerStats {
         let mut dirty: Vec<u32> = (0..self.owners.len() as u32)
-            .filter(|&frame| self.is_made(frame) && self.entry(frame) & DIRTY != 0)
+            .filter(|&frame| self.is_output(frame) && self.entry(frame) & DIRTY != 0)
             .collect();
         dirty.sort_unstable_by_key(|&frame| self.owners[frame as usize]);
         for batch in dirty.chunks(BATCH_PAGES_MAX) {
@@ -155,7 +158,7 @@ impl Pager {
         for kind in 0..self.tables.len() {
             for page in 0..self.tables[kind].len() as u32 {
                 // What had to make room is written already.
-                if self.tables[kind].entry(page) == IN_MADE {
+                if self.tables[kind].entry(page) == IN_OUTPUT {
                     continue;
                 }
                 batch.push(self.fault_in(kind, page));
@@ -166,7 +169,7 @@ impl Pager {
             }
         }
         self.write_back(&batch);
-        told(self.places.end_file(generation));
+        or_raise(self.places.end_file(generation));
         for table in &mut self.tables {
             for page in 0..table.len() as u32 {
                 if table.entry(page) & RESIDENT == 0 {
@@ -247,7 +250,7 @@ impl Pager {
         let address = self.address(kind, page);
         let at = frame as usize * SLOTS;
         let slots = &mut self.frames[at..at + SLOTS];
-        told(self.places.read(place, address, slots));
+        or_raise(self.places.read(place, address, slots));
         self.stats.pages_read += 1;
         self.set_place(frame, place);
         self.owners[frame as usize] = (kind as u8, page);
@@ -279,7 +282,7 @@ impl Pager {
             self.order.put(frame, ());
         };
         if self.entry(frame) & DIRTY != 0 {
-            if self.is_made(frame) {
+            if self.is_output(frame) {
                 let mut batch = vec![frame];
                 batch.extend(self.cold_dirty_frames());
                 batch.sort_unstable_by_key(|&f| self.owners[f as usize]);
@@ -293,10 +296,10 @@ impl Pager {
         frame
     }
 
-    /// Whether the page in `frame` belongs to the file that is made.
-    fn is_made(&self, frame: u32) -> bool {
+    /// Whether the page in `frame` belongs to the output file.
+    fn is_output(&self, frame: u32) -> bool {
         let owner = self.owners[frame as usize];
-        owner != NOBODY && self.places.makes(usize::from(owner.0))
+        owner != NOBODY && self.places.goes_to_output(usize::from(owner.0))
     }
 
     /// The next victims that would have to be written, so that one commit serves many misses.
@@ -304,7 +307,7 @@ impl Pager {
         let n = (self.frames_max / 4).clamp(1, BATCH_PAGES_MAX - 1);
         let cold = self.order.iter().rev().map(|(&frame, ())| frame);
         cold.filter(|&frame| {
-            self.entry(frame) & (REFERENCED | DIRTY) == DIRTY && self.is_made(frame)
+            self.entry(frame) & (REFERENCED | DIRTY) == DIRTY && self.is_output(frame)
         })
         .take(n)
         .collect()
@@ -322,12 +325,12 @@ impl Pager {
         let (address, place) = (self.address_of(frame), self.place(frame));
         let at = frame as usize * SLOTS;
         let slots = &mut self.frames[at..at + SLOTS];
-        let place = told(self.places.spill(place, address, slots));
+        let place = or_raise(self.places.spill(place, address, slots));
         self.stats.pages_written += 1;
         self.is_at(frame, place);
     }
 
-    /// Writes pages to the file that is made, in one commit.
+    /// Writes pages to the output file, in one commit.
     fn write_back(&mut self, batch: &[u32]) {
         for &frame in batch {
             let address = self.address_of(frame);
@@ -340,11 +343,11 @@ impl Pager {
             let at = frame as usize * SLOTS;
             (address, &frames[at..at + SLOTS])
         });
-        told(self.places.write(pages));
+        or_raise(self.places.write(pages));
         self.stats.pages_written += batch.len() as u64;
         self.stats.commits += 1;
         for &frame in batch {
-            self.is_at(frame, IN_MADE);
+            self.is_at(frame, IN_OUTPUT);
         }
     }
 
@@ -447,7 +450,7 @@ impl Pages for Pager {
 impl Pager {
     /// Leaves the places of the first `n` pages of a kind in the spill to others.
     fn forget(&mut self, kind: usize, n: u32) {
-        assert!(!self.places.makes(kind), "written once, and kept");
+        assert!(!self.places.goes_to_output(kind), "written once, and kept");
         for page in 0..n {
             let entry = self.tables[kind].entry(page);
             let place = frame_of(entry).map_or(entry, |frame| self.place(frame));
@@ -466,7 +469,7 @@ impl Pager {
 }
 
 /// What was done with a file. Unwinds on errors.
-fn told<T>(done: Result<T, StorageError>) -> T {
+fn or_raise<T>(done: Result<T, StorageError>) -> T {
     done.unwrap_or_else(|error| raise(error))
 }
 

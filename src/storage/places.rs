@@ -10,6 +10,7 @@ use super::{DiskPath, StorageError, StoreFile, kind};
 
 /// What a pool begins with, and what it is to make.
 pub struct Backing {
+    /// Rank of the sub-domain whose pages these are.
     pub subdomain: u32,
     /// Generation being written.
     pub generation: u32,
@@ -23,7 +24,7 @@ pub struct Backing {
     pub cache_bytes: usize,
 }
 
-/// Files as they are opened: a place is one of the page table's, `IN_BASE`, `IN_MADE` or one in the spill.
+/// Files as they are opened: a place is one of the page table's, `IN_BASE`, `IN_OUTPUT` or one in the spill.
 #[derive(Default)]
 pub(super) struct Places {
     backing: Option<Backing>,
@@ -48,8 +49,8 @@ impl Places {
         self.backing.as_ref().map_or(0, |b| b.subdomain)
     }
 
-    /// Whether pages of this kind go to the file that is made.
-    pub fn makes(&self, kind: usize) -> bool {
+    /// Whether pages of this kind go to the output file.
+    pub fn goes_to_output(&self, kind: usize) -> bool {
         kind != kind::SCRATCH && self.backing.as_ref().is_some_and(|b| b.made.is_some())
     }
 
@@ -132,7 +133,7 @@ impl Places {
         seal_page(frame, address, self.backing().generation);
     }
 
-    /// Writes sealed pages to the file that is made, in one commit. Errors: the disk.
+    /// Writes sealed pages to the output file, in one commit. Errors: the disk.
     pub fn write<'a>(
         &mut self,
         pages: impl Iterator<Item = (PageAddress, &'a [Slot])>,
@@ -156,7 +157,7 @@ impl Places {
         assert!(before.is_none(), "its pages are in the file it makes");
     }
 
-    /// Closes the file that is made, with all pages in it, and goes on from it as `generation`. Errors: the disk.
+    /// Closes the output file, with all pages in it, and goes on from it as `generation`. Errors: the disk.
     pub fn end_file(&mut self, generation: u32) -> Result<(), StorageError> {
         self.spill = None;
         if let Some(made) = self.made.take() {

@@ -9,7 +9,7 @@ use std::sync::{Arc, Condvar, Mutex, Once, OnceLock, PoisonError};
 
 use rayon::{Scope, ThreadPool, ThreadPoolBuilder};
 
-use super::CancelToken;
+use super::cancel_token::CancelToken;
 
 thread_local! {
     static CURRENT: RefCell<Option<RunContext>> = const { RefCell::new(None) };
@@ -88,8 +88,9 @@ impl RunContext {
         panic.take()
     }
 
+    /// Whether the run of this thread is to end.
     #[inline]
-    pub(super) fn is_current_cancelled() -> bool {
+    pub fn is_current_cancelled() -> bool {
         CURRENT.with_borrow(|current| {
             current
                 .as_ref()

@@ -22,7 +22,7 @@ impl ScratchFile {
     pub fn create(dir: &DiskPath) -> Result<Self, StorageError> {
         let number = FILES.fetch_add(1, Ordering::Relaxed);
         let path = dir.join(format!(".tetdb-scratch-{}-{number}", std::process::id()));
-        let file = path.told(path.disk().create(path.path()))?;
+        let file = path.at_path(path.disk().create(path.path()))?;
         // Where a file without a name lives on while it is open, a run that is killed leaves nothing.
         let is_nameless = cfg!(unix) && path.remove_file().is_ok();
         Ok(Self {
@@ -34,17 +34,17 @@ impl ScratchFile {
 
     /// Fills `out` from byte `at` on, all of which must have been written.
     pub fn read(&self, at: u64, out: &mut [u8]) -> Result<(), StorageError> {
-        self.path.told(self.file.read(at, out))
+        self.path.at_path(self.file.read(at, out))
     }
 
-    /// Where it was made.
+    /// Where it was created.
     pub fn path(&self) -> &DiskPath {
         &self.path
     }
 
     /// Writes `bytes` from byte `at` on.
     pub fn write(&self, at: u64, bytes: &[u8]) -> Result<(), StorageError> {
-        self.path.told(self.file.write(at, bytes))
+        self.path.at_path(self.file.write(at, bytes))
     }
 }
 

@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::slice::ParallelSliceMut;
 
+use super::sort_record::{SortBytes, SortRecord};
 use super::{DiskPath, StorageError, check_cancelled, parallel};
 
 /// Numbers run files within the process.
@@ -14,12 +15,12 @@ static RUNS: AtomicU64 = AtomicU64::new(0);
 /// A run is read through at least this much buffer.
 const READ_BYTES_MIN: usize = 16 << 10;
 
-/// Collects records of `N` bytes; [`Sorter::finish`] gives them back in ascending order of their bytes.
+/// Collects records; [`Sorter::finish`] gives them back in ascending order.
 ///
-/// Numbers therefore go in big-endian. Memory: `memory_bytes`, whatever is pushed. Equal records stay as many as they
+/// Memory: `memory_bytes`, whatever is pushed. Equal records stay as many as they
 /// were. The result does not depend on the memory, nor on threads.
-pub struct Sorter<const N: usize> {
-    records: Vec<[u8; N]>,
+pub struct Sorter<R: SortRecord> {
+    records: Vec<R::Bytes>,
     records_max: usize,
     memory_bytes: usize,
     dir: DiskPath,
@@ -40,7 +41,8 @@ impl Drop for Run {
 
 /// Compares records by their bytes: the first eight as one number, which is what nearly always decides.
 #[inline(always)]
-fn order<const N: usize>(a: &[u8; N], b: &[u8; N]) -> std::cmp::Ordering {
+fn order<B: SortBytes>(a: &B, b: &B) -> std::cmp::Ordering {
+    let (a, b) = (a.as_ref(), b.as_ref());
     match (a.split_first_chunk::<8>(), b.split_first_chunk::<8>()) {
         (Some((a, a_rest)), Some((b, b_rest))) => u64::from_be_bytes(*a)
             .cmp(&u64::from_be_bytes(*b))
@@ -49,7 +51,7 @@ fn order<const N: usize>(a: &[u8; N], b: &[u8; N]) -> std::cmp::Ordering {
     }
 }
 
-impl<const N: usize> Sorter<N> {
+impl<R: SortRecord> Sorter<R> {
     /// A sorter with runs in `dir`, which must exist.
     pub fn new(dir: impl Into<DiskPath>, memory_bytes: u64) -> Self {
         let memory_bytes = usize::try_from(memory_bytes)
@@ -57,7 +59,7 @@ impl<const N: usize> Sorter<N> {
             .max(1 << 16);
         Self {
             records: Vec::new(),
-            records_max: memory_bytes / N,
+            records_max: memory_bytes / size_of::<R::Bytes>(),
             memory_bytes,
             dir: dir.into(),
             runs: Vec::new(),
@@ -66,7 +68,7 @@ impl<const N: usize> Sorter<N> {
 
     /// Adds a record. Errors: the disk, when a run is written.
     #[inline]
-    pub fn push(&mut self, record: [u8; N]) -> Result<(), StorageError> {
+    pub fn push(&mut self, record: R) -> Result<(), StorageError> {
         if self.records.len() == self.records_max {
             self.spill()?;
         }
@@ -76,7 +78,7 @@ impl<const N: usize> Sorter<N> {
             let more = more.min(self.records_max - self.records.len());
             self.records.reserve_exact(more);
         }
-        self.records.push(record);
+        self.records.push(record.to_bytes());
         Ok(())
     }
 
@@ -93,18 +95,18 @@ impl<const N: usize> Sorter<N> {
         let written = created.and_then(|file| {
             let mut out = BufWriter::with_capacity(1 << 18, file);
             for record in &self.records {
-                out.write_all(record)?;
+                out.write_all(record.as_ref())?;
             }
             out.flush()
         });
-        run.path.told(written)?;
+        run.path.at_path(written)?;
         self.runs.push(run);
         self.records.clear();
         Ok(())
     }
 
     /// Ends pushing. Errors: the disk.
-    pub fn finish(mut self) -> Result<Sorted<N>, StorageError> {
+    pub fn finish(mut self) -> Result<Sorted<R>, StorageError> {
         if self.runs.is_empty() {
             let records = &mut self.records;
             parallel(|| records.par_sort_unstable_by(order));
@@ -127,7 +129,7 @@ impl<const N: usize> Sorter<N> {
         for (k, run) in self.runs.drain(..).enumerate() {
             let file = run
                 .path
-                .told(run.path.disk().open_stream(run.path.path()))?;
+                .at_path(run.path.disk().open_stream(run.path.path()))?;
             let mut reader = RunReader {
                 bytes: BufReader::with_capacity(buffer, file),
                 run,
@@ -147,29 +149,29 @@ struct RunReader {
 }
 
 impl RunReader {
-    fn next<const N: usize>(&mut self) -> Result<Option<[u8; N]>, StorageError> {
-        let mut record = [0; N];
-        match self.bytes.read_exact(&mut record) {
+    fn next<B: SortBytes>(&mut self) -> Result<Option<B>, StorageError> {
+        let mut record = B::ZERO;
+        match self.bytes.read_exact(record.as_mut()) {
             Ok(()) => Ok(Some(record)),
             Err(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => Ok(None),
-            Err(e) => self.run.path.told(Err(e)),
+            Err(e) => self.run.path.at_path(Err(e)),
         }
     }
 }
 
 /// Records in ascending order.
-pub struct Sorted<const N: usize> {
-    memory: std::vec::IntoIter<[u8; N]>,
-    heap: BinaryHeap<Reverse<([u8; N], usize)>>,
+pub struct Sorted<R: SortRecord> {
+    memory: std::vec::IntoIter<R::Bytes>,
+    heap: BinaryHeap<Reverse<(R::Bytes, usize)>>,
     readers: Vec<RunReader>,
 }
 
-impl<const N: usize> Iterator for Sorted<N> {
-    type Item = Result<[u8; N], StorageError>;
+impl<R: SortRecord> Iterator for Sorted<R> {
+    type Item = Result<R, StorageError>;
 
     fn next(&mut self) -> Option<Self::Item> {
         if self.readers.is_empty() {
-            return self.memory.next().map(Ok);
+            return self.memory.next().map(|bytes| Ok(R::from_bytes(&bytes)));
         }
         let mut least = self.heap.peek_mut()?;
         let Reverse((record, k)) = *least;
@@ -180,7 +182,7 @@ impl<const N: usize> Iterator for Sorted<N> {
             }
             Err(e) => return Some(Err(e)),
         }
-        Some(Ok(record))
+        Some(Ok(R::from_bytes(&record)))
     }
 }
 

@@ -51,7 +51,7 @@ impl Spill {
         self.file.read(at, bytemuck::cast_slice_mut(frame))
     }
 
-    /// Where the file was made.
+    /// Where the file was created.
     pub fn path(&self) -> &DiskPath {
         self.file.path()
     }

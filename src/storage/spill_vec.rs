@@ -8,7 +8,7 @@ use std::sync::Arc;
 use bytemuck::Pod;
 
 use super::paged_vec::{FRAMES_MIN, PAGE_BYTES, PagedVec, SharedPagedVec, per_page};
-use super::{Budget, DiskPath, Lease, Sorter, StorageError};
+use super::{Budget, DiskPath, Lease, SortRecord, Sorter, StorageError};
 
 /// Memory for arrays and sorts, and a folder for those it does not hold.
 #[derive(Clone)]
@@ -99,7 +99,7 @@ impl ScratchSpace {
     }
 
     /// Sorts in a quarter of what is left.
-    pub fn sorter<const N: usize>(&self) -> Sorter<N> {
+    pub fn sorter<R: SortRecord>(&self) -> Sorter<R> {
         match &self.dir {
             Some(dir) => Sorter::new(dir, self.available() / 4),
             None => Sorter::new("", u64::MAX),
@@ -107,7 +107,9 @@ impl ScratchSpace {
     }
 }
 
-/// An array of `T`.
+/// An array of `T`, in memory while its share lasts and in an unnamed scratch file beyond it.
+///
+/// An access that fails on disk unwinds as the pager's do.
 pub struct SpillVec<T> {
     place: Residence<T>,
     lease: Option<Lease>,
@@ -119,6 +121,7 @@ enum Residence<T> {
 }
 
 impl<T: Pod> SpillVec<T> {
+    /// Element `i`.
     #[inline(always)]
     pub fn get(&mut self, i: usize) -> T {
         match &mut self.place {
@@ -127,6 +130,7 @@ impl<T: Pod> SpillVec<T> {
         }
     }
 
+    /// Makes `value` element `i`.
     #[inline(always)]
     pub fn set(&mut self, i: usize, value: T) {
         match &mut self.place {
@@ -144,6 +148,7 @@ impl<T: Pod> SpillVec<T> {
         }
     }
 
+    /// How many elements there are.
     pub fn len(&self) -> usize {
         match &self.place {
             Residence::Memory(all) => all.len(),
@@ -151,6 +156,7 @@ impl<T: Pod> SpillVec<T> {
         }
     }
 
+    /// Whether there is no element.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -184,6 +190,7 @@ pub struct SpillVecBuilder<T> {
 }
 
 impl<T: Pod> SpillVecBuilder<T> {
+    /// Adds an element at the end. Unwinds when a scratch file fails.
     #[inline]
     pub fn push(&mut self, value: T) {
         if let Some(paged) = &mut self.paged {
@@ -202,6 +209,7 @@ impl<T: Pod> SpillVecBuilder<T> {
         self.memory.push(value);
     }
 
+    /// How many elements there are.
     pub fn len(&self) -> usize {
         match &self.paged {
             Some(paged) => paged.len,
@@ -209,6 +217,7 @@ impl<T: Pod> SpillVecBuilder<T> {
         }
     }
 
+    /// Whether there is no element.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -243,11 +252,14 @@ impl<T: Pod> SpillVecBuilder<T> {
 /// An array that no longer changes, read by many threads.
 #[derive(Clone)]
 pub enum FrozenSpillVec<T> {
+    /// In memory.
     Memory(Vec<T>),
+    /// In a scratch file, in parts, each with frames of its own.
     Disk(Arc<SharedPagedVec<T>>),
 }
 
 impl<T: Pod> FrozenSpillVec<T> {
+    /// Element `i`.
     #[inline(always)]
     pub fn get(&self, i: usize) -> T {
         match self {
@@ -256,6 +268,7 @@ impl<T: Pod> FrozenSpillVec<T> {
         }
     }
 
+    /// How many elements there are.
     pub fn len(&self) -> usize {
         match self {
             Self::Memory(all) => all.len(),
@@ -263,6 +276,7 @@ impl<T: Pod> FrozenSpillVec<T> {
         }
     }
 
+    /// Whether there is no element.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

@@ -1,4 +1,4 @@
-//! The directory of a store: made, opened, its files named and, when nobody lists them, removed.
+//! The directory of a store: created, opened, its files named and, when nobody lists them, removed.
 
 use std::path::Path;
 
@@ -80,7 +80,7 @@ impl Catalog {
         Ok(catalog)
     }
 
-    /// Whether `dir` is a directory where a store can be made: empty, or left by a run that was killed before its first commit.
+    /// Whether `dir` is a directory where a store can be created: empty, or left by a run that was killed before its first commit.
     pub fn is_vacant(dir: impl Into<DiskPath>) -> bool {
         let names = dir.into().list();
         names.is_ok_and(|names| names.iter().all(|name| name == CATALOG_NEW))
@@ -111,7 +111,9 @@ impl Catalog {
         }
         if !path.is_file() {
             let reason = match dir.join(CATALOG_NEW).exists() {
-                true => "its making was interrupted at the start; `tetdb mesh` begins it again",
+                true => {
+                    "its creation was interrupted at the start; meshing into it begins it again"
+                }
                 false => "it has no catalog",
             };
             return Err(StoreError::NotOurs {
@@ -181,7 +183,7 @@ impl Catalog {
         self.dir.join(named(SUBDOMAIN, file))
     }
 
-    /// Where the file of a coarse leaf in a generation is, whether it exists or not.
+    /// Where the file of a coarse snapshot in a generation is, whether it exists or not.
     pub fn coarse_path(&self, subdomain: u32, generation: u32) -> DiskPath {
         let file = FileRow {
             subdomain,
@@ -190,9 +192,9 @@ impl Catalog {
         self.dir.join(named(COARSE, file))
     }
 
-    /// A folder for sorted runs, made when it is not there; removed when the store is next opened for writing.
+    /// A folder for sorted runs, created when it is not there; removed when the store is next opened for writing.
     ///
-    /// Errors: the folder cannot be made.
+    /// Errors: the folder cannot be created.
     pub fn scratch_dir(&self) -> Result<DiskPath, StoreError> {
         let path = self.dir.join(SCRATCH);
         path.create_dir_all()?;
@@ -358,7 +360,7 @@ impl Catalog {
     }
 
     /// What the sub-domains of the last change were before it, by rank.
-    pub fn before(&mut self) -> Result<Vec<SubdomainRow>, StoreError> {
+    pub fn previous(&mut self) -> Result<Vec<SubdomainRow>, StoreError> {
         self.rows(RowKind::Previous)
     }
 
@@ -367,12 +369,12 @@ impl Catalog {
         self.rows(RowKind::File)
     }
 
-    /// The coarse leaves that were kept, by sub-domain.
+    /// The coarse snapshots that were kept, by sub-domain.
     pub fn coarse_snapshots(&mut self) -> Result<Vec<CoarseRow>, StoreError> {
         self.rows(RowKind::Coarse)
     }
 
-    /// The coarse leaf of one sub-domain, if it was kept.
+    /// The coarse snapshot of one sub-domain, if it was kept.
     pub fn coarse_snapshot(&mut self, rank: u32) -> Result<Option<CoarseRow>, StoreError> {
         self.row(RowKind::Coarse.key(0, rank))
     }

@@ -11,39 +11,72 @@ use crate::storage::StorageError;
 pub enum StoreError {
     /// Another process writes the store.
     #[error("{path} is being written by another process; wait for it, or stop it")]
-    Busy { path: PathBuf },
+    Busy {
+        /// The file or folder.
+        path: PathBuf,
+    },
     /// There is nothing at this path.
     #[error("there is no store at {path}")]
-    NotFound { path: PathBuf },
+    NotFound {
+        /// The file or folder.
+        path: PathBuf,
+    },
     /// There is something else at this path.
     #[error("{path} exists and is not a store: {reason}")]
-    NotOurs { path: PathBuf, reason: &'static str },
+    NotOurs {
+        /// The file or folder.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: &'static str,
+    },
     /// A finished store is already there.
     #[error("{path} is already a finished store")]
-    Finished { path: PathBuf },
+    Finished {
+        /// The file or folder.
+        path: PathBuf,
+    },
     /// A store is there whose creation was interrupted.
     #[error("{path} is an unfinished store")]
-    Unfinished { path: PathBuf },
+    Unfinished {
+        /// The file or folder.
+        path: PathBuf,
+    },
     /// The store is of another format version.
     #[error("{path} has format version {found}, this program reads version {expected}")]
     Format {
+        /// The file or folder.
         path: PathBuf,
+        /// Version of this program.
         expected: u16,
+        /// Version of the store.
         found: u16,
     },
     /// The catalog lists no such sub-domain.
     #[error("{path} has no sub-domain {subdomain}")]
-    NoSubdomain { path: PathBuf, subdomain: u32 },
+    NoSubdomain {
+        /// The file or folder.
+        path: PathBuf,
+        /// Rank of the sub-domain.
+        subdomain: u32,
+    },
     /// The sub-domain's coarse snapshot was not kept.
     #[error(
         "{path} has no coarse snapshot of sub-domain {subdomain}, from which it could be meshed again"
     )]
-    NoCoarseSnapshot { path: PathBuf, subdomain: u32 },
+    NoCoarseSnapshot {
+        /// The file or folder.
+        path: PathBuf,
+        /// Rank of the sub-domain.
+        subdomain: u32,
+    },
     /// A row of the catalog cannot be what was written.
     #[error("{path} is damaged: catalog row {key:016x} {reason}")]
     Row {
+        /// The file or folder.
         path: PathBuf,
+        /// Key of the row.
         key: u64,
+        /// What is wrong with it.
         reason: String,
     },
     /// The file of a sub-domain.

@@ -4,6 +4,8 @@
 //! files and then flips the catalog in one commit, so that a store is at any moment as one of its
 //! steps left it.
 
+#![warn(missing_docs)]
+
 mod catalog;
 mod error;
 mod rows;

@@ -16,7 +16,7 @@ pub struct Step {
     pub(super) changes: BTreeMap<u64, Option<Vec<u8>>>,
     pub(super) listed: BTreeSet<FileRow>,
     pub(super) unlisted: BTreeSet<FileRow>,
-    /// The same for coarse leaves.
+    /// The same for coarse snapshots.
     pub(super) coarse_listed: BTreeSet<FileRow>,
     pub(super) coarse_unlisted: BTreeSet<FileRow>,
     pub(super) journal_rows: u32,
@@ -78,12 +78,12 @@ impl Step {
     }
 
     /// What a sub-domain was before its last change; its file must stay listed.
-    pub fn set_before(&mut self, row: &SubdomainRow) {
+    pub fn set_previous(&mut self, row: &SubdomainRow) {
         self.put(RowKind::Previous.key(0, row.rank), row);
     }
 
     /// Forgets what a sub-domain was before.
-    pub fn remove_before(&mut self, rank: u32) {
+    pub fn remove_previous(&mut self, rank: u32) {
         self.changes.insert(RowKind::Previous.key(0, rank), None);
     }
 
@@ -115,7 +115,7 @@ impl Step {
         self.unlisted.insert(file);
     }
 
-    /// A coarse leaf counts from now on; its file is synced before the commit.
+    /// A coarse snapshot counts from now on; its file is synced before the commit.
     pub fn list_coarse(&mut self, row: &CoarseRow) {
         self.put(RowKind::Coarse.key(0, row.rank), row);
         self.coarse_listed.insert(FileRow {
@@ -124,7 +124,7 @@ impl Step {
         });
     }
 
-    /// Forgets a coarse leaf; its file is removed after the commit.
+    /// Forgets a coarse snapshot; its file is removed after the commit.
     pub fn drop_coarse(&mut self, row: &CoarseRow) {
         self.changes.insert(RowKind::Coarse.key(0, row.rank), None);
         self.coarse_unlisted.insert(FileRow {

@@ -1,4 +1,4 @@
-//! A hand-made store of two sub-domains with an interface; opening, stepping, purging, damage.
+//! A store written by hand of two sub-domains with an interface; opening, stepping, purging, damage.
 
 use tetdb_schema::ids::{Owner, SubdomainId, VertexId};
 use tetdb_schema::record::{FACES, InterfaceFace, NO_TET, SealedFacet, SealedVertex, tag};

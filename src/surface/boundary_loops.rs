@@ -1,10 +1,9 @@
 //! Where an open surface is open: the rims of its holes, and vertices that lie on open edges.
 
 use rayon::prelude::*;
-use robust::Coord;
 
 use super::Surface;
-use super::edges::{Closedness, Groups};
+use super::edges::{Closedness, ends, in_line, open_groups};
 use super::point_tree::PointTree;
 use crate::geom::{Aabb, Point};
 use crate::storage::parallel;
@@ -60,39 +59,6 @@ pub fn boundary_loops(surface: &Surface, closedness: &Closedness) -> Vec<Boundar
         by_length.then(a.triangle.cmp(&b.triangle))
     });
     boundary_loops
-}
-
-/// For each open edge the number of its connected group, counted in order of first appearance.
-pub(super) fn open_groups(open: &[(u32, [u32; 2])]) -> Vec<u32> {
-    let vertices = ends(open);
-    let place = |v: u32| {
-        let found = vertices.binary_search(&v);
-        found.expect("every end is in the list") as u32
-    };
-    let mut groups = Groups::new(vertices.len());
-    for (_, [a, b]) in open {
-        groups.join(place(*a), place(*b));
-    }
-    let mut numbers = vec![u32::MAX; vertices.len()];
-    let mut n = 0;
-    open.iter()
-        .map(|(_, [a, _])| {
-            let number = &mut numbers[groups.root(place(*a)) as usize];
-            if *number == u32::MAX {
-                *number = n;
-                n += 1;
-            }
-            *number
-        })
-        .collect()
-}
-
-/// The vertices of open edges, ascending.
-fn ends(open: &[(u32, [u32; 2])]) -> Vec<u32> {
-    let mut vertices: Vec<u32> = open.iter().flat_map(|(_, v)| *v).collect();
-    vertices.sort_unstable();
-    vertices.dedup();
-    vertices
 }
 
 /// Vertices of open edges that lie on another open edge, not farther than `distance_max` from it, in order of the edges.
@@ -206,12 +172,4 @@ fn on_edge(p: Point, [a, b]: [Point; 2], distance_max: f64, gap: f64) -> Option<
 fn to_inside([a, b]: [Point; 2], p: Point) -> Option<f64> {
     let share = (p - a).dot(b - a) / (b - a).length_squared();
     (share > 0.0 && share < 1.0).then(|| p.distance(a + (b - a) * share))
-}
-
-/// Whether three points lie on a line, exactly.
-pub(super) fn in_line(a: Point, b: Point, c: Point) -> bool {
-    let flat = |axis: fn(Point) -> Coord<f64>| robust::orient2d(axis(a), axis(b), axis(c)) == 0.0;
-    flat(|p| Coord { x: p.x, y: p.y })
-        && flat(|p| Coord { x: p.y, y: p.z })
-        && flat(|p| Coord { x: p.z, y: p.x })
 }

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::geom::{Aabb, HilbertFrame, Point};
-use crate::storage::{FrozenSpillVec, ScratchSpace, parallel, raise};
+use crate::storage::{FrozenSpillVec, Keyed, ScratchSpace, parallel, raise};
 
 /// Things in one leaf.
 const LEAF: usize = 4;
@@ -38,18 +38,16 @@ impl BoxTree {
         box_of: impl Fn(u32) -> Aabb + Sync,
     ) -> Self {
         let frame = HilbertFrame::new(bounds);
-        let mut sorter = room.sorter::<12>();
+        let mut sorter = room.sorter::<Keyed>();
         for first in (0..n).step_by(AT_ONCE) {
             let some = first..n.min(first.saturating_add(AT_ONCE as u32));
-            let keys: Vec<[u8; 12]> = parallel(|| {
+            let keys: Vec<Keyed> = parallel(|| {
                 some.into_par_iter()
                     .filter(|&i| keep(i))
                     .map(|i| {
                         let Aabb { low, high } = box_of(i);
-                        let mut key = [0; 12];
-                        key[..8].copy_from_slice(&frame.index((low + high) * 0.5).to_be_bytes());
-                        key[8..].copy_from_slice(&i.to_be_bytes());
-                        key
+                        let key = frame.index((low + high) * 0.5);
+                        Keyed { key, id: i }
                     })
                     .collect()
             });
@@ -63,10 +61,7 @@ impl BoxTree {
             let some: Vec<u32> = sorted
                 .by_ref()
                 .take(AT_ONCE)
-                .map(|key| {
-                    let key = key.unwrap_or_else(|e| raise(e));
-                    u32::from_be_bytes([key[8], key[9], key[10], key[11]])
-                })
+                .map(|keyed| keyed.unwrap_or_else(|e| raise(e)).id)
                 .collect();
             if some.is_empty() {
                 break;

@@ -1,10 +1,11 @@
 //! Which triangles meet at which edges: holes, repeated and collapsed triangles, parts.
 
 use rayon::prelude::*;
+use robust::Coord;
 
 use super::Surface;
-use super::boundary_loops::{in_line, open_groups};
-use crate::storage::{ScratchSpace, SpillVec, parallel, raise};
+use crate::geom::Point;
+use crate::storage::{ScratchSpace, SpillVec, parallel, raise, sort_record};
 
 /// What edges alone tell about a surface.
 ///
@@ -57,35 +58,28 @@ pub(super) struct Facets {
     pub is_left_out: Vec<bool>,
 }
 
-/// One facet at one edge.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-pub(super) struct EdgeUse {
-    /// The edge's vertices, the smaller one first.
-    pub edge: [u32; 2],
-    /// `4 * triangle + k`, the edge going from corner k to the next.
-    half: u32,
+sort_record! {
+    /// One facet at one edge.
+    #[derive(Eq, PartialOrd, Ord, bytemuck::Pod, bytemuck::Zeroable)]
+    #[repr(C)]
+    pub(super) struct EdgeUse {
+        /// The edge's vertices, the smaller one first.
+        pub edge: [u32; 2],
+        /// `4 * triangle + k`, the edge going from corner k to the next.
+        half: u32,
+    }
+}
+
+sort_record! {
+    /// A triangle by its vertices.
+    struct SortedTriangle {
+        /// Ascending.
+        vertices: [u32; 3],
+        triangle: u32,
+    }
 }
 
 impl EdgeUse {
-    /// As bytes that sort as it does.
-    fn to_bytes(self) -> [u8; 12] {
-        let mut bytes = [0; 12];
-        let places = bytes.chunks_exact_mut(4);
-        for (place, x) in places.zip([self.edge[0], self.edge[1], self.half]) {
-            place.copy_from_slice(&x.to_be_bytes());
-        }
-        bytes
-    }
-
-    fn from_bytes(b: [u8; 12]) -> Self {
-        let number = |i: usize| u32::from_be_bytes([b[i], b[i + 1], b[i + 2], b[i + 3]]);
-        Self {
-            edge: [number(0), number(4)],
-            half: number(8),
-        }
-    }
-
     pub fn triangle(self) -> u32 {
         self.half >> 2
     }
@@ -126,7 +120,7 @@ impl Facets {
             is_left_out[t as usize] = repeated;
         }
         let (duplicates, two_sided) = repetitions(surface, &mut is_left_out, room);
-        let mut sorter = room.sorter::<12>();
+        let mut sorter = room.sorter::<EdgeUse>();
         for (t, triangle) in (0u32..).zip(&surface.triangles) {
             if is_left_out[t as usize] {
                 continue;
@@ -137,13 +131,13 @@ impl Facets {
                     edge: [a.min(b), a.max(b)],
                     half: 4 * t + k,
                 };
-                let pushed = sorter.push(edge_use.to_bytes());
+                let pushed = sorter.push(edge_use);
                 pushed.unwrap_or_else(|e| raise(e));
             }
         }
         let mut uses = room.list();
-        for bytes in sorter.finish().unwrap_or_else(|e| raise(e)) {
-            uses.push(EdgeUse::from_bytes(bytes.unwrap_or_else(|e| raise(e))));
+        for edge_use in sorter.finish().unwrap_or_else(|e| raise(e)) {
+            uses.push(edge_use.unwrap_or_else(|e| raise(e)));
         }
         let uses = uses.done();
         Self {
@@ -222,26 +216,26 @@ fn repetitions(
     is_left_out: &mut [bool],
     room: &ScratchSpace,
 ) -> (Vec<[u32; 2]>, Vec<[u32; 2]>) {
-    let mut sorter = room.sorter::<16>();
+    let mut sorter = room.sorter::<SortedTriangle>();
     for (t, triangle) in (0u32..).zip(&surface.triangles) {
         if !is_left_out[t as usize] {
-            let mut key = *triangle;
-            key.sort_unstable();
-            let mut record = [0; 16];
-            for (place, x) in record.chunks_exact_mut(4).zip([key[0], key[1], key[2], t]) {
-                place.copy_from_slice(&x.to_be_bytes());
-            }
-            let pushed = sorter.push(record);
+            let mut vertices = *triangle;
+            vertices.sort_unstable();
+            let pushed = sorter.push(SortedTriangle {
+                vertices,
+                triangle: t,
+            });
             pushed.unwrap_or_else(|e| raise(e));
         }
     }
     let (mut duplicates, mut two_sided) = (Vec::new(), Vec::new());
     // Of the set at hand: its vertices, the first triangle, the first one of the other orientation.
-    let mut set = None::<([u8; 12], u32, Option<u32>)>;
+    let mut set = None::<([u32; 3], u32, Option<u32>)>;
     for key in sorter.finish().unwrap_or_else(|e| raise(e)) {
-        let key = key.unwrap_or_else(|e| raise(e));
-        let [vertices @ .., a, b, c, d] = key;
-        let t = u32::from_be_bytes([a, b, c, d]);
+        let SortedTriangle {
+            vertices,
+            triangle: t,
+        } = key.unwrap_or_else(|e| raise(e));
         let Some((_, first, opposite)) = set.as_mut().filter(|set| set.0 == vertices) else {
             set = Some((vertices, t, None));
             continue;
@@ -292,4 +286,45 @@ impl Groups {
         let (a, b) = (self.root(a), self.root(b));
         self.parent[a.max(b) as usize] = a.min(b);
     }
+}
+
+/// For each open edge the number of its connected group, counted in order of first appearance.
+pub(super) fn open_groups(open: &[(u32, [u32; 2])]) -> Vec<u32> {
+    let vertices = ends(open);
+    let place = |v: u32| {
+        let found = vertices.binary_search(&v);
+        found.expect("every end is in the list") as u32
+    };
+    let mut groups = Groups::new(vertices.len());
+    for (_, [a, b]) in open {
+        groups.join(place(*a), place(*b));
+    }
+    let mut numbers = vec![u32::MAX; vertices.len()];
+    let mut n = 0;
+    open.iter()
+        .map(|(_, [a, _])| {
+            let number = &mut numbers[groups.root(place(*a)) as usize];
+            if *number == u32::MAX {
+                *number = n;
+                n += 1;
+            }
+            *number
+        })
+        .collect()
+}
+
+/// The vertices of open edges, ascending.
+pub(super) fn ends(open: &[(u32, [u32; 2])]) -> Vec<u32> {
+    let mut vertices: Vec<u32> = open.iter().flat_map(|(_, v)| *v).collect();
+    vertices.sort_unstable();
+    vertices.dedup();
+    vertices
+}
+
+/// Whether three points lie on a line, exactly.
+pub(super) fn in_line(a: Point, b: Point, c: Point) -> bool {
+    let flat = |axis: fn(Point) -> Coord<f64>| robust::orient2d(axis(a), axis(b), axis(c)) == 0.0;
+    flat(|p| Coord { x: p.x, y: p.y })
+        && flat(|p| Coord { x: p.y, y: p.z })
+        && flat(|p| Coord { x: p.z, y: p.x })
 }

@@ -70,7 +70,7 @@ impl ClusterCell {
     }
 }
 
-/// Triangles with what is told of each.
+/// Triangles with the values of each.
 ///
 /// Shape: `triangles[i]` = places in `points`; `tags[i]` runs parallel to it.
 #[derive(Clone, Debug, Default, PartialEq)]

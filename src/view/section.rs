@@ -10,7 +10,7 @@ use crate::query::Hit;
 use crate::query::Selection;
 use crate::query::Solid;
 use crate::query::{QueryError, QuerySession};
-use crate::storage::{Sorted, Sorter};
+use crate::storage::{Payload, Sorted, Sorter, sort_record};
 use tetdb_schema::record::FACES;
 
 /// A plane seen from the side its normal points to.
@@ -106,13 +106,25 @@ pub struct Extent {
     pub size: [f32; 2],
 }
 
-/// Depth, corners, heights, then what is told of the tetrahedron.
-const BYTES: usize = 8 + 12 * 8 + 6 * 4;
+sort_record! {
+    /// A piece by its depth.
+    struct DeepPiece {
+        depth: f64,
+        corners: Payload<[f64; 8]>,
+        heights: Payload<[f64; 4]>,
+        n: Payload<u32>,
+        facing: Payload<f32>,
+        subdomain: Payload<u32>,
+        region: Payload<u32>,
+        quality: Payload<f32>,
+        size: Payload<f32>,
+    }
+}
 
 /// The pieces of a cut, far ones first.
 pub struct Section {
     pub extent: Extent,
-    sorted: Sorted<BYTES>,
+    sorted: Sorted<DeepPiece>,
 }
 
 impl QuerySession {
@@ -144,7 +156,7 @@ impl QuerySession {
 
 /// Pieces on their way into order.
 pub(super) struct Pieces {
-    sorter: Sorter<BYTES>,
+    sorter: Sorter<DeepPiece>,
     extent: Extent,
 }
 
@@ -258,47 +270,29 @@ fn polygon(view: &View, tet: &Hit) -> Vec<[f64; 2]> {
     }
 }
 
-fn record(depth: f64, piece: &Piece) -> [u8; BYTES] {
-    let bits = depth.to_bits();
-    // In the order of the numbers.
-    let key = bits ^ if bits >> 63 == 1 { u64::MAX } else { 1 << 63 };
-    let mut record = [0; BYTES];
-    record[..8].copy_from_slice(&key.to_be_bytes());
-    let corners = piece.corners.as_flattened().iter().chain(&piece.heights);
-    for (bytes, x) in record[8..104].chunks_exact_mut(8).zip(corners) {
-        bytes.copy_from_slice(&x.to_le_bytes());
+fn record(depth: f64, piece: &Piece) -> DeepPiece {
+    DeepPiece {
+        depth,
+        corners: Payload(bytemuck::cast(piece.corners)),
+        heights: Payload(piece.heights),
+        n: Payload(piece.n as u32),
+        facing: Payload(piece.facing),
+        subdomain: Payload(piece.subdomain),
+        region: Payload(piece.region),
+        quality: Payload(piece.quality),
+        size: Payload(piece.size),
     }
-    let words = [
-        piece.n as u32,
-        piece.facing.to_bits(),
-        piece.subdomain,
-        piece.region,
-        piece.quality.to_bits(),
-        piece.size.to_bits(),
-    ];
-    for (bytes, word) in record[104..].chunks_exact_mut(4).zip(words) {
-        bytes.copy_from_slice(&word.to_le_bytes());
-    }
-    record
 }
 
-fn piece(record: &[u8; BYTES]) -> Piece {
-    let double = |i: usize| {
-        let bytes = record[8 + 8 * i..16 + 8 * i].try_into();
-        f64::from_le_bytes(bytes.expect("eight bytes were taken"))
-    };
-    let word = |i: usize| {
-        let bytes = record[104 + 4 * i..108 + 4 * i].try_into();
-        u32::from_le_bytes(bytes.expect("four bytes were taken"))
-    };
+fn piece(record: &DeepPiece) -> Piece {
     Piece {
-        corners: [0, 1, 2, 3].map(|i| [double(2 * i), double(2 * i + 1)]),
-        heights: [8, 9, 10, 11].map(double),
-        n: word(0) as usize,
-        facing: f32::from_bits(word(1)),
-        subdomain: word(2),
-        region: word(3),
-        quality: f32::from_bits(word(4)),
-        size: f32::from_bits(word(5)),
+        corners: bytemuck::cast(record.corners.0),
+        heights: record.heights.0,
+        n: record.n.0 as usize,
+        facing: record.facing.0,
+        subdomain: record.subdomain.0,
+        region: record.region.0,
+        quality: record.quality.0,
+        size: record.size.0,
     }
 }

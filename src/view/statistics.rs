@@ -106,7 +106,7 @@ impl QuerySession {
     pub fn statistics(
         &mut self,
         budget: &Budget,
-        tell: &dyn Fn(u64, u64),
+        report: &dyn Fn(u64, u64),
     ) -> Result<Statistics, QueryError> {
         let _lease = budget.lease(SAMPLE_BYTES + CHUNK_BYTES, "a sample of edges")?;
         let total: u64 = self.rows.iter().map(|r| r.tets).sum();
@@ -133,7 +133,7 @@ impl QuerySession {
                 });
                 counts = counts.and(found);
                 done += records.len() as u64;
-                tell(done, total);
+                report(done, total);
             }
         }
         Ok(Statistics {

@@ -20,6 +20,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("size-field-changed", "size_files.rs"),
     ("no-coarse-leaf", "resaturate.rs"),
     ("nothing-to-undo", "resaturate.rs"),
+    ("store-recipe", "tests/front_door"),
     ("invalid-mesh", "below"),
 ];
 

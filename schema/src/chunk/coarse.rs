@@ -1,4 +1,4 @@
-//! Coarse leaves: working meshes kept as they were, in the order they were, less what follows from the rest (neighbors, sizes).
+//! Coarse snapshots: working meshes kept as they were, in the order they were, less what follows from the rest (neighbors, sizes).
 
 use super::columns::{Columns, Malformed, Reader};
 use super::facets::{decode_vertices, encode_vertices};

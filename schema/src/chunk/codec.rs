@@ -63,7 +63,7 @@ impl<R: ChunkRecord> Encoder<R> {
         Ok(&self.value)
     }
 
-    /// The value made by the last call of [`Encoder::encode`].
+    /// The value written by the last call of [`Encoder::encode`].
     pub fn last_value(&self) -> &[u8] {
         &self.value
     }

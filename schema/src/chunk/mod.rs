@@ -35,17 +35,29 @@ const _: () = assert!(CHUNK_BYTES_MAX + 16 <= 65_536);
 #[repr(u8)]
 #[non_exhaustive]
 pub enum ChunkKind {
+    /// Tetrahedra of a sealed sub-domain.
     Tets = 33,
+    /// Vertices of a sealed sub-domain.
     Vertices = 34,
+    /// Facets of a sealed sub-domain.
     Facets = 35,
+    /// Interface faces of a sealed sub-domain.
     InterfaceFaces = 36,
+    /// Summaries of chunks of tetrahedra.
     TetSummaries = 40,
+    /// Summaries of chunks of vertices.
     VertexSummaries = 41,
+    /// Summaries of chunks of facets.
     FacetSummaries = 42,
+    /// Summaries of chunks of interface faces.
     InterfaceSummaries = 43,
+    /// Tetrahedra of a coarse snapshot.
     CoarseTets = 49,
+    /// Vertices of a coarse snapshot.
     CoarseVertices = 50,
+    /// Facets of a coarse snapshot.
     CoarseFacets = 51,
+    /// Interface faces of a coarse snapshot.
     CoarseFaces = 52,
 }
 
@@ -59,9 +71,13 @@ impl ChunkKind {
 /// Where a chunk belongs; a chunk found anywhere else is damage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ChunkAddress {
+    /// What it holds.
     pub kind: ChunkKind,
+    /// Rank of the sub-domain.
     pub subdomain: u32,
+    /// Generation of the file.
     pub generation: u32,
+    /// Number among the chunks of its kind, from 0.
     pub chunk: u32,
 }
 
@@ -76,7 +92,9 @@ impl ChunkAddress {
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("sub-domain {}, {:?} chunk {}: {reason}", address.subdomain, address.kind, address.chunk)]
 pub struct ChunkError {
+    /// Where the chunk belongs.
     pub address: ChunkAddress,
+    /// What is wrong with it.
     pub reason: ChunkDamage,
 }
 
@@ -84,18 +102,34 @@ pub struct ChunkError {
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum ChunkDamage {
+    /// Too short or too long.
     #[error("expected {HEAD_BYTES} to {CHUNK_BYTES_MAX} bytes, found {found}")]
-    Length { found: usize },
+    Length {
+        /// Bytes of the value.
+        found: usize,
+    },
+    /// The content is not what was written.
     #[error("its checksum {found:016x} does not match its content ({expected:016x})")]
-    Checksum { expected: u64, found: u64 },
+    Checksum {
+        /// Computed from the content.
+        expected: u64,
+        /// As stored.
+        found: u64,
+    },
+    /// The chunk belongs elsewhere, or is of another format.
     #[error("its head names {field} {found}, expected {expected}")]
     Head {
+        /// Which entry of the head.
         field: &'static str,
+        /// By its address.
         expected: u32,
+        /// As stored.
         found: u32,
     },
+    /// The payload cannot be decompressed.
     #[error("its payload cannot be decompressed")]
     Compression,
+    /// The payload holds no such records.
     #[error("its payload is malformed: {0}")]
     Payload(#[from] Malformed),
 }

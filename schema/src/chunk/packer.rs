@@ -18,9 +18,13 @@ const RECORD_BYTES_GUESS: usize = 8;
 
 /// A chunk ready to be stored, and the records in it.
 pub struct Packed<R> {
+    /// Where it belongs.
     pub address: ChunkAddress,
+    /// Number of its first record in the sub-domain.
     pub first: u32,
+    /// The bytes to store.
     pub value: Vec<u8>,
+    /// Its records, in order.
     pub records: Vec<R>,
 }
 

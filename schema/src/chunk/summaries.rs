@@ -16,30 +16,37 @@ pub struct TetSummary {
     pub regions: [u32; 2],
     /// Least and greatest vertex number.
     pub vertices: [u32; 2],
+    /// Number of the first record.
     pub first: u32,
+    /// How many records there are.
     pub count: u32,
     /// Faces without a partner in the chunk: shared with other chunks or on the boundary.
     pub open_faces: u32,
     /// Bytes of the stored value.
     pub bytes: u32,
-    /// Not less than the length of any edge; 0 where that is not told.
+    /// Not less than the length of any edge; 0 where that is not known.
     pub edge_max: f32,
 }
 
 /// Of a chunk of vertices; 64 bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VertexSummary {
+    /// Low and high corner of the box around its vertices.
     pub bounds: [[f64; 3]; 2],
+    /// Number of the first record.
     pub first: u32,
+    /// How many records there are.
     pub count: u32,
-    /// Which cells of the box, divided in four along each axis, have vertices: bit x + 4 y + 16 z. 0: not told.
+    /// Which cells of the box, divided in four along each axis, have vertices: bit x + 4 y + 16 z. 0: not known.
     pub cells: u64,
 }
 
 /// Of a chunk of facets or interface faces; 16 bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RangeSummary<const INTERFACE: bool> {
+    /// Number of the first record.
     pub first: u32,
+    /// How many records there are.
     pub count: u32,
 }
 

@@ -69,7 +69,7 @@ fn faces(n: u32) -> Vec<InterfaceFace> {
         .collect()
 }
 
-/// Of a coarse leaf: any even turn of the nodes, in any order.
+/// Of a coarse snapshot: any even turn of the nodes, in any order.
 fn coarse_tets(n: u32) -> Vec<CoarseTet> {
     let mut next = random(3);
     (tets(n).into_iter().enumerate())

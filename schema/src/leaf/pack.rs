@@ -8,9 +8,11 @@ use crate::page::{
 
 /// A page of records ready to be stored, with whatever else is full by now.
 pub struct PageSet<R> {
+    /// Number of the page.
     pub page: u32,
     /// Number of the first record.
     pub first: u32,
+    /// Its records, in order.
     pub records: Vec<R>,
     /// Keys and values: the page, and the page of second words when it is full.
     pub values: Vec<(u64, Vec<u8>)>,

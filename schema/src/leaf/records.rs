@@ -25,7 +25,9 @@ pub struct TetPlace {
 /// What a record becomes: a slot, and two words that stand beside it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Working {
+    /// The slot of the main page.
     pub slot: Slot,
+    /// Its words in the page of second words.
     pub beside: [u32; 2],
 }
 
@@ -76,7 +78,7 @@ impl PageRecord for SealedTet {
 }
 
 impl SealedVertex {
-    /// As a working vertex of sub-domain `rank`, which is nailed down unless it is the mesher's own. Its tetrahedron is not told.
+    /// As a working vertex of sub-domain `rank`, which is nailed down unless it is the mesher's own. Its tetrahedron is not known.
     pub fn to_working(self, rank: u32) -> Working {
         let id = VertexId::from_number(self.id);
         let (cut, index) = match id.map(|id| (id.owner, id.index)) {

@@ -79,6 +79,9 @@ pub struct ExportArgs {
     /// Only faces between sub-domains (.vtu)
     #[arg(long)]
     pub interfaces: bool,
+    /// Write even over the surface the store was made from
+    #[arg(long)]
+    pub force: bool,
     #[command(flatten)]
     pub read: ReadArgs,
 }

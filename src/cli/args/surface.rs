@@ -70,6 +70,9 @@ pub struct RefineSurfaceArgs {
     /// Greatest ratio of neighboring edge lengths [default: 1.3]
     #[arg(long, value_name = "RATIO")]
     pub hgrad: Option<String>,
+    /// Write even over the surface that is read
+    #[arg(long)]
+    pub force: bool,
     /// Answer with one JSON object
     #[arg(long)]
     pub json: bool,

@@ -142,13 +142,13 @@ impl ReadError {
                 "copy or download the file again; compare its length with the original's"
             }
             Self::Unexpected { .. } | Self::NotANumber { .. } => {
-                "look at that place; write the file again from the program that made it"
+                "look at that place; write the file again from the program it comes from"
             }
             Self::IndexOutOfRange { .. } => {
-                "write the file again from the program that made it; vertex numbers must name vertices of the file"
+                "write the file again from the program it comes from; vertex numbers must name vertices of the file"
             }
             Self::CountMismatch { .. } => {
-                "write the file again from the program that made it; the counts must match what follows"
+                "write the file again from the program it comes from; the counts must match what follows"
             }
             Self::CoordinateRange { .. } => {
                 "scale the surface to ordinary units, for example metres"
@@ -159,7 +159,7 @@ impl ReadError {
             Self::Empty { .. } => {
                 "choose a file that holds a surface; lines, points and tetrahedra alone bound nothing"
             }
-            Self::TooLarge { .. } => "give more with --memory, or a coarser background mesh",
+            Self::TooLarge { .. } => "allow more memory, or give a coarser background mesh",
             Self::Alone { .. } => {
                 "put the .sol file and its .mesh side by side, under the same name"
             }

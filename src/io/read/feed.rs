@@ -28,7 +28,7 @@ pub(super) struct Feed<R> {
     pub offset: u64,
     /// Line of the next byte, from 1; counted by the text functions only.
     pub line: u64,
-    /// Whether places are told as bytes.
+    /// Whether places are counted in bytes.
     pub binary: bool,
     /// A comment runs from this byte to the end of its line.
     pub comment: Option<u8>,

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use super::error::{FilePlace, ReadError, Spot};
 use super::feed::Result;
-use super::open_plain;
+use super::open::open_plain;
 
 const MAGIC: &[u8; 6] = b"\x93NUMPY";
 /// Longest head that is read.

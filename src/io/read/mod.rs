@@ -13,7 +13,9 @@ mod medit;
 mod meditb;
 mod obj;
 mod off;
+mod open;
 mod ply;
+mod sink;
 mod sizes;
 mod stl;
 mod tetgen;
@@ -24,18 +26,17 @@ mod collection;
 mod tests;
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, Read};
 use std::path::{Path, PathBuf};
 
 pub use error::{FilePlace, ReadError, Spot};
 use feed::{Feed, Result};
 pub use lengths::read_lengths;
+use open::open;
+use sink::SurfaceSink;
 pub use sizes::{read_sizes, size_files};
 
 use crate::surface::{Surface, SurfaceBuilder, SurfaceError};
-
-/// Bytes of the read buffer of one file.
-const BUFFER_BYTES: usize = 256 << 10;
 
 /// A kind of surface file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -88,28 +89,6 @@ impl Format {
             Some(Self::Stl)
         } else {
             None
-        }
-    }
-}
-
-/// What the readers share: the surface being built and how this file's labels are called.
-pub(crate) struct SurfaceSink<'a> {
-    builder: &'a mut SurfaceBuilder,
-    /// The file's name without folder and extension: the label of triangles that have none.
-    stem: String,
-    /// Put before each label when several files make one surface.
-    prefix: Option<String>,
-}
-
-impl SurfaceSink<'_> {
-    /// The id of label `name`, or of the file's own label when it is empty.
-    fn label(&mut self, name: &str) -> u32 {
-        match (&self.prefix, name.is_empty()) {
-            (None, true) => self.builder.label(&self.stem),
-            (None, false) => self.builder.label(name),
-            (Some(prefix), true) => self.builder.label(prefix),
-            (Some(prefix), false) if prefix == name => self.builder.label(prefix),
-            (Some(prefix), false) => self.builder.label(&format!("{prefix}:{name}")),
         }
     }
 }
@@ -189,29 +168,6 @@ fn unique(stem: &str, taken: &[String]) -> String {
         name = format!("{stem}~{n}");
     }
     name
-}
-
-fn open(path: &Path) -> Result<Feed<BufReader<File>>> {
-    let (reader, length) = open_plain(path)?;
-    Ok(Feed::new(&path.to_string_lossy(), reader, length))
-}
-
-/// Opens a regular file; tells its length.
-fn open_plain(path: &Path) -> Result<(BufReader<File>, u64)> {
-    let name = path.to_string_lossy();
-    let unreadable = |reason: String| ReadError::Unreadable {
-        place: FilePlace {
-            file: name.to_string(),
-            spot: Spot::Totals,
-        },
-        reason,
-    };
-    let file = File::open(path).map_err(|e| unreadable(e.to_string()))?;
-    let meta = file.metadata().map_err(|e| unreadable(e.to_string()))?;
-    if !meta.is_file() {
-        return Err(unreadable("it is not a regular file".to_owned()));
-    }
-    Ok((BufReader::with_capacity(BUFFER_BYTES, file), meta.len()))
 }
 
 fn read_file(path: &Path, target: &mut SurfaceSink) -> Result<()> {

@@ -5,16 +5,43 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use super::Result;
 use super::draft::Draft;
+use super::error::Result;
 use super::merged::{Merged, Tet};
-use super::stream::{Stream, word32, word64};
-use crate::storage::{Sorted, Sorter};
+use super::stream::Stream;
+use crate::storage::{Sorted, Sorter, sort_record};
 
 /// The element's face opposite each of its nodes.
 const SIDE_OPPOSITE: [u8; 4] = [3, 4, 2, 1];
 /// Most numbers of a line of a set.
 const PER_LINE: usize = 16;
+
+sort_record! {
+    /// A number and the set that has it.
+    struct Member {
+        set: u32,
+        number: u64,
+    }
+}
+
+sort_record! {
+    /// A face of an element in the surface of a label.
+    struct Side {
+        label: u32,
+        element: u64,
+        /// The element's name of the face.
+        side: u8,
+    }
+}
+
+sort_record! {
+    /// A boundary face by its tetrahedron.
+    struct TetFace {
+        tet: u64,
+        label: u32,
+        vertices: [u64; 3],
+    }
+}
 
 pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<()> {
     mesh.check_limits(out, i32::MAX as u64)?;
@@ -41,13 +68,13 @@ pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
     stream.finish()
 }
 
-/// Writes elements and the sets of regions; returns (label, element, side) for the surfaces.
+/// Writes elements and the sets of regions; returns the sides of the surfaces.
 fn elements(
     mesh: &mut Merged,
     dir: &Path,
     stream: &mut Stream,
     regions: &BTreeSet<u32>,
-) -> Result<Sorted<13>> {
+) -> Result<Sorted<Side>> {
     // With one region its set is named with the elements, else sets follow.
     match regions.iter().next() {
         Some(region) if regions.len() == 1 => {
@@ -55,27 +82,23 @@ fn elements(
         }
         _ => stream.text("*ELEMENT, TYPE=C3D4, ELSET=all_elements\n"),
     }
-    let mut by_region = Sorter::<12>::new(dir, mesh.sorter_bytes() / 2);
-    let mut sides = Sorter::<13>::new(dir, mesh.sorter_bytes() / 2);
+    let mut by_region = Sorter::new(dir, mesh.sorter_bytes() / 2);
+    let mut sides = Sorter::new(dir, mesh.sorter_bytes() / 2);
     let mut faces = faces_by_tet(mesh, dir)?.peekable();
     let mut number = 0u64;
     mesh.tets(|tet| {
-        while let Some(face) =
-            faces.next_if(|f| f.as_ref().map_or(true, |f| word64(f, 0) <= number))
-        {
+        while let Some(face) = faces.next_if(|f| f.as_ref().map_or(true, |f| f.tet <= number)) {
             let face = face?;
-            let mut side = [0; 13];
-            side[..4].copy_from_slice(&face[8..12]);
-            side[4..12].copy_from_slice(&(number + 1).to_be_bytes());
-            side[12] = SIDE_OPPOSITE[opposite(tet, &face)];
-            sides.push(side)?;
+            sides.push(Side {
+                label: face.label,
+                element: number + 1,
+                side: SIDE_OPPOSITE[opposite(tet, &face)],
+            })?;
         }
         number += 1;
         if regions.len() > 1 {
-            let mut record = [0; 12];
-            record[..4].copy_from_slice(&tet.region.to_be_bytes());
-            record[4..].copy_from_slice(&number.to_be_bytes());
-            by_region.push(record)?;
+            let set = tet.region;
+            by_region.push(Member { set, number })?;
         }
         let [a, b, c, d] = tet.nodes.map(|v| v + 1);
         stream.integer(number, b',');
@@ -90,42 +113,39 @@ fn elements(
     Ok(sides.finish()?)
 }
 
-/// (tetrahedron, label, three vertices), ascending.
-fn faces_by_tet(mesh: &Merged, dir: &Path) -> Result<Sorted<36>> {
+/// The boundary faces, by tetrahedron.
+fn faces_by_tet(mesh: &Merged, dir: &Path) -> Result<Sorted<TetFace>> {
     let mut sorter = Sorter::new(dir, mesh.sorter_bytes());
     mesh.faces().each(|face| {
-        let mut record = [0; 36];
-        record[..8].copy_from_slice(&face.tet.to_be_bytes());
-        record[8..12].copy_from_slice(&face.label.to_be_bytes());
-        for (i, v) in face.vertices.into_iter().enumerate() {
-            record[12 + 8 * i..20 + 8 * i].copy_from_slice(&v.to_be_bytes());
-        }
-        Ok(sorter.push(record)?)
+        Ok(sorter.push(TetFace {
+            tet: face.tet,
+            label: face.label,
+            vertices: face.vertices,
+        })?)
     })?;
     Ok(sorter.finish()?)
 }
 
 /// The node of `tet` that is not in `face`.
-fn opposite(tet: &Tet, face: &[u8; 36]) -> usize {
-    let corners = [12, 20, 28].map(|at| word64(face, at));
-    let outside = |v: &u64| !corners.contains(v);
+fn opposite(tet: &Tet, face: &TetFace) -> usize {
+    let outside = |v: &u64| !face.vertices.contains(v);
     tet.nodes.iter().position(outside).unwrap_or(0)
 }
 
-/// Writes sorted (set, number) as sets, each after its head; equal records count once.
-fn sets(sorted: Sorted<12>, head: impl Fn(u32) -> String, stream: &mut Stream) -> Result<()> {
-    let mut last: Option<[u8; 12]> = None;
+/// Writes sorted members as sets, each after its head; equal records count once.
+fn sets(sorted: Sorted<Member>, head: impl Fn(u32) -> String, stream: &mut Stream) -> Result<()> {
+    let mut last: Option<Member> = None;
     let mut on_line = 0;
     for record in sorted {
         let record = record?;
         if last == Some(record) {
             continue;
         }
-        if last.is_none_or(|l| l[..4] != record[..4]) {
+        if last.is_none_or(|l| l.set != record.set) {
             if last.is_some() {
                 stream.text("\n");
             }
-            stream.text(&head(word32(&record, 0)));
+            stream.text(&head(record.set));
             on_line = 0;
         } else if on_line == PER_LINE {
             stream.text("\n");
@@ -133,7 +153,7 @@ fn sets(sorted: Sorted<12>, head: impl Fn(u32) -> String, stream: &mut Stream) -
         } else {
             stream.text(",");
         }
-        stream.text(&word64(&record, 4).to_string());
+        stream.text(&record.number.to_string());
         stream.end()?;
         on_line += 1;
         last = Some(record);
@@ -144,16 +164,16 @@ fn sets(sorted: Sorted<12>, head: impl Fn(u32) -> String, stream: &mut Stream) -
     Ok(())
 }
 
-fn surfaces(sides: Sorted<13>, names: &BTreeMap<u32, String>, stream: &mut Stream) -> Result<()> {
+fn surfaces(sides: Sorted<Side>, names: &BTreeMap<u32, String>, stream: &mut Stream) -> Result<()> {
     let mut last = None;
     for side in sides {
         let side = side?;
-        let label = word32(&side, 0);
+        let label = side.label;
         if last != Some(label) {
             last = Some(label);
             stream.text(&format!("*SURFACE, TYPE=ELEMENT, NAME={}\n", names[&label]));
         }
-        stream.text(&format!("{},S{}\n", word64(&side, 4), side[12]));
+        stream.text(&format!("{},S{}\n", side.element, side.side));
         stream.end()?;
     }
     Ok(())
@@ -165,13 +185,11 @@ fn node_sets(
     names: &BTreeMap<u32, String>,
     stream: &mut Stream,
 ) -> Result<()> {
-    let mut sorter = Sorter::<12>::new(dir, mesh.sorter_bytes());
+    let mut sorter = Sorter::new(dir, mesh.sorter_bytes());
     mesh.faces().each(|face| {
         for v in face.vertices {
-            let mut record = [0; 12];
-            record[..4].copy_from_slice(&face.label.to_be_bytes());
-            record[4..].copy_from_slice(&(v + 1).to_be_bytes());
-            sorter.push(record)?;
+            let (set, number) = (face.label, v + 1);
+            sorter.push(Member { set, number })?;
         }
         Ok(())
     })?;

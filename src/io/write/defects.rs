@@ -8,8 +8,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::draft::Draft;
+use super::error::{Result, WriteError};
 use super::vtu_layout::{Array, Group, Index, Layout};
-use super::{Result, WriteError};
 use crate::surface::{Defect, Surface};
 
 /// VTK's number of a triangle.

@@ -5,7 +5,7 @@ use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use super::{Result, WriteError};
+use super::error::{Result, WriteError};
 
 /// Numbers drafts within the process.
 static NUMBER: AtomicU32 = AtomicU32::new(0);
@@ -42,7 +42,7 @@ impl Draft {
 
     /// A new file that will become `out`, expected to need `bytes`.
     ///
-    /// Errors: less than that is free; the file cannot be made.
+    /// Errors: less than that is free; the file cannot be created.
     pub fn create(&mut self, out: &Path, bytes: u64) -> Result<PathBuf> {
         if let Some(available) = available_bytes(&self.dir).filter(|&free| free < bytes) {
             return Err(WriteError::NoSpace {

@@ -87,10 +87,10 @@ impl WriteError {
             }
             Self::Io { .. } => "check that the folder exists and may be written: `ls -ld FOLDER`",
             Self::Store(error) if error.is_damage() => {
-                "see what is left with `tetdb verify`; copy the store again or mesh the surface again"
+                "verify the store to see what is left; copy it again or mesh the surface again"
             }
             Self::Store(StoreError::Storage(StorageError::Cancelled)) => "run the command again",
-            Self::Store(_) => "look at the store with `tetdb info`",
+            Self::Store(_) => "look at the state of the store",
         }
     }
 
@@ -146,3 +146,6 @@ impl From<SealedError> for WriteError {
         Self::from(StoreError::from(error))
     }
 }
+
+/// What writers return.
+pub(super) type Result<T> = std::result::Result<T, WriteError>;

@@ -5,33 +5,37 @@ use std::path::{Path, PathBuf};
 
 use tetdb_schema::record::{InterfaceFace, NO_TET, SealedFacet};
 
-use super::Result;
+use super::error::Result;
 use super::numbering::PartNumbers;
-use super::stream::{Records, scratch, word32, word64};
-use crate::storage::Sorter;
-
-const BYTES: usize = 61;
+use super::stream::{Records, scratch};
+use crate::storage::{SortRecord, Sorter, sort_record};
 
 /// Marks the key of an interface face, and sorts it behind the input triangles; below it the number of the cut, then of the face.
 const INTERFACE: u64 = 1 << 63;
 
-/// A boundary face in the merged mesh.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Face {
-    /// Number of the input triangle, or an interface face's cut and number in it.
-    key: u64,
-    /// Numbers of its vertices: in the input's order, or counter-clockwise seen from the other sub-domain.
-    pub vertices: [u64; 3],
-    pub label: u32,
-    /// Of an input triangle: in front (where the normal points to) and behind; 0 is empty, and stands for unknown at an interface.
-    pub regions: [u32; 2],
-    /// Number of the tetrahedron on its filled side, on the front one when both are written.
-    pub tet: u64,
-    /// The sub-domain of that tetrahedron.
-    pub subdomain: u32,
-    /// The sub-domain behind an interface face.
-    pub neighbor: u32,
+sort_record! {
+    /// A boundary face in the merged mesh.
+    pub(super) struct Face {
+        /// Number of the input triangle, or an interface face's cut and number in it.
+        key: u64,
+        /// On the side that is left out when both sides are written.
+        is_second: bool,
+        /// Numbers of its vertices: in the input's order, or counter-clockwise seen from the other sub-domain.
+        pub vertices: [u64; 3],
+        pub label: u32,
+        /// Of an input triangle: in front (where the normal points to) and behind; 0 is empty, and stands for unknown at an interface.
+        pub regions: [u32; 2],
+        /// The sub-domain of its tetrahedron.
+        pub subdomain: u32,
+        /// The sub-domain behind an interface face.
+        pub neighbor: u32,
+        /// Number of the tetrahedron on its filled side, on the front one when both are written.
+        pub tet: u64,
+    }
 }
+
+/// Bytes of a face in the scratch file.
+const BYTES: usize = size_of::<<Face as SortRecord>::Bytes>();
 
 impl Face {
     /// Its number in the input.
@@ -43,35 +47,6 @@ impl Face {
     pub fn cut(&self) -> Option<(u32, u32)> {
         let key = self.key.checked_sub(INTERFACE)?;
         Some(((key >> 32) as u32, key as u32))
-    }
-
-    /// `second`: on the side that has no word when both sides are written.
-    fn to_record(self, second: bool) -> [u8; BYTES] {
-        let mut record = [0; BYTES];
-        record[..8].copy_from_slice(&self.key.to_be_bytes());
-        record[8] = u8::from(second);
-        for (i, v) in self.vertices.into_iter().enumerate() {
-            record[9 + 8 * i..17 + 8 * i].copy_from_slice(&v.to_be_bytes());
-        }
-        let [front, back] = self.regions;
-        let words = [self.label, front, back, self.subdomain, self.neighbor];
-        for (i, word) in words.into_iter().enumerate() {
-            record[33 + 4 * i..37 + 4 * i].copy_from_slice(&word.to_be_bytes());
-        }
-        record[53..].copy_from_slice(&self.tet.to_be_bytes());
-        record
-    }
-
-    fn from_record(record: &[u8; BYTES]) -> Self {
-        Self {
-            key: word64(record, 0),
-            vertices: [9, 17, 25].map(|at| word64(record, at)),
-            label: word32(record, 33),
-            regions: [37, 41].map(|at| word32(record, at)),
-            subdomain: word32(record, 45),
-            neighbor: word32(record, 49),
-            tet: word64(record, 53),
-        }
     }
 }
 
@@ -85,7 +60,7 @@ pub(super) struct FaceSource<'a> {
 
 /// Collects faces of one sub-domain after the other.
 pub(super) struct FaceSorter {
-    sorter: Sorter<BYTES>,
+    sorter: Sorter<Face>,
     path: PathBuf,
 }
 
@@ -101,7 +76,7 @@ impl FaceSorter {
     /// Adds a facet of a sub-domain.
     ///
     /// A triangle between two sub-domains is in both: the one with its filled side, or with its front when both sides are
-    /// filled, has the word, unless it is not written. Errors: the disk.
+    /// filled, counts, unless it is not written. Errors: the disk.
     pub fn push(&mut self, f: &SealedFacet, part: &FaceSource) -> Result<()> {
         let preferred = usize::from(f.regions[0] == 0);
         let here = [preferred, 1 - preferred];
@@ -110,6 +85,7 @@ impl FaceSorter {
         };
         let face = Face {
             key: f.triangle,
+            is_second: side != preferred,
             vertices: f.vertices.map(|v| part.numbers.of(v)),
             label: f.label,
             regions: f.regions,
@@ -117,7 +93,7 @@ impl FaceSorter {
             subdomain: part.rank,
             neighbor: part.rank,
         };
-        Ok(self.sorter.push(face.to_record(side != preferred))?)
+        Ok(self.sorter.push(face)?)
     }
 
     /// Adds an interface face of a sub-domain, under a label. Errors: the disk.
@@ -129,6 +105,7 @@ impl FaceSorter {
     ) -> Result<()> {
         let face = Face {
             key: INTERFACE | u64::from(f.cut) << 32 | u64::from(f.index),
+            is_second: false,
             vertices: f.vertices.map(|v| part.numbers.of(v)),
             label,
             regions: [0, 0],
@@ -136,7 +113,7 @@ impl FaceSorter {
             subdomain: part.rank,
             neighbor: f.other,
         };
-        Ok(self.sorter.push(face.to_record(false))?)
+        Ok(self.sorter.push(face)?)
     }
 
     /// Ends collecting. Errors: the disk.
@@ -148,14 +125,14 @@ impl FaceSorter {
         };
         let mut stream = scratch(&faces.path)?;
         let mut last = None;
-        for record in self.sorter.finish()? {
-            let record = record?;
-            if last.replace(word64(&record, 0)) == Some(word64(&record, 0)) {
+        for face in self.sorter.finish()? {
+            let face = face?;
+            if last.replace(face.key) == Some(face.key) {
                 continue;
             }
             faces.n += 1;
-            *faces.labels.entry(word32(&record, 33)).or_default() += 1;
-            stream.bytes(&record);
+            *faces.labels.entry(face.label).or_default() += 1;
+            stream.bytes(&face.to_bytes());
             stream.end()?;
         }
         stream.finish()?;
@@ -176,7 +153,7 @@ impl Faces {
     pub fn each(&self, mut each: impl FnMut(&Face) -> Result<()>) -> Result<()> {
         let mut records = Records::<BYTES>::open(&self.path, 0)?;
         while let Some(record) = records.next()? {
-            each(&Face::from_record(&record))?;
+            each(&Face::from_bytes(&record))?;
         }
         Ok(())
     }

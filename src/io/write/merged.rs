@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 use tetdb_schema::ids::TetId;
 use tetdb_schema::record::SealedVertex;
 
+use super::error::{Result, WriteError};
 use super::faces::{FaceSorter, FaceSource, Faces};
 use super::numbering::Numbering;
-use super::{Result, WriteError};
 use crate::sealed::SealedError;
 use crate::sealed::{Shape, Subdomain};
 use crate::storage::check_cancelled;
@@ -18,15 +18,19 @@ use tetdb_schema::catalog::SubdomainRow;
 
 /// Counts records and tells.
 pub(super) struct Progress<'a> {
-    tell: &'a dyn Fn(u64, u64),
+    report: &'a dyn Fn(u64, u64),
     done: Cell<u64>,
     total: Cell<u64>,
 }
 
 impl<'a> Progress<'a> {
-    pub fn new(tell: &'a dyn Fn(u64, u64)) -> Self {
+    pub fn new(report: &'a dyn Fn(u64, u64)) -> Self {
         let (done, total) = (Cell::new(0), Cell::new(0));
-        Self { tell, done, total }
+        Self {
+            report,
+            done,
+            total,
+        }
     }
 
     /// Counts `n` more records; the place where a request to stop is heard.
@@ -34,7 +38,7 @@ impl<'a> Progress<'a> {
         check_cancelled();
         let done = self.done.get() + n as u64;
         self.done.set(done);
-        (self.tell)(done, self.total.get().max(done));
+        (self.report)(done, self.total.get().max(done));
     }
 }
 
@@ -187,9 +191,9 @@ impl<'a> Merged<'a> {
     }
 
     /// Tells that all is done.
-    pub fn tell_end(&self) {
+    pub fn report_end(&self) {
         let total = self.progress.total.get().max(self.progress.done.get());
-        (self.progress.tell)(total, total);
+        (self.progress.report)(total, total);
     }
 
     /// Refuses what does not fit the format's numbers.

@@ -5,8 +5,8 @@
 use std::path::{Path, PathBuf};
 
 use super::draft::Draft;
+use super::error::{Result, WriteError};
 use super::stream::{Stream, Strip};
-use super::{Result, WriteError};
 
 /// Bytes of every head written here: a multiple of 64, as the format asks, with room for any number of rows.
 pub(super) const HEAD_BYTES: usize = 1024;

@@ -8,14 +8,59 @@ use std::path::{Path, PathBuf};
 
 use tetdb_schema::ids::{Owner, SubdomainId, VertexId};
 
-use super::Result;
-use super::stream::{Records, scratch, word32, word64};
+use super::error::Result;
+use super::stream::{Records, scratch};
 use crate::sealed::SealedError;
-use crate::storage::{Sorted, Sorter};
+use crate::storage::{SortRecord, Sorted, Sorter, sort_record};
 use crate::store::{Catalog, StoreError};
 
-/// Bytes of a record of the table: local number, then dense number.
-const ENTRY: usize = 12;
+sort_record! {
+    /// A vertex that another sub-domain may also have.
+    pub(super) struct Candidate {
+        pub id: u64,
+        /// Place in the list of parts.
+        pub part: u32,
+        /// Number in the part.
+        pub local: u32,
+    }
+}
+
+sort_record! {
+    /// A vertex that several parts have.
+    struct SharedVertex {
+        part: u32,
+        local: u32,
+        /// The same for all parts that have it.
+        group: u64,
+        /// Another part numbers it.
+        is_elsewhere: bool,
+    }
+}
+
+sort_record! {
+    /// A group's number, or a part that needs it.
+    struct GroupMember {
+        group: u64,
+        /// Not the one that numbers it, which comes first.
+        is_elsewhere: bool,
+        part: u32,
+        local: u32,
+        /// The number; 0 where it is not yet known.
+        number: u64,
+    }
+}
+
+sort_record! {
+    /// A vertex of a part that another part numbers.
+    struct TableEntry {
+        part: u32,
+        local: u32,
+        number: u64,
+    }
+}
+
+/// Bytes of an entry in the scratch file.
+const ENTRY: usize = size_of::<<TableEntry as SortRecord>::Bytes>();
 
 /// Numbers of all vertices.
 ///
@@ -88,58 +133,65 @@ impl Numbering {
         Ok(numbering)
     }
 
-    /// Finds vertices with equal ids. A place is (part, local, group, whether another part numbers it).
+    /// Finds vertices with equal ids.
     fn group(
         &mut self,
         store: &mut Catalog,
         parts: &[(u32, u64)],
-        by_id: Sorted<16>,
-        places: &mut Sorter<17>,
+        by_id: Sorted<Candidate>,
+        places: &mut Sorter<SharedVertex>,
     ) -> Result<()> {
-        let mut owner: Option<([u8; 16], bool)> = None;
+        let mut owner: Option<(Candidate, bool)> = None;
         let mut group = 0u64;
-        for record in by_id {
-            let record = record?;
+        for candidate in by_id {
+            let candidate = candidate?;
             match &mut owner {
-                Some((first, several)) if first[..8] == record[..8] => {
-                    let part = word32(&record, 8);
-                    if part == word32(&first[..], 8) {
-                        return Err(twice(store, parts[part as usize].0, word64(&record, 0)));
+                Some((first, several)) if first.id == candidate.id => {
+                    if candidate.part == first.part {
+                        let rank = parts[candidate.part as usize].0;
+                        return Err(twice(store, rank, candidate.id));
                     }
                     if !*several {
                         *several = true;
                         group += 1;
-                        places.push(place(&first[8..], group, 0))?;
+                        places.push(first.shared(group, false))?;
                     }
-                    places.push(place(&record[8..], group, 1))?;
-                    self.shared[part as usize] += 1;
+                    places.push(candidate.shared(group, true))?;
+                    self.shared[candidate.part as usize] += 1;
                 }
-                _ => owner = Some((record, false)),
+                _ => owner = Some((candidate, false)),
             }
         }
         Ok(())
     }
 
-    /// Gives each group its number. A result is (group, 0, number) or (group, 1, part, local).
-    fn number(&self, places: Sorted<17>, dir: &Path, memory: usize) -> Result<Sorted<17>> {
+    /// Gives each group its number.
+    fn number(
+        &self,
+        places: Sorted<SharedVertex>,
+        dir: &Path,
+        memory: usize,
+    ) -> Result<Sorted<GroupMember>> {
         let mut groups = Sorter::new(dir, memory as u64 / 4);
         let (mut part, mut shared) = (0, 0);
-        for record in places {
-            let record = record?;
-            if word32(&record, 0) != part {
-                (part, shared) = (word32(&record, 0), 0);
+        for vertex in places {
+            let vertex = vertex?;
+            if vertex.part != part {
+                (part, shared) = (vertex.part, 0);
             }
-            let mut out = [0; 17];
-            out[..8].copy_from_slice(&record[8..16]);
-            out[8] = record[16];
-            if record[16] == 0 {
-                let number = self.firsts[part as usize] + u64::from(word32(&record, 4)) - shared;
-                out[9..].copy_from_slice(&number.to_be_bytes());
-            } else {
+            let mut member = GroupMember {
+                group: vertex.group,
+                is_elsewhere: vertex.is_elsewhere,
+                part,
+                local: vertex.local,
+                number: 0,
+            };
+            if vertex.is_elsewhere {
                 shared += 1;
-                out[9..].copy_from_slice(&record[..8]);
+            } else {
+                member.number = self.firsts[part as usize] + u64::from(vertex.local) - shared;
             }
-            groups.push(out)?;
+            groups.push(member)?;
         }
         Ok(groups.finish()?)
     }
@@ -164,21 +216,22 @@ impl Numbering {
             let mut entries = Records::<ENTRY>::open(&self.table, before)?;
             while part.locals.len() < n {
                 let Some(entry) = entries.next()? else { break };
-                part.locals.push(word32(&entry, 0));
-                part.numbers.push(word64(&entry, 4));
+                let entry = TableEntry::from_bytes(&entry);
+                part.locals.push(entry.local);
+                part.numbers.push(entry.number);
             }
         }
         Ok(part)
     }
 }
 
-/// All vertices that another sub-domain may also have, as (id, place in `parts`, local).
+/// All vertices that another sub-domain may also have.
 pub(super) fn candidates(
     store: &mut Catalog,
     parts: &[(u32, u64)],
     dir: &Path,
     memory: usize,
-) -> Result<Sorted<16>> {
+) -> Result<Sorted<Candidate>> {
     let mut sorter = Sorter::new(dir, memory as u64 / 4);
     for (p, &(rank, _)) in (0u32..).zip(parts) {
         let mut part = store.open_subdomain(rank, memory / 4)?;
@@ -188,42 +241,42 @@ pub(super) fn candidates(
             if VertexId::from_number(id).map(|v| v.owner) == own {
                 continue;
             }
-            let mut record = [0; 16];
-            record[..8].copy_from_slice(&id.to_be_bytes());
-            record[8..12].copy_from_slice(&p.to_be_bytes());
-            record[12..].copy_from_slice(&local.to_be_bytes());
-            sorter.push(record)?;
+            sorter.push(Candidate { id, part: p, local })?;
         }
     }
     Ok(sorter.finish()?)
 }
 
-fn place(part_and_local: &[u8], group: u64, shared: u8) -> [u8; 17] {
-    let mut record = [0; 17];
-    record[..8].copy_from_slice(part_and_local);
-    record[8..16].copy_from_slice(&group.to_be_bytes());
-    record[16] = shared;
-    record
+impl Candidate {
+    fn shared(&self, group: u64, is_elsewhere: bool) -> SharedVertex {
+        SharedVertex {
+            part: self.part,
+            local: self.local,
+            group,
+            is_elsewhere,
+        }
+    }
 }
 
 /// Carries each group's number to the parts that share it, and writes the tables one after the other.
-fn carry(groups: Sorted<17>, dir: &Path, memory: usize, table: &Path) -> Result<()> {
-    let mut sorter = Sorter::<16>::new(dir, memory as u64 / 4);
-    let mut number = [0; 8];
-    for record in groups {
-        let record = record?;
-        if record[8] == 0 {
-            number.copy_from_slice(&record[9..]);
+fn carry(groups: Sorted<GroupMember>, dir: &Path, memory: usize, table: &Path) -> Result<()> {
+    let mut sorter = Sorter::new(dir, memory as u64 / 4);
+    let mut number = 0;
+    for member in groups {
+        let member = member?;
+        if !member.is_elsewhere {
+            number = member.number;
             continue;
         }
-        let mut out = [0; 16];
-        out[..8].copy_from_slice(&record[9..]);
-        out[8..].copy_from_slice(&number);
-        sorter.push(out)?;
+        sorter.push(TableEntry {
+            part: member.part,
+            local: member.local,
+            number,
+        })?;
     }
     let mut stream = scratch(table)?;
-    for record in sorter.finish()? {
-        stream.bytes(&record?[4..]);
+    for entry in sorter.finish()? {
+        stream.bytes(&entry?.to_bytes());
         stream.end()?;
     }
     stream.finish()

@@ -106,7 +106,7 @@ pub(super) fn write(
     out: &Path,
     selection: &Selection,
     memory: usize,
-    tell: &dyn Fn(u64, u64),
+    report: &dyn Fn(u64, u64),
 ) -> Result<FileCounts> {
     let mut rows = store.subdomains()?;
     if !selection.subdomains.is_empty() {
@@ -124,7 +124,7 @@ pub(super) fn write(
             if tets.ids.len() >= GROUP_ROWS {
                 tets.write(&mut table, row.rank)?;
             }
-            tell(counts.tets + tets.done, all);
+            report(counts.tets + tets.done, all);
         }
         tets.write(&mut table, row.rank)?;
         table.finish()?;

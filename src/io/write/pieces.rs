@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use super::dispatch;
 use super::draft::Draft;
 use super::merged::{FaceSet, Merged, Progress, Scope};
 use super::stream::Stream;
@@ -17,7 +18,7 @@ pub(super) fn write(
     out: &Path,
     selection: &Selection,
     memory: usize,
-    tell: &dyn Fn(u64, u64),
+    report: &dyn Fn(u64, u64),
 ) -> Result<FileCounts> {
     let format = MeshFormat::of_extension(out).expect("the format was told from the name");
     let (parallel, extension) = match format {
@@ -42,16 +43,16 @@ pub(super) fn write(
         let dir = draft.dir().join(format!("piece-{}", row.rank));
         fs::create_dir(&dir).map_err(|e| WriteError::io(&dir, e))?;
         // A piece's records stand for its tetrahedra in the whole.
-        let told = |done: u64, total: u64| {
+        let report_piece = |done: u64, total: u64| {
             let share = done as f64 / total.max(1) as f64;
-            tell(counts.tets + (share * row.tets as f64) as u64, all);
+            report(counts.tets + (share * row.tets as f64) as u64, all);
         };
-        let mut mesh = Merged::open(store, scope, &dir, memory, Progress::new(&told))?;
-        let made = super::write(format, selection.content, &mut mesh, draft, &piece)?;
+        let mut mesh = Merged::open(store, scope, &dir, memory, Progress::new(&report_piece))?;
+        let written = dispatch::write(format, selection.content, &mut mesh, draft, &piece)?;
         fs::remove_dir_all(&dir).map_err(|e| WriteError::io(&dir, e))?;
-        counts.vertices += made.vertices;
-        counts.tets += made.tets;
-        counts.triangles += made.triangles;
+        counts.vertices += written.vertices;
+        counts.tets += written.tets;
+        counts.triangles += written.triangles;
         pieces.push(piece);
     }
     if parallel {

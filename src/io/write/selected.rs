@@ -5,13 +5,13 @@
 
 use std::path::{Path, PathBuf};
 
-use super::Result;
 use super::draft::Draft;
+use super::error::Result;
 use super::npy::length;
-use super::stream::{Records, Stream, scratch, word, word64};
+use super::stream::{Records, Stream, scratch};
 use super::vtu::TETRA;
 use super::vtu_layout::{Array, Group, Index, Layout};
-use crate::storage::{Sorted, Sorter};
+use crate::storage::{Payload, Sorted, Sorter, sort_record};
 
 /// Region, sub-domain, quality, number.
 const CELL: usize = 4 + 4 + 8 + 8;
@@ -29,14 +29,32 @@ pub struct SelectedTet {
     pub corners: [[f64; 3]; 4],
 }
 
+sort_record! {
+    /// A corner of a tetrahedron by its vertex.
+    struct Corner {
+        vertex: u64,
+        /// 4 · tetrahedron + corner.
+        place: u64,
+        point: Payload<[f64; 3]>,
+    }
+}
+
+sort_record! {
+    /// A corner of a tetrahedron and the dense number of its vertex.
+    struct CornerNumber {
+        /// 4 · tetrahedron + corner.
+        place: u64,
+        number: u64,
+    }
+}
+
 /// Tetrahedra being gathered for one `.vtu` file; nothing has its name until [`SelectedVtu::finish`].
 pub struct SelectedVtu {
     draft: Draft,
     out: PathBuf,
     cells: Stream,
     cells_path: PathBuf,
-    /// Vertex id, corner (4 · tetrahedron + place), position.
-    corners: Sorter<40>,
+    corners: Sorter<Corner>,
     n: u64,
     memory_bytes: u64,
 }
@@ -60,13 +78,11 @@ impl SelectedVtu {
     /// Adds a tetrahedron. Errors: the disk.
     pub fn push(&mut self, tet: &SelectedTet) -> Result<()> {
         for (place, (vertex, corner)) in (0u64..).zip(tet.vertices.iter().zip(tet.corners)) {
-            let mut record = [0; 40];
-            record[..8].copy_from_slice(&vertex.to_be_bytes());
-            record[8..16].copy_from_slice(&(4 * self.n + place).to_be_bytes());
-            for (bytes, x) in record[16..].chunks_exact_mut(8).zip(corner) {
-                bytes.copy_from_slice(&x.to_le_bytes());
-            }
-            self.corners.push(record)?;
+            self.corners.push(Corner {
+                vertex: *vertex,
+                place: 4 * self.n + place,
+                point: Payload(corner),
+            })?;
         }
         self.n += 1;
         self.cells.bytes(&tet.region.to_le_bytes());
@@ -113,7 +129,7 @@ impl SelectedVtu {
         ] = &mut strips;
         let mut points = Records::<32>::open(&points_path, 0)?;
         while let Some(record) = points.next()? {
-            vertex_ids.put(&word64(&record, 0).to_le_bytes())?;
+            vertex_ids.put(&record[..8])?;
             places.put(&record[8..])?;
         }
         let mut cells = Records::<CELL>::open(&self.cells_path, 0)?;
@@ -127,8 +143,8 @@ impl SelectedVtu {
             index.put(ends, end)?;
             types.put(&[TETRA])?;
         }
-        for record in numbers.finish()? {
-            index.put(nodes, u64::from_be_bytes(word(&record?, 8)))?;
+        for corner in numbers.finish()? {
+            index.put(nodes, corner?.number)?;
         }
         strips
             .into_iter()
@@ -138,23 +154,28 @@ impl SelectedVtu {
 }
 
 /// Gives vertices dense numbers by their ids: writes id and position of each once, and (corner, number) of every corner.
-fn number(corners: Sorted<40>, points: &mut Stream, numbers: &mut Sorter<16>) -> Result<u64> {
+fn number(
+    corners: Sorted<Corner>,
+    points: &mut Stream,
+    numbers: &mut Sorter<CornerNumber>,
+) -> Result<u64> {
     let mut last = None;
     let mut n = 0u64;
-    for record in corners {
-        let record = record?;
-        let vertex = word64(&record, 0);
+    for corner in corners {
+        let Corner {
+            vertex,
+            place,
+            point,
+        } = corner?;
         if last != Some(vertex) {
             last = Some(vertex);
             n += 1;
-            points.bytes(&record[..8]);
-            points.bytes(&record[16..]);
+            points.bytes(&vertex.to_le_bytes());
+            (point.0.iter()).for_each(|x| points.bytes(&x.to_le_bytes()));
             points.end()?;
         }
-        let mut entry = [0; 16];
-        entry[..8].copy_from_slice(&record[8..16]);
-        entry[8..].copy_from_slice(&(n - 1).to_be_bytes());
-        numbers.push(entry)?;
+        let number = n - 1;
+        numbers.push(CornerNumber { place, number })?;
     }
     Ok(n)
 }

@@ -4,7 +4,7 @@ use std::fs::{File, OpenOptions};
 use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use super::{Result, WriteError};
+use super::error::{Result, WriteError};
 
 /// Bytes gathered before a write.
 const BUFFER_BYTES: usize = 256 << 10;
@@ -140,19 +140,4 @@ impl<const N: usize> Records<N> {
 pub(super) fn scratch(path: &Path) -> Result<Stream> {
     File::create_new(path).map_err(|e| WriteError::io(path, e))?;
     Stream::open(path)
-}
-
-/// Number of `N` big-endian bytes at `at`.
-pub(super) fn word<const N: usize>(record: &[u8], at: usize) -> [u8; N] {
-    record[at..at + N].try_into().expect("N bytes were taken")
-}
-
-/// The u32 at `at`.
-pub(super) fn word32(record: &[u8], at: usize) -> u32 {
-    u32::from_be_bytes(word(record, at))
-}
-
-/// The u64 at `at`.
-pub(super) fn word64(record: &[u8], at: usize) -> u64 {
-    u64::from_be_bytes(word(record, at))
 }

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use super::draft::Draft;
+use super::error::{Result, WriteError};
 use super::stream::Stream;
-use super::{Result, WriteError};
 use crate::surface::Surface;
 
 /// A writer of one format.

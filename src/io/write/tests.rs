@@ -467,18 +467,18 @@ fn progress_ends_at_its_total() -> Outcome {
     let path = dir.path().join("two.tetdb");
     two_subdomains(&path)?;
     for name in ["p.vtu", "p.msh"] {
-        let told = std::cell::RefCell::new(Vec::new());
-        let tell = |done, total| told.borrow_mut().push((done, total));
+        let progress = std::cell::RefCell::new(Vec::new());
+        let report = |done, total| progress.borrow_mut().push((done, total));
         export(
             &mut Catalog::open(&path)?,
             &dir.path().join(name),
             &Selection::default(),
             1 << 20,
-            &tell,
+            &report,
         )?;
-        let told = told.into_inner();
-        let (done, total) = told.last().copied().ok_or("something told")?;
-        assert!(done == total && told.iter().all(|t| t.0 <= t.1 && t.1 == total));
+        let progress = progress.into_inner();
+        let (done, total) = progress.last().copied().ok_or("no progress")?;
+        assert!(done == total && progress.iter().all(|t| t.0 <= t.1 && t.1 == total));
     }
     Ok(())
 }

@@ -8,18 +8,36 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::draft::Draft;
-use super::numbering::candidates;
-use super::stream::{Stream, word32};
+use super::numbering::{Candidate, candidates};
+use super::stream::Stream;
 use super::{FileCounts, Result};
 use crate::sealed::SealedError;
-use crate::storage::{Sorted, Sorter};
+use crate::storage::{Sorted, Sorter, sort_record};
 use crate::store::{Catalog, StoreError};
 use tetdb_schema::catalog::NeighborRow;
 
-/// A pair's vertex: low, high, order, number in low, number in high.
-type SharedVertices = Sorted<24>;
-/// A pair's face: low, high, cut, number in the cut, side, tetrahedron.
-type SharedFaces = Sorted<21>;
+sort_record! {
+    /// A vertex of a pair of sub-domains, the lower rank first.
+    struct SharedVertex {
+        pair: [u32; 2],
+        id: u64,
+        /// Its number in each.
+        numbers: [u32; 2],
+    }
+}
+
+sort_record! {
+    /// A face of a pair of sub-domains, seen from one of them.
+    struct SharedFace {
+        pair: [u32; 2],
+        cut: u32,
+        /// Its number in the cut.
+        index: u32,
+        /// Seen from the higher rank.
+        is_high: bool,
+        tet: u32,
+    }
+}
 
 pub(super) fn write(
     store: &mut Catalog,
@@ -63,27 +81,27 @@ pub(super) fn write(
 fn pairs(
     store: &mut Catalog,
     stream: &mut Stream,
-    vertices: SharedVertices,
-    faces: SharedFaces,
+    vertices: Sorted<SharedVertex>,
+    faces: Sorted<SharedFace>,
 ) -> Result<()> {
     let mut vertices = vertices.peekable();
     let mut faces = faces.peekable();
     let mut before = "";
     while let Some(first) = vertices.next() {
         let first = first?;
-        let pair: [u8; 8] = *first.first_chunk().expect("a pair stands first");
-        let mut shared = [vec![word32(&first, 16)], vec![word32(&first, 20)]];
-        while let Some(next) = vertices.next_if(|r| r.as_ref().is_ok_and(|r| r[..8] == pair)) {
-            let next = next?;
-            shared[0].push(word32(&next, 16));
-            shared[1].push(word32(&next, 20));
+        let pair = first.pair;
+        let mut shared = first.numbers.map(|number| vec![number]);
+        while let Some(next) = vertices.next_if(|v| v.as_ref().is_ok_and(|v| v.pair == pair)) {
+            let [low, high] = next?.numbers;
+            shared[0].push(low);
+            shared[1].push(high);
         }
         let mut tets = [Vec::new(), Vec::new()];
-        while let Some(next) = faces.next_if(|r| r.as_ref().is_ok_and(|r| r[..8] == pair)) {
+        while let Some(next) = faces.next_if(|f| f.as_ref().is_ok_and(|f| f.pair == pair)) {
             let next = next?;
-            tets[usize::from(next[16])].push(word32(&next, 17));
+            tets[usize::from(next.is_high)].push(next.tet);
         }
-        let (low, high) = (word32(&pair, 0), word32(&pair, 4));
+        let [low, high] = pair;
         if tets[0].len() != tets[1].len() {
             return Err(unequal(store, low, high));
         }
@@ -99,8 +117,8 @@ fn pairs(
     match faces.next() {
         None => Ok(()),
         Some(face) => {
-            let face = face?;
-            Err(unequal(store, word32(&face, 0), word32(&face, 4)))
+            let [low, high] = face?.pair;
+            Err(unequal(store, low, high))
         }
     }
 }
@@ -136,32 +154,30 @@ fn shared_vertices(
     ranks: &[(u32, u64)],
     dir: &Path,
     memory: usize,
-) -> Result<SharedVertices> {
-    let mut sorter = Sorter::<24>::new(dir, memory as u64 / 4);
-    let mut group: Vec<(u32, u32)> = Vec::new();
-    let mut id = [0; 8];
-    let mut hand_on = |group: &mut Vec<(u32, u32)>, id: [u8; 8]| -> Result<()> {
+) -> Result<Sorted<SharedVertex>> {
+    let mut sorter = Sorter::new(dir, memory as u64 / 4);
+    let mut group: Vec<Candidate> = Vec::new();
+    let mut id = 0;
+    let mut hand_on = |group: &mut Vec<Candidate>, id: u64| -> Result<()> {
         for (i, a) in group.iter().enumerate() {
             for b in &group[i + 1..] {
-                let mut record = [0; 24];
-                record[..4].copy_from_slice(&ranks[a.0 as usize].0.to_be_bytes());
-                record[4..8].copy_from_slice(&ranks[b.0 as usize].0.to_be_bytes());
-                record[8..16].copy_from_slice(&id);
-                record[16..20].copy_from_slice(&a.1.to_be_bytes());
-                record[20..].copy_from_slice(&b.1.to_be_bytes());
-                sorter.push(record)?;
+                sorter.push(SharedVertex {
+                    pair: [a, b].map(|v| ranks[v.part as usize].0),
+                    id,
+                    numbers: [a.local, b.local],
+                })?;
             }
         }
         group.clear();
         Ok(())
     };
-    for record in candidates(store, ranks, dir, memory)? {
-        let record = record?;
-        if record[..8] != id {
+    for candidate in candidates(store, ranks, dir, memory)? {
+        let candidate = candidate?;
+        if candidate.id != id {
             hand_on(&mut group, id)?;
-            id = *record.first_chunk().expect("an id stands first");
+            id = candidate.id;
         }
-        group.push((word32(&record, 8), word32(&record, 12)));
+        group.push(candidate);
     }
     hand_on(&mut group, id)?;
     Ok(sorter.finish()?)
@@ -173,20 +189,19 @@ fn shared_faces(
     ranks: &[(u32, u64)],
     dir: &Path,
     memory: usize,
-) -> Result<SharedFaces> {
-    let mut sorter = Sorter::<21>::new(dir, memory as u64 / 4);
+) -> Result<Sorted<SharedFace>> {
+    let mut sorter = Sorter::new(dir, memory as u64 / 4);
     for &(rank, _) in ranks {
         let mut part = store.open_subdomain(rank, memory / 4)?;
         for face in part.interfaces() {
             let face = face?;
-            let mut record = [0; 21];
-            record[..4].copy_from_slice(&rank.min(face.other).to_be_bytes());
-            record[4..8].copy_from_slice(&rank.max(face.other).to_be_bytes());
-            record[8..12].copy_from_slice(&face.cut.to_be_bytes());
-            record[12..16].copy_from_slice(&face.index.to_be_bytes());
-            record[16] = u8::from(rank > face.other);
-            record[17..].copy_from_slice(&face.tet.to_be_bytes());
-            sorter.push(record)?;
+            sorter.push(SharedFace {
+                pair: [rank.min(face.other), rank.max(face.other)],
+                cut: face.cut,
+                index: face.index,
+                is_high: rank > face.other,
+                tet: face.tet,
+            })?;
         }
     }
     Ok(sorter.finish()?)

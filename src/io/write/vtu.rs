@@ -4,8 +4,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::Result;
 use super::draft::Draft;
+use super::error::Result;
 use super::merged::Merged;
 use super::vtu_boundary;
 use super::vtu_layout::{Array, Group, Index, Layout};

@@ -7,23 +7,40 @@
 
 use std::path::{Path, PathBuf};
 
-use super::Result;
 use super::draft::Draft;
+use super::error::Result;
 use super::merged::Merged;
-use super::stream::{Records, scratch, word64};
+use super::stream::{Records, scratch};
 use super::vtu_layout::{Array, Group, Index, Layout};
-use crate::storage::{Sorted, Sorter};
+use crate::storage::{Sorted, Sorter, sort_record};
 
 /// VTK's number of a triangle.
 const TRIANGLE: u8 = 5;
+
+sort_record! {
+    /// A corner of a face and its vertex in the mesh.
+    struct Corner {
+        vertex: u64,
+        /// 3 · face + corner.
+        place: u64,
+    }
+}
+
+sort_record! {
+    /// A corner of a face and the dense number of its vertex.
+    struct CornerNumber {
+        /// 3 · face + corner.
+        place: u64,
+        number: u64,
+    }
+}
 
 /// The vertices of the faces, numbered densely.
 struct Corners {
     n_vertices: u64,
     /// Their numbers in the mesh, ascending; 8 bytes each.
     used: PathBuf,
-    /// (3 · face + corner, its dense number), ascending.
-    dense: Sorted<16>,
+    dense: Sorted<CornerNumber>,
 }
 
 /// Writes the faces; returns the number of their vertices.
@@ -80,7 +97,7 @@ pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
             .try_for_each(|x| points.put(&x.to_le_bytes()))
     })?;
     for corner in corners.dense {
-        index.put(&mut nodes, word64(&corner?, 8))?;
+        index.put(&mut nodes, corner?.number)?;
     }
     let mut end = 0;
     mesh.faces().each(|face| {
@@ -112,29 +129,29 @@ fn or_none(number: Option<u64>) -> i64 {
 }
 
 fn corners(mesh: &Merged, dir: &Path) -> Result<Corners> {
-    let mut by_vertex = Sorter::<16>::new(dir, mesh.sorter_bytes());
+    let mut by_vertex = Sorter::new(dir, mesh.sorter_bytes());
     let mut place = 0u64;
     mesh.faces().each(|face| {
-        for v in face.vertices {
-            by_vertex.push(pair(v, place))?;
+        for vertex in face.vertices {
+            by_vertex.push(Corner { vertex, place })?;
             place += 1;
         }
         Ok(())
     })?;
-    let mut by_place = Sorter::<16>::new(dir, mesh.sorter_bytes());
+    let mut by_place = Sorter::new(dir, mesh.sorter_bytes());
     let used = dir.join("corners");
     let mut stream = scratch(&used)?;
     let (mut n_vertices, mut last) = (0, None);
-    for record in by_vertex.finish()? {
-        let record = record?;
-        let vertex = word64(&record, 0);
+    for corner in by_vertex.finish()? {
+        let Corner { vertex, place } = corner?;
         if last != Some(vertex) {
             last = Some(vertex);
             n_vertices += 1;
-            stream.bytes(&record[..8]);
+            stream.bytes(&vertex.to_be_bytes());
             stream.end()?;
         }
-        by_place.push(pair(word64(&record, 8), n_vertices - 1))?;
+        let number = n_vertices - 1;
+        by_place.push(CornerNumber { place, number })?;
     }
     stream.finish()?;
     Ok(Corners {
@@ -142,13 +159,6 @@ fn corners(mesh: &Merged, dir: &Path) -> Result<Corners> {
         used,
         dense: by_place.finish()?,
     })
-}
-
-fn pair(a: u64, b: u64) -> [u8; 16] {
-    let mut record = [0; 16];
-    record[..8].copy_from_slice(&a.to_be_bytes());
-    record[8..].copy_from_slice(&b.to_be_bytes());
-    record
 }
 
 /// Names of labels 0, 1, .., up to the last one a face has.

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use super::error::{Result, WriteError};
 use super::stream::{Stream, Strip};
-use super::{Result, WriteError};
 
 /// Where an array belongs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -7,7 +7,7 @@ use crate::mesh::{Facet, Mesh, VertexTag};
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::Options;
 use crate::pipeline::progress::{Event, Watcher};
-use crate::storage::{Pages, ScratchSpace, raise};
+use crate::storage::{Keyed, Pages, ScratchSpace, raise};
 use crate::surface::Surface;
 
 /// What the coarse step did.
@@ -19,7 +19,7 @@ pub struct CoarseReport {
 }
 
 /// Points between two words to the watcher.
-const TELL_EVERY: usize = 4096;
+const REPORT_EVERY: usize = 4096;
 
 /// Builds the coarse mesh of a valid surface into an empty mesh.
 ///
@@ -28,10 +28,10 @@ pub fn coarse<P: Pages>(
     mesh: &mut Mesh<P>,
     surface: &Surface,
     options: &Options,
-    room: &ScratchSpace,
+    scratch: &ScratchSpace,
     watch: &Watcher,
 ) -> Result<CoarseReport, PipelineError> {
-    let kernel = inserted(mesh, surface, room, watch);
+    let kernel = inserted(mesh, surface, scratch, watch);
     recovered(mesh, kernel, options, watch)
 }
 
@@ -39,10 +39,10 @@ pub fn coarse<P: Pages>(
 pub(crate) fn inserted<P: Pages>(
     mesh: &mut Mesh<P>,
     surface: &Surface,
-    room: &ScratchSpace,
+    scratch: &ScratchSpace,
     watch: &Watcher,
 ) -> KernelStats {
-    triangulate(mesh, surface, room, watch).unwrap_or_else(|(i, why)| {
+    triangulate(mesh, surface, scratch, watch).unwrap_or_else(|(i, why)| {
         let p = surface.points[i as usize];
         panic!("vertex {i} of the surface at {p} was refused: {why:?}")
     })
@@ -91,32 +91,30 @@ fn stage(stage: &'static str) -> Event {
 pub(crate) fn triangulate<P: Pages>(
     mesh: &mut Mesh<P>,
     surface: &Surface,
-    room: &ScratchSpace,
+    scratch: &ScratchSpace,
     watch: &Watcher,
 ) -> Result<KernelStats, (u32, Rejected)> {
     let bounds = surface.bounds();
     let frame = HilbertFrame::new(&bounds);
-    let mut order = room.sorter::<12>();
+    let mut order = scratch.sorter::<Keyed>();
     for (i, &p) in (0u32..).zip(&surface.points) {
-        let mut record = [0; 12];
-        record[..8].copy_from_slice(&insertion_key(&frame, p).to_be_bytes());
-        record[8..].copy_from_slice(&i.to_be_bytes());
-        order.push(record).unwrap_or_else(|e| raise(e));
+        let key = insertion_key(&frame, p);
+        let pushed = order.push(Keyed { key, id: i });
+        pushed.unwrap_or_else(|e| raise(e));
     }
     let order = order.finish().unwrap_or_else(|e| raise(e));
     let mut kernel = Kernel::default();
     let mut hint = enclose(mesh, &bounds);
     let total = surface.points.len();
-    let mut number = room.column(total, 0u32);
+    let mut number = scratch.column(total, 0u32);
     for (k, record) in order.enumerate() {
-        let record = record.unwrap_or_else(|e| raise(e));
-        let i = u32::from_be_bytes([record[8], record[9], record[10], record[11]]);
+        let i = record.unwrap_or_else(|e| raise(e)).id;
         let p = surface.points[i as usize];
         let v = mesh.add_vertex(p, 0.0);
         mesh.set_vertex_attribute(v, VertexTag::Surface, i);
         number.set(i as usize, v);
         hint = kernel.insert(mesh, v, p, hint).map_err(|why| (i, why))?;
-        if k % TELL_EVERY == 0 {
+        if k % REPORT_EVERY == 0 {
             watch(Event {
                 stage: "coarse mesh",
                 done: k as u64,

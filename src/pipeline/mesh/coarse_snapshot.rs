@@ -1,4 +1,4 @@
-//! Coarse leaves: what a sub-domain is made from is kept, so that it can be made again.
+//! Coarse snapshots: what a sub-domain is meshed from is kept, so that it can be meshed again.
 
 use crate::mesh::{Mesh, Workspace};
 use crate::pipeline::error::PipelineError;
@@ -9,7 +9,7 @@ use crate::store::StoreError;
 use tetdb_schema::catalog::CoarseRow;
 
 /// Writes the working mesh of sub-domain `rank`, which has no gaps, to `path`. Errors: the disk.
-pub(crate) fn keep<P: Pages>(
+pub(crate) fn save<P: Pages>(
     mesh: &mut Mesh<P>,
     path: &DiskPath,
     rank: u32,
@@ -43,27 +43,27 @@ pub(crate) fn keep<P: Pages>(
 ///
 /// Not restored are sizes and `tet_of`, which the fine step sets anew. Errors: damage; the disk.
 pub(crate) fn reopen(
-    leaf: &mut CoarseSnapshot,
+    snapshot: &mut CoarseSnapshot,
     backing: Backing,
     frames: u64,
     space: &Workspace,
 ) -> Result<Mesh, PipelineError> {
-    let (rank, path) = (leaf.row().rank, leaf.path().to_owned());
+    let (rank, path) = (snapshot.row().rank, snapshot.path().to_owned());
     let damaged = |what: &str| {
         StoreError::Sealed(SealedError::Content {
             path: path.clone(),
             subdomain: rank,
-            what: format!("its coarse leaf has {what}"),
+            what: format!("its coarse snapshot has {what}"),
         })
     };
     let mut mesh = Mesh::new(Pager::new(frames, Some(backing)));
-    for chunk in leaf.vertices() {
+    for chunk in snapshot.vertices() {
         chunk?
             .records
             .iter()
             .for_each(|v| mesh.add_snapshot_vertex(v));
     }
-    for chunk in leaf.tets() {
+    for chunk in snapshot.tets() {
         for tet in &chunk?.records {
             if !mesh.add_snapshot_tet(tet) {
                 return Err(damaged("a tetrahedron without its vertices").into());
@@ -72,7 +72,7 @@ pub(crate) fn reopen(
     }
     let n_vertices = mesh.n_vertices();
     let is_here = |v: &[u32; 3]| v.iter().all(|&v| v < n_vertices);
-    for chunk in leaf.facets() {
+    for chunk in snapshot.facets() {
         for facet in chunk?.records.iter() {
             if !is_here(&facet.vertices) {
                 return Err(damaged("a facet without its vertices").into());
@@ -80,7 +80,7 @@ pub(crate) fn reopen(
             mesh.add_snapshot_facet(facet);
         }
     }
-    for chunk in leaf.faces() {
+    for chunk in snapshot.faces() {
         for face in chunk?.records.iter() {
             if !is_here(&face.vertices) {
                 return Err(damaged("an interface face without its vertices").into());
@@ -152,9 +152,9 @@ mod tests {
         };
         let mut mesh = made(&space);
         let path = scratch.join("coarse.redb");
-        let row = keep(&mut mesh, &path, 3, 7, 1 << 20).expect("room for the leaf");
+        let row = save(&mut mesh, &path, 3, 7, 1 << 20).expect("space for the snapshot");
         assert_eq!((row.tets, row.rank), (u64::from(mesh.n_tets()), 3));
-        let mut leaf = CoarseSnapshot::open(&path, row, 1 << 20).expect("just written");
+        let mut snapshot = CoarseSnapshot::open(&path, row, 1 << 20).expect("just written");
         for frames in [1 << 26, 16 << 16] {
             let backing = Backing {
                 subdomain: 3,
@@ -164,7 +164,7 @@ mod tests {
                 base: None,
                 cache_bytes: 1 << 20,
             };
-            let mut again = reopen(&mut leaf, backing, frames, &space).expect("no damage");
+            let mut again = reopen(&mut snapshot, backing, frames, &space).expect("no damage");
             assert_eq!(again.state().to_words(), mesh.state().to_words());
             let mut from = 0;
             while let Some((t, tet)) = mesh.next_tet(from) {

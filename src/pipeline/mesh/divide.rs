@@ -1,29 +1,22 @@
 //! One bisection as a step: the part's file in, the files of its two children out, one commit.
 
-use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
 use std::time::Instant;
 
+use super::common::Common;
+use super::cut_journal::CutJournal;
+use super::owners::{InheritedFace, NewCut, TopologyChange};
 use super::run::Run;
 use super::stages::{StageFiles, Stages};
-use super::subdomain::Common;
 use crate::bisect::{self, CutPlan, CutReport, Opened, Zone};
 use crate::mesh::{Mesh, Workspace};
 use crate::optimize::Settings;
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::Plan;
 use crate::pipeline::progress::{Event, Watcher};
-use crate::pipeline::seal::totals::journal;
-use crate::pipeline::tree::{self, PartMesh, TreePart, blob};
+use crate::pipeline::tree::{self, DONE, PartMesh, TreePart, blob, open_part};
 use crate::pipeline::workers::work_off;
-use crate::sealed::SealedError;
-use crate::storage::{Backing, DiskPath, Pager, PagerStats, StoreFile, attempt};
-use crate::store::StoreError;
-use crate::topology::{Neighbors, Owners};
-use tetdb_schema::catalog::{NeighborRow, Stage, StoreState, TopologyRow};
-
-/// Generations from a part to what is made of it.
-pub(crate) const DONE: u32 = 2;
+use crate::storage::{Backing, DiskPath, Pager, PagerStats, attempt};
+use tetdb_schema::catalog::{Stage, StoreState};
 
 /// What a worker needs to bisect a part.
 pub(crate) struct CutJob {
@@ -53,8 +46,8 @@ pub(crate) struct Divided {
 /// A child as its file holds it.
 struct Child {
     mesh: PartMesh,
-    /// Cut and number of the faces it took over from its parent, and on which side of those cuts it is.
-    inherited: Vec<(u32, u32, u32)>,
+    /// Interface faces it took over from its parent.
+    inherited: Vec<InheritedFace>,
 }
 
 impl CutJob {
@@ -103,11 +96,11 @@ impl CutJob {
         };
         let mut stages = Stages::default();
         if let Some(kept) = &self.kept {
-            kept.keep(&mut host, Stage::Coarse, &mut stages, watch)?;
+            kept.save(&mut host, Stage::Coarse, &mut stages, watch)?;
         }
         let refined = bisect::refine(&mut host, &plan, &space, &progress)?;
         if let Some(kept) = &self.kept {
-            kept.keep(&mut host, Stage::Refined, &mut stages, watch)?;
+            kept.save(&mut host, Stage::Refined, &mut stages, watch)?;
         }
         let faces = self.kept.as_ref().map(|_| &mut stages.faces);
         let opened = bisect::choose(&mut host, &mut core, &plan, refined, faces, &progress);
@@ -156,7 +149,11 @@ impl CutJob {
         for n in 0..mesh.n_interface_faces() {
             let face = mesh.interface_face(n);
             if face.cut != opened.zone.cut {
-                inherited.push((face.cut, face.index, face.side));
+                inherited.push(InheritedFace {
+                    cut: face.cut,
+                    index: face.index,
+                    side: face.side,
+                });
             }
         }
         inherited.sort_unstable();
@@ -259,74 +256,24 @@ impl Run<'_> {
         } = &divided;
         let cut = opened.zone.cut;
         let [low, high] = children;
-        let faces = opened.report.interface.chosen.faces as u32;
-        let (low_name, high_name) = (low.mesh.part.first, high.mesh.part.first);
-        let mut neighbors = neighbors_of(&self.catalog.topology()?);
-        let mut owners = BTreeMap::from([(cut, Owners::new(faces, low_name, high_name))]);
-        neighbors.set(low_name, high_name, u64::from(faces));
-        for &(cut, index, side) in &high.inherited {
-            let table = match owners.entry(cut) {
-                Entry::Occupied(entry) => entry.into_mut(),
-                Entry::Vacant(entry) => entry.insert(read_owners(self.catalog, cut)?),
-            };
-            let other = table.other(index, side).ok_or_else(|| {
-                StoreError::Sealed(SealedError::Content {
-                    path: self.catalog.dir().to_owned(),
-                    subdomain: low_name,
-                    what: format!("face {index} of cut {cut} has no owner"),
-                })
-            })?;
-            table.faces[index as usize][side as usize] = high_name;
-            neighbors.remove(low_name, other);
-            neighbors.add(high_name, other);
-        }
-        // Who was a neighbor of the parent is one of a child: no other row changes.
-        let mut names: Vec<u32> = neighbors.of(low_name).iter().map(|n| n.0).collect();
-        names.extend(neighbors.of(high_name).iter().map(|n| n.0));
-        names.extend([low_name, high_name]);
-        names.sort_unstable();
-        names.dedup();
-        let report = opened.report;
-        let interface = report.interface;
-        let measures = [
-            ("cut", f64::from(cut)),
-            ("zone_vertices", report.refine.inserted as f64),
-            ("zone_rejects", report.refine.out_of_place as f64),
-            ("frozen_hits", report.refine.frozen_hits as f64),
-            ("free_tets", interface.free_tets as f64),
-            ("moves", interface.moves as f64),
-            ("natural_faces", interface.natural.faces as f64),
-            ("minimum_faces", interface.minimum.faces as f64),
-            ("interface_faces", interface.chosen.faces as f64),
-            ("natural_face_quality", interface.natural.quality_mean()),
-            ("interface_face_quality", interface.chosen.quality_mean()),
-            (
-                "natural_over_constrained",
-                interface.natural.over_constrained as f64,
-            ),
-            ("over_constrained", interface.chosen.over_constrained as f64),
-            ("at_surface", interface.chosen.at_surface as f64),
-            ("natural_pinched", interface.natural.pinched as f64),
-            ("pinched", interface.chosen.pinched as f64),
-            ("z_tets", report.z_tets as f64),
-            ("z_enclosed", report.z_enclosed as f64),
-            (
-                "layers_least",
-                report.layers_least.map_or(f64::INFINITY, f64::from),
-            ),
-            ("choice_bytes", interface.bytes as f64),
-            ("plane_s", report.seconds.plane),
-            ("zone_s", report.seconds.zone),
-            ("core_s", report.seconds.core),
-            ("interface_s", report.seconds.interface),
-            ("load_low", report.plane.load[0]),
-            ("load", report.plane.load[1]),
-            ("pages_read", divided.pages.pages_read as f64),
-            ("pages_written", divided.pages.pages_written as f64),
-            ("frames_used", divided.frames_used as f64),
-        ];
-        let mut row = journal(StoreState::Bisected, "bisect", divided.clock, &measures);
-        row.subdomain = Some(low_name);
+        let topology = TopologyChange::of_cut(
+            self.catalog,
+            &NewCut {
+                cut,
+                faces: opened.report.interface.chosen.faces as u32,
+                low: low.mesh.part.first,
+                high: high.mesh.part.first,
+                inherited: &high.inherited,
+            },
+        )?;
+        let journal = CutJournal {
+            cut,
+            subdomain: low.mesh.part.first,
+            report: &opened.report,
+            pages: divided.pages,
+            frames_used: divided.frames_used,
+        };
+        let row = journal.row(divided.clock);
         self.catalog.commit(|step| {
             for child in children {
                 step.list_file(child.mesh.part.first, child.mesh.generation);
@@ -336,12 +283,7 @@ impl Run<'_> {
             step.unlist_file(parent.part.first, parent.generation);
             stages.describe(&opened.zone, step);
             step.set_blob(blob::CUT + cut, &tree::plane_bytes(&opened.zone.surface));
-            for (cut, table) in &owners {
-                step.set_blob(blob::OWNERS + cut, &table.to_bytes());
-            }
-            for &name in &names {
-                step.set_topology(&topology_row(&neighbors, name));
-            }
+            topology.commit(step);
             step.set_state(StoreState::Bisected);
             step.append_journal(&row);
             Ok(())
@@ -349,57 +291,5 @@ impl Run<'_> {
         self.pages.add(divided.pages);
         self.frames_used = self.frames_used.max(divided.frames_used);
         Ok([low.mesh, high.mesh])
-    }
-}
-
-/// Opens a part's mesh from the file `base`.
-pub(crate) fn open_part(
-    part: PartMesh,
-    base: DiskPath,
-    mut backing: Backing,
-    frames: u64,
-) -> Result<Mesh, PipelineError> {
-    backing.base = Some(StoreFile::open_repaired(
-        &base,
-        backing.cache_bytes / 2,
-        false,
-    )?);
-    let mut pager = Pager::new(frames, Some(backing));
-    pager.adopt(part.extents);
-    Ok(Mesh::with_state(pager, part.state))
-}
-
-/// The owners of a cut's faces.
-pub(crate) fn read_owners(
-    catalog: &mut crate::store::Catalog,
-    cut: u32,
-) -> Result<Owners, StoreError> {
-    let bytes = catalog.blob(blob::OWNERS + cut)?.unwrap_or_default();
-    Owners::from_bytes(&bytes).ok_or_else(|| {
-        StoreError::Sealed(SealedError::Content {
-            path: catalog.dir().to_owned(),
-            subdomain: cut,
-            what: format!("the table of owners of cut {cut} is damaged"),
-        })
-    })
-}
-
-fn neighbors_of(rows: &[TopologyRow]) -> Neighbors {
-    let mut neighbors = Neighbors::default();
-    for row in rows {
-        for neighbor in &row.neighbors {
-            neighbors.set(row.subdomain, neighbor.subdomain, neighbor.faces);
-        }
-    }
-    neighbors
-}
-
-fn topology_row(neighbors: &Neighbors, name: u32) -> TopologyRow {
-    let of = neighbors.of(name).into_iter();
-    TopologyRow {
-        subdomain: name,
-        neighbors: of
-            .map(|(subdomain, faces)| NeighborRow { subdomain, faces })
-            .collect(),
     }
 }

@@ -31,7 +31,7 @@ const BESIDE_VERTEX: u64 = 24;
 const LOOK_TRIANGLE: u64 = 160;
 const LOOK_LEAST: u64 = 16 << 20;
 
-/// The vertices and facets of a surface in a mesh, made before there was a store.
+/// The vertices and facets of a surface in a mesh, inserted before there was a store.
 pub struct HeadStart {
     mesh: Mesh,
     kernel: KernelStats,
@@ -90,7 +90,7 @@ impl HeadStartShare {
 /// Does `look`, which finds out whether and how `surface` is to be meshed; meanwhile its vertices are inserted, where there is a second thread
 /// and memory for both under `cap`.
 ///
-/// `look` is told how many bytes of the cap it has to leave. What it returns does not depend on that. Effects: none on disk.
+/// `look` receives how many bytes of the cap it has to leave. What it returns does not depend on that. Effects: none on disk.
 /// Errors: those of `look`; what was inserted is then dropped.
 pub fn ahead<T, E>(
     surface: &Surface,
@@ -133,7 +133,7 @@ impl Drop for Vain<'_> {
     }
 }
 
-/// Inserts everything, or gives up: there is too little memory, or a point that must be told of in its turn, or a stop is wanted.
+/// Inserts everything, or gives up: there is too little memory, or a point whose error must be reported in its turn, or the run is cancelled.
 fn begin(
     surface: &Surface,
     share: &HeadStartShare,
@@ -155,7 +155,7 @@ fn begin(
         let kernel = triangulate(&mut mesh, surface, &ScratchSpace::boundless(), &watch).ok()?;
         Some((mesh, kernel))
     });
-    // What failed here fails again, or finds room, where it is told.
+    // What failed here fails again, or finds memory, where it is reported.
     let (mesh, kernel) = inserted.ok()??;
     Some(HeadStart {
         mesh,
@@ -232,7 +232,7 @@ mod tests {
         let bytes = begun.bytes();
         let (mut mesh, found) = begun.into_mesh(bytes, backing);
         assert_eq!(found, kernel);
-        // As many pages again, so that those made ahead leave memory.
+        // As many pages again, so that those inserted early leave memory.
         let n = mesh.pages().n_pages::<{ kind::SCRATCH }>() + 4 * mesh.pages().frames_used() as u32;
         for page in 0..n {
             mesh.set_scratch((page << SLOT_BITS) * 8, page);

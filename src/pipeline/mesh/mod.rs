@@ -2,8 +2,11 @@
 
 pub(super) mod coarse;
 pub(super) mod coarse_snapshot;
+pub(super) mod common;
+mod cut_journal;
 pub(super) mod divide;
 mod head_start;
+pub(super) mod owners;
 mod run;
 mod saturate;
 mod stages;

@@ -6,9 +6,10 @@ use std::time::Instant;
 
 use super::FineReport;
 use super::coarse::{CoarseReport, inserted, recovered};
-use super::divide::{DONE, read_owners};
+use super::common::Common;
 use super::head_start::{HeadStart, ahead};
-use super::subdomain::{Common, FinishedSubdomain, SubdomainJob};
+use super::owners::read_owners;
+use super::subdomain::{FinishedSubdomain, SubdomainJob};
 use crate::bisect::{CutReport, load_of};
 use crate::boundary::RegionSummary;
 use crate::geom::{Aabb, HilbertFrame};
@@ -18,8 +19,8 @@ use crate::pipeline::plan::estimate::n_subdomains;
 use crate::pipeline::plan::leases::Leases;
 use crate::pipeline::plan::{Estimate, Options, Plan, Prepared, prepare};
 use crate::pipeline::progress::Watcher;
-use crate::pipeline::seal::totals::{SealedTotals, Totals, journal, whole};
-use crate::pipeline::tree::{self, PartMesh, TreePart, blob};
+use crate::pipeline::seal::totals::{SealedTotals, Totals, journal, sum_totals};
+use crate::pipeline::tree::{self, DONE, PartMesh, TreePart, blob};
 use crate::pipeline::workers::map_bounded;
 use crate::sizing::{SizeField, SizeSummary, TETS_PER_LOAD};
 use crate::storage::{Backing, Budget, DiskPath, Pager, PagerStats, ScratchSpace, attempt};
@@ -398,7 +399,7 @@ impl<'a> Run<'a> {
         let Totals {
             regions,
             interfaces,
-        } = whole(self.catalog, self.n, &BTreeMap::new())?;
+        } = sum_totals(self.catalog, self.n, &BTreeMap::new())?;
         let scratch = self.catalog.scratch_dir()?;
         self.catalog.commit(|step| {
             step.set_regions(&regions);

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use super::subdomain::Common;
+use super::common::Common;
 use crate::bisect::{OutsideZones, Zone};
 use crate::mesh::{Mesh, Workspace};
 use crate::optimize::{self, OptimizeReport};
@@ -22,7 +22,7 @@ pub struct FineReport {
 }
 
 /// Divides and optimizes a coarse mesh; no vertex is added in `zones`, which are final.
-pub(crate) fn fine<P: Pages>(
+pub(crate) fn saturate_and_optimize<P: Pages>(
     mesh: &mut Mesh<P>,
     field: &SizeField,
     common: Common,

@@ -8,7 +8,8 @@ use crate::geom::{Aabb, Point};
 use crate::mesh::Mesh;
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::progress::Watcher;
-use crate::pipeline::seal::compact::{SealTarget, seal};
+use crate::pipeline::seal::compact::seal;
+use crate::pipeline::seal::target::SealTarget;
 use crate::pipeline::tree::blob;
 use crate::sealed::SealedError;
 use crate::sealed::{Form, Sealed};
@@ -58,7 +59,7 @@ impl StageFiles {
     }
 
     /// Seals the mesh as it is. Effects: its scratch map is used up. Errors: the disk.
-    pub(crate) fn keep<P: Pages>(
+    pub(crate) fn save<P: Pages>(
         &self,
         mesh: &mut Mesh<P>,
         stage: Stage,

@@ -5,18 +5,17 @@ use std::time::Instant;
 
 use tetdb_schema::ids::SubdomainId;
 
-use super::coarse_snapshot::keep;
-use super::divide::open_part;
-use super::saturate::{FineReport, fine};
-use crate::bisect::{Method, Zone};
-use crate::geom::Aabb;
+use super::coarse_snapshot::save;
+use super::common::Common;
+use super::saturate::{FineReport, saturate_and_optimize};
+use crate::bisect::Zone;
 use crate::mesh::{Mesh, Workspace};
-use crate::optimize::Mode;
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::Plan;
 use crate::pipeline::progress::Watcher;
-use crate::pipeline::seal::compact::{SealTarget, seal};
-use crate::pipeline::tree::PartMesh;
+use crate::pipeline::seal::compact::seal;
+use crate::pipeline::seal::target::SealTarget;
+use crate::pipeline::tree::{PartMesh, open_part};
 use crate::sealed::{Form, Sealed};
 use crate::sizing::SizeField;
 use crate::storage::{Backing, DiskPath, PagerStats, attempt};
@@ -34,7 +33,7 @@ pub(crate) struct SubdomainJob {
     pub generation: u32,
     /// A size field of its own, in place of that of the whole.
     pub field: Option<SizeField>,
-    /// Where to keep the coarse leaf, if it is to be kept.
+    /// Where to keep the coarse snapshot, if it is to be kept.
     pub kept: Option<DiskPath>,
     pub scratch: DiskPath,
     pub zones: Vec<Zone>,
@@ -43,22 +42,13 @@ pub(crate) struct SubdomainJob {
     pub share: Plan,
 }
 
-/// What is the same for all sub-domains.
-#[derive(Clone, Copy)]
-pub(crate) struct Common<'a> {
-    pub field: &'a SizeField,
-    pub mode: Mode,
-    pub method: Method,
-    pub bounds: Aabb,
-}
-
 /// A finished sub-domain; its file is not yet listed.
 pub(crate) struct FinishedSubdomain {
     pub part: PartMesh,
     pub generation: u32,
     pub sealed: Sealed,
     pub kept: Option<CoarseRow>,
-    /// Seconds it took to keep the coarse leaf.
+    /// Seconds it took to keep the coarse snapshot.
     pub keep_s: f64,
     pub fine: FineReport,
     pub pages: PagerStats,
@@ -102,11 +92,11 @@ impl SubdomainJob {
         };
         let (rank, coarse) = (self.part.part.first, self.part.generation);
         let kept = match &self.kept {
-            Some(path) => Some(keep(&mut mesh, path, rank, coarse, self.share.buffers)?),
+            Some(path) => Some(save(&mut mesh, path, rank, coarse, self.share.buffers)?),
             None => None,
         };
         let keep_s = clock.elapsed().as_secs_f64();
-        let fine = fine(
+        let fine = saturate_and_optimize(
             &mut mesh,
             self.field.as_ref().unwrap_or(common.field),
             common,

@@ -1,4 +1,4 @@
-//! What a mesh will be and what it will take, before any of it is made.
+//! What a mesh will be and what it will take, before any of it exists.
 //!
 //! Numbers of tetrahedra come from the size field and the surface; bytes and seconds per tetrahedron, vertex and triangle are measured.
 //! Unless another case is named, they are those of `balls,count=100` (394,000 tetrahedra on 62,000 triangles), `box,h=0.02` (1.03 million on
@@ -15,9 +15,9 @@ use crate::sizing::{
 use crate::storage::{ScratchSpace, attempt};
 use crate::surface::{OUTSIDE, Seeker, Surface, Volumes};
 
-/// Bytes held while volumes are told, for each triangle: which volume each side has, which sides see each other, and which is left out.
+/// Bytes held while volumes are identified, for each triangle: which volume each side has, which sides see each other, and which is left out.
 const PREPARE_TRIANGLE: usize = 17;
-/// Bytes held while sizes are made, for each vertex: its size, and lists of those near a cell.
+/// Bytes held while sizes are computed, for each vertex: its size, and lists of those near a cell.
 const PREPARE_VERTEX: usize = 20;
 /// Bytes for frames of what is not held.
 const PREPARE_LEAST: usize = 8 << 20;
@@ -32,12 +32,12 @@ const DELAUNAY: f64 = 1.025;
 const SEALED_TET: f64 = 2.74;
 const SEALED_VERTEX: f64 = 22.1;
 const SEALED_FACET: f64 = 10.0;
-/// Bytes of the coarse leaves for each triangle, and for each tetrahedron of the refined zones: 14 to 20, and 8 to 10.
+/// Bytes of the coarse snapshots for each triangle, and for each tetrahedron of the refined zones: 14 to 20, and 8 to 10.
 const KEPT_TRIANGLE: f64 = 18.0;
 const KEPT_ZONE_TET: f64 = 9.0;
 /// Of one kept as working pages, for each record of whatever kind: a slot, and a quarter of another.
 const PAGES_RECORD: f64 = 40.05;
-/// The least file of a sub-domain, of a coarse leaf, and the catalog without its size field: redb's own pages.
+/// The least file of a sub-domain, of a coarse snapshot, and the catalog without its size field: redb's own pages.
 const FILE_LEAST: f64 = 50e3;
 const COARSE_FILE_LEAST: f64 = 30e3;
 const CATALOG_LEAST: f64 = 100e3;
@@ -93,7 +93,7 @@ pub struct Estimate {
     sizes_bytes: u64,
     /// How finished sub-domains are kept.
     form: Form,
-    /// Whether the coarse leaves stay in the store.
+    /// Whether the coarse snapshots stay in the store.
     keeps_coarse: bool,
 }
 
@@ -112,17 +112,17 @@ pub fn prepare(
     surface: &Surface,
     options: &Options,
     background: Option<&Background>,
-    room: &ScratchSpace,
+    scratch: &ScratchSpace,
 ) -> Result<Prepared, PipelineError> {
     // A scratch file that fails unwinds to here.
-    attempt(|| prepare_in(surface, options, background, room))?
+    attempt(|| prepare_in(surface, options, background, scratch))?
 }
 
 fn prepare_in(
     surface: &Surface,
     options: &Options,
     background: Option<&Background>,
-    room: &ScratchSpace,
+    scratch: &ScratchSpace,
 ) -> Result<Prepared, PipelineError> {
     if let (Some(file), None) = (&options.size_field, background) {
         return Err(PipelineError::SizeField { file: file.clone() });
@@ -141,15 +141,21 @@ fn prepare_in(
             constraints: &constraints,
             at_vertices,
         };
-        SizeField::build_with(&surface.points, &surface.triangles, &asked, &further, room)
+        SizeField::build_with(
+            &surface.points,
+            &surface.triangles,
+            &asked,
+            &further,
+            scratch,
+        )
     };
-    // What building takes is given back before the surface's tree is made, where regions have no sizes of their own.
+    // What building takes is given back before the surface's tree is built, where regions have no sizes of their own.
     let early = match asked.regions.is_empty() {
         true => Some(built(&[])?),
         false => None,
     };
-    let seeker = Seeker::of(surface, room, |_| true);
-    let volumes = Volumes::of_in(&seeker, room);
+    let seeker = Seeker::of(surface, scratch, |_| true);
+    let volumes = Volumes::of_in(&seeker, scratch);
     let policy = options.regions()?;
     let chosen = policy.filled(OUTSIDE, volumes.n_volumes, &volumes.walls())?;
     let filled: Vec<bool> = (0..volumes.n_volumes)
@@ -162,10 +168,10 @@ fn prepare_in(
     };
     let (field, mut sizes) = match early {
         Some(built) => built,
-        None => built(&region_sizes(&domain, &asked, room)?)?,
+        None => built(&region_sizes(&domain, &asked, scratch)?)?,
     };
     if background.is_some() {
-        sizes.source = format!("--size-field, {}", sizes.source);
+        sizes.source = format!("a size field, {}", sizes.source);
     }
     let estimate = Estimate::of(&domain, options, &field)?;
     Ok(Prepared {
@@ -210,7 +216,7 @@ impl Estimate {
     }
 
     /// Bytes of surface and size field, held all the time under `cap`.
-    pub fn held_bytes(&self, cap: u64) -> u64 {
+    pub fn resident_bytes(&self, cap: u64) -> u64 {
         let share = SizeField::share_of(cap.saturating_sub(self.surface_bytes));
         self.surface_bytes + self.octree_bytes + self.sizes_bytes.min(share)
     }
@@ -226,7 +232,7 @@ impl Estimate {
         (sealed + files) as u64 + self.octree_bytes + self.sizes_bytes + self.coarse_bytes()
     }
 
-    /// Bytes of the coarse leaves in it.
+    /// Bytes of the coarse snapshots in it.
     fn coarse_bytes(&self) -> u64 {
         if !self.keeps_coarse {
             return 0;
@@ -235,10 +241,10 @@ impl Estimate {
         (KEPT_TRIANGLE * self.triangles as f64 + KEPT_ZONE_TET * self.zone_tets() + files) as u64
     }
 
-    /// Most bytes on disk while it is made with `cap` bytes of memory by so many threads.
+    /// Most bytes on disk while it is meshed with `cap` bytes of memory by so many threads.
     pub fn disk_peak_bytes(&self, cap: u64, threads: usize) -> u64 {
         let (n, at_once) = (f64::from(self.subdomains), self.at_once(threads));
-        let (frames, buffers) = match Plan::new(cap, self.held_bytes(cap)) {
+        let (frames, buffers) = match Plan::new(cap, self.resident_bytes(cap)) {
             Ok(plan) => (plan.frames as f64, plan.buffers as f64),
             Err(_) => (0.0, 0.0),
         };
@@ -282,7 +288,7 @@ impl Estimate {
     pub fn memory_full_bytes(&self, threads: usize) -> u64 {
         let pages = self.pages_bytes(threads);
         let buffers = (BUFFERS_TET * self.tets()).min(BUFFERS_MAX);
-        // All triangles while the coarse mesh is made, later those of the sub-domains at hand.
+        // All triangles while the coarse mesh is built, later those of the sub-domains at hand.
         let triangles = BESIDE_TRIANGLE * self.triangles as f64;
         let share = self.at_once(threads) / f64::from(self.subdomains);
         let beside = BESIDE_TET / FRAMES_TET * pages + share * triangles;
@@ -297,13 +303,13 @@ impl Estimate {
     /// The smallest cap under which all steps find room.
     pub fn memory_least_bytes(&self) -> u64 {
         let mut cap = (self.least_to_prepare + self.octree_bytes).max(MEMORY_MIN);
-        while Plan::new(cap, self.held_bytes(cap)).is_err() {
+        while Plan::new(cap, self.resident_bytes(cap)).is_err() {
             cap += 1 << 20;
         }
         cap
     }
 
-    /// Seconds on so many threads, with verification. Only sub-domains are made side by side.
+    /// Seconds on so many threads, with verification. Only sub-domains are meshed side by side.
     pub fn seconds(&self, threads: usize) -> f64 {
         let side_by_side = f64::from(self.subdomains).min(threads.max(1) as f64);
         SECONDS_TRIANGLE * self.triangles as f64
@@ -311,7 +317,7 @@ impl Estimate {
             + SECONDS_VERIFY * self.tets()
     }
 
-    /// Sub-domains made at one time.
+    /// Sub-domains meshed at one time.
     fn at_once(&self, threads: usize) -> f64 {
         f64::from(self.subdomains).min(threads.max(1) as f64)
     }
@@ -344,7 +350,7 @@ pub fn least_for(surface: &Surface) -> u64 {
     cap
 }
 
-/// The smallest cap under which volumes and sizes can be told: what is held of each triangle and vertex beside the surface.
+/// The smallest cap under which volumes and sizes can be computed: what is held of each triangle and vertex beside the surface.
 fn least_to_prepare(surface: &Surface) -> u64 {
     let beside = PREPARE_TRIANGLE * surface.n_triangles() + PREPARE_VERTEX * surface.n_vertices();
     (surface.bytes() + beside + PREPARE_LEAST) as u64
@@ -387,7 +393,7 @@ mod tests {
         assert_eq!(made.sizes.to_string(), wide.sizes.to_string());
         assert_eq!(made.field.to_bytes(), wide.field.to_bytes());
         assert!(made.field.bytes() < wide.field.bytes());
-        // What is held of it, and no more, is what the ledger was told.
+        // What is held of it, and no more, is what the ledger has recorded.
         assert!(made.field.bytes() as u64 <= wide.estimate.octree_bytes + (1 << 20));
         Ok(())
     }

@@ -7,7 +7,7 @@ use crate::storage::{Budget, Lease};
 use crate::surface::Surface;
 
 /// Share of the surface that stays with the process once it is dropped, as heap between what is still in use: with 50,000 grains 21 MB of 120
-/// were still there while sub-domains were made, which a resumed run never held.
+/// were still there while sub-domains were meshed, which a resumed run never held.
 const LEFT_BEHIND: usize = 8;
 
 /// What the ledger has given to a run, and how it is shared out.

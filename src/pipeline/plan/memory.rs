@@ -76,7 +76,7 @@ impl Plan {
         }
     }
 
-    /// How many sub-domains can be made at once: a worker needs frames of its own.
+    /// How many sub-domains can be meshed at once: a worker needs frames of its own.
     pub fn workers(&self) -> usize {
         let by_frames = (self.frames / FRAMES_OF_WORKER).max(1);
         n_threads().min(usize::try_from(by_frames).unwrap_or(usize::MAX))

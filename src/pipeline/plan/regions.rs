@@ -11,7 +11,7 @@ use crate::surface::Surface;
 pub(crate) fn region_sizes<'a>(
     domain: &Domain<'a>,
     sizes: &SizeOptions,
-    room: &ScratchSpace,
+    scratch: &ScratchSpace,
 ) -> Result<Vec<Region<'a>>, PipelineError> {
     let diagonal = domain.seeker.surface().bounds().diagonal();
     let one = |size: &RegionSize| {
@@ -20,7 +20,14 @@ pub(crate) fn region_sizes<'a>(
         let Domain {
             seeker, volumes, ..
         } = *domain;
-        Ok(Region::new(seeker, volumes, is_here, h, sizes.beta(), room))
+        Ok(Region::new(
+            seeker,
+            volumes,
+            is_here,
+            h,
+            sizes.beta(),
+            scratch,
+        ))
     };
     sizes.regions.iter().map(one).collect()
 }

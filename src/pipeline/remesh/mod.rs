@@ -1,12 +1,14 @@
 //! Sub-domains of a finished store meshed again, and the way back.
 
 mod previous;
+mod request;
 mod resaturate;
 mod run;
 mod sizes;
+mod summary;
 
 pub use previous::{forget, undo};
-pub use resaturate::{
-    Forecast, Remade, ResaturateSummary, Resaturation, asked, changed, forecast, resaturate,
-};
+pub use request::Resaturation;
+pub use resaturate::{Forecast, asked, changed, forecast, resaturate};
 pub use sizes::{NewSizes, Values};
+pub use summary::{Remade, ResaturateSummary};

@@ -1,11 +1,11 @@
-//! The previous version of sub-domains that were made again: brought back or dropped.
+//! The previous version of sub-domains that were meshed again: brought back or dropped.
 
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use super::resaturate::{Remade, ResaturateSummary};
+use super::summary::{Remade, ResaturateSummary};
 use crate::pipeline::error::PipelineError;
-use crate::pipeline::seal::totals::{journal, totals_of, whole};
+use crate::pipeline::seal::totals::{journal, sum_totals, totals_of};
 use crate::pipeline::tree::{self, blob};
 use crate::storage::PagerStats;
 use crate::store::{Catalog, Step, StoreError};
@@ -16,7 +16,7 @@ use tetdb_schema::catalog::{StoreState, SubdomainRow};
 /// Errors: [`PipelineError::NothingToUndo`].
 pub fn undo(catalog: &mut Catalog) -> Result<ResaturateSummary, PipelineError> {
     let clock = Instant::now();
-    let before = catalog.before()?;
+    let before = catalog.previous()?;
     if before.is_empty() {
         return Err(PipelineError::NothingToUndo {
             path: catalog.dir().to_owned(),
@@ -38,7 +38,7 @@ pub fn undo(catalog: &mut Catalog) -> Result<ResaturateSummary, PipelineError> {
             fine: None,
         });
     }
-    let regions = whole(catalog, n, &totals)?.regions;
+    let regions = sum_totals(catalog, n, &totals)?.regions;
     catalog.commit(|step| {
         for ([now, then], old, new) in &blobs {
             let length = |blob: &Option<Vec<u8>>| blob.as_ref().map_or(0, Vec::len);
@@ -49,7 +49,7 @@ pub fn undo(catalog: &mut Catalog) -> Result<ResaturateSummary, PipelineError> {
             }
         }
         for part in &parts {
-            step.remove_before(part.after.rank);
+            step.remove_previous(part.after.rank);
             step.set_subdomain(&part.after);
             step.unlist_file(part.after.rank, part.before.generation);
         }
@@ -94,7 +94,7 @@ pub(crate) struct Previous {
 impl Previous {
     /// As the catalog has it. Errors: a damaged catalog.
     pub fn of(catalog: &mut Catalog) -> Result<Self, StoreError> {
-        let rows = catalog.before()?;
+        let rows = catalog.previous()?;
         let mut blobs = Vec::new();
         for row in &rows {
             for (_, then) in VERSIONED {
@@ -109,7 +109,7 @@ impl Previous {
     /// Forgets it in `step`.
     pub fn drop(&self, step: &mut Step) {
         for row in &self.rows {
-            step.remove_before(row.rank);
+            step.remove_previous(row.rank);
             step.unlist_file(row.rank, row.generation);
         }
         for &(number, length) in &self.blobs {

@@ -1,50 +1,22 @@
-//! Sub-domains made again from their coarse leaves, each alone; what lies around them stays as it is.
+//! Sub-domains meshed again from their coarse snapshots, each alone; what lies around them stays as it is.
 //!
 //! Workers write new files beside the old ones; when all are done, one commit lists the new files and remembers the old as the previous
 //! version. A run that is killed leaves the old mesh or the new one.
 
 use std::collections::BTreeSet;
 
-use super::run::RemeshRun;
+use super::request::Resaturation;
+use super::run::{RemeshRun, recorded_field};
 use super::sizes::{NewSizes, Recorded, predicted};
+use super::summary::ResaturateSummary;
 use crate::pipeline::error::PipelineError;
-use crate::pipeline::mesh::FineReport;
 use crate::pipeline::plan::Options;
 use crate::pipeline::progress::Watcher;
-use crate::pipeline::tree::{self, blob};
-use crate::sizing::SizeField;
-use crate::storage::{Budget, PagerStats, attempt};
+use crate::pipeline::tree::blob;
+use crate::storage::{Budget, attempt};
 use crate::store::{Catalog, StoreError};
-use tetdb_schema::catalog::SubdomainRow;
 
-/// What to make again.
-#[derive(Clone, Debug)]
-pub struct Resaturation {
-    pub ranks: BTreeSet<u32>,
-    /// `None`: with the sizes that are recorded.
-    pub sizes: Option<NewSizes>,
-    /// The file of each is damaged: it must become what the catalog says it was, and is no previous version.
-    pub repair: bool,
-}
-
-/// A sub-domain before and after.
-#[derive(Clone, Debug)]
-pub struct Remade {
-    pub before: SubdomainRow,
-    pub after: SubdomainRow,
-    /// `None` where an older version came back.
-    pub fine: Option<FineReport>,
-}
-
-/// What a run did, by rank.
-#[derive(Clone, Debug)]
-pub struct ResaturateSummary {
-    pub parts: Vec<Remade>,
-    pub pages: PagerStats,
-    pub frames_used: usize,
-}
-
-/// What would be made again.
+/// What would be meshed again.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Forecast {
     pub rank: u32,
@@ -53,10 +25,10 @@ pub struct Forecast {
     pub predicted: f64,
 }
 
-/// Makes sub-domains of a finished store again, in one step.
+/// Meshes sub-domains of a finished store again, in one step.
 ///
 /// The result depends on the store and the sizes alone. Interfaces and all other sub-domains stay as they are. Effects: one commit; the
-/// replaced files stay as the previous version, the one before goes. Errors: a sub-domain that is not there or whose coarse leaf
+/// replaced files stay as the previous version, the one before goes. Errors: a sub-domain that is not there or whose coarse snapshot
 /// was not kept; sizes that make no sense. The store is then as it was.
 pub fn resaturate(
     catalog: &mut Catalog,
@@ -111,7 +83,7 @@ pub fn changed(
     sizes: &NewSizes,
     budget: &Budget,
 ) -> Result<BTreeSet<u32>, PipelineError> {
-    let field = whole_field(catalog, options)?;
+    let field = recorded_field(catalog, options)?;
     let recorded = Recorded { whole: &field };
     let mut ranks = BTreeSet::new();
     for row in catalog.subdomains()? {
@@ -123,21 +95,10 @@ pub fn changed(
     Ok(ranks)
 }
 
-/// What was asked for when a sub-domain was last made again with other sizes; `None` for one with those of the whole.
+/// What was asked for when a sub-domain was last meshed again with other sizes; `None` for one with those of the whole.
 ///
 /// Errors: a damaged catalog.
 pub fn asked(catalog: &mut Catalog, rank: u32) -> Result<Option<String>, StoreError> {
     let bytes = catalog.blob(blob::ASKED + rank)?;
     Ok(bytes.map(|bytes| String::from_utf8_lossy(&bytes).into_owned()))
-}
-
-/// The recorded field of the whole.
-pub(crate) fn whole_field(
-    catalog: &mut Catalog,
-    options: &Options,
-) -> Result<SizeField, PipelineError> {
-    let bytes = catalog.blob(blob::SIZE_FIELD)?.unwrap_or_default();
-    let diagonal = tree::bounds(catalog)?.diagonal();
-    let field = SizeField::from_bytes(&bytes)?;
-    Ok(field.with_sources(&options.sizes()?, diagonal)?)
 }

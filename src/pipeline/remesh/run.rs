@@ -5,16 +5,18 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::previous::{Previous, VERSIONED};
-use super::resaturate::{Remade, ResaturateSummary, Resaturation, whole_field};
+use super::request::Resaturation;
 use super::sizes::{Recorded, Values};
+use super::summary::{Remade, ResaturateSummary};
 use crate::mesh::Workspace;
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::mesh::coarse_snapshot::reopen;
-use crate::pipeline::mesh::divide::read_owners;
-use crate::pipeline::mesh::subdomain::{Common, FinishedSubdomain, SubdomainJob};
+use crate::pipeline::mesh::common::Common;
+use crate::pipeline::mesh::owners::read_owners;
+use crate::pipeline::mesh::subdomain::{FinishedSubdomain, SubdomainJob};
 use crate::pipeline::plan::{Options, Plan};
 use crate::pipeline::progress::Watcher;
-use crate::pipeline::seal::totals::{SealedTotals, journal, whole};
+use crate::pipeline::seal::totals::{SealedTotals, journal, sum_totals};
 use crate::pipeline::tree::{self, PartMesh, blob};
 use crate::pipeline::workers::map_bounded;
 use crate::sealed::SealedError;
@@ -41,7 +43,7 @@ pub(crate) struct RemeshRun<'a> {
 
 /// A sub-domain to be made again.
 struct Job {
-    leaf: SubdomainJob,
+    subdomain: SubdomainJob,
     kept: CoarseRow,
     path: DiskPath,
 }
@@ -49,24 +51,24 @@ struct Job {
 impl Job {
     fn run(self, common: Common, watch: &Watcher) -> Result<FinishedSubdomain, PipelineError> {
         attempt(|| {
-            let share = self.leaf.share;
+            let share = self.subdomain.share;
             let backing = Backing {
                 subdomain: self.kept.rank,
-                generation: self.leaf.generation,
-                spill: self.leaf.scratch.clone(),
+                generation: self.subdomain.generation,
+                spill: self.subdomain.scratch.clone(),
                 made: None,
                 base: None,
                 cache_bytes: share.redb as usize,
             };
             let space = Workspace {
-                dir: &self.leaf.scratch,
+                dir: &self.subdomain.scratch,
                 memory: share.buffers / 2,
             };
             let cache = (share.redb / 2) as usize;
             let mut kept = CoarseSnapshot::open(&self.path, self.kept, cache)?;
             let mesh = reopen(&mut kept, backing, share.frames, &space)?;
             drop(kept);
-            self.leaf.finish(mesh, common, watch)
+            self.subdomain.finish(mesh, common, watch)
         })?
     }
 }
@@ -94,7 +96,7 @@ impl<'a> RemeshRun<'a> {
             *newest = file.generation.max(*newest);
         }
         Ok(Self {
-            field: Arc::new(whole_field(catalog, options)?),
+            field: Arc::new(recorded_field(catalog, options)?),
             last,
             n: tree::n_subdomains(catalog)?,
             catalog,
@@ -125,7 +127,7 @@ impl<'a> RemeshRun<'a> {
         for (row, _) in &self.rows {
             let field = match &self.what.sizes {
                 Some(sizes) => {
-                    let made = recorded.made_new(self.catalog, row.rank, sizes, from, memory)?;
+                    let made = recorded.build_new(self.catalog, row.rank, sizes, from, memory)?;
                     from += row.tets as usize;
                     Some(made)
                 }
@@ -211,13 +213,13 @@ impl<'a> RemeshRun<'a> {
             watch,
             |(again, _), (rank, field)| again.job(parts[rank as usize], field, share),
             &|job: Job, watch| job.run(common, watch).map(Box::new),
-            |(_, leaves), leaf| {
-                leaves.insert(leaf.sealed.row.rank, *leaf);
+            |(_, finished), subdomain| {
+                finished.insert(subdomain.sealed.row.rank, *subdomain);
                 Ok(())
             },
         )?;
-        let (again, leaves) = state;
-        again.commit(leaves, &made)
+        let (again, finished) = state;
+        again.commit(finished, &made)
     }
 
     fn job(
@@ -242,7 +244,7 @@ impl<'a> RemeshRun<'a> {
         let last = self.last.get(&rank).copied().unwrap_or(0);
         let scratch = self.catalog.scratch_dir()?.join(format!("leaf-{rank}"));
         scratch.create_dir_all()?;
-        let leaf = SubdomainJob {
+        let subdomain = SubdomainJob {
             part,
             base: self.catalog.coarse_path(rank, kept.generation),
             sealed: self.catalog.file_path(rank, last + 2),
@@ -257,7 +259,7 @@ impl<'a> RemeshRun<'a> {
             share,
         };
         Ok(Job {
-            leaf,
+            subdomain,
             kept,
             path: self.catalog.coarse_path(rank, kept.generation),
         })
@@ -265,12 +267,12 @@ impl<'a> RemeshRun<'a> {
 
     fn commit(
         &mut self,
-        leaves: BTreeMap<u32, FinishedSubdomain>,
+        finished: BTreeMap<u32, FinishedSubdomain>,
         made: &BTreeMap<u32, Vec<u8>>,
     ) -> Result<ResaturateSummary, PipelineError> {
         let (mut totals, mut old_blobs) = (BTreeMap::new(), Vec::new());
         for (row, _) in &self.rows {
-            let (rank, sealed) = (row.rank, &leaves[&row.rank].sealed);
+            let (rank, sealed) = (row.rank, &finished[&row.rank].sealed);
             assert_eq!(
                 sealed.row.interface_digest, row.interface_digest,
                 "the interfaces of sub-domain {rank} have changed"
@@ -279,7 +281,7 @@ impl<'a> RemeshRun<'a> {
                 return Err(StoreError::Sealed(SealedError::Content {
                     path: self.catalog.dir().to_owned(),
                     subdomain: rank,
-                    what: "made again it is not what the catalog says it was".to_owned(),
+                    what: "meshed again, it is not what the catalog says it was".to_owned(),
                 })
                 .into());
             }
@@ -288,7 +290,7 @@ impl<'a> RemeshRun<'a> {
                 old_blobs.push((then + rank, self.catalog.blob(now + rank)?));
             }
         }
-        let regions = whole(self.catalog, self.n, &totals)?.regions;
+        let regions = sum_totals(self.catalog, self.n, &totals)?.regions;
         let dropped = Previous::of(self.catalog)?;
         let (what, rows, clock) = (self.what, &self.rows, self.clock);
         let asked = what.sizes.as_ref().map(|sizes| sizes.asked.as_bytes());
@@ -306,28 +308,32 @@ impl<'a> RemeshRun<'a> {
                 }
             }
             for (row, _) in rows {
-                let (rank, leaf) = (row.rank, &leaves[&row.rank]);
-                step.list_file(rank, leaf.generation);
-                step.set_subdomain(&leaf.sealed.row);
+                let (rank, subdomain) = (row.rank, &finished[&row.rank]);
+                step.list_file(rank, subdomain.generation);
+                step.set_subdomain(&subdomain.sealed.row);
                 step.set_blob(blob::SEALED + rank, &totals[&rank].to_bytes());
                 match what.repair {
                     true => step.unlist_file(rank, row.generation),
-                    false => step.set_before(row),
+                    false => step.set_previous(row),
                 }
                 if let (Some(field), Some(asked)) = (made.get(&rank), asked) {
                     step.set_blob(blob::FIELD + rank, field);
                     step.set_blob(blob::ASKED + rank, asked);
                 }
-                let refine = &leaf.fine.refine;
+                let refine = &subdomain.fine.refine;
                 let measures = [
                     ("tets_before", row.tets as f64),
-                    ("tets", leaf.sealed.row.tets as f64),
+                    ("tets", subdomain.sealed.row.tets as f64),
                     ("inserted_vertices", refine.inserted as f64),
                     ("frozen_hits", refine.frozen_hits as f64),
-                    ("pages_read", leaf.pages.pages_read as f64),
-                    ("pages_written", leaf.pages.pages_written as f64),
+                    ("pages_read", subdomain.pages.pages_read as f64),
+                    ("pages_written", subdomain.pages.pages_written as f64),
                 ];
-                let since = if leaves.len() == 1 { clock } else { leaf.clock };
+                let since = if finished.len() == 1 {
+                    clock
+                } else {
+                    subdomain.clock
+                };
                 let mut journal = journal(StoreState::Sealed, step_name, since, &measures);
                 journal.subdomain = Some(rank);
                 step.append_journal(&journal);
@@ -345,15 +351,26 @@ impl<'a> RemeshRun<'a> {
             pages: PagerStats::default(),
             frames_used: 0,
         };
-        for ((before, _), leaf) in self.rows.iter().zip(leaves.into_values()) {
-            summary.pages.add(leaf.pages);
-            summary.frames_used = summary.frames_used.max(leaf.frames_used);
+        for ((before, _), subdomain) in self.rows.iter().zip(finished.into_values()) {
+            summary.pages.add(subdomain.pages);
+            summary.frames_used = summary.frames_used.max(subdomain.frames_used);
             summary.parts.push(Remade {
                 before: before.clone(),
-                after: leaf.sealed.row,
-                fine: Some(leaf.fine),
+                after: subdomain.sealed.row,
+                fine: Some(subdomain.fine),
             });
         }
         Ok(summary)
     }
+}
+
+/// The recorded field of the whole.
+pub(crate) fn recorded_field(
+    catalog: &mut Catalog,
+    options: &Options,
+) -> Result<SizeField, PipelineError> {
+    let bytes = catalog.blob(blob::SIZE_FIELD)?.unwrap_or_default();
+    let diagonal = tree::bounds(catalog)?.diagonal();
+    let field = SizeField::from_bytes(&bytes)?;
+    Ok(field.with_sources(&options.sizes()?, diagonal)?)
 }

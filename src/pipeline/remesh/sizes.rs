@@ -82,7 +82,7 @@ impl Recorded<'_> {
     /// The field with which `rank` is to be made. `from`: where its lengths begin in those given one by one.
     ///
     /// Errors: lengths that are not as many as there should be; sizes that make no sense; damage.
-    pub fn made_new(
+    pub fn build_new(
         &self,
         catalog: &mut Catalog,
         rank: u32,
@@ -125,7 +125,7 @@ impl Recorded<'_> {
         let scaled;
         let (old, new): (&SizeField, &dyn SizeConstraint) = match &own {
             Some(own) => {
-                made = self.made_new(catalog, rank, sizes, 0, memory)?;
+                made = self.build_new(catalog, rank, sizes, 0, memory)?;
                 scaled = Scaled {
                     field: &made,
                     factor: 1.0,

@@ -5,36 +5,21 @@
 //! 2. tetrahedra sorted by their new numbers, smallest vertex first, which follows the curve too;
 //! 3. their required faces sorted by vertices and joined with the facets, which so learn their tetrahedra.
 
-use std::collections::BTreeMap;
-
-use tetdb_schema::ids::{Owner, SubdomainId, VertexId};
+use tetdb_schema::ids::{Owner, VertexId};
 use tetdb_schema::leaf::TetPlace;
 use tetdb_schema::page::NONE;
 use tetdb_schema::record::{InterfaceFace, SealedFacet, SealedTet, SealedVertex, tag};
 
 use super::neighbors::Neighbors;
-use crate::geom::{Aabb, HilbertFrame};
+use super::records::{Claim, RequiredFace, TetRecord};
+use super::target::SealTarget;
+use crate::geom::HilbertFrame;
 use crate::mesh::anatomy::FACES;
 use crate::mesh::{Mesh, VertexTag, dense};
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::progress::{Event, Watcher};
 use crate::sealed::{Form, Sealed, SealedWriter, sorted_face};
-use crate::storage::{DiskPath, Pages, Sorted, Sorter, check_cancelled};
-use crate::topology::Owners;
-
-/// Where and how to seal.
-pub(crate) struct SealTarget<'a> {
-    pub path: &'a DiskPath,
-    pub form: Form,
-    pub scratch: &'a DiskPath,
-    pub subdomain: SubdomainId,
-    pub generation: u32,
-    /// Bytes for sort runs and for the writer together.
-    pub memory: u64,
-    pub bounds: Aabb,
-    /// Owners of the faces of the cuts around it, by cut; without them interface faces are left out.
-    pub owners: Option<&'a BTreeMap<u32, Owners>>,
-}
+use crate::storage::{Keyed, Pages, Sorted, Sorter, check_cancelled};
 
 /// Writes `mesh` to `target`, in the order and under the numbers of a sealed sub-domain whatever the form. Effects: the mesh's scratch map is used up; `tet_of` must be right for all vertices.
 pub(crate) fn seal<P: Pages>(
@@ -69,7 +54,7 @@ pub(crate) fn seal<P: Pages>(
     Ok(writer.finish()?)
 }
 
-fn tell(watch: &Watcher, stage: &'static str, done: u64, total: u32) {
+fn report_progress(watch: &Watcher, stage: &'static str, done: u64, total: u32) {
     if done.is_multiple_of(65_536) {
         check_cancelled();
         watch(Event {
@@ -88,19 +73,17 @@ fn vertices<P: Pages>(
     watch: &Watcher,
 ) -> Result<(), PipelineError> {
     let frame = HilbertFrame::new(&target.bounds);
-    let mut sorter = Sorter::<12>::new(target.scratch, target.memory / 4);
+    let mut sorter = Sorter::new(target.scratch, target.memory / 4);
     for v in mesh.vertex_ids() {
         // A surface vertex between two empty regions has no tetrahedron, but its facets are listed.
         if mesh.tet_of(v) == NONE && mesh.vertex_attribute(v).0 != VertexTag::Surface {
             continue;
         }
-        let mut record = [0; 12];
-        record[..8].copy_from_slice(&frame.index(mesh.point(v)).to_be_bytes());
-        record[8..].copy_from_slice(&v.to_be_bytes());
-        sorter.push(record)?;
+        let key = frame.index(mesh.point(v));
+        sorter.push(Keyed { key, id: v })?;
     }
     for (local, record) in sorter.finish()?.enumerate() {
-        let v = word(&record?, 8);
+        let v = record?.id;
         let local = local as u32;
         mesh.set_scratch(dense(v), local);
         let (point, h) = mesh.point_and_size(v);
@@ -127,19 +110,16 @@ fn vertices<P: Pages>(
             tag,
             id,
         })?;
-        tell(watch, "seal vertices", u64::from(local), mesh.n_vertices());
+        report_progress(watch, "seal vertices", u64::from(local), mesh.n_vertices());
     }
     Ok(())
 }
 
-/// Nodes, region and flags of a tetrahedron, 4 + 1 + 1 big-endian words, and a mask of its required faces.
-pub(crate) type TetRecord = [u8; 25];
-
 fn sort_tets<P: Pages>(
     mesh: &mut Mesh<P>,
     target: &SealTarget,
-) -> Result<Sorted<25>, PipelineError> {
-    let mut sorter = Sorter::<25>::new(target.scratch, target.memory / 4);
+) -> Result<Sorted<TetRecord>, PipelineError> {
+    let mut sorter = Sorter::new(target.scratch, target.memory / 4);
     let mut from = 0;
     while let Some((t, tet)) = mesh.next_tet(from) {
         from = t + 1;
@@ -147,130 +127,118 @@ fn sort_tets<P: Pages>(
         let nodes = [a, b, c, d].map(|v| mesh.scratch(dense(v)));
         let (region, flags) = mesh.tet_attribute(t);
         let rotated = SealedTet { nodes, region }.rotated();
-        let mut record: TetRecord = [0; 25];
+        let mut required = 0;
         for (i, node) in rotated.nodes.into_iter().enumerate() {
-            record[4 * i..4 * i + 4].copy_from_slice(&node.to_be_bytes());
             let old = nodes.iter().position(|&n| n == node).unwrap_or(0);
-            record[24] |= u8::from(tet.is_required(old)) << i;
+            required |= u8::from(tet.is_required(old)) << i;
         }
-        record[16..20].copy_from_slice(&region.to_be_bytes());
-        record[20..24].copy_from_slice(&flags.to_be_bytes());
-        sorter.push(record)?;
+        sorter.push(TetRecord {
+            nodes: rotated.nodes,
+            region,
+            flags,
+            required,
+        })?;
     }
     Ok(sorter.finish()?)
 }
 
-/// A required face: its vertices ascending, the tetrahedron, and whether ascending order is odd in it.
-type FaceRecord = [u8; 17];
-
 fn tets(
-    order: Sorted<25>,
+    order: Sorted<TetRecord>,
     n_tets: u32,
     neighbors: &mut Option<Neighbors>,
     target: &SealTarget,
     writer: &mut SealedWriter,
     watch: &Watcher,
-) -> Result<Sorted<17>, PipelineError> {
-    let mut faces = Sorter::<17>::new(target.scratch, target.memory / 4);
+) -> Result<Sorted<RequiredFace>, PipelineError> {
+    let mut faces = Sorter::new(target.scratch, target.memory / 4);
     for (t, record) in order.enumerate() {
-        let record = record?;
-        let nodes = nodes(&record);
-        let region = word(&record, 16);
+        let TetRecord {
+            nodes,
+            region,
+            flags,
+            required,
+        } = record?;
         match neighbors {
             None => writer.push_tet(nodes, region)?,
             Some(neighbors) => {
                 let place = TetPlace {
                     neighbors: neighbors.next()?,
-                    required: record[24],
-                    flags: word(&record, 20),
+                    required,
+                    flags,
                 };
                 writer.push_placed_tet(SealedTet { nodes, region }, &place)?;
             }
         }
-        for i in (0..4).filter(|i| record[24] >> i & 1 != 0) {
-            let (face, odd) = sorted_face(FACES[i].map(|k| nodes[k]));
-            faces.push(face_record(face, t as u32, odd))?;
+        for i in (0..4).filter(|i| required >> i & 1 != 0) {
+            let (vertices, odd) = sorted_face(FACES[i].map(|k| nodes[k]));
+            let tet = t as u32;
+            faces.push(RequiredFace { vertices, tet, odd })?;
         }
-        tell(watch, "seal tetrahedra", t as u64, n_tets);
+        report_progress(watch, "seal tetrahedra", t as u64, n_tets);
     }
     Ok(faces.finish()?)
 }
 
-fn face_record(face: [u32; 3], number: u32, odd: bool) -> FaceRecord {
-    let mut record: FaceRecord = [0; 17];
-    for (i, v) in face.into_iter().enumerate() {
-        record[4 * i..4 * i + 4].copy_from_slice(&v.to_be_bytes());
-    }
-    record[12..16].copy_from_slice(&number.to_be_bytes());
-    record[16] = u8::from(odd);
-    record
-}
-
-/// What claims a required face.
-const FACET: u8 = 0;
-const INTERFACE: u8 = 1;
-/// Vertices ascending, number, parity, kind.
-type ClaimRecord = [u8; 18];
-
 /// Joins facets and interface faces with the faces of tetrahedra; all ascend by their sorted vertices.
 fn facets<P: Pages>(
     mesh: &mut Mesh<P>,
-    faces: Sorted<17>,
+    faces: Sorted<RequiredFace>,
     target: &SealTarget,
     writer: &mut SealedWriter,
 ) -> Result<(), PipelineError> {
-    let mut sorter = Sorter::<18>::new(target.scratch, target.memory / 4);
+    let mut sorter = Sorter::new(target.scratch, target.memory / 4);
     for n in 0..mesh.n_facets() {
         let vertices = mesh.facet(n).vertices.map(|v| mesh.scratch(dense(v)));
-        sorter.push(claim_record(vertices, n, FACET))?;
+        sorter.push(claim(vertices, n, false))?;
     }
     let n_interface_faces = target.owners.map_or(0, |_| mesh.n_interface_faces());
     for n in 0..n_interface_faces {
         let face = mesh.interface_face(n);
         let vertices = face.vertices.map(|v| mesh.scratch(dense(v)));
-        sorter.push(claim_record(vertices, n, INTERFACE))?;
+        sorter.push(claim(vertices, n, true))?;
     }
     let mut faces = faces.peekable();
     // A face may be both a facet and an interface face: what was read stays at hand.
-    let (mut at, mut sides) = ([0; 12], [NONE; 2]);
+    let (mut at, mut sides) = ([0; 3], [NONE; 2]);
     // Of a facet given from both sides the first one names the tetrahedra.
     let mut is_named = [false; 2];
     for claim in sorter.finish()? {
         let claim = claim?;
-        if claim[..12] != at || sides == [NONE; 2] {
+        if claim.vertices != at || sides == [NONE; 2] {
             (sides, is_named) = ([NONE; 2], [false; 2]);
-            at.copy_from_slice(&claim[..12]);
-            while let Some(face) =
-                faces.next_if(|f| f.as_ref().map_or(true, |f| f[..12] <= claim[..12]))
-            {
+            at = claim.vertices;
+            let is_up_to = |face: &RequiredFace| face.vertices <= claim.vertices;
+            while let Some(face) = faces.next_if(|f| f.as_ref().map_or(true, is_up_to)) {
                 let face = face?;
-                if face[..12] == claim[..12] {
-                    sides[usize::from(face[16])] = word(&face, 12);
+                if face.vertices == claim.vertices {
+                    sides[usize::from(face.odd)] = face.tet;
                 }
             }
         }
         // A tetrahedron sees its face from inside turn as the facet does when it lies behind it.
-        let odd = usize::from(claim[16]);
-        let tets = match std::mem::replace(&mut is_named[usize::from(claim[17])], true) {
+        let odd = usize::from(claim.odd);
+        let named = &mut is_named[usize::from(claim.at_interface)];
+        let tets = match std::mem::replace(named, true) {
             true => [NONE; 2],
             false => [sides[1 - odd], sides[odd]],
         };
-        let number = word(&claim, 12);
-        if claim[17] == FACET {
-            push_facet(mesh, number, tets, writer)?;
+        if claim.at_interface {
+            push_interface_face(mesh, claim.number, tets[1], target, writer)?;
         } else {
-            push_interface_face(mesh, number, tets[1], target, writer)?;
+            push_facet(mesh, claim.number, tets, writer)?;
         }
     }
     Ok(())
 }
 
-fn claim_record(vertices: [u32; 3], number: u32, kind: u8) -> ClaimRecord {
-    let (face, odd) = sorted_face(vertices);
-    let mut record: ClaimRecord = [0; 18];
-    record[..17].copy_from_slice(&face_record(face, number, odd));
-    record[17] = kind;
-    record
+fn claim(vertices: [u32; 3], number: u32, at_interface: bool) -> Claim {
+    let (vertices, odd) = sorted_face(vertices);
+    Claim {
+        vertices,
+        number,
+        odd,
+        at_interface,
+    }
 }
 
 fn push_facet<P: Pages>(
@@ -314,14 +282,4 @@ fn push_interface_face<P: Pages>(
         tet,
     })?;
     Ok(())
-}
-
-/// The nodes of a tetrahedron, rotated.
-pub(crate) fn nodes(record: &TetRecord) -> [u32; 4] {
-    [0, 4, 8, 12].map(|at| word(record, at))
-}
-
-pub(crate) fn word(record: &[u8], at: usize) -> u32 {
-    let bytes = [record[at], record[at + 1], record[at + 2], record[at + 3]];
-    u32::from_be_bytes(bytes)
 }

@@ -2,4 +2,6 @@
 
 pub(super) mod compact;
 mod neighbors;
+mod records;
+pub(super) mod target;
 pub(super) mod totals;

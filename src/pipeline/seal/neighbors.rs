@@ -2,7 +2,8 @@
 
 use tetdb_schema::page::NONE;
 
-use super::compact::{SealTarget, TetRecord, nodes, word};
+use super::records::{Link, TetFace, TetRecord};
+use super::target::SealTarget;
 use crate::mesh::anatomy::FACES;
 use crate::pipeline::error::PipelineError;
 use crate::sealed::sorted_face;
@@ -10,37 +11,36 @@ use crate::storage::{Sorted, Sorter, check_cancelled};
 
 /// The four neighbors of each tetrahedron in turn.
 pub(crate) struct Neighbors {
-    /// A face, as 4 · tetrahedron + face, and the one on its other side, where there is one.
-    links: std::iter::Peekable<Sorted<8>>,
+    /// Of every face with another side.
+    links: std::iter::Peekable<Sorted<Link>>,
     tet: u32,
 }
 
 impl Neighbors {
     /// Of tetrahedra in their new order. Errors: the disk.
-    pub fn of(order: Sorted<25>, target: &SealTarget) -> Result<Self, PipelineError> {
+    pub fn of(order: Sorted<TetRecord>, target: &SealTarget) -> Result<Self, PipelineError> {
         let memory = target.memory / 4;
-        let mut faces = Sorter::<16>::new(target.scratch, memory);
+        let mut faces = Sorter::new(target.scratch, memory);
         for (t, record) in order.enumerate() {
-            let record: TetRecord = record?;
-            let nodes = nodes(&record);
+            let nodes = record?.nodes;
             for (i, corners) in FACES.into_iter().enumerate() {
-                let (face, _) = sorted_face(corners.map(|k| nodes[k]));
-                let [a, b, c] = face;
-                faces.push(words([a, b, c, (t as u32) << 2 | i as u32]))?;
+                let (vertices, _) = sorted_face(corners.map(|k| nodes[k]));
+                let place = (t as u32) << 2 | i as u32;
+                faces.push(TetFace { vertices, place })?;
             }
             if t & 0xffff == 0 {
                 check_cancelled();
             }
         }
-        let mut links = Sorter::<8>::new(target.scratch, memory);
-        let mut open = None::<[u8; 16]>;
+        let mut links = Sorter::new(target.scratch, memory);
+        let mut open = None::<TetFace>;
         for face in faces.finish()? {
-            let face: [u8; 16] = face?;
+            let face = face?;
             match open.take() {
-                Some(before) if before[..12] == face[..12] => {
-                    let (a, b) = (word(&before, 12), word(&face, 12));
-                    links.push(words([a, b]))?;
-                    links.push(words([b, a]))?;
+                Some(before) if before.vertices == face.vertices => {
+                    let [from, to] = [before.place, face.place];
+                    links.push(Link { from, to })?;
+                    links.push(Link { from: to, to: from })?;
                 }
                 _ => open = Some(face),
             }
@@ -55,26 +55,17 @@ impl Neighbors {
     pub fn next(&mut self) -> Result<[u32; 4], PipelineError> {
         let mut four = [NONE; 4];
         let tet = self.tet;
-        let is_here = |link: &Result<[u8; 8], _>| match link {
-            Ok(link) => word(link, 0) >> 2 == tet,
+        let is_here = |link: &Result<Link, _>| match link {
+            Ok(link) => link.from >> 2 == tet,
             Err(_) => true,
         };
         while let Some(link) = self.links.next_if(is_here) {
             let link = link?;
-            four[(word(&link, 0) & 3) as usize] = word(&link, 4);
+            four[(link.from & 3) as usize] = link.to;
         }
         self.tet += 1;
         Ok(four)
     }
-}
-
-/// Big-endian, so that bytes sort as numbers do.
-fn words<const N: usize, const M: usize>(words: [u32; N]) -> [u8; M] {
-    let mut record = [0; M];
-    for (bytes, word) in record.chunks_exact_mut(4).zip(words) {
-        bytes.copy_from_slice(&word.to_be_bytes());
-    }
-    record
 }
 
 #[cfg(test)]

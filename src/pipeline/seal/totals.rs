@@ -78,7 +78,7 @@ pub(crate) struct Totals {
 }
 
 /// The whole from the totals of all `n` sub-domains; those in `changed` go first.
-pub(crate) fn whole(
+pub(crate) fn sum_totals(
     catalog: &mut Catalog,
     n: u32,
     changed: &BTreeMap<u32, SealedTotals>,

@@ -7,7 +7,7 @@ fn surface_and_interfaces_select_what_stands_on_them() -> Outcome {
     let (cells, parts) = (6, 3);
     let made = grid(cells, parts)?;
     let all = made.all()?;
-    let mut inquiry = made.inquiry(64 << 20)?;
+    let mut session = made.session(64 << 20)?;
     let faces =
         |t: &Hit, on: &dyn Fn(&Point) -> bool| t.corners.iter().filter(|c| on(c)).count() == 3;
     let end = cells as f64;
@@ -16,7 +16,7 @@ fn surface_and_interfaces_select_what_stands_on_them() -> Outcome {
         touching_surface: true,
         ..Selection::default()
     };
-    expect(&mut inquiry, &all, selection, |t| {
+    expect(&mut session, &all, selection, |t| {
         t.corners.iter().any(outer)
     })?;
     // Label 0 is the side x = 0, label 5 the side z = end.
@@ -25,7 +25,7 @@ fn surface_and_interfaces_select_what_stands_on_them() -> Outcome {
         labels: Some(vec![0, 5]),
         ..Selection::default()
     };
-    let n = expect(&mut inquiry, &all, selection.clone(), sides)?;
+    let n = expect(&mut session, &all, selection.clone(), sides)?;
     // In the cells along the edge one tetrahedron has both.
     assert_eq!(n, 2 * 2 * cells * cells - cells);
     let cut = 4.0;
@@ -34,25 +34,25 @@ fn surface_and_interfaces_select_what_stands_on_them() -> Outcome {
         interface: Some([2, 1]),
         ..Selection::default()
     };
-    let n = expect(&mut inquiry, &all, both.clone(), interface)?;
+    let n = expect(&mut session, &all, both.clone(), interface)?;
     assert_eq!(n, 2 * 2 * cells * cells);
     let selection = Selection {
         labels: selection.labels,
         ..both
     };
     // Rows of cells under the side z = end have at most one face on each.
-    expect(&mut inquiry, &all, selection, |t| interface(t) && sides(t))?;
+    expect(&mut session, &all, selection, |t| interface(t) && sides(t))?;
     let selection = Selection {
         interface: Some([0, 2]),
         ..Selection::default()
     };
-    let refused = inquiry.select(selection).err();
+    let refused = session.select(selection).err();
     assert!(matches!(refused, Some(QueryError::NoInterface(0, 2))));
     let selection = Selection {
         subdomains: Some(vec![3]),
         ..Selection::default()
     };
-    assert!(inquiry.select(selection).is_err());
+    assert!(session.select(selection).is_err());
     Ok(())
 }
 
@@ -61,7 +61,7 @@ fn balls_shells_and_neighbors_cross_interfaces() -> Outcome {
     let mut random = Random::new(4);
     for made in [grid(4, 2)?, real()?] {
         let all = made.all()?;
-        let mut inquiry = made.inquiry(64 << 20)?;
+        let mut session = made.session(64 << 20)?;
         let mut across = 0;
         for _ in 0..40 {
             let tet = all[random.below(all.len())];
@@ -70,15 +70,15 @@ fn balls_shells_and_neighbors_cross_interfaces() -> Outcome {
             for vertices in [vec![a], vec![a, b]] {
                 let named: Vec<VertexId> = vertices.iter().map(|&v| id(v)).collect();
                 let selection = Selection {
-                    sharing: Some(inquiry.around(&named)?),
+                    sharing: Some(session.around(&named)?),
                     ..Selection::default()
                 };
-                expect(&mut inquiry, &all, selection, |t| {
+                expect(&mut session, &all, selection, |t| {
                     vertices.iter().all(|v| t.vertices.contains(v))
                 })?;
             }
             let selection = Selection {
-                sharing: Some(inquiry.next_to(tet.id)?),
+                sharing: Some(session.next_to(tet.id)?),
                 ..Selection::default()
             };
             let shared = |t: &Hit| {
@@ -87,9 +87,9 @@ fn balls_shells_and_neighbors_cross_interfaces() -> Outcome {
                     .filter(|v| tet.vertices.contains(v))
                     .count()
             };
-            let n = expect(&mut inquiry, &all, selection.clone(), |t| shared(t) == 3)?;
+            let n = expect(&mut session, &all, selection.clone(), |t| shared(t) == 3)?;
             assert!((1..=4).contains(&n));
-            let others = ids(inquiry.select(selection)?)?;
+            let others = ids(session.select(selection)?)?;
             across += others
                 .iter()
                 .filter(|o| o.subdomain() != tet.id.subdomain())
@@ -101,11 +101,11 @@ fn balls_shells_and_neighbors_cross_interfaces() -> Outcome {
         );
         let nobody: TetId = "0:536870911".parse()?;
         assert!(matches!(
-            inquiry.next_to(nobody),
+            session.next_to(nobody),
             Err(QueryError::NoTet { .. })
         ));
         let nowhere = VertexId::from_number(7 << 32).expect("cut 7");
-        let refused = inquiry.around(&[nowhere]);
+        let refused = session.around(&[nowhere]);
         assert!(matches!(refused, Err(QueryError::NoVertex { .. })));
     }
     Ok(())

@@ -30,8 +30,8 @@ fn points_are_found_in_the_lowest_tetrahedron_that_holds_them() -> Outcome {
             .into_iter()
             .map(|t| (Aabb::around(t.corners), t))
             .collect();
-        let mut inquiry = made.inquiry(64 << 20)?;
-        let located = inquiry.locate(&points)?;
+        let mut session = made.session(64 << 20)?;
+        let located = session.locate(&points)?;
         for (located, &p) in located.iter().zip(&points) {
             assert_eq!(located.point, p);
             assert_eq!(located.found.map(|t| t.id), holder(&all, p), "{p}");
@@ -42,7 +42,7 @@ fn points_are_found_in_the_lowest_tetrahedron_that_holds_them() -> Outcome {
         }
         // One by one, from nothing: the other way to look.
         for batch in points.chunks(7).step_by(25) {
-            let alone = made.inquiry(64 << 20)?.locate(batch)?;
+            let alone = made.session(64 << 20)?.locate(batch)?;
             let together = &located[points.iter().position(|p| p == &batch[0]).unwrap_or(0)..];
             assert_eq!(alone[0], together[0]);
             for answer in alone {
@@ -85,8 +85,8 @@ fn solids_select_what_meets_them_and_what_lies_in_them() -> Outcome {
     let mut random = Random::new(2);
     for (made, lattice) in [(grid(4, 2)?, Some(4)), (real()?, None)] {
         let all = made.all()?;
-        let mut inquiry = made.inquiry(64 << 20)?;
-        let bounds = inquiry.bounds();
+        let mut session = made.session(64 << 20)?;
+        let bounds = session.bounds();
         let mut touching = 0;
         for solid in solids(&mut random, lattice, &bounds) {
             for inside in [false, true] {
@@ -95,7 +95,7 @@ fn solids_select_what_meets_them_and_what_lies_in_them() -> Outcome {
                     inside,
                     ..Selection::default()
                 };
-                let found = ids(inquiry.select(selection)?)?;
+                let found = ids(session.select(selection)?)?;
                 let found: BTreeSet<TetId> = found.into_iter().collect();
                 for (i, tet) in all.iter().enumerate() {
                     // Rational numbers are slow: of the many far away only some are looked at.

@@ -13,7 +13,7 @@ fn area(piece: &Piece) -> f64 {
 #[test]
 fn sections_cover_what_the_plane_cuts_once() -> Outcome {
     let made = grid(4, 2)?;
-    let mut inquiry = made.inquiry(64 << 20)?;
+    let mut session = made.session(64 << 20)?;
     let diagonal = 16.0 * 2f64.sqrt();
     for (origin, normal, expected) in [
         // Between and through vertices, from both sides, along a diagonal, through a corner.
@@ -28,8 +28,8 @@ fn sections_cover_what_the_plane_cuts_once() -> Outcome {
         (Point::new(4.0, 4.0, 4.0), Point::ONE, 0.0),
     ] {
         let view = View::new(origin, normal);
-        let section = |inquiry: &mut QuerySession, crinkle| {
-            inquiry.section(
+        let section = |session: &mut QuerySession, crinkle| {
+            session.section(
                 &view,
                 crinkle,
                 Selection::default(),
@@ -37,7 +37,7 @@ fn sections_cover_what_the_plane_cuts_once() -> Outcome {
                 1 << 16,
             )
         };
-        let cut = section(&mut inquiry, false)?;
+        let cut = section(&mut session, false)?;
         let extent = cut.extent;
         let pieces: Vec<Piece> = cut.collect::<Result<_, _>>()?;
         assert_eq!(pieces.len() as u64, extent.n);
@@ -51,7 +51,7 @@ fn sections_cover_what_the_plane_cuts_once() -> Outcome {
             continue;
         }
         // Faces of whole tetrahedra, seen from the front, hide no less.
-        let whole = section(&mut inquiry, true)?;
+        let whole = section(&mut session, true)?;
         let pieces: Vec<Piece> = whole.collect::<Result<_, _>>()?;
         assert!(
             pieces

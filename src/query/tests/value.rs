@@ -6,14 +6,14 @@ use super::*;
 fn numbers_and_conditions_select_what_they_say() -> Outcome {
     for made in [grid(6, 3)?, real()?] {
         let all = made.all()?;
-        let mut inquiry = made.inquiry(64 << 20)?;
+        let mut session = made.session(64 << 20)?;
         let none = Selection::default;
-        expect(&mut inquiry, &all, none(), |_| true)?;
+        expect(&mut session, &all, none(), |_| true)?;
         let selection = Selection {
             subdomains: Some(vec![1]),
             ..none()
         };
-        let n = expect(&mut inquiry, &all, selection, |t| {
+        let n = expect(&mut session, &all, selection, |t| {
             t.id.subdomain().rank() == 1
         })?;
         assert!(n > 0);
@@ -21,7 +21,7 @@ fn numbers_and_conditions_select_what_they_say() -> Outcome {
             regions: Some(vec![2, 7]),
             ..none()
         };
-        expect(&mut inquiry, &all, selection, |t| t.region == 2)?;
+        expect(&mut session, &all, selection, |t| t.region == 2)?;
         for text in [
             "quality > 1.5 and region = 1",
             "x < 0.25 or z > 0.75 and subdomain in [1]",
@@ -34,7 +34,7 @@ fn numbers_and_conditions_select_what_they_say() -> Outcome {
                 condition: Some(condition.clone()),
                 ..none()
             };
-            expect(&mut inquiry, &all, selection, |t| {
+            expect(&mut session, &all, selection, |t| {
                 condition.truth(&t.values())
             })?;
         }
@@ -43,8 +43,8 @@ fn numbers_and_conditions_select_what_they_say() -> Outcome {
             tets: Some(three.to_vec()),
             ..none()
         };
-        expect(&mut inquiry, &all, selection, |t| three.contains(&t.id))?;
-        assert_eq!(inquiry.tet(three[1])?, all[all.len() / 2]);
+        expect(&mut session, &all, selection, |t| three.contains(&t.id))?;
+        assert_eq!(session.tet(three[1])?, all[all.len() / 2]);
     }
     Ok(())
 }
@@ -53,12 +53,12 @@ fn numbers_and_conditions_select_what_they_say() -> Outcome {
 fn answers_are_sorted_by_any_variable() -> Outcome {
     let made = grid(6, 2)?;
     let mut all = made.all()?;
-    let mut inquiry = made.inquiry(64 << 20)?;
+    let mut session = made.session(64 << 20)?;
     for (variable, descending) in [(4, false), (4, true), (0, true), (3, false)] {
         let dir = made.dir.path();
         // Little memory: runs go to the disk.
         let ordered = Ordered::new(
-            inquiry.select(Selection::default())?,
+            session.select(Selection::default())?,
             variable,
             descending,
             dir,
@@ -112,11 +112,11 @@ fn the_worst_and_the_best_are_found_without_a_look_at_all() -> Outcome {
                 condition: Some(condition),
                 ..Selection::default()
             };
-            let mut inquiry = made.inquiry(64 << 20)?;
-            let found = inquiry.extreme(&selection, greatest, limit)?;
+            let mut session = made.session(64 << 20)?;
+            let found = session.extreme(&selection, greatest, limit)?;
             assert_eq!(found, expected, "{text}");
             // A single one is found in the chunk that promises most, but for a promise hardly kept.
-            let measures = inquiry.measures();
+            let measures = session.measures();
             assert!(
                 limit > 1 || measures.tet_chunks_read <= 2,
                 "{text}: {measures:?}"
@@ -130,8 +130,8 @@ fn the_worst_and_the_best_are_found_without_a_look_at_all() -> Outcome {
 fn only_chunks_that_matter_are_read() -> Outcome {
     let made = real_of("box,h=0.035")?;
     let all = made.all()?;
-    let mut inquiry = made.inquiry(64 << 20)?;
-    let chunks = inquiry.measures();
+    let mut session = made.session(64 << 20)?;
+    let chunks = session.measures();
     assert!(chunks.tet_chunks >= 4, "{chunks:?}");
     let nowhere = Selection {
         solids: vec![Solid::Sphere {
@@ -140,17 +140,17 @@ fn only_chunks_that_matter_are_read() -> Outcome {
         }],
         ..Selection::default()
     };
-    assert_eq!(inquiry.select(nowhere)?.count(), 0);
+    assert_eq!(session.select(nowhere)?.count(), 0);
     let never = Selection {
         condition: Some(Expression::parse("quality > 1e6 or x > 17", &VARIABLES)?),
         ..Selection::default()
     };
-    assert_eq!(inquiry.select(never)?.count(), 0);
-    inquiry.locate(&[Point::splat(-1.0)])?;
-    assert_eq!(inquiry.measures().tet_chunks_read, 0);
+    assert_eq!(session.select(never)?.count(), 0);
+    session.locate(&[Point::splat(-1.0)])?;
+    assert_eq!(session.measures().tet_chunks_read, 0);
     let center = all[all.len() / 3].centroid();
-    inquiry.locate(&[center])?;
-    let read = inquiry.measures();
+    session.locate(&[center])?;
+    let read = session.measures();
     assert!(read.tet_chunks_read <= 2, "{read:?}");
     assert!(
         read.vertex_chunks_read < chunks.vertex_chunks / 2,

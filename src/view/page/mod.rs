@@ -1,6 +1,6 @@
 //! A page about a mesh: one HTML file with everything in it, to be opened in a browser, without a network.
 //!
-//! The page's own text, style and program are files in `assets`; what is told of a mesh is added as data: a JSON
+//! The page's own text, style and program are files in `assets`; the facts about a mesh are added as data: a JSON
 //! object, and surfaces packed as text. They go to the file one after the other.
 
 mod pack;
@@ -69,7 +69,7 @@ impl Page {
         ))
     }
 
-    /// Adds what is told of the mesh, and the program; returns the file's length. Errors: the disk.
+    /// Adds the data about the mesh, and the program; returns the file's length. Errors: the disk.
     pub fn finish(mut self, data: &serde_json::Value) -> Result<u64> {
         self.file
             .line("<script type=\"application/json\" id=\"data\">")?;

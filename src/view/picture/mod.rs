@@ -51,7 +51,7 @@ pub struct PictureFrame {
     /// Mean length of an edge in those units: how fine what is drawn is.
     pub edge: f64,
     pub bar: Option<ColorBar>,
-    /// Whether colors stand for kinds, of which there are several: those told with [`Picture::kind`] are listed.
+    /// Whether colors stand for kinds, of which there are several: those named with [`Picture::kind`] are listed.
     pub kinds: bool,
 }
 

@@ -6,9 +6,9 @@ use tiny_skia::{
     Color, FillRule, LineJoin, Paint, Path as Outline, PathBuilder, Pixmap, Stroke, Transform,
 };
 
-use super::Result;
 use super::color::Rgb;
-use crate::io::write::{WriteError, bytes};
+use crate::io::write::WriteError;
+use crate::io::write::bytes;
 
 /// Color of edges, and how much of it is seen.
 const EDGE: ([u8; 3], f64) = ([30; 3], 0.86);
@@ -22,7 +22,7 @@ pub(super) struct Png {
 
 impl Png {
     /// Errors: no memory for so many pixels.
-    pub fn new(out: &Path, [width, height]: [u32; 2]) -> Result<Self> {
+    pub fn new(out: &Path, [width, height]: [u32; 2]) -> Result<Self, WriteError> {
         let mut pixels = Pixmap::new(width, height).ok_or_else(|| WriteError::TooLarge {
             path: out.to_owned(),
             what: "pixels",
@@ -127,7 +127,7 @@ impl Png {
         }
     }
 
-    pub fn finish(self) -> Result<u64> {
+    pub fn finish(self) -> Result<u64, WriteError> {
         let encoded = self.pixels.encode_png().map_err(|e| WriteError::Io {
             path: self.out.clone(),
             source: std::io::Error::other(e),

@@ -2,16 +2,16 @@
 
 use std::path::Path;
 
-use super::Result;
 use super::color::Rgb;
 use crate::io::write::TextFile;
+use crate::io::write::WriteError;
 
 pub(super) struct Svg {
     file: TextFile,
 }
 
 impl Svg {
-    pub fn new(out: &Path, [width, height]: [u32; 2]) -> Result<Self> {
+    pub fn new(out: &Path, [width, height]: [u32; 2]) -> Result<Self, WriteError> {
         let mut file = TextFile::new(out)?;
         file.line(&format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\">\n\
@@ -20,7 +20,12 @@ impl Svg {
         Ok(Self { file })
     }
 
-    pub fn polygon(&mut self, corners: &[[f32; 2]], color: Rgb, line: Option<f32>) -> Result<()> {
+    pub fn polygon(
+        &mut self,
+        corners: &[[f32; 2]],
+        color: Rgb,
+        line: Option<f32>,
+    ) -> Result<(), WriteError> {
         let points: Vec<String> = corners
             .iter()
             .map(|[x, y]| format!("{x:.2},{y:.2}"))
@@ -37,7 +42,7 @@ impl Svg {
         ))
     }
 
-    pub fn finish(mut self) -> Result<u64> {
+    pub fn finish(mut self) -> Result<u64, WriteError> {
         self.file.line("</g>\n</svg>")?;
         self.file.finish()
     }

@@ -1,0 +1,63 @@
+//! Files that a run writes are none that it reads.
+
+use std::path::{Path, PathBuf};
+
+use super::Error;
+use super::surface::IN_STORE;
+use crate::samples::PREFIX;
+use crate::store::Catalog;
+
+/// Refuses to write to `out` where that is a folder, or one of `inputs`, through whatever links.
+///
+/// Errors: `usage`.
+pub(crate) fn check_target(out: &Path, inputs: &[PathBuf]) -> Result<(), Error> {
+    let refused = |message: String| {
+        Err(Error::new("usage", message).with_help("choose another name for what is written"))
+    };
+    if out.is_dir() {
+        let what = match Catalog::open(out).is_ok() {
+            true => "a store",
+            false => "a folder",
+        };
+        return refused(format!(
+            "{} is {what}, no file to be written",
+            out.display()
+        ));
+    }
+    match inputs.iter().find(|input| is_same_file(input, out)) {
+        Some(input) => refused(format!(
+            "{} would be overwritten: it is {}, which this run reads or the store was made from",
+            out.display(),
+            input.display()
+        )),
+        None => Ok(()),
+    }
+}
+
+/// The files a store was made from.
+pub(crate) fn inputs_of(store: &Path) -> Vec<PathBuf> {
+    let job = Catalog::open(store).and_then(|mut catalog| catalog.job());
+    let sources = job.map(|job| job.surfaces).unwrap_or_default();
+    let files = sources.into_iter().map(|source| source.path);
+    files
+        .filter(|path| path != IN_STORE && !path.starts_with(PREFIX))
+        .map(PathBuf::from)
+        .collect()
+}
+
+/// Whether two paths lead to one file.
+fn is_same_file(a: &Path, b: &Path) -> bool {
+    let (Ok(a_meta), Ok(b_meta)) = (a.metadata(), b.metadata()) else {
+        return false;
+    };
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt;
+        (a_meta.dev(), a_meta.ino()) == (b_meta.dev(), b_meta.ino())
+    }
+    #[cfg(not(unix))]
+    {
+        let _ = (a_meta, b_meta);
+        matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+    }
+}

@@ -1,0 +1,32 @@
+//! What a cut did.
+
+use super::interface::InterfaceReport;
+use super::spread::ChosenPlane;
+use crate::refine::RefineReport;
+
+/// How a cut went.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CutReport {
+    pub plane: ChosenPlane,
+    pub refine: RefineReport,
+    pub interface: InterfaceReport,
+    /// Interface vertices of the cut, which bear its number.
+    pub vertices: u32,
+    /// Tetrahedra with a face on the interface, and those whose circumsphere lies in the refined zone.
+    pub z_tets: u64,
+    pub z_enclosed: u64,
+    /// Tetrahedra, from face to face, between the interface and the first with a vertex out of the refined zone, at least; three
+    /// stands for more.
+    pub layers_least: Option<u32>,
+    pub seconds: StageSeconds,
+}
+
+/// Wall time of the stages of a cut.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StageSeconds {
+    pub plane: f64,
+    pub zone: f64,
+    /// Copying the core out and optimizing it.
+    pub core: f64,
+    pub interface: f64,
+}

@@ -1,0 +1,64 @@
+//! A parsed expression and what can be asked of it.
+
+use super::op::{Op, STACK_MAX};
+use super::{machine, ranges};
+
+/// What an expression is: a number or a truth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    Number,
+    Truth,
+}
+
+/// An expression ready to be evaluated, by any number of threads at once.
+///
+/// Shape: `ops` in postfix order; no prefix of them needs more than [`Expression::STACK_MAX`] values at once.
+#[derive(Clone, Debug)]
+pub struct Expression {
+    pub(super) ops: Vec<Op>,
+    pub(super) lists: Vec<Vec<f64>>,
+    pub(super) kind: Kind,
+}
+
+impl Expression {
+    /// Longest text in bytes.
+    pub const TEXT_MAX: usize = 16_384;
+    /// Most values waiting for their operation, and most brackets and signs within each other.
+    pub const STACK_MAX: usize = STACK_MAX;
+
+    /// What it is.
+    pub fn kind(&self) -> Kind {
+        self.kind
+    }
+
+    /// Whether it asks for the variable at this position.
+    pub fn uses(&self, variable: usize) -> bool {
+        self.ops
+            .iter()
+            .any(|op| matches!(op, Op::Variable(v) if *v == variable))
+    }
+
+    /// Its value, where it is a number; `values` are those of the variables.
+    ///
+    /// Panics when it is a truth, or with fewer values than variables.
+    pub fn number(&self, values: &[f64]) -> f64 {
+        assert_eq!(self.kind, Kind::Number, "a truth is no number");
+        machine::run(&self.ops, &self.lists, values)
+    }
+
+    /// Its value, where it is a truth; `values` are those of the variables.
+    ///
+    /// Panics when it is a number, or with fewer values than variables.
+    pub fn truth(&self, values: &[f64]) -> bool {
+        assert_eq!(self.kind, Kind::Truth, "a number is no truth");
+        machine::run(&self.ops, &self.lists, values) != 0.0
+    }
+
+    /// Whether it, a truth, can hold when each variable lies somewhere in its closed range.
+    ///
+    /// False is certain, true is not. Panics as [`Expression::truth`].
+    pub fn may_hold(&self, ranges: &[[f64; 2]]) -> bool {
+        assert_eq!(self.kind, Kind::Truth, "a number is no truth");
+        ranges::may_hold(&self.ops, &self.lists, ranges)
+    }
+}

@@ -1,0 +1,25 @@
+//! What of a mesh is written.
+
+use std::collections::BTreeSet;
+
+/// What of a mesh is written.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Selection {
+    /// Ranks of sub-domains; none stands for all. What bounds them towards others is boundary.
+    pub subdomains: BTreeSet<u32>,
+    /// Each sub-domain in a file of its own.
+    pub pieces: bool,
+    pub content: Content,
+}
+
+/// Which elements are written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Content {
+    /// Tetrahedra and boundary faces.
+    #[default]
+    Mesh,
+    /// Input triangles and interface faces; only as [`MeshFormat::Vtu`].
+    Boundary,
+    /// Interface faces; only as [`MeshFormat::Vtu`].
+    Interfaces,
+}

@@ -1,0 +1,24 @@
+//! Where a sealed sub-domain goes, and with what means.
+
+use std::collections::BTreeMap;
+
+use tetdb_schema::ids::SubdomainId;
+
+use crate::geom::Aabb;
+use crate::sealed::Form;
+use crate::storage::DiskPath;
+use crate::topology::Owners;
+
+/// Where and how to seal.
+pub(crate) struct SealTarget<'a> {
+    pub path: &'a DiskPath,
+    pub form: Form,
+    pub scratch: &'a DiskPath,
+    pub subdomain: SubdomainId,
+    pub generation: u32,
+    /// Bytes for sort runs and for the writer together.
+    pub memory: u64,
+    pub bounds: Aabb,
+    /// Owners of the faces of the cuts around it, by cut; without them interface faces are left out.
+    pub owners: Option<&'a BTreeMap<u32, Owners>>,
+}

@@ -1,0 +1,26 @@
+//! What saturation is asked for: wanted lengths, and where points may go.
+
+use super::place::PlacementRule;
+use crate::geom::{Aabb, Point};
+
+/// Where the wanted length at a point that divides an edge comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Lengths {
+    /// From the size field.
+    #[default]
+    Field,
+    /// Interpolated between the ends of the edge, hence from the vertices of the coarse mesh: the paper's way, section 1.1.
+    /// Kept for comparison: what the vertices of the surface do not know is never seen.
+    Ends,
+}
+
+/// What is wanted where, and where points may go.
+pub struct Field<'a> {
+    pub lengths: Lengths,
+    /// Wanted edge length at a position.
+    pub h: &'a dyn Fn(Point) -> f64,
+    /// Where points may go.
+    pub place: &'a dyn PlacementRule,
+    /// Box of the mesh, which fixes the order along the curve.
+    pub bounds: Aabb,
+}

@@ -1,0 +1,20 @@
+//! What saturation did.
+
+/// What saturation did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RefineReport {
+    pub passes: u32,
+    pub candidates: u64,
+    pub inserted: u64,
+    /// Too near to a vertex or a required face.
+    pub near: u64,
+    /// No cavity that keeps the required faces, or a walk that left the mesh.
+    pub blocked: u64,
+    /// Refused for nothing but their place.
+    pub out_of_place: u64,
+    /// Cavities, made star-shaped and allowed where they lie, that held a tetrahedron frozen beside an interface.
+    pub frozen_hits: u64,
+    /// Tetrahedra with two required faces or more when the passes ended: none of their edges could be divided. Not counted where
+    /// only a part of the mesh is divided.
+    pub over_constrained: u64,
+}

@@ -1,0 +1,21 @@
+//! Who divides edges: the kernel and the scratch of one block.
+
+use super::activity::Activity;
+use super::candidate::Candidate;
+use super::recent::Recent;
+use crate::delaunay::Kernel;
+use crate::geom::HilbertFrame;
+use crate::reconnect::Shell;
+
+pub(super) struct Worker {
+    pub kernel: Kernel,
+    pub order: HilbertFrame,
+    /// Scratch: (edge as ordered pair, a tetrahedron that has it).
+    pub edges: Vec<(u64, u32)>,
+    pub candidates: Vec<Candidate>,
+    pub recent: Recent,
+    pub shell: Shell,
+    pub active: Activity,
+    /// A tetrahedron in use, where a walk can start when its own start is gone.
+    pub last: u32,
+}

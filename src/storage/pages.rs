@@ -1,0 +1,53 @@
+//! Records by kind and id, whatever holds their pages.
+
+use tetdb_schema::page::Slot;
+
+/// Kinds of working pages an accessor may name, as positions in a page table.
+pub mod kind {
+    use tetdb_schema::page::PageKind;
+
+    /// Nodes and neighbors of tetrahedra.
+    pub const TETS: usize = 0;
+    /// Region and flags of tetrahedra.
+    pub const TET_ATTRIBUTES: usize = 1;
+    /// Positions, lengths and a tetrahedron of each vertex.
+    pub const VERTICES: usize = 2;
+    /// Tag and owner of vertices.
+    pub const VERTEX_ATTRIBUTES: usize = 3;
+    /// Input triangles.
+    pub const FACETS: usize = 4;
+    /// Faces shared with other sub-domains.
+    pub const INTERFACE_FACES: usize = 5;
+    /// A map for a step's own use; it is never stored in a result.
+    pub const SCRATCH: usize = 6;
+    /// The page kinds in that order.
+    pub const ALL: [PageKind; 7] = [
+        PageKind::Tets,
+        PageKind::TetAttributes,
+        PageKind::Vertices,
+        PageKind::VertexAttributes,
+        PageKind::Facets,
+        PageKind::InterfaceFaces,
+        PageKind::Scratch,
+    ];
+}
+
+/// Random access to records by id, whatever holds them.
+///
+/// The borrow ends before the next access: no reference into a page survives it.
+pub trait Pages {
+    /// Reads record `id` of kind `K` (one of [`kind`]).
+    fn read<const K: usize>(&mut self, id: u32) -> &Slot;
+    /// Reads four records of kind `K` at once, which is cheaper than one after another.
+    fn read_four<const K: usize>(&mut self, ids: [u32; 4]) -> [&Slot; 4];
+    /// Opens record `id` of kind `K` for change; its page is dirty from then on.
+    fn write<const K: usize>(&mut self, id: u32) -> &mut Slot;
+    /// Number of pages of kind `K`.
+    fn n_pages<const K: usize>(&self) -> u32;
+    /// Appends a zeroed page of kind `K` and returns its number.
+    fn append_page<const K: usize>(&mut self) -> u32;
+    /// Forgets the first `n` pages of kind `K`; the others move up to take their numbers.
+    fn drop_front<const K: usize>(&mut self, n: u32);
+    /// Forgets all pages of kind `K`, as if there had never been one.
+    fn clear<const K: usize>(&mut self);
+}

@@ -1,0 +1,275 @@
+//! The library and the program are callers of one door.
+//!
+//! Why: a store that one of them leaves must be whole to the other, and a program that embeds the library must outlive whatever becomes of
+//! a run. How: each makes, and the other verifies, resumes and changes; runs side by side are cancelled, refused and finished.
+
+use std::path::Path;
+use std::process::{Command, Output};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use tetdb::store::Catalog;
+use tetdb::{
+    CancelToken, Event, Length, Mesher, Order, Settings, Sizes, Store, Subdomains, Surface,
+    VerifyLevel,
+};
+
+type Outcome = Result<(), Box<dyn std::error::Error>>;
+
+fn program(dir: &Path, words: &[&str]) -> std::io::Result<Output> {
+    Command::new(env!("CARGO_BIN_EXE_tetdb"))
+        .args(words)
+        .current_dir(dir)
+        .output()
+}
+
+/// What the program prints; it must succeed.
+fn answer(dir: &Path, words: &[&str]) -> std::io::Result<String> {
+    let output = program(dir, words)?;
+    let talk = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{words:?}: {talk}");
+    Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned())
+}
+
+/// A cube of side 1 in 12 triangles.
+fn cube() -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
+    let points = (0..8).map(|i| [i & 1, i >> 1 & 1, i >> 2 & 1].map(f64::from));
+    let quads = [
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+    ];
+    let triangles = quads
+        .iter()
+        .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]);
+    (points.collect(), triangles.collect())
+}
+
+fn mesher() -> Result<Mesher, tetdb::Error> {
+    let (points, triangles) = cube();
+    let surface = Surface::from_arrays(&points, &triangles, None)?.refined(Length::units(0.2))?;
+    Ok(Mesher::new(surface).threads(2))
+}
+
+#[test]
+fn what_the_library_makes_from_arrays_the_program_goes_on_with() -> Outcome {
+    let dir = tempfile::tempdir()?;
+    let path = dir.path().join("cube.tetdb");
+    let mut store = mesher()?.subdomains(Subdomains::Exactly(1)).create(&path)?;
+    assert!(store.summary().is_verified && store.summary().n_tets > 100);
+    let near = store.query().in_box([0.0; 3], [0.1; 3]).collect()?;
+    assert!(!near.is_empty());
+    let digest = store.summary().digest.clone();
+    drop(store);
+    let run = |words: &[&str]| answer(dir.path(), words);
+    assert_eq!(run(&["digest", "cube.tetdb"])?, digest);
+    run(&["verify", "cube.tetdb", "--full"])?;
+    run(&["info", "cube.tetdb", "--json"])?;
+    run(&["resume", "cube.tetdb"])?;
+    run(&[
+        "resaturate",
+        "cube.tetdb",
+        "--subdomain",
+        "0",
+        "--refine-by",
+        "0.7",
+    ])?;
+    assert_ne!(run(&["digest", "cube.tetdb"])?, digest);
+    let store = Store::open(&path)?.undo()?;
+    assert_eq!(store.summary().digest, digest);
+    Ok(())
+}
+
+#[test]
+fn what_the_program_makes_the_library_goes_on_with() -> Outcome {
+    let dir = tempfile::tempdir()?;
+    let words = [
+        "mesh",
+        "sample:box,h=0.2",
+        "-o",
+        "box.tetdb",
+        "--hsiz",
+        "10%",
+    ];
+    answer(dir.path(), &words)?;
+    let theirs = Store::open(dir.path().join("box.tetdb"))?;
+    let ours = Mesher::new(Surface::sample("box,h=0.2")?)
+        .sizes(Sizes::interior(Length::share_of_diagonal(0.1)))
+        .threads(1)
+        .create(dir.path().join("ours.tetdb"))?;
+    assert!(ours.is_same_mesh(&theirs));
+    assert!(theirs.verify(VerifyLevel::Delaunay)?.is_valid());
+    let n = theirs.summary().n_tets;
+    let changed = theirs.remesh().subdomains(&[0]).scaled(0.7).run()?;
+    assert!(changed.store.summary().n_tets > n);
+    answer(dir.path(), &["verify", "box.tetdb"])?;
+    // The same job once more is the same store.
+    let again = Mesher::new(Surface::sample("box,h=0.2")?)
+        .sizes(Sizes::interior(Length::share_of_diagonal(0.1)))
+        .create(dir.path().join("ours.tetdb"))?;
+    assert!(again.is_same_mesh(&ours));
+    let other = Mesher::new(Surface::sample("box,h=0.25")?).create(dir.path().join("ours.tetdb"));
+    assert_eq!(other.err().map(|e| e.code()), Some("store-exists"));
+    Ok(())
+}
+
+#[test]
+fn a_cancelled_run_goes_on_in_the_same_process_and_in_the_program() -> Outcome {
+    let dir = tempfile::tempdir()?;
+    let whole = mesher()?.create(dir.path().join("whole.tetdb"))?;
+    for (name, by_program) in [("a.tetdb", false), ("b.tetdb", true)] {
+        let (path, token) = (dir.path().join(name), CancelToken::new());
+        let inner = token.clone();
+        let begun = mesher()?.cancel(&token).progress(move |event| {
+            if matches!(event, Event::StoreBegun(_)) {
+                inner.cancel();
+            }
+        });
+        let error = begun.create(&path).err().ok_or("it was cancelled")?;
+        assert!(error.is_cancelled(), "{error}");
+        assert_eq!(error.exit_code(), 130);
+        let refused = Store::open(&path).err().map(|e| e.code());
+        assert_eq!(refused, Some("store-unfinished"));
+        token.reset();
+        let store = match by_program {
+            true => {
+                answer(dir.path(), &["resume", name])?;
+                Store::open(&path)?
+            }
+            false => Store::resume(&path, Settings::new().cancel(&token))?,
+        };
+        assert!(store.is_same_mesh(&whole));
+    }
+    Ok(())
+}
+
+/// Threads of this process, where the system says.
+fn n_threads() -> Option<usize> {
+    Some(std::fs::read_dir("/proc/self/task").ok()?.count())
+}
+
+#[test]
+fn of_three_runs_at_once_each_ends_in_its_own_way() -> Outcome {
+    let dir = tempfile::tempdir()?;
+    let whole = mesher()?.create(dir.path().join("whole.tetdb"))?;
+    let token = CancelToken::new();
+    let was_cancelled = AtomicBool::new(false);
+    std::thread::scope(|scope| -> Outcome {
+        let cancelled = scope.spawn(|| {
+            let inner = token.clone();
+            let run = mesher()?.cancel(&token).progress(move |_| inner.cancel());
+            run.create(dir.path().join("cancelled.tetdb"))
+        });
+        let refused = scope.spawn(|| {
+            let (points, mut triangles) = cube();
+            triangles.pop();
+            let open = Surface::from_arrays(&points, &triangles, None)?;
+            Mesher::new(open).create(dir.path().join("refused.tetdb"))
+        });
+        let finished = scope.spawn(|| mesher()?.create(dir.path().join("finished.tetdb")));
+        let cancelled = cancelled.join().expect("no call unwinds into its caller");
+        was_cancelled.store(
+            cancelled.is_err_and(|e| e.is_cancelled()),
+            Ordering::Relaxed,
+        );
+        let refused = refused.join().expect("no call unwinds into its caller");
+        assert_eq!(refused.err().map(|e| e.code()), Some("open-surface"));
+        let finished = finished.join().expect("no call unwinds into its caller");
+        assert!(finished?.is_same_mesh(&whole));
+        Ok(())
+    })?;
+    assert!(was_cancelled.into_inner());
+    assert!(!dir.path().join("refused.tetdb").exists());
+    Ok(())
+}
+
+#[test]
+fn a_run_leaves_no_thread_behind() -> Outcome {
+    let dir = tempfile::tempdir()?;
+    let run = |name: &str| -> Outcome {
+        let mut store = mesher()?.threads(5).create(dir.path().join(name))?;
+        let worst = store.query().order_by("quality", Order::Falling)?.limit(2);
+        assert_eq!(worst.collect()?.len(), 2);
+        Ok(())
+    };
+    run("first.tetdb")?;
+    // Other tests of this process come and go: what is left over by a run would add up.
+    let mut least = usize::MAX;
+    for i in 0..8 {
+        run(&format!("{i}.tetdb"))?;
+        least = least.min(n_threads().unwrap_or(0));
+    }
+    assert!(least < 30, "{least} threads");
+    Ok(())
+}
+
+#[test]
+fn a_store_of_another_recipe_is_not_gone_on_with() -> Outcome {
+    let dir = tempfile::tempdir()?;
+    let path = dir.path().join("old.tetdb");
+    let token = CancelToken::new();
+    let inner = token.clone();
+    let begun = mesher()?.cancel(&token).progress(move |event| {
+        if matches!(event, Event::StoreBegun(_)) {
+            inner.cancel();
+        }
+    });
+    assert!(begun.create(&path).is_err());
+    let mut catalog = Catalog::open_writable(&path)?;
+    catalog.commit(|step| {
+        // The blob of the recipe's version.
+        step.set_blob(2, &99u32.to_le_bytes());
+        Ok(())
+    })?;
+    catalog.close()?;
+    let error = Store::resume(&path, Settings::new())
+        .err()
+        .ok_or("refused")?;
+    assert_eq!((error.code(), error.exit_code()), ("store-recipe", 8));
+    assert!(error.message().contains("99"), "{error}");
+    let output = program(dir.path(), &["resume", "old.tetdb"])?;
+    assert_eq!(output.status.code(), Some(8));
+    Ok(())
+}
+
+#[test]
+fn what_makes_no_sense_is_an_error_with_a_word() -> Outcome {
+    let dir = tempfile::tempdir()?;
+    let (points, triangles) = cube();
+    let code = |result: Result<Surface, tetdb::Error>| result.err().map(|e| e.code());
+    let mut wild = triangles.clone();
+    wild[3][1] = 77;
+    assert_eq!(
+        code(Surface::from_arrays(&points, &wild, None)),
+        Some("index-out-of-range")
+    );
+    let mut nan = points.clone();
+    nan[2][0] = f64::NAN;
+    assert_eq!(
+        code(Surface::from_arrays(&nan, &triangles, None)),
+        Some("not-a-number")
+    );
+    assert_eq!(
+        code(Surface::from_arrays(&points, &triangles, Some(&["a"]))),
+        Some("count-mismatch")
+    );
+    assert_eq!(code(Surface::sample("teapot")), Some("bad-sample"));
+    assert_eq!(
+        code(Surface::read(["nowhere.stl"])),
+        Some("unreadable-file")
+    );
+    let path = dir.path().join("x.tetdb");
+    let word = |mesher: Mesher| mesher.create(&path).err().map(|e| e.code());
+    let sizes = Sizes::interior(Length::units(-1.0));
+    assert_eq!(word(mesher()?.sizes(sizes)), Some("bad-size"));
+    assert_eq!(
+        word(mesher()?.subdomains(Subdomains::Exactly(0))),
+        Some("usage")
+    );
+    assert_eq!(word(mesher()?.threads(0)), Some("usage"));
+    assert_eq!(word(mesher()?.memory(tetdb::Bytes::mib(3))), Some("memory"));
+    assert!(!path.exists(), "a refused run leaves nothing");
+    Ok(())
+}

@@ -1,0 +1,46 @@
+//! The crate's sources as the tests of its structure read them.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+pub fn src() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
+}
+
+/// All Rust files below `dir` in order of their names, test files left out.
+pub fn sources(dir: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(dir).expect("a source folder is readable") {
+        let path = entry.expect("a folder entry is readable").path();
+        let is_tests = path.file_stem().is_some_and(|stem| stem == "tests");
+        if is_tests {
+            continue;
+        } else if path.is_dir() {
+            found.extend(sources(&path));
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            found.push(path);
+        }
+    }
+    found.sort();
+    found
+}
+
+/// The text without comments, up to the tests at its foot, and without what is declared for tests alone.
+pub fn without_tests(text: &str) -> String {
+    let mut lines = Vec::new();
+    let mut rest = text.lines().peekable();
+    while let Some(line) = rest.next() {
+        let code = line.split("//").next().unwrap_or_default();
+        if code.trim() == "#[cfg(test)]" {
+            match rest.peek() {
+                // A module with a body; `mod tests;` only names a file.
+                Some(next) if next.starts_with("mod ") && next.contains('{') => break,
+                Some(next) if next.ends_with(';') => _ = rest.next(),
+                _ => {}
+            }
+            continue;
+        }
+        lines.push(code);
+    }
+    lines.join("\n")
+}
