@@ -1,6 +1,8 @@
 // One exception, two calls of the C library: `cli::heap`.
 #![deny(unsafe_code)]
 #![warn(missing_docs)]
+// The page names the modules, which are public with `internals` alone.
+#![cfg_attr(not(feature = "internals"), allow(rustdoc::private_intra_doc_links))]
 #![doc = include_str!("README.md")]
 
 #[doc(inline)]
