@@ -3,7 +3,7 @@
 //! | chapter | what you learn |
 //! |---|---|
 //! | [`start`] | build the program, mesh a surface of your own, check the result, repair a surface |
-//! | [`sizes`] | say how long edges shall be: everywhere, in places, by a formula or a file |
+//! | [`sizes`] | say how long edges should be: everywhere, in places, by a formula or a file |
 //! | [`regions`] | choose which volumes are filled |
 //! | [`subdomains`] | divide a large mesh, limit memory, pass parts to a parallel solver |
 //! | [`questions`] | find tetrahedra by place, condition or neighborhood |
