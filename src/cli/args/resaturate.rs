@@ -6,7 +6,7 @@ use super::{RunArgs, SizeArgs};
 
 /// Make sub-domains of a finished store again, from their coarse leaves. Interfaces and all other sub-domains stay as they are.
 ///
-/// Size options take the place of all sizes that the sub-domains were made with; without any, they are made as they were.
+/// Sizes stay what they were unless options say otherwise: lengths replace those of the first run, shapes and regions are added to its. Without any, sub-domains are made as they were.
 #[derive(Debug, clap::Args)]
 #[command(
     mut_arg("size_field", |arg| arg.help("Edge lengths from a file: .npy, one for each tetrahedron (or vertex) of the named sub-domains in the order in which `tetdb export --subdomain` writes them; or a MEDIT .sol with its background .mesh of tetrahedra beside it")),

@@ -46,7 +46,7 @@ pub struct SizeArgs {
     /// Greatest edge length inside
     #[arg(long, value_name = "H")]
     pub hmax: Option<String>,
-    /// Greatest ratio of neighboring edge lengths [default: 1.3]
+    /// Greatest ratio of neighboring edge lengths [default: 1.3, and 2 next to needles of the surface]
     #[arg(long, value_name = "RATIO")]
     pub hgrad: Option<String>,
     /// Edge length in a box, and at most OUTSIDE away from it; may be repeated
