@@ -16,6 +16,7 @@ mod report;
 mod resaturate;
 mod same_mesh;
 mod shell;
+mod silent;
 mod size_files;
 mod sizes;
 mod snapshot;
