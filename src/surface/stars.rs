@@ -7,8 +7,7 @@
 //!        / | \
 //! ```
 //!
-//! Why: a flat polygon of 50,000 corners with a fan in it has 1.25 billion pairs of overlapping boxes and not one of triangles that touch. With walls
-//! along it the walls and the fan are still compared in more than linear time, many fewer tests than all pairs.
+//! Why: a flat polygon of 50,000 corners with a fan in it has 1.25 billion pairs of overlapping boxes and not one of triangles that touch.
 
 use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
@@ -259,10 +258,14 @@ fn around_arc(u: Point, v: Point) -> Aabb {
     for axis in [Point::X, Point::Y, Point::Z] {
         // Where the whole circle is farthest along the axis, which may be between the two.
         let top = axis - normal * axis.dot(normal);
+        let Some(top) = top.try_normalize().filter(|_| top.length() > NEAR_END) else {
+            // Nowhere is it off zero by more; the direction would be rounding.
+            bounds.low -= axis * NEAR_END;
+            bounds.high += axis * NEAR_END;
+            continue;
+        };
         for end in [top, -top] {
-            let is_between =
-                u.cross(end).dot(normal) > -NEAR_END && end.cross(v).dot(normal) > -NEAR_END;
-            if let (true, Some(end)) = (is_between, end.try_normalize()) {
+            if u.cross(end).dot(normal) > -NEAR_END && end.cross(v).dot(normal) > -NEAR_END {
                 bounds = bounds.union(Aabb::around([end]));
             }
         }
@@ -380,13 +383,13 @@ mod tests {
 
     #[test]
     fn twice_the_triangles_around_one_place_are_twice_the_pairs() {
-        for make in [polygon, book] {
+        for make in [polygon, book, column, cones] {
             let looked = [2000, 4000].map(|n| {
                 let (_, n_touching, looked) = found(&surface(&make(n)));
                 assert_eq!(n_touching, 0);
                 looked as f64
             });
-            assert!(looked[1] < 2.5 * looked[0], "{looked:?}");
+            assert!(looked[1] <= 2.5 * looked[0], "{looked:?}");
         }
     }
 
