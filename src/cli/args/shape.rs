@@ -91,7 +91,7 @@ pub struct ShapeArgs {
     /// How far to optimize [default: full]
     #[arg(long, value_enum)]
     pub optimize: Option<Optimize>,
-    /// Do not keep what sub-domains are made from: a smaller store, in which none can be made again by `tetdb resaturate`
+    /// Do not keep what sub-domains are meshed from: a smaller store, in which none can be meshed again by `tetdb resaturate`
     #[arg(long)]
     pub drop_coarse: bool,
     /// How finished sub-domains are kept [default: packed]
