@@ -49,7 +49,7 @@ impl Subdomain {
     /// Opens the sub-domain of `row` at `path` with `memory_bytes` for redb's cache and decoded vertices.
     ///
     /// The row may be that of a stage that was kept. Errors: [`SealedError::NotSealed`]; damage.
-    pub fn open(
+    pub(crate) fn open(
         path: &DiskPath,
         row: SubdomainRow,
         memory_bytes: usize,

@@ -15,7 +15,7 @@ pub enum StorageError {
         path: PathBuf,
         /// What the cause was.
         #[source]
-        source: Box<redb::Error>,
+        source: Box<dyn std::error::Error + Send + Sync>,
     },
     /// The file is open for writing elsewhere.
     #[error("{path} is being written by another process")]

@@ -129,7 +129,8 @@ impl StoreFile {
         let path = &path.into();
         match Self::open(path, cache_bytes, writable) {
             Err(StorageError::Database { source, .. })
-                if !writable && matches!(*source, redb::Error::RepairAborted) =>
+                if !writable
+                    && matches!(source.downcast_ref(), Some(redb::Error::RepairAborted)) =>
             {
                 Self::open_for(path.clone(), cache_bytes, Access::Private)
             }
