@@ -34,9 +34,9 @@ use vertex::Mover;
 
 /// Tetrahedra are bad above this q ... On balls and even scans the rounds before leave nothing of q > 3.5, so that nothing is touched
 /// there. At 4, twice as many are tried and most in vain: nearly all between 4 and 8 are good for the triangles around them.
-const QUALITY_MAX: f64 = 8.0;
+const QUALITY_MAX: f64 = 50.0;
 /// ... and above this excess. The worst of a mesh stands on a needle: at an excess of 2 it may be twice as bad as another mesher's.
-const EXCESS_MAX: f64 = 1.5;
+const EXCESS_MAX: f64 = 2.0;
 /// Searches stop at this value, and an operation that reaches it is done without trying others.
 const ENOUGH: f64 = 0.5;
 /// Sweeps of moves for the product at most.
