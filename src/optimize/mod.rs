@@ -5,6 +5,7 @@
 //! 3. `rounds`: every tetrahedron with q ≥ 2 is attacked by edge removal, then face swap, then smoothing.
 //! 4. `rescue`: what is still worst is attacked by collapse and insertion too.
 //! 5. `share`: what is still bad, beside what the surface spoils, is attacked by all of these, judged by their sum.
+//! 6. `mend`: what is far worse than the surface forces (`bound`) is attacked, worst first, by vertices in growing cavities too.
 //!
 //! Placement of points alone leaves 86 to 90 % of the tetrahedra below q = 2 and slivers without bound;
 //! steps 1 and 2 give 97 %, step 3 aimed at *every* q ≥ 2 gives 99 % and more. Aimed only at q ≥ 2.86
@@ -19,11 +20,14 @@
 //! J. R. Shewchuk, "Aggressive tetrahedral mesh improvement" (2007).
 
 mod bad_fraction;
+mod bound;
+mod climb;
 mod collapse;
 mod deficit;
 mod insertion;
 mod lawson;
 mod measure;
+mod mend;
 mod objective;
 mod odt;
 mod pages;
@@ -37,8 +41,10 @@ mod swap;
 mod tests;
 mod vertex_operations;
 
+pub use bound::{excess, face_floor, face_least, least};
 pub use lawson::LawsonStats;
 pub use measure::{Histogram, QualityTable, measure};
+pub use mend::MendCounts;
 pub use quality::{GOODNESS_WANTED, inverse_quality, is_forcing, quality};
 pub use rounds::OperationCounts;
 pub use run::{Mode, OptimizeReport, Progress, Settings, run, run_with};

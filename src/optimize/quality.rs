@@ -5,7 +5,7 @@
 use crate::geom::{Point, orient};
 
 /// α = √6 / 12.
-const ALPHA: f64 = 0.204_124_145_231_931_5;
+pub(super) const ALPHA: f64 = 0.204_124_145_231_931_5;
 
 /// Goodness of a tetrahedron that is left alone: q = 2, the first bin of the table.
 pub const GOODNESS_WANTED: f64 = 0.5;

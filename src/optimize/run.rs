@@ -2,6 +2,7 @@
 
 use super::bad_fraction::SHARE;
 use super::lawson::{Lawson, LawsonStats};
+use super::mend::{MendCounts, Mender};
 use super::odt;
 use super::pages::{PageFlags, Way, clear_marks};
 use super::rounds::{BAD, OperationCounts, Rounds};
@@ -58,6 +59,7 @@ pub struct OptimizeReport {
     /// Vertices that could not move because a tetrahedron would not stay positive, over all sweeps.
     pub odt_held: u64,
     pub operations: OperationCounts,
+    pub mended: MendCounts,
 }
 
 /// Optimizes the whole mesh with the usual choices of `mode`.
@@ -104,8 +106,13 @@ pub fn run_with<P: Pages>(
         rounds.finish(mesh);
         rounds.flags = bad;
         rounds.run(mesh, SHARE, &mut |done, total| tell("share", done, total));
-        rounds.finish(mesh);
+        let mut bad = rounds.finish(mesh);
         report.operations = rounds.counts;
+        let mut mender = Mender::default();
+        mender.run(mesh, &mut bad, &mut |done| {
+            tell("mend", (1000.0 * done) as u32, 1000);
+        });
+        report.mended = mender.counts;
     }
     report
 }

@@ -1,6 +1,7 @@
 //! A cube with prescribed skin and a random inside: what optimization must reach and must not touch.
 
 use super::bad_fraction::SHARE;
+use super::mend::Mender;
 use super::pages::PageFlags;
 use super::rounds::Rounds;
 use super::*;
@@ -279,6 +280,65 @@ fn the_last_rounds_make_fewer_bad_ones_and_none_of_the_worst_worse() {
         rounds.counts
     );
     assert!(after.worst <= before.worst.max(4.0));
+}
+
+/// Moves an inner vertex to just above the face opposite it in one of its tetrahedra; returns it.
+fn flatten<P: Pages>(mesh: &mut Mesh<P>) -> u32 {
+    let mut ball = crate::reconnect::Ball::default();
+    for (t, tet) in live(mesh) {
+        for (i, v) in tet.vertices().into_iter().enumerate() {
+            if mesh.is_fixed(v) || !ball.gather(mesh, v, t, 64) {
+                continue;
+            }
+            let old = mesh.point(v);
+            let [a, b, c] = tet.face(i).map(|w| mesh.point(w));
+            let middle = (a + b + c) / 3.0;
+            mesh.set_point(v, middle + (old - middle) * 1e-9);
+            let is_positive = ball.records.iter().all(|record| {
+                let [a, b, c, d] = mesh.points(record);
+                orient(a, b, c, d) > 0.0
+            });
+            if is_positive {
+                return v;
+            }
+            mesh.set_point(v, old);
+        }
+    }
+    panic!("no vertex can be moved that far");
+}
+
+#[test]
+fn what_is_flat_but_for_rounding_is_mended_and_the_skin_stays() {
+    let mut mesh = cube(Mesh::new(FlatPages::default()), 8, 5);
+    run(&mut mesh, Mode::Full, &|_| ());
+    let before = measure(&mut mesh);
+    let (hull, _) = checked(&mut mesh);
+    flatten(&mut mesh);
+    assert!(measure(&mut mesh).worst > 1e8);
+    let mut mender = Mender::default();
+    let mut pages = PageFlags::all(&mesh);
+    mender.run(&mut mesh, &mut pages, &mut |_| ());
+    let after = checked(&mut mesh);
+    assert!(after.0 == hull && (after.1 - 1.0).abs() < 1e-9);
+    let table = measure(&mut mesh);
+    assert!(
+        table.worst < before.worst.max(8.0),
+        "{table:?} {:?}",
+        mender.counts
+    );
+    assert!(mender.counts.vertices_moved + mender.counts.vertices_inserted > 0);
+}
+
+#[test]
+fn a_good_mesh_is_left_as_it_is() {
+    let mut mesh = cube(Mesh::new(FlatPages::default()), 8, 6);
+    run(&mut mesh, Mode::Full, &|_| ());
+    let before = content(&mut mesh);
+    let mut mender = Mender::default();
+    let mut pages = PageFlags::all(&mesh);
+    mender.run(&mut mesh, &mut pages, &mut |_| ());
+    assert_eq!(mender.counts, MendCounts::default());
+    assert!(content(&mut mesh) == before);
 }
 
 /// Not a test of anything: prints what tuning needs. `CUBE_N=60 cargo test --release optimize::tests::table -- --ignored --nocapture`

@@ -1,0 +1,358 @@
+//! A vertex and the faces it is joined to: what its tetrahedra are worth, and where it should be.
+
+use std::collections::HashMap;
+
+use super::super::bound::{face_least, least};
+use super::super::climb::Climb;
+use super::super::quality::{ALPHA, inverse_quality};
+use crate::geom::{Point, orient};
+use crate::mesh::anatomy::FACES;
+use crate::mesh::{FaceRef, Mesh, Tet};
+use crate::storage::Pages;
+
+/// A face of the star and the tetrahedron of the vertex on it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Side {
+    /// Counter-clockwise seen from outside: (v, 0, 1, 2) is positive.
+    pub(super) vertices: [u32; 3],
+    pub(super) points: [Point; 3],
+    /// Twice the area, outward.
+    normal: Point,
+    area: f64,
+    /// Square root of the area.
+    width: f64,
+    longest_squared: f64,
+    /// Square of the volume below which rounding may decide, over the squared distance of the vertex.
+    doubt: f64,
+    /// See [`weight`].
+    weight: f64,
+    /// The face beyond, or none.
+    pub(super) across: FaceRef,
+    pub(super) required: bool,
+}
+
+impl Side {
+    /// Face `i` of a tetrahedron.
+    pub(super) fn new<P: Pages>(
+        mesh: &mut Mesh<P>,
+        record: &Tet,
+        i: usize,
+        bounds: &mut FaceBounds,
+    ) -> Self {
+        let vertices = record.face(i);
+        let points = vertices.map(|v| mesh.point(v));
+        let [a, b, c] = points;
+        let (u, v, w) = (b - a, c - a, c - b);
+        let normal = u.cross(v);
+        let required = record.is_required(i);
+        Self {
+            vertices,
+            points,
+            normal,
+            area: normal.length(),
+            width: normal.length().sqrt(),
+            longest_squared: u.dot(u).max(v.dot(v)).max(w.dot(w)),
+            doubt: 1e-28 * u.dot(u) * v.dot(v),
+            weight: if required {
+                weight(bounds.of(vertices, points))
+            } else {
+                1.0
+            },
+            across: record.neighbor[i],
+            required,
+        }
+    }
+
+    /// Weight over q with the vertex at `p`; zero or less where the tetrahedron is not exactly positive.
+    #[inline]
+    pub(super) fn value(&self, p: Point) -> f64 {
+        let good = self.inverse_quality(p);
+        if good > 0.0 { self.weight * good } else { good }
+    }
+
+    /// How much nearer `p` is to the plane of the face than `margin` times the square root of the area.
+    fn lacking(&self, p: Point, margin: f64) -> f64 {
+        let height = self.normal.dot(self.points[0] - p) / self.area;
+        margin * self.width - height
+    }
+
+    /// 1 / q of the tetrahedron with the vertex at `p`, or how far behind the face that is, in lengths of its longest edge: the ratio that is
+    /// 1 / q in front of it would send a vertex behind several faces to infinity, where it is nearest to zero.
+    #[inline]
+    pub(super) fn inverse_quality(&self, p: Point) -> f64 {
+        let [a, b, c] = self.points;
+        let (u, v, w) = (a - p, b - p, c - p);
+        let squared = |x: Point| x.dot(x);
+        let longest = (squared(u).max(squared(v)))
+            .max(squared(w))
+            .max(self.longest_squared);
+        let mut det = self.normal.dot(u);
+        if det * det <= self.doubt * squared(u) {
+            det = orient(p, a, b, c);
+        }
+        if det <= 0.0 {
+            return det / (self.area * self.longest_squared.sqrt());
+        }
+        let areas = u.cross(v).length() + v.cross(w).length() + w.cross(u).length() + self.area;
+        det / (ALPHA * longest.sqrt() * areas)
+    }
+}
+
+/// Distances from the sides that a place for a new vertex should have, in square roots of their areas, tried in this order, and the moves
+/// tried for each.
+const MARGINS: [f64; 3] = [0.3, 0.06, 0.01];
+const RELAXATIONS: u32 = 24;
+
+/// What 1 / q is multiplied with on a face of this bound, to be compared with tetrahedra that nothing forces: the bound of a good
+/// triangle, 0.65 of that of a needle.
+///
+/// Twice a bound of 1 is an element to compute with, twice one of 1000 is a loss of 1000. A face without area in doubles is no
+/// reason to do anything.
+fn weight(bound: f64) -> f64 {
+    if bound < NEEDLE {
+        bound * (1.0 - 0.35 * (bound - 1.0) / (NEEDLE - 1.0))
+    } else if bound.is_finite() {
+        0.65 * bound
+    } else {
+        f64::MAX
+    }
+}
+
+/// Triangles of this bound and more are needles.
+const NEEDLE: f64 = 10.0;
+
+/// The bounds of required faces met so far: their corners never move.
+#[derive(Default)]
+pub(super) struct FaceBounds {
+    known: HashMap<[u32; 3], f64>,
+}
+
+impl FaceBounds {
+    /// Forgets all when there are so many: about 2 MB.
+    const KNOWN_MAX: usize = 1 << 16;
+
+    fn of(&mut self, mut vertices: [u32; 3], points: [Point; 3]) -> f64 {
+        if self.known.len() >= Self::KNOWN_MAX {
+            self.known.clear();
+        }
+        vertices.sort_unstable();
+        *(self.known.entry(vertices)).or_insert_with(|| face_least(points))
+    }
+}
+
+/// What a tetrahedron of the mesh counts, in the same units as the sides of a star.
+pub(super) fn value_of<P: Pages>(
+    mesh: &mut Mesh<P>,
+    tet: &Tet,
+    bounds: &mut FaceBounds,
+) -> [f64; 2] {
+    let points = mesh.points(tet);
+    let good = inverse_quality(points).max(0.0);
+    let required = [0, 1, 2, 3].map(|i| tet.is_required(i));
+    let bound = match required.iter().filter(|&&r| r).count() {
+        0 => 1.0,
+        1 => {
+            let i = required.iter().position(|&r| r).unwrap_or(0);
+            bounds.of(tet.face(i), FACES[i].map(|k| points[k]))
+        }
+        _ => least(points, required),
+    };
+    [good, good * weight(bound)]
+}
+
+/// What a set of tetrahedra costs: the worst q, and the sum over the bad ones.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cost {
+    pub(super) worst_goodness: f64,
+    /// Σ value^(-1/2) · goodness^(-1/4) over values below 1/2: a very bad one is worth many that are less bad, but not any number of them.
+    /// By values alone a needle of twice its bound would weigh as little as a q of 2, and it is the worst of the mesh.
+    pub(super) sum: f64,
+}
+
+impl Default for Cost {
+    fn default() -> Self {
+        Self {
+            worst_goodness: f64::INFINITY,
+            sum: 0.0,
+        }
+    }
+}
+
+impl Cost {
+    pub(super) fn add(&mut self, inverse_quality: f64, value: f64) {
+        self.worst_goodness = self.worst_goodness.min(inverse_quality);
+        if value < 0.5 {
+            let (value, inverse_quality) = (value.max(1e-30), inverse_quality.max(1e-30));
+            self.sum += 1.0 / (value * inverse_quality.sqrt()).sqrt();
+        }
+    }
+
+    /// Whether this, of least value `value`, may take the place of `old`: the worst q does not rise above 10, and either the sum falls or what
+    /// is aimed at was very bad and becomes much better. Without the sum, tetrahedra just over the threshold would be divided for little; with it alone,
+    /// needles near their bound keep their neighbors from being mended.
+    pub(super) fn is_better(&self, old: &Self, value: f64, aim: Aim) -> bool {
+        let is_much = aim.own < VERY_BAD && value > MUCH * aim.own;
+        self.worst_goodness >= old.worst_goodness.min(0.1)
+            && value > aim.own
+            && (is_much || self.sum < old.sum)
+    }
+}
+
+/// Tetrahedra below this value may be replaced by more bad ones than before, if each is better by the factor.
+const VERY_BAD: f64 = 0.125;
+const MUCH: f64 = 1.5;
+
+/// What an operation on a bad tetrahedron is to reach.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Aim {
+    /// The tetrahedron's value.
+    pub(super) own: f64,
+    /// Where searches stop.
+    pub(super) enough: f64,
+}
+
+/// The faces that a vertex is, or is to be, joined to.
+#[derive(Default)]
+pub(super) struct Star {
+    pub(super) sides: Vec<Side>,
+}
+
+impl Star {
+    /// The least value of the sides with the vertex at `p`, or any value of at most `floor` when it is not above `floor`.
+    ///
+    /// Effects: a side that decides early moves forward, to decide earlier next time.
+    pub(super) fn least(&mut self, p: Point, floor: f64) -> f64 {
+        let mut least = f64::INFINITY;
+        for k in 0..self.sides.len() {
+            let value = self.sides[k].value(p);
+            if value <= floor || value.is_nan() {
+                self.sides.swap(k, k / 2);
+                return value;
+            }
+            least = least.min(value);
+        }
+        least
+    }
+
+    /// A number that grows with the product of the sides' values, whatever their number and however small they are, or
+    /// `f64::NEG_INFINITY` when a tetrahedron is not positive or its 1 / q is below `floor`.
+    ///
+    /// The product is kept as mantissa and exponent; exponent plus mantissa is the logarithm with straight lines between the powers of
+    /// two, from basic operations, equal on every machine.
+    pub(super) fn product(&self, p: Point, floor: f64) -> f64 {
+        let (mut mantissa, mut exponent) = (1.0f64, 0.0);
+        for side in &self.sides {
+            let good = side.inverse_quality(p);
+            if good.is_nan() || good < floor.max(f64::MIN_POSITIVE) {
+                return f64::NEG_INFINITY;
+            }
+            mantissa *= unit(good, &mut exponent);
+            mantissa = unit(mantissa, &mut exponent);
+        }
+        exponent + mantissa
+    }
+
+    /// The corner, its place and the least value of the sides that do not have it, where that is largest and above `floor`.
+    pub(super) fn best_corner(&self, floor: f64) -> Option<(u32, Point, f64)> {
+        let mut corners: Vec<(u32, Point)> = (self.sides.iter())
+            .flat_map(|side| side.vertices.into_iter().zip(side.points))
+            .collect();
+        corners.sort_unstable_by_key(|corner| corner.0);
+        corners.dedup_by_key(|corner| corner.0);
+        let mut best = None;
+        let mut most = floor;
+        for (v, p) in corners {
+            let others = self.sides.iter().filter(|side| !side.vertices.contains(&v));
+            let mut least = f64::INFINITY;
+            for side in others {
+                least = least.min(side.value(p));
+                if least <= most || least.is_nan() {
+                    break;
+                }
+            }
+            if least > most && least.is_finite() {
+                most = least;
+                best = Some((v, p, least));
+            }
+        }
+        best
+    }
+
+    /// The cost with the vertex at `p`; sides that have it are faces of the others' tetrahedra.
+    pub(super) fn cost(&self, p: Point) -> Cost {
+        let mut cost = Cost::default();
+        for side in self.sides.iter().filter(|side| !side.points.contains(&p)) {
+            cost.add(side.inverse_quality(p), side.value(p));
+        }
+        cost
+    }
+
+    /// How far the sides' corners are from `p` in the mean.
+    pub(super) fn radius(&self, p: Point) -> f64 {
+        let corners = self.sides.iter().flat_map(|side| side.points);
+        let sum: f64 = corners.map(|c| (c - p).length()).sum();
+        sum / (3.0 * self.sides.len() as f64)
+    }
+
+    /// A point in front of all sides near `p`, if they have one, not nearer to each than a share of its size if that is possible: the
+    /// point is put in front of the side that it is most behind, again and again.
+    ///
+    /// Source: T. S. Motzkin and I. J. Schoenberg, "The relaxation method for linear inequalities" (1954).
+    pub(super) fn into_kernel(&self, p: Point) -> Point {
+        let mut at = p;
+        for margin in MARGINS {
+            for _ in 0..RELAXATIONS {
+                let lacks = |side: &Side| side.lacking(at, margin);
+                let most = self.sides.iter().map(lacks).enumerate();
+                let Some((k, lack)) = most.max_by(|a, b| a.1.total_cmp(&b.1)) else {
+                    return at;
+                };
+                if lack <= 0.0 {
+                    return at;
+                }
+                at -= self.sides[k].normal * (1.3 * lack / self.sides[k].area);
+            }
+        }
+        at
+    }
+
+    /// Moves from `start` to where the least value is largest; stops at `enough`. Returns where and what it is there.
+    pub(super) fn raise_least(&mut self, start: Point, steps: u32, enough: f64) -> (Point, f64) {
+        let value = self.least(start, f64::NEG_INFINITY);
+        let climb = Climb {
+            start,
+            step: 0.2 * self.radius(start),
+            steps,
+            enough,
+        };
+        let found = climb.run(value, |p, floor| self.least(p, floor));
+        found.unwrap_or((start, value))
+    }
+}
+
+/// A positive number as one in [1, 2), the power of two added to `exponent`.
+fn unit(x: f64, exponent: &mut f64) -> f64 {
+    let bits = x.to_bits();
+    *exponent += (bits >> 52) as f64 - 1023.0;
+    f64::from_bits(bits & ((1 << 52) - 1) | 1023 << 52)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn products_of_any_size_are_ordered() {
+        let values = |list: &[f64]| {
+            let (mut mantissa, mut exponent) = (1.0, 0.0);
+            for &value in list {
+                mantissa *= unit(value, &mut exponent);
+                mantissa = unit(mantissa, &mut exponent);
+            }
+            exponent + mantissa
+        };
+        assert!(values(&[1e-200, 1e-200, 1e-200]) < values(&[1e-200, 1e-200, 1.1e-200]));
+        assert!(values(&[0.5, 0.5]) < values(&[0.5, 0.51]) && values(&[0.25]) == values(&[0.5; 2]));
+        assert!(values(&[0.999]) < values(&[1.0]) && values(&[]) == values(&[1.0]));
+    }
+}

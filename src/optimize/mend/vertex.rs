@@ -1,0 +1,98 @@
+//! Moves of inner vertices: first for all of the ball together, then for its worst.
+
+use super::super::climb::Climb;
+use super::super::smooth::is_free;
+use super::star::{Aim, Cost, FaceBounds, Side, Star, value_of};
+use crate::geom::Point;
+use crate::mesh::Mesh;
+use crate::reconnect::Ball;
+use crate::storage::Pages;
+
+/// Largest ball whose vertex moves.
+const BALL_MAX: usize = 128;
+/// Steps of a search.
+const STEPS: u32 = 60;
+/// A move for the sum must at least raise the product of a ball by this much in powers of two: less is worth no sweep.
+const GAIN_MIN: f64 = 0.1;
+
+/// A tetrahedron below this value is flat but for rounding.
+const FLAT: f64 = 1e-6;
+
+/// Scratch of moves.
+#[derive(Default)]
+pub(super) struct Mover {
+    pub(super) ball: Ball,
+    star: Star,
+}
+
+impl Mover {
+    /// Gathers the star of `v` from its tetrahedron `t`; `false` when it may not move or its ball is too large.
+    pub(super) fn gather<P: Pages>(
+        &mut self,
+        mesh: &mut Mesh<P>,
+        v: u32,
+        t: u32,
+        bounds: &mut FaceBounds,
+    ) -> bool {
+        if !is_free(mesh, v)
+            || !self.ball.gather(mesh, v, t, BALL_MAX)
+            || !self.ball.closed
+            || self.ball.required
+        {
+            return false;
+        }
+        self.star.sides.clear();
+        for (record, &local) in self.ball.records.iter().zip(&self.ball.locals) {
+            let side = Side::new(mesh, record, local.into(), bounds);
+            self.star.sides.push(side);
+        }
+        true
+    }
+
+    /// Moves the vertex gathered to where the product of its ball's values is largest.
+    ///
+    /// What the worst value of a ball cannot do, this can: in clusters of flat tetrahedra each move for the worst is stopped by
+    /// the next one, while their product still has a slope.
+    pub(super) fn raise_product<P: Pages>(&mut self, mesh: &mut Mesh<P>) -> bool {
+        let (v, start) = (self.ball.v, mesh.point(self.ball.v));
+        let climb = Climb {
+            start,
+            step: 0.2 * self.star.radius(start),
+            steps: STEPS,
+            enough: f64::INFINITY,
+        };
+        // A mere needle must not become worse; in a cluster some have to, for a while.
+        let least = self.star.least(start, f64::NEG_INFINITY);
+        let floor = if least < FLAT {
+            f64::MIN_POSITIVE
+        } else {
+            least
+        };
+        let before = self.star.product(start, f64::MIN_POSITIVE);
+        match climb.run(before, |p, _| self.star.product(p, floor)) {
+            Some((p, value)) if value > before + GAIN_MIN => {
+                mesh.set_point(v, p);
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// Where the worst of the ball gathered is best, and its value there, where the ball gets better.
+    pub(super) fn raise_least<P: Pages>(
+        &mut self,
+        mesh: &mut Mesh<P>,
+        aim: Aim,
+        bounds: &mut FaceBounds,
+    ) -> Option<(Point, f64)> {
+        let start = mesh.point(self.ball.v);
+        let (at, value) = self.star.raise_least(start, STEPS, aim.enough);
+        let mut old = Cost::default();
+        for record in &self.ball.records {
+            let [good, value] = value_of(mesh, record, bounds);
+            old.add(good, value);
+        }
+        let is_better = value > 0.0 && self.star.cost(at).is_better(&old, value, aim);
+        is_better.then_some((at, value))
+    }
+}
