@@ -33,7 +33,9 @@ pub use ask::{Answers, Order, Query};
 pub use codes::{CODES, CodeRow};
 pub use error::Error;
 pub(crate) use guard::guarded;
-pub use memory::{Bytes, peak_bytes};
+pub use memory::Bytes;
+#[cfg(any(test, feature = "cli", feature = "internals"))]
+pub use memory::peak_bytes;
 pub(crate) use memory::{default_cap, show_bytes};
 pub(crate) use mesher::predict;
 pub use mesher::{Existing, Mesher, Prediction};

@@ -137,6 +137,7 @@ impl Remesh {
     }
 
     /// With sizes that a caller in this crate has prepared.
+    #[cfg(any(test, feature = "cli", feature = "internals"))]
     pub(crate) fn prepared_sizes(mut self, sizes: Option<NewSizes>) -> Self {
         self.prepared = sizes;
         self
