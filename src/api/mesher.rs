@@ -198,7 +198,7 @@ impl Mesher {
     }
 
     /// Whether a mesh that memory or disk are not expected to hold is refused. Default: it is.
-    #[cfg(any(test, feature = "cli", feature = "internals"))]
+    #[cfg(feature = "cli")]
     pub(crate) fn preflight(mut self, preflight: bool) -> Self {
         self.preflight = preflight;
         self
@@ -278,7 +278,7 @@ impl Mesher {
     }
 
     /// Refuses early what is no store or an unfinished one, before a surface is read for it.
-    #[cfg(any(test, feature = "cli", feature = "internals"))]
+    #[cfg(feature = "cli")]
     pub(crate) fn check_path(path: &Path, existing: Existing) -> Result<(), Error> {
         if !path.exists() || existing == Existing::Replace {
             return Ok(());

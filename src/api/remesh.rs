@@ -137,7 +137,7 @@ impl Remesh {
     }
 
     /// With sizes that a caller in this crate has prepared.
-    #[cfg(any(test, feature = "cli", feature = "internals"))]
+    #[cfg(feature = "cli")]
     pub(crate) fn prepared_sizes(mut self, sizes: Option<NewSizes>) -> Self {
         self.prepared = sizes;
         self

@@ -48,8 +48,10 @@ use error::Result;
 pub use error::WriteError;
 pub use format::{ENDINGS, MeshFormat};
 pub use npy::TextFile;
+#[cfg(any(feature = "pictures", feature = "internals"))]
+pub use npy::bytes;
 #[cfg(any(test, feature = "cli", feature = "internals"))]
-pub use npy::{NpyField, NpyTable, bytes};
+pub use npy::{NpyField, NpyTable};
 pub use report::ExportReport;
 use report::FileCounts;
 #[cfg(any(test, feature = "cli", feature = "internals"))]

@@ -120,7 +120,7 @@ impl TextFile {
 }
 
 /// Writes a whole file at once; returns its length. Errors: the disk.
-#[cfg(any(test, feature = "cli", feature = "internals"))]
+#[cfg(any(feature = "pictures", feature = "internals"))]
 pub fn bytes(out: &Path, content: &[u8]) -> Result<u64> {
     let mut draft = Draft::new(out)?;
     let path = draft.create(out, content.len() as u64)?;
