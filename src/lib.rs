@@ -1,6 +1,8 @@
 // One exception, two calls of the C library: `cli::heap`.
 #![deny(unsafe_code)]
 #![warn(missing_docs)]
+// The page names the modules, which are public with `internals` alone.
+#![cfg_attr(not(feature = "internals"), allow(rustdoc::private_intra_doc_links))]
 #![doc = include_str!("README.md")]
 
 #[doc(inline)]
@@ -18,6 +20,10 @@ pub mod data {
     pub use glam::DVec3;
     pub use tetdb_schema as schema;
 }
+
+// Its text alone: nothing of it is in a program.
+#[cfg(doc)]
+pub mod guide;
 
 #[cfg(feature = "internals")]
 pub use house::*;

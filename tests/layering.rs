@@ -139,6 +139,7 @@ fn every_room_is_a_module_of_the_crate() {
     let declared: BTreeSet<&str> = lib
         .lines()
         .filter_map(|l| l.trim_start().strip_prefix("pub mod ")?.strip_suffix(';'))
+        .filter(|name| !NOT_ROOMS.contains(name))
         .collect();
     let found: BTreeSet<String> = sources(&src()).iter().filter_map(|p| room_of(p)).collect();
     assert_eq!(declared, found.iter().map(String::as_str).collect());

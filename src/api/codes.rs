@@ -57,7 +57,7 @@ pub const CODES: &[CodeRow] = &[
     row(
         "unknown-format",
         3,
-        "the format of a file cannot be told from its name",
+        "the format of a file does not follow from its name",
     ),
     row("truncated-file", 3, "an input file ends too early"),
     row(
@@ -109,7 +109,7 @@ pub const CODES: &[CodeRow] = &[
     row(
         "unrecovered-triangles",
         3,
-        "input triangles that could not be made faces of the mesh",
+        "input triangles that could not be recovered as faces of the mesh",
     ),
     row(
         "nothing-filled",
@@ -143,7 +143,7 @@ pub const CODES: &[CodeRow] = &[
     row(
         "no-coarse-leaf",
         8,
-        "what the sub-domain was made from was not kept",
+        "the coarse snapshot of the sub-domain was not kept",
     ),
     row(
         "nothing-to-undo",

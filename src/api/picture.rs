@@ -222,8 +222,9 @@ impl Snapshot {
         let (section, view) = pieces(self, session, memory)?;
         let extent = section.extent;
         if extent.n == 0 {
-            let message = "expected a plane that cuts tetrahedra of the mesh";
-            return Err(Error::new("bad-query", message));
+            let message = "the plane cuts no tetrahedron of the mesh";
+            let help = "choose a point within the bounds of the mesh";
+            return Err(Error::new("bad-query", message).with_help(help));
         }
         let frame = PictureFrame {
             pixels: self.pixels,

@@ -204,18 +204,18 @@ impl Remesh {
             );
             return Err(Error::new("bad-size", message));
         }
-        let asked = self.sizes.clone().unwrap_or_default().options;
+        let mut asked = self.sizes.clone().unwrap_or_default().options;
+        job::identify_sizes(&mut asked)?;
         let beta = match &asked.hgrad {
             Some(_) => asked.sizes()?.beta(),
             None => options.sizes()?.beta(),
         };
         let field = match &self.sizes {
-            Some(_) => Some(field_of_surface(
-                open,
-                asked.clone(),
-                options,
-                &self.settings,
-            )?),
+            Some(_) => {
+                let mut all = options.clone();
+                all.add_sizes(&asked);
+                Some(field_of_surface(open, &all, &self.settings)?)
+            }
             None => None,
         };
         let asked = serde_json::to_value(&asked).unwrap_or_default();
@@ -230,24 +230,17 @@ impl Remesh {
     }
 }
 
-/// The field of the whole surface with other options, but the regions and the gradation it was made with.
+/// The field of the surface a store was made from, with these options. Errors: a surface that is not what it was.
 pub(crate) fn field_of_surface(
     open: &mut Catalog,
-    mut all: Options,
-    options: &Options,
+    all: &Options,
     settings: &Settings,
 ) -> Result<SizeField, Error> {
-    job::identify_sizes(&mut all)?;
-    all.regions.clone_from(&options.regions);
-    all.optimize.clone_from(&options.optimize);
-    if all.hgrad.is_none() {
-        all.hgrad.clone_from(&options.hgrad);
-    }
     let (dir, cap) = (open.dir().to_owned(), settings.cap()?);
     let scratch = scratch_beside(&crate::surface::Surface::default(), cap, &dir)?;
     let surface = Surface::of_record(&open.job()?.surfaces, &dir, &scratch)?;
     drop(scratch);
-    let prepared = predict(&surface.inner, &all, cap, &dir)?;
+    let prepared = predict(&surface.inner, all, cap, &dir)?;
     settings.note(prepared.sizes.to_string());
     Ok(prepared.field)
 }

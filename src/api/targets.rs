@@ -26,7 +26,7 @@ pub(crate) fn check_target(out: &Path, inputs: &[PathBuf]) -> Result<(), Error> 
     }
     match inputs.iter().find(|input| is_same_file(input, out)) {
         Some(input) => refused(format!(
-            "{} would be overwritten: it is {}, which this run reads or the store was made from",
+            "{} would be overwritten: it is {}, which this run reads or the store was meshed from",
             out.display(),
             input.display()
         )),

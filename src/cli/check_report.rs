@@ -230,11 +230,16 @@ impl<'a> Findings<'a> {
             short(f.edge_median)
         ));
         if let (Some(tets), Some(share)) = (self.tets_expected, self.forced_share()) {
+            let forced = match f.forcing_triangles {
+                0 => "no triangle forces a quality of 2 or worse".to_owned(),
+                n => format!(
+                    "at least {:.2} % of them stand on one of {n} triangles whose shape alone makes quality 2 or worse",
+                    100.0 * share
+                ),
+            };
             console.line(&format!(
-                "mesh: about {} tetrahedra with default sizes; at least {:.2} % of them stand on one of {} triangles whose shape alone makes quality 2 or worse",
-                rounded(tets),
-                100.0 * share,
-                f.forcing_triangles
+                "mesh: about {} tetrahedra with default sizes; {forced}",
+                rounded(tets)
             ));
         }
     }
@@ -256,7 +261,7 @@ impl<'a> Findings<'a> {
         }
         if f.edge_min > 0.0 && f.edge_max / f.edge_min > POOR_RATIO {
             advice.push(format!(
-                "the shortest edge is {:.1e} of the longest; if such edges are no intended detail, take them out where the surface was made",
+                "the shortest edge is {:.1e} of the longest; if such edges are no intended detail, remove them in the program the surface comes from",
                 f.edge_min / f.edge_max
             ));
         }

@@ -52,8 +52,17 @@ pub fn options(args: &ShapeArgs) -> Result<Options, Failure> {
     Ok(options)
 }
 
-/// Puts the sizes of the command line over those of `options`.
+/// Puts the sizes of the command line over those of `options`: its lists replace theirs.
 pub fn take_sizes(args: &SizeArgs, options: &mut Options) {
+    take_lengths(args, options);
+    for (given, option) in lists(args, options) {
+        if !given.is_empty() {
+            option.clone_from(given);
+        }
+    }
+}
+
+fn take_lengths(args: &SizeArgs, options: &mut Options) {
     let texts = [
         (&args.hsiz, &mut options.hsiz),
         (&args.hmin, &mut options.hmin),
@@ -67,17 +76,19 @@ pub fn take_sizes(args: &SizeArgs, options: &mut Options) {
             option.clone_from(given);
         }
     }
-    let lists = [
+}
+
+/// Shapes and regions, of the command line and of options.
+fn lists<'a>(
+    args: &'a SizeArgs,
+    options: &'a mut Options,
+) -> [(&'a Vec<String>, &'a mut Vec<String>); 4] {
+    [
         (&args.size_box, &mut options.size_box),
         (&args.size_sphere, &mut options.size_sphere),
         (&args.size_cylinder, &mut options.size_cylinder),
         (&args.size_region, &mut options.size_region),
-    ];
-    for (given, option) in lists {
-        if !given.is_empty() {
-            option.clone_from(given);
-        }
-    }
+    ]
 }
 
 fn read(text: &str) -> Result<Options, Failure> {

@@ -77,7 +77,7 @@ pub fn run(args: &EstimateArgs, console: &Console) -> Result<u8, Failure> {
         format!("; {} are free", memory::show(free))
     });
     console.line(&format!(
-        "disk: {} while it is made, {} for the finished store{free}",
+        "disk: {} at most on the way, {} for the finished store{free}",
         memory::show(disk),
         memory::show(estimate.store_bytes()),
     ));

@@ -57,7 +57,7 @@ pub fn check_format(out: &Path) -> Result<(), Failure> {
         Some(_) => Ok(()),
         None => Err(Failure::new(
             "unknown-format",
-            "the format of a mesh file cannot be told from its name",
+            "the format of a mesh file does not follow from its name",
         )
         .at(out.display())
         .help(format!("end the name with {ENDINGS}"))),

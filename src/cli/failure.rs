@@ -102,7 +102,7 @@ fn help_of(code: &str) -> &'static str {
         "busy" => "wait for the other process, or stop it",
         "disk-full" => "free some space, then `tetdb resume STORE`",
         "damaged" => {
-            "`tetdb verify STORE` lists what is damaged; `tetdb resaturate STORE --repair` makes damaged sub-domains again, `--forget` drops a damaged previous version"
+            "`tetdb verify STORE` lists what is damaged; `tetdb resaturate STORE --repair` meshes damaged sub-domains again, `--forget` drops a damaged previous version"
         }
         "memory" => "give more with --memory, or mesh a coarser surface",
         "stopped" if super::signals::has_store() => {
@@ -110,8 +110,8 @@ fn help_of(code: &str) -> &'static str {
         }
         "stopped" => "nothing was begun; run it again",
         "no-such-part" => "`tetdb info STORE` lists what there is",
-        "no-such-store" => "check the path; `tetdb mesh SURFACE -o STORE` makes a store",
-        "not-a-store" => "choose another path; what is there was not made by this program",
+        "no-such-store" => "check the path; `tetdb mesh SURFACE -o STORE` creates a store",
+        "not-a-store" => "choose another path; what is there was not written by this program",
         "store-exists" => "choose another path, or replace it with --force",
         "no-coarse-leaf" => "mesh the surface again without --drop-coarse",
         "store-unfinished" => "`tetdb resume STORE` goes on with it",

@@ -127,7 +127,7 @@ pub fn print(path: &Path, console: &Console) -> Result<(), Failure> {
     let coarse: u64 = catalog.coarse_snapshots()?.iter().map(|c| c.bytes).sum();
     if coarse > 0 {
         console.line(&format!(
-            "coarse leaves, from which sub-domains can be made again: {}, {:.2} bytes per tetrahedron",
+            "coarse snapshots, from which sub-domains can be meshed again: {}, {:.2} bytes per tetrahedron",
             memory::show(coarse),
             coarse as f64 / tets.max(1) as f64
         ));

@@ -76,7 +76,7 @@ pub fn resume(args: &ResumeArgs, console: &Console) -> Result<u8, Failure> {
 /// Threads, signals, and the cap.
 pub(super) fn begin(args: &RunArgs, console: &Console) -> Result<Settings, Failure> {
     if args.threads == Some(0) {
-        let message = "--threads 0 leaves nobody to work";
+        let message = "--threads 0 is no thread to work with";
         return Err(Failure::new("usage", message).help("give 1 or more"));
     }
     for out in &args.export {

@@ -214,7 +214,7 @@ impl FileSink {
             }
             "vtu" => Self::Vtu(SelectedVtu::new(out, memory)?),
             _ => {
-                let message = "the format of a file of answers cannot be told from its name";
+                let message = "the format of a file of answers does not follow from its name";
                 return Err(Failure::new("unknown-format", message)
                     .at(out.display())
                     .help("end the name with .csv, .jsonl, .npy or .vtu"));

@@ -70,7 +70,9 @@ pub fn new_sizes(
         sizes.values = Some(values(Path::new(file), open, args, settings.cap()?)?);
     } else if args.sizes != SizeArgs::default() {
         identify_sizes(&mut asked)?;
-        sizes.field = Some(field_of_surface(open, asked.clone(), options, settings)?);
+        let mut all = options.clone();
+        all.add_sizes(&asked);
+        sizes.field = Some(field_of_surface(open, &all, settings)?);
     }
     asked.size_field = lengths.or(asked.size_field);
     let asked = serde_json::to_value(&asked).unwrap_or_default();

@@ -16,7 +16,13 @@ pub fn run(args: &SnapshotArgs, console: &Console) -> Result<u8, Failure> {
     check_target(&args.output, &inputs_of(&args.store))?;
     let settings = console.settings(memory::asked(args.read.memory.as_deref())?, None);
     let snapshot = snapshot(args)?;
-    let snapped = take(&args.store, &args.output, &snapshot, &settings)?;
+    let snapped = take(&args.store, &args.output, &snapshot, &settings);
+    let snapped = snapped.map_err(|error| match (error.code(), &args.plane) {
+        ("bad-query", Some(plane)) => {
+            bad("--plane", plane, "a plane that cuts tetrahedra of the mesh")
+        }
+        _ => error.into(),
+    })?;
     console.done();
     print(args, &snapped, console);
     Ok(0)

@@ -54,9 +54,8 @@ pub(crate) struct OpenSubdomain {
 /// use tetdb::store::Catalog;
 /// use tetdb::expr::Expression;
 /// use tetdb::geom::Point;
-/// use tetdb::query::{Inquiry, Selection, Solid, VARIABLES};
+/// use tetdb::query::{QuerySession, Selection, Solid, VARIABLES};
 /// use tetdb::storage::Budget;
-/// # use tetdb::store::Catalog;
 /// # use tetdb_schema::catalog::Job;
 /// # let dir = tempfile::tempdir()?;
 /// # let path = dir.path().join("box.tetdb");
@@ -66,7 +65,7 @@ pub(crate) struct OpenSubdomain {
 /// # tetdb::pipeline::mesh(&mut catalog, &surface, &options, &Budget::new(256 << 20), &|_| {})?;
 /// # catalog.close()?;
 ///
-/// let mut inquiry = Inquiry::open(Catalog::open(&path)?, &Budget::new(64 << 20))?;
+/// let mut inquiry = QuerySession::open(Catalog::open(&path)?, &Budget::new(64 << 20))?;
 /// let center = Point::splat(0.5);
 /// let located = inquiry.locate(&[center, Point::splat(7.0)])?;
 /// assert!(located[0].found.is_some() && located[1].found.is_none());

@@ -1,4 +1,4 @@
-//! Seeded makers of closed surfaces, the paper's cases among them.
+//! Seeded makers of closed surfaces, the paper's cases among them, and kinds of what CAD programs write.
 //!
 //! A sample is named in one word without characters special to a shell, such as
 //! `balls,count=1000,seed=1,h=0.02`. The same word gives the same bits on every machine: only IEEE
@@ -11,15 +11,19 @@
 mod balls;
 mod boxes;
 mod build;
+mod caps;
 mod error;
 mod grains;
 mod hull;
 mod knot;
+mod needles;
+mod prism;
 mod random;
 mod sample;
 mod shells;
 mod spec;
 mod sphere;
+mod steps;
 mod trig;
 
 #[cfg(test)]

@@ -1,8 +1,11 @@
 //! From a word such as `balls,count=1000,h=0.02` to what it asks for.
 
 use super::balls::Balls;
+use super::caps::Caps;
 use super::grains::Grains;
+use super::needles::Needles;
 use super::shells::{ShellKind, make_shells};
+use super::steps::Steps;
 use super::{Sample, SampleError, boxes, knot, sphere};
 use crate::geom::Point;
 use crate::surface::{SourceFile, Surface};
@@ -12,7 +15,9 @@ use std::str::FromStr;
 /// What a surface argument begins with when it names a sample.
 pub const PREFIX: &str = "sample:";
 /// The samples there are.
-pub const SAMPLES: &[&str] = &["balls", "box", "grains", "knot", "shells", "sphere"];
+pub const SAMPLES: &[&str] = &[
+    "balls", "box", "caps", "grains", "knot", "needles", "shells", "sphere", "steps",
+];
 
 /// A sample that can be made.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,11 +34,13 @@ pub enum SampleKind {
         sides: Point,
         h: f64,
     },
+    Caps(Caps),
     Grains(Grains),
     Knot {
         tube: f64,
         h: f64,
     },
+    Needles(Needles),
     Shells {
         count: usize,
         kind: ShellKind,
@@ -43,6 +50,7 @@ pub enum SampleKind {
         radius: f64,
         h: f64,
     },
+    Steps(Steps),
 }
 
 impl SampleSpec {
@@ -56,6 +64,7 @@ impl SampleSpec {
         let kind = match name {
             "balls" => parse_balls(rest)?,
             "box" => parse_box(rest)?,
+            "caps" => parse_caps(rest)?,
             "grains" => parse_grains(rest)?,
             "knot" => {
                 let keys = Keys::new("knot", &["tube", "h"], rest)?;
@@ -63,6 +72,7 @@ impl SampleSpec {
                 let h = keys.length("h", tube / 4.0)?;
                 SampleKind::Knot { tube, h }
             }
+            "needles" => parse_needles(rest)?,
             "shells" => parse_shells(rest)?,
             "sphere" => {
                 let keys = Keys::new("sphere", &["radius", "h"], rest)?;
@@ -70,6 +80,7 @@ impl SampleSpec {
                 let h = keys.length("h", radius / 10.0)?;
                 SampleKind::Sphere { radius, h }
             }
+            "steps" => parse_steps(rest)?,
             _ => {
                 return Err(SampleError::UnknownName {
                     found: name.to_owned(),
@@ -90,10 +101,13 @@ impl SampleSpec {
         match self.kind {
             SampleKind::Balls(_) => "balls",
             SampleKind::Box { .. } => "box",
+            SampleKind::Caps(_) => "caps",
             SampleKind::Grains(_) => "grains",
             SampleKind::Knot { .. } => "knot",
+            SampleKind::Needles(_) => "needles",
             SampleKind::Shells { .. } => "shells",
             SampleKind::Sphere { .. } => "sphere",
+            SampleKind::Steps(_) => "steps",
         }
     }
 
@@ -109,8 +123,14 @@ impl SampleSpec {
                     sides.x, sides.y, sides.z
                 )
             }
+            SampleKind::Caps(Caps { count, seed }) => {
+                format!("{PREFIX}caps,count={count},seed={seed}")
+            }
             SampleKind::Grains(Grains { count, seed, h }) => {
                 format!("{PREFIX}grains,count={count},seed={seed},h={h}")
+            }
+            SampleKind::Needles(Needles { count, holes, seed }) => {
+                format!("{PREFIX}needles,count={count},holes={holes},seed={seed}")
             }
             SampleKind::Knot { tube, h } => format!("{PREFIX}knot,tube={tube},h={h}"),
             SampleKind::Shells { count, kind, h } => {
@@ -121,6 +141,9 @@ impl SampleSpec {
                 format!("{PREFIX}shells,count={count},kind={kind},h={h}")
             }
             SampleKind::Sphere { radius, h } => format!("{PREFIX}sphere,radius={radius},h={h}"),
+            SampleKind::Steps(Steps { count, step, seed }) => {
+                format!("{PREFIX}steps,count={count},step={step},seed={seed}")
+            }
         }
     }
 
@@ -133,10 +156,13 @@ impl SampleSpec {
         match &self.kind {
             SampleKind::Balls(balls) => balls.make(),
             SampleKind::Box { sides, h } => boxes::make_box(*sides, *h),
+            SampleKind::Caps(caps) => caps.make(),
             SampleKind::Grains(grains) => grains.make(),
             SampleKind::Knot { tube, h } => knot::make_knot(*tube, *h),
+            SampleKind::Needles(needles) => needles.make(),
             SampleKind::Shells { count, kind, h } => make_shells(*count, *kind, *h),
             SampleKind::Sphere { radius, h } => sphere::make_sphere(*radius, *h),
+            SampleKind::Steps(steps) => steps.make(),
         }
     }
 
@@ -169,6 +195,30 @@ fn parse_box(rest: &str) -> Result<SampleKind, SampleError> {
     let sides = Point::new(x, y, keys.length("z", 1.0)?);
     let h = keys.length("h", sides.max_element() / 20.0)?;
     Ok(SampleKind::Box { sides, h })
+}
+
+fn parse_caps(rest: &str) -> Result<SampleKind, SampleError> {
+    let keys = Keys::new("caps", &["count", "seed"], rest)?;
+    // Of more corners neighbors would be too near to tell convex from flat.
+    let count = keys.number("count", 60, 3, 20_000)?;
+    let seed = keys.number("seed", 1, 0, u64::MAX)?;
+    Ok(SampleKind::Caps(Caps { count, seed }))
+}
+
+fn parse_needles(rest: &str) -> Result<SampleKind, SampleError> {
+    let keys = Keys::new("needles", &["count", "holes", "seed"], rest)?;
+    let count = keys.number("count", 64, 8, 20_000)?;
+    let holes = keys.number("holes", 9, 1, 100_000)?;
+    let seed = keys.number("seed", 1, 0, u64::MAX)?;
+    Ok(SampleKind::Needles(Needles { count, holes, seed }))
+}
+
+fn parse_steps(rest: &str) -> Result<SampleKind, SampleError> {
+    let keys = Keys::new("steps", &["count", "step", "seed"], rest)?;
+    let count = keys.number("count", 5, 1, 1_000_000)?;
+    let step = keys.number("step", 1e-7, 1e-8, 1e-2)?;
+    let seed = keys.number("seed", 1, 0, u64::MAX)?;
+    Ok(SampleKind::Steps(Steps { count, step, seed }))
 }
 
 fn parse_grains(rest: &str) -> Result<SampleKind, SampleError> {

@@ -235,6 +235,57 @@ fn the_knot_is_one_ring() {
     );
 }
 
+/// What meshing asks of a surface, and more: closed in exact signs, one volume or three.
+fn check_solid(text: &str, n_parts: i64) -> Sample {
+    let sample = made(text);
+    let genus = text.contains("needles").then_some(9).unwrap_or(0);
+    assert_eq!(check_closed(&sample), 2 * (n_parts - genus), "{text}");
+    let validation = crate::surface::validate(&sample.clone().into());
+    assert!(
+        validation.is_valid(),
+        "{text}: {:?}",
+        validation.defects.first()
+    );
+    assert!(sample.signed_volume() > 0.0, "{text}");
+    sample
+}
+
+#[test]
+fn steps_are_valid_and_as_low_as_asked() {
+    for seed in 0..20 {
+        for step in ["1e-2", "1e-4", "1e-6", "1e-7", "1e-8"] {
+            let sample = check_solid(&format!("steps,step={step},seed={seed}"), 1);
+            assert_eq!(sample.triangles.len(), 60);
+            let asked: f64 = step.parse().unwrap();
+            let low = edges_of(&sample).0;
+            assert!((0.49..=1.01).contains(&(low / asked)), "{low} {asked}");
+        }
+        check_solid(&format!("steps,count=200,step=0.01,seed={seed}"), 1);
+    }
+}
+
+#[test]
+fn needles_are_three_valid_parts() {
+    for seed in 0..20 {
+        let sample = check_solid(&format!("needles,seed={seed}"), 3);
+        // A disk, a rod, nine holes, the plate's two sides and outer walls.
+        assert_eq!(
+            sample.triangles.len(),
+            2 * (4 * 64 - 4) + 9 * (4 * 64 + 8) + 24
+        );
+    }
+    check_solid("needles,count=2000,seed=3", 3);
+}
+
+#[test]
+fn caps_are_valid_however_their_ears_are_cut() {
+    for seed in 0..20 {
+        let sample = check_solid(&format!("caps,seed={seed}"), 1);
+        assert_eq!(sample.triangles.len(), 4 * 60 - 4);
+        check_solid(&format!("caps,count=2000,seed={seed}"), 1);
+    }
+}
+
 #[test]
 fn the_same_word_gives_the_same_bits() {
     let found = [
@@ -254,6 +305,9 @@ fn the_same_word_gives_the_same_bits() {
         "knot",
         "shells,kind=boxes",
         "sphere,h=0.3",
+        "steps,step=1e-3",
+        "needles,holes=2",
+        "caps,seed=5",
     ] {
         let spec = SampleSpec::parse(text).unwrap();
         assert_eq!(SampleSpec::parse(&spec.canonical()).unwrap(), spec);

@@ -15,7 +15,7 @@ use super::bits::Bits;
 use super::constraint::SizeConstraint;
 use super::corners::Corners;
 use super::seeds::OctreeFrame;
-use super::tree::{CELLS_PER_SIZE, DEPTH, LATTICE, Leaf, Tree};
+use super::tree::{DEPTH, LATTICE, Leaf, Tree};
 use crate::geom::{Aabb, Point};
 use crate::storage::{SpillVec, parallel};
 
@@ -26,7 +26,7 @@ const CELLS_AT_ONCE: usize = 1 << 16;
 /// Cells at most: as many leaves as can be numbered.
 const CELLS_MAX: usize = 1 << 28;
 /// Wishes between corners may be off what lies between their values by this share.
-const BEND_MAX: f64 = 0.1;
+pub(super) const BEND_MAX: f64 = 0.1;
 
 /// Wishes for one surface, in its box.
 pub(super) struct SizeConstraints<'a> {
@@ -35,6 +35,12 @@ pub(super) struct SizeConstraints<'a> {
     pub bounds: Aabb,
     /// No wish goes below this, in units of the cube's side.
     pub least: f64,
+    /// What lies between corners may be off what their values tell by this share.
+    pub bend_max: f64,
+    /// Cells are no wider than this many of the least wished lengths in them, where wishes bend.
+    pub cells_per_size: f64,
+    /// Cells are divided that far outside the box, in their own widths.
+    pub beside: f64,
 }
 
 impl SizeConstraints<'_> {
@@ -109,8 +115,10 @@ impl SizeConstraints<'_> {
     }
 
     fn is_in_bounds(&self, cell: Leaf) -> bool {
-        let low = self.frame.low + cell.low() * self.frame.side;
-        let high = low + Point::splat(cell.side() * self.frame.side);
+        let width = cell.side() * self.frame.side;
+        let beside = Point::splat(self.beside * width);
+        let low = self.frame.low + cell.low() * self.frame.side - beside;
+        let high = low + Point::splat(width) + beside + beside;
         self.bounds.meets(&Aabb { low, high })
     }
 
@@ -139,8 +147,8 @@ impl SizeConstraints<'_> {
             *h = self.h(std::array::from_fn(|k| cell.anchor[k] + step[k]))?;
         }
         let least = h.iter().copied().fold(f64::INFINITY, f64::min);
-        let is_fine = !least.is_finite() || cell.side() <= CELLS_PER_SIZE * least;
-        Ok((!is_fine && bends(&h), true))
+        let is_fine = !least.is_finite() || cell.side() <= self.cells_per_size * least;
+        Ok((!is_fine && bends(&h, self.bend_max), true))
     }
 
     /// Lowers values at the corners of leaves to what is wished there.
@@ -183,7 +191,7 @@ impl SizeConstraints<'_> {
 }
 
 /// Whether some of 27 values is far from the mean of the corners around it.
-fn bends(h: &[f64; 27]) -> bool {
+fn bends(h: &[f64; 27], most: f64) -> bool {
     (0..27).any(|i| {
         let at = [i % 3, i / 3 % 3, i / 9];
         let mut sum = 0.0;
@@ -196,6 +204,6 @@ fn bends(h: &[f64; 27]) -> bool {
         }
         let mean = sum / 8.0;
         // Infinite on both sides is the same, on one side it is not.
-        mean != h[i] && (mean - h[i]).abs() > BEND_MAX * h[i].min(mean)
+        mean != h[i] && (mean - h[i]).abs() > most * h[i].min(mean)
     })
 }

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::closed::TETS_PER_LOAD;
 use super::field::SizeField;
 use super::integral::{Domain, SurfaceSkin};
+use super::options::SizeOptions;
 use crate::geom::Point;
 use crate::storage::parallel;
 
@@ -72,7 +73,8 @@ impl SizeField {
     fn needles(&self, domain: &Domain) -> f64 {
         let surface = domain.seeker.surface();
         let h: Vec<f64> = parallel(|| surface.points.par_iter().map(|&p| self.h(p)).collect());
-        let steepest = 0.5 * NEEDLE_FROM * 3f64.sqrt() * self.beta();
+        let slope = self.beta().max(SizeOptions::default().beta_needles());
+        let steepest = 0.5 * NEEDLE_FROM * 3f64.sqrt() * slope;
         let over = |t: usize| {
             let corners = surface.triangles[t];
             let edges = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| {

@@ -3,15 +3,16 @@
 use super::SizingError;
 use super::closed::{divide_parameters, metric_length};
 use super::constraint::SizeConstraint;
-use super::constraints::SizeConstraints;
+use super::constraints::{BEND_MAX, SizeConstraints};
 use super::corners::Corners;
+use super::gather::seeds_of;
 use super::options::SizeOptions;
-use super::seeds::{OctreeFrame, seeds_of};
+use super::seeds::{OctreeFrame, frame_of};
 use super::sources::ResolvedSource;
 use super::summary::SizeSummary;
-use super::tree::{DEPTH, LATTICE, LEAF, Leaf, Tree, octant_of};
+use super::tree::{CELLS_PER_SIZE, DEPTH, LATTICE, LEAF, Leaf, Tree, octant_of};
 use super::values::Maker;
-use crate::geom::{Point, lex_cmp};
+use crate::geom::{Aabb, Point, lex_cmp};
 use crate::storage::{FrozenSpillVec, ScratchSpace, SpillVec};
 use std::cmp::Ordering;
 
@@ -38,7 +39,7 @@ const WIDTHS_INVERSE: [f64; DEPTH as usize + 1] = {
 /// Continuous (up to the rounding of f32 values, 1e-7 of h), positive, with `beta = ln(hgrad)` bounding its
 /// slope: `|h(x) - h(y)| <= beta · |x - y|` between corners of a leaf. Inside a leaf each partial
 /// derivative is at most `beta`, so that the slope is below `√3 · beta`; 1.52 is the most seen
-/// between random points.
+/// between random points. Where the surface has needles `ln(hgrad_needles)` takes the place of `beta`.
 /// Outside the surface's box the value of the nearest point of a slightly larger cube.
 #[derive(Clone, Debug)]
 pub struct SizeField {
@@ -95,12 +96,10 @@ impl SizeField {
         further: &Further,
         room: &ScratchSpace,
     ) -> Result<(Self, SizeSummary), SizingError> {
-        let (frame, bounds, mut seeds) = seeds_of(points, triangles, room)?;
-        if let Some(h) = further.at_vertices {
-            seeds.lower(h)?;
-        }
+        let (frame, bounds) = frame_of(points, triangles);
         let targets = options.resolve(bounds.diagonal())?;
         let scaled = targets.scaled(1.0 / frame.side);
+        let seeds = seeds_of(points, triangles, frame, &scaled, further.at_vertices, room)?;
         let mut list = further.constraints.to_vec();
         list.extend(options.formula.iter().map(|f| f as &dyn SizeConstraint));
         let constraints = SizeConstraints {
@@ -108,6 +107,9 @@ impl SizeField {
             frame,
             bounds,
             least: scaled.hmin.unwrap_or(0.0),
+            bend_max: BEND_MAX,
+            cells_per_size: CELLS_PER_SIZE,
+            beside: 0.0,
         };
         let tree = Tree::build(&seeds, &scaled, |tree| constraints.refine(tree))?;
         let mut corners = Corners::of(&tree, room);
@@ -116,10 +118,11 @@ impl SizeField {
             corners: &mut corners,
             seeds: &seeds,
             beta: scaled.beta,
-            constraints: &constraints,
+            steeper: None,
             room,
         };
-        let h = maker.values(&scaled)?;
+        maker.allow_steeper();
+        let h = maker.values(&scaled, &constraints)?;
         let field = Self::of_corners(frame, targets.beta, tree, corners, h, room)
             .with_sources(options, bounds.diagonal())?;
         let summary = field.summary(&seeds, &targets, options, room);
@@ -205,6 +208,28 @@ impl SizeField {
         h
     }
 
+    /// Whether the octree is finer than a cube of that width somewhere near its middle.
+    fn is_finer_in(&self, middle: Point, width: f64) -> bool {
+        let is_finer = |p: Point| {
+            let cell = self.on_lattice(p).map(|x| (x as u32).min(LATTICE - 1));
+            let (_, level) = self.tree.leaf_at(cell);
+            // Widths of cells differ by factors of two, those of another cube by any.
+            self.frame.side / f64::from(1u32 << level) < 0.99 * width
+        };
+        let quarter = |i: usize, axis: usize| if i >> axis & 1 == 1 { 0.25 } else { -0.25 };
+        let step = |i: usize| Point::new(quarter(i, 0), quarter(i, 1), quarter(i, 2));
+        is_finer(middle) || (0..8).any(|i| is_finer(middle + step(i) * width))
+    }
+
+    /// Leaves whose lowest corner is in a box.
+    pub fn n_leaves_in(&self, bounds: &Aabb) -> usize {
+        let is_inside = |leaf: &Leaf| {
+            let low = self.frame.low + leaf.low() * self.frame.side;
+            bounds.low.cmple(low).all() && low.cmple(bounds.high).all()
+        };
+        self.tree.leaves().filter(is_inside).count()
+    }
+
     /// Position in lattice units; points outside are moved to the cube's wall.
     #[inline]
     fn on_lattice(&self, p: Point) -> [f64; 3] {
@@ -272,6 +297,21 @@ impl SizeField {
         size_of::<Self>()
             + self.tree.blocks.capacity() * size_of::<[u32; 8]>()
             + self.jump.cells.capacity() * size_of::<(u32, u32)>()
+    }
+}
+
+/// Where the octree is divided, so is what takes its sizes; shapes beside it are known by their values only.
+impl SizeConstraint for SizeField {
+    fn h(&self, p: Point) -> Result<f64, SizingError> {
+        Ok(Self::h(self, p))
+    }
+
+    fn divides(&self, middle: Point, width: f64) -> Option<bool> {
+        match self.is_finer_in(middle, width) {
+            true => Some(true),
+            false if self.sources.is_empty() => Some(false),
+            false => None,
+        }
     }
 }
 

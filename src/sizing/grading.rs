@@ -35,6 +35,8 @@ pub(super) struct Grading<'a> {
     pub tree: &'a Tree,
     pub corners: &'a mut Corners,
     pub beta: f64,
+    /// By leaf, how many times `beta` its slope may be; once where it is not given.
+    pub steeper: Option<&'a mut SpillVec<f32>>,
 }
 
 impl Grading<'_> {
@@ -52,6 +54,7 @@ impl Grading<'_> {
             check_cancelled();
             let mut sweep = Sweep {
                 of_leaf: &mut self.corners.of_leaf,
+                steeper: self.steeper.as_deref_mut(),
                 h,
                 changed: &mut changed,
                 next: &mut next,
@@ -103,6 +106,7 @@ impl Grading<'_> {
 /// One way through all leaves.
 struct Sweep<'a> {
     of_leaf: &'a mut SpillVec<[u32; 8]>,
+    steeper: Option<&'a mut SpillVec<f32>>,
     h: &'a mut SpillVec<f32>,
     changed: &'a mut Bits,
     next: &'a mut Bits,
@@ -122,7 +126,11 @@ impl Sweep<'_> {
             *h = self.h.get(id as usize);
         }
         let mut h = before;
-        let step = self.beta * leaf.side();
+        let steeper = match &mut self.steeper {
+            Some(by_leaf) => f64::from(by_leaf.get(number as usize)),
+            None => 1.0,
+        };
+        let step = self.beta * leaf.side() * steeper;
         // Largest differences, by squared distance of corners in sides.
         let steps = [0.0, step, step * 2f64.sqrt(), step * 3f64.sqrt()];
         while relax_once(&mut h, &steps) {}

@@ -343,9 +343,12 @@ impl Sum<'_> {
         };
         let [mut low, mut high] = [low, high].map(|h| f64::from(h) * field.frame.side);
         if cell.entry & LEAF != 0 {
-            // In part of a leaf sizes differ by no more than the slope allows.
+            // In part of a leaf sizes differ by no more than the slope allows, which is more next to needles.
+            let (_, level) = field.tree.leaf_at(cell.leaf.anchor);
+            let width = field.frame.side / f64::from(1u32 << level);
+            let slope = 3f64.sqrt() * field.beta.max((high - low) / width);
             let h = field.h(middle);
-            let step = 3f64.sqrt() * field.beta * reach;
+            let step = slope * reach;
             (low, high) = (low.max(h - step), high.min(h + step));
         }
         for source in &field.sources {

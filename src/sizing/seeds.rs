@@ -1,8 +1,17 @@
-//! Sizes at the surface's vertices, in the octree's frame.
+//! Sizes at the surface's vertices, and along its long edges, in the octree's frame.
+//!
+//! ```text
+//!   a                                   b     Between two ends with short edges a long edge gets seeds a step of their
+//!   o-.--.---.-----.------.-----.---.-.-o     own size apart: sizes grow from both ends up to the edge's own length.
+//!                                             Without, all of it would be as small as its ends, for nothing.
+//! ```
 
 use super::SizingError;
 use crate::geom::{Aabb, Point};
-use crate::storage::ScratchSpace;
+use crate::storage::FrozenSpillVec;
+
+/// Position in the unit cube, size, and how many times the gradation's slope is allowed there.
+pub(super) type EdgeSeed = [f32; 5];
 
 /// The cube of the octree: `low` corner and `side`, in input units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,17 +32,21 @@ impl OctreeFrame {
     }
 }
 
-/// Sizes of the surface's vertices that their edges give, and their positions, in units of the cube's side.
+/// Places with sizes, in units of the cube's side: the surface's vertices, numbered as there, and behind them places along its edges.
 #[derive(Debug)]
 pub(super) struct Seeds<'a> {
-    points: &'a [Point],
-    frame: OctreeFrame,
-    per_side: f64,
+    pub(super) points: &'a [Point],
+    pub(super) frame: OctreeFrame,
+    pub(super) per_side: f64,
     /// By vertex; zero where no triangle has it.
-    h: Vec<f64>,
+    pub(super) h: Vec<f64>,
+    /// By vertex, how many times the gradation's slope is allowed there; empty where it is once for all.
+    pub(super) steeper: Vec<f32>,
+    /// What follows the vertices.
+    pub(super) along: Option<FrozenSpillVec<EdgeSeed>>,
 }
 
-impl Seeds<'_> {
+impl<'a> Seeds<'a> {
     /// The vertices that triangles use, in their order.
     pub(super) fn vertices(&self) -> impl Iterator<Item = u32> {
         (0u32..)
@@ -42,91 +55,86 @@ impl Seeds<'_> {
             .map(|(v, _)| v)
     }
 
-    /// Position of a vertex in the unit cube.
-    #[inline]
-    pub(super) fn at(&self, v: u32) -> Point {
-        let p = self.points[v as usize] - self.frame.low;
-        (p * self.per_side).clamp(Point::ZERO, Point::ONE)
+    /// The vertices that triangles use, then the places along edges.
+    pub(super) fn all(&self) -> impl Iterator<Item = u32> {
+        let first = self.points.len() as u32;
+        let n = self.along.as_ref().map_or(0, FrozenSpillVec::len) as u32;
+        self.vertices().chain(first..first + n)
     }
 
-    /// Size at a vertex.
+    /// What follows the vertices, if it is not one of them.
     #[inline]
-    pub(super) fn h(&self, v: u32) -> f64 {
-        self.h[v as usize]
+    fn along(&self, seed: u32) -> Option<EdgeSeed> {
+        let behind = (seed as usize).checked_sub(self.points.len())?;
+        Some(self.along.as_ref()?.get(behind))
     }
 
-    /// Lowers sizes to those given, one for each vertex of the surface, in input units.
-    pub(super) fn lower(&mut self, h: &[f64]) -> Result<(), SizingError> {
-        if h.len() != self.h.len() {
-            return Err(SizingError::SizeCount {
-                found: h.len(),
-                expected: self.h.len(),
-            });
+    /// Position of a seed in the unit cube.
+    #[inline]
+    pub(super) fn at(&self, seed: u32) -> Point {
+        match self.along(seed) {
+            Some([x, y, z, ..]) => Point::new(f64::from(x), f64::from(y), f64::from(z)),
+            None => self.in_cube(self.points[seed as usize]),
         }
-        for (seed, &h) in self.h.iter_mut().zip(h) {
-            *seed = seed.min(h / self.frame.side);
+    }
+
+    fn in_cube(&self, p: Point) -> Point {
+        ((p - self.frame.low) * self.per_side).clamp(Point::ZERO, Point::ONE)
+    }
+
+    /// Size at a seed.
+    #[inline]
+    pub(super) fn h(&self, seed: u32) -> f64 {
+        match self.along(seed) {
+            Some([.., h, _]) => f64::from(h),
+            None => self.h[seed as usize],
         }
-        Ok(())
+    }
+
+    /// How many times the gradation's slope is allowed at a seed.
+    pub(super) fn steeper(&self, seed: u32) -> f64 {
+        match self.along(seed) {
+            Some([.., steeper]) => f64::from(steeper),
+            None => (self.steeper.get(seed as usize)).map_or(1.0, |&s| f64::from(s)),
+        }
+    }
+
+    /// Whether more than the gradation's slope is allowed anywhere.
+    pub(super) fn is_steeper(&self) -> bool {
+        !self.steeper.is_empty()
+    }
+
+    /// The vertices that triangles use, with sizes that are known, in a cube that is.
+    pub(super) fn with_sizes(
+        points: &'a [Point],
+        triangles: &[[u32; 3]],
+        frame: OctreeFrame,
+        size: impl Fn(Point) -> f64,
+    ) -> Result<Self, SizingError> {
+        let mut h = vec![0.0; points.len()];
+        for &v in triangles.iter().flatten() {
+            let h = &mut h[v as usize];
+            if *h == 0.0 {
+                *h = size(points[v as usize]) / frame.side;
+            }
+        }
+        if triangles.is_empty() {
+            return Err(SizingError::NoEdges);
+        }
+        Ok(Self {
+            points,
+            frame,
+            per_side: 1.0 / frame.side,
+            h,
+            steeper: Vec::new(),
+            along: None,
+        })
     }
 }
 
-/// Sizes of the vertices that triangles use, and the box around them.
-///
-/// The size is the geometric mean of the arithmetic and the harmonic mean of the incident edges'
-/// lengths: equal to both where lengths are similar. With either alone, one needle's short
-/// edge would be ignored, or one would rule all its long neighbors.
-///
-/// Memory: 8 bytes a vertex and a quarter of the room: for so many vertices at a time the triangles are gone through.
-pub(super) fn seeds_of<'a>(
-    points: &'a [Point],
-    triangles: &[[u32; 3]],
-    room: &ScratchSpace,
-) -> Result<(OctreeFrame, Aabb, Seeds<'a>), SizingError> {
+/// The cube around the points that triangles use, and their box.
+pub(super) fn frame_of(points: &[Point], triangles: &[[u32; 3]]) -> (OctreeFrame, Aabb) {
     let corners = triangles.iter().flatten().map(|&v| points[v as usize]);
     let bounds = Aabb::around(corners);
-    let frame = OctreeFrame::around(&bounds);
-    let at_once = usize::try_from(room.available() / 4 / 24).unwrap_or(usize::MAX);
-    let at_once = at_once.clamp(1 << 16, points.len().max(1 << 16));
-    let mut h = vec![0.0; points.len()];
-    for (k, h) in h.chunks_mut(at_once).enumerate() {
-        sizes_from(k * at_once, points, triangles, frame.side, h);
-    }
-    if h.iter().all(|&h| h == 0.0) || !frame.side.is_normal() {
-        return Err(SizingError::NoEdges);
-    }
-    let seeds = Seeds {
-        points,
-        frame,
-        per_side: 1.0 / frame.side,
-        h,
-    };
-    Ok((frame, bounds, seeds))
-}
-
-/// Sizes of the vertices from `first` on.
-fn sizes_from(first: usize, points: &[Point], triangles: &[[u32; 3]], side: f64, h: &mut [f64]) {
-    // Per vertex: number of edge ends, their lengths' sum, their inverse lengths' sum.
-    let mut sums = vec![[0.0f64; 3]; h.len()];
-    for t in triangles {
-        for (i, j) in [(0, 1), (1, 2), (2, 0)] {
-            let ends = [t[i] as usize, t[j] as usize];
-            let here = ends.map(|v| v.wrapping_sub(first));
-            if here.iter().all(|&v| v >= sums.len()) {
-                continue;
-            }
-            let length = points[ends[0]].distance(points[ends[1]]);
-            if length > 0.0 && (1.0 / length).is_finite() {
-                for v in here.into_iter().filter(|&v| v < h.len()) {
-                    sums[v][0] += 1.0;
-                    sums[v][1] += length;
-                    sums[v][2] += 1.0 / length;
-                }
-            }
-        }
-    }
-    for (h, [n, sum, inverse]) in h.iter_mut().zip(sums) {
-        if n > 0.0 {
-            *h = (sum / inverse).sqrt() / side;
-        }
-    }
+    (OctreeFrame::around(&bounds), bounds)
 }

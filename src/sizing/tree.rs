@@ -93,9 +93,18 @@ impl Tree {
         targets: &Targets,
         divide_further: impl FnOnce(&mut Self) -> Result<(), SizingError>,
     ) -> Result<Self, SizingError> {
-        let all: Vec<u32> = seeds.vertices().collect();
-        let shape = shape_of(Leaf::ROOT, &all, seeds, targets);
-        drop(all);
+        let all: Vec<u32> = seeds.all().collect();
+        Self::build_near(&all, seeds, targets, divide_further)
+    }
+
+    /// The same, for some of the seeds.
+    pub(super) fn build_near(
+        some: &[u32],
+        seeds: &Seeds,
+        targets: &Targets,
+        divide_further: impl FnOnce(&mut Self) -> Result<(), SizingError>,
+    ) -> Result<Self, SizingError> {
+        let shape = shape_of(Leaf::ROOT, some, seeds, targets);
         let mut tree = Self::from_shape(&shape);
         drop(shape);
         divide_further(&mut tree)?;

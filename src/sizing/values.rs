@@ -31,15 +31,20 @@ pub(super) struct Maker<'a> {
     pub corners: &'a mut Corners,
     pub seeds: &'a Seeds<'a>,
     pub beta: f64,
-    pub constraints: &'a SizeConstraints<'a>,
+    /// By leaf, how many times `beta` its slope may be; once where it is not given.
+    pub steeper: Option<SpillVec<f32>>,
     pub room: &'a ScratchSpace,
 }
 
 impl Maker<'_> {
     /// Sizes at all corners, in units of the root's side, no steeper than the gradation along any line
     /// between two corners of a leaf.
-    pub(super) fn values(&mut self, targets: &Targets) -> Result<SpillVec<f32>, SizingError> {
-        let (mut gathered, nearest) = self.gather(targets.any());
+    pub(super) fn values(
+        &mut self,
+        targets: &Targets,
+        constraints: &SizeConstraints,
+    ) -> Result<SpillVec<f32>, SizingError> {
+        let (mut gathered, nearest) = self.gather(|seeds, v| seeds.h(v), targets.any());
         let cones = nearest.map(|nearest| self.cones(&mut gathered, nearest));
         let mut h = match targets.hsiz {
             Some(_) => gathered,
@@ -51,38 +56,41 @@ impl Maker<'_> {
                 h.set(i, wanted.max(lower.get(i)).min(upper.get(i)));
             }
         }
-        self.constraints.lower(self.tree, self.corners, &mut h)?;
+        constraints.lower(self.tree, self.corners, &mut h)?;
         self.grading().grade_closed(&mut h);
         Ok(h)
     }
 
-    /// Sizes at all corners that are those of the wishes, joined to the seeds' sizes by the gradation: near the seeds neither
-    /// finer nor coarser than it allows. Where nothing is wished, what is wished around it.
-    pub(super) fn values_within(&mut self) -> Result<SpillVec<f32>, SizingError> {
-        let (mut gathered, nearest) = self.gather(true);
-        let cones = nearest.map(|nearest| self.cones(&mut gathered, nearest));
-        drop(gathered);
-        let mut constrained = self.room.column(self.corners.n_corners, f32::INFINITY);
-        self.constraints
-            .lower(self.tree, self.corners, &mut constrained)?;
-        let mut h = self.fill(constrained);
-        if let Some([mut lower, mut upper]) = cones {
-            for i in 0..h.len() {
-                h.change(i, |h| *h = h.max(lower.get(i)).min(upper.get(i)));
-            }
+    /// Lets leaves near needles be steeper, as the seeds allow it in the mean: gathered and filled in as sizes are.
+    pub(super) fn allow_steeper(&mut self) {
+        if !self.seeds.is_steeper() {
+            return;
         }
-        self.grading().grade_closed(&mut h);
-        Ok(h)
+        let (at_seeds, _) = self.gather(|seeds, v| seeds.steeper(v), false);
+        let mut at_corners = self.fill(at_seeds);
+        let mut by_leaf = self.room.column(self.corners.of_leaf.len(), 1.0f32);
+        for i in 0..by_leaf.len() {
+            let ids = self.corners.of_leaf.get(i);
+            let sum: f64 = (ids.iter())
+                .map(|&id| f64::from(at_corners.get(id as usize)))
+                .sum();
+            by_leaf.set(i, (sum / 8.0) as f32);
+        }
+        self.steeper = Some(by_leaf);
     }
 
-    /// Weighted means of the seeds' sizes at the corners of the leaves that hold them, infinite elsewhere;
+    /// Weighted means of a value of the seeds at the corners of the leaves that hold them, infinite elsewhere;
     /// and, when asked for, distances from there to the nearest of these seeds.
     ///
     /// Seeds are taken leaf by leaf, those of a leaf in their order. What falls on a hanging corner is handed to the corners it hangs on.
-    fn gather(&mut self, with_nearest: bool) -> (SpillVec<f32>, Option<SpillVec<f64>>) {
+    pub(super) fn gather(
+        &mut self,
+        value: impl Fn(&Seeds, u32) -> f64,
+        with_nearest: bool,
+    ) -> (SpillVec<f32>, Option<SpillVec<f64>>) {
         let (tree, seeds, n) = (self.tree, self.seeds, self.corners.n_corners);
         let mut by_leaf = self.room.sorter::<LeafSeed>();
-        for v in seeds.vertices() {
+        for v in seeds.all() {
             let (leaf, _) = tree.leaf_at(lattice_cell(seeds.at(v)));
             let pushed = by_leaf.push(LeafSeed { leaf, seed: v });
             pushed.unwrap_or_else(|e| raise(e));
@@ -92,7 +100,7 @@ impl Maker<'_> {
         let mut nearest = with_nearest.then(|| self.room.column(n, f64::INFINITY));
         for next in by_leaf {
             let LeafSeed { seed, .. } = next.unwrap_or_else(|e| raise(e));
-            let (at, h) = (seeds.at(seed), seeds.h(seed));
+            let (at, h) = (seeds.at(seed), value(seeds, seed));
             let cell = lattice_cell(at);
             let (number, level) = tree.leaf_at(cell);
             let anchor = cell.map(|x| x & !((LATTICE >> level) - 1));
@@ -139,7 +147,7 @@ impl Maker<'_> {
 
     /// Fills the corners that have no value: fronts of averages of their neighbors, then averaging of all
     /// filled ones among themselves, which tends to the harmonic interpolation.
-    fn fill(&mut self, gathered: SpillVec<f32>) -> SpillVec<f32> {
+    pub(super) fn fill(&mut self, gathered: SpillVec<f32>) -> SpillVec<f32> {
         let mut h = gathered;
         let mut is_open = Bits::new(h.len());
         for i in 0..h.len() {
@@ -187,16 +195,17 @@ impl Maker<'_> {
         h
     }
 
-    fn grading(&mut self) -> Grading<'_> {
+    pub(super) fn grading(&mut self) -> Grading<'_> {
         Grading {
             tree: self.tree,
             corners: self.corners,
             beta: self.beta,
+            steeper: self.steeper.as_mut(),
         }
     }
 
     /// What the gradation allows beside sizes at some corners, each at a distance from where it holds: the least, the most.
-    fn cones(
+    pub(super) fn cones(
         &mut self,
         gathered: &mut SpillVec<f32>,
         mut nearest: SpillVec<f64>,

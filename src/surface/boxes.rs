@@ -107,6 +107,28 @@ impl BoxTree {
         }
     }
 
+    /// Calls `visit` with the things whose boxes share a point with some bounds, in curve order.
+    pub fn meeting(&self, bounds: &Aabb, mut visit: impl FnMut(u32)) {
+        let top = self.levels.len() - 1;
+        let mut stack: Vec<(usize, usize)> =
+            (0..self.levels[top].len()).map(|n| (top, n)).collect();
+        while let Some((level, node)) = stack.pop() {
+            if !self.levels[level].get(node).meets(bounds) {
+                continue;
+            }
+            if level > 0 {
+                let children = self.children(level, node).rev();
+                stack.extend(children.map(|child| (level - 1, child)));
+                continue;
+            }
+            for i in self.members(node) {
+                if self.boxes.get(i).meets(bounds) {
+                    visit(self.order.get(i));
+                }
+            }
+        }
+    }
+
     /// Nodes one level below that a node above the leaves holds.
     pub fn children(&self, level: usize, node: usize) -> std::ops::Range<usize> {
         node * ARITY..((node + 1) * ARITY).min(self.levels[level - 1].len())

@@ -8,12 +8,13 @@ use crate::storage::{ScratchSpace, parallel};
 
 /// Leaves one task handles.
 const BLOCK: usize = 256;
-/// Leaves between two looks at how much was found.
+/// Leaves between two looks at how much was found: few at first, so that a hopeless heap of some thousand triangles is given up early.
+const ROUND_MIN: usize = 1 << 4;
 const ROUND: usize = 1 << 14;
 /// Results one task keeps at most: with `ROUND / BLOCK` tasks this bounds the memory on hopeless input.
 const BLOCK_LISTED_MAX: usize = 8192;
-/// Results after which the search ends: the input is hopeless and its pairs may be quadratic.
-const FOUND_MAX: u64 = 10_000_000;
+/// Results after which the search ends: the input is hopeless and its pairs may be quadratic. To look at so many takes some seconds.
+pub(super) const FOUND_MAX: u64 = 1_000_000;
 
 /// A tree over the triangles that `keep` accepts.
 pub(super) fn tree_of(
@@ -35,7 +36,7 @@ impl BoxTree {
     /// Calls `test` on each pair of triangles whose boxes share a point and collects what it returns.
     ///
     /// At most `listed_max` results are kept, of all that are counted; which ones does not depend on
-    /// the number of threads. The search ends after a round with more than ten million in all.
+    /// the number of threads. The search ends after a round with more than a million in all.
     pub fn pairs<T: Send>(
         &self,
         listed_max: usize,
@@ -43,15 +44,17 @@ impl BoxTree {
     ) -> (Vec<T>, u64) {
         let n_leaves = self.levels[0].len();
         let (mut listed, mut n_found) = (Vec::new(), 0);
-        for round in (0..n_leaves).step_by(ROUND) {
-            let end = (round + ROUND).min(n_leaves);
-            let starts: Vec<usize> = (round..end).step_by(BLOCK).collect();
+        let (mut end, mut length) = (0, ROUND_MIN);
+        while end < n_leaves {
+            let begin = end;
+            end = (begin + length).min(n_leaves);
+            let starts: Vec<usize> = (begin..end).step_by(BLOCK).collect();
             let found: Vec<(Vec<T>, u64)> = parallel(|| {
                 starts
                     .into_par_iter()
                     .map(|start| {
                         let (mut out, mut n) = (Vec::new(), 0);
-                        let mut keep = |a, b| {
+                        let mut keep = |a: u32, b: u32| {
                             if let Some(result) = test(a, b) {
                                 n += 1;
                                 if out.len() < BLOCK_LISTED_MAX {
@@ -67,6 +70,7 @@ impl BoxTree {
                     })
                     .collect()
             });
+            let before = n_found;
             for (block, n) in found {
                 n_found += n;
                 let room = listed_max - listed.len();
@@ -74,6 +78,9 @@ impl BoxTree {
             }
             if n_found > FOUND_MAX {
                 break;
+            }
+            if n_found - before < FOUND_MAX / 16 {
+                length = (2 * length).min(ROUND);
             }
         }
         (listed, n_found)

@@ -2,7 +2,7 @@
 //!
 //! Reading order: [`triangles`](Surface) (what a surface is), `weld` (how readers build one),
 //! `edges` (which triangles meet where), `orientation` (turning triangles the same way), `contact`
-//! (how two triangles touch), `boxes` and `broad` (which pairs to look at), `validate` (all of it together),
+//! (how two triangles touch), `boxes`, `broad` and `stars` (which pairs to look at), `validate` (all of it together),
 //! `defect` (what can be wrong and what to do about it), `boundary_loops` (where it is open), `near` and `repair`
 //! (mending on demand), `fitness` (what mesh its triangles allow), `split` (finer triangles of the same surface),
 //! `seek` (distances and what lies above), `volumes` (what is enclosed).
@@ -22,6 +22,7 @@ mod point_tree;
 mod repair;
 mod seek;
 mod split;
+mod stars;
 mod triangles;
 mod validate;
 mod volumes;

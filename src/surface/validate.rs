@@ -1,9 +1,9 @@
 //! Exact validation: everything that keeps a surface from bounding volumes, found and listed.
 
 use super::boundary_loops::{JUNCTION_SHARE, TJunction, t_junctions};
-use super::broad::tree_of;
 use super::contact::{ContactKind, contact};
 use super::edges::{Closedness, Facets};
+use super::stars::touching;
 use super::{Defect, Surface, SurfaceError};
 use crate::storage::ScratchSpace;
 
@@ -19,7 +19,7 @@ pub struct Validation {
     pub t_junctions: Vec<TJunction>,
     /// Kind by kind (no area, repeated, open at a T-junction, open, intersecting), each sorted by triangle.
     pub defects: Vec<Defect>,
-    /// Pairs of triangles that touch where they should not, listed or not; counting ends beyond ten million.
+    /// Pairs of triangles that touch where they should not, listed or not; counting ends beyond a million.
     pub n_intersections: u64,
     /// Defects in all, listed or not.
     pub n_defects: u64,
@@ -60,13 +60,13 @@ impl Validation {
 
 /// Checks a surface completely and exactly.
 ///
-/// Near-linear time where boxes of triangles overlap few others; about 150 bytes per triangle. Same
+/// Near-linear time where boxes of triangles overlap few others, but for those around one vertex or one edge, of which there may be many; about 150 bytes per triangle. Same
 /// result for any number of threads. Orientation is no defect: see [`Closedness::n_inconsistent`].
 pub fn validate(surface: &Surface) -> Validation {
     validate_in(surface, &ScratchSpace::boundless())
 }
 
-/// [`validate`] in a room: 6 bytes a triangle are held beside the surface, the rest goes to scratch files where the room is too small.
+/// [`validate`] in a room: 8 bytes a triangle are held beside the surface and 60 for each around a vertex of hundreds, the rest goes to scratch files where the room is too small.
 ///
 /// A scratch file that fails unwinds ([`attempt`](crate::storage::attempt)).
 pub fn validate_in(surface: &Surface, room: &ScratchSpace) -> Validation {
@@ -87,12 +87,13 @@ pub fn validate_in(surface: &Surface, room: &ScratchSpace) -> Validation {
     for &(t, _) in &closedness.degenerate {
         is_left_out[t as usize] = true;
     }
-    let tree = tree_of(surface, room, |t| !is_left_out[t as usize]);
-    let (mut touching, n_intersections) = tree.pairs(LISTED_MAX, |a, b| {
+    let look = |a: u32, b: u32| {
         let ids = [a, b].map(|t| surface.triangles[t as usize]);
         let found = contact(surface.corners(a), ids[0], surface.corners(b), ids[1])?;
         Some(([a, b], found))
-    });
+    };
+    let (mut touching, n_intersections) =
+        touching(surface, &mut is_left_out, room, LISTED_MAX, look);
     touching.sort_unstable_by_key(|(triangles, _)| *triangles);
     let n_defects = defects.len() as u64 + n_intersections;
     defects.extend(

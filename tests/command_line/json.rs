@@ -1,4 +1,4 @@
-//! JSON.md tells every key that is answered, and no other.
+//! The guide's chapter on scripting names every key that is answered, and no other.
 //!
 //! Why: scripts are written from that page.
 //! How: each section's commands are run; the keys of what they answer, over all runs of a section, must be those of its tables.
@@ -9,8 +9,8 @@ use serde_json::Value;
 
 use super::place::Place;
 
-const PAGE: &str = include_str!("../../JSON.md");
-/// Keys below these are of anybody's making.
+const PAGE: &str = include_str!("../../src/guide/scripting.md");
+/// Keys below these are of any name.
 const FREE: [&str; 4] = [
     "options",
     "subdomains[].sizes.options",
@@ -18,7 +18,7 @@ const FREE: [&str; 4] = [
     "measures.chunks",
 ];
 
-/// What is run in which section, in order. The surfaces are made before.
+/// The commands of each section, in order. The surfaces are written before.
 const RUNS: [(&str, &[&str]); 13] = [
     (
         "sample",
@@ -95,7 +95,7 @@ const CROSSING: &str = "OFF\n13 11 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n0.1 0.1 0.1\n2
     5 0 0\n7 0 0\n6 1 0\n6 0 0\n6 -1 0\n\
     3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n3 4 6 5\n3 4 5 7\n3 4 7 6\n3 5 6 7\n3 8 9 10\n3 11 8 12\n3 9 11 12\n";
 
-/// The keys of each section; of `info` also where it is told under other names.
+/// The keys of each section; of `info` also under other names.
 fn documented(section: &str) -> BTreeSet<String> {
     let mut inside = false;
     let mut keys = BTreeSet::new();
@@ -109,7 +109,7 @@ fn documented(section: &str) -> BTreeSet<String> {
         let cell = row.split(" |").next().unwrap_or_default();
         keys.extend(cell.trim_matches('`').split("`, `").map(str::to_owned));
     }
-    assert!(!keys.is_empty(), "JSON.md tells nothing of {section}");
+    assert!(!keys.is_empty(), "the chapter says nothing of {section}");
     keys
 }
 
@@ -141,16 +141,16 @@ fn collect(value: &Value, key: &str, keys: &mut BTreeSet<String>) {
     }
 }
 
-/// What is told by its parts is told: a null in place of an object or list has the key of neither.
-fn settle(found: &mut BTreeSet<String>, told: &BTreeSet<String>) {
+/// A key whose parts are documented is documented: a null in place of an object or list has the key of neither.
+fn settle(found: &mut BTreeSet<String>, named: &BTreeSet<String>) {
     found.retain(|key| {
         let parts = [format!("{key}."), format!("{key}[")];
-        told.contains(key) || !told.iter().any(|t| parts.iter().any(|p| t.starts_with(p)))
+        named.contains(key) || !named.iter().any(|t| parts.iter().any(|p| t.starts_with(p)))
     });
 }
 
 #[test]
-fn every_key_is_told_and_no_other() {
+fn every_key_is_documented_and_no_other() {
     let place = Place::new();
     place.write("holes.off", HOLES);
     place.write("crossing.off", CROSSING);
@@ -190,10 +190,10 @@ fn every_key_is_told_and_no_other() {
     }
     // A line of progress comes only of what lasts; its keys are those of a test of their own.
     settle(&mut said, &talk);
-    let untold: Vec<&String> = said.difference(&talk).collect();
+    let unnamed: Vec<&String> = said.difference(&talk).collect();
     assert!(
-        untold.is_empty(),
-        "stderr says what JSON.md does not: {untold:?}"
+        unnamed.is_empty(),
+        "keys on stderr that the chapter does not name: {unnamed:?}"
     );
     let unsaid = talk
         .difference(&said)
@@ -202,13 +202,13 @@ fn every_key_is_told_and_no_other() {
 }
 
 fn same(section: &str, mut found: BTreeSet<String>) {
-    let told = documented(section);
-    settle(&mut found, &told);
-    let untold: Vec<&String> = found.difference(&told).collect();
-    let missing: Vec<&String> = told.difference(&found).collect();
+    let named = documented(section);
+    settle(&mut found, &named);
+    let unnamed: Vec<&String> = found.difference(&named).collect();
+    let missing: Vec<&String> = named.difference(&found).collect();
     assert!(
-        untold.is_empty() && missing.is_empty(),
-        "{section}: JSON.md does not tell {untold:?}, and tells {missing:?}, which no run answered"
+        unnamed.is_empty() && missing.is_empty(),
+        "{section}: the chapter does not name {unnamed:?}, and names {missing:?}, which no run answered"
     );
 }
 
@@ -220,8 +220,11 @@ fn every_command_has_a_section() {
     for line in commands.take_while(|l| !l.is_empty()) {
         let name = line.split_whitespace().next().unwrap_or_default();
         let is_silent = ["help", "completions", "man"].contains(&name);
-        let is_told = PAGE.contains(&format!("## `tetdb {name}`"))
+        let is_named = PAGE.contains(&format!("## `tetdb {name}`"))
             || ["mesh", "resume"].contains(&name) && PAGE.contains(&format!("`{name}`"));
-        assert!(is_silent || is_told, "JSON.md has no section on {name}");
+        assert!(
+            is_silent || is_named,
+            "the chapter has no section on {name}"
+        );
     }
 }

@@ -1,9 +1,9 @@
 //! Reads a finished store with `tetdb-schema` and redb alone: `cargo run --release --example read_store -- part.tetdb`.
 //!
-//! A store is a directory. Its catalog names the files that count, one for each sub-domain; in each, chunks of
-//! tetrahedra and of vertices stand under keys made of their kind and number, and `tetdb-schema` decodes them; of a store made with
-//! `--seal none` there are working pages in their place. Counts,
-//! volume and digest are printed, as `tetdb info` and `tetdb digest` have them. What the bytes mean is told in `schema/README.md`.
+//! A store is a directory. Its catalog names the files that count, one for each sub-domain. In each file, chunks of tetrahedra and
+//! of vertices have keys composed of their kind and number, and `tetdb-schema` decodes them; a store written with `--seal none` has
+//! working pages in their place. Counts, volume and digest are printed, as `tetdb info` and `tetdb digest` print them. The bytes are
+//! described in `schema/README.md`.
 
 use std::error::Error;
 use std::path::Path;

@@ -28,7 +28,7 @@ pub struct MeshArgs {
     pub run: RunArgs,
 }
 
-/// What a mesh will be and what it will take, before any of it is made. Nothing is refused but a bad surface or option.
+/// What a mesh will be and what it will take, before any work. Nothing is refused but a bad surface or option.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  tetdb estimate part.stl\n  tetdb estimate part.stl --hsiz 1% --memory 2GiB\n  tetdb estimate sample:balls,count=100 --json"

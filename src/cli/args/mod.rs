@@ -25,7 +25,7 @@ pub use surface::{CheckArgs, RefineSurfaceArgs, SampleArgs};
 #[command(name = "tetdb", version, about, max_term_width = 110)]
 #[command(
     after_help = "`tetdb mesh` fills a closed triangle surface with tetrahedra and leaves a store, which is a directory; most other commands take a\n\
-    store and read it. A run that was stopped goes on with `tetdb resume`. Made surfaces such as sample:balls,count=100 stand\n\
+    store and read it. A run that was stopped goes on with `tetdb resume`. Generated surfaces such as sample:balls,count=100 stand\n\
     wherever a surface file can.\n\n\
     Examples:\n  tetdb check part.stl\n  tetdb mesh part.stl --export part.vtu\n  tetdb info part.tetdb\n  tetdb report part.tetdb part.html\n  \
     tetdb mesh sample:balls,count=100 -o balls.tetdb --memory 256MiB\n\nExit codes: 0 done, 1 internal error, 2 usage, 3 bad input, 4 store damaged, 5 store busy,\n\
@@ -51,8 +51,8 @@ pub enum Command {
     Resume(ResumeArgs),
     /// Make sub-domains again: with other sizes, or damaged ones
     ///
-    /// Each is made from the coarse mesh kept in the store. Interfaces and all other sub-domains stay as they are. Size options take the
-    /// place of all sizes that the sub-domains were made with; without any, they are made as they were.
+    /// Each is meshed from the coarse mesh kept in the store. Interfaces and all other sub-domains stay as they are. Size options take the
+    /// place of all sizes that the sub-domains were meshed with; without any, they are meshed as they were.
     Resaturate(Box<ResaturateArgs>),
     /// Say whether a surface can be meshed, and where it cannot
     ///
@@ -95,7 +95,7 @@ pub enum Command {
     /// For any browser, in one file and without a network: numbers, tables, charts, and the mesh in space to turn and cut. Below 20 MB
     /// whatever the mesh.
     Report(ReportArgs),
-    /// Write a made surface to a file
+    /// Write a generated surface to a file
     Sample(SampleArgs),
     /// Print the completions of a shell
     Completions(CompletionsArgs),

@@ -13,7 +13,7 @@ use std::path::PathBuf;
     angle_min, angle_max (dihedral, degrees); columns also: id, vertices, points."
 )]
 pub struct QueryArgs {
-    /// The store, as `tetdb mesh` made it
+    /// The store, a directory that `tetdb mesh` wrote
     #[arg(value_name = "STORE")]
     pub store: PathBuf,
     /// The tetrahedron that holds a point; may be repeated

@@ -4,19 +4,19 @@ use std::path::PathBuf;
 
 use super::{RunArgs, SizeArgs};
 
-/// Make sub-domains of a finished store again, from their coarse leaves. Interfaces and all other sub-domains stay as they are.
+/// Mesh sub-domains of a finished store again, from their coarse snapshots. Interfaces and all other sub-domains stay as they are.
 ///
-/// Size options take the place of all sizes that the sub-domains were made with; without any, they are made as they were.
+/// Sizes stay what they were unless options say otherwise: lengths replace those of the first run, shapes and regions are added to its. Without any, sub-domains are meshed as they were.
 #[derive(Debug, clap::Args)]
 #[command(
     mut_arg("size_field", |arg| arg.help("Edge lengths from a file: .npy, one for each tetrahedron (or vertex) of the named sub-domains in the order in which `tetdb export --subdomain` writes them; or a MEDIT .sol with its background .mesh of tetrahedra beside it")),
-    mut_arg("hsiz", |arg| arg.help("Edge length inside: a length, or 1% of the box diagonal [default: as it was made]")),
+    mut_arg("hsiz", |arg| arg.help("Edge length inside: a length, or 1% of the box diagonal [default: as it was]")),
     after_help = "Examples:\n  tetdb resaturate part.tetdb --subdomain 5,9 --hsiz 1%\n  tetdb resaturate part.tetdb --subdomain 5 --refine-by 0.5\n  \
     tetdb resaturate part.tetdb --subdomain 5 --size-field h.npy\n  tetdb resaturate part.tetdb --changed --size-sphere 0,0,0,0.1,0.01 --dry-run\n  \
     tetdb resaturate part.tetdb --undo\n  tetdb resaturate part.tetdb --repair"
 )]
 pub struct ResaturateArgs {
-    /// The store, as `tetdb mesh` made it
+    /// The store, a directory that `tetdb mesh` wrote
     #[arg(value_name = "STORE")]
     pub store: PathBuf,
     /// The sub-domains to make again, as numbers with commas between them
@@ -33,10 +33,10 @@ pub struct ResaturateArgs {
     pub changed: bool,
     #[command(flatten)]
     pub sizes: SizeArgs,
-    /// Multiply lengths: those asked for, or else those the sub-domain was made with
+    /// Multiply lengths: those asked for, or else those the sub-domain was meshed with
     #[arg(long, value_name = "FACTOR")]
     pub refine_by: Option<String>,
-    /// Only list what would be made again, with the tetrahedra to expect
+    /// Only list what would be meshed again, with the predicted tetrahedra
     #[arg(long, conflicts_with_all = ["undo", "forget", "repair"])]
     pub dry_run: bool,
     /// Bring back what was before the last change

@@ -46,7 +46,7 @@ pub struct SizeArgs {
     /// Greatest edge length inside
     #[arg(long, value_name = "H")]
     pub hmax: Option<String>,
-    /// Greatest ratio of neighboring edge lengths [default: 1.3]
+    /// Greatest ratio of neighboring edge lengths [default: 1.3, and 2 next to needles of the surface]
     #[arg(long, value_name = "RATIO")]
     pub hgrad: Option<String>,
     /// Edge length in a box, and at most OUTSIDE away from it; may be repeated
@@ -91,7 +91,7 @@ pub struct ShapeArgs {
     /// How far to optimize [default: full]
     #[arg(long, value_enum)]
     pub optimize: Option<Optimize>,
-    /// Do not keep what sub-domains are made from: a smaller store, in which none can be made again by `tetdb resaturate`
+    /// Do not keep what sub-domains are meshed from: a smaller store, in which none can be meshed again by `tetdb resaturate`
     #[arg(long)]
     pub drop_coarse: bool,
     /// How finished sub-domains are kept [default: packed]

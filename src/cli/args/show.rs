@@ -26,7 +26,7 @@ pub enum ColorBy {
     Stages need a store made with --keep-stages."
 )]
 pub struct SnapshotArgs {
-    /// The store, as `tetdb mesh` made it
+    /// The store, a directory that `tetdb mesh` wrote
     #[arg(value_name = "STORE")]
     pub store: PathBuf,
     /// The picture to write: .png or .svg
@@ -44,7 +44,7 @@ pub struct SnapshotArgs {
     /// What bounds one sub-domain in space, shaded: input triangles in its color, interfaces in that of the neighbor; with --plane as above
     #[arg(long, value_name = "SUBDOMAIN", conflicts_with_all = ["surface", "crinkle", "condition"])]
     pub shell: Option<u32>,
-    /// What a cut had on its way, of a store made with --keep-stages: coarse or refined (the mesh, with the plane of the cut as a line),
+    /// What a cut had on its way, of a store meshed with --keep-stages: coarse or refined (the mesh, with the plane of the cut as a line),
     /// natural or interface (the interface in space, before and after its faces were chosen)
     #[arg(long, value_name = "CUT:WHAT", conflicts_with_all = ["surface", "shell"])]
     pub stage: Option<String>,
@@ -69,7 +69,7 @@ pub struct SnapshotArgs {
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  tetdb report part.tetdb part.html")]
 pub struct ReportArgs {
-    /// The store, as `tetdb mesh` made it
+    /// The store, a directory that `tetdb mesh` wrote
     #[arg(value_name = "STORE")]
     pub store: PathBuf,
     /// The page to write: .html; one that is there is replaced

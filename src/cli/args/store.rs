@@ -6,7 +6,7 @@ use super::ReadArgs;
 
 #[derive(Debug, clap::Args)]
 pub struct StoreArgs {
-    /// The store, as `tetdb mesh` made it
+    /// The store, a directory that `tetdb mesh` wrote
     #[arg(value_name = "STORE")]
     pub store: PathBuf,
     /// Answer with one JSON object
@@ -20,13 +20,13 @@ pub struct StoreArgs {
     Exit code 0: the mesh is valid; 7: it is not; 4: the store is damaged, and what is damaged is listed."
 )]
 pub struct VerifyArgs {
-    /// The store, as `tetdb mesh` made it
+    /// The store, a directory that `tetdb mesh` wrote
     #[arg(value_name = "STORE")]
     pub store: PathBuf,
     /// Also count the faces that are locally Delaunay
     #[arg(long)]
     pub full: bool,
-    /// The surface whose triangles must all be there [default: what the store was made from]
+    /// The surface whose triangles must all be there [default: what the store was meshed from]
     #[arg(long, value_name = "SURFACE")]
     pub against: Vec<String>,
     #[command(flatten)]
@@ -55,7 +55,7 @@ pub struct CompareArgs {
     tetdb export part.tetdb piece.meshb --pieces --subdomain 3,5\n  tetdb export part.tetdb cuts.vtu --interfaces"
 )]
 pub struct ExportArgs {
-    /// The store, as `tetdb mesh` made it
+    /// The store, a directory that `tetdb mesh` wrote
     #[arg(value_name = "STORE")]
     pub store: PathBuf,
     /// Files to write; the extension tells the format: .vtu, .pvtu, .mesh, .meshb, .msh, .inp, .npy (an array a file), .json (topology), .parquet (where built in)
@@ -79,7 +79,7 @@ pub struct ExportArgs {
     /// Only faces between sub-domains (.vtu)
     #[arg(long)]
     pub interfaces: bool,
-    /// Write even over the surface the store was made from
+    /// Write even over the surface the store was meshed from
     #[arg(long)]
     pub force: bool,
     #[command(flatten)]

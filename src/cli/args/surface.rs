@@ -36,14 +36,17 @@ pub struct CheckArgs {
     Keys, each with a default:
   balls   count, seed, h      a cube with empty balls of many sizes in it
   box     x, y, z, h          sides of a box
+  caps    count, seed         a column with flat ends of many corners, badly cut into triangles
   grains  count, seed, h      disjoint convex polyhedra in a box; mesh them with --regions all
   knot    tube, h             a knotted tube
+  needles count, holes, seed  a fan, slats and a perforated plate, as CAD programs write them
   shells  count, kind, h      one inside the other; kind is spheres or boxes
   sphere  radius, h
+  steps   count, step, seed   a slab with steps of 1e-2 to 1e-8 of its length
 h is the length of the edges."
 )]
 pub struct SampleArgs {
-    /// NAME,key=value,... with the names balls, box, grains, knot, shells, sphere
+    /// NAME,key=value,... with the names balls, box, caps, grains, knot, needles, shells, sphere, steps
     #[arg(value_name = "SAMPLE")]
     pub sample: String,
     /// The file to write: .stl (text), .off, .obj or .ply, all exact

@@ -17,8 +17,8 @@ use crate::surface::{OUTSIDE, Seeker, Surface, Volumes};
 
 /// Bytes held while volumes are identified, for each triangle: which volume each side has, which sides see each other, and which is left out.
 const PREPARE_TRIANGLE: usize = 17;
-/// Bytes held while sizes are computed, for each vertex: its size, and lists of those near a cell.
-const PREPARE_VERTEX: usize = 20;
+/// Bytes held while sizes are computed, for each vertex: its size and slope, and lists of those and of the places along edges near a cell.
+const PREPARE_VERTEX: usize = 36;
 /// Bytes for frames of what is not held.
 const PREPARE_LEAST: usize = 8 << 20;
 /// Tetrahedra of one sub-domain, unless a number of sub-domains is asked for. With twice as many, two at once do not fit 512 MiB: 20 million then

@@ -106,6 +106,33 @@ impl Options {
         Ok(sizes)
     }
 
+    /// Puts other sizes beside these: single lengths replace them, lists are added.
+    pub fn add_sizes(&mut self, other: &Self) {
+        let texts = [
+            (&other.hsiz, &mut self.hsiz),
+            (&other.hmin, &mut self.hmin),
+            (&other.hmax, &mut self.hmax),
+            (&other.hgrad, &mut self.hgrad),
+            (&other.size_expr, &mut self.size_expr),
+            (&other.size_field, &mut self.size_field),
+            (&other.size_field_hash, &mut self.size_field_hash),
+        ];
+        for (given, option) in texts {
+            if given.is_some() {
+                option.clone_from(given);
+            }
+        }
+        let lists = [
+            (&other.size_box, &mut self.size_box),
+            (&other.size_sphere, &mut self.size_sphere),
+            (&other.size_cylinder, &mut self.size_cylinder),
+            (&other.size_region, &mut self.size_region),
+        ];
+        for (given, option) in lists {
+            option.extend_from_slice(given);
+        }
+    }
+
     /// The number of sub-domains asked for; `None` for one that follows from the predicted size of the mesh.
     ///
     /// Errors: a text that is neither `auto` nor a number from 1.

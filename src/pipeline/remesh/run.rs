@@ -8,6 +8,7 @@ use super::previous::{Previous, VERSIONED};
 use super::request::Resaturation;
 use super::sizes::{Recorded, Values};
 use super::summary::{Remade, ResaturateSummary};
+use crate::geom::{Aabb, Point};
 use crate::mesh::Workspace;
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::mesh::coarse_snapshot::reopen;
@@ -142,8 +143,13 @@ impl<'a> RemeshRun<'a> {
     fn field_bytes(&self, values: Option<&Values>) -> u64 {
         /// Bytes of the octree while it is built, for each face of a skin.
         const SKIN_FACE: u64 = 300;
+        /// The same for each leaf of the field that the sub-domain has.
+        const LEAF: u64 = 150;
         let one = |(row, kept): &(SubdomainRow, CoarseRow)| {
-            let skin = 24 * kept.vertices + SKIN_FACE * (kept.facets + kept.interface_faces);
+            let [low, high] = row.bounds.map(Point::from_array);
+            let leaves = self.field.n_leaves_in(&Aabb { low, high }) as u64;
+            let faces = kept.facets + kept.interface_faces;
+            let skin = 24 * kept.vertices + SKIN_FACE * faces + LEAF * leaves;
             match values {
                 Some(_) => skin + BackgroundMesh::bytes(row.vertices, row.tets),
                 None => skin,

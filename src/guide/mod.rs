@@ -1,0 +1,81 @@
+//! The guide: from the first mesh to programs of your own. Every command and every block of Rust in it is run by a test.
+//!
+//! | chapter | what you learn |
+//! |---|---|
+//! | [`start`] | build the program, mesh a surface of your own, check the result, repair a surface |
+//! | [`sizes`] | say how long edges should be: everywhere, in places, by a formula or a file |
+//! | [`regions`] | choose which volumes are filled |
+//! | [`subdomains`] | divide a large mesh, limit memory, pass parts to a parallel solver |
+//! | [`questions`] | find tetrahedra by place, condition or neighborhood |
+//! | [`resaturation`] | mesh some sub-domains again, with other sizes or after damage |
+//! | [`pictures`] | draw cuts and surfaces; ParaView, Gmsh, NumPy, DuckDB |
+//! | [`scripting`] | JSON output, configuration files, shell completion |
+//! | [`library`] | the same from Rust |
+//! | [`errors`] | every error code, exit codes, what to do |
+
+/// Where the chapters' links lead here. In a chapter's file the same links lead to files; what comes first counts.
+macro_rules! links {
+    () => {
+        concat!(
+            "[start]: crate::guide::start\n",
+            "[sizes]: crate::guide::sizes\n",
+            "[regions]: crate::guide::regions\n",
+            "[subdomains]: crate::guide::subdomains\n",
+            "[questions]: crate::guide::questions\n",
+            "[resaturation]: crate::guide::resaturation\n",
+            "[pictures]: crate::guide::pictures\n",
+            "[scripting]: crate::guide::scripting\n",
+            "[library]: crate::guide::library\n",
+            "[errors]: crate::guide::errors\n",
+            "[`Surface`]: crate::Surface\n",
+            "[`Mesher`]: crate::Mesher\n",
+            "[`Store`]: crate::Store\n",
+            "[`Existing::Replace`]: crate::Existing::Replace\n",
+            "[`Mesher::predict`]: crate::Mesher::predict\n",
+            "[`SealedTet`]: crate::data::schema::record::SealedTet\n",
+            "[`SealedVertex`]: crate::data::schema::record::SealedVertex\n",
+            "[`Error`]: crate::Error\n",
+        )
+    };
+}
+
+pub mod start {
+    #![doc = links!()]
+    #![doc = include_str!("start.md")]
+}
+pub mod sizes {
+    #![doc = links!()]
+    #![doc = include_str!("sizes.md")]
+}
+pub mod regions {
+    #![doc = links!()]
+    #![doc = include_str!("regions.md")]
+}
+pub mod subdomains {
+    #![doc = links!()]
+    #![doc = include_str!("subdomains.md")]
+}
+pub mod questions {
+    #![doc = links!()]
+    #![doc = include_str!("questions.md")]
+}
+pub mod resaturation {
+    #![doc = links!()]
+    #![doc = include_str!("resaturation.md")]
+}
+pub mod pictures {
+    #![doc = links!()]
+    #![doc = include_str!("pictures.md")]
+}
+pub mod scripting {
+    #![doc = links!()]
+    #![doc = include_str!("scripting.md")]
+}
+pub mod library {
+    #![doc = links!()]
+    #![doc = include_str!("library.md")]
+}
+pub mod errors {
+    #![doc = links!()]
+    #![doc = include_str!("errors.md")]
+}

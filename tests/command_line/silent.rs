@@ -1,0 +1,160 @@
+//! Nothing is lost in silence: inputs, answers, other runs' stores.
+//!
+//! Why: a tool that overwrites what it reads, or reports success with half an answer, is trusted once. How: each way of losing something that was
+//! found is tried, and must end with an error and everything where it was.
+
+use std::fs::{self, File};
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use super::place::{Place, TETRA};
+
+#[test]
+fn what_a_run_reads_is_never_what_it_writes() {
+    let place = Place::new();
+    let mesh = "MeshVersionFormatted 2\nDimension 3\nVertices\n4\n0 0 0 0\n1 0 0 0\n0 1 0 0\n0 0 1 0\nTriangles\n4\n\
+        1 3 2 1\n1 2 4 1\n2 3 4 1\n1 4 3 1\nEnd\n";
+    place.write("k.mesh", mesh);
+    place.write("s.off", TETRA);
+    fs::hard_link(place.path("s.off"), place.path("linked.off")).expect("a link");
+    place.run_line("mesh k.mesh").succeeds();
+    let mut refused = vec![
+        "refine-surface s.off s.off --hsiz 0.1",
+        "refine-surface s.off linked.off --hsiz 0.1",
+        "check s.off --repair --write s.off",
+        "export k.tetdb k.mesh",
+        "export k.tetdb k.tetdb",
+        "snapshot k.tetdb k.tetdb",
+        "mesh s.off --export s.off",
+        "mesh k.mesh -o other.tetdb --export k.mesh",
+        "query k.tetdb -o k.mesh",
+    ];
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink(place.path("k.mesh"), place.path("soft.mesh")).expect("a link");
+        refused.push("export k.tetdb soft.mesh");
+    }
+    for line in refused {
+        let done = place.run_line(line);
+        assert_ne!(done.exit(), Some(0), "{line}");
+        assert!(!place.path("other.tetdb").exists(), "{line}");
+        let files = [("k.mesh", mesh), ("s.off", TETRA)];
+        for (name, content) in files {
+            let found = fs::read_to_string(place.path(name)).expect("it is still there");
+            assert_eq!(found, content, "{line}");
+        }
+    }
+    place
+        .run_line("refine-surface s.off s.off --hsiz 0.5 --force")
+        .succeeds();
+    place.run_line("export k.tetdb k.mesh --force").succeeds();
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn an_answer_that_cannot_be_written_is_an_error_and_a_closed_pipe_is_none() {
+    let place = Place::new();
+    place.write("a.off", TETRA);
+    place.run_line("mesh a.off").succeeds();
+    let lines = [
+        "info a.tetdb",
+        "info a.tetdb --json",
+        "digest a.tetdb",
+        "query a.tetdb",
+        "query a.tetdb --csv",
+        "query a.tetdb --json",
+        "verify a.tetdb",
+        "compare a.tetdb a.tetdb",
+        "check a.off",
+        "estimate a.off",
+        "completions bash",
+        "man",
+    ];
+    for line in lines {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let full = File::create("/dev/full").expect("it is always there");
+        let mut full_run = place.command(&words);
+        let output = full_run.stdout(full).output().expect("the program starts");
+        let talk = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(6), "{line}: {talk}");
+        let mut child = place.command(&words).spawn().expect("the program starts");
+        drop(child.stdout.take());
+        let status = child.wait().expect("it ends");
+        assert_eq!(status.code(), Some(0), "{line} into a closed pipe");
+    }
+}
+
+#[test]
+fn of_two_runs_at_once_onto_one_path_neither_is_replaced_in_silence() {
+    let place = Place::new();
+    let digest_of = |h: &str| {
+        let word = format!("sample:box,h={h}");
+        let store = format!("{h}.tetdb");
+        place.run(&["mesh", &word, "-o", &store]).succeeds();
+        place.digest(&store)
+    };
+    let (first, second) = (digest_of("0.2"), digest_of("0.25"));
+    for delay in [0, 1, 2, 5, 10, 20, 40, 80, 160, 320] {
+        let start = |word: &str| {
+            let words = ["mesh", word, "-o", "x.tetdb"];
+            let mut command = place.command(&words);
+            command.stdout(Stdio::null()).stderr(Stdio::null());
+            command.spawn().expect("the program starts")
+        };
+        let mut one = start("sample:box,h=0.2");
+        std::thread::sleep(Duration::from_millis(delay));
+        let mut two = start("sample:box,h=0.25");
+        let exits = [&mut one, &mut two].map(|child| child.wait().expect("it ends").code());
+        let winner = match exits {
+            [Some(0), Some(5 | 8)] => &first,
+            [Some(5 | 8), Some(0)] => &second,
+            other => panic!("{delay} ms apart: exit codes {other:?}"),
+        };
+        assert_eq!(&place.digest("x.tetdb"), winner, "{delay} ms apart");
+        fs::remove_dir_all(place.path("x.tetdb")).expect("it is ours");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn an_export_that_is_stopped_leaves_no_file_behind() {
+    let place = Place::new();
+    let words = ["mesh", "sample:box,h=0.05", "-o", "b.tetdb", "--no-verify"];
+    place.run(&words).succeeds();
+    for millis in [5, 20, 60] {
+        let mut child = place
+            .command(&["export", "b.tetdb", "b.mesh"])
+            .spawn()
+            .expect("the program starts");
+        std::thread::sleep(Duration::from_millis(millis));
+        let id = child.id().to_string();
+        let sent = Command::new("kill").args(["-TERM", &id]).status();
+        assert!(sent.is_ok());
+        child.wait().expect("it ends");
+        let left: Vec<String> = (place.names().into_iter())
+            .filter(|name| name.contains(".tmp"))
+            .collect();
+        assert!(left.is_empty(), "{left:?}");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn without_a_cap_a_run_goes_by_the_limits_of_its_process() {
+    let place = Place::new();
+    for limit in ["--as=1500000000", "--data=300000000"] {
+        let run = Command::new("prlimit")
+            .args([
+                limit,
+                env!("CARGO_BIN_EXE_tetdb"),
+                "mesh",
+                "sample:box,h=0.3",
+            ])
+            .args(["-o", "l.tetdb", "--force", "--threads", "2"])
+            .current_dir(place.path(""))
+            .output();
+        let Ok(output) = run else { return };
+        let talk = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{limit}: {talk}");
+    }
+}

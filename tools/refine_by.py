@@ -1,0 +1,72 @@
+#!/usr/bin/env python3
+"""A finished mesh made again with lengths times a factor: what becomes of counts and qualities, and whether undo brings back the old.
+
+  refine_by.py TETDB SURFACE... [--factors 0.5,0.8,0.9,1,1.25] [--subdomains 1,4] [--mesh "--regions all"]
+
+TETDB: the program. SURFACE: a file, or a sample with options of its own in the same word, as in "sample:box,h=0.1 --size-sphere 0,0,0,0.2,0.01". Each is meshed once for each
+number of sub-domains; all sub-domains are made again with each factor, and brought back. Prints a table; exit code 1 when a digest after undo is not the old one, or a factor below 1 gives
+fewer tetrahedra.
+"""
+import argparse
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+
+def run(*words):
+    done = subprocess.run([str(w) for w in words], capture_output=True, text=True)
+    if done.returncode:
+        sys.exit(f"{' '.join(map(str, words))}\n{done.stderr}")
+    return done.stdout
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("tetdb")
+    parser.add_argument("surfaces", nargs="+")
+    parser.add_argument("--factors", default="0.5,0.8,0.9,1,1.25")
+    parser.add_argument("--subdomains", default="1,4")
+    parser.add_argument("--mesh", default="--regions all")
+    args = parser.parse_args()
+    factors = args.factors.split(",")
+    is_good = True
+    print("| surface | sub-domains | tetrahedra, q < 2, worst q | " + " | ".join(f"× {f}" for f in factors) + " |")
+    print("|" + "---|" * (3 + len(factors)))
+    for surface in args.surfaces:
+        for n in args.subdomains.split(","):
+            with tempfile.TemporaryDirectory() as folder:
+                is_good &= row(args, surface, n, factors, pathlib.Path(folder) / "a.tetdb")
+    return 0 if is_good else 1
+
+
+def state(args, store):
+    info = json.loads(run(args.tetdb, "info", store, "--json"))
+    parts = info["subdomains"]
+    bins = [sum(part["quality"]["bins"][k] for part in parts) for k in range(len(parts[0]["quality"]["bins"]))]
+    tets = sum(part["tets"] for part in parts)
+    worst = max(part["quality"]["worst"] for part in parts)
+    return info["digest"], len(parts), tets, 100 * bins[0] / sum(bins), worst
+
+
+def row(args, surface, n, factors, store):
+    file, *options = surface.split()
+    common = ["--threads", "1", "--no-verify", "--quiet"]
+    run(args.tetdb, "mesh", file, *options, *args.mesh.split(), "-o", store, "--subdomains", n, *common)
+    digest, n, tets, below, worst = state(args, store)
+    name = pathlib.Path(file).name
+    cells, is_good = [], True
+    for factor in factors:
+        ranks = ",".join(map(str, range(n)))
+        run(args.tetdb, "resaturate", store, "--subdomain", ranks, "--refine-by", factor, *common)
+        _, _, now, good, bad = state(args, store)
+        run(args.tetdb, "resaturate", store, "--undo", "--no-verify", "--quiet")
+        is_good &= state(args, store)[0] == digest and (float(factor) >= 1 or now >= tets)
+        cells.append(f"{now:,} ({now / tets:.3f}), {good:.1f} %, {bad:.4g}")
+    print(f"| {name}{' ' if options else ''}{' '.join(options)} | {n} | {tets:,}, {below:.1f} %, {worst:.4g} | " + " | ".join(cells) + " |", flush=True)
+    return is_good
+
+
+if __name__ == "__main__":
+    sys.exit(main())
