@@ -213,7 +213,6 @@ impl<T: Pod> SpillVecBuilder<T> {
     }
 
     /// Whether there is no element.
-    #[cfg(any(test, feature = "internals"))]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
