@@ -131,6 +131,7 @@ fn group_free() -> Option<u64> {
 }
 
 /// The most this process has ever held, in bytes, where the system says.
+#[cfg(any(test, feature = "cli", feature = "internals"))]
 pub fn peak_bytes() -> Option<u64> {
     field("/proc/self/status", "VmHWM:")
 }

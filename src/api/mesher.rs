@@ -76,7 +76,9 @@ pub struct Prediction {
 pub(crate) struct Created {
     pub path: PathBuf,
     /// `None` where the finished mesh of this job was there already.
+    #[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "for the program"))]
     pub summary: Option<pipeline::Summary>,
+    #[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "for the program"))]
     pub was_there: bool,
 }
 
@@ -196,6 +198,7 @@ impl Mesher {
     }
 
     /// Whether a mesh that memory or disk are not expected to hold is refused. Default: it is.
+    #[cfg(feature = "cli")]
     pub(crate) fn preflight(mut self, preflight: bool) -> Self {
         self.preflight = preflight;
         self
@@ -275,6 +278,7 @@ impl Mesher {
     }
 
     /// Refuses early what is no store or an unfinished one, before a surface is read for it.
+    #[cfg(feature = "cli")]
     pub(crate) fn check_path(path: &Path, existing: Existing) -> Result<(), Error> {
         if !path.exists() || existing == Existing::Replace {
             return Ok(());

@@ -33,13 +33,19 @@ pub use ask::{Answers, Order, Query};
 pub use codes::{CODES, CodeRow};
 pub use error::Error;
 pub(crate) use guard::guarded;
-pub use memory::{Bytes, peak_bytes};
-pub(crate) use memory::{default_cap, show_bytes};
+pub use memory::Bytes;
+#[cfg(feature = "cli")]
+pub(crate) use memory::default_cap;
+#[cfg(any(test, feature = "cli", feature = "internals"))]
+pub use memory::peak_bytes;
+pub(crate) use memory::show_bytes;
+#[cfg(feature = "cli")]
 pub(crate) use mesher::predict;
 pub use mesher::{Existing, Mesher, Prediction};
 pub use options::{Optimize, Regions, Seal, Subdomains};
 pub use picture::{ColorBy, Snapped, Snapshot};
 pub use remesh::{Remesh, Remeshed};
+#[cfg(feature = "cli")]
 pub(crate) use resume::resume_reported;
 pub use settings::{Event, Settings};
 pub use show::{ExportOptions, Exported};

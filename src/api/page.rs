@@ -26,7 +26,9 @@ const LABELS_NAMED: usize = 24;
 pub(crate) struct Written {
     pub bytes: u64,
     /// Triangles of each surface, and those shown.
+    #[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "for the program"))]
     pub scene: Value,
+    #[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "for the program"))]
     pub measures: Measures,
 }
 

@@ -137,6 +137,7 @@ impl Remesh {
     }
 
     /// With sizes that a caller in this crate has prepared.
+    #[cfg(feature = "cli")]
     pub(crate) fn prepared_sizes(mut self, sizes: Option<NewSizes>) -> Self {
         self.prepared = sizes;
         self

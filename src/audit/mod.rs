@@ -15,6 +15,7 @@
 
 mod against;
 mod claims;
+#[cfg(any(test, feature = "cli", feature = "internals"))]
 mod compare;
 mod damage;
 mod interface;
@@ -27,6 +28,7 @@ mod tests;
 
 use std::path::{Path, PathBuf};
 
+#[cfg(any(test, feature = "cli", feature = "internals"))]
 pub use compare::{Population, Qualities, qualities};
 pub use damage::damage;
 pub use options::VerifyOptions;
@@ -68,6 +70,7 @@ pub fn verify(
 /// The digests of all tetrahedra and of all interface faces, recomputed from the chunks.
 ///
 /// Errors: damage, and failures of the disk.
+#[cfg(any(test, feature = "internals"))]
 pub fn digest(store: &mut Catalog, memory_bytes: usize) -> Result<[Digest; 2], StoreError> {
     let mut both = [Digest::default(); 2];
     for row in store.subdomains()? {

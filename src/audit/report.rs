@@ -15,6 +15,7 @@ const OFFENDERS_KEPT: u64 = 10;
 #[serde(rename_all = "snake_case")]
 pub enum Level {
     /// Every record can be read and counts agree; nodes exist and differ; digests are right.
+    #[cfg_attr(not(feature = "internals"), allow(dead_code, reason = "for benches"))]
     Element,
     /// Every face has two sides, or one and is required.
     Adjacency,
@@ -161,6 +162,7 @@ impl Report {
     }
 
     /// Number of findings of a kind.
+    #[cfg(any(test, feature = "internals"))]
     pub fn count(&self, finding: Finding) -> u64 {
         self.findings.get(&finding).copied().unwrap_or(0)
     }

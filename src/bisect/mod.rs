@@ -101,6 +101,7 @@ pub struct InterfaceFaces {
 /// Refines the zone of a cut in `host` and chooses the interface in `core`, which must be empty.
 ///
 /// `progress` receives a stage and how much of it is done. Effects: all ids of `host` may change. Errors: the disk.
+#[cfg(any(test, feature = "internals"))]
 pub fn open<P: Pages, Q: Pages>(
     host: &mut Mesh<P>,
     core: &mut Mesh<Q>,

@@ -34,10 +34,15 @@ pub enum PlaneChoice {
     #[default]
     Load,
     /// As the paper says: centroids of the mesh, unweighted; the axis of the largest moment; placed by load.
+    #[cfg_attr(
+        not(feature = "internals"),
+        allow(dead_code, reason = "for comparison")
+    )]
     Centroids,
     /// As `Load`, but shared by volume: what becomes of the balance when sizes do not count.
     Volume,
     /// This one, as it is.
+    #[cfg_attr(not(feature = "internals"), allow(dead_code, reason = "for tests"))]
     Given(Plane),
 }
 

@@ -21,6 +21,7 @@ pub enum RegionPolicy {
     /// What the normals point out of.
     ByOrientation,
     /// The volumes of these points.
+    #[cfg_attr(not(feature = "internals"), allow(dead_code, reason = "for tests"))]
     Seeds(Vec<Point>),
 }
 

@@ -4,6 +4,7 @@ use std::time::Duration;
 #[derive(Clone, Debug, Default)]
 pub struct RecoveryReport {
     /// Facets of the input.
+    #[cfg_attr(not(feature = "internals"), allow(dead_code, reason = "for tests"))]
     pub facets: u32,
     /// Facets the Delaunay mesh does not have.
     pub missing_facets: u32,
@@ -24,6 +25,7 @@ pub struct RecoveryReport {
     /// Flips done.
     pub flips: u64,
     /// Time to find what is missing.
+    #[cfg_attr(not(feature = "internals"), allow(dead_code, reason = "for tests"))]
     pub map_time: Duration,
     /// Time to recover by flips.
     pub flip_time: Duration,

@@ -33,13 +33,6 @@ impl Expression {
         self.kind
     }
 
-    /// Whether it asks for the variable at this position.
-    pub fn uses(&self, variable: usize) -> bool {
-        self.ops
-            .iter()
-            .any(|op| matches!(op, Op::Variable(v) if *v == variable))
-    }
-
     /// Its value, where it is a number; `values` are those of the variables.
     ///
     /// Panics when it is a truth, or with fewer values than variables.

@@ -180,6 +180,7 @@ impl<P: Pages> Mesh<P> {
     }
 
     /// Marks or unmarks a face as required, on both sides.
+    #[cfg(any(test, feature = "internals"))]
     pub fn set_required(&mut self, face: FaceRef, required: bool) {
         let other = self.tet(face.tet()).neighbor[face.face()];
         for f in [face, other] {

@@ -21,15 +21,18 @@ mod tree;
 mod workers;
 
 pub use error::PipelineError;
+#[cfg(any(test, feature = "internals"))]
+pub use mesh::coarse_mesh;
 pub use mesh::{
-    CoarseReport, FineReport, HeadStart, Summary, ahead, coarse_mesh, mesh, mesh_prepared,
-    stage_faces,
+    CoarseReport, FineReport, HeadStart, Summary, ahead, mesh, mesh_prepared, stage_faces,
 };
 pub use plan::{
     Estimate, MEMORY_MIN, Options, Plan, Prepared, RECIPE, Trial, least_for, prepare, recipe_of,
     record_recipe,
 };
-pub use progress::{Event, Watcher, silent};
+#[cfg(any(test, feature = "internals"))]
+pub use progress::silent;
+pub use progress::{Event, Watcher};
 pub use remesh::{
     Forecast, NewSizes, Remade, ResaturateSummary, Resaturation, Values, asked, changed, forecast,
     forget, resaturate, undo,

@@ -15,4 +15,5 @@ pub struct Event {
 pub type Watcher<'a> = dyn Fn(Event) + 'a;
 
 /// The watcher that does nothing.
+#[cfg(any(test, feature = "internals"))]
 pub fn silent(_: Event) {}

@@ -9,10 +9,12 @@
 //! `selection` (what is asked for), `marks` (faces of the surface and of interfaces), `select` (the answers one after the other),
 //! `order` (sorted), `extreme` (the worst few), `around` (tetrahedra around vertices, edges, neighbors).
 
+#[cfg(any(test, feature = "cli", feature = "internals"))]
 mod around;
 mod decoded;
 mod error;
 mod exact;
+#[cfg(any(test, feature = "cli", feature = "internals"))]
 mod extreme;
 mod hit;
 mod lazy;

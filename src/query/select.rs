@@ -75,6 +75,7 @@ impl QuerySession {
 
 impl Selected<'_> {
     /// What it has cost so far.
+    #[cfg(any(test, feature = "internals"))]
     pub fn measures(&self) -> crate::query::Measures {
         self.inquiry.measures()
     }

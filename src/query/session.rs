@@ -191,6 +191,7 @@ impl QuerySession {
     }
 
     /// Names of the labels; their place is their number.
+    #[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "for the program"))]
     pub fn labels(&self) -> &[String] {
         &self.labels
     }
@@ -273,6 +274,7 @@ impl QuerySession {
     }
 
     /// Counts chunks of vertices read elsewhere.
+    #[cfg(any(test, feature = "cli", feature = "internals"))]
     pub(crate) fn count_vertices(&mut self, chunks: u64) {
         self.measures.vertex_chunks_read += chunks;
     }

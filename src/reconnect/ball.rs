@@ -1,6 +1,6 @@
 //! All tetrahedra around a vertex.
 
-use crate::mesh::{FaceRef, Mesh, Tet};
+use crate::mesh::{Mesh, Tet};
 use crate::storage::Pages;
 
 /// Up to this many tetrahedra are found again by looking through the list.
@@ -82,16 +82,6 @@ impl Ball {
     pub fn gather_of<P: Pages>(&mut self, mesh: &mut Mesh<P>, v: u32, tets_max: usize) -> bool {
         let start = mesh.tet_of(v);
         self.gather(mesh, v, start, tets_max)
-    }
-
-    /// The face opposite `v` in tetrahedron `n` of the ball.
-    pub fn opposite(&self, n: usize) -> FaceRef {
-        FaceRef::new(self.tets[n], self.locals[n].into())
-    }
-
-    /// Position of the first tetrahedron that also has `w`: edge v w exists when there is one.
-    pub fn with_vertex(&self, w: u32) -> Option<usize> {
-        self.records.iter().position(|r| r.local(w).is_some())
     }
 
     #[inline]

@@ -14,6 +14,7 @@ pub enum Forced {
     /// The chord between two positions of the ring.
     Diagonal(usize, usize),
     /// The triangle of three positions of the ring.
+    #[cfg_attr(not(feature = "internals"), allow(dead_code, reason = "for tests"))]
     Triangle(usize, usize, usize),
 }
 

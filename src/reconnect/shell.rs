@@ -49,6 +49,7 @@ impl Shell {
     /// Gathers the tetrahedra around edge `e` of `t`; `false` when there are more than `tets_max` (nothing usable is left then).
     ///
     /// The first tetrahedron of a closed shell is `t`. An open one starts at its hull face.
+    #[cfg(any(test, feature = "internals"))]
     #[inline]
     pub fn gather<P: Pages>(
         &mut self,
@@ -156,12 +157,8 @@ impl Shell {
         self.ring.len()
     }
 
-    /// Position of `v` in the ring.
-    pub fn ring_position(&self, v: u32) -> Option<usize> {
-        self.ring.iter().position(|&r| r == v)
-    }
-
     /// Whether the edge itself is flagged as required; reads one attribute.
+    #[cfg(any(test, feature = "internals"))]
     pub fn edge_is_required<P: Pages>(&self, mesh: &mut Mesh<P>) -> bool {
         let (_, flags) = mesh.tet_attribute(self.tets[0]);
         let [i, j, ..] = self.locals[0];
@@ -169,6 +166,7 @@ impl Shell {
     }
 
     /// Positions of a, b and of the ring's vertices (in `ring_points`).
+    #[cfg(any(test, feature = "internals"))]
     pub fn points<P: Pages>(
         &self,
         mesh: &mut Mesh<P>,

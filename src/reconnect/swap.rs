@@ -30,6 +30,7 @@ pub struct FaceSwap {
 
 impl FaceSwap {
     /// Gathers the two sides of a face; `None` on the hull and for a required face.
+    #[cfg(any(test, feature = "internals"))]
     #[inline]
     pub fn gather<P: Pages>(mesh: &mut Mesh<P>, face: FaceRef) -> Option<Self> {
         let record = mesh.tet(face.tet());
@@ -62,6 +63,7 @@ impl FaceSwap {
     }
 
     /// Whether the three new tetrahedra are exactly positive: p q passes through the inside of the face.
+    #[cfg(any(test, feature = "internals"))]
     #[inline]
     pub fn is_positive(p: Point, q: Point, [x, y, z]: [Point; 3]) -> bool {
         orient(p, q, x, y) > 0.0 && orient(p, q, y, z) > 0.0 && orient(p, q, z, x) > 0.0

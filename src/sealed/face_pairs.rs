@@ -61,11 +61,6 @@ impl FacePairs {
         }
     }
 
-    /// Bytes of the table.
-    pub fn bytes(&self) -> usize {
-        self.entries.len() * size_of::<Entry>()
-    }
-
     /// Empties the table.
     pub fn clear(&mut self) {
         self.entries.iter_mut().for_each(|e| e.reference = VACANT);

@@ -75,6 +75,7 @@ impl SealedWriter {
     /// Starts the file of `subdomain` in `generation` at `path`, which must not exist.
     ///
     /// Errors: the file cannot be created.
+    #[cfg(any(test, feature = "internals"))]
     pub fn create(
         path: impl Into<DiskPath>,
         subdomain: SubdomainId,

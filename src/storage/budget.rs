@@ -46,6 +46,7 @@ impl Budget {
     }
 
     /// Most bytes ever leased at once.
+    #[cfg(any(test, feature = "internals"))]
     pub fn high_water(&self) -> u64 {
         self.ledger.high_water.load(Ordering::Relaxed)
     }

@@ -17,6 +17,7 @@ mod disk;
 mod disk_path;
 mod error;
 mod file;
+#[cfg(any(test, feature = "internals"))]
 mod flat;
 mod page_table;
 mod paged_vec;
@@ -39,6 +40,7 @@ pub use disk::{Disk, Entry};
 pub use disk_path::DiskPath;
 pub use error::StorageError;
 pub use file::StoreFile;
+#[cfg(any(test, feature = "internals"))]
 pub use flat::FlatPages;
 pub use pager::{Pager, PagerStats};
 pub use pages::{Pages, kind};

@@ -102,11 +102,6 @@ impl Pager {
         self.stats
     }
 
-    /// Frames the pool may use.
-    pub fn frames_max(&self) -> usize {
-        self.frames_max
-    }
-
     /// Frames touched so far.
     pub fn frames_used(&self) -> usize {
         self.owners.len()

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use bytemuck::Pod;
 
 use super::paged_vec::{FRAMES_MIN, PAGE_BYTES, PagedVec, SharedPagedVec, per_page};
-use super::{Budget, DiskPath, Lease, SortRecord, Sorter, StorageError};
+use super::{Budget, DiskPath, Lease, SortRecord, Sorter};
 
 /// Memory for arrays and sorts, and a folder for those it does not hold.
 #[derive(Clone)]
@@ -48,11 +48,6 @@ impl ScratchSpace {
     /// Bytes not taken at the moment.
     pub fn available(&self) -> u64 {
         self.budget.available()
-    }
-
-    /// Takes `bytes` for something that is no array. Errors: [`StorageError::Budget`].
-    pub fn lease(&self, bytes: u64, what: &'static str) -> Result<Lease, StorageError> {
-        self.budget.lease(bytes, what)
     }
 
     /// `n` times `value`. A quarter of what is left is the most an array takes.
@@ -277,6 +272,7 @@ impl<T: Pod> FrozenSpillVec<T> {
     }
 
     /// Whether there is no element.
+    #[cfg(any(test, feature = "internals"))]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -350,6 +346,9 @@ mod tests {
         let dir = tempfile::tempdir().expect("a folder");
         let room = ScratchSpace::new(1 << 20, dir.path().join("missing"));
         let made = attempt(|| drop(room.column(1 << 20, 0u64)));
-        assert!(matches!(made, Err(StorageError::Io { .. })), "{made:?}");
+        assert!(
+            matches!(made, Err(crate::storage::StorageError::Io { .. })),
+            "{made:?}"
+        );
     }
 }

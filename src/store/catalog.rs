@@ -43,6 +43,7 @@ impl Catalog {
     ///
     /// An empty directory is taken over. Errors: [`StoreError::Finished`], [`StoreError::Unfinished`],
     /// [`StoreError::NotOurs`] or [`StoreError::Busy`] say what is already there.
+    #[cfg(any(test, feature = "internals"))]
     pub fn create(dir: impl Into<DiskPath>, job: &Job) -> Result<Self, StoreError> {
         Self::create_with(dir, job, |_| ())
     }
@@ -232,10 +233,6 @@ impl Catalog {
             self.file_path(file.subdomain, file.generation)
                 .remove_file()?;
         }
-        for file in &step.coarse_unlisted {
-            self.coarse_path(file.subdomain, file.generation)
-                .remove_file()?;
-        }
         Ok(())
     }
 
@@ -413,6 +410,7 @@ impl Catalog {
     }
 
     /// Bytes of the catalog's file.
+    #[cfg(any(test, feature = "cli", feature = "internals"))]
     pub fn file_bytes(&self) -> Result<u64, StoreError> {
         Ok(self.dir.join(CATALOG).bytes()?)
     }

@@ -18,7 +18,6 @@ pub struct Step {
     pub(super) unlisted: BTreeSet<FileRow>,
     /// The same for coarse snapshots.
     pub(super) coarse_listed: BTreeSet<FileRow>,
-    pub(super) coarse_unlisted: BTreeSet<FileRow>,
     pub(super) journal_rows: u32,
 }
 
@@ -29,7 +28,6 @@ impl Step {
             listed: BTreeSet::new(),
             unlisted: BTreeSet::new(),
             coarse_listed: BTreeSet::new(),
-            coarse_unlisted: BTreeSet::new(),
             journal_rows,
         }
     }
@@ -87,11 +85,6 @@ impl Step {
         self.changes.insert(RowKind::Previous.key(0, rank), None);
     }
 
-    /// Forgets a sub-domain.
-    pub fn remove_subdomain(&mut self, rank: u32) {
-        self.changes.insert(RowKind::Subdomain.key(0, rank), None);
-    }
-
     /// A file counts from now on; it is synced before the commit.
     pub fn list_file(&mut self, subdomain: u32, generation: u32) {
         let file = FileRow {
@@ -119,15 +112,6 @@ impl Step {
     pub fn list_coarse(&mut self, row: &CoarseRow) {
         self.put(RowKind::Coarse.key(0, row.rank), row);
         self.coarse_listed.insert(FileRow {
-            subdomain: row.rank,
-            generation: row.generation,
-        });
-    }
-
-    /// Forgets a coarse snapshot; its file is removed after the commit.
-    pub fn drop_coarse(&mut self, row: &CoarseRow) {
-        self.changes.insert(RowKind::Coarse.key(0, row.rank), None);
-        self.coarse_unlisted.insert(FileRow {
             subdomain: row.rank,
             generation: row.generation,
         });

@@ -8,6 +8,7 @@ mod error;
 mod feed;
 mod gmsh;
 mod gmsh_numbers;
+#[cfg(any(test, feature = "cli", feature = "internals"))]
 mod lengths;
 mod medit;
 mod meditb;
@@ -31,6 +32,7 @@ use std::path::{Path, PathBuf};
 
 pub use error::{FilePlace, ReadError, Spot};
 use feed::{Feed, Result};
+#[cfg(any(test, feature = "cli", feature = "internals"))]
 pub use lengths::read_lengths;
 use open::open;
 use sink::SurfaceSink;
@@ -146,6 +148,7 @@ pub fn read_surface(paths: &[PathBuf]) -> Result<Surface> {
 ///
 /// # Errors
 /// As [`read_surface`].
+#[cfg(any(test, feature = "internals"))]
 pub fn read_memory(format: Format, file: &str, bytes: &[u8]) -> Result<Surface> {
     let mut builder = SurfaceBuilder::new();
     let mut target = SurfaceSink {

@@ -11,6 +11,7 @@
 //! `numbering` (shared vertices), `faces` (its boundary), `draft` and `stream` (files), then one file per format.
 
 mod abaqus;
+#[cfg(any(test, feature = "cli", feature = "internals"))]
 mod defects;
 mod dispatch;
 mod draft;
@@ -27,6 +28,7 @@ mod numbering;
 mod parquet;
 mod pieces;
 mod report;
+#[cfg(any(test, feature = "cli", feature = "internals"))]
 mod selected;
 mod selection;
 mod stream;
@@ -40,13 +42,19 @@ mod vtu_layout;
 
 use std::path::Path;
 
+#[cfg(any(test, feature = "cli", feature = "internals"))]
 pub use defects::defects;
 use error::Result;
 pub use error::WriteError;
 pub use format::{ENDINGS, MeshFormat};
-pub use npy::{NpyField, NpyTable, TextFile, bytes};
+pub use npy::TextFile;
+#[cfg(any(feature = "pictures", feature = "internals"))]
+pub use npy::bytes;
+#[cfg(any(test, feature = "cli", feature = "internals"))]
+pub use npy::{NpyField, NpyTable};
 pub use report::ExportReport;
 use report::FileCounts;
+#[cfg(any(test, feature = "cli", feature = "internals"))]
 pub use selected::{SelectedTet, SelectedVtu};
 pub use selection::{Content, Selection};
 pub use surface::{SurfaceReport, surface};

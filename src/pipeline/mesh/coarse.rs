@@ -14,6 +14,7 @@ use crate::surface::Surface;
 #[derive(Clone, Debug)]
 pub struct CoarseReport {
     /// Work of the Delaunay insertion.
+    #[cfg_attr(not(feature = "internals"), allow(dead_code, reason = "for benches"))]
     pub kernel: KernelStats,
     /// What boundary recovery did.
     pub recovery: RecoveryReport,
@@ -27,6 +28,7 @@ const REPORT_EVERY: usize = 4096;
 /// Builds the coarse mesh of a valid surface into an empty mesh.
 ///
 /// Errors: triangles that cannot be recovered; regions of which none is filled. Pages and scratch files that fail unwind.
+#[cfg(any(test, feature = "internals"))]
 pub fn coarse<P: Pages>(
     mesh: &mut Mesh<P>,
     surface: &Surface,

@@ -12,7 +12,9 @@ mod saturate;
 mod stages;
 pub(super) mod subdomain;
 
-pub use coarse::{CoarseReport, coarse as coarse_mesh};
+pub use coarse::CoarseReport;
+#[cfg(any(test, feature = "internals"))]
+pub use coarse::coarse as coarse_mesh;
 pub use head_start::{HeadStart, ahead};
 pub use run::{Summary, mesh, mesh_prepared};
 pub use saturate::FineReport;

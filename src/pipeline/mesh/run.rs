@@ -35,10 +35,12 @@ const COARSE: u32 = 1;
 #[derive(Clone, Debug)]
 pub struct Summary {
     /// The coarse mesh of the whole domain.
+    #[cfg_attr(not(feature = "internals"), allow(dead_code, reason = "for tests"))]
     pub coarse: Option<CoarseReport>,
     /// The size field.
     pub sizes: Option<SizeSummary>,
     /// The bisections of this run, in order.
+    #[cfg_attr(not(feature = "internals"), allow(dead_code, reason = "for tests"))]
     pub cuts: Vec<CutReport>,
     /// What refinement and optimization did to the sub-domains of this run, by rank.
     pub fine: BTreeMap<u32, FineReport>,

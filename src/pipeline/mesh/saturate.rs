@@ -18,6 +18,7 @@ pub struct FineReport {
     /// What the division of edges did.
     pub refine: RefineReport,
     /// What the optimization did.
+    #[cfg_attr(not(feature = "internals"), allow(dead_code, reason = "for benches"))]
     pub optimize: OptimizeReport,
     /// What refinement and optimization took.
     pub seconds: [f64; 2],

@@ -288,6 +288,7 @@ impl Estimate {
     }
 
     /// Most bytes the process will hold with a cap of `cap`.
+    #[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "for the program"))]
     pub fn memory_bytes(&self, cap: u64, threads: usize) -> u64 {
         self.memory_full_bytes(threads).min(cap + BEYOND_CAP as u64)
     }

@@ -47,6 +47,7 @@ pub fn resaturate(
 }
 
 /// What [`resaturate`] would make, without making it. Errors: as there.
+#[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "for the program"))]
 pub fn forecast(
     catalog: &mut Catalog,
     options: &Options,
@@ -79,6 +80,7 @@ pub fn forecast(
 }
 
 /// The sub-domains that `sizes` would make otherwise than they are. Errors: damage; sizes that make no sense.
+#[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "for the program"))]
 pub fn changed(
     catalog: &mut Catalog,
     options: &Options,
@@ -100,6 +102,7 @@ pub fn changed(
 /// What was asked for when a sub-domain was last meshed again with other sizes; `None` for one with those of the whole.
 ///
 /// Errors: a damaged catalog.
+#[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "for the program"))]
 pub fn asked(catalog: &mut Catalog, rank: u32) -> Result<Option<String>, StoreError> {
     let bytes = catalog.blob(blob::ASKED + rank)?;
     Ok(bytes.map(|bytes| String::from_utf8_lossy(&bytes).into_owned()))

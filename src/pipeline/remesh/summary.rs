@@ -12,6 +12,7 @@ pub struct Remade {
     /// Its row in the catalog after the run.
     pub after: SubdomainRow,
     /// `None` where an older version came back.
+    #[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "for the program"))]
     pub fine: Option<FineReport>,
 }
 

@@ -154,7 +154,11 @@ impl Picture {
                 canvas.solid(pixels, heights, color, self.line);
                 Ok(())
             }
-            Canvas::Svg(_) => self.polygon(corners, color),
+            Canvas::Svg(_) => {
+                #[cfg(not(feature = "pictures"))]
+                let _ = heights;
+                self.polygon(corners, color)
+            }
         }
     }
 
