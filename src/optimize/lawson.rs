@@ -18,9 +18,13 @@ use crate::storage::{Pages, check_cancelled};
 /// Flips done and faces met that could not be flipped (some of them later could).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LawsonStats {
+    /// Faces replaced by an edge: two tetrahedra became three.
     pub flips_23: u64,
+    /// Edges replaced by a face: three tetrahedra became two.
     pub flips_32: u64,
+    /// Edges with four tetrahedra replaced by another edge with four.
     pub flips_44: u64,
+    /// Faces that could not be flipped.
     pub stuck: u64,
 }
 

@@ -11,6 +11,7 @@ use super::quality::quality;
 /// Tetrahedra per bin: `[1,2[`, `[2,3[`, … `[9,10[`, `[10,∞[`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Histogram {
+    /// Tetrahedra in each bin.
     pub bins: [u64; 10],
 }
 
@@ -38,15 +39,19 @@ impl Histogram {
 /// What there is to say about the quality of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct QualityTable {
+    /// All tetrahedra by quality.
     pub histogram: Histogram,
     /// Largest q, and the tetrahedron that has it.
     pub worst: f64,
+    /// Index of the tetrahedron of largest q.
     pub worst_tet: u32,
     /// Radians.
     pub dihedral_min: f64,
+    /// Largest dihedral angle, in radians.
     pub dihedral_max: f64,
     /// Inner faces that are not required, and those of them whose opposite vertices are not inside the sphere (exact).
     pub faces: u64,
+    /// Those that are locally Delaunay.
     pub faces_delaunay: u64,
 }
 

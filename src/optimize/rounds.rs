@@ -24,11 +24,17 @@ const BALL_MAX: usize = 128;
 pub struct OperationCounts {
     /// Bad tetrahedra looked at, over all rounds.
     pub attacked: u64,
+    /// Edges removed.
     pub edges_removed: u64,
+    /// Faces swapped for edges.
     pub faces_swapped: u64,
+    /// Vertices moved by smoothing.
     pub vertices_smoothed: u64,
+    /// Edges collapsed.
     pub edges_collapsed: u64,
+    /// Vertices inserted.
     pub vertices_inserted: u64,
+    /// Rounds done.
     pub rounds: u32,
 }
 

@@ -25,6 +25,7 @@ pub enum Mode {
 /// Choices of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
+    /// How much is done.
     pub mode: Mode,
     /// Sweeps of smoothing; 0 in mode `None`. From 86 % of q < 2, two take it to 94, three to 95.6, six to 97 %; what is
     /// still bad then costs one face that is not locally Delaunay each: 2.95, 2.2 and 1.5 % of the faces after `Full`.
@@ -46,18 +47,24 @@ impl Settings {
 /// Where a run is: the name of the stage, and pages done of those there are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
+    /// Name of the stage.
     pub stage: &'static str,
+    /// Pages done.
     pub done: u32,
+    /// Pages there are.
     pub total: u32,
 }
 
 /// What a run did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct OptimizeReport {
+    /// What the flips towards the Delaunay mesh did.
     pub flips: LawsonStats,
+    /// Vertices moved by the sweeps of smoothing, over all sweeps.
     pub odt_moves: u64,
     /// Vertices that could not move because a tetrahedron would not stay positive, over all sweeps.
     pub odt_held: u64,
+    /// Operations on bad tetrahedra.
     pub operations: OperationCounts,
     pub mended: MendCounts,
 }

@@ -10,10 +10,13 @@ use crate::surface::Surface;
 /// directions; points are numbered in the order in which triangles first name them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sample {
+    /// Positions of the vertices.
     pub points: Vec<Point>,
     /// Counter-clockwise seen from outside the filled part.
     pub triangles: Vec<[u32; 3]>,
+    /// Label of each triangle, as an index into `label_names`.
     pub labels: Vec<u32>,
+    /// Names of the labels.
     pub label_names: Vec<String>,
 }
 

@@ -29,27 +29,45 @@ pub struct SampleSpec {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum SampleKind {
+    /// Balls inside a box.
     Balls(Balls),
+    /// A box.
     Box {
+        /// Lengths of its sides.
         sides: Point,
+        /// Edge length of the triangles.
         h: f64,
     },
+    /// See [`Caps`].
     Caps(Caps),
+    /// Grains that fill a box.
     Grains(Grains),
+    /// A tube along a knot.
     Knot {
+        /// Radius of the tube.
         tube: f64,
+        /// Edge length of the triangles.
         h: f64,
     },
+    /// See [`Needles`].
     Needles(Needles),
+    /// Surfaces within each other.
     Shells {
+        /// How many.
         count: usize,
+        /// Their shape.
         kind: ShellKind,
+        /// Edge length of the triangles.
         h: f64,
     },
+    /// A sphere.
     Sphere {
+        /// Its radius.
         radius: f64,
+        /// Edge length of the triangles.
         h: f64,
     },
+    /// See [`Steps`].
     Steps(Steps),
 }
 

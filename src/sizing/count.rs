@@ -44,6 +44,7 @@ pub struct TetCounts {
 }
 
 impl TetCounts {
+    /// All tetrahedra.
     pub fn tets(&self) -> f64 {
         self.inner_tets + self.surface_tets
     }

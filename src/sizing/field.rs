@@ -58,6 +58,7 @@ pub struct SizeField {
 /// Sizes besides those of the surface's edges and the options.
 #[derive(Clone, Copy, Default)]
 pub struct Further<'a> {
+    /// Wanted sizes as functions of position.
     pub constraints: &'a [&'a dyn SizeConstraint],
     /// One for each vertex of the surface.
     pub at_vertices: Option<&'a [f64]>,

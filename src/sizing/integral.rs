@@ -36,12 +36,15 @@ const SHARE_SIZES: f64 = 0.02;
 pub struct SurfaceSkin {
     /// To triangles, and to vertices.
     pub triangles: f64,
+    /// Distance to vertices.
     pub vertices: f64,
 }
 
 /// A domain: the volumes of a surface that are filled.
 pub struct Domain<'a> {
+    /// Finds where points lie relative to the surface.
     pub seeker: &'a Seeker<'a>,
+    /// The volumes of the surface.
     pub volumes: &'a Volumes,
     /// By volume.
     pub filled: &'a [bool],

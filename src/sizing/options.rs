@@ -11,6 +11,7 @@ use super::sources::SizeSource;
 pub struct RegionSize {
     /// A region's number, or a label of triangles around it.
     pub which: String,
+    /// The size in it.
     pub h: Length,
 }
 
@@ -42,6 +43,7 @@ pub struct SizeOptions {
     pub hsiz: Option<Length>,
     /// Smallest and largest size of the interior; the surface's own edges may be beyond.
     pub hmin: Option<Length>,
+    /// Largest size of the interior.
     pub hmax: Option<Length>,
     /// Largest ratio of the lengths of two edges that follow each other. The field's slope is at
     /// most `beta = ln(hgrad)`: in a field of that slope, steps of one h grow by `exp(beta)` each.

@@ -10,16 +10,37 @@ use crate::geom::Point;
 /// A convex region, closed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape {
-    Box { low: Point, high: Point },
-    Sphere { center: Point, radius: f64 },
-    Cylinder { ends: [Point; 2], radius: f64 },
+    /// A box along the axes.
+    Box {
+        /// Least coordinates.
+        low: Point,
+        /// Greatest coordinates.
+        high: Point,
+    },
+    /// A full sphere.
+    Sphere {
+        /// Its center.
+        center: Point,
+        /// Its radius.
+        radius: f64,
+    },
+    /// A full cylinder.
+    Cylinder {
+        /// Centers of its two ends.
+        ends: [Point; 2],
+        /// Its radius.
+        radius: f64,
+    },
 }
 
 /// Sizes inside and outside a shape, as asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SizeSource {
+    /// Where the sizes hold.
     pub shape: Shape,
+    /// Size inside the shape.
     pub inside: Length,
+    /// Size outside it, if one was asked for.
     pub outside: Option<Length>,
 }
 

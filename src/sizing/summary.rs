@@ -5,8 +5,11 @@ use std::fmt;
 /// Lowest, median and highest of some lengths, in input units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
+    /// The least length.
     pub low: f64,
+    /// The median length.
     pub median: f64,
+    /// The greatest length.
     pub high: f64,
 }
 
@@ -21,8 +24,11 @@ pub struct SizeSummary {
     pub field: Range,
     /// Slope bound, `ln(hgrad)`.
     pub beta: f64,
+    /// Leaves of the octree.
     pub n_leaves: usize,
+    /// Memory of the field in bytes.
     pub bytes: usize,
+    /// What the user may not expect.
     pub warnings: Vec<SizeWarning>,
 }
 
@@ -32,8 +38,11 @@ pub struct SizeSummary {
 pub enum SizeWarning {
     /// The wanted interior size is far below the surface's edges, which are kept.
     FarBelowSurface {
+        /// The option that asks for the size.
         option: &'static str,
+        /// The size it asks for.
         wanted: f64,
+        /// Median size of the surface.
         surface_median: f64,
     },
 }

@@ -17,7 +17,9 @@ const GAP_SHARE: f64 = 1e-9;
 /// Open edges that hang together: the rim of a hole.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BoundaryLoop {
+    /// Number of edges.
     pub n_edges: usize,
+    /// Sum of their lengths, in input units.
     pub length: f64,
     /// The first triangle along it.
     pub triangle: u32,
@@ -28,10 +30,13 @@ pub struct BoundaryLoop {
 /// A vertex on an open edge of a triangle that does not have it: the two sides of a seam are divided unlike.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TJunction {
+    /// Index of the vertex.
     pub vertex: u32,
+    /// Its position.
     pub at: Point,
     /// The triangle and the edge (in its direction) the vertex lies on.
     pub triangle: u32,
+    /// Vertices of the edge.
     pub edge: [u32; 2],
     /// From the vertex to the edge; 0 means exactly in line.
     pub distance: f64,

@@ -27,6 +27,7 @@ pub struct BoxTree {
 }
 
 impl BoxTree {
+    /// Children of a node.
     pub const ARITY: usize = ARITY;
 
     /// A tree over those of `n` things within `bounds` that `keep` accepts. A scratch file that fails unwinds.

@@ -50,6 +50,7 @@ impl fmt::Display for ContactKind {
 /// Where and how two triangles touch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
+    /// How they touch.
     pub kind: ContactKind,
     /// A point of the contact; rounded, unless it is a vertex.
     pub at: Point,

@@ -7,21 +7,40 @@ use crate::geom::Point;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SurfaceError {
+    /// There are too many vertices, triangles or labels to number.
     #[error("the surface has more than {limit} {what}")]
-    TooLarge { what: &'static str, limit: usize },
+    TooLarge {
+        /// What there is too much of.
+        what: &'static str,
+        /// The most allowed.
+        limit: usize,
+    },
+    /// A triangle names a vertex that is not there.
     #[error("triangle {triangle} names vertex {vertex}, but there are {n_vertices}")]
     NoSuchVertex {
+        /// The triangle.
         triangle: u32,
+        /// The vertex it names.
         vertex: u32,
+        /// Number of vertices.
         n_vertices: usize,
     },
+    /// The surface is too small to compute with exactly.
     #[error(
         "the surface is too small to compute with exactly: its longest extent is {extent:e}, expected above 1e-24"
     )]
-    TooSmall { extent: f64 },
+    TooSmall {
+        /// Its longest extent.
+        extent: f64,
+    },
     /// Validation found defects; the first of the worst kind is told.
     #[error("{defect}")]
-    Invalid { defect: Box<Defect>, n_defects: u64 },
+    Invalid {
+        /// The first defect of the worst kind.
+        defect: Box<Defect>,
+        /// Defects in all.
+        n_defects: u64,
+    },
 }
 
 impl SurfaceError {
@@ -56,23 +75,32 @@ pub enum Defect {
     /// Two corners are one vertex, or the corners lie exactly on a line.
     #[error("triangle {triangle} has no area: {}", if *repeated { "a corner is repeated" } else { "its corners are exactly in line" })]
     Degenerate {
+        /// The triangle.
         triangle: u32,
+        /// Whether two corners are one vertex.
         repeated: bool,
+        /// Its corners.
         corners: [Point; 3],
     },
     /// The same three vertices twice in the same cyclic order.
     #[error("triangle {} repeats triangle {}", triangles[1], triangles[0])]
     Duplicate {
+        /// The two triangles.
         triangles: [u32; 2],
+        /// Their corners.
         corners: [Point; 3],
     },
     /// An edge with one triangle only: the surface has a hole there.
     #[error("the surface is open: the edge of triangle {triangle} from {} to {} has no second triangle{}", show(*from), show(*to),
         junction.map(|p| format!("; a vertex lies on it at {} (T-junction)", show(p))).unwrap_or_default())]
     OpenEdge {
+        /// The triangle at the edge.
         triangle: u32,
+        /// Vertices of the edge.
         vertices: [u32; 2],
+        /// Where the edge begins.
         from: Point,
+        /// Where the edge ends.
         to: Point,
         /// A vertex that lies on the edge, or as good as: a T-junction.
         junction: Option<Point>,
@@ -80,8 +108,11 @@ pub enum Defect {
     /// Two triangles touch elsewhere than in the vertices and edges they share.
     #[error("triangles {} and {} meet where they should not: {kind}", triangles[0], triangles[1])]
     SelfIntersection {
+        /// The two triangles.
         triangles: [u32; 2],
+        /// How they touch.
         kind: ContactKind,
+        /// A point where they touch.
         at: Point,
     },
 }

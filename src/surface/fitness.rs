@@ -17,16 +17,21 @@ const ALPHA: f64 = 0.204_124_145_231_931_5;
 pub struct Fitness {
     /// Triangles with an angle below 5 degrees; those without area are among them.
     pub small_angles: u64,
+    /// Their share of all triangles.
     pub small_angle_share: f64,
+    /// The least angle, in degrees.
     pub angle_least_degrees: f64,
     /// Shortest, median and longest edge of a triangle, in input units.
     pub edge_min: f64,
+    /// Median length of an edge.
     pub edge_median: f64,
+    /// Length of the longest edge.
     pub edge_max: f64,
     /// Triangles on which every tetrahedron has quality 2 or worse.
     pub forcing_triangles: u64,
     /// The same with quality 10 or worse.
     pub hopeless_triangles: u64,
+    /// Area of the surface, in squared input units.
     pub area: f64,
     /// What the surface encloses, each part counted positive; none when it is open.
     pub volume: Option<f64>,

@@ -165,6 +165,7 @@ pub struct Closing {
     pub share: f64,
     /// The same in input units.
     pub distance: f64,
+    /// Points that would be joined to others.
     pub points_joined: usize,
     /// Open edges left; where dividing cannot close them all, before any was divided.
     pub open_edges: usize,

@@ -8,6 +8,7 @@ use crate::storage::ScratchSpace;
 /// A triangle met by a line along z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crossing {
+    /// Index of the triangle.
     pub triangle: u32,
     /// Where, in input units.
     pub z: f64,
@@ -33,6 +34,7 @@ pub struct Seeker<'a> {
 }
 
 impl<'a> Seeker<'a> {
+    /// Sees all triangles of the surface.
     pub fn new(surface: &'a Surface) -> Self {
         Self::of(surface, &ScratchSpace::boundless(), |_| true)
     }
@@ -49,6 +51,7 @@ impl<'a> Seeker<'a> {
         Self { surface, tree }
     }
 
+    /// The surface it answers for.
     pub fn surface(&self) -> &'a Surface {
         self.surface
     }

@@ -24,7 +24,9 @@ const TRIANGLES_MAX: usize = 1 << 30;
 /// What was done.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct SplitReport {
+    /// Edges divided.
     pub edges_divided: u64,
+    /// Edges swapped.
     pub edges_swapped: u64,
     /// Greatest distance of a new vertex from the input triangle it lies on: rounding of its coordinates.
     pub deviation_max: f64,

@@ -14,9 +14,13 @@ use crate::geom::{Aabb, Point};
 /// Is not: validated. A triangle may be degenerate, the surface open; see [`validate`](super::validate).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Surface {
+    /// Positions of the vertices.
     pub points: Vec<Point>,
+    /// Vertices of each triangle.
     pub triangles: Vec<[u32; 3]>,
+    /// Label of each triangle, as an index into `label_names`.
     pub labels: Vec<u32>,
+    /// Names of the labels.
     pub label_names: Vec<String>,
     /// The files read, in order.
     pub files: Vec<SourceFile>,
@@ -93,6 +97,7 @@ impl Surface {
 pub struct Note {
     /// The file it is about.
     pub file: String,
+    /// What was done or left out.
     pub kind: NoteKind,
 }
 
@@ -101,17 +106,37 @@ pub struct Note {
 #[non_exhaustive]
 pub enum NoteKind {
     /// A text STL ended without `endsolid`.
-    MissingEndsolid { line: u64 },
+    MissingEndsolid {
+        /// The line where the file ended.
+        line: u64,
+    },
     /// An indexed file held vertices with identical coordinates, now one each.
-    WeldedVertices { n: u64 },
+    WeldedVertices {
+        /// Vertices that were joined to others.
+        n: u64,
+    },
     /// Vertices that no triangle uses were left out.
-    UnusedVertices { n: u64 },
+    UnusedVertices {
+        /// How many.
+        n: u64,
+    },
     /// Polygons with more than three corners were cut into fans.
-    FannedPolygons { n: u64 },
+    FannedPolygons {
+        /// How many.
+        n: u64,
+    },
     /// Elements that are no part of a surface (tetrahedra, lines, …) were left out.
-    SkippedElements { what: &'static str, n: u64 },
+    SkippedElements {
+        /// The kind of element.
+        what: &'static str,
+        /// How many.
+        n: u64,
+    },
     /// A planar facet of several polygons or with holes was taken polygon by polygon.
-    SplitFacets { n: u64 },
+    SplitFacets {
+        /// How many.
+        n: u64,
+    },
 }
 
 impl fmt::Display for Note {

@@ -22,7 +22,9 @@ pub const OUTSIDE: u32 = 0;
 /// How two volumes meet: triangles whose front looks into the lower-numbered one, and the others.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Wall {
+    /// Triangles whose front looks into the lower-numbered volume.
     pub front: u64,
+    /// The other triangles.
     pub back: u64,
 }
 
@@ -34,6 +36,7 @@ pub struct Wall {
 pub struct Volumes {
     /// Of each triangle: the volume in front, the volume behind.
     pub of_side: Vec<[u32; 2]>,
+    /// Number of volumes, the unbounded one included.
     pub n_volumes: u32,
     /// Of each volume: the sum of its angles at edges, in radians, known to a hundredth each.
     pub angles: Vec<f64>,
