@@ -66,6 +66,7 @@ pub struct OptimizeReport {
     pub odt_held: u64,
     /// Operations on bad tetrahedra.
     pub operations: OperationCounts,
+    /// What lift and mend did.
     pub mended: MendCounts,
 }
 

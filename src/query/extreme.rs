@@ -22,7 +22,7 @@ impl QuerySession {
     /// The `limit` tetrahedra of greatest quality `q` (the worst), or of the least, in that order; equal ones by id.
     ///
     /// Chunks are read in the order of what their summaries promise, until no other can have any. Memory: twice the
-    /// answer and a chunk. Errors: as [`QuerySession::select`]; panics where there are [none](Inquiry::has_extremes).
+    /// answer and a chunk. Errors: as [`QuerySession::select`]; panics where there are [none](QuerySession::has_extremes).
     pub fn extreme(
         &mut self,
         selection: &Selection,

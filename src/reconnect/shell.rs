@@ -49,7 +49,6 @@ impl Shell {
     /// Gathers the tetrahedra around edge `e` of `t`; `false` when there are more than `tets_max` (nothing usable is left then).
     ///
     /// The first tetrahedron of a closed shell is `t`. An open one starts at its hull face.
-    #[cfg(any(test, feature = "internals"))]
     #[inline]
     pub fn gather<P: Pages>(
         &mut self,

@@ -38,7 +38,7 @@ pub enum SampleKind {
         /// Edge length of the triangles.
         h: f64,
     },
-    /// See [`Caps`].
+    /// A coplanar cap with many vertices, badly triangulated; see `caps.rs`.
     Caps(Caps),
     /// Grains that fill a box.
     Grains(Grains),
@@ -49,7 +49,7 @@ pub enum SampleKind {
         /// Edge length of the triangles.
         h: f64,
     },
-    /// See [`Needles`].
+    /// Fans, slats and perforated plates; see `needles.rs`.
     Needles(Needles),
     /// Surfaces within each other.
     Shells {
@@ -67,7 +67,7 @@ pub enum SampleKind {
         /// Edge length of the triangles.
         h: f64,
     },
-    /// See [`Steps`].
+    /// Plates with steps of a small share of their size; see `steps.rs`.
     Steps(Steps),
 }
 

@@ -238,7 +238,7 @@ fn the_knot_is_one_ring() {
 /// What meshing asks of a surface, and more: closed in exact signs, one volume or three.
 fn check_solid(text: &str, n_parts: i64) -> Sample {
     let sample = made(text);
-    let genus = text.contains("needles").then_some(9).unwrap_or(0);
+    let genus = if text.contains("needles") { 9 } else { 0 };
     assert_eq!(check_closed(&sample), 2 * (n_parts - genus), "{text}");
     let validation = crate::surface::validate(&sample.clone().into());
     assert!(

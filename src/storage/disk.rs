@@ -46,8 +46,6 @@ pub trait Disk: Debug + Send + Sync {
     fn list(&self, dir: &Path) -> io::Result<Vec<String>>;
     /// What is at a path; `None`: nothing, or nothing that may be seen.
     fn entry(&self, path: &Path) -> Option<Entry>;
-    /// Bytes free for files at a path, where the system says.
-    fn available_bytes(&self, path: &Path) -> Option<u64>;
 }
 
 /// What has a name on a disk.

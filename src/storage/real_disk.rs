@@ -7,7 +7,6 @@ use std::path::Path;
 use redb::backends::FileBackend;
 use redb::{Builder, DatabaseError, ReadOnlyDatabase, StorageBackend};
 
-use super::available_bytes;
 use super::disk::{Disk, Entry};
 
 /// Files and folders of this machine, with redb's own locks on database files.
@@ -87,9 +86,5 @@ impl Disk for RealDisk {
             true => Some(Entry::Folder),
             false => Some(Entry::File(metadata.len())),
         }
-    }
-
-    fn available_bytes(&self, path: &Path) -> Option<u64> {
-        available_bytes(path)
     }
 }

@@ -2,7 +2,7 @@
 
 /// A record of an external sort: its bytes, compared one after the other, have its order.
 ///
-/// [`sort_record!`](crate::storage::sort_record) writes this for a struct: fields one after the other, without gaps, numbers
+/// `sort_record!` writes this for a struct: fields one after the other, without gaps, numbers
 /// big-endian. So records sort by their first field, equal ones by the second, and so on.
 pub trait SortRecord: Copy + Send + Sync {
     /// `[u8; N]`.

@@ -123,10 +123,7 @@ fn stars(surface: &Surface, is_left_out: &mut [bool]) -> Vec<Star> {
     }
     let mut number = HashMap::new();
     let mut centers: Vec<(Center, Vec<u32>)> = Vec::new();
-    for t in 0..surface.n_triangles() {
-        if is_left_out[t] {
-            continue;
-        }
+    for (t, is_out) in is_left_out.iter_mut().enumerate().filter(|(_, out)| !**out) {
         let edges = edges_of(t).into_iter().map(|edge| {
             let n = at_edges.get(&edge).copied().unwrap_or(0);
             (n, Center::Edge(edge))
@@ -139,7 +136,7 @@ fn stars(surface: &Surface, is_left_out: &mut [bool]) -> Vec<Star> {
         .or_else(|| vertices.into_iter().max_by_key(|(n, _)| *n))
         .filter(|(n, _)| *n >= STAR_MIN);
         if let Some((_, center)) = best {
-            is_left_out[t] = true;
+            *is_out = true;
             let next = centers.len();
             let k = *number.entry(center).or_insert(next);
             if k == next {

@@ -19,8 +19,8 @@ pub enum Content {
     /// Tetrahedra and boundary faces.
     #[default]
     Mesh,
-    /// Input triangles and interface faces; only as [`MeshFormat::Vtu`].
+    /// Input triangles and interface faces; only as `.vtu`.
     Boundary,
-    /// Interface faces; only as [`MeshFormat::Vtu`].
+    /// Interface faces; only as `.vtu`.
     Interfaces,
 }

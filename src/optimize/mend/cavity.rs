@@ -73,7 +73,7 @@ impl Cavity {
         let mut best: Option<Proposal> = None;
         loop {
             // Without a place that sees all faces the last one stays, and what hides faces from it is crossed next.
-            let inside = self.star.into_kernel(at);
+            let inside = self.star.moved_into_kernel(at);
             let mut value = self.star.least(inside, f64::NEG_INFINITY);
             if value > 0.0 {
                 (at, value) = self.star.raise_least(inside, STEPS_GROWING, aim.enough);

@@ -54,9 +54,13 @@ const TRIED_MAX: usize = 1500;
 pub struct MendCounts {
     /// Bad tetrahedra tried, over all passes.
     pub tried: u64,
+    /// Flips, and edges removed.
     pub reconnected: u64,
+    /// Moves of a vertex, each counted.
     pub vertices_moved: u64,
+    /// Vertices put into cavities and on edges.
     pub vertices_inserted: u64,
+    /// Vertices taken away with one of their edges.
     pub vertices_removed: u64,
 }
 

@@ -298,7 +298,7 @@ impl Star {
     /// point is put in front of the side that it is most behind, again and again.
     ///
     /// Source: T. S. Motzkin and I. J. Schoenberg, "The relaxation method for linear inequalities" (1954).
-    pub(super) fn into_kernel(&self, p: Point) -> Point {
+    pub(super) fn moved_into_kernel(&self, p: Point) -> Point {
         let mut at = p;
         for margin in MARGINS {
             for _ in 0..RELAXATIONS {

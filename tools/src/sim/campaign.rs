@@ -4,7 +4,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use tetdb::pipeline::PipelineError;
-use tetdb::store::{Catalog, StoreError};
+use tetdb::store::Catalog;
 
 use super::{Case, Digests, SimDisk, Trouble, Wreck};
 
@@ -39,21 +39,7 @@ pub struct Changed {
 
 /// The exit code the program has for an error.
 pub fn exit_code(error: PipelineError) -> u8 {
-    match error {
-        PipelineError::Store(e) => store_exit_code(&e),
-        PipelineError::Storage(e) => store_exit_code(&e.into()),
-        _ => 3,
-    }
-}
-
-fn store_exit_code(error: &StoreError) -> u8 {
-    match error {
-        StoreError::Busy { .. } => 5,
-        StoreError::NotFound { .. } | StoreError::NoSubdomain { .. } => 3,
-        e if e.is_damage() => 4,
-        StoreError::Storage(_) => 6,
-        _ => 8,
-    }
+    tetdb::Error::from(error).exit_code()
 }
 
 fn ended(run: impl FnOnce() -> Result<(), PipelineError>) -> End {

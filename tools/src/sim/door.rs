@@ -229,10 +229,4 @@ impl Disk for Door {
             Node::File(f) => Some(Entry::File(state.files[*f].now.len())),
         }
     }
-
-    fn available_bytes(&self, _: &Path) -> Option<u64> {
-        let state = self.0.lock();
-        let space = state.trouble.space?;
-        Some(space.saturating_sub(state.used_bytes()))
-    }
 }
