@@ -1,6 +1,8 @@
 //! The directory of a store: created, opened, its files named and, when nobody lists them, removed.
 
+use std::io::ErrorKind;
 use std::path::Path;
+use std::time::Duration;
 
 use rkyv::api::high::{HighDeserializer, HighValidator};
 use rkyv::bytecheck::CheckBytes;
@@ -12,7 +14,7 @@ use tetdb_schema::page::FORMAT_VERSION;
 use super::rows::{self, RowKind};
 use super::{Step, StoreError};
 use crate::sealed::{CoarseSnapshot, Form, SealedError, Subdomain};
-use crate::storage::{DiskPath, StoreFile};
+use crate::storage::{DiskPath, StorageError, StoreFile};
 use tetdb_schema::catalog::{
     CoarseRow, FileRow, InterfaceRow, Job, JournalRow, RegionRow, StageRow, StoreState,
     SubdomainRow, TopologyRow,
@@ -58,8 +60,16 @@ impl Catalog {
         refuse_existing(&dir)?;
         dir.create_dir_all()?;
         let draft = dir.join(CATALOG_NEW);
-        draft.remove_file()?;
-        let file = StoreFile::create(&draft, CACHE_BYTES)?;
+        let file = create_draft(&draft, &dir)?;
+        // Whoever has the draft is the only one here, but another may have been here before.
+        if dir.join(CATALOG).exists() {
+            drop(file);
+            draft.remove_file()?;
+            refuse_existing(&dir)?;
+            return Err(StoreError::Busy {
+                path: dir.path().to_owned(),
+            });
+        }
         let mut catalog = Self {
             dir,
             file,
@@ -488,6 +498,32 @@ fn refuse_existing(dir: &DiskPath) -> Result<(), StoreError> {
         true => Err(StoreError::Finished { path }),
         false => Err(StoreError::Unfinished { path }),
     }
+}
+
+/// Creates the catalog's draft, which only one run can; one that a killed run left is replaced.
+fn create_draft(draft: &DiskPath, dir: &DiskPath) -> Result<StoreFile, StoreError> {
+    /// Between its creation and its lock a draft looks as if nobody had it.
+    const LOCKED_AFTER: Duration = Duration::from_millis(50);
+    let busy = || StoreError::Busy {
+        path: dir.path().to_owned(),
+    };
+    let create = || {
+        StoreFile::create(draft, CACHE_BYTES).map_err(|error| match error {
+            StorageError::Io { source, .. } if source.kind() == ErrorKind::AlreadyExists => busy(),
+            other => other.into(),
+        })
+    };
+    if !draft.exists() {
+        return create();
+    }
+    std::thread::sleep(LOCKED_AFTER);
+    if draft.exists()
+        && let Err(StorageError::Busy { .. }) = StoreFile::open(draft, CACHE_BYTES, true)
+    {
+        return Err(busy());
+    }
+    draft.remove_file()?;
+    create()
 }
 
 /// First words of the names of files.
