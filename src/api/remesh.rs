@@ -100,7 +100,7 @@ impl Remesh {
         self
     }
 
-    /// With these sizes in place of those on record.
+    /// With these sizes beside those on record: single lengths replace them, shapes and regions are added.
     pub fn sizes(mut self, sizes: Sizes) -> Self {
         self.sizes = Some(sizes);
         self
