@@ -195,10 +195,7 @@ impl Store {
         } = self;
         guarded_in(context, || {
             if session.is_none() {
-                *session = Some(QuerySession::open(
-                    catalog.share(),
-                    &settings.budget()?,
-                )?);
+                *session = Some(QuerySession::open(catalog.share(), &settings.budget()?)?);
             }
             work(session.as_mut().expect("it was opened above"))
         })

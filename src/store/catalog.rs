@@ -7,6 +7,7 @@ use rkyv::api::high::{HighDeserializer, HighValidator};
 use rkyv::bytecheck::CheckBytes;
 use rkyv::rancor;
 use rkyv::{Archive, Deserialize};
+use tetdb_schema::chunk::is_box;
 use tetdb_schema::digest::Digest;
 use tetdb_schema::page::FORMAT_VERSION;
 
@@ -137,7 +138,11 @@ impl Catalog {
     /// Whether `dir` is a directory where a store can be created: empty, or left by a run that was killed before its first commit.
     pub fn is_vacant(dir: impl Into<DiskPath>) -> bool {
         let names = dir.into().list();
-        names.is_ok_and(|names| names.iter().all(|name| [CATALOG_NEW, LOCK].contains(&&**name)))
+        names.is_ok_and(|names| {
+            names
+                .iter()
+                .all(|name| [CATALOG_NEW, LOCK].contains(&&**name))
+        })
     }
 
     /// Opens a store for reading; others may read and change it meanwhile.
@@ -423,18 +428,35 @@ impl Catalog {
 
     /// All sub-domains by rank.
     pub fn subdomains(&mut self) -> Result<Vec<SubdomainRow>, StoreError> {
-        self.rows(RowKind::Subdomain)
+        let rows: Vec<SubdomainRow> = self.rows(RowKind::Subdomain)?;
+        rows.iter().try_for_each(|row| self.check_row(row))?;
+        Ok(rows)
+    }
+
+    /// Refuses a row that no sub-domain can have, before anybody computes with it.
+    fn check_row(&self, row: &SubdomainRow) -> Result<(), StoreError> {
+        let is_finished = Form::of(row.state).is_some() && row.vertices > 0;
+        let is_sound = is_box(&row.bounds) && !row.volume.is_nan() && !row.quality.worst.is_nan();
+        match !is_finished || is_sound {
+            true => Ok(()),
+            false => {
+                let reason = "gives a sub-domain a box, volume or quality that none can have";
+                Err(self.damaged_row(RowKind::Subdomain.key(0, row.rank), reason.to_owned()))
+            }
+        }
     }
 
     /// One sub-domain.
     ///
     /// Errors: [`StoreError::NoSubdomain`].
     pub fn subdomain(&mut self, rank: u32) -> Result<SubdomainRow, StoreError> {
-        let row = self.row(RowKind::Subdomain.key(0, rank))?;
-        row.ok_or_else(|| StoreError::NoSubdomain {
+        let row: Option<SubdomainRow> = self.row(RowKind::Subdomain.key(0, rank))?;
+        let row = row.ok_or_else(|| StoreError::NoSubdomain {
             path: self.dir().to_owned(),
             subdomain: rank,
-        })
+        })?;
+        self.check_row(&row)?;
+        Ok(row)
     }
 
     /// Opens a sealed sub-domain with `memory_bytes` for redb's cache and decoded vertices.
@@ -524,7 +546,9 @@ impl Catalog {
 
     /// What the sub-domains of the last change were before it, by rank.
     pub fn previous(&mut self) -> Result<Vec<SubdomainRow>, StoreError> {
-        self.rows(RowKind::Previous)
+        let rows: Vec<SubdomainRow> = self.rows(RowKind::Previous)?;
+        rows.iter().try_for_each(|row| self.check_row(row))?;
+        Ok(rows)
     }
 
     /// The files that count, by sub-domain and generation.
@@ -555,7 +579,11 @@ impl Catalog {
 
     /// Meshes that were kept to be looked at, the coarse ones first, by cut.
     pub fn stages(&mut self) -> Result<Vec<StageRow>, StoreError> {
-        self.rows(RowKind::Stage)
+        let stages: Vec<StageRow> = self.rows(RowKind::Stage)?;
+        stages
+            .iter()
+            .try_for_each(|stage| self.check_row(&stage.row))?;
+        Ok(stages)
     }
 
     /// All steps done so far, in order.

@@ -191,6 +191,14 @@ pub(crate) fn two_subdomains(path: &std::path::Path) -> Result<(), StoreError> {
         for part in &sealed {
             step.list_file(part.row.rank, 1);
             step.set_subdomain(&part.row);
+            let neighbor = NeighborRow {
+                subdomain: 1 - part.row.rank,
+                faces: side.faces,
+            };
+            step.set_topology(&TopologyRow {
+                subdomain: part.row.rank,
+                neighbors: vec![neighbor],
+            });
         }
         step.set_interfaces(
             1,
