@@ -17,6 +17,7 @@ mod disk;
 mod disk_path;
 mod error;
 mod file;
+mod file_lock;
 #[cfg(any(test, feature = "internals"))]
 mod flat;
 mod page_table;
@@ -36,10 +37,11 @@ mod spill_vec;
 pub use budget::{Budget, Lease};
 pub use cancel::{attempt, check_cancelled, raise};
 pub use cancel_token::CancelToken;
-pub use disk::{Disk, Entry};
+pub use disk::{Disk, Entry, FileId};
 pub use disk_path::DiskPath;
 pub use error::StorageError;
 pub use file::StoreFile;
+pub use file_lock::{FileLock, Refused};
 #[cfg(any(test, feature = "internals"))]
 pub use flat::FlatPages;
 pub use pager::{Pager, PagerStats};
