@@ -112,6 +112,11 @@ impl From<SizingError> for Error {
 
 impl From<BoundaryError> for Error {
     fn from(e: BoundaryError) -> Self {
+        if matches!(e, BoundaryError::Orientation { .. }) {
+            return Self::new("contradicting-orientation", &e)
+                .with_help("fill all regions, which needs no orientation, or give each shared wall from both sides")
+                .with_remedy(Remedy::General);
+        }
         Self::new("unrecovered-triangles", &e)
             .with_help("look at these triangles; a finer or better shaped surface there helps")
             .with_remedy(Remedy::General)

@@ -119,6 +119,9 @@ fn help_of(code: &str) -> &'static str {
         "store-recipe" => {
             "go on with the version of this program that began it, or mesh again with --force"
         }
+        "contradicting-orientation" => {
+            "`--regions all` fills every volume whatever the orientation; or give each shared wall from both sides, once in each file"
+        }
         "nothing-filled" => "try --regions all, and look at the surface with `tetdb check SURFACE`",
         "nothing-to-undo" => {
             "only the last `tetdb resaturate` can be undone, once, and not after --forget"

@@ -43,7 +43,7 @@ pub use orientation::{Orientation, orient_alike, orient_alike_in};
 pub use repair::{Closing, Repair, closing, repair};
 pub use seek::{Crossing, Seeker};
 pub use split::{SplitReport, split};
-pub use triangles::{Note, NoteKind, SourceFile, Surface};
+pub use triangles::{Note, NoteKind, SourceFile, Surface, VolumePoints};
 pub use validate::{Validation, validate, validate_in};
 pub use volumes::{OUTSIDE, Volumes, Wall};
 pub use weld::SurfaceBuilder;

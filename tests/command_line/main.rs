@@ -21,4 +21,5 @@ mod size_files;
 mod sizes;
 mod snapshot;
 mod subdomains;
+mod walls;
 mod zone;
