@@ -1,9 +1,12 @@
 //! What `check` found, for people and for programs.
 
+use std::path::Path;
+
 use serde_json::{Value, json};
 
-use super::check_expected;
 use super::console::Console;
+use crate::api::{default_cap, predict};
+use crate::pipeline::Options;
 use crate::surface::{
     BoundaryLoop, Closing, Defect, Fitness, Surface, Validation, boundary_loops, closing, fitness,
     show, show_number, validate,
@@ -24,7 +27,7 @@ pub struct Findings<'a> {
     boundary_loops: Vec<BoundaryLoop>,
     closing: Vec<Closing>,
     fitness: Fitness,
-    /// Tetrahedra with default sizes, roughly; none for an open surface.
+    /// Tetrahedra with default sizes, as they are estimated before a mesh; none of a surface that cannot be meshed.
     tets_expected: Option<f64>,
 }
 
@@ -34,7 +37,7 @@ impl<'a> Findings<'a> {
         let validation = validate(surface);
         let is_closed = validation.closedness.is_closed();
         let fitness = fitness(surface, &validation.closedness);
-        let tets_expected = check_expected::tets(surface, &fitness);
+        let tets_expected = (validation.is_valid()).then(|| expected(surface)).flatten();
         Self {
             surface,
             turned,
@@ -287,6 +290,17 @@ impl<'a> Findings<'a> {
         };
         console.line(&format!("help: {help}"));
     }
+}
+
+/// Tetrahedra with default sizes; none where no size makes sense.
+fn expected(surface: &Surface) -> Option<f64> {
+    let prepared = predict(
+        surface,
+        &Options::default(),
+        default_cap().0,
+        Path::new("."),
+    );
+    Some(prepared.ok()?.estimate.tets())
 }
 
 fn defect_json(defect: &Defect) -> Value {

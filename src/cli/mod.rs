@@ -2,7 +2,6 @@
 
 mod args;
 mod check;
-mod check_expected;
 mod check_report;
 mod compare;
 mod config;
