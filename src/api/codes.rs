@@ -165,7 +165,7 @@ pub const CODES: &[CodeRow] = &[
     row(
         "size-field-changed",
         8,
-        "the sizes of --size-field are not those the store was begun with",
+        "the sizes of the size field are not those the store was begun with",
     ),
     row(
         "stopped",

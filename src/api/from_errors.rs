@@ -31,7 +31,9 @@ impl From<WriteError> for Error {
 
 impl From<SurfaceError> for Error {
     fn from(e: SurfaceError) -> Self {
-        let error = Self::new(e.code(), &e).with_help(e.help());
+        let error = Self::new(e.code(), &e)
+            .with_help(e.help())
+            .with_remedy(Remedy::General);
         match &e {
             SurfaceError::Invalid { defect, n_defects } => {
                 let more = match n_defects.saturating_sub(1) {

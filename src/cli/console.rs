@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 
-use super::failure::Failure;
+use super::failure::{Failure, in_flags};
 use crate::api::{Bytes, Event, Settings};
 use crate::storage::CancelToken;
 
@@ -98,7 +98,7 @@ impl Console {
                 unit,
             } => self.progress(stage, done, total, unit),
             Event::Note(ref text) => self.note(text),
-            Event::Warning(ref text) => self.warn(text),
+            Event::Warning(ref text) => self.warn(&in_flags(text)),
             Event::StoreBegun(_) => super::signals::store_begins(),
         }
     }

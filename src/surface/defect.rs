@@ -186,18 +186,18 @@ impl Defect {
         match self {
             Self::Empty => "choose a file that holds triangles",
             Self::Degenerate { .. } | Self::Duplicate { .. } => {
-                "`tetdb check SURFACE` lists all such triangles; `tetdb check SURFACE --repair --write OUT` drops them"
+                "a repair drops such triangles"
             }
             Self::OpenEdge {
                 junction: Some(_), ..
             } => {
-                "`tetdb check SURFACE --repair --write OUT` divides triangles where vertices lie exactly on their open edges"
+                "a repair divides triangles where vertices lie exactly on their open edges"
             }
             Self::OpenEdge { .. } => {
-                "`tetdb check SURFACE` lists the holes and says whether joining near points closes them; otherwise close them where the surface was made"
+                "a repair may close them by joining near points; otherwise close them where the surface was made"
             }
             Self::SelfIntersection { .. } => {
-                "`tetdb check SURFACE` lists the places; unite or separate the parts where the surface was made"
+                "unite or separate the parts where the surface was made"
             }
         }
     }

@@ -31,12 +31,13 @@ pub(super) fn read<R: BufRead>(
     mut feed: Feed<R>,
     kind: Kind,
     nodes: Option<&Path>,
+    limit: u64,
     target: &mut SurfaceSink,
 ) -> Result<()> {
     feed.comment = Some(b'#');
     let numbering = match read_points(&mut feed, target)? {
         Some(numbering) => numbering,
-        None => read_node_file(&feed, nodes, target)?,
+        None => read_node_file(&feed, nodes, limit, target)?,
     };
     let n_facets = feed.count("facets", 4)?;
     feed.skip_line()?;
@@ -89,12 +90,13 @@ fn note_volume_points<R: BufRead>(
 fn read_node_file<R: BufRead>(
     feed: &Feed<R>,
     nodes: Option<&Path>,
+    limit: u64,
     target: &mut SurfaceSink,
 ) -> Result<Numbering> {
     let Some(path) = nodes else {
         return Err(feed.unsupported("points in a separate .node file"));
     };
-    let mut feed = open(path)?;
+    let mut feed = open(path, limit)?;
     feed.comment = Some(b'#');
     match read_points(&mut feed, target)? {
         Some(numbering) => Ok(numbering),
