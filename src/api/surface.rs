@@ -259,7 +259,10 @@ impl Surface {
                 surface.sources = vec![given(&surface.inner)];
                 surface
             }
-            _ => Self::load(&sources.iter().map(|s| s.path.clone()).collect::<Vec<_>>(), cap)?,
+            _ => Self::load(
+                &sources.iter().map(|s| s.path.clone()).collect::<Vec<_>>(),
+                cap,
+            )?,
         };
         for (then, now) in sources.iter().zip(&surface.sources) {
             if (then.bytes, then.hash) != (now.bytes, now.hash) {

@@ -140,7 +140,13 @@ mod tests {
         assert_eq!(options.hgrad.as_deref(), Some("1.5"));
         assert_eq!(options.subdomains.as_deref(), Some("4"));
         assert_eq!(options.size_sphere, ["0,-1,0.5,1,0.01", "0,0,0,1,0.1"]);
-        for text in ["hsiz = 3 4", "hsize = \"1\"", "size_box = 3", "hsiz = true", "size_box = [[true]]"] {
+        for text in [
+            "hsiz = 3 4",
+            "hsize = \"1\"",
+            "size_box = 3",
+            "hsiz = true",
+            "size_box = [[true]]",
+        ] {
             assert_eq!(read(text).err().map(|f| f.exit()), Some(2), "{text}");
         }
     }

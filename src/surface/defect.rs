@@ -124,7 +124,7 @@ pub(crate) fn show(p: Point) -> String {
 }
 
 /// A number, with a power of ten when it would be long without.
-pub(crate) fn show_number(x: f64) -> String {
+fn show_number(x: f64) -> String {
     if x == 0.0 || (1e-4..1e9).contains(&x.abs()) {
         format!("{x}")
     } else {
@@ -185,14 +185,10 @@ impl Defect {
     pub fn help(&self) -> &'static str {
         match self {
             Self::Empty => "choose a file that holds triangles",
-            Self::Degenerate { .. } | Self::Duplicate { .. } => {
-                "a repair drops such triangles"
-            }
+            Self::Degenerate { .. } | Self::Duplicate { .. } => "a repair drops such triangles",
             Self::OpenEdge {
                 junction: Some(_), ..
-            } => {
-                "a repair divides triangles where vertices lie exactly on their open edges"
-            }
+            } => "a repair divides triangles where vertices lie exactly on their open edges",
             Self::OpenEdge { .. } => {
                 "a repair may close them by joining near points; otherwise close them where the surface was made"
             }

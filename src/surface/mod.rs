@@ -35,7 +35,7 @@ pub use boundary_loops::{BoundaryLoop, TJunction, boundary_loops, t_junctions};
 pub use boxes::BoxTree;
 pub use contact::{Contact, ContactKind, contact};
 pub use defect::{Defect, SurfaceError};
-pub(crate) use defect::{show, show_number};
+pub(crate) use defect::show;
 pub use edges::{Closedness, closedness};
 pub use fitness::{Fitness, fitness};
 pub use near::weld_near;

@@ -247,7 +247,9 @@ impl ReadError {
             Self::Empty { .. } => {
                 "choose a file that holds a surface; lines, points and tetrahedra alone bound nothing"
             }
-            Self::TooLarge { .. } => "allow more memory, unpack the file to disk, or give a coarser background mesh",
+            Self::TooLarge { .. } => {
+                "allow more memory, unpack the file to disk, or give a coarser background mesh"
+            }
             Self::Alone { .. } => {
                 "put the .sol file and its .mesh side by side, under the same name"
             }

@@ -208,7 +208,10 @@ fn unique(stem: &str, taken: &[String]) -> String {
 
 fn read_file(path: &Path, limit: u64, target: &mut SurfaceSink) -> Result<()> {
     if let Some(kind) = solid_model(path, b"") {
-        return Err(ReadError::SolidModel { place: FilePlace::whole(path), kind });
+        return Err(ReadError::SolidModel {
+            place: FilePlace::whole(path),
+            kind,
+        });
     }
     let mut feed = open(path, limit)?;
     let format = match Format::of_extension(path) {

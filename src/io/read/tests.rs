@@ -67,7 +67,10 @@ fn files_on_disk() {
         surface.source(5).map(|(f, t)| (f.ends_with("b.OBJ"), t)),
         Some((true, 1))
     );
-    assert_eq!(read_surface(&[path("c")], 1 << 20).unwrap().n_triangles(), 4);
+    assert_eq!(
+        read_surface(&[path("c")], 1 << 20).unwrap().n_triangles(),
+        4
+    );
     let twice = read_surface(&[path("a.stl"), path("a.stl")], 1 << 20).unwrap();
     assert_eq!(twice.label_names, ["a", "a~2"]);
     let code = |name: &str| read_surface(&[path(name)], 1 << 20).unwrap_err().code();
