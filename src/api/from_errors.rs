@@ -31,7 +31,9 @@ impl From<WriteError> for Error {
 
 impl From<SurfaceError> for Error {
     fn from(e: SurfaceError) -> Self {
-        let error = Self::new(e.code(), &e).with_help(e.help());
+        let error = Self::new(e.code(), &e)
+            .with_help(e.help())
+            .with_remedy(Remedy::General);
         match &e {
             SurfaceError::Invalid { defect, n_defects } => {
                 let more = match n_defects.saturating_sub(1) {
@@ -113,6 +115,11 @@ impl From<SizingError> for Error {
 
 impl From<BoundaryError> for Error {
     fn from(e: BoundaryError) -> Self {
+        if matches!(e, BoundaryError::Orientation { .. }) {
+            return Self::new("contradicting-orientation", &e)
+                .with_help("fill all regions, which needs no orientation, or give each shared wall from both sides")
+                .with_remedy(Remedy::General);
+        }
         Self::new("unrecovered-triangles", &e)
             .with_help("look at these triangles; a finer or better shaped surface there helps")
             .with_remedy(Remedy::General)

@@ -23,6 +23,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("nothing-to-undo", "resaturate.rs"),
     ("store-recipe", "tests/front_door"),
     ("invalid-mesh", "below"),
+    ("contradicting-orientation", "walls.rs"),
 ];
 
 /// Words no test provokes, and why.
