@@ -134,6 +134,11 @@ pub const CODES: &[CodeRow] = &[
         "the store was begun by a version whose recipe gives another mesh",
     ),
     row("busy", 5, "another process writes the store"),
+    row(
+        "store-changed",
+        5,
+        "another process changed the store while it was read; ask again",
+    ),
     row("memory", 6, "the memory cap is too small for this work"),
     row(
         "no-room",

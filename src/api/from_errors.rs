@@ -83,6 +83,7 @@ impl From<StoreError> for Error {
             StoreError::Storage(inner) => return inner.into(),
             StoreError::Sealed(SealedError::Storage(inner)) => return inner.into(),
             StoreError::Busy { .. } => "busy",
+            StoreError::Changed { .. } => "store-changed",
             StoreError::NotFound { .. } => "no-such-store",
             StoreError::NoSubdomain { .. } => "no-such-part",
             StoreError::NotOurs { .. } => "not-a-store",
@@ -150,6 +151,7 @@ impl From<PipelineError> for Error {
 fn with_general_help(code: &'static str, e: &impl ToString) -> Error {
     let help = match code {
         "busy" => "wait for the other process, or stop it",
+        "store-changed" => "ask again: the answer is then of the store as it is now",
         "disk-full" => "free some space, then resume",
         "damaged" => {
             "verify the store to see what is damaged; damaged sub-domains can be meshed again"

@@ -5,6 +5,9 @@ use super::{BoxTree, Surface};
 use crate::geom::{Aabb, Point, mix};
 use crate::storage::ScratchSpace;
 
+/// Room on the stack of a walk through the tree: enough for most, so that it does not grow step by step.
+const STACK: usize = 64;
+
 /// A triangle met by a line along z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crossing {
@@ -78,7 +81,8 @@ impl<'a> Seeker<'a> {
         let Some(top) = self.tree.levels.len().checked_sub(1) else {
             return found;
         };
-        let mut stack = vec![(top, 0, 0.0)];
+        let mut stack = Vec::with_capacity(STACK);
+        stack.push((top, 0, 0.0));
         while let Some((level, node, least)) = stack.pop() {
             if least >= best {
                 continue;
@@ -157,7 +161,8 @@ impl<'a> Seeker<'a> {
                 || b.high.z < low
                 || b.low.z > high
         };
-        let mut stack = vec![(top, 0)];
+        let mut stack = Vec::with_capacity(STACK);
+        stack.push((top, 0));
         while let Some((level, node)) = stack.pop() {
             if misses(&self.tree.levels[level].get(node), high) {
                 continue;

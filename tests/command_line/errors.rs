@@ -14,6 +14,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("damaged", "damage.rs"),
     ("store-format", "damage.rs"),
     ("busy", "crash.rs"),
+    ("store-changed", "together.rs"),
     ("store-unfinished", "crash.rs"),
     ("stopped", "crash.rs"),
     ("surface-changed", "below"),

@@ -23,5 +23,6 @@ mod sizes;
 mod snapshot;
 mod streams;
 mod subdomains;
+mod together;
 mod walls;
 mod zone;
