@@ -20,6 +20,8 @@ use crate::storage::{Budget, attempt};
 const POINT_BYTES: u64 = 512;
 /// The place of quality among the variables.
 const QUALITY: usize = 0;
+/// The place of excess.
+const EXCESS: usize = VARIABLES.len() - 1;
 /// Points answered together, at most.
 const POINTS_MAX: u64 = 1 << 17;
 
@@ -36,7 +38,9 @@ pub fn run(args: &QueryArgs, console: &Console) -> Result<u8, Failure> {
     let lease = budget.lease(cap / 8, "answers")?;
     attempt(|| -> Result<u8, Failure> {
         let n = if args.point.is_empty() && args.points.is_none() {
-            let selection = selection(args, &mut inquiry)?;
+            let mut selection = selection(args, &mut inquiry)?;
+            selection.excess = columns.contains(&QueryColumn::Variable(EXCESS))
+                || order.is_some_and(|(variable, _)| variable == EXCESS);
             let mut writer = writer(args, columns, cap, console)?;
             let n = match order {
                 Some((QUALITY, descending))
@@ -132,6 +136,13 @@ fn columns(args: &QueryArgs) -> Result<Vec<QueryColumn>, Failure> {
     });
     let mut columns = columns.collect::<Result<Vec<_>, _>>()?;
     if of_points {
+        if columns.contains(&QueryColumn::Variable(EXCESS)) {
+            return Err(bad(
+                "--select",
+                "excess",
+                "no excess where points are asked for",
+            ));
+        }
         columns.insert(0, QueryColumn::Point);
         columns.push(QueryColumn::Barycentric);
     }
