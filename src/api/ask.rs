@@ -122,7 +122,8 @@ impl<'s> Query<'s> {
         self
     }
 
-    /// A condition on quality, region, subdomain, volume, x, y, z (of the centroid), edge_min, edge_max, angle_min and angle_max (degrees),
+    /// A condition on quality, region, subdomain, volume, x, y, z (of the centroid), edge_min, edge_max, angle_min, angle_max (degrees)
+    /// and excess (quality over the least that the faces on the surface allow),
     /// such as `quality > 6 and region in [1, 2]`.
     ///
     /// Errors: `bad-expression`, with the place.
@@ -137,6 +138,7 @@ impl<'s> Query<'s> {
             let message = format!("{variable}: expected one of {}", VARIABLES.join(", "));
             return Err(Error::new("bad-query", message));
         };
+        self.selection.excess |= variable == "excess";
         self.order = Some((place, order));
         Ok(self)
     }

@@ -7,7 +7,9 @@ use serde_json::{Value, json};
 use super::console::Console;
 use super::words::{self, count};
 use crate::api::{default_cap, predict};
+use crate::geom::Point;
 use crate::geom::short;
+use crate::optimize::face_least;
 use crate::pipeline::Options;
 use crate::surface::{
     BoundaryLoop, Closing, Defect, Fitness, Surface, Validation, boundary_loops, closing, fitness,
@@ -96,6 +98,12 @@ impl<'a> Findings<'a> {
         let mut fitness = json!(self.fitness);
         fitness["tets_expected"] = json!(self.tets_expected);
         fitness["forced_share"] = json!(self.forced_share());
+        if surface.n_triangles() > 0 {
+            let (least, at) = self.least_quality();
+            // Infinite without area: then it is null.
+            fitness["least_quality"] = json!(least);
+            fitness["least_quality_at"] = json!(at.to_array());
+        }
         json!({
             "schema": 1, "triangles": surface.n_triangles(), "vertices": surface.n_vertices(),
             "labels": surface.label_names, "bounds": self.bounds(), "turned_triangles": self.turned,
@@ -258,7 +266,25 @@ impl<'a> Findings<'a> {
                 "mesh: about {} tetrahedra with default sizes; {forced}",
                 rounded(tets)
             ));
+            let (least, at) = self.least_quality();
+            if f.forcing_triangles > 0 && least.is_finite() {
+                console.line(&format!(
+                    "worst: no tetrahedron on triangle {} at {} {} {} can have a quality below {}",
+                    f.worst_triangle,
+                    short(at.x),
+                    short(at.y),
+                    short(at.z),
+                    short(least)
+                ));
+            }
         }
+    }
+
+    /// The least quality that a tetrahedron on the worst triangle can have, and the triangle's centroid.
+    fn least_quality(&self) -> (f64, Point) {
+        let corners = self.surface.corners(self.fitness.worst_triangle);
+        let [a, b, c] = corners;
+        (face_least(corners), (a + b + c) / 3.0)
     }
 
     /// What would make a better mesh.

@@ -22,6 +22,8 @@ const POINT_BYTES: u64 = 512;
 const QUALITY: usize = 0;
 /// No line of a point is longer.
 const LINE_MAX: u64 = 4096;
+/// The place of excess.
+const EXCESS: usize = VARIABLES.len() - 1;
 /// Points answered together, at most.
 const POINTS_MAX: u64 = 1 << 17;
 
@@ -38,7 +40,9 @@ pub fn run(args: &QueryArgs, console: &Console) -> Result<u8, Failure> {
     let lease = budget.lease(cap / 8, "answers")?;
     attempt(|| -> Result<u8, Failure> {
         let n = if args.point.is_empty() && args.points.is_none() {
-            let selection = selection(args, &mut inquiry)?;
+            let mut selection = selection(args, &mut inquiry)?;
+            selection.excess = columns.contains(&QueryColumn::Variable(EXCESS))
+                || order.is_some_and(|(variable, _)| variable == EXCESS);
             let mut writer = writer(args, columns, cap, console)?;
             let n = match order {
                 Some((QUALITY, descending))
@@ -134,6 +138,13 @@ fn columns(args: &QueryArgs) -> Result<Vec<QueryColumn>, Failure> {
     });
     let mut columns = columns.collect::<Result<Vec<_>, _>>()?;
     if of_points {
+        if columns.contains(&QueryColumn::Variable(EXCESS)) {
+            return Err(bad(
+                "--select",
+                "excess",
+                "no excess where points are asked for",
+            ));
+        }
         columns.insert(0, QueryColumn::Point);
         columns.push(QueryColumn::Barycentric);
     }

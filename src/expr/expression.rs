@@ -33,6 +33,11 @@ impl Expression {
         self.kind
     }
 
+    /// Whether it names the variable at a position.
+    pub fn names(&self, variable: usize) -> bool {
+        (self.ops.iter()).any(|op| matches!(op, Op::Variable(v) if *v == variable))
+    }
+
     /// Its value, where it is a number; `values` are those of the variables.
     ///
     /// Panics when it is a truth, or with fewer values than variables.

@@ -72,6 +72,17 @@ impl PageFlags {
         self.flags[page] = true;
     }
 
+    /// Flags of pages that are flagged here or in `other`.
+    pub(super) fn or(mut self, other: &Self) -> Self {
+        for page in (0..)
+            .zip(&other.flags)
+            .filter_map(|(page, &f)| f.then_some(page))
+        {
+            self.raise_page(page);
+        }
+        self
+    }
+
     /// The first flagged page from `from` on; its flag is taken down.
     pub(super) fn take_next(&mut self, from: u32) -> Option<u32> {
         let skipped = self.flags.get(from as usize..)?.iter().position(|&f| f)?;

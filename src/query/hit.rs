@@ -3,12 +3,14 @@
 use tetdb_schema::ids::TetId;
 
 use crate::geom::{Aabb, Point};
+use crate::optimize::excess;
 use crate::sealed::Shape;
 use tetdb_schema::chunk::TetSummary;
 
 /// What an expression may name, and what answers may be ordered by. Lengths and volumes in the units of the input, `x y z` are those
-/// of the centroid, angles are dihedral ones in degrees.
-pub const VARIABLES: [&str; 11] = [
+/// of the centroid, angles are dihedral ones in degrees; `excess` is the
+/// quality over the least that the tetrahedron's faces on the surface allow.
+pub const VARIABLES: [&str; 12] = [
     "quality",
     "region",
     "subdomain",
@@ -20,7 +22,11 @@ pub const VARIABLES: [&str; 11] = [
     "edge_max",
     "angle_min",
     "angle_max",
+    "excess",
 ];
+
+/// The place of `excess` among the [`VARIABLES`]: the one that needs the surface.
+pub(super) const EXCESS: usize = VARIABLES.len() - 1;
 
 /// A tetrahedron that was asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,6 +41,8 @@ pub struct Hit {
     pub corners: [Point; 4],
     /// Its quality, volume, edges and angles.
     pub shape: Shape,
+    /// Which faces, each opposite the vertex of its place, are input triangles; known where the question is about excess.
+    pub on_surface: Option<[bool; 4]>,
 }
 
 impl Hit {
@@ -46,6 +54,7 @@ impl Hit {
             vertices,
             corners,
             shape: Shape::of(corners),
+            on_surface: None,
         }
     }
 
@@ -73,6 +82,11 @@ impl Hit {
         [degrees(greatest), degrees(least)]
     }
 
+    /// Its quality over the least that its faces on the surface allow any tetrahedron; NaN where these are not known.
+    pub fn excess(&self) -> f64 {
+        (self.on_surface).map_or(f64::NAN, |faces| excess(self.corners, faces))
+    }
+
     /// The values of [`VARIABLES`].
     pub fn values(&self) -> [f64; VARIABLES.len()] {
         let [x, y, z] = self.centroid().to_array();
@@ -89,6 +103,7 @@ impl Hit {
             edge_max,
             angle_min,
             angle_max,
+            self.excess(),
         ]
     }
 }
@@ -114,5 +129,7 @@ pub(super) fn ranges(summary: &TetSummary, rank: u32) -> [[f64; 2]; VARIABLES.le
         [0.0, diagonal],
         [0.0, 180.0],
         [0.0, 180.0],
+        // No bound is below 1 or above the quality; a triangle without area in doubles forces all.
+        [1.0 - 1e-12, f64::from(q1.next_up())],
     ]
 }

@@ -6,7 +6,7 @@
 //!
 //! Reading order: `solid` (boxes, balls, planes and what meets them) on `exact`; `decoded` (a decoded chunk) and `tree`;
 //! `session` (what is held open); `locate` (points), `lazy` (a single point); `hit` (a tetrahedron with its columns);
-//! `selection` (what is asked for), `marks` (faces of the surface and of interfaces), `select` (the answers one after the other),
+//! `selection` (what is asked for), `marks` (tetrahedra on the surface and on interfaces), `surface_faces` (their faces on the surface), `select` (the answers one after the other),
 //! `order` (sorted), `extreme` (the worst few), `around` (tetrahedra around vertices, edges, neighbors).
 
 #[cfg(any(test, feature = "cli", feature = "internals"))]
@@ -26,6 +26,7 @@ mod select;
 mod selection;
 mod session;
 mod solid;
+mod surface_faces;
 #[cfg(test)]
 mod tests;
 mod tree;

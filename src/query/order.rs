@@ -17,8 +17,13 @@ sort_record! {
         vertices: [u64; 4],
         corners: [[f64; 3]; 4],
         region: u32,
+        /// A bit for each face on the surface, or [`UNKNOWN`].
+        on_surface: u32,
     }
 }
+
+/// Where faces on the surface are not known.
+const UNKNOWN: u32 = 16;
 
 /// Tetrahedra ascending by one of the [`VARIABLES`](super::VARIABLES), or descending; equal ones by id.
 pub struct Ordered {
@@ -64,11 +69,18 @@ fn record(tet: &Hit, value: f64, descending: bool) -> OrderedHit {
         vertices: tet.vertices,
         corners: tet.corners.map(|c| c.to_array()),
         region: tet.region,
+        on_surface: tet.on_surface.map_or(UNKNOWN, |faces| {
+            (0..4).map(|i| u32::from(faces[i]) << i).sum()
+        }),
     }
 }
 
 fn hit(record: OrderedHit) -> Hit {
     let id = TetId::from_number(record.id).expect("it was written from an id");
     let corners = record.corners.map(Point::from_array);
-    Hit::new(id, record.region, record.vertices, corners)
+    let known = (record.on_surface != UNKNOWN).then_some(record.on_surface);
+    Hit {
+        on_surface: known.map(|bits| [0, 1, 2, 3].map(|i| bits >> i & 1 != 0)),
+        ..Hit::new(id, record.region, record.vertices, corners)
+    }
 }

@@ -149,12 +149,25 @@ pub(super) fn hits_in(
     chunk: u32,
 ) -> Result<Vec<Hit>, QueryError> {
     let mut nearby = Nearby::default();
+    let surface = match selection.needs_surface() {
+        true => Some(inquiry.surface_of(rank)?),
+        false => None,
+    };
+    let mut on_surface = Vec::new();
     let frame = inquiry.frame(rank, chunk, |part, local, tet| {
-        marks.as_ref().is_none_or(|m| m.has(local))
+        let keep = marks.as_ref().is_none_or(|m| m.has(local))
             && TetId::new(part.id(), local).is_some_and(|id| selection.may_be(id, tet.region))
-            && (!selection.is_local() || nearby.may_meet(part, selection, chunk, tet.nodes))
+            && (!selection.is_local() || nearby.may_meet(part, selection, chunk, tet.nodes));
+        if keep {
+            on_surface.push(surface.as_ref().map(|faces| faces.of(local, tet)));
+        }
+        keep
     })?;
-    let found = frame.tets.iter().map(|tet| frame.hit(tet));
+    let found = frame.tets.iter().zip(on_surface);
+    let found = found.map(|(tet, on_surface)| Hit {
+        on_surface,
+        ..frame.hit(tet)
+    });
     Ok(found.filter(|found| selection.holds(found)).collect())
 }
 

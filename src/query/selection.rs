@@ -3,7 +3,7 @@
 use tetdb_schema::chunk::TetSummary;
 use tetdb_schema::ids::{Owner, TetId};
 
-use super::hit::{Hit, ranges};
+use super::hit::{EXCESS, Hit, ranges};
 use super::solid::Solid;
 use crate::expr::Expression;
 use crate::geom::{Aabb, Point};
@@ -32,6 +32,8 @@ pub struct Selection {
     pub sharing: Option<Sharing>,
     /// A truth about the [`VARIABLES`](super::VARIABLES).
     pub condition: Option<Expression>,
+    /// Whether the excess of what is found is asked for, be it in no condition.
+    pub excess: bool,
 }
 
 /// Vertices, of which a tetrahedron has some.
@@ -91,6 +93,11 @@ impl Selection {
     pub(super) fn may_meet(&self, bounds: &Aabb) -> bool {
         self.solids.iter().all(|s| s.may_meet(bounds))
             && self.sharing.as_ref().is_none_or(|s| s.may_meet(bounds))
+    }
+
+    /// Whether the faces on the surface have to be known.
+    pub(super) fn needs_surface(&self) -> bool {
+        self.excess || (self.condition.as_ref()).is_some_and(|e| e.names(EXCESS))
     }
 
     /// Whether anything is asked about places.

@@ -8,6 +8,7 @@ use tetdb_schema::record::SealedTet;
 
 use super::QueryError;
 use super::decoded::{DecodedChunk, Searched};
+use super::surface_faces::SurfaceFaces;
 use super::tree::BoxTree;
 use crate::geom::{Aabb, Point};
 use crate::sealed::SealedError;
@@ -94,6 +95,8 @@ pub struct QuerySession {
     frames_bytes: usize,
     frames_bytes_max: usize,
     pub(crate) budget: Budget,
+    /// Faces on the surface of the sub-domain asked about last, where excess is asked for.
+    pub(super) surface: Option<Arc<SurfaceFaces>>,
     measures: Measures,
     /// The plane of the cut, of a mesh that was kept on its way.
     cutting: Option<[Point; 2]>,
@@ -160,6 +163,7 @@ impl QuerySession {
             frames_bytes: 0,
             frames_bytes_max: frames_bytes_max as usize,
             budget: budget.clone(),
+            surface: None,
             measures,
             cutting: None,
             _lease: lease,

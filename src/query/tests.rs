@@ -45,10 +45,20 @@ impl Fixture {
         for row in store.subdomains()? {
             let mut part = store.open_subdomain(row.rank, 16 << 20)?;
             let tets = part.tets().collect::<Result<Vec<_>, _>>()?;
+            let facets = part.facets().collect::<Result<Vec<_>, _>>()?;
             for (id, tet) in tets {
                 let corners = part.corners(tet.nodes)?;
                 let (ids, points) = (corners.map(|c| c.id), corners.map(|c| c.point));
-                all.push(Hit::new(id, tet.region, ids, points));
+                let beside = facets.iter().filter(|f| f.tets.contains(&id.local()));
+                let faces: Vec<[u32; 3]> = beside.map(|facet| facet.vertices).collect();
+                // A face is opposite the vertex it lacks.
+                let on_surface = tet
+                    .nodes
+                    .map(|v| faces.iter().any(|face| !face.contains(&v)));
+                all.push(Hit {
+                    on_surface: Some(on_surface),
+                    ..Hit::new(id, tet.region, ids, points)
+                });
             }
         }
         Ok(all)

@@ -1,5 +1,7 @@
 //! How well the triangles of a surface are shaped: every input triangle stays, and a needle makes bad tetrahedra.
 
+use std::cmp::Ordering;
+
 use rayon::prelude::*;
 
 use super::Surface;
@@ -31,6 +33,8 @@ pub struct Fitness {
     pub forcing_triangles: u64,
     /// The same with quality 10 or worse.
     pub hopeless_triangles: u64,
+    /// The triangle with the smallest inscribed circle for its longest edge, the first of equal ones: it allows the worst quality.
+    pub worst_triangle: u32,
     /// Area of the surface, in squared input units.
     pub area: f64,
     /// What the surface encloses, each part counted positive; none when it is open.
@@ -46,6 +50,7 @@ struct Sums {
     high: f64,
     n_forcing: u64,
     n_hopeless: u64,
+    worst: (f64, u32),
 }
 
 /// Measures the shapes of all triangles.
@@ -65,6 +70,7 @@ pub fn fitness(surface: &Surface, closedness: &Closedness) -> Fitness {
         high: 0.0,
         n_forcing: 0,
         n_hopeless: 0,
+        worst: (0.0, 0),
     };
     // Least and sum are free of the order of triangles, so the answer is the same for any number of threads.
     let all = parallel(|| {
@@ -90,6 +96,7 @@ pub fn fitness(surface: &Surface, closedness: &Closedness) -> Fitness {
         edge_max: all.high,
         forcing_triangles: all.n_forcing,
         hopeless_triangles: all.n_hopeless,
+        worst_triangle: all.worst.1,
         area: (0..n as u32).map(|t| area(surface, t)).sum(),
         volume: closedness.is_closed().then(|| volume(surface)),
     }
@@ -103,6 +110,11 @@ fn join(a: Sums, b: Sums) -> Sums {
         high: a.high.max(b.high),
         n_forcing: a.n_forcing + b.n_forcing,
         n_hopeless: a.n_hopeless + b.n_hopeless,
+        worst: match a.worst.0.total_cmp(&b.worst.0) {
+            Ordering::Less => b.worst,
+            Ordering::Equal if b.worst.1 < a.worst.1 => b.worst,
+            _ => a.worst,
+        },
     }
 }
 
@@ -137,6 +149,14 @@ fn shape(surface: &Surface, t: u32) -> Sums {
         high,
         n_forcing: is_worse(FORCED_QUALITY),
         n_hopeless: is_worse(10.0),
+        worst: (
+            if quality.is_nan() {
+                f64::INFINITY
+            } else {
+                quality
+            },
+            t,
+        ),
     }
 }
 

@@ -273,3 +273,49 @@ fn what_makes_no_sense_is_an_error_with_a_word() -> Outcome {
     assert!(!path.exists(), "a refused run leaves nothing");
     Ok(())
 }
+
+#[test]
+fn on_steps_needles_and_caps_what_the_surface_does_not_force_is_mended() -> Outcome {
+    let dir = tempfile::tempdir()?;
+    let at = |name: String| dir.path().join(name);
+    for (spec, seed) in [
+        ("steps", 1),
+        ("needles,count=16,holes=2", 2),
+        ("caps,count=24", 3),
+    ]
+    .into_iter()
+    .flat_map(|(spec, first)| (first..first + 2).map(move |seed| (spec, seed)))
+    {
+        let mesher = |threads| {
+            let surface = Surface::sample(&format!("{spec},seed={seed}"))?;
+            Ok::<_, tetdb::Error>(Mesher::new(surface).threads(threads))
+        };
+        let name = spec.split(',').next().unwrap_or(spec);
+        let mut store = mesher(1)?.create(at(format!("{name}{seed}.tetdb")))?;
+        let other = mesher(2)?.create(at(format!("{name}{seed}_2.tetdb")))?;
+        assert!(store.is_same_mesh(&other), "{spec} {seed}");
+        assert!(store.summary().n_tets < 20_000, "{spec} {seed}");
+        // No volume that cannot be told from zero, unless a triangle forces it.
+        let flat = "volume < 1e-12*edge_max^3 and excess > 2";
+        assert!(
+            store.query().where_(flat)?.collect()?.is_empty(),
+            "{spec} {seed}"
+        );
+        let worst = store.query().order_by("excess", Order::Falling)?.limit(1);
+        let worst = worst.collect()?.remove(0);
+        assert!(
+            worst.excess() >= 1.0 - 1e-9 && worst.excess() <= worst.shape.quality * (1.0 + 1e-9)
+        );
+        // As good as allowed: the bound of what stands on the surface is met by its own quality.
+        let forced = store
+            .query()
+            .where_("quality > 3 and excess < 1.5")?
+            .collect()?;
+        assert!(
+            forced
+                .iter()
+                .all(|hit| hit.on_surface.is_some_and(|faces| faces.contains(&true)))
+        );
+    }
+    Ok(())
+}

@@ -23,11 +23,11 @@ use crate::mesh::{Mesh, Tet, VertexTag};
 use crate::reconnect::{Replacement, Shell};
 use crate::storage::Pages;
 
-/// Tetrahedra of a cavity at most. Those that flat tetrahedra need: 20 in the median, 37 for nine in ten.
-const TETS_MAX: usize = 40;
 /// Steps of the search after each growth, and after the last.
 const STEPS_GROWING: u32 = 20;
 const STEPS: u32 = 80;
+/// Growth without any place that sees all faces ends after so many tetrahedra.
+const HIDDEN_MAX: u32 = 24;
 /// Longest ring of an edge that gets a vertex.
 const RING_MAX: usize = 24;
 
@@ -71,12 +71,17 @@ impl Cavity {
         let points = mesh.points(&self.records[0]);
         let mut at = (points[0] + points[1] + points[2] + points[3]) * 0.25;
         let mut best: Option<Proposal> = None;
+        let mut n_hidden = 0;
         loop {
-            // Without a place that sees all faces the last one stays, and what hides faces from it is crossed next.
-            let inside = self.star.moved_into_kernel(at);
-            let mut value = self.star.least(inside, f64::NEG_INFINITY);
+            let mut value = self.star.least(at, f64::NEG_INFINITY);
+            n_hidden += 1;
+            if value <= 0.0 {
+                at = self.star.moved_into_kernel(at);
+                value = self.star.least(at, f64::NEG_INFINITY);
+            }
             if value > 0.0 {
-                (at, value) = self.star.raise_least(inside, STEPS_GROWING, aim.enough);
+                n_hidden = 0;
+                (at, value) = self.star.raise_least(at, STEPS_GROWING, aim.enough);
             }
             let n = self.tets.len();
             if value > best.map_or(0.0, |b| b.value) && self.is_better(at, value, aim) {
@@ -100,7 +105,8 @@ impl Cavity {
                 });
             }
             if best.is_some_and(|b| b.value >= aim.enough)
-                || n == TETS_MAX
+                || n >= aim.tets_max
+                || n_hidden > HIDDEN_MAX
                 || !self.add_worst(mesh, at, bounds)
             {
                 break;

@@ -2,23 +2,26 @@
 //!
 //! Where vertices of the surface are coplanar, or inner vertices of boundary recovery lie on a plane but for rounding, tetrahedra of no
 //! volume stay through all rounds before: a flip cannot remove them, and the cavity that a Delaunay kernel would open for a vertex
-//! does not fit. Nothing forces them. Four operations, judged by q over the bound (`bound`):
+//! does not fit. Nothing forces them.
 //!
 //! 1. `vertex`: inner vertices of bad tetrahedra move for the product of their ball, in sweeps; that takes clusters apart;
 //! 2. then, for each bad tetrahedron in order, the first that makes it good enough, or else the best, of: a flip, or an edge or a vertex
 //!    removed; a vertex moved for the worst of its ball; a vertex put on one of its edges; a vertex put into a cavity that grows (`cavity`).
 //!
-//! The last gains most. What is tried in vain is remembered until something changes it.
+//! The last gains most. What is tried in vain is remembered until something changes it. All this three times, judged differently
+//! ([`STAGES`]): by q, because what stands beside a needle is as bad as what stands on it and by excess nothing could take its place; by q over the bound
+//! (`bound`); and by the number of those of q ≥ 10.
 //!
-//! Deterministic: order follows excess, then ids, and neither depends on paging.
+//! Deterministic: order follows q or excess, then ids, and neither depends on paging.
 
 mod cavity;
+mod kernel;
 mod star;
 mod vertex;
 
 use std::collections::{BinaryHeap, HashSet};
 
-use super::bound::{excess, face_floor};
+use super::bound::face_floor;
 use super::collapse::Collapser;
 use super::objective::Worst;
 use super::pages::{PageFlags, tets_of_page};
@@ -29,25 +32,74 @@ use crate::geom::{Point, STEP, mix};
 use crate::mesh::{Mesh, Tet};
 use crate::storage::{Pages, check_cancelled};
 use cavity::{Cavity, Proposal};
-use star::{Aim, FaceBounds, value_of};
+use star::{Aim, FaceBounds, Measure, value_of};
 use vertex::Mover;
 
-/// Tetrahedra are bad above this q ... A solver fails on the worst ones, which have millions. On balls and even scans the rounds before leave
-/// nothing of the kind, so that nothing is touched there. At 8, meshes of CAD surfaces took two to five times as long, and on four of ten
-/// more tetrahedra had q of 10 and above, for what surrounds a mended one pays for it.
-const QUALITY_MAX: f64 = 50.0;
-/// ... and above this excess: what stands on a needle of the surface is as good as it can be.
+/// What a part of the work is about.
+struct Stage {
+    /// Tetrahedra are bad above this q and [`EXCESS_MAX`].
+    quality_max: f64,
+    by_excess: bool,
+    /// See [`Aim::fewer`].
+    fewer: bool,
+    /// See [`Aim::more`].
+    more: u32,
+    /// See [`Aim::tets_max`].
+    tets_max: usize,
+    /// Passes over what is still bad; each tries what has changed since it was tried before.
+    passes_max: u32,
+    /// Bad tetrahedra listed, and tried in a pass, are at most a constant and one in so many of the mesh: each takes some milliseconds.
+    one_in: u32,
+}
+
+/// A solver fails on the worst ones, which have millions: first these are brought down, then what is farthest from what the surface allows, then the
+/// number of those of q ≥ 10. On balls and even scans the rounds before leave next to nothing of the kind, so that little is touched there.
+///
+/// Cavities of flat tetrahedra need 20 in the median, 37 for nine in ten.
+const STAGES: [Stage; 3] = [
+    Stage {
+        quality_max: 50.0,
+        by_excess: false,
+        fewer: false,
+        more: 3,
+        tets_max: 40,
+        passes_max: 3,
+        one_in: 100,
+    },
+    Stage {
+        quality_max: 50.0,
+        by_excess: true,
+        fewer: false,
+        more: 1,
+        tets_max: 40,
+        passes_max: 2,
+        one_in: 100,
+    },
+    Stage {
+        quality_max: 10.0,
+        by_excess: false,
+        fewer: true,
+        more: 0,
+        tets_max: 24,
+        passes_max: 2,
+        one_in: 60,
+    },
+];
+
+impl Stage {
+    fn tried_max(&self, n_tets: u32) -> usize {
+        TRIED_MIN + (n_tets / self.one_in) as usize
+    }
+}
+
+/// What stands on a needle of the surface is as good as it can be below this excess.
 const EXCESS_MAX: f64 = 2.0;
 /// Searches stop at this value, and an operation that reaches it is done without trying others.
 const ENOUGH: f64 = 0.5;
-/// Sweeps of moves for the product at most.
-const SWEEPS_MAX: u32 = 10;
-/// Passes over what is still bad; each tries what has changed since it was tried before.
-const PASSES_MAX: u32 = 3;
-/// Bad tetrahedra listed at most, the worst ones: on a wing of sixteen thousand needles all but a few are bad.
-const LISTED_MAX: usize = 1000;
-/// Tetrahedra tried in a pass at most, with what operations leave bad: each takes some milliseconds.
-const TRIED_MAX: usize = 1500;
+/// Sweeps of moves for the product at most: where vertices hold each other, heights double in each.
+const SWEEPS_MAX: u32 = 60;
+/// Tetrahedra listed and tried at least; see [`Stage::one_in`]. On a wing of sixteen thousand needles all but a few are bad.
+const TRIED_MIN: usize = 500;
 
 /// Accepted operations.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -70,21 +122,26 @@ impl MendCounts {
     }
 }
 
-/// The excess of a tetrahedron where it is a bad one.
-fn bad_excess<P: Pages>(mesh: &mut Mesh<P>, tet: &Tet) -> Option<f64> {
+/// How bad a tetrahedron is where it is a bad one: its excess, or its q.
+fn badness<P: Pages>(
+    mesh: &mut Mesh<P>,
+    tet: &Tet,
+    stage: &Stage,
+    bounds: &mut FaceBounds,
+) -> Option<f64> {
     let points = mesh.points(tet);
-    if !is_below(points, 1.0 / QUALITY_MAX) {
+    if !is_below(points, 1.0 / stage.quality_max) {
         return None;
     }
     let q = quality(points);
-    let required = [0, 1, 2, 3].map(|i| tet.is_required(i));
-    for i in (0..4).filter(|&i| required[i]) {
+    for i in (0..4).filter(|&i| tet.is_required(i)) {
         if q <= EXCESS_MAX * face_floor(tet.face(i).map(|v| mesh.point(v))) {
             return None;
         }
     }
-    let excess = excess(points, required);
-    (excess > EXCESS_MAX).then_some(excess)
+    // A face without area in doubles is no reason to do anything.
+    let excess = q / bounds.of_tet(tet, points);
+    (excess > EXCESS_MAX).then_some(if stage.by_excess { excess } else { q })
 }
 
 /// A tetrahedron by its vertices' positions.
@@ -103,7 +160,7 @@ pub(super) struct Mender {
     bounds: FaceBounds,
     swapper: Swapper<Worst>,
     collapser: Collapser<Worst>,
-    /// Bits of the excess, which order like it, and the tetrahedron.
+    /// Bits of the badness, which order like it, and the tetrahedron.
     queue: BinaryHeap<(u64, u32)>,
     /// Names of what was tried in vain.
     failed: HashSet<u64>,
@@ -121,24 +178,38 @@ impl Mender {
         pages: &mut PageFlags,
         progress: &mut dyn FnMut(f64),
     ) {
-        let list = self.list(mesh, pages);
-        if list.is_empty() {
+        // The last stage's are the most.
+        let [first, .., last] = &STAGES;
+        if self.list(mesh, pages, last).is_empty() {
             return;
         }
+        let list = self.list(mesh, &mut pages.clone(), first);
         self.lift(mesh, &list);
-        for _ in 0..PASSES_MAX {
-            let before = self.counts.changes();
-            let list = self.list(mesh, pages);
-            self.queue.extend(list);
-            self.pass(mesh, pages, progress);
-            if self.counts.changes() == before {
-                break;
+        for stage in &STAGES {
+            let mut flags = pages.clone();
+            self.failed.clear();
+            for _ in 0..stage.passes_max {
+                let before = self.counts.changes();
+                let list = self.list(mesh, &mut flags, stage);
+                self.queue.extend(list);
+                self.pass(mesh, &mut flags, stage, progress);
+                if self.counts.changes() == before {
+                    break;
+                }
             }
+            *pages = flags.or(pages);
         }
     }
 
     /// The bad tetrahedra of the flagged pages, worst first; pages with none lose their flags.
-    fn list<P: Pages>(&mut self, mesh: &mut Mesh<P>, pages: &mut PageFlags) -> Vec<(u64, u32)> {
+    fn list<P: Pages>(
+        &mut self,
+        mesh: &mut Mesh<P>,
+        pages: &mut PageFlags,
+        stage: &Stage,
+    ) -> Vec<(u64, u32)> {
+        let most = stage.tried_max(mesh.n_tets());
+        let bounds = &mut self.bounds;
         let mut list = Vec::new();
         let mut bad = PageFlags::default();
         let mut from = 0;
@@ -146,19 +217,19 @@ impl Mender {
             check_cancelled();
             from = page + 1;
             tets_of_page(mesh, page, |mesh, t, tet| {
-                if let Some(excess) = bad_excess(mesh, &tet) {
-                    list.push((excess.to_bits(), t));
+                if let Some(badness) = badness(mesh, &tet, stage, bounds) {
+                    list.push((badness.to_bits(), t));
                     bad.raise(t);
                 }
             });
-            if list.len() >= 2 * LISTED_MAX {
+            if list.len() >= 2 * most {
                 list.sort_unstable_by(|a, b| b.cmp(a));
-                list.truncate(LISTED_MAX);
+                list.truncate(most);
             }
         }
         *pages = bad;
         list.sort_unstable_by(|a, b| b.cmp(a));
-        list.truncate(LISTED_MAX);
+        list.truncate(most);
         list
     }
 
@@ -173,10 +244,19 @@ impl Mender {
         }
         for _ in 0..SWEEPS_MAX {
             check_cancelled();
+            let before = self.counts.vertices_moved;
             vertices.retain(|&(v, t)| {
-                self.mover.gather(mesh, v, t, &mut self.bounds) && self.mover.raise_product(mesh)
+                if !self.mover.gather(mesh, v, t, &mut self.bounds) {
+                    return false;
+                }
+                let is_moved = self.mover.raise_product(mesh);
+                self.counts.vertices_moved += u64::from(is_moved);
+                // One that is stuck between others in a cluster may move after them.
+                is_moved || self.mover.is_flat()
             });
-            self.counts.vertices_moved += vertices.len() as u64;
+            if self.counts.vertices_moved == before {
+                break;
+            }
         }
     }
 
@@ -184,35 +264,41 @@ impl Mender {
         &mut self,
         mesh: &mut Mesh<P>,
         pages: &mut PageFlags,
+        stage: &Stage,
         progress: &mut dyn FnMut(f64),
     ) {
         self.touched.swap(0, 1);
         self.touched[0].clear();
         let total = self.queue.len();
         // What operations leave bad is followed up, up to a bound.
-        let mut left = TRIED_MAX;
+        let mut left = stage.tried_max(mesh.n_tets());
         while let Some((bits, t)) = self.queue.pop() {
             check_cancelled();
             progress(1.0 - (self.queue.len().min(total)) as f64 / total as f64);
             let tet = mesh.tet(t);
             // Changed since it was listed: then it was listed anew.
             let is_current = tet.is_live()
-                && bad_excess(mesh, &tet).is_some_and(|excess| excess.to_bits() == bits);
-            if left == 0 || !is_current || !self.is_worth_trying(mesh, &tet) {
+                && badness(mesh, &tet, stage, &mut self.bounds)
+                    .is_some_and(|b| b.to_bits() == bits);
+            if left == 0 {
+                self.queue.clear();
+                break;
+            }
+            if !is_current || !self.is_worth_trying(mesh, &tet) {
                 continue;
             }
             left -= 1;
             self.counts.tried += 1;
-            if !self.attack(mesh, t, &tet) {
+            if !self.attack(mesh, t, &tet, stage) {
                 self.failed.insert(name(mesh.points(&tet)));
                 continue;
             }
             for &t in &self.changed {
                 let tet = mesh.tet(t);
                 self.touched[0].extend(tet.vertices());
-                if let Some(excess) = bad_excess(mesh, &tet) {
+                if let Some(badness) = badness(mesh, &tet, stage, &mut self.bounds) {
                     pages.raise(t);
-                    self.queue.push((excess.to_bits(), t));
+                    self.queue.push((badness.to_bits(), t));
                 }
             }
         }
@@ -226,11 +312,21 @@ impl Mender {
     }
 
     /// Tries everything on the bad tetrahedron `t`; after success `changed` lists the tetrahedra that are new or moved.
-    fn attack<P: Pages>(&mut self, mesh: &mut Mesh<P>, t: u32, tet: &Tet) -> bool {
+    fn attack<P: Pages>(&mut self, mesh: &mut Mesh<P>, t: u32, tet: &Tet, stage: &Stage) -> bool {
         self.changed.clear();
+        self.bounds.measure = match stage.by_excess {
+            true => Measure::Excess,
+            false => Measure::Quality(quality(mesh.points(tet))),
+        };
         let [_, own] = value_of(mesh, tet, &mut self.bounds);
         let enough = ENOUGH.max(2.0 * own);
-        let aim = Aim { own, enough };
+        let aim = Aim {
+            own,
+            enough,
+            fewer: stage.fewer,
+            more: stage.more,
+            tets_max: stage.tets_max,
+        };
         if self.reconnect(mesh, t, tet, enough) {
             return true;
         }

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use super::super::bound::{face_least, least};
 use super::super::climb::Climb;
 use super::super::quality::{ALPHA, inverse_quality};
+use super::kernel::farthest_inside;
 use crate::geom::{Point, orient};
 use crate::mesh::anatomy::FACES;
 use crate::mesh::{FaceRef, Mesh, Tet};
@@ -19,12 +20,10 @@ pub(super) struct Side {
     /// Twice the area, outward.
     normal: Point,
     area: f64,
-    /// Square root of the area.
-    width: f64,
     longest_squared: f64,
     /// Square of the volume below which rounding may decide, over the squared distance of the vertex.
     doubt: f64,
-    /// See [`weight`].
+    /// See [`Measure::weight`].
     weight: f64,
     /// The face beyond, or none.
     pub(super) across: FaceRef,
@@ -50,11 +49,11 @@ impl Side {
             points,
             normal,
             area: normal.length(),
-            width: normal.length().sqrt(),
             longest_squared: u.dot(u).max(v.dot(v)).max(w.dot(w)),
             doubt: 1e-28 * u.dot(u) * v.dot(v),
             weight: if required {
-                weight(bounds.of(vertices, points))
+                let bound = bounds.of(vertices, points);
+                bounds.measure.weight(bound)
             } else {
                 1.0
             },
@@ -70,10 +69,16 @@ impl Side {
         if good > 0.0 { self.weight * good } else { good }
     }
 
-    /// How much nearer `p` is to the plane of the face than `margin` times the square root of the area.
-    fn lacking(&self, p: Point, margin: f64) -> f64 {
-        let height = self.normal.dot(self.points[0] - p) / self.area;
-        margin * self.width - height
+    /// How far in front of the plane `p` is.
+    fn height(&self, p: Point) -> f64 {
+        let [a, b, c] = self.points;
+        orient(p, a, b, c) / self.area
+    }
+
+    /// Radius of the inscribed circle.
+    fn radius(&self) -> f64 {
+        let [a, b, c] = self.points;
+        self.area / ((b - a).length() + (c - a).length() + (c - b).length())
     }
 
     /// 1 / q of the tetrahedron with the vertex at `p`, or how far behind the face that is, in lengths of its longest edge: the ratio that is
@@ -98,10 +103,30 @@ impl Side {
     }
 }
 
-/// Distances from the sides that a place for a new vertex should have, in square roots of their areas, tried in this order, and the moves
-/// tried for each.
-const MARGINS: [f64; 3] = [0.3, 0.06, 0.01];
-const RELAXATIONS: u32 = 24;
+/// What tetrahedra are judged by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Measure {
+    /// q, while one of this q is mended: half of it counts as reached by what stands on a triangle that allows no less.
+    Quality(f64),
+    /// q over the bound.
+    Excess,
+}
+
+impl Default for Measure {
+    fn default() -> Self {
+        Self::Quality(1.0)
+    }
+}
+
+impl Measure {
+    /// What 1 / q is multiplied with on a face of this bound.
+    fn weight(self, bound: f64) -> f64 {
+        match self {
+            Self::Quality(q) => (2.0 * bound / q).clamp(1.0, f64::MAX),
+            Self::Excess => weight(bound),
+        }
+    }
+}
 
 /// What 1 / q is multiplied with on a face of this bound, to be compared with tetrahedra that nothing forces: the bound of a good
 /// triangle, 0.65 of that of a needle.
@@ -124,6 +149,7 @@ const NEEDLE: f64 = 10.0;
 /// The bounds of required faces met so far: their corners never move.
 #[derive(Default)]
 pub(super) struct FaceBounds {
+    pub(super) measure: Measure,
     known: HashMap<[u32; 3], f64>,
 }
 
@@ -140,7 +166,22 @@ impl FaceBounds {
     }
 }
 
-/// What a tetrahedron of the mesh counts, in the same units as the sides of a star.
+impl FaceBounds {
+    /// The bound of a tetrahedron.
+    pub(super) fn of_tet(&mut self, tet: &Tet, points: [Point; 4]) -> f64 {
+        let required = [0, 1, 2, 3].map(|i| tet.is_required(i));
+        match required.iter().filter(|&&r| r).count() {
+            0 => 1.0,
+            1 => {
+                let i = required.iter().position(|&r| r).unwrap_or(0);
+                self.of(tet.face(i), FACES[i].map(|k| points[k]))
+            }
+            _ => least(points, required),
+        }
+    }
+}
+
+/// 1 / q of a tetrahedron of the mesh, and what it counts in the same units as the sides of a star.
 pub(super) fn value_of<P: Pages>(
     mesh: &mut Mesh<P>,
     tet: &Tet,
@@ -148,16 +189,10 @@ pub(super) fn value_of<P: Pages>(
 ) -> [f64; 2] {
     let points = mesh.points(tet);
     let good = inverse_quality(points).max(0.0);
-    let required = [0, 1, 2, 3].map(|i| tet.is_required(i));
-    let bound = match required.iter().filter(|&&r| r).count() {
-        0 => 1.0,
-        1 => {
-            let i = required.iter().position(|&r| r).unwrap_or(0);
-            bounds.of(tet.face(i), FACES[i].map(|k| points[k]))
-        }
-        _ => least(points, required),
-    };
-    [good, good * weight(bound)]
+    [
+        good,
+        good * bounds.measure.weight(bounds.of_tet(tet, points)),
+    ]
 }
 
 /// What a set of tetrahedra costs: the worst q, and the sum over the bad ones.
@@ -167,6 +202,8 @@ pub(super) struct Cost {
     /// Σ value^(-1/2) · goodness^(-1/4) over values below 1/2: a very bad one is worth many that are less bad, but not any number of them.
     /// By values alone a needle of twice its bound would weigh as little as a q of 2, and it is the worst of the mesh.
     pub(super) sum: f64,
+    /// Those of q ≥ 10.
+    pub(super) n_poor: u32,
 }
 
 impl Default for Cost {
@@ -174,6 +211,7 @@ impl Default for Cost {
         Self {
             worst_goodness: f64::INFINITY,
             sum: 0.0,
+            n_poor: 0,
         }
     }
 }
@@ -181,25 +219,36 @@ impl Default for Cost {
 impl Cost {
     pub(super) fn add(&mut self, inverse_quality: f64, value: f64) {
         self.worst_goodness = self.worst_goodness.min(inverse_quality);
+        self.n_poor += u32::from(inverse_quality < 0.1);
         if value < 0.5 {
             let (value, inverse_quality) = (value.max(1e-30), inverse_quality.max(1e-30));
             self.sum += 1.0 / (value * inverse_quality.sqrt()).sqrt();
         }
     }
 
-    /// Whether this, of least value `value`, may take the place of `old`: the worst q does not rise above 10, and either the sum falls or what
-    /// is aimed at was very bad and becomes much better. Without the sum, tetrahedra just over the threshold would be divided for little; with it alone,
-    /// needles near their bound keep their neighbors from being mended.
+    /// Whether this, of least value `value`, may take the place of `old`: the worst q does not rise above 10, and
+    /// - to have fewer of q ≥ 10: there are fewer;
+    /// - else the sum falls or what is aimed at was very bad and becomes much better, and there are hardly more of them.
+    ///   Without the sum, tetrahedra just over the threshold would be divided for little; with it alone, needles near their bound keep
+    ///   their neighbors from being mended.
     pub(super) fn is_better(&self, old: &Self, value: f64, aim: Aim) -> bool {
         let is_much = aim.own < VERY_BAD && value > MUCH * aim.own;
-        self.worst_goodness >= old.worst_goodness.min(0.1)
-            && value > aim.own
-            && (is_much || self.sum < old.sum)
+        let gain = (value / aim.own).max(1.0);
+        let more = if is_much {
+            aim.more * exponent(gain)
+        } else {
+            0
+        };
+        let is_wanted = match aim.fewer {
+            true => (self.n_poor, self.sum) < (old.n_poor, old.sum),
+            false => (is_much || self.sum < old.sum) && self.n_poor <= old.n_poor + more,
+        };
+        self.worst_goodness >= old.worst_goodness.min(0.1) && value > aim.own && is_wanted
     }
 }
 
 /// Tetrahedra below this value may be replaced by more bad ones than before, if each is better by the factor.
-const VERY_BAD: f64 = 0.125;
+const VERY_BAD: f64 = 0.02;
 const MUCH: f64 = 1.5;
 
 /// What an operation on a bad tetrahedron is to reach.
@@ -209,6 +258,12 @@ pub(super) struct Aim {
     pub(super) own: f64,
     /// Where searches stop.
     pub(super) enough: f64,
+    /// Whether there are to be fewer of q ≥ 10, and nothing else.
+    pub(super) fewer: bool,
+    /// How many more of q ≥ 10 there may be for each time that the value doubles.
+    pub(super) more: u32,
+    /// Tetrahedra of a cavity at most.
+    pub(super) tets_max: usize,
 }
 
 /// The faces that a vertex is, or is to be, joined to.
@@ -294,40 +349,73 @@ impl Star {
         sum / (3.0 * self.sides.len() as f64)
     }
 
-    /// A point in front of all sides near `p`, if they have one, not nearer to each than a share of its size if that is possible: the
-    /// point is put in front of the side that it is most behind, again and again.
-    ///
-    /// Source: T. S. Motzkin and I. J. Schoenberg, "The relaxation method for linear inequalities" (1954).
+    /// The least height of `p` over a side, negative behind one.
+    fn height(&self, p: Point) -> f64 {
+        let heights = self.sides.iter().map(|side| side.height(p));
+        heights.fold(f64::INFINITY, f64::min)
+    }
+
+    /// The point that is farthest in front of all sides, in radii of their inscribed circles, up to one: what is nearer makes a flat
+    /// tetrahedron. Behind some, where no point is in front of all; `p` where rounding leaves no answer.
     pub(super) fn moved_into_kernel(&self, p: Point) -> Point {
-        let mut at = p;
-        for margin in MARGINS {
-            for _ in 0..RELAXATIONS {
-                let lacks = |side: &Side| side.lacking(at, margin);
-                let most = self.sides.iter().map(lacks).enumerate();
-                let Some((k, lack)) = most.max_by(|a, b| a.1.total_cmp(&b.1)) else {
-                    return at;
-                };
-                if lack <= 0.0 {
-                    return at;
-                }
-                at -= self.sides[k].normal * (1.3 * lack / self.sides[k].area);
-            }
+        let sides = (self.sides.iter()).filter(|side| side.area > 0.0);
+        let planes = sides.map(|side| {
+            let n = side.normal / side.area;
+            (n, n.dot(side.points[0] - p), side.radius())
+        });
+        farthest_inside(p, 4.0 * self.radius(p), planes).unwrap_or(p)
+    }
+
+    /// The best of moves of `p` away from the nearest sides, in steps from the least of the heights to the size of the star, each twice the one
+    /// before: between planes a rounding error apart, no search finds room that starts with steps of the size of the star.
+    ///
+    /// The direction is the gradient of the sum of the heights' logarithms.
+    pub(super) fn lift(&self, p: Point, floor: f64) -> Option<(Point, f64)> {
+        let mut gradient = Point::ZERO;
+        for side in &self.sides {
+            gradient -= side.normal / (side.area * side.height(p));
         }
-        at
+        let least = self.height(p);
+        let direction = gradient / gradient.length();
+        if least <= 0.0 || !direction.is_finite() {
+            return None;
+        }
+        let (mut step, end) = (0.5 * least, self.radius(p));
+        let mut best: Option<(Point, f64)> = None;
+        while step < end {
+            let at = p + direction * step;
+            let value = self.product(at, floor);
+            if value > best.map_or(f64::NEG_INFINITY, |b| b.1) {
+                best = Some((at, value));
+            }
+            step *= 2.0;
+        }
+        best
     }
 
     /// Moves from `start` to where the least value is largest; stops at `enough`. Returns where and what it is there.
     pub(super) fn raise_least(&mut self, start: Point, steps: u32, enough: f64) -> (Point, f64) {
         let value = self.least(start, f64::NEG_INFINITY);
-        let climb = Climb {
-            start,
-            step: 0.2 * self.radius(start),
-            steps,
-            enough,
-        };
-        let found = climb.run(value, |p, floor| self.least(p, floor));
-        found.unwrap_or((start, value))
+        // Between planes that are near each other, only short steps lead anywhere.
+        for step in [0.2 * self.radius(start), self.height(start)] {
+            let climb = Climb {
+                start,
+                step,
+                steps,
+                enough,
+            };
+            let found = climb.run(value, |p, floor| self.least(p, floor));
+            if let Some(found) = found {
+                return found;
+            }
+        }
+        (start, value)
     }
+}
+
+/// The power of two below a number of at least 1.
+fn exponent(x: f64) -> u32 {
+    (x.to_bits() >> 52) as u32 - 1023
 }
 
 /// A positive number as one in [1, 2), the power of two added to `exponent`.

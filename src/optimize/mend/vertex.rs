@@ -23,6 +23,8 @@ const FLAT: f64 = 1e-6;
 pub(super) struct Mover {
     pub(super) ball: Ball,
     star: Star,
+    /// Whether the ball had a tetrahedron without volume but for rounding when it was looked at last.
+    was_flat: bool,
 }
 
 impl Mover {
@@ -55,27 +57,34 @@ impl Mover {
     /// the next one, while their product still has a slope.
     pub(super) fn raise_product<P: Pages>(&mut self, mesh: &mut Mesh<P>) -> bool {
         let (v, start) = (self.ball.v, mesh.point(self.ball.v));
-        let climb = Climb {
-            start,
-            step: 0.2 * self.star.radius(start),
-            steps: STEPS,
-            enough: f64::INFINITY,
-        };
         // A mere needle must not become worse; in a cluster some have to, for a while.
         let least = self.star.least(start, f64::NEG_INFINITY);
-        let floor = if least < FLAT {
+        self.was_flat = least < FLAT;
+        let floor = if self.was_flat {
             f64::MIN_POSITIVE
         } else {
             least
         };
         let before = self.star.product(start, f64::MIN_POSITIVE);
-        match climb.run(before, |p, _| self.star.product(p, floor)) {
-            Some((p, value)) if value > before + GAIN_MIN => {
-                mesh.set_point(v, p);
-                true
-            }
-            _ => false,
+        let (lifted, value) = (self.star.lift(start, floor)).unwrap_or((start, before));
+        let climb = Climb {
+            start: lifted,
+            step: 0.2 * self.star.radius(start),
+            steps: STEPS,
+            enough: f64::INFINITY,
+        };
+        let found = climb.run(value, |p, _| self.star.product(p, floor));
+        let (p, value) = found.unwrap_or((lifted, value));
+        let is_better = value > before + GAIN_MIN;
+        if is_better {
+            mesh.set_point(v, p);
         }
+        is_better
+    }
+
+    /// Whether the ball last looked at by [`Mover::raise_product`] was flat before.
+    pub(super) fn is_flat(&self) -> bool {
+        self.was_flat
     }
 
     /// Where the worst of the ball gathered is best, and its value there, where the ball gets better.

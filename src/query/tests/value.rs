@@ -28,6 +28,7 @@ fn numbers_and_conditions_select_what_they_say() -> Outcome {
             "edge_max > 0.07 and angle_min < 40",
             "volume*6 < edge_min^3",
             "quality > 1e6",
+            "excess > 1.2 and quality < 3",
         ] {
             let condition = Expression::parse(text, &VARIABLES)?;
             let selection = Selection {
