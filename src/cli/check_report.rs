@@ -1,14 +1,19 @@
 //! What `check` found, for people and for programs.
 
+use std::path::Path;
+
 use serde_json::{Value, json};
 
-use super::check_expected;
 use super::console::Console;
+use super::words::{self, count};
+use crate::api::{default_cap, predict};
 use crate::geom::Point;
+use crate::geom::short;
 use crate::optimize::face_least;
+use crate::pipeline::Options;
 use crate::surface::{
     BoundaryLoop, Closing, Defect, Fitness, Surface, Validation, boundary_loops, closing, fitness,
-    show, show_number, validate,
+    show, validate,
 };
 
 /// Defects of one kind, holes and junctions listed for people.
@@ -26,7 +31,7 @@ pub struct Findings<'a> {
     boundary_loops: Vec<BoundaryLoop>,
     closing: Vec<Closing>,
     fitness: Fitness,
-    /// Tetrahedra with default sizes, roughly; none for an open surface.
+    /// Tetrahedra with default sizes, as they are estimated before a mesh; none of a surface that cannot be meshed.
     tets_expected: Option<f64>,
 }
 
@@ -36,7 +41,7 @@ impl<'a> Findings<'a> {
         let validation = validate(surface);
         let is_closed = validation.closedness.is_closed();
         let fitness = fitness(surface, &validation.closedness);
-        let tets_expected = check_expected::tets(surface, &fitness);
+        let tets_expected = (validation.is_valid()).then(|| expected(surface)).flatten();
         Self {
             surface,
             turned,
@@ -50,6 +55,11 @@ impl<'a> Findings<'a> {
             tets_expected,
             validation,
         }
+    }
+
+    fn bounds(&self) -> [[f64; 3]; 2] {
+        let bounds = self.surface.bounds();
+        [bounds.low, bounds.high].map(|p| p.to_array())
     }
 
     pub fn is_valid(&self) -> bool {
@@ -96,7 +106,7 @@ impl<'a> Findings<'a> {
         }
         json!({
             "schema": 1, "triangles": surface.n_triangles(), "vertices": surface.n_vertices(),
-            "labels": surface.label_names, "turned_triangles": self.turned,
+            "labels": surface.label_names, "bounds": self.bounds(), "turned_triangles": self.turned,
             "edges": edges.n_edges, "parts": edges.n_components, "open_edges": edges.open.len(),
             "nonmanifold_edges": edges.n_nonmanifold, "two_sided_triangles": edges.two_sided.len(),
             "valid": self.is_valid(), "n_defects": found.n_defects,
@@ -111,12 +121,19 @@ impl<'a> Findings<'a> {
     pub fn print(&self, surfaces: &[String], is_repaired: bool, console: &Console) {
         let edges = &self.validation.closedness;
         console.line(&format!(
-            "{} triangles, {} vertices, {} edges, {} part(s)",
+            "{} triangles, {} vertices, {} edges, {}",
             self.surface.n_triangles(),
             self.surface.n_vertices(),
             edges.n_edges,
-            edges.n_components
+            count(edges.n_components as u64, "part")
         ));
+        if self.surface.n_triangles() > 0 {
+            console.line(&format!("box {}", words::bounds(self.bounds())));
+            console.line(&format!(
+                "labels: {}",
+                words::listed(&self.surface.label_names)
+            ));
+        }
         if !edges.two_sided.is_empty() {
             console.line(&format!(
                 "{} triangles are given from both sides: each pair is one facet between two regions",
@@ -165,9 +182,9 @@ impl<'a> Findings<'a> {
     fn print_openness(&self, surfaces: &[String], console: &Console) {
         let open = &self.validation.closedness.open;
         console.line(&format!(
-            "{} open edges around {} hole(s):",
-            open.len(),
-            self.boundary_loops.len()
+            "{} around {}:",
+            count(open.len() as u64, "open edge"),
+            count(self.boundary_loops.len() as u64, "hole")
         ));
         for rim in self.boundary_loops.iter().take(LISTED) {
             console.line(&format!(
@@ -181,12 +198,12 @@ impl<'a> Findings<'a> {
         tell_rest(self.boundary_loops.len() as u64, console);
         let junctions = &self.validation.t_junctions;
         if !junctions.is_empty() {
-            console.line(&format!("{} T-junction(s):", junctions.len()));
+            console.line(&format!("{}:", count(junctions.len() as u64, "T-junction")));
         }
         for junction in junctions.iter().take(LISTED) {
             let how = match junction.distance {
                 0.0 => "exactly".to_owned(),
-                distance => format!("but for {distance:.1e}"),
+                distance => format!("but for {}", short(distance)),
             };
             console.line(&format!(
                 "  a vertex at {} lies on an open edge of triangle {}, {how}",
@@ -216,8 +233,8 @@ impl<'a> Findings<'a> {
         };
         console.line(&if closes.share > 0.0 {
             format!(
-                "all close if points nearer than {:e} of the box diagonal ({:.3e}) are joined, {left}: `tetdb check {surfaces} --repair --weld {:e} --write OUT`",
-                closes.share, closes.distance, closes.share
+                "all close if points nearer than {:e} of the box diagonal ({}) are joined, {left}: `tetdb check {surfaces} --repair --weld {:e} --write OUT`",
+                closes.share, short(closes.distance), closes.share
             )
         } else {
             format!("all close by a repair that joins no points, {left}: `tetdb check {surfaces} --repair --write OUT`")
@@ -230,9 +247,9 @@ impl<'a> Findings<'a> {
             return;
         }
         console.line(&format!(
-            "shapes: {:.3} % of the triangles have an angle below 5 degrees (least {:.4}); edges {} to {}, median {}",
-            100.0 * f.small_angle_share,
-            f.angle_least_degrees,
+            "shapes: {} % of the triangles have an angle below 5 degrees (least {}); edges {} to {}, median {}",
+            short(100.0 * f.small_angle_share),
+            short(f.angle_least_degrees),
             short(f.edge_min),
             short(f.edge_max),
             short(f.edge_median)
@@ -241,8 +258,8 @@ impl<'a> Findings<'a> {
             let forced = match f.forcing_triangles {
                 0 => "no triangle forces a quality of 2 or worse".to_owned(),
                 n => format!(
-                    "at least {:.2} % of them stand on one of {n} triangles whose shape alone makes quality 2 or worse",
-                    100.0 * share
+                    "at least {} % of them stand on one of {n} triangles whose shape alone makes quality 2 or worse",
+                    short(100.0 * share)
                 ),
             };
             console.line(&format!(
@@ -287,8 +304,8 @@ impl<'a> Findings<'a> {
         }
         if f.edge_min > 0.0 && f.edge_max / f.edge_min > POOR_RATIO {
             advice.push(format!(
-                "the shortest edge is {:.1e} of the longest; if such edges are no intended detail, remove them in the program the surface comes from",
-                f.edge_min / f.edge_max
+                "the shortest edge is {} of the longest; if such edges are no intended detail, remove them in the program the surface comes from",
+                short(f.edge_min / f.edge_max)
             ));
         }
         advice
@@ -315,6 +332,17 @@ impl<'a> Findings<'a> {
     }
 }
 
+/// Tetrahedra with default sizes; none where no size makes sense.
+fn expected(surface: &Surface) -> Option<f64> {
+    let prepared = predict(
+        surface,
+        &Options::default(),
+        default_cap().0,
+        Path::new("."),
+    );
+    Some(prepared.ok()?.estimate.tets())
+}
+
 fn defect_json(defect: &Defect) -> Value {
     let mut value = json!({
         "code": defect.code(), "triangles": defect.triangles(), "at": defect.at().map(|p| p.to_array()),
@@ -330,12 +358,6 @@ fn tell_rest(n: u64, console: &Console) {
     if n > LISTED as u64 {
         console.line(&format!("  ... {n} in all; --json lists them"));
     }
-}
-
-/// Four digits.
-fn short(x: f64) -> String {
-    let text = format!("{x:.3e}");
-    show_number(text.parse().unwrap_or(x))
 }
 
 /// Two digits are all an estimate has.
