@@ -19,7 +19,7 @@ const fn row(code: &'static str, exit: u8, meaning: &'static str) -> CodeRow {
     }
 }
 
-/// Every error word, its exit code, and what it means; README carries the same table.
+/// Every error word, its exit code, and what it means; the guide carries the same table.
 pub const CODES: &[CodeRow] = &[
     row(
         "internal",

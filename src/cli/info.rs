@@ -287,7 +287,7 @@ pub fn share_below_two(q: &QualityRow) -> f64 {
 /// The paper's table: share and number of tetrahedra by quality.
 fn quality_lines(q: &QualityRow) -> Vec<String> {
     let total: u64 = q.bins.iter().sum();
-    let mut lines = vec!["quality (longest edge over inradius, 1 is regular):".to_owned()];
+    let mut lines = vec!["quality q (1 is regular, larger is worse):".to_owned()];
     for (i, &n) in q.bins.iter().enumerate().filter(|(_, n)| **n > 0) {
         let to = if i + 1 == q.bins.len() {
             "inf".to_owned()
@@ -297,14 +297,44 @@ fn quality_lines(q: &QualityRow) -> Vec<String> {
         lines.push(format!(
             "  [{:>2}, {to:>3}[ {:>9} %  {n:>12}",
             i + 1,
-            short(100.0 * n as f64 / total.max(1) as f64)
+            share(n, total)
         ));
     }
     lines.push(format!(
         "  worst {}; dihedral angles {} to {} degrees",
-        short(q.worst),
+        worst(q.worst),
         short(q.dihedral[0].to_degrees()),
         short(q.dihedral[1].to_degrees())
     ));
     lines
+}
+
+/// A share in percent, in at most four digits, but never 100 % when it is not all.
+fn share(n: u64, total: u64) -> String {
+    let percent = 100.0 * n as f64 / total.max(1) as f64;
+    if n < total && percent >= 99.995 {
+        return (2..12)
+            .map(|digits| format!("{percent:.digits$}"))
+            .find(|text| !text.starts_with("100"))
+            .unwrap_or_else(|| "99.9999999".to_owned());
+    }
+    short(percent)
+}
+
+/// A quality in four digits, or as many as keep it in its row of the table.
+fn worst(q: f64) -> String {
+    let text = short(q);
+    let is_in_its_row = text
+        .parse::<f64>()
+        .is_ok_and(|shown| shown.floor() == q.floor());
+    match is_in_its_row || q >= 10.0 {
+        true => text,
+        false => (4..16)
+            .map(|digits| format!("{q:.digits$}"))
+            .find(|text| {
+                text.parse::<f64>()
+                    .is_ok_and(|shown| shown.floor() == q.floor())
+            })
+            .unwrap_or(text),
+    }
 }

@@ -52,7 +52,6 @@ pub fn run() -> ExitCode {
     };
     let console = Console::with(args.command.is_json(), args.quiet, args.verbose);
     let settings = console.settings(None, None);
-    // A panic of redb on a damaged tree is damage; its own message would only confuse.
     signals::listen(&console);
     let done = guarded(&settings, || Ok(dispatch(&args.command, &console)));
     let done = done.map(|done| console.end_answer().and(done));

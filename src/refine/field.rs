@@ -1,6 +1,6 @@
 //! What saturation is asked for: wanted lengths, and where points may go.
 
-use super::place::PlacementRule;
+use super::placement::PlacementRule;
 use crate::geom::{Aabb, Point};
 
 /// Where the wanted length at a point that divides an edge comes from.

@@ -10,10 +10,10 @@
 
 mod activity;
 mod candidate;
-mod candidates;
 mod field;
 mod insert;
-mod place;
+mod long_edges;
+mod placement;
 mod recent;
 mod report;
 mod worker;
@@ -27,7 +27,7 @@ use crate::storage::{Pages, StorageError, check_cancelled};
 
 use activity::Activity;
 pub use field::{Field, Lengths};
-pub use place::{Everywhere, PlacementRule};
+pub use placement::{Everywhere, PlacementRule};
 use recent::Recent;
 pub use report::RefineReport;
 use worker::Worker;

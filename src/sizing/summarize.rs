@@ -29,12 +29,21 @@ impl SizeField {
         let (low, high) = self.range();
         let wanted = [("hsiz", targets.hsiz), ("hmax", targets.hmax)];
         let warnings = wanted.into_iter().filter_map(|(option, wanted)| {
-            let wanted = wanted.filter(|&h| h < FAR_BELOW * surface.median)?;
-            Some(SizeWarning::FarBelowSurface {
+            let wanted = wanted?;
+            if wanted < FAR_BELOW * surface.median {
+                return Some(SizeWarning::FarBelowSurface {
+                    option,
+                    wanted,
+                    surface_median: surface.median,
+                    away: (surface.median - wanted) / targets.beta,
+                });
+            }
+            // An upper bound that nothing comes near is no disappointment.
+            let is_far_above = option == "hsiz" && wanted > FAR_ABOVE * high;
+            is_far_above.then_some(SizeWarning::NeverReached {
                 option,
                 wanted,
-                surface_median: surface.median,
-                away: (surface.median - wanted) / targets.beta,
+                most: high,
             })
         });
         SizeSummary {
@@ -87,6 +96,9 @@ fn weighted_range(list: impl Iterator<Item = (f64, f64)>, room: &ScratchSpace) -
 /// Below this share of the surface's median edge, an interior size is warned about: the surface is
 /// not divided, so that large triangles would stand against small tetrahedra.
 const FAR_BELOW: f64 = 0.4;
+
+/// Above this multiple of the longest length that the field has, a wanted one is warned about: it is as good as none, and often in another unit.
+const FAR_ABOVE: f64 = 4.0;
 
 fn plural(n: usize, what: &str) -> String {
     format!("{n} {what}{}", if n == 1 { "" } else { "s" })

@@ -49,6 +49,15 @@ pub enum SizeWarning {
         /// How far from edges of that length the gradation lets sizes come down to it.
         away: f64,
     },
+    /// The wanted interior size is longer than the gradation lets sizes grow within the surface.
+    NeverReached {
+        /// The option that asks for the size.
+        option: &'static str,
+        /// The size it asks for.
+        wanted: f64,
+        /// The longest that comes out.
+        most: f64,
+    },
 }
 
 impl fmt::Display for SizeWarning {
@@ -67,6 +76,16 @@ impl fmt::Display for SizeWarning {
                 short(*surface_median),
                 short(*wanted),
                 short(*away)
+            ),
+            Self::NeverReached {
+                option,
+                wanted,
+                most,
+            } => write!(
+                f,
+                "{option} {} is never reached: from the surface's edges lengths grow to {} at most (hgrad says how fast); is it in the surface's unit?",
+                short(*wanted),
+                short(*most)
             ),
         }
     }

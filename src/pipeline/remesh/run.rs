@@ -282,6 +282,7 @@ impl<'a> RemeshRun<'a> {
         made: &BTreeMap<u32, Vec<u8>>,
     ) -> Result<ResaturateSummary, PipelineError> {
         let (mut totals, mut old_blobs) = (BTreeMap::new(), Vec::new());
+        let mut is_new = self.what.repair;
         for (row, _) in &self.rows {
             let (rank, sealed) = (row.rank, &finished[&row.rank].sealed);
             assert_eq!(
@@ -296,10 +297,16 @@ impl<'a> RemeshRun<'a> {
                 })
                 .into());
             }
+            is_new |= sealed.row.digest != row.digest;
+            is_new |= made.get(&rank) != self.catalog.blob(blob::FIELD + rank)?.as_ref()
+                && !made.is_empty();
             totals.insert(rank, SealedTotals::of(sealed));
             for (now, then) in VERSIONED {
                 old_blobs.push((then + rank, self.catalog.blob(now + rank)?));
             }
+        }
+        if !is_new {
+            return self.leave(finished);
         }
         let regions = sum_totals(self.catalog, self.n, &totals)?.regions;
         let dropped = Previous::of(self.catalog)?;
@@ -357,6 +364,25 @@ impl<'a> RemeshRun<'a> {
             // Nothing in it counts.
             let _ = scratch.remove_dir_all();
         }
+        Ok(self.summary(finished))
+    }
+
+    /// Nothing has changed: what was made is dropped, and the version before the last change stays to be brought back.
+    fn leave(
+        &mut self,
+        mut finished: BTreeMap<u32, FinishedSubdomain>,
+    ) -> Result<ResaturateSummary, PipelineError> {
+        for (row, _) in &self.rows {
+            let subdomain = finished.get_mut(&row.rank).expect("made for each");
+            let path = self.catalog.file_path(row.rank, subdomain.generation);
+            // It is not listed: what stays is removed by the next writer.
+            let _ = path.remove_file();
+            subdomain.sealed.row = row.clone();
+        }
+        Ok(self.summary(finished))
+    }
+
+    fn summary(&self, finished: BTreeMap<u32, FinishedSubdomain>) -> ResaturateSummary {
         let mut summary = ResaturateSummary {
             parts: Vec::new(),
             pages: PagerStats::default(),
@@ -371,7 +397,7 @@ impl<'a> RemeshRun<'a> {
                 fine: Some(subdomain.fine),
             });
         }
-        Ok(summary)
+        summary
     }
 }
 

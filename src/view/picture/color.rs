@@ -38,7 +38,8 @@ pub fn scale(share: f64) -> Rgb {
     Rgb([0, 1, 2].map(|k| (STOPS[i][k] + t * (STOPS[i + 1][k] - STOPS[i][k])).round() as u8))
 }
 
-/// The color of kind `n`: hues a golden section apart, so that near numbers look different however many there are.
+/// The color of kind `n`: hues a golden section apart, so that near numbers look different however many there are. The page's
+/// script does the same.
 pub fn category(n: u32) -> Rgb {
     let hue = (f64::from(n) * 0.618_033_988_749_895 + 0.58).fract() * 6.0;
     // Every other round of hues is darker.
