@@ -24,7 +24,7 @@ import peers
 
 # Where the search for the best apex begins, in longest edges: along the longest edge, away from it, up.
 START, HALF = np.array([0.5, 0.2, 0.6]), 1.0
-GRID = np.stack(np.meshgrid(*[np.linspace(-1, 1, 5)] * 3), -1).reshape(-1, 3)
+GRID = np.stack(np.meshgrid(*[np.linspace(-1, 1, 3)] * 3), -1).reshape(-1, 3)
 
 
 def quality(p):
@@ -44,6 +44,21 @@ def inner_radius(corners):
     return np.linalg.norm(np.cross(b - a, c - a), axis=1) / lengths.sum(0) / lengths.max(0)
 
 
+def quality_above(base, apex):
+    """q with apexes (n, k, 3) over triangles (n, 3, 2) of longest edge 1: the inradius is three volumes over the sum of the areas."""
+    longest, areas = np.ones(apex.shape[:2]), 0.0
+    for k in range(3):
+        a, b = base[:, None, k], base[:, None, (k + 1) % 3]
+        edge, to = b - a, apex[..., :2] - a
+        longest = np.maximum(longest, (to**2).sum(-1) + apex[..., 2]**2)
+        away = edge[..., 0] * to[..., 1] - edge[..., 1] * to[..., 0]
+        areas = areas + np.sqrt(away**2 + (edge**2).sum(-1) * apex[..., 2]**2)
+    double = np.abs(base[:, 1, 0] * base[:, 2, 1])[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        q = peers.ALPHA * np.sqrt(longest) * (areas + double) / (double * apex[..., 2])
+    return np.where(np.isfinite(q), q, np.inf)
+
+
 def face_least(corners):
     """The least q of tetrahedra on triangles (n, 3, 3): a grid of apexes, moved to its best and made finer again and again."""
     least = np.empty(len(corners))
@@ -56,18 +71,18 @@ def face_least(corners):
         u, v = (b - a) / longest, (c - a) / longest
         x = np.einsum("ij,ij->i", u, v)
         y = np.linalg.norm(np.cross(u, v), axis=1)
-        base = np.zeros((len(p), 1, 3, 3))
-        base[:, 0, 1, 0], base[:, 0, 2, 0], base[:, 0, 2, 1] = 1, x, y
+        corners_2d = np.zeros((len(p), 3, 2))
+        corners_2d[:, 1, 0], corners_2d[:, 2, 0], corners_2d[:, 2, 1] = 1, x, y
         at, half, best = np.repeat(START[None], len(p), 0), np.full(len(p), HALF), np.full(len(p), np.inf)
-        for _ in range(48):
+        rows = np.arange(len(p))
+        for _ in range(56):
             apex = at[:, None] + half[:, None, None] * GRID
             apex[..., 2] = np.abs(apex[..., 2])
-            q = quality(np.concatenate([np.broadcast_to(base, (len(p), len(GRID), 3, 3)), apex[:, :, None]], 2))
+            q = quality_above(corners_2d, apex)
             k = q.argmin(1)
-            rows = np.arange(len(p))
             better = q[rows, k] < best
             at[better], best[better] = apex[rows, k][better], q[rows, k][better]
-            half *= np.where(better, 0.9, 0.6)
+            half *= np.where(better, 0.9, 0.65)
         least[s:s + 4096] = best
     return least
 

@@ -272,6 +272,22 @@ impl QuerySession {
         Ok(DecodedChunk::new(part, &records, keep)?)
     }
 
+    /// The faces of a sub-domain that are input triangles, kept until another's are wanted.
+    ///
+    /// Errors: damage; a budget without 16 bytes for each of their sides.
+    pub(super) fn surface_of(&mut self, rank: u32) -> Result<Arc<SurfaceFaces>, QueryError> {
+        if let Some(known) = self.surface.as_ref().filter(|s| s.rank == rank) {
+            return Ok(known.clone());
+        }
+        self.surface = None;
+        let part = &self.part(rank)?.subdomain;
+        let (bytes, chunks) = (SurfaceFaces::bytes(part), part.row().chunks[2]);
+        self.measures.face_chunks_read += u64::from(chunks);
+        let lease = (self.budget).lease(bytes, "the sides of the input triangles")?;
+        let read = SurfaceFaces::read(&mut self.part(rank)?.subdomain, lease)?;
+        Ok(self.surface.insert(Arc::new(read)).clone())
+    }
+
     /// Counts a chunk of tetrahedra read elsewhere.
     pub(crate) fn count_tets(&mut self) {
         self.measures.tet_chunks_read += 1;
