@@ -7,7 +7,7 @@
 
 #[doc(inline)]
 pub use api::{
-    Answers, Bytes, CODES, CancelToken, CheckReport, CodeRow, ColorBy, Error, Event, Existing,
+    Answers, Bytes, CODES, CancelToken, CheckReport, CodeRow, ColorBy, DefectPlace, Error, Event, Existing,
     ExportOptions, Exported, Length, Mesher, Optimize, Order, Prediction, Query, Regions, Remesh,
     Remeshed, Seal, Settings, Sizes, Snapped, Snapshot, Store, Subdomains, Summary, Surface,
     Verification, VerifyLevel,

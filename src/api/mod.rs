@@ -8,9 +8,11 @@
 mod ask;
 mod codes;
 pub(crate) mod error;
+pub(crate) mod field_arrays;
 mod from_errors;
 pub(crate) mod guard;
 pub(crate) mod job;
+mod located;
 mod memory;
 mod mesher;
 mod options;
@@ -25,6 +27,7 @@ pub(crate) mod show;
 mod sizes;
 pub(crate) mod store;
 pub(crate) mod surface;
+mod surface_arrays;
 pub(crate) mod targets;
 pub(crate) mod verify;
 
@@ -52,4 +55,5 @@ pub use show::{ExportOptions, Exported};
 pub use sizes::{Length, Sizes};
 pub use store::{Store, Summary};
 pub use surface::{CheckReport, Surface};
+pub use surface_arrays::DefectPlace;
 pub use verify::{Verification, VerifyLevel};
