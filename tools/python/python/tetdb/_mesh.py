@@ -107,7 +107,7 @@ def mesh(
     replace = _options.one_of(existing, ("keep", "replace"), "existing") == "replace"
     listener = _options.listener(progress)
     where = _path(path)
-    _native.mesh(given._native, where, job, settings, replace, bool(verify), listener)
+    _native.mesh(given._inner, where, job, settings, replace, bool(verify), listener)
     return Store(where, memory=memory, threads=threads)
 
 

@@ -329,12 +329,14 @@ class Store:
             part = self._native.part(row.rank)
             for first in range(0, row.n_tets, n):
                 arrays = part.block(first, n)
-                points, vertex_ids, tets, regions, quality = map(_locked, arrays)
+                points, vertex_ids, tets, regions, quality = arrays
+                for array in (points, vertex_ids, tets, regions, quality):
+                    _locked(array)
                 del arrays
                 start = (row.rank << _TET_BITS) + first
                 ids = _locked(np.arange(start, start + len(tets), dtype=np.int64))
                 chunk = Chunk(row.rank, points, tets, regions, quality, ids, vertex_ids)
-                del points, vertex_ids, tets, regions, quality, ids
+                del points, vertex_ids, tets, regions, quality, ids, array
                 yield chunk
                 # What the caller let go of is gone before the next is read.
                 del chunk
@@ -371,7 +373,7 @@ class Store:
 
         Columns: `id`, `subdomain`, `region`, `quality`, `vertices` (4 lasting ids), `centroid` (3).
         """
-        import pyarrow as pa
+        import pyarrow as pa  # type: ignore[import-untyped]
 
         def fixed(array: npt.NDArray[Any], width: int) -> Any:
             return pa.FixedSizeListArray.from_arrays(pa.array(array.reshape(-1)), width)

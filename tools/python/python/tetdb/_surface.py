@@ -112,7 +112,7 @@ class Surface:
     (4, True)
     """
 
-    _native: _native.Surface
+    _inner: _native.Surface
 
     def __init__(
         self,
@@ -122,17 +122,17 @@ class Surface:
     ) -> None:
         if triangles is None:
             if isinstance(points, Surface):
-                self._native = points._native
+                self._inner = points._inner
                 return
             if _is_path(points):
-                self._native = _native.Surface.read([os.fspath(points)])
+                self._inner = _native.Surface.read([os.fspath(points)])
                 return
             if isinstance(points, (list, tuple)) and points and all(map(_is_path, points)):
-                self._native = _native.Surface.read([os.fspath(p) for p in points])
+                self._inner = _native.Surface.read([os.fspath(p) for p in points])
                 return
             points, triangles, found = _of_mesh(points)
             labels = found if labels is None else labels
-        self._native = _of_arrays(points, triangles, labels)
+        self._inner = _of_arrays(points, triangles, labels)
 
     @classmethod
     def read(cls, *files: str | os.PathLike[str]) -> Surface:
@@ -142,41 +142,41 @@ class Surface:
     @classmethod
     def _of(cls, native: _native.Surface) -> Surface:
         surface = cls.__new__(cls)
-        surface._native = native
+        surface._inner = native
         return surface
 
     @property
     def points(self) -> npt.NDArray[np.float64]:
         """(n, 3) float64: the vertices, those with the same coordinates once. A copy."""
-        return self._native.points()
+        return self._inner.points()
 
     @property
     def triangles(self) -> npt.NDArray[np.int32]:
         """(m, 3) int32: positions in `points`. A copy."""
-        return self._native.triangles().view(np.int32)
+        return self._inner.triangles().view(np.int32)
 
     @property
     def labels(self) -> npt.NDArray[np.str_]:
         """(m,) str: the label of each triangle."""
-        names, codes = self._native.labels()
+        names, codes = self._inner.labels()
         return np.array(names, dtype=np.str_)[codes]
 
     @property
     def n_points(self) -> int:
-        return self._native.n_points()
+        return self._inner.n_points()
 
     @property
     def n_triangles(self) -> int:
-        return self._native.n_triangles()
+        return self._inner.n_triangles()
 
     @property
     def bounds(self) -> tuple[tuple[float, ...], ...]:
         """Low and high corner of the smallest box around it."""
-        return tuple(tuple(corner) for corner in self._native.bounds())
+        return tuple(tuple(corner) for corner in self._inner.bounds())
 
     def check(self) -> CheckReport:
         """Finds all that is wrong, by exact predicates. Defects are an answer, not an error."""
-        words, codes, triangles, places = self._native.check()
+        words, codes, triangles, places = self._inner.check()
         said = json.loads(words)
         edges = tuple(said.pop("edges"))
         ok = said["n_defects"] == 0
@@ -192,15 +192,15 @@ class Surface:
         """
         if weld is not None and not isinstance(weld, (int, float)):
             raise TetdbError("bad-size", f"{weld!r} is no share of the box diagonal", "weld")
-        return self._of(self._native.repaired(weld))
+        return self._of(self._inner.repaired(weld))
 
     def refined(self, hsiz: Length) -> Surface:
         """The same surface with edges of `hsiz` at most; new vertices lie on the old triangles."""
-        return self._of(self._native.refined(length(hsiz, "hsiz")))
+        return self._of(self._inner.refined(length(hsiz, "hsiz")))
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Writes ``.stl``, ``.off``, ``.obj`` or ``.ply``."""
-        self._native.write(os.fspath(path))
+        self._inner.write(os.fspath(path))
 
     def estimate(
         self,
@@ -227,7 +227,7 @@ class Surface:
             self.bounds, hsiz, hmin, hmax, hgrad, size, regions, "full", subdomains, True
         )
         settings = _options.settings(memory, threads)
-        return Estimate(**json.loads(_native.predict(self._native, job, settings)))
+        return Estimate(**json.loads(_native.predict(self._inner, job, settings)))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Surface, (self.points, self.triangles, self.labels)
