@@ -102,4 +102,6 @@ _CLASSES: dict[str, type[TetdbError]] = {
 def of_code(
     code: str, message: str, where: str | None = None, help: str | None = None
 ) -> TetdbError:
+    if code == "memory" and where is None and help is None:
+        help = "give a larger memory"
     return _CLASSES.get(code, TetdbError)(code, message, where, help)

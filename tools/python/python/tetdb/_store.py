@@ -32,6 +32,9 @@ _HIT = np.dtype(
         ("angle_min", "<f8"), ("angle_max", "<f8"),
     ]
 )  # fmt: skip
+_VARIABLES = (
+    "quality", "region", "subdomain", "volume", "x", "y", "z", "edge_min", "edge_max", "angle_min", "angle_max",
+)  # fmt: skip
 _FACE = np.dtype([("vertices", "<i4", 3), ("cut", "<i4"), ("index", "<i4"), ("other", "<i4"), ("tet", "<i4")])
 _FACET = np.dtype(
     [("triangle", "<i8"), ("vertices", "<i4", 3), ("label", "<i4"), ("regions", "<i4", 2), ("tets", "<i4", 2)]
@@ -457,8 +460,8 @@ class Store:
             flat = [_sizes.numbers(one, 3, "plane", "bad-query") for one in _two(plane, "plane")]
         if where is not None and not isinstance(where, str):
             raise TetdbError("bad-expression", f"{where!r} is no text", "where")
-        if order_by is not None and not isinstance(order_by, str):
-            raise TetdbError("bad-query", f"{order_by!r} is no text", "order_by")
+        if order_by is not None:
+            _options.one_of(order_by, _VARIABLES, "order_by")
         words = self._native.query(
             {
                 "condition": where,
