@@ -5,9 +5,7 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use serde_json::json;
-use tetdb::{
-    Bytes, CancelToken, Existing, Mesher, Optimize, Regions, Settings, Store, Subdomains,
-};
+use tetdb::{Bytes, CancelToken, Existing, Mesher, Optimize, Regions, Settings, Store, Subdomains};
 
 use crate::failure::Failure;
 use crate::sizes::SizeWords;
@@ -118,7 +116,11 @@ pub fn resume(
         board: &board,
         callable: callable.as_ref(),
     };
-    let work = || Store::resume(path, settings).map(drop).map_err(Failure::from);
+    let work = || {
+        Store::resume(path, settings)
+            .map(drop)
+            .map_err(Failure::from)
+    };
     watched(py, &token, Some(&listener), work)
 }
 

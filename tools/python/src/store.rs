@@ -237,11 +237,15 @@ impl Store {
         let points: Vec<[f64; 3]> = bytemuck::cast_slice(points.as_slice()?).to_vec();
         let located = self.in_session(py, |store| Ok(store.locate_barycentric(&points)?))?;
         let id = |found: &Option<(Hit, _)>| {
-            found.as_ref().map_or(-1, |(hit, _)| hit.id.number().cast_signed())
+            found
+                .as_ref()
+                .map_or(-1, |(hit, _)| hit.id.number().cast_signed())
         };
         let ids = PyArray1::from_vec(py, located.iter().map(id).collect());
         let none = [f64::NAN; 4];
-        let shares = located.iter().flat_map(|found| found.map_or(none, |(_, shares)| shares));
+        let shares = located
+            .iter()
+            .flat_map(|found| found.map_or(none, |(_, shares)| shares));
         let shares = PyArray1::from_vec(py, shares.collect());
         Ok((ids, shares.reshape([located.len(), 4])?))
     }
@@ -348,7 +352,9 @@ impl Store {
     }
 
     fn forget_previous(&self, py: Python<'_>) -> PyResult<()> {
-        self.changed(py, None, |mut store| Ok(store.forget_previous().map(drop)?))
+        self.changed(py, None, |mut store| {
+            Ok(store.forget_previous().map(drop)?)
+        })
     }
 }
 

@@ -124,7 +124,9 @@ impl Surface {
     }
 
     fn refined(&self, py: Python<'_>, hsiz: (f64, bool)) -> PyResult<Self> {
-        made(py, || tetdb::Surface::clone(&self.inner).refined(length(hsiz)))
+        made(py, || {
+            tetdb::Surface::clone(&self.inner).refined(length(hsiz))
+        })
     }
 
     fn write(&self, py: Python<'_>, out: PathBuf) -> PyResult<()> {

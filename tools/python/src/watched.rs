@@ -62,9 +62,7 @@ impl Listener<'_> {
                 } => callable.call1(py, ("progress", stage, done, total, unit))?,
                 Event::Note(text) => say(py, callable, "note", &text)?,
                 Event::Warning(text) => say(py, callable, "warning", &text)?,
-                Event::StoreBegun(path) => {
-                    say(py, callable, "store", &path.to_string_lossy())?
-                }
+                Event::StoreBegun(path) => say(py, callable, "store", &path.to_string_lossy())?,
                 _ => continue,
             };
         }
