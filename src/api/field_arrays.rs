@@ -2,11 +2,10 @@
 
 use std::io::Write;
 use std::path::Path;
-use std::sync::Arc;
 
 use xxhash_rust::xxh3::{Xxh3, xxh3_128};
 
-use super::{Error, Sizes};
+use super::Error;
 use crate::geom::Point;
 use crate::sizing::{Background, BackgroundMesh};
 
@@ -28,30 +27,6 @@ pub(crate) struct FieldArrays {
     points: Vec<[f64; 3]>,
     tets: Vec<[u32; 4]>,
     lengths: Vec<f64>,
-}
-
-impl Sizes {
-    /// Lengths at the vertices of a tetrahedral background mesh, linear in between; nothing is asked for outside of it.
-    ///
-    /// Shape: `lengths` runs parallel to `points`, which `tets` index. The store keeps a copy. For a new mesh only. Errors:
-    /// `count-mismatch`, `not-a-number`, `index-out-of-range`, `bad-size`, `unsupported-content` name the point or the tetrahedron.
-    pub fn field_of_arrays(
-        mut self,
-        points: &[[f64; 3]],
-        tets: &[[u32; 4]],
-        lengths: &[f64],
-    ) -> Result<Self, Error> {
-        check(points, tets, lengths)?;
-        let field = FieldArrays {
-            points: points.to_vec(),
-            tets: tets.to_vec(),
-            lengths: lengths.to_vec(),
-        };
-        self.options.size_field = Some(IN_STORE.to_owned());
-        self.options.size_field_hash = Some(field.hash());
-        self.field = Some(Arc::new(field));
-        Ok(self)
-    }
 }
 
 fn check(points: &[[f64; 3]], tets: &[[u32; 4]], lengths: &[f64]) -> Result<(), Error> {
@@ -88,6 +63,20 @@ fn check(points: &[[f64; 3]], tets: &[[u32; 4]], lengths: &[f64]) -> Result<(), 
 }
 
 impl FieldArrays {
+    /// Errors: what is no field, with its place.
+    pub(crate) fn new(
+        points: &[[f64; 3]],
+        tets: &[[u32; 4]],
+        lengths: &[f64],
+    ) -> Result<Self, Error> {
+        check(points, tets, lengths)?;
+        Ok(Self {
+            points: points.to_vec(),
+            tets: tets.to_vec(),
+            lengths: lengths.to_vec(),
+        })
+    }
+
     /// As the mesher asks it. Errors: `memory`, when it needs more than half of `cap`.
     pub(crate) fn background(&self, cap: u64) -> Result<Background, Error> {
         let needed = BackgroundMesh::bytes(self.points.len() as u64, self.tets.len() as u64);
@@ -119,7 +108,7 @@ impl FieldArrays {
     }
 
     /// That of its files, as [`job`](super::job) takes it.
-    fn hash(&self) -> String {
+    pub(crate) fn hash(&self) -> String {
         let mut all = Xxh3::new();
         for file in [self.sizes(), self.mesh()] {
             all.update(&xxh3_128(&file).to_le_bytes());
@@ -156,7 +145,10 @@ pub(crate) fn is_in_store(file: &str) -> bool {
 
 /// Sections of a binary MEDIT file: keyword, where the next begins, content.
 fn file_of(sections: &[(i32, Vec<u8>)]) -> Vec<u8> {
-    let mut bytes: Vec<u8> = [1, VERSION].into_iter().flat_map(i32::to_le_bytes).collect();
+    let mut bytes: Vec<u8> = [1, VERSION]
+        .into_iter()
+        .flat_map(i32::to_le_bytes)
+        .collect();
     let mut section = |keyword: i32, content: &[u8]| {
         bytes.extend(keyword.to_le_bytes());
         let next = bytes.len() + 8 + content.len();
@@ -174,7 +166,7 @@ fn file_of(sections: &[(i32, Vec<u8>)]) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::api::{CancelToken, Event, Length, Mesher, Settings, Store, Surface};
+    use crate::api::{CancelToken, Event, Length, Mesher, Settings, Sizes, Store, Surface};
 
     fn field() -> Sizes {
         let corner = |c: u32| [0, 1, 2].map(|k| f64::from(c >> k & 1));

@@ -7,6 +7,7 @@
 
 mod ask;
 mod codes;
+mod defects;
 pub(crate) mod error;
 pub(crate) mod field_arrays;
 mod from_errors;
@@ -34,6 +35,7 @@ pub(crate) mod verify;
 pub use crate::storage::CancelToken;
 pub use ask::{Answers, Order, Query};
 pub use codes::{CODES, CodeRow};
+pub use defects::DefectPlace;
 pub use error::Error;
 pub(crate) use guard::guarded;
 pub use memory::Bytes;
@@ -55,5 +57,4 @@ pub use show::{ExportOptions, Exported};
 pub use sizes::{Length, Sizes};
 pub use store::{Store, Summary};
 pub use surface::{CheckReport, Surface};
-pub use surface_arrays::DefectPlace;
 pub use verify::{Verification, VerifyLevel};

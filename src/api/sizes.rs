@@ -4,7 +4,8 @@ use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
 
-use super::field_arrays::FieldArrays;
+use super::Error;
+use super::field_arrays::{FieldArrays, IN_STORE};
 use crate::pipeline::Options;
 
 /// A length in the units of the surface, or a share of its box diagonal.
@@ -145,6 +146,23 @@ impl Sizes {
         self.options.size_field = Some(file.as_ref().to_string_lossy().into_owned());
         self.field = None;
         self
+    }
+
+    /// Lengths at the vertices of a tetrahedral background mesh, linear in between; nothing is asked for outside of it.
+    ///
+    /// Shape: `lengths` runs parallel to `points`, which `tets` index. The store keeps a copy. For a new mesh only. Errors:
+    /// `count-mismatch`, `not-a-number`, `index-out-of-range`, `bad-size`, `unsupported-content` name the point or the tetrahedron.
+    pub fn field_of_arrays(
+        mut self,
+        points: &[[f64; 3]],
+        tets: &[[u32; 4]],
+        lengths: &[f64],
+    ) -> Result<Self, Error> {
+        let field = FieldArrays::new(points, tets, lengths)?;
+        self.options.size_field = Some(IN_STORE.to_owned());
+        self.options.size_field_hash = Some(field.hash());
+        self.field = Some(Arc::new(field));
+        Ok(self)
     }
 }
 

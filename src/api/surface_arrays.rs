@@ -1,32 +1,6 @@
-//! A surface as arrays, and its defects with their places as numbers.
+//! A surface as arrays.
 
 use super::Surface;
-use crate::surface::Validation;
-
-/// Where a defect is.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct DefectPlace {
-    /// The word for it, one of [`CODES`](super::CODES).
-    pub code: &'static str,
-    /// The triangle it is about, and the second one where there are two. `None`: the surface has none.
-    pub triangles: [Option<u32>; 2],
-    /// A position where it can be seen.
-    pub at: Option<[f64; 3]>,
-}
-
-impl DefectPlace {
-    pub(super) fn all_of(validation: &Validation) -> Vec<Self> {
-        let defects = validation.defects.iter();
-        let place = |d: &crate::surface::Defect| Self {
-            code: d.code(),
-            triangles: [0, 1].map(|i| d.triangles().get(i).copied()),
-            at: d.at().map(|p| p.to_array()),
-        };
-        defects.map(place).collect()
-    }
-}
-
 impl Surface {
     /// Positions of the vertices, those with the same coordinates once.
     pub fn points(&self) -> &[[f64; 3]] {

@@ -164,11 +164,23 @@ def test_damage_and_other_writers_have_classes_of_their_own(tmp_path: Path) -> N
     store = tetdb.mesh(BOX, tmp_path / "s")
     digest = store.digest
     store.close()
-    other = tetdb.open(tmp_path / "s")
-    other.query(limit=1)
-    with pytest.raises(tetdb.StoreBusy):
-        store.resaturate([0], scale=0.9)
-    other.close()
+    reader = tetdb.open(tmp_path / "s")
+    reader.query(limit=1)
+    store.resaturate([0], scale=0.9)
+    assert reader.query(limit=1).size
+    store.undo()
+    reader.close()
+    store.close()
+    busy: list[bool] = []
+
+    def listener(event: tetdb.Event) -> None:
+        if event.kind == "store":
+            with pytest.raises(tetdb.StoreBusy):
+                tetdb.resume(tmp_path / "t")
+            busy.append(True)
+
+    tetdb.mesh(tetdb.sample("balls,count=2"), tmp_path / "t", hsiz="2%", progress=listener)
+    assert busy
     [file] = (tmp_path / "s").glob("subdomain-00000-*")
     content = bytearray(file.read_bytes())
     content[len(content) // 3 : len(content) // 2] = bytes(len(content) // 2 - len(content) // 3)

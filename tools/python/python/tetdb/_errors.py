@@ -47,7 +47,7 @@ class SurfaceError(TetdbError):
 
 
 class StoreBusy(TetdbError):
-    """Another process or handle has the store open."""
+    """Another process or handle writes the store, or changed it while it was read: ask again."""
 
 
 class StoreDamaged(TetdbError):
@@ -68,6 +68,7 @@ class InvalidMesh(TetdbError):
 
 _CLASSES: dict[str, type[TetdbError]] = {
     "busy": StoreBusy,
+    "store-changed": StoreBusy,
     "damaged": StoreDamaged,
     "memory": OutOfMemory,
     "no-room": NoRoom,
@@ -93,6 +94,7 @@ _CLASSES: dict[str, type[TetdbError]] = {
         "self-intersection",
         "unrecovered-triangles",
         "nothing-filled",
+        "contradicting-orientation",
         "surface-changed",
     ),
     SurfaceError,
