@@ -11,6 +11,7 @@
 //! | [`pictures`] | draw cuts and surfaces; ParaView, Gmsh, NumPy, DuckDB |
 //! | [`scripting`] | JSON output, configuration files, shell completion |
 //! | [`library`] | the same from Rust |
+//! | [`python`] | the same from Python, in arrays |
 //! | [`errors`] | every error code, exit codes, what to do |
 
 /// Where the chapters' links lead here. In a chapter's file the same links lead to files; what comes first counts.
@@ -26,6 +27,7 @@ macro_rules! links {
             "[pictures]: crate::guide::pictures\n",
             "[scripting]: crate::guide::scripting\n",
             "[library]: crate::guide::library\n",
+            "[python]: crate::guide::python\n",
             "[errors]: crate::guide::errors\n",
             "[`Surface`]: crate::Surface\n",
             "[`Mesher`]: crate::Mesher\n",
@@ -74,6 +76,10 @@ pub mod scripting {
 pub mod library {
     #![doc = links!()]
     #![doc = include_str!("library.md")]
+}
+pub mod python {
+    #![doc = links!()]
+    #![doc = include_str!("python.md")]
 }
 pub mod errors {
     #![doc = links!()]

@@ -175,6 +175,7 @@ chapters! {
     pictures: 10,
     scripting: 5,
     library: 0,
+    python: 0,
     errors: 2,
 }
 
