@@ -62,7 +62,7 @@ def store(info):
     return {"tets": info["tets"], "parts": len(parts),
             "tets by part": {p["id"]: p["tets"] for p in parts},
             "volume by region": {r["region"]: r["volume"] for r in info["regions"] if r["filled"]},
-            "faces between parts": {p["id"]: {n["subdomain"]: n["faces"] for n in p["neighbors"]} for p in parts}}
+            "faces between parts": {p["id"]: {n["subdomain"]: n["faces"] for n in p["neighbors"] or []} for p in parts}}
 
 
 # Areas per label of the first file read are what the others must have.

@@ -44,10 +44,11 @@ pub fn run(args: &ExportArgs, console: &Console) -> Result<u8, Failure> {
     }
     let to_stdout = args.out.iter().any(|out| out == Path::new("-"));
     if to_stdout && (console.is_json() || args.out.len() > 1) {
-        return Err(
-            Failure::new("usage", "the standard output holds one mesh and nothing else")
-                .help("leave --json and other names out"),
-        );
+        return Err(Failure::new(
+            "usage",
+            "the standard output holds one mesh and nothing else",
+        )
+        .help("leave --json and other names out"));
     }
     if !args.force {
         let inputs = inputs_of(&args.store);

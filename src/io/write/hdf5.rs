@@ -45,9 +45,16 @@ impl Number {
 /// A node of the file's tree.
 pub(super) struct Object {
     name: &'static str,
-    /// Name, datatype, dataspace and bytes of each.
-    attributes: Vec<(&'static str, Vec<u8>, Vec<u8>, Vec<u8>)>,
+    attributes: Vec<Attribute>,
     content: Content,
+}
+
+/// A small value attached to an object.
+struct Attribute {
+    name: &'static str,
+    datatype: Vec<u8>,
+    dataspace: Vec<u8>,
+    bytes: Vec<u8>,
 }
 
 enum Content {
@@ -77,10 +84,12 @@ impl Object {
 
     /// The same with a list of integers attached.
     pub fn with_integers(mut self, name: &'static str, values: &[i64]) -> Self {
-        let bytes = values.iter().flat_map(|v| v.to_le_bytes()).collect();
-        let shape = dataspace(&[values.len() as u64]);
-        self.attributes
-            .push((name, Number::I64.datatype(), shape, bytes));
+        self.attributes.push(Attribute {
+            name,
+            datatype: Number::I64.datatype(),
+            dataspace: dataspace(&[values.len() as u64]),
+            bytes: values.iter().flat_map(|v| v.to_le_bytes()).collect(),
+        });
         self
     }
 
@@ -88,9 +97,12 @@ impl Object {
     pub fn with_text(mut self, name: &'static str, text: &str) -> Self {
         let mut datatype = vec![0x13, 0, 0, 0];
         datatype.extend((text.len() as u32).to_le_bytes());
-        let scalar = vec![2, 0, 0, 0];
-        self.attributes
-            .push((name, datatype, scalar, text.as_bytes().to_vec()));
+        self.attributes.push(Attribute {
+            name,
+            datatype,
+            dataspace: vec![2, 0, 0, 0],
+            bytes: text.as_bytes().to_vec(),
+        });
         self
     }
 }
@@ -173,18 +185,18 @@ fn put_object(object: &Object, plan: &mut Plan) -> u64 {
             message(0x08, &layout);
         }
     }
-    for (name, datatype, dataspace, bytes) in &object.attributes {
-        let mut attribute = vec![3, 0];
-        for length in [name.len() + 1, datatype.len(), dataspace.len()] {
-            attribute.extend((length as u16).to_le_bytes());
+    for a in &object.attributes {
+        let mut data = vec![3, 0];
+        for length in [a.name.len() + 1, a.datatype.len(), a.dataspace.len()] {
+            data.extend((length as u16).to_le_bytes());
         }
-        attribute.push(0);
-        attribute.extend_from_slice(name.as_bytes());
-        attribute.push(0);
-        for part in [datatype, dataspace, bytes] {
-            attribute.extend_from_slice(part);
+        data.push(0);
+        data.extend_from_slice(a.name.as_bytes());
+        data.push(0);
+        for part in [&a.datatype, &a.dataspace, &a.bytes] {
+            data.extend_from_slice(part);
         }
-        message(0x0c, &attribute);
+        message(0x0c, &data);
     }
     let mut header = b"OHDR\x02\x02".to_vec();
     header.extend((messages.len() as u32).to_le_bytes());

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::error::{Result, WriteError};
 use super::hdf5::{self, Number, Object};
-use super::stream::{Stream, Strip};
+use super::stream::Strip;
 
 /// Where an array belongs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

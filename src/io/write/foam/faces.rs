@@ -168,7 +168,7 @@ impl FaceWalk {
         let mut census = Census::default();
         let (dir, bytes) = (mesh.dir().to_owned(), mesh.sorter_bytes());
         let mut sides = Sorter::new(&dir, bytes);
-        for p in 0..parts.len() {
+        for (p, row) in parts.iter().enumerate() {
             let mut part = mesh.open_part(p)?.part;
             let (mut patches, mut between) = (BTreeMap::new(), BTreeMap::new());
             for facet in part.facets() {
@@ -188,7 +188,7 @@ impl FaceWalk {
                 sides.push(Side {
                     cut: face.cut,
                     index: face.index,
-                    rank: parts[p].rank,
+                    rank: row.rank,
                     tet: face.tet,
                     other: face.other,
                     vertices: sorted_face(face.vertices).0,

@@ -300,7 +300,8 @@ impl Job<'_> {
             size.cells,
             ascii,
             |file| {
-                (0..size.cells as u32).try_for_each(|cell| file.label((first_tet as u32 + cell) as i32))
+                (0..size.cells as u32)
+                    .try_for_each(|cell| file.label((first_tet as u32 + cell) as i32))
             },
         )?;
         let mut zones = Zones::new(&scratch, false, bytes);

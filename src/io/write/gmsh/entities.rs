@@ -39,9 +39,10 @@ impl Entities {
             let rank = parts[p].rank;
             for chunk in 0..part.tet_summaries().len() {
                 let summary = part.tet_summaries()[chunk];
-                for axis in 0..3 {
-                    bounds[0][axis] = bounds[0][axis].min(summary.bounds[0][axis]);
-                    bounds[1][axis] = bounds[1][axis].max(summary.bounds[1][axis]);
+                let [low, high] = &mut bounds;
+                for (axis, (low, high)) in low.iter_mut().zip(high).enumerate() {
+                    *low = low.min(summary.bounds[0][axis]);
+                    *high = high.max(summary.bounds[1][axis]);
                 }
                 let [least, greatest] = summary.regions;
                 if least == greatest {
