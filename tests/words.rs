@@ -30,8 +30,6 @@ const IN_NO_MESSAGE: &[&str] = &["crew", "made", "told"];
 
 /// Modules whose names are not yet plain.
 const NAMES_OPEN: &[&str] = &["cli", "optimize"];
-/// Files and folders below the command line that still name flags.
-const FLAGS_OPEN: &[&str] = &["pipeline/plan/options.rs", "sizing", "surface/defect.rs"];
 
 #[test]
 fn names_are_plain() {
@@ -66,23 +64,10 @@ fn only_the_command_line_names_flags() {
         .into_iter()
         .filter(names_flag)
         .collect();
-    let open = |path: &&PathBuf| {
-        FLAGS_OPEN
-            .iter()
-            .any(|open| path.starts_with(src().join(open)))
-    };
-    let new: Vec<_> = all.iter().filter(|path| !open(path)).collect();
     assert!(
-        new.is_empty(),
-        "string literals with flags of the command line in {new:#?}"
+        all.is_empty(),
+        "string literals with flags of the command line in {all:#?}"
     );
-    for name in FLAGS_OPEN {
-        let folder = src().join(name);
-        assert!(
-            all.iter().any(|p| p.starts_with(&folder)),
-            "{name} names no flag any more"
-        );
-    }
 }
 
 #[test]

@@ -112,6 +112,11 @@ pub const CODES: &[CodeRow] = &[
         "input triangles that could not be recovered as faces of the mesh",
     ),
     row(
+        "contradicting-orientation",
+        3,
+        "filling by orientation, where triangles do not agree on what is inside",
+    ),
+    row(
         "nothing-filled",
         3,
         "the surface encloses no region to fill",
@@ -129,6 +134,11 @@ pub const CODES: &[CodeRow] = &[
         "the store was begun by a version whose recipe gives another mesh",
     ),
     row("busy", 5, "another process writes the store"),
+    row(
+        "store-changed",
+        5,
+        "another process changed the store while it was read; ask again",
+    ),
     row("memory", 6, "the memory cap is too small for this work"),
     row(
         "no-room",
@@ -160,7 +170,7 @@ pub const CODES: &[CodeRow] = &[
     row(
         "size-field-changed",
         8,
-        "the sizes of --size-field are not those the store was begun with",
+        "the sizes of the size field are not those the store was begun with",
     ),
     row(
         "stopped",

@@ -31,7 +31,9 @@ impl From<WriteError> for Error {
 
 impl From<SurfaceError> for Error {
     fn from(e: SurfaceError) -> Self {
-        let error = Self::new(e.code(), &e).with_help(e.help());
+        let error = Self::new(e.code(), &e)
+            .with_help(e.help())
+            .with_remedy(Remedy::General);
         match &e {
             SurfaceError::Invalid { defect, n_defects } => {
                 let more = match n_defects.saturating_sub(1) {
@@ -81,6 +83,7 @@ impl From<StoreError> for Error {
             StoreError::Storage(inner) => return inner.into(),
             StoreError::Sealed(SealedError::Storage(inner)) => return inner.into(),
             StoreError::Busy { .. } => "busy",
+            StoreError::Changed { .. } => "store-changed",
             StoreError::NotFound { .. } => "no-such-store",
             StoreError::NoSubdomain { .. } => "no-such-part",
             StoreError::NotOurs { .. } => "not-a-store",
@@ -112,6 +115,11 @@ impl From<SizingError> for Error {
 
 impl From<BoundaryError> for Error {
     fn from(e: BoundaryError) -> Self {
+        if matches!(e, BoundaryError::Orientation { .. }) {
+            return Self::new("contradicting-orientation", &e)
+                .with_help("fill all regions, which needs no orientation, or give each shared wall from both sides")
+                .with_remedy(Remedy::General);
+        }
         Self::new("unrecovered-triangles", &e)
             .with_help("look at these triangles; a finer or better shaped surface there helps")
             .with_remedy(Remedy::General)
@@ -143,6 +151,7 @@ impl From<PipelineError> for Error {
 fn with_general_help(code: &'static str, e: &impl ToString) -> Error {
     let help = match code {
         "busy" => "wait for the other process, or stop it",
+        "store-changed" => "ask again: the answer is then of the store as it is now",
         "disk-full" => "free some space, then resume",
         "damaged" => {
             "verify the store to see what is damaged; damaged sub-domains can be meshed again"

@@ -2,9 +2,11 @@
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 use super::preflight::{self, preflight, scratch_beside, with_free_space};
+use super::store::say_how_locked;
 use super::{
     Bytes, Error, Event, Optimize, Regions, Seal, Settings, Sizes, Store, Subdomains, Surface,
     Verification, guarded, job, replace, verify,
@@ -12,7 +14,7 @@ use super::{
 use crate::audit::Level;
 use crate::pipeline::{self, Estimate, Options, Prepared, RECIPE};
 use crate::storage::{Budget, CancelToken, attempt, n_threads};
-use crate::store::{Catalog, StoreError};
+use crate::store::{Catalog, StoreError, WriterLock};
 use crate::surface;
 use tetdb_schema::catalog::StoreState;
 
@@ -251,7 +253,7 @@ impl Mesher {
             preflight::surface_fits(&self.surface.inner, cap)?;
         }
         let prepared = self.prepare(path, cap, settings)?;
-        let summary = match self.mesh(path, cap, prepared, settings) {
+        let (summary, lock) = match self.mesh(path, cap, prepared, settings) {
             // Another run was faster: what it left decides.
             Err(error) if error.code() == "store-exists" && self.is_there(path)? => {
                 return Ok(Created {
@@ -268,7 +270,7 @@ impl Mesher {
                 0 => None,
                 _ => Some(&self.surface.inner),
             };
-            verify_new(path, surface, cap, settings)?;
+            verify_new(path, surface, cap, settings, lock)?;
         }
         Ok(Created {
             path: path.to_owned(),
@@ -345,14 +347,14 @@ impl Mesher {
         })
     }
 
-    /// Everything from the first commit to the last.
+    /// Everything from the first commit to the last. Returns the lock as well: nobody changes the store before it is verified.
     fn mesh(
         &mut self,
         path: &Path,
         cap: u64,
         prepared: (Prepared, Option<pipeline::HeadStart>),
         settings: &Settings,
-    ) -> Result<pipeline::Summary, Error> {
+    ) -> Result<(pipeline::Summary, Arc<WriterLock>), Error> {
         // The old store is only replaced once the new one is sealed.
         let replaces =
             self.existing == Existing::Replace && path.exists() && !Catalog::is_vacant(path);
@@ -362,6 +364,8 @@ impl Mesher {
         };
         let needed = prepared.0.estimate.disk_peak_bytes(cap, n_threads());
         let mut catalog = self.begin(path, &place, replaces, settings)?;
+        let lock = catalog.lock().expect("it is open for writing");
+        say_how_locked(&catalog, settings);
         settings.say(&Event::StoreBegun(place.clone()));
         let budget = Budget::new(cap);
         let watch = settings.watcher();
@@ -383,9 +387,9 @@ impl Mesher {
         };
         catalog.close()?;
         if replaces {
-            replace::exchange(path)?;
+            replace::exchange(path, &lock)?;
         }
-        Ok(summary)
+        Ok((summary, lock))
     }
 
     /// The catalog of the new store, or of the same replacement that was begun before.
@@ -458,6 +462,7 @@ pub(super) fn verify_new(
     surface: Option<&surface::Surface>,
     cap: u64,
     settings: &Settings,
+    lock: Arc<WriterLock>,
 ) -> Result<Verification, Error> {
     let mut catalog = Catalog::open(path)?;
     let again;
@@ -476,7 +481,7 @@ pub(super) fn verify_new(
         return Err(verify::invalid(&report, path));
     }
     settings.note(verify::sentence(&report));
-    verify::record(path)?;
+    verify::record(path, lock)?;
     Ok(Verification { report })
 }
 

@@ -2,17 +2,18 @@
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use serde_json::json;
 
 use super::mesher::predict;
 use super::preflight::scratch_beside;
-use super::store::open_finished;
+use super::store::{open_finished, open_to_change};
 use super::{Error, Settings, Sizes, Store, Surface, guarded, job, verify};
 use crate::audit::Level;
 use crate::pipeline::{self, NewSizes, Options, RECIPE, ResaturateSummary, Resaturation, Values};
 use crate::sizing::SizeField;
-use crate::store::{Catalog, StoreError};
+use crate::store::{Catalog, StoreError, WriterLock};
 use tetdb_schema::catalog::SubdomainRow;
 
 /// What is to be meshed again, and how; begun by [`Store::remesh`].
@@ -39,6 +40,8 @@ pub struct Remesh {
     prepared: Option<NewSizes>,
     repair: bool,
     verify: bool,
+    /// `None`: it is taken when the run begins.
+    lock: Option<Arc<WriterLock>>,
 }
 
 /// What was meshed again.
@@ -60,7 +63,7 @@ impl Store {
     pub fn undo(self) -> Result<Self, Error> {
         let (path, settings) = self.into_parts();
         guarded(&settings, || {
-            let mut catalog = Catalog::open_writable(&path)?;
+            let mut catalog = open_to_change(&path, &settings)?;
             pipeline::undo(&mut catalog)?;
             Ok(catalog.close()?)
         })?;
@@ -71,7 +74,7 @@ impl Store {
     pub fn forget_previous(&mut self) -> Result<usize, Error> {
         self.close_session();
         guarded(self.settings(), || {
-            let mut catalog = Catalog::open_writable(self.path())?;
+            let mut catalog = open_to_change(self.path(), self.settings())?;
             let n = pipeline::forget(&mut catalog)?;
             catalog.close()?;
             Ok(n)
@@ -91,6 +94,7 @@ impl Remesh {
             prepared: None,
             repair: false,
             verify: true,
+            lock: None,
         }
     }
 
@@ -136,6 +140,13 @@ impl Remesh {
         self
     }
 
+    /// By a caller in this crate who has the lock of the store.
+    #[cfg(feature = "cli")]
+    pub(crate) fn locked(mut self, lock: Option<Arc<WriterLock>>) -> Self {
+        self.lock = lock;
+        self
+    }
+
     /// With sizes that a caller in this crate has prepared.
     #[cfg(feature = "cli")]
     pub(crate) fn prepared_sizes(mut self, sizes: Option<NewSizes>) -> Self {
@@ -160,16 +171,20 @@ impl Remesh {
     pub(crate) fn run_reported(self) -> Result<ResaturateSummary, Error> {
         let settings = self.settings.clone();
         guarded(&settings, || {
-            let summary = self.change()?;
+            let (summary, lock) = self.change()?;
             if self.verify {
-                verify_changed(&self.path, &self.settings)?;
+                verify_changed(&self.path, &self.settings, lock)?;
             }
             Ok(summary)
         })
     }
 
-    fn change(&self) -> Result<ResaturateSummary, Error> {
-        let mut open = open_finished(&self.path)?;
+    fn change(&self) -> Result<(ResaturateSummary, Arc<WriterLock>), Error> {
+        let mut open = match &self.lock {
+            Some(lock) => Catalog::open_locked(&self.path, lock.clone())?,
+            None => open_to_change(&self.path, &self.settings)?,
+        };
+        let lock = open.lock().expect("it is open for writing");
         let options = job::options_of(&open.job()?, &self.path)?;
         let ranks = match self.repair && self.ranks.is_empty() {
             true => damaged(&mut open)?,
@@ -180,17 +195,15 @@ impl Remesh {
             Some(sizes) => Some(sizes.clone()),
             None => self.new_sizes(&mut open, &options)?,
         };
-        drop(open);
         let what = Resaturation {
             ranks,
             sizes,
             repair: self.repair,
         };
-        let mut catalog = Catalog::open_writable(&self.path)?;
         let (budget, watch) = (self.settings.budget()?, self.settings.watcher());
-        let summary = pipeline::resaturate(&mut catalog, &options, &what, &budget, &watch)?;
-        catalog.close()?;
-        Ok(summary)
+        let summary = pipeline::resaturate(&mut open, &options, &what, &budget, &watch)?;
+        open.close()?;
+        Ok((summary, lock))
     }
 
     fn new_sizes(&self, open: &mut Catalog, options: &Options) -> Result<Option<NewSizes>, Error> {
@@ -286,8 +299,12 @@ fn read_all(catalog: &mut Catalog, rank: u32) -> Result<(), StoreError> {
     Ok(part.check()?)
 }
 
-/// Verifies a changed store, against its surface if that is still there, and puts it on record.
-pub(crate) fn verify_changed(path: &std::path::Path, settings: &Settings) -> Result<(), Error> {
+/// Verifies a changed store, against its surface if that is still there, and puts it on record; `lock` was held since.
+pub(crate) fn verify_changed(
+    path: &std::path::Path,
+    settings: &Settings,
+    lock: Arc<WriterLock>,
+) -> Result<(), Error> {
     let report = {
         let mut open = open_finished(path)?;
         let sources = open.job()?.surfaces;
@@ -304,5 +321,5 @@ pub(crate) fn verify_changed(path: &std::path::Path, settings: &Settings) -> Res
         return Err(verify::invalid(&report, path).with_help("undo brings back what was before"));
     }
     settings.note(verify::sentence(&report));
-    verify::record(path)
+    verify::record(path, lock)
 }

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use super::{Error, Settings};
 use crate::storage::DiskPath;
-use crate::store::{Catalog, StoreError};
+use crate::store::{Catalog, StoreError, WriterLock};
 use tetdb_schema::catalog::StoreState;
 
 /// Where the new store is built.
@@ -40,11 +40,28 @@ pub(crate) fn is_begun(path: &Path) -> bool {
     state(&new_of(path)).is_some()
 }
 
-/// Brings to its end what an interrupted exchange left: the names are right afterwards. Errors: the disk.
+/// Brings to its end what an interrupted exchange left: the names are right afterwards.
+///
+/// Errors: the disk; `busy` while another run is at it, which has the lock of the new store until all names are right.
 pub(crate) fn settle(path: &Path, settings: &Settings) -> Result<(), Error> {
     let (new, old) = (new_of(path), old_of(path));
+    let places = [&new, path, &old];
+    let Some(place) = places.into_iter().find(|place| Catalog::is_at(*place)) else {
+        return Ok(());
+    };
+    if !new.exists() && !old.exists() {
+        return Ok(());
+    }
+    let lock = match WriterLock::acquire(place) {
+        Err(StoreError::NotFound { .. } | StoreError::Busy { .. }) => {
+            let (path, writer) = (path.to_owned(), "another process".to_owned());
+            return Err(StoreError::Busy { path, writer }.into());
+        }
+        other => other?,
+    };
     if !path.exists() && state(&new).is_some_and(StoreState::is_finished) {
         rename(&new, path)?;
+        lock.moved_to(path);
         settings.note(format!(
             "{} was finished as {}, and has its place now",
             path.display(),
@@ -53,6 +70,7 @@ pub(crate) fn settle(path: &Path, settings: &Settings) -> Result<(), Error> {
     }
     if !path.exists() && state(&old).is_some() {
         rename(&old, path)?;
+        lock.moved_to(path);
     }
     if path.exists() && state(&old).is_some() {
         remove(&old)?;
@@ -79,33 +97,40 @@ pub(crate) fn take_up(
     if is_same(&mut catalog) {
         return Ok(Some(catalog));
     }
+    let _lock = catalog.lock();
     drop(catalog);
     remove(&new)?;
     Ok(None)
 }
 
-/// The new store, which is sealed and closed, takes its place. Errors: the disk.
-pub(crate) fn exchange(path: &Path) -> Result<(), Error> {
+/// The new store, which is sealed and closed and whose lock is held, takes its place. Errors: the disk.
+pub(crate) fn exchange(path: &Path, lock: &WriterLock) -> Result<(), Error> {
     let (new, old) = (new_of(path), old_of(path));
+    // A store whose writer lives is not replaced; while this one is held, no writer begins.
+    let held = match Catalog::open_writable(path) {
+        Err(error @ StoreError::Busy { .. }) => return Err(error.into()),
+        other => other.ok(),
+    };
     if path.exists() {
-        // A store whose writer lives is not replaced; while this one is held, no writer begins.
-        let held = match Catalog::open_writable(path) {
-            Err(error @ StoreError::Busy { .. }) => return Err(error.into()),
-            other => other.ok(),
-        };
         rename(path, &old)?;
-        drop(held);
     }
     rename(&new, path)?;
+    lock.moved_to(path);
     if old.exists() {
         remove(&old)?;
     }
+    drop(held);
     Ok(())
 }
 
-/// Removes a store that this program made. Errors: the disk.
+/// Removes a store that this program made. It has another name first: what has its name is a whole store, or nothing. Errors: the disk.
 pub(crate) fn remove(path: &Path) -> Result<(), Error> {
-    Ok(DiskPath::from(path).remove_dir_all()?)
+    let removed = beside(path, "being-removed");
+    if removed.exists() {
+        DiskPath::from(&removed).remove_dir_all()?;
+    }
+    rename(path, &removed)?;
+    Ok(DiskPath::from(&removed).remove_dir_all()?)
 }
 
 /// Errors: the disk.

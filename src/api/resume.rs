@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::mesher::{Created, lent_or_given, predict, report, verify_new};
 use super::preflight::{scratch_beside, with_free_space};
+use super::store::say_how_locked;
 use super::{Error, Event, Settings, Store, Surface, guarded, job, replace};
 use crate::pipeline;
 use crate::storage::Budget;
@@ -40,12 +41,14 @@ fn run(path: &Path, settings: &Settings, verify: bool) -> Result<Created, Error>
         true => replace::new_of(path),
         false => path.to_owned(),
     };
-    let mut reader = Catalog::open(&place)?;
-    let (state, job) = (reader.state()?, reader.job()?);
+    let mut catalog = Catalog::open_writable(&place)?;
+    say_how_locked(&catalog, settings);
+    let lock = catalog.lock().expect("it is open for writing");
+    let (state, job) = (catalog.state()?, catalog.job()?);
     if !state.is_finished() {
-        job::check_recipe(&mut reader)?;
+        job::check_recipe(&mut catalog)?;
     }
-    drop(reader);
+    drop(catalog);
     let scratch = scratch_beside(&surface::Surface::default(), cap, path)?;
     let mut surface = Surface::of_record(&job.surfaces, &place, &scratch)?;
     drop(scratch);
@@ -60,15 +63,16 @@ fn run(path: &Path, settings: &Settings, verify: bool) -> Result<Created, Error>
         }
         false => {
             let options = job::options_of(&job, &place)?;
-            Some(go_on(&place, &options, &mut surface, cap, settings)?)
+            let catalog = Catalog::open_locked(&place, lock.clone())?;
+            Some(go_on(catalog, &options, &mut surface, cap, settings)?)
         }
     };
     if replaces {
-        replace::exchange(path)?;
+        replace::exchange(path, &lock)?;
     }
     if verify {
         let at_hand = Some(&surface.inner).filter(|s| s.n_triangles() > 0);
-        verify_new(path, at_hand, cap, settings)?;
+        verify_new(path, at_hand, cap, settings, lock)?;
     }
     Ok(Created {
         path: path.to_owned(),
@@ -78,13 +82,13 @@ fn run(path: &Path, settings: &Settings, verify: bool) -> Result<Created, Error>
 }
 
 fn go_on(
-    place: &Path,
+    mut catalog: Catalog,
     options: &pipeline::Options,
     surface: &mut Surface,
     cap: u64,
     settings: &Settings,
 ) -> Result<pipeline::Summary, Error> {
-    let mut catalog = Catalog::open_writable(place)?;
+    let place = &catalog.dir().to_owned();
     let (watch, budget) = (settings.watcher(), Budget::new(cap));
     let made = if catalog.state()? < StoreState::Coarse {
         let inner = &surface.inner;

@@ -15,7 +15,8 @@ use tetdb_schema::catalog::{InterfaceRow, RegionRow, StoreState, SubdomainRow};
 /// Memory of one open sub-domain: half for the database, half for decoded vertices.
 const SUBDOMAIN_BYTES: usize = 16 << 20;
 
-/// A finished store, open for reading. Others may read it at the same time.
+/// A finished store, open for reading. Others may read and change it at the same time: this goes on to answer from the state it was
+/// opened in, or with the error `store-changed` where files of that state are gone.
 ///
 /// ```
 /// # let dir = tempfile::tempdir()?;
@@ -36,6 +37,8 @@ pub struct Store {
     path: PathBuf,
     settings: Settings,
     context: RunContext,
+    /// What all answers come from, whatever others do to the store meanwhile.
+    catalog: Catalog,
     summary: Summary,
     session: Option<QuerySession>,
 }
@@ -76,11 +79,16 @@ impl Store {
     pub fn open_with(path: impl AsRef<Path>, settings: Settings) -> Result<Self, Error> {
         let path = path.as_ref().to_owned();
         let context = RunContext::new(settings.n_threads(), settings.cancel.clone());
-        let summary = guarded_in(&context, || Summary::of(&mut open_finished(&path)?))?;
+        let (catalog, summary) = guarded_in(&context, || {
+            let mut catalog = open_finished(&path)?;
+            let summary = Summary::of(&mut catalog)?;
+            Ok((catalog, summary))
+        })?;
         Ok(Self {
             path,
             settings,
             context,
+            catalog,
             summary,
             session: None,
         })
@@ -110,7 +118,7 @@ impl Store {
     /// Errors: `no-such-part`; damage.
     pub fn subdomain(&self, rank: u32) -> Result<Subdomain, Error> {
         guarded_in(&self.context, || {
-            Ok(Catalog::open(&self.path)?.open_subdomain(rank, SUBDOMAIN_BYTES)?)
+            Ok(self.catalog.share().open_subdomain(rank, SUBDOMAIN_BYTES)?)
         })
     }
 
@@ -137,7 +145,7 @@ impl Store {
     pub fn verify(&self, level: VerifyLevel) -> Result<Verification, Error> {
         guarded_in(&self.context, || {
             let cap = self.settings.cap()?;
-            let mut catalog = open_finished(&self.path)?;
+            let mut catalog = self.catalog.share();
             let sources = catalog.job()?.surfaces;
             let scratch = scratch_beside(
                 &crate::surface::Surface::default(),
@@ -179,7 +187,7 @@ impl Store {
         work: impl FnOnce(&mut QuerySession) -> Result<T, Error>,
     ) -> Result<T, Error> {
         let Self {
-            path,
+            catalog,
             settings,
             context,
             session,
@@ -187,10 +195,7 @@ impl Store {
         } = self;
         guarded_in(context, || {
             if session.is_none() {
-                *session = Some(QuerySession::open(
-                    open_finished(path)?,
-                    &settings.budget()?,
-                )?);
+                *session = Some(QuerySession::open(catalog.share(), &settings.budget()?)?);
             }
             work(session.as_mut().expect("it was opened above"))
         })
@@ -228,7 +233,27 @@ impl Summary {
 
 /// Opens a store that is finished. Errors: `store-unfinished`.
 pub(crate) fn open_finished(path: &Path) -> Result<Catalog, Error> {
-    let mut catalog = Catalog::open(path)?;
+    if_finished(Catalog::open(path)?, path)
+}
+
+/// Opens a store that is finished, to change it. Errors: `store-unfinished`; `busy` while another does.
+pub(crate) fn open_to_change(path: &Path, settings: &Settings) -> Result<Catalog, Error> {
+    let catalog = Catalog::open_writable(path)?;
+    say_how_locked(&catalog, settings);
+    if_finished(catalog, path)
+}
+
+/// Says so when nothing but a file keeps others from writing.
+pub(crate) fn say_how_locked(catalog: &Catalog, settings: &Settings) {
+    if catalog.lock().is_some_and(|lock| lock.is_by_name()) {
+        settings.note(format!(
+            "note: the file system of {} knows no locks; writer.lock in it keeps other writers of this host away, and has to be removed by hand when a writer of another host has died",
+            catalog.dir().display()
+        ));
+    }
+}
+
+fn if_finished(mut catalog: Catalog, path: &Path) -> Result<Catalog, Error> {
     match catalog.state()?.is_finished() {
         true => Ok(catalog),
         false => Err(StoreError::Unfinished {

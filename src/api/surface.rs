@@ -9,7 +9,7 @@ use xxhash_rust::xxh3::Xxh3;
 use super::error::{Error, Remedy};
 use super::{Length, Settings, guarded};
 use crate::geom::Point;
-use crate::io::read::read_surface;
+use crate::io::read::{is_stream, read_surface};
 use crate::io::write;
 use crate::samples::{PREFIX, SampleSpec};
 use crate::sizing::{SizeField, SizeOptions};
@@ -87,11 +87,12 @@ pub(crate) const IN_STORE: &str = "store:surface.obj";
 impl Surface {
     /// Reads files as one surface, each file a label unless it has labels of its own.
     ///
-    /// STL, PLY, OBJ, OFF, MEDIT, Gmsh and TetGen files. Errors: what cannot be read, with its line or byte.
+    /// STL, PLY, OBJ, OFF, MEDIT, Gmsh and TetGen files, also packed as `.gz` or `.zst`, and pipes. Errors: what cannot be read, with its line or byte.
     pub fn read<P: AsRef<Path>>(files: impl IntoIterator<Item = P>) -> Result<Self, Error> {
         let paths: Vec<PathBuf> = files.into_iter().map(|p| p.as_ref().to_owned()).collect();
         guarded(&Settings::new(), || {
-            Self::read_in(&paths)?.oriented(&ScratchSpace::boundless())
+            let cap = Settings::new().cap()?;
+            Self::read_in(&paths, cap)?.oriented(&ScratchSpace::boundless())
         })
     }
 
@@ -201,12 +202,12 @@ impl Surface {
         })
     }
 
-    /// Reads files, or one sample, within a scratch space.
-    pub(crate) fn load(words: &[String]) -> Result<Self, Error> {
+    /// Reads files, or one sample; of packed files and pipes a quarter of `cap` is held.
+    pub(crate) fn load(words: &[String], cap: u64) -> Result<Self, Error> {
         let samples = words.iter().filter(|word| word.starts_with(PREFIX)).count();
         match (samples, words) {
             (1, [word]) => Self::generated(word),
-            (0, _) => Self::read_in(&words.iter().map(PathBuf::from).collect::<Vec<_>>()),
+            (0, _) => Self::read_in(&words.iter().map(PathBuf::from).collect::<Vec<_>>(), cap),
             _ => Err(
                 Error::new("usage", "a sample cannot be joined with other surfaces")
                     .with_help("write it to a file first")
@@ -251,13 +252,17 @@ impl Surface {
         store: &Path,
         scratch: &ScratchSpace,
     ) -> Result<Self, Error> {
+        let cap = Settings::new().cap()?;
         let mut surface = match sources {
             [only] if only.path == IN_STORE => {
-                let mut surface = Self::read_in(&[in_store(store)])?;
+                let mut surface = Self::read_in(&[in_store(store)], cap)?;
                 surface.sources = vec![given(&surface.inner)];
                 surface
             }
-            _ => Self::load(&sources.iter().map(|s| s.path.clone()).collect::<Vec<_>>())?,
+            _ => Self::load(
+                &sources.iter().map(|s| s.path.clone()).collect::<Vec<_>>(),
+                cap,
+            )?,
         };
         for (then, now) in sources.iter().zip(&surface.sources) {
             if (then.bytes, then.hash) != (now.bytes, now.hash) {
@@ -292,10 +297,15 @@ impl Surface {
         Ok(Self::of(spec.make()?.into(), vec![source]))
     }
 
-    fn read_in(paths: &[PathBuf]) -> Result<Self, Error> {
-        let inner = read_surface(paths)?;
-        let sources: Result<_, Error> = paths.iter().map(|p| source(p)).collect();
-        Ok(Self::of(inner, sources?))
+    fn read_in(paths: &[PathBuf], cap: u64) -> Result<Self, Error> {
+        // What can be read but once is not there for a later run: the store keeps a copy.
+        let is_stream = paths.iter().any(|path| is_stream(path));
+        let inner = read_surface(paths, cap / 4)?;
+        let sources = match is_stream {
+            true => vec![given(&inner)],
+            false => paths.iter().map(|p| source(p)).collect::<Result<_, _>>()?,
+        };
+        Ok(Self::of(inner, sources))
     }
 
     fn built(
@@ -354,6 +364,10 @@ pub(crate) fn source(path: &Path) -> Result<SurfaceSource, Error> {
         Error::new("unreadable-file", format!("the file cannot be read: {e}")).at(path.display())
     };
     let absolute = std::path::absolute(path).map_err(io)?;
+    if !std::fs::metadata(path).map_err(io)?.is_file() {
+        let message = "it is not a regular file, and would have to be read twice";
+        return Err(Error::new("unreadable-file", message).at(path.display()));
+    }
     let mut file = std::fs::File::open(path).map_err(io)?;
     let mut hash = Xxh3::new();
     let (mut buffer, mut bytes) = (vec![0; 1 << 16], 0);

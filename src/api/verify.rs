@@ -1,12 +1,13 @@
 //! Is it a valid mesh of its surface?
 
 use std::path::Path;
+use std::sync::Arc;
 
 use super::Settings;
 use super::error::{Error, Remedy};
 use crate::audit::{self, Level, Report, VerifyOptions};
 use crate::storage::attempt;
-use crate::store::{Catalog, StoreError};
+use crate::store::{Catalog, StoreError, WriterLock};
 use crate::surface::Surface;
 use tetdb_schema::catalog::StoreState;
 
@@ -122,9 +123,9 @@ pub(crate) fn invalid(report: &Report, path: &Path) -> Error {
     .with_remedy(Remedy::General)
 }
 
-/// Puts on record that a finished store was verified.
-pub(crate) fn record(path: &Path) -> Result<(), Error> {
-    let mut catalog = Catalog::open_writable(path)?;
+/// Puts on record that a finished store was verified, which nobody else has changed meanwhile: `lock` was held.
+pub(crate) fn record(path: &Path, lock: Arc<WriterLock>) -> Result<(), Error> {
+    let mut catalog = Catalog::open_locked(path, lock)?;
     if catalog.state()? < StoreState::Verified {
         catalog.commit(|step| {
             step.set_state(StoreState::Verified);

@@ -3,7 +3,6 @@
 //! The mesh itself is read by [`verify`](super::verify), chunk by chunk; here every file that counts is, also those that are only kept:
 //! coarse snapshots, previous versions, stages.
 
-use crate::sealed::CoarseSnapshot;
 use crate::storage::check_cancelled;
 use crate::store::{Catalog, StoreError};
 use tetdb_schema::catalog::{CoarseRow, SubdomainRow};
@@ -90,10 +89,9 @@ impl DamageFound {
     }
 
     fn of_snapshot(&mut self, store: &mut Catalog, row: CoarseRow) -> Result<(), StoreError> {
-        let path = store.coarse_path(row.rank, row.generation);
-        let mut leaf = match CoarseSnapshot::open(&path, row, MEMORY_BYTES) {
+        let mut leaf = match store.open_coarse(row.rank, MEMORY_BYTES) {
             Ok(leaf) => leaf,
-            Err(error) => return self.note::<(), _>(Err(error)).map(drop),
+            Err(error) => return self.note::<(), StoreError>(Err(error)).map(drop),
         };
         let mut is_sound = true;
         for chunk in leaf.vertices() {

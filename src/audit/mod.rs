@@ -11,7 +11,7 @@
 //!
 //! Reading order: [`Report`] (what is found), `claims` (facets say which tetrahedra they touch),
 //! `pass` (once through a sub-domain), `pairing` (faces across chunks), `interface` (faces across
-//! sub-domains), `against` (the input). `damage` lists all that cannot be read.
+//! sub-domains), `against` (the input), `rows` (summaries and the catalog). `damage` lists all that cannot be read.
 
 mod against;
 mod claims;
@@ -23,6 +23,7 @@ mod options;
 mod pairing;
 mod pass;
 mod report;
+mod rows;
 #[cfg(test)]
 mod tests;
 
@@ -64,7 +65,9 @@ pub fn verify(
     }
     let interfaces = store.interfaces()?;
     let regions = store.regions()?;
-    audit.finish(&interfaces, &regions)
+    let mut report = audit.finish(&interfaces, &regions)?;
+    rows::check_catalog(store, &mut report)?;
+    Ok(report)
 }
 
 /// The digests of all tetrahedra and of all interface faces, recomputed from the chunks.

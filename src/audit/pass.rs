@@ -1,10 +1,9 @@
 //! Once through each sub-domain: facets, then tetrahedra chunk by chunk, then the faces left open.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
 use rayon::prelude::*;
-use tetdb_schema::chunk::ChunkRecord;
+use tetdb_schema::chunk::{ChunkRecord, TetSummary};
 use tetdb_schema::digest::Digest;
 use tetdb_schema::record::{FACES, NO_TET, SealedTet};
 
@@ -12,6 +11,7 @@ use super::against::{Input, check_owners};
 use super::claims::{Claims, FACET, INTERFACE, SortedClaims};
 use super::interface::Interfaces;
 use super::pairing::{OpenSides, Side};
+use super::rows::{Rederived, RegionSums, check_regions};
 use super::{Finding, Level, Offender, Report, VerifyOptions};
 use crate::geom::{Point, insphere, orient};
 use crate::sealed::SealedError;
@@ -33,7 +33,7 @@ pub(super) struct Audit<'a> {
     pairs: FacePairs,
     report: Report,
     digests: [Digest; 2],
-    regions: BTreeMap<u32, u64>,
+    regions: RegionSums,
     /// Sum of the absolute values of what the volume within the boundary is made of.
     volume_scale: f64,
     /// What rounding of those values adds up to at most: of needles and thin plates, more than the tolerance.
@@ -64,7 +64,7 @@ impl<'a> Audit<'a> {
             pairs: FacePairs::new(SealedTet::COUNT_MAX),
             report,
             digests: [Digest::default(); 2],
-            regions: BTreeMap::new(),
+            regions: RegionSums::new(),
             volume_scale: 0.0,
             volume_rounding: 0.0,
             apex: None,
@@ -180,11 +180,13 @@ impl<'a> Audit<'a> {
     ) -> Result<[Digest; 2], StoreError> {
         let rank = part.id().rank();
         let mut digest = [Digest::default(); 2];
+        let mut rows = Rederived::new(rank);
         let mut open = OpenSides::new(self.scratch, self.options.memory_bytes / 4);
         let mut expected = 0;
-        for chunk in 0..part.tet_summaries().len() {
+        for place in 0..part.tet_summaries().len() {
             check_cancelled();
-            let chunk = part.tet_chunk(chunk as u32)?;
+            let chunk = part.tet_chunk(place as u32)?;
+            let summary = part.tet_summaries()[place];
             if chunk.first != expected {
                 return Err(StoreError::Sealed(SealedError::Content {
                     path: part.path().to_owned(),
@@ -201,21 +203,22 @@ impl<'a> Audit<'a> {
             for (i, tet) in tets.iter().enumerate() {
                 let c = part.corners(tet.nodes)?;
                 mark(used, &tet.nodes);
-                digest[0].add_tet(c.map(|c| c.mix), tet.region, rank);
-                *self.regions.entry(tet.region).or_default() += 1;
                 self.distinct(rank, chunk.first + i as u32, tet, &c);
                 corners.push(c);
             }
+            rows.add(tets, &corners, &summary, &mut self.report);
             let marks = self.marks(part, claims, chunk.first, tets)?;
             if self.level(Level::Geometry) {
                 self.orientations(rank, chunk.first, &corners);
             }
             if self.level(Level::Adjacency) {
-                self.pair(rank, chunk.first, tets, &corners, &marks, &mut open)?;
+                self.pair(rank, &summary, tets, &corners, &marks, &mut open)?;
             }
         }
         let total = part.row().tets;
         counted(part, "tetrahedra", u64::from(expected), total)?;
+        digest[0] = rows.digest();
+        rows.finish(part, &mut self.regions, &mut self.report)?;
         for chunk in 0..part.row().chunks[3] {
             for face in part.interface_chunk(chunk)?.records {
                 let mixes = part.corners(face.vertices)?.map(|c| c.mix);
@@ -302,12 +305,13 @@ impl<'a> Audit<'a> {
     fn pair(
         &mut self,
         rank: u32,
-        first: u32,
+        summary: &TetSummary,
         tets: &[SealedTet],
         corners: &[[Corner; 4]],
         marks: &[[u8; 4]],
         open: &mut OpenSides,
     ) -> Result<(), StoreError> {
+        let (first, mut n_open) = (summary.first, 0);
         self.pairs.clear();
         let mut inner = Vec::with_capacity(tets.len() * 2);
         for (t, tet) in tets.iter().enumerate() {
@@ -329,6 +333,7 @@ impl<'a> Audit<'a> {
         }
         for (key, odd, reference) in self.pairs.open() {
             let (t, i) = (reference as usize / 4, reference as usize % 4);
+            n_open += 1;
             open.push(&Side {
                 face: key,
                 odd,
@@ -337,6 +342,16 @@ impl<'a> Audit<'a> {
                 region: tets[t].region,
                 mark: marks[t][i],
             })?;
+        }
+        if n_open != summary.open_faces {
+            let finding = Finding::CatalogDiffers;
+            self.report.find(finding, || {
+                let what = format!(
+                    "a chunk has {n_open} open faces, its summary counts {}",
+                    summary.open_faces
+                );
+                Offender::new(finding, Some(rank), what).with_tet(first)
+            });
         }
         self.report.inner_faces += inner.len() as u64;
         for pair in &inner {
@@ -471,19 +486,7 @@ impl<'a> Audit<'a> {
         if self.level(Level::Topology) {
             self.interfaces.finish(interfaces, &mut self.report)?;
         }
-        let counted = |r: u32| self.regions.get(&r).copied().unwrap_or(0);
-        for row in regions.iter().filter(|r| r.tets != counted(r.region)) {
-            let finding = Finding::CatalogDiffers;
-            self.report.find(finding, || {
-                let what = format!(
-                    "region {} has {} tetrahedra, the catalog counts {}",
-                    row.region,
-                    counted(row.region),
-                    row.tets
-                );
-                Offender::new(finding, None, what)
-            });
-        }
+        check_regions(regions, &self.regions, &mut self.report);
         if self.options.level >= Level::Geometry {
             let (found, expected) = (self.report.volume, self.report.volume_within_boundary);
             let tolerance = VOLUME_TOLERANCE * self.volume_scale.max(found) + self.volume_rounding;

@@ -7,7 +7,7 @@ use super::*;
 use crate::geom::Point;
 use crate::sealed::SealedWriter;
 use crate::store::Catalog;
-use tetdb_schema::catalog::{Job, StoreState};
+use tetdb_schema::catalog::{Job, StoreState, SubdomainRow, TopologyRow};
 
 type Outcome = Result<(), Box<dyn std::error::Error>>;
 
@@ -250,5 +250,69 @@ fn two_subdomains_verify_and_a_changed_interface_is_found() -> Outcome {
     catalog.close()?;
     let report = verify(&mut Catalog::open(&path)?, None, &options)?;
     assert_eq!(report.count(Finding::CatalogDiffers), 1);
+    Ok(())
+}
+
+#[test]
+fn every_row_that_was_changed_is_found() -> Outcome {
+    type Change = fn(&mut SubdomainRow, &mut Vec<TopologyRow>);
+    let changes: [Change; 9] = [
+        |row, _| row.volume *= 1.0 + 1e-12,
+        |row, _| row.bounds[1][0] += 1.0,
+        |row, _| row.bytes += 1,
+        |row, _| row.quality.bins.swap(0, 9),
+        |row, _| row.quality.worst += 1.0,
+        |row, _| row.quality.worst_tet += 1,
+        |row, _| row.quality.dihedral[0] *= 0.5,
+        |_, topology| topology[1].neighbors[0].faces += 1,
+        |_, topology| topology[0].neighbors.clear(),
+    ];
+    let dir = tempfile::tempdir()?;
+    let options = VerifyOptions {
+        level: Level::Topology,
+        memory_bytes: 4 << 20,
+        temp_dir: dir.path().to_owned(),
+    };
+    for (i, change) in changes.into_iter().enumerate() {
+        let path = dir.path().join(format!("{i}.tetdb"));
+        crate::store::two_subdomains(&path)?;
+        let mut catalog = Catalog::open_writable(&path)?;
+        let (mut row, mut topology) = (catalog.subdomain(1)?, catalog.topology()?);
+        change(&mut row, &mut topology);
+        catalog.commit(|step| {
+            step.set_subdomain(&row);
+            topology.iter().for_each(|row| step.set_topology(row));
+            Ok(())
+        })?;
+        catalog.close()?;
+        let report = verify(&mut Catalog::open(&path)?, None, &options)?;
+        assert_eq!(report.count(Finding::CatalogDiffers), 1, "change {i}");
+    }
+    Ok(())
+}
+
+#[test]
+fn a_row_without_sense_is_damage_and_no_panic() -> Outcome {
+    type Change = fn(&mut SubdomainRow);
+    let changes: [Change; 4] = [
+        |row| row.bounds[0][1] = f64::NAN,
+        |row| row.bounds.swap(0, 1),
+        |row| row.bounds[1][2] = f64::INFINITY,
+        |row| row.quality.worst = f64::NAN,
+    ];
+    for change in changes {
+        let dir = tempfile::tempdir()?;
+        let path = dir.path().join("a.tetdb");
+        crate::store::two_subdomains(&path)?;
+        let mut catalog = Catalog::open_writable(&path)?;
+        let mut row = catalog.subdomain(0)?;
+        change(&mut row);
+        catalog.commit(|step| {
+            step.set_subdomain(&row);
+            Ok(())
+        })?;
+        let refused = Catalog::open(&path)?.subdomains().map(drop);
+        assert!(refused.is_err_and(|error| error.is_damage()));
+    }
     Ok(())
 }

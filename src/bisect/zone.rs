@@ -55,7 +55,7 @@ impl Zone {
 pub(super) struct InZone<'a> {
     pub zone: &'a Zone,
     pub earlier: &'a [Zone],
-    pub h: &'a dyn Fn(Point) -> f64,
+    pub h: &'a (dyn Fn(Point) -> f64 + Sync),
 }
 
 /// How far from the surface a zone can reach, in units of h at a point not yet in it: by a third wider than it is, for
@@ -124,7 +124,7 @@ pub struct OutsideZones<'a> {
     /// Zones of earlier cuts.
     pub zones: &'a [Zone],
     /// Wanted edge length at a position.
-    pub h: &'a dyn Fn(Point) -> f64,
+    pub h: &'a (dyn Fn(Point) -> f64 + Sync),
 }
 
 impl PlacementRule for OutsideZones<'_> {

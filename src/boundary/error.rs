@@ -45,10 +45,16 @@ pub enum BoundaryError {
         /// The triangle it lies on.
         facet: Box<FacetPlace>,
     },
-    /// The volume outside is not separated from this seed or region.
+    /// The volume outside is not separated from this seed.
     #[error("the surface does not close: {what}")]
     Leak {
-        /// Which seed, region or side is not separated.
+        /// Which seed is not separated.
+        what: String,
+    },
+    /// What triangles point out of cannot be decided.
+    #[error("the triangles do not point out of the same volumes: {what}")]
+    Orientation {
+        /// Which triangles contradict each other.
         what: String,
     },
 }

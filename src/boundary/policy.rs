@@ -37,7 +37,7 @@ pub struct Filled {
 impl RegionPolicy {
     /// Chooses among the volumes behind `outside`, up to `end`. Of seeds nothing is known here: none.
     ///
-    /// Errors: [`BoundaryError::Leak`] when orientation is contradictory.
+    /// Errors: [`BoundaryError::Orientation`] when orientation is contradictory.
     pub fn filled(&self, outside: u32, end: u32, walls: &Walls) -> Result<Filled, BoundaryError> {
         let all: BTreeSet<u32> = (outside + 1..end).collect();
         let mut all_instead_of_parity = false;
@@ -79,16 +79,21 @@ impl RegionPolicy {
 fn winding(outside: u32, end: u32, walls: &Walls) -> Result<Vec<i64>, BoundaryError> {
     let two_ways = |w: &&Wall| w.front != 0 && w.back != 0 && w.front != w.back;
     if let Some(w) = walls.values().find(two_ways) {
-        return Err(BoundaryError::Leak {
+        return Err(BoundaryError::Orientation {
             what: format!(
-                "of the triangles between two volumes {} point one way and {} the other; orient the surface",
+                "of the triangles between two volumes {} point one way and {} the other",
                 w.front, w.back
             ),
         });
     }
     let sign = |w: &Wall| i64::from(w.front > w.back) - i64::from(w.back > w.front);
-    spread(outside, end, walls, sign, 0).ok_or(BoundaryError::Leak {
-        what: "the orientations around its volumes contradict each other".into(),
+    spread(outside, end, walls, sign, 0).ok_or_else(|| {
+        let inner = walls.keys().filter(|(low, _)| *low != outside).count();
+        BoundaryError::Orientation {
+            what: format!(
+                "{inner} walls part two volumes that both lie inside, and a wall given once points out of one of its two volumes alone"
+            ),
+        }
     })
 }
 

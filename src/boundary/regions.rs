@@ -47,7 +47,7 @@ pub struct Regions {
 /// tetrahedra carry their region as attribute; facets carry the regions in front and behind; `tet_of` is refreshed; vertices
 /// without tetrahedra are removed unless they are the surface's.
 ///
-/// Errors: [`BoundaryError::Leak`] when orientation is contradictory or a seed is outside.
+/// Errors: [`BoundaryError::Orientation`] when orientation is contradictory, [`BoundaryError::Leak`] when a seed is outside.
 pub fn fill_regions<P: Pages>(
     mesh: &mut Mesh<P>,
     policy: &RegionPolicy,

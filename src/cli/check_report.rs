@@ -1,12 +1,17 @@
 //! What `check` found, for people and for programs.
 
+use std::path::Path;
+
 use serde_json::{Value, json};
 
-use super::check_expected;
 use super::console::Console;
+use super::words::{self, count};
+use crate::api::{default_cap, predict};
+use crate::geom::short;
+use crate::pipeline::Options;
 use crate::surface::{
     BoundaryLoop, Closing, Defect, Fitness, Surface, Validation, boundary_loops, closing, fitness,
-    show, show_number, validate,
+    show, validate,
 };
 
 /// Defects of one kind, holes and junctions listed for people.
@@ -24,7 +29,7 @@ pub struct Findings<'a> {
     boundary_loops: Vec<BoundaryLoop>,
     closing: Vec<Closing>,
     fitness: Fitness,
-    /// Tetrahedra with default sizes, roughly; none for an open surface.
+    /// Tetrahedra with default sizes, as they are estimated before a mesh; none of a surface that cannot be meshed.
     tets_expected: Option<f64>,
 }
 
@@ -34,7 +39,7 @@ impl<'a> Findings<'a> {
         let validation = validate(surface);
         let is_closed = validation.closedness.is_closed();
         let fitness = fitness(surface, &validation.closedness);
-        let tets_expected = check_expected::tets(surface, &fitness);
+        let tets_expected = (validation.is_valid()).then(|| expected(surface)).flatten();
         Self {
             surface,
             turned,
@@ -103,12 +108,21 @@ impl<'a> Findings<'a> {
     pub fn print(&self, surfaces: &[String], is_repaired: bool, console: &Console) {
         let edges = &self.validation.closedness;
         console.line(&format!(
-            "{} triangles, {} vertices, {} edges, {} part(s)",
+            "{} triangles, {} vertices, {} edges, {}",
             self.surface.n_triangles(),
             self.surface.n_vertices(),
             edges.n_edges,
-            edges.n_components
+            count(edges.n_components as u64, "part")
         ));
+        let bounds = self.surface.bounds();
+        let corners = [bounds.low, bounds.high].map(|p| p.to_array());
+        if self.surface.n_triangles() > 0 {
+            console.line(&format!("box {}", words::bounds(corners)));
+            console.line(&format!(
+                "labels: {}",
+                words::listed(&self.surface.label_names)
+            ));
+        }
         if !edges.two_sided.is_empty() {
             console.line(&format!(
                 "{} triangles are given from both sides: each pair is one facet between two regions",
@@ -157,9 +171,9 @@ impl<'a> Findings<'a> {
     fn print_openness(&self, surfaces: &[String], console: &Console) {
         let open = &self.validation.closedness.open;
         console.line(&format!(
-            "{} open edges around {} hole(s):",
-            open.len(),
-            self.boundary_loops.len()
+            "{} around {}:",
+            count(open.len() as u64, "open edge"),
+            count(self.boundary_loops.len() as u64, "hole")
         ));
         for rim in self.boundary_loops.iter().take(LISTED) {
             console.line(&format!(
@@ -173,12 +187,12 @@ impl<'a> Findings<'a> {
         tell_rest(self.boundary_loops.len() as u64, console);
         let junctions = &self.validation.t_junctions;
         if !junctions.is_empty() {
-            console.line(&format!("{} T-junction(s):", junctions.len()));
+            console.line(&format!("{}:", count(junctions.len() as u64, "T-junction")));
         }
         for junction in junctions.iter().take(LISTED) {
             let how = match junction.distance {
                 0.0 => "exactly".to_owned(),
-                distance => format!("but for {distance:.1e}"),
+                distance => format!("but for {}", short(distance)),
             };
             console.line(&format!(
                 "  a vertex at {} lies on an open edge of triangle {}, {how}",
@@ -208,8 +222,8 @@ impl<'a> Findings<'a> {
         };
         console.line(&if closes.share > 0.0 {
             format!(
-                "all close if points nearer than {:e} of the box diagonal ({:.3e}) are joined, {left}: `tetdb check {surfaces} --repair --weld {:e} --write OUT`",
-                closes.share, closes.distance, closes.share
+                "all close if points nearer than {:e} of the box diagonal ({}) are joined, {left}: `tetdb check {surfaces} --repair --weld {:e} --write OUT`",
+                closes.share, short(closes.distance), closes.share
             )
         } else {
             format!("all close by a repair that joins no points, {left}: `tetdb check {surfaces} --repair --write OUT`")
@@ -222,9 +236,9 @@ impl<'a> Findings<'a> {
             return;
         }
         console.line(&format!(
-            "shapes: {:.3} % of the triangles have an angle below 5 degrees (least {:.4}); edges {} to {}, median {}",
-            100.0 * f.small_angle_share,
-            f.angle_least_degrees,
+            "shapes: {} % of the triangles have an angle below 5 degrees (least {}); edges {} to {}, median {}",
+            short(100.0 * f.small_angle_share),
+            short(f.angle_least_degrees),
             short(f.edge_min),
             short(f.edge_max),
             short(f.edge_median)
@@ -233,8 +247,8 @@ impl<'a> Findings<'a> {
             let forced = match f.forcing_triangles {
                 0 => "no triangle forces a quality of 2 or worse".to_owned(),
                 n => format!(
-                    "at least {:.2} % of them stand on one of {n} triangles whose shape alone makes quality 2 or worse",
-                    100.0 * share
+                    "at least {} % of them stand on one of {n} triangles whose shape alone makes quality 2 or worse",
+                    short(100.0 * share)
                 ),
             };
             console.line(&format!(
@@ -261,8 +275,8 @@ impl<'a> Findings<'a> {
         }
         if f.edge_min > 0.0 && f.edge_max / f.edge_min > POOR_RATIO {
             advice.push(format!(
-                "the shortest edge is {:.1e} of the longest; if such edges are no intended detail, remove them in the program the surface comes from",
-                f.edge_min / f.edge_max
+                "the shortest edge is {} of the longest; if such edges are no intended detail, remove them in the program the surface comes from",
+                short(f.edge_min / f.edge_max)
             ));
         }
         advice
@@ -289,6 +303,17 @@ impl<'a> Findings<'a> {
     }
 }
 
+/// Tetrahedra with default sizes; none where no size makes sense.
+fn expected(surface: &Surface) -> Option<f64> {
+    let prepared = predict(
+        surface,
+        &Options::default(),
+        default_cap().0,
+        Path::new("."),
+    );
+    Some(prepared.ok()?.estimate.tets())
+}
+
 fn defect_json(defect: &Defect) -> Value {
     let mut value = json!({
         "code": defect.code(), "triangles": defect.triangles(), "at": defect.at().map(|p| p.to_array()),
@@ -304,12 +329,6 @@ fn tell_rest(n: u64, console: &Console) {
     if n > LISTED as u64 {
         console.line(&format!("  ... {n} in all; --json lists them"));
     }
-}
-
-/// Four digits.
-fn short(x: f64) -> String {
-    let text = format!("{x:.3e}");
-    show_number(text.parse().unwrap_or(x))
 }
 
 /// Two digits are all an estimate has.

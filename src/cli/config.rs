@@ -1,11 +1,16 @@
 //! The options that shape the mesh, from the command line and a file.
 
+use std::path::Path;
+
 use clap::ValueEnum;
 
 use super::args::{Optimize, Regions, ShapeArgs, SizeArgs};
 use super::failure::Failure;
 use crate::api::job::identify_sizes;
 use crate::pipeline::Options;
+
+/// No configuration is longer.
+const BYTES_MAX: u64 = 1 << 20;
 
 /// The options of a run: the file's, then the command line's over them, then the defaults.
 ///
@@ -14,9 +19,10 @@ pub fn options(args: &ShapeArgs) -> Result<Options, Failure> {
     let mut options = match &args.config {
         None => Options::default(),
         Some(path) => {
-            let text = std::fs::read_to_string(path).map_err(|e| {
+            let text = text(path).map_err(|e| {
                 Failure::new("unreadable-file", format!("the file cannot be read: {e}"))
                     .at(path.display())
+                    .help("a configuration is a regular file of some lines")
             })?;
             read(&text).map_err(|failure| failure.at(path.display()))?
         }
@@ -91,13 +97,23 @@ fn lists<'a>(
     ]
 }
 
+/// What a file holds. Errors: a pipe or a device, which may have no end; a file that is far too long for options.
+fn text(path: &Path) -> std::io::Result<String> {
+    let refused = |why: &str| Err(std::io::Error::other(why));
+    match std::fs::metadata(path)? {
+        meta if !meta.is_file() => refused("it is not a regular file"),
+        meta if meta.len() > BYTES_MAX => refused("it is longer than a megabyte"),
+        _ => std::fs::read_to_string(path),
+    }
+}
+
 fn read(text: &str) -> Result<Options, Failure> {
     toml::from_str(text).map_err(|e| bad(e.to_string().trim_end().to_owned()))
 }
 
 fn bad(what: String) -> Failure {
     Failure::new("bad-config", what).help(
-        "keys are those of `tetdb mesh --help`, for example hsiz = \"2%\" or size_sphere = [\"0,0,0,1,0.1\"]",
+        "keys are those of `tetdb mesh --help`, for example hsiz = 0.1, hmax = \"2%\" or size_sphere = [[0, 0, 0, 1, 0.1]]",
     )
 }
 
@@ -118,7 +134,19 @@ mod tests {
         let options = options.unwrap_or_else(|_| panic!("a good file"));
         assert_eq!(options.hsiz.as_deref(), Some("2%"));
         assert_eq!(options.size_sphere.len(), 1);
-        for text in ["hsiz = 3 4", "hsize = \"1\"", "size_box = 3"] {
+        let numbers = "hsiz = 2\nhgrad = 1.5\nsubdomains = 4\nsize_sphere = [[0, -1, 0.5, 1, 1e-2], \"0,0,0,1,0.1\"]\n";
+        let options = read(numbers).unwrap_or_else(|_| panic!("numbers are numbers"));
+        assert_eq!(options.hsiz.as_deref(), Some("2"));
+        assert_eq!(options.hgrad.as_deref(), Some("1.5"));
+        assert_eq!(options.subdomains.as_deref(), Some("4"));
+        assert_eq!(options.size_sphere, ["0,-1,0.5,1,0.01", "0,0,0,1,0.1"]);
+        for text in [
+            "hsiz = 3 4",
+            "hsize = \"1\"",
+            "size_box = 3",
+            "hsiz = true",
+            "size_box = [[true]]",
+        ] {
             assert_eq!(read(text).err().map(|f| f.exit()), Some(2), "{text}");
         }
     }

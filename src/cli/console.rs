@@ -4,15 +4,21 @@ use std::io::{IsTerminal, Write};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use serde::Serialize;
 
-use super::failure::Failure;
+use super::failure::{Failure, in_flags};
 use crate::api::{Bytes, Event, Settings};
+use crate::geom::short;
 use crate::storage::CancelToken;
 
 /// Without a terminal, progress is one line in so much time.
 const PLAIN_EVERY: Duration = Duration::from_secs(10);
+
+/// Colors of a terminal.
+const RED: u8 = 31;
+const GREEN: u8 = 32;
+const YELLOW: u8 = 33;
 
 /// Where everything that is printed goes through; clones print to the same terminal.
 #[derive(Clone)]
@@ -20,6 +26,9 @@ pub struct Console {
     json: bool,
     /// Neither progress nor remarks.
     quiet: bool,
+    verbose: bool,
+    /// Whether errors and warnings have colors.
+    colors: bool,
     terminal: bool,
     bar: ProgressBar,
     state: Arc<Mutex<State>>,
@@ -44,11 +53,11 @@ struct State {
 
 impl Console {
     pub fn new(json: bool) -> Self {
-        Self::with(json, false)
+        Self::with(json, false, false)
     }
 
-    /// One that prints warnings and errors alone, if `quiet`.
-    pub fn with(json: bool, quiet: bool) -> Self {
+    /// One that prints warnings and errors alone, if `quiet`, and internals too, if `verbose`.
+    pub fn with(json: bool, quiet: bool, verbose: bool) -> Self {
         let terminal = std::io::stderr().is_terminal() && !json && !quiet;
         let bar = if terminal {
             ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr_with_hz(10))
@@ -59,6 +68,9 @@ impl Console {
         Self {
             json,
             quiet,
+            verbose,
+            colors: std::io::stderr().is_terminal()
+                && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty()),
             terminal,
             bar,
             state: Arc::new(Mutex::new(State {
@@ -98,7 +110,7 @@ impl Console {
                 unit,
             } => self.progress(stage, done, total, unit),
             Event::Note(ref text) => self.note(text),
-            Event::Warning(ref text) => self.warn(text),
+            Event::Warning(ref text) => self.warn(&in_flags(text)),
             Event::StoreBegun(_) => super::signals::store_begins(),
         }
     }
@@ -106,6 +118,24 @@ impl Console {
     /// Whether the answer is JSON.
     pub fn is_json(&self) -> bool {
         self.json
+    }
+
+    /// Whether only what is asked for is printed.
+    pub fn is_quiet(&self) -> bool {
+        self.quiet
+    }
+
+    /// Whether internals are printed.
+    pub fn is_verbose(&self) -> bool {
+        self.verbose
+    }
+
+    /// A word in a color of the terminal, where there is one.
+    fn colored(&self, color: u8, word: &str) -> String {
+        match self.colors {
+            true => format!("\x1b[1;{color}m{word}\x1b[0m"),
+            false => word.to_owned(),
+        }
     }
 
     /// A remark.
@@ -117,7 +147,11 @@ impl Console {
 
     /// A remark that is never left out.
     pub fn warn(&self, text: &str) {
-        self.print(&format!("warning: {text}"));
+        let word = match self.json {
+            true => "warning:".to_owned(),
+            false => self.colored(YELLOW, "warning:"),
+        };
+        self.print(&format!("{word} {text}"));
     }
 
     fn print(&self, text: &str) {
@@ -241,12 +275,13 @@ impl Console {
                     "where": failure.place, "help": failure.help }
             }));
         } else {
-            eprintln!("error[{}]: {}", failure.code, failure.message);
+            let word = self.colored(RED, &format!("error[{}]:", failure.code));
+            eprintln!("{word} {}", failure.message);
             if let Some(place) = &failure.place {
                 eprintln!("  at: {place}");
             }
             if let Some(help) = &failure.help {
-                eprintln!("help: {help}");
+                eprintln!("{} {help}", self.colored(GREEN, "help:"));
             }
         }
         exit
@@ -259,9 +294,16 @@ impl Console {
 
 fn style(known_total: bool) -> ProgressStyle {
     let template = if known_total {
-        "{msg:24} [{bar:30}] {percent:>3} %  {per_sec}  {eta} to go"
+        "{msg:24} [{bar:30}] {percent:>3} %  {rate}  {eta} to go"
     } else {
-        "{msg:24} {pos}  {per_sec}  {elapsed}"
+        "{msg:24} {pos}  {rate}  {elapsed}"
     };
-    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
+    let style = ProgressStyle::with_template(template);
+    let style = style.unwrap_or_else(|_| ProgressStyle::default_bar());
+    style.with_key(
+        "rate",
+        |state: &ProgressState, out: &mut dyn std::fmt::Write| {
+            let _ = write!(out, "{}/s", short(state.per_sec()));
+        },
+    )
 }

@@ -6,11 +6,13 @@ use serde_json::json;
 
 use super::args::EstimateArgs;
 use super::console::Console;
-use super::failure::Failure;
+use super::failure::{Failure, in_flags};
 use super::input::Space;
+use super::words::count;
 use super::{config, input, memory};
 use crate::api::preflight::free_at;
 use crate::api::{default_cap, predict};
+use crate::geom::short;
 use crate::storage::n_threads;
 
 pub fn run(args: &EstimateArgs, console: &Console) -> Result<u8, Failure> {
@@ -54,7 +56,7 @@ pub fn run(args: &EstimateArgs, console: &Console) -> Result<u8, Failure> {
     }
     console.line(&prepared.sizes.to_string());
     for warning in &prepared.sizes.warnings {
-        console.line(&format!("warning: {warning}"));
+        console.warn(&in_flags(&warning.to_string()));
     }
     console.line(&format!(
         "about {} tetrahedra and {} vertices from {} triangles, in {}",
@@ -82,8 +84,9 @@ pub fn run(args: &EstimateArgs, console: &Console) -> Result<u8, Failure> {
         memory::show(estimate.store_bytes()),
     ));
     console.line(&format!(
-        "time: about {:.0} s on {threads} threads of a 2.6 GHz server; needles in the surface make it more",
-        estimate.seconds(threads).max(1.0)
+        "time: about {} s on {} of a 2.6 GHz server; needles in the surface make it more",
+        short(estimate.seconds(threads).max(1.0).round()),
+        count(threads as u64, "thread")
     ));
     console.line(match (fits_memory, fits_disk) {
         (true, true) => "fits: yes",

@@ -1,5 +1,8 @@
 //! Errors as the user sees them: a word, an exit code, what happened, where, what to do.
 
+use clap::CommandFactory;
+
+use super::args::Args;
 use crate::api::error::{Error, Remedy};
 use crate::boundary::BoundaryError;
 use crate::io::read::ReadError;
@@ -66,7 +69,7 @@ impl From<Error> for Failure {
         };
         Self {
             code: e.code(),
-            message: e.message().to_owned(),
+            message: in_flags(e.message()),
             place: e.place().map(str::to_owned),
             help,
         }
@@ -97,6 +100,22 @@ failures!(
     WriteError
 );
 
+/// A message that begins with an option's key, with the option as it is typed; and what makes a surface finer.
+pub fn in_flags(text: &str) -> String {
+    let text = text.replace(
+        "refine the surface first",
+        "refine it first with `tetdb refine-surface SURFACE FINE --hsiz H`",
+    );
+    let end = text.find([' ', ':']).unwrap_or(text.len());
+    let (key, rest) = text.split_at(end);
+    let root = Args::command();
+    let mut options = (root.find_subcommand("mesh").into_iter()).flat_map(|m| m.get_arguments());
+    match options.any(|option| option.get_id() == key && option.get_long().is_some()) {
+        true => format!("--{}{rest}", key.replace('_', "-")),
+        false => text,
+    }
+}
+
 fn help_of(code: &str) -> &'static str {
     match code {
         "busy" => "wait for the other process, or stop it",
@@ -118,6 +137,24 @@ fn help_of(code: &str) -> &'static str {
         "store-format" => "use the version of this program that wrote the store, or mesh again",
         "store-recipe" => {
             "go on with the version of this program that began it, or mesh again with --force"
+        }
+        "degenerate-triangle" | "duplicate-triangle" => {
+            "`tetdb check SURFACE` lists all such triangles; `tetdb check SURFACE --repair --write OUT` drops them"
+        }
+        "open-surface" => {
+            "`tetdb check SURFACE` lists the holes and says whether a repair closes them; otherwise close them where the surface was made"
+        }
+        "self-intersection" => {
+            "`tetdb check SURFACE` lists the places; unite or separate the parts where the surface was made"
+        }
+        "empty-surface" => "choose a file that holds triangles",
+        "coordinate-range" => "scale the surface to ordinary units, for example metres",
+        "surface-too-large" => "split the surface into parts and mesh them one by one",
+        "index-out-of-range" => {
+            "write the file again from the program it comes from; vertex numbers must name vertices of the file"
+        }
+        "contradicting-orientation" => {
+            "`--regions all` fills every volume whatever the orientation; or give each shared wall from both sides, once in each file"
         }
         "nothing-filled" => "try --regions all, and look at the surface with `tetdb check SURFACE`",
         "nothing-to-undo" => {

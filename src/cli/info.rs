@@ -9,12 +9,16 @@ use super::args::StoreArgs;
 use super::console::Console;
 use super::failure::Failure;
 use super::memory;
+use super::words::{self, count};
+use crate::geom::{Aabb, Point, short};
 use crate::pipeline;
 use crate::store::Catalog;
-use tetdb_schema::catalog::{QualityRow, StoreState, SubdomainRow};
+use tetdb_schema::catalog::{QualityRow, RegionRow, StoreState, SubdomainRow};
 
 /// Regions listed for people.
 const REGIONS_LISTED: usize = 12;
+/// Bytes per tetrahedron are shown of meshes with so many.
+const TETS_MEASURED: u64 = 10_000;
 /// Sub-domains listed for people.
 const SUBDOMAINS_LISTED: usize = 32;
 
@@ -97,11 +101,13 @@ pub fn print(path: &Path, console: &Console) -> Result<(), Failure> {
     console.line(&format!(
         "{}: {}, from {}",
         path.display(),
-        words(state),
+        state_words(state),
         surfaces.join(", ")
     ));
-    for row in catalog.journal()? {
-        console.line(&format!("  {:<28} {:>9.2} s", row.step, row.seconds));
+    if console.is_verbose() {
+        for row in catalog.journal()? {
+            console.line(&format!("  {:<28} {:>9.2} s", row.step, row.seconds));
+        }
     }
     if !state.is_finished() {
         console.line(&format!(
@@ -111,73 +117,26 @@ pub fn print(path: &Path, console: &Console) -> Result<(), Failure> {
         return Ok(());
     }
     let rows = catalog.subdomains()?;
-    let regions = catalog.regions()?;
     let (tets, bytes) = (
         rows.iter().map(|r| r.tets).sum::<u64>(),
         rows.iter().map(|r| r.bytes).sum::<u64>(),
     );
     console.line(&format!(
-        "{tets} tetrahedra, {} vertices, {} input triangles in {} sub-domain(s); {} on disk, {:.2} bytes per tetrahedron",
+        "{tets} tetrahedra, {} vertices, {} input triangles in {}; {} on disk",
         rows.iter().map(|r| r.vertices).sum::<u64>(),
         rows.iter().map(|r| r.facets).sum::<u64>(),
-        rows.len(),
+        count(rows.len() as u64, "sub-domain"),
         memory::show(bytes),
-        bytes as f64 / tets.max(1) as f64
     ));
-    let coarse: u64 = catalog.coarse_snapshots()?.iter().map(|c| c.bytes).sum();
-    if coarse > 0 {
-        console.line(&format!(
-            "coarse snapshots, from which sub-domains can be meshed again: {}, {:.2} bytes per tetrahedron",
-            memory::show(coarse),
-            coarse as f64 / tets.max(1) as f64
-        ));
-    }
-    let own = catalog.file_bytes()?;
-    console.line(&format!(
-        "catalog, with the wanted sizes: {}, {:.2} bytes per tetrahedron",
-        memory::show(own),
-        own as f64 / tets.max(1) as f64
-    ));
-    let before = catalog.previous()?;
-    if !before.is_empty() {
-        console.line(&format!(
-            "previous version of {} sub-domain(s), for `tetdb resaturate --undo`: {}",
-            before.len(),
-            memory::show(before.iter().map(|r| r.bytes).sum())
-        ));
-    }
-    if rows.len() > 1 {
-        let topology = catalog.topology()?;
-        for row in rows.iter().take(SUBDOMAINS_LISTED) {
-            let neighbors = topology.iter().find(|t| t.subdomain == row.rank);
-            let neighbors = neighbors.map_or(0, |t| t.neighbors.len());
-            console.line(&format!(
-                "  sub-domain {:>4}: {:>10} tetrahedra, {:>7} interface faces, {neighbors} neighbor(s), worst q {:.3}",
-                row.rank, row.tets, row.interface_faces, row.quality.worst
-            ));
-        }
-        if rows.len() > SUBDOMAINS_LISTED {
-            console.line(&format!("  ... {} sub-domains in all", rows.len()));
-        }
-    }
-    for region in regions.iter().take(REGIONS_LISTED) {
-        let (name, what) = if region.filled {
-            (
-                region.region.to_string(),
-                format!("{} tetrahedra", region.tets),
-            )
-        } else {
-            ("-".to_owned(), "empty".to_owned())
-        };
-        console.line(&format!(
-            "  region {name:>4}: volume {:.6e}, {what}, {} label(s) around it",
-            region.volume,
-            region.labels.len()
-        ));
-    }
-    if regions.len() > REGIONS_LISTED {
-        console.line(&format!("  ... {} regions in all", regions.len()));
-    }
+    let all = (rows.iter()).map(|r| Aabb::around(r.bounds.map(Point::from_array)));
+    let all = all.fold(Aabb::EMPTY, Aabb::union);
+    let corners = [all.low, all.high].map(|p| p.to_array());
+    console.line(&format!("box {}", words::bounds(corners)));
+    let labels = catalog.labels()?;
+    console.line(&format!("labels: {}", words::listed(&labels)));
+    print_bytes(catalog, &rows, console)?;
+    print_subdomains(catalog, &rows, console)?;
+    print_regions(&catalog.regions()?, &labels, console);
     for line in quality_lines(&merged(rows.iter().map(|r| &r.quality))) {
         console.line(&line);
     }
@@ -185,7 +144,107 @@ pub fn print(path: &Path, console: &Console) -> Result<(), Failure> {
     Ok(())
 }
 
-fn words(state: StoreState) -> &'static str {
+/// What each part of the store takes.
+fn print_bytes(
+    catalog: &mut Catalog,
+    rows: &[SubdomainRow],
+    console: &Console,
+) -> Result<(), Failure> {
+    let before = catalog.previous()?;
+    if !before.is_empty() {
+        console.line(&format!(
+            "previous version of {}, for `tetdb resaturate --undo`: {}",
+            count(before.len() as u64, "sub-domain"),
+            memory::show(before.iter().map(|r| r.bytes).sum())
+        ));
+    }
+    if !console.is_verbose() {
+        return Ok(());
+    }
+    let tets: u64 = rows.iter().map(|r| r.tets).sum();
+    let coarse: u64 = catalog.coarse_snapshots()?.iter().map(|c| c.bytes).sum();
+    for (what, bytes) in [
+        ("sub-domains", rows.iter().map(|r| r.bytes).sum()),
+        (
+            "coarse snapshots, from which sub-domains can be meshed again",
+            coarse,
+        ),
+        ("catalog, with the wanted sizes", catalog.file_bytes()?),
+    ] {
+        // Of a small mesh the least a file takes says nothing of a tetrahedron.
+        let each = match tets >= TETS_MEASURED {
+            true => format!(
+                ", {} bytes per tetrahedron",
+                short(bytes as f64 / tets as f64)
+            ),
+            false => String::new(),
+        };
+        console.line(&format!("{what}: {}{each}", memory::show(bytes)));
+    }
+    Ok(())
+}
+
+fn print_subdomains(
+    catalog: &mut Catalog,
+    rows: &[SubdomainRow],
+    console: &Console,
+) -> Result<(), Failure> {
+    if rows.len() == 1 {
+        return Ok(());
+    }
+    let topology = catalog.topology()?;
+    for row in rows.iter().take(SUBDOMAINS_LISTED) {
+        let neighbors = topology.iter().find(|t| t.subdomain == row.rank);
+        let neighbors = neighbors.map_or(0, |t| t.neighbors.len());
+        console.line(&format!(
+            "  sub-domain {:>4}: {:>10} tetrahedra, {:>7} interface faces, {}, worst q {}",
+            row.rank,
+            row.tets,
+            row.interface_faces,
+            count(neighbors as u64, "neighbor"),
+            short(row.quality.worst)
+        ));
+    }
+    if rows.len() > SUBDOMAINS_LISTED {
+        console.line(&format!("  ... {} sub-domains in all", rows.len()));
+    }
+    Ok(())
+}
+
+/// Few regions one by one, many as a whole.
+fn print_regions(regions: &[RegionRow], labels: &[String], console: &Console) {
+    if regions.len() > REGIONS_LISTED {
+        let (filled, empty): (Vec<_>, Vec<_>) = regions.iter().partition(|r| r.filled);
+        let volume = |list: &[&RegionRow]| short(list.iter().map(|r| r.volume).sum());
+        console.line(&format!(
+            "{} filled, volume {} in all; {} empty, volume {}; --json lists them",
+            count(filled.len() as u64, "region"),
+            volume(&filled),
+            empty.len(),
+            volume(&empty)
+        ));
+        return;
+    }
+    for region in regions {
+        let (name, what) = match region.filled {
+            true => (
+                region.region.to_string(),
+                count(region.tets, "tetrahedron").replace("tetrahedrons", "tetrahedra"),
+            ),
+            false => ("-".to_owned(), "empty".to_owned()),
+        };
+        let around = region.labels.iter();
+        let around = around.filter_map(|&label| labels.get(label as usize));
+        let around: Vec<&String> = around.collect();
+        console.line(&format!(
+            "  region {name:>4}: volume {}, {what}, within {}",
+            short(region.volume),
+            words::listed(&around)
+        ));
+    }
+}
+
+fn state_words(state: StoreState) -> &'static str {
     match state {
         StoreState::Verified => "finished and verified",
         StoreState::Sealed => "finished, not verified",
@@ -232,16 +291,16 @@ fn quality_lines(q: &QualityRow) -> Vec<String> {
             (i + 2).to_string()
         };
         lines.push(format!(
-            "  [{:>2}, {to:>3}[ {:>9.4} %  {n:>12}",
+            "  [{:>2}, {to:>3}[ {:>9} %  {n:>12}",
             i + 1,
-            100.0 * n as f64 / total.max(1) as f64
+            short(100.0 * n as f64 / total.max(1) as f64)
         ));
     }
     lines.push(format!(
-        "  worst {:.3}; dihedral angles {:.2} to {:.2} degrees",
-        q.worst,
-        q.dihedral[0].to_degrees(),
-        q.dihedral[1].to_degrees()
+        "  worst {}; dihedral angles {} to {} degrees",
+        short(q.worst),
+        short(q.dihedral[0].to_degrees()),
+        short(q.dihedral[1].to_degrees())
     ));
     lines
 }

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::console::Console;
 use super::failure::Failure;
+use super::memory;
 use crate::api::Surface;
 use crate::api::preflight::scratch_beside;
 use crate::storage::{ScratchSpace, attempt};
@@ -30,7 +31,11 @@ impl Space<'_> {
 
 /// Reads files or generates a sample.
 pub fn load(arguments: &[String], space: Space, console: &Console) -> Result<Surface, Failure> {
-    let surface = Surface::load(arguments)?;
+    let cap = match space {
+        Space::Boundless => memory::cap(None)?,
+        Space::Capped(cap, _) => cap,
+    };
+    let surface = Surface::load(arguments, cap)?;
     let scratch = space.scratch(&surface.inner)?;
     let surface = surface.oriented(&scratch)?;
     for note in surface.notes() {

@@ -15,6 +15,18 @@ use crate::io::write::Selection;
 use crate::pipeline::Summary;
 
 pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
+    if let Some(file) = args
+        .output
+        .as_deref()
+        .filter(|out| export::check_format(out).is_ok())
+    {
+        let message = format!(
+            "-o {0} names a mesh file; -o names the store",
+            file.display()
+        );
+        let help = format!("`--export {}` writes that file as well", file.display());
+        return Err(Failure::new("usage", message).help(help));
+    }
     let options = config::options(&args.shape)?;
     // Sizes are checked before anything is read.
     options.sizes()?;
@@ -47,9 +59,7 @@ pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
             "{} already holds the finished mesh of this surface with these options",
             path.display()
         ));
-        write_exports(&path, &args.run, &settings, console)?;
-        info::print(&path, console)?;
-        return Ok(0);
+        return finish(&path, &args.run, &settings, None, console);
     }
     finish(
         &path,
@@ -118,15 +128,20 @@ fn finish(
             answer["frames_used"] = json!(s.frames_used);
         }
         console.answer(&answer);
-    } else {
+    } else if !console.is_quiet() {
         info::print(path, console)?;
-        if let Some(peak) = memory::peak() {
+        if let Some(peak) = memory::peak().filter(|_| summary.is_some()) {
             console.line(&format!(
                 "peak memory {} of {}",
                 memory::show(peak),
                 memory::show(cap)
             ));
         }
+        let page = path.with_extension("html");
+        let (store, page) = (path.display(), page.display());
+        console.note(&format!(
+            "next: `tetdb report {store} {page}` shows it in a browser, `tetdb export {store} FILE.vtu` writes it for other programs"
+        ));
     }
     Ok(0)
 }

@@ -2,7 +2,6 @@
 
 mod args;
 mod check;
-mod check_expected;
 mod check_report;
 mod compare;
 mod config;
@@ -28,10 +27,11 @@ mod shell;
 mod signals;
 mod snapshot;
 mod verify;
+mod words;
 
 use std::process::ExitCode;
 
-use clap::error::ErrorKind;
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, Parser};
 
 use args::{Args, Command};
@@ -50,7 +50,7 @@ pub fn run() -> ExitCode {
         Ok(args) => args,
         Err(error) => return unparsed(&error),
     };
-    let console = Console::with(args.command.is_json(), args.quiet);
+    let console = Console::with(args.command.is_json(), args.quiet, args.verbose);
     let settings = console.settings(None, None);
     // A panic of redb on a damaged tree is damage; its own message would only confuse.
     signals::listen(&console);
@@ -76,6 +76,19 @@ fn unparsed(error: &clap::Error) -> ExitCode {
     let text = text.split("\n\nUsage:").next().unwrap_or(&text);
     let message = text.strip_prefix("error: ").unwrap_or(text).trim_end();
     let command = std::env::args().nth(1).filter(|c| is_command(c));
+    if let Some(ContextValue::String(word)) = error.get(ContextKind::InvalidArg)
+        && error.kind() == ErrorKind::UnknownArgument
+        && word.starts_with('-')
+        && word[1..].starts_with(|c: char| c.is_ascii_digit() || c == '.')
+    {
+        let help = format!(
+            "the option before it takes no value of this kind; write values that begin with a minus behind a sign of equality, as in --option={word}"
+        );
+        let message = format!("{word} looks like a negative number, and no option here takes one");
+        return ExitCode::from(
+            Console::new(is_json).fail(&Failure::new("usage", message).help(help)),
+        );
+    }
     let help = format!("`tetdb {} --help`", command.unwrap_or_default()).replace("  ", " ");
     ExitCode::from(Console::new(is_json).fail(&Failure::new("usage", message).help(help)))
 }

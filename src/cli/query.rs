@@ -1,7 +1,7 @@
 //! `query`: tetrahedra by place, number, neighborhood or condition.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, stdin};
+use std::io::{BufRead, BufReader, Read, stdin};
 use std::path::Path;
 
 use super::args::QueryArgs;
@@ -20,6 +20,8 @@ use crate::storage::{Budget, attempt};
 const POINT_BYTES: u64 = 512;
 /// The place of quality among the variables.
 const QUALITY: usize = 0;
+/// No line of a point is longer.
+const LINE_MAX: u64 = 4096;
 /// Points answered together, at most.
 const POINTS_MAX: u64 = 1 << 17;
 
@@ -202,8 +204,11 @@ fn locate(
         Ok(true)
     };
     if let Some(path) = &args.points {
-        for (number, line) in (1u64..).zip(lines(path)?) {
-            let line = line.map_err(|e| unreadable(path, &e))?;
+        let mut from = opened(path)?;
+        for number in 1u64.. {
+            let Some(line) = line(&mut from).map_err(|e| unreadable(path, &e))? else {
+                break;
+            };
             points.extend(parse_line(path, number, &line)?);
             if points.len() >= block && !answer(&mut points, writer)? {
                 return Ok(n);
@@ -214,12 +219,23 @@ fn locate(
     Ok(n)
 }
 
-fn lines(path: &Path) -> Result<Box<dyn Iterator<Item = std::io::Result<String>>>, Failure> {
+fn opened(path: &Path) -> Result<Box<dyn BufRead>, Failure> {
     if path == Path::new("-") {
-        return Ok(Box::new(stdin().lines()));
+        return Ok(Box::new(stdin().lock()));
     }
     let file = File::open(path).map_err(|e| unreadable(path, &e))?;
-    Ok(Box::new(BufReader::new(file).lines()))
+    Ok(Box::new(BufReader::new(file)))
+}
+
+/// The next line, or `None` at the end. Errors: one too long for three numbers, as a device without end gives.
+fn line(from: &mut dyn BufRead) -> std::io::Result<Option<String>> {
+    let mut line = String::new();
+    let n = from.take(LINE_MAX).read_line(&mut line)?;
+    if n as u64 == LINE_MAX && !line.ends_with('\n') {
+        let why = format!("a line is longer than {LINE_MAX} bytes");
+        return Err(std::io::Error::other(why));
+    }
+    Ok((n > 0).then_some(line))
 }
 
 fn unreadable(path: &Path, error: &std::io::Error) -> Failure {

@@ -1,7 +1,6 @@
 //! `resaturate`: sub-domains of a finished store made again.
 
 use std::collections::BTreeSet;
-use std::path::Path;
 
 use serde_json::{Value, json};
 
@@ -13,7 +12,7 @@ use super::resaturate_sizes::{self, new_sizes};
 use super::{memory, mesh};
 use crate::api::job::options_of;
 use crate::api::remesh::{damaged, verify_changed};
-use crate::api::store::open_finished;
+use crate::api::store::{open_finished, open_to_change};
 use crate::api::{Remesh, Settings};
 use crate::pipeline::{self, Forecast, NewSizes, Options, Remade, ResaturateSummary, Resaturation};
 use crate::storage::Budget;
@@ -24,18 +23,19 @@ pub fn run(args: &ResaturateArgs, console: &Console) -> Result<u8, Failure> {
     let settings = mesh::begin(&args.run, console)?;
     let cap = settings.cap()?;
     let budget = Budget::new(cap);
-    let mut open = open_finished(&args.store)?;
+    let mut open = match args.dry_run {
+        true => open_finished(&args.store)?,
+        false => open_to_change(&args.store, &settings)?,
+    };
     if args.forget {
-        drop(open);
-        return forget(&args.store, console);
+        return forget(open, console);
     }
     if args.undo {
-        drop(open);
-        let mut catalog = Catalog::open_writable(&args.store)?;
-        let summary = pipeline::undo(&mut catalog)?;
-        catalog.close()?;
-        if !args.run.no_verify {
-            verify_changed(&args.store, &settings)?;
+        let lock = open.lock();
+        let summary = pipeline::undo(&mut open)?;
+        open.close()?;
+        if let (false, Some(lock)) = (args.run.no_verify, lock) {
+            verify_changed(&args.store, &settings, lock)?;
         }
         return finish(args, &summary, &settings, console);
     }
@@ -62,11 +62,13 @@ pub fn run(args: &ResaturateArgs, console: &Console) -> Result<u8, Failure> {
         print_forecast(&list, console);
         return Ok(0);
     }
+    let lock = open.lock();
     drop(open);
     let ranks: Vec<u32> = ranks.into_iter().collect();
     let mut remesh = Remesh::new(args.store.clone(), settings.clone())
         .subdomains(&ranks)
         .prepared_sizes(sizes)
+        .locked(lock)
         .verify(!args.run.no_verify);
     if args.repair {
         remesh = remesh.repair();
@@ -117,8 +119,7 @@ fn ranks(
     }
 }
 
-fn forget(path: &Path, console: &Console) -> Result<u8, Failure> {
-    let mut catalog = Catalog::open_writable(path)?;
+fn forget(mut catalog: Catalog, console: &Console) -> Result<u8, Failure> {
     let n = pipeline::forget(&mut catalog)?;
     catalog.close()?;
     if console.is_json() {

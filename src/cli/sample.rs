@@ -1,5 +1,9 @@
 //! `sample`: made surfaces as files.
 
+use std::fs::File;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+
 use serde_json::json;
 
 use super::args::SampleArgs;
@@ -10,12 +14,44 @@ use crate::api::targets::check_target;
 use crate::io::write;
 use crate::samples::PREFIX;
 
+/// Writes to the standard output.
+fn to_stdout(word: &str, format: &str, console: &Console) -> Result<u8, Failure> {
+    let surface = input::load(&[word.to_owned()], Space::Boundless, console)?.inner;
+    // A file first, with a name nobody else has: the writers know files alone.
+    let file = std::env::temp_dir().join(format!("tetdb-sample-{}.{format}", std::process::id()));
+    let copied = write::surface(&surface, &file)
+        .map_err(Failure::from)
+        .and_then(|_| copy(&file, console).map_err(|e| Failure::new("io", e).at(file.display())));
+    let _ = std::fs::remove_file(&file);
+    copied.map(|()| 0)
+}
+
+fn copy(file: &Path, console: &Console) -> std::io::Result<()> {
+    let mut from = BufReader::new(File::open(file)?);
+    loop {
+        let bytes = from.fill_buf()?;
+        let n = bytes.len();
+        if n == 0 || !console.write(bytes) {
+            return Ok(());
+        }
+        from.consume(n);
+    }
+}
+
 pub fn run(args: &SampleArgs, console: &Console) -> Result<u8, Failure> {
     let word = if args.sample.starts_with(PREFIX) {
         args.sample.clone()
     } else {
         format!("{PREFIX}{}", args.sample)
     };
+    let format = args.format.as_deref().unwrap_or("stl");
+    if args.output == Path::new("-") {
+        return to_stdout(&word, format, console);
+    }
+    if args.format.is_some() {
+        let message = "--format is for -o -; a file's ending says its format";
+        return Err(Failure::new("usage", message).help("name the file .stl, .off, .obj or .ply"));
+    }
     check_target(&args.output, &[])?;
     let surface = input::load(&[word], Space::Boundless, console)?.inner;
     write::surface(&surface, &args.output)?;

@@ -51,12 +51,38 @@ fn name(command: &Command) -> String {
 }
 
 fn page(command: &Command) -> Result<Vec<u8>, Failure> {
+    let after = command.get_after_help().map(ToString::to_string);
+    let (examples, rest) = examples(after.as_deref().unwrap_or_default());
     let mut text = Vec::new();
-    let rendered = clap_mangen::Man::new(command.clone())
+    let rendered = clap_mangen::Man::new(command.clone().after_help(rest))
         .title(name(command))
         .render(&mut text);
     rendered.map_err(|e| Failure::new("internal", e))?;
+    if !examples.is_empty() {
+        text.extend_from_slice(b".SH EXAMPLES\n.nf\n");
+        for line in examples {
+            text.extend_from_slice(line.replace('\\', "\\e").replace('-', "\\-").as_bytes());
+            text.push(b'\n');
+        }
+        text.extend_from_slice(b".fi\n");
+    }
     Ok(text)
+}
+
+/// The lines of examples in what stands below the options, and the rest of it.
+fn examples(after: &str) -> (Vec<&str>, String) {
+    let is_head = |line: &str| matches!(line, "Example:" | "Examples:");
+    let (mut examples, mut rest) = (Vec::new(), Vec::new());
+    let mut inside = false;
+    for line in after.lines() {
+        inside = is_head(line) || inside && line.starts_with("  ");
+        match inside {
+            true if is_head(line) => {}
+            true => examples.push(line.trim()),
+            false => rest.push(line),
+        }
+    }
+    (examples, rest.join("\n").trim().to_owned())
 }
 
 fn unwritable(path: &Path, error: &std::io::Error) -> Failure {

@@ -6,6 +6,7 @@
 mod dyadic;
 mod hash;
 mod hilbert;
+mod number;
 mod point;
 mod sign;
 mod wide;
@@ -18,6 +19,7 @@ pub(crate) mod tests;
 pub use dyadic::Dyadic;
 pub use hash::{STEP, mix};
 pub use hilbert::{HilbertFrame, hilbert_index};
+pub use number::short;
 pub use point::{Aabb, Point};
 pub use sign::{
     Seen, in_sphere_perturbed, insphere, insphere_filtered, lex_cmp, orient, orient_sign,

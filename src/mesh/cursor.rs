@@ -5,12 +5,13 @@ use tetdb_schema::page::{NONE, RECORDS, SLOT_BITS, SLOT_MASK, SLOTS, u32_le};
 use super::anatomy::mark::IN_CAVITY;
 use super::anatomy::{FaceRef, MARK, REQUIRED, Tet, VERTEX_MASK};
 use super::state::{Arena, MeshState, dense, next_id, sparse};
-use crate::storage::{Pager, Pages, StorageError, kind, raise};
+use crate::storage::{Pager, Pages, SharedPages, StorageError, kind, raise};
 
 /// Cursor over one sub-domain's paged arrays: tetrahedra, vertices, their attributes, facets.
 ///
 /// Every access may load a page and evict another; records are copied out, so nothing dangles.
 /// Ids depend only on the order of calls, never on which pages are resident.
+#[derive(Clone)]
 pub struct Mesh<P: Pages = Pager> {
     pub(super) pages: P,
     pub(super) state: MeshState,
@@ -76,6 +77,15 @@ impl<P: Pages> Mesh<P> {
         let slot = self.pages.write::<K>(record);
         slot[word] = u32_le::from_native(a);
         slot[word + 1] = u32_le::from_native(b);
+    }
+
+    /// The mesh as several threads may read it, when all of it is in memory.
+    pub fn shared(&mut self) -> Option<Mesh<SharedPages<'_>>> {
+        let state = self.state;
+        Some(Mesh {
+            pages: self.pages.shared()?,
+            state,
+        })
     }
 
     /// The pages themselves.

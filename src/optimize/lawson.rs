@@ -11,7 +11,7 @@ use super::pages::{Way, tets_of_page};
 use super::sphere::Sphere;
 use crate::geom::{Point, orient};
 use crate::mesh::anatomy::{EDGE_OF, FACES};
-use crate::mesh::{FaceRef, Mesh, Tet};
+use crate::mesh::{FaceRef, Mesh, Scan, Tet, scan_parts};
 use crate::reconnect::{FaceSwap, Forced, RingTriangulation, Shell, remove_edge};
 use crate::storage::{Pages, check_cancelled};
 
@@ -28,6 +28,45 @@ pub struct LawsonStats {
     pub stuck: u64,
 }
 
+/// Pages looked at before the first of their flips. The mesh depends on it.
+const BATCH_PAGES: usize = 32;
+
+/// Lists the tetrahedra of a page with a face to a larger id that is not locally Delaunay.
+struct Suspicious;
+
+impl Scan for Suspicious {
+    type Part = u32;
+    type Found = Vec<u32>;
+
+    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &page: &u32) -> Vec<u32> {
+        let mut found = Vec::new();
+        tets_of_page(mesh, page, |mesh, t, tet| {
+            if is_suspicious(mesh, t, &tet) {
+                found.push(t);
+            }
+        });
+        found
+    }
+}
+
+#[inline(always)]
+fn is_suspicious<P: Pages>(mesh: &mut Mesh<P>, t: u32, tet: &Tet) -> bool {
+    let sphere = Sphere::new(mesh.points(tet));
+    // Which faces are tested is as good as random: listing them first takes the guess out of the branches.
+    let (mut faces, mut n) = ([0usize; 4], 0);
+    for i in 0..4 {
+        let across = tet.neighbor[i];
+        let tested = across.exists() && !tet.is_required(i) && across.tet() >= t;
+        faces[n & 3] = i;
+        n += usize::from(tested);
+    }
+    faces[..n].iter().any(|&i| {
+        let q = mesh.apex(tet.neighbor[i]);
+        let q = mesh.point(q);
+        sphere.has_inside(q)
+    })
+}
+
 /// Scratch of the restoration.
 #[derive(Default)]
 pub(super) struct Lawson {
@@ -40,36 +79,32 @@ pub(super) struct Lawson {
 }
 
 impl Lawson {
-    /// One pass over all faces, page by page; each flip is followed up at once.
+    /// One pass over all faces, batch by batch of pages: what is suspicious before any flip of the batch is looked at
+    /// again in order, and each flip is followed up at once.
     pub(super) fn sweep<P: Pages>(&mut self, mesh: &mut Mesh<P>, way: Way) {
-        for page in way.tet_pages(mesh) {
+        let pages: Vec<u32> = way.tet_pages(mesh).collect();
+        for batch in pages.chunks(BATCH_PAGES) {
             check_cancelled();
-            tets_of_page(mesh, page, |mesh, t, tet| {
-                self.check::<P, true>(mesh, t, &tet);
+            for t in scan_parts(mesh, batch, &Suspicious).into_iter().flatten() {
+                self.stack.push(t);
                 while let Some(t) = self.stack.pop() {
                     let tet = mesh.tet(t);
                     if tet.is_live() {
-                        self.check::<P, false>(mesh, t, &tet);
+                        self.check(mesh, t, &tet);
                     }
                 }
-            });
+            }
         }
     }
 
-    /// Tests the faces of `t`, in the sweep only those to larger ids, and flips at the first that can be.
-    #[inline(always)]
-    fn check<P: Pages, const SWEEP: bool>(&mut self, mesh: &mut Mesh<P>, t: u32, tet: &Tet) {
+    /// Tests the faces of `t` and flips at the first that can be.
+    fn check<P: Pages>(&mut self, mesh: &mut Mesh<P>, t: u32, tet: &Tet) {
         let p = mesh.points(tet);
         let sphere = Sphere::new(p);
-        // Which faces are tested is as good as random: listing them first takes the guess out of the branches.
-        let (mut faces, mut n) = ([0usize; 4], 0);
         for i in 0..4 {
-            let across = tet.neighbor[i];
-            let tested = across.exists() && !tet.is_required(i) && (!SWEEP || across.tet() >= t);
-            faces[n & 3] = i;
-            n += usize::from(tested);
-        }
-        for &i in &faces[..n] {
+            if !tet.neighbor[i].exists() || tet.is_required(i) {
+                continue;
+            }
             let q = mesh.apex(tet.neighbor[i]);
             let q = mesh.point(q);
             if sphere.has_inside(q) && self.flip(mesh, t, tet, p, i, q) {

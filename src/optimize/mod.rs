@@ -36,6 +36,7 @@ mod rounds;
 mod run;
 mod smooth;
 mod sphere;
+mod sums;
 mod swap;
 #[cfg(test)]
 mod tests;

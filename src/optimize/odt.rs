@@ -13,9 +13,10 @@ use tetdb_schema::page::{RECORDS, SLOT_BITS, Slot, u32_le};
 
 use super::pages::{Way, tets_of_page};
 use super::smooth::is_free;
+use super::sums::Sums;
 use crate::geom::{Point, orient};
 use crate::mesh::anatomy::FACES;
-use crate::mesh::{Mesh, Tet, dense, sparse};
+use crate::mesh::{Mesh, Scan, Tet, dense, scan_parts, sparse};
 use crate::reconnect::Ball;
 use crate::storage::{Pages, check_cancelled, kind};
 
@@ -24,6 +25,11 @@ const MOVE_MAX: f64 = 0.3;
 
 /// A vertex may halve its move 1 / STEP_BACK − 1 times before it goes back altogether: without that, 6 % stay where they were, with one halving 2 %.
 const STEP_BACK: f64 = 0.5;
+
+/// Pages whose sums are one term of a vertex's sum: the positions depend on it.
+const GROUP_PAGES: usize = 8;
+/// Groups summed before they are added up.
+const BATCH_GROUPS: usize = 8;
 
 /// Moves done in one sweep, and vertices taken back because a tetrahedron would not stay positive.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -50,7 +56,7 @@ pub(super) fn sweep<P: Pages>(mesh: &mut Mesh<P>, way: Way) -> Moves {
 /// Four numbers beside a vertex: first the sum of weighted circumcenters times two and the sum of weights (both as
 /// six volumes), then the position before the move and what is left of its patience: 1 when moved, 0 when not.
 #[inline(always)]
-fn four(slot: &Slot) -> [f64; 4] {
+pub(super) fn four(slot: &Slot) -> [f64; 4] {
     let f = |i: usize| {
         let (low, high) = (slot[i].to_native(), slot[i + 1].to_native());
         f64::from_bits(u64::from(low) | u64::from(high) << 32)
@@ -59,7 +65,7 @@ fn four(slot: &Slot) -> [f64; 4] {
 }
 
 #[inline(always)]
-fn set_four(slot: &mut Slot, numbers: [f64; 4]) {
+pub(super) fn set_four(slot: &mut Slot, numbers: [f64; 4]) {
     for (i, number) in numbers.into_iter().enumerate() {
         let bits = number.to_bits();
         slot[2 * i] = u32_le::from_native(bits as u32);
@@ -68,15 +74,37 @@ fn set_four(slot: &mut Slot, numbers: [f64; 4]) {
 }
 
 /// Adds up circumcenters at all vertices; those of required and hull faces get a sum that is not a number.
+///
+/// Each group of pages has sums of its own, which are added in the order of groups: so they do not depend on who computed them.
 fn gather<P: Pages>(mesh: &mut Mesh<P>, way: Way) {
-    for page in way.tet_pages(mesh) {
+    let pages: Vec<u32> = way.tet_pages(mesh).collect();
+    let groups: Vec<Vec<u32>> = pages.chunks(GROUP_PAGES).map(<[u32]>::to_vec).collect();
+    for batch in groups.chunks(BATCH_GROUPS) {
         check_cancelled();
-        tets_of_page(mesh, page, |mesh, _, tet| add(mesh, &tet));
+        for sums in scan_parts(mesh, batch, &Circumcenters) {
+            sums.add_to(mesh);
+        }
+    }
+}
+
+/// Sums weighted circumcenters over a group of pages.
+struct Circumcenters;
+
+impl Scan for Circumcenters {
+    type Part = Vec<u32>;
+    type Found = Sums;
+
+    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, group: &Vec<u32>) -> Sums {
+        let mut sums = Sums::default();
+        for &page in group {
+            tets_of_page(mesh, page, |mesh, _, tet| add(&mut sums, mesh, &tet));
+        }
+        sums
     }
 }
 
 #[inline(always)]
-fn add<P: Pages>(mesh: &mut Mesh<P>, tet: &Tet) {
+fn add<P: Pages>(sums: &mut Sums, mesh: &mut Mesh<P>, tet: &Tet) {
     let ends = mesh.ends(tet);
     let p = [ends[0].point, ends[1].point, ends[2].point, ends[3].point];
     let size = |i: usize| f64::from(ends[i].h);
@@ -97,16 +125,14 @@ fn add<P: Pages>(mesh: &mut Mesh<P>, tet: &Tet) {
         }
         // Seen from another corner, the center is nearer by that corner's position.
         let own = sum - corner * (2.0 * det);
-        let slot = mesh.pages_mut().write::<{ kind::SCRATCH }>(tet.vertex(i));
-        let [x, y, z, volume] = four(slot);
-        set_four(slot, [x + own.x, y + own.y, z + own.z, volume + det]);
+        sums.add(tet.vertex(i), [own.x, own.y, own.z, det]);
     }
-    pin(mesh, tet);
+    pin(sums, tet);
 }
 
 /// Pins the vertices of required and hull faces.
 #[inline(always)]
-fn pin<P: Pages>(mesh: &mut Mesh<P>, tet: &Tet) {
+fn pin(sums: &mut Sums, tet: &Tet) {
     let inner = tet.neighbor.iter().all(|face| face.exists());
     if inner && !(0..4).any(|i| tet.is_required(i)) {
         return;
@@ -114,8 +140,7 @@ fn pin<P: Pages>(mesh: &mut Mesh<P>, tet: &Tet) {
     for (i, face) in FACES.into_iter().enumerate() {
         if tet.is_required(i) || !tet.neighbor[i].exists() {
             for k in face {
-                let slot = mesh.pages_mut().write::<{ kind::SCRATCH }>(tet.vertex(k));
-                set_four(slot, [f64::NAN; 4]);
+                sums.add(tet.vertex(k), [f64::NAN; 4]);
             }
         }
     }
@@ -158,13 +183,30 @@ fn is_positive<P: Pages>(mesh: &mut Mesh<P>, tet: &Tet) -> bool {
 /// Takes vertices back until every tetrahedron is exactly positive; where all were taken back it is, as before.
 fn restore<P: Pages>(mesh: &mut Mesh<P>, way: Way, moves: &mut Moves) {
     let (mut ball, mut list) = (Ball::default(), Vec::new());
-    for page in way.tet_pages(mesh) {
+    let pages: Vec<u32> = way.tet_pages(mesh).collect();
+    for batch in pages.chunks(GROUP_PAGES * BATCH_GROUPS) {
+        for t in scan_parts(mesh, batch, &Inverted).into_iter().flatten() {
+            list.push((t, mesh.tet(t)));
+            take_back(mesh, &mut list, &mut ball, moves);
+        }
+    }
+}
+
+/// Lists the tetrahedra of a page that are not positive.
+struct Inverted;
+
+impl Scan for Inverted {
+    type Part = u32;
+    type Found = Vec<u32>;
+
+    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &page: &u32) -> Vec<u32> {
+        let mut found = Vec::new();
         tets_of_page(mesh, page, |mesh, t, tet| {
             if !is_positive(mesh, &tet) {
-                list.push((t, tet));
-                take_back(mesh, &mut list, &mut ball, moves);
+                found.push(t);
             }
         });
+        found
     }
 }
 

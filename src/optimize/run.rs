@@ -110,10 +110,14 @@ pub fn run_with<P: Pages>(
         rounds.run(mesh, BAD, &mut |done, total| tell("quality", done, total));
         let bad = rounds.finish(mesh);
         rounds.flags.clone_from(&bad);
-        rounds.run(mesh, WORST, &mut |done, total| tell("worst", done, total));
+        rounds.run(mesh, WORST, &mut |done, total| {
+            tell("improve the worst", done, total)
+        });
         rounds.finish(mesh);
         rounds.flags = bad;
-        rounds.run(mesh, SHARE, &mut |done, total| tell("share", done, total));
+        rounds.run(mesh, SHARE, &mut |done, total| {
+            tell("improve low qualities", done, total)
+        });
         let mut bad = rounds.finish(mesh);
         report.operations = rounds.counts;
         let mut mender = Mender::default();

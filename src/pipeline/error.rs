@@ -27,7 +27,7 @@ pub enum PipelineError {
     #[error(transparent)]
     Storage(#[from] StorageError),
     /// An option that was checked before has no meaning any more.
-    #[error("option {option}: '{value}' is not known")]
+    #[error("{option} '{value}' is not known")]
     Option {
         /// Name of the option.
         option: &'static str,

@@ -1,13 +1,19 @@
 //! Points that divide long edges.
 
+use std::ops::Range;
+
+use rayon::slice::ParallelSliceMut;
+use tetdb_schema::page::SLOT_BITS;
+
 use super::candidate::Candidate;
 use super::field::{Field, Lengths};
 use super::worker::Worker;
-use crate::geom::{Point, mix};
+use crate::geom::{HilbertFrame, Point, mix};
 use crate::mesh::anatomy::mark::EXAMINED;
 use crate::mesh::anatomy::{EDGE_OF, EDGES, MARK};
-use crate::mesh::{End, Mesh};
-use crate::storage::Pages;
+use crate::mesh::{End, Mesh, Scan, Tet, scan_parts};
+use crate::reconnect::Shell;
+use crate::storage::{Pages, parallel};
 
 /// Edges longer than this, in units of the wanted length, are divided.
 const LONG: f64 = std::f64::consts::SQRT_2;
@@ -24,75 +30,142 @@ const JITTER_FROM: f64 = 2.0;
 const JITTER: f64 = 0.4;
 /// Largest shell that is looked at for required faces.
 const SHELL_MAX: usize = 64;
-/// Edges gathered before their candidates are computed and inserted; bounds the memory of a block.
-const EDGES_MAX: usize = 1 << 19;
+/// Edges divided as one part.
+const EDGES_PART: usize = 1 << 12;
 
 impl Worker {
-    /// Gathers the edges of unexamined tetrahedra from id `from` on, at most up to `last`, and marks those examined.
-    ///
-    /// Returns the id to go on from; it is past `last` when all were taken.
+    /// Gathers the edges of the unexamined tetrahedra of some pages, and marks those examined.
     pub(super) fn collect_edges<P: Pages>(
         &mut self,
         mesh: &mut Mesh<P>,
         field: &Field,
-        from: u32,
-        last: u32,
-    ) -> u32 {
+        pages: &[u32],
+    ) {
         self.edges.clear();
-        let mut next = from;
-        while let Some((t, tet)) = mesh.next_tet(next) {
-            if t > last {
-                next = t;
-                break;
-            }
-            next = t + 1;
-            if tet.node[EXAMINED] & MARK != 0 {
-                continue;
-            }
-            mesh.set_mark(t, EXAMINED, true);
-            let v = tet.vertices();
-            let ends = mesh.ends(&tet);
-            if field.place.is_partial() {
-                // Spelled out, here and below: `map` on arrays is not always inlined.
-                let [a, b, c, d] = &ends;
-                let points = [a.point, b.point, c.point, d.point];
-                let sizes = [a.h, b.h, c.h, d.h];
-                if !field.place.reaches(&points, &sizes) {
-                    continue;
-                }
-            }
-            for [i, j] in EDGES {
-                if !may_be_long(&ends[i], &ends[j]) {
-                    continue;
-                }
-                let (a, b) = (v[i].min(v[j]), v[i].max(v[j]));
-                self.edges.push((u64::from(a) << 32 | u64::from(b), t));
-            }
-            if self.edges.len() > EDGES_MAX - 6 {
-                break;
+        let found = scan_parts(mesh, pages, &LongEdges { field });
+        for (&page, edges) in pages.iter().zip(found) {
+            if let Some(edges) = edges {
+                self.edges.extend(edges);
+                mark_examined(mesh, page);
             }
         }
-        if self.edges.is_empty() {
-            return u32::MAX;
-        }
-        self.edges.sort_unstable();
+        let edges = &mut self.edges;
+        parallel(|| edges.par_sort_unstable());
         self.edges.dedup_by_key(|e| e.0);
-        next
     }
 
     /// Fills `candidates` with the points that divide the gathered edges, in order of insertion.
     pub(super) fn make_candidates<P: Pages>(&mut self, mesh: &mut Mesh<P>, field: &Field) {
         self.candidates.clear();
-        let edges = std::mem::take(&mut self.edges);
-        for &(key, tet) in &edges {
-            let (a, b) = ((key >> 32) as u32, key as u32);
-            self.divide(mesh, field, a, b, tet);
+        let n = self.edges.len();
+        let starts = (0..n).step_by(EDGES_PART);
+        let parts: Vec<Range<usize>> = starts.map(|i| i..n.min(i + EDGES_PART)).collect();
+        let division = Division {
+            edges: &self.edges,
+            field,
+            order: &self.order,
+        };
+        for found in scan_parts(mesh, &parts, &division) {
+            self.candidates.extend(found);
         }
-        self.edges = edges;
-        self.candidates.sort_unstable_by_key(|c| c.key);
+        let candidates = &mut self.candidates;
+        // Stable: the points that share a key stay in the order of their edges, whoever sorts.
+        parallel(|| candidates.par_sort_by_key(|c| c.key));
     }
+}
 
-    fn divide<P: Pages>(&mut self, mesh: &mut Mesh<P>, field: &Field, a: u32, b: u32, tet: u32) {
+/// An edge as an ordered pair of vertices, and a tetrahedron that has it.
+type Edge = (u64, u32);
+
+/// Lists the edges of a page's unexamined tetrahedra that may be long; none when all are examined.
+struct LongEdges<'a> {
+    field: &'a Field<'a>,
+}
+
+impl Scan for LongEdges<'_> {
+    type Part = u32;
+    type Found = Option<Vec<Edge>>;
+
+    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &page: &u32) -> Option<Vec<Edge>> {
+        let mut edges = None;
+        let mut from = page << SLOT_BITS;
+        while let Some((t, tet)) = mesh.next_tet(from).filter(|(t, _)| t >> SLOT_BITS == page) {
+            from = t + 1;
+            if tet.node[EXAMINED] & MARK == 0 {
+                self.list(mesh, t, &tet, edges.get_or_insert_default());
+            }
+        }
+        edges
+    }
+}
+
+impl LongEdges<'_> {
+    #[inline(always)]
+    fn list<P: Pages>(&self, mesh: &mut Mesh<P>, t: u32, tet: &Tet, edges: &mut Vec<Edge>) {
+        let (v, ends) = (tet.vertices(), mesh.ends(tet));
+        if self.field.place.is_partial() {
+            // Spelled out, here and below: `map` on arrays is not always inlined.
+            let [a, b, c, d] = &ends;
+            let points = [a.point, b.point, c.point, d.point];
+            if !(self.field.place).reaches(&points, &[a.h, b.h, c.h, d.h]) {
+                return;
+            }
+        }
+        for [i, j] in EDGES {
+            if may_be_long(&ends[i], &ends[j]) {
+                let (a, b) = (v[i].min(v[j]), v[i].max(v[j]));
+                edges.push((u64::from(a) << 32 | u64::from(b), t));
+            }
+        }
+    }
+}
+
+fn mark_examined<P: Pages>(mesh: &mut Mesh<P>, page: u32) {
+    let mut from = page << SLOT_BITS;
+    while let Some((t, tet)) = mesh.next_tet(from).filter(|(t, _)| t >> SLOT_BITS == page) {
+        from = t + 1;
+        if tet.node[EXAMINED] & MARK == 0 {
+            mesh.set_mark(t, EXAMINED, true);
+        }
+    }
+}
+
+/// Finds the points that divide edges.
+struct Division<'a> {
+    edges: &'a [Edge],
+    field: &'a Field<'a>,
+    order: &'a HilbertFrame,
+}
+
+impl Scan for Division<'_> {
+    type Part = Range<usize>;
+    type Found = Vec<Candidate>;
+
+    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, part: &Range<usize>) -> Vec<Candidate> {
+        let mut divider = Divider {
+            field: self.field,
+            order: self.order,
+            shell: Shell::default(),
+            candidates: Vec::new(),
+        };
+        for &(key, tet) in &self.edges[part.clone()] {
+            divider.divide(mesh, (key >> 32) as u32, key as u32, tet);
+        }
+        divider.candidates
+    }
+}
+
+/// Divides edges one after another.
+struct Divider<'a> {
+    field: &'a Field<'a>,
+    order: &'a HilbertFrame,
+    shell: Shell,
+    candidates: Vec<Candidate>,
+}
+
+impl Divider<'_> {
+    fn divide<P: Pages>(&mut self, mesh: &mut Mesh<P>, a: u32, b: u32, tet: u32) {
+        let field = self.field;
         let (pa, ha) = mesh.point_and_size(a);
         let (pb, hb) = mesh.point_and_size(b);
         let (ha, hb) = (f64::from(ha), f64::from(hb));
@@ -164,9 +237,7 @@ impl Worker {
             }
         }
     }
-}
 
-impl Worker {
     /// Whether the edge a b of `tet` belongs to a required face: its points would lie in that face.
     fn is_required<P: Pages>(&mut self, mesh: &mut Mesh<P>, a: u32, b: u32, tet: u32) -> bool {
         let record = mesh.tet(tet);

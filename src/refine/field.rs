@@ -23,7 +23,7 @@ pub struct Field<'a> {
     /// How the wanted length of an edge is found.
     pub lengths: Lengths,
     /// Wanted edge length at a position.
-    pub h: &'a dyn Fn(Point) -> f64,
+    pub h: &'a (dyn Fn(Point) -> f64 + Sync),
     /// Where points may go.
     pub place: &'a dyn PlacementRule,
     /// Box of the mesh, which fixes the order along the curve.

@@ -18,10 +18,11 @@ mod recent;
 mod report;
 mod worker;
 
+use tetdb_schema::page::SLOT_BITS;
+
 use crate::delaunay::Kernel;
 use crate::geom::HilbertFrame;
 use crate::mesh::{Mesh, Workspace, dense, renumber, sparse};
-use crate::reconnect::Shell;
 use crate::storage::{Pages, StorageError, check_cancelled};
 
 use activity::Activity;
@@ -58,7 +59,6 @@ pub fn saturate<P: Pages>(
         edges: Vec::new(),
         candidates: Vec::new(),
         recent: Recent::new(),
-        shell: Shell::default(),
         active: Activity::all(mesh),
         last: 0,
     };
@@ -75,7 +75,9 @@ pub fn saturate<P: Pages>(
             check_cancelled();
             let to = end.min(from + BLOCK_TETS);
             if worker.active.take(from, to) {
-                worker.block(mesh, field, sparse(from), sparse(to - 1), &mut report);
+                let (first, last) = (sparse(from) >> SLOT_BITS, sparse(to - 1) >> SLOT_BITS);
+                let pages: Vec<u32> = (first..=last).collect();
+                worker.block(mesh, field, &pages, &mut report);
                 progress(report.inserted);
             }
         }
@@ -109,27 +111,23 @@ fn count_over_constrained<P: Pages>(mesh: &mut Mesh<P>) -> u64 {
 }
 
 impl Worker {
-    /// Divides the long edges of the unexamined tetrahedra with ids `first..=last`.
+    /// Divides the long edges of the unexamined tetrahedra of some pages.
     fn block<P: Pages>(
         &mut self,
         mesh: &mut Mesh<P>,
         field: &Field,
-        first: u32,
-        last: u32,
+        pages: &[u32],
         report: &mut RefineReport,
     ) {
-        let mut from = first;
-        while from <= last {
-            from = self.collect_edges(mesh, field, from, last);
-            self.make_candidates(mesh, field);
-            report.candidates += self.candidates.len() as u64;
-            let candidates = std::mem::take(&mut self.candidates);
-            self.recent.clear();
-            for candidate in &candidates {
-                self.try_insert(mesh, field, candidate, report);
-            }
-            self.candidates = candidates;
+        self.collect_edges(mesh, field, pages);
+        self.make_candidates(mesh, field);
+        report.candidates += self.candidates.len() as u64;
+        let candidates = std::mem::take(&mut self.candidates);
+        self.recent.clear();
+        for candidate in &candidates {
+            self.try_insert(mesh, field, candidate, report);
         }
+        self.candidates = candidates;
     }
 }
 

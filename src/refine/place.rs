@@ -3,7 +3,7 @@
 use crate::geom::Point;
 
 /// A part of space in which edges are divided.
-pub trait PlacementRule {
+pub trait PlacementRule: Sync {
     /// Whether [`PlacementRule::reaches`] is worth asking: most tetrahedra are out of reach.
     fn is_partial(&self) -> bool {
         false

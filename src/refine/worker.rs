@@ -5,7 +5,6 @@ use super::candidate::Candidate;
 use super::recent::Recent;
 use crate::delaunay::Kernel;
 use crate::geom::HilbertFrame;
-use crate::reconnect::Shell;
 
 pub(super) struct Worker {
     pub kernel: Kernel,
@@ -14,7 +13,6 @@ pub(super) struct Worker {
     pub edges: Vec<(u64, u32)>,
     pub candidates: Vec<Candidate>,
     pub recent: Recent,
-    pub shell: Shell,
     pub active: Activity,
     /// A tetrahedron in use, where a walk can start when its own start is gone.
     pub last: u32,

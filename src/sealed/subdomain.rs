@@ -72,10 +72,25 @@ impl Subdomain {
         let tet_chunks = summaries::<TetSummary>(&mut file, &row)?;
         let vertex_chunks = summaries::<VertexSummary>(&mut file, &row)?;
         // Nobody asks these yet, but damage in them is damage too.
-        summaries::<RangeSummary<false>>(&mut file, &row)?;
-        summaries::<RangeSummary<true>>(&mut file, &row)?;
-        let tets: u64 = tet_chunks.iter().map(|s| u64::from(s.count)).sum();
-        let vertices: u64 = vertex_chunks.iter().map(|s| u64::from(s.count)).sum();
+        let facets = summaries::<RangeSummary<false>>(&mut file, &row)?;
+        let faces = summaries::<RangeSummary<true>>(&mut file, &row)?;
+        let tets = n_records(tet_chunks.iter().map(|s| [s.first, s.count]));
+        let vertices = n_records(vertex_chunks.iter().map(|s| [s.first, s.count]));
+        let facets = n_records(facets.iter().map(|s| [s.first, s.count]));
+        let faces = n_records(faces.iter().map(|s| [s.first, s.count]));
+        let (Some(tets), Some(vertices), Some(facets), Some(faces)) =
+            (tets, vertices, facets, faces)
+        else {
+            return Err(damaged(
+                "the summaries of its chunks do not follow each other".to_owned(),
+            ));
+        };
+        if facets != row.facets || faces != row.interface_faces {
+            return Err(damaged(format!(
+                "its chunks hold {facets} facets and {faces} interface faces, the catalog counts {} and {}",
+                row.facets, row.interface_faces
+            )));
+        }
         if tets != row.tets || vertices != row.vertices || vertices > u64::from(u32::MAX) {
             return Err(damaged(format!(
                 "its chunks hold {tets} tetrahedra and {vertices} vertices, the catalog counts {} and {}",
@@ -268,6 +283,13 @@ fn address<R: ChunkRecord>(row: &SubdomainRow) -> ChunkAddress {
 fn n_chunks<R: ChunkRecord>(row: &SubdomainRow) -> u32 {
     let place = CHUNK_KINDS.iter().position(|&k| k == R::KIND);
     row.chunks[place.expect("every kind is listed")]
+}
+
+/// Records in chunks that begin at and hold so many; `None` when one does not begin where the one before ends.
+fn n_records(mut chunks: impl Iterator<Item = [u32; 2]>) -> Option<u64> {
+    chunks.try_fold(0, |n, [first, count]| {
+        (u64::from(first) == n).then_some(n + u64::from(count))
+    })
 }
 
 /// All summaries of one kind: some ten bytes per thousand tetrahedra.

@@ -17,14 +17,22 @@ use tetdb_schema::catalog::QualityRow;
 const PIECE: usize = 4096;
 
 /// What is summed over tetrahedra, in their order.
-pub(super) struct Totals {
+pub struct Totals {
+    /// Of the tetrahedra.
     pub digest: Digest,
+    /// Of the vertices; whoever has them sets it.
     pub bounds: Aabb,
+    /// As in [`QualityRow`].
     pub bins: [u64; QUALITY_BINS],
+    /// Greatest quality.
     pub worst: f64,
+    /// The first that has it.
     pub worst_tet: u32,
+    /// Least and greatest cosine of a dihedral angle.
     pub cosines: [f64; 2],
+    /// Sum in order.
     pub volume: f64,
+    /// By number.
     pub regions: BTreeMap<u32, RegionTotals>,
     /// Of the piece at hand; kept, for memory that is asked for anew is cleared by the system each time.
     corners: Vec<[Corner; 4]>,

@@ -4,7 +4,7 @@
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SizingError {
-    /// A value of an option is not usable.
+    /// A value of an option is not usable. Messages name options by their keys in a file of options.
     #[error("{option} {found}: expected {expected}")]
     BadValue {
         /// The option.
@@ -15,7 +15,7 @@ pub enum SizingError {
         expected: &'static str,
     },
     /// The smallest size is above the largest.
-    #[error("the smallest size {hmin} is above the largest size {hmax}; change --hmin or --hmax")]
+    #[error("hmin {hmin} is above hmax {hmax}")]
     Crossed {
         /// Smallest size.
         hmin: f64,
@@ -23,7 +23,7 @@ pub enum SizingError {
         hmax: f64,
     },
     /// An expression cannot be read.
-    #[error("--size-expr {text}: {message} (at character {})", at + 1)]
+    #[error("size_expr {text}: {message} (at character {})", at + 1)]
     BadFormula {
         /// The expression.
         text: String,
@@ -34,7 +34,7 @@ pub enum SizingError {
     },
     /// An expression gives no length at some point.
     #[error(
-        "--size-expr {text} is {found} at ({}, {}, {}): expected a length above zero everywhere in the surface's box",
+        "size_expr {text} is {found} at ({}, {}, {}): expected a length above zero everywhere in the surface's box",
         at[0], at[1], at[2]
     )]
     NoSize {
@@ -46,7 +46,7 @@ pub enum SizingError {
         found: f64,
     },
     /// A size for a region is not usable.
-    #[error("--size-region {found}: {expected}")]
+    #[error("size_region {found}: {expected}")]
     BadRegion {
         /// The region and size found.
         found: String,
@@ -55,7 +55,7 @@ pub enum SizingError {
     },
     /// A file of sizes has another number of them than the surface has vertices.
     #[error(
-        "--size-field: {found} sizes for the {expected} vertices of the surface; without a mesh of tetrahedra beside it the file must have one for each"
+        "size_field: {found} sizes for the {expected} vertices of the surface; without a mesh of tetrahedra beside it the file must have one for each"
     )]
     SizeCount {
         /// Number of sizes found.

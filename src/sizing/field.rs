@@ -193,7 +193,9 @@ impl SizeField {
     #[inline]
     pub fn h(&self, p: Point) -> f64 {
         let at = self.on_lattice(p);
-        let cell = at.map(|x| (x as u32).min(LATTICE - 1));
+        // Spelled out, here and below: `map` on arrays is not always inlined, and this is asked ten million times.
+        let of = |x: f64| (x as u32).min(LATTICE - 1);
+        let cell = [of(at[0]), of(at[1]), of(at[2])];
         let (mut entry, mut level) = self.jump.at(cell);
         while entry & LEAF == 0 {
             entry = self.tree.blocks[entry as usize][octant_of(cell, level)];
@@ -201,7 +203,8 @@ impl SizeField {
         }
         let mask = !((LATTICE >> level) - 1);
         let per_width = WIDTHS_INVERSE[level as usize];
-        let local = std::array::from_fn(|i| (at[i] - f64::from(cell[i] & mask)) * per_width);
+        let within = |i: usize| (at[i] - f64::from(cell[i] & mask)) * per_width;
+        let local = [within(0), within(1), within(2)];
         let mut h = trilinear(&self.values.get((entry & !LEAF) as usize), local) * self.frame.side;
         for source in &self.sources {
             h = h.min(source.h(p, self.beta));
@@ -235,7 +238,8 @@ impl SizeField {
     #[inline]
     fn on_lattice(&self, p: Point) -> [f64; 3] {
         let at = (p - self.frame.low) * self.per_lattice;
-        at.to_array().map(|x| x.clamp(0.0, f64::from(LATTICE)))
+        let clamped = |x: f64| x.clamp(0.0, f64::from(LATTICE));
+        [clamped(at.x), clamped(at.y), clamped(at.z)]
     }
 
     /// Length of the edge `a b` in the metric of the sizes at its ends, taken as linear between them.
@@ -319,10 +323,10 @@ impl SizeConstraint for SizeField {
 /// Value at `local`, each coordinate from 0 to 1.
 #[inline]
 fn trilinear(values: &[f32; 8], [x, y, z]: [f64; 3]) -> f64 {
-    let v = values.map(f64::from);
+    let at = |i: usize| f64::from(values[i]);
     let mix = |a: f64, b: f64, t: f64| a + (b - a) * t;
-    let low = mix(mix(v[0], v[1], x), mix(v[2], v[3], x), y);
-    let high = mix(mix(v[4], v[5], x), mix(v[6], v[7], x), y);
+    let low = mix(mix(at(0), at(1), x), mix(at(2), at(3), x), y);
+    let high = mix(mix(at(4), at(5), x), mix(at(6), at(7), x), y);
     mix(low, high, z)
 }
 

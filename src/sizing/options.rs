@@ -25,13 +25,13 @@ impl RegionSize {
             .rsplit_once(',')
             .filter(|(which, _)| !which.trim().is_empty());
         let (which, h) = parts.ok_or_else(|| SizingError::BadValue {
-            option: "--size-region",
+            option: "size_region",
             found: text.to_owned(),
             expected: "REGION,H or LABEL,H, such as 2,0.05",
         })?;
         Ok(Self {
             which: which.trim().to_owned(),
-            h: Length::parse("--size-region", h)?,
+            h: Length::parse("size_region", h)?,
         })
     }
 }
@@ -91,9 +91,9 @@ impl SizeOptions {
         let length =
             |option, text: Option<&str>| text.map(|t| Length::parse(option, t)).transpose();
         let mut options = Self {
-            hsiz: length("--hsiz", hsiz)?,
-            hmin: length("--hmin", hmin)?,
-            hmax: length("--hmax", hmax)?,
+            hsiz: length("hsiz", hsiz)?,
+            hmin: length("hmin", hmin)?,
+            hmax: length("hmax", hmax)?,
             ..Self::default()
         };
         if let Some(text) = hgrad {
@@ -134,9 +134,9 @@ impl SizeOptions {
             })
         };
         let targets = Targets {
-            hsiz: resolve("--hsiz", self.hsiz)?,
-            hmin: resolve("--hmin", self.hmin)?,
-            hmax: resolve("--hmax", self.hmax)?,
+            hsiz: resolve("hsiz", self.hsiz)?,
+            hmin: resolve("hmin", self.hmin)?,
+            hmax: resolve("hmax", self.hmax)?,
             beta: slope_of_gradation(self.hgrad),
             beta_needles: self.beta_needles(),
         };
@@ -154,7 +154,7 @@ fn gradation_is_good(x: f64) -> bool {
 
 fn bad_gradation(found: &str) -> SizingError {
     SizingError::BadValue {
-        option: "--hgrad",
+        option: "hgrad",
         found: found.to_owned(),
         expected: "a ratio from 1.02 to 10, such as 1.3",
     }

@@ -51,7 +51,7 @@ impl SizeSource {
     /// Names the option and the value.
     pub fn parse_box(text: &str) -> Result<Self, SizingError> {
         let form = Form {
-            option: "--size-box",
+            option: "size_box",
             expected: "X0,Y0,Z0,X1,Y1,Z1,H or X0,Y0,Z0,X1,Y1,Z1,H,OUTSIDE",
             text,
         };
@@ -74,7 +74,7 @@ impl SizeSource {
     /// Names the option and the value.
     pub fn parse_sphere(text: &str) -> Result<Self, SizingError> {
         let form = Form {
-            option: "--size-sphere",
+            option: "size_sphere",
             expected: "X,Y,Z,R,H or X,Y,Z,R,H,OUTSIDE with R not below zero",
             text,
         };
@@ -96,7 +96,7 @@ impl SizeSource {
     /// Names the option and the value.
     pub fn parse_cylinder(text: &str) -> Result<Self, SizingError> {
         let form = Form {
-            option: "--size-cylinder",
+            option: "size_cylinder",
             expected: "X0,Y0,Z0,X1,Y1,Z1,R,H or X0,Y0,Z0,X1,Y1,Z1,R,H,OUTSIDE with two different ends",
             text,
         };
@@ -266,7 +266,7 @@ mod tests {
             "nan,2,3,4,1",
         ] {
             let error = SizeSource::parse_sphere(text).expect_err(text).to_string();
-            assert!(error.contains("--size-sphere"), "{error}");
+            assert!(error.contains("size_sphere"), "{error}");
         }
         assert!(SizeSource::parse_cylinder("0,0,0,0,0,0,1,0.1").is_err());
     }

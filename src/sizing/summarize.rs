@@ -5,6 +5,7 @@ use super::length::Length;
 use super::options::{SizeOptions, Targets};
 use super::seeds::Seeds;
 use super::summary::{Range, SizeSummary, SizeWarning};
+use crate::geom::short;
 use crate::storage::{ScratchSpace, raise, sort_record};
 
 impl SizeField {
@@ -26,13 +27,14 @@ impl SizeField {
         });
         let median = weighted_range(middles, room).median;
         let (low, high) = self.range();
-        let wanted = [("--hsiz", targets.hsiz), ("--hmax", targets.hmax)];
+        let wanted = [("hsiz", targets.hsiz), ("hmax", targets.hmax)];
         let warnings = wanted.into_iter().filter_map(|(option, wanted)| {
             let wanted = wanted.filter(|&h| h < FAR_BELOW * surface.median)?;
             Some(SizeWarning::FarBelowSurface {
                 option,
                 wanted,
                 surface_median: surface.median,
+                away: (surface.median - wanted) / targets.beta,
             })
         });
         SizeSummary {
@@ -86,31 +88,35 @@ fn weighted_range(list: impl Iterator<Item = (f64, f64)>, room: &ScratchSpace) -
 /// not divided, so that large triangles would stand against small tetrahedra.
 const FAR_BELOW: f64 = 0.4;
 
+fn plural(n: usize, what: &str) -> String {
+    format!("{n} {what}{}", if n == 1 { "" } else { "s" })
+}
+
 fn source_of(options: &SizeOptions, targets: &Targets) -> String {
     let mut parts = Vec::new();
     let named = [
-        ("--hsiz", options.hsiz, targets.hsiz),
-        ("--hmin", options.hmin, targets.hmin),
-        ("--hmax", options.hmax, targets.hmax),
+        ("hsiz", options.hsiz, targets.hsiz),
+        ("hmin", options.hmin, targets.hmin),
+        ("hmax", options.hmax, targets.hmax),
     ];
     for (name, asked, length) in named {
         match (asked, length) {
             (Some(Length::Percent(share)), Some(h)) => {
-                parts.push(format!("{name} {share}% = {h:.4}"));
+                parts.push(format!("{name} {share}% = {}", short(h)));
             }
             (Some(_), Some(h)) => parts.push(format!("{name} {h}")),
             _ => {}
         }
     }
     if !options.sources.is_empty() {
-        parts.push(format!("{} shapes", options.sources.len()));
+        parts.push(plural(options.sources.len(), "shape"));
     }
     if !options.regions.is_empty() {
-        parts.push(format!("{} regions", options.regions.len()));
+        parts.push(plural(options.regions.len(), "region"));
     }
     if options.formula.is_some() {
-        parts.push("--size-expr".to_owned());
+        parts.push("size_expr".to_owned());
     }
     parts.push("the surface's edges".to_owned());
-    format!("{}, --hgrad {}", parts.join(", "), options.hgrad)
+    format!("{}, hgrad {}", parts.join(", "), options.hgrad)
 }

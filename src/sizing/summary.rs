@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use crate::geom::short;
+
 /// Lowest, median and highest of some lengths, in input units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
@@ -44,6 +46,8 @@ pub enum SizeWarning {
         wanted: f64,
         /// Median size of the surface.
         surface_median: f64,
+        /// How far from edges of that length the gradation lets sizes come down to it.
+        away: f64,
     },
 }
 
@@ -54,10 +58,15 @@ impl fmt::Display for SizeWarning {
                 option,
                 wanted,
                 surface_median,
+                away,
             } => write!(
                 f,
-                "{option} {wanted:.4} is far below the surface's edges (median {surface_median:.4}), which are kept: \
-                 near the surface tetrahedra stay large; refine the surface first"
+                "{option} {} is far below the surface's edges, which are kept: next to them edges of tetrahedra stay near the median of {}, and \
+                 reach {} only {} or more away from them; refine the surface first",
+                short(*wanted),
+                short(*surface_median),
+                short(*wanted),
+                short(*away)
             ),
         }
     }
@@ -68,8 +77,14 @@ impl fmt::Display for SizeSummary {
         let Range { low, median, high } = self.surface;
         write!(
             f,
-            "sizes from {}; surface median {median:.4} ({low:.4} to {high:.4}), volume median {:.4} ({:.4} to {:.4})",
-            self.source, self.field.median, self.field.low, self.field.high
+            "sizes from {}; surface median {} ({} to {}), wanted in the volume {} ({} to {})",
+            self.source,
+            short(median),
+            short(low),
+            short(high),
+            short(self.field.median),
+            short(self.field.low),
+            short(self.field.high)
         )
     }
 }

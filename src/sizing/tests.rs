@@ -567,7 +567,7 @@ fn summaries_say_where_sizes_came_from() {
         "{text}"
     );
     assert_eq!(summary.warnings.len(), 1);
-    assert!(summary.warnings[0].to_string().contains("--hsiz 0.0173"));
+    assert!(summary.warnings[0].to_string().contains("hsiz 0.0173"));
     assert!(
         (summary.surface.median / 0.0557 - 1.0).abs() < 0.05,
         "{summary:?}"

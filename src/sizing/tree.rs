@@ -275,8 +275,8 @@ impl Iterator for Cells<'_> {
 #[inline]
 pub(super) fn octant_of(cell: [u32; 3], level: u32) -> usize {
     let bit = DEPTH - 1 - level;
-    let [x, y, z] = cell.map(|c| c >> bit & 1);
-    (x | y << 1 | z << 2) as usize
+    let at = |axis: usize| cell[axis] >> bit & 1;
+    (at(0) | at(1) << 1 | at(2) << 2) as usize
 }
 
 impl Leaf {

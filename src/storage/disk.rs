@@ -8,6 +8,8 @@ use std::path::Path;
 
 use redb::{Builder, DatabaseError, ReadOnlyDatabase, StorageBackend};
 
+use super::file_lock::{FileLock, Refused};
+
 /// Files and folders by path. Paths mean what they mean to the operating system.
 ///
 /// What is written counts after [`StorageBackend::sync_data`] or [`Disk::sync_file`]; that a file has a name, another name or none, after
@@ -42,11 +44,18 @@ pub trait Disk: Debug + Send + Sync {
     fn remove_file(&self, path: &Path) -> io::Result<()>;
     /// Gives a file another name on the same disk, replacing what had it.
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()>;
+    /// Takes the right that a file stands for. Errors: another has it; the folder takes no files.
+    fn lock(&self, path: &Path) -> Result<FileLock, Refused>;
     /// Names in a folder, in any order.
     fn list(&self, dir: &Path) -> io::Result<Vec<String>>;
     /// What is at a path; `None`: nothing, or nothing that may be seen.
     fn entry(&self, path: &Path) -> Option<Entry>;
+    /// Which file has this name now; `None`: none.
+    fn id(&self, path: &Path) -> Option<FileId>;
 }
+
+/// Tells a file from any other that is there or open at the same time, whatever its name.
+pub type FileId = (u64, u64);
 
 /// What has a name on a disk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::StorageError;
-use super::disk::{Disk, Entry};
+use super::disk::{Disk, Entry, FileId};
+use super::file_lock::{FileLock, Refused};
 use super::real_disk::RealDisk;
 
 /// A path on a disk: the real one, unless said otherwise.
@@ -60,6 +61,16 @@ impl DiskPath {
     /// Whether a folder is there.
     pub fn is_dir(&self) -> bool {
         self.disk.entry(&self.path) == Some(Entry::Folder)
+    }
+
+    /// Which file has this name now.
+    pub fn id(&self) -> Option<FileId> {
+        self.disk.id(&self.path)
+    }
+
+    /// Takes the right that the file stands for. Errors: another has it; the folder takes no files.
+    pub fn lock(&self) -> Result<FileLock, Refused> {
+        self.disk.lock(&self.path)
     }
 
     /// Length of the file in bytes. Errors: there is none.

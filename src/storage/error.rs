@@ -80,7 +80,7 @@ pub enum StorageError {
         what: &'static str,
     },
     /// The user asked to stop; the step in flight is lost, everything before it is kept.
-    #[error("stopped")]
+    #[error("the run was ended before it was done")]
     Cancelled,
 }
 

@@ -2,6 +2,7 @@
 
 use std::io::ErrorKind;
 use std::path::Path;
+use std::sync::Arc;
 
 use redb::{
     Database, DatabaseError, Durability, ReadOnlyDatabase, ReadOnlyTable, ReadableDatabase,
@@ -17,9 +18,10 @@ const CHECK_CACHE_BYTES: usize = 1 << 20;
 /// The only table of a file; see the schema's page on keys.
 const PAGES: TableDefinition<u64, &[u8]> = TableDefinition::new("pages");
 
+#[derive(Clone)]
 enum Handle {
-    Writer(Box<Database>),
-    Reader(Box<ReadOnlyDatabase>),
+    Writer(Arc<Database>),
+    Reader(Arc<ReadOnlyDatabase>),
 }
 
 /// Values by key in one redb file.
@@ -64,7 +66,7 @@ impl StoreFile {
         let file = path.at_path(path.disk().create(path.path()))?;
         let db = guarded(|| builder.create_with_backend(backend(file)));
         let mut file = Self {
-            handle: Some(Handle::Writer(Box::new(db.map_err(|e| e.at(path.path()))?))),
+            handle: Some(Handle::Writer(Arc::new(db.map_err(|e| e.at(path.path()))?))),
             path,
             table: None,
             damage: None,
@@ -93,11 +95,11 @@ impl StoreFile {
         builder.set_cache_size(cache_bytes);
         // redb follows its tree of free pages while it opens.
         let handle = guarded(|| match access {
-            Access::Write => open_writable(&path, &builder).map(|db| Handle::Writer(Box::new(db))),
-            Access::Private => open_private(&path, &builder).map(|db| Handle::Writer(Box::new(db))),
+            Access::Write => open_writable(&path, &builder).map(|db| Handle::Writer(Arc::new(db))),
+            Access::Private => open_private(&path, &builder).map(|db| Handle::Writer(Arc::new(db))),
             Access::Share => match path.disk().open_shared(path.path(), &builder) {
-                Some(db) => db.map(|db| Handle::Reader(Box::new(db))),
-                None => open_private(&path, &builder).map(|db| Handle::Writer(Box::new(db))),
+                Some(db) => db.map(|db| Handle::Reader(Arc::new(db))),
+                None => open_private(&path, &builder).map(|db| Handle::Writer(Arc::new(db))),
             },
         });
         let mut file = Self {
@@ -261,10 +263,52 @@ impl StoreFile {
         }
     }
 
+    /// The same file for another reader, as it was when this one opened it.
+    pub fn share(&self) -> Self {
+        Self {
+            path: self.path.clone(),
+            handle: self.handle.clone(),
+            table: None,
+            damage: self.damage.clone(),
+        }
+    }
+
+    /// Writes all it holds, then the changes, into a new file at `to`, which lasts and is closed when this returns.
+    ///
+    /// Memory: a batch of values. Errors: as [`StoreFile::create`] and [`StoreFile::write`]; damage.
+    pub fn rewrite<'a>(
+        &mut self,
+        to: &DiskPath,
+        cache_bytes: usize,
+        changes: impl Iterator<Item = (u64, Option<&'a [u8]>)>,
+    ) -> Result<(), StorageError> {
+        /// Values of so many bytes are read before they are written.
+        const BATCH_BYTES: usize = 1 << 20;
+        let mut new = Self::create_unsynced(to, cache_bytes)?;
+        let mut from = Some(0);
+        while let Some(first) = from.take() {
+            let (mut batch, mut bytes) = (Vec::new(), 0);
+            self.scan(first..u64::MAX, |key, value| {
+                if bytes > BATCH_BYTES {
+                    from = Some(key);
+                    return false;
+                }
+                bytes += value.len();
+                batch.push((key, value.to_vec()));
+                true
+            })?;
+            new.write(batch.iter().map(|(key, value)| (*key, &value[..])))?;
+        }
+        new.change(changes)?;
+        new.compact()?;
+        to.sync_file()
+    }
+
     /// Shrinks the file to what it holds, and closes it.
     pub fn compact(mut self) -> Result<(), StorageError> {
         self.table = None;
         if let Some(Handle::Writer(db)) = &mut self.handle {
+            let db = Arc::get_mut(db).expect("what is written is not shared");
             let done = guarded(|| db.compact().map_err(redb::Error::from));
             done.map_err(|e| e.at(self.path.path()))?;
         }

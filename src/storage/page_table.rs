@@ -78,6 +78,20 @@ impl PageTable {
         self.quick[page as usize] = first | clean;
     }
 
+    /// Lets every page be read at once; `false` when one is not in memory.
+    pub(super) fn make_readable(&mut self) -> bool {
+        for page in 0..self.entries.len() {
+            let entry = self.entries[page];
+            if entry & RESIDENT == 0 {
+                return false;
+            }
+            if entry & REFERENCED == 0 {
+                self.set(page as u32, entry | REFERENCED);
+            }
+        }
+        true
+    }
+
     /// Adds a page at the end.
     pub(super) fn push(&mut self, entry: u32) {
         self.entries.push(IN_BASE);

@@ -13,7 +13,7 @@ use super::page_table::{
     DIRTY, FRAMES_LIMIT, IN_BASE, IN_OUTPUT, PageTable, REFERENCED, RESIDENT, frame_of,
 };
 use super::places::{Backing, Places};
-use super::{DiskPath, Pages, StorageError, check_cancelled, kind, raise};
+use super::{DiskPath, Pages, SharedPages, StorageError, check_cancelled, kind, raise};
 
 /// Dirty pages written in one commit; a quarter of what redb's cache should hold.
 const BATCH_PAGES_MAX: usize = 256;
@@ -439,6 +439,11 @@ impl Pages for Pager {
         self.forget(K, self.n_pages::<K>());
         let dropped = std::mem::take(&mut self.tables[K]).frames();
         self.release(dropped);
+    }
+
+    fn shared(&mut self) -> Option<SharedPages<'_>> {
+        let all = self.tables.iter_mut().all(PageTable::make_readable);
+        all.then(|| SharedPages::new(&self.frames, &self.tables))
     }
 }
 

@@ -2,6 +2,8 @@
 
 use tetdb_schema::page::Slot;
 
+use super::SharedPages;
+
 /// Kinds of working pages an accessor may name, as positions in a page table.
 pub mod kind {
     use tetdb_schema::page::PageKind;
@@ -50,4 +52,8 @@ pub trait Pages {
     fn drop_front<const K: usize>(&mut self, n: u32);
     /// Forgets all pages of kind `K`, as if there had never been one.
     fn clear<const K: usize>(&mut self);
+    /// A view for several threads, when all pages are in memory.
+    fn shared(&mut self) -> Option<SharedPages<'_>> {
+        None
+    }
 }

@@ -7,7 +7,8 @@ use std::path::Path;
 use redb::backends::FileBackend;
 use redb::{Builder, DatabaseError, ReadOnlyDatabase, StorageBackend};
 
-use super::disk::{Disk, Entry};
+use super::disk::{Disk, Entry, FileId};
+use super::file_lock::{FileLock, Refused};
 
 /// Files and folders of this machine, with redb's own locks on database files.
 #[derive(Clone, Copy, Debug)]
@@ -74,6 +75,10 @@ impl Disk for RealDisk {
         fs::rename(from, to)
     }
 
+    fn lock(&self, path: &Path) -> Result<FileLock, Refused> {
+        FileLock::acquire(path)
+    }
+
     fn list(&self, dir: &Path) -> io::Result<Vec<String>> {
         fs::read_dir(dir)?
             .map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned()))
@@ -86,5 +91,23 @@ impl Disk for RealDisk {
             true => Some(Entry::Folder),
             false => Some(Entry::File(metadata.len())),
         }
+    }
+
+    #[cfg(unix)]
+    fn id(&self, path: &Path) -> Option<FileId> {
+        use std::os::unix::fs::MetadataExt;
+        let metadata = fs::metadata(path).ok()?;
+        Some((metadata.dev(), metadata.ino()))
+    }
+
+    /// By when and how large it was written, where the system has no other numbers.
+    #[cfg(not(unix))]
+    fn id(&self, path: &Path) -> Option<FileId> {
+        let metadata = fs::metadata(path).ok()?;
+        let since = metadata
+            .modified()
+            .ok()?
+            .duration_since(std::time::UNIX_EPOCH);
+        Some((metadata.len(), since.ok()?.as_nanos() as u64))
     }
 }

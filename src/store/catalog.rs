@@ -1,20 +1,20 @@
 //! The directory of a store: created, opened, its files named and, when nobody lists them, removed.
 
-use std::io::ErrorKind;
 use std::path::Path;
-use std::time::Duration;
+use std::sync::Arc;
 
 use rkyv::api::high::{HighDeserializer, HighValidator};
 use rkyv::bytecheck::CheckBytes;
 use rkyv::rancor;
 use rkyv::{Archive, Deserialize};
+use tetdb_schema::chunk::is_box;
 use tetdb_schema::digest::Digest;
 use tetdb_schema::page::FORMAT_VERSION;
 
 use super::rows::{self, RowKind};
 use super::{Step, StoreError};
 use crate::sealed::{CoarseSnapshot, Form, SealedError, Subdomain};
-use crate::storage::{DiskPath, StorageError, StoreFile};
+use crate::storage::{DiskPath, FileId, FileLock, Refused, StorageError, StoreFile};
 use tetdb_schema::catalog::{
     CoarseRow, FileRow, InterfaceRow, Job, JournalRow, RegionRow, StageRow, StoreState,
     SubdomainRow, TopologyRow,
@@ -27,17 +27,62 @@ const CACHE_BYTES: usize = 2 << 20;
 const CATALOG: &str = "catalog.redb";
 /// The catalog until its first commit: a catalog that can be seen has its job.
 const CATALOG_NEW: &str = "catalog.redb-new";
+/// The catalog of a finished store as it is after the next commit, until it takes the place of the one before.
+const CATALOG_NEXT: &str = "catalog.redb-next";
+/// Stands for the right to change the store; see [`FileLock`].
+const LOCK: &str = "writer.lock";
 /// Folder of sorted runs; everything in it is scratch.
 const SCRATCH: &str = "scratch";
 
 /// The catalog of a store, open for reading or for writing.
 ///
-/// Many processes may read, or one may write. Changes happen in [`Catalog::commit`] only.
+/// At most one process writes at a time, and has [`WriterLock`] from before its first byte to after its last. Changes happen in
+/// [`Catalog::commit`] only. The catalog of an unfinished store is changed in place, and nobody can read it meanwhile. That of a finished
+/// store never is: a commit writes another file, which takes its name. A reader has the file that had the name when it came, so that it
+/// sees one state of the store however long it reads, and neither waits for the other.
 pub struct Catalog {
     dir: DiskPath,
     file: StoreFile,
-    writable: bool,
+    /// Which file `file` is; another one has its name once the store has been changed.
+    id: Option<FileId>,
+    /// `None`: open for reading only.
+    lock: Option<Arc<WriterLock>>,
+    /// `false`: each commit writes a new file.
+    in_place: bool,
     journal_rows: u32,
+}
+
+/// The right to change a store, which one process at a time has; it ends when the last that shares it is dropped.
+#[derive(Debug)]
+pub struct WriterLock {
+    file: FileLock,
+}
+
+impl WriterLock {
+    /// Takes the right to change the store in a folder.
+    ///
+    /// Errors: [`StoreError::Busy`] while another has it; [`StoreError::NotFound`]; the folder takes no files.
+    pub fn acquire(dir: impl Into<DiskPath>) -> Result<Arc<Self>, StoreError> {
+        let dir = dir.into();
+        let path = dir.path().to_owned();
+        match dir.join(LOCK).lock() {
+            Ok(file) => Ok(Arc::new(Self { file })),
+            Err(Refused::Held(writer)) => Err(StoreError::Busy { path, writer }),
+            Err(Refused::Io(_)) if !dir.exists() => Err(StoreError::NotFound { path }),
+            Err(Refused::Io(e)) => Err(StorageError::io(&path.join(LOCK), e).into()),
+        }
+    }
+
+    /// Whether the store is on a file system that knows no locks: then the file [`WriterLock`] left there decides, and one that was left
+    /// by a process of another host has to be removed by hand.
+    pub fn is_by_name(&self) -> bool {
+        self.file.is_by_name()
+    }
+
+    /// The store has another name now.
+    pub fn moved_to(&self, dir: &Path) {
+        self.file.moved_to(&dir.join(LOCK));
+    }
 }
 
 impl Catalog {
@@ -57,23 +102,22 @@ impl Catalog {
         describe: impl FnOnce(&mut Step),
     ) -> Result<Self, StoreError> {
         let dir = dir.into();
-        refuse_existing(&dir)?;
-        dir.create_dir_all()?;
-        let draft = dir.join(CATALOG_NEW);
-        let file = create_draft(&draft, &dir)?;
-        // Whoever has the draft is the only one here, but another may have been here before.
-        if dir.join(CATALOG).exists() {
-            drop(file);
-            draft.remove_file()?;
-            refuse_existing(&dir)?;
-            return Err(StoreError::Busy {
-                path: dir.path().to_owned(),
-            });
+        match refuse_existing(&dir) {
+            // Whether somebody is at it, the lock says.
+            Ok(()) | Err(StoreError::Unfinished { .. }) => {}
+            Err(other) => return Err(other),
         }
+        dir.create_dir_all()?;
+        let lock = WriterLock::acquire(&dir)?;
+        refuse_existing(&dir)?;
+        let draft = dir.join(CATALOG_NEW);
+        draft.remove_file()?;
         let mut catalog = Self {
+            file: StoreFile::create(&draft, CACHE_BYTES)?,
+            id: draft.id(),
             dir,
-            file,
-            writable: true,
+            lock: Some(lock),
+            in_place: true,
             journal_rows: 0,
         };
         catalog.commit(|step| {
@@ -94,26 +138,76 @@ impl Catalog {
     /// Whether `dir` is a directory where a store can be created: empty, or left by a run that was killed before its first commit.
     pub fn is_vacant(dir: impl Into<DiskPath>) -> bool {
         let names = dir.into().list();
-        names.is_ok_and(|names| names.iter().all(|name| name == CATALOG_NEW))
+        names.is_ok_and(|names| {
+            names
+                .iter()
+                .all(|name| [CATALOG_NEW, LOCK].contains(&&**name))
+        })
     }
 
-    /// Opens a store for reading; other processes may read it as well.
+    /// Opens a store for reading; others may read and change it meanwhile.
     ///
-    /// Errors: [`StoreError::NotFound`], [`StoreError::NotOurs`], [`StoreError::Busy`] while it is written, [`StoreError::Format`].
+    /// Errors: [`StoreError::NotFound`], [`StoreError::NotOurs`], [`StoreError::Busy`] while it is unfinished and written,
+    /// [`StoreError::Format`].
     pub fn open(dir: impl Into<DiskPath>) -> Result<Self, StoreError> {
-        Self::open_as(dir.into(), false)
+        Self::open_as(&dir.into(), false)
     }
 
-    /// Opens a store for writing, alone, and removes files that an interrupted step left.
+    /// Opens a store for writing, and removes files that an interrupted step left.
     ///
-    /// Errors: as [`Catalog::open`]; [`StoreError::Busy`] also while another process reads it.
+    /// Errors: as [`Catalog::open`]; [`StoreError::Busy`] while another process writes.
     pub fn open_writable(dir: impl Into<DiskPath>) -> Result<Self, StoreError> {
-        let mut catalog = Self::open_as(dir.into(), true)?;
+        let dir = dir.into();
+        Self::find(&dir)?;
+        let lock = WriterLock::acquire(&dir)?;
+        Self::open_locked(dir, lock)
+    }
+
+    /// The same for one who has the lock of the store. Errors: as [`Catalog::open`].
+    pub fn open_locked(
+        dir: impl Into<DiskPath>,
+        lock: Arc<WriterLock>,
+    ) -> Result<Self, StoreError> {
+        let dir = dir.into();
+        let mut catalog = Self::open_as(&dir, false)?;
+        if !catalog.state()?.is_finished() {
+            drop(catalog);
+            catalog = Self::open_as(&dir, true)?;
+        }
+        catalog.lock = Some(lock);
         catalog.purge()?;
         Ok(catalog)
     }
 
-    fn open_as(dir: DiskPath, writable: bool) -> Result<Self, StoreError> {
+    /// The lock of the store, to be held longer than the catalog is open; `None` when it is open for reading.
+    pub fn lock(&self) -> Option<Arc<WriterLock>> {
+        self.lock.clone()
+    }
+
+    /// The same state of the store for another reader.
+    pub fn share(&self) -> Self {
+        Self {
+            dir: self.dir.clone(),
+            file: self.file.share(),
+            id: self.id,
+            lock: None,
+            in_place: false,
+            journal_rows: self.journal_rows,
+        }
+    }
+
+    /// Whether the store is as it was when this was opened.
+    pub fn is_current(&self) -> bool {
+        self.dir.join(CATALOG).id() == self.id
+    }
+
+    /// Whether there is a catalog in a folder.
+    pub fn is_at(dir: impl Into<DiskPath>) -> bool {
+        dir.into().join(CATALOG).is_file()
+    }
+
+    /// The path of the catalog in a folder. Errors: there is none.
+    fn find(dir: &DiskPath) -> Result<DiskPath, StoreError> {
         let path = dir.join(CATALOG);
         if !dir.exists() {
             return Err(StoreError::NotFound {
@@ -132,14 +226,29 @@ impl Catalog {
                 reason,
             });
         }
+        Ok(path)
+    }
+
+    fn open_as(dir: &DiskPath, in_place: bool) -> Result<Self, StoreError> {
+        let path = Self::find(dir)?;
+        let (file, id) = loop {
+            let id = path.id();
+            let file = StoreFile::open_repaired(&path, CACHE_BYTES, in_place)?;
+            // Another may have taken its name between the two looks.
+            if path.id() == id {
+                break (file, id);
+            }
+        };
         let mut catalog = Self {
-            dir,
-            file: StoreFile::open_repaired(&path, CACHE_BYTES, writable)?,
-            writable,
+            dir: dir.clone(),
+            file,
+            id,
+            lock: None,
+            in_place,
             journal_rows: 0,
         };
         catalog.check_format()?;
-        if !writable {
+        if !in_place {
             // A file opened for writing has been checked.
             catalog.file.check()?;
         }
@@ -221,7 +330,7 @@ impl Catalog {
         describe: impl FnOnce(&mut Step) -> Result<(), StoreError>,
     ) -> Result<(), StoreError> {
         assert!(
-            self.writable,
+            self.lock.is_some(),
             "{} is open for reading only",
             self.dir().display()
         );
@@ -236,8 +345,10 @@ impl Catalog {
                 .sync_file()?;
         }
         self.dir.sync_dir()?;
-        let changes = step.changes.iter();
-        self.file.change(changes.map(|(&k, v)| (k, v.as_deref())))?;
+        match self.in_place {
+            true => self.file.change(step.rows())?,
+            false => self.replace_file(&step)?,
+        }
         self.journal_rows = step.journal_rows;
         for file in &step.unlisted {
             self.file_path(file.subdomain, file.generation)
@@ -246,7 +357,30 @@ impl Catalog {
         Ok(())
     }
 
-    /// Removes sub-domain files the catalog does not list, and scratch.
+    /// Writes the catalog as it is after a step, and gives it the name of the one that readers have.
+    fn replace_file(&mut self, step: &Step) -> Result<(), StoreError> {
+        let next = self.dir.join(CATALOG_NEXT);
+        next.remove_file()?;
+        let written = self.file.rewrite(&next, CACHE_BYTES, step.rows());
+        let opened = written.and_then(|()| {
+            let id = next.id();
+            let mut file = StoreFile::open(&next, CACHE_BYTES, false)?;
+            file.rename(CATALOG)?;
+            Ok((file, id))
+        });
+        match opened {
+            Ok((file, id)) => {
+                (self.file, self.id) = (file, id);
+                Ok(())
+            }
+            Err(error) => {
+                let _ = next.remove_file();
+                Err(error.into())
+            }
+        }
+    }
+
+    /// Removes sub-domain files the catalog does not list, what an interrupted commit left, and scratch.
     fn purge(&mut self) -> Result<(), StoreError> {
         let listed = self.files()?;
         let coarse: Vec<FileRow> = (self.coarse_snapshots()?.iter())
@@ -260,7 +394,8 @@ impl Catalog {
             let is_stray = |kind, listed: &[FileRow]| {
                 parsed(kind, &name).is_some_and(|file| !listed.contains(&file))
             };
-            if is_stray(SUBDOMAIN, &listed) || is_stray(COARSE, &coarse) {
+            let is_draft = [CATALOG_NEW, CATALOG_NEXT].contains(&&*name);
+            if is_draft || is_stray(SUBDOMAIN, &listed) || is_stray(COARSE, &coarse) {
                 path.remove_file()?;
             } else if name == SCRATCH {
                 path.remove_dir_all()?;
@@ -293,18 +428,35 @@ impl Catalog {
 
     /// All sub-domains by rank.
     pub fn subdomains(&mut self) -> Result<Vec<SubdomainRow>, StoreError> {
-        self.rows(RowKind::Subdomain)
+        let rows: Vec<SubdomainRow> = self.rows(RowKind::Subdomain)?;
+        rows.iter().try_for_each(|row| self.check_row(row))?;
+        Ok(rows)
+    }
+
+    /// Refuses a row that no sub-domain can have, before anybody computes with it.
+    fn check_row(&self, row: &SubdomainRow) -> Result<(), StoreError> {
+        let is_finished = Form::of(row.state).is_some() && row.vertices > 0;
+        let is_sound = is_box(&row.bounds) && !row.volume.is_nan() && !row.quality.worst.is_nan();
+        match !is_finished || is_sound {
+            true => Ok(()),
+            false => {
+                let reason = "gives a sub-domain a box, volume or quality that none can have";
+                Err(self.damaged_row(RowKind::Subdomain.key(0, row.rank), reason.to_owned()))
+            }
+        }
     }
 
     /// One sub-domain.
     ///
     /// Errors: [`StoreError::NoSubdomain`].
     pub fn subdomain(&mut self, rank: u32) -> Result<SubdomainRow, StoreError> {
-        let row = self.row(RowKind::Subdomain.key(0, rank))?;
-        row.ok_or_else(|| StoreError::NoSubdomain {
+        let row: Option<SubdomainRow> = self.row(RowKind::Subdomain.key(0, rank))?;
+        let row = row.ok_or_else(|| StoreError::NoSubdomain {
             path: self.dir().to_owned(),
             subdomain: rank,
-        })
+        })?;
+        self.check_row(&row)?;
+        Ok(row)
     }
 
     /// Opens a sealed sub-domain with `memory_bytes` for redb's cache and decoded vertices.
@@ -326,7 +478,32 @@ impl Catalog {
         memory_bytes: usize,
     ) -> Result<Subdomain, StoreError> {
         let path = self.file_path(row.rank, row.generation);
-        Ok(Subdomain::open(&path, row, memory_bytes)?)
+        let opened = Subdomain::open(&path, row.clone(), memory_bytes);
+        self.of_one_state(opened, |now| {
+            let is_row = |other: &SubdomainRow| *other == row;
+            Ok(now.subdomains()?.iter().any(is_row)
+                || now.previous()?.iter().any(is_row)
+                || now.stages()?.iter().any(|stage| is_row(&stage.row)))
+        })
+    }
+
+    /// What was opened of a file that this catalog lists.
+    ///
+    /// Names of files that are no longer listed may be given again, also by a whole new store at the same path. So when the store has been
+    /// changed, a file is only ours if the new catalog has the same row of it. Errors: [`StoreError::Changed`]; that of `opened`.
+    fn of_one_state<T>(
+        &self,
+        opened: Result<T, SealedError>,
+        is_listed: impl FnOnce(&mut Self) -> Result<bool, StoreError>,
+    ) -> Result<T, StoreError> {
+        let is_ours = self.is_current()
+            || Self::open(&self.dir).is_ok_and(|mut now| is_listed(&mut now).unwrap_or(false));
+        match is_ours {
+            true => Ok(opened?),
+            false => Err(StoreError::Changed {
+                path: self.dir().to_owned(),
+            }),
+        }
     }
 
     /// Opens the coarse snapshot of a sub-domain with `cache_bytes` for redb.
@@ -343,7 +520,8 @@ impl Catalog {
             subdomain: rank,
         })?;
         let path = self.coarse_path(rank, row.generation);
-        Ok(CoarseSnapshot::open(&path, row, cache_bytes)?)
+        let opened = CoarseSnapshot::open(&path, row, cache_bytes);
+        self.of_one_state(opened, |now| Ok(now.coarse_snapshots()?.contains(&row)))
     }
 
     /// The digest of the tetrahedra and of the interface faces, from the rows of the sub-domains.
@@ -368,7 +546,9 @@ impl Catalog {
 
     /// What the sub-domains of the last change were before it, by rank.
     pub fn previous(&mut self) -> Result<Vec<SubdomainRow>, StoreError> {
-        self.rows(RowKind::Previous)
+        let rows: Vec<SubdomainRow> = self.rows(RowKind::Previous)?;
+        rows.iter().try_for_each(|row| self.check_row(row))?;
+        Ok(rows)
     }
 
     /// The files that count, by sub-domain and generation.
@@ -399,7 +579,11 @@ impl Catalog {
 
     /// Meshes that were kept to be looked at, the coarse ones first, by cut.
     pub fn stages(&mut self) -> Result<Vec<StageRow>, StoreError> {
-        self.rows(RowKind::Stage)
+        let stages: Vec<StageRow> = self.rows(RowKind::Stage)?;
+        stages
+            .iter()
+            .try_for_each(|stage| self.check_row(&stage.row))?;
+        Ok(stages)
     }
 
     /// All steps done so far, in order.
@@ -498,32 +682,6 @@ fn refuse_existing(dir: &DiskPath) -> Result<(), StoreError> {
         true => Err(StoreError::Finished { path }),
         false => Err(StoreError::Unfinished { path }),
     }
-}
-
-/// Creates the catalog's draft, which only one run can; one that a killed run left is replaced.
-fn create_draft(draft: &DiskPath, dir: &DiskPath) -> Result<StoreFile, StoreError> {
-    /// Between its creation and its lock a draft looks as if nobody had it.
-    const LOCKED_AFTER: Duration = Duration::from_millis(50);
-    let busy = || StoreError::Busy {
-        path: dir.path().to_owned(),
-    };
-    let create = || {
-        StoreFile::create(draft, CACHE_BYTES).map_err(|error| match error {
-            StorageError::Io { source, .. } if source.kind() == ErrorKind::AlreadyExists => busy(),
-            other => other.into(),
-        })
-    };
-    if !draft.exists() {
-        return create();
-    }
-    std::thread::sleep(LOCKED_AFTER);
-    if draft.exists()
-        && let Err(StorageError::Busy { .. }) = StoreFile::open(draft, CACHE_BYTES, true)
-    {
-        return Err(busy());
-    }
-    draft.remove_file()?;
-    create()
 }
 
 /// First words of the names of files.

@@ -10,9 +10,17 @@ use crate::storage::StorageError;
 #[non_exhaustive]
 pub enum StoreError {
     /// Another process writes the store.
-    #[error("{path} is being written by another process; wait for it, or stop it")]
+    #[error("{path} is being written by {writer}; wait for it, or stop it")]
     Busy {
         /// The file or folder.
+        path: PathBuf,
+        /// Who, in words.
+        writer: String,
+    },
+    /// Another process has changed the store since it was opened, and what was asked for is no longer there.
+    #[error("{path} was changed by another process while it was read")]
+    Changed {
+        /// The folder.
         path: PathBuf,
     },
     /// There is nothing at this path.
@@ -102,7 +110,10 @@ impl StoreError {
 impl From<StorageError> for StoreError {
     fn from(error: StorageError) -> Self {
         match error {
-            StorageError::Busy { path } => Self::Busy { path },
+            StorageError::Busy { path } => Self::Busy {
+                path,
+                writer: "another process".to_owned(),
+            },
             other => Self::Storage(other),
         }
     }

@@ -13,7 +13,7 @@ mod step;
 #[cfg(test)]
 mod tests;
 
-pub use catalog::Catalog;
+pub use catalog::{Catalog, WriterLock};
 pub use error::StoreError;
 pub use step::Step;
 #[cfg(test)]

@@ -32,6 +32,11 @@ impl Step {
         }
     }
 
+    /// The rows it sets, and the keys of those it removes.
+    pub(super) fn rows(&self) -> impl Iterator<Item = (u64, Option<&[u8]>)> {
+        self.changes.iter().map(|(&key, row)| (key, row.as_deref()))
+    }
+
     pub(super) fn put_bytes(&mut self, key: u64, bytes: &[u8]) {
         self.changes
             .insert(key, Some(rows::guarded_bytes(key, bytes)));

@@ -48,12 +48,12 @@ fn what_is_in_the_way_of_a_new_store_is_named() -> Outcome {
     drop(catalog);
     let found = no_error(Catalog::create(&path, &job()));
     assert!(matches!(found, StoreError::Finished { .. }), "{found}");
-    let readers = (Catalog::open(&path)?, Catalog::open(&path)?);
+    let writer = Catalog::open_writable(&path)?;
     assert!(matches!(
         no_error(Catalog::open_writable(&path)),
         StoreError::Busy { .. }
     ));
-    drop(readers);
+    drop((Catalog::open(&path)?, Catalog::open(&path)?, writer));
     let found = no_error(Catalog::create(dir.path(), &job()));
     assert!(matches!(found, StoreError::NotOurs { .. }), "{found}");
     let found = no_error(Catalog::open(dir.path().join("b")));
@@ -191,6 +191,14 @@ pub(crate) fn two_subdomains(path: &std::path::Path) -> Result<(), StoreError> {
         for part in &sealed {
             step.list_file(part.row.rank, 1);
             step.set_subdomain(&part.row);
+            let neighbor = NeighborRow {
+                subdomain: 1 - part.row.rank,
+                faces: side.faces,
+            };
+            step.set_topology(&TopologyRow {
+                subdomain: part.row.rank,
+                neighbors: vec![neighbor],
+            });
         }
         step.set_interfaces(
             1,

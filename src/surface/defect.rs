@@ -124,7 +124,7 @@ pub(crate) fn show(p: Point) -> String {
 }
 
 /// A number, with a power of ten when it would be long without.
-pub(crate) fn show_number(x: f64) -> String {
+fn show_number(x: f64) -> String {
     if x == 0.0 || (1e-4..1e9).contains(&x.abs()) {
         format!("{x}")
     } else {
@@ -185,19 +185,15 @@ impl Defect {
     pub fn help(&self) -> &'static str {
         match self {
             Self::Empty => "choose a file that holds triangles",
-            Self::Degenerate { .. } | Self::Duplicate { .. } => {
-                "`tetdb check SURFACE` lists all such triangles; `tetdb check SURFACE --repair --write OUT` drops them"
-            }
+            Self::Degenerate { .. } | Self::Duplicate { .. } => "a repair drops such triangles",
             Self::OpenEdge {
                 junction: Some(_), ..
-            } => {
-                "`tetdb check SURFACE --repair --write OUT` divides triangles where vertices lie exactly on their open edges"
-            }
+            } => "a repair divides triangles where vertices lie exactly on their open edges",
             Self::OpenEdge { .. } => {
-                "`tetdb check SURFACE` lists the holes and says whether joining near points closes them; otherwise close them where the surface was made"
+                "a repair may close them by joining near points; otherwise close them where the surface was made"
             }
             Self::SelfIntersection { .. } => {
-                "`tetdb check SURFACE` lists the places; unite or separate the parts where the surface was made"
+                "unite or separate the parts where the surface was made"
             }
         }
     }

@@ -2,8 +2,11 @@
 
 use super::broad::tree_of;
 use super::{BoxTree, Surface};
-use crate::geom::{Aabb, Point};
+use crate::geom::{Aabb, Point, mix};
 use crate::storage::ScratchSpace;
+
+/// Room on the stack of a walk through the tree: enough for most, so that it does not grow step by step.
+const STACK: usize = 64;
 
 /// A triangle met by a line along z.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -78,7 +81,8 @@ impl<'a> Seeker<'a> {
         let Some(top) = self.tree.levels.len().checked_sub(1) else {
             return found;
         };
-        let mut stack = vec![(top, 0, 0.0)];
+        let mut stack = Vec::with_capacity(STACK);
+        stack.push((top, 0, 0.0));
         while let Some((level, node, least)) = stack.pop() {
             if least >= best {
                 continue;
@@ -128,11 +132,26 @@ impl<'a> Seeker<'a> {
         all
     }
 
-    /// Calls `visit` on the crossings in boxes from `low` up; it returns up to where others are wanted.
-    fn each_crossing(&self, p: Point, low: f64, mut visit: impl FnMut(Crossing) -> f64) {
+    /// How many triangles a question looks at, in the mean of some points: half of them where long thin ones fan out, some tens else.
+    pub fn effort(&self) -> f64 {
+        /// Enough to tell some tens from thousands.
+        const PROBES: u64 = 64;
+        let bounds = self.surface.bounds();
+        let looked_at = (0..PROBES).map(|i| {
+            let at = |k: u64| (mix(3 * i + k) >> 11) as f64 / (1u64 << 53) as f64;
+            let p = bounds.low + (bounds.high - bounds.low) * Point::new(at(0), at(1), at(2));
+            self.each_crossing(p, p.z, |_| f64::INFINITY)
+        });
+        looked_at.sum::<usize>() as f64 / PROBES as f64
+    }
+
+    /// Calls `visit` on the crossings in boxes from `low` up; it returns up to where others are wanted. Returns how many triangles were
+    /// looked at.
+    fn each_crossing(&self, p: Point, low: f64, mut visit: impl FnMut(Crossing) -> f64) -> usize {
         let mut high = f64::INFINITY;
+        let mut n = 0;
         let Some(top) = self.tree.levels.len().checked_sub(1) else {
-            return;
+            return n;
         };
         let misses = |b: &Aabb, high: f64| {
             p.x < b.low.x
@@ -142,7 +161,8 @@ impl<'a> Seeker<'a> {
                 || b.high.z < low
                 || b.low.z > high
         };
-        let mut stack = vec![(top, 0)];
+        let mut stack = Vec::with_capacity(STACK);
+        stack.push((top, 0));
         while let Some((level, node)) = stack.pop() {
             if misses(&self.tree.levels[level].get(node), high) {
                 continue;
@@ -153,13 +173,16 @@ impl<'a> Seeker<'a> {
                 continue;
             }
             for i in self.tree.members(node) {
-                if !misses(&self.tree.boxes.get(i), high)
-                    && let Some(c) = self.crossing(self.tree.order.get(i), p)
-                {
+                if misses(&self.tree.boxes.get(i), high) {
+                    continue;
+                }
+                n += 1;
+                if let Some(c) = self.crossing(self.tree.order.get(i), p) {
                     high = visit(c);
                 }
             }
         }
+        n
     }
 
     fn crossing(&self, triangle: u32, p: Point) -> Option<Crossing> {

@@ -132,11 +132,27 @@ pub enum NoteKind {
         /// How many.
         n: u64,
     },
+    /// Points that mark holes or regions of the volume were ignored.
+    VolumePoints {
+        /// What they mark.
+        points: VolumePoints,
+        /// How many.
+        n: u64,
+    },
     /// A planar facet of several polygons or with holes was taken polygon by polygon.
     SplitFacets {
         /// How many.
         n: u64,
     },
+}
+
+/// What points inside the volume mark.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum VolumePoints {
+    /// Volumes to leave empty.
+    Holes,
+    /// Volumes with an attribute or a size of their own.
+    Regions,
 }
 
 impl fmt::Display for Note {
@@ -162,6 +178,19 @@ impl fmt::Display for Note {
             ),
             NoteKind::SkippedElements { what, n } => {
                 write!(f, "{n} {what} were left out; only the surface is read")
+            }
+            NoteKind::VolumePoints { points, n } => {
+                let (what, instead) = match points {
+                    VolumePoints::Holes => (
+                        "hole points",
+                        "leave cavities empty by the choice of regions (parity, outer, by-orientation)",
+                    ),
+                    VolumePoints::Regions => (
+                        "region attributes",
+                        "regions are numbered in the order of their triangles; sizes go by that number or by label",
+                    ),
+                };
+                write!(f, "{n} {what} are ignored; {instead}")
             }
             NoteKind::SplitFacets { n } => write!(
                 f,

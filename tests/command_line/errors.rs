@@ -14,6 +14,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("damaged", "damage.rs"),
     ("store-format", "damage.rs"),
     ("busy", "crash.rs"),
+    ("store-changed", "together.rs"),
     ("store-unfinished", "crash.rs"),
     ("stopped", "crash.rs"),
     ("surface-changed", "below"),
@@ -22,6 +23,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("nothing-to-undo", "resaturate.rs"),
     ("store-recipe", "tests/front_door"),
     ("invalid-mesh", "below"),
+    ("contradicting-orientation", "walls.rs"),
 ];
 
 /// Words no test provokes, and why.

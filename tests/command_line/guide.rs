@@ -18,7 +18,10 @@ const ERRORS: &str = include_str!("../../src/guide/errors.md");
 /// What stands before a command in a checkout.
 const CARGO_RUN: &str = "cargo run --release -- ";
 /// The command that runs this very test, and those that only build.
-const NOT_HERE: [&str; 2] = ["cargo test --release --workspace", "cargo install --path ."];
+const NOT_HERE: [&str; 2] = [
+    "cargo test --profile quick --workspace",
+    "cargo install --path .",
+];
 /// The README's first sample is smaller here; `.ci/run` runs it in full.
 const SMALLER: (&str, &str) = ("count=100", "count=3");
 

@@ -99,6 +99,10 @@ impl Done {
         String::from_utf8_lossy(&self.output.stdout).into_owned()
     }
 
+    pub fn stdout_bytes(&self) -> Vec<u8> {
+        self.output.stdout.clone()
+    }
+
     pub fn stderr(&self) -> String {
         String::from_utf8_lossy(&self.output.stderr).into_owned()
     }

@@ -4,8 +4,8 @@
 //! copies one bit apart. How: `solids` are known to be hard, `cuts` draws small ones at random; each is meshed and
 //! checked by `mesher`, or refused by the validator because rounding made it cross itself. There is no third way.
 //!
-//! `TETDB_TORTURE=20 cargo test --release --test torture` meshes each solid with twenty times as many variants.
-//! `cargo test --release --test torture -- --ignored --nocapture random` draws 100,000 random cases; `TETDB_TORTURE_CASES` and
+//! `TETDB_TORTURE=20 cargo test --profile quick --test torture` meshes each solid with twenty times as many variants.
+//! `cargo test --profile quick --test torture -- --ignored --nocapture random` draws 100,000 random cases; `TETDB_TORTURE_CASES` and
 //! `TETDB_TORTURE_SEED` say otherwise.
 
 mod cuts;

@@ -19,7 +19,7 @@ mod vertices;
 pub use codec::{Decoder, Encoder};
 pub use columns::{Columns, Malformed};
 pub use packer::{Packed, Packer};
-pub use summaries::{RangeSummary, TetSummary, VertexSummary};
+pub use summaries::{RangeSummary, TetSummary, VertexSummary, is_box};
 
 use thiserror::Error;
 

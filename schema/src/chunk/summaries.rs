@@ -68,8 +68,13 @@ impl Fields<'_> {
     fn f64(&mut self) -> f64 {
         f64::from_le_bytes(self.take())
     }
-    fn bounds(&mut self) -> [[f64; 3]; 2] {
-        [(); 2].map(|()| [(); 3].map(|()| self.f64()))
+    /// Errors: a box that holds nothing.
+    fn bounds(&mut self) -> Result<[[f64; 3]; 2], Malformed> {
+        let bounds = [(); 2].map(|()| [(); 3].map(|()| self.f64()));
+        match is_box(&bounds) {
+            true => Ok(bounds),
+            false => Err(Malformed("a box is inverted or has no finite corners")),
+        }
     }
     /// The rest is reserved and zero.
     fn finish(self) -> Result<(), Malformed> {
@@ -79,6 +84,13 @@ impl Fields<'_> {
             Err(Malformed("a reserved byte is not zero"))
         }
     }
+}
+
+/// Whether a box has finite corners, the low one first.
+pub fn is_box([low, high]: &[[f64; 3]; 2]) -> bool {
+    let ends = low.iter().zip(high);
+    ends.into_iter()
+        .all(|(low, high)| low.is_finite() && high.is_finite() && low <= high)
 }
 
 fn pad(columns: &mut Columns, start: usize, width: usize) {
@@ -94,6 +106,21 @@ fn put_bounds(columns: &mut Columns, bounds: &[[f64; 3]; 2]) {
 impl TetSummary {
     /// Bytes of a summary.
     pub const BYTES: usize = 128;
+
+    /// Whether some chunk can have it.
+    fn check(&self) -> Result<(), Malformed> {
+        let [least, most] = self.quality;
+        let is_sound = least <= most
+            && self.regions[0] <= self.regions[1]
+            && self.vertices[0] <= self.vertices[1]
+            && self.edge_max >= 0.0
+            && !self.volume.is_nan()
+            && self.count > 0;
+        match is_sound {
+            true => Ok(()),
+            false => Err(Malformed("a summary that no chunk can have")),
+        }
+    }
 }
 
 impl ChunkRecord for TetSummary {
@@ -126,8 +153,8 @@ impl ChunkRecord for TetSummary {
     ) -> Result<(), Malformed> {
         for _ in 0..count {
             let mut f = Fields(columns.raw(Self::BYTES)?);
-            records.push(Self {
-                bounds: f.bounds(),
+            let summary = Self {
+                bounds: f.bounds()?,
                 volume: f.f64(),
                 quality: [f.f32(), f.f32()],
                 regions: [f.u32(), f.u32()],
@@ -137,8 +164,10 @@ impl ChunkRecord for TetSummary {
                 open_faces: f.u32(),
                 bytes: f.u32(),
                 edge_max: f.f32(),
-            });
+            };
             f.finish()?;
+            summary.check()?;
+            records.push(summary);
         }
         Ok(())
     }
@@ -206,7 +235,7 @@ impl ChunkRecord for VertexSummary {
         for _ in 0..count {
             let mut f = Fields(columns.raw(Self::BYTES)?);
             records.push(Self {
-                bounds: f.bounds(),
+                bounds: f.bounds()?,
                 first: f.u32(),
                 count: f.u32(),
                 cells: u64::from_le_bytes(f.take()),

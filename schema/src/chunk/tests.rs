@@ -275,6 +275,54 @@ fn damage_is_an_error() {
 }
 
 #[test]
+fn a_summary_that_no_chunk_can_have_is_refused() {
+    let sound = TetSummary {
+        bounds: [[0.1; 3], [0.9; 3]],
+        volume: 2.0,
+        quality: [1.0, 3.5],
+        regions: [1, 2],
+        vertices: [4, 9],
+        first: 0,
+        count: 3,
+        open_faces: 5,
+        bytes: 65_000,
+        edge_max: 0.7,
+    };
+    type Change = fn(&mut TetSummary);
+    let changes: [Change; 7] = [
+        |s| s.bounds[0][1] = f64::NAN,
+        |s| s.bounds.swap(0, 1),
+        |s| s.bounds[1][2] = f64::INFINITY,
+        |s| s.quality = [f32::NAN; 2],
+        |s| s.regions = [2, 1],
+        |s| s.edge_max = -1.0,
+        |s| s.count = 0,
+    ];
+    let mut decoder = Decoder::<TetSummary>::new().expect("a zstd context");
+    for (i, change) in changes.into_iter().enumerate() {
+        let mut summary = sound;
+        change(&mut summary);
+        let chunk = &pack(&[sound, summary])[0];
+        let read = decoder.decode(&chunk.value, chunk.address, &mut Vec::new());
+        assert!(read.is_err(), "change {i}");
+    }
+    let bounds = [[1.0; 3], [0.0; 3]];
+    let summary = VertexSummary {
+        bounds,
+        first: 0,
+        count: 9,
+        cells: 0,
+    };
+    let chunk = &pack(&[summary])[0];
+    let mut decoder = Decoder::<VertexSummary>::new().expect("a zstd context");
+    assert!(
+        decoder
+            .decode(&chunk.value, chunk.address, &mut Vec::new())
+            .is_err()
+    );
+}
+
+#[test]
 fn the_cells_of_a_box_hold_its_vertices() {
     let mut state = 7u64;
     let mut random = || {

@@ -40,7 +40,7 @@ fn every_valid_surface_is_recovered() {
         if !matches!(class, "valid" | "repairable") || !name.contains(&only) {
             continue;
         }
-        let surface = match crate::io::read::read_surface(&[directory.join(name)]) {
+        let surface = match crate::io::read::read_surface(&[directory.join(name)], 1 << 30) {
             Ok(surface) => surface,
             Err(e) => {
                 println!("{name:28} not read: {e}");

@@ -46,7 +46,7 @@ pub struct EstimateArgs {
     #[arg(long, value_name = "SIZE")]
     pub memory: Option<String>,
     /// Threads the run would use [default: all cores]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub threads: Option<usize>,
     /// Answer with one JSON object
     #[arg(long)]

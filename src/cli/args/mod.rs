@@ -32,9 +32,12 @@ pub use surface::{CheckArgs, RefineSurfaceArgs, SampleArgs};
     6 memory or disk, 7 the answer is no, 8 store unusable as it is, 130/143 stopped."
 )]
 pub struct Args {
-    /// Say nothing on stderr but warnings and errors
+    /// Say nothing but warnings, errors and what a command is asked for
     #[arg(long, short, global = true)]
     pub quiet: bool,
+    /// Say more: steps and their seconds, bytes of each part of a store
+    #[arg(long, short, global = true, conflicts_with = "quiet")]
+    pub verbose: bool,
     #[command(subcommand)]
     pub command: Command,
 }
@@ -144,7 +147,7 @@ pub struct RunArgs {
     #[arg(long, value_name = "SIZE")]
     pub memory: Option<String>,
     /// Threads to use [default: all cores]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub threads: Option<usize>,
     /// Skip the verification at the end
     #[arg(long)]

@@ -78,7 +78,7 @@ pub struct QueryArgs {
     #[arg(long, requires = "order_by")]
     pub desc: bool,
     /// No more than so many
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub limit: Option<u64>,
     /// Answer with comma-separated values
     #[arg(long, conflicts_with = "json")]

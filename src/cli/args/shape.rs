@@ -38,16 +38,16 @@ pub enum Seal {
 #[derive(Clone, Debug, Default, PartialEq, clap::Args)]
 pub struct SizeArgs {
     /// Edge length inside: a length, or 1% of the box diagonal [default: from the surface's edges]
-    #[arg(long, value_name = "H")]
+    #[arg(long, value_name = "H", allow_hyphen_values = true)]
     pub hsiz: Option<String>,
     /// Least edge length inside
-    #[arg(long, value_name = "H")]
+    #[arg(long, value_name = "H", allow_hyphen_values = true)]
     pub hmin: Option<String>,
     /// Greatest edge length inside
-    #[arg(long, value_name = "H")]
+    #[arg(long, value_name = "H", allow_hyphen_values = true)]
     pub hmax: Option<String>,
     /// Greatest ratio of neighboring edge lengths [default: 1.3, and 2 next to needles of the surface]
-    #[arg(long, value_name = "RATIO")]
+    #[arg(long, value_name = "RATIO", allow_hyphen_values = true)]
     pub hgrad: Option<String>,
     /// Edge length in a box, and at most OUTSIDE away from it; may be repeated
     #[arg(
@@ -67,7 +67,7 @@ pub struct SizeArgs {
     )]
     pub size_cylinder: Vec<String>,
     /// Edge length in a region, by its number in `tetdb info` or a label of triangles around it; may be repeated
-    #[arg(long, value_name = "REGION_OR_LABEL,H")]
+    #[arg(long, value_name = "REGION_OR_LABEL,H", allow_hyphen_values = true)]
     pub size_region: Vec<String>,
     /// Edge lengths at the vertices of a mesh: a MEDIT .sol with its background .mesh of tetrahedra beside it, or with one length for each of the surface's vertices
     #[arg(long, value_name = "FILE")]

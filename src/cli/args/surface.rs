@@ -10,7 +10,7 @@ use std::path::PathBuf;
     Exit code 0: the surface can be meshed; 3: it has defects. With --repair this is said of what was written."
 )]
 pub struct CheckArgs {
-    /// Surface files, or a sample such as sample:balls,count=100
+    /// Surface files, a sample such as sample:balls,count=100, or - for the standard input
     #[arg(required = true, value_name = "SURFACE")]
     pub surfaces: Vec<String>,
     /// Write the defective triangles to this .vtu file, the kind of defect as cell data
@@ -20,7 +20,12 @@ pub struct CheckArgs {
     #[arg(long, requires = "write")]
     pub repair: bool,
     /// With --repair: first join points not farther apart than this share of the box diagonal
-    #[arg(long, value_name = "R", requires = "repair")]
+    #[arg(
+        long,
+        value_name = "R",
+        requires = "repair",
+        allow_hyphen_values = true
+    )]
     pub weld: Option<String>,
     /// With --repair: where to write the repaired surface (.stl, .ply, .obj, .off)
     #[arg(long, value_name = "OUT", requires = "repair")]
@@ -32,7 +37,7 @@ pub struct CheckArgs {
 
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  tetdb sample balls,count=1000,h=0.0093 -o balls.stl\n  tetdb sample box,h=0.1 -o box.off\n\n\
+    after_help = "Examples:\n  tetdb sample balls,count=1000,h=0.0093 -o balls.stl\n  tetdb sample box,h=0.1 -o box.off\n  tetdb sample knot -o - | tetdb check -\n\n\
     Keys, each with a default:
   balls   count, seed, h      a cube with empty balls of many sizes in it
   box     x, y, z, h          sides of a box
@@ -49,9 +54,12 @@ pub struct SampleArgs {
     /// NAME,key=value,... with the names balls, box, caps, grains, knot, needles, shells, sphere, steps
     #[arg(value_name = "SAMPLE")]
     pub sample: String,
-    /// The file to write: .stl (text), .off, .obj or .ply, all exact
+    /// The file to write: .stl (text), .off, .obj or .ply, all exact; - is the standard output
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
+    /// With -o -: stl, off, obj or ply [default: stl]
+    #[arg(long, value_name = "FORMAT")]
+    pub format: Option<String>,
     /// Answer with one JSON object
     #[arg(long)]
     pub json: bool,
@@ -68,10 +76,10 @@ pub struct RefineSurfaceArgs {
     #[arg(value_name = "OUT")]
     pub output: PathBuf,
     /// Wanted edge length: a length, or 1% of the box diagonal; shorter edges stay
-    #[arg(long, value_name = "H")]
+    #[arg(long, value_name = "H", allow_hyphen_values = true)]
     pub hsiz: String,
     /// Greatest ratio of neighboring edge lengths [default: 1.3]
-    #[arg(long, value_name = "RATIO")]
+    #[arg(long, value_name = "RATIO", allow_hyphen_values = true)]
     pub hgrad: Option<String>,
     /// Write even over the surface that is read
     #[arg(long)]

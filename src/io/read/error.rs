@@ -24,6 +24,16 @@ pub enum Spot {
     Byte(u64),
 }
 
+impl FilePlace {
+    /// A file as a whole.
+    pub(super) fn whole(path: &std::path::Path) -> Self {
+        Self {
+            file: path.to_string_lossy().into_owned(),
+            spot: Spot::Totals,
+        }
+    }
+}
+
 impl fmt::Display for FilePlace {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.spot {
@@ -51,6 +61,14 @@ pub enum ReadError {
     UnknownFormat {
         /// Where in the file.
         place: FilePlace,
+    },
+    /// The file holds curved faces of a solid model, not triangles.
+    #[error("the file is a solid model ({kind}): it has curved faces and no triangles")]
+    SolidModel {
+        /// Where in the file.
+        place: FilePlace,
+        /// The kind of model.
+        kind: &'static str,
     },
     /// The file ends too early.
     #[error("the file ends too early: expected {expected}, found {found}")]
@@ -163,7 +181,7 @@ impl ReadError {
     pub fn code(&self) -> &'static str {
         match self {
             Self::Unreadable { .. } => "unreadable-file",
-            Self::UnknownFormat { .. } => "unknown-format",
+            Self::UnknownFormat { .. } | Self::SolidModel { .. } => "unknown-format",
             Self::Truncated { .. } => "truncated-file",
             Self::Unexpected { .. } => "unexpected-text",
             Self::NotANumber { .. } => "not-a-number",
@@ -183,6 +201,7 @@ impl ReadError {
         match self {
             Self::Unreadable { place, .. }
             | Self::UnknownFormat { place }
+            | Self::SolidModel { place, .. }
             | Self::Truncated { place, .. }
             | Self::Unexpected { place, .. }
             | Self::NotANumber { place, .. }
@@ -202,7 +221,10 @@ impl ReadError {
         match self {
             Self::Unreadable { .. } => "check the path and that the file may be read: `ls -l FILE`",
             Self::UnknownFormat { .. } => {
-                "name the file .stl, .off, .obj, .ply, .mesh, .meshb, .msh, .smesh or .poly after what it holds"
+                "name the file .stl, .off, .obj, .ply, .mesh, .meshb, .msh, .smesh or .poly after what it holds, with .gz or .zst behind it where it is packed"
+            }
+            Self::SolidModel { .. } => {
+                "write its surface as triangles first: in a CAD program export STL with a fine tolerance, or with Gmsh `gmsh -2 part.step -o part.stl`"
             }
             Self::Truncated { .. } => {
                 "copy or download the file again; compare its length with the original's"
@@ -225,7 +247,9 @@ impl ReadError {
             Self::Empty { .. } => {
                 "choose a file that holds a surface; lines, points and tetrahedra alone bound nothing"
             }
-            Self::TooLarge { .. } => "allow more memory, or give a coarser background mesh",
+            Self::TooLarge { .. } => {
+                "allow more memory, unpack the file to disk, or give a coarser background mesh"
+            }
             Self::Alone { .. } => {
                 "put the .sol file and its .mesh side by side, under the same name"
             }

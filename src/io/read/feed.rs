@@ -65,6 +65,12 @@ impl<R: BufRead> Feed<R> {
         Ok((head, n, Feed::new(&self.file, reader, self.len)))
     }
 
+    /// First bytes, as many as the reader holds, without taking them.
+    pub fn head(&mut self) -> Result<&[u8]> {
+        let place = self.place();
+        self.reader.fill_buf().map_err(|e| broken(place, &e))
+    }
+
     pub fn file(&self) -> &str {
         &self.file
     }

@@ -10,6 +10,8 @@ use super::feed::Result;
 use super::open::open_plain;
 
 const MAGIC: &[u8; 6] = b"\x93NUMPY";
+/// Shorter lengths cannot be kept in single precision, with room for their inverse cubes in sums.
+const LENGTH_MIN: f64 = 1e-30;
 /// Longest head that is read.
 const HEAD_MAX: usize = 1 << 16;
 
@@ -107,10 +109,10 @@ pub fn read_lengths(path: &Path, limit: u64) -> Result<Vec<f64>> {
             8 => f64::from_le_bytes(std::array::from_fn(|i| word[i])),
             _ => f64::from(f32::from_le_bytes(std::array::from_fn(|i| word[i]))),
         };
-        if !(h.is_normal() && h > 0.0) {
+        if !(LENGTH_MIN..1.0 / LENGTH_MIN).contains(&h) {
             return Err(ReadError::Unexpected {
                 place: place(Spot::Totals),
-                expected: "a length above zero".to_owned(),
+                expected: format!("a length from {LENGTH_MIN:e} to {:e}", 1.0 / LENGTH_MIN),
                 found: format!("{h} as number {i}"),
             });
         }
@@ -170,6 +172,12 @@ mod tests {
             ("<i8", "(2,)", &two[..], "unexpected-text"),
             ("<f8", "(2, 1)", &two[..], "unexpected-text"),
             ("<f8", "(1,)", &[0; 8][..], "unexpected-text"),
+            (
+                "<f8",
+                "(1,)",
+                &1e-300f64.to_le_bytes()[..],
+                "unexpected-text",
+            ),
             ("<f8", "(9000000000,)", &two[..], "memory"),
             ("<f8", "()", &two[..], "unexpected-text"),
         ] {

@@ -26,15 +26,15 @@ mod collection;
 #[cfg(test)]
 mod tests;
 
-use std::fs::File;
-use std::io::{BufRead, Read};
+use std::io::BufRead;
 use std::path::{Path, PathBuf};
 
 pub use error::{FilePlace, ReadError, Spot};
 use feed::{Feed, Result};
 #[cfg(any(test, feature = "cli", feature = "internals"))]
 pub use lengths::read_lengths;
-use open::open;
+pub use open::is_stream;
+use open::{open, unpacked_name};
 use sink::SurfaceSink;
 pub use sizes::{read_sizes, size_files};
 
@@ -65,8 +65,9 @@ pub enum Format {
 }
 
 impl Format {
-    /// The format a file name's extension tells.
+    /// The format a file name's extension tells; `.gz` and `.zst` behind it are passed over.
     pub fn of_extension(path: &Path) -> Option<Self> {
+        let path = unpacked_name(path);
         let extension = path.extension()?.to_str()?.to_ascii_lowercase();
         Some(match extension.as_str() {
             "stl" | "stla" | "stlb" => Self::Stl,
@@ -83,7 +84,7 @@ impl Format {
     }
 
     /// The format the first bytes of a file tell, for names that do not.
-    fn of_head(head: &[u8]) -> Option<Self> {
+    fn of_head(head: &[u8], length: u64) -> Option<Self> {
         let starts = |word: &str| {
             head.get(..word.len())
                 .is_some_and(|h| h.eq_ignore_ascii_case(word.as_bytes()))
@@ -96,11 +97,31 @@ impl Format {
             Some(Self::Medit)
         } else if starts("OFF") || starts("COFF") || starts("NOFF") {
             Some(Self::Off)
-        } else if starts("solid") {
+        } else if starts("solid") || is_binary_stl(head, length) {
             Some(Self::Stl)
         } else {
             None
         }
+    }
+}
+
+/// Whether a length is the one a binary STL with this head must have.
+fn is_binary_stl(head: &[u8], length: u64) -> bool {
+    head.get(80..84)
+        .and_then(|count| count.try_into().ok())
+        .is_some_and(|count| length == 84 + 50 * u64::from(u32::from_le_bytes(count)))
+}
+
+/// The kind of solid model a file is, of those that hold no triangles.
+fn solid_model(path: &Path, head: &[u8]) -> Option<&'static str> {
+    let name = unpacked_name(path);
+    let extension = name.extension().unwrap_or_default().to_string_lossy();
+    match extension.to_ascii_lowercase().as_str() {
+        "step" | "stp" => Some("STEP"),
+        "iges" | "igs" => Some("IGES"),
+        "brep" | "brp" => Some("BREP"),
+        _ if head.starts_with(b"ISO-10303-21") => Some("STEP"),
+        _ => None,
     }
 }
 
@@ -109,9 +130,11 @@ const EXTENT_MIN: f64 = 1e-24;
 
 /// Reads files as one surface, each with its name before its labels when there are several.
 ///
+/// Packed files (`.gz`, `.zst`), pipes and `-`, the standard input, are held unpacked while they are read: `limit` bytes at most.
+///
 /// # Errors
 /// The first [`ReadError`], with its file and place; nothing is repaired beyond welding and fanning.
-pub fn read_surface(paths: &[PathBuf]) -> Result<Surface> {
+pub fn read_surface(paths: &[PathBuf], limit: u64) -> Result<Surface> {
     let mut builder = SurfaceBuilder::new();
     let mut prefixes: Vec<String> = Vec::new();
     for path in paths {
@@ -123,7 +146,7 @@ pub fn read_surface(paths: &[PathBuf]) -> Result<Surface> {
             stem,
             prefix,
         };
-        read_file(path, &mut target)?;
+        read_file(path, limit, &mut target)?;
     }
     let surface = builder.finish();
     let bounds = surface.bounds();
@@ -158,12 +181,13 @@ pub fn read_memory(format: Format, file: &str, bytes: &[u8]) -> Result<Surface> 
     };
     target.builder.begin_file(file);
     let feed = Feed::new(file, bytes, bytes.len() as u64);
-    read_feed(format, feed, None, &mut target)?;
+    read_feed(format, feed, None, 0, &mut target)?;
     Ok(builder.finish())
 }
 
 fn stem(path: &Path) -> String {
-    let text = path.file_stem().unwrap_or_default().to_string_lossy();
+    let name = unpacked_name(path);
+    let text = name.file_stem().unwrap_or_default().to_string_lossy();
     let name = feed::name(text.as_bytes());
     if name.is_empty() {
         "surface".to_owned()
@@ -182,35 +206,40 @@ fn unique(stem: &str, taken: &[String]) -> String {
     name
 }
 
-fn read_file(path: &Path, target: &mut SurfaceSink) -> Result<()> {
-    let feed = open(path)?;
+fn read_file(path: &Path, limit: u64, target: &mut SurfaceSink) -> Result<()> {
+    if let Some(kind) = solid_model(path, b"") {
+        return Err(ReadError::SolidModel {
+            place: FilePlace::whole(path),
+            kind,
+        });
+    }
+    let mut feed = open(path, limit)?;
     let format = match Format::of_extension(path) {
         Some(format) => format,
         None => {
-            let mut head = Vec::new();
-            let place = FilePlace {
-                file: feed.file().to_owned(),
-                spot: Spot::Totals,
-            };
-            // A second look at the file, because the first bytes are still needed by the reader.
-            let sniff = File::open(path).and_then(|f| f.take(64).read_to_end(&mut head));
-            sniff.map_err(|e| ReadError::Unreadable {
-                place: place.clone(),
-                reason: e.to_string(),
-            })?;
-            Format::of_head(&head).ok_or(ReadError::UnknownFormat { place })?
+            let (length, head) = (feed.len, feed.head()?);
+            let found = Format::of_head(head, length);
+            let kind = solid_model(path, head);
+            found.ok_or_else(|| {
+                let place = FilePlace::whole(path);
+                match kind {
+                    Some(kind) => ReadError::SolidModel { place, kind },
+                    None => ReadError::UnknownFormat { place },
+                }
+            })?
         }
     };
     target.builder.begin_file(feed.file());
     let nodes = matches!(format, Format::TetgenSmesh | Format::TetgenPoly)
-        .then(|| path.with_extension("node"));
-    read_feed(format, feed, nodes.as_deref(), target)
+        .then(|| unpacked_name(path).with_extension("node"));
+    read_feed(format, feed, nodes.as_deref(), limit, target)
 }
 
 fn read_feed<R: BufRead>(
     format: Format,
     feed: Feed<R>,
     nodes: Option<&Path>,
+    limit: u64,
     target: &mut SurfaceSink,
 ) -> Result<()> {
     if feed.len == 0 {
@@ -229,7 +258,7 @@ fn read_feed<R: BufRead>(
         Format::Medit => medit::read(feed, target),
         Format::MeditBinary => meditb::read(feed, target),
         Format::Gmsh => gmsh::read(feed, target),
-        Format::TetgenSmesh => tetgen::read(feed, tetgen::Kind::Smesh, nodes, target),
-        Format::TetgenPoly => tetgen::read(feed, tetgen::Kind::Poly, nodes, target),
+        Format::TetgenSmesh => tetgen::read(feed, tetgen::Kind::Smesh, nodes, limit, target),
+        Format::TetgenPoly => tetgen::read(feed, tetgen::Kind::Poly, nodes, limit, target),
     }
 }

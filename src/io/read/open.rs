@@ -1,34 +1,125 @@
-//! Files opened for a reader.
+//! Files opened for a reader: plain ones as they are, packed ones and pipes unpacked in memory, within a limit.
 
 use std::fs::File;
-use std::io::BufReader;
-use std::path::Path;
+use std::io::{BufRead, BufReader, Cursor, Read};
+use std::path::{Path, PathBuf};
 
-use super::error::{FilePlace, ReadError, Spot};
+use super::error::{FilePlace, ReadError};
 use super::feed::{Feed, Result};
 
 /// Bytes of the read buffer of one file.
 const BUFFER_BYTES: usize = 256 << 10;
+/// A zstd frame may ask for a window of 2 to this power bytes: 32 MiB, beyond what any ordinary level asks for.
+const WINDOW_LOG_MAX: u32 = 25;
 
-pub(super) fn open(path: &Path) -> Result<Feed<BufReader<File>>> {
-    let (reader, length) = open_plain(path)?;
-    Ok(Feed::new(&path.to_string_lossy(), reader, length))
+/// A file of any kind, to be read once.
+pub(super) type Reader = Box<dyn BufRead>;
+
+/// How the bytes of a file are packed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Packing {
+    Gzip,
+    Zstd,
+}
+
+/// The packing that the end of a name tells, and the name without it.
+fn packing(path: &Path) -> Option<(Packing, PathBuf)> {
+    let extension = path.extension()?.to_str()?.to_ascii_lowercase();
+    let packing = match extension.as_str() {
+        "gz" => Packing::Gzip,
+        "zst" => Packing::Zstd,
+        _ => return None,
+    };
+    Some((packing, path.with_extension("")))
+}
+
+/// A file's name without the ending of its packing.
+pub(super) fn unpacked_name(path: &Path) -> PathBuf {
+    packing(path).map_or_else(|| path.to_owned(), |(_, inner)| inner)
+}
+
+/// Whether what stands here can be read but once: a pipe, or `-`, the standard input.
+pub fn is_stream(path: &Path) -> bool {
+    path == Path::new("-") || std::fs::metadata(path).is_ok_and(|meta| is_pipe(&meta))
+}
+
+#[cfg(unix)]
+fn is_pipe(meta: &std::fs::Metadata) -> bool {
+    use std::os::unix::fs::FileTypeExt;
+    meta.file_type().is_fifo() || meta.file_type().is_socket()
+}
+
+#[cfg(not(unix))]
+fn is_pipe(_: &std::fs::Metadata) -> bool {
+    false
+}
+
+/// Opens a regular file, plain or packed, or a pipe. Of what is packed or piped at most `limit` bytes are held.
+pub(super) fn open(path: &Path, limit: u64) -> Result<Feed<Reader>> {
+    let name = path.to_string_lossy();
+    let unpack: Reader = match packing(path) {
+        Some((Packing::Gzip, _)) => {
+            let (reader, _) = open_plain(path)?;
+            Box::new(BufReader::new(flate2::bufread::MultiGzDecoder::new(reader)))
+        }
+        Some((Packing::Zstd, _)) => {
+            let (reader, _) = open_plain(path)?;
+            let decoder = zstd::stream::read::Decoder::with_buffer(reader).and_then(|mut d| {
+                d.window_log_max(WINDOW_LOG_MAX)?;
+                Ok(d)
+            });
+            Box::new(BufReader::new(
+                decoder.map_err(|e| unreadable(path, e.to_string()))?,
+            ))
+        }
+        None if path == Path::new("-") => Box::new(BufReader::new(std::io::stdin())),
+        None if is_stream(path) => {
+            let file = File::open(path).map_err(|e| unreadable(path, e.to_string()))?;
+            Box::new(BufReader::new(file))
+        }
+        None => {
+            let (reader, length) = open_plain(path)?;
+            return Ok(Feed::new(&name, Box::new(reader), length));
+        }
+    };
+    let bytes = within(unpack, path, limit)?;
+    let length = bytes.len() as u64;
+    Ok(Feed::new(&name, Box::new(Cursor::new(bytes)), length))
+}
+
+/// All bytes, unless they are more than `limit`.
+fn within(from: Reader, path: &Path, limit: u64) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let read = from.take(limit.saturating_add(1)).read_to_end(&mut bytes);
+    read.map_err(|e| unreadable(path, e.to_string()))?;
+    if bytes.len() as u64 > limit {
+        return Err(ReadError::TooLarge {
+            place: FilePlace::whole(path),
+            what: "the unpacked file",
+            needed: bytes.len() as u64,
+            limit,
+        });
+    }
+    Ok(bytes)
 }
 
 /// Opens a regular file; tells its length.
+///
+/// # Errors
+/// A pipe or a device, before it is opened: that could take for ever, and so could reading it.
 pub(super) fn open_plain(path: &Path) -> Result<(BufReader<File>, u64)> {
-    let name = path.to_string_lossy();
-    let unreadable = |reason: String| ReadError::Unreadable {
-        place: FilePlace {
-            file: name.to_string(),
-            spot: Spot::Totals,
-        },
-        reason,
-    };
-    let file = File::open(path).map_err(|e| unreadable(e.to_string()))?;
-    let meta = file.metadata().map_err(|e| unreadable(e.to_string()))?;
+    let meta = std::fs::metadata(path).map_err(|e| unreadable(path, e.to_string()))?;
     if !meta.is_file() {
-        return Err(unreadable("it is not a regular file".to_owned()));
+        let reason = "it is not a regular file".to_owned();
+        return Err(unreadable(path, reason));
     }
+    let file = File::open(path).map_err(|e| unreadable(path, e.to_string()))?;
     Ok((BufReader::with_capacity(BUFFER_BYTES, file), meta.len()))
+}
+
+fn unreadable(path: &Path, reason: String) -> ReadError {
+    ReadError::Unreadable {
+        place: FilePlace::whole(path),
+        reason,
+    }
 }

@@ -3,13 +3,14 @@
 //! One number per vertex is wanted. With tetrahedra in the mesh it is a background; without a mesh, or with one of triangles
 //! alone, the sizes are those of the surface's own vertices.
 
-use std::io::BufRead;
+use std::fs::File;
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
 use super::error::{FilePlace, ReadError, Spot};
 use super::feed::{Feed, Result};
 use super::meditb::{DIMENSION, Numbers, TETRAHEDRA, VERTICES};
-use super::open;
+use super::open::open_plain;
 use crate::geom::Point;
 use crate::sizing::{Background, BackgroundMesh};
 
@@ -56,8 +57,8 @@ pub fn size_files(path: &Path) -> Result<(PathBuf, Option<PathBuf>)> {
 pub fn read_sizes(path: &Path, limit: u64) -> Result<Background> {
     let (sizes, mesh) = size_files(path)?;
     let h = match is_binary(&sizes) {
-        true => binary_sizes(open(&sizes)?, limit)?,
-        false => text_sizes(open(&sizes)?, limit)?,
+        true => binary_sizes(feed(&sizes)?, limit)?,
+        false => text_sizes(feed(&sizes)?, limit)?,
     };
     let Some(mesh) = mesh else {
         return Ok(Background::AtVertices(h));
@@ -67,8 +68,8 @@ pub fn read_sizes(path: &Path, limit: u64) -> Result<Background> {
         ..Solid::default()
     };
     match is_binary(&mesh) {
-        true => binary_solid(open(&mesh)?, &mut solid)?,
-        false => text_solid(open(&mesh)?, &mut solid)?,
+        true => binary_solid(feed(&mesh)?, &mut solid)?,
+        false => text_solid(feed(&mesh)?, &mut solid)?,
     }
     if solid.tets.is_empty() {
         return Ok(Background::AtVertices(h));
@@ -89,6 +90,11 @@ pub fn read_sizes(path: &Path, limit: u64) -> Result<Background> {
         solid.tets,
         h,
     ))))
+}
+
+fn feed(path: &Path) -> Result<Feed<BufReader<File>>> {
+    let (reader, length) = open_plain(path)?;
+    Ok(Feed::new(&path.to_string_lossy(), reader, length))
 }
 
 fn is_binary(path: &Path) -> bool {

@@ -1,15 +1,15 @@
 //! TetGen `.smesh` and `.poly`, with the points in the file or in the `.node` file beside it.
 //!
 //! Each polygon is taken for itself and fanned; a facet of several polygons or with holes is noted,
-//! and overlapping polygons are found by validation. Holes and regions of the volume are not read:
-//! what is filled is decided by the surface alone.
+//! and overlapping polygons are found by validation. Points that mark holes and regions of the volume are
+//! counted and noted: what is filled is decided by the surface alone.
 
 use std::io::BufRead;
 use std::path::Path;
 
 use super::feed::{Feed, parse};
 use super::{ReadError, Result, SurfaceSink, open};
-use crate::surface::NoteKind;
+use crate::surface::{NoteKind, VolumePoints};
 
 /// The two layouts of the facet part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,12 +31,13 @@ pub(super) fn read<R: BufRead>(
     mut feed: Feed<R>,
     kind: Kind,
     nodes: Option<&Path>,
+    limit: u64,
     target: &mut SurfaceSink,
 ) -> Result<()> {
     feed.comment = Some(b'#');
     let numbering = match read_points(&mut feed, target)? {
         Some(numbering) => numbering,
-        None => read_node_file(&feed, nodes, target)?,
+        None => read_node_file(&feed, nodes, limit, target)?,
     };
     let n_facets = feed.count("facets", 4)?;
     feed.skip_line()?;
@@ -57,30 +58,45 @@ pub(super) fn read<R: BufRead>(
     if n_split > 0 {
         target.builder.note(NoteKind::SplitFacets { n: n_split });
     }
-    // The volume's holes and regions.
-    if !feed.at_end()? {
-        let n_holes = feed.integer("the number of holes")?;
-        if let Ok(n) = u64::try_from(n_holes)
-            && n > 0
-        {
-            target.builder.note(NoteKind::SkippedElements {
-                what: "hole points",
-                n,
-            });
-        }
+    for points in [VolumePoints::Holes, VolumePoints::Regions] {
+        note_volume_points(&mut feed, points, target)?;
     }
     feed.finish(target.builder)
+}
+
+/// Notes the points that mark holes or regions of the volume, where the file has that part: they choose nothing.
+fn note_volume_points<R: BufRead>(
+    feed: &mut Feed<R>,
+    points: VolumePoints,
+    target: &mut SurfaceSink,
+) -> Result<()> {
+    if feed.at_end()? {
+        return Ok(());
+    }
+    let n = u64::try_from(feed.integer("the number of points in the volume")?).unwrap_or(0);
+    feed.skip_line()?;
+    for _ in 0..n {
+        if feed.at_end()? {
+            break;
+        }
+        feed.skip_line()?;
+    }
+    if n > 0 {
+        target.builder.note(NoteKind::VolumePoints { points, n });
+    }
+    Ok(())
 }
 
 fn read_node_file<R: BufRead>(
     feed: &Feed<R>,
     nodes: Option<&Path>,
+    limit: u64,
     target: &mut SurfaceSink,
 ) -> Result<Numbering> {
     let Some(path) = nodes else {
         return Err(feed.unsupported("points in a separate .node file"));
     };
-    let mut feed = open(path)?;
+    let mut feed = open(path, limit)?;
     feed.comment = Some(b'#');
     match read_points(&mut feed, target)? {
         Some(numbering) => Ok(numbering),

@@ -125,6 +125,9 @@ impl WriteError {
                 "verify the store to see what is left; copy it again or mesh the surface again"
             }
             Self::Store(StoreError::Storage(StorageError::Cancelled)) => "run the command again",
+            Self::Store(StoreError::Changed { .. }) => {
+                "run the command again: the file is then of the store as it is now"
+            }
             Self::Store(_) => "look at the state of the store",
         }
     }
@@ -151,6 +154,7 @@ fn word_of(error: &StoreError) -> &'static str {
         StoreError::Format { .. } => "store-format",
         _ if error.is_damage() => "damaged",
         StoreError::Busy { .. } => "busy",
+        StoreError::Changed { .. } => "store-changed",
         _ => "io",
     }
 }

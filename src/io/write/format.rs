@@ -90,7 +90,7 @@ impl MeshFormat {
     }
 
     /// Whether pieces in it carry numbers in the whole, so that all of it is open while they are written.
-    pub fn knows_the_whole(self) -> bool {
+    pub fn numbers_globally(self) -> bool {
         matches!(self, Self::OpenFoam | Self::Gmsh)
     }
 

@@ -98,7 +98,7 @@ pub fn export(
             MeshFormat::Parquet => {
                 parquet::write(store, &mut draft, out, selection, memory_bytes, report)?
             }
-            _ if format == MeshFormat::Pvtu || selection.pieces && !format.knows_the_whole() => {
+            _ if format == MeshFormat::Pvtu || selection.pieces && !format.numbers_globally() => {
                 let what = (format, selection);
                 pieces::write(store, &mut draft, out, what, memory_bytes, report)?
             }

@@ -174,15 +174,22 @@ fn obj(surface: &Surface, stream: &mut Stream) -> Result<()> {
 
 fn ply(surface: &Surface, stream: &mut Stream) -> Result<()> {
     stream.text("ply\nformat binary_little_endian 1.0\n");
+    // Where all triangles have one, a property of it says nothing, and some readers take lists of corners alone.
+    let has_labels = surface.label_names.len() > 1;
     for (number, name) in surface.label_names.iter().enumerate() {
         let name = name.replace(['\n', '\r'], " ");
         stream.text(&format!("comment label {number} {name}\n"));
     }
     stream.text(&format!(
         "element vertex {}\nproperty double x\nproperty double y\nproperty double z\n\
-         element face {}\nproperty list uchar int vertex_indices\nproperty int label\nend_header\n",
+         element face {}\nproperty list uchar int vertex_indices\n{}end_header\n",
         surface.n_vertices(),
-        surface.n_triangles()
+        surface.n_triangles(),
+        if has_labels {
+            "property int label\n"
+        } else {
+            ""
+        }
     ));
     for p in &surface.points {
         for x in p.to_array() {
@@ -192,7 +199,7 @@ fn ply(surface: &Surface, stream: &mut Stream) -> Result<()> {
     }
     for (triangle, label) in surface.triangles.iter().zip(&surface.labels) {
         stream.bytes(&[3]);
-        for v in triangle.iter().chain([label]) {
+        for v in triangle.iter().chain(has_labels.then_some(label)) {
             stream.bytes(&v.to_le_bytes());
         }
         stream.end()?;

@@ -3,6 +3,7 @@
 pub(super) mod estimate;
 pub(super) mod leases;
 mod memory;
+mod option_text;
 mod options;
 mod recipe;
 mod regions;

@@ -1,5 +1,7 @@
 use serde::{Deserialize, Serialize};
 
+use super::option_text::{text, texts};
+
 use super::Plan;
 use crate::bisect::Method;
 use crate::boundary::RegionPolicy;
@@ -16,24 +18,28 @@ const TETS_MIN: f64 = 25_000.0;
 #[serde(default, deny_unknown_fields)]
 pub struct Options {
     /// Wanted sizes as typed: lengths, or `1%` of the box diagonal.
+    #[serde(deserialize_with = "text")]
     pub hsiz: Option<String>,
     /// Least wanted length, as typed.
+    #[serde(deserialize_with = "text")]
     pub hmin: Option<String>,
     /// Greatest wanted length, as typed.
+    #[serde(deserialize_with = "text")]
     pub hmax: Option<String>,
     /// Gradation, as typed.
+    #[serde(deserialize_with = "text")]
     pub hgrad: Option<String>,
     /// Sizes in boxes, spheres and cylinders, as typed.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(deserialize_with = "texts", skip_serializing_if = "Vec::is_empty")]
     pub size_box: Vec<String>,
     /// Sizes in spheres, as typed.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(deserialize_with = "texts", skip_serializing_if = "Vec::is_empty")]
     pub size_sphere: Vec<String>,
     /// Sizes in cylinders, as typed.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(deserialize_with = "texts", skip_serializing_if = "Vec::is_empty")]
     pub size_cylinder: Vec<String>,
     /// Sizes of regions, as typed.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(deserialize_with = "texts", skip_serializing_if = "Vec::is_empty")]
     pub size_region: Vec<String>,
     /// A length as an expression in x, y and z.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -49,7 +55,7 @@ pub struct Options {
     /// `none`, `delaunay`, `full`.
     pub optimize: Option<String>,
     /// `auto` or a number.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(deserialize_with = "text", skip_serializing_if = "Option::is_none")]
     pub subdomains: Option<String>,
     /// Whether sub-domains are made for good: what they were made from is not kept. It does not shape the mesh.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
@@ -142,7 +148,7 @@ impl Options {
             Some(text) => match text.parse() {
                 Ok(n) if n > 0 => Ok(Some(n)),
                 _ => Err(PipelineError::Option {
-                    option: "--subdomains",
+                    option: "subdomains",
                     value: text.to_owned(),
                 }),
             },
@@ -185,20 +191,20 @@ impl Options {
         match self.seal.as_deref().unwrap_or("packed") {
             "packed" => Ok(Form::Sealed),
             "none" => Ok(Form::Pages),
-            _ => Err(unknown("--seal", &self.seal)),
+            _ => Err(unknown("seal", &self.seal)),
         }
     }
 
     /// [`Options::region_policy`], or an error that names the word.
     pub(crate) fn regions(&self) -> Result<RegionPolicy, PipelineError> {
         self.region_policy()
-            .ok_or_else(|| unknown("--regions", &self.regions))
+            .ok_or_else(|| unknown("regions", &self.regions))
     }
 
     /// [`Options::optimize_mode`], or an error that names the word.
     pub(crate) fn mode(&self) -> Result<Mode, PipelineError> {
         self.optimize_mode()
-            .ok_or_else(|| unknown("--optimize", &self.optimize))
+            .ok_or_else(|| unknown("optimize", &self.optimize))
     }
 }
 

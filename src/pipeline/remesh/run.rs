@@ -38,6 +38,9 @@ pub(crate) struct RemeshRun<'a> {
     rows: Vec<(SubdomainRow, CoarseRow)>,
     /// The latest generation of each sub-domain's files.
     last: BTreeMap<u32, u32>,
+    /// Steps on record: with their number no generation is given twice, also not that of a file that was undone, which a reader may
+    /// still look for.
+    steps: u32,
     n: u32,
     clock: Instant,
 }
@@ -99,6 +102,7 @@ impl<'a> RemeshRun<'a> {
         Ok(Self {
             field: Arc::new(recorded_field(catalog, options)?),
             last,
+            steps: catalog.journal()?.len() as u32,
             n: tree::n_subdomains(catalog)?,
             catalog,
             options,
@@ -248,13 +252,14 @@ impl<'a> RemeshRun<'a> {
         let (row, kept) = asked.expect("asked for");
         let (row, kept) = (row.clone(), *kept);
         let last = self.last.get(&rank).copied().unwrap_or(0);
+        let generation = last + 2 + 2 * self.steps;
         let scratch = self.catalog.scratch_dir()?.join(format!("leaf-{rank}"));
         scratch.create_dir_all()?;
         let subdomain = SubdomainJob {
             part,
             base: self.catalog.coarse_path(rank, kept.generation),
-            sealed: self.catalog.file_path(rank, last + 2),
-            generation: last + 2,
+            sealed: self.catalog.file_path(rank, generation),
+            generation,
             // As it was.
             form: Form::of(row.state).unwrap_or_default(),
             field,

@@ -274,7 +274,7 @@ fn skin(
         return Err(StoreError::Sealed(SealedError::Content {
             path: catalog.dir().to_owned(),
             subdomain: rank,
-            what: "its coarse leaf has a face without its vertices".to_owned(),
+            what: "its coarse snapshot has a face without its vertices".to_owned(),
         })
         .into());
     }

@@ -200,12 +200,15 @@ fn facets<P: Pages>(
     let mut faces = faces.peekable();
     // A face may be both a facet and an interface face: what was read stays at hand.
     let (mut at, mut sides) = ([0; 3], [NONE; 2]);
-    // Of a facet given from both sides the first one names the tetrahedra.
-    let mut is_named = [false; 2];
-    for claim in sorter.finish()? {
+    // Facets of a wall given from both sides: each names the tetrahedron behind it, so both keep their labels.
+    let is_pair =
+        |a: &Claim, b: &Claim| a.vertices == b.vertices && !a.at_interface && !b.at_interface;
+    let mut last: Option<Claim> = None;
+    let mut all = sorter.finish()?.peekable();
+    while let Some(claim) = all.next() {
         let claim = claim?;
         if claim.vertices != at || sides == [NONE; 2] {
-            (sides, is_named) = ([NONE; 2], [false; 2]);
+            sides = [NONE; 2];
             at = claim.vertices;
             let is_up_to = |face: &RequiredFace| face.vertices <= claim.vertices;
             while let Some(face) = faces.next_if(|f| f.as_ref().map_or(true, is_up_to)) {
@@ -217,16 +220,19 @@ fn facets<P: Pages>(
         }
         // A tetrahedron sees its face from inside turn as the facet does when it lies behind it.
         let odd = usize::from(claim.odd);
-        let named = &mut is_named[usize::from(claim.at_interface)];
-        let tets = match std::mem::replace(named, true) {
-            true => [NONE; 2],
-            false => [sides[1 - odd], sides[odd]],
-        };
+        let next = all.peek().and_then(|next| next.as_ref().ok());
+        let has_twin = [last.as_ref(), next]
+            .into_iter()
+            .flatten()
+            .any(|c| is_pair(c, &claim));
+        let front = if has_twin { NONE } else { sides[1 - odd] };
+        let tets = [front, sides[odd]];
         if claim.at_interface {
             push_interface_face(mesh, claim.number, tets[1], target, writer)?;
         } else {
             push_facet(mesh, claim.number, tets, writer)?;
         }
+        last = Some(claim);
     }
     Ok(())
 }

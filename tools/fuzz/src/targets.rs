@@ -1,9 +1,13 @@
-//! What is fed with arbitrary bytes: every reader of surfaces, every decoder of pages and chunks.
+//! What is fed with arbitrary bytes: every reader of surfaces, options and expressions, every decoder of pages and chunks.
 //!
 //! A target may answer with any error. It may not panic, hang, or hold more than its input justifies.
 //! Bytes that cannot have been written are also given a valid head and checksum, or only the checksum would be tested.
 
+use tetdb::expr::{Expression, Kind};
 use tetdb::io::read::{Format, read_memory};
+use tetdb::pipeline::Options;
+use tetdb::samples::SampleSpec;
+use tetdb::sizing::{RegionSize, SizeOptions, SizeSource};
 use tetdb::storage::kind;
 use tetdb::surface::{orient_alike, validate};
 use tetdb_schema::chunk::{
@@ -38,6 +42,14 @@ const fn reader(name: &'static str, format: Format, run: fn(&[u8])) -> Target {
     }
 }
 
+const fn text(name: &'static str, run: fn(&[u8])) -> Target {
+    Target {
+        name,
+        format: None,
+        run,
+    }
+}
+
 pub const TARGETS: &[Target] = &[
     reader("stl", Format::Stl, |bytes| read(Format::Stl, bytes)),
     reader("off", Format::Off, |bytes| read(Format::Off, bytes)),
@@ -54,6 +66,9 @@ pub const TARGETS: &[Target] = &[
     reader("poly", Format::TetgenPoly, |bytes| {
         read(Format::TetgenPoly, bytes)
     }),
+    text("expr", expression),
+    text("config", config),
+    text("option", option),
     Target {
         name: "page",
         format: None,
@@ -70,6 +85,66 @@ pub const TARGETS: &[Target] = &[
         run: chunk,
     },
 ];
+
+/// An expression of sizes or of a query: parsed, and its value at some points.
+fn expression(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else {
+        return;
+    };
+    let Ok(found) = Expression::parse(text, &["x", "y", "z"]) else {
+        return;
+    };
+    for values in [[0.0; 3], [1.0, -2.0, 0.5], [1e300, -1e-300, f64::NAN]] {
+        match found.kind() {
+            Kind::Number => {
+                found.number(&values);
+            }
+            Kind::Truth => {
+                let range = values.map(|x| [x, x]);
+                // What holds at a point may hold around it.
+                assert!(!found.truth(&values) || found.may_hold(&range), "{text}");
+                found.may_hold(&[[-1.0, 1.0], [f64::NEG_INFINITY, f64::INFINITY], [0.0, 0.0]]);
+            }
+        }
+    }
+}
+
+/// A file of options.
+fn config(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else {
+        return;
+    };
+    let Ok(options) = toml::from_str::<Options>(text) else {
+        return;
+    };
+    let _ = (options.sizes(), options.subdomain_count(), options.form());
+    let _ = (options.region_policy(), options.optimize_mode());
+    // What a store has on record comes back as it was.
+    let recorded = serde_json::to_string(&options).expect("options are text");
+    assert_eq!(
+        serde_json::from_str::<Options>(&recorded).ok(),
+        Some(options)
+    );
+}
+
+/// One option as typed; the first byte says which.
+fn option(bytes: &[u8]) {
+    let Some((&which, rest)) = bytes.split_first() else {
+        return;
+    };
+    let Ok(text) = std::str::from_utf8(rest) else {
+        return;
+    };
+    match which % 7 {
+        0 => drop(SizeOptions::parse(Some(text), Some(text), Some(text), None)),
+        1 => drop(SizeOptions::parse(None, None, None, Some(text))),
+        2 => drop(SizeSource::parse_box(text)),
+        3 => drop(SizeSource::parse_sphere(text)),
+        4 => drop(SizeSource::parse_cylinder(text)),
+        5 => drop(RegionSize::parse(text)),
+        _ => drop(SampleSpec::parse(text)),
+    }
+}
 
 /// Larger surfaces are read but not validated.
 const VALIDATED_MAX: usize = 2000;

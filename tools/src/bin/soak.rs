@@ -3,7 +3,7 @@
 //! ```text
 //! soak MODE RESULTS [--seed N] [--items N] [--minutes N] [--program PATH]
 //! ```
-//! Modes: `kills` and `flips` (of the program at PATH), `images`, `faults`, `deaths`, `space` (of the library, on a disk in memory). Each item
+//! Modes: `kills`, `flips`, `swaps`, `races` and `readers` (of the program at PATH), `images`, `faults`, `deaths`, `space` (of the library, on a disk in memory). Each item
 //! appends a line of JSON to the file RESULTS; a campaign that was stopped goes on behind its last line. Exit 1 when something was wrong.
 
 use std::fs::OpenOptions;
@@ -66,7 +66,7 @@ fn main() -> ExitCode {
     };
     let first = first_item(&args);
     let Some(mut mode) = Mode::new(&args.mode, &args.program) else {
-        eprintln!("modes: kills, flips, images, faults, deaths, space");
+        eprintln!("modes: kills, flips, swaps, races, readers, images, faults, deaths, space");
         return ExitCode::from(2);
     };
     // Panics are caught and counted.

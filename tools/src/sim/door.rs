@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use redb::{Builder, DatabaseError, ReadOnlyDatabase, StorageBackend};
-use tetdb::storage::{Disk, Entry};
+use tetdb::storage::{Disk, Entry, FileId, FileLock, Refused};
 
 use super::SimDisk;
 use super::state::{Call, Node, Pending, Told};
@@ -213,6 +213,11 @@ impl Disk for Door {
         Ok(())
     }
 
+    /// One process uses it.
+    fn lock(&self, _: &Path) -> Result<FileLock, Refused> {
+        Ok(FileLock::unshared())
+    }
+
     fn list(&self, dir: &Path) -> io::Result<Vec<String>> {
         let mut state = self.0.lock();
         state.begin(Call::List)?;
@@ -227,6 +232,13 @@ impl Disk for Door {
         match state.names.get(path)? {
             Node::Folder => Some(Entry::Folder),
             Node::File(f) => Some(Entry::File(state.files[*f].now.len())),
+        }
+    }
+
+    fn id(&self, path: &Path) -> Option<FileId> {
+        match self.0.lock().names.get(path)? {
+            Node::Folder => None,
+            Node::File(f) => Some((0, *f as u64)),
         }
     }
 }

@@ -2,6 +2,9 @@
 
 mod flips;
 mod kills;
+mod races;
+mod readers;
+mod swaps;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -31,6 +34,12 @@ impl Item {
 pub enum Mode {
     Kills(kills::Kills),
     Flips(flips::Flips),
+    /// Two writers at once.
+    Races(races::Races),
+    /// Many readers beside a writer.
+    Readers(readers::Readers),
+    /// Whole files and pages in the place of others.
+    Swaps(swaps::Swaps),
     Images(Sim),
     /// Every call failing, one after the other.
     Faults(Sim),
@@ -145,6 +154,9 @@ impl Mode {
         Some(match mode {
             "kills" => Self::Kills(kills::Kills::new(program)),
             "flips" => Self::Flips(flips::Flips::new(program)),
+            "races" => Self::Races(races::Races::new(program)),
+            "readers" => Self::Readers(readers::Readers::new(program)),
+            "swaps" => Self::Swaps(swaps::Swaps::new(program)),
             "images" => Self::Images(Sim::new(Case::small())),
             "faults" => Self::Faults(Sim::new(Case::tiny())),
             "deaths" => Self::Deaths(Sim::new(Case::tiny())),
@@ -156,7 +168,8 @@ impl Mode {
     /// How many items there are.
     pub fn items(&self) -> u64 {
         match self {
-            Self::Kills(_) | Self::Flips(_) | Self::Images(_) => u64::MAX,
+            Self::Kills(_) | Self::Flips(_) | Self::Races(_) => u64::MAX,
+            Self::Readers(_) | Self::Swaps(_) | Self::Images(_) => u64::MAX,
             Self::Faults(sim) => sim.reference.calls,
             Self::Deaths(sim) => sim.reference.boundaries,
             Self::Space(_) => SPACES,
@@ -167,6 +180,9 @@ impl Mode {
         match self {
             Self::Kills(kills) => kills.item(seed, item),
             Self::Flips(flips) => flips.item(seed, item),
+            Self::Races(races) => races.item(seed, item),
+            Self::Readers(readers) => readers.item(item),
+            Self::Swaps(swaps) => swaps.item(seed, item),
             Self::Images(sim) => sim.images(seed, item),
             Self::Faults(sim) => sim.fault(item),
             Self::Deaths(sim) => sim.death(item),

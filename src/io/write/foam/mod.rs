@@ -2,17 +2,17 @@
 //!
 //! Faces stand in the order that OpenFOAM asks for: those with two cells by owner, then by neighbor; then patch by patch. A patch for each
 //! label with faces on the boundary, a face zone for each label with cells on both sides, a cell zone for each region. The faces that two
-//! sub-domains share are patches of both, in one order, and begin at the same vertex. Reading order: `faces`, `whole`, `processors`,
+//! sub-domains share are patches of both, in one order, and begin at the same vertex. Reading order: `faces`, `serial`, `processors`,
 //! `polymesh` and `file` (what is written).
 
 mod faces;
 mod file;
 mod polymesh;
 mod processors;
-mod whole;
+mod serial;
 
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::draft::Draft;
 use super::error::{Result, WriteError};
@@ -42,12 +42,7 @@ pub(super) fn write(
         let ranks = &selection.subdomains;
         return processors::write(mesh, draft, &case, (&mut walk, &names), ranks, ascii);
     }
-    whole::write(mesh, draft, &case, (&mut walk, &names), ascii)
-}
-
-/// `constant/polyMesh` below `root`.
-fn mesh_dir(root: &Path) -> PathBuf {
-    root.join("constant").join("polyMesh")
+    serial::write(mesh, draft, &case, (&mut walk, &names), ascii)
 }
 
 /// A case that was decomposed into more parts would mix the meshes.

@@ -1,12 +1,17 @@
 //! The files of one `polyMesh` folder.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::super::draft::Draft;
 use super::super::error::Result;
 use super::file::FoamFile;
 use crate::storage::{Sorter, sort_record};
+
+/// `constant/polyMesh` below `root`.
+pub(super) fn mesh_dir(root: &Path) -> PathBuf {
+    root.join("constant").join("polyMesh")
+}
 
 /// What patches and zones are called, by label and region, in the order in which they are written.
 pub(super) struct Names {

@@ -10,9 +10,10 @@ use super::super::report::FileCounts;
 use super::super::stream::{Records, scratch};
 use super::faces::{FaceWalk, PartFaces, zone_of};
 use super::file::FoamFile;
-use super::mesh_dir;
-use super::polymesh::{FaceFiles, Names, Patch, Size, Zones, write_boundary, write_labels};
-use super::whole::{WithTwoCells, in_order};
+use super::polymesh::{
+    FaceFiles, Names, Patch, Size, Zones, mesh_dir, write_boundary, write_labels,
+};
+use super::serial::{WithTwoCells, in_order};
 use crate::storage::{Sorter, sort_record};
 
 sort_record! {

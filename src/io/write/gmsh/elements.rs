@@ -4,8 +4,11 @@ use super::super::error::Result;
 use super::super::merged::{Merged, Opened};
 use super::entities::Entities;
 use super::out::Out;
-use super::{TETRAHEDRON, TRIANGLE};
 use crate::storage::{Sorter, sort_record};
+
+/// Gmsh's numbers of the two types of elements.
+const TRIANGLE: u32 = 2;
+const TETRAHEDRON: u32 = 4;
 
 sort_record! {
     /// A triangle by its entity.

@@ -129,7 +129,7 @@ impl Entities {
     }
 
     /// Labels and regions as surfaces and volumes: tag, bounds, physical tag; what bounds them is not listed.
-    pub fn write_whole(&self, out: &mut Out) -> Result<()> {
+    pub fn write_model(&self, out: &mut Out) -> Result<()> {
         let (labels, regions) = (self.labels(), self.regions());
         for n in [0, 0, labels.len(), regions.len()] {
             out.size(n as u64);

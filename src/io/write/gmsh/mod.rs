@@ -22,10 +22,6 @@ use super::selection::Selection;
 use entities::Entities;
 use out::Out;
 
-/// Gmsh's numbers of the two types of elements.
-const TRIANGLE: u32 = 2;
-const TETRAHEDRON: u32 = 4;
-
 /// Writes one file of all, or one of each partition.
 pub(super) fn write(
     mesh: &mut Merged,
@@ -88,7 +84,7 @@ fn write_file(
         out.text(&names);
         Ok(())
     })?;
-    out.section("Entities", |out| entities.write_whole(out))?;
+    out.section("Entities", |out| entities.write_model(out))?;
     if entities.is_partitioned() {
         out.section("PartitionedEntities", |out| {
             entities.write_partitioned(out, mesh.n_parts(), selection.ghosts)

@@ -8,8 +8,7 @@ use super::super::merged::Merged;
 use super::super::report::FileCounts;
 use super::faces::{FaceWalk, Inner, Upper, zone_of};
 use super::file::FoamFile;
-use super::mesh_dir;
-use super::polymesh::{FaceFiles, Names, Patch, Size, Zones, write_boundary};
+use super::polymesh::{FaceFiles, Names, Patch, Size, Zones, mesh_dir, write_boundary};
 use crate::storage::{Sorted, Sorter, sort_record};
 
 sort_record! {

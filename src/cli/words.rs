@@ -1,0 +1,47 @@
+//! Counts, lists and sizes in words.
+
+use crate::geom::short;
+
+/// Names listed for people.
+const LISTED: usize = 12;
+
+/// `1 label`, `2 labels`.
+pub fn count(n: impl Into<u64>, what: &str) -> String {
+    match n.into() {
+        1 => format!("1 {what}"),
+        n => format!("{n} {what}s"),
+    }
+}
+
+/// Names with commas between, of many the first.
+pub fn listed<T: AsRef<str>>(names: &[T]) -> String {
+    let shown: Vec<&str> = names.iter().take(LISTED).map(AsRef::as_ref).collect();
+    let rest = match names.len().saturating_sub(LISTED) {
+        0 => String::new(),
+        n => format!(" and {n} more"),
+    };
+    shown.join(", ") + &rest
+}
+
+/// A box by its corners.
+pub fn bounds([low, high]: [[f64; 3]; 2]) -> String {
+    let corner = |p: [f64; 3]| p.map(short).join(", ");
+    format!("({}) to ({})", corner(low), corner(high))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_is_no_plural_and_long_lists_end() {
+        assert_eq!(count(1u32, "region"), "1 region");
+        assert_eq!(count(0u32, "region"), "0 regions");
+        let names: Vec<String> = (0..14).map(|n| n.to_string()).collect();
+        assert!(listed(&names).ends_with("11 and 2 more"));
+        assert_eq!(
+            bounds([[0.0; 3], [1.0, 0.5, 1e-9]]),
+            "(0, 0, 0) to (1, 0.5, 1e-9)"
+        );
+    }
+}

@@ -1,0 +1,193 @@
+//! The program as a person meets it: what it says by itself, on the way and at the end.
+//!
+//! Why: a summary that hides the box of a part, or a hint that leads nowhere, costs a person an hour.
+//! How: small parts are checked, meshed and asked for, and what is printed is read as a person would.
+
+use super::place::{Place, TETRA};
+
+/// Everything a command printed.
+fn said(place: &Place, line: &str) -> String {
+    let done = place.run_line(line).succeeds();
+    done.stdout() + &done.stderr()
+}
+
+#[test]
+fn box_and_labels_are_named_by_check_and_info() {
+    let place = Place::new();
+    place.write("part.off", TETRA);
+    place.run_line("mesh part.off").succeeds();
+    for command in ["check part.off", "info part.tetdb"] {
+        let said = said(&place, command);
+        assert!(said.contains("box (0, 0, 0) to (1, 1, 1)"), "{said}");
+        assert!(said.contains("labels: part"), "{said}");
+    }
+}
+
+#[test]
+fn numbers_have_four_digits_and_ones_no_plural() {
+    let place = Place::new();
+    place.write("part.off", TETRA);
+    let said = said(
+        &place,
+        "mesh part.off --size-sphere 0,0,0,0.1,0.3 --hsiz 0.123456",
+    );
+    assert!(
+        said.contains("1 shape,") && said.contains("in 1 sub-domain;"),
+        "{said}"
+    );
+    for bad in [
+        "(s)",
+        "0.0000",
+        "100.0000",
+        "e0 ",
+        "e0,",
+        "bytes per tetrahedron",
+        "1 shapes",
+    ] {
+        assert!(!said.contains(bad), "{bad:?} in {said}");
+    }
+}
+
+#[test]
+fn internals_are_for_those_who_ask_and_quiet_is_quiet() {
+    let place = Place::new();
+    place.write("part.off", TETRA);
+    let usual = said(&place, "mesh part.off -o a.tetdb");
+    assert!(!usual.contains("catalog,"), "{usual}");
+    assert!(usual.contains("`tetdb report a.tetdb a.html`"), "{usual}");
+    assert!(usual.contains("`tetdb export a.tetdb"), "{usual}");
+    let more = said(&place, "mesh part.off -o b.tetdb --verbose");
+    assert!(
+        more.contains("catalog,") && more.contains("coarse mesh"),
+        "{more}"
+    );
+    assert_eq!(said(&place, "mesh part.off -o c.tetdb --quiet"), "");
+}
+
+#[test]
+fn a_mesh_file_named_as_the_store_is_sent_to_export() {
+    let place = Place::new();
+    place.write("part.off", TETRA);
+    let error = place.run_line("mesh part.off -o part.vtu --json").error();
+    assert_eq!(error["code"], "usage");
+    assert!(
+        error["help"].to_string().contains("--export part.vtu"),
+        "{error}"
+    );
+    assert!(!place.path("part.vtu").exists());
+}
+
+#[test]
+fn solid_models_get_advice() {
+    let place = Place::new();
+    place.write("part.step", "ISO-10303-21;\nHEADER;\n");
+    place.write("part", "ISO-10303-21;\nHEADER;\n");
+    place.write("part.igs", "S 1\n");
+    for name in ["part.step", "part", "part.igs"] {
+        let error = place.run(&["check", name, "--json"]).error();
+        assert_eq!(error["code"], "unknown-format", "{error}");
+        assert!(error["help"].to_string().contains("gmsh -2"), "{error}");
+    }
+}
+
+#[test]
+fn negative_numbers_reach_the_option_before_them() {
+    let place = Place::new();
+    place.write("part.off", TETRA);
+    let error = place.run_line("mesh part.off --hsiz -1 --json").error();
+    assert_eq!(error["code"], "bad-size");
+    let message = error["message"].to_string();
+    assert!(
+        message.contains("--hsiz -1") && message.contains("above zero"),
+        "{message}"
+    );
+    let error = place.run_line("check part.off -1 --json").error();
+    assert!(
+        error["message"].to_string().contains("negative number"),
+        "{error}"
+    );
+}
+
+#[test]
+fn numbers_of_a_configuration_are_numbers() {
+    let place = Place::new();
+    place.write("part.off", TETRA);
+    place.write(
+        "a.toml",
+        "hsiz = 0.25\nsize_sphere = [[0, 0, 0, 0.1, 0.05]]\n",
+    );
+    place.write(
+        "b.toml",
+        "hsiz = \"0.25\"\nsize_sphere = [\"0,0,0,0.1,0.05\"]\n",
+    );
+    for name in ["a", "b"] {
+        let line = format!("mesh part.off --config {name}.toml -o {name}.tetdb");
+        place.run_line(&line).succeeds();
+    }
+    assert_eq!(place.digest("a.tetdb"), place.digest("b.tetdb"));
+}
+
+#[test]
+fn sizes_that_edges_of_the_surface_forbid_are_said_to_stay_out_of_reach() {
+    let place = Place::new();
+    let said = said(&place, "estimate sample:box,h=0.3 --hsiz 0.03");
+    for words in [
+        "--hsiz 0.03 is far below",
+        "away from them",
+        "tetdb refine-surface",
+    ] {
+        assert!(said.contains(words), "{words}: {said}");
+    }
+}
+
+#[test]
+fn check_and_estimate_expect_the_same() {
+    let place = Place::new();
+    let check = place.run_line("check sample:knot,h=0.1 --json").json();
+    let estimate = place.run_line("estimate sample:knot,h=0.1 --json").json();
+    let expected = check["fitness"]["tets_expected"]
+        .as_f64()
+        .expect("a number");
+    assert_eq!(Some(expected.round() as u64), estimate["tets"].as_u64());
+    place
+        .run_line("mesh sample:knot,h=0.1 -o k.tetdb")
+        .succeeds();
+    let actual = place.run_line("info k.tetdb --json").json()["tets"].as_f64();
+    let ratio = expected / actual.expect("a number");
+    assert!((0.9..1.1).contains(&ratio), "{ratio}");
+}
+
+#[test]
+fn an_open_surface_is_not_sent_to_the_command_it_comes_from() {
+    let place = Place::new();
+    place.write(
+        "open.off",
+        TETRA.replace("4 4 0", "4 3 0").replace("3 0 3 2\n", ""),
+    );
+    let said = place.run_line("check open.off").stdout();
+    let help = said.lines().find(|line| line.starts_with("help:"));
+    assert!(
+        help.is_none_or(|help| !help.contains("tetdb check SURFACE")),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_ply_of_one_label_is_corners_alone() {
+    let place = Place::new();
+    place.run_line("sample box,h=0.5 -o one.ply").succeeds();
+    place.write("part.off", TETRA);
+    place
+        .run_line("refine-surface part.off one.ply --hsiz 0.5")
+        .succeeds();
+    let bytes = std::fs::read(place.path("one.ply")).expect("it was written");
+    let head = String::from_utf8_lossy(&bytes[..300.min(bytes.len())]).into_owned();
+    assert!(!head.contains("property int label"), "{head}");
+    place.run_line("check one.ply").succeeds();
+}
+
+#[test]
+fn pages_of_the_manual_have_examples() {
+    let page = said(&Place::new(), "man query");
+    assert!(page.contains(".SH EXAMPLES\n.nf\ntetdb query"), "{page}");
+}

@@ -1,0 +1,120 @@
+//! Pipes, packed files, and inputs that have no end.
+//!
+//! Why: a surface often comes out of another program, packed or not; and a device without end must not fill memory.
+//! How: surfaces go in by every way there is; endless and pathological inputs must be refused soon, with a place.
+
+use std::io::Write;
+use std::process::Stdio;
+
+use super::place::{Place, TETRA};
+
+/// CRC-32 and a stored block: gzip without compression.
+fn gzip(bytes: &[u8]) -> Vec<u8> {
+    let crc = !bytes.iter().fold(!0u32, |crc, &byte| {
+        (0..8).fold(crc ^ u32::from(byte), |c, _| {
+            c >> 1 ^ (0xedb8_8320 & (c & 1).wrapping_neg())
+        })
+    });
+    let length = bytes.len() as u16;
+    let mut out = vec![0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 255, 1];
+    out.extend(length.to_le_bytes());
+    out.extend((!length).to_le_bytes());
+    out.extend(bytes);
+    out.extend(crc.to_le_bytes());
+    out.extend((bytes.len() as u32).to_le_bytes());
+    out
+}
+
+#[test]
+fn packed_surfaces_are_the_surfaces_they_hold() {
+    let place = Place::new();
+    place.write("part.off", TETRA);
+    place.write("part.off.gz", gzip(TETRA.as_bytes()));
+    place.write(
+        "part.off.zst",
+        zstd::bulk::compress(TETRA.as_bytes(), 3).expect("room"),
+    );
+    for (k, name) in ["part.off", "part.off.gz", "part.off.zst"]
+        .iter()
+        .enumerate()
+    {
+        place
+            .run_line(&format!("mesh {name} -o {k}.tetdb"))
+            .succeeds();
+        place.run_line(&format!("verify {k}.tetdb")).succeeds();
+        assert_eq!(place.digest("0.tetdb"), place.digest(&format!("{k}.tetdb")));
+        let labels = place.run_line(&format!("info {k}.tetdb --json")).json()["labels"].clone();
+        assert_eq!(labels, serde_json::json!(["part"]));
+    }
+}
+
+#[test]
+fn what_unpacks_to_more_than_its_share_of_memory_is_refused() {
+    let place = Place::new();
+    let zeros = zstd::bulk::compress(&vec![b' '; 40 << 20], 3).expect("room");
+    place.write("bomb.off.zst", zeros);
+    let error = place
+        .run_line("mesh bomb.off.zst --memory 64MiB --json")
+        .error();
+    assert_eq!(error["code"], "memory", "{error}");
+    place.write("cut.off.gz", &gzip(TETRA.as_bytes())[..40]);
+    let error = place.run_line("check cut.off.gz --json").error();
+    assert_eq!(error["code"], "unreadable-file", "{error}");
+}
+
+#[test]
+fn a_surface_may_come_by_the_standard_input() {
+    let place = Place::new();
+    let mut texts = vec![TETRA.as_bytes().to_vec()];
+    for format in ["stl", "ply", "off"] {
+        let line = format!("sample box,h=0.5 -o - --format {format}");
+        texts.push(place.run_line(&line).succeeds().stdout_bytes());
+    }
+    for text in texts {
+        let mut command = place.command(&["check", "-"]);
+        let mut child = command.stdin(Stdio::piped()).spawn().expect("it starts");
+        let mut input = child.stdin.take().expect("a pipe");
+        input.write_all(&text).expect("it reads");
+        drop(input);
+        let output = child.wait_with_output().expect("it ends");
+        let said = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(
+            output.status.success() && said.contains("it can be meshed"),
+            "{said}"
+        );
+    }
+}
+
+#[test]
+fn endless_and_enormous_inputs_are_refused_at_once() {
+    let place = Place::new();
+    place.write("part.off", TETRA);
+    place.run_line("mesh part.off").succeeds();
+    let long = "# a comment\n".repeat(20 << 16);
+    place.write("long.toml", long);
+    let made = std::process::Command::new("mkfifo")
+        .arg(place.path("pipe.sol"))
+        .status();
+    assert!(made.is_ok_and(|made| made.success()), "mkfifo works here");
+    for (line, code) in [
+        ("check /dev/zero", "unreadable-file"),
+        ("mesh part.off --config /dev/zero", "unreadable-file"),
+        ("mesh part.off --config pipe.sol", "unreadable-file"),
+        ("mesh part.off --config long.toml", "unreadable-file"),
+        ("mesh part.off --size-field pipe.sol", "unreadable-file"),
+        ("query part.tetdb --points /dev/zero", "unreadable-file"),
+        (
+            "verify part.tetdb --against /dev/urandom",
+            "unreadable-file",
+        ),
+    ] {
+        let words: Vec<&str> = line.split(' ').chain(["--json"]).collect();
+        let mut limited = vec!["20", env!("CARGO_BIN_EXE_tetdb")];
+        limited.extend(words);
+        let mut command = std::process::Command::new("timeout");
+        let command = command.args(limited).current_dir(place.path("."));
+        let output = command.output().expect("it starts");
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(said.contains(code), "{line}: {:?} {said}", output.status);
+    }
+}
