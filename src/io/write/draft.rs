@@ -69,13 +69,18 @@ impl Draft {
 
     /// Syncs all files, then renames them into place. Returns places and lengths.
     ///
-    /// Errors: the disk. Files of one mesh are renamed one after the other: each is whole, old or new.
+    /// Errors: the disk. Of several files those that are there go first, so that no moment has some of an old mesh and some of this one.
     pub fn publish(self) -> Result<Vec<(PathBuf, u64)>> {
         let mut done = Vec::new();
         for (path, out) in &self.files {
             let synced = File::open(path).and_then(|f| f.sync_all().and(f.metadata()));
             let length = synced.map_err(|e| WriteError::io(out, e))?.len();
             done.push((out.clone(), length));
+        }
+        if self.files.len() > 1 {
+            for (_, out) in self.files.iter().filter(|(_, out)| out.exists()) {
+                fs::remove_file(out).map_err(|e| WriteError::io(out, e))?;
+            }
         }
         for (path, out) in &self.files {
             fs::create_dir_all(folder(out)).map_err(|e| WriteError::io(out, e))?;

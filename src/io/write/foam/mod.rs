@@ -21,7 +21,10 @@ use super::names::set_names;
 use super::report::FileCounts;
 use super::selection::Selection;
 use faces::FaceWalk;
-use polymesh::Names;
+use polymesh::{Names, Size};
+
+/// Bytes of scratch for a tetrahedron: four faces before they meet, two after.
+const SCRATCH_BYTES: u64 = 4 * 16 + 2 * 24;
 
 /// Writes the mesh into the case that `out`, an empty file for ParaView, stands in.
 pub(super) fn write(
@@ -36,13 +39,27 @@ pub(super) fn write(
     let ascii = selection.ascii;
     let mut walk = FaceWalk::new(mesh)?;
     let names = names(mesh, &walk)?;
-    draft.create(out, 0)?;
+    draft.create(out, needed_bytes(mesh, ascii))?;
     if selection.pieces {
         refuse_more_processors(&case, mesh.parts().len())?;
         let ranks = &selection.subdomains;
         return processors::write(mesh, draft, &case, (&mut walk, &names), ranks, ascii);
     }
     serial::write(mesh, draft, &case, (&mut walk, &names), ascii)
+}
+
+/// About what all files need, and the sorted faces of the largest sub-domain beside them.
+fn needed_bytes(mesh: &Merged, ascii: bool) -> u64 {
+    let parts = mesh.parts();
+    let cells = mesh.n_tets();
+    let size = Size {
+        points: parts.iter().map(|part| part.n_vertices).sum(),
+        cells,
+        inner: 2 * cells,
+        faces: 2 * cells + mesh.n_faces(),
+    };
+    let largest = parts.iter().map(|part| part.n_tets).max();
+    size.bytes(ascii) + SCRATCH_BYTES * largest.unwrap_or(0)
 }
 
 /// A case that was decomposed into more parts would mix the meshes.

@@ -280,7 +280,7 @@ impl Job<'_> {
         } = mesh.open_part(p)?;
         let (dir, ascii) = (self.dir(part.id().rank()), self.ascii);
         let what = (dir.as_path(), "points", "vectorField");
-        let mut points = FoamFile::create(draft, what, "", ascii, size.bytes(ascii))?;
+        let mut points = FoamFile::create(draft, what, "", ascii, 24 * size.points)?;
         points.list(size.points, |file| {
             for vertex in part.vertices() {
                 file.point(vertex?.point)?;

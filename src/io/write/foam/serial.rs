@@ -99,9 +99,8 @@ fn write_points(
     size: Size,
     ascii: bool,
 ) -> Result<()> {
-    // The first file asks for the space of all.
     let what = (dir, "points", "vectorField");
-    let mut points = FoamFile::create(draft, what, "", ascii, size.bytes(ascii))?;
+    let mut points = FoamFile::create(draft, what, "", ascii, 24 * size.points)?;
     points.begin_list(size.points);
     mesh.vertices(|_, vertex| points.point(vertex.point))?;
     points.end_list(size.points);
