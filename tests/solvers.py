@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Do the solvers' own readers see the mesh that the store has?
 
-  solvers.py INFO.json NAME.vtkhdf | NAME.msh | NAME.msh22 | CASE.foam | NAME.ele ...
+  solvers.py INFO.json NAME.vtkhdf | NAME.vtu | NAME.msh | NAME.inp | CASE.foam | NAME.ele ...
 
 INFO.json: what `tetdb info --json` printed. A `.vtkhdf` is read by VTK and by h5py, an OpenFOAM case (whole and processors) by a reader of
 this file, and by checkMesh where it is installed, `.msh` by gmsh. Counts, volume per region, area per label and the neighbors of
@@ -51,6 +51,28 @@ def areas(points, tris):
     return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
 
 
+def corners_of(points, tets):
+    """The corners of tetrahedra; of those of second order also whether quadratics are integrated exactly."""
+    if tets.shape[1] == 4:
+        return tets
+    ends = [(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)]
+    for node, (a, b) in enumerate(ends, 4):
+        assert (points[tets[:, node]] == (points[tets[:, a]] / 2 + points[tets[:, b]] / 2)).all(), f"node {node} is not the middle"
+    edges = np.concatenate([np.sort(tets[:, list(e)], axis=1) for e in ends])
+    middles = tets[:, 4:].T.ravel()
+    pairs = np.unique(np.column_stack([edges, middles]), axis=0)
+    assert len(pairs) == len(np.unique(edges, axis=0)) == len(np.unique(middles)), "an edge has two middles"
+    volume = volumes(points, tets)
+    for i, j in ((0, 0), (0, 1), (1, 2), (2, 2)):
+        # By the element: corners weigh -1/20, middles 1/5. By the corners alone, exactly.
+        values = (points[:, i] * points[:, j])[tets]
+        element = (volume * (values[:, 4:].sum(axis=1) / 5 - values[:, :4].sum(axis=1) / 20)).sum()
+        x, y = points[tets[:, :4], i], points[tets[:, :4], j]
+        exact = (volume * (x.sum(axis=1) * y.sum(axis=1) + (x * y).sum(axis=1)) / 20).sum()
+        assert abs(element - exact) <= 1e-12 * max(abs(exact), volume.sum()), f"a quadratic is integrated to {element}, not {exact}"
+    return tets[:, :4]
+
+
 def by(keys, values):
     keys = np.asarray(keys)
     return {k: float(values[keys == k].sum()) for k in np.unique(keys).tolist()}
@@ -90,9 +112,11 @@ def check_vtkhdf(path, want):
     volume, parts = collections.defaultdict(float), {}
     for grid in grids(path):
         points = vtk_to_numpy(grid.GetPoints().GetData())
-        tets = vtk_to_numpy(grid.GetCells().GetConnectivityArray()).reshape(-1, 4)
-        assert (vtk_to_numpy(grid.GetCells().GetOffsetsArray()) == 4 * np.arange(len(tets) + 1)).all()
+        n = 10 if grid.GetCellType(0) == 24 else 4
+        tets = vtk_to_numpy(grid.GetCells().GetConnectivityArray()).reshape(-1, n)
+        assert (vtk_to_numpy(grid.GetCells().GetOffsetsArray()) == n * np.arange(len(tets) + 1)).all()
         assert len(np.unique(tets)) == len(points), "a point without a tetrahedron"
+        tets = corners_of(points, tets)
         data = grid.GetCellData()
         for region, v in by(vtk_to_numpy(data.GetArray("region")), volumes(points, tets)).items():
             volume[region] += v
@@ -106,7 +130,7 @@ def check_vtkhdf(path, want):
     skin = path.replace(".vtkhdf", "_boundary.vtkhdf")
     (grid,) = grids(skin)
     points = vtk_to_numpy(grid.GetPoints().GetData())
-    tris = vtk_to_numpy(grid.GetCells().GetConnectivityArray()).reshape(-1, 3)
+    tris = vtk_to_numpy(grid.GetCells().GetConnectivityArray()).reshape(-1, 6 if grid.GetCellType(0) == 22 else 3)[:, :3]
     data = grid.GetCellData()
     names = bytes(vtk_to_numpy(grid.GetFieldData().GetArray("label_names"))).decode().split("\0")
     neighbor, rank = vtk_to_numpy(data.GetArray("neighbor")), vtk_to_numpy(data.GetArray("subdomain"))
@@ -126,6 +150,30 @@ def check_vtkhdf(path, want):
         place = g["PointData/mesh_vertex"][:]
         assert (f["Points"][:][place] == g["Points"][:]).all()
     print(f"{path}: VTK {vtk.vtkVersion().GetVTKVersion()} and HDF5 {h5py.version.hdf5_version} see {len(parts)} partitions, {sum(parts.values())} tetrahedra")
+
+
+def check_vtu(path, want):
+    import vtk
+    from vtk.util.numpy_support import vtk_to_numpy
+    reader = vtk.vtkXMLUnstructuredGridReader()
+    reader.SetFileName(path)
+    reader.Update()
+    grid = reader.GetOutput()
+    points = vtk_to_numpy(grid.GetPoints().GetData())
+    n = 10 if grid.GetCellType(0) == 24 else 4
+    tets = vtk_to_numpy(grid.GetCells().GetConnectivityArray()).reshape(-1, n)
+    found = by(vtk_to_numpy(grid.GetCellData().GetArray("region")), volumes(points, corners_of(points, tets)))
+    same(path, "volume by region", found, want["volume by region"])
+    print(f"{path}: VTK {vtk.vtkVersion().GetVTKVersion()} sees {len(tets)} tetrahedra of {n} nodes")
+
+
+def check_inp(path, want):
+    import meshio
+    mesh = meshio.read(path)
+    (tets,) = [block.data for block in mesh.cells if block.type.startswith("tetra")]
+    found = float(volumes(mesh.points, corners_of(mesh.points, tets)).sum())
+    same(path, "volume", found, sum(want["volume by region"].values()))
+    print(f"{path}: meshio {meshio.__version__} sees {len(tets)} tetrahedra of {tets.shape[1]} nodes")
 
 
 def gmsh_file(gmsh, path):

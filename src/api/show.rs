@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::store::open_finished;
 use super::targets::{check_target, inputs_of};
 use super::{Error, Settings, Store, guarded};
-use crate::io::write::{self, Content, MeshFormat, Selection};
+use crate::io::write::{self, Content, MeshFormat, Order, Selection};
 
 /// A writer holds no more than this, however large the cap.
 const MEMORY_MAX: u64 = 512 << 20;
@@ -70,6 +70,12 @@ impl ExportOptions {
     /// Text instead of binary numbers, where the format has both.
     pub fn ascii(mut self) -> Self {
         self.selection.ascii = true;
+        self
+    }
+
+    /// Elements with the middles of edges as nodes: tetrahedra of ten, triangles of six; `.vtu`, `.pvtu`, `.vtkhdf` and `.inp`.
+    pub fn second_order(mut self) -> Self {
+        self.selection.order = Order::Second;
         self
     }
 

@@ -10,7 +10,7 @@ use super::failure::Failure;
 use super::memory;
 use crate::api::targets::{check_target, inputs_of};
 use crate::api::{Error, Exported, Settings, show};
-use crate::io::write::{Content, ENDINGS, MeshFormat, Selection, check};
+use crate::io::write::{Content, ENDINGS, MeshFormat, Order, Selection, check};
 
 pub fn run(args: &ExportArgs, console: &Console) -> Result<u8, Failure> {
     let settings = console.settings(memory::asked(args.read.memory.as_deref())?, None);
@@ -35,6 +35,10 @@ pub fn run(args: &ExportArgs, console: &Console) -> Result<u8, Failure> {
         format,
         ascii: args.ascii,
         ghosts: args.ghosts,
+        order: match args.order {
+            2 => Order::Second,
+            _ => Order::First,
+        },
     };
     for out in &args.out {
         if format.is_none() {

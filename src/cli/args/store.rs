@@ -72,6 +72,9 @@ pub struct ExportArgs {
     /// Text instead of binary numbers (.msh, .foam)
     #[arg(long)]
     pub ascii: bool,
+    /// Nodes of the elements: 1, corners; 2, also the middles of edges (.vtu, .pvtu, .vtkhdf, .inp)
+    #[arg(long, value_name = "ORDER", default_value = "1", value_parser = clap::value_parser!(u8).range(1..=2))]
+    pub order: u8,
     /// List in .msh, for each partition, the tetrahedra of others that touch it
     #[arg(long)]
     pub ghosts: bool,

@@ -84,6 +84,11 @@ impl MeshFormat {
         )
     }
 
+    /// Whether elements of second order are written in it.
+    pub fn has_second_order(self) -> bool {
+        matches!(self, Self::Vtu | Self::Pvtu | Self::VtkHdf | Self::Abaqus)
+    }
+
     /// Whether it can hold faces without tetrahedra.
     pub fn holds_faces_alone(self) -> bool {
         matches!(self, Self::Vtu | Self::VtkHdf)

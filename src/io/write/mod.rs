@@ -24,6 +24,7 @@ mod gmsh22;
 mod hdf5;
 mod medit;
 mod merged;
+mod midpoints;
 mod names;
 mod npy;
 mod npy_columns;
@@ -62,7 +63,7 @@ pub use report::ExportReport;
 use report::FileCounts;
 #[cfg(any(test, feature = "cli", feature = "internals"))]
 pub use selected::{SelectedTet, SelectedVtu};
-pub use selection::{Content, Selection};
+pub use selection::{Content, Order, Selection};
 pub use surface::{SurfaceReport, surface};
 
 use crate::storage::attempt;
@@ -152,6 +153,9 @@ pub fn check(out: &Path, selection: &Selection) -> Result<MeshFormat> {
             Err(cannot("faces without tetrahedra; .vtu and .vtkhdf do"))
         }
         () if selection.ascii && !format.has_text() => Err(cannot("text")),
+        () if selection.order == Order::Second && !format.has_second_order() => Err(cannot(
+            "elements of second order; .vtu, .pvtu, .vtkhdf and .inp do",
+        )),
         () if selection.ghosts && format != MeshFormat::Gmsh => {
             Err(cannot("ghost cells; .msh does"))
         }

@@ -19,6 +19,18 @@ pub struct Selection {
     pub ascii: bool,
     /// Of each part the tetrahedra that touch other parts, listed for those (`.msh`).
     pub ghosts: bool,
+    /// Nodes of the elements.
+    pub order: Order,
+}
+
+/// Nodes of the elements.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Order {
+    /// Corners.
+    #[default]
+    First,
+    /// Corners and the middles of edges.
+    Second,
 }
 
 /// Which elements are written.
