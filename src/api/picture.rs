@@ -16,6 +16,8 @@ use tetdb_schema::catalog::Stage;
 
 /// Qualities from here on have the last color: few are worse, and the others should differ.
 const QUALITY_MOST: f32 = 3.0;
+/// What has no label.
+const INSIDE: Rgb = Rgb([205, 205, 210]);
 /// Bytes of a pixel while it is drawn, with its height, and again while it is compressed.
 const PIXEL_BYTES: u64 = 16;
 /// Towards the viewer of surfaces in space: a little from the right, a little from above.
@@ -33,6 +35,8 @@ pub enum ColorBy {
     Quality,
     /// The mean edge length.
     Size,
+    /// The label of input triangles, in space; tetrahedra are gray.
+    Label,
 }
 
 /// What is drawn.
@@ -168,6 +172,11 @@ impl Snapshot {
         if in_space && self.color == ColorBy::Quality {
             return bad(
                 "a color by quality: expected sub-domain, region or size, for faces have no quality",
+            );
+        }
+        if !in_space && self.color == ColorBy::Label {
+            return bad(
+                "a color by label: expected a picture in space, for tetrahedra have no label",
             );
         }
         let vectors = self
@@ -311,6 +320,7 @@ fn draw(
     match snapshot.color {
         ColorBy::Subdomain => picture.kind(piece.subdomain),
         ColorBy::Region => picture.kind(piece.region),
+        ColorBy::Label => picture.kind(piece.label.unwrap_or(u32::MAX)),
         ColorBy::Quality | ColorBy::Size => {}
     }
     let color = color(snapshot.color, extent, piece);
@@ -347,7 +357,7 @@ fn are_many(by: ColorBy, subject: Subject, session: &QuerySession) -> bool {
             false
         }
         ColorBy::Subdomain => session.subdomains().len() > 1,
-        ColorBy::Region => true,
+        ColorBy::Region | ColorBy::Label => true,
         ColorBy::Quality | ColorBy::Size => false,
     }
 }
@@ -379,7 +389,7 @@ fn bar(by: ColorBy, extent: &Extent) -> Option<ColorBar> {
     let [least, most] = match by {
         ColorBy::Quality => [1.0, QUALITY_MOST],
         ColorBy::Size => extent.size,
-        ColorBy::Subdomain | ColorBy::Region => return None,
+        ColorBy::Subdomain | ColorBy::Region | ColorBy::Label => return None,
     };
     Some(ColorBar {
         least: f64::from(least),
@@ -396,6 +406,7 @@ fn color(by: ColorBy, extent: &Extent, piece: &Piece) -> Rgb {
     match by {
         ColorBy::Subdomain => category(piece.subdomain),
         ColorBy::Region => category(piece.region),
+        ColorBy::Label => piece.label.map_or(INSIDE, category),
         ColorBy::Quality => scale(share(piece.quality)),
         ColorBy::Size => scale(share(piece.size)),
     }

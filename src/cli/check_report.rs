@@ -55,6 +55,11 @@ impl<'a> Findings<'a> {
         }
     }
 
+    fn bounds(&self) -> [[f64; 3]; 2] {
+        let bounds = self.surface.bounds();
+        [bounds.low, bounds.high].map(|p| p.to_array())
+    }
+
     pub fn is_valid(&self) -> bool {
         self.validation.is_valid()
     }
@@ -93,7 +98,7 @@ impl<'a> Findings<'a> {
         fitness["forced_share"] = json!(self.forced_share());
         json!({
             "schema": 1, "triangles": surface.n_triangles(), "vertices": surface.n_vertices(),
-            "labels": surface.label_names, "turned_triangles": self.turned,
+            "labels": surface.label_names, "bounds": self.bounds(), "turned_triangles": self.turned,
             "edges": edges.n_edges, "parts": edges.n_components, "open_edges": edges.open.len(),
             "nonmanifold_edges": edges.n_nonmanifold, "two_sided_triangles": edges.two_sided.len(),
             "valid": self.is_valid(), "n_defects": found.n_defects,
@@ -114,10 +119,8 @@ impl<'a> Findings<'a> {
             edges.n_edges,
             count(edges.n_components as u64, "part")
         ));
-        let bounds = self.surface.bounds();
-        let corners = [bounds.low, bounds.high].map(|p| p.to_array());
         if self.surface.n_triangles() > 0 {
-            console.line(&format!("box {}", words::bounds(corners)));
+            console.line(&format!("box {}", words::bounds(self.bounds())));
             console.line(&format!(
                 "labels: {}",
                 words::listed(&self.surface.label_names)

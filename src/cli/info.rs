@@ -67,13 +67,20 @@ pub fn object(path: &Path) -> Result<Value, Failure> {
         "surfaces": job.surfaces, "options": serde_json::from_str::<Value>(&job.options).unwrap_or(Value::Null),
         "tool_version": job.tool_version, "labels": catalog.labels()?, "regions": catalog.regions()?,
         "tets": rows.iter().map(|r| r.tets).sum::<u64>(),
-        "vertices": rows.iter().map(|r| r.vertices).sum::<u64>(),
+        "vertices": rows.iter().map(|r| r.vertices).sum::<u64>(), "bounds": bounds(&rows),
         "bytes": rows.iter().map(|r| r.bytes).sum::<u64>(),
         "coarse_bytes": coarse.iter().map(|c| c.bytes).sum::<u64>(),
         "previous_bytes": catalog.previous()?.iter().map(|r| r.bytes).sum::<u64>(),
         "catalog_bytes": catalog.file_bytes()?, "digest": digest(&rows),
         "stages": stages, "subdomains": subdomains, "interfaces": catalog.interfaces()?, "journal": catalog.journal()?,
     }))
+}
+
+/// Low and high corner of the box around all of them.
+fn bounds(rows: &[SubdomainRow]) -> [[f64; 3]; 2] {
+    let each = (rows.iter()).map(|r| Aabb::around(r.bounds.map(Point::from_array)));
+    let all = each.fold(Aabb::EMPTY, Aabb::union);
+    [all.low, all.high].map(|p| p.to_array())
 }
 
 fn sum(digests: impl Iterator<Item = [u64; 2]>) -> [u64; 2] {
@@ -128,10 +135,7 @@ pub fn print(path: &Path, console: &Console) -> Result<(), Failure> {
         count(rows.len() as u64, "sub-domain"),
         memory::show(bytes),
     ));
-    let all = (rows.iter()).map(|r| Aabb::around(r.bounds.map(Point::from_array)));
-    let all = all.fold(Aabb::EMPTY, Aabb::union);
-    let corners = [all.low, all.high].map(|p| p.to_array());
-    console.line(&format!("box {}", words::bounds(corners)));
+    console.line(&format!("box {}", words::bounds(bounds(&rows))));
     let labels = catalog.labels()?;
     console.line(&format!("labels: {}", words::listed(&labels)));
     print_bytes(catalog, &rows, console)?;

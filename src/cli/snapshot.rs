@@ -37,14 +37,19 @@ fn snapshot(args: &SnapshotArgs) -> Result<Snapshot, Failure> {
         return Err(bad("--from", from, expected));
     }
     if in_space && matches!(args.color, ColorBy::Quality) {
-        let expected = "subdomain, region or size, for faces have no quality";
+        let expected = "subdomain, region, size or label, for faces have no quality";
         return Err(bad("--color", "quality", expected));
+    }
+    if !in_space && matches!(args.color, ColorBy::Label) {
+        let expected = "with --surface or --shell, for tetrahedra have no label";
+        return Err(bad("--color", "label", expected));
     }
     snapshot = snapshot.pixels(width, height).color(match args.color {
         ColorBy::Subdomain => api::ColorBy::Subdomain,
         ColorBy::Region => api::ColorBy::Region,
         ColorBy::Quality => api::ColorBy::Quality,
         ColorBy::Size => api::ColorBy::Size,
+        ColorBy::Label => api::ColorBy::Label,
     });
     if let Some(text) = &args.plane {
         let expected = "six numbers, a point and a direction towards the viewer";

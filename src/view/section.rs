@@ -94,6 +94,8 @@ pub struct Piece {
     pub subdomain: u32,
     /// Number of the region.
     pub region: u32,
+    /// Number of the label, of an input triangle.
+    pub label: Option<u32>,
     /// Quality q of the tetrahedron.
     pub quality: f32,
     /// Mean length of the tetrahedron's longest and shortest edge.
@@ -113,6 +115,9 @@ pub struct Extent {
     pub size: [f32; 2],
 }
 
+/// Stands for no label in a record.
+const NO_LABEL: u32 = u32::MAX;
+
 sort_record! {
     /// A piece by its depth.
     struct DeepPiece {
@@ -123,6 +128,7 @@ sort_record! {
         facing: Payload<f32>,
         subdomain: Payload<u32>,
         region: Payload<u32>,
+        label: Payload<u32>,
         quality: Payload<f32>,
         size: Payload<f32>,
     }
@@ -232,6 +238,7 @@ pub(super) fn pieces(view: &View, crinkle: bool, tet: &Hit) -> Vec<(f64, Piece)>
             facing: facing as f32,
             subdomain: tet.id.subdomain().rank(),
             region: tet.region,
+            label: None,
             quality: tet.shape.quality as f32,
             size: (0.5 * (least + most)) as f32,
         }
@@ -287,6 +294,7 @@ fn record(depth: f64, piece: &Piece) -> DeepPiece {
         facing: Payload(piece.facing),
         subdomain: Payload(piece.subdomain),
         region: Payload(piece.region),
+        label: Payload(piece.label.unwrap_or(NO_LABEL)),
         quality: Payload(piece.quality),
         size: Payload(piece.size),
     }
@@ -300,6 +308,7 @@ fn piece(record: &DeepPiece) -> Piece {
         facing: record.facing.0,
         subdomain: record.subdomain.0,
         region: record.region.0,
+        label: Some(record.label.0).filter(|&label| label != NO_LABEL),
         quality: record.quality.0,
         size: record.size.0,
     }

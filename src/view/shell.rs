@@ -5,9 +5,9 @@ use std::path::Path;
 use super::section::{Piece, Pieces, Section, View};
 use crate::geom::Point;
 use crate::pipeline::stage_faces;
-use crate::query::{QueryError, QuerySession};
+use crate::query::{QueryError, QuerySession, Selection, Solid};
 use crate::storage::check_cancelled;
-use tetdb_schema::record::NO_TET;
+use tetdb_schema::record::{FACES, NO_TET};
 
 /// Which faces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,7 +22,7 @@ pub enum ShellView {
     Chosen(u32),
 }
 
-/// A half space: what lies beyond the point in the direction is left out.
+/// A half space: what lies beyond the point in the direction is left out; tetrahedra that the plane cuts are shown whole.
 pub type Clip = [Point; 2];
 
 impl QuerySession {
@@ -49,10 +49,12 @@ impl QuerySession {
                     let rank = self.rows[place].rank;
                     self.triangles(rank, &mut all)?;
                 }
+                self.cut_tets(None, &mut all)?;
             }
             ShellView::Subdomain(rank) => {
                 self.triangles(rank, &mut all)?;
                 self.walls(rank, &mut all)?;
+                self.cut_tets(Some(rank), &mut all)?;
             }
             ShellView::Natural(cut) | ShellView::Chosen(cut) => {
                 let Some(faces) = stage_faces(&mut self.store, cut)? else {
@@ -65,7 +67,7 @@ impl QuerySession {
                     _ => faces.chosen,
                 };
                 for face in list {
-                    all.push(face, cut, 0)?;
+                    all.push(face, cut, 0, None)?;
                 }
             }
         }
@@ -100,7 +102,27 @@ impl QuerySession {
                 if side == 0 {
                     corners.swap(1, 2);
                 }
-                all.push(corners, rank, facet.regions[side])?;
+                all.push(corners, rank, facet.regions[side], Some(facet.label))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The tetrahedra that the plane of a clip cuts, whole.
+    fn cut_tets(&mut self, rank: Option<u32>, all: &mut Shown) -> Result<(), QueryError> {
+        let Some([point, normal]) = all.clip else {
+            return Ok(());
+        };
+        let selection = Selection {
+            solids: vec![Solid::Plane { point, normal }],
+            subdomains: rank.map(|rank| vec![rank]),
+            ..Selection::default()
+        };
+        for tet in self.select(selection)? {
+            let tet = tet?;
+            for face in FACES {
+                let corners = face.map(|i| tet.corners[i]);
+                all.show(corners, tet.id.subdomain().rank(), tet.region, None)?;
             }
         }
         Ok(())
@@ -114,7 +136,7 @@ impl QuerySession {
             for face in part.interface_chunk(chunk)?.records {
                 let corners = part.corners(face.vertices)?.map(|c| c.point);
                 // In the color of the sub-domain behind them.
-                all.push(corners, face.other, 0)?;
+                all.push(corners, face.other, 0, None)?;
             }
         }
         Ok(())
@@ -129,14 +151,30 @@ struct Shown<'a> {
 }
 
 impl Shown<'_> {
-    fn push(&mut self, corners: [Point; 3], subdomain: u32, region: u32) -> Result<(), QueryError> {
+    /// Shows a face, unless its middle is cut away.
+    fn push(
+        &mut self,
+        corners: [Point; 3],
+        subdomain: u32,
+        region: u32,
+        label: Option<u32>,
+    ) -> Result<(), QueryError> {
         let [a, b, c] = corners;
         let middle = (a + b + c) / 3.0;
-        if let Some([point, beyond]) = self.clip
-            && (middle - point).dot(beyond) > 0.0
-        {
-            return Ok(());
+        match self.clip {
+            Some([point, beyond]) if (middle - point).dot(beyond) > 0.0 => Ok(()),
+            _ => self.show(corners, subdomain, region, label),
         }
+    }
+
+    fn show(
+        &mut self,
+        corners: [Point; 3],
+        subdomain: u32,
+        region: u32,
+        label: Option<u32>,
+    ) -> Result<(), QueryError> {
+        let [a, b, c] = corners;
         let normal = (b - a).cross(c - a).normalize_or_zero();
         let [p, q, r] = corners.map(|p| self.view.flat(p));
         let [x, y, z] = corners.map(|p| self.view.height(p));
@@ -148,6 +186,7 @@ impl Shown<'_> {
             facing: self.view.facing(normal) as f32,
             subdomain,
             region,
+            label,
             quality: 1.0,
             size: size as f32,
         };

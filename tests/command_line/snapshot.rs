@@ -159,3 +159,26 @@ fn surfaces_are_drawn_with_what_bounds_them() {
     let failed = place.run_line("snapshot a.tetdb b.svg --shell 2 --json");
     assert_eq!(failed.error()["code"], "no-such-part");
 }
+
+#[test]
+fn a_surface_that_is_cut_open_shows_tetrahedra_and_labels_have_colors() {
+    let place = Place::new();
+    place
+        .run_line("mesh sample:box,h=0.5 -o box.tetdb")
+        .succeeds();
+    let pieces = |options: &str| {
+        let line = format!("snapshot box.tetdb a.png --surface --size 200x200 --json {options}");
+        let answer = place.run_line(&line).succeeds().json();
+        answer["pieces"].as_u64().expect("a number")
+    };
+    let (whole, cut) = (pieces(""), pieces("--plane 0.5,0.5,0.5,1,0,0"));
+    let tets = place.run_line("query box.tetdb --plane 0.5,0.5,0.5,1,0,0 --json");
+    let n_cut = tets.succeeds().stdout().lines().count() as u64;
+    assert!(
+        n_cut > 0 && cut >= 4 * n_cut && cut <= whole + 4 * n_cut,
+        "{whole} {cut} {n_cut}"
+    );
+    assert_eq!(pieces("--color label"), whole);
+    let refused = place.run_line("snapshot box.tetdb a.png --color label --json");
+    assert_eq!(refused.error()["code"], "bad-query");
+}

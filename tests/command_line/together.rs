@@ -17,7 +17,7 @@ const MEMORY: usize = 16 << 20;
 
 /// A finished store of two sub-domains.
 fn store(place: &Place) {
-    let line = "mesh sample:box,h=0.06 -o a.tetdb --subdomains 2 --no-verify";
+    let line = "mesh sample:box,h=0.045 -o a.tetdb --subdomains 2 --no-verify";
     place.run_line(line).succeeds();
 }
 
@@ -50,7 +50,7 @@ fn a_question_during_a_change_is_answered_from_before_or_after_it() {
     let mut writer = place.command(&words).spawn().expect("it starts");
     let (mut answers, mut n) = (Vec::new(), 0);
     while writer.try_wait().expect("it is ours").is_none() {
-        place.run_line("query a.tetdb --at 0.5,0.5,0.5").succeeds();
+        place.run_line("query a.tetdb --point 0.5,0.5,0.5").succeeds();
         answers.push(place.digest("a.tetdb"));
         n += 1;
     }
@@ -93,7 +93,7 @@ fn a_reader_of_a_store_that_was_replaced_gets_nothing_of_the_new_one() {
     let place = Place::new();
     store(&place);
     let mut reader = Catalog::open(place.path("a.tetdb")).expect("a finished store");
-    let line = "mesh sample:box,h=0.05 -o a.tetdb --subdomains 2 --force --no-verify";
+    let line = "mesh sample:box,h=0.042 -o a.tetdb --subdomains 2 --force --no-verify";
     place.run_line(line).succeeds();
     let refused = found(&mut reader).expect_err("its files are gone");
     assert!(matches!(refused, StoreError::Changed { .. }), "{refused}");
@@ -153,7 +153,7 @@ fn what_a_killed_writer_left_is_read_as_it_is_and_cleaned_up_by_the_next() {
     let before = content(&path);
     assert_eq!(place.digest("a.tetdb"), digest);
     for line in [
-        "query a.tetdb --at 0.5,0.5,0.5",
+        "query a.tetdb --point 0.5,0.5,0.5",
         "info a.tetdb",
         "verify a.tetdb",
     ] {

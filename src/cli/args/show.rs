@@ -13,13 +13,14 @@ pub enum ColorBy {
     Region,
     Quality,
     Size,
+    Label,
 }
 
 /// A cut through the mesh by a plane, seen from the side its direction points to; or surfaces in space. Reads only what is seen.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  tetdb snapshot part.tetdb cut.png\n  tetdb snapshot part.tetdb cut.png --plane 0,0,0,1,0.5,0 --crinkle --color quality\n  \
-    tetdb snapshot part.tetdb bad.svg --where \"quality > 2\" --crinkle\n  tetdb snapshot part.tetdb whole.png --surface\n  tetdb snapshot part.tetdb inside.png --surface --plane 0,0,0,1,0,0\n  \
+    tetdb snapshot part.tetdb bad.svg --where \"quality > 2\" --crinkle\n  tetdb snapshot part.tetdb whole.png --surface --color label\n  tetdb snapshot part.tetdb inside.png --surface --plane 0,0,0,1,0,0\n  \
     tetdb snapshot part.tetdb shell.png --shell 3 --from 1,1,0.5\n  tetdb snapshot stages.tetdb coarse.png --stage 2:coarse\n  tetdb snapshot stages.tetdb refined.png --stage 2:refined\n  \
     tetdb snapshot stages.tetdb natural.png --stage 2:natural\n  tetdb snapshot stages.tetdb interface.png --stage 2:interface\n\n\
     Two meshes compared: give both the same --plane, --color and --size; quality is always colored from 1 to 3.\n\
@@ -38,7 +39,7 @@ pub struct SnapshotArgs {
     /// Draw the tetrahedra that meet the plane whole, not the polygons it cuts out of them
     #[arg(long)]
     pub crinkle: bool,
-    /// The whole surface in space, shaded; with --plane, what lies beyond it is left out and the inside is seen
+    /// The whole surface in space, shaded; with --plane, what lies beyond it is left out and the tetrahedra it cuts are seen
     #[arg(long, conflicts_with_all = ["crinkle", "condition"])]
     pub surface: bool,
     /// What bounds one sub-domain in space, shaded: input triangles in its color, interfaces in that of the neighbor; with --plane as above
@@ -51,7 +52,7 @@ pub struct SnapshotArgs {
     /// The direction towards the viewer of what is shown in space
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub from: Option<String>,
-    /// What colors stand for: size is the mean of the longest and the shortest edge
+    /// What colors stand for: size is the mean of the longest and the shortest edge, label that of input triangles with --surface or --shell
     #[arg(long, value_enum, default_value = "subdomain", value_name = "WHAT")]
     pub color: ColorBy,
     /// Draw only tetrahedra of which this holds, as in `tetdb query`

@@ -209,7 +209,7 @@ fn unique(stem: &str, taken: &[String]) -> String {
 fn read_file(path: &Path, limit: u64, target: &mut SurfaceSink) -> Result<()> {
     if let Some(kind) = solid_model(path, b"") {
         return Err(ReadError::SolidModel {
-            place: FilePlace::whole(path),
+            place: FilePlace::of_file(path),
             kind,
         });
     }
@@ -221,7 +221,7 @@ fn read_file(path: &Path, limit: u64, target: &mut SurfaceSink) -> Result<()> {
             let found = Format::of_head(head, length);
             let kind = solid_model(path, head);
             found.ok_or_else(|| {
-                let place = FilePlace::whole(path);
+                let place = FilePlace::of_file(path);
                 match kind {
                     Some(kind) => ReadError::SolidModel { place, kind },
                     None => ReadError::UnknownFormat { place },

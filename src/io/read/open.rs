@@ -94,7 +94,7 @@ fn within(from: Reader, path: &Path, limit: u64) -> Result<Vec<u8>> {
     read.map_err(|e| unreadable(path, e.to_string()))?;
     if bytes.len() as u64 > limit {
         return Err(ReadError::TooLarge {
-            place: FilePlace::whole(path),
+            place: FilePlace::of_file(path),
             what: "the unpacked file",
             needed: bytes.len() as u64,
             limit,
@@ -119,7 +119,7 @@ pub(super) fn open_plain(path: &Path) -> Result<(BufReader<File>, u64)> {
 
 fn unreadable(path: &Path, reason: String) -> ReadError {
     ReadError::Unreadable {
-        place: FilePlace::whole(path),
+        place: FilePlace::of_file(path),
         reason,
     }
 }

@@ -35,7 +35,7 @@ impl Readers {
             program,
             dir: tempfile::tempdir().expect("a folder for a store"),
         };
-        let mesh = "mesh sample:box,h=0.08 -o a.tetdb --subdomains 2";
+        let mesh = "mesh sample:box,h=0.045 -o a.tetdb --subdomains 2";
         readers.run(mesh).expect("an undisturbed run");
         readers
     }
