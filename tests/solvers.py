@@ -421,7 +421,7 @@ def check_foam(path, want):
         if ranks:
             sees.append("addressing right")
     print(f"{path}: {'whole' if whole else 'no whole'}, {len(ranks)} processors, ordered, closed, alike on both sides {sees}")
-    run_openfoam(case, whole, len(ranks))
+    run_openfoam(case, whole, ranks)
 
 
 HEAD = "FoamFile { version 2.0; format ascii; class %s; object %s; }\n"
@@ -457,7 +457,8 @@ def write_dictionary(path, name, body, kind="dictionary"):
         file.write(HEAD % (kind, name) + body + "\n")
 
 
-def run_openfoam(case, whole, n):
+def run_openfoam(case, whole, ranks):
+    n = len(ranks)
     for program in ("checkMesh", "laplacianFoam", "reconstructPar", "mpirun"):
         if not shutil.which(program):
             skipped.append(f"OpenFOAM: {program} is not installed")
@@ -475,14 +476,24 @@ def run_openfoam(case, whole, n):
         else:
             complain(f"{case}: checkMesh: {text[-2500:]}")
     if whole and n:
-        compare_solutions(case, whole, n)
+        compare_solutions(case, whole, ranks)
 
 
-def compare_solutions(case, whole, n):
-    """A Laplace problem with another temperature on each patch, solved on the whole and on all processors, then put together again."""
-    patches = "".join(f"{name} {{ type fixedValue; value uniform {i}; }} " for i, name in enumerate(whole.patches))
-    body = f'dimensions [0 0 0 1 0 0 0]; internalField uniform 0; boundaryField {{ {patches} "proc.*" {{ type processor; value uniform 0; }} }}'
-    for root in [case] + [os.path.join(case, f"processor{i}") for i in range(n)]:
+def compare_solutions(case, whole, ranks):
+    """A Laplace problem whose temperature on the boundary is x + 2y - z, solved on the whole and on all processors, then put together again."""
+    n = len(ranks)
+    roots = [(case, whole)] + [(os.path.join(case, f"processor{i}"), mesh) for i, mesh in enumerate(ranks)]
+    for root, mesh in roots:
+        patches = ""
+        for name, patch in mesh.patches.items():
+            if patch["type"] == "processor":
+                # What stands in the cells behind at first.
+                patches += f"{name} {{ type processor; value uniform 0; }}\n"
+                continue
+            centers = mesh.points[mesh.faces[mesh.patch(name)]].mean(axis=1)
+            values = " ".join(f"{v:.15g}" for v in centers @ [1, 2, -1])
+            patches += f"{name} {{ type fixedValue; value nonuniform List<scalar> {len(centers)} ({values}); }}\n"
+        body = f"dimensions [0 0 0 1 0 0 0]; internalField uniform 0; boundaryField {{ {patches} }}"
         write_dictionary(os.path.join(root, "0", "T"), "T", body, "volScalarField")
     properties = os.path.join(case, "constant", "transportProperties")
     write_dictionary(properties, "transportProperties", "DT DT [0 2 -1 0 0 0 0] 1;")
