@@ -32,6 +32,7 @@ mod surface_arrays;
 pub(crate) mod targets;
 pub(crate) mod verify;
 
+pub use crate::io::write::MeshFormat;
 pub use crate::storage::CancelToken;
 pub use ask::{Answers, Order, Query};
 pub use codes::{CODES, CodeRow};
