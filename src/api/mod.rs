@@ -28,6 +28,7 @@ pub(crate) mod surface;
 pub(crate) mod targets;
 pub(crate) mod verify;
 
+pub use crate::io::write::MeshFormat;
 pub use crate::storage::CancelToken;
 pub use ask::{Answers, Order, Query};
 pub use codes::{CODES, CodeRow};

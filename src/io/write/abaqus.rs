@@ -8,6 +8,7 @@ use std::path::Path;
 use super::draft::Draft;
 use super::error::Result;
 use super::merged::{Merged, Tet};
+use super::names::set_names;
 use super::stream::Stream;
 use crate::storage::{Sorted, Sorter, sort_record};
 
@@ -195,27 +196,4 @@ fn node_sets(
     })?;
     let head = |label: u32| format!("*NSET, NSET={}\n", names[&label]);
     sets(sorter.finish()?, head, stream)
-}
-
-/// Names Abaqus takes: letters, digits, `_` and `-`, a letter first, at most 80, case not distinguished.
-fn set_names(labels: &BTreeMap<u32, String>) -> BTreeMap<u32, String> {
-    let mut taken = BTreeSet::new();
-    let mut names = BTreeMap::new();
-    for (&label, name) in labels {
-        let letter = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-        let mut clean: String = name
-            .chars()
-            .map(|c| if letter(c) { c } else { '_' })
-            .collect();
-        if !clean.starts_with(|c: char| c.is_ascii_alphabetic()) {
-            clean.insert_str(0, "label_");
-        }
-        clean.truncate(60);
-        if !taken.insert(clean.to_ascii_lowercase()) {
-            clean += &format!("_{label}");
-            taken.insert(clean.to_ascii_lowercase());
-        }
-        names.insert(label, clean);
-    }
-    names
 }

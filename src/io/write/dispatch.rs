@@ -7,13 +7,13 @@ use super::error::Result;
 use super::format::MeshFormat;
 use super::merged::Merged;
 use super::report::FileCounts;
-use super::selection::Content;
-use super::{abaqus, gmsh, medit, npy_columns, vtu, vtu_boundary};
+use super::selection::{Content, Selection};
+use super::{abaqus, foam, gmsh, gmsh22, medit, npy_columns, tetgen, vtu, vtu_boundary};
 
 /// Writes a mesh as one file, and what belongs to it.
 pub(super) fn write(
     format: MeshFormat,
-    content: Content,
+    selection: &Selection,
     mesh: &mut Merged,
     draft: &mut Draft,
     out: &Path,
@@ -24,19 +24,24 @@ pub(super) fn write(
         triangles: mesh.n_faces(),
     };
     match format {
-        MeshFormat::Vtu if content != Content::Mesh => {
+        MeshFormat::Vtu | MeshFormat::VtkHdf if selection.content != Content::Mesh => {
             mesh.expect_passes(1, 0);
-            counts.vertices = vtu_boundary::write(mesh, draft, out)?;
+            let is_hdf = format == MeshFormat::VtkHdf;
+            counts.vertices = vtu_boundary::write(mesh, draft, out, is_hdf)?;
             counts.tets = 0;
         }
-        MeshFormat::Vtu | MeshFormat::Pvtu => vtu::write(mesh, draft, out)?,
+        MeshFormat::Vtu | MeshFormat::Pvtu => vtu::write(mesh, draft, out, false)?,
+        MeshFormat::VtkHdf => vtu::write(mesh, draft, out, true)?,
         MeshFormat::Medit => medit::write_text(mesh, draft, out)?,
         MeshFormat::MeditBinary => medit::write_binary(mesh, draft, out)?,
-        MeshFormat::Gmsh => gmsh::write(mesh, draft, out)?,
+        MeshFormat::Gmsh => counts = gmsh::write(mesh, draft, out, selection)?,
+        MeshFormat::Gmsh22 => gmsh22::write(mesh, draft, out)?,
         MeshFormat::Abaqus => abaqus::write(mesh, draft, out)?,
         MeshFormat::Numpy => npy_columns::write(mesh, draft, out)?,
         #[cfg(feature = "parquet")]
         MeshFormat::Parquet => unreachable!("its pieces are written elsewhere"),
+        MeshFormat::OpenFoam => counts = foam::write(mesh, draft, out, selection)?,
+        MeshFormat::TetGen => tetgen::write(mesh, draft, out)?,
         MeshFormat::Topology => unreachable!("the topology is no mesh"),
     }
     mesh.report_end();

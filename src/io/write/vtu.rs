@@ -1,6 +1,7 @@
-//! VTK XML unstructured grids: the tetrahedra in one file, the boundary faces in another beside it.
+//! VTK unstructured grids, XML or HDF5: the tetrahedra in one file, the boundary faces in another beside it.
 //!
-//! Source: the VTK file formats document, appended raw data with 64-bit lengths.
+//! A `.vtkhdf` file has a partition for each sub-domain, with vertices of its own. Source: the VTK file formats document, appended
+//! raw data with 64-bit lengths; for `.vtkhdf` see `vtu_layout`.
 
 use std::path::{Path, PathBuf};
 
@@ -8,14 +9,20 @@ use super::draft::Draft;
 use super::error::Result;
 use super::merged::Merged;
 use super::vtu_boundary;
-use super::vtu_layout::{Array, Group, Index, Layout};
+use super::vtu_layout::{Array, Container, Group, Index, Layout};
 
 /// VTK's number of a tetrahedron.
 pub(super) const TETRA: u8 = 10;
 
-pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<()> {
+/// Writes both; for `.vtkhdf` the mesh is one whose vertices are numbered apart.
+pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path, is_hdf: bool) -> Result<()> {
     mesh.expect_passes(2, 1);
-    let index = Index::new(mesh.n_vertices(), 4 * mesh.n_tets());
+    let parts = mesh.parts();
+    let container = match is_hdf {
+        true => Container::Hdf(parts.iter().map(|p| [p.n_vertices, p.n_tets]).collect()),
+        false => Container::Xml,
+    };
+    let index = Index::within(&container, mesh.n_vertices(), 4 * mesh.n_tets());
     let arrays = vec![
         Array::new(Group::PointData, "global_id", "Int64"),
         Array::new(Group::CellData, "subdomain", "UInt32"),
@@ -27,7 +34,8 @@ pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
         Array::new(Group::Cells, "offsets", index.kind()),
         Array::new(Group::Cells, "types", "UInt8"),
     ];
-    let layout = Layout::new(arrays, [mesh.n_vertices(), mesh.n_tets(), 4], "");
+    let counts = [mesh.n_vertices(), mesh.n_tets(), 4];
+    let layout = Layout::new(&container, &arrays, counts, ("", &[]));
     let path = draft.create(out, layout.file_bytes())?;
     let [
         mut vertex_ids,
@@ -47,8 +55,13 @@ pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
             .iter()
             .try_for_each(|x| points.put(&x.to_le_bytes()))
     })?;
-    let mut end = 0;
+    let (mut end, mut first_vertex) = (0, 0);
+    let mut coming = parts.iter().filter(|_| is_hdf).peekable();
     mesh.tets_with_quality(|tet| {
+        if let Some(part) = coming.next_if(|part| part.rank == tet.subdomain) {
+            (end, first_vertex) = (0, part.first_vertex);
+            index.put(&mut ends, end)?;
+        }
         end += 4;
         ranks.put(&tet.subdomain.to_le_bytes())?;
         regions.put(&tet.region.to_le_bytes())?;
@@ -56,7 +69,7 @@ pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
         ids.put(&tet.id.number().to_le_bytes())?;
         tet.nodes
             .iter()
-            .try_for_each(|&v| index.put(&mut nodes, v))?;
+            .try_for_each(|&v| index.put(&mut nodes, v - first_vertex))?;
         index.put(&mut ends, end)?;
         types.put(&[TETRA])
     })?;
@@ -65,7 +78,7 @@ pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
     ] {
         strip.finish()?;
     }
-    vtu_boundary::write(mesh, draft, &boundary_path(out))?;
+    vtu_boundary::write(mesh, draft, &boundary_path(out), is_hdf)?;
     Ok(())
 }
 

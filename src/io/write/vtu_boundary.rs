@@ -1,9 +1,8 @@
-//! The boundary faces as a VTK file with vertices of their own.
+//! The boundary faces as a VTK file, `.vtu` or `.vtkhdf`, with vertices of their own.
 //!
 //! `input_id` is -1 on faces shared with another sub-domain; there `neighbor` is its number, `cut` and `cut_face` name the face for both.
 //! Its vertices are those of the faces, in the order of the mesh; `mesh_vertex` tells where each is in
-//! the file of the tetrahedra. Label names stand in the field array `label_names`: bytes of UTF-8, a zero
-//! after each name, because arrays of text are not read by every program.
+//! the file of the tetrahedra. Label names stand in the field array `label_names`.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +10,7 @@ use super::draft::Draft;
 use super::error::Result;
 use super::merged::Merged;
 use super::stream::{Records, scratch};
-use super::vtu_layout::{Array, Group, Index, Layout};
+use super::vtu_layout::{Array, Container, Group, Index, Layout};
 use crate::storage::{Sorted, Sorter, sort_record};
 
 /// VTK's number of a triangle.
@@ -44,10 +43,14 @@ struct Corners {
 }
 
 /// Writes the faces; returns the number of their vertices.
-pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<u64> {
+pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path, is_hdf: bool) -> Result<u64> {
     let corners = corners(mesh, mesh.dir())?;
     let n_faces = mesh.n_faces();
-    let index = Index::new(corners.n_vertices, 3 * n_faces);
+    let container = match is_hdf {
+        true => Container::Hdf(vec![[corners.n_vertices, n_faces]]),
+        false => Container::Xml,
+    };
+    let index = Index::within(&container, corners.n_vertices, 3 * n_faces);
     let arrays = vec![
         Array::new(Group::PointData, "mesh_vertex", "Int64"),
         Array::new(Group::PointData, "global_id", "Int64"),
@@ -64,7 +67,13 @@ pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
         Array::new(Group::Cells, "offsets", index.kind()),
         Array::new(Group::Cells, "types", "UInt8"),
     ];
-    let layout = Layout::new(arrays, [corners.n_vertices, n_faces, 3], &label_names(mesh));
+    let counts = [corners.n_vertices, n_faces, 3];
+    let layout = Layout::new(
+        &container,
+        &arrays,
+        counts,
+        ("label_names", &label_names(mesh)),
+    );
     let path = draft.create(out, layout.file_bytes())?;
     let [
         mut numbers,
@@ -100,6 +109,9 @@ pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
         index.put(&mut nodes, corner?.number)?;
     }
     let mut end = 0;
+    if is_hdf {
+        index.put(&mut ends, end)?;
+    }
     mesh.faces().each(|face| {
         end += 3;
         labels.put(&face.label.to_le_bytes())?;
@@ -161,20 +173,14 @@ fn corners(mesh: &Merged, dir: &Path) -> Result<Corners> {
     })
 }
 
-/// Names of labels 0, 1, .., up to the last one a face has.
-fn label_names(mesh: &Merged) -> String {
+/// Names of labels 0, 1, .., up to the last one a face has, a zero after each.
+fn label_names(mesh: &Merged) -> Vec<u8> {
     let labels = mesh.labels();
-    let mut bytes = String::new();
-    let mut n = 0;
-    for label in 0..=labels.keys().next_back().copied().unwrap_or_default() {
-        let name = labels.get(&label).map_or("", String::as_str);
-        for byte in name.bytes().chain([0]) {
-            bytes += &format!("{byte} ");
-            n += 1;
-        }
-    }
-    format!(
-        "    <FieldData>\n      <DataArray type=\"UInt8\" Name=\"label_names\" NumberOfTuples=\"{n}\" format=\"ascii\">\n        \
-         {bytes}\n      </DataArray>\n    </FieldData>\n"
-    )
+    let last = labels.keys().next_back().copied().unwrap_or_default();
+    (0..=last)
+        .flat_map(|label| {
+            let name = labels.get(&label).map_or("", String::as_str);
+            name.bytes().chain([0])
+        })
+        .collect()
 }
