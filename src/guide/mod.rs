@@ -8,7 +8,8 @@
 //! | [`subdomains`] | divide a large mesh, limit memory, pass parts to a parallel solver |
 //! | [`questions`] | find tetrahedra by place, condition or neighborhood |
 //! | [`resaturation`] | mesh some sub-domains again, with other sizes or after damage |
-//! | [`pictures`] | draw cuts and surfaces; ParaView, Gmsh, NumPy, DuckDB |
+//! | [`pictures`] | draw cuts and surfaces |
+//! | [`exports`] | files for VTK, OpenFOAM, Gmsh, NumPy, DuckDB and others |
 //! | [`scripting`] | JSON output, configuration files, shell completion |
 //! | [`library`] | the same from Rust |
 //! | [`errors`] | every error code, exit codes, what to do |
@@ -24,6 +25,7 @@ macro_rules! links {
             "[questions]: crate::guide::questions\n",
             "[resaturation]: crate::guide::resaturation\n",
             "[pictures]: crate::guide::pictures\n",
+            "[exports]: crate::guide::exports\n",
             "[scripting]: crate::guide::scripting\n",
             "[library]: crate::guide::library\n",
             "[errors]: crate::guide::errors\n",
@@ -66,6 +68,10 @@ pub mod resaturation {
 pub mod pictures {
     #![doc = links!()]
     #![doc = include_str!("pictures.md")]
+}
+pub mod exports {
+    #![doc = links!()]
+    #![doc = include_str!("exports.md")]
 }
 pub mod scripting {
     #![doc = links!()]

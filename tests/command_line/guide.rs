@@ -173,6 +173,7 @@ chapters! {
     questions: 8,
     resaturation: 5,
     pictures: 10,
+    exports: 8,
     scripting: 5,
     library: 0,
     errors: 2,
