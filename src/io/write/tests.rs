@@ -296,10 +296,14 @@ fn push_hull(
                     tets: [NO_TET, t],
                 })?;
             } else if on(0, half) {
+                // The same number on both sides, another for each face.
+                let mut sorted = face.map(|g| place(g)[1] * (n + 1) + place(g)[2]);
+                sorted.sort_unstable();
+                let index = sorted.iter().fold(0, |a, p| a * (n + 1).pow(2) + p);
                 writer.push_interface_face(InterfaceFace {
                     vertices,
                     cut: 1,
-                    index: 0,
+                    index,
                     other: 1 - rank,
                     tet: t,
                 })?;
