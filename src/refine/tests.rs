@@ -10,7 +10,11 @@ fn cube(h: f64, pager: Pager) -> (Mesh<Pager>, RefineReport) {
     graded(pager, Lengths::Field, &|_| h)
 }
 
-fn graded(pager: Pager, lengths: Lengths, h: &(dyn Fn(Point) -> f64 + Sync)) -> (Mesh<Pager>, RefineReport) {
+fn graded(
+    pager: Pager,
+    lengths: Lengths,
+    h: &(dyn Fn(Point) -> f64 + Sync),
+) -> (Mesh<Pager>, RefineReport) {
     let mut mesh = Mesh::new(pager);
     let bounds = Aabb::around([Point::ZERO, Point::ONE]);
     enclose(&mut mesh, &bounds);

@@ -50,7 +50,9 @@ fn a_question_during_a_change_is_answered_from_before_or_after_it() {
     let mut writer = place.command(&words).spawn().expect("it starts");
     let (mut answers, mut n) = (Vec::new(), 0);
     while writer.try_wait().expect("it is ours").is_none() {
-        place.run_line("query a.tetdb --point 0.5,0.5,0.5").succeeds();
+        place
+            .run_line("query a.tetdb --point 0.5,0.5,0.5")
+            .succeeds();
         answers.push(place.digest("a.tetdb"));
         n += 1;
     }

@@ -172,7 +172,12 @@ mod tests {
             ("<i8", "(2,)", &two[..], "unexpected-text"),
             ("<f8", "(2, 1)", &two[..], "unexpected-text"),
             ("<f8", "(1,)", &[0; 8][..], "unexpected-text"),
-            ("<f8", "(1,)", &1e-300f64.to_le_bytes()[..], "unexpected-text"),
+            (
+                "<f8",
+                "(1,)",
+                &1e-300f64.to_le_bytes()[..],
+                "unexpected-text",
+            ),
             ("<f8", "(9000000000,)", &two[..], "memory"),
             ("<f8", "()", &two[..], "unexpected-text"),
         ] {
