@@ -12,9 +12,10 @@ use tetdb_schema::digest::Digest;
 use tetdb_schema::page::FORMAT_VERSION;
 
 use super::rows::{self, RowKind};
+use super::writer_lock::{LOCK, WriterLock};
 use super::{Step, StoreError};
 use crate::sealed::{CoarseSnapshot, Form, SealedError, Subdomain};
-use crate::storage::{DiskPath, FileId, FileLock, Refused, StorageError, StoreFile};
+use crate::storage::{DiskPath, FileId, StoreFile};
 use tetdb_schema::catalog::{
     CoarseRow, FileRow, InterfaceRow, Job, JournalRow, RegionRow, StageRow, StoreState,
     SubdomainRow, TopologyRow,
@@ -29,8 +30,6 @@ const CATALOG: &str = "catalog.redb";
 const CATALOG_NEW: &str = "catalog.redb-new";
 /// The catalog of a finished store as it is after the next commit, until it takes the place of the one before.
 const CATALOG_NEXT: &str = "catalog.redb-next";
-/// Stands for the right to change the store; see [`FileLock`].
-const LOCK: &str = "writer.lock";
 /// Folder of sorted runs; everything in it is scratch.
 const SCRATCH: &str = "scratch";
 
@@ -50,39 +49,6 @@ pub struct Catalog {
     /// `false`: each commit writes a new file.
     in_place: bool,
     journal_rows: u32,
-}
-
-/// The right to change a store, which one process at a time has; it ends when the last that shares it is dropped.
-#[derive(Debug)]
-pub struct WriterLock {
-    file: FileLock,
-}
-
-impl WriterLock {
-    /// Takes the right to change the store in a folder.
-    ///
-    /// Errors: [`StoreError::Busy`] while another has it; [`StoreError::NotFound`]; the folder takes no files.
-    pub fn acquire(dir: impl Into<DiskPath>) -> Result<Arc<Self>, StoreError> {
-        let dir = dir.into();
-        let path = dir.path().to_owned();
-        match dir.join(LOCK).lock() {
-            Ok(file) => Ok(Arc::new(Self { file })),
-            Err(Refused::Held(writer)) => Err(StoreError::Busy { path, writer }),
-            Err(Refused::Io(_)) if !dir.exists() => Err(StoreError::NotFound { path }),
-            Err(Refused::Io(e)) => Err(StorageError::io(&path.join(LOCK), e).into()),
-        }
-    }
-
-    /// Whether the store is on a file system that knows no locks: then the file [`WriterLock`] left there decides, and one that was left
-    /// by a process of another host has to be removed by hand.
-    pub fn is_by_name(&self) -> bool {
-        self.file.is_by_name()
-    }
-
-    /// The store has another name now.
-    pub fn moved_to(&self, dir: &Path) {
-        self.file.moved_to(&dir.join(LOCK));
-    }
 }
 
 impl Catalog {

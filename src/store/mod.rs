@@ -12,8 +12,9 @@ mod rows;
 mod step;
 #[cfg(test)]
 mod tests;
+mod writer_lock;
 
-pub use catalog::{Catalog, WriterLock};
+pub use catalog::Catalog;
 pub use error::StoreError;
 pub use step::Step;
 #[cfg(test)]
@@ -23,3 +24,4 @@ pub use tetdb_schema::catalog::{
     QualityRow, RegionRow, Stage, StageRow, StoreState, SubdomainRow, SubdomainState,
     SurfaceSource, TopologyRow,
 };
+pub use writer_lock::WriterLock;
