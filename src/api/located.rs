@@ -4,6 +4,9 @@ use super::{Error, Store};
 use crate::geom::Point;
 use crate::query::Hit;
 
+/// A tetrahedron, and the shares of its corners in a point.
+type Located = (Hit, [f64; 4]);
+
 impl Store {
     /// [`Store::locate`], with the point's barycentric coordinates: of sum 1 but for rounding, and exactly zero on a face.
     ///
@@ -11,7 +14,7 @@ impl Store {
     pub fn locate_barycentric(
         &mut self,
         points: &[[f64; 3]],
-    ) -> Result<Vec<Option<(Hit, [f64; 4])>>, Error> {
+    ) -> Result<Vec<Option<Located>>, Error> {
         self.with_session(|session| {
             let points: Vec<_> = points.iter().map(|p| Point::from_array(*p)).collect();
             let located = session.locate(&points)?.into_iter();

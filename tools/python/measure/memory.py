@@ -1,4 +1,4 @@
-"""Memory of reading a store from Python: `python_memory.py STORE [EXPORTED.vtu]`."""
+"""Memory of reading a store from Python: `memory.py STORE [EXPORTED.vtu]`."""
 
 import sys
 import time

@@ -1,8 +1,8 @@
 """Wheels of other meshers beside this one's, each run in a process of its own: seconds of all its threads, tetrahedra, quality, peak memory, exit.
 
-    python python_peers.py FOLDER        # prints a Markdown table
+    python peers.py FOLDER        # prints a Markdown table
 
-Each gets the same surface, and one of the same with a triangle turned to stick through it.
+Each gets the same surface, and one of the same with a spike through it.
 """
 
 import json
@@ -76,7 +76,7 @@ def one(name, file, folder):
 def main(folder):
     import tetdb
 
-    print("| surface | mesher | CPU s | tetrahedra | mean q | q > 3 | worst q | peak MiB | input vertices kept | surface with a triangle through it |")
+    print("| surface | mesher | CPU s | tetrahedra | mean q | q > 3 | worst q | peak MiB | input vertices kept | surface with a spike through it |")
     print("|---|---|---|---|---|---|---|---|---|---|")
     for spec in SURFACES:
         surface = tetdb.sample(spec)
@@ -85,7 +85,9 @@ def main(folder):
         points, triangles = points[used], numbers.reshape(-1, 3).astype(np.int32)
         spoiled = points.copy()
         at = triangles[len(triangles) // 2]
-        spoiled[at[0]] += 3 * (points.mean(axis=0) - spoiled[at[0]])
+        # A spike from there through the surface at its first point.
+        first = points[triangles[0][0]]
+        spoiled[at[0]] = first + 0.1 * (first - points[at[0]])
         files = [os.path.join(folder, name) for name in ("good.npz", "bad.npz")]
         for file, xyz in zip(files, (points, spoiled)):
             np.savez(file, points=xyz, triangles=triangles)
