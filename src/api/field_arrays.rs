@@ -165,7 +165,6 @@ fn file_of(sections: &[(i32, Vec<u8>)]) -> Vec<u8> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::api::{CancelToken, Event, Length, Mesher, Settings, Sizes, Store, Surface};
 
     fn field() -> Sizes {

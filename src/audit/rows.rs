@@ -26,7 +26,7 @@ pub(super) type RegionSums = BTreeMap<u32, RegionTotals>;
 
 impl Rederived {
     pub(super) fn new(rank: u32) -> Self {
-        let totals = Totals::new();
+        let totals = Totals::default();
         Self { totals, rank }
     }
 

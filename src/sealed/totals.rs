@@ -71,9 +71,9 @@ pub(super) fn count_open(pairs: &mut FacePairs, tets: &[SealedTet]) -> u32 {
     open
 }
 
-impl Totals {
-    /// Of nothing.
-    pub fn new() -> Self {
+/// Of nothing.
+impl Default for Totals {
+    fn default() -> Self {
         Self {
             digest: Digest::default(),
             bounds: Aabb::EMPTY,
@@ -87,7 +87,9 @@ impl Totals {
             shapes: Vec::with_capacity(PIECE),
         }
     }
+}
 
+impl Totals {
     /// Adds a chunk and returns its summary, but for what only its bytes and faces tell.
     ///
     /// Errors: those of `corners_of`.

@@ -116,7 +116,7 @@ impl SealedWriter {
             faces: Cutter::new(form, rank, generation).map_err(io)?,
             face_chunks: Vec::new(),
             pairs: FacePairs::new(SealedTet::COUNT_MAX),
-            totals: Totals::new(),
+            totals: Totals::default(),
             interfaces: BTreeMap::new(),
         })
     }
