@@ -136,7 +136,7 @@ fn what_a_killed_writer_left_is_read_as_it_is_and_cleaned_up_by_the_next() {
     let path = place.path("a.tetdb");
     let digest = place.digest("a.tetdb");
     // As versions before this one left it: changed in place, and not closed.
-    let mut file = StoreFile::open(&path.join("catalog.redb"), 1 << 20, true).expect("a catalog");
+    let mut file = StoreFile::open(path.join("catalog.redb"), 1 << 20, true).expect("a catalog");
     let key = u64::MAX - 1;
     file.write([(key, &[1][..])].into_iter()).expect("room");
     let torn = fs::read(path.join("catalog.redb")).expect("a catalog");
