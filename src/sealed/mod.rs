@@ -23,6 +23,7 @@ pub use face_pairs::{FacePairs, Paired, sorted_face};
 pub use form::Form;
 pub use shape::{Shape, quality_bin};
 pub use subdomain::{Chunk, Chunks, Subdomain};
-pub use totals::{RegionTotals, Totals};
+pub use totals::RegionTotals;
+pub(crate) use totals::Totals;
 pub use vertex_cache::{Corner, VertexCache};
 pub use writer::{InterfaceSide, Sealed, SealedWriter};

@@ -17,7 +17,7 @@ use tetdb_schema::catalog::QualityRow;
 const PIECE: usize = 4096;
 
 /// What is summed over tetrahedra, in their order.
-pub struct Totals {
+pub(crate) struct Totals {
     /// Of the tetrahedra.
     pub digest: Digest,
     /// Of the vertices; whoever has them sets it.
