@@ -119,6 +119,9 @@ def main():
     first, wrong = {}, 0
     for path in files:
         for program in READERS[os.path.splitext(path)[1]]:
+            if program == "meshio" and path.endswith(".msh") and b"$PartitionedEntities" in open(path, "rb").read(1 << 20):
+                print(f"{path}: skipped, meshio reads no partitioned entities")
+                continue
             try:
                 got = globals()["by_" + program](path)
             except ImportError:

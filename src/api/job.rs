@@ -1,11 +1,12 @@
 //! What a store has on record of how it was made: options, surface, sizes from a file, the recipe's version.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use tetdb_schema::catalog::Job;
 use xxhash_rust::xxh3::Xxh3;
 
 use super::error::{Error, Remedy};
+use super::field_arrays::is_in_store;
 use super::surface::source;
 use crate::io::read::{read_sizes, size_files};
 use crate::pipeline::{Options, RECIPE, recipe_of};
@@ -56,6 +57,10 @@ pub(crate) fn check_recipe(catalog: &mut Catalog) -> Result<(), Error> {
 
 /// Notes in the options where the file of sizes is and what it holds.
 pub(crate) fn identify_sizes(options: &mut Options) -> Result<(), Error> {
+    // What was given as arrays is identified already.
+    if options.size_field.as_deref().is_some_and(is_in_store) {
+        return Ok(());
+    }
     options.size_field_hash = None;
     if let Some(file) = &options.size_field {
         let path =
@@ -66,14 +71,21 @@ pub(crate) fn identify_sizes(options: &mut Options) -> Result<(), Error> {
     Ok(())
 }
 
-/// Reads the sizes of identified options, in at most half of what may be held.
+/// Reads the sizes of identified options, in at most half of what may be held; those that were given as arrays from `store`.
 ///
 /// Errors: `size-field-changed` when the files are not what they were.
-pub(crate) fn read_background(options: &Options, cap: u64) -> Result<Option<Background>, Error> {
+pub(crate) fn read_background(
+    options: &Options,
+    store: &Path,
+    cap: u64,
+) -> Result<Option<Background>, Error> {
     let Some(file) = &options.size_field else {
         return Ok(None);
     };
-    let path = Path::new(file);
+    let path = &match is_in_store(file) {
+        true => store.join(file.trim_start_matches("store:")),
+        false => PathBuf::from(file),
+    };
     if options.size_field_hash != Some(hash(path)?) {
         return Err(Error::new(
             "size-field-changed",

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
+use super::field_arrays::FieldArrays;
 use super::preflight::{self, preflight, scratch_beside, with_free_space};
 use super::store::say_how_locked;
 use super::{
@@ -48,6 +49,7 @@ pub enum Existing {
 pub struct Mesher {
     surface: Surface,
     options: Options,
+    field: Option<Arc<FieldArrays>>,
     settings: Settings,
     existing: Existing,
     preflight: bool,
@@ -99,6 +101,7 @@ impl Mesher {
         Self {
             surface,
             options,
+            field: None,
             settings: Settings::new(),
             existing: Existing::default(),
             preflight: true,
@@ -109,6 +112,7 @@ impl Mesher {
     /// Wanted edge lengths.
     pub fn sizes(mut self, sizes: Sizes) -> Self {
         let old = std::mem::replace(&mut self.options, sizes.options);
+        self.field = sizes.field;
         self.options.regions = old.regions;
         self.options.optimize = old.optimize;
         self.options.subdomains = old.subdomains;
@@ -215,7 +219,8 @@ impl Mesher {
             let scratch = scratch_beside(&self.surface.inner, cap, Path::new("."))?;
             let surface = &self.surface.inner;
             attempt(|| surface::validate_in(surface, &scratch))?.accept()?;
-            let prepared = predict(surface, &options, cap, Path::new("."))?;
+            let field = self.field.as_deref();
+            let prepared = predict_with(surface, &options, field, cap, Path::new("."))?;
             Ok(Prediction::of(&prepared.estimate, cap, n_threads()))
         })
     }
@@ -339,7 +344,8 @@ impl Mesher {
                 clock.elapsed().as_secs_f64()
             ));
             settings.note(format!("memory: {}", settings.cap_in_words()));
-            let prepared = predict(surface, &self.options, left, path)?;
+            let field = self.field.as_deref();
+            let prepared = predict_with(surface, &self.options, field, left, path)?;
             if self.preflight {
                 preflight(&prepared.estimate, cap, path, settings)?;
             }
@@ -411,6 +417,9 @@ impl Mesher {
         }
         let catalog = Catalog::create_with(place, &job, pipeline::record_recipe)?;
         self.surface.keep_in(place)?;
+        if let Some(field) = &self.field {
+            field.keep_in(place)?;
+        }
         Ok(catalog)
     }
 }
@@ -431,14 +440,28 @@ pub(super) fn report(summary: &pipeline::Summary, settings: &Settings) {
     }
 }
 
-/// The size field of a surface and what it predicts, within `cap`.
+/// The size field of a surface and what it predicts, within `cap`; what was given as arrays is read from `store`.
 pub(crate) fn predict(
     surface: &surface::Surface,
     options: &Options,
     cap: u64,
     store: &Path,
 ) -> Result<Prepared, Error> {
-    let background = job::read_background(options, cap)?;
+    predict_with(surface, options, None, cap, store)
+}
+
+/// The same, with what was given as arrays and is in no store yet.
+fn predict_with(
+    surface: &surface::Surface,
+    options: &Options,
+    field: Option<&FieldArrays>,
+    cap: u64,
+    store: &Path,
+) -> Result<Prepared, Error> {
+    let background = match field {
+        Some(field) => Some(field.background(cap)?),
+        None => job::read_background(options, store, cap)?,
+    };
     let scratch = scratch_beside(surface, cap, store)?;
     Ok(pipeline::prepare(
         surface,

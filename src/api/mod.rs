@@ -7,10 +7,13 @@
 
 mod ask;
 mod codes;
+mod defects;
 pub(crate) mod error;
+pub(crate) mod field_arrays;
 mod from_errors;
 pub(crate) mod guard;
 pub(crate) mod job;
+mod located;
 mod memory;
 mod mesher;
 mod options;
@@ -25,12 +28,15 @@ pub(crate) mod show;
 mod sizes;
 pub(crate) mod store;
 pub(crate) mod surface;
+mod surface_arrays;
 pub(crate) mod targets;
 pub(crate) mod verify;
 
+pub use crate::io::write::MeshFormat;
 pub use crate::storage::CancelToken;
 pub use ask::{Answers, Order, Query};
 pub use codes::{CODES, CodeRow};
+pub use defects::DefectPlace;
 pub use error::Error;
 pub(crate) use guard::guarded;
 pub use memory::Bytes;

@@ -217,7 +217,13 @@ impl Remesh {
             );
             return Err(Error::new("bad-size", message));
         }
-        let mut asked = self.sizes.clone().unwrap_or_default().options;
+        let given = self.sizes.clone().unwrap_or_default();
+        if given.field.is_some() {
+            let message = "a background mesh of arrays is for a new mesh";
+            return Err(Error::new("usage", message)
+                .with_help("give a length for each tetrahedron or vertex instead"));
+        }
+        let mut asked = given.options;
         job::identify_sizes(&mut asked)?;
         let beta = match &asked.hgrad {
             Some(_) => asked.sizes()?.beta(),

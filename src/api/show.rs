@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::store::open_finished;
 use super::targets::{check_target, inputs_of};
 use super::{Error, Settings, Store, guarded};
-use crate::io::write::{self, Content, Selection};
+use crate::io::write::{self, Content, MeshFormat, Order, Selection};
 
 /// A writer holds no more than this, however large the cap.
 const MEMORY_MAX: u64 = 512 << 20;
@@ -49,22 +49,46 @@ impl ExportOptions {
         self
     }
 
-    /// Only input triangles and interface faces; `.vtu` alone.
+    /// Only input triangles and interface faces; `.vtu` and `.vtkhdf`.
     pub fn boundary(mut self) -> Self {
         self.selection.content = Content::Boundary;
         self
     }
 
-    /// Only interface faces; `.vtu` alone.
+    /// Only interface faces; `.vtu` and `.vtkhdf`.
     pub fn interfaces(mut self) -> Self {
         self.selection.content = Content::Interfaces;
+        self
+    }
+
+    /// This format, whatever the name ends with.
+    pub fn format(mut self, format: MeshFormat) -> Self {
+        self.selection.format = Some(format);
+        self
+    }
+
+    /// Text instead of binary numbers, where the format has both.
+    pub fn ascii(mut self) -> Self {
+        self.selection.ascii = true;
+        self
+    }
+
+    /// Elements with the middles of edges as nodes: tetrahedra of ten, triangles of six; `.vtu`, `.pvtu`, `.vtkhdf` and `.inp`.
+    pub fn second_order(mut self) -> Self {
+        self.selection.order = Order::Second;
+        self
+    }
+
+    /// For each partition the tetrahedra of others that touch it; `.msh`.
+    pub fn ghosts(mut self) -> Self {
+        self.selection.ghosts = true;
         self
     }
 }
 
 impl Store {
-    /// Writes the mesh for another program, in the format the ending of `out` names: `.vtu`, `.pvtu`, `.mesh`, `.meshb`, `.msh`, `.inp`,
-    /// `.npy`, `.json` (who neighbors whom), and `.parquet` with that feature.
+    /// Writes the mesh for another program, in the format the ending of `out` names: `.vtu`, `.pvtu`, `.vtkhdf`, `.foam` (OpenFOAM), `.msh`,
+    /// `.mesh`, `.meshb`, `.ele` (TetGen), `.inp`, `.npy`, `.json` (who neighbors whom), and `.parquet` with that feature.
     ///
     /// Streamed; nothing has its name before it is whole. Errors: `usage` for a folder or the surface the store was made from; `unknown-format`, `format-limit`, `disk-full`; damage.
     pub fn export(

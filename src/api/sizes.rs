@@ -2,7 +2,10 @@
 
 use std::fmt;
 use std::path::Path;
+use std::sync::Arc;
 
+use super::Error;
+use super::field_arrays::{FieldArrays, IN_STORE};
 use crate::pipeline::Options;
 
 /// A length in the units of the surface, or a share of its box diagonal.
@@ -12,6 +15,8 @@ pub enum Length {
     Units(f64),
     /// A share of the diagonal of the surface's box: 0.01 is one percent.
     ShareOfDiagonal(f64),
+    /// The same in percent, on record as it is given.
+    Percent(f64),
 }
 
 impl Length {
@@ -24,6 +29,11 @@ impl Length {
     pub const fn share_of_diagonal(share: f64) -> Self {
         Self::ShareOfDiagonal(share)
     }
+
+    /// A share of the diagonal of the surface's box in percent.
+    pub const fn percent(percent: f64) -> Self {
+        Self::Percent(percent)
+    }
 }
 
 impl fmt::Display for Length {
@@ -32,6 +42,7 @@ impl fmt::Display for Length {
         match self {
             Self::Units(length) => write!(f, "{length}"),
             Self::ShareOfDiagonal(share) => write!(f, "{}%", 100.0 * share),
+            Self::Percent(percent) => write!(f, "{percent}%"),
         }
     }
 }
@@ -42,6 +53,7 @@ impl fmt::Display for Length {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sizes {
     pub(crate) options: Options,
+    pub(crate) field: Option<Arc<FieldArrays>>,
 }
 
 impl Sizes {
@@ -132,7 +144,25 @@ impl Sizes {
     /// Lengths at the vertices of a background mesh: a MEDIT `.sol` with its `.mesh` beside it.
     pub fn field(mut self, file: impl AsRef<Path>) -> Self {
         self.options.size_field = Some(file.as_ref().to_string_lossy().into_owned());
+        self.field = None;
         self
+    }
+
+    /// Lengths at the vertices of a tetrahedral background mesh, linear in between; nothing is asked for outside of it.
+    ///
+    /// Shape: `lengths` runs parallel to `points`, which `tets` index. The store keeps a copy. For a new mesh only. Errors:
+    /// `count-mismatch`, `not-a-number`, `index-out-of-range`, `bad-size`, `unsupported-content` name the point or the tetrahedron.
+    pub fn field_of_arrays(
+        mut self,
+        points: &[[f64; 3]],
+        tets: &[[u32; 4]],
+        lengths: &[f64],
+    ) -> Result<Self, Error> {
+        let field = FieldArrays::new(points, tets, lengths)?;
+        self.options.size_field = Some(IN_STORE.to_owned());
+        self.options.size_field_hash = Some(field.hash());
+        self.field = Some(Arc::new(field));
+        Ok(self)
     }
 }
 

@@ -7,7 +7,7 @@ use tetdb_schema::catalog::SurfaceSource;
 use xxhash_rust::xxh3::Xxh3;
 
 use super::error::{Error, Remedy};
-use super::{Length, Settings, guarded};
+use super::{DefectPlace, Length, Settings, guarded};
 use crate::geom::Point;
 use crate::io::read::{is_stream, read_surface};
 use crate::io::write;
@@ -33,6 +33,8 @@ pub struct Surface {
 pub struct CheckReport {
     /// Each defect as the error it would be, some hundred at most.
     pub defects: Vec<Error>,
+    /// Where each of `defects` is, in the same order.
+    pub places: Vec<DefectPlace>,
     /// All defects.
     pub n_defects: u64,
     /// Edges with one triangle.
@@ -58,6 +60,7 @@ impl CheckReport {
         let defects = defects.map(|d| Error::new(d.code(), d).at(d.place()).with_help(d.help()));
         Self {
             defects: defects.collect(),
+            places: DefectPlace::all_of(validation),
             n_defects: validation.n_defects,
             n_open_edges: validation.closedness.open.len(),
             n_small_angles: fitness.small_angles as usize,

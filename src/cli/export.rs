@@ -9,11 +9,21 @@ use super::console::Console;
 use super::failure::Failure;
 use super::memory;
 use crate::api::targets::{check_target, inputs_of};
-use crate::api::{Exported, Settings, show};
-use crate::io::write::{Content, ENDINGS, MeshFormat, Selection};
+use crate::api::{Error, Exported, Settings, show};
+use crate::io::write::{Content, ENDINGS, MeshFormat, Order, Selection, check};
 
 pub fn run(args: &ExportArgs, console: &Console) -> Result<u8, Failure> {
     let settings = console.settings(memory::asked(args.read.memory.as_deref())?, None);
+    let format = match &args.format {
+        Some(word) => Some(MeshFormat::of_word(word).ok_or_else(|| {
+            Failure::new("unknown-format", "no format has this name")
+                .at(word)
+                .help(format!(
+                    "choose msh22, or an ending without its dot: {ENDINGS}"
+                ))
+        })?),
+        None => None,
+    };
     let selection = Selection {
         subdomains: args.subdomain.iter().copied().collect(),
         pieces: args.pieces,
@@ -22,18 +32,27 @@ pub fn run(args: &ExportArgs, console: &Console) -> Result<u8, Failure> {
             (_, true) => Content::Interfaces,
             _ => Content::Mesh,
         },
+        format,
+        ascii: args.ascii,
+        ghosts: args.ghosts,
+        order: match args.order {
+            2 => Order::Second,
+            _ => Order::First,
+        },
     };
     for out in &args.out {
-        check_format(out)?;
-        if selection.content != Content::Mesh
-            && MeshFormat::of_extension(out) != Some(MeshFormat::Vtu)
-        {
-            return Err(
-                Failure::new("usage", "faces without tetrahedra are written as .vtu")
-                    .at(out.display())
-                    .help("end the name with .vtu"),
-            );
+        if format.is_none() {
+            check_format(out)?;
         }
+        check(out, &selection).map_err(Error::from)?;
+    }
+    let to_stdout = args.out.iter().any(|out| out == Path::new("-"));
+    if to_stdout && (console.is_json() || args.out.len() > 1) {
+        return Err(Failure::new(
+            "usage",
+            "the standard output holds one mesh and nothing else",
+        )
+        .help("leave --json and other names out"));
     }
     if !args.force {
         let inputs = inputs_of(&args.store);

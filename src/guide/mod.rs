@@ -8,9 +8,11 @@
 //! | [`subdomains`] | divide a large mesh, limit memory, pass parts to a parallel solver |
 //! | [`questions`] | find tetrahedra by place, condition or neighborhood |
 //! | [`resaturation`] | mesh some sub-domains again, with other sizes or after damage |
-//! | [`pictures`] | draw cuts and surfaces; ParaView, Gmsh, NumPy, DuckDB |
+//! | [`pictures`] | draw cuts and surfaces |
+//! | [`exports`] | files for VTK, OpenFOAM, Gmsh, NumPy, DuckDB and others |
 //! | [`scripting`] | JSON output, configuration files, shell completion |
 //! | [`library`] | the same from Rust |
+//! | [`python`] | the same from Python, in arrays |
 //! | [`errors`] | every error code, exit codes, what to do |
 
 /// Where the chapters' links lead here. In a chapter's file the same links lead to files; what comes first counts.
@@ -24,8 +26,10 @@ macro_rules! links {
             "[questions]: crate::guide::questions\n",
             "[resaturation]: crate::guide::resaturation\n",
             "[pictures]: crate::guide::pictures\n",
+            "[exports]: crate::guide::exports\n",
             "[scripting]: crate::guide::scripting\n",
             "[library]: crate::guide::library\n",
+            "[python]: crate::guide::python\n",
             "[errors]: crate::guide::errors\n",
             "[`Surface`]: crate::Surface\n",
             "[`Mesher`]: crate::Mesher\n",
@@ -67,6 +71,10 @@ pub mod pictures {
     #![doc = links!()]
     #![doc = include_str!("pictures.md")]
 }
+pub mod exports {
+    #![doc = links!()]
+    #![doc = include_str!("exports.md")]
+}
 pub mod scripting {
     #![doc = links!()]
     #![doc = include_str!("scripting.md")]
@@ -74,6 +82,10 @@ pub mod scripting {
 pub mod library {
     #![doc = links!()]
     #![doc = include_str!("library.md")]
+}
+pub mod python {
+    #![doc = links!()]
+    #![doc = include_str!("python.md")]
 }
 pub mod errors {
     #![doc = links!()]

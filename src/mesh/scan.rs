@@ -10,9 +10,9 @@ pub trait Scan: Sync {
     /// A part: a page of tetrahedra, a range of edges.
     type Part: Sync;
     /// What is found in a part.
-    type Found: Send;
+    type Output: Send;
     /// Looks at a part. Is not to change the mesh.
-    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, part: &Self::Part) -> Self::Found;
+    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, part: &Self::Part) -> Self::Output;
 }
 
 /// Scans parts and passes what is found to `take`, part by part in their order, whoever scanned them.
@@ -23,7 +23,7 @@ pub fn scan_parts<P: Pages, S: Scan>(
     mesh: &mut Mesh<P>,
     parts: &[S::Part],
     scan: &S,
-) -> Vec<S::Found> {
+) -> Vec<S::Output> {
     if parts.len() > 1
         && n_threads() > 1
         && let Some(shared) = mesh.shared()

@@ -36,7 +36,7 @@ struct Suspicious;
 
 impl Scan for Suspicious {
     type Part = u32;
-    type Found = Vec<u32>;
+    type Output = Vec<u32>;
 
     fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &page: &u32) -> Vec<u32> {
         let mut found = Vec::new();

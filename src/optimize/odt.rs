@@ -92,7 +92,7 @@ struct Circumcenters;
 
 impl Scan for Circumcenters {
     type Part = Vec<u32>;
-    type Found = Sums;
+    type Output = Sums;
 
     fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, group: &Vec<u32>) -> Sums {
         let mut sums = Sums::default();
@@ -197,7 +197,7 @@ struct Inverted;
 
 impl Scan for Inverted {
     type Part = u32;
-    type Found = Vec<u32>;
+    type Output = Vec<u32>;
 
     fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &page: &u32) -> Vec<u32> {
         let mut found = Vec::new();

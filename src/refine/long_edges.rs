@@ -84,7 +84,7 @@ struct LongEdges<'a> {
 
 impl Scan for LongEdges<'_> {
     type Part = u32;
-    type Found = Option<Vec<Edge>>;
+    type Output = Option<Vec<Edge>>;
 
     fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &page: &u32) -> Option<Vec<Edge>> {
         let mut edges = None;
@@ -139,7 +139,7 @@ struct Division<'a> {
 
 impl Scan for Division<'_> {
     type Part = Range<usize>;
-    type Found = Vec<Candidate>;
+    type Output = Vec<Candidate>;
 
     fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, part: &Range<usize>) -> Vec<Candidate> {
         let mut divider = Divider {

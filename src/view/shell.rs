@@ -122,7 +122,11 @@ impl QuerySession {
             let tet = tet?;
             for face in FACES {
                 let corners = face.map(|i| tet.corners[i]);
-                all.show(corners, tet.id.subdomain().rank(), tet.region, None)?;
+                let [a, b, c] = corners;
+                // A tetrahedron's faces that look away are behind its others.
+                if all.view.facing((b - a).cross(c - a)) > 0.0 {
+                    all.show(corners, tet.id.subdomain().rank(), tet.region, None)?;
+                }
             }
         }
         Ok(())

@@ -202,7 +202,7 @@ fn fitness_is_told_and_advice_given() {
     }
     place.write("flat.off", off(&flat));
     let text = place.run_line("check flat.off").succeeds().stdout();
-    assert!(text.contains("66.667 % of the triangles"), "{text}");
+    assert!(text.contains("66.67 % of the triangles"), "{text}");
     assert!(text.contains("advice: 8 triangles"), "{text}");
 }
 
@@ -238,6 +238,7 @@ fn the_answer_has_its_fields() {
         fields,
         [
             "advice",
+            "bounds",
             "closing",
             "defects",
             "edges",

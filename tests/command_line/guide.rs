@@ -173,8 +173,10 @@ chapters! {
     questions: 8,
     resaturation: 5,
     pictures: 10,
+    exports: 8,
     scripting: 5,
     library: 0,
+    python: 0,
     errors: 2,
 }
 

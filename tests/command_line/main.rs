@@ -4,6 +4,7 @@ mod check;
 mod crash;
 mod damage;
 mod errors;
+mod exports;
 mod forms;
 mod guide;
 mod json;

@@ -52,18 +52,32 @@ pub struct CompareArgs {
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  tetdb export part.tetdb part.vtu part.msh\n  tetdb export part.tetdb part.pvtu topology.json\n  \
-    tetdb export part.tetdb piece.meshb --pieces --subdomain 3,5\n  tetdb export part.tetdb cuts.vtu --interfaces"
+    tetdb export part.tetdb piece.meshb --pieces --subdomain 3,5\n  tetdb export part.tetdb cuts.vtu --interfaces\n  \
+    tetdb export part.tetdb case/part.foam --pieces\n  tetdb export part.tetdb - --format mesh"
 )]
 pub struct ExportArgs {
     /// The store, a directory that `tetdb mesh` wrote
     #[arg(value_name = "STORE")]
     pub store: PathBuf,
-    /// Files to write; the extension tells the format: .vtu, .pvtu, .mesh, .meshb, .msh, .inp, .npy (an array a file), .json (topology), .parquet (where built in)
+    /// Files to write; the extension tells the format: .vtu, .pvtu, .vtkhdf, .foam (OpenFOAM, in its folder), .msh, .mesh, .meshb, .ele (TetGen),
+    /// .inp, .npy (an array a file), .json (topology), .parquet (where built in); `-` with --format is standard output
     #[arg(required = true, value_name = "OUT")]
     pub out: Vec<PathBuf>,
-    /// A file for each sub-domain, NAME_00007.mesh, with the faces it shares with others; .pvtu always does so
+    /// The format, by the word of its ending, where the name does not tell it: vtu, msh, ..; msh22 is Gmsh's old one
+    #[arg(long, value_name = "FORMAT")]
+    pub format: Option<String>,
+    /// A file for each sub-domain, NAME_00007.mesh, with the faces it shares with others; .pvtu always does so; of .foam processorN
     #[arg(long)]
     pub pieces: bool,
+    /// Text instead of binary numbers (.msh, .foam)
+    #[arg(long)]
+    pub ascii: bool,
+    /// Nodes of the elements: 1, corners; 2, also the middles of edges (.vtu, .pvtu, .vtkhdf, .inp)
+    #[arg(long, value_name = "ORDER", default_value = "1", value_parser = clap::value_parser!(u8).range(1..=2))]
+    pub order: u8,
+    /// List in .msh, for each partition, the tetrahedra of others that touch it
+    #[arg(long)]
+    pub ghosts: bool,
     /// Only these sub-domains, as numbers with commas between them
     #[arg(
         long,
@@ -73,10 +87,10 @@ pub struct ExportArgs {
         alias = "subdomains"
     )]
     pub subdomain: Vec<u32>,
-    /// Only input triangles and faces between sub-domains (.vtu)
+    /// Only input triangles and faces between sub-domains (.vtu, .vtkhdf)
     #[arg(long, conflicts_with = "interfaces")]
     pub boundary: bool,
-    /// Only faces between sub-domains (.vtu)
+    /// Only faces between sub-domains (.vtu, .vtkhdf)
     #[arg(long)]
     pub interfaces: bool,
     /// Write even over the surface the store was meshed from

@@ -90,7 +90,16 @@ impl<R: BufRead> Mesh<'_, '_, R> {
             self.numbers.feed.skip_line()?;
             match (section.as_slice(), version) {
                 (b"$PhysicalNames", _) => self.read_names()?,
-                (b"$Entities", 4) => self.read_entities()?,
+                (b"$Entities", 4) => self.read_entities(false)?,
+                (b"$PartitionedEntities", 4) => {
+                    self.numbers.size()?;
+                    let n_ghosts = self.numbers.size()?;
+                    for _ in 0..self.numbers.check_count("ghosts", n_ghosts, 2, 4)? {
+                        self.numbers.int()?;
+                        self.numbers.int()?;
+                    }
+                    self.read_entities(true)?;
+                }
                 (b"$Nodes", 2) => self.read_nodes_2()?,
                 (b"$Nodes", _) => self.read_nodes_4()?,
                 (b"$Elements", 2) if self.numbers.binary => self.read_elements_2_binary()?,
@@ -257,7 +266,7 @@ impl<R: BufRead> Mesh<'_, '_, R> {
 
     // --- 4.1 ----------------------------------------------------------------------------------
 
-    fn read_entities(&mut self) -> Result<()> {
+    fn read_entities(&mut self, partitioned: bool) -> Result<()> {
         let mut counts = [0; 4];
         for count in &mut counts {
             let declared = self.numbers.size()?;
@@ -267,6 +276,12 @@ impl<R: BufRead> Mesh<'_, '_, R> {
             for i in 0..n {
                 self.numbers.need_record("entities", n, i)?;
                 let entity = self.numbers.int()?;
+                if partitioned {
+                    // Dimension and number of what it is a part of, and the partitions.
+                    self.numbers.int()?;
+                    self.numbers.int()?;
+                    self.int_list()?;
+                }
                 for _ in 0..if dimension == 0 { 3 } else { 6 } {
                     self.numbers.double()?;
                 }
@@ -279,7 +294,10 @@ impl<R: BufRead> Mesh<'_, '_, R> {
                 }
             }
         }
-        self.numbers.end("$EndEntities")
+        self.numbers.end(match partitioned {
+            true => "$EndPartitionedEntities",
+            false => "$EndEntities",
+        })
     }
 
     fn int_list(&mut self) -> Result<Vec<i64>> {

@@ -99,6 +99,8 @@ impl Format {
             Some(Self::Off)
         } else if starts("solid") || is_binary_stl(head, length) {
             Some(Self::Stl)
+        } else if starts("v ") {
+            Some(Self::Obj)
         } else {
             None
         }

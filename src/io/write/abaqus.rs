@@ -1,4 +1,4 @@
-//! Abaqus input: C3D4 elements, an element set per region, a surface and a node set per label.
+//! Abaqus input: C3D4 elements, or C3D10 with the middles of edges, an element set per region, a surface and a node set per label.
 //!
 //! Source: the Abaqus keywords reference; faces of C3D4 are S1 = 1 2 3, S2 = 1 4 2, S3 = 2 4 3, S4 = 3 4 1.
 
@@ -8,6 +8,8 @@ use std::path::Path;
 use super::draft::Draft;
 use super::error::Result;
 use super::merged::{Merged, Tet};
+use super::midpoints::Midpoints;
+use super::names::set_names;
 use super::stream::Stream;
 use crate::storage::{Sorted, Sorter, sort_record};
 
@@ -43,28 +45,42 @@ sort_record! {
     }
 }
 
-pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<()> {
+pub(super) fn write(
+    mesh: &mut Merged,
+    draft: &mut Draft,
+    out: &Path,
+    mut middles: Option<Midpoints>,
+) -> Result<()> {
     mesh.check_limits(out, i32::MAX as u64)?;
     mesh.expect_passes(1, 1);
     let digits = u64::from(mesh.n_vertices().max(1).ilog10());
-    let bytes = 60 * mesh.n_vertices() + (5 * digits + 10) * mesh.n_tets();
+    let n_middles = middles.as_ref().map_or(0, Midpoints::n);
+    let numbers = if n_middles > 0 { 11 } else { 5 };
+    let bytes = 60 * (mesh.n_vertices() + n_middles) + numbers * (digits + 2) * mesh.n_tets();
     let path = draft.create(out, bytes)?;
     let mut stream = Stream::open(&path)?;
     stream.text("*HEADING\nexported by tetdb\n*NODE, NSET=all_nodes\n");
-    mesh.vertices(|number, vertex| {
-        let [x, y, z] = vertex.point;
+    let mut put = |number: u64, [x, y, z]: [f64; 3]| {
         stream.integer(number + 1, b',');
         stream.double(x, b',');
         stream.double(y, b',');
         stream.double(z, b'\n');
         stream.end()
-    })?;
+    };
+    mesh.vertices(|number, vertex| put(number, vertex.point))?;
+    if let Some(middles) = &middles {
+        let (mut points, mut number) = (middles.points()?, mesh.n_vertices());
+        while let Some(point) = points.next()? {
+            put(number, point)?;
+            number += 1;
+        }
+    }
     let regions = mesh.regions()?;
     let dir = mesh.dir().to_owned();
-    let sides = elements(mesh, &dir, &mut stream, &regions)?;
+    let sides = elements(mesh, &dir, &mut stream, &regions, middles.as_mut())?;
     let names = set_names(&mesh.labels());
     surfaces(sides, &names, &mut stream)?;
-    node_sets(mesh, &dir, &names, &mut stream)?;
+    node_sets(mesh, &dir, &names, &mut stream, middles.as_mut())?;
     stream.finish()
 }
 
@@ -74,18 +90,21 @@ fn elements(
     dir: &Path,
     stream: &mut Stream,
     regions: &BTreeSet<u32>,
+    mut middles: Option<&mut Midpoints>,
 ) -> Result<Sorted<Side>> {
+    let kind = if middles.is_some() { "C3D10" } else { "C3D4" };
     // With one region its set is named with the elements, else sets follow.
     match regions.iter().next() {
         Some(region) if regions.len() == 1 => {
-            stream.text(&format!("*ELEMENT, TYPE=C3D4, ELSET=region_{region}\n"));
+            stream.text(&format!("*ELEMENT, TYPE={kind}, ELSET=region_{region}\n"));
         }
-        _ => stream.text("*ELEMENT, TYPE=C3D4, ELSET=all_elements\n"),
+        _ => stream.text(&format!("*ELEMENT, TYPE={kind}, ELSET=all_elements\n")),
     }
     let mut by_region = Sorter::new(dir, mesh.sorter_bytes() / 2);
     let mut sides = Sorter::new(dir, mesh.sorter_bytes() / 2);
     let mut faces = faces_by_tet(mesh, dir)?.peekable();
     let mut number = 0u64;
+    let first_middle = mesh.n_vertices() + 1;
     mesh.tets(|tet| {
         while let Some(face) = faces.next_if(|f| f.as_ref().map_or(true, |f| f.tet <= number)) {
             let face = face?;
@@ -105,7 +124,12 @@ fn elements(
         stream.integer(a, b',');
         stream.integer(b, b',');
         stream.integer(c, b',');
-        stream.integer(d, b'\n');
+        stream.integer(d, if middles.is_some() { b',' } else { b'\n' });
+        if let Some(middles) = &mut middles {
+            for (i, edge) in middles.next::<6>()?.into_iter().enumerate() {
+                stream.integer(first_middle + edge, if i < 5 { b',' } else { b'\n' });
+            }
+        }
         stream.end()
     })?;
     let head = |region: u32| format!("*ELSET, ELSET=region_{region}\n");
@@ -184,6 +208,7 @@ fn node_sets(
     dir: &Path,
     names: &BTreeMap<u32, String>,
     stream: &mut Stream,
+    mut middles: Option<&mut Midpoints>,
 ) -> Result<()> {
     let mut sorter = Sorter::new(dir, mesh.sorter_bytes());
     mesh.faces().each(|face| {
@@ -191,31 +216,14 @@ fn node_sets(
             let (set, number) = (face.label, v + 1);
             sorter.push(Member { set, number })?;
         }
+        if let Some(middles) = &mut middles {
+            for edge in middles.next::<3>()? {
+                let (set, number) = (face.label, mesh.n_vertices() + edge + 1);
+                sorter.push(Member { set, number })?;
+            }
+        }
         Ok(())
     })?;
     let head = |label: u32| format!("*NSET, NSET={}\n", names[&label]);
     sets(sorter.finish()?, head, stream)
-}
-
-/// Names Abaqus takes: letters, digits, `_` and `-`, a letter first, at most 80, case not distinguished.
-fn set_names(labels: &BTreeMap<u32, String>) -> BTreeMap<u32, String> {
-    let mut taken = BTreeSet::new();
-    let mut names = BTreeMap::new();
-    for (&label, name) in labels {
-        let letter = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-        let mut clean: String = name
-            .chars()
-            .map(|c| if letter(c) { c } else { '_' })
-            .collect();
-        if !clean.starts_with(|c: char| c.is_ascii_alphabetic()) {
-            clean.insert_str(0, "label_");
-        }
-        clean.truncate(60);
-        if !taken.insert(clean.to_ascii_lowercase()) {
-            clean += &format!("_{label}");
-            taken.insert(clean.to_ascii_lowercase());
-        }
-        names.insert(label, clean);
-    }
-    names
 }

@@ -9,7 +9,7 @@ use std::path::Path;
 
 use super::draft::Draft;
 use super::error::{Result, WriteError};
-use super::vtu_layout::{Array, Group, Index, Layout};
+use super::vtu_layout::{Array, Container, Group, Index, Layout};
 use crate::surface::{Defect, Surface};
 
 /// VTK's number of a triangle.
@@ -49,7 +49,12 @@ pub fn defects(surface: &Surface, defects: &[Defect], out: &Path) -> Result<u64>
         Array::new(Group::Cells, "offsets", index.kind()),
         Array::new(Group::Cells, "types", "UInt8"),
     ];
-    let layout = Layout::new(arrays, [3 * n, n, 3], &names());
+    let texts: Vec<u8> = KINDS
+        .iter()
+        .flat_map(|word| word.bytes().chain([0]))
+        .collect();
+    let texts = ("defect_names", texts.as_slice());
+    let layout = Layout::new(&Container::Xml, &arrays, [3 * n, n, 3], texts);
     let mut draft = Draft::new(out)?;
     let path = draft.create(out, layout.file_bytes())?;
     let [
@@ -96,19 +101,4 @@ fn numbered(defects: &[Defect]) -> BTreeMap<u32, (i32, i32)> {
         }
     }
     bad
-}
-
-/// The words in the head of the file.
-fn names() -> String {
-    let bytes: Vec<String> = KINDS
-        .iter()
-        .flat_map(|word| word.bytes().chain([0]))
-        .map(|byte| byte.to_string())
-        .collect();
-    format!(
-        "    <FieldData>\n      <DataArray type=\"UInt8\" Name=\"defect_names\" NumberOfTuples=\"{}\" format=\"ascii\">\n        \
-         {}\n      </DataArray>\n    </FieldData>\n",
-        bytes.len(),
-        bytes.join(" ")
-    )
 }

@@ -6,14 +6,15 @@ use super::draft::Draft;
 use super::error::Result;
 use super::format::MeshFormat;
 use super::merged::Merged;
+use super::midpoints::Midpoints;
 use super::report::FileCounts;
-use super::selection::Content;
-use super::{abaqus, gmsh, medit, npy_columns, vtu, vtu_boundary};
+use super::selection::{Content, Order, Selection};
+use super::{abaqus, foam, gmsh, gmsh22, medit, npy_columns, tetgen, vtu, vtu_boundary};
 
 /// Writes a mesh as one file, and what belongs to it.
 pub(super) fn write(
     format: MeshFormat,
-    content: Content,
+    selection: &Selection,
     mesh: &mut Merged,
     draft: &mut Draft,
     out: &Path,
@@ -23,22 +24,36 @@ pub(super) fn write(
         tets: mesh.n_tets(),
         triangles: mesh.n_faces(),
     };
+    let mut middles = match selection.order {
+        Order::First => None,
+        Order::Second => Some(Midpoints::gather(mesh)?),
+    };
+    let mut n_middles = middles.as_ref().map_or(0, Midpoints::n);
     match format {
-        MeshFormat::Vtu if content != Content::Mesh => {
+        MeshFormat::Vtu | MeshFormat::VtkHdf if selection.content != Content::Mesh => {
             mesh.expect_passes(1, 0);
-            counts.vertices = vtu_boundary::write(mesh, draft, out)?;
+            let is_hdf = format == MeshFormat::VtkHdf;
+            counts.vertices = vtu_boundary::write(mesh, draft, out, is_hdf, middles.as_mut())?;
             counts.tets = 0;
+            n_middles = 0;
         }
-        MeshFormat::Vtu | MeshFormat::Pvtu => vtu::write(mesh, draft, out)?,
+        MeshFormat::Vtu | MeshFormat::Pvtu => {
+            vtu::write(mesh, draft, out, false, middles.as_mut())?
+        }
+        MeshFormat::VtkHdf => vtu::write(mesh, draft, out, true, middles.as_mut())?,
         MeshFormat::Medit => medit::write_text(mesh, draft, out)?,
         MeshFormat::MeditBinary => medit::write_binary(mesh, draft, out)?,
-        MeshFormat::Gmsh => gmsh::write(mesh, draft, out)?,
-        MeshFormat::Abaqus => abaqus::write(mesh, draft, out)?,
+        MeshFormat::Gmsh => counts = gmsh::write(mesh, draft, out, selection)?,
+        MeshFormat::Gmsh22 => gmsh22::write(mesh, draft, out)?,
+        MeshFormat::Abaqus => abaqus::write(mesh, draft, out, middles)?,
         MeshFormat::Numpy => npy_columns::write(mesh, draft, out)?,
         #[cfg(feature = "parquet")]
         MeshFormat::Parquet => unreachable!("its pieces are written elsewhere"),
+        MeshFormat::OpenFoam => counts = foam::write(mesh, draft, out, selection)?,
+        MeshFormat::TetGen => tetgen::write(mesh, draft, out)?,
         MeshFormat::Topology => unreachable!("the topology is no mesh"),
     }
+    counts.vertices += n_middles;
     mesh.report_end();
     Ok(counts)
 }

@@ -7,6 +7,9 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use super::error::{Result, WriteError};
 
+/// The name that stands for standard output.
+pub(super) const STDOUT: &str = "-";
+
 /// Numbers drafts within the process.
 static NUMBER: AtomicU32 = AtomicU32::new(0);
 
@@ -24,7 +27,11 @@ impl Draft {
     pub fn new(out: &Path) -> Result<Self> {
         let name = out.file_name().unwrap_or_default().to_string_lossy();
         let number = NUMBER.fetch_add(1, Ordering::Relaxed);
-        let dir = folder(out).join(format!(".{name}.{}-{number}.tmp", std::process::id()));
+        let folder = match out == Path::new(STDOUT) {
+            true => std::env::temp_dir(),
+            false => folder(out).to_owned(),
+        };
+        let dir = folder.join(format!(".{name}.{}-{number}.tmp", std::process::id()));
         if out.is_dir() {
             let source = std::io::Error::from(std::io::ErrorKind::IsADirectory);
             return Err(WriteError::io(out, source));
@@ -40,10 +47,13 @@ impl Draft {
         &self.dir
     }
 
-    /// A new file that will become `out`, expected to need `bytes`.
+    /// A new file that will become `out`, expected to need `bytes`; standard output is itself.
     ///
     /// Errors: less than that is free; the file cannot be created.
     pub fn create(&mut self, out: &Path, bytes: u64) -> Result<PathBuf> {
+        if out == Path::new(STDOUT) {
+            return Ok(out.to_owned());
+        }
         if let Some(available) = available_bytes(&self.dir).filter(|&free| free < bytes) {
             return Err(WriteError::NoSpace {
                 path: out.to_owned(),
@@ -59,7 +69,7 @@ impl Draft {
 
     /// Syncs all files, then renames them into place. Returns places and lengths.
     ///
-    /// Errors: the disk. Files of one mesh are renamed one after the other: each is whole, old or new.
+    /// Errors: the disk. Of several files those that are there go first, so that no moment has some of an old mesh and some of this one.
     pub fn publish(self) -> Result<Vec<(PathBuf, u64)>> {
         let mut done = Vec::new();
         for (path, out) in &self.files {
@@ -67,7 +77,13 @@ impl Draft {
             let length = synced.map_err(|e| WriteError::io(out, e))?.len();
             done.push((out.clone(), length));
         }
+        if self.files.len() > 1 {
+            for (_, out) in self.files.iter().filter(|(_, out)| out.exists()) {
+                fs::remove_file(out).map_err(|e| WriteError::io(out, e))?;
+            }
+        }
         for (path, out) in &self.files {
+            fs::create_dir_all(folder(out)).map_err(|e| WriteError::io(out, e))?;
             fs::rename(path, out).map_err(|e| WriteError::io(out, e))?;
             let parent = folder(out);
             let synced = File::open(parent).and_then(|d| d.sync_all());

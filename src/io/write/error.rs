@@ -20,6 +20,16 @@ pub enum WriteError {
         /// The known endings.
         known: &'static str,
     },
+    /// The format has no place for what was asked for.
+    #[error("{path}: the format {format} holds no {what}")]
+    Unsupported {
+        /// The file to be written.
+        path: PathBuf,
+        /// The format.
+        format: &'static str,
+        /// What it cannot hold.
+        what: &'static str,
+    },
     /// The format has only single precision, the surface needs double.
     #[error("{path}: this format would round the coordinates of vertex {vertex}")]
     Lossy {
@@ -75,6 +85,7 @@ impl WriteError {
     pub fn code(&self) -> &'static str {
         match self {
             Self::UnknownFormat { .. } => "unknown-format",
+            Self::Unsupported { .. } => "usage",
             Self::Lossy { .. } => "lossy-format",
             Self::TooLarge { .. } => "format-limit",
             Self::NoSpace { .. } | Self::DiskFull { .. } => "disk-full",
@@ -87,6 +98,7 @@ impl WriteError {
     pub fn place(&self) -> Option<&Path> {
         match self {
             Self::UnknownFormat { path, .. }
+            | Self::Unsupported { path, .. }
             | Self::Lossy { path, .. }
             | Self::TooLarge { path, .. }
             | Self::NoSpace { path, .. }
@@ -102,6 +114,7 @@ impl WriteError {
             Self::UnknownFormat { .. } => {
                 "end the name of a mesh with .vtu, .mesh, .meshb, .msh, .inp or .npy, of a surface with .stl, .off, .obj or .ply"
             }
+            Self::Unsupported { .. } => "choose another format, or leave that option out",
             Self::Lossy { .. } => "choose .ply, .obj, .off or .stl (text), which keep doubles",
             Self::TooLarge { .. } => "export to .vtu or .meshb, whose numbers have 64 bits",
             Self::NoSpace { .. } | Self::DiskFull { .. } => {

@@ -9,10 +9,10 @@ use tetdb_schema::record::SealedVertex;
 
 use super::error::{Result, WriteError};
 use super::faces::{FaceSorter, FaceSource, Faces};
-use super::numbering::Numbering;
+use super::numbering::{Numbering, PartNumbers, Sharer, candidates, sharers};
 use crate::sealed::SealedError;
 use crate::sealed::{Shape, Subdomain};
-use crate::storage::check_cancelled;
+use crate::storage::{Sorted, check_cancelled};
 use crate::store::{Catalog, StoreError};
 use tetdb_schema::catalog::SubdomainRow;
 
@@ -70,6 +70,27 @@ pub(super) enum FaceSet {
 pub(super) struct Scope<'s> {
     pub ranks: &'s BTreeSet<u32>,
     pub faces: FaceSet,
+    /// Each sub-domain numbers all its vertices, also those it shares.
+    pub apart: bool,
+}
+
+/// A sub-domain in the merged mesh.
+#[derive(Clone, Copy)]
+pub(super) struct Part {
+    pub rank: u32,
+    /// Number of the first vertex that it numbers.
+    pub first_vertex: u64,
+    /// Vertices that it has.
+    pub n_vertices: u64,
+    pub n_tets: u64,
+}
+
+/// A sub-domain being read, and its numbers in the merged mesh.
+pub(super) struct Opened {
+    pub part: Subdomain,
+    pub numbers: PartNumbers,
+    /// Number of its first tetrahedron.
+    pub first_tet: u64,
 }
 
 impl Scope<'_> {
@@ -113,7 +134,7 @@ impl<'a> Merged<'a> {
         parts.retain(|row| scope.holds(row.rank));
         let label_names = catalog.labels()?;
         let counts: Vec<_> = parts.iter().map(|row| (row.rank, row.vertices)).collect();
-        let numbering = Numbering::new(store, &counts, dir, memory)?;
+        let numbering = Numbering::new(store, &counts, scope.apart, dir, memory)?;
         let first_label = label_names.len() as u32;
         let mut sorter = FaceSorter::new(dir, memory as u64 / 4);
         let mut tet_first = 0;
@@ -145,6 +166,80 @@ impl<'a> Merged<'a> {
         self.numbering.n_vertices()
     }
 
+    /// The sub-domains, by rank.
+    pub fn parts(&self) -> Vec<Part> {
+        let part = |(p, row): (usize, &SubdomainRow)| Part {
+            rank: row.rank,
+            first_vertex: self.numbering.first(p),
+            n_vertices: row.vertices,
+            n_tets: row.tets,
+        };
+        self.parts.iter().enumerate().map(part).collect()
+    }
+
+    /// Sub-domain `p`, to be read as it is. Errors: damage, the disk.
+    pub fn open_part(&mut self, p: usize) -> Result<Opened> {
+        let (numbers, first_tet) = self.numbers_of(p)?;
+        let rank = self.parts[p].rank;
+        Ok(Opened {
+            part: self.store.open_subdomain(rank, self.memory / 4)?,
+            numbers,
+            first_tet,
+        })
+    }
+
+    /// Numbers of the vertices of sub-domain `p`, and of its first tetrahedron. Errors: the disk.
+    pub fn numbers_of(&self, p: usize) -> Result<(PartNumbers, u64)> {
+        let before: u64 = self.parts[..p].iter().map(|row| row.tets).sum();
+        Ok((self.numbering.part(p)?, before))
+    }
+
+    /// Every vertex that several sub-domains have, by the places of these. Errors: damage, the disk.
+    pub fn sharers(&mut self) -> Result<Sorted<Sharer>> {
+        let counts: Vec<_> = self.parts.iter().map(|r| (r.rank, r.vertices)).collect();
+        let by_id = candidates(self.store, &counts, &self.dir, self.memory)?;
+        sharers(by_id, &self.dir, self.sorter_bytes())
+    }
+
+    /// Numbers of the filled regions, ascending. Errors: damage.
+    pub fn filled_regions(&mut self) -> Result<Vec<u32>> {
+        let rows = self.store.regions()?;
+        Ok((rows.iter().filter(|r| r.filled))
+            .map(|r| r.region)
+            .collect())
+    }
+
+    /// How many labels the input has.
+    pub fn n_labels(&self) -> u32 {
+        self.label_names.len() as u32
+    }
+
+    /// The name of a label; one that the input has not stands for the interface to a sub-domain.
+    pub fn label_name(&self, label: u32) -> String {
+        match self.label_names.get(label as usize) {
+            Some(name) => name.clone(),
+            None => format!("interface_{}", label - self.n_labels()),
+        }
+    }
+
+    /// Counts records that were read past the passes, for progress.
+    pub fn advance(&self, n: usize) {
+        self.progress.advance(n);
+    }
+
+    /// Refuses a mesh that has not what its records announced.
+    pub fn expect_count(&self, what: &str, expected: u64, found: u64) -> Result<()> {
+        if expected == found {
+            return Ok(());
+        }
+        Err(StoreError::Sealed(SealedError::Content {
+            path: self.store.dir().to_owned(),
+            subdomain: self.parts.first().map_or(0, |row| row.rank),
+            what: format!("{found} {what} where {expected} were expected"),
+        })
+        .into())
+    }
+
     /// Number of sub-domains.
     pub fn n_parts(&self) -> usize {
         self.parts.len()
@@ -174,12 +269,7 @@ impl<'a> Merged<'a> {
 
     /// Names of the labels the faces have, ascending by label.
     pub fn labels(&self) -> BTreeMap<u32, String> {
-        // A label that the input has not stands for an interface: collect_faces puts them behind.
-        let first = self.label_names.len() as u32;
-        let name = |&label: &u32| match self.label_names.get(label as usize) {
-            Some(name) => (label, name.clone()),
-            None => (label, format!("interface_{}", label - first)),
-        };
+        let name = |&label: &u32| (label, self.label_name(label));
         self.faces.labels.keys().map(name).collect()
     }
 

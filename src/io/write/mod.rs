@@ -8,7 +8,7 @@
 //! and synced. Coordinates are never rounded.
 //!
 //! Reading order: [`export`] (what is written, in which format), `pieces` (a file for each sub-domain), `merged` (sub-domains as one mesh),
-//! `numbering` (shared vertices), `faces` (its boundary), `draft` and `stream` (files), then one file per format.
+//! `numbering` (shared vertices), `faces` (its boundary), `draft` and `stream` (files), then one file or folder per format.
 
 mod abaqus;
 #[cfg(any(test, feature = "cli", feature = "internals"))]
@@ -17,10 +17,15 @@ mod dispatch;
 mod draft;
 mod error;
 mod faces;
+mod foam;
 mod format;
 mod gmsh;
+mod gmsh22;
+mod hdf5;
 mod medit;
 mod merged;
+mod midpoints;
+mod names;
 mod npy;
 mod npy_columns;
 mod numbering;
@@ -35,11 +40,13 @@ mod stream;
 mod surface;
 #[cfg(test)]
 mod tests;
+mod tetgen;
 mod topology;
 mod vtu;
 mod vtu_boundary;
 mod vtu_layout;
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 #[cfg(any(test, feature = "cli", feature = "internals"))]
@@ -56,12 +63,12 @@ pub use report::ExportReport;
 use report::FileCounts;
 #[cfg(any(test, feature = "cli", feature = "internals"))]
 pub use selected::{SelectedTet, SelectedVtu};
-pub use selection::{Content, Selection};
+pub use selection::{Content, Order, Selection};
 pub use surface::{SurfaceReport, surface};
 
 use crate::storage::attempt;
 use crate::store::{Catalog, StoreError};
-use draft::Draft;
+use draft::{Draft, STDOUT};
 use merged::{FaceSet, Merged, Progress, Scope};
 
 /// Writes what `selection` says of the finished mesh of `store` to `out` in the format its extension tells, replacing what is there.
@@ -75,16 +82,7 @@ pub fn export(
     memory_bytes: usize,
     report: &dyn Fn(u64, u64),
 ) -> Result<ExportReport> {
-    let unknown = |known| WriteError::UnknownFormat {
-        path: out.to_owned(),
-        known,
-    };
-    let format = MeshFormat::of_extension(out).ok_or_else(|| unknown(ENDINGS))?;
-    if selection.content != Content::Mesh && format != MeshFormat::Vtu {
-        return Err(unknown(
-            ".vtu, the only format for faces without tetrahedra",
-        ));
-    }
+    let format = check(out, selection)?;
     attempt(|| {
         let catalog = &mut *store;
         let path = catalog.dir().to_owned();
@@ -101,25 +99,29 @@ pub fn export(
             MeshFormat::Parquet => {
                 parquet::write(store, &mut draft, out, selection, memory_bytes, report)?
             }
-            MeshFormat::Pvtu => {
-                pieces::write(store, &mut draft, out, selection, memory_bytes, report)?
-            }
-            _ if selection.pieces => {
-                pieces::write(store, &mut draft, out, selection, memory_bytes, report)?
+            _ if format == MeshFormat::Pvtu || selection.pieces && !format.numbers_globally() => {
+                let what = (format, selection);
+                pieces::write(store, &mut draft, out, what, memory_bytes, report)?
             }
             _ => {
+                let apart = format == MeshFormat::VtkHdf;
                 let scope = Scope {
-                    ranks: &selection.subdomains,
+                    ranks: match selection.pieces {
+                        true => &BTreeSet::new(),
+                        false => &selection.subdomains,
+                    },
                     faces: match selection.content {
+                        Content::Mesh if apart => FaceSet::SkinAndInterfaces,
                         Content::Mesh => FaceSet::Skin,
                         Content::Boundary => FaceSet::SkinAndInterfaces,
                         Content::Interfaces => FaceSet::Interfaces,
                     },
+                    apart,
                 };
                 let progress = Progress::new(report);
                 let dir = draft.dir().to_owned();
                 let mut mesh = Merged::open(store, scope, &dir, memory_bytes, progress)?;
-                dispatch::write(format, selection.content, &mut mesh, &mut draft, out)?
+                dispatch::write(format, selection, &mut mesh, &mut draft, out)?
             }
         };
         Ok(ExportReport {
@@ -129,4 +131,40 @@ pub fn export(
             files: draft.publish()?,
         })
     })?
+}
+
+/// The format of `out`, if it can hold what is selected.
+pub fn check(out: &Path, selection: &Selection) -> Result<MeshFormat> {
+    let path = || out.to_owned();
+    let known = ENDINGS;
+    let named = selection.format.or_else(|| MeshFormat::of_extension(out));
+    let format = named.ok_or_else(|| WriteError::UnknownFormat {
+        path: path(),
+        known,
+    })?;
+    let cannot = |what| WriteError::Unsupported {
+        path: path(),
+        format: format.word(),
+        what,
+    };
+    let stdout = out == Path::new(STDOUT);
+    match () {
+        () if selection.content != Content::Mesh && !format.holds_faces_alone() => {
+            Err(cannot("faces without tetrahedra; .vtu and .vtkhdf do"))
+        }
+        () if selection.ascii && !format.has_text() => Err(cannot("text")),
+        () if selection.order == Order::Second && !format.has_second_order() => Err(cannot(
+            "elements of second order; .vtu, .pvtu, .vtkhdf and .inp do",
+        )),
+        () if selection.ghosts && format != MeshFormat::Gmsh => {
+            Err(cannot("ghost cells; .msh does"))
+        }
+        () if selection.ghosts && selection.pieces => {
+            Err(cannot("ghost cells in files of one partition"))
+        }
+        () if stdout && (selection.pieces || !format.is_stream()) => {
+            Err(cannot("one file that is written from beginning to end"))
+        }
+        () => Ok(format),
+    }
 }

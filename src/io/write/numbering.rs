@@ -104,12 +104,13 @@ impl PartNumbers {
 }
 
 impl Numbering {
-    /// Numbers the vertices of all sub-domains; `parts` are their ranks and numbers of vertices.
+    /// Numbers the vertices of all sub-domains; `parts` are their ranks and numbers of vertices. With `apart`, each has all of its own.
     ///
     /// Holds about `memory` bytes. Errors: damage, the disk.
     pub fn new(
         store: &mut Catalog,
         parts: &[(u32, u64)],
+        apart: bool,
         dir: &Path,
         memory: usize,
     ) -> Result<Self> {
@@ -120,7 +121,7 @@ impl Numbering {
             n_vertices: 0,
         };
         let mut places = Sorter::new(dir, memory as u64 / 4);
-        if parts.len() > 1 {
+        if parts.len() > 1 && !apart {
             let by_id = candidates(store, parts, dir, memory)?;
             numbering.group(store, parts, by_id, &mut places)?;
         }
@@ -196,6 +197,11 @@ impl Numbering {
         Ok(groups.finish()?)
     }
 
+    /// The number of the first vertex that part `p` numbers.
+    pub fn first(&self, p: usize) -> u64 {
+        self.firsts[p]
+    }
+
     /// Number of vertices of the merged mesh.
     pub fn n_vertices(&self) -> u64 {
         self.n_vertices
@@ -243,6 +249,38 @@ pub(super) fn candidates(
             }
             sorter.push(Candidate { id, part: p, local })?;
         }
+    }
+    Ok(sorter.finish()?)
+}
+
+sort_record! {
+    /// A vertex of one part that another has too.
+    pub(super) struct Sharer {
+        pub part: u32,
+        pub local: u32,
+        pub other: u32,
+    }
+}
+
+/// Every vertex that several parts have, for each of these and each other one.
+pub(super) fn sharers(by_id: Sorted<Candidate>, dir: &Path, bytes: u64) -> Result<Sorted<Sharer>> {
+    let mut sorter = Sorter::new(dir, bytes);
+    let mut group: Vec<Candidate> = Vec::new();
+    for candidate in by_id {
+        let candidate = candidate?;
+        if group.first().is_some_and(|first| first.id != candidate.id) {
+            group.clear();
+        }
+        for other in &group {
+            for [a, b] in [[&candidate, other], [other, &candidate]] {
+                sorter.push(Sharer {
+                    part: a.part,
+                    local: a.local,
+                    other: b.part,
+                })?;
+            }
+        }
+        group.push(candidate);
     }
     Ok(sorter.finish()?)
 }

@@ -16,11 +16,10 @@ pub(super) fn write(
     store: &mut Catalog,
     draft: &mut Draft,
     out: &Path,
-    selection: &Selection,
+    (format, selection): (MeshFormat, &Selection),
     memory: usize,
     report: &dyn Fn(u64, u64),
 ) -> Result<FileCounts> {
-    let format = MeshFormat::of_extension(out).expect("the format was told from the name");
     let (parallel, extension) = match format {
         MeshFormat::Pvtu => (true, "vtu"),
         _ => (
@@ -39,6 +38,7 @@ pub(super) fn write(
         let scope = Scope {
             ranks: &BTreeSet::from([row.rank]),
             faces: FaceSet::SkinAndInterfaces,
+            apart: false,
         };
         let dir = draft.dir().join(format!("piece-{}", row.rank));
         fs::create_dir(&dir).map_err(|e| WriteError::io(&dir, e))?;
@@ -48,7 +48,7 @@ pub(super) fn write(
             report(counts.tets + (share * row.tets as f64) as u64, all);
         };
         let mut mesh = Merged::open(store, scope, &dir, memory, Progress::new(&report_piece))?;
-        let written = dispatch::write(format, selection.content, &mut mesh, draft, &piece)?;
+        let written = dispatch::write(format, selection, &mut mesh, draft, &piece)?;
         fs::remove_dir_all(&dir).map_err(|e| WriteError::io(&dir, e))?;
         counts.vertices += written.vertices;
         counts.tets += written.tets;

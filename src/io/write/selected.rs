@@ -10,7 +10,7 @@ use super::error::Result;
 use super::npy::length;
 use super::stream::{Records, Stream, scratch};
 use super::vtu::TETRA;
-use super::vtu_layout::{Array, Group, Index, Layout};
+use super::vtu_layout::{Array, Container, Group, Index, Layout};
 use crate::storage::{Payload, Sorted, Sorter, sort_record};
 
 /// Region, sub-domain, quality, number.
@@ -117,7 +117,8 @@ impl SelectedVtu {
             Array::new(Group::Cells, "offsets", index.kind()),
             Array::new(Group::Cells, "types", "UInt8"),
         ];
-        let layout = Layout::new(arrays, [n_points, self.n, 4], "");
+        let counts = [n_points, self.n, 4];
+        let layout = Layout::new(&Container::Xml, &arrays, counts, ("", &[]));
         let path = self.draft.create(&self.out, layout.file_bytes())?;
         let mut strips = layout.open::<9>(&path)?;
         let [

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeSet;
 
+use super::format::MeshFormat;
+
 /// What of a mesh is written.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Selection {
@@ -11,6 +13,24 @@ pub struct Selection {
     pub pieces: bool,
     /// Which elements are written.
     pub content: Content,
+    /// The format; by default the one that the file's name tells.
+    pub format: Option<MeshFormat>,
+    /// Text where the format has both text and binary.
+    pub ascii: bool,
+    /// Of each part the tetrahedra that touch other parts, listed for those (`.msh`).
+    pub ghosts: bool,
+    /// Nodes of the elements.
+    pub order: Order,
+}
+
+/// Nodes of the elements.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Order {
+    /// Corners.
+    #[default]
+    First,
+    /// Corners and the middles of edges.
+    Second,
 }
 
 /// Which elements are written.
@@ -19,8 +39,8 @@ pub enum Content {
     /// Tetrahedra and boundary faces.
     #[default]
     Mesh,
-    /// Input triangles and interface faces; only as `.vtu`.
+    /// Input triangles and interface faces; only as `.vtu` or `.vtkhdf`.
     Boundary,
-    /// Interface faces; only as `.vtu`.
+    /// Interface faces; only as `.vtu` or `.vtkhdf`.
     Interfaces,
 }

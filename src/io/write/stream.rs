@@ -4,6 +4,7 @@ use std::fs::{File, OpenOptions};
 use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
+use super::draft::STDOUT;
 use super::error::{Result, WriteError};
 
 /// Bytes gathered before a write.
@@ -12,19 +13,25 @@ const BUFFER_BYTES: usize = 256 << 10;
 /// A file being written as text or bytes.
 pub(super) struct Stream {
     path: PathBuf,
-    file: File,
+    file: Box<dyn Write>,
     buffer: Vec<u8>,
     integers: itoa::Buffer,
     doubles: zmij::Buffer,
 }
 
 impl Stream {
-    /// Writes `path`, which exists, from its beginning.
+    /// Writes `path`, which exists, from its beginning; or standard output.
     pub fn open(path: &Path) -> Result<Self> {
-        let file = OpenOptions::new().write(true).open(path);
+        let file: Box<dyn Write> = match path == Path::new(STDOUT) {
+            true => Box::new(std::io::stdout()),
+            false => {
+                let file = OpenOptions::new().write(true).open(path);
+                Box::new(file.map_err(|e| WriteError::io(path, e))?)
+            }
+        };
         Ok(Self {
             path: path.to_owned(),
-            file: file.map_err(|e| WriteError::io(path, e))?,
+            file,
             buffer: Vec::with_capacity(BUFFER_BYTES + 4096),
             integers: itoa::Buffer::new(),
             doubles: zmij::Buffer::new(),
@@ -64,7 +71,15 @@ impl Stream {
 
     fn flush(&mut self) -> Result<()> {
         let written = self.file.write_all(&self.buffer);
+        let written = written.and_then(|()| self.file.flush());
         self.buffer.clear();
+        if self.path == Path::new(STDOUT)
+            && (written.as_ref()).is_err_and(|e| e.kind() == std::io::ErrorKind::BrokenPipe)
+        {
+            // Whoever reads has enough; what follows goes nowhere.
+            self.file = Box::new(std::io::sink());
+            return Ok(());
+        }
         written.map_err(|e| WriteError::io(&self.path, e))
     }
 

@@ -427,9 +427,17 @@ fn boundaries_read_back_as_the_surface() -> Outcome {
             .zip(&points)
             .all(|(&v, p)| whole[v as usize] == *p)
     );
-    for name in ["b.mesh", "b.meshb", "b.msh"] {
+    for (name, format) in [
+        ("b.mesh", None),
+        ("b.meshb", None),
+        ("b.msh", Some(MeshFormat::Gmsh22)),
+    ] {
         let out = dir.path().join(name);
-        export(&mut store, &out, &Selection::default(), 1 << 20, &quiet)?;
+        let selection = Selection {
+            format,
+            ..Selection::default()
+        };
+        export(&mut store, &out, &selection, 1 << 20, &quiet)?;
         let surface = read_surface(&[out], 0)?;
         assert_eq!(triangles(&surface), expected, "{name}");
         let runs = |l: &[u32]| l.windows(2).map(|w| w[0] == w[1]).collect::<Vec<_>>();
@@ -449,15 +457,117 @@ fn files_do_not_depend_on_the_memory() -> Outcome {
     let path = dir.path().join("cubes.tetdb");
     cubes(&path, 20)?;
     let mut store = Catalog::open(&path)?;
-    for name in ["m.vtu", "m.meshb", "m.inp"] {
-        let out = dir.path().join(name);
+    let names = ["m.vtu", "m.meshb", "m.inp", "m.vtkhdf", "m.msh", "m.foam"];
+    for (name, pieces) in names.iter().flat_map(|n| [(n, false), (n, true)]) {
+        let selection = Selection {
+            pieces,
+            ..Selection::default()
+        };
         let mut files = Vec::new();
         for memory in [1 << 16, 64 << 20] {
-            export(&mut store, &out, &Selection::default(), memory, &quiet)?;
-            files.push(std::fs::read(&out)?);
+            let report = export(
+                &mut store,
+                &dir.path().join(name),
+                &selection,
+                memory,
+                &quiet,
+            )?;
+            let read = report.files.iter().map(|(file, _)| std::fs::read(file));
+            files.push(read.collect::<std::io::Result<Vec<_>>>()?);
         }
-        assert!(files[0] == files[1], "{name}");
+        assert!(files[0] == files[1], "{name}, pieces: {pieces}");
     }
+    Ok(())
+}
+
+#[test]
+fn a_surface_read_from_partitions_has_all_triangles_and_labels() -> Outcome {
+    let dir = tempfile::tempdir()?;
+    let path = dir.path().join("cubes.tetdb");
+    cubes(&path, 4)?;
+    let mut store = Catalog::open(&path)?;
+    let mut seen = Vec::new();
+    for (format, ascii) in [
+        (MeshFormat::Gmsh22, false),
+        (MeshFormat::Gmsh, false),
+        (MeshFormat::Gmsh, true),
+    ] {
+        let selection = Selection {
+            format: Some(format),
+            ascii,
+            ghosts: format == MeshFormat::Gmsh,
+            ..Selection::default()
+        };
+        let out = dir.path().join("s.msh");
+        export(&mut store, &out, &selection, 1 << 20, &quiet)?;
+        let surface = read_surface(&[out], 0)?;
+        let mut triangles: Vec<_> = (0..surface.n_triangles() as u32)
+            .map(|t| {
+                let corners = surface.corners(t).map(|p| p.to_array().map(f64::to_bits));
+                let label = surface.labels[t as usize] as usize;
+                (corners, surface.label_names[label].clone())
+            })
+            .collect();
+        triangles.sort_unstable();
+        seen.push(triangles);
+    }
+    assert!(seen[0] == seen[1] && seen[1] == seen[2]);
+    Ok(())
+}
+
+#[test]
+fn pieces_are_the_same_written_together_or_alone() -> Outcome {
+    let dir = tempfile::tempdir()?;
+    let path = dir.path().join("cubes.tetdb");
+    cubes(&path, 6)?;
+    let mut store = Catalog::open(&path)?;
+    for name in ["p.foam", "p.msh", "p.vtu"] {
+        let mut written = BTreeMap::new();
+        for subdomains in [vec![], vec![0], vec![1]] {
+            let selection = Selection {
+                subdomains: subdomains.into_iter().collect(),
+                pieces: true,
+                ..Selection::default()
+            };
+            let out = dir.path().join(name);
+            let report = export(&mut store, &out, &selection, 1 << 20, &quiet)?;
+            for (file, _) in report.files {
+                let bytes = std::fs::read(&file)?;
+                let first = written.entry(file.clone()).or_insert(bytes.clone());
+                assert!(*first == bytes, "{}", file.display());
+            }
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn what_a_format_cannot_hold_is_refused() -> Outcome {
+    let dir = tempfile::tempdir()?;
+    let of = |name: &str, selection: Selection| {
+        let refused = check(&dir.path().join(name), &selection);
+        refused.err().map(|error| error.code())
+    };
+    let text = || Selection {
+        ascii: true,
+        ..Selection::default()
+    };
+    let ghosts = |pieces| Selection {
+        ghosts: true,
+        pieces,
+        ..Selection::default()
+    };
+    assert_eq!(of("a.vtu", text()), Some("usage"));
+    assert_eq!(of("a.msh", text()), None);
+    assert_eq!(of("a.foam", ghosts(false)), Some("usage"));
+    assert_eq!(of("a.msh", ghosts(true)), Some("usage"));
+    assert_eq!(of("a.msh", ghosts(false)), None);
+    let vtu = Selection {
+        format: Some(MeshFormat::Vtu),
+        ..Selection::default()
+    };
+    let to_stdout = check(Path::new("-"), &vtu);
+    assert_eq!(to_stdout.err().ok_or("an error")?.code(), "usage");
     Ok(())
 }
 
@@ -466,7 +576,7 @@ fn progress_ends_at_its_total() -> Outcome {
     let dir = tempfile::tempdir()?;
     let path = dir.path().join("two.tetdb");
     two_subdomains(&path)?;
-    for name in ["p.vtu", "p.msh"] {
+    for name in ["p.vtu", "p.msh", "p.foam", "p.ele"] {
         let progress = std::cell::RefCell::new(Vec::new());
         let report = |done, total| progress.borrow_mut().push((done, total));
         export(

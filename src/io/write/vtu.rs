@@ -1,21 +1,47 @@
-//! VTK XML unstructured grids: the tetrahedra in one file, the boundary faces in another beside it.
+//! VTK unstructured grids, XML or HDF5: the tetrahedra in one file, the boundary faces in another beside it.
 //!
-//! Source: the VTK file formats document, appended raw data with 64-bit lengths.
+//! A `.vtkhdf` file has a partition for each sub-domain, with vertices of its own. Source: the VTK file formats document, appended
+//! raw data with 64-bit lengths; for `.vtkhdf` see `vtu_layout`.
 
 use std::path::{Path, PathBuf};
 
 use super::draft::Draft;
 use super::error::Result;
 use super::merged::Merged;
-use super::vtu_boundary;
-use super::vtu_layout::{Array, Group, Index, Layout};
+use super::midpoints::{MiddlePoints, Midpoints};
+use super::vtu_boundary::{self, Partition, partitions};
+use super::vtu_layout::{Array, Container, Group, Index, Layout};
 
 /// VTK's number of a tetrahedron.
 pub(super) const TETRA: u8 = 10;
 
-pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<()> {
+/// VTK's number of a tetrahedron with the middles of its edges.
+const QUADRATIC_TETRA: u8 = 24;
+/// The lasting id of a vertex that has none: the middle of an edge.
+const NO_ID: i64 = -1;
+
+/// Writes both; for `.vtkhdf` the mesh is one whose vertices are numbered apart.
+pub(super) fn write(
+    mesh: &mut Merged,
+    draft: &mut Draft,
+    out: &Path,
+    is_hdf: bool,
+    mut middles: Option<&mut Midpoints>,
+) -> Result<()> {
     mesh.expect_passes(2, 1);
-    let index = Index::new(mesh.n_vertices(), 4 * mesh.n_tets());
+    let partitions = partitions(mesh, is_hdf, middles.as_deref());
+    let container = match is_hdf {
+        true => Container::Hdf(
+            partitions
+                .iter()
+                .map(|p| [p.n_points(), p.n_tets])
+                .collect(),
+        ),
+        false => Container::Xml,
+    };
+    let n_points = partitions.iter().map(Partition::n_points).sum();
+    let corners = if middles.is_some() { 10 } else { 4 };
+    let index = Index::within(&container, n_points, corners * mesh.n_tets());
     let arrays = vec![
         Array::new(Group::PointData, "global_id", "Int64"),
         Array::new(Group::CellData, "subdomain", "UInt32"),
@@ -27,7 +53,8 @@ pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
         Array::new(Group::Cells, "offsets", index.kind()),
         Array::new(Group::Cells, "types", "UInt8"),
     ];
-    let layout = Layout::new(arrays, [mesh.n_vertices(), mesh.n_tets(), 4], "");
+    let counts = [n_points, mesh.n_tets(), corners];
+    let layout = Layout::new(&container, &arrays, counts, ("", &[]));
     let path = draft.create(out, layout.file_bytes())?;
     let [
         mut vertex_ids,
@@ -40,32 +67,65 @@ pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
         mut ends,
         mut types,
     ] = layout.open(&path)?;
-    mesh.vertices(|_, vertex| {
-        vertex_ids.put(&vertex.id.to_le_bytes())?;
-        vertex
-            .point
-            .iter()
-            .try_for_each(|x| points.put(&x.to_le_bytes()))
+    let mut put = |id: i64, point: [f64; 3]| {
+        vertex_ids.put(&id.to_le_bytes())?;
+        (point.iter()).try_for_each(|x| points.put(&x.to_le_bytes()))
+    };
+    // The middles of a partition stand behind its vertices.
+    let mut middle_points = middles.as_deref().map(Midpoints::points).transpose()?;
+    let mut put_middles = |n: u64, put: &mut dyn FnMut(i64, [f64; 3]) -> Result<()>| {
+        (0..n).try_for_each(|_| {
+            let point = middle_points.as_mut().map(MiddlePoints::next).transpose()?;
+            point.flatten().map_or(Ok(()), |point| put(NO_ID, point))
+        })
+    };
+    let mut of_points = partitions.iter();
+    let mut current = of_points.next();
+    mesh.vertices(|number, vertex| {
+        while let Some(part) = current.filter(|part| number >= part.first_vertex + part.n_vertices)
+        {
+            put_middles(part.n_middles, &mut put)?;
+            current = of_points.next();
+        }
+        put(vertex.id as i64, vertex.point)
     })?;
+    for part in current.into_iter().chain(of_points) {
+        put_middles(part.n_middles, &mut put)?;
+    }
+    let mut part = &partitions[0];
     let mut end = 0;
+    let mut coming = partitions.iter().filter(|_| is_hdf).peekable();
     mesh.tets_with_quality(|tet| {
-        end += 4;
+        if let Some(next) = coming.next_if(|part| part.rank == tet.subdomain) {
+            (part, end) = (next, 0);
+            index.put(&mut ends, end)?;
+        }
+        end += corners;
         ranks.put(&tet.subdomain.to_le_bytes())?;
         regions.put(&tet.region.to_le_bytes())?;
         qualities.put(&tet.quality.to_le_bytes())?;
         ids.put(&tet.id.number().to_le_bytes())?;
-        tet.nodes
-            .iter()
-            .try_for_each(|&v| index.put(&mut nodes, v))?;
+        for v in tet.nodes {
+            index.put(&mut nodes, v - part.first_vertex)?;
+        }
+        if let Some(middles) = &mut middles {
+            for edge in middles.next::<6>()? {
+                index.put(&mut nodes, part.n_vertices + edge - part.first_middle)?;
+            }
+        }
         index.put(&mut ends, end)?;
-        types.put(&[TETRA])
+        types.put(&[if corners == 10 {
+            QUADRATIC_TETRA
+        } else {
+            TETRA
+        }])
     })?;
     for strip in [
         vertex_ids, ranks, regions, qualities, ids, points, nodes, ends, types,
     ] {
         strip.finish()?;
     }
-    vtu_boundary::write(mesh, draft, &boundary_path(out))?;
+    vtu_boundary::write(mesh, draft, &boundary_path(out), is_hdf, middles)?;
     Ok(())
 }
 

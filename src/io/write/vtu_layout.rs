@@ -1,9 +1,10 @@
-//! The shape of a VTK XML file with raw appended arrays: the head names each array's place behind it.
+//! The shape of a VTK file, XML with raw appended arrays or VTKHDF: the place of each array, known before the first byte.
 
 use std::path::Path;
 
 use super::error::{Result, WriteError};
-use super::stream::{Stream, Strip};
+use super::hdf5::{self, Number, Object};
+use super::stream::Strip;
 
 /// Where an array belongs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,6 +42,25 @@ impl Array {
         }
     }
 
+    fn number(&self) -> Number {
+        match self.kind {
+            "UInt8" => Number::U8,
+            "UInt32" => Number::U32,
+            "Int64" => Number::I64,
+            "Float64" => Number::F64,
+            kind => unreachable!("no array of {kind} is written"),
+        }
+    }
+
+    fn bytes(&self, [n_points, n_cells, corners]: Counts) -> u64 {
+        let tuples = match self.group {
+            Group::Points | Group::PointData => n_points,
+            Group::Cells if self.name == "connectivity" => corners * n_cells,
+            Group::CellData | Group::Cells => n_cells,
+        };
+        tuples * self.components * self.width
+    }
+
     /// The same with three components.
     pub fn vectors(self) -> Self {
         Self {
@@ -63,6 +83,14 @@ impl Index {
         Self { narrow }
     }
 
+    /// As [`Index::new`], but with 64 bits where the container asks for them.
+    pub fn within(container: &Container, n_points: u64, n_corners: u64) -> Self {
+        match container {
+            Container::Xml => Self::new(n_points, n_corners),
+            Container::Hdf(_) => Self { narrow: false },
+        }
+    }
+
     pub fn kind(self) -> &'static str {
         if self.narrow { "Int32" } else { "Int64" }
     }
@@ -77,98 +105,171 @@ impl Index {
     }
 }
 
+/// How a VTK file holds its arrays.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Container {
+    /// `.vtu`: one mesh.
+    Xml,
+    /// `.vtkhdf`: partitions, each with points of its own; vertices and tetrahedra of each. Offsets of each begin with a 0.
+    Hdf(Vec<[u64; 2]>),
+}
+
 /// A file with its arrays measured.
 pub(super) struct Layout {
-    arrays: Vec<Array>,
-    n_points: u64,
-    n_cells: u64,
-    n_corners: u64,
-    head: String,
+    /// What is known at once, and where it begins.
+    fixed: Vec<(u64, Vec<u8>)>,
+    /// First byte and length of each array.
+    places: Vec<[u64; 2]>,
+    bytes: u64,
 }
 
 const TAIL: &str = "\n  </AppendedData>\n</VTKFile>\n";
+/// An array of the field data and its texts: UTF-8, a zero after each, for not every program reads arrays of text.
+pub(super) type Texts<'a> = (&'static str, &'a [u8]);
+
+/// Numbers of points, of cells and of the corners of a cell.
+pub(super) type Counts = [u64; 3];
 
 impl Layout {
-    /// `arrays` in the order of the groups; `field_data` is put into the head as it is.
-    pub fn new(
-        arrays: Vec<Array>,
-        [n_points, n_cells, corners]: [u64; 3],
-        field_data: &str,
-    ) -> Self {
-        let mut layout = Self {
-            arrays,
-            n_points,
-            n_cells,
-            n_corners: corners * n_cells,
-            head: String::new(),
-        };
-        layout.head = layout.write_head(field_data);
-        layout
-    }
-
-    fn bytes(&self, array: &Array) -> u64 {
-        let tuples = match array.group {
-            Group::Points | Group::PointData => self.n_points,
-            Group::Cells if array.name == "connectivity" => self.n_corners,
-            Group::CellData | Group::Cells => self.n_cells,
-        };
-        tuples * array.components * array.width
-    }
-
-    fn write_head(&self, field_data: &str) -> String {
-        let mut text = format!(
-            "<?xml version=\"1.0\"?>\n\
-             <VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n  \
-             <UnstructuredGrid>\n{field_data}    <Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n",
-            self.n_points, self.n_cells
-        );
-        let mut offset = 0;
-        for group in [
-            Group::PointData,
-            Group::CellData,
-            Group::Points,
-            Group::Cells,
-        ] {
-            text += &format!("      <{group:?}>\n");
-            for array in self.arrays.iter().filter(|a| a.group == group) {
-                text += &format!(
-                    "        <DataArray type=\"{}\" Name=\"{}\" NumberOfComponents=\"{}\" format=\"appended\" offset=\"{offset}\"/>\n",
-                    array.kind, array.name, array.components
-                );
-                offset += 8 + self.bytes(array);
-            }
-            text += &format!("      </{group:?}>\n");
+    /// `arrays` in the order of the groups; `texts` go into the field data, unless they are empty.
+    pub fn new(container: &Container, arrays: &[Array], counts: Counts, texts: Texts) -> Self {
+        match container {
+            Container::Xml => Self::xml(arrays, counts, texts),
+            Container::Hdf(partitions) => Self::hdf(partitions, arrays, counts, texts),
         }
-        text + "    </Piece>\n  </UnstructuredGrid>\n  <AppendedData encoding=\"raw\">\n   _"
+    }
+
+    fn xml(arrays: &[Array], counts: Counts, texts: Texts) -> Self {
+        let head = xml_head(arrays, counts, texts).into_bytes();
+        let mut at = head.len() as u64;
+        let mut fixed = vec![(0, head)];
+        let mut places = Vec::new();
+        for array in arrays {
+            let bytes = array.bytes(counts);
+            fixed.push((at, bytes.to_le_bytes().to_vec()));
+            places.push([at + 8, bytes]);
+            at += 8 + bytes;
+        }
+        fixed.push((at, TAIL.as_bytes().to_vec()));
+        Self {
+            fixed,
+            places,
+            bytes: at + TAIL.len() as u64,
+        }
+    }
+
+    /// Source: the VTKHDF file format in the VTK documentation, version 2, unstructured grids.
+    fn hdf(partitions: &[[u64; 2]], arrays: &[Array], counts: Counts, texts: Texts) -> Self {
+        let n_partitions = partitions.len() as u64;
+        let children = |group: Group| -> Vec<Object> {
+            let of_group = arrays.iter().filter(|a| a.group == group);
+            of_group
+                .map(|array| {
+                    let (name, rows) = match array.name {
+                        "connectivity" => ("Connectivity", counts[1] * counts[2]),
+                        "offsets" => ("Offsets", counts[1] + n_partitions),
+                        "types" => ("Types", counts[1]),
+                        name if group == Group::CellData => (name, counts[1]),
+                        name => (name, counts[0]),
+                    };
+                    let shape = [rows, array.components];
+                    let rank = if array.components == 1 { 1 } else { 2 };
+                    Object::array(name, array.number(), &shape[..rank])
+                })
+                .collect()
+        };
+        let mut top = vec![
+            Object::group("PointData", children(Group::PointData)),
+            Object::group("CellData", children(Group::CellData)),
+        ];
+        top.extend(children(Group::Points));
+        top.extend(children(Group::Cells));
+        let of_partitions = ["NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds"];
+        top.extend(of_partitions.map(|name| Object::array(name, Number::I64, &[n_partitions])));
+        let field = Object::array(texts.0, Number::U8, &[texts.1.len() as u64]);
+        let fields = if texts.1.is_empty() {
+            vec![]
+        } else {
+            vec![field]
+        };
+        top.push(Object::group("FieldData", fields));
+        let grid = Object::group("VTKHDF", top)
+            .with_integers("Version", &[2, 0])
+            .with_text("Type", "UnstructuredGrid");
+        let mut plan = hdf5::plan(&Object::group("", vec![grid]));
+        let small = plan.arrays.split_off(arrays.len());
+        let mut fixed = vec![(0, plan.head)];
+        let per_cell = [[1, 0], [0, 1], [0, counts[2]]];
+        for ([at, _], [of_points, of_cells]) in small.iter().zip(per_cell) {
+            let number = |&[points, cells]: &[u64; 2]| points * of_points + cells * of_cells;
+            let values = partitions.iter().map(number);
+            fixed.push((*at, values.flat_map(u64::to_le_bytes).collect()));
+        }
+        if let Some(&[at, _]) = small.get(per_cell.len()) {
+            fixed.push((at, texts.1.to_vec()));
+        }
+        Self {
+            fixed,
+            places: plan.arrays,
+            bytes: plan.file_bytes,
+        }
     }
 
     /// Length of the whole file.
     pub fn file_bytes(&self) -> u64 {
-        let arrays: u64 = self.arrays.iter().map(|a| 8 + self.bytes(a)).sum();
-        self.head.len() as u64 + arrays + TAIL.len() as u64
+        self.bytes
     }
 
-    /// Writes head, array lengths and tail, and opens a strip for each array.
+    /// Writes what is known, and opens a strip for each array.
     pub fn open<const N: usize>(&self, path: &Path) -> Result<[Strip; N]> {
-        let mut stream = Stream::open(path)?;
-        stream.text(&self.head);
-        stream.finish()?;
-        let mut at = self.head.len() as u64;
-        let mut strips = Vec::with_capacity(N);
-        for array in &self.arrays {
-            let bytes = self.bytes(array);
-            let mut length = Strip::open(path, at, 8)?;
-            length.put(&bytes.to_le_bytes())?;
-            length.finish()?;
-            strips.push(Strip::open(path, at + 8, bytes)?);
-            at += 8 + bytes;
+        for (at, bytes) in &self.fixed {
+            let mut strip = Strip::open(path, *at, bytes.len() as u64)?;
+            strip.put(bytes)?;
+            strip.finish()?;
         }
-        let mut tail = Strip::open(path, at, TAIL.len() as u64)?;
-        tail.put(TAIL.as_bytes())?;
-        tail.finish()?;
+        let open = |&[at, bytes]: &[u64; 2]| Strip::open(path, at, bytes);
+        let strips = self.places.iter().map(open).collect::<Result<Vec<_>>>()?;
         strips.try_into().map_err(|_| WriteError::Io {
             path: path.to_owned(),
             source: std::io::Error::other("the arrays of the file were miscounted"),
         })
     }
+}
+
+fn xml_head(arrays: &[Array], counts: Counts, texts: Texts) -> String {
+    let mut text = "<?xml version=\"1.0\"?>\n\
+         <VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n  \
+         <UnstructuredGrid>\n"
+        .to_owned();
+    if !texts.1.is_empty() {
+        let numbers: String = texts.1.iter().map(|byte| format!("{byte} ")).collect();
+        text += &format!(
+            "    <FieldData>\n      <DataArray type=\"UInt8\" Name=\"{}\" NumberOfTuples=\"{}\" format=\"ascii\">\n        \
+             {numbers}\n      </DataArray>\n    </FieldData>\n",
+            texts.0,
+            texts.1.len()
+        );
+    }
+    text += &format!(
+        "    <Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n",
+        counts[0], counts[1]
+    );
+    let mut offset = 0;
+    for group in [
+        Group::PointData,
+        Group::CellData,
+        Group::Points,
+        Group::Cells,
+    ] {
+        text += &format!("      <{group:?}>\n");
+        for array in arrays.iter().filter(|a| a.group == group) {
+            text += &format!(
+                "        <DataArray type=\"{}\" Name=\"{}\" NumberOfComponents=\"{}\" format=\"appended\" offset=\"{offset}\"/>\n",
+                array.kind, array.name, array.components
+            );
+            offset += 8 + array.bytes(counts);
+        }
+        text += &format!("      </{group:?}>\n");
+    }
+    text + "    </Piece>\n  </UnstructuredGrid>\n  <AppendedData encoding=\"raw\">\n   _"
 }

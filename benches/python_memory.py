@@ -1,0 +1,53 @@
+"""Memory of reading a store from Python: `python_memory.py STORE [EXPORTED.vtu]`."""
+
+import sys
+import time
+
+import numpy as np  # noqa: F401
+
+import tetdb
+
+MIB = 1 << 20
+
+
+def status(name):
+    with open("/proc/self/status") as lines:
+        return next(int(line.split()[1]) for line in lines if line.startswith(name)) * 1024 / MIB
+
+
+def measured(name, work):
+    with open("/proc/self/clear_refs", "w") as refs:
+        refs.write("5")
+    before, start = status("VmRSS"), time.perf_counter()
+    array_bytes = work()
+    seconds, peak = time.perf_counter() - start, status("VmHWM")
+    print(f"{name}: {seconds:.1f} s, arrays {array_bytes / MIB:.0f} MiB, grew by {peak - before:.0f} MiB, peak {peak:.0f} MiB of the process", flush=True)
+
+
+def subdomain(store, rank):
+    part = store.subdomain(rank)
+    names = ("points", "tets", "regions", "quality", "ids", "vertex_ids", "lengths", "interfaces", "facets")
+    return sum(getattr(part, name).nbytes for name in names)
+
+
+def chunks(store):
+    total = 0
+    for chunk in store.chunks(1_000_000):
+        total += chunk.points.nbytes + chunk.tets.nbytes + chunk.regions.nbytes + chunk.quality.nbytes + chunk.ids.nbytes + chunk.vertex_ids.nbytes
+        del chunk
+    return total
+
+
+def vtu(path):
+    import meshio
+
+    return sum(a.nbytes for a in (meshio.read(path).points,))
+
+
+store = tetdb.open(sys.argv[1])
+print(store)
+measured("chunks of 1,000,000", lambda: chunks(store))
+for rank in range(len(store.subdomains)):
+    measured(f"sub-domain {rank} ({store.subdomains[rank].n_tets} tetrahedra)", lambda: subdomain(store, rank))
+if len(sys.argv) > 2:
+    measured("meshio reads the .vtu", lambda: vtu(sys.argv[2]))

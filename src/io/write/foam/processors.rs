@@ -1,0 +1,316 @@
+//! Each sub-domain as the `polyMesh` of a processor, with its numbers in the whole.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use super::super::draft::Draft;
+use super::super::error::Result;
+use super::super::merged::{Merged, Opened};
+use super::super::report::FileCounts;
+use super::super::stream::{Records, scratch};
+use super::faces::{FaceWalk, PartFaces, zone_of};
+use super::file::FoamFile;
+use super::polymesh::{
+    FaceFiles, Names, Patch, Size, Zones, mesh_dir, write_boundary, write_labels,
+};
+use super::serial::{WithTwoCells, in_order};
+use crate::storage::{Sorter, sort_record};
+
+sort_record! {
+    /// Where a face between two sub-domains is in the whole.
+    struct Address {
+        rank: u32,
+        other: u32,
+        cut: u32,
+        index: u32,
+        /// Its number in the whole, from 1.
+        face: u32,
+    }
+}
+
+/// What is written for every processor.
+struct Job<'j> {
+    case: &'j Path,
+    names: &'j Names,
+    ascii: bool,
+    /// Faces of the whole before those of the first patch.
+    n_inner: u64,
+    /// Faces of each patch in the sub-domains before this one, and before it in the whole.
+    patch_starts: BTreeMap<u32, u64>,
+}
+
+/// Writes the processors of `ranks`, or all when there are none; all are read, for numbers in the whole depend on those before.
+pub(super) fn write(
+    mesh: &mut Merged,
+    draft: &mut Draft,
+    case: &Path,
+    (walk, names): (&mut FaceWalk, &Names),
+    ranks: &BTreeSet<u32>,
+    ascii: bool,
+) -> Result<FileCounts> {
+    mesh.expect_passes(0, 2);
+    let parts = mesh.parts();
+    let mut counts = FileCounts::default();
+    let n_between: u64 = (walk.census.between.iter().flat_map(|b| b.values())).sum();
+    let inner =
+        |(p, part): (usize, &super::super::merged::Part)| walk.census.n_inner(p, part.n_tets);
+    let n_inner = parts.iter().enumerate().map(inner).sum::<u64>() + n_between / 2;
+    let mut start = n_inner;
+    let mut job = Job {
+        case,
+        names,
+        ascii,
+        n_inner,
+        patch_starts: BTreeMap::new(),
+    };
+    for &label in names.patches.keys() {
+        job.patch_starts.insert(label, start);
+        start += (walk.census.patches.iter().filter_map(|p| p.get(&label))).sum::<u64>();
+    }
+    let mut addresses = Sorter::new(mesh.dir(), mesh.sorter_bytes() / 4);
+    let mut next = 0;
+    for (p, part) in parts.iter().enumerate() {
+        let is_written = ranks.is_empty() || ranks.contains(&part.rank);
+        let faces = walk.part(mesh, p)?;
+        let sizes = sizes(walk, p, part.n_vertices, part.n_tets);
+        job.faces(
+            mesh,
+            draft,
+            walk,
+            (p, faces, sizes),
+            is_written,
+            (&mut next, &mut addresses),
+        )?;
+        if is_written {
+            job.points_and_cells(mesh, draft, p, sizes)?;
+            counts.vertices += sizes.points;
+            counts.tets += sizes.cells;
+            counts.triangles += sizes.faces - sizes.inner;
+        }
+    }
+    mesh.expect_count("inner faces", job.n_inner, next)?;
+    let mut addresses = addresses.finish()?.peekable();
+    for (p, part) in parts.iter().enumerate() {
+        let is_written = ranks.is_empty() || ranks.contains(&part.rank);
+        let of_part = std::iter::from_fn(|| {
+            addresses.next_if(|a| a.as_ref().map_or(true, |a| a.rank == part.rank))
+        });
+        if !is_written {
+            of_part.for_each(drop);
+            continue;
+        }
+        let sizes = sizes(walk, p, part.n_vertices, part.n_tets);
+        let dir = job.dir(part.rank);
+        write_labels(
+            draft,
+            (&dir, "faceProcAddressing"),
+            sizes.faces,
+            ascii,
+            |file| {
+                let mut known = Records::<4>::open(&scratch_path(mesh.dir(), part.rank), 0)?;
+                while let Some(label) = known.next()? {
+                    file.label(i32::from_le_bytes(label))?;
+                }
+                of_part.into_iter().try_for_each(|address| {
+                    let Address {
+                        rank, other, face, ..
+                    } = address?;
+                    // The whole has the face as the lower one sees it.
+                    file.label(if rank < other {
+                        face as i32
+                    } else {
+                        -(face as i32)
+                    })
+                })
+            },
+        )?;
+    }
+    Ok(counts)
+}
+
+fn scratch_path(dir: &Path, rank: u32) -> std::path::PathBuf {
+    dir.join(format!("addressing-{rank}"))
+}
+
+fn sizes(walk: &FaceWalk, p: usize, points: u64, cells: u64) -> Size {
+    let of = |map: &BTreeMap<u32, u64>| map.values().sum::<u64>();
+    let inner = walk.census.n_inner(p, cells);
+    Size {
+        points,
+        cells,
+        inner,
+        faces: inner + of(&walk.census.patches[p]) + of(&walk.census.between[p]),
+    }
+}
+
+impl Job<'_> {
+    fn dir(&self, rank: u32) -> std::path::PathBuf {
+        mesh_dir(&self.case.join(format!("processor{rank}")))
+    }
+
+    /// Faces, boundary and face zones of a sub-domain; its addresses but for faces between sub-domains, which go to `addresses`.
+    fn faces(
+        &mut self,
+        mesh: &mut Merged,
+        draft: &mut Draft,
+        walk: &FaceWalk,
+        (p, faces, size): (usize, PartFaces, Size),
+        is_written: bool,
+        (next, addresses): (&mut u64, &mut Sorter<Address>),
+    ) -> Result<()> {
+        let rank = mesh.parts()[p].rank;
+        let dir = self.dir(rank);
+        let (numbers, _) = mesh.numbers_of(p)?;
+        let mut files = match is_written {
+            true => Some(FaceFiles::create(draft, &dir, size, self.ascii)?),
+            false => None,
+        };
+        let mut known = scratch(&scratch_path(mesh.dir(), rank))?;
+        let mut zones = Zones::new(mesh.dir(), true, mesh.sorter_bytes() / 4);
+        in_order(faces.inner, faces.uppers, |face| {
+            *next += 1;
+            match face {
+                WithTwoCells::Here(face) => {
+                    let Some(files) = &mut files else {
+                        return Ok(());
+                    };
+                    if let Some((zone, is_flipped)) = zone_of(face.zone) {
+                        zones.push(zone, files.written() as u32, is_flipped)?;
+                    }
+                    known.bytes(&(*next as u32).to_le_bytes());
+                    known.end()?;
+                    files.inner(face.owner, face.neighbor, face.vertices)
+                }
+                WithTwoCells::Across(upper) => {
+                    for (rank, other) in [(rank, upper.other), (upper.other, rank)] {
+                        addresses.push(Address {
+                            rank,
+                            other,
+                            cut: upper.cut,
+                            index: upper.index,
+                            face: *next as u32,
+                        })?;
+                    }
+                    Ok(())
+                }
+            }
+        })?;
+        for face in faces.outer {
+            let face = face?;
+            let start = self.patch_starts.get_mut(&face.patch);
+            let start = start.expect("patches were counted from the same faces");
+            *start += 1;
+            if let Some(files) = &mut files {
+                known.bytes(&(*start as u32).to_le_bytes());
+                known.end()?;
+                files.outer(face.owner, face.vertices)?;
+            }
+        }
+        known.finish()?;
+        let Some(mut files) = files else {
+            return Ok(());
+        };
+        for face in faces.between {
+            let face = face?;
+            if let Some((zone, is_flipped)) = zone_of(face.zone) {
+                zones.push(zone, files.written() as u32, is_flipped)?;
+            }
+            // Both sides begin with the vertex that has the least number in the whole; its neighbor then goes round the other way.
+            let [a, b, c] = face.vertices;
+            let [i, j, k] = face.vertices.map(|v| numbers.of(v));
+            let turned = match i.min(j).min(k) {
+                least if least == i => [a, b, c],
+                least if least == j => [b, c, a],
+                _ => [c, a, b],
+            };
+            files.outer(face.owner, turned)?;
+        }
+        mesh.expect_count("faces", size.faces, files.written())?;
+        files.finish()?;
+        zones.write(draft, &dir, &self.names.face_zones, self.ascii)?;
+        self.boundary(mesh, draft, walk, p, size)
+    }
+
+    fn boundary(
+        &self,
+        mesh: &Merged,
+        draft: &mut Draft,
+        walk: &FaceWalk,
+        p: usize,
+        size: Size,
+    ) -> Result<()> {
+        let here = mesh.parts()[p].rank;
+        let dir = self.dir(here);
+        let counts = &walk.census.patches[p];
+        let plain = self.names.patches.iter().map(|(label, name)| Patch {
+            name: name.clone(),
+            between: None,
+            n_faces: counts.get(label).copied().unwrap_or_default(),
+        });
+        let shared = walk.census.between[p]
+            .iter()
+            .map(|(&there, &n_faces)| Patch {
+                name: format!("procBoundary{here}to{there}"),
+                between: Some([here as usize, there as usize]),
+                n_faces,
+            });
+        let patches: Vec<_> = plain.chain(shared).collect();
+        write_boundary(draft, &dir, size.inner, &patches)?;
+        let what = (dir.as_path(), "boundaryProcAddressing");
+        write_labels(draft, what, patches.len() as u64, self.ascii, |file| {
+            (0..).zip(&patches).try_for_each(|(number, patch)| {
+                file.label(if patch.between.is_some() { -1 } else { number })
+            })
+        })
+    }
+
+    /// Points and cell zones of a sub-domain, and the numbers of its points and cells in the whole.
+    fn points_and_cells(
+        &self,
+        mesh: &mut Merged,
+        draft: &mut Draft,
+        p: usize,
+        size: Size,
+    ) -> Result<()> {
+        let (scratch, bytes) = (mesh.dir().to_owned(), mesh.sorter_bytes());
+        let Opened {
+            mut part,
+            numbers,
+            first_tet,
+        } = mesh.open_part(p)?;
+        let (dir, ascii) = (self.dir(part.id().rank()), self.ascii);
+        let what = (dir.as_path(), "points", "vectorField");
+        let mut points = FoamFile::create(draft, what, "", ascii, 24 * size.points)?;
+        points.list(size.points, |file| {
+            for vertex in part.vertices() {
+                file.point(vertex?.point)?;
+            }
+            Ok(())
+        })?;
+        points.finish()?;
+        write_labels(
+            draft,
+            (&dir, "pointProcAddressing"),
+            size.points,
+            ascii,
+            |file| (0..size.points as u32).try_for_each(|v| file.label(numbers.of(v) as i32)),
+        )?;
+        write_labels(
+            draft,
+            (&dir, "cellProcAddressing"),
+            size.cells,
+            ascii,
+            |file| {
+                (0..size.cells as u32)
+                    .try_for_each(|cell| file.label((first_tet as u32 + cell) as i32))
+            },
+        )?;
+        let mut zones = Zones::new(&scratch, false, bytes);
+        for tet in part.tets() {
+            let (id, tet) = tet?;
+            zones.push(tet.region, id.local(), false)?;
+        }
+        mesh.advance(size.cells as usize);
+        zones.write(draft, &dir, &self.names.cell_zones, ascii)
+    }
+}

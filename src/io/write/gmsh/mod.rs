@@ -1,0 +1,107 @@
+//! Gmsh 4.1, binary or text: physical surfaces are labels, physical volumes regions.
+//!
+//! Of several sub-domains each is a partition, numbered from 1, whose part of a label or region is an entity of its own below the label's or
+//! region's. Elements are numbered from 1, triangles first; all numbers are those of the whole, also in files of one partition, named
+//! `NAME_1.msh` and so on. Each vertex stands with the first entity it is on, surfaces before volumes.
+//! Source: the Gmsh reference manual, "MSH file format".
+
+mod elements;
+mod entities;
+mod ghosts;
+mod nodes;
+mod out;
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use super::draft::Draft;
+use super::error::Result;
+use super::merged::Merged;
+use super::report::FileCounts;
+use super::selection::Selection;
+use entities::Entities;
+use out::Out;
+
+/// Writes one file of all, or one of each partition.
+pub(super) fn write(
+    mesh: &mut Merged,
+    draft: &mut Draft,
+    out: &Path,
+    selection: &Selection,
+) -> Result<FileCounts> {
+    mesh.expect_passes(1, 1);
+    if !selection.pieces {
+        let all: Vec<usize> = (0..mesh.n_parts()).collect();
+        return write_file(mesh, draft, out, &all, selection);
+    }
+    let mut counts = FileCounts::default();
+    for (p, part) in mesh.parts().into_iter().enumerate() {
+        let ranks: &BTreeSet<u32> = &selection.subdomains;
+        if ranks.is_empty() || ranks.contains(&part.rank) {
+            let path = piece_path(out, part.rank);
+            let written = write_file(mesh, draft, &path, &[p], selection)?;
+            counts.vertices += written.vertices;
+            counts.tets += written.tets;
+            counts.triangles += written.triangles;
+        }
+    }
+    Ok(counts)
+}
+
+/// `NAME_1.msh` of the first sub-domain, as Gmsh itself calls the files of partitions.
+fn piece_path(out: &Path, rank: u32) -> PathBuf {
+    let stem = out.file_stem().unwrap_or_default().to_string_lossy();
+    let ending = out.extension().unwrap_or_default().to_string_lossy();
+    out.with_file_name(format!("{stem}_{}.{ending}", rank + 1))
+}
+
+/// Writes the partitions `which`, by their places among all.
+fn write_file(
+    mesh: &mut Merged,
+    draft: &mut Draft,
+    path: &Path,
+    which: &[usize],
+    selection: &Selection,
+) -> Result<FileCounts> {
+    let entities = Entities::gather(mesh, which)?;
+    let (ascii, n_tets) = (selection.ascii, entities.n_tets());
+    let nodes = nodes::gather(mesh, which, &entities, path)?;
+    let elements_bytes = if ascii { 30 } else { 40 };
+    let vertex_bytes = if ascii { 55 } else { 32 };
+    let bytes = 1000 + vertex_bytes * nodes.n + elements_bytes * (n_tets + entities.n_faces());
+    let file = draft.create(path, bytes)?;
+    let mut out = Out::open(&file, ascii)?;
+    out.section("MeshFormat", |out| {
+        out.text(if ascii { "4.1 0 8\n" } else { "4.1 1 8\n" });
+        if !ascii {
+            out.int(1);
+            out.text("\n");
+        }
+        Ok(())
+    })?;
+    let names = entities.physical_names(mesh);
+    out.section("PhysicalNames", |out| {
+        out.text(&names);
+        Ok(())
+    })?;
+    out.section("Entities", |out| entities.write_model(out))?;
+    if entities.is_partitioned() {
+        out.section("PartitionedEntities", |out| {
+            entities.write_partitioned(out, mesh.n_parts(), selection.ghosts)
+        })?;
+    }
+    out.section("Nodes", |out| nodes.write(out, &entities))?;
+    out.section("Elements", |out| {
+        elements::write(mesh, out, which, &entities)
+    })?;
+    if selection.ghosts {
+        let count = ghosts::gather(mesh, which, ascii)?;
+        out.section("GhostElements", |out| ghosts::write(mesh, out, count))?;
+    }
+    out.finish()?;
+    Ok(FileCounts {
+        vertices: nodes.n,
+        tets: n_tets,
+        triangles: entities.n_faces(),
+    })
+}

@@ -1,0 +1,26 @@
+//! Names of labels for programs that do not take every text.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Names that Abaqus and OpenFOAM take: letters, digits, `_` and `-`, a letter first, at most 80, case not distinguished.
+pub(super) fn set_names(labels: &BTreeMap<u32, String>) -> BTreeMap<u32, String> {
+    let mut taken = BTreeSet::new();
+    let mut names = BTreeMap::new();
+    for (&label, name) in labels {
+        let letter = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+        let mut clean: String = name
+            .chars()
+            .map(|c| if letter(c) { c } else { '_' })
+            .collect();
+        if !clean.starts_with(|c: char| c.is_ascii_alphabetic()) {
+            clean.insert_str(0, "label_");
+        }
+        clean.truncate(60);
+        if !taken.insert(clean.to_ascii_lowercase()) {
+            clean += &format!("_{label}");
+            taken.insert(clean.to_ascii_lowercase());
+        }
+        names.insert(label, clean);
+    }
+    names
+}

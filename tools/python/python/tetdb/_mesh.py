@@ -1,0 +1,196 @@
+"""New meshes, and those that were interrupted."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _native, _options
+from ._options import Progress
+from ._sizes import Length, Size
+from ._store import Store
+from ._surface import Surface
+
+__all__ = ["Comparison", "compare", "mesh", "open", "resume", "tetrahedralize"]
+
+
+def mesh(
+    surface: Any,
+    path: str | os.PathLike[str],
+    *,
+    hsiz: Length | None = None,
+    hmin: Length | None = None,
+    hmax: Length | None = None,
+    hgrad: float | None = None,
+    size: Size | Iterable[Size] | None = None,
+    regions: str = "parity",
+    optimize: str = "full",
+    subdomains: int | None = None,
+    memory: int | str | None = None,
+    threads: int | None = None,
+    progress: bool | Progress | None = None,
+    existing: str = "keep",
+    keep_coarse: bool = True,
+    verify: bool = True,
+) -> Store:
+    """Meshes a surface into a new store and opens it.
+
+    The mesh depends on the surface and on the options above `memory` alone. Ctrl-C, or an exception of `progress`, ends the run soon
+    and leaves a store that :func:`resume` goes on with.
+
+    Parameters
+    ----------
+    surface : Surface, or what :class:`Surface` takes
+        What is meshed; its triangles all stay.
+    path : path
+        Folder of the store.
+    hsiz, hmin, hmax : float or str, optional
+        Wanted, least and greatest edge length inside: in the surface's units, or ``"2%"`` of the diagonal of its box.
+    hgrad : float, optional
+        Greatest ratio of neighboring edge lengths. Default: 1.3.
+    size : Box, Sphere, Cylinder, InRegion, Field, Function, callable, str, path, or a list of them, optional
+        Where edges are shorter. Of everything that applies the least length counts. A callable takes points (k, 3) and returns lengths
+        (k,); it is asked once, on a regular grid (see :class:`Function`), and what it said is kept in the store.
+    regions : {"parity", "all", "outer", "by-orientation"}
+        Which enclosed regions are filled.
+    optimize : {"full", "delaunay", "none"}
+        How far tetrahedra are improved.
+    subdomains : int, optional
+        How many. Default: one for each two million tetrahedra.
+    memory : int or str, optional
+        Bytes the run may hold, or text such as ``"8GiB"``. Default: 60 % of what is free.
+    threads : int, optional
+        Default: one per core.
+    progress : bool or callable, optional
+        True prints; a callable takes an :class:`Event`, on the calling thread, twenty times a second at most.
+    existing : {"keep", "replace"}
+        The finished mesh of the same surface and options is returned as it is; anything else at `path` is refused, or replaced.
+    keep_coarse : bool
+        Whether sub-domains can be meshed again.
+    verify : bool
+        Whether the finished mesh is verified by exact predicates.
+
+    Returns
+    -------
+    Store
+
+    Raises
+    ------
+    SurfaceError
+        A surface with defects, before anything is written.
+    OutOfMemory, NoRoom
+        Memory or disk is not expected to hold the mesh.
+    KeyboardInterrupt
+        After Ctrl-C.
+    TetdbError
+        Everything else; `code`, `where` and `help` say what.
+
+    Examples
+    --------
+    >>> import tetdb, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     with tetdb.mesh(tetdb.sample("box,h=0.5"), folder + "/box.tetdb", hsiz="20%") as store:
+    ...         store.n_tets > 0, store.is_verified
+    (True, True)
+    """
+    given = surface if isinstance(surface, Surface) else Surface(surface)
+    job = _options.job(
+        given.bounds, hsiz, hmin, hmax, hgrad, size, regions, optimize, subdomains, keep_coarse
+    )
+    settings = _options.settings(memory, threads)
+    replace = _options.one_of(existing, ("keep", "replace"), "existing") == "replace"
+    listener = _options.listener(progress)
+    where = _path(path)
+    _native.mesh(given._inner, where, job, settings, replace, bool(verify), listener)
+    return Store(where, memory=memory, threads=threads)
+
+
+def resume(
+    path: str | os.PathLike[str],
+    *,
+    memory: int | str | None = None,
+    threads: int | None = None,
+    progress: bool | Progress | None = None,
+) -> Store:
+    """Goes on with an interrupted run, verifies and opens the store: the mesh of a run that was never interrupted."""
+    where, settings = _path(path), _options.settings(memory, threads)
+    _native.resume(where, settings, _options.listener(progress))
+    return Store(where, memory=memory, threads=threads)
+
+
+def open(
+    path: str | os.PathLike[str], *, memory: int | str | None = None, threads: int | None = None
+) -> Store:
+    """Opens a finished store."""
+    return Store(_path(path), memory=memory, threads=threads)
+
+
+def tetrahedralize(
+    points: Any, triangles: npt.ArrayLike | None = None, **options: Any
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int32]]:
+    """Points (n, 3) and tetrahedra (m, 4) of a mesh that fits into memory; its store is temporary.
+
+    Parameters
+    ----------
+    points, triangles
+        As of :class:`Surface`.
+    **options
+        As of :func:`mesh`.
+
+    Examples
+    --------
+    >>> import tetdb
+    >>> s = tetdb.sample("box,h=0.5")
+    >>> points, tets = tetdb.tetrahedralize(s.points, s.triangles, hsiz=0.3)
+    >>> points.shape[1], tets.shape[1], int(tets.max()) < len(points)
+    (3, 4, True)
+    """
+    with tempfile.TemporaryDirectory(prefix="tetdb-") as folder:
+        with mesh(Surface(points, triangles), os.path.join(folder, "mesh"), **options) as store:
+            merged = store.merged()
+            return merged.points, merged.tets
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Whether two stores hold the same mesh, bit for bit.
+
+    Attributes
+    ----------
+    same : bool
+        The same mesh in the same sub-domains.
+    digests : tuple of str
+        Of both.
+    subdomains : list of int
+        Ranks of those that differ, or that only one has.
+    """
+
+    same: bool
+    digests: tuple[str, str]
+    subdomains: list[int]
+
+
+def compare(a: Store | str | os.PathLike[str], b: Store | str | os.PathLike[str]) -> Comparison:
+    """Compares two finished stores by their digests."""
+    stores = [s if isinstance(s, Store) else open(s) for s in (a, b)]
+    rows = [{s.rank: s.digest for s in store.subdomains} for store in stores]
+    ranks = sorted(rows[0].keys() | rows[1].keys())
+    differ = [rank for rank in ranks if rows[0].get(rank) != rows[1].get(rank)]
+    digests = stores[0].digest, stores[1].digest
+    return Comparison(digests[0] == digests[1], digests, differ)
+
+
+def _path(path: Any) -> str:
+    try:
+        where = os.fsdecode(path)
+    except TypeError:
+        raise _options.usage(f"{path!r} is no path", "path") from None
+    if not where or "\0" in where:
+        raise _options.usage(f"{path!r} is no path", "path")
+    return where

@@ -1,0 +1,139 @@
+"""Options as the native half takes them."""
+
+from __future__ import annotations
+
+import operator
+import re
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from . import _sizes
+from ._errors import TetdbError
+from ._sizes import Length, Size
+
+__all__ = ["Event"]
+
+_UNITS = {
+    "K": 2**10, "KiB": 2**10, "M": 2**20, "MiB": 2**20, "G": 2**30, "GiB": 2**30, "T": 2**40, "TiB": 2**40,
+    "kB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Event:
+    """What a run says while it works.
+
+    Attributes
+    ----------
+    kind : str
+        ``"progress"``, ``"note"``, ``"warning"``, or ``"store"``: from now on there is a store at the path `text`.
+    text : str
+        Of progress the stage, one or two words; otherwise the sentence or the path.
+    done, total, unit
+        Of progress: work done, work in all where that is known, what they count.
+    """
+
+    kind: str
+    text: str
+    done: int = 0
+    total: int | None = None
+    unit: str = ""
+
+
+Progress = Callable[[Event], object]
+
+
+def _printer() -> Callable[..., object]:
+    seen: list[tuple[str, int]] = []
+
+    def show(kind: str, text: str, done: int, total: int | None, unit: str) -> None:
+        if kind != "progress":
+            print(f"tetdb: {text}", flush=True)
+            return
+        part = text, (10 * done // total if total else 0)
+        if [part] != seen:
+            seen[:] = [part]
+            print(f"tetdb: {text} {done}{f' of {total}' if total else ''} {unit}", flush=True)
+
+    return show
+
+
+def listener(progress: bool | Progress | None) -> Callable[..., object] | None:
+    if progress is None or progress is False:
+        return None
+    if progress is True:
+        return _printer()
+    if not callable(progress):
+        raise usage(f"{progress!r} is neither True nor a callable", "progress")
+    return lambda *words: progress(Event(*words))
+
+
+def usage(message: str, where: str) -> TetdbError:
+    return TetdbError("usage", message, where)
+
+
+def one_of(value: Any, words: tuple[str, ...], where: str) -> str:
+    if not isinstance(value, str) or value not in words:
+        raise usage(f"{value!r}: expected one of {', '.join(words)}", where)
+    return value
+
+
+def count(value: Any, least: int, where: str) -> int:
+    try:
+        number = operator.index(value)
+    except TypeError:
+        raise usage(f"{value!r} is no whole number", where) from None
+    if isinstance(value, bool) or not least <= number < 2**31:
+        raise usage(f"{value!r}: expected a whole number from {least}", where)
+    return number
+
+
+def settings(memory: int | str | None, threads: int | None) -> dict[str, Any]:
+    if threads is not None:
+        threads = count(threads, 1, "threads")
+    return {"memory": None if memory is None else size_of_memory(memory), "threads": threads}
+
+
+def size_of_memory(memory: Any) -> int:
+    """Bytes of ``8 * 2**30``, ``"8GiB"`` or ``"2GB"``."""
+    if isinstance(memory, str):
+        found = re.fullmatch(r"\s*(\d+(?:\.\d*)?)\s*([a-zA-Z]+)\s*", memory)
+        if found and found[2] in _UNITS:
+            return int(float(found[1]) * _UNITS[found[2]])
+    else:
+        try:
+            if (number := operator.index(memory)) >= 0 and not isinstance(memory, bool):
+                return number
+        except TypeError:
+            pass
+    raise TetdbError("bad-memory", f"{memory!r} is not a memory size", "memory", "give bytes, or text such as '8GiB'")
+
+
+def ranks(value: Any, where: str) -> list[int]:
+    every = [value] if isinstance(value, int) else value
+    try:
+        return [count(one, 0, where) for one in every]
+    except TypeError:
+        raise usage(f"{value!r} is no list of sub-domains", where) from None
+
+
+def job(
+    bounds: Sequence[Sequence[float]],
+    hsiz: Length | None,
+    hmin: Length | None,
+    hmax: Length | None,
+    hgrad: float | None,
+    size: Size | Iterable[Size] | None,
+    regions: str,
+    optimize: str,
+    subdomains: int | None,
+    keep_coarse: bool,
+) -> dict[str, Any]:
+    return {
+        "sizes": _sizes.words(bounds, hsiz, hmin, hmax, hgrad, size),
+        "regions": one_of(regions, ("parity", "all", "outer", "by-orientation"), "regions"),
+        "optimize": one_of(optimize, ("none", "delaunay", "full"), "optimize"),
+        "subdomains": None if subdomains is None else count(subdomains, 1, "subdomains"),
+        "keep_coarse": bool(keep_coarse),
+    }

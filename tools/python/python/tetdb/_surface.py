@@ -1,0 +1,294 @@
+"""Surfaces: from files, arrays or other packages' meshes; checked, repaired, refined."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _native, _options
+from ._errors import SurfaceError, TetdbError
+from ._sizes import Length, Size, length
+
+__all__ = ["CheckReport", "Defects", "Estimate", "Surface", "sample"]
+
+
+@dataclass(frozen=True, eq=False)
+class Defects:
+    """What is wrong with a surface, kind by kind; all arrays run parallel.
+
+    Attributes
+    ----------
+    codes : list of str
+        The kind of each, such as ``"open-surface"``.
+    triangles : (n, 2) int64
+        The triangles it is about; -1 where there is no second one.
+    places : (n, 3) float64
+        A position where it can be seen, in the surface's units.
+    """
+
+    codes: list[str]
+    triangles: npt.NDArray[np.int64]
+    places: npt.NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.codes)
+
+
+@dataclass(frozen=True, eq=False)
+class CheckReport:
+    """All that is wrong with a surface, and what its triangles allow.
+
+    Attributes
+    ----------
+    ok : bool
+        Whether it can be meshed.
+    defects : Defects
+        Up to 100,000 of them, with places.
+    n_defects : int
+        All of them.
+    messages : list of str
+        The first hundred in words.
+    n_open_edges, n_small_angles, n_forcing_triangles : int
+        Edges with one triangle; triangles with an angle below five degrees; triangles on which no tetrahedron can have q < 2.
+    edges : tuple of float
+        Least, median and greatest edge length.
+    volume : float or None
+        Enclosed volume of a closed surface.
+    """
+
+    ok: bool
+    defects: Defects
+    n_defects: int
+    messages: list[str]
+    n_open_edges: int
+    n_small_angles: int
+    n_forcing_triangles: int
+    edges: tuple[float, ...]
+    volume: float | None
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What to expect of a mesh: counts, bytes, seconds on a server of 2.6 GHz."""
+
+    tets: float
+    vertices: float
+    subdomains: int
+    store_bytes: int
+    disk_peak_bytes: int
+    memory_least_bytes: int
+    seconds: float
+
+
+class Surface:
+    """A triangle surface with labels; all triangles are turned like their neighbors.
+
+    Parameters
+    ----------
+    points : (n, 3) float array, or a mesh
+        Vertices; or all at once: a PyVista ``PolyData`` of triangles, a trimesh or meshio mesh, a path, a list of paths.
+    triangles : (m, 3) int array
+        Positions in `points`, counter-clockwise seen from outside or all the other way.
+    labels : (m,) array of str or int, optional
+        The label of each triangle.
+
+    Raises
+    ------
+    SurfaceError
+        Wrong shapes or types, numbers that are not finite, triangles that name no point; `where` says which.
+
+    Examples
+    --------
+    >>> import tetdb
+    >>> points = [[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    >>> s = tetdb.Surface(points, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    >>> s.n_triangles, s.check().ok
+    (4, True)
+    """
+
+    _inner: _native.Surface
+
+    def __init__(
+        self,
+        points: Any,
+        triangles: npt.ArrayLike | None = None,
+        labels: Sequence[str] | npt.ArrayLike | None = None,
+    ) -> None:
+        if triangles is None:
+            if isinstance(points, Surface):
+                self._inner = points._inner
+                return
+            if _is_path(points):
+                self._inner = _native.Surface.read([os.fspath(points)])
+                return
+            if isinstance(points, (list, tuple)) and points and all(map(_is_path, points)):
+                self._inner = _native.Surface.read([os.fspath(p) for p in points])
+                return
+            points, triangles, found = _of_mesh(points)
+            labels = found if labels is None else labels
+        self._inner = _of_arrays(points, triangles, labels)
+
+    @classmethod
+    def read(cls, *files: str | os.PathLike[str]) -> Surface:
+        """Reads files as one surface: STL, PLY, OBJ, OFF, MEDIT, Gmsh, TetGen; each a label unless it has its own."""
+        return cls._of(_native.Surface.read([os.fspath(f) for f in files]))
+
+    @classmethod
+    def _of(cls, native: _native.Surface) -> Surface:
+        surface = cls.__new__(cls)
+        surface._inner = native
+        return surface
+
+    @property
+    def points(self) -> npt.NDArray[np.float64]:
+        """(n, 3) float64: the vertices, those with the same coordinates once. A copy."""
+        return self._inner.points()
+
+    @property
+    def triangles(self) -> npt.NDArray[np.int32]:
+        """(m, 3) int32: positions in `points`. A copy."""
+        return self._inner.triangles().view(np.int32)
+
+    @property
+    def labels(self) -> npt.NDArray[np.str_]:
+        """(m,) str: the label of each triangle."""
+        names, codes = self._inner.labels()
+        return np.array(names, dtype=np.str_)[codes]
+
+    @property
+    def n_points(self) -> int:
+        return self._inner.n_points()
+
+    @property
+    def n_triangles(self) -> int:
+        return self._inner.n_triangles()
+
+    @property
+    def bounds(self) -> tuple[tuple[float, ...], ...]:
+        """Low and high corner of the smallest box around it."""
+        return tuple(tuple(corner) for corner in self._inner.bounds())
+
+    def check(self) -> CheckReport:
+        """Finds all that is wrong, by exact predicates. Defects are an answer, not an error."""
+        words, codes, triangles, places = self._inner.check()
+        said = json.loads(words)
+        edges = tuple(said.pop("edges"))
+        ok = said["n_defects"] == 0
+        return CheckReport(ok=ok, defects=Defects(codes, triangles, places), edges=edges, **said)
+
+    def repaired(self, weld: float | None = None) -> Surface:
+        """Without triangles of no area and repeated ones, divided at T-junctions, turned alike.
+
+        Parameters
+        ----------
+        weld : float, optional
+            Points nearer than this share of the box diagonal are joined; up to 0.01.
+        """
+        if weld is not None and not isinstance(weld, (int, float)):
+            raise TetdbError("bad-size", f"{weld!r} is no share of the box diagonal", "weld")
+        return self._of(self._inner.repaired(weld))
+
+    def refined(self, hsiz: Length) -> Surface:
+        """The same surface with edges of `hsiz` at most; new vertices lie on the old triangles."""
+        return self._of(self._inner.refined(length(hsiz, "hsiz")))
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Writes ``.stl``, ``.off``, ``.obj`` or ``.ply``."""
+        self._inner.write(os.fspath(path))
+
+    def estimate(
+        self,
+        *,
+        hsiz: Length | None = None,
+        hmin: Length | None = None,
+        hmax: Length | None = None,
+        hgrad: float | None = None,
+        size: Size | Iterable[Size] | None = None,
+        regions: str = "parity",
+        subdomains: int | None = None,
+        memory: int | str | None = None,
+        threads: int | None = None,
+    ) -> Estimate:
+        """Tetrahedra, memory, disk and time to expect; nothing is written. Options as of :func:`mesh`.
+
+        Examples
+        --------
+        >>> import tetdb
+        >>> 100 < tetdb.sample("box,h=0.5").estimate(hsiz="10%").tets < 10_000
+        True
+        """
+        job = _options.job(
+            self.bounds, hsiz, hmin, hmax, hgrad, size, regions, "full", subdomains, True
+        )
+        settings = _options.settings(memory, threads)
+        return Estimate(**json.loads(_native.predict(self._inner, job, settings)))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Surface, (self.points, self.triangles, self.labels)
+
+    def __repr__(self) -> str:
+        return f"<tetdb.Surface: {self.n_points} points, {self.n_triangles} triangles>"
+
+
+def sample(spec: str) -> Surface:
+    """A generated surface such as ``"balls,count=100,seed=1"`` or ``"box,h=0.1"``."""
+    if not isinstance(spec, str):
+        raise SurfaceError("bad-sample", f"{spec!r} is no text", "spec")
+    return Surface._of(_native.Surface.sample(spec))
+
+
+def _is_path(value: object) -> bool:
+    return isinstance(value, (str, os.PathLike))
+
+
+def _of_mesh(mesh: Any) -> tuple[Any, Any, Any]:
+    """Points, triangles and labels of another package's mesh, told by its attributes."""
+    if hasattr(mesh, "cells_dict") and hasattr(mesh, "points"):
+        return mesh.points, mesh.cells_dict.get("triangle", np.empty((0, 3), int)), None
+    if hasattr(mesh, "regular_faces") and hasattr(mesh, "points"):
+        if not mesh.is_all_triangles:
+            raise SurfaceError("unsupported-content", "the mesh has faces that are no triangles", "points", "call its triangulate() first")
+        label = mesh.cell_data["label"] if "label" in mesh.cell_data else None
+        return mesh.points, np.asarray(mesh.regular_faces).reshape(-1, 3), label
+    if hasattr(mesh, "vertices") and hasattr(mesh, "faces"):
+        return mesh.vertices, mesh.faces, None
+    raise SurfaceError("unsupported-content", f"{type(mesh).__name__} is no surface", "points", "give points and triangles, a mesh of PyVista, trimesh or meshio, or paths")
+
+
+def _of_arrays(points: Any, triangles: Any, labels: Any) -> _native.Surface:
+    try:
+        xyz = np.asarray(points)
+        tri = np.asarray(triangles)
+    except (TypeError, ValueError) as error:
+        raise SurfaceError("unsupported-content", f"no array: {error}", "points or triangles") from None
+    if xyz.dtype.kind not in "fiu" or xyz.ndim != 2 or xyz.shape[1] != 3:
+        raise SurfaceError("unsupported-content", f"expected real numbers (n, 3), found {xyz.dtype} {xyz.shape}", "points")
+    if tri.size == 0 and tri.ndim == 2 and tri.shape[1] == 3:
+        tri = tri.astype(np.int64)
+    if tri.dtype.kind not in "iu" or tri.ndim != 2 or tri.shape[1] != 3:
+        raise SurfaceError("unsupported-content", f"expected integers (m, 3), found {tri.dtype} {tri.shape}", "triangles")
+    bad = np.flatnonzero(((tri < 0) | (tri >= len(xyz))).any(axis=1))
+    if bad.size:
+        raise SurfaceError(
+            "index-out-of-range",
+            f"it names point {tri[bad[0]].tolist()}, but there are {len(xyz)}",
+            f"triangle {bad[0]}",
+        )
+    named = None
+    if labels is not None:
+        each = np.asarray(labels)
+        if each.shape != (len(tri),) or each.dtype.kind not in "UiuO":
+            raise SurfaceError("count-mismatch", f"expected one label for each of {len(tri)} triangles, found {each.dtype} {each.shape}", "labels")
+        names, codes = np.unique(each.astype(np.str_), return_inverse=True)
+        named = [str(n) for n in names], codes.astype(np.int64)
+    return _native.Surface.of_arrays(
+        np.ascontiguousarray(xyz, dtype=np.float64),
+        np.ascontiguousarray(tri, dtype=np.uint32),
+        named,
+    )

@@ -1,0 +1,375 @@
+//! A finished store: questions, files, pictures, sub-domains again.
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
+use pyo3::prelude::*;
+use serde_json::json;
+use tetdb::data::Hit;
+use tetdb::{CancelToken, ColorBy, ExportOptions, Order, Snapshot, VerifyLevel};
+
+use crate::failure::Failure;
+use crate::part::Part;
+use crate::run::SettingWords;
+use crate::sizes::SizeWords;
+use crate::watched::{Board, Listener, watched};
+
+/// Words of a hit: id, 4 vertices, region and sub-domain in one, 12 coordinates, 3 of the centroid, 6 numbers.
+const HIT_WORDS: usize = 27;
+
+/// Where a store is and how it is worked with. What is asked goes through one session, question after question; everything else opens
+/// the store for itself.
+#[pyclass(frozen, module = "tetdb._native")]
+pub struct Store {
+    path: PathBuf,
+    settings: SettingWords,
+    token: CancelToken,
+    session: Mutex<Option<tetdb::Store>>,
+    /// The process that opened it: threads and locks of a session are not there in a child.
+    process: u32,
+}
+
+/// A question, as the Python half words it.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+struct QueryWords {
+    condition: Option<String>,
+    box_: Option<[[f64; 3]; 2]>,
+    sphere: Option<([f64; 3], f64)>,
+    plane: Option<[[f64; 3]; 2]>,
+    inside: bool,
+    subdomains: Option<Vec<u32>>,
+    regions: Option<Vec<u32>>,
+    labels: Option<Vec<u32>>,
+    touching_surface: bool,
+    order_by: Option<(String, bool)>,
+    limit: Option<usize>,
+}
+
+/// A picture.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+struct PictureWords {
+    kind: String,
+    color: String,
+    plane: Option<[[f64; 3]; 2]>,
+    seen_from: Option<[f64; 3]>,
+    condition: Option<String>,
+    crinkle: bool,
+    pixels: [u32; 2],
+}
+
+/// Sub-domains again.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+struct RemeshWords<'py> {
+    ranks: Vec<u32>,
+    sizes: Option<SizeWords<'py>>,
+    lengths: Option<Vec<f64>>,
+    scale: f64,
+    repair: bool,
+}
+
+impl Store {
+    /// A store of its own for one piece of work.
+    fn opened(&self, token: &CancelToken) -> Result<tetdb::Store, Failure> {
+        let settings = self.settings.settings(token, None);
+        Ok(tetdb::Store::open_with(&self.path, settings)?)
+    }
+
+    fn alone<T: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(tetdb::Store) -> Result<T, Failure> + Send,
+    ) -> PyResult<T> {
+        let token = CancelToken::new();
+        watched(py, &token, None, || work(self.opened(&token)?))
+    }
+
+    fn in_session<T: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut tetdb::Store) -> Result<T, Failure> + Send,
+    ) -> PyResult<T> {
+        watched(py, &self.token, None, || {
+            let mut session = self.session.lock().unwrap_or_else(PoisonError::into_inner);
+            if session.is_none() {
+                *session = Some(self.opened(&self.token)?);
+            }
+            work(session.as_mut().expect("it was opened above"))
+        })
+    }
+
+    /// Changes the store, with the session closed: it reads, and nobody may while the store is written.
+    fn changed(
+        &self,
+        py: Python<'_>,
+        callable: Option<&Py<PyAny>>,
+        work: impl FnOnce(tetdb::Store) -> Result<(), Failure> + Send,
+    ) -> PyResult<()> {
+        let (token, board) = (CancelToken::new(), Arc::new(Board::default()));
+        let listener = Listener {
+            board: &board,
+            callable,
+        };
+        watched(py, &token, Some(&listener), || {
+            let mut session = self.session.lock().unwrap_or_else(PoisonError::into_inner);
+            *session = None;
+            let settings = self.settings.settings(&token, Some(&board));
+            work(tetdb::Store::open_with(&self.path, settings)?)
+        })
+    }
+}
+
+impl Drop for Store {
+    fn drop(&mut self) {
+        if self.process != std::process::id() {
+            // Threads of the parent that would be waited for are not here.
+            let session = self.session.get_mut();
+            std::mem::forget(session.unwrap_or_else(PoisonError::into_inner).take());
+        }
+    }
+}
+
+#[pymethods]
+impl Store {
+    #[new]
+    fn new(py: Python<'_>, path: PathBuf, settings: SettingWords) -> PyResult<Self> {
+        let store = Self {
+            path,
+            settings,
+            token: CancelToken::new(),
+            session: Mutex::new(None),
+            process: std::process::id(),
+        };
+        store.in_session(py, |_| Ok(()))?;
+        Ok(store)
+    }
+
+    /// Closes the session; the next question opens another.
+    fn close(&self, py: Python<'_>) {
+        py.detach(|| {
+            *self.session.lock().unwrap_or_else(PoisonError::into_inner) = None;
+        });
+    }
+
+    /// What the store holds, as JSON.
+    fn summary(&self, py: Python<'_>) -> PyResult<String> {
+        self.alone(py, |store| {
+            let s = store.summary();
+            let words = json!({
+                "n_tets": s.n_tets, "n_vertices": s.n_vertices, "bytes": s.bytes,
+                "digest": s.digest, "is_verified": s.is_verified,
+                "worst_quality": s.worst_quality, "labels": s.labels, "regions": s.regions,
+                "subdomains": s.subdomains, "interfaces": s.interfaces,
+            });
+            Ok(words.to_string())
+        })
+    }
+
+    fn part(&self, py: Python<'_>, rank: u32) -> PyResult<Part> {
+        self.alone(py, |store| Ok(Part::new(store.subdomain(rank)?)))
+    }
+
+    /// Rows of [`HIT_WORDS`] words.
+    fn query<'py>(
+        &self,
+        py: Python<'py>,
+        words: QueryWords,
+    ) -> PyResult<Bound<'py, PyArray2<u64>>> {
+        let all = self.in_session(py, |store| {
+            let mut query = store.query();
+            if let Some([low, high]) = words.box_ {
+                query = query.in_box(low, high);
+            }
+            if let Some((center, radius)) = words.sphere {
+                query = query.in_sphere(center, radius);
+            }
+            if let Some([point, normal]) = words.plane {
+                query = query.at_plane(point, normal);
+            }
+            if words.inside {
+                query = query.inside();
+            }
+            if let Some(ranks) = &words.subdomains {
+                query = query.in_subdomains(ranks);
+            }
+            if let Some(regions) = &words.regions {
+                query = query.in_regions(regions);
+            }
+            if let Some(labels) = &words.labels {
+                query = query.on_labels(labels);
+            }
+            if words.touching_surface {
+                query = query.touching_surface();
+            }
+            if let Some(condition) = &words.condition {
+                query = query.where_(condition)?;
+            }
+            if let Some((variable, falls)) = &words.order_by {
+                let order = match falls {
+                    true => Order::Falling,
+                    false => Order::Rising,
+                };
+                query = query.order_by(variable, order)?;
+            }
+            if let Some(n) = words.limit {
+                query = query.limit(n);
+            }
+            let mut all = Vec::new();
+            for hit in query.answers()? {
+                all.extend(words_of(&hit?));
+            }
+            Ok(all)
+        })?;
+        let n = all.len() / HIT_WORDS;
+        PyArray1::from_vec(py, all).reshape([n, HIT_WORDS])
+    }
+
+    /// Ids, -1 outside, and barycentric coordinates.
+    #[expect(clippy::type_complexity, reason = "what Python takes apart at once")]
+    fn locate<'py>(
+        &self,
+        py: Python<'py>,
+        points: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<(Bound<'py, PyArray1<i64>>, Bound<'py, PyArray2<f64>>)> {
+        let points: Vec<[f64; 3]> = bytemuck::cast_slice(points.as_slice()?).to_vec();
+        let located = self.in_session(py, |store| Ok(store.locate_barycentric(&points)?))?;
+        let id = |found: &Option<(Hit, _)>| {
+            found
+                .as_ref()
+                .map_or(-1, |(hit, _)| hit.id.number().cast_signed())
+        };
+        let ids = PyArray1::from_vec(py, located.iter().map(id).collect());
+        let none = [f64::NAN; 4];
+        let shares = located
+            .iter()
+            .flat_map(|found| found.map_or(none, |(_, shares)| shares));
+        let shares = PyArray1::from_vec(py, shares.collect());
+        Ok((ids, shares.reshape([located.len(), 4])?))
+    }
+
+    /// Writes the mesh for another program; returns files with their lengths.
+    fn export(
+        &self,
+        py: Python<'_>,
+        out: PathBuf,
+        subdomains: Vec<u32>,
+        pieces: bool,
+        content: String,
+    ) -> PyResult<Vec<(PathBuf, u64)>> {
+        self.alone(py, |store| {
+            let mut options = ExportOptions::new().subdomains(&subdomains);
+            if pieces {
+                options = options.pieces();
+            }
+            options = match content.as_str() {
+                "boundary" => options.boundary(),
+                "interfaces" => options.interfaces(),
+                _ => options,
+            };
+            Ok(store.export(out, &options)?.files)
+        })
+    }
+
+    fn snapshot(&self, py: Python<'_>, out: PathBuf, words: PictureWords) -> PyResult<()> {
+        self.alone(py, |store| {
+            let mut picture = match words.kind.as_str() {
+                "surface" => Snapshot::surface(),
+                _ => Snapshot::cut(),
+            };
+            picture = picture.color(match words.color.as_str() {
+                "region" => ColorBy::Region,
+                "quality" => ColorBy::Quality,
+                "size" => ColorBy::Size,
+                _ => ColorBy::Subdomain,
+            });
+            if let Some([point, normal]) = words.plane {
+                picture = picture.plane(point, normal);
+            }
+            if let Some(direction) = words.seen_from {
+                picture = picture.seen_from(direction);
+            }
+            if let Some(condition) = &words.condition {
+                picture = picture.where_(condition)?;
+            }
+            if words.crinkle {
+                picture = picture.crinkle();
+            }
+            let [width, height] = words.pixels;
+            store.snapshot(out, &picture.pixels(width, height))?;
+            Ok(())
+        })
+    }
+
+    fn report(&self, py: Python<'_>, out: PathBuf) -> PyResult<u64> {
+        self.alone(py, |store| Ok(store.report(out)?))
+    }
+
+    /// Tetrahedra checked, and findings with how often each occurs.
+    fn verify(&self, py: Python<'_>, full: bool) -> PyResult<(u64, Vec<(String, u64)>)> {
+        self.alone(py, |store| {
+            let level = match full {
+                true => VerifyLevel::Delaunay,
+                false => VerifyLevel::Geometry,
+            };
+            let found = store.verify(level)?;
+            Ok((found.n_tets(), found.findings()))
+        })
+    }
+
+    fn resaturate(
+        &self,
+        py: Python<'_>,
+        words: RemeshWords<'_>,
+        callable: Option<Py<PyAny>>,
+    ) -> PyResult<()> {
+        let sizes = match &words.sizes {
+            Some(sizes) => Some(sizes.sizes(py)?),
+            None => None,
+        };
+        let (ranks, lengths) = (words.ranks, words.lengths);
+        let (scale, repair) = (words.scale, words.repair);
+        self.changed(py, callable.as_ref(), move |store| {
+            let mut remesh = store.remesh().subdomains(&ranks).scaled(scale);
+            if let Some(sizes) = sizes {
+                remesh = remesh.sizes(sizes);
+            }
+            if let Some(lengths) = lengths {
+                remesh = remesh.lengths_of_tets(lengths);
+            }
+            if repair {
+                remesh = remesh.repair();
+            }
+            remesh.run()?;
+            Ok(())
+        })
+    }
+
+    fn undo(&self, py: Python<'_>) -> PyResult<()> {
+        self.changed(py, None, |store| Ok(store.undo().map(drop)?))
+    }
+
+    fn forget_previous(&self, py: Python<'_>) -> PyResult<()> {
+        self.changed(py, None, |mut store| {
+            Ok(store.forget_previous().map(drop)?)
+        })
+    }
+}
+
+fn words_of(hit: &Hit) -> [u64; HIT_WORDS] {
+    let [quality, _, _, volume, x, y, z, rest @ ..] = hit.values();
+    let mut words = [0; HIT_WORDS];
+    words[0] = hit.id.number();
+    words[1..5].copy_from_slice(&hit.vertices);
+    let rank = u64::from(hit.id.subdomain().rank());
+    // Two integers of four bytes, the first one in the low half.
+    words[5] = u64::from(hit.region) | rank << 32;
+    let corners = hit.corners.into_iter().flat_map(|corner| corner.to_array());
+    let numbers = corners.chain([x, y, z, quality, volume]).chain(rest);
+    for (word, number) in words[6..].iter_mut().zip(numbers) {
+        *word = number.to_bits();
+    }
+    words
+}

@@ -1,0 +1,147 @@
+//! Surfaces: read, given as arrays, checked, repaired, refined.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::prelude::*;
+use serde_json::json;
+use tetdb::{CancelToken, DefectPlace};
+
+use crate::sizes::length;
+use crate::watched::watched;
+
+/// A surface; several may share its memory, and nobody changes it.
+#[pyclass(frozen, module = "tetdb._native")]
+pub struct Surface {
+    pub inner: Arc<tetdb::Surface>,
+}
+
+fn made(
+    py: Python<'_>,
+    work: impl FnOnce() -> Result<tetdb::Surface, tetdb::Error> + Send,
+) -> PyResult<Surface> {
+    let surface = watched(py, &CancelToken::new(), None, || Ok(work()?))?;
+    let inner = Arc::new(surface);
+    Ok(Surface { inner })
+}
+
+#[pymethods]
+impl Surface {
+    #[staticmethod]
+    fn read(py: Python<'_>, files: Vec<PathBuf>) -> PyResult<Self> {
+        made(py, || tetdb::Surface::read(files))
+    }
+
+    #[staticmethod]
+    fn sample(py: Python<'_>, spec: String) -> PyResult<Self> {
+        made(py, || tetdb::Surface::sample(&spec))
+    }
+
+    /// `codes` names for each triangle one of `names`. The arrays are copied while the interpreter's lock is held: nobody changes them meanwhile.
+    #[staticmethod]
+    fn of_arrays(
+        py: Python<'_>,
+        points: PyReadonlyArray2<'_, f64>,
+        triangles: PyReadonlyArray2<'_, u32>,
+        labels: Option<(Vec<String>, PyReadonlyArray1<'_, i64>)>,
+    ) -> PyResult<Self> {
+        let points: Vec<[f64; 3]> = bytemuck::cast_slice(points.as_slice()?).to_vec();
+        let triangles: Vec<[u32; 3]> = bytemuck::cast_slice(triangles.as_slice()?).to_vec();
+        let labels = match labels {
+            Some((names, codes)) => Some((names, codes.as_slice()?.to_vec())),
+            None => None,
+        };
+        made(py, move || {
+            let labels: Option<Vec<&str>> = labels.as_ref().map(|(names, codes)| {
+                let names = codes.iter().map(|&code| names[code as usize].as_str());
+                names.collect()
+            });
+            tetdb::Surface::from_arrays(&points, &triangles, labels.as_deref())
+        })
+    }
+
+    fn points<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        rows(py, bytemuck::cast_slice(self.inner.points()), 3)
+    }
+
+    fn triangles<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<u32>> {
+        rows(py, bytemuck::cast_slice(self.inner.triangles()), 3)
+    }
+
+    /// Names, and for each triangle a position among them.
+    fn labels<'py>(&self, py: Python<'py>) -> (Vec<String>, Bound<'py, PyArray1<u32>>) {
+        let codes = PyArray1::from_slice(py, self.inner.labels_of_triangles());
+        (self.inner.labels().to_vec(), codes)
+    }
+
+    fn n_points(&self) -> usize {
+        self.inner.n_vertices()
+    }
+
+    fn n_triangles(&self) -> usize {
+        self.inner.n_triangles()
+    }
+
+    fn bounds(&self) -> [[f64; 3]; 2] {
+        self.inner.bounds()
+    }
+
+    /// The report as JSON, and of its defects codes, triangles (-1: none) and positions.
+    #[expect(clippy::type_complexity, reason = "what Python takes apart at once")]
+    fn check<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(
+        String,
+        Vec<&'static str>,
+        Bound<'py, PyArray2<i64>>,
+        Bound<'py, PyArray2<f64>>,
+    )> {
+        let work = || Ok(self.inner.check()?);
+        let report = watched(py, &CancelToken::new(), None, work)?;
+        let words = json!({
+            "n_defects": report.n_defects, "n_open_edges": report.n_open_edges,
+            "n_small_angles": report.n_small_angles,
+            "n_forcing_triangles": report.n_forcing_triangles,
+            "edges": report.edges, "volume": report.volume,
+            "messages": report.defects.iter().take(100).map(ToString::to_string).collect::<Vec<_>>(),
+        });
+        let triangles = |place: &DefectPlace| place.triangles.map(|t| t.map_or(-1, i64::from));
+        let at = |place: &DefectPlace| place.at.unwrap_or([f64::NAN; 3]);
+        let all: Vec<_> = report.places.iter().map(triangles).collect();
+        let places: Vec<_> = report.places.iter().map(at).collect();
+        Ok((
+            words.to_string(),
+            report.places.iter().map(|place| place.code).collect(),
+            rows(py, bytemuck::cast_slice(&all), 2),
+            rows(py, bytemuck::cast_slice(&places), 3),
+        ))
+    }
+
+    fn repaired(&self, py: Python<'_>, weld: Option<f64>) -> PyResult<Self> {
+        made(py, || tetdb::Surface::clone(&self.inner).repaired(weld))
+    }
+
+    fn refined(&self, py: Python<'_>, hsiz: (f64, bool)) -> PyResult<Self> {
+        made(py, || {
+            tetdb::Surface::clone(&self.inner).refined(length(hsiz))
+        })
+    }
+
+    fn write(&self, py: Python<'_>, out: PathBuf) -> PyResult<()> {
+        let work = || Ok(self.inner.write(out)?);
+        watched(py, &CancelToken::new(), None, work)
+    }
+}
+
+/// A matrix of `width` columns.
+fn rows<'py, T: numpy::Element + Copy>(
+    py: Python<'py>,
+    all: &[T],
+    width: usize,
+) -> Bound<'py, PyArray2<T>> {
+    let array = PyArray1::from_slice(py, all);
+    let rows = array.reshape([all.len() / width, width]);
+    rows.expect("all rows are whole")
+}

@@ -1,0 +1,44 @@
+"""The mesh is the program's, bit for bit, whoever asks for it and with however many threads."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import tetdb
+
+CASES: list[tuple[str, list[str], dict[str, Any]]] = [
+    ("box,h=0.3", [], {}),
+    ("box,h=0.2", ["--hsiz", "7.3%"], {"hsiz": "7.3%"}),
+    ("box,h=0.3", ["--hsiz", "0.1", "--hgrad", "1.5"], {"hsiz": 0.1, "hgrad": 1.5}),
+    ("balls,count=3", ["--regions", "all"], {"regions": "all"}),
+    ("balls,count=2", ["--optimize", "none"], {"optimize": "none"}),
+    ("shells,count=2,h=0.3", ["--regions", "all", "--size-region", "2,0.15"],
+     {"regions": "all", "size": tetdb.InRegion(2, 0.15)}),
+    ("knot,h=0.2", ["--size-sphere", "2,0,0,0.5,0.1"], {"size": tetdb.Sphere((2, 0, 0), 0.5, 0.1)}),
+    ("knot,h=0.3", ["--size-box", "-1,-1,-1,1,1,1,0.1,20%"],
+     {"size": [tetdb.Box((-1, -1, -1), (1, 1, 1), 0.1, "20%")]}),
+    ("box,h=0.3", ["--size-expr", "0.06+0.3*abs(z)"], {"size": "0.06+0.3*abs(z)"}),
+    ("box,h=0.06", ["--subdomains", "2", "--hsiz", "0.04"], {"subdomains": 2, "hsiz": 0.04}),
+    ("sphere,h=0.3", ["--hmax", "20%", "--optimize", "delaunay"], {"hmax": "20%", "optimize": "delaunay"}),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("spec", "words", "options"), CASES, ids=[f"{c[0]} {' '.join(c[1])}" for c in CASES])
+def test_digests_are_those_of_the_program(
+    spec: str, words: list[str], options: dict[str, Any], run: Callable[..., str], tmp_path: Path
+) -> None:
+    run("sample", spec, "-o", "surface.off")
+    run("mesh", "surface.off", "-o", "program", "--threads", "1", *words)
+    wanted = run("digest", "program").split()[0]
+    surface = tetdb.Surface.read(tmp_path / "surface.off")
+    arrays = tetdb.Surface(surface.points, surface.triangles, surface.labels)
+    with tetdb.mesh(surface, tmp_path / "one", threads=1, **options) as one:
+        assert one.digest == wanted
+    with tetdb.mesh(arrays, tmp_path / "two", threads=2, memory="128MiB", **options) as two:
+        assert two.digest == wanted
+    # What one wrote is the same job for the other: nothing is meshed again.
+    assert tetdb.mesh(surface, tmp_path / "program", **options).digest == wanted
