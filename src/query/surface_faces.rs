@@ -22,7 +22,7 @@ impl SurfaceFaces {
 
     /// Reads those of a sub-domain; `lease` is for [`SurfaceFaces::bytes`]. Errors: damage.
     pub fn read(part: &mut Subdomain, lease: Lease) -> Result<Self, StoreError> {
-        let mut faces = Vec::new();
+        let mut faces = Vec::with_capacity(2 * part.row().facets as usize);
         for chunk in 0..part.row().chunks[2] {
             check_cancelled();
             for facet in part.facet_chunk(chunk)?.records {
