@@ -531,16 +531,16 @@ fn vertices_that_nearly_touch_have_a_bounded_load() {
 #[test]
 fn bad_values_are_named() {
     for (result, parts) in [
-        (Length::parse("--hsiz", "0"), ["--hsiz 0", "above zero"]),
-        (Length::parse("--hmin", "-1%"), ["--hmin -1%", "above zero"]),
-        (Length::parse("--hmax", "big"), ["--hmax big", "1%"]),
-        (Length::parse("--hsiz", "inf"), ["--hsiz inf", "above zero"]),
+        (Length::parse("hsiz", "0"), ["hsiz 0", "above zero"]),
+        (Length::parse("hmin", "-1%"), ["hmin -1%", "above zero"]),
+        (Length::parse("hmax", "big"), ["hmax big", "1%"]),
+        (Length::parse("hsiz", "inf"), ["hsiz inf", "above zero"]),
     ] {
         let message = result.unwrap_err().to_string();
         assert!(parts.iter().all(|part| message.contains(part)), "{message}");
     }
     let error = SizeOptions::parse(None, None, None, Some("1")).unwrap_err();
-    assert!(error.to_string().contains("--hgrad 1:"), "{error}");
+    assert!(error.to_string().contains("hgrad 1:"), "{error}");
     let (points, triangles) = cube(2, |i| i as f64 / 2.0);
     let crossed = options(None, Some("2"), Some("1"));
     let error = SizeField::build(&points, &triangles, &crossed).unwrap_err();
@@ -563,7 +563,7 @@ fn summaries_say_where_sizes_came_from() {
     .unwrap();
     let text = summary.to_string();
     assert!(
-        text.contains("--hsiz 1% = 0.0173") && text.contains("--hgrad 1.3"),
+        text.contains("hsiz 1% = 0.0173") && text.contains("hgrad 1.3"),
         "{text}"
     );
     assert_eq!(summary.warnings.len(), 1);

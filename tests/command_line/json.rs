@@ -69,7 +69,7 @@ const RUNS: [(&str, &[&str]); 13] = [
         &[
             "query a.tetdb --point 0.1,0.2,0.3 --point 7,7,7",
             "query a.tetdb --tet 0:5",
-            "query a.tetdb --tet 0:5 --select id,x,y,z,edge_min,edge_max,angle_min,angle_max",
+            "query a.tetdb --tet 0:5 --select id,x,y,z,edge_min,edge_max,angle_min,angle_max,excess",
         ],
     ),
     ("snapshot", &["snapshot a.tetdb a.svg"]),

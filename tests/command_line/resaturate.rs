@@ -132,14 +132,16 @@ fn half_the_size_changes_one_part_only_and_can_be_undone() {
         .run_line("resaturate a.tetdb --subdomain 1")
         .succeeds();
     assert!(changed(&after, &info(&place)).is_empty());
-    // Only the last change can be undone: it changed nothing.
+    // That was no change: the one before it is undone.
     place.run_line("resaturate a.tetdb --undo").succeeds();
-    assert_eq!(info(&place)["digest"], after["digest"]);
+    assert_eq!(info(&place)["digest"], before["digest"]);
     refuses(
         &place.run_line("resaturate a.tetdb --undo --json"),
         "nothing-to-undo",
         8,
     );
+    place.run_line(line).succeeds();
+    assert_eq!(info(&place)["digest"], after["digest"]);
     place.run_line(line).succeeds();
     place.run_line("resaturate a.tetdb --undo").succeeds();
     assert_eq!(info(&place)["digest"], after["digest"]);
@@ -370,7 +372,7 @@ fn what_cannot_be_made_again_is_told() {
     refuses(&line("--undo"), "nothing-to-undo", 8);
     refuses(&line("--subdomain 7"), "no-such-part", 3);
     refuses(&line("--subdomain 1 --refine-by 0"), "bad-size", 2);
-    refuses(&line("--subdomain 1 --hsiz -1"), "usage", 2);
+    refuses(&line("--subdomain 1 --hsiz -1"), "bad-size", 2);
     refuses(&line("--subdomain 1 --hmin 2 --hmax 1"), "bad-size", 2);
     refuses(
         &line("--subdomain 1 --size-field none.npy"),

@@ -360,10 +360,6 @@ impl<'a> RemeshRun<'a> {
             step.set_state(StoreState::Sealed);
             Ok(())
         })?;
-        if let Ok(scratch) = self.catalog.scratch_dir() {
-            // Nothing in it counts.
-            let _ = scratch.remove_dir_all();
-        }
         Ok(self.summary(finished))
     }
 
@@ -383,6 +379,10 @@ impl<'a> RemeshRun<'a> {
     }
 
     fn summary(&self, finished: BTreeMap<u32, FinishedSubdomain>) -> ResaturateSummary {
+        if let Ok(scratch) = self.catalog.scratch_dir() {
+            // Nothing in it counts.
+            let _ = scratch.remove_dir_all();
+        }
         let mut summary = ResaturateSummary {
             parts: Vec::new(),
             pages: PagerStats::default(),

@@ -2,6 +2,15 @@
 
 use super::*;
 
+/// Without what is read only where somebody asks for it.
+fn bare(hits: &[Hit]) -> Vec<Hit> {
+    let without = |hit: &Hit| Hit {
+        on_surface: None,
+        ..*hit
+    };
+    hits.iter().map(without).collect()
+}
+
 #[test]
 fn numbers_and_conditions_select_what_they_say() -> Outcome {
     for made in [grid(6, 3)?, real()?] {
@@ -45,7 +54,7 @@ fn numbers_and_conditions_select_what_they_say() -> Outcome {
             ..none()
         };
         expect(&mut session, &all, selection, |t| three.contains(&t.id))?;
-        assert_eq!(session.tet(three[1])?, all[all.len() / 2]);
+        assert_eq!(session.tet(three[1])?, bare(&all)[all.len() / 2]);
     }
     Ok(())
 }
@@ -76,7 +85,7 @@ fn answers_are_sorted_by_any_variable() -> Outcome {
             };
             by_value.then(a.id.cmp(&b.id))
         });
-        assert_eq!(found, all);
+        assert_eq!(bare(&found), bare(&all));
     }
     Ok(())
 }
@@ -115,7 +124,7 @@ fn the_worst_and_the_best_are_found_without_a_look_at_all() -> Outcome {
             };
             let mut session = made.session(64 << 20)?;
             let found = session.extreme(&selection, greatest, limit)?;
-            assert_eq!(found, expected, "{text}");
+            assert_eq!(bare(&found), bare(&expected), "{text}");
             // A single one is found in the chunk that promises most, but for a promise hardly kept.
             let measures = session.measures();
             assert!(
