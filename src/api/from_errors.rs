@@ -109,7 +109,15 @@ impl From<QueryError> for Error {
 
 impl From<SizingError> for Error {
     fn from(e: SizingError) -> Self {
-        Self::new("bad-size", e).with_help("a size is a length in the surface's units, such as 0.5, or a share of its box diagonal, such as 1%")
+        let help = match &e {
+            SizingError::BadValue { expected, .. } if !expected.contains("length") => {
+                "write a plain number, with a point and without a unit"
+            }
+            _ => {
+                "a length is a number in the surface's own unit, such as 0.5, or a share of its box diagonal, such as 1%"
+            }
+        };
+        Self::new("bad-size", e).with_help(help)
     }
 }
 

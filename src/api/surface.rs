@@ -364,7 +364,11 @@ pub(crate) fn in_store(store: &Path) -> PathBuf {
 /// What identifies a file later: absolute path, length, hash.
 pub(crate) fn source(path: &Path) -> Result<SurfaceSource, Error> {
     let io = |e: std::io::Error| {
-        Error::new("unreadable-file", format!("the file cannot be read: {e}")).at(path.display())
+        let message = match e.kind() {
+            std::io::ErrorKind::NotFound => "there is no such file".to_owned(),
+            _ => format!("the file cannot be read: {e}"),
+        };
+        Error::new("unreadable-file", message).at(path.display())
     };
     let absolute = std::path::absolute(path).map_err(io)?;
     if !std::fs::metadata(path).map_err(io)?.is_file() {

@@ -325,6 +325,9 @@ impl<'a> Findings<'a> {
                 "`tetdb check {} --repair --write OUT` drops such triangles",
                 surfaces.join(" ")
             )
+        } else if matches!(first, Defect::OpenEdge { .. }) {
+            // That no repair does was told with the holes.
+            "close it where the surface was made".to_owned()
         } else {
             first.help().to_owned()
         };

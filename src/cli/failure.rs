@@ -130,7 +130,9 @@ fn help_of(code: &str) -> &'static str {
         "stopped" => "nothing was begun; run it again",
         "no-such-part" => "`tetdb info STORE` lists what there is",
         "no-such-store" => "check the path; `tetdb mesh SURFACE -o STORE` creates a store",
-        "not-a-store" => "choose another path; what is there was not written by this program",
+        "not-a-store" => {
+            "a store is a directory that this program wrote; a surface is looked at by `tetdb check SURFACE`, and a new store takes another path"
+        }
         "store-exists" => "choose another path, or replace it with --force",
         "no-coarse-leaf" => "mesh the surface again without --drop-coarse",
         "store-unfinished" => "`tetdb resume STORE` goes on with it",

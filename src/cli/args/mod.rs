@@ -24,19 +24,25 @@ pub use surface::{CheckArgs, RefineSurfaceArgs, SampleArgs};
 #[derive(Debug, Parser)]
 #[command(name = "tetdb", version, about, max_term_width = 110)]
 #[command(
-    after_help = "`tetdb mesh` fills a closed triangle surface with tetrahedra and leaves a store, which is a directory; most other commands take a\n\
-    store and read it. A run that was stopped goes on with `tetdb resume`. Generated surfaces such as sample:balls,count=100 stand\n\
+    after_help = "`tetdb mesh` fills a closed triangle surface with tetrahedra and leaves a store, which is a directory; most other commands take a \
+    store and read it. A run that was stopped goes on with `tetdb resume`. Generated surfaces such as sample:balls,count=100 stand \
     wherever a surface file can.\n\n\
     Examples:\n  tetdb check part.stl\n  tetdb mesh part.stl --export part.vtu\n  tetdb info part.tetdb\n  tetdb report part.tetdb part.html\n  \
-    tetdb mesh sample:balls,count=100 -o balls.tetdb --memory 256MiB\n\nExit codes: 0 done, 1 internal error, 2 usage, 3 bad input, 4 store damaged, 5 store busy,\n\
+    tetdb mesh sample:balls,count=100 -o balls.tetdb --memory 256MiB\n\nExit codes: 0 done, 1 internal error, 2 usage, 3 bad input, 4 store damaged, 5 store busy, \
     6 memory or disk, 7 the answer is no, 8 store unusable as it is, 130/143 stopped."
 )]
 pub struct Args {
     /// Say nothing but warnings, errors and what a command is asked for
-    #[arg(long, short, global = true)]
+    #[arg(long, short, global = true, display_order = 990)]
     pub quiet: bool,
     /// Say more: steps and their seconds, bytes of each part of a store
-    #[arg(long, short, global = true, conflicts_with = "quiet")]
+    #[arg(
+        long,
+        short,
+        global = true,
+        conflicts_with = "quiet",
+        display_order = 991
+    )]
     pub verbose: bool,
     #[command(subcommand)]
     pub command: Command,

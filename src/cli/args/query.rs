@@ -9,7 +9,7 @@ use std::path::PathBuf;
     tetdb query part.tetdb --sphere 0,0,0,0.5 --inside -o ball.vtu\n  \
     tetdb query part.tetdb --where \"quality > 2 and region = 1\" --order-by quality --desc --limit 10\n  \
     tetdb query part.tetdb --neighbors 0:12 --select id,quality,vertices\n\n\
-    Variables and columns: quality, region, subdomain, volume, x, y, z (of the centroid), edge_min, edge_max,\n\
+    Variables and columns: quality, region, subdomain, volume, x, y, z (of the centroid), edge_min, edge_max, \
     angle_min, angle_max (dihedral, degrees), excess (quality over the least that the faces on the surface allow); columns also: id, vertices, points."
 )]
 pub struct QueryArgs {
