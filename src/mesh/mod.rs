@@ -13,6 +13,6 @@ pub use anatomy::{FaceRef, Tet};
 pub use cursor::Mesh;
 pub use faces::{Facet, InterfaceFace};
 pub use renumber::{Workspace, renumber};
-pub use scan::{Scan, scan_parts};
+pub use scan::{Scan, scan_parts, tets_of_page};
 pub use state::{MESH_STATE_WORDS, MeshState, dense, next_id, sparse};
 pub use vertices::{End, VertexTag};

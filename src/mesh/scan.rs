@@ -1,8 +1,9 @@
 //! Looking at many pages of a mesh that nobody changes meanwhile: on all threads of the run when it is in memory.
 
 use rayon::prelude::*;
+use tetdb_schema::page::SLOT_BITS;
 
-use super::Mesh;
+use super::{Mesh, Tet};
 use crate::storage::{Pages, check_cancelled, n_threads, parallel};
 
 /// A question to parts of a mesh, each answered for itself.
@@ -15,10 +16,9 @@ pub trait Scan: Sync {
     fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, part: &Self::Part) -> Self::Output;
 }
 
-/// Scans parts and passes what is found to `take`, part by part in their order, whoever scanned them.
+/// Scans parts; what is found comes in the order of the parts, whoever scanned them.
 ///
-/// Memory: what is found in all parts, or in one where the mesh is not in memory; `take` may change the mesh, so parts must
-/// not depend on what it does: give few at a time where that matters.
+/// Memory: what is found in all parts: give few at a time where that is much.
 pub fn scan_parts<P: Pages, S: Scan>(
     mesh: &mut Mesh<P>,
     parts: &[S::Part],
@@ -36,4 +36,21 @@ pub fn scan_parts<P: Pages, S: Scan>(
     }
     let found = |part| scan.scan(mesh, part);
     parts.iter().map(found).collect()
+}
+
+/// The tetrahedra in use of a page, in id order.
+pub fn tets_of_page<P: Pages>(
+    mesh: &mut Mesh<P>,
+    page: u32,
+    mut each: impl FnMut(&mut Mesh<P>, u32, Tet),
+) {
+    let end = (page + 1) << SLOT_BITS;
+    let mut from = page << SLOT_BITS;
+    while let Some((t, tet)) = mesh.next_tet(from) {
+        if t >= end {
+            break;
+        }
+        from = t + 1;
+        each(mesh, t, tet);
+    }
 }

@@ -7,11 +7,11 @@
 //! Source: C. L. Lawson, "Properties of n-dimensional triangulations" (1986); B. Joe, "Construction of
 //! three-dimensional Delaunay triangulations using local transformations" (1991).
 
-use super::pages::{Way, tets_of_page};
+use super::pages::Way;
 use super::sphere::Sphere;
 use crate::geom::{Point, orient};
 use crate::mesh::anatomy::{EDGE_OF, FACES};
-use crate::mesh::{FaceRef, Mesh, Scan, Tet, scan_parts};
+use crate::mesh::{FaceRef, Mesh, Scan, Tet, scan_parts, tets_of_page};
 use crate::reconnect::{FaceSwap, Forced, RingTriangulation, Shell, remove_edge};
 use crate::storage::{Pages, check_cancelled};
 

@@ -11,12 +11,12 @@
 
 use tetdb_schema::page::{RECORDS, SLOT_BITS, Slot, u32_le};
 
-use super::pages::{Way, tets_of_page};
+use super::pages::Way;
 use super::smooth::is_free;
 use super::sums::Sums;
 use crate::geom::{Point, orient};
 use crate::mesh::anatomy::FACES;
-use crate::mesh::{Mesh, Scan, Tet, dense, scan_parts, sparse};
+use crate::mesh::{Mesh, Scan, Tet, dense, scan_parts, sparse, tets_of_page};
 use crate::reconnect::Ball;
 use crate::storage::{Pages, check_cancelled, kind};
 

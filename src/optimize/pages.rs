@@ -92,23 +92,6 @@ impl PageFlags {
     }
 }
 
-/// The tetrahedra in use of a page, in id order.
-pub(super) fn tets_of_page<P: Pages>(
-    mesh: &mut Mesh<P>,
-    page: u32,
-    mut each: impl FnMut(&mut Mesh<P>, u32, Tet),
-) {
-    let end = (page + 1) << SLOT_BITS;
-    let mut from = page << SLOT_BITS;
-    while let Some((t, tet)) = mesh.next_tet(from) {
-        if t >= end {
-            break;
-        }
-        from = t + 1;
-        each(mesh, t, tet);
-    }
-}
-
 /// Whether every operation has failed on this tetrahedron since something near it changed.
 #[inline]
 pub(super) fn is_examined(tet: &Tet) -> bool {

@@ -2,14 +2,14 @@
 
 use super::bad_fraction::BadFraction;
 use super::objective::Worst;
-use super::pages::{PageFlags, clear_marks, is_examined, reopen, tets_of_page};
+use super::pages::{PageFlags, clear_marks, is_examined, reopen};
 use super::quality::{CONTENT, GOODNESS_WANTED, face_bound, inverse_quality, is_below};
 use super::smooth::{Star, is_free, raised};
 use super::swap::Swapper;
 use super::vertex_operations::VertexOperations;
 use crate::mesh::anatomy::MARK;
 use crate::mesh::anatomy::mark::{EXAMINED, RESCUED};
-use crate::mesh::{Mesh, Tet};
+use crate::mesh::{Mesh, Tet, tets_of_page};
 use crate::storage::{Pages, check_cancelled};
 
 /// Rounds end after this many even if they still gain.

@@ -3,7 +3,6 @@
 use std::ops::Range;
 
 use rayon::slice::ParallelSliceMut;
-use tetdb_schema::page::SLOT_BITS;
 
 use super::candidate::Candidate;
 use super::field::{Field, Lengths};
@@ -11,7 +10,7 @@ use super::worker::Worker;
 use crate::geom::{HilbertFrame, Point, mix};
 use crate::mesh::anatomy::mark::EXAMINED;
 use crate::mesh::anatomy::{EDGE_OF, EDGES, MARK};
-use crate::mesh::{End, Mesh, Scan, Tet, scan_parts};
+use crate::mesh::{End, Mesh, Scan, Tet, scan_parts, tets_of_page};
 use crate::reconnect::Shell;
 use crate::storage::{Pages, parallel};
 
@@ -88,13 +87,11 @@ impl Scan for LongEdges<'_> {
 
     fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &page: &u32) -> Option<Vec<Edge>> {
         let mut edges = None;
-        let mut from = page << SLOT_BITS;
-        while let Some((t, tet)) = mesh.next_tet(from).filter(|(t, _)| t >> SLOT_BITS == page) {
-            from = t + 1;
+        tets_of_page(mesh, page, |mesh, t, tet| {
             if tet.node[EXAMINED] & MARK == 0 {
                 self.list(mesh, t, &tet, edges.get_or_insert_default());
             }
-        }
+        });
         edges
     }
 }
@@ -121,13 +118,11 @@ impl LongEdges<'_> {
 }
 
 fn mark_examined<P: Pages>(mesh: &mut Mesh<P>, page: u32) {
-    let mut from = page << SLOT_BITS;
-    while let Some((t, tet)) = mesh.next_tet(from).filter(|(t, _)| t >> SLOT_BITS == page) {
-        from = t + 1;
+    tets_of_page(mesh, page, |mesh, t, tet| {
         if tet.node[EXAMINED] & MARK == 0 {
             mesh.set_mark(t, EXAMINED, true);
         }
-    }
+    });
 }
 
 /// Finds the points that divide edges.
