@@ -6,6 +6,7 @@ use rayon::slice::ParallelSliceMut;
 
 use super::candidate::Candidate;
 use super::field::{Field, Lengths};
+use super::pattern::Pattern;
 use super::worker::Worker;
 use crate::geom::{HilbertFrame, Point, mix};
 use crate::mesh::anatomy::mark::EXAMINED;
@@ -41,7 +42,11 @@ impl Worker {
         pages: &[u32],
     ) {
         self.edges.clear();
-        let found = scan_parts(mesh, pages, &LongEdges { field });
+        let edges = LongEdges {
+            field,
+            examined_too: self.examined_too,
+        };
+        let found = scan_parts(mesh, pages, &edges);
         for (&page, edges) in pages.iter().zip(found) {
             if let Some(edges) = edges {
                 self.edges.extend(edges);
@@ -63,6 +68,7 @@ impl Worker {
             edges: &self.edges,
             field,
             order: &self.order,
+            placing: self.placing,
         };
         for found in scan_parts(mesh, &parts, &division) {
             self.candidates.extend(found);
@@ -70,6 +76,8 @@ impl Worker {
         let candidates = &mut self.candidates;
         // Stable: the points that share a key stay in the order of their edges, whoever sorts.
         parallel(|| candidates.par_sort_by_key(|c| c.key));
+        // Points of many edges have moved to the same place.
+        candidates.dedup_by_key(|c| c.point);
     }
 }
 
@@ -79,6 +87,7 @@ type Edge = (u64, u32);
 /// Lists the edges of a page's unexamined tetrahedra that may be long; none when all are examined.
 struct LongEdges<'a> {
     field: &'a Field<'a>,
+    examined_too: bool,
 }
 
 impl Scan for LongEdges<'_> {
@@ -88,7 +97,7 @@ impl Scan for LongEdges<'_> {
     fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &page: &u32) -> Option<Vec<Edge>> {
         let mut edges = None;
         tets_of_page(mesh, page, |mesh, t, tet| {
-            if tet.node[EXAMINED] & MARK == 0 {
+            if self.examined_too || tet.node[EXAMINED] & MARK == 0 {
                 self.list(mesh, t, &tet, edges.get_or_insert_default());
             }
         });
@@ -130,6 +139,7 @@ struct Division<'a> {
     edges: &'a [Edge],
     field: &'a Field<'a>,
     order: &'a HilbertFrame,
+    placing: bool,
 }
 
 impl Scan for Division<'_> {
@@ -140,6 +150,7 @@ impl Scan for Division<'_> {
         let mut divider = Divider {
             field: self.field,
             order: self.order,
+            pattern: self.placing.then(Pattern::new),
             shell: Shell::default(),
             candidates: Vec::new(),
         };
@@ -154,6 +165,7 @@ impl Scan for Division<'_> {
 struct Divider<'a> {
     field: &'a Field<'a>,
     order: &'a HilbertFrame,
+    pattern: Option<Pattern>,
     shell: Shell,
     candidates: Vec<Candidate>,
 }
@@ -202,7 +214,11 @@ impl Divider<'_> {
         let mut try_point = |u: f64| {
             let mut point = pa + (pb - pa) * u;
             let mut h = length_at(u, point);
-            if metric > JITTER_FROM {
+            let pattern = self.pattern.as_mut();
+            if let Some(place) = pattern.and_then(|pattern| pattern.nearest(field, point, h)) {
+                point = place;
+                h = length_at(u, point);
+            } else if metric > JITTER_FROM {
                 point += jitter(point) * (JITTER * h);
                 h = length_at(u, point);
             }

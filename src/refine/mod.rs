@@ -1,7 +1,8 @@
 //! Divide edges until saturated, in a zone or everywhere.
 //!
 //! Edges longer than √2 in the metric of the wanted size are divided equally; the points are inserted
-//! by the constrained kernel where no vertex is nearer than 1/√2. What decides is order alone: blocks
+//! by the constrained kernel where no vertex is nearer than 1/√2. First they move to the nearest place of a relaxed pattern, as long as
+//! there are any (`pattern`); then they stay where they divide. What decides is order alone: blocks
 //! of tetrahedra in id order, long edges before short ones within a block, then the Hilbert curve. So
 //! the result does not depend on which pages are resident, nor on threads.
 //!
@@ -13,6 +14,7 @@ mod candidate;
 mod field;
 mod insert;
 mod long_edges;
+mod pattern;
 mod placement;
 mod recent;
 mod report;
@@ -38,6 +40,9 @@ const BLOCK_TETS: u32 = 32 * 2046;
 /// Passes over the mesh; six suffice for a uniform field, graded ones take a few more.
 const PASSES_MAX: u32 = 40;
 
+/// A pass that inserts less than this share of all vertices is the last one that moves points to places of the pattern.
+const FEW: f64 = 0.02;
+
 /// A mesh that has grown so much since it was numbered along the curve is numbered again: below, a sweep over its pages
 /// jumps between layers created in different passes; above, sorting costs more than it saves.
 const GROWTH: f64 = 1.5;
@@ -61,6 +66,8 @@ pub fn saturate<P: Pages>(
         recent: Recent::new(),
         active: Activity::all(mesh),
         last: 0,
+        placing: true,
+        examined_too: false,
     };
     let mut numbered = mesh.n_tets();
     for _ in 0..PASSES_MAX {
@@ -87,7 +94,14 @@ pub fn saturate<P: Pages>(
             worker.active = Activity::all(mesh);
             worker.last = 0;
         }
-        if report.inserted == before {
+        let inserted = report.inserted - before;
+        worker.examined_too = false;
+        if worker.placing && inserted as f64 <= FEW * report.inserted as f64 {
+            // What is long still has no place of the pattern near enough: near the surface, and where sizes vary.
+            worker.placing = false;
+            worker.examined_too = true;
+            worker.active = Activity::all(mesh);
+        } else if !worker.placing && inserted == 0 {
             break;
         }
     }

@@ -14,6 +14,10 @@ pub(super) struct Worker {
     pub candidates: Vec<Candidate>,
     pub recent: Recent,
     pub active: Activity,
+    /// Whether points move to the nearest place of the pattern.
+    pub placing: bool,
+    /// Whether tetrahedra are examined again.
+    pub examined_too: bool,
     /// A tetrahedron in use, where a walk can start when its own start is gone.
     pub last: u32,
 }
