@@ -87,6 +87,7 @@ pub struct QuerySession {
     pub(crate) rows: Vec<SubdomainRow>,
     pub(crate) labels: Vec<String>,
     /// Of region 1, 2, …; empty for one without a name.
+    #[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "for the program"))]
     pub(crate) region_names: Vec<String>,
     /// Over the boxes of the sub-domains.
     pub(super) tree: BoxTree,
@@ -198,6 +199,7 @@ impl QuerySession {
     }
 
     /// The regions of this name. Errors: there is none.
+    #[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "for the program"))]
     pub fn regions_called(&self, name: &str) -> Result<Vec<u32>, QueryError> {
         regions_called(&self.region_names, name)
     }
