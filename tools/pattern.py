@@ -6,7 +6,7 @@
 Random points are smoothed towards an optimal Delaunay triangulation (L. Chen and M. Holst, 2011): 1.3 % of the tetrahedra are left with
 q >= 2. Then, as long as there are any, one vertex each of a dozen of them is displaced at random and everything is smoothed for a few
 rounds; what leaves more of them than before is taken back. Written are three 16-bit numbers for each point, in units of 1/65536 of the side.
-Takes ten minutes. Needs numpy and scipy.
+Takes ten minutes; another version of Qhull may give another pattern, as good. Needs numpy and scipy.
 """
 import argparse
 
