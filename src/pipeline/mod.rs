@@ -18,6 +18,7 @@ mod progress;
 mod remesh;
 mod seal;
 mod tree;
+mod work;
 mod workers;
 
 pub use error::PipelineError;

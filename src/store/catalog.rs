@@ -255,27 +255,42 @@ impl Catalog {
         Ok(())
     }
 
+    /// The directory of the store, with the disk it is on.
+    pub(crate) fn disk_path(&self) -> &DiskPath {
+        &self.dir
+    }
+
     /// The directory of the store.
     pub fn dir(&self) -> &Path {
         self.dir.path()
     }
 
-    /// Where the file of a sub-domain in a generation is, whether it exists or not.
-    pub fn file_path(&self, subdomain: u32, generation: u32) -> DiskPath {
+    /// The name of a sub-domain's file in a generation.
+    pub(crate) fn file_name(subdomain: u32, generation: u32) -> String {
         let file = FileRow {
             subdomain,
             generation,
         };
-        self.dir.join(named(SUBDOMAIN, file))
+        named(SUBDOMAIN, file)
+    }
+
+    /// The name of a coarse snapshot's file in a generation.
+    pub(crate) fn coarse_name(subdomain: u32, generation: u32) -> String {
+        let file = FileRow {
+            subdomain,
+            generation,
+        };
+        named(COARSE, file)
+    }
+
+    /// Where the file of a sub-domain in a generation is, whether it exists or not.
+    pub fn file_path(&self, subdomain: u32, generation: u32) -> DiskPath {
+        self.dir.join(Self::file_name(subdomain, generation))
     }
 
     /// Where the file of a coarse snapshot in a generation is, whether it exists or not.
     pub fn coarse_path(&self, subdomain: u32, generation: u32) -> DiskPath {
-        let file = FileRow {
-            subdomain,
-            generation,
-        };
-        self.dir.join(named(COARSE, file))
+        self.dir.join(Self::coarse_name(subdomain, generation))
     }
 
     /// A folder for sorted runs, created when it is not there; removed when the store is next opened for writing.

@@ -3,14 +3,13 @@
 pub(super) mod coarse;
 pub(super) mod coarse_snapshot;
 pub(super) mod common;
-mod cut_journal;
+pub(super) mod cut_journal;
 pub(super) mod divide;
 mod head_start;
 pub(super) mod owners;
 mod run;
-mod saturate;
-mod stages;
-pub(super) mod subdomain;
+pub(super) mod saturate;
+pub(super) mod stages;
 
 pub use coarse::CoarseReport;
 #[cfg(any(test, feature = "internals"))]

@@ -9,7 +9,6 @@ use super::coarse::{CoarseReport, inserted, recovered};
 use super::common::Common;
 use super::head_start::{HeadStart, ahead};
 use super::owners::read_owners;
-use super::subdomain::{FinishedSubdomain, SubdomainJob};
 use crate::bisect::{CutReport, load_of};
 use crate::boundary::RegionSummary;
 use crate::geom::{Aabb, HilbertFrame};
@@ -19,12 +18,13 @@ use crate::pipeline::plan::estimate::n_subdomains;
 use crate::pipeline::plan::leases::Leases;
 use crate::pipeline::plan::{Estimate, Options, Plan, Prepared, prepare};
 use crate::pipeline::progress::Watcher;
-use crate::pipeline::seal::totals::{SealedTotals, Totals, journal, sum_totals};
+use crate::pipeline::seal::totals::{Totals, journal, sum_totals};
 use crate::pipeline::tree::{self, DONE, PartMesh, TreePart, blob};
+use crate::pipeline::work::{SubdomainOrder, SubdomainReceipt, Traffic, Worker, Workplace};
 use crate::pipeline::workers::map_bounded;
 use crate::sizing::{SizeField, SizeSummary, TETS_PER_LOAD};
-use crate::storage::{Backing, Budget, DiskPath, Pager, PagerStats, ScratchSpace, attempt};
-use crate::store::{Catalog, StoreError};
+use crate::storage::{Backing, Budget, Pager, PagerStats, ScratchSpace, attempt};
+use crate::store::Catalog;
 use crate::surface::Surface;
 use tetdb_schema::catalog::{RegionRow, StoreState};
 
@@ -190,25 +190,20 @@ impl<'a> Run<'a> {
                 .subdomain_count()?
                 .filter(|&asked| asked > self.n),
             pages: PagerStats::default(),
-            frames_used: self.frames_used,
+            frames_used: 0,
         };
         let sealed: BTreeSet<u32> = self.catalog.subdomains()?.iter().map(|r| r.rank).collect();
         let mut left = tree::parts(self.catalog, self.n)?;
         left.retain(|p| !sealed.contains(&p.part.first));
         self.leaves(left, open, &mut summary)?;
         self.close()?;
-        summary.pages.add(self.pages);
+        (summary.pages, summary.frames_used) = (self.pages, self.frames_used);
         Ok(summary)
     }
 
     /// What is the same for all workers.
     pub(crate) fn common(&self) -> Result<Common<'a>, PipelineError> {
-        Ok(Common {
-            field: self.field,
-            mode: self.options.mode()?,
-            method: self.options.method,
-            bounds: self.bounds,
-        })
+        Common::of(self.options, self.field, self.bounds)
     }
 
     fn coarse_step(
@@ -308,97 +303,89 @@ impl<'a> Run<'a> {
         open: Option<Mesh>,
         summary: &mut Summary,
     ) -> Result<(), PipelineError> {
-        let common = self.common()?;
+        let worker = Worker {
+            place: Workplace::in_store(self.catalog)?,
+            common: self.common()?,
+        };
         if let (Some(mesh), [part]) = (open, &left[..]) {
-            let job = self.job(*part, 1)?;
-            let leaf = job.finish(mesh, common, self.watch)?;
-            return self.seal_step(leaf, summary);
+            let job = worker.subdomain_job(self.subdomain_order(*part)?, self.plan)?;
+            let leaf = job.finish(mesh, worker.common, self.watch)?;
+            return self.seal_step(&leaf.receipt(), Some(leaf.fine), summary);
         }
         let (workers, watch) = (self.plan.workers().min(left.len()), self.watch);
+        let share = self.plan.shared_by(workers.max(1) as u64);
         map_bounded(
             &mut (self, summary),
             left,
             workers,
             watch,
-            |(run, _), part| run.job(part, workers as u64),
-            &|job: SubdomainJob, watch| job.run(common, watch).map(Box::new),
-            |(run, summary), leaf| run.seal_step(*leaf, summary),
+            |(run, _), part| run.subdomain_order(part),
+            &|order: SubdomainOrder, watch| {
+                let job = worker.subdomain_job(order, share)?;
+                job.run(worker.common, watch).map(Box::new)
+            },
+            |(run, summary), leaf| run.seal_step(&leaf.receipt(), Some(leaf.fine), summary),
         )
     }
 
-    fn job(&mut self, part: PartMesh, workers: u64) -> Result<SubdomainJob, PipelineError> {
+    /// What makes a sub-domain.
+    pub(crate) fn subdomain_order(
+        &mut self,
+        part: PartMesh,
+    ) -> Result<SubdomainOrder, PipelineError> {
         let rank = part.part.first;
         let mut owners = BTreeMap::new();
         for cut in part.part.cuts_above(self.n) {
-            owners.insert(cut, read_owners(self.catalog, cut)?);
+            owners.insert(cut, read_owners(self.catalog, cut)?.across(rank));
         }
-        let share = self.plan.shared_by(workers).without_file();
-        Ok(SubdomainJob {
+        let zones = tree::zones_above(self.catalog, part.part, self.n)?;
+        Ok(SubdomainOrder {
             part,
-            base: self.catalog.file_path(rank, part.generation),
-            sealed: self.catalog.file_path(rank, part.generation + DONE),
-            generation: part.generation + DONE,
-            form: self.options.form()?,
-            field: None,
-            kept: (!self.options.drop_coarse)
-                .then(|| self.catalog.coarse_path(rank, part.generation)),
-            scratch: self.scratch(&format!("leaf-{rank}"))?,
-            zones: tree::zones_above(self.catalog, part.part, self.n)?,
+            zones,
             owners,
-            share,
         })
     }
 
-    /// A scratch folder of this name.
-    pub(crate) fn scratch(&mut self, name: &str) -> Result<DiskPath, StoreError> {
-        let path = self.catalog.scratch_dir()?.join(name);
-        path.create_dir_all()?;
-        Ok(path)
-    }
-
     /// Commits a finished sub-domain.
-    fn seal_step(
+    pub(crate) fn commit_subdomain(
         &mut self,
-        leaf: FinishedSubdomain,
-        summary: &mut Summary,
+        leaf: &SubdomainReceipt,
     ) -> Result<(), PipelineError> {
-        let (rank, generation) = (leaf.part.part.first, leaf.part.generation);
-        let refine = &leaf.fine.refine;
-        let measures = [
-            ("predicted_tets", TETS_PER_LOAD * leaf.part.load),
-            ("coarse_tets", f64::from(leaf.part.state.n_tets())),
-            ("keep_s", leaf.keep_s),
-            ("inserted_vertices", refine.inserted as f64),
-            ("over_constrained_tets", refine.over_constrained as f64),
-            ("zone_rejects", refine.out_of_place as f64),
-            ("frozen_hits", refine.frozen_hits as f64),
-            ("pages_read", leaf.pages.pages_read as f64),
-            ("pages_written", leaf.pages.pages_written as f64),
-            ("frames_used", leaf.frames_used as f64),
-            ("refine_s", leaf.fine.seconds[0]),
-            ("optimize_s", leaf.fine.seconds[1]),
-            ("seal_s", leaf.seal_seconds),
-        ];
+        let mut journal = leaf.journal.clone();
         // A finished sub-domain leaves the state of the whole as it is until the last one.
-        let state = self.catalog.state()?;
-        let mut row = journal(state, "saturate, optimize, seal", leaf.clock, &measures);
-        row.subdomain = Some(rank);
-        let totals = SealedTotals::of(&leaf.sealed).to_bytes();
+        journal.state = self.catalog.state()?;
         self.catalog.commit(|step| {
-            step.set_subdomain(&leaf.sealed.row);
-            step.set_blob(blob::SEALED + rank, &totals);
-            step.list_file(rank, leaf.generation);
-            step.unlist_file(rank, generation);
+            let rank = leaf.row.rank;
+            step.set_subdomain(&leaf.row);
+            step.set_blob(blob::SEALED + rank, &leaf.totals);
+            step.list_file(rank, leaf.row.generation);
+            step.unlist_file(rank, leaf.coarse);
             if let Some(kept) = &leaf.kept {
                 step.list_coarse(kept);
             }
-            step.append_journal(&row);
+            step.append_journal(&journal);
             Ok(())
         })?;
-        summary.pages.add(leaf.pages);
-        summary.frames_used = summary.frames_used.max(leaf.frames_used);
-        summary.fine.insert(rank, leaf.fine);
+        self.count(leaf.traffic);
         Ok(())
+    }
+
+    fn seal_step(
+        &mut self,
+        leaf: &SubdomainReceipt,
+        fine: Option<FineReport>,
+        summary: &mut Summary,
+    ) -> Result<(), PipelineError> {
+        self.commit_subdomain(leaf)?;
+        let of_rank = fine.map(|fine| (leaf.row.rank, fine));
+        summary.fine.extend(of_rank);
+        Ok(())
+    }
+
+    /// Adds to what the run has read and written.
+    pub(crate) fn count(&mut self, traffic: Traffic) {
+        self.pages.add(traffic.pages());
+        self.frames_used = self.frames_used.max(traffic.frames_used as usize);
     }
 
     /// Everything is sealed: regions and interfaces of the whole.
