@@ -26,6 +26,8 @@ mod sample;
 mod shell;
 mod signals;
 mod snapshot;
+mod tasks;
+mod task_scripts;
 mod verify;
 mod words;
 
@@ -104,6 +106,9 @@ fn dispatch(command: &Command, console: &Console) -> Result<u8, Failure> {
         Command::Mesh(args) => mesh::run(args, console),
         Command::Estimate(args) => estimate::run(args, console),
         Command::Resume(args) => mesh::resume(args, console),
+        Command::Plan(args) => tasks::plan(args, console),
+        Command::Work(args) => tasks::work(args, console),
+        Command::Gather(args) => tasks::gather(args, console),
         Command::Resaturate(args) => resaturate::run(args, console),
         Command::Check(args) => check::run(args, console),
         Command::Info(args) => info::run(args, console),

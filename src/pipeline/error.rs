@@ -64,6 +64,22 @@ pub enum PipelineError {
         /// Vertices of the sub-domains.
         vertices: u64,
     },
+    /// There are no tasks to do, or not yet.
+    #[error("{path} has no tasks that could be done now: {reason}")]
+    NoPlan {
+        /// Directory of the store.
+        path: std::path::PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// A file that tasks exchange cannot be used.
+    #[error("{path} cannot be used: {what}")]
+    TaskFile {
+        /// The file.
+        path: std::path::PathBuf,
+        /// What is wrong with it.
+        what: String,
+    },
     /// All tetrahedra came to lie on one side of a cut.
     #[error("cut {cut} leaves no tetrahedron on one side: ask for fewer sub-domains")]
     EmptyPart {

@@ -6,6 +6,7 @@
 //! | `mesh::coarse` | coarse | validate; Delaunay mesh of the surface's vertices; recover every triangle; color and empty regions |
 //! | `mesh::divide` | bisected | as often as there are sub-domains less one: refine a band, choose the interface, write two children |
 //! | `mesh::subdomain`, `seal` | sealed | each sub-domain alone: divide edges; optimize; sort, compress and seal |
+//! | `work`, `tasks` | | a cut or a sub-domain as an order and a receipt that any process can do and write; batches of them for schedulers |
 //! | `remesh` | sealed | sub-domains of a finished store again, from their coarse snapshots, with other sizes or because they are damaged; and back |
 //!
 //! Inserting the surface's vertices may begin before there is a store (`mesh::head_start`). The pipeline receives a surface, not a
@@ -17,6 +18,7 @@ mod plan;
 mod progress;
 mod remesh;
 mod seal;
+mod tasks;
 mod tree;
 mod work;
 mod workers;
@@ -34,6 +36,9 @@ pub use plan::{
 #[cfg(any(test, feature = "internals"))]
 pub use progress::silent;
 pub use progress::{Event, Watcher};
+pub use tasks::{
+    Gathered, Performed, Planned, Stage, StageKind, TASKS_MAX, TaskSettings, TaskState, end_plan, gather, is_being_worked, perform, plan as plan_tasks, status,
+};
 pub use remesh::{
     Forecast, NewSizes, Remade, ResaturateSummary, Resaturation, Values, asked, changed, forecast,
     forget, resaturate, undo,

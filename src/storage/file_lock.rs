@@ -172,7 +172,7 @@ impl Holder {
         let now = now.unwrap_or_default();
         let count = COUNT.fetch_add(1, Ordering::Relaxed);
         Self {
-            host: host(),
+            host: host_name(),
             process: std::process::id(),
             time: now.as_secs(),
             run: format!("{}-{count}", now.as_nanos()),
@@ -194,10 +194,7 @@ fn may_live(path: &Path) -> bool {
     let Some(holder) = Holder::read(path) else {
         return true;
     };
-    let processes = Path::new("/proc");
-    holder.host != host()
-        || !processes.join("self").exists()
-        || processes.join(holder.process.to_string()).exists()
+    !is_process_gone(&holder.host, holder.process)
 }
 
 fn holder(path: &Path) -> String {
@@ -207,7 +204,16 @@ fn holder(path: &Path) -> String {
     }
 }
 
-fn host() -> String {
+/// Whether a process is known to have ended: of another host nobody knows.
+pub fn is_process_gone(host: &str, process: u32) -> bool {
+    let processes = Path::new("/proc");
+    host == host_name()
+        && processes.join("self").exists()
+        && !processes.join(process.to_string()).exists()
+}
+
+/// The name of this machine.
+pub fn host_name() -> String {
     let read = |path| fs::read_to_string(path).ok();
     let name = read("/proc/sys/kernel/hostname").or_else(|| read("/etc/hostname"));
     let name = name.or_else(|| std::env::var("HOSTNAME").ok());

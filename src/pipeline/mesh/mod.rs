@@ -2,6 +2,7 @@
 
 pub(super) mod coarse;
 pub(super) mod coarse_snapshot;
+pub(super) mod commit;
 pub(super) mod common;
 pub(super) mod cut_journal;
 pub(super) mod divide;

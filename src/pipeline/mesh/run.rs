@@ -6,9 +6,9 @@ use std::time::Instant;
 
 use super::FineReport;
 use super::coarse::{CoarseReport, inserted, recovered};
+use super::commit::{close, commit_subdomain, subdomain_order};
 use super::common::Common;
 use super::head_start::{HeadStart, ahead};
-use super::owners::read_owners;
 use crate::bisect::{CutReport, load_of};
 use crate::boundary::RegionSummary;
 use crate::geom::{Aabb, HilbertFrame};
@@ -18,7 +18,7 @@ use crate::pipeline::plan::estimate::n_subdomains;
 use crate::pipeline::plan::leases::Leases;
 use crate::pipeline::plan::{Estimate, Options, Plan, Prepared, prepare};
 use crate::pipeline::progress::Watcher;
-use crate::pipeline::seal::totals::{Totals, journal, sum_totals};
+use crate::pipeline::seal::totals::journal;
 use crate::pipeline::tree::{self, DONE, PartMesh, TreePart, blob};
 use crate::pipeline::work::{SubdomainOrder, SubdomainReceipt, Traffic, Worker, Workplace};
 use crate::pipeline::workers::map_bounded;
@@ -176,29 +176,39 @@ impl<'a> Run<'a> {
             held = held.without_surface(self.options, budget)?;
             self.plan = held.plan;
         }
+        if self.options.coarse_only {
+            return self.summary(coarse, sizes, Vec::new());
+        }
         // Pages of the coarse mesh that are still resident would take the frames of the others.
         open = open.filter(|_| self.n == 1);
         let cuts = self.divide_all()?;
-        let mut summary = Summary {
+        let mut summary = self.summary(coarse, sizes, cuts)?;
+        let sealed: BTreeSet<u32> = self.catalog.subdomains()?.iter().map(|r| r.rank).collect();
+        let mut left = tree::parts(self.catalog, self.n)?;
+        left.retain(|p| !sealed.contains(&p.part.first));
+        self.leaves(left, open, &mut summary)?;
+        close(self.catalog, self.n)?;
+        (summary.pages, summary.frames_used) = (self.pages, self.frames_used);
+        Ok(summary)
+    }
+
+    fn summary(
+        &self,
+        coarse: Option<CoarseReport>,
+        sizes: Option<SizeSummary>,
+        cuts: Vec<CutReport>,
+    ) -> Result<Summary, PipelineError> {
+        let asked = self.options.subdomain_count()?;
+        Ok(Summary {
             coarse,
             sizes,
             cuts,
             fine: BTreeMap::new(),
             subdomains: self.n,
-            subdomains_asked: self
-                .options
-                .subdomain_count()?
-                .filter(|&asked| asked > self.n),
-            pages: PagerStats::default(),
-            frames_used: 0,
-        };
-        let sealed: BTreeSet<u32> = self.catalog.subdomains()?.iter().map(|r| r.rank).collect();
-        let mut left = tree::parts(self.catalog, self.n)?;
-        left.retain(|p| !sealed.contains(&p.part.first));
-        self.leaves(left, open, &mut summary)?;
-        self.close()?;
-        (summary.pages, summary.frames_used) = (self.pages, self.frames_used);
-        Ok(summary)
+            subdomains_asked: asked.filter(|&asked| asked > self.n),
+            pages: self.pages,
+            frames_used: self.frames_used,
+        })
     }
 
     /// What is the same for all workers.
@@ -308,7 +318,7 @@ impl<'a> Run<'a> {
             common: self.common()?,
         };
         if let (Some(mesh), [part]) = (open, &left[..]) {
-            let job = worker.subdomain_job(self.subdomain_order(*part)?, self.plan)?;
+            let job = worker.subdomain_job(subdomain_order(self.catalog, self.n, *part)?, self.plan)?;
             let leaf = job.finish(mesh, worker.common, self.watch)?;
             return self.seal_step(&leaf.receipt(), Some(leaf.fine), summary);
         }
@@ -319,7 +329,7 @@ impl<'a> Run<'a> {
             left,
             workers,
             watch,
-            |(run, _), part| run.subdomain_order(part),
+            |(run, _), part| Ok(subdomain_order(run.catalog, run.n, part)?),
             &|order: SubdomainOrder, watch| {
                 let job = worker.subdomain_job(order, share)?;
                 job.run(worker.common, watch).map(Box::new)
@@ -328,55 +338,14 @@ impl<'a> Run<'a> {
         )
     }
 
-    /// What makes a sub-domain.
-    pub(crate) fn subdomain_order(
-        &mut self,
-        part: PartMesh,
-    ) -> Result<SubdomainOrder, PipelineError> {
-        let rank = part.part.first;
-        let mut owners = BTreeMap::new();
-        for cut in part.part.cuts_above(self.n) {
-            owners.insert(cut, read_owners(self.catalog, cut)?.across(rank));
-        }
-        let zones = tree::zones_above(self.catalog, part.part, self.n)?;
-        Ok(SubdomainOrder {
-            part,
-            zones,
-            owners,
-        })
-    }
-
-    /// Commits a finished sub-domain.
-    pub(crate) fn commit_subdomain(
-        &mut self,
-        leaf: &SubdomainReceipt,
-    ) -> Result<(), PipelineError> {
-        let mut journal = leaf.journal.clone();
-        // A finished sub-domain leaves the state of the whole as it is until the last one.
-        journal.state = self.catalog.state()?;
-        self.catalog.commit(|step| {
-            let rank = leaf.row.rank;
-            step.set_subdomain(&leaf.row);
-            step.set_blob(blob::SEALED + rank, &leaf.totals);
-            step.list_file(rank, leaf.row.generation);
-            step.unlist_file(rank, leaf.coarse);
-            if let Some(kept) = &leaf.kept {
-                step.list_coarse(kept);
-            }
-            step.append_journal(&journal);
-            Ok(())
-        })?;
-        self.count(leaf.traffic);
-        Ok(())
-    }
-
     fn seal_step(
         &mut self,
         leaf: &SubdomainReceipt,
         fine: Option<FineReport>,
         summary: &mut Summary,
     ) -> Result<(), PipelineError> {
-        self.commit_subdomain(leaf)?;
+        commit_subdomain(self.catalog, leaf)?;
+        self.count(leaf.traffic);
         let of_rank = fine.map(|fine| (leaf.row.rank, fine));
         summary.fine.extend(of_rank);
         Ok(())
@@ -386,26 +355,6 @@ impl<'a> Run<'a> {
     pub(crate) fn count(&mut self, traffic: Traffic) {
         self.pages.add(traffic.pages());
         self.frames_used = self.frames_used.max(traffic.frames_used as usize);
-    }
-
-    /// Everything is sealed: regions and interfaces of the whole.
-    fn close(&mut self) -> Result<(), PipelineError> {
-        let Totals {
-            regions,
-            interfaces,
-        } = sum_totals(self.catalog, self.n, &BTreeMap::new())?;
-        let scratch = self.catalog.scratch_dir()?;
-        self.catalog.commit(|step| {
-            step.set_regions(&regions);
-            for (&cut, rows) in &interfaces {
-                step.set_interfaces(cut, rows);
-            }
-            step.set_state(StoreState::Sealed);
-            Ok(())
-        })?;
-        // Nothing in it counts; what cannot be removed now goes when the store is next opened for writing.
-        let _ = scratch.remove_dir_all();
-        Ok(())
     }
 }
 

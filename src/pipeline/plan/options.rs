@@ -66,6 +66,9 @@ pub struct Options {
     /// Whether meshes on their way are kept to be looked at; the finished mesh is the same.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub keep_stages: bool,
+    /// Whether the run ends with the coarse mesh: tasks do the rest. Not stored: it does not shape the mesh.
+    #[serde(skip)]
+    pub coarse_only: bool,
     /// For comparisons by a program. It is not stored: a run that is resumed makes cuts as usual.
     #[serde(skip)]
     pub method: Method,

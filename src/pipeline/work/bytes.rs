@@ -6,7 +6,7 @@
 //! | 8..10 | version |
 //! | 10..12 | what it is, see [`Kind`] |
 //! | 12..16 | zero |
-//! | 16..24 | xxh3 of the rest, with bytes 0..16 as one number for seed |
+//! | 16..24 | xxh3 of the rest, seeded with the xxh3 of bytes 0..16 |
 
 use rkyv::api::high::{HighDeserializer, HighSerializer, HighValidator};
 use rkyv::bytecheck::CheckBytes;
@@ -34,29 +34,30 @@ pub(crate) enum Kind {
     SizeField = 4,
 }
 
+/// What stands before a body.
+pub(crate) fn head(kind: Kind, body: &[u8]) -> Vec<u8> {
+    let mut head = MAGIC.to_vec();
+    head.extend(VERSION.to_le_bytes());
+    head.extend((kind as u16).to_le_bytes());
+    head.extend([0; 4]);
+    let sum = xxh3_64_with_seed(body, xxh3_64(&head));
+    head.extend(sum.to_le_bytes());
+    head
+}
+
 /// Archives a record.
 pub(crate) fn to_bytes<T>(kind: Kind, record: &T) -> Vec<u8>
 where
     T: for<'a> Serialize<HighSerializer<AlignedVec, ArenaHandle<'a>, Error>>,
 {
     let body = rkyv::to_bytes::<Error>(record).expect("memory is the only resource this takes");
-    let mut bytes = MAGIC.to_vec();
-    bytes.extend(VERSION.to_le_bytes());
-    bytes.extend((kind as u16).to_le_bytes());
-    bytes.extend([0; 4]);
-    let sum = xxh3_64_with_seed(&body, xxh3_64(&bytes));
-    bytes.extend(sum.to_le_bytes());
+    let mut bytes = head(kind, &body);
     bytes.extend_from_slice(&body);
     bytes
 }
 
-/// Checks and opens a record. Errors: in words what is wrong with the bytes.
-pub(crate) fn from_bytes<T>(kind: Kind, bytes: &[u8]) -> Result<T, String>
-where
-    T: Archive,
-    T::Archived:
-        for<'a> CheckBytes<HighValidator<'a, Error>> + Deserialize<T, HighDeserializer<Error>>,
-{
+/// The body behind its head. Errors: in words what is wrong with the bytes.
+pub(crate) fn body(kind: Kind, bytes: &[u8]) -> Result<&[u8], String> {
     let Some((head, body)) = bytes.split_first_chunk::<HEAD>() else {
         return Err(format!("it has only {} bytes", bytes.len()));
     };
@@ -74,9 +75,20 @@ where
     if xxh3_64_with_seed(body, xxh3_64(front)).to_le_bytes() != sum {
         return Err("it does not match its checksum".to_owned());
     }
-    if number(10) != kind as u16 {
-        return Err("it is of another kind".to_owned());
+    match number(10) == kind as u16 {
+        true => Ok(body),
+        false => Err("it is of another kind".to_owned()),
     }
+}
+
+/// Checks and opens a record. Errors: as [`body`].
+pub(crate) fn from_bytes<T>(kind: Kind, bytes: &[u8]) -> Result<T, String>
+where
+    T: Archive,
+    T::Archived:
+        for<'a> CheckBytes<HighValidator<'a, Error>> + Deserialize<T, HighDeserializer<Error>>,
+{
+    let body = body(kind, bytes)?;
     let mut aligned = AlignedVec::<16>::with_capacity(body.len());
     aligned.extend_from_slice(body);
     rkyv::from_bytes::<T, Error>(&aligned).map_err(|e| format!("it cannot be opened: {e}"))

@@ -12,7 +12,7 @@ mod receipt;
 pub(super) mod subdomain;
 mod worker;
 
-pub(super) use bytes::{Kind, from_bytes, to_bytes};
+pub(super) use bytes::{Kind, body, from_bytes, head, to_bytes};
 pub(super) use order::{CutOrder, Order, SubdomainOrder};
 pub(super) use receipt::{CutReceipt, Receipt, SubdomainReceipt, Traffic};
 pub(super) use worker::{Worker, Workplace};
