@@ -30,8 +30,8 @@ mod sizes;
 pub(crate) mod store;
 pub(crate) mod surface;
 mod surface_arrays;
-pub(crate) mod tasks;
 pub(crate) mod targets;
+pub(crate) mod tasks;
 pub(crate) mod verify;
 
 pub use crate::io::write::MeshFormat;

@@ -114,7 +114,9 @@ impl Tasks {
         let gathered = self.gather_reported()?;
         match gathered.is_finished {
             true => Ok(None),
-            false => Ok(Some(gathered.left.into_iter().map(|(task, _)| task).collect())),
+            false => Ok(Some(
+                gathered.left.into_iter().map(|(task, _)| task).collect(),
+            )),
         }
     }
 

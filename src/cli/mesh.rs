@@ -63,7 +63,7 @@ pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
         return finish(&path, &args.run, &settings, None, console);
     }
     if args.coarse_only {
-        return Ok(begun(&path, &settings, console)?);
+        return begun(&path, &settings, console);
     }
     finish(
         &path,

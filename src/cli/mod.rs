@@ -26,8 +26,8 @@ mod sample;
 mod shell;
 mod signals;
 mod snapshot;
-mod tasks;
 mod task_scripts;
+mod tasks;
 mod verify;
 mod words;
 

@@ -76,7 +76,11 @@ impl Script<'_> {
             );
             after = " --dependency=afterok:$g".to_owned();
         }
-        let resume = format!("{} --memory {}MiB", self.command("resume"), self.memory_bytes >> 20);
+        let resume = format!(
+            "{} --memory {}MiB",
+            self.command("resume"),
+            self.memory_bytes >> 20
+        );
         let _ = writeln!(
             text,
             "# Verified as one.\nsubmit{after} --job-name=tetdb-verify --mem={megabytes}M --cpus-per-task={} --wrap {}",

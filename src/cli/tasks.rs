@@ -9,8 +9,8 @@ use serde_json::{Value, json};
 use super::args::{GatherArgs, PlanArgs, WorkArgs};
 use super::console::Console;
 use super::failure::Failure;
-use super::task_scripts::Script;
 use super::memory;
+use super::task_scripts::Script;
 use crate::api::Tasks;
 use crate::api::tasks::ranges;
 use crate::pipeline::{Planned, StageKind, TaskState};
@@ -45,13 +45,11 @@ pub fn plan(args: &PlanArgs, console: &Console) -> Result<u8, Failure> {
         planned: &planned,
     };
     if console.is_json() {
-        let stages: Vec<Value> = (planned.stages.iter())
-            .map(|s| json!({ "does": kind(s.kind), "first_task": s.first, "tasks": s.tasks().len() }))
-            .collect();
-        console.answer(&json!({
-            "schema": 1, "store": args.store.display().to_string(), "subdomains": planned.subdomains,
-            "subdomains_suited": suits.max(planned.subdomains), "stage": planned.stage, "stages": stages,
-        }));
+        let mut answer = object(&planned);
+        answer["schema"] = json!(1);
+        answer["store"] = json!(args.store.display().to_string());
+        answer["subdomains_suited"] = json!(suits.max(planned.subdomains));
+        console.answer(&answer);
         return Ok(0);
     }
     let text = match &args.engine {
@@ -110,7 +108,10 @@ pub fn gather(args: &GatherArgs, console: &Console) -> Result<u8, Failure> {
         }));
     } else if gathered.is_finished {
         console.line(&format!("{} is finished", args.store.display()));
-        console.note(&format!("next: `tetdb resume {}` verifies it", args.store.display()));
+        console.note(&format!(
+            "next: `tetdb resume {}` verifies it",
+            args.store.display()
+        ));
     } else {
         console.line(&format!(
             "stage {} of {}: tasks {} can begin",
@@ -137,26 +138,34 @@ pub(super) fn object(planned: &Planned) -> Value {
     let states: Vec<Value> = (planned.states.iter())
         .map(|(task, state)| state_object(*task, state))
         .collect();
+    let stages: Vec<Value> = (planned.stages.iter())
+        .map(|s| json!({ "does": kind(s.kind), "first_task": s.first, "tasks": s.tasks().len() }))
+        .collect();
     json!({
-        "stage": planned.stage, "stages": planned.stages.len(), "done": done, "running": running, "failed": failed,
-        "waiting": waiting, "seconds_mean": planned.seconds_mean(), "states": states,
+        "subdomains": planned.subdomains, "tasks": planned.tasks, "stage": planned.stage, "stages": stages,
+        "done": done, "running": running, "failed": failed, "waiting": waiting,
+        "task_mean_s": planned.seconds_mean(), "states": states,
     })
 }
 
 fn state_object(task: u32, state: &TaskState) -> Value {
-    match state {
-        TaskState::Waiting => json!({ "task": task, "state": "waiting" }),
-        TaskState::Running { host } => json!({ "task": task, "state": "running", "host": host }),
-        TaskState::Failed { why } => json!({ "task": task, "state": "failed", "why": why }),
-        TaskState::Done { seconds } => json!({ "task": task, "state": "done", "wall_s": seconds }),
-    }
+    let (word, host, why, seconds) = match state {
+        TaskState::Waiting => ("waiting", None, None, None),
+        TaskState::Running { host } => ("running", Some(host), None, None),
+        TaskState::Failed { why } => ("failed", None, Some(why), None),
+        TaskState::Done { seconds } => ("done", None, None, Some(seconds)),
+    };
+    json!({ "task": task, "state": word, "host": host, "why": why, "wall_s": seconds })
 }
 
 /// The same for people.
 pub(super) fn print(planned: &Planned, console: &Console) {
     let [done, running, failed, waiting] = planned.counts();
     let range = planned.range();
-    let what = planned.stages.get(planned.stage).map_or("", |s| kind(s.kind));
+    let what = planned
+        .stages
+        .get(planned.stage)
+        .map_or("", |s| kind(s.kind));
     console.line(&format!(
         "tasks {}-{} of stage {} of {} ({what}): {done} done, {running} running, {failed} failed, {waiting} waiting",
         range.start,

@@ -5,7 +5,7 @@
 //! | `plan` | | options, the size field and what it predicts, how the memory cap is shared out |
 //! | `mesh::coarse` | coarse | validate; Delaunay mesh of the surface's vertices; recover every triangle; color and empty regions |
 //! | `mesh::divide` | bisected | as often as there are sub-domains less one: refine a band, choose the interface, write two children |
-//! | `mesh::subdomain`, `seal` | sealed | each sub-domain alone: divide edges; optimize; sort, compress and seal |
+//! | `work::subdomain`, `seal` | sealed | each sub-domain alone: divide edges; optimize; sort, compress and seal |
 //! | `work`, `tasks` | | a cut or a sub-domain as an order and a receipt that any process can do and write; batches of them for schedulers |
 //! | `remesh` | sealed | sub-domains of a finished store again, from their coarse snapshots, with other sizes or because they are damaged; and back |
 //!
@@ -26,9 +26,7 @@ mod workers;
 pub use error::PipelineError;
 #[cfg(any(test, feature = "internals"))]
 pub use mesh::coarse_mesh;
-pub use mesh::{
-    CoarseReport, FineReport, HeadStart, Summary, ahead, mesh, mesh_prepared, stage_faces,
-};
+pub use mesh::{CoarseReport, HeadStart, Summary, ahead, mesh, mesh_prepared};
 pub use plan::{
     Estimate, MEMORY_MIN, Options, Plan, Prepared, RECIPE, Trial, least_for, prepare, recipe_of,
     record_recipe,
@@ -36,10 +34,12 @@ pub use plan::{
 #[cfg(any(test, feature = "internals"))]
 pub use progress::silent;
 pub use progress::{Event, Watcher};
-pub use tasks::{
-    Gathered, Performed, Planned, Stage, StageKind, TASKS_MAX, TaskSettings, TaskState, end_plan, gather, is_being_worked, perform, plan as plan_tasks, status,
-};
 pub use remesh::{
     Forecast, NewSizes, Remade, ResaturateSummary, Resaturation, Values, asked, changed, forecast,
     forget, resaturate, undo,
 };
+pub use tasks::{
+    Gathered, Performed, Planned, Stage, StageKind, TASKS_MAX, TaskSettings, TaskState, end_plan,
+    gather, is_being_worked, perform, plan as plan_tasks, status,
+};
+pub use work::{FineReport, stage_faces};

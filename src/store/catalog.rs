@@ -32,6 +32,8 @@ const CATALOG_NEW: &str = "catalog.redb-new";
 const CATALOG_NEXT: &str = "catalog.redb-next";
 /// Folder of sorted runs; everything in it is scratch.
 const SCRATCH: &str = "scratch";
+/// Folder of tasks that others do; nothing in it counts once the store is finished.
+const WORK: &str = "work";
 
 /// The catalog of a store, open for reading or for writing.
 ///
@@ -302,6 +304,16 @@ impl Catalog {
         Ok(path)
     }
 
+    /// The folder of tasks, whether it is there or not.
+    pub(crate) fn work_dir(&self) -> DiskPath {
+        self.dir.join(WORK)
+    }
+
+    /// The same of the store at a path that is not opened.
+    pub(crate) fn work_dir_at(dir: impl Into<DiskPath>) -> DiskPath {
+        dir.into().join(WORK)
+    }
+
     /// One atomic step: files first, then the rows `describe` sets, in one commit; then files no longer listed go.
     ///
     /// Errors: what `describe` returns, before anything is written; failures of the commit, after which the
@@ -363,6 +375,7 @@ impl Catalog {
 
     /// Removes sub-domain files the catalog does not list, what an interrupted commit left, and scratch.
     fn purge(&mut self) -> Result<(), StoreError> {
+        let is_finished = self.state()?.is_finished();
         let listed = self.files()?;
         let coarse: Vec<FileRow> = (self.coarse_snapshots()?.iter())
             .map(|row| FileRow {
@@ -378,7 +391,7 @@ impl Catalog {
             let is_draft = [CATALOG_NEW, CATALOG_NEXT].contains(&&*name);
             if is_draft || is_stray(SUBDOMAIN, &listed) || is_stray(COARSE, &coarse) {
                 path.remove_file()?;
-            } else if name == SCRATCH {
+            } else if name == SCRATCH || name == WORK && is_finished {
                 path.remove_dir_all()?;
             }
         }

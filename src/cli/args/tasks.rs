@@ -46,7 +46,9 @@ pub struct PlanArgs {
 }
 
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  tetdb work part.tetdb --task 17 --memory 4GiB --threads 2 --scratch /local/scratch")]
+#[command(
+    after_help = "Example:\n  tetdb work part.tetdb --task 17 --memory 4GiB --threads 2 --scratch /local/scratch"
+)]
 pub struct WorkArgs {
     /// The store, on a file system that all machines share
     #[arg(value_name = "STORE")]

@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 
 use super::owners::{NewCut, TopologyChange, read_owners};
-use super::stages;
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::seal::totals::{Totals, sum_totals};
 use crate::pipeline::tree::{self, PartMesh, blob};
+use crate::pipeline::work::stages;
 use crate::pipeline::work::{CutOrder, CutReceipt, SubdomainOrder, SubdomainReceipt};
 use crate::store::{Catalog, StoreError};
 use tetdb_schema::catalog::StoreState;
@@ -41,10 +41,7 @@ pub(crate) fn subdomain_order(
 }
 
 /// Commits bisections, each after those above it, in one step: of the files between them only the last children's are there.
-pub(crate) fn commit_cuts(
-    catalog: &mut Catalog,
-    cuts: &[CutReceipt],
-) -> Result<(), PipelineError> {
+pub(crate) fn commit_cuts(catalog: &mut Catalog, cuts: &[CutReceipt]) -> Result<(), PipelineError> {
     let mut topology = TopologyChange::none(catalog)?;
     for cut in cuts {
         let [low, high] = cut.children.map(|child| child.part.first);

@@ -3,25 +3,12 @@
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 
-use rkyv::{Archive, Deserialize, Serialize};
-
 use crate::pipeline::tree::blob;
+use crate::pipeline::work::InheritedFace;
 use crate::sealed::SealedError;
 use crate::store::{Catalog, Step, StoreError};
 use crate::topology::{Neighbors, Owners};
 use tetdb_schema::catalog::{NeighborRow, TopologyRow};
-
-/// An interface face of an earlier cut that a child took over from its parent.
-#[derive(
-    Archive, Serialize, Deserialize, Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord,
-)]
-pub(crate) struct InheritedFace {
-    pub cut: u32,
-    /// Number in the cut.
-    pub index: u32,
-    /// On which side of the cut the child is.
-    pub side: u32,
-}
 
 /// A cut as far as neighbors are concerned.
 pub(crate) struct NewCut<'a> {

@@ -4,10 +4,8 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Instant;
 
-use super::FineReport;
 use super::coarse::{CoarseReport, inserted, recovered};
 use super::commit::{close, commit_subdomain, subdomain_order};
-use super::common::Common;
 use super::head_start::{HeadStart, ahead};
 use crate::bisect::{CutReport, load_of};
 use crate::boundary::RegionSummary;
@@ -20,7 +18,10 @@ use crate::pipeline::plan::{Estimate, Options, Plan, Prepared, prepare};
 use crate::pipeline::progress::Watcher;
 use crate::pipeline::seal::totals::journal;
 use crate::pipeline::tree::{self, DONE, PartMesh, TreePart, blob};
-use crate::pipeline::work::{SubdomainOrder, SubdomainReceipt, Traffic, Worker, Workplace};
+use crate::pipeline::work::common::Common;
+use crate::pipeline::work::{
+    FineReport, SubdomainOrder, SubdomainReceipt, Traffic, Worker, Workplace,
+};
 use crate::pipeline::workers::map_bounded;
 use crate::sizing::{SizeField, SizeSummary, TETS_PER_LOAD};
 use crate::storage::{Backing, Budget, Pager, PagerStats, ScratchSpace, attempt};
@@ -318,7 +319,8 @@ impl<'a> Run<'a> {
             common: self.common()?,
         };
         if let (Some(mesh), [part]) = (open, &left[..]) {
-            let job = worker.subdomain_job(subdomain_order(self.catalog, self.n, *part)?, self.plan)?;
+            let job =
+                worker.subdomain_job(subdomain_order(self.catalog, self.n, *part)?, self.plan)?;
             let leaf = job.finish(mesh, worker.common, self.watch)?;
             return self.seal_step(&leaf.receipt(), Some(leaf.fine), summary);
         }

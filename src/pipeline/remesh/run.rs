@@ -11,13 +11,13 @@ use super::summary::{Remade, ResaturateSummary};
 use crate::geom::{Aabb, Point};
 use crate::mesh::Workspace;
 use crate::pipeline::error::PipelineError;
-use crate::pipeline::mesh::coarse_snapshot::reopen;
-use crate::pipeline::mesh::common::Common;
 use crate::pipeline::mesh::owners::read_owners;
 use crate::pipeline::plan::{Options, Plan};
 use crate::pipeline::progress::Watcher;
 use crate::pipeline::seal::totals::{SealedTotals, journal, sum_totals};
 use crate::pipeline::tree::{self, PartMesh, blob};
+use crate::pipeline::work::coarse_snapshot::reopen;
+use crate::pipeline::work::common::Common;
 use crate::pipeline::work::subdomain::{FinishedSubdomain, SubdomainJob};
 use crate::pipeline::workers::map_bounded;
 use crate::sealed::SealedError;
@@ -365,7 +365,9 @@ impl<'a> RemeshRun<'a> {
     ) -> Result<ResaturateSummary, PipelineError> {
         for (row, _) in &self.rows {
             let subdomain = finished.get_mut(&row.rank).expect("made for each");
-            let path = self.catalog.file_path(row.rank, subdomain.sealed.row.generation);
+            let path = self
+                .catalog
+                .file_path(row.rank, subdomain.sealed.row.generation);
             // It is not listed: what stays is removed by the next writer.
             let _ = path.remove_file();
             subdomain.sealed.row = row.clone();

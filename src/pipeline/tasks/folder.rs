@@ -34,7 +34,9 @@ impl Patience {
     /// Waits a little; `false` when the time is over.
     fn goes_on(self) -> bool {
         check_cancelled();
-        let left = self.0.and_then(|end| end.checked_duration_since(Instant::now()));
+        let left = self
+            .0
+            .and_then(|end| end.checked_duration_since(Instant::now()));
         left.is_some_and(|left| {
             std::thread::sleep(left.min(LOOK_AGAIN));
             true
@@ -73,10 +75,8 @@ pub(super) struct TaskFolder {
 }
 
 impl TaskFolder {
-    pub fn of(store: &DiskPath) -> Self {
-        Self {
-            dir: store.join("work"),
-        }
+    pub fn of(dir: DiskPath) -> Self {
+        Self { dir }
     }
 
     pub fn plan_path(&self) -> DiskPath {
@@ -148,7 +148,8 @@ impl TaskFolder {
     /// The size field's bytes. Errors: in words what is wrong with them.
     pub fn field(&self, patience: Patience) -> Result<Vec<u8>, PipelineError> {
         let path = self.field_path();
-        let mut bytes = (patience.until(|| read(&path))?).ok_or_else(|| damaged(&path, "it is missing"))?;
+        let mut bytes =
+            (patience.until(|| read(&path))?).ok_or_else(|| damaged(&path, "it is missing"))?;
         let length = body(Kind::SizeField, &bytes)
             .map_err(|e| damaged(&path, &e))?
             .len();
@@ -184,7 +185,10 @@ pub(super) fn read(path: &DiskPath) -> Result<Option<Vec<u8>>, StorageError> {
 }
 
 /// A record of a file; `None` where there is none. Errors: in words what is wrong with it.
-pub(super) fn read_record<T>(path: &DiskPath, kind: Kind) -> Result<Option<Result<T, String>>, StorageError>
+pub(super) fn read_record<T>(
+    path: &DiskPath,
+    kind: Kind,
+) -> Result<Option<Result<T, String>>, StorageError>
 where
     T: Archive,
     T::Archived:
@@ -214,8 +218,8 @@ where
 /// Copies a file, which may be on another disk.
 pub(super) fn copy(from: &DiskPath, to: &DiskPath) -> Result<(), StorageError> {
     let draft = draft_of(to);
-    let mut source = (from.disk().open_stream(from.path()))
-        .map_err(|e| StorageError::io(from.path(), e))?;
+    let mut source =
+        (from.disk().open_stream(from.path())).map_err(|e| StorageError::io(from.path(), e))?;
     let copied = (|| {
         let mut file = to.disk().create_stream(draft.path())?;
         let mut buffer = vec![0; COPY];
@@ -231,11 +235,19 @@ pub(super) fn copy(from: &DiskPath, to: &DiskPath) -> Result<(), StorageError> {
 }
 
 fn draft_of(path: &DiskPath) -> DiskPath {
-    let name = path.path().file_name().unwrap_or_default().to_string_lossy();
+    let name = path
+        .path()
+        .file_name()
+        .unwrap_or_default()
+        .to_string_lossy();
     path.folder().join(format!("{name}.{}", attempt_name()))
 }
 
-fn end_draft(draft: &DiskPath, path: &DiskPath, written: std::io::Result<()>) -> Result<(), StorageError> {
+fn end_draft(
+    draft: &DiskPath,
+    path: &DiskPath,
+    written: std::io::Result<()>,
+) -> Result<(), StorageError> {
     let done = written
         .map_err(|e| StorageError::io(path.path(), e))
         .and_then(|()| draft.sync_file())

@@ -10,7 +10,9 @@ use super::records::{PlanRecord, TaskOrders, TaskReceipts};
 use super::schedule::{Stage, StageKind, stages};
 use super::status::is_being_worked;
 use crate::pipeline::error::PipelineError;
-use crate::pipeline::mesh::commit::{close, commit_cuts, commit_subdomain, cut_order, subdomain_order};
+use crate::pipeline::mesh::commit::{
+    close, commit_cuts, commit_subdomain, cut_order, subdomain_order,
+};
 use crate::pipeline::plan::RECIPE;
 use crate::pipeline::tree::{self, PartMesh, TreePart, blob};
 use crate::pipeline::work::{CutReceipt, Kind, Order, Receipt};
@@ -47,7 +49,7 @@ impl Gathered {
 /// `options` are those of the job, as JSON. Errors: no coarse mesh, or nothing left to do; the disk.
 pub fn plan(catalog: &mut Catalog, tasks: u32, options: &str) -> Result<(), PipelineError> {
     attempt(|| {
-        let folder = TaskFolder::of(catalog.disk_path());
+        let folder = TaskFolder::of(catalog.work_dir());
         let state = catalog.state()?;
         let no_plan = |reason: &str| PipelineError::NoPlan {
             path: folder.dir.folder().path().to_owned(),
@@ -57,7 +59,9 @@ pub fn plan(catalog: &mut Catalog, tasks: u32, options: &str) -> Result<(), Pipe
             return Err(no_plan("it is finished"));
         }
         if state < StoreState::Coarse {
-            return Err(no_plan("it has no coarse mesh yet, which one process makes"));
+            return Err(no_plan(
+                "it has no coarse mesh yet, which one process makes",
+            ));
         }
         let bounds = tree::bounds(catalog)?;
         let mut plan = PlanRecord {
@@ -98,8 +102,14 @@ pub fn plan(catalog: &mut Catalog, tasks: u32, options: &str) -> Result<(), Pipe
 /// A file that is not there is looked for during `wait`. Errors: no plan; the disk. What is committed stays so.
 pub fn gather(catalog: &mut Catalog, wait: Duration) -> Result<Gathered, PipelineError> {
     attempt(|| {
-        let folder = TaskFolder::of(catalog.disk_path());
+        let folder = TaskFolder::of(catalog.work_dir());
         let patience = Patience::of(wait);
+        if catalog.state()?.is_finished() {
+            return Ok(Gathered {
+                is_finished: true,
+                ..Gathered::default()
+            });
+        }
         let plan = folder.plan(patience)?;
         let run = GatherRun {
             catalog,
@@ -148,7 +158,8 @@ impl GatherRun<'_> {
             }
         }
         close(self.catalog, n)?;
-        self.folder.dir.remove_dir_all()?;
+        // A task that nobody waits for may still write; what stays goes when the store is next opened for writing.
+        let _ = self.folder.dir.remove_dir_all();
         gathered.is_finished = true;
         Ok(gathered)
     }
@@ -160,10 +171,15 @@ impl GatherRun<'_> {
         let is_open = |part: TreePart| match stage.kind {
             StageKind::Cuts => parts.iter().any(|p| p.part == part),
             StageKind::Subtrees => wide_within(&parts, part).next().is_some(),
-            StageKind::Subdomains => (part.first..part.first + part.count).any(|r| !sealed.contains(&r)),
+            StageKind::Subdomains => {
+                (part.first..part.first + part.count).any(|r| !sealed.contains(&r))
+            }
         };
         let tasks = stage.tasks().zip(&stage.parts);
-        Ok(tasks.filter(|(_, part)| is_open(**part)).map(|(task, _)| task).collect())
+        Ok(tasks
+            .filter(|(_, part)| is_open(**part))
+            .map(|(task, _)| task)
+            .collect())
     }
 
     /// What a task has done, its files at hand; else why nothing can be committed.
@@ -189,7 +205,12 @@ impl GatherRun<'_> {
         let dir = self.folder.files_dir(&receipts.attempt);
         for (name, bytes) in &receipts.files {
             let file = dir.join(name);
-            let is_there = || Ok(file.bytes().is_ok_and(|found| found == *bytes).then_some(()));
+            let is_there = || {
+                Ok(file
+                    .bytes()
+                    .is_ok_and(|found| found == *bytes)
+                    .then_some(()))
+            };
             if patience.until(is_there)?.is_none() {
                 return Ok(Err(format!("its file {name} is missing or not complete")));
             }
@@ -202,9 +223,13 @@ impl GatherRun<'_> {
         let from = self.folder.files_dir(&done.attempt);
         let store = self.folder.dir.folder();
         let files = self.catalog.files()?;
-        let files = files.iter().map(|f| Catalog::file_name(f.subdomain, f.generation));
+        let files = files
+            .iter()
+            .map(|f| Catalog::file_name(f.subdomain, f.generation));
         let coarse = self.catalog.coarse_snapshots()?;
-        let coarse = coarse.iter().map(|c| Catalog::coarse_name(c.rank, c.generation));
+        let coarse = coarse
+            .iter()
+            .map(|c| Catalog::coarse_name(c.rank, c.generation));
         let listed: BTreeSet<String> = files.chain(coarse).collect();
         for (name, _) in &done.files {
             // One that counts already is not touched: this part of the task was committed before.
@@ -221,7 +246,10 @@ impl GatherRun<'_> {
         }
         self.commit_new_cuts(cuts, done.task)?;
         let sealed: BTreeSet<u32> = self.catalog.subdomains()?.iter().map(|r| r.rank).collect();
-        for sub in subdomains.iter().filter(|sub| !sealed.contains(&sub.row.rank)) {
+        for sub in subdomains
+            .iter()
+            .filter(|sub| !sealed.contains(&sub.row.rank))
+        {
             commit_subdomain(self.catalog, sub)?;
         }
         // What remains in it are other names of files that count now.
@@ -270,7 +298,11 @@ impl GatherRun<'_> {
             orders,
             below: stage.kind == StageKind::Subtrees,
         };
-        Ok(write_record(&self.folder.orders_path(task), Kind::Orders, &record)?)
+        Ok(write_record(
+            &self.folder.orders_path(task),
+            Kind::Orders,
+            &record,
+        )?)
     }
 }
 
@@ -293,7 +325,7 @@ fn place(from: &DiskPath, to: &DiskPath) -> Result<(), StorageError> {
 ///
 /// Errors: the disk.
 pub fn end_plan(catalog: &mut Catalog) -> Result<bool, PipelineError> {
-    let folder = TaskFolder::of(catalog.disk_path());
+    let folder = TaskFolder::of(catalog.work_dir());
     if !folder.dir.exists() {
         return Ok(false);
     }

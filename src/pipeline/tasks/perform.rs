@@ -6,14 +6,16 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use super::folder::{Patience, TaskFolder, attempt_name, copy, damaged, read_record, scratch_in, write_record};
+use super::folder::{
+    Patience, TaskFolder, attempt_name, copy, damaged, read_record, scratch_in, write_record,
+};
 use super::records::{Mark, PlanRecord, TaskOrders, TaskReceipts};
 use super::schedule::stages;
 use crate::geom::{Aabb, Point};
 use crate::pipeline::error::PipelineError;
-use crate::pipeline::mesh::common::Common;
 use crate::pipeline::plan::{Options, Plan};
 use crate::pipeline::progress::Watcher;
+use crate::pipeline::work::common::Common;
 use crate::pipeline::work::{Kind, Order, Receipt, Worker, Workplace};
 use crate::pipeline::workers::work_off;
 use crate::sizing::SizeField;
@@ -54,7 +56,7 @@ pub fn perform(
 ) -> Result<Performed, PipelineError> {
     attempt(|| {
         let patience = Patience::of(settings.wait);
-        let folder = TaskFolder::of(&store.into());
+        let folder = TaskFolder::of(Catalog::work_dir_at(store));
         let plan = folder.plan(patience)?;
         let stages = stages(plan.n, plan.tasks);
         let Some(stage) = stages.iter().position(|s| s.tasks().contains(&task)) else {
@@ -94,7 +96,8 @@ fn is_done(folder: &TaskFolder, plan: &PlanRecord, task: u32) -> Result<bool, St
     Ok(found.is_some_and(|found| {
         found.is_ok_and(|receipts| {
             let dir = folder.files_dir(&receipts.attempt);
-            let is_there = |(name, bytes): &(String, u64)| dir.join(name).bytes().is_ok_and(|b| b == *bytes);
+            let is_there =
+                |(name, bytes): &(String, u64)| dir.join(name).bytes().is_ok_and(|b| b == *bytes);
             receipts.run == plan.run && receipts.files.iter().all(is_there)
         })
     }))
@@ -132,7 +135,13 @@ fn marked<T>(folder: &TaskFolder, task: u32, mark: &Mark, work: impl FnOnce() ->
                 let now = SystemTime::now().duration_since(UNIX_EPOCH);
                 let renewed = now.unwrap_or_default().as_secs();
                 // For others to look at: the work goes on without it.
-                let _ = folder.set_mark(task, &Mark { renewed, ..mark.clone() });
+                let _ = folder.set_mark(
+                    task,
+                    &Mark {
+                        renewed,
+                        ..mark.clone()
+                    },
+                );
                 if stopped.recv_timeout(RENEWED_EVERY) != Err(RecvTimeoutError::Timeout) {
                     return;
                 }
@@ -174,7 +183,12 @@ impl<'a> Attempt<'a> {
         }
     }
 
-    fn run(self, patience: Patience, budget: &Budget, watch: &Watcher) -> Result<usize, PipelineError> {
+    fn run(
+        self,
+        patience: Patience,
+        budget: &Budget,
+        watch: &Watcher,
+    ) -> Result<usize, PipelineError> {
         let clock = Instant::now();
         let output = self.local.as_ref().unwrap_or(&self.files);
         let scratch = output.join("scratch");
@@ -193,7 +207,11 @@ impl<'a> Attempt<'a> {
                 receipts,
                 seconds: clock.elapsed().as_secs_f64(),
             };
-            write_record(&self.folder.receipts_path(record.task), Kind::Receipts, &record)?;
+            write_record(
+                &self.folder.receipts_path(record.task),
+                Kind::Receipts,
+                &record,
+            )?;
             Ok(n)
         })();
         if let Some(local) = &self.local {
@@ -280,17 +298,29 @@ impl<'a> Attempt<'a> {
             };
             let path = store.join(Catalog::file_name(part.part.first, part.generation));
             let found = patience.until(|| Ok(path.is_file().then_some(())))?;
-            found.ok_or_else(|| damaged(&path, "it is missing, unless the task has been done meanwhile"))?;
+            found.ok_or_else(|| {
+                damaged(
+                    &path,
+                    "it is missing, unless the task has been done meanwhile",
+                )
+            })?;
         }
         Ok(())
     }
 
     /// Makes all files last where everybody finds them; their names and lengths.
-    fn deliver(&self, output: &DiskPath, receipts: &[Receipt]) -> Result<Vec<(String, u64)>, StorageError> {
+    fn deliver(
+        &self,
+        output: &DiskPath,
+        receipts: &[Receipt],
+    ) -> Result<Vec<(String, u64)>, StorageError> {
         let mut names: BTreeSet<String> = receipts.iter().flat_map(Receipt::files).collect();
         for receipt in receipts {
             if let Receipt::Cut(cut) = receipt {
-                names.remove(&Catalog::file_name(cut.parent.part.first, cut.parent.generation));
+                names.remove(&Catalog::file_name(
+                    cut.parent.part.first,
+                    cut.parent.generation,
+                ));
             }
         }
         let mut files = Vec::with_capacity(names.len());

@@ -10,6 +10,7 @@ use super::schedule::{Stage, stages};
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::work::Kind;
 use crate::storage::{StorageError, is_process_gone};
+use crate::store::Catalog;
 
 /// A task that has not said for so long that it lives is taken for dead: twelve times what it takes to say so.
 const SILENT: u64 = 60;
@@ -84,7 +85,8 @@ impl Planned {
 
 /// How far the tasks of the store at `store` are; `None` where none are planned. Nothing is changed, and the catalog is not opened.
 pub fn status(store: &Path) -> Result<Option<Planned>, PipelineError> {
-    let folder = TaskFolder::of(&store.into());
+    let folder = TaskFolder::of(Catalog::work_dir_at(store));
+    // Of a finished store it is about to go.
     if !folder.plan_path().exists() {
         return Ok(None);
     }
@@ -114,7 +116,14 @@ fn state(folder: &TaskFolder, run: u64, task: u32) -> Result<TaskState, StorageE
         (Some(Err(why)), _) => TaskState::Failed {
             why: format!("its receipt cannot be used: {why}"),
         },
-        (_, Some(Mark { host, error: Some(error), .. })) => TaskState::Failed {
+        (
+            _,
+            Some(Mark {
+                host,
+                error: Some(error),
+                ..
+            }),
+        ) => TaskState::Failed {
             why: format!("on {host}: {error}"),
         },
         (_, Some(mark)) if is_alive(&mark) => TaskState::Running { host: mark.host },

@@ -2,16 +2,16 @@
 
 use std::time::Instant;
 
+use super::common::Common;
+use super::cut_journal::CutJournal;
 use super::order::CutOrder;
+use super::receipt::InheritedFace;
 use super::receipt::{CutReceipt, Traffic};
+use super::stages::{StageFiles, Stages};
 use crate::bisect::{self, CutPlan, CutReport, Opened, Zone};
 use crate::mesh::{Mesh, Workspace};
 use crate::optimize::Settings;
 use crate::pipeline::error::PipelineError;
-use crate::pipeline::mesh::common::Common;
-use crate::pipeline::mesh::cut_journal::CutJournal;
-use crate::pipeline::mesh::owners::InheritedFace;
-use crate::pipeline::mesh::stages::{StageFiles, Stages};
 use crate::pipeline::plan::Plan;
 use crate::pipeline::progress::{Event, Watcher};
 use crate::pipeline::tree::{DONE, PartMesh, TreePart, open_part};
@@ -100,7 +100,8 @@ impl CutJob<'_> {
         let mut pages = PagerStats::default();
         let [low, high] = part.children();
         let mut child = |part, path| {
-            let (child, stats) = self.child((&mut host, &mut core), &opened, (part, path), &space)?;
+            let (child, stats) =
+                self.child((&mut host, &mut core), &opened, (part, path), &space)?;
             pages.add(stats);
             Ok::<_, PipelineError>(child)
         };

@@ -6,13 +6,20 @@
 //! write, messages between processes. Both have a form in bytes with a version and a checksum, the same for every carrier.
 
 mod bytes;
+pub(super) mod coarse_snapshot;
+pub(super) mod common;
 mod cut;
+mod cut_journal;
 mod order;
 mod receipt;
+mod saturate;
+pub(super) mod stages;
 pub(super) mod subdomain;
 mod worker;
 
 pub(super) use bytes::{Kind, body, from_bytes, head, to_bytes};
 pub(super) use order::{CutOrder, Order, SubdomainOrder};
-pub(super) use receipt::{CutReceipt, Receipt, SubdomainReceipt, Traffic};
+pub(super) use receipt::{CutReceipt, InheritedFace, Receipt, SubdomainReceipt, Traffic};
+pub use saturate::FineReport;
+pub use stages::stage_faces;
 pub(super) use worker::{Worker, Workplace};

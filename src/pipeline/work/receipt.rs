@@ -3,7 +3,6 @@
 use rkyv::{Archive, Deserialize, Serialize};
 
 use super::order::CutOrder;
-use crate::pipeline::mesh::owners::InheritedFace;
 use crate::pipeline::tree::{PartMesh, ZoneRow};
 use crate::storage::PagerStats;
 use crate::store::Catalog;
@@ -48,6 +47,16 @@ pub(crate) struct SubdomainReceipt {
     pub totals: Vec<u8>,
     pub journal: JournalRow,
     pub traffic: Traffic,
+}
+
+/// An interface face of an earlier cut that a child took over from its parent.
+#[derive(Archive, Serialize, Deserialize, Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct InheritedFace {
+    pub cut: u32,
+    /// Number in the cut.
+    pub index: u32,
+    /// On which side of the cut the child is.
+    pub side: u32,
 }
 
 /// Pages read and written, and the most held at once.

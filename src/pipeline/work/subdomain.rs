@@ -5,13 +5,13 @@ use std::time::Instant;
 
 use tetdb_schema::ids::SubdomainId;
 
+use super::coarse_snapshot::save;
+use super::common::Common;
 use super::receipt::{SubdomainReceipt, Traffic};
+use super::saturate::{FineReport, saturate_and_optimize};
 use crate::bisect::Zone;
 use crate::mesh::{Mesh, Workspace};
 use crate::pipeline::error::PipelineError;
-use crate::pipeline::mesh::coarse_snapshot::save;
-use crate::pipeline::mesh::common::Common;
-use crate::pipeline::mesh::saturate::{FineReport, saturate_and_optimize};
 use crate::pipeline::plan::Plan;
 use crate::pipeline::progress::Watcher;
 use crate::pipeline::seal::compact::seal;

@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use super::common::Common;
 use super::cut::CutJob;
 use super::order::{CutOrder, Order, SubdomainOrder};
 use super::receipt::{CutReceipt, Receipt};
 use super::subdomain::SubdomainJob;
 use crate::bisect::CutReport;
 use crate::pipeline::error::PipelineError;
-use crate::pipeline::mesh::common::Common;
 use crate::pipeline::plan::Plan;
 use crate::pipeline::progress::Watcher;
 use crate::pipeline::tree::DONE;
