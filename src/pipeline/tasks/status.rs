@@ -39,6 +39,10 @@ pub enum TaskState {
 
 /// The plan of a store and how far its tasks are.
 #[derive(Clone, Debug)]
+#[cfg_attr(
+    not(feature = "cli"),
+    allow(dead_code, reason = "for the program alone")
+)]
 pub struct Planned {
     /// Sub-domains.
     pub subdomains: u32,
@@ -52,6 +56,10 @@ pub struct Planned {
     pub states: Vec<(u32, TaskState)>,
 }
 
+#[cfg_attr(
+    not(feature = "cli"),
+    allow(dead_code, reason = "for the program alone")
+)]
 impl Planned {
     /// Tasks of the stage that is being done.
     pub fn range(&self) -> Range<u32> {
