@@ -4,7 +4,9 @@ use super::guard::guarded_in;
 use super::{Error, Store};
 use crate::expr::{ExprError, Expression, Kind};
 use crate::geom::{Aabb, Point};
-use crate::query::{Hit, Ordered, QueryError, QuerySession, Selection, Solid, VARIABLES};
+use crate::query::{
+    Hit, Ordered, QueryError, QuerySession, Selection, Solid, VARIABLES, regions_called,
+};
 use crate::storage::RunContext;
 
 /// Memory of answers while they are sorted.
@@ -102,6 +104,13 @@ impl<'s> Query<'s> {
     pub fn in_regions(mut self, regions: &[u32]) -> Self {
         self.selection.regions = Some(regions.to_vec());
         self
+    }
+
+    /// They are in a region of this name. Errors: `no-such-part`.
+    pub fn in_region_called(mut self, name: &str) -> Result<Self, Error> {
+        let found = regions_called(&self.store.summary().region_names, name)?;
+        self.selection.regions.get_or_insert_default().extend(found);
+        Ok(self)
     }
 
     /// They stand on an input triangle with one of these labels, positions in [`Summary::labels`](super::Summary::labels).

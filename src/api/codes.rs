@@ -121,6 +121,11 @@ pub const CODES: &[CodeRow] = &[
         3,
         "the surface encloses no region to fill",
     ),
+    row(
+        "bad-seed",
+        3,
+        "a region seed or a hole has no meaning, or contradicts the surface or another",
+    ),
     row("no-such-store", 3, "there is no store at this path"),
     row(
         "no-such-part",

@@ -11,7 +11,7 @@ use crate::sealed::SealedError;
 use crate::sizing::SizingError;
 use crate::storage::StorageError;
 use crate::store::StoreError;
-use crate::surface::SurfaceError;
+use crate::surface::{SurfaceError, show};
 
 impl From<ReadError> for Error {
     fn from(e: ReadError) -> Self {
@@ -128,6 +128,15 @@ impl From<BoundaryError> for Error {
                 .with_help("fill all regions, which needs no orientation, or give each shared wall from both sides")
                 .with_remedy(Remedy::General);
         }
+        if let BoundaryError::Seed { point, .. } = &e {
+            return Self::new("bad-seed", &e)
+                .at(show(*point))
+                .with_help("a seed lies inside the region that it fills or names, off its triangles; one for each region");
+        }
+        if let BoundaryError::NoSeed = &e {
+            return Self::new("bad-seed", &e)
+                .with_help("give a point inside each region to fill, or inside each hole");
+        }
         Self::new("unrecovered-triangles", &e)
             .with_help("look at these triangles; a finer or better shaped surface there helps")
             .with_remedy(Remedy::General)
@@ -148,6 +157,10 @@ impl From<PipelineError> for Error {
             PipelineError::NothingToUndo { .. } => Self::new("nothing-to-undo", &e)
                 .with_help("only the last change can be undone, once, and not after its old version was dropped")
                 .with_remedy(Remedy::General),
+            PipelineError::BadSeed { option, .. } => Self::new("bad-seed", &e).with_help(match option {
+                "hole" => "such as 0.5,0.5,0.2",
+                _ => "such as 0.5,0.5,0.2,rock",
+            }),
             PipelineError::SizeCount { .. } => Self::new("count-mismatch", &e)
                 .with_help("give one length for each, in the order of the exported arrays")
                 .with_remedy(Remedy::General),

@@ -8,10 +8,12 @@ use xxhash_rust::xxh3::Xxh3;
 use super::error::{Error, Remedy};
 use super::field_arrays::is_in_store;
 use super::surface::source;
+use crate::boundary::RegionPolicy;
 use crate::io::read::{read_sizes, size_files};
 use crate::pipeline::{Options, RECIPE, recipe_of};
 use crate::sizing::Background;
 use crate::store::Catalog;
+use crate::surface::{Seed, SeedKind};
 use tetdb_schema::catalog::SurfaceSource;
 
 /// The record of a run.
@@ -70,6 +72,24 @@ pub(crate) fn identify_sizes(options: &mut Options) -> Result<(), Error> {
         options.size_field = Some(path.to_string_lossy().into_owned());
     }
     Ok(())
+}
+
+/// Puts what the surface's files say of regions into the options, so that the record is complete: under the rule `seeds` as if it was asked
+/// for; names alone under any other rule.
+pub(crate) fn take_seeds(options: &mut Options, seeds: &[Seed]) {
+    let is_rule = options.region_policy() == Some(RegionPolicy::Seeds);
+    for seed in seeds {
+        let list = match (is_rule, &seed.kind) {
+            (true, SeedKind::Hole) => &mut options.hole,
+            (true, SeedKind::Region(_)) => &mut options.region_seed,
+            (false, SeedKind::Region(Some(_))) => &mut options.region_name,
+            (false, _) => continue,
+        };
+        let text = seed.to_string();
+        if !list.contains(&text) {
+            list.push(text);
+        }
+    }
 }
 
 /// Reads the sizes of identified options, in at most half of what may be held; those that were given as arrays from `store`.

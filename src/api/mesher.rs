@@ -13,10 +13,11 @@ use super::{
     Verification, guarded, job, replace, verify,
 };
 use crate::audit::Level;
+use crate::geom::Point;
 use crate::pipeline::{self, Estimate, Options, Prepared, RECIPE};
 use crate::storage::{Budget, CancelToken, attempt, n_threads};
 use crate::store::{Catalog, StoreError, WriterLock};
-use crate::surface;
+use crate::surface::{self, Seed, SeedKind};
 use tetdb_schema::catalog::StoreState;
 
 /// A surface that takes more than this part of the cap is not kept while the mesh is refined.
@@ -120,12 +121,34 @@ impl Mesher {
         self.options.drop_coarse = old.drop_coarse;
         self.options.keep_stages = old.keep_stages;
         self.options.coarse_only = old.coarse_only;
+        self.options.region_seed = old.region_seed;
+        self.options.hole = old.hole;
         self
     }
 
     /// Which regions are filled.
     pub fn regions(mut self, regions: Regions) -> Self {
         self.options.regions = Some(regions.word().to_owned());
+        self
+    }
+
+    /// The region around `point` is called `name`, and filled under [`Regions::Seeds`]; may be repeated.
+    ///
+    /// A name is good wherever a region is asked for: sizes, questions, exports. Seeds outside, on a triangle, in a region that stays
+    /// empty, or of two names in one region are refused when the mesh is begun (`bad-seed`).
+    pub fn region_seed(mut self, point: [f64; 3], name: Option<&str>) -> Self {
+        let kind = SeedKind::Region(name.map(str::to_owned));
+        let point = Point::from_array(point);
+        self.options
+            .region_seed
+            .push(Seed { point, kind }.to_string());
+        self
+    }
+
+    /// The region around `point` stays empty, whatever the rule; may be repeated.
+    pub fn hole(mut self, point: [f64; 3]) -> Self {
+        let (point, kind) = (Point::from_array(point), SeedKind::Hole);
+        self.options.hole.push(Seed { point, kind }.to_string());
         self
     }
 
@@ -223,6 +246,7 @@ impl Mesher {
             let cap = self.settings.cap()?;
             let mut options = self.options.clone();
             job::identify_sizes(&mut options)?;
+            job::take_seeds(&mut options, &self.surface.inner.seeds);
             let scratch = scratch_beside(&self.surface.inner, cap, Path::new("."))?;
             let surface = &self.surface.inner;
             attempt(|| surface::validate_in(surface, &scratch))?.accept()?;
@@ -261,6 +285,8 @@ impl Mesher {
             return Err(Error::new("usage", message).with_help("choose another path"));
         }
         job::identify_sizes(&mut self.options)?;
+        job::take_seeds(&mut self.options, &self.surface.inner.seeds);
+        self.options.region_rule()?;
         let cap = settings.cap()?;
         replace::settle(path, settings)?;
         if self.is_there(path)? {
@@ -362,6 +388,9 @@ impl Mesher {
             settings.note(format!("memory: {}", settings.cap_in_words()));
             let field = self.field.as_deref();
             let prepared = predict_with(surface, &self.options, field, left, path)?;
+            for note in &prepared.notes {
+                settings.note(format!("note: {note}"));
+            }
             if self.preflight {
                 preflight(&prepared.estimate, cap, path, settings)?;
             }

@@ -12,6 +12,8 @@ pub enum Regions {
     Outer,
     /// What the triangles' front sides turn away from.
     ByOrientation,
+    /// Those of [`Mesher::region_seed`](super::Mesher::region_seed); where only holes are given, all others.
+    Seeds,
 }
 
 /// How far tetrahedra are improved.
@@ -53,6 +55,7 @@ impl Regions {
             Self::All => "all",
             Self::Outer => "outer",
             Self::ByOrientation => "by-orientation",
+            Self::Seeds => "seeds",
         }
     }
 }

@@ -109,12 +109,14 @@ fn of_catalog(path: &Path, catalog: &mut Catalog, title: &str) -> Result<Value, 
         })
     });
     let subdomains: Vec<Value> = subdomains.collect();
+    let called = catalog.region_names()?;
     let regions = catalog.regions()?.into_iter().map(|r| {
         let names = r.labels.iter().take(LABELS_NAMED);
         let names: Vec<&str> = names
             .filter_map(|&l| labels.get(l as usize).map(String::as_str))
             .collect();
-        json!({ "region": r.region, "filled": r.filled, "tets": r.tets, "volume": r.volume, "labels": names })
+        let name = (r.region as usize).checked_sub(1).and_then(|n| called.get(n));
+        json!({ "region": r.region, "name": name, "filled": r.filled, "tets": r.tets, "volume": r.volume, "labels": names })
     });
     let regions: Vec<Value> = regions.collect();
     let interfaces = catalog.interfaces()?.into_iter();

@@ -63,6 +63,8 @@ pub struct Summary {
     pub labels: Vec<String>,
     /// Regions by number, empty ones among them.
     pub regions: Vec<RegionRow>,
+    /// What regions 1, 2, … are called, empty for one without a name; none at all where no region has one.
+    pub region_names: Vec<String>,
     /// Sub-domains by rank.
     pub subdomains: Vec<SubdomainRow>,
     /// Which sub-domains share how many faces, by cut.
@@ -225,6 +227,7 @@ impl Summary {
             worst_quality: worst.fold(0.0, f64::max),
             labels: catalog.labels()?,
             regions: catalog.regions()?,
+            region_names: catalog.region_names()?,
             interfaces: catalog.interfaces()?,
             subdomains,
         })

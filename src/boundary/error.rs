@@ -45,12 +45,17 @@ pub enum BoundaryError {
         /// The triangle it lies on.
         facet: Box<FacetPlace>,
     },
-    /// The volume outside is not separated from this seed.
-    #[error("the surface does not close: {what}")]
-    Leak {
-        /// Which seed is not separated.
-        what: String,
+    /// A seed says something that cannot be.
+    #[error("{message}")]
+    Seed {
+        /// Which seed, and what it contradicts.
+        message: String,
+        /// Where it is.
+        point: Point,
     },
+    /// Regions are to be filled by seeds, and there is none.
+    #[error("neither a region seed nor a hole is given, and regions are filled by seeds")]
+    NoSeed,
     /// What triangles point out of cannot be decided.
     #[error("the triangles do not point out of the same volumes: {what}")]
     Orientation {

@@ -32,6 +32,7 @@ mod polygon;
 mod recover;
 mod regions;
 mod report;
+mod seeds;
 mod settle;
 mod space;
 mod star;
@@ -46,6 +47,7 @@ pub use policy::{Filled, RegionPolicy, Walls};
 pub use recover::recover;
 pub use regions::{RegionSummary, Regions, fill_regions};
 pub use report::RecoveryReport;
+pub use seeds::RegionRule;
 
 #[cfg(test)]
 mod tests;

@@ -3,7 +3,6 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use super::error::BoundaryError;
-use crate::geom::Point;
 use crate::surface::Wall;
 
 /// How pairs of volumes meet, the lower-numbered one first.
@@ -20,9 +19,8 @@ pub enum RegionPolicy {
     Outer,
     /// What the normals point out of.
     ByOrientation,
-    /// The volumes of these points.
-    #[cfg_attr(not(feature = "internals"), allow(dead_code, reason = "for tests"))]
-    Seeds(Vec<Point>),
+    /// The volumes of seeds; where only holes are given, all others.
+    Seeds,
 }
 
 /// The volumes a policy chooses.
@@ -30,6 +28,8 @@ pub enum RegionPolicy {
 pub struct Filled {
     /// Numbers of the chosen volumes.
     pub volumes: BTreeSet<u32>,
+    /// What some of them are called.
+    pub names: BTreeMap<u32, String>,
     /// Parity was contradictory (shared walls), so all were chosen.
     pub all_instead_of_parity: bool,
 }
@@ -43,7 +43,7 @@ impl RegionPolicy {
         let mut all_instead_of_parity = false;
         let volumes = match self {
             Self::All => all,
-            Self::Seeds(_) => BTreeSet::new(),
+            Self::Seeds => BTreeSet::new(),
             Self::Outer => {
                 let outer = walls.keys().filter(|&&(low, _)| low == outside);
                 outer.map(|&(_, high)| high).collect()
@@ -71,6 +71,7 @@ impl RegionPolicy {
         };
         Ok(Filled {
             volumes,
+            names: BTreeMap::new(),
             all_instead_of_parity,
         })
     }

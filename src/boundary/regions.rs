@@ -1,16 +1,16 @@
 //! Which volumes are filled: components between required faces, those kept that the policy chooses.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use super::error::BoundaryError;
 use super::find::{SearchResult, find_face};
 use super::flood::{Flood, OUTSIDE};
 use super::map::face_at;
-use super::policy::{RegionPolicy, Walls};
+use super::policy::{Filled, Walls};
 use super::recover::place;
+use super::seeds::RegionRule;
 use super::space::PagedSpace;
 use crate::delaunay::Kernel;
-use crate::geom::Point;
 use crate::mesh::{Mesh, VertexTag};
 use crate::storage::{Pages, check_cancelled};
 use tetdb_schema::page::NONE;
@@ -20,6 +20,8 @@ use tetdb_schema::page::NONE;
 pub struct RegionSummary {
     /// Number of the region, from 1; 0 for one that stays empty.
     pub region: u32,
+    /// What it is called.
+    pub name: Option<String>,
     /// In cubed input units.
     pub volume: f64,
     /// Number of tetrahedra in it.
@@ -41,33 +43,48 @@ pub struct Regions {
     pub loose_facets: Vec<u64>,
 }
 
+impl Regions {
+    /// Names of region 1, 2, …, empty for one without; none at all when no region has one.
+    pub fn names(&self) -> Vec<String> {
+        let filled = self.list.iter().filter(|region| region.region > 0);
+        let names: Vec<String> =
+            (filled.map(|region| region.name.clone().unwrap_or_default())).collect();
+        match names.iter().any(|name| !name.is_empty()) {
+            true => names,
+            false => Vec::new(),
+        }
+    }
+}
+
 /// Colors the volumes, deletes everything that is not filled, and the enclosing box.
 ///
 /// Every facet must be a required face. Effects: faces to the outside have no neighbor, required bits stay; filled
 /// tetrahedra carry their region as attribute; facets carry the regions in front and behind; `tet_of` is refreshed; vertices
 /// without tetrahedra are removed unless they are the surface's.
 ///
-/// Errors: [`BoundaryError::Orientation`] when orientation is contradictory, [`BoundaryError::Leak`] when a seed is outside.
+/// Errors: [`BoundaryError::Orientation`] when orientation is contradictory, [`BoundaryError::Seed`] when a seed is outside or contradicts another.
 pub fn fill_regions<P: Pages>(
     mesh: &mut Mesh<P>,
-    policy: &RegionPolicy,
+    rule: &RegionRule,
 ) -> Result<Regions, BoundaryError> {
     let mut flood = Flood::run(mesh);
     let walls = survey(mesh, &mut flood)?;
     let mut regions = Regions::default();
-    let filled = choose(mesh, &flood, &walls, policy, &mut regions)?;
+    let filled = choose(mesh, &flood, &walls, rule)?;
+    regions.all_instead_of_parity = filled.all_instead_of_parity;
     let mut order: Vec<u32> = (OUTSIDE + 1..flood.components.len() as u32).collect();
     order.sort_by_key(|&c| flood.components[c as usize].side_first);
     let mut number = vec![0u32; flood.components.len()];
     let mut n = 0;
     for &c in &order {
-        if filled.contains(&c) {
+        if filled.volumes.contains(&c) {
             n += 1;
             number[c as usize] = n;
         }
         let component = &flood.components[c as usize];
         regions.list.push(RegionSummary {
             region: number[c as usize],
+            name: filled.names.get(&c).cloned(),
             volume: component.volume,
             tets: component.tets,
             facets: component.facets,
@@ -124,34 +141,18 @@ fn choose<P: Pages>(
     mesh: &mut Mesh<P>,
     flood: &Flood,
     walls: &Walls,
-    policy: &RegionPolicy,
-    regions: &mut Regions,
-) -> Result<BTreeSet<u32>, BoundaryError> {
-    if let RegionPolicy::Seeds(seeds) = policy {
-        return of_seeds(mesh, seeds);
-    }
-    let chosen = policy.filled(OUTSIDE, flood.components.len() as u32, walls)?;
-    regions.all_instead_of_parity = chosen.all_instead_of_parity;
-    Ok(chosen.volumes)
-}
-
-fn of_seeds<P: Pages>(mesh: &mut Mesh<P>, seeds: &[Point]) -> Result<BTreeSet<u32>, BoundaryError> {
-    let mut filled = BTreeSet::new();
+    rule: &RegionRule,
+) -> Result<Filled, BoundaryError> {
+    let end = flood.components.len() as u32;
+    let chosen = rule.policy.filled(OUTSIDE, end, walls)?;
     let mut kernel = Kernel::default();
-    for &p in seeds {
+    rule.apply(chosen, OUTSIDE, end, |p| {
         let start = mesh.tet_of(0);
-        let component = match kernel.locate(mesh, p, start) {
+        match kernel.locate(mesh, p, start) {
             Ok(found) => mesh.tet_attribute(found.tet).0,
             Err(_) => OUTSIDE,
-        };
-        if component == OUTSIDE {
-            return Err(BoundaryError::Leak {
-                what: format!("the seed {:?} is outside", p.to_array()),
-            });
         }
-        filled.insert(component);
-    }
-    Ok(filled)
+    })
 }
 
 /// Deletes what is not filled and writes the numbers of what is.

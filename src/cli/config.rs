@@ -8,6 +8,7 @@ use super::args::{Optimize, Regions, ShapeArgs, SizeArgs};
 use super::failure::Failure;
 use crate::api::job::identify_sizes;
 use crate::pipeline::Options;
+use crate::surface::{Seed, SeedKind};
 
 /// No configuration is longer.
 const BYTES_MAX: u64 = 1 << 20;
@@ -41,8 +42,14 @@ pub fn options(args: &ShapeArgs) -> Result<Options, Failure> {
     }
     options.drop_coarse |= args.drop_coarse;
     options.keep_stages |= args.keep_stages;
+    take_seeds(args, &mut options)?;
+    let is_seeded = !(options.region_seed.is_empty() && options.hole.is_empty());
     // The words are stored in full, so that a store tells all of what made it.
-    options.regions.get_or_insert_with(|| word(Regions::Parity));
+    options.regions.get_or_insert_with(|| match is_seeded {
+        true => word(Regions::Seeds),
+        false => word(Regions::Parity),
+    });
+
     options.optimize.get_or_insert_with(|| word(Optimize::Full));
     if options.region_policy().is_none() || options.optimize_mode().is_none() {
         let words = [&options.regions, &options.optimize].map(|w| w.clone().unwrap_or_default());
@@ -52,6 +59,7 @@ pub fn options(args: &ShapeArgs) -> Result<Options, Failure> {
             None => failure,
         });
     }
+    options.region_rule()?;
     options.subdomain_count()?;
     options.form()?;
     identify_sizes(&mut options)?;
@@ -66,6 +74,42 @@ pub fn take_sizes(args: &SizeArgs, options: &mut Options) {
             option.clone_from(given);
         }
     }
+}
+
+/// Seeds of the command line and of its file replace those of `options`. Errors: the file, with its line.
+fn take_seeds(args: &ShapeArgs, options: &mut Options) -> Result<(), Failure> {
+    for (given, option) in [
+        (&args.region_seed, &mut options.region_seed),
+        (&args.hole, &mut options.hole),
+    ] {
+        if !given.is_empty() {
+            option.clone_from(given);
+        }
+    }
+    let Some(path) = &args.seeds else {
+        return Ok(());
+    };
+    let text = text(path).map_err(|e| {
+        Failure::new("unreadable-file", format!("the file cannot be read: {e}"))
+            .at(path.display())
+            .help("seeds are in a regular file, a line for each")
+    })?;
+    for (number, line) in (1..).zip(text.lines()) {
+        let line = line.split('#').next().unwrap_or_default().trim();
+        if line.is_empty() {
+            continue;
+        }
+        let seed = Seed::parse_line(line).ok_or_else(|| {
+            Failure::new("bad-seed", format!("`{line}` is no seed"))
+                .at(format!("{}, line {number}", path.display()))
+                .help("a line is `x y z name`, `x y z` or `x y z hole`")
+        })?;
+        match seed.kind {
+            SeedKind::Hole => options.hole.push(seed.to_string()),
+            SeedKind::Region(_) => options.region_seed.push(seed.to_string()),
+        }
+    }
+    Ok(())
 }
 
 fn take_lengths(args: &SizeArgs, options: &mut Options) {

@@ -10,13 +10,14 @@ use super::failure::{Failure, in_flags};
 use super::input::Space;
 use super::words::count;
 use super::{config, input, memory};
+use crate::api::job::take_seeds;
 use crate::api::preflight::free_at;
 use crate::api::{default_cap, predict};
 use crate::geom::short;
 use crate::storage::n_threads;
 
 pub fn run(args: &EstimateArgs, console: &Console) -> Result<u8, Failure> {
-    let options = config::options(&args.shape)?;
+    let mut options = config::options(&args.shape)?;
     options.sizes()?;
     let (cap, whence) = match memory::asked(args.memory.as_deref())? {
         Some(cap) => (cap, "--memory".to_owned()),
@@ -26,6 +27,7 @@ pub fn run(args: &EstimateArgs, console: &Console) -> Result<u8, Failure> {
     let store = args.output.as_deref().unwrap_or(Path::new("."));
     let space = Space::Capped(cap, store);
     let surface = input::load_valid(&args.surfaces, space, console)?;
+    take_seeds(&mut options, &surface.inner.seeds);
     let prepared = predict(&surface.inner, &options, cap, store)?;
     let estimate = &prepared.estimate;
     let disk_free = free_at(store);

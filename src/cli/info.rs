@@ -68,7 +68,7 @@ pub fn object(path: &Path) -> Result<Value, Failure> {
     Ok(json!({
         "schema": 1, "store": path.display().to_string(), "state": state, "finished": state.is_finished(),
         "surfaces": job.surfaces, "options": serde_json::from_str::<Value>(&job.options).unwrap_or(Value::Null),
-        "tool_version": job.tool_version, "labels": catalog.labels()?, "regions": catalog.regions()?,
+        "tool_version": job.tool_version, "labels": catalog.labels()?, "regions": named_regions(catalog)?,
         "tets": rows.iter().map(|r| r.tets).sum::<u64>(),
         "vertices": rows.iter().map(|r| r.vertices).sum::<u64>(), "bounds": bounds(&rows),
         "bytes": rows.iter().map(|r| r.bytes).sum::<u64>(),
@@ -78,6 +78,24 @@ pub fn object(path: &Path) -> Result<Value, Failure> {
         "stages": stages, "subdomains": subdomains, "interfaces": catalog.interfaces()?,
         "tasks": planned.as_ref().map(tasks::object), "journal": catalog.journal()?,
     }))
+}
+
+/// The regions' rows, each with its name or null.
+fn named_regions(catalog: &mut Catalog) -> Result<Vec<Value>, Failure> {
+    let (rows, names) = (catalog.regions()?, catalog.region_names()?);
+    let named = |row: RegionRow| {
+        let name = region_name(&row, &names);
+        let mut value = json!(row);
+        value["name"] = json!(name);
+        value
+    };
+    Ok(rows.into_iter().map(named).collect())
+}
+
+/// What a region is called, of the names from region 1 on.
+fn region_name<'a>(row: &RegionRow, names: &'a [String]) -> Option<&'a str> {
+    let name = names.get((row.region as usize).checked_sub(1)?)?;
+    (!name.is_empty()).then_some(name)
 }
 
 /// Low and high corner of the box around all of them.
@@ -148,7 +166,8 @@ pub fn print(path: &Path, console: &Console) -> Result<(), Failure> {
     console.line(&format!("labels: {}", words::listed(&labels)));
     print_bytes(catalog, &rows, console)?;
     print_subdomains(catalog, &rows, console)?;
-    print_regions(&catalog.regions()?, &labels, console);
+    let names = catalog.region_names()?;
+    print_regions(&catalog.regions()?, &names, &labels, console);
     for line in quality_lines(&merged(rows.iter().map(|r| &r.quality))) {
         console.line(&line);
     }
@@ -224,7 +243,7 @@ fn print_subdomains(
 }
 
 /// Few regions one by one, many as a whole.
-fn print_regions(regions: &[RegionRow], labels: &[String], console: &Console) {
+fn print_regions(regions: &[RegionRow], names: &[String], labels: &[String], console: &Console) {
     if regions.len() > REGIONS_LISTED {
         let (filled, empty): (Vec<_>, Vec<_>) = regions.iter().partition(|r| r.filled);
         let volume = |list: &[&RegionRow]| short(list.iter().map(|r| r.volume).sum());
@@ -248,8 +267,9 @@ fn print_regions(regions: &[RegionRow], labels: &[String], console: &Console) {
         let around = region.labels.iter();
         let around = around.filter_map(|&label| labels.get(label as usize));
         let around: Vec<&String> = around.collect();
+        let called = region_name(region, names).map_or(String::new(), |name| format!(" ({name})"));
         console.line(&format!(
-            "  region {name:>4}: volume {}, {what}, within {}",
+            "  region {name:>4}{called}: volume {}, {what}, within {}",
             short(region.volume),
             words::listed(&around)
         ));

@@ -76,7 +76,9 @@ pub fn selection(args: &QueryArgs, inquiry: &mut QuerySession) -> Result<Selecti
         None => Ok(None),
     };
     selection.subdomains = ranks("--subdomain", &args.subdomain)?;
-    selection.regions = ranks("--region", &args.region)?;
+    if let Some(text) = &args.region {
+        selection.regions = Some(regions(text, inquiry)?);
+    }
     if let Some(text) = &args.label {
         let names = text.split(',').map(|name| label(inquiry, name.trim()));
         selection.labels = Some(names.collect::<Result<_, _>>()?);
@@ -110,6 +112,21 @@ pub fn selection(args: &QueryArgs, inquiry: &mut QuerySession) -> Result<Selecti
         selection.sharing = Some(inquiry.around(&vertices)?);
     }
     Ok(selection)
+}
+
+/// Regions by number or name.
+fn regions(text: &str, inquiry: &QuerySession) -> Result<Vec<u32>, Failure> {
+    let mut found = Vec::new();
+    for word in text.split(',').map(str::trim) {
+        match word.parse() {
+            Ok(region) => found.push(region),
+            Err(_) if word.is_empty() || inquiry.region_names.is_empty() => {
+                return Err(bad("--region", text, RANKS));
+            }
+            Err(_) => found.extend(inquiry.regions_called(word)?),
+        }
+    }
+    Ok(found)
 }
 
 fn solids(args: &QueryArgs) -> Result<Vec<Solid>, Failure> {

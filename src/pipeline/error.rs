@@ -34,6 +34,17 @@ pub enum PipelineError {
         /// The value it was given.
         value: String,
     },
+    /// A region seed or a hole is not three numbers, and a name.
+    #[error(
+        "{option} {found}: expected three numbers{}",
+        if *option == "hole" { "" } else { ", and a name behind them" }
+    )]
+    BadSeed {
+        /// Name of the option.
+        option: &'static str,
+        /// The text it was given.
+        found: String,
+    },
     /// The sizes of a file were not handed in.
     #[error("the sizes of {file} must be read before the mesh is begun")]
     SizeField {

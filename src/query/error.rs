@@ -33,6 +33,14 @@ pub enum QueryError {
         /// The labels of the store.
         known: Vec<String>,
     },
+    /// The store has no such region.
+    #[error("there is no region {name:?}; there are {}", known.join(", "))]
+    NoRegion {
+        /// The region asked for.
+        name: String,
+        /// Names of the regions.
+        known: Vec<String>,
+    },
     /// No stage of the cut was kept.
     #[error("no stage of cut {cut} is in the store; {}", cuts(kept))]
     NoStage {

@@ -39,5 +39,6 @@ pub use order::Ordered;
 pub use select::Selected;
 pub use selection::{Selection, Sharing};
 pub(crate) use session::checked_chunk;
+pub(crate) use session::regions_called;
 pub use session::{Measures, QuerySession};
 pub use solid::Solid;

@@ -86,6 +86,9 @@ pub struct QuerySession {
     pub(crate) store: Catalog,
     pub(crate) rows: Vec<SubdomainRow>,
     pub(crate) labels: Vec<String>,
+    /// Of region 1, 2, …; empty for one without a name.
+    #[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "for the program"))]
+    pub(crate) region_names: Vec<String>,
     /// Over the boxes of the sub-domains.
     pub(super) tree: BoxTree,
     bounds: Aabb,
@@ -137,7 +140,7 @@ impl QuerySession {
         rows: Vec<SubdomainRow>,
         budget: &Budget,
     ) -> Result<Self, QueryError> {
-        let labels = store.labels()?;
+        let (labels, region_names) = (store.labels()?, store.region_names()?);
         let cap = budget.cap();
         let frames_bytes_max = (cap / 2).min(FRAMES_BYTES_MAX);
         let parts_max = (cap / 4 / PART_BYTES).clamp(1, PARTS_MAX);
@@ -156,6 +159,7 @@ impl QuerySession {
             tree: BoxTree::new(rows.len(), |i| bounds_of(&rows[i])),
             rows,
             labels,
+            region_names,
             bounds,
             parts: LruCache::unbounded(),
             parts_max: parts_max as usize,
@@ -192,6 +196,12 @@ impl QuerySession {
     /// The sub-domains by rank.
     pub fn subdomains(&self) -> &[SubdomainRow] {
         &self.rows
+    }
+
+    /// The regions of this name. Errors: there is none.
+    #[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "for the program"))]
+    pub fn regions_called(&self, name: &str) -> Result<Vec<u32>, QueryError> {
+        regions_called(&self.region_names, name)
     }
 
     /// Names of the labels; their place is their number.
@@ -355,4 +365,17 @@ pub(crate) fn vertex_chunk(part: &Subdomain, v: u32, place: &mut usize) -> usize
         *place = part.vertex_chunk_of(v);
     }
     *place
+}
+
+/// The numbers of all regions called `name`, of the names from region 1 on. Errors: there is none.
+pub(crate) fn regions_called(names: &[String], name: &str) -> Result<Vec<u32>, QueryError> {
+    let all = (1..).zip(names).filter(|(_, known)| *known == name);
+    let found: Vec<u32> = all.map(|(region, _)| region).collect();
+    match found.is_empty() || name.is_empty() {
+        false => Ok(found),
+        true => Err(QueryError::NoRegion {
+            name: name.to_owned(),
+            known: names.iter().filter(|n| !n.is_empty()).cloned().collect(),
+        }),
+    }
 }

@@ -420,6 +420,12 @@ impl Catalog {
         Ok(self.row(RowKind::Regions.key(0, 0))?.unwrap_or_default())
     }
 
+    /// What regions are called: of region 1, 2, …, empty for one without a name; shorter where the last have none.
+    pub fn region_names(&mut self) -> Result<Vec<String>, StoreError> {
+        let names = self.row(RowKind::RegionNames.key(0, 0))?;
+        Ok(names.unwrap_or_default())
+    }
+
     /// All sub-domains by rank.
     pub fn subdomains(&mut self) -> Result<Vec<SubdomainRow>, StoreError> {
         let rows: Vec<SubdomainRow> = self.rows(RowKind::Subdomain)?;

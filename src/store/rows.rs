@@ -26,6 +26,7 @@ pub(super) enum RowKind {
     Coarse = 75,
     Previous = 76,
     Stage = 77,
+    RegionNames = 78,
 }
 
 impl RowKind {

@@ -75,6 +75,11 @@ impl Step {
         self.put(RowKind::Regions.key(0, 0), regions);
     }
 
+    /// What regions are called, from region 1 on.
+    pub fn set_region_names(&mut self, names: &Vec<String>) {
+        self.put(RowKind::RegionNames.key(0, 0), names);
+    }
+
     /// A sub-domain, new or changed.
     pub fn set_subdomain(&mut self, row: &SubdomainRow) {
         self.put(RowKind::Subdomain.key(0, row.rank), row);

@@ -5,7 +5,7 @@
 //! (how two triangles touch), `boxes`, `broad` and `stars` (which pairs to look at), `validate` (all of it together),
 //! `defect` (what can be wrong and what to do about it), `boundary_loops` (where it is open), `near` and `repair`
 //! (mending on demand), `fitness` (what mesh its triangles allow), `split` (finer triangles of the same surface),
-//! `seek` (distances and what lies above), `volumes` (what is enclosed).
+//! `seek` (distances and what lies above), `volumes` (what is enclosed), `seeds` (what points say of volumes).
 //!
 //! Is not: file formats (`io`), which volumes are filled (`boundary`).
 
@@ -20,6 +20,7 @@ mod near;
 mod orientation;
 mod point_tree;
 mod repair;
+mod seeds;
 mod seek;
 mod split;
 mod stars;
@@ -41,6 +42,7 @@ pub use fitness::{Fitness, fitness};
 pub use near::weld_near;
 pub use orientation::{Orientation, orient_alike, orient_alike_in};
 pub use repair::{Closing, Repair, closing, repair};
+pub use seeds::{Seed, SeedKind};
 pub use seek::{Crossing, Seeker};
 pub use split::{SplitReport, split};
 pub use triangles::{Note, NoteKind, SourceFile, Surface, VolumePoints};

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::mem::size_of;
 
+use super::Seed;
 use crate::geom::{Aabb, Point};
 
 /// An indexed triangle surface with a label on each triangle.
@@ -26,6 +27,8 @@ pub struct Surface {
     pub files: Vec<SourceFile>,
     /// What a reader found worth telling, in order.
     pub notes: Vec<Note>,
+    /// What the files say of volumes, in order.
+    pub seeds: Vec<Seed>,
 }
 
 /// One file of a surface and the triangles that came from it.
@@ -132,7 +135,7 @@ pub enum NoteKind {
         /// How many.
         n: u64,
     },
-    /// Points that mark holes or regions of the volume were ignored.
+    /// Points that mark holes or regions of the volume.
     VolumePoints {
         /// What they mark.
         points: VolumePoints,
@@ -180,17 +183,17 @@ impl fmt::Display for Note {
                 write!(f, "{n} {what} were left out; only the surface is read")
             }
             NoteKind::VolumePoints { points, n } => {
-                let (what, instead) = match points {
+                let (what, use_of) = match points {
                     VolumePoints::Holes => (
                         "hole points",
-                        "leave cavities empty by the choice of regions (parity, outer, by-orientation)",
+                        "count where regions are filled by seeds, and are ignored else",
                     ),
                     VolumePoints::Regions => (
-                        "region attributes",
-                        "regions are numbered in the order of their triangles; sizes go by that number or by label",
+                        "regions with an attribute or reference",
+                        "are named by it, and are what is filled where regions are filled by seeds",
                     ),
                 };
-                write!(f, "{n} {what} are ignored; {instead}")
+                write!(f, "{n} {what} {use_of}")
             }
             NoteKind::SplitFacets { n } => write!(
                 f,

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::{Note, NoteKind, SourceFile, Surface, SurfaceError};
+use super::{Note, NoteKind, Seed, SourceFile, Surface, SurfaceError};
 use crate::geom::Point;
 
 /// Vertices and triangles of a surface at most: ids keep two bits free in the mesh.
@@ -139,6 +139,24 @@ impl SurfaceBuilder {
         let [a, b, c] = corners;
         let ids = [self.weld(a)?, self.weld(b)?, self.weld(c)?];
         self.triangle(ids, label)
+    }
+
+    /// Says something of the volume around a point.
+    pub fn seed(&mut self, seed: Seed) {
+        self.surface.seeds.push(seed);
+    }
+
+    /// The middle of four vertices of the current file, where it has them.
+    pub fn middle(&self, corners: [u32; 4]) -> Option<Point> {
+        let point = |v: u32| {
+            let vert = *self.file2vert.get(v as usize)?;
+            self.surface.points.get(vert as usize).copied()
+        };
+        let mut sum = Point::ZERO;
+        for v in corners {
+            sum += point(v)?;
+        }
+        Some(0.25 * sum)
     }
 
     /// Adds a note about the current file.

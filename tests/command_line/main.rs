@@ -17,6 +17,7 @@ mod regions;
 mod report;
 mod resaturate;
 mod same_mesh;
+mod seeds;
 mod shell;
 mod silent;
 mod size_files;

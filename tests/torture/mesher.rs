@@ -151,7 +151,7 @@ pub fn recovery(shape: &Shape) -> Outcome {
             };
         }
     };
-    if let Err(error) = fill_regions(&mut mesh, &RegionPolicy::All) {
+    if let Err(error) = fill_regions(&mut mesh, &RegionPolicy::All.into()) {
         return Outcome::Wrong(error.to_string());
     }
     match wrong(&mut mesh, Some(&surface)) {

@@ -190,7 +190,12 @@ fn thin_plates_with_different_cuts_are_recovered() {
 
 #[test]
 fn nested_shells_are_told_apart() {
-    use crate::boundary::{RegionPolicy, fill_regions};
+    use crate::boundary::{RegionPolicy, RegionRule, fill_regions};
+    use crate::surface::{Seed, SeedKind};
+    let seed = |at: f64, name: &str| Seed {
+        point: Point::splat(at),
+        kind: SeedKind::Region(Some(name.to_owned())),
+    };
     let make = || {
         let parts: Vec<_> = (0..3)
             .map(|i| {
@@ -212,14 +217,14 @@ fn nested_shells_are_told_apart() {
         (RegionPolicy::Parity, vec![1, 0, 2], 1000.0 - 343.0 + 64.0),
         (RegionPolicy::All, vec![1, 2, 3], 1000.0),
         (RegionPolicy::Outer, vec![1, 0, 0], 657.0),
-        (
-            RegionPolicy::Seeds(vec![Point::splat(5.0)]),
-            vec![0, 0, 1],
-            64.0,
-        ),
+        (RegionPolicy::Seeds, vec![0, 0, 1], 64.0),
     ] {
         let mut mesh = make();
-        let regions = fill_regions(&mut mesh, &policy).expect("closed");
+        let mut rule = RegionRule::from(policy.clone());
+        if policy == RegionPolicy::Seeds {
+            rule.seeds = vec![seed(5.0, "core")];
+        }
+        let regions = fill_regions(&mut mesh, &rule).expect("closed");
         let numbers: Vec<u32> = regions.list.iter().map(|r| r.region).collect();
         assert_eq!(numbers, filled, "{policy:?}");
         let sum: f64 = regions
@@ -238,10 +243,16 @@ fn nested_shells_are_told_apart() {
             .sum();
         assert_eq!(n, mesh.n_tets());
     }
-    let seed = RegionPolicy::Seeds(vec![Point::splat(-5.0)]);
-    assert!(fill_regions(&mut make(), &seed).is_err());
+    for seeds in [
+        vec![seed(-5.0, "out")],
+        vec![seed(5.0, "a"), seed(5.1, "b")],
+    ] {
+        let mut rule = RegionRule::from(RegionPolicy::Seeds);
+        rule.seeds = seeds;
+        assert!(fill_regions(&mut make(), &rule).is_err());
+    }
     // All normals point outward: the middle shell is inside two of them.
-    let regions = fill_regions(&mut make(), &RegionPolicy::ByOrientation).expect("oriented");
+    let regions = fill_regions(&mut make(), &RegionPolicy::ByOrientation.into()).expect("oriented");
     assert!(regions.list.iter().all(|r| r.region > 0));
 }
 
@@ -267,7 +278,7 @@ fn two_cubes_that_share_a_wall_are_both_filled() {
     );
     let mut mesh = delaunay(&all, &both);
     recover(&mut mesh).expect("two cubes");
-    let regions = fill_regions(&mut mesh, &RegionPolicy::Parity).expect("closed");
+    let regions = fill_regions(&mut mesh, &RegionPolicy::Parity.into()).expect("closed");
     assert!(!regions.all_instead_of_parity);
     assert_eq!(
         regions.list.iter().map(|r| r.region).collect::<Vec<_>>(),
@@ -283,7 +294,7 @@ fn two_cubes_that_share_a_wall_are_both_filled() {
     );
     let mut mesh = delaunay(&all, &both);
     recover(&mut mesh).expect("two cubes and a wall");
-    let regions = fill_regions(&mut mesh, &RegionPolicy::Parity).expect("closed");
+    let regions = fill_regions(&mut mesh, &RegionPolicy::Parity.into()).expect("closed");
     assert!(regions.all_instead_of_parity);
     assert_eq!(regions.list.len(), 2);
 }

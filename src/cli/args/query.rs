@@ -41,7 +41,7 @@ pub struct QueryArgs {
     /// Of these sub-domains, such as 0,3
     #[arg(long, value_name = "LIST", alias = "domain")]
     pub subdomain: Option<String>,
-    /// Of these regions, as numbers in `tetdb info`
+    /// Of these regions, as numbers or names in `tetdb info`
     #[arg(long, value_name = "LIST")]
     pub region: Option<String>,
     /// With a face on an input triangle of one of these labels, names or numbers

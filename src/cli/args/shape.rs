@@ -14,6 +14,8 @@ pub enum Regions {
     Outer,
     /// What lies behind triangles that look away from it
     ByOrientation,
+    /// What has a seed (--region-seed, --seeds, or the regions of the surface's files); where only holes are given, all others
+    Seeds,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -85,9 +87,18 @@ pub struct ShapeArgs {
     /// Options from a TOML file, such as hsiz = "2%"; what the command line says goes first
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// Which regions to fill [default: parity]
+    /// Which regions to fill [default: parity; with seeds or holes: seeds]
     #[arg(long, value_enum)]
     pub regions: Option<Regions>,
+    /// A point inside a region, and what it is called; may be repeated
+    #[arg(long, value_name = "X,Y,Z[,NAME]", allow_hyphen_values = true)]
+    pub region_seed: Vec<String>,
+    /// A point inside a region that stays empty; may be repeated
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    pub hole: Vec<String>,
+    /// Seeds and holes from a file: a line `x y z name` or `x y z hole` for each
+    #[arg(long, value_name = "FILE")]
+    pub seeds: Option<PathBuf>,
     /// How far to optimize [default: full]
     #[arg(long, value_enum)]
     pub optimize: Option<Optimize>,

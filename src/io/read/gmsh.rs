@@ -3,7 +3,7 @@
 //! Sections this reader does not need are passed over. An element in several physical groups is
 //! given to the first (4.1); 2.2 repeats such elements, and validation reports the repetition.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::io::BufRead;
 
 use super::feed::{Feed, name};
@@ -24,6 +24,13 @@ struct Mesh<'a, 'b, R> {
     /// The label used last and the group it came from.
     last: Option<(i64, u32)>,
     n_solids: u64,
+    /// The same of volumes.
+    volume_names: HashMap<i64, String>,
+    volume_groups: HashMap<i64, i64>,
+    /// By name of a volume's group, the first tetrahedron of each volume.
+    first_tets: BTreeMap<String, Vec<[u32; 4]>>,
+    /// The volumes that have one.
+    seen: HashSet<(i64, i64)>,
 }
 
 pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
@@ -65,6 +72,10 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
         groups: HashMap::new(),
         last: None,
         n_solids: 0,
+        volume_names: HashMap::new(),
+        volume_groups: HashMap::new(),
+        first_tets: BTreeMap::new(),
+        seen: HashSet::new(),
     };
     mesh.read_sections(version)?;
     if mesh.n_solids > 0 {
@@ -73,6 +84,8 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
             what: "solid elements",
             n,
         });
+        let first = std::mem::take(&mut mesh.first_tets);
+        mesh.target.regions_of_mesh(&first);
     }
     mesh.numbers.feed.finish(mesh.target.builder)
 }
@@ -125,6 +138,10 @@ impl<R: BufRead> Mesh<'_, '_, R> {
             line.clear();
             feed.read_line(&mut line)?;
             let text = name(&line);
+            if dimension == 3 {
+                let name = text.trim_matches('"').to_owned();
+                self.volume_names.insert(tag, name);
+            }
             if dimension == 2 {
                 self.names.insert(tag, text.trim_matches('"').to_owned());
             }
@@ -146,6 +163,23 @@ impl<R: BufRead> Mesh<'_, '_, R> {
         };
         self.last = Some((group, label));
         label
+    }
+
+    /// Keeps the first tetrahedron of each volume in a physical group.
+    fn solid(&mut self, kind: i64, tags: &[i64; 4], group: i64, volume: i64) -> Result<()> {
+        self.n_solids += 1;
+        let is_tet = kind == 4 || kind == 11;
+        if group == 0 || !is_tet || !self.seen.insert((group, volume)) {
+            return Ok(());
+        }
+        let mut corners = [0; 4];
+        for (corner, tag) in corners.iter_mut().zip(tags) {
+            *corner = self.nodes.find(*tag, &self.numbers.feed)?;
+        }
+        let known = self.volume_names.get(&group).cloned();
+        let name = known.unwrap_or_else(|| format!("volume_{group}"));
+        self.first_tets.entry(name).or_default().push(corners);
+        Ok(())
     }
 
     fn node(&mut self, tag: i64, p: Point) -> Result<()> {
@@ -241,11 +275,13 @@ impl<R: BufRead> Mesh<'_, '_, R> {
     /// The tags and nodes of one element.
     fn read_element_2(&mut self, kind: i64, n_tags: i64) -> Result<()> {
         let n_tags = self.numbers.check_count("element tags", n_tags, 1, 4)?;
-        let mut group = 0;
+        let (mut group, mut entity) = (0, 0);
         for i in 0..n_tags {
             let tag = self.numbers.int()?;
-            if i == 0 {
-                group = tag;
+            match i {
+                0 => group = tag,
+                1 => entity = tag,
+                _ => {}
             }
         }
         let (n_nodes, role) = need_element_type(kind, &self.numbers.feed)?;
@@ -256,11 +292,10 @@ impl<R: BufRead> Mesh<'_, '_, R> {
                 *slot = tag;
             }
         }
-        self.n_solids += u64::from(role == Role::Solid);
-        if role == Role::Face {
-            self.face(&tags[..n_nodes], group)
-        } else {
-            Ok(())
+        match role {
+            Role::Face => self.face(&tags[..n_nodes], group),
+            Role::Solid => self.solid(kind, &tags, group, entity),
+            _ => Ok(()),
         }
     }
 
@@ -286,8 +321,12 @@ impl<R: BufRead> Mesh<'_, '_, R> {
                     self.numbers.double()?;
                 }
                 let groups = self.int_list()?;
-                if let (2, Some(&group)) = (dimension, groups.first()) {
-                    self.groups.insert(entity, group.saturating_abs());
+                let known = match dimension {
+                    2 => &mut self.groups,
+                    _ => &mut self.volume_groups,
+                };
+                if let (2.., Some(&group)) = (dimension, groups.first()) {
+                    known.insert(entity, group.saturating_abs());
                 }
                 if dimension > 0 {
                     self.int_list()?;
@@ -378,11 +417,12 @@ impl<R: BufRead> Mesh<'_, '_, R> {
             self.numbers.need_record("blocks", n_blocks, i)?;
             let (dimension, entity, kind, n) = self.block("elements", 2)?;
             let (n_nodes, role) = need_element_type(kind, &self.numbers.feed)?;
-            let group = if dimension == 2 {
-                self.groups.get(&entity).copied().unwrap_or(0)
-            } else {
-                0
+            let groups = match dimension {
+                2 => Some(&self.groups),
+                3 => Some(&self.volume_groups),
+                _ => None,
             };
+            let group = groups.and_then(|g| g.get(&entity)).copied().unwrap_or(0);
             for k in 0..n {
                 self.numbers.need_record("elements", n, k)?;
                 self.numbers.size()?;
@@ -393,9 +433,10 @@ impl<R: BufRead> Mesh<'_, '_, R> {
                         *slot = tag;
                     }
                 }
-                self.n_solids += u64::from(role == Role::Solid);
-                if role == Role::Face {
-                    self.face(&tags[..n_nodes], group)?;
+                match role {
+                    Role::Face => self.face(&tags[..n_nodes], group)?,
+                    Role::Solid => self.solid(kind, &tags, group, entity)?,
+                    _ => {}
                 }
             }
             found += n;

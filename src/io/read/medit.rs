@@ -1,5 +1,6 @@
 //! MEDIT `.mesh` text: keywords, each with a count and that many records of numbers.
 
+use std::collections::BTreeMap;
 use std::io::BufRead;
 
 use super::feed::Feed;
@@ -8,13 +9,7 @@ use crate::geom::Point;
 use crate::surface::NoteKind;
 
 /// Solid elements, left out with a note.
-const SOLIDS: [&str; 5] = [
-    "Tetrahedra",
-    "Hexahedra",
-    "Prisms",
-    "Pyramids",
-    "TetrahedraP2",
-];
+const SOLIDS: [&str; 4] = ["Hexahedra", "Prisms", "Pyramids", "TetrahedraP2"];
 
 pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
     feed.comment = Some(b'#');
@@ -43,6 +38,10 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
             }
             "quadrilaterals" => {
                 read_faces(&mut feed, "quadrilaterals", 4, n_vertices, target)?;
+                more = feed.next_word()?;
+            }
+            "tetrahedra" => {
+                read_tets(&mut feed, n_vertices, target)?;
                 more = feed.next_word()?;
             }
             "trianglesp2" | "quadrilateralsq2" => return Err(feed.unsupported("curved triangles")),
@@ -89,6 +88,49 @@ fn read_faces<R: BufRead>(
         feed.placed(target.builder.polygon(&corners[..n_corners], label))?;
     }
     Ok(())
+}
+
+/// Tetrahedra are left out, but for one of each reference: it marks a region.
+fn read_tets<R: BufRead>(
+    feed: &mut Feed<R>,
+    n_vertices: u64,
+    target: &mut SurfaceSink,
+) -> Result<()> {
+    let n = feed.count("tetrahedra", 10)?;
+    let mut first = BTreeMap::new();
+    for i in 0..n {
+        if feed.at_end()? {
+            return Err(feed.too_few("tetrahedra", n, i));
+        }
+        let mut corners = [0; 4];
+        for corner in &mut corners {
+            *corner = feed.index(1, n_vertices)?;
+        }
+        note_reference(&mut first, feed.integer("a reference")?, corners);
+    }
+    note_tets(n, &first, target);
+    Ok(())
+}
+
+/// Keeps the first tetrahedron of each reference but 0, which means none.
+pub(super) fn note_reference(
+    first: &mut BTreeMap<String, Vec<[u32; 4]>>,
+    reference: i64,
+    corners: [u32; 4],
+) {
+    if reference != 0 {
+        let known = first.entry(format!("ref_{reference}"));
+        known.or_insert_with(|| vec![corners]);
+    }
+}
+
+/// Says that tetrahedra were left out, and what regions they mark.
+pub(super) fn note_tets(n: u64, first: &BTreeMap<String, Vec<[u32; 4]>>, target: &mut SurfaceSink) {
+    if n > 0 {
+        let what = "tetrahedra";
+        target.builder.note(NoteKind::SkippedElements { what, n });
+        target.regions_of_mesh(first);
+    }
 }
 
 /// Label ids of integer references; remembers the last, because neighbors in a file mostly agree.

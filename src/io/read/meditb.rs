@@ -9,10 +9,11 @@
 //! The file begins with 1 (its bytes tell the order) and the version; each section with its keyword
 //! and the position after it. Source: the libMeshb documentation of the GMF format.
 
+use std::collections::BTreeMap;
 use std::io::BufRead;
 
 use super::feed::Feed;
-use super::medit::RefLabels;
+use super::medit::{RefLabels, note_reference, note_tets};
 use super::{ReadError, Result, SurfaceSink};
 use crate::geom::Point;
 use crate::surface::NoteKind;
@@ -190,13 +191,25 @@ fn read_section<R: BufRead>(
         TRIANGLES => read_faces(numbers, "triangles", 3, *n_vertices, target)?,
         QUADRILATERALS => read_faces(numbers, "quadrilaterals", 4, *n_vertices, target)?,
         TRIANGLES_P2 => return Err(numbers.feed.unsupported("curved triangles")),
-        TETRAHEDRA | PRISMS | HEXAHEDRA | PYRAMIDS => {
+        TETRAHEDRA => {
+            let n = numbers.count("tetrahedra", 5 * int)?;
+            let mut first = BTreeMap::new();
+            for _ in 0..n {
+                let mut corners = [0; 4];
+                for corner in &mut corners {
+                    let index = numbers.integer()?;
+                    *corner = numbers.feed.check_index(index, 1, *n_vertices)?;
+                }
+                note_reference(&mut first, numbers.integer()?, corners);
+            }
+            note_tets(n, &first, target);
+        }
+        PRISMS | HEXAHEDRA | PYRAMIDS => {
             let n = numbers.count("solid elements", 5 * int)?;
             let what = match keyword {
                 PRISMS => "prisms",
                 HEXAHEDRA => "hexahedra",
-                PYRAMIDS => "pyramids",
-                _ => "tetrahedra",
+                _ => "pyramids",
             };
             if n > 0 {
                 target.builder.note(NoteKind::SkippedElements { what, n });

@@ -1,6 +1,9 @@
 //! Where readers put triangles.
 
-use crate::surface::SurfaceBuilder;
+use std::collections::BTreeMap;
+
+use crate::geom::Point;
+use crate::surface::{NoteKind, Seed, SeedKind, SurfaceBuilder, VolumePoints};
 
 /// What the readers share: the surface being built and how this file's labels are called.
 pub(crate) struct SurfaceSink<'a> {
@@ -21,5 +24,36 @@ impl SurfaceSink<'_> {
             (Some(prefix), false) if prefix == name => self.builder.label(prefix),
             (Some(prefix), false) => self.builder.label(&format!("{prefix}:{name}")),
         }
+    }
+
+    /// The region around `point` is called `name`.
+    pub(super) fn region(&mut self, point: Point, name: &str) {
+        let name = match &self.prefix {
+            None => name.to_owned(),
+            Some(prefix) => format!("{prefix}:{name}"),
+        };
+        let kind = SeedKind::Region(Some(name));
+        self.builder.seed(Seed { point, kind });
+    }
+
+    /// Notes that so many points mark holes or regions.
+    pub(super) fn note_points(&mut self, points: VolumePoints, n: u64) {
+        if n > 0 {
+            self.builder.note(NoteKind::VolumePoints { points, n });
+        }
+    }
+
+    /// The regions of a mesh of tetrahedra: the middle of one tetrahedron of each, and what it is called.
+    pub(super) fn regions_of_mesh(&mut self, first: &BTreeMap<String, Vec<[u32; 4]>>) {
+        let mut n = 0;
+        for (name, tets) in first {
+            for corners in tets {
+                if let Some(middle) = self.builder.middle(*corners) {
+                    self.region(middle, name);
+                    n += 1;
+                }
+            }
+        }
+        self.note_points(VolumePoints::Regions, n);
     }
 }

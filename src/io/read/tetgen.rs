@@ -1,15 +1,15 @@
 //! TetGen `.smesh` and `.poly`, with the points in the file or in the `.node` file beside it.
 //!
 //! Each polygon is taken for itself and fanned; a facet of several polygons or with holes is noted,
-//! and overlapping polygons are found by validation. Points that mark holes and regions of the volume are
-//! counted and noted: what is filled is decided by the surface alone.
+//! and overlapping polygons are found by validation. Points that mark holes and regions of the volume become seeds; a region is called
+//! `attribute_N` after its attribute.
 
 use std::io::BufRead;
 use std::path::Path;
 
-use super::feed::{Feed, parse};
+use super::feed::{Feed, name, parse};
 use super::{ReadError, Result, SurfaceSink, open};
-use crate::surface::{NoteKind, VolumePoints};
+use crate::surface::{NoteKind, Seed, SeedKind, VolumePoints};
 
 /// The two layouts of the facet part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,13 +59,13 @@ pub(super) fn read<R: BufRead>(
         target.builder.note(NoteKind::SplitFacets { n: n_split });
     }
     for points in [VolumePoints::Holes, VolumePoints::Regions] {
-        note_volume_points(&mut feed, points, target)?;
+        read_volume_points(&mut feed, points, target)?;
     }
     feed.finish(target.builder)
 }
 
-/// Notes the points that mark holes or regions of the volume, where the file has that part: they choose nothing.
-fn note_volume_points<R: BufRead>(
+/// Reads the points that mark holes or regions of the volume, where the file has that part.
+fn read_volume_points<R: BufRead>(
     feed: &mut Feed<R>,
     points: VolumePoints,
     target: &mut SurfaceSink,
@@ -75,15 +75,28 @@ fn note_volume_points<R: BufRead>(
     }
     let n = u64::try_from(feed.integer("the number of points in the volume")?).unwrap_or(0);
     feed.skip_line()?;
-    for _ in 0..n {
+    for i in 0..n {
         if feed.at_end()? {
-            break;
+            return Err(feed.too_few("points in the volume", n, i));
+        }
+        let _: i64 = feed.integer("the number of a point in the volume")?;
+        let point = feed.point()?;
+        match points {
+            VolumePoints::Holes => target.builder.seed(Seed {
+                point,
+                kind: SeedKind::Hole,
+            }),
+            VolumePoints::Regions => {
+                let attribute = match feed.next_word_in_line()? {
+                    true => name(feed.word()),
+                    false => "0".to_owned(),
+                };
+                target.region(point, &format!("attribute_{attribute}"));
+            }
         }
         feed.skip_line()?;
     }
-    if n > 0 {
-        target.builder.note(NoteKind::VolumePoints { points, n });
-    }
+    target.note_points(points, n);
     Ok(())
 }
 

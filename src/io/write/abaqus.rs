@@ -2,7 +2,7 @@
 //!
 //! Source: the Abaqus keywords reference; faces of C3D4 are S1 = 1 2 3, S2 = 1 4 2, S3 = 2 4 3, S4 = 3 4 1.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::draft::Draft;
@@ -77,6 +77,8 @@ pub(super) fn write(
     }
     let regions = mesh.regions()?;
     let dir = mesh.dir().to_owned();
+    let regions = regions.iter().map(|&r| (r, mesh.region_name(r)));
+    let regions = set_names(&regions.collect());
     let sides = elements(mesh, &dir, &mut stream, &regions, middles.as_mut())?;
     let names = set_names(&mesh.labels());
     surfaces(sides, &names, &mut stream)?;
@@ -89,14 +91,14 @@ fn elements(
     mesh: &mut Merged,
     dir: &Path,
     stream: &mut Stream,
-    regions: &BTreeSet<u32>,
+    regions: &BTreeMap<u32, String>,
     mut middles: Option<&mut Midpoints>,
 ) -> Result<Sorted<Side>> {
     let kind = if middles.is_some() { "C3D10" } else { "C3D4" };
     // With one region its set is named with the elements, else sets follow.
-    match regions.iter().next() {
-        Some(region) if regions.len() == 1 => {
-            stream.text(&format!("*ELEMENT, TYPE={kind}, ELSET=region_{region}\n"));
+    match regions.values().next() {
+        Some(name) if regions.len() == 1 => {
+            stream.text(&format!("*ELEMENT, TYPE={kind}, ELSET={name}\n"));
         }
         _ => stream.text(&format!("*ELEMENT, TYPE={kind}, ELSET=all_elements\n")),
     }
@@ -132,7 +134,7 @@ fn elements(
         }
         stream.end()
     })?;
-    let head = |region: u32| format!("*ELSET, ELSET=region_{region}\n");
+    let head = |region: u32| format!("*ELSET, ELSET={}\n", regions[&region]);
     sets(by_region.finish()?, head, stream)?;
     Ok(sides.finish()?)
 }

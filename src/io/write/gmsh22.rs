@@ -8,6 +8,7 @@ use std::path::Path;
 use super::draft::Draft;
 use super::error::Result;
 use super::merged::Merged;
+use super::names::quotable;
 use super::stream::Stream;
 
 /// Gmsh's numbers of the two types of elements.
@@ -97,12 +98,11 @@ fn physical_names(mesh: &mut Merged) -> Result<String> {
     let regions = mesh.regions()?;
     let mut text = format!("$PhysicalNames\n{}\n", labels.len() + regions.len());
     for (label, name) in labels {
-        // A name ends at the next quote or line.
-        let name = name.replace('"', "'").replace(['\n', '\r'], " ");
-        text += &format!("2 {} \"{name}\"\n", label + 1);
+        text += &format!("2 {} \"{}\"\n", label + 1, quotable(&name));
     }
     for region in regions {
-        text += &format!("3 {region} \"region_{region}\"\n");
+        let name = quotable(&mesh.region_name(region));
+        text += &format!("3 {region} \"{name}\"\n");
     }
     Ok(text + "$EndPhysicalNames\n")
 }

@@ -113,6 +113,7 @@ pub(super) struct Merged<'a> {
     numbering: Numbering,
     faces: Faces,
     label_names: Vec<String>,
+    region_names: Vec<String>,
     dir: PathBuf,
     memory: usize,
     progress: Progress<'a>,
@@ -132,7 +133,7 @@ impl<'a> Merged<'a> {
         let catalog = &mut *store;
         let mut parts = catalog.subdomains()?;
         parts.retain(|row| scope.holds(row.rank));
-        let label_names = catalog.labels()?;
+        let (label_names, region_names) = (catalog.labels()?, catalog.region_names()?);
         let counts: Vec<_> = parts.iter().map(|row| (row.rank, row.vertices)).collect();
         let numbering = Numbering::new(store, &counts, scope.apart, dir, memory)?;
         let first_label = label_names.len() as u32;
@@ -156,6 +157,7 @@ impl<'a> Merged<'a> {
             numbering,
             faces,
             label_names,
+            region_names,
             dir: dir.to_owned(),
             memory,
             progress,
@@ -219,6 +221,26 @@ impl<'a> Merged<'a> {
         match self.label_names.get(label as usize) {
             Some(name) => name.clone(),
             None => format!("interface_{}", label - self.n_labels()),
+        }
+    }
+
+    /// What a region is called: its own name, or one after its number.
+    pub fn region_name(&self, region: u32) -> String {
+        let place = (region as usize).checked_sub(1);
+        match place.and_then(|place| self.region_names.get(place)) {
+            Some(name) if !name.is_empty() => name.clone(),
+            _ => format!("region_{region}"),
+        }
+    }
+
+    /// Names of regions 0 (none), 1, 2, …, a zero after each; nothing when no region has one.
+    pub fn region_names(&self) -> Vec<u8> {
+        match self.region_names.len() as u32 {
+            0 => Vec::new(),
+            n => {
+                let name = |region| self.region_name(region).into_bytes().into_iter().chain([0]);
+                [0].into_iter().chain((1..=n).flat_map(name)).collect()
+            }
         }
     }
 

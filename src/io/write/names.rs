@@ -1,6 +1,11 @@
-//! Names of labels for programs that do not take every text.
+//! Names of labels and regions for programs that do not take every text.
 
 use std::collections::{BTreeMap, BTreeSet};
+
+/// For Gmsh, where a name ends at the next quote or line.
+pub(super) fn quotable(name: &str) -> String {
+    name.replace('"', "'").replace(['\n', '\r'], " ")
+}
 
 /// Names that Abaqus and OpenFOAM take: letters, digits, `_` and `-`, a letter first, at most 80, case not distinguished.
 pub(super) fn set_names(labels: &BTreeMap<u32, String>) -> BTreeMap<u32, String> {

@@ -53,8 +53,9 @@ pub(super) fn write(
         Array::new(Group::Cells, "offsets", index.kind()),
         Array::new(Group::Cells, "types", "UInt8"),
     ];
+    let names = mesh.region_names();
     let counts = [n_points, mesh.n_tets(), corners];
-    let layout = Layout::new(&container, &arrays, counts, ("", &[]));
+    let layout = Layout::new(&container, &arrays, counts, ("region_names", &names));
     let path = draft.create(out, layout.file_bytes())?;
     let [
         mut vertex_ids,

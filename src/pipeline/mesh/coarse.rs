@@ -64,7 +64,7 @@ pub(crate) fn recovered<P: Pages>(
     mesh.refresh_tet_of();
     let recovery = recover(mesh)?;
     watch(stage("color the regions"));
-    let regions = fill_regions(mesh, &options.regions()?)?;
+    let regions = fill_regions(mesh, &options.region_rule()?)?;
     if mesh.n_tets() == 0 {
         return Err(PipelineError::NothingFilled {
             policy: options

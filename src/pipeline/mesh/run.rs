@@ -271,6 +271,10 @@ impl<'a> Run<'a> {
             step.list_file(0, COARSE);
             step.set_labels(&label_names);
             step.set_regions(&report.regions.list.iter().map(region_row).collect());
+            let names = report.regions.names();
+            if !names.is_empty() {
+                step.set_region_names(&names);
+            }
             step.set_blob(blob::SIZE_FIELD, &field);
             step.set_blob(blob::BOUNDS, &tree::bounds_bytes(&bounds));
             step.set_blob(blob::SUBDOMAINS, &n.to_le_bytes());

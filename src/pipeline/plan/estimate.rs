@@ -6,6 +6,7 @@
 
 use super::regions::region_sizes;
 use super::{MEMORY_MIN, Options, Plan};
+use crate::boundary::{BoundaryError, Filled, RegionPolicy};
 use crate::optimize::Mode;
 use crate::pipeline::error::PipelineError;
 use crate::sealed::Form;
@@ -15,6 +16,9 @@ use crate::sizing::{
 use crate::storage::{ScratchSpace, attempt};
 use crate::surface::{OUTSIDE, Seeker, Surface, Volumes};
 
+/// A seed nearer to the surface than this share of the box diagonal lies on it: the side is found by sums of doubles, which are known to
+/// some 1e-16 of it, and a thousand times more where triangles are steep.
+const ON_SURFACE: f64 = 1e-12;
 /// Bytes held while volumes are identified, for each triangle: which volume each side has, which sides see each other, and which is left out.
 const PREPARE_TRIANGLE: usize = 17;
 /// Bytes held while sizes are computed, for each vertex: its size and slope, and lists of those and of the places along edges near a cell.
@@ -110,6 +114,8 @@ pub struct Prepared {
     pub sizes: SizeSummary,
     /// The predicted mesh.
     pub estimate: Estimate,
+    /// What is worth knowing of the regions.
+    pub notes: Vec<String>,
 }
 
 /// Builds the size field and counts what it will give. It makes nothing on disk. `background` is what the options' `size_field` holds.
@@ -163,8 +169,7 @@ fn prepare_in(
     };
     let seeker = Seeker::of(surface, scratch, |_| true);
     let volumes = Volumes::of_in(&seeker, scratch);
-    let policy = options.regions()?;
-    let chosen = policy.filled(OUTSIDE, volumes.n_volumes, &volumes.walls())?;
+    let chosen = chosen(&seeker, &volumes, options)?;
     let filled: Vec<bool> = (0..volumes.n_volumes)
         .map(|v| chosen.volumes.contains(&v))
         .collect();
@@ -175,7 +180,7 @@ fn prepare_in(
     };
     let (field, mut sizes) = match early {
         Some(built) => built,
-        None => built(&region_sizes(&domain, &asked, scratch)?)?,
+        None => built(&region_sizes(&domain, &chosen.names, &asked, scratch)?)?,
     };
     if background.is_some() {
         sizes.source = format!("a size field, {}", sizes.source);
@@ -185,7 +190,43 @@ fn prepare_in(
         field,
         sizes,
         estimate,
+        notes: notes(&chosen, options, volumes.n_volumes - 1),
     })
+}
+
+/// The volumes that are filled. Errors: seeds that say what cannot be.
+fn chosen(seeker: &Seeker, volumes: &Volumes, options: &Options) -> Result<Filled, PipelineError> {
+    let rule = options.region_rule()?;
+    let reach = ON_SURFACE * seeker.surface().bounds().diagonal();
+    for seed in &rule.seeds {
+        if seeker.distance(seed.point, reach).is_finite() {
+            return Err(PipelineError::Boundary(BoundaryError::Seed {
+                message: format!(
+                    "the seed {seed} lies on a triangle: a seed lies inside its region"
+                ),
+                point: seed.point,
+            }));
+        }
+    }
+    let (end, walls) = (volumes.n_volumes, volumes.walls());
+    let chosen = rule.policy.filled(OUTSIDE, end, &walls)?;
+    Ok(rule.apply(chosen, OUTSIDE, end, |p| volumes.at(seeker, p))?)
+}
+
+/// What is worth knowing of seeds: where some regions have a name, how many have none; how many of the `n` volumes have no seed.
+fn notes(chosen: &Filled, options: &Options, n: u32) -> Vec<String> {
+    let filled = chosen.volumes.len();
+    let (unnamed, empty) = (filled - chosen.names.len(), n as usize - filled);
+    let mut notes = Vec::new();
+    if !chosen.names.is_empty() && unnamed > 0 {
+        notes.push(format!("{unnamed} of {filled} filled regions have no name"));
+    }
+    if options.region_policy() == Some(RegionPolicy::Seeds) && empty > 0 {
+        notes.push(format!(
+            "{empty} of {n} regions have no seed, or a hole, and stay empty"
+        ));
+    }
+    notes
 }
 
 impl Estimate {

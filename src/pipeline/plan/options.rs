@@ -4,11 +4,12 @@ use super::option_text::{text, texts};
 
 use super::Plan;
 use crate::bisect::Method;
-use crate::boundary::RegionPolicy;
+use crate::boundary::{RegionPolicy, RegionRule};
 use crate::optimize::Mode;
 use crate::pipeline::error::PipelineError;
 use crate::sealed::Form;
 use crate::sizing::{Formula, RegionSize, SizeOptions, SizeSource, SizingError};
+use crate::surface::Seed;
 
 /// Sub-domains smaller than this are nearly all refined zone: more are not made.
 const TETS_MIN: f64 = 25_000.0;
@@ -50,8 +51,17 @@ pub struct Options {
     /// What the files of `size_field` hold, as 32 hex digits: found by the program, so that a changed file is noticed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_field_hash: Option<String>,
-    /// `parity`, `all`, `outer`, `by-orientation`.
+    /// `parity`, `all`, `outer`, `by-orientation`, `seeds`.
     pub regions: Option<String>,
+    /// Points in regions to fill or name, as typed.
+    #[serde(deserialize_with = "texts", skip_serializing_if = "Vec::is_empty")]
+    pub region_seed: Vec<String>,
+    /// Points in regions that stay empty, as typed.
+    #[serde(deserialize_with = "texts", skip_serializing_if = "Vec::is_empty")]
+    pub hole: Vec<String>,
+    /// What the surface's files say of regions that are not chosen by seeds: found by the program.
+    #[serde(deserialize_with = "texts", skip_serializing_if = "Vec::is_empty")]
+    pub region_name: Vec<String>,
     /// `none`, `delaunay`, `full`.
     pub optimize: Option<String>,
     /// `auto` or a number.
@@ -173,6 +183,7 @@ impl Options {
             "all" => RegionPolicy::All,
             "outer" => RegionPolicy::Outer,
             "by-orientation" => RegionPolicy::ByOrientation,
+            "seeds" => RegionPolicy::Seeds,
             _ => return None,
         })
     }
@@ -198,10 +209,26 @@ impl Options {
         }
     }
 
-    /// [`Options::region_policy`], or an error that names the word.
-    pub(crate) fn regions(&self) -> Result<RegionPolicy, PipelineError> {
-        self.region_policy()
-            .ok_or_else(|| unknown("regions", &self.regions))
+    /// Which regions are filled and what they are called.
+    ///
+    /// Errors: the word or the seed that has no meaning.
+    pub fn region_rule(&self) -> Result<RegionRule, PipelineError> {
+        let policy = self.region_policy();
+        let bad = |option, text: &str| PipelineError::BadSeed {
+            option,
+            found: text.to_owned(),
+        };
+        let region =
+            |text: &String| Seed::parse_region(text).ok_or_else(|| bad("region_seed", text));
+        let hole = |text: &String| Seed::parse_hole(text).ok_or_else(|| bad("hole", text));
+        let regions = self.region_seed.iter().map(region);
+        Ok(RegionRule {
+            policy: policy.ok_or_else(|| unknown("regions", &self.regions))?,
+            seeds: regions
+                .chain(self.hole.iter().map(hole))
+                .collect::<Result<_, _>>()?,
+            names: (self.region_name.iter().map(region)).collect::<Result<_, _>>()?,
+        })
     }
 
     /// [`Options::optimize_mode`], or an error that names the word.

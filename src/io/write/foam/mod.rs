@@ -85,6 +85,6 @@ fn names(mesh: &mut Merged, walk: &FaceWalk) -> Result<Names> {
     Ok(Names {
         patches: patches.iter().map(named).collect(),
         face_zones: census.zones.keys().map(named).collect(),
-        cell_zones: (regions.iter().map(|r| (*r, format!("region_{r}")))).collect(),
+        cell_zones: set_names(&regions.iter().map(|&r| (r, mesh.region_name(r))).collect()),
     })
 }

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::super::error::Result;
 use super::super::merged::Merged;
+use super::super::names::quotable;
 use super::out::Out;
 
 /// The least and the greatest coordinates.
@@ -119,7 +120,7 @@ impl Entities {
             );
         }
         for region in regions {
-            text += &format!("3 {region} \"region_{region}\"\n");
+            text += &format!("3 {region} \"{}\"\n", quotable(&mesh.region_name(region)));
         }
         text
     }
@@ -178,9 +179,4 @@ impl Entities {
         }
         Ok(())
     }
-}
-
-/// A name ends at the next quote or line.
-fn quotable(name: &str) -> String {
-    name.replace('"', "'").replace(['\n', '\r'], " ")
 }

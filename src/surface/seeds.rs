@@ -1,0 +1,110 @@
+//! Points that say what the volume around them is: a region with a name, or a hole.
+
+use std::fmt;
+
+use crate::geom::Point;
+
+/// A point inside a volume, and what it says of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Seed {
+    /// Where it is.
+    pub point: Point,
+    /// What it says.
+    pub kind: SeedKind,
+}
+
+/// What a [`Seed`] says of the volume around it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum SeedKind {
+    /// It is filled, and called so.
+    Region(Option<String>),
+    /// It stays empty.
+    Hole,
+}
+
+impl Seed {
+    /// `X,Y,Z` or `X,Y,Z,NAME`; the name is the rest and may have commas.
+    pub fn parse_region(text: &str) -> Option<Self> {
+        let mut words = text.splitn(4, ',');
+        let point = point_of(words.by_ref().take(3))?;
+        let name = words.next().map(str::trim).filter(|name| !name.is_empty());
+        let kind = SeedKind::Region(name.map(str::to_owned));
+        Some(Self { point, kind })
+    }
+
+    /// `X,Y,Z`.
+    pub fn parse_hole(text: &str) -> Option<Self> {
+        let point = point_of(text.split(','))?;
+        let kind = SeedKind::Hole;
+        Some(Self { point, kind })
+    }
+
+    /// A line of a file: `x y z`, `x y z name` or `x y z hole`, also with commas; the name may have spaces.
+    pub fn parse_line(line: &str) -> Option<Self> {
+        let mut rest = line;
+        let mut words = [""; 3];
+        for word in &mut words {
+            rest = rest.trim_start();
+            let end = rest.find(|c: char| c == ',' || c.is_whitespace());
+            let (found, after) = rest.split_at(end.unwrap_or(rest.len()));
+            *word = found;
+            rest = after.trim_start();
+            rest = rest.strip_prefix(',').unwrap_or(rest);
+        }
+        let point = point_of(words.into_iter())?;
+        let kind = match rest.trim() {
+            "hole" => SeedKind::Hole,
+            "" => SeedKind::Region(None),
+            name => SeedKind::Region(Some(name.to_owned())),
+        };
+        Some(Self { point, kind })
+    }
+}
+
+/// As it is typed.
+impl fmt::Display for Seed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [x, y, z] = self.point.to_array();
+        write!(f, "{x},{y},{z}")?;
+        match &self.kind {
+            SeedKind::Region(Some(name)) => write!(f, ",{name}"),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Three finite numbers and nothing else.
+fn point_of<'a>(words: impl Iterator<Item = &'a str>) -> Option<Point> {
+    let numbers: Option<Vec<f64>> = words
+        .map(|word| word.trim().parse().ok().filter(|x: &f64| x.is_finite()))
+        .collect();
+    Some(Point::from_array(numbers?.try_into().ok()?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seeds_come_back_as_they_are_typed() {
+        for text in ["0.5,0.25,-1", "1,2,3,rock", "1,2,3,salt, wet"] {
+            let seed = Seed::parse_region(text).expect("a seed");
+            assert_eq!(seed.to_string(), text);
+        }
+        let lines = ["1 2 3 salt rock", "1,2,3,salt rock", " 1, 2 ,3  salt rock "];
+        for line in lines {
+            let name = Some("salt rock".to_owned());
+            let found = Seed::parse_line(line).map(|seed| seed.kind);
+            assert_eq!(found, Some(SeedKind::Region(name)), "{line}");
+        }
+        assert_eq!(
+            Seed::parse_line("1 2 3 hole").map(|s| s.kind),
+            Some(SeedKind::Hole)
+        );
+        for text in ["", "1,2", "1,2,x,rock", "1,nan,2"] {
+            assert_eq!(Seed::parse_region(text), None, "{text}");
+            assert_eq!(Seed::parse_line(text), None, "{text}");
+        }
+        assert_eq!(Seed::parse_hole("1,2,3,rock"), None);
+    }
+}
