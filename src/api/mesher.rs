@@ -287,6 +287,7 @@ impl Mesher {
         job::identify_sizes(&mut self.options)?;
         job::take_seeds(&mut self.options, &self.surface.inner.seeds);
         self.options.region_rule()?;
+        self.options.hands = settings.hands.clone();
         let cap = settings.cap()?;
         replace::settle(path, settings)?;
         if self.is_there(path)? {

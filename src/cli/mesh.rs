@@ -114,7 +114,13 @@ pub(super) fn begin(args: &RunArgs, console: &Console) -> Result<Settings, Failu
         export::check_format(out)?;
     }
     let cap = memory::asked(args.memory.as_deref())?;
-    Ok(console.settings(cap, args.threads))
+    #[cfg_attr(not(feature = "mpi"), allow(unused_mut))]
+    let mut settings = console.settings(cap, args.threads);
+    #[cfg(feature = "mpi")]
+    {
+        settings.hands = super::ranks::hands();
+    }
+    Ok(settings)
 }
 
 fn output(args: &MeshArgs) -> PathBuf {

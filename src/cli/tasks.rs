@@ -88,7 +88,7 @@ pub fn work(args: &WorkArgs, console: &Console) -> Result<u8, Failure> {
 }
 
 /// The folder that the scheduler or the system gives a job on this machine.
-fn scratch_of_machine() -> Option<PathBuf> {
+pub(super) fn scratch_of_machine() -> Option<PathBuf> {
     let set = |name| env::var_os(name).filter(|dir| !dir.is_empty());
     let dir = set("SLURM_TMPDIR").or_else(|| set("TMPDIR"))?;
     Some(PathBuf::from(dir)).filter(|dir| dir.is_dir())

@@ -1,5 +1,6 @@
 use thiserror::Error;
 
+use super::work::HelperFailure;
 use crate::boundary::BoundaryError;
 use crate::sealed::SealedError;
 use crate::sizing::SizingError;
@@ -83,6 +84,9 @@ pub enum PipelineError {
         /// Why.
         reason: String,
     },
+    /// A process that helped could not do its part.
+    #[error("{}", .0.message)]
+    Helper(HelperFailure),
     /// A file that tasks exchange cannot be used.
     #[error("{path} cannot be used: {what}")]
     TaskFile {
@@ -102,5 +106,11 @@ pub enum PipelineError {
 impl From<SealedError> for PipelineError {
     fn from(error: SealedError) -> Self {
         Self::from(StoreError::from(error))
+    }
+}
+
+impl From<HelperFailure> for PipelineError {
+    fn from(failure: HelperFailure) -> Self {
+        Self::Helper(failure)
     }
 }

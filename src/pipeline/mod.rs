@@ -38,8 +38,12 @@ pub use remesh::{
     Forecast, NewSizes, Remade, ResaturateSummary, Resaturation, Values, asked, changed, forecast,
     forget, resaturate, undo,
 };
+#[cfg(feature = "mpi")]
+pub use tasks::serve;
 pub use tasks::{
     Gathered, Performed, Planned, Stage, StageKind, TASKS_MAX, TaskSettings, TaskState, end_plan,
     gather, is_being_worked, perform, plan as plan_tasks, status,
 };
-pub use work::{FineReport, stage_faces};
+pub use work::{FineReport, Hands, stage_faces};
+#[cfg(feature = "mpi")]
+pub use work::{HelperFailure, Helpers};

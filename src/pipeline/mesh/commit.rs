@@ -112,5 +112,9 @@ pub(crate) fn close(catalog: &mut Catalog, n: u32) -> Result<(), PipelineError> 
     })?;
     // Nothing in it counts; what cannot be removed now goes when the store is next opened for writing.
     let _ = scratch.remove_dir_all();
+    let work = catalog.work_dir();
+    if work.exists() {
+        let _ = work.remove_dir_all();
+    }
     Ok(())
 }

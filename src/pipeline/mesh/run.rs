@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 use std::time::Instant;
 
 use super::coarse::{CoarseReport, inserted, recovered};
@@ -17,12 +18,14 @@ use crate::pipeline::plan::leases::Leases;
 use crate::pipeline::plan::{Estimate, Options, Plan, Prepared, prepare};
 use crate::pipeline::progress::Watcher;
 use crate::pipeline::seal::totals::journal;
+use crate::pipeline::tasks::{ask, begin, wrong_receipt};
 use crate::pipeline::tree::{self, DONE, PartMesh, TreePart, blob};
 use crate::pipeline::work::common::Common;
 use crate::pipeline::work::{
-    FineReport, SubdomainOrder, SubdomainReceipt, Traffic, Worker, Workplace,
+    FineReport, Helpers, Order, Receipt, SubdomainOrder, SubdomainReceipt, Traffic, Worker,
+    Workplace,
 };
-use crate::pipeline::workers::map_bounded;
+use crate::pipeline::workers::{Hand, map_bounded};
 use crate::sizing::{SizeField, SizeSummary, TETS_PER_LOAD};
 use crate::storage::{Backing, Budget, Pager, PagerStats, ScratchSpace, attempt};
 use crate::store::Catalog;
@@ -136,6 +139,7 @@ fn go_on(
         pages: PagerStats::default(),
         frames_used: 0,
         watch,
+        slots: None,
     };
     // Unwinding from a failed page access ends here; a step's commit is its last act, so nothing is half done.
     attempt(|| run.steps(surface, new, held, budget))?
@@ -152,7 +156,12 @@ pub(crate) struct Run<'a> {
     pub pages: PagerStats,
     pub frames_used: usize,
     pub watch: &'a Watcher<'a>,
+    /// Orders that other processes do at once, when they have begun.
+    pub slots: Option<usize>,
 }
+
+/// A finished sub-domain, and how it went where this process meshed it.
+type SubdomainDone = (Box<SubdomainReceipt>, Option<FineReport>);
 
 impl<'a> Run<'a> {
     fn steps(
@@ -330,17 +339,38 @@ impl<'a> Run<'a> {
         }
         let (workers, watch) = (self.plan.workers().min(left.len()), self.watch);
         let share = self.plan.shared_by(workers.max(1) as u64);
+        let here = |order: SubdomainOrder, watch: &Watcher| {
+            let job = worker.subdomain_job(order, share)?;
+            let leaf = job.run(worker.common, watch)?;
+            Ok((Box::new(leaf.receipt()), Some(leaf.fine)))
+        };
+        let there = match left.is_empty() {
+            true => Vec::new(),
+            false => self.helpers()?,
+        };
+        let store = &worker.place.store;
+        let elsewhere: Vec<_> = (there.iter())
+            .map(|(helpers, slot)| {
+                move |order: SubdomainOrder, _: &Watcher| match ask(
+                    &**helpers,
+                    *slot,
+                    &Order::Subdomain(order),
+                    store,
+                )? {
+                    Receipt::Subdomain(receipt) => Ok((Box::new(receipt), None)),
+                    Receipt::Cut(_) => Err(wrong_receipt()),
+                }
+            })
+            .collect();
+        let mut hands: Vec<Hand<SubdomainOrder, SubdomainDone>> = vec![&here; workers];
+        hands.extend(elsewhere.iter().map(|hand| hand as Hand<_, _>));
         map_bounded(
             &mut (self, summary),
             left,
-            workers,
+            &hands,
             watch,
             |(run, _), part| Ok(subdomain_order(run.catalog, run.n, part)?),
-            &|order: SubdomainOrder, watch| {
-                let job = worker.subdomain_job(order, share)?;
-                job.run(worker.common, watch).map(Box::new)
-            },
-            |(run, summary), leaf| run.seal_step(&leaf.receipt(), Some(leaf.fine), summary),
+            |(run, summary), (leaf, fine)| run.seal_step(&leaf, fine, summary),
         )
     }
 
@@ -355,6 +385,19 @@ impl<'a> Run<'a> {
         let of_rank = fine.map(|fine| (leaf.row.rank, fine));
         summary.fine.extend(of_rank);
         Ok(())
+    }
+
+    /// Other processes that share the work, one entry for each order they do at once. Effects: they begin.
+    pub(crate) fn helpers(&mut self) -> Result<Vec<(Arc<dyn Helpers>, usize)>, PipelineError> {
+        let Some(helpers) = self.options.hands.0.clone() else {
+            return Ok(Vec::new());
+        };
+        let slots = match self.slots {
+            Some(slots) => slots,
+            None => begin(&*helpers, self.catalog, self.options, &self.bounds)?,
+        };
+        self.slots = Some(slots);
+        Ok((0..slots).map(|slot| (helpers.clone(), slot)).collect())
     }
 
     /// Adds to what the run has read and written.

@@ -19,7 +19,7 @@ use crate::pipeline::tree::{self, PartMesh, blob};
 use crate::pipeline::work::coarse_snapshot::reopen;
 use crate::pipeline::work::common::Common;
 use crate::pipeline::work::subdomain::{FinishedSubdomain, SubdomainJob};
-use crate::pipeline::workers::map_bounded;
+use crate::pipeline::workers::{Hand, map_bounded};
 use crate::sealed::SealedError;
 use crate::sealed::{CoarseSnapshot, Form};
 use crate::sizing::{BackgroundMesh, SizeField};
@@ -211,13 +211,13 @@ impl<'a> RemeshRun<'a> {
         let whole = Arc::clone(&self.field);
         let common = Common::of(self.options, &whole, bounds)?;
         let mut state = (self, BTreeMap::new());
+        let run = &|job: Job, watch: &Watcher| job.run(common, watch).map(Box::new);
         map_bounded(
             &mut state,
             fields.into_iter().collect(),
-            workers,
+            &vec![run as Hand<Job, Box<FinishedSubdomain>>; workers],
             watch,
             |(again, _), (rank, field)| again.job(parts[rank as usize], field, share),
-            &|job: Job, watch| job.run(common, watch).map(Box::new),
             |(_, finished), subdomain| {
                 finished.insert(subdomain.sealed.row.rank, *subdomain);
                 Ok(())

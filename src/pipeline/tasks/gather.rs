@@ -158,8 +158,6 @@ impl GatherRun<'_> {
             }
         }
         close(self.catalog, n)?;
-        // A task that nobody waits for may still write; what stays goes when the store is next opened for writing.
-        let _ = self.folder.dir.remove_dir_all();
         gathered.is_finished = true;
         Ok(gathered)
     }
@@ -329,6 +327,7 @@ pub fn end_plan(catalog: &mut Catalog) -> Result<bool, PipelineError> {
     if !folder.dir.exists() {
         return Ok(false);
     }
+    let had_plan = folder.plan_path().exists();
     match gather(catalog, Duration::ZERO) {
         Ok(_) | Err(PipelineError::NoPlan { .. } | PipelineError::TaskFile { .. }) => {}
         Err(error) => return Err(error),
@@ -336,5 +335,5 @@ pub fn end_plan(catalog: &mut Catalog) -> Result<bool, PipelineError> {
     if folder.dir.exists() {
         folder.dir.remove_dir_all()?;
     }
-    Ok(true)
+    Ok(had_plan)
 }

@@ -20,9 +20,13 @@ mod gather;
 mod perform;
 mod records;
 mod schedule;
+mod serve;
 mod status;
 
 pub use gather::{Gathered, end_plan, gather, plan};
 pub use perform::{Performed, TaskSettings, perform};
 pub use schedule::{Stage, StageKind, TASKS_MAX};
+#[cfg(feature = "mpi")]
+pub use serve::serve;
+pub(super) use serve::{ask, begin, wrong_receipt};
 pub use status::{Planned, TaskState, is_being_worked, status};

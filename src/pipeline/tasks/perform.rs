@@ -15,9 +15,10 @@ use crate::geom::{Aabb, Point};
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::{Options, Plan};
 use crate::pipeline::progress::Watcher;
+use crate::pipeline::tree::ZoneRow;
 use crate::pipeline::work::common::Common;
 use crate::pipeline::work::{Kind, Order, Receipt, Worker, Workplace};
-use crate::pipeline::workers::work_off;
+use crate::pipeline::workers::{Hand, work_off};
 use crate::sizing::SizeField;
 use crate::storage::{Budget, DiskPath, ScratchSpace, StorageError, attempt, host_name};
 use crate::store::Catalog;
@@ -152,6 +153,9 @@ fn marked<T>(folder: &TaskFolder, task: u32, mark: &Mark, work: impl FnOnce() ->
     })
 }
 
+/// What an order did, and the zones above it where the cuts below it belong to the task.
+type Below = (Option<Vec<ZoneRow>>, Receipt);
+
 /// One attempt at a task.
 struct Attempt<'a> {
     name: String,
@@ -257,17 +261,17 @@ impl<'a> Attempt<'a> {
         let (first, later) = (at_once(orders.len()), at_once(usize::MAX));
         let jobs = orders.iter().rev().map(|order| (order.clone(), first));
         let mut receipts = Vec::new();
+        let run = &|(order, share): (Order, Plan), watch: &Watcher| {
+            let zones = match &order {
+                Order::Cut(cut) if self.orders.below => Some(cut.zones.clone()),
+                _ => None,
+            };
+            Ok((zones, worker.perform(order, share, watch)?))
+        };
         work_off(
             jobs.collect(),
-            share.workers(),
+            &vec![run as Hand<(Order, Plan), Below>; share.workers()],
             watch,
-            &|(order, share): (Order, Plan), watch| {
-                let zones = match &order {
-                    Order::Cut(cut) if self.orders.below => Some(cut.zones.clone()),
-                    _ => None,
-                };
-                Ok((zones, worker.perform(order, share, watch)?))
-            },
             &mut |(zones, receipt)| {
                 let mut next = Vec::new();
                 if let (Some(zones), Receipt::Cut(cut)) = (zones, &receipt) {
@@ -292,11 +296,7 @@ impl<'a> Attempt<'a> {
     fn wait_for_inputs(&self, patience: Patience) -> Result<(), PipelineError> {
         let store = self.folder.dir.folder();
         for order in &self.orders.orders {
-            let part = match order {
-                Order::Cut(cut) => &cut.parent,
-                Order::Subdomain(sub) => &sub.part,
-            };
-            let path = store.join(Catalog::file_name(part.part.first, part.generation));
+            let path = store.join(order.input());
             let found = patience.until(|| Ok(path.is_file().then_some(())))?;
             found.ok_or_else(|| {
                 damaged(

@@ -10,6 +10,7 @@ pub(super) mod coarse_snapshot;
 pub(super) mod common;
 mod cut;
 mod cut_journal;
+mod helpers;
 mod order;
 mod receipt;
 mod saturate;
@@ -18,6 +19,7 @@ pub(super) mod subdomain;
 mod worker;
 
 pub(super) use bytes::{Kind, body, from_bytes, head, to_bytes};
+pub use helpers::{Hands, HelperFailure, Helpers};
 pub(super) use order::{CutOrder, Order, SubdomainOrder};
 pub(super) use receipt::{CutReceipt, InheritedFace, Receipt, SubdomainReceipt, Traffic};
 pub use saturate::FineReport;

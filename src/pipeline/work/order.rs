@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use rkyv::{Archive, Deserialize, Serialize};
 
 use crate::pipeline::tree::{PartMesh, ZoneRow};
+use crate::store::Catalog;
 use crate::topology::FacesAcross;
 
 /// One unit of work.
@@ -14,6 +15,17 @@ pub(crate) enum Order {
     Cut(CutOrder),
     /// Mesh a sub-domain to its final density.
     Subdomain(SubdomainOrder),
+}
+
+impl Order {
+    /// The name of the file it begins with.
+    pub fn input(&self) -> String {
+        let part = match self {
+            Self::Cut(order) => &order.parent,
+            Self::Subdomain(order) => &order.part,
+        };
+        Catalog::file_name(part.part.first, part.generation)
+    }
 }
 
 /// A part to be bisected.
