@@ -25,6 +25,7 @@ mod sizes;
 mod snapshot;
 mod streams;
 mod subdomains;
+mod tasks;
 mod together;
 mod walls;
 mod zone;
