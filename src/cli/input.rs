@@ -68,7 +68,7 @@ pub fn load_with(
         let (with, n) = surface.open_parts_in(&space.scratch(&Default::default())?)?;
         surface = with;
         console.note(&format!(
-            "note: {} in open parts are taken for sheets",
+            "note: sheets: {} of open parts",
             count(n as u64, "triangle")
         ));
     }
