@@ -259,10 +259,12 @@ pub(super) struct PointTable {
 impl PointTable {
     /// Of points that are all different.
     pub(super) fn of(points: &[Point]) -> Self {
-        let mut table = Self::default();
-        while points.len() * 2 >= table.slots.len() {
-            table.grow(points);
-        }
+        // Half of what it grows to.
+        let len = (points.len() + 1).next_power_of_two();
+        let mut table = Self {
+            slots: vec![0; len],
+        };
+        table.grow(points);
         table
     }
 

@@ -232,7 +232,7 @@ fn sheets_in_wrong_places_are_refused_with_the_place() {
         ("box.obj", "index.obj", "index-out-of-range"),
         ("box.obj", "empty.obj", "empty-surface"),
         ("box.obj", "points.obj", "empty-surface"),
-        ("box.obj", "text.stl", "unexpected-text"),
+        ("box.obj", "text.stl", "truncated-file"),
         ("box.obj", "nothing.obj", "unreadable-file"),
     ] {
         let run = place.run_line(&format!("mesh {surface} --embed {sheet} -o s.tetdb --json"));
