@@ -14,7 +14,7 @@ use super::chain::Trouble;
 use super::patch::Patch;
 use super::space::{Space, sorted};
 use super::suppress::{CavitySkin, Fan};
-use super::walk::ball;
+use super::walk::{ball, swapped};
 use crate::geom::Point;
 use crate::mesh::FaceRef;
 use crate::storage::Pages;
@@ -28,7 +28,9 @@ impl<P: Pages> Patch<'_, P> {
         tets: &[u32],
         fan: &Fan,
     ) -> Result<(), Trouble> {
-        let missing = Trouble::Broken("a fan without outline");
+        let missing = Trouble::Precision(
+            "no vertex is joined to both ends of the segment where the sheet ends",
+        );
         let (Some(&a), Some(&b)) = (fan.polygon.first(), fan.polygon.last()) else {
             return Err(missing);
         };
@@ -52,16 +54,52 @@ impl<P: Pages> Patch<'_, P> {
         let facet: Point = inner.iter().map(|&v| self.offset(x, v)).sum();
         let turned = |v: u32| across(facet).dot(across(self.offset(x, v)));
         let q = both.min_by(|&v, &w| turned(v).total_cmp(&turned(w)).then(v.cmp(&w)));
-        let q = q.ok_or(Trouble::Precision(
-            "no vertex is joined to both ends of the segment where the sheet ends",
-        ))?;
+        let q = match q {
+            Some(q) => q,
+            None => self.vertex_between(tets, a, b).ok_or(missing)?,
+        };
         let facet = skin.facets.len();
         skin.facets.push([a, b, q]);
         for face in [[a, x, q], [x, b, q]] {
             skin.faces.insert(sorted(face), (facet, face));
         }
-        self.require_known(skin, tets);
+        let tets = ball(self, x);
+        self.require_known(skin, &tets);
         Ok(())
+    }
+
+    /// A new vertex joined to `a` and `b`: in a face of `x` that has `a` on one side and `b` on the other.
+    fn vertex_between(&mut self, tets: &[u32], a: u32, b: u32) -> Option<u32> {
+        for &t in tets {
+            let tet = self.tet(t);
+            let Some(i) = tet.local(a).filter(|&i| !tet.is_required(i)) else {
+                continue;
+            };
+            let across = self.across(t, i).tet();
+            let other = self.tet(across);
+            if other.local(b).is_none() {
+                continue;
+            }
+            let face = tet.face(i);
+            // The middle of the face; should rounding put it outside, a place nearer to one of its corners.
+            for toward in [None, Some(0), Some(1), Some(2)] {
+                let mut place = face.iter().map(|&v| self.position(v)).sum::<Point>() / 3.0;
+                if let Some(k) = toward {
+                    place = place.midpoint(self.position(face[k]));
+                }
+                let y = self.add_vertex(place, None);
+                let quads: Vec<[u32; 4]> = (face.iter())
+                    .flat_map(|&v| [(&tet, v), (&other, v)])
+                    .filter_map(|(tet, v)| Some(swapped(tet, tet.local(v)?, y)))
+                    .collect();
+                if quads.iter().all(|&q| self.orient(q) > 0.0) {
+                    self.replace(&[t, across], &quads);
+                    return Some(y);
+                }
+                self.drop_vertex(y);
+            }
+        }
+        None
     }
 
     /// Takes the facets from number `first` on out of the skin: they are faces like others again.

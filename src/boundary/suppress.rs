@@ -22,7 +22,7 @@ use super::patch::Patch;
 use super::polygon::triangulate;
 use super::space::{Space, sorted};
 use super::target::RecoveryTarget;
-use super::walk::{ball, edge_at, swapped};
+use super::walk::{self, ball, edge_at, swapped};
 use crate::geom::Point;
 use crate::mesh::FaceRef;
 use crate::storage::Pages;
@@ -97,6 +97,7 @@ impl<P: Pages> Patch<'_, P> {
             [only] if !only.closed => {
                 let n_facets = skin.facets.len();
                 self.continue_sheet(skin, x, &ball, only)?;
+                let ball = walk::ball(self, x);
                 let fans = self.fans(skin, x, &ball)?;
                 let done = self.suppress_fans(skin, x, ball, fans);
                 self.end_sheet(skin, n_facets);
