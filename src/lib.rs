@@ -10,7 +10,7 @@ pub use api::{
     Answers, Bytes, CODES, CancelToken, CheckReport, CodeRow, ColorBy, DefectPlace, Error, Event,
     Existing, ExportOptions, Exported, Length, MeshFormat, Mesher, Optimize, Order, Prediction,
     Query, Regions, Remesh, Remeshed, Seal, Settings, Sizes, Snapped, Snapshot, Store, Subdomains,
-    Summary, Surface, Verification, VerifyLevel,
+    Summary, Surface, Tasks, Verification, VerifyLevel,
 };
 
 /// What the front door hands out of the modules below: sub-domains and their records, hits of a query.

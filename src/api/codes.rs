@@ -161,6 +161,21 @@ pub const CODES: &[CodeRow] = &[
     row("store-exists", 8, "a finished store is already there"),
     row("store-unfinished", 8, "the store is not finished"),
     row(
+        "no-tasks",
+        8,
+        "nobody has planned tasks for the store, or the stage of a task has not come",
+    ),
+    row(
+        "tasks-left",
+        8,
+        "some tasks of a stage have no usable receipt and have to be done again",
+    ),
+    row(
+        "task-file",
+        4,
+        "a file that tasks exchange is missing or damaged",
+    ),
+    row(
         "no-coarse-leaf",
         8,
         "the coarse snapshot of the sub-domain was not kept",

@@ -168,6 +168,16 @@ impl From<PipelineError> for Error {
             PipelineError::SizeCount { .. } => Self::new("count-mismatch", &e)
                 .with_help("give one length for each, in the order of the exported arrays")
                 .with_remedy(Remedy::General),
+            PipelineError::Helper(failure) => {
+                let row = super::CODES.iter().find(|row| row.code == failure.code);
+                with_general_help(row.map_or("internal", |row| row.code), &failure.message)
+            }
+            PipelineError::NoPlan { .. } => Self::new("no-tasks", &e)
+                .with_help("the store's summary says how far it is; the stage before a task has to be gathered first")
+                .with_remedy(Remedy::General),
+            PipelineError::TaskFile { .. } => Self::new("task-file", &e)
+                .with_help("gather again, which writes orders anew, then do the task again")
+                .with_remedy(Remedy::General),
             other => Self::new("usage", other),
         }
     }

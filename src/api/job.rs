@@ -38,6 +38,7 @@ pub(crate) fn is_same(job: &Job, options: &Options, surfaces: &[SurfaceSource]) 
         // A store that kept more or less than asked for holds the same mesh.
         o.drop_coarse = options.drop_coarse;
         o.seal.clone_from(&options.seal);
+        o.coarse_only = options.coarse_only;
         o == *options
     });
     same && job.surfaces == surfaces

@@ -120,6 +120,7 @@ impl Mesher {
         self.options.seal = old.seal;
         self.options.drop_coarse = old.drop_coarse;
         self.options.keep_stages = old.keep_stages;
+        self.options.coarse_only = old.coarse_only;
         self.options.region_seed = old.region_seed;
         self.options.hole = old.hole;
         self
@@ -181,6 +182,12 @@ impl Mesher {
     /// Whether meshes on the way (before each cut, with its zone refined) are kept to be looked at. Default: they are not.
     pub fn keep_stages(mut self, keep: bool) -> Self {
         self.options.keep_stages = keep;
+        self
+    }
+
+    /// Whether the run ends with the coarse mesh, and leaves the rest to [`Tasks`](super::Tasks) or [`Store::resume`]. Default: it does not.
+    pub fn coarse_only(mut self, coarse_only: bool) -> Self {
+        self.options.coarse_only = coarse_only;
         self
     }
 
@@ -259,6 +266,11 @@ impl Mesher {
         Store::open_with(created.path, settings)
     }
 
+    /// The same where the store may stay unfinished, see [`Mesher::coarse_only`]. Errors: as [`Mesher::create`].
+    pub fn create_unfinished(self, path: impl AsRef<Path>) -> Result<(), Error> {
+        self.create_reported(path.as_ref()).map(|_| ())
+    }
+
     /// [`Mesher::create`], and what the run did.
     pub(crate) fn create_reported(mut self, path: &Path) -> Result<Created, Error> {
         let settings = self.settings.clone();
@@ -268,9 +280,14 @@ impl Mesher {
     fn run(&mut self, path: &Path, settings: &Settings) -> Result<Created, Error> {
         self.options.sizes()?;
         self.options.subdomain_count()?;
+        if self.options.coarse_only && self.existing == Existing::Replace {
+            let message = "a store is not replaced by one that stays unfinished";
+            return Err(Error::new("usage", message).with_help("choose another path"));
+        }
         job::identify_sizes(&mut self.options)?;
         job::take_seeds(&mut self.options, &self.surface.inner.seeds);
         self.options.region_rule()?;
+        self.options.hands = settings.hands.clone();
         let cap = settings.cap()?;
         replace::settle(path, settings)?;
         if self.is_there(path)? {
@@ -296,7 +313,7 @@ impl Mesher {
             other => other?,
         };
         report(&summary, settings);
-        if self.verify {
+        if self.verify && !self.options.coarse_only {
             let surface = match self.surface.n_triangles() {
                 0 => None,
                 _ => Some(&self.surface.inner),

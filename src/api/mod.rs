@@ -1,7 +1,8 @@
 //! The front door: whoever calls it gets validation, refusal before anything is written, the job on record, verification and resume.
 //!
 //! Reading order: `surface`, `sizes` and `options` (what is asked for), `settings` (memory, threads, cancelling, progress), `mesher`
-//! (a new store), `store` (a finished one), `ask` (questions), `remesh` (sub-domains again), `show` (files, pictures, the page),
+//! (a new store), `store` (a finished one), `ask` (questions), `remesh` (sub-domains again), `tasks` (many
+//! machines), `show` (files, pictures, the page),
 //! `error`. Private: `job` (what is put on record), `preflight` (what is refused before it begins), `replace` (one store in the place of
 //! another), `guard` (nothing unwinds into the caller).
 
@@ -30,6 +31,7 @@ pub(crate) mod store;
 pub(crate) mod surface;
 mod surface_arrays;
 pub(crate) mod targets;
+pub(crate) mod tasks;
 pub(crate) mod verify;
 
 pub use crate::io::write::MeshFormat;
@@ -58,4 +60,5 @@ pub use show::{ExportOptions, Exported};
 pub use sizes::{Length, Sizes};
 pub use store::{Store, Summary};
 pub use surface::{CheckReport, Surface};
+pub use tasks::Tasks;
 pub use verify::{Verification, VerifyLevel};

@@ -8,7 +8,7 @@ use super::store::say_how_locked;
 use super::{Error, Event, Settings, Store, Surface, guarded, job, replace};
 use crate::pipeline;
 use crate::storage::Budget;
-use crate::store::Catalog;
+use crate::store::{Catalog, StoreError};
 use crate::surface;
 use tetdb_schema::catalog::StoreState;
 
@@ -44,10 +44,18 @@ fn run(path: &Path, settings: &Settings, verify: bool) -> Result<Created, Error>
     let mut catalog = Catalog::open_writable(&place)?;
     say_how_locked(&catalog, settings);
     let lock = catalog.lock().expect("it is open for writing");
-    let (state, job) = (catalog.state()?, catalog.job()?);
-    if !state.is_finished() {
+    let job = catalog.job()?;
+    if !catalog.state()?.is_finished() {
         job::check_recipe(&mut catalog)?;
+        if let Some((task, host)) = pipeline::is_being_worked(&place)? {
+            let (path, writer) = (place, format!("task {task} on {host}"));
+            return Err(StoreError::Busy { path, writer }.into());
+        }
+        if pipeline::end_plan(&mut catalog)? {
+            settings.note("what tasks had done is in the store; their plan is dropped");
+        }
     }
+    let state = catalog.state()?;
     drop(catalog);
     let scratch = scratch_beside(&surface::Surface::default(), cap, path)?;
     let mut surface = Surface::of_record(&job.surfaces, &place, &scratch)?;
@@ -62,7 +70,8 @@ fn run(path: &Path, settings: &Settings, verify: bool) -> Result<Created, Error>
             None
         }
         false => {
-            let options = job::options_of(&job, &place)?;
+            let mut options = job::options_of(&job, &place)?;
+            options.hands = settings.hands.clone();
             let catalog = Catalog::open_locked(&place, lock.clone())?;
             Some(go_on(catalog, &options, &mut surface, cap, settings)?)
         }

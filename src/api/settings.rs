@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::memory::{Bytes, default_cap};
 use super::{Error, error::Remedy};
-use crate::pipeline::{self, MEMORY_MIN, Watcher};
+use crate::pipeline::{self, Hands, MEMORY_MIN, Watcher};
 use crate::storage::{Budget, CancelToken};
 
 /// What a run says while it works.
@@ -41,6 +41,8 @@ pub struct Settings {
     threads: Option<usize>,
     pub(crate) cancel: CancelToken,
     progress: Option<Listener>,
+    /// Other processes that share the work.
+    pub(crate) hands: Hands,
 }
 
 impl fmt::Debug for Settings {

@@ -9,7 +9,9 @@ use super::args::StoreArgs;
 use super::console::Console;
 use super::failure::Failure;
 use super::memory;
+use super::tasks;
 use super::words::{self, count};
+use crate::api::Tasks;
 use crate::geom::{Aabb, Point, short};
 use crate::pipeline;
 use crate::store::Catalog;
@@ -62,6 +64,7 @@ pub fn object(path: &Path) -> Result<Value, Failure> {
         |s| json!({ "cut": s.cut, "stage": s.stage, "tets": s.row.tets, "bytes": s.row.bytes }),
     );
     let stages: Vec<Value> = stages.collect();
+    let planned = Tasks::of(path).status()?;
     Ok(json!({
         "schema": 1, "store": path.display().to_string(), "state": state, "finished": state.is_finished(),
         "surfaces": job.surfaces, "options": serde_json::from_str::<Value>(&job.options).unwrap_or(Value::Null),
@@ -72,7 +75,8 @@ pub fn object(path: &Path) -> Result<Value, Failure> {
         "coarse_bytes": coarse.iter().map(|c| c.bytes).sum::<u64>(),
         "previous_bytes": catalog.previous()?.iter().map(|r| r.bytes).sum::<u64>(),
         "catalog_bytes": catalog.file_bytes()?, "digest": digest(&rows),
-        "stages": stages, "subdomains": subdomains, "interfaces": catalog.interfaces()?, "journal": catalog.journal()?,
+        "stages": stages, "subdomains": subdomains, "interfaces": catalog.interfaces()?,
+        "tasks": planned.as_ref().map(tasks::object), "journal": catalog.journal()?,
     }))
 }
 
@@ -133,6 +137,10 @@ pub fn print(path: &Path, console: &Console) -> Result<(), Failure> {
         for row in catalog.journal()? {
             console.line(&format!("  {:<28} {:>9.2} s", row.step, row.seconds));
         }
+    }
+    if let Some(planned) = Tasks::of(path).status()? {
+        tasks::print(&planned, console);
+        return Ok(());
     }
     if !state.is_finished() {
         console.line(&format!(

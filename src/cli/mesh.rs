@@ -54,6 +54,7 @@ pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
         .settings(settings.clone())
         .existing(existing)
         .preflight(!args.no_preflight)
+        .coarse_only(args.coarse_only)
         .verify(!args.run.no_verify)
         .create_reported(&path)?;
     console.done();
@@ -64,6 +65,9 @@ pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
         ));
         return finish(&path, &args.run, &settings, None, console);
     }
+    if args.coarse_only {
+        return begun(&path, &settings, console);
+    }
     finish(
         &path,
         &args.run,
@@ -71,6 +75,23 @@ pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
         created.summary.as_ref(),
         console,
     )
+}
+
+/// What can be done with a coarse mesh.
+fn begun(path: &Path, settings: &Settings, console: &Console) -> Result<u8, Failure> {
+    if console.is_json() {
+        let mut answer = info::object(path)?;
+        answer["memory_cap_bytes"] = json!(settings.cap()?);
+        answer["peak_bytes"] = json!(memory::peak());
+        console.answer(&answer);
+    } else if !console.is_quiet() {
+        let store = path.display();
+        console.line(&format!("{store}: the coarse mesh is there"));
+        console.note(&format!(
+            "next: `tetdb plan {store} --tasks N` makes tasks of the rest, `tetdb resume {store}` does it here"
+        ));
+    }
+    Ok(0)
 }
 
 pub fn resume(args: &ResumeArgs, console: &Console) -> Result<u8, Failure> {
@@ -96,7 +117,13 @@ pub(super) fn begin(args: &RunArgs, console: &Console) -> Result<Settings, Failu
         export::check_format(out)?;
     }
     let cap = memory::asked(args.memory.as_deref())?;
-    Ok(console.settings(cap, args.threads))
+    #[cfg_attr(not(feature = "mpi"), allow(unused_mut))]
+    let mut settings = console.settings(cap, args.threads);
+    #[cfg(feature = "mpi")]
+    {
+        settings.hands = super::ranks::hands();
+    }
+    Ok(settings)
 }
 
 fn output(args: &MeshArgs) -> PathBuf {

@@ -18,6 +18,8 @@ mod mesh;
 mod query;
 mod query_ask;
 mod query_rows;
+#[cfg(feature = "mpi")]
+mod ranks;
 mod refine_surface;
 mod report;
 mod resaturate;
@@ -26,6 +28,8 @@ mod sample;
 mod shell;
 mod signals;
 mod snapshot;
+mod task_scripts;
+mod tasks;
 mod verify;
 mod words;
 
@@ -46,6 +50,35 @@ pub use failure::{CODES, CodeRow};
 pub fn run() -> ExitCode {
     heap::keep_little();
     heap::keep_sweeping();
+    #[cfg(feature = "mpi")]
+    let ranks = match ranks::begin() {
+        Ok(ranks) => ranks,
+        Err(failure) => return ExitCode::from(Console::new(false).fail(&failure)),
+    };
+    #[cfg(feature = "mpi")]
+    if let Some(ranks) = ranks {
+        let exit = run_rank(&ranks);
+        ranks.end();
+        return exit;
+    }
+    run_alone()
+}
+
+/// Rank 0 is the program as ever; of the others only that one says what is wrong with the command line.
+#[cfg(feature = "mpi")]
+fn run_rank(ranks: &ranks::Ranks) -> ExitCode {
+    if ranks.rank == 0 {
+        return run_alone();
+    }
+    let Ok(args) = Args::try_parse() else {
+        return ExitCode::SUCCESS;
+    };
+    let console = Console::with(false, true, false);
+    signals::listen(&console);
+    ExitCode::from(ranks.serve(&args.command, &console))
+}
+
+fn run_alone() -> ExitCode {
     let args = match Args::try_parse() {
         Ok(args) => args,
         Err(error) => return unparsed(&error),
@@ -104,6 +137,9 @@ fn dispatch(command: &Command, console: &Console) -> Result<u8, Failure> {
         Command::Mesh(args) => mesh::run(args, console),
         Command::Estimate(args) => estimate::run(args, console),
         Command::Resume(args) => mesh::resume(args, console),
+        Command::Plan(args) => tasks::plan(args, console),
+        Command::Work(args) => tasks::work(args, console),
+        Command::Gather(args) => tasks::gather(args, console),
         Command::Resaturate(args) => resaturate::run(args, console),
         Command::Check(args) => check::run(args, console),
         Command::Info(args) => info::run(args, console),

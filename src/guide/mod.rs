@@ -6,6 +6,7 @@
 //! | [`sizes`] | say how long edges should be: everywhere, in places, by a formula or a file |
 //! | [`regions`] | choose which volumes are filled |
 //! | [`subdomains`] | divide a large mesh, limit memory, pass parts to a parallel solver |
+//! | [`cluster`] | share a mesh among the machines of a cluster |
 //! | [`questions`] | find tetrahedra by place, condition or neighborhood |
 //! | [`resaturation`] | mesh some sub-domains again, with other sizes or after damage |
 //! | [`pictures`] | draw cuts and surfaces |
@@ -23,6 +24,7 @@ macro_rules! links {
             "[sizes]: crate::guide::sizes\n",
             "[regions]: crate::guide::regions\n",
             "[subdomains]: crate::guide::subdomains\n",
+            "[cluster]: crate::guide::cluster\n",
             "[questions]: crate::guide::questions\n",
             "[resaturation]: crate::guide::resaturation\n",
             "[pictures]: crate::guide::pictures\n",
@@ -34,6 +36,7 @@ macro_rules! links {
             "[`Surface`]: crate::Surface\n",
             "[`Mesher`]: crate::Mesher\n",
             "[`Store`]: crate::Store\n",
+            "[`Tasks`]: crate::Tasks\n",
             "[`Existing::Replace`]: crate::Existing::Replace\n",
             "[`Mesher::predict`]: crate::Mesher::predict\n",
             "[`SealedTet`]: crate::data::schema::record::SealedTet\n",
@@ -58,6 +61,10 @@ pub mod regions {
 pub mod subdomains {
     #![doc = links!()]
     #![doc = include_str!("subdomains.md")]
+}
+pub mod cluster {
+    #![doc = links!()]
+    #![doc = include_str!("cluster.md")]
 }
 pub mod questions {
     #![doc = links!()]

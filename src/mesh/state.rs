@@ -1,9 +1,10 @@
 //! Ids of records, and how many of each kind there are.
 
+use rkyv::{Archive, Deserialize, Serialize};
 use tetdb_schema::page::{NONE, RECORDS, SLOT_BITS, SLOT_MASK};
 
 /// Records of one kind: ids handed out in order, freed slots used again, last freed first.
-#[derive(Clone, Copy, Debug)]
+#[derive(Archive, Serialize, Deserialize, Clone, Copy, Debug, PartialEq)]
 pub(super) struct Arena {
     /// The next id never used.
     pub(super) fresh: u32,
@@ -25,7 +26,7 @@ impl Default for Arena {
 pub const MESH_STATE_WORDS: usize = 12;
 
 /// Counts that, with the pages, are the whole state of a working mesh.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Archive, Serialize, Deserialize, Clone, Copy, Debug, Default, PartialEq)]
 pub struct MeshState {
     pub(super) tets: Arena,
     pub(super) vertices: Arena,

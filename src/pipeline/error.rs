@@ -1,5 +1,6 @@
 use thiserror::Error;
 
+use super::work::HelperFailure;
 use crate::boundary::BoundaryError;
 use crate::geom::Point;
 use crate::sealed::SealedError;
@@ -90,6 +91,25 @@ pub enum PipelineError {
         /// Vertices of the sub-domains.
         vertices: u64,
     },
+    /// There are no tasks to do, or not yet.
+    #[error("{path} has no tasks that could be done now: {reason}")]
+    NoPlan {
+        /// Directory of the store.
+        path: std::path::PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// A process that helped could not do its part.
+    #[error("{}", .0.message)]
+    Helper(HelperFailure),
+    /// A file that tasks exchange cannot be used.
+    #[error("{path} cannot be used: {what}")]
+    TaskFile {
+        /// The file.
+        path: std::path::PathBuf,
+        /// What is wrong with it.
+        what: String,
+    },
     /// All tetrahedra came to lie on one side of a cut.
     #[error("cut {cut} leaves no tetrahedron on one side: ask for fewer sub-domains")]
     EmptyPart {
@@ -101,5 +121,11 @@ pub enum PipelineError {
 impl From<SealedError> for PipelineError {
     fn from(error: SealedError) -> Self {
         Self::from(StoreError::from(error))
+    }
+}
+
+impl From<HelperFailure> for PipelineError {
+    fn from(failure: HelperFailure) -> Self {
+        Self::Helper(failure)
     }
 }

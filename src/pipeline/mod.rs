@@ -5,7 +5,8 @@
 //! | `plan` | | options, the size field and what it predicts, how the memory cap is shared out |
 //! | `mesh::coarse` | coarse | validate; Delaunay mesh of the surface's vertices; recover every triangle; color and empty regions |
 //! | `mesh::divide` | bisected | as often as there are sub-domains less one: refine a band, choose the interface, write two children |
-//! | `mesh::subdomain`, `seal` | sealed | each sub-domain alone: divide edges; optimize; sort, compress and seal |
+//! | `work::subdomain`, `seal` | sealed | each sub-domain alone: divide edges; optimize; sort, compress and seal |
+//! | `work`, `tasks` | | a cut or a sub-domain as an order and a receipt that any process can do and write; batches of them for schedulers |
 //! | `remesh` | sealed | sub-domains of a finished store again, from their coarse snapshots, with other sizes or because they are damaged; and back |
 //!
 //! Inserting the surface's vertices may begin before there is a store (`mesh::head_start`). The pipeline receives a surface, not a
@@ -17,15 +18,15 @@ mod plan;
 mod progress;
 mod remesh;
 mod seal;
+mod tasks;
 mod tree;
+mod work;
 mod workers;
 
 pub use error::PipelineError;
 #[cfg(any(test, feature = "internals"))]
 pub use mesh::coarse_mesh;
-pub use mesh::{
-    CoarseReport, FineReport, HeadStart, Summary, ahead, mesh, mesh_prepared, stage_faces,
-};
+pub use mesh::{CoarseReport, HeadStart, Summary, ahead, mesh, mesh_prepared};
 pub use plan::{
     Estimate, MEMORY_MIN, Options, Plan, Prepared, RECIPE, Trial, least_for, prepare, recipe_of,
     record_recipe,
@@ -37,3 +38,12 @@ pub use remesh::{
     Forecast, NewSizes, Remade, ResaturateSummary, Resaturation, Values, asked, changed, forecast,
     forget, resaturate, undo,
 };
+#[cfg(feature = "mpi")]
+pub use tasks::serve;
+pub use tasks::{
+    Gathered, Performed, Planned, Stage, StageKind, TASKS_MAX, TaskSettings, TaskState, end_plan,
+    gather, is_being_worked, perform, plan as plan_tasks, status,
+};
+pub use work::{FineReport, Hands, stage_faces};
+#[cfg(feature = "mpi")]
+pub use work::{HelperFailure, Helpers};

@@ -3,6 +3,8 @@
 //! A part is a run of ranks, named by its first. A cut is named by the first rank of its high side: so cuts are numbered from left to
 //! right, and the tree follows from the number of sub-domains alone.
 
+use rkyv::{Archive, Deserialize, Serialize};
+
 use crate::bisect::{Plane, Zone};
 use crate::geom::{Aabb, Point};
 use crate::mesh::{MESH_STATE_WORDS, Mesh, MeshState};
@@ -40,7 +42,7 @@ pub(crate) mod blob {
 }
 
 /// Ranks `first..first + count`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Archive, Serialize, Deserialize, Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct TreePart {
     pub first: u32,
     pub count: u32,
@@ -85,7 +87,7 @@ impl TreePart {
 }
 
 /// A part's working mesh, as its file holds it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Archive, Serialize, Deserialize, Clone, Copy, Debug, PartialEq)]
 pub(crate) struct PartMesh {
     pub part: TreePart,
     pub generation: u32,
@@ -184,12 +186,37 @@ fn damaged(catalog: &Catalog, first: u32) -> StoreError {
     })
 }
 
-pub(crate) fn plane_bytes(plane: &Plane) -> Vec<u8> {
-    let [x, y, z] = plane.normal.to_array();
-    [x, y, z, plane.offset]
-        .into_iter()
-        .flat_map(f64::to_le_bytes)
-        .collect()
+/// The zone of a cut as it is kept.
+#[derive(Archive, Serialize, Deserialize, Clone, Copy, Debug, PartialEq)]
+pub(crate) struct ZoneRow {
+    pub cut: u32,
+    /// Normal and offset of the plane.
+    pub plane: [f64; 4],
+}
+
+impl From<Zone> for ZoneRow {
+    fn from(zone: Zone) -> Self {
+        let [x, y, z] = zone.surface.normal.to_array();
+        let plane = [x, y, z, zone.surface.offset];
+        Self {
+            cut: zone.cut,
+            plane,
+        }
+    }
+}
+
+impl From<ZoneRow> for Zone {
+    fn from(ZoneRow { cut, plane }: ZoneRow) -> Self {
+        let [x, y, z, offset] = plane;
+        let normal = Point::new(x, y, z);
+        let surface = Plane { normal, offset };
+        Self { cut, surface }
+    }
+}
+
+pub(crate) fn plane_bytes(zone: ZoneRow) -> Vec<u8> {
+    let numbers = zone.plane.into_iter();
+    numbers.flat_map(f64::to_le_bytes).collect()
 }
 
 /// The zones of the cuts above `part`.
@@ -197,7 +224,7 @@ pub(crate) fn zones_above(
     catalog: &mut Catalog,
     part: TreePart,
     n: u32,
-) -> Result<Vec<Zone>, StoreError> {
+) -> Result<Vec<ZoneRow>, StoreError> {
     let mut zones = Vec::new();
     for cut in part.cuts_above(n) {
         let bytes = catalog.blob(blob::CUT + cut)?.unwrap_or_default();
@@ -205,12 +232,10 @@ pub(crate) fn zones_above(
             .chunks_exact(8)
             .map(|b| f64::from_le_bytes(std::array::from_fn(|i| b[i])))
             .collect();
-        let &[x, y, z, offset] = &numbers[..] else {
+        let Ok(plane) = numbers.try_into() else {
             return Err(damaged(catalog, cut));
         };
-        let normal = Point::new(x, y, z);
-        let surface = Plane { normal, offset };
-        zones.push(Zone { cut, surface });
+        zones.push(ZoneRow { cut, plane });
     }
     Ok(zones)
 }

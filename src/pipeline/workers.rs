@@ -12,22 +12,24 @@ use crate::storage::RunContext;
 /// Milliseconds between two words of one worker.
 const TELL_EVERY: u128 = 100;
 
-/// Does `jobs` with `workers` threads; `run` is a worker's part, `commit` takes what was done, in whatever order
+/// A worker's part.
+pub(crate) type Hand<'a, J, D> = &'a (dyn Fn(J, &Watcher) -> Result<D, PipelineError> + Sync);
+
+/// Does `jobs` with a thread for each of `hands`, which do their part; `commit` takes what was done, in whatever order
 /// it is finished, and names the jobs that have become possible.
 ///
 /// Threads of their own, not tasks of the pool: a task that waits for a sort would take up another job meanwhile, and its memory.
-/// Errors: the first of `run` and `commit`; what others finish after it is not committed.
+/// Errors: the first of `hands` and `commit`; what others finish after it is not committed.
 pub(crate) fn work_off<J: Send, D: Send>(
     jobs: Vec<J>,
-    workers: usize,
+    hands: &[Hand<J, D>],
     watch: &Watcher,
-    run: &(dyn Fn(J, &Watcher) -> Result<D, PipelineError> + Sync),
     commit: &mut dyn FnMut(D) -> Result<Vec<J>, PipelineError>,
 ) -> Result<(), PipelineError> {
     let list = JobQueue::new(jobs);
     let (tell, hear) = channel();
     std::thread::scope(|scope| {
-        for _ in 0..workers {
+        for &run in hands {
             let (list, tell) = (&list, tell.clone());
             let context = RunContext::current();
             scope.spawn(move || match context {
@@ -49,20 +51,20 @@ pub(crate) fn work_off<J: Send, D: Send>(
 pub(crate) fn map_bounded<S, I, J: Send, D: Send>(
     state: &mut S,
     items: Vec<I>,
-    workers: usize,
+    hands: &[Hand<J, D>],
     watch: &Watcher,
     draw: impl Fn(&mut S, I) -> Result<J, PipelineError>,
-    run: &(dyn Fn(J, &Watcher) -> Result<D, PipelineError> + Sync),
     commit: impl Fn(&mut S, D) -> Result<(), PipelineError>,
 ) -> Result<(), PipelineError> {
     let mut items = items.into_iter();
-    let mut jobs = Vec::with_capacity(2 * workers);
-    for item in items.by_ref().take(2 * workers) {
+    let at_hand = 2 * hands.len();
+    let mut jobs = Vec::with_capacity(at_hand);
+    for item in items.by_ref().take(at_hand) {
         jobs.push(draw(state, item)?);
     }
     // The last of the list is taken first.
     jobs.reverse();
-    work_off(jobs, workers, watch, run, &mut |done| {
+    work_off(jobs, hands, watch, &mut |done| {
         commit(state, done)?;
         let next = items.next().map(|item| draw(state, item));
         Ok(next.transpose()?.into_iter().collect())
@@ -195,16 +197,16 @@ mod tests {
     /// Jobs that halve a number until it is 1: `n` leaves, whatever the order.
     fn halve(n: u32, workers: usize, fail_at: u32) -> Result<u32, PipelineError> {
         let mut leaves = 0;
+        let run = &|n: u32, _: &Watcher| match n {
+            n if n == fail_at => Err(PipelineError::NothingFilled {
+                policy: String::new(),
+            }),
+            n => Ok(n),
+        };
         work_off(
             vec![n],
-            workers,
+            &vec![run as Hand<u32, u32>; workers],
             &silent,
-            &|n: u32, _: &Watcher| match n {
-                n if n == fail_at => Err(PipelineError::NothingFilled {
-                    policy: String::new(),
-                }),
-                n => Ok(n),
-            },
             &mut |n| {
                 if n == 1 {
                     leaves += 1;
@@ -225,9 +227,12 @@ mod tests {
         }
         let nothing: Vec<u32> = Vec::new();
         assert!(
-            work_off(nothing, 2, &silent, &|n, _: &Watcher| Ok(n), &mut |_| Ok(
-                Vec::new()
-            ))
+            work_off(
+                nothing,
+                &[&|n, _: &Watcher| Ok(n), &|n, _: &Watcher| Ok(n)],
+                &silent,
+                &mut |_| Ok(Vec::new())
+            )
             .is_ok()
         );
     }

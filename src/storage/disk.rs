@@ -44,6 +44,10 @@ pub trait Disk: Debug + Send + Sync {
     fn remove_file(&self, path: &Path) -> io::Result<()>;
     /// Gives a file another name on the same disk, replacing what had it.
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()>;
+    /// Gives a file a second name on the same disk. Errors: there are none on this disk; the name is taken.
+    fn link(&self, _from: &Path, _to: &Path) -> io::Result<()> {
+        Err(io::ErrorKind::Unsupported.into())
+    }
     /// Takes the right that a file stands for. Errors: another has it; the folder takes no files.
     fn lock(&self, path: &Path) -> Result<FileLock, Refused>;
     /// Names in a folder, in any order.

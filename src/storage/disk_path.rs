@@ -115,6 +115,11 @@ impl DiskPath {
         to.folder().sync_dir()
     }
 
+    /// Gives what is here a second name. Errors: this disk has none; the name is taken.
+    pub fn link(&self, to: &Self) -> Result<(), StorageError> {
+        to.at_path(self.disk.link(&self.path, &to.path))
+    }
+
     /// Removes the file, if it is there.
     pub fn remove_file(&self) -> Result<(), StorageError> {
         match self.disk.remove_file(&self.path) {

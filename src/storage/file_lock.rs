@@ -3,12 +3,17 @@
 //! The system's lock on the file decides, and ends with the process, however that ends. On a file system that knows no locks the file itself
 //! decides: whoever creates it has the right, and one that a process of this host left behind when it died is taken over. The file says
 //! who has it, for the message to others.
+//!
+//! There are file systems of clusters where every machine gets the lock it asks for. So a file that is not new is looked at even by who has
+//! its lock: a process of this host that it names and that lives has the right, and so has one of another host while it renews the file.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, ErrorKind, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::sync::{Mutex, PoisonError};
+use std::thread::JoinHandle;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
@@ -18,11 +23,16 @@ const ATTEMPTS: u32 = 100;
 /// Without locks two may take over a dead process's file at once: after this time the file says which of them has it.
 const SETTLED_AFTER: Duration = Duration::from_millis(200);
 
+/// Between two times that a holder renews its file.
+const RENEWED_EVERY: Duration = Duration::from_millis(500);
+/// A holder on another host that has not renewed its file for so long is gone: six times what it takes, so that a slow disk is no death.
+const RENEWED_WITHIN: Duration = Duration::from_secs(3);
+
 /// A right that is held; it ends when this is dropped.
 #[derive(Debug)]
 pub struct FileLock {
     /// `None`: nothing to release.
-    held: Option<File>,
+    held: Option<Renewed>,
     path: Mutex<PathBuf>,
     text: String,
     is_by_name: bool,
@@ -46,6 +56,42 @@ struct Holder {
     time: u64,
     /// Differs between any two that are taken on one host.
     run: String,
+    /// When the process began, in the system's own ticks: its number may be another's later. 0: unknown.
+    #[serde(default)]
+    began: u64,
+}
+
+/// A file that is renewed while this lives.
+#[derive(Debug)]
+struct Renewed {
+    stop: Option<Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Renewed {
+    fn new(file: File) -> Self {
+        let (stop, stopped) = channel();
+        // The file, and with it its lock, is closed when the thread ends.
+        let renew = move || {
+            while stopped.recv_timeout(RENEWED_EVERY) == Err(RecvTimeoutError::Timeout) {
+                // Who cannot say that it lives still does.
+                let _ = file.set_modified(SystemTime::now());
+            }
+        };
+        Self {
+            thread: Some(std::thread::spawn(renew)),
+            stop: Some(stop),
+        }
+    }
+}
+
+impl Drop for Renewed {
+    fn drop(&mut self) {
+        self.stop = None;
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
 }
 
 impl FileLock {
@@ -76,7 +122,14 @@ impl FileLock {
                 continue;
             };
             let is_by_name = match try_lock(&file) {
-                Ok(()) => false,
+                Ok(()) if is_new => false,
+                Ok(()) if is_held_all_the_same(path) => {
+                    return Err(Refused::Held(holder(path)));
+                }
+                Ok(()) => {
+                    is_taken_over = true;
+                    false
+                }
                 Err(TryLockError::WouldBlock) => return Err(Refused::Held(holder(path))),
                 Err(TryLockError::Error(e)) if !knows_no_locks(&e) => return Err(e.into()),
                 Err(TryLockError::Error(_)) if is_new => true,
@@ -92,13 +145,13 @@ impl FileLock {
             file.set_len(0)?;
             file.rewind()?;
             file.write_all(text.as_bytes())?;
-            if is_by_name && is_taken_over {
+            if is_taken_over {
                 std::thread::sleep(SETTLED_AFTER);
             }
             // Whoever had it may have removed the file meanwhile: then this one has no name, and another may be locked in its place.
             if fs::read_to_string(path).is_ok_and(|found| found == text) {
                 return Ok(Self {
-                    held: Some(file),
+                    held: Some(Renewed::new(file)),
                     path: Mutex::new(path.to_owned()),
                     text,
                     is_by_name,
@@ -172,11 +225,30 @@ impl Holder {
         let now = now.unwrap_or_default();
         let count = COUNT.fetch_add(1, Ordering::Relaxed);
         Self {
-            host: host(),
+            host: host_name(),
             process: std::process::id(),
             time: now.as_secs(),
             run: format!("{}-{count}", now.as_nanos()),
+            began: began(std::process::id()),
         }
+    }
+
+    /// Whether it says so by itself: as a process of this host, or by renewing its file.
+    fn lives(&self, path: &Path) -> bool {
+        if self.host == host_name() {
+            return self.began != 0 && self.began == began(self.process);
+        }
+        let modified = || {
+            // Opened anew: other machines' changes are seen then.
+            let file = File::open(path).ok()?;
+            file.metadata().ok()?.modified().ok()
+        };
+        let first = modified();
+        let looks = RENEWED_WITHIN.as_millis() / RENEWED_EVERY.as_millis();
+        (0..looks).any(|_| {
+            std::thread::sleep(RENEWED_EVERY);
+            modified() != first
+        })
     }
 
     fn read(path: &Path) -> Option<Self> {
@@ -189,15 +261,32 @@ impl Holder {
     }
 }
 
+/// Whether a file that was there before, and whose lock nobody has, belongs to somebody.
+fn is_held_all_the_same(path: &Path) -> bool {
+    let Some(holder) = Holder::read(path) else {
+        // Somebody who created it just now is about to write; who died before that never will.
+        std::thread::sleep(SETTLED_AFTER);
+        return Holder::read(path).is_some_and(|holder| holder.lives(path));
+    };
+    holder.lives(path)
+}
+
+/// When a process of this host began; 0 where the system does not say.
+fn began(process: u32) -> u64 {
+    /// Place of the number in the line, counted behind the name, which may hold anything.
+    const BEGAN: usize = 19;
+    let line = fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
+    let behind = line.rsplit_once(')').map_or("", |(_, behind)| behind);
+    let number = behind.split_whitespace().nth(BEGAN);
+    number.and_then(|n| n.parse().ok()).unwrap_or(0)
+}
+
 /// Whether the process that left the file may still be there: of another host nobody knows.
 fn may_live(path: &Path) -> bool {
     let Some(holder) = Holder::read(path) else {
         return true;
     };
-    let processes = Path::new("/proc");
-    holder.host != host()
-        || !processes.join("self").exists()
-        || processes.join(holder.process.to_string()).exists()
+    !is_process_gone(&holder.host, holder.process)
 }
 
 fn holder(path: &Path) -> String {
@@ -207,7 +296,16 @@ fn holder(path: &Path) -> String {
     }
 }
 
-fn host() -> String {
+/// Whether a process is known to have ended: of another host nobody knows.
+pub fn is_process_gone(host: &str, process: u32) -> bool {
+    let processes = Path::new("/proc");
+    host == host_name()
+        && processes.join("self").exists()
+        && !processes.join(process.to_string()).exists()
+}
+
+/// The name of this machine.
+pub fn host_name() -> String {
     let read = |path| fs::read_to_string(path).ok();
     let name = read("/proc/sys/kernel/hostname").or_else(|| read("/etc/hostname"));
     let name = name.or_else(|| std::env::var("HOSTNAME").ok());
@@ -222,6 +320,10 @@ mod tests {
         Err(TryLockError::Error(ErrorKind::Unsupported.into()))
     }
 
+    fn that_refuse_nobody(_: &File) -> Result<(), TryLockError> {
+        Ok(())
+    }
+
     fn is_held(lock: Result<FileLock, Refused>) -> bool {
         matches!(lock, Err(Refused::Held(_)))
     }
@@ -230,7 +332,7 @@ mod tests {
     fn one_holder_at_a_time_with_locks_and_without() -> io::Result<()> {
         let dir = tempfile::tempdir()?;
         let path = dir.path().join("lock");
-        for try_lock in [File::try_lock, without_locks] {
+        for try_lock in [File::try_lock, without_locks, that_refuse_nobody] {
             let acquire = || FileLock::acquire_with(&path, try_lock);
             let held = acquire().expect("nobody has it");
             let Err(Refused::Held(words)) = acquire() else {
@@ -264,7 +366,28 @@ mod tests {
     }
 
     #[test]
+    fn a_file_that_another_host_renews_is_held_whatever_the_locks_say() -> io::Result<()> {
+        let dir = tempfile::tempdir()?;
+        let path = dir.path().join("lock");
+        let mut left = Holder::this();
+        left.host += ".elsewhere";
+        fs::write(&path, serde_json::to_string(&left)?)?;
+        let renewed = Renewed::new(File::open(&path)?);
+        let acquire = || FileLock::acquire_with(&path, that_refuse_nobody);
+        assert!(is_held(acquire()));
+        drop(renewed);
+        drop(acquire().expect("it is not renewed any more"));
+        Ok(())
+    }
+
+    #[test]
     fn of_many_threads_one_has_it() {
+        for try_lock in [File::try_lock, that_refuse_nobody] {
+            one_of_many_threads_has_it(try_lock);
+        }
+    }
+
+    fn one_of_many_threads_has_it(try_lock: impl Fn(&File) -> Result<(), TryLockError> + Sync) {
         let dir = tempfile::tempdir().expect("a folder");
         let path = dir.path().join("lock");
         let inside = AtomicU32::new(0);
@@ -273,7 +396,7 @@ mod tests {
             for _ in 0..8 {
                 scope.spawn(|| {
                     for _ in 0..300 {
-                        if let Ok(_held) = FileLock::acquire(&path) {
+                        if let Ok(_held) = FileLock::acquire_with(&path, &try_lock) {
                             assert_eq!(inside.fetch_add(1, Ordering::SeqCst), 0);
                             taken.fetch_add(1, Ordering::SeqCst);
                             std::thread::yield_now();

@@ -41,7 +41,7 @@ pub use disk::{Disk, Entry, FileId};
 pub use disk_path::DiskPath;
 pub use error::StorageError;
 pub use file::StoreFile;
-pub use file_lock::{FileLock, Refused};
+pub use file_lock::{FileLock, Refused, host_name, is_process_gone};
 #[cfg(any(test, feature = "internals"))]
 pub use flat::FlatPages;
 pub use pager::{Pager, PagerStats};

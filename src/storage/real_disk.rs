@@ -75,6 +75,10 @@ impl Disk for RealDisk {
         fs::rename(from, to)
     }
 
+    fn link(&self, from: &Path, to: &Path) -> io::Result<()> {
+        fs::hard_link(from, to)
+    }
+
     fn lock(&self, path: &Path) -> Result<FileLock, Refused> {
         FileLock::acquire(path)
     }

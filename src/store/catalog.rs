@@ -32,6 +32,8 @@ const CATALOG_NEW: &str = "catalog.redb-new";
 const CATALOG_NEXT: &str = "catalog.redb-next";
 /// Folder of sorted runs; everything in it is scratch.
 const SCRATCH: &str = "scratch";
+/// Folder of tasks that others do; nothing in it counts once the store is finished.
+const WORK: &str = "work";
 
 /// The catalog of a store, open for reading or for writing.
 ///
@@ -255,27 +257,42 @@ impl Catalog {
         Ok(())
     }
 
+    /// The directory of the store, with the disk it is on.
+    pub(crate) fn disk_path(&self) -> &DiskPath {
+        &self.dir
+    }
+
     /// The directory of the store.
     pub fn dir(&self) -> &Path {
         self.dir.path()
     }
 
-    /// Where the file of a sub-domain in a generation is, whether it exists or not.
-    pub fn file_path(&self, subdomain: u32, generation: u32) -> DiskPath {
+    /// The name of a sub-domain's file in a generation.
+    pub(crate) fn file_name(subdomain: u32, generation: u32) -> String {
         let file = FileRow {
             subdomain,
             generation,
         };
-        self.dir.join(named(SUBDOMAIN, file))
+        named(SUBDOMAIN, file)
+    }
+
+    /// The name of a coarse snapshot's file in a generation.
+    pub(crate) fn coarse_name(subdomain: u32, generation: u32) -> String {
+        let file = FileRow {
+            subdomain,
+            generation,
+        };
+        named(COARSE, file)
+    }
+
+    /// Where the file of a sub-domain in a generation is, whether it exists or not.
+    pub fn file_path(&self, subdomain: u32, generation: u32) -> DiskPath {
+        self.dir.join(Self::file_name(subdomain, generation))
     }
 
     /// Where the file of a coarse snapshot in a generation is, whether it exists or not.
     pub fn coarse_path(&self, subdomain: u32, generation: u32) -> DiskPath {
-        let file = FileRow {
-            subdomain,
-            generation,
-        };
-        self.dir.join(named(COARSE, file))
+        self.dir.join(Self::coarse_name(subdomain, generation))
     }
 
     /// A folder for sorted runs, created when it is not there; removed when the store is next opened for writing.
@@ -285,6 +302,16 @@ impl Catalog {
         let path = self.dir.join(SCRATCH);
         path.create_dir_all()?;
         Ok(path)
+    }
+
+    /// The folder of tasks, whether it is there or not.
+    pub(crate) fn work_dir(&self) -> DiskPath {
+        self.dir.join(WORK)
+    }
+
+    /// The same of the store at a path that is not opened.
+    pub(crate) fn work_dir_at(dir: impl Into<DiskPath>) -> DiskPath {
+        dir.into().join(WORK)
     }
 
     /// One atomic step: files first, then the rows `describe` sets, in one commit; then files no longer listed go.
@@ -348,6 +375,7 @@ impl Catalog {
 
     /// Removes sub-domain files the catalog does not list, what an interrupted commit left, and scratch.
     fn purge(&mut self) -> Result<(), StoreError> {
+        let is_finished = self.state()?.is_finished();
         let listed = self.files()?;
         let coarse: Vec<FileRow> = (self.coarse_snapshots()?.iter())
             .map(|row| FileRow {
@@ -363,7 +391,7 @@ impl Catalog {
             let is_draft = [CATALOG_NEW, CATALOG_NEXT].contains(&&*name);
             if is_draft || is_stray(SUBDOMAIN, &listed) || is_stray(COARSE, &coarse) {
                 path.remove_file()?;
-            } else if name == SCRATCH {
+            } else if name == SCRATCH || name == WORK && is_finished {
                 path.remove_dir_all()?;
             }
         }

@@ -8,6 +8,8 @@
 
 use std::collections::BTreeMap;
 
+use rkyv::{Archive, Deserialize, Serialize};
+
 /// Owners of the faces of one cut. Shape: `faces[i]` = the parts on the low and on the high side of face `i`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Owners {
@@ -45,6 +47,33 @@ impl Owners {
     pub fn other(&self, index: u32, side: u32) -> Option<u32> {
         let owners = self.faces.get(index as usize)?;
         Some(owners[1 - (side as usize & 1)])
+    }
+
+    /// The faces of one part, and who has them on the other side.
+    pub fn across(&self, part: u32) -> FacesAcross {
+        let faces = (0..).zip(&self.faces);
+        let other = |(index, &owners): (u32, &[u32; 2])| match owners {
+            [a, b] if a == part => Some([index, b]),
+            [a, b] if b == part => Some([index, a]),
+            _ => None,
+        };
+        FacesAcross {
+            faces: faces.filter_map(other).collect(),
+        }
+    }
+}
+
+/// The faces that one part has in a cut. Shape: `faces[i]` = the number of a face and the part on its other side, ascending.
+#[derive(Archive, Serialize, Deserialize, Clone, Debug, Default, PartialEq, Eq)]
+pub struct FacesAcross {
+    faces: Vec<[u32; 2]>,
+}
+
+impl FacesAcross {
+    /// Who has the face on the other side; `None` when the part has no such face.
+    pub fn other(&self, index: u32) -> Option<u32> {
+        let at = self.faces.binary_search_by_key(&index, |face| face[0]);
+        Some(self.faces[at.ok()?][1])
     }
 }
 
@@ -109,6 +138,10 @@ mod tests {
         assert_eq!(neighbors.of(0), [(2, 3), (3, 2)]);
         assert_eq!(neighbors.of(3), [(0, 2)]);
         assert_eq!(owners.other(4, 0), Some(3));
+        let [two, three] = [2, 3].map(|part| owners.across(part));
+        assert_eq!((two.other(2), two.other(3)), (Some(0), None));
+        assert_eq!((three.other(2), three.other(3)), (None, Some(0)));
+        assert_eq!(owners.across(0).other(4), Some(3));
         assert_eq!(Owners::from_bytes(&owners.to_bytes()), Some(owners));
         assert_eq!(Owners::from_bytes(&[1]), None);
     }

@@ -22,6 +22,9 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("no-coarse-leaf", "resaturate.rs"),
     ("nothing-to-undo", "resaturate.rs"),
     ("store-recipe", "tests/front_door"),
+    ("no-tasks", "tasks.rs"),
+    ("tasks-left", "tasks.rs"),
+    ("task-file", "tasks.rs"),
     ("invalid-mesh", "below"),
     ("contradicting-orientation", "walls.rs"),
 ];

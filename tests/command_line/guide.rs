@@ -170,6 +170,7 @@ chapters! {
     sizes: 8,
     regions: 3,
     subdomains: 5,
+    cluster: 8,
     questions: 8,
     resaturation: 5,
     pictures: 10,

@@ -19,7 +19,7 @@ const FREE: [&str; 4] = [
 ];
 
 /// The commands of each section, in order. The surfaces are written before.
-const RUNS: [(&str, &[&str]); 13] = [
+const RUNS: [(&str, &[&str]); 16] = [
     (
         "sample",
         &[
@@ -45,8 +45,12 @@ const RUNS: [(&str, &[&str]); 13] = [
         &[
             "mesh box.stl -o a.tetdb --subdomains 2 --keep-stages --memory 256MiB",
             "resume a.tetdb",
+            "mesh box.stl -o t.tetdb --subdomains 2 --coarse-only --memory 256MiB",
         ],
     ),
+    ("plan", &["plan t.tetdb --tasks 2"]),
+    ("work", &["work t.tetdb --task 1"]),
+    ("gather", &["gather t.tetdb"]),
     ("digest", &["digest a.tetdb"]),
     (
         "verify",

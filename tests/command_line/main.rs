@@ -26,6 +26,7 @@ mod sizes;
 mod snapshot;
 mod streams;
 mod subdomains;
+mod tasks;
 mod together;
 mod walls;
 mod zone;

@@ -23,6 +23,9 @@ pub struct MeshArgs {
     /// Replace the store if it is there
     #[arg(long)]
     pub force: bool,
+    /// End with the coarse mesh, and leave the rest to `tetdb plan` or `tetdb resume`
+    #[arg(long, conflicts_with_all = ["force", "export"])]
+    pub coarse_only: bool,
     /// Begin even when disk or memory are expected not to hold the mesh
     #[arg(long, hide = true)]
     pub no_preflight: bool,

@@ -7,6 +7,7 @@ mod shape;
 mod show;
 mod store;
 mod surface;
+mod tasks;
 
 use std::path::PathBuf;
 
@@ -19,6 +20,7 @@ pub use shape::{Optimize, Regions, ShapeArgs, SizeArgs};
 pub use show::{ColorBy, CompletionsArgs, ManArgs, ReportArgs, SnapshotArgs};
 pub use store::{CompareArgs, ExportArgs, StoreArgs, VerifyArgs};
 pub use surface::{CheckArgs, RefineSurfaceArgs, SampleArgs, SheetArgs};
+pub use tasks::{GatherArgs, PlanArgs, WorkArgs};
 
 /// Tetrahedral meshes of any size in a database, every input triangle kept.
 #[derive(Debug, Parser)]
@@ -58,6 +60,17 @@ pub enum Command {
     Estimate(Box<EstimateArgs>),
     /// Go on with an unfinished store
     Resume(ResumeArgs),
+    /// Plan the rest of a store as tasks for a batch scheduler
+    ///
+    /// The store has its coarse mesh. Tasks run in stages, in any order and on any machines that see the store; between stages `tetdb gather`
+    /// commits what they did. The mesh is that of one process.
+    Plan(PlanArgs),
+    /// Do one task of a plan
+    ///
+    /// It can be killed and done again, also twice at the same time.
+    Work(WorkArgs),
+    /// Commit what tasks have done, and let the next ones begin
+    Gather(GatherArgs),
     /// Make sub-domains again: with other sizes, or damaged ones
     ///
     /// Each is meshed from the coarse mesh kept in the store. Interfaces and all other sub-domains stay as they are. Size options take the
@@ -119,6 +132,9 @@ impl Command {
             Self::Mesh(a) => a.run.json,
             Self::Estimate(a) => a.json,
             Self::Resume(a) => a.run.json,
+            Self::Plan(a) => a.json,
+            Self::Work(a) => a.json,
+            Self::Gather(a) => a.json,
             Self::Resaturate(a) => a.run.json,
             Self::Check(a) => a.json,
             Self::Info(a) | Self::Digest(a) => a.json,

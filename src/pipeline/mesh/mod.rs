@@ -1,21 +1,14 @@
 //! One run: the coarse mesh, the bisections, each sub-domain to its final density.
 
 pub(super) mod coarse;
-pub(super) mod coarse_snapshot;
-pub(super) mod common;
-mod cut_journal;
+pub(super) mod commit;
 pub(super) mod divide;
 mod head_start;
 pub(super) mod owners;
 mod run;
-mod saturate;
-mod stages;
-pub(super) mod subdomain;
 
 pub use coarse::CoarseReport;
 #[cfg(any(test, feature = "internals"))]
 pub use coarse::coarse as coarse_mesh;
 pub use head_start::{HeadStart, ahead};
 pub use run::{Summary, mesh, mesh_prepared};
-pub use saturate::FineReport;
-pub use stages::stage_faces;

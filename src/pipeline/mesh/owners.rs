@@ -1,23 +1,14 @@
 //! Who owns the faces of a cut and who neighbors whom, as the catalog keeps it.
 
-use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::pipeline::tree::blob;
+use crate::pipeline::work::InheritedFace;
 use crate::sealed::SealedError;
 use crate::store::{Catalog, Step, StoreError};
 use crate::topology::{Neighbors, Owners};
 use tetdb_schema::catalog::{NeighborRow, TopologyRow};
-
-/// An interface face of an earlier cut that a child took over from its parent.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct InheritedFace {
-    pub cut: u32,
-    /// Number in the cut.
-    pub index: u32,
-    /// On which side of the cut the child is.
-    pub side: u32,
-}
 
 /// A cut as far as neighbors are concerned.
 pub(crate) struct NewCut<'a> {
@@ -31,16 +22,27 @@ pub(crate) struct NewCut<'a> {
     pub inherited: &'a [InheritedFace],
 }
 
-/// What a cut changes in the catalog's tables of owners and neighbors.
+/// What cuts change in the catalog's tables of owners and neighbors.
 pub(crate) struct TopologyChange {
     /// By cut.
     owners: BTreeMap<u32, Owners>,
-    rows: Vec<TopologyRow>,
+    neighbors: Neighbors,
+    /// Parts whose rows change.
+    names: BTreeSet<u32>,
 }
 
 impl TopologyChange {
-    /// Of a new cut. Errors: a damaged catalog.
-    pub fn of_cut(catalog: &mut Catalog, new: &NewCut) -> Result<Self, StoreError> {
+    /// Nothing changes yet. Errors: a damaged catalog.
+    pub fn none(catalog: &mut Catalog) -> Result<Self, StoreError> {
+        Ok(Self {
+            owners: BTreeMap::new(),
+            neighbors: neighbors_of(&catalog.topology()?),
+            names: BTreeSet::new(),
+        })
+    }
+
+    /// One more cut. Errors: a damaged catalog.
+    pub fn add(&mut self, catalog: &mut Catalog, new: &NewCut) -> Result<(), StoreError> {
         let &NewCut {
             cut,
             faces,
@@ -48,8 +50,8 @@ impl TopologyChange {
             high,
             ..
         } = new;
-        let mut neighbors = neighbors_of(&catalog.topology()?);
-        let mut owners = BTreeMap::from([(cut, Owners::new(faces, low, high))]);
+        let (owners, neighbors) = (&mut self.owners, &mut self.neighbors);
+        owners.insert(cut, Owners::new(faces, low, high));
         neighbors.set(low, high, u64::from(faces));
         for face in new.inherited {
             let table = match owners.entry(face.cut) {
@@ -68,19 +70,9 @@ impl TopologyChange {
             neighbors.add(high, other);
         }
         // Who was a neighbor of the parent is one of a child: no other row changes.
-        let mut names: Vec<u32> = [low, high]
-            .into_iter()
-            .flat_map(|name| neighbors.of(name))
-            .map(|n| n.0)
-            .chain([low, high])
-            .collect();
-        names.sort_unstable();
-        names.dedup();
-        let rows = names.iter().map(|&name| topology_row(&neighbors, name));
-        Ok(Self {
-            owners,
-            rows: rows.collect(),
-        })
+        let beside = [low, high].into_iter().flat_map(|name| neighbors.of(name));
+        self.names.extend(beside.map(|n| n.0).chain([low, high]));
+        Ok(())
     }
 
     /// Puts it into `step`.
@@ -88,8 +80,8 @@ impl TopologyChange {
         for (cut, table) in &self.owners {
             step.set_blob(blob::OWNERS + cut, &table.to_bytes());
         }
-        for row in &self.rows {
-            step.set_topology(row);
+        for &name in &self.names {
+            step.set_topology(&topology_row(&self.neighbors, name));
         }
     }
 }

@@ -2,14 +2,12 @@
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 use std::time::Instant;
 
-use super::FineReport;
 use super::coarse::{CoarseReport, inserted, recovered};
-use super::common::Common;
+use super::commit::{close, commit_subdomain, subdomain_order};
 use super::head_start::{HeadStart, ahead};
-use super::owners::read_owners;
-use super::subdomain::{FinishedSubdomain, SubdomainJob};
 use crate::bisect::{CutReport, load_of};
 use crate::boundary::RegionSummary;
 use crate::geom::{Aabb, HilbertFrame};
@@ -19,12 +17,18 @@ use crate::pipeline::plan::estimate::n_subdomains;
 use crate::pipeline::plan::leases::Leases;
 use crate::pipeline::plan::{Estimate, Options, Plan, Prepared, prepare};
 use crate::pipeline::progress::Watcher;
-use crate::pipeline::seal::totals::{SealedTotals, Totals, journal, sum_totals};
+use crate::pipeline::seal::totals::journal;
+use crate::pipeline::tasks::{ask, begin, wrong_receipt};
 use crate::pipeline::tree::{self, DONE, PartMesh, TreePart, blob};
-use crate::pipeline::workers::map_bounded;
+use crate::pipeline::work::common::Common;
+use crate::pipeline::work::{
+    FineReport, Helpers, Order, Receipt, SubdomainOrder, SubdomainReceipt, Traffic, Worker,
+    Workplace,
+};
+use crate::pipeline::workers::{Hand, map_bounded};
 use crate::sizing::{SizeField, SizeSummary, TETS_PER_LOAD};
-use crate::storage::{Backing, Budget, DiskPath, Pager, PagerStats, ScratchSpace, attempt};
-use crate::store::{Catalog, StoreError};
+use crate::storage::{Backing, Budget, Pager, PagerStats, ScratchSpace, attempt};
+use crate::store::Catalog;
 use crate::surface::Surface;
 use tetdb_schema::catalog::{RegionRow, StoreState};
 
@@ -135,6 +139,7 @@ fn go_on(
         pages: PagerStats::default(),
         frames_used: 0,
         watch,
+        slots: None,
     };
     // Unwinding from a failed page access ends here; a step's commit is its last act, so nothing is half done.
     attempt(|| run.steps(surface, new, held, budget))?
@@ -151,7 +156,12 @@ pub(crate) struct Run<'a> {
     pub pages: PagerStats,
     pub frames_used: usize,
     pub watch: &'a Watcher<'a>,
+    /// Orders that other processes do at once, when they have begun.
+    pub slots: Option<usize>,
 }
+
+/// A finished sub-domain, and how it went where this process meshed it.
+type SubdomainDone = (Box<SubdomainReceipt>, Option<FineReport>);
 
 impl<'a> Run<'a> {
     fn steps(
@@ -176,39 +186,44 @@ impl<'a> Run<'a> {
             held = held.without_surface(self.options, budget)?;
             self.plan = held.plan;
         }
+        if self.options.coarse_only {
+            return self.summary(coarse, sizes, Vec::new());
+        }
         // Pages of the coarse mesh that are still resident would take the frames of the others.
         open = open.filter(|_| self.n == 1);
         let cuts = self.divide_all()?;
-        let mut summary = Summary {
+        let mut summary = self.summary(coarse, sizes, cuts)?;
+        let sealed: BTreeSet<u32> = self.catalog.subdomains()?.iter().map(|r| r.rank).collect();
+        let mut left = tree::parts(self.catalog, self.n)?;
+        left.retain(|p| !sealed.contains(&p.part.first));
+        self.leaves(left, open, &mut summary)?;
+        close(self.catalog, self.n)?;
+        (summary.pages, summary.frames_used) = (self.pages, self.frames_used);
+        Ok(summary)
+    }
+
+    fn summary(
+        &self,
+        coarse: Option<CoarseReport>,
+        sizes: Option<SizeSummary>,
+        cuts: Vec<CutReport>,
+    ) -> Result<Summary, PipelineError> {
+        let asked = self.options.subdomain_count()?;
+        Ok(Summary {
             coarse,
             sizes,
             cuts,
             fine: BTreeMap::new(),
             subdomains: self.n,
-            subdomains_asked: self
-                .options
-                .subdomain_count()?
-                .filter(|&asked| asked > self.n),
-            pages: PagerStats::default(),
+            subdomains_asked: asked.filter(|&asked| asked > self.n),
+            pages: self.pages,
             frames_used: self.frames_used,
-        };
-        let sealed: BTreeSet<u32> = self.catalog.subdomains()?.iter().map(|r| r.rank).collect();
-        let mut left = tree::parts(self.catalog, self.n)?;
-        left.retain(|p| !sealed.contains(&p.part.first));
-        self.leaves(left, open, &mut summary)?;
-        self.close()?;
-        summary.pages.add(self.pages);
-        Ok(summary)
+        })
     }
 
     /// What is the same for all workers.
     pub(crate) fn common(&self) -> Result<Common<'a>, PipelineError> {
-        Ok(Common {
-            field: self.field,
-            mode: self.options.mode()?,
-            method: self.options.method,
-            bounds: self.bounds,
-        })
+        Common::of(self.options, self.field, self.bounds)
     }
 
     fn coarse_step(
@@ -312,117 +327,83 @@ impl<'a> Run<'a> {
         open: Option<Mesh>,
         summary: &mut Summary,
     ) -> Result<(), PipelineError> {
-        let common = self.common()?;
+        let worker = Worker {
+            place: Workplace::in_store(self.catalog)?,
+            common: self.common()?,
+        };
         if let (Some(mesh), [part]) = (open, &left[..]) {
-            let job = self.job(*part, 1)?;
-            let leaf = job.finish(mesh, common, self.watch)?;
-            return self.seal_step(leaf, summary);
+            let job =
+                worker.subdomain_job(subdomain_order(self.catalog, self.n, *part)?, self.plan)?;
+            let leaf = job.finish(mesh, worker.common, self.watch)?;
+            return self.seal_step(&leaf.receipt(), Some(leaf.fine), summary);
         }
         let (workers, watch) = (self.plan.workers().min(left.len()), self.watch);
+        let share = self.plan.shared_by(workers.max(1) as u64);
+        let here = |order: SubdomainOrder, watch: &Watcher| {
+            let job = worker.subdomain_job(order, share)?;
+            let leaf = job.run(worker.common, watch)?;
+            Ok((Box::new(leaf.receipt()), Some(leaf.fine)))
+        };
+        let there = match left.is_empty() {
+            true => Vec::new(),
+            false => self.helpers()?,
+        };
+        let store = &worker.place.store;
+        let elsewhere: Vec<_> = (there.iter())
+            .map(|(helpers, slot)| {
+                move |order: SubdomainOrder, _: &Watcher| match ask(
+                    &**helpers,
+                    *slot,
+                    &Order::Subdomain(order),
+                    store,
+                )? {
+                    Receipt::Subdomain(receipt) => Ok((Box::new(receipt), None)),
+                    Receipt::Cut(_) => Err(wrong_receipt()),
+                }
+            })
+            .collect();
+        let mut hands: Vec<Hand<SubdomainOrder, SubdomainDone>> = vec![&here; workers];
+        hands.extend(elsewhere.iter().map(|hand| hand as Hand<_, _>));
         map_bounded(
             &mut (self, summary),
             left,
-            workers,
+            &hands,
             watch,
-            |(run, _), part| run.job(part, workers as u64),
-            &|job: SubdomainJob, watch| job.run(common, watch).map(Box::new),
-            |(run, summary), leaf| run.seal_step(*leaf, summary),
+            |(run, _), part| Ok(subdomain_order(run.catalog, run.n, part)?),
+            |(run, summary), (leaf, fine)| run.seal_step(&leaf, fine, summary),
         )
     }
 
-    fn job(&mut self, part: PartMesh, workers: u64) -> Result<SubdomainJob, PipelineError> {
-        let rank = part.part.first;
-        let mut owners = BTreeMap::new();
-        for cut in part.part.cuts_above(self.n) {
-            owners.insert(cut, read_owners(self.catalog, cut)?);
-        }
-        let share = self.plan.shared_by(workers).without_file();
-        Ok(SubdomainJob {
-            part,
-            base: self.catalog.file_path(rank, part.generation),
-            sealed: self.catalog.file_path(rank, part.generation + DONE),
-            generation: part.generation + DONE,
-            form: self.options.form()?,
-            field: None,
-            kept: (!self.options.drop_coarse)
-                .then(|| self.catalog.coarse_path(rank, part.generation)),
-            scratch: self.scratch(&format!("leaf-{rank}"))?,
-            zones: tree::zones_above(self.catalog, part.part, self.n)?,
-            owners,
-            share,
-        })
-    }
-
-    /// A scratch folder of this name.
-    pub(crate) fn scratch(&mut self, name: &str) -> Result<DiskPath, StoreError> {
-        let path = self.catalog.scratch_dir()?.join(name);
-        path.create_dir_all()?;
-        Ok(path)
-    }
-
-    /// Commits a finished sub-domain.
     fn seal_step(
         &mut self,
-        leaf: FinishedSubdomain,
+        leaf: &SubdomainReceipt,
+        fine: Option<FineReport>,
         summary: &mut Summary,
     ) -> Result<(), PipelineError> {
-        let (rank, generation) = (leaf.part.part.first, leaf.part.generation);
-        let refine = &leaf.fine.refine;
-        let measures = [
-            ("predicted_tets", TETS_PER_LOAD * leaf.part.load),
-            ("coarse_tets", f64::from(leaf.part.state.n_tets())),
-            ("keep_s", leaf.keep_s),
-            ("inserted_vertices", refine.inserted as f64),
-            ("over_constrained_tets", refine.over_constrained as f64),
-            ("zone_rejects", refine.out_of_place as f64),
-            ("frozen_hits", refine.frozen_hits as f64),
-            ("pages_read", leaf.pages.pages_read as f64),
-            ("pages_written", leaf.pages.pages_written as f64),
-            ("frames_used", leaf.frames_used as f64),
-            ("refine_s", leaf.fine.seconds[0]),
-            ("optimize_s", leaf.fine.seconds[1]),
-            ("seal_s", leaf.seal_seconds),
-        ];
-        // A finished sub-domain leaves the state of the whole as it is until the last one.
-        let state = self.catalog.state()?;
-        let mut row = journal(state, "saturate, optimize, seal", leaf.clock, &measures);
-        row.subdomain = Some(rank);
-        let totals = SealedTotals::of(&leaf.sealed).to_bytes();
-        self.catalog.commit(|step| {
-            step.set_subdomain(&leaf.sealed.row);
-            step.set_blob(blob::SEALED + rank, &totals);
-            step.list_file(rank, leaf.generation);
-            step.unlist_file(rank, generation);
-            if let Some(kept) = &leaf.kept {
-                step.list_coarse(kept);
-            }
-            step.append_journal(&row);
-            Ok(())
-        })?;
-        summary.pages.add(leaf.pages);
-        summary.frames_used = summary.frames_used.max(leaf.frames_used);
-        summary.fine.insert(rank, leaf.fine);
+        commit_subdomain(self.catalog, leaf)?;
+        self.count(leaf.traffic);
+        let of_rank = fine.map(|fine| (leaf.row.rank, fine));
+        summary.fine.extend(of_rank);
         Ok(())
     }
 
-    /// Everything is sealed: regions and interfaces of the whole.
-    fn close(&mut self) -> Result<(), PipelineError> {
-        let Totals {
-            regions,
-            interfaces,
-        } = sum_totals(self.catalog, self.n, &BTreeMap::new())?;
-        let scratch = self.catalog.scratch_dir()?;
-        self.catalog.commit(|step| {
-            step.set_regions(&regions);
-            for (&cut, rows) in &interfaces {
-                step.set_interfaces(cut, rows);
-            }
-            step.set_state(StoreState::Sealed);
-            Ok(())
-        })?;
-        // Nothing in it counts; what cannot be removed now goes when the store is next opened for writing.
-        let _ = scratch.remove_dir_all();
-        Ok(())
+    /// Other processes that share the work, one entry for each order they do at once. Effects: they begin.
+    pub(crate) fn helpers(&mut self) -> Result<Vec<(Arc<dyn Helpers>, usize)>, PipelineError> {
+        let Some(helpers) = self.options.hands.0.clone() else {
+            return Ok(Vec::new());
+        };
+        let slots = match self.slots {
+            Some(slots) => slots,
+            None => begin(&*helpers, self.catalog, self.options, &self.bounds)?,
+        };
+        self.slots = Some(slots);
+        Ok((0..slots).map(|slot| (helpers.clone(), slot)).collect())
+    }
+
+    /// Adds to what the run has read and written.
+    pub(crate) fn count(&mut self, traffic: Traffic) {
+        self.pages.add(traffic.pages());
+        self.frames_used = self.frames_used.max(traffic.frames_used as usize);
     }
 }
 

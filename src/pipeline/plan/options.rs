@@ -7,6 +7,7 @@ use crate::bisect::Method;
 use crate::boundary::{RegionPolicy, RegionRule};
 use crate::optimize::Mode;
 use crate::pipeline::error::PipelineError;
+use crate::pipeline::work::Hands;
 use crate::sealed::Form;
 use crate::sizing::{Formula, RegionSize, SizeOptions, SizeSource, SizingError};
 use crate::surface::Seed;
@@ -76,6 +77,12 @@ pub struct Options {
     /// Whether meshes on their way are kept to be looked at; the finished mesh is the same.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub keep_stages: bool,
+    /// Whether the run ends with the coarse mesh: tasks do the rest. Not stored: it does not shape the mesh.
+    #[serde(skip)]
+    pub coarse_only: bool,
+    /// Other processes that share the work. Not stored.
+    #[serde(skip)]
+    pub hands: Hands,
     /// For comparisons by a program. It is not stored: a run that is resumed makes cuts as usual.
     #[serde(skip)]
     pub method: Method,

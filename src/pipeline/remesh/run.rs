@@ -11,15 +11,15 @@ use super::summary::{Remade, ResaturateSummary};
 use crate::geom::{Aabb, Point};
 use crate::mesh::Workspace;
 use crate::pipeline::error::PipelineError;
-use crate::pipeline::mesh::coarse_snapshot::reopen;
-use crate::pipeline::mesh::common::Common;
 use crate::pipeline::mesh::owners::read_owners;
-use crate::pipeline::mesh::subdomain::{FinishedSubdomain, SubdomainJob};
 use crate::pipeline::plan::{Options, Plan};
 use crate::pipeline::progress::Watcher;
 use crate::pipeline::seal::totals::{SealedTotals, journal, sum_totals};
 use crate::pipeline::tree::{self, PartMesh, blob};
-use crate::pipeline::workers::map_bounded;
+use crate::pipeline::work::coarse_snapshot::reopen;
+use crate::pipeline::work::common::Common;
+use crate::pipeline::work::subdomain::{FinishedSubdomain, SubdomainJob};
+use crate::pipeline::workers::{Hand, map_bounded};
 use crate::sealed::SealedError;
 use crate::sealed::{CoarseSnapshot, Form};
 use crate::sizing::{BackgroundMesh, SizeField};
@@ -209,20 +209,15 @@ impl<'a> RemeshRun<'a> {
             .collect();
         let parts = tree::parts(self.catalog, self.n)?;
         let whole = Arc::clone(&self.field);
-        let common = Common {
-            field: &whole,
-            mode: self.options.mode()?,
-            method: self.options.method,
-            bounds,
-        };
+        let common = Common::of(self.options, &whole, bounds)?;
         let mut state = (self, BTreeMap::new());
+        let run = &|job: Job, watch: &Watcher| job.run(common, watch).map(Box::new);
         map_bounded(
             &mut state,
             fields.into_iter().collect(),
-            workers,
+            &vec![run as Hand<Job, Box<FinishedSubdomain>>; workers],
             watch,
             |(again, _), (rank, field)| again.job(parts[rank as usize], field, share),
-            &|job: Job, watch| job.run(common, watch).map(Box::new),
             |(_, finished), subdomain| {
                 finished.insert(subdomain.sealed.row.rank, *subdomain);
                 Ok(())
@@ -241,7 +236,7 @@ impl<'a> RemeshRun<'a> {
         let rank = part.part.first;
         let mut owners = BTreeMap::new();
         for cut in part.part.cuts_above(self.n) {
-            owners.insert(cut, read_owners(self.catalog, cut)?);
+            owners.insert(cut, read_owners(self.catalog, cut)?.across(rank));
         }
         // The faces of cuts stay; with sizes of its own a sub-domain may be refined up to them.
         let zones = match field {
@@ -265,7 +260,7 @@ impl<'a> RemeshRun<'a> {
             field,
             kept: None,
             scratch,
-            zones,
+            zones: zones.into_iter().map(Into::into).collect(),
             owners,
             share,
         };
@@ -327,7 +322,7 @@ impl<'a> RemeshRun<'a> {
             }
             for (row, _) in rows {
                 let (rank, subdomain) = (row.rank, &finished[&row.rank]);
-                step.list_file(rank, subdomain.generation);
+                step.list_file(rank, subdomain.sealed.row.generation);
                 step.set_subdomain(&subdomain.sealed.row);
                 step.set_blob(blob::SEALED + rank, &totals[&rank].to_bytes());
                 match what.repair {
@@ -370,7 +365,9 @@ impl<'a> RemeshRun<'a> {
     ) -> Result<ResaturateSummary, PipelineError> {
         for (row, _) in &self.rows {
             let subdomain = finished.get_mut(&row.rank).expect("made for each");
-            let path = self.catalog.file_path(row.rank, subdomain.generation);
+            let path = self
+                .catalog
+                .file_path(row.rank, subdomain.sealed.row.generation);
             // It is not listed: what stays is removed by the next writer.
             let _ = path.remove_file();
             subdomain.sealed.row = row.clone();

@@ -1,6 +1,6 @@
 //! What a run did, by rank.
 
-use crate::pipeline::mesh::FineReport;
+use crate::pipeline::work::FineReport;
 use crate::storage::PagerStats;
 use tetdb_schema::catalog::SubdomainRow;
 

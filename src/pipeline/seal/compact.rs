@@ -273,7 +273,7 @@ fn push_interface_face<P: Pages>(
 ) -> Result<(), PipelineError> {
     let face = mesh.interface_face(number);
     let owners = target.owners.and_then(|o| o.get(&face.cut));
-    let other = owners.and_then(|o| o.other(face.index, face.side));
+    let other = owners.and_then(|o| o.other(face.index));
     let (Some(other), true) = (other, tet != NONE) else {
         panic!(
             "face {} of cut {} has no owner on the other side, or no tetrahedron in sub-domain {}",

@@ -7,7 +7,7 @@ use tetdb_schema::ids::SubdomainId;
 use crate::geom::Aabb;
 use crate::sealed::Form;
 use crate::storage::DiskPath;
-use crate::topology::Owners;
+use crate::topology::FacesAcross;
 
 /// Where and how to seal.
 pub(crate) struct SealTarget<'a> {
@@ -19,6 +19,6 @@ pub(crate) struct SealTarget<'a> {
     /// Bytes for sort runs and for the writer together.
     pub memory: u64,
     pub bounds: Aabb,
-    /// Owners of the faces of the cuts around it, by cut; without them interface faces are left out.
-    pub owners: Option<&'a BTreeMap<u32, Owners>>,
+    /// Who has the other side of its interface faces, by cut; without them interface faces are left out.
+    pub owners: Option<&'a BTreeMap<u32, FacesAcross>>,
 }

@@ -7,6 +7,7 @@ use tetdb_schema::ids::SubdomainId;
 
 use super::coarse_snapshot::save;
 use super::common::Common;
+use super::receipt::{SubdomainReceipt, Traffic};
 use super::saturate::{FineReport, saturate_and_optimize};
 use crate::bisect::Zone;
 use crate::mesh::{Mesh, Workspace};
@@ -15,12 +16,13 @@ use crate::pipeline::plan::Plan;
 use crate::pipeline::progress::Watcher;
 use crate::pipeline::seal::compact::seal;
 use crate::pipeline::seal::target::SealTarget;
+use crate::pipeline::seal::totals::{SealedTotals, journal};
 use crate::pipeline::tree::{PartMesh, open_part};
 use crate::sealed::{Form, Sealed};
-use crate::sizing::SizeField;
+use crate::sizing::{SizeField, TETS_PER_LOAD};
 use crate::storage::{Backing, DiskPath, PagerStats, attempt};
-use crate::topology::Owners;
-use tetdb_schema::catalog::CoarseRow;
+use crate::topology::FacesAcross;
+use tetdb_schema::catalog::{CoarseRow, StoreState};
 
 /// What a worker needs to make a sub-domain.
 pub(crate) struct SubdomainJob {
@@ -37,15 +39,14 @@ pub(crate) struct SubdomainJob {
     pub kept: Option<DiskPath>,
     pub scratch: DiskPath,
     pub zones: Vec<Zone>,
-    /// Owners of the faces around it, by cut.
-    pub owners: BTreeMap<u32, Owners>,
+    /// Who has the other side of the faces around it, by cut.
+    pub owners: BTreeMap<u32, FacesAcross>,
     pub share: Plan,
 }
 
 /// A finished sub-domain; its file is not yet listed.
 pub(crate) struct FinishedSubdomain {
     pub part: PartMesh,
-    pub generation: u32,
     pub sealed: Sealed,
     pub kept: Option<CoarseRow>,
     /// Seconds it took to keep the coarse snapshot.
@@ -124,7 +125,6 @@ impl SubdomainJob {
         let _ = self.scratch.remove_dir_all();
         Ok(FinishedSubdomain {
             part: self.part,
-            generation,
             sealed,
             kept,
             keep_s,
@@ -134,5 +134,38 @@ impl SubdomainJob {
             seal_seconds,
             clock,
         })
+    }
+}
+
+impl FinishedSubdomain {
+    /// For whoever commits it; the state of the store after that is set then.
+    pub(crate) fn receipt(&self) -> SubdomainReceipt {
+        let refine = &self.fine.refine;
+        let measures = [
+            ("predicted_tets", TETS_PER_LOAD * self.part.load),
+            ("coarse_tets", f64::from(self.part.state.n_tets())),
+            ("keep_s", self.keep_s),
+            ("inserted_vertices", refine.inserted as f64),
+            ("over_constrained_tets", refine.over_constrained as f64),
+            ("zone_rejects", refine.out_of_place as f64),
+            ("frozen_hits", refine.frozen_hits as f64),
+            ("pages_read", self.pages.pages_read as f64),
+            ("pages_written", self.pages.pages_written as f64),
+            ("frames_used", self.frames_used as f64),
+            ("refine_s", self.fine.seconds[0]),
+            ("optimize_s", self.fine.seconds[1]),
+            ("seal_s", self.seal_seconds),
+        ];
+        let step = "saturate, optimize, seal";
+        let mut journal = journal(StoreState::Bisected, step, self.clock, &measures);
+        journal.subdomain = Some(self.part.part.first);
+        SubdomainReceipt {
+            coarse: self.part.generation,
+            row: self.sealed.row.clone(),
+            kept: self.kept,
+            totals: SealedTotals::of(&self.sealed).to_bytes(),
+            journal,
+            traffic: Traffic::new(self.pages, self.frames_used),
+        }
     }
 }

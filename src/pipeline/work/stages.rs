@@ -21,12 +21,12 @@ use tetdb_schema::catalog::{Stage, StageRow};
 const FIRST: u32 = 1 << 30;
 
 /// Where the stages of one cut go.
-pub(crate) struct StageFiles {
-    cut: u32,
-    paths: [DiskPath; 2],
-    scratch: DiskPath,
-    memory: u64,
-    bounds: Aabb,
+pub(crate) struct StageFiles<'a> {
+    pub cut: u32,
+    pub output: &'a DiskPath,
+    pub scratch: &'a DiskPath,
+    pub memory: u64,
+    pub bounds: Aabb,
 }
 
 /// The stages of one cut; their files are not yet listed.
@@ -40,24 +40,7 @@ fn generation(stage: Stage) -> u32 {
     FIRST + stage as u32
 }
 
-impl StageFiles {
-    pub(crate) fn new(
-        catalog: &Catalog,
-        cut: u32,
-        scratch: &DiskPath,
-        memory: u64,
-        bounds: Aabb,
-    ) -> Self {
-        let path = |stage| catalog.file_path(cut, generation(stage));
-        Self {
-            cut,
-            paths: [path(Stage::Coarse), path(Stage::Refined)],
-            scratch: scratch.clone(),
-            memory,
-            bounds,
-        }
-    }
-
+impl StageFiles<'_> {
     /// Seals the mesh as it is. Effects: its scratch map is used up. Errors: the disk.
     pub(crate) fn save<P: Pages>(
         &self,
@@ -66,10 +49,11 @@ impl StageFiles {
         stages: &mut Stages,
         watch: &Watcher,
     ) -> Result<(), PipelineError> {
+        let name = Catalog::file_name(self.cut, generation(stage));
         let target = SealTarget {
             form: Form::Sealed,
-            path: &self.paths[stage as usize],
-            scratch: &self.scratch,
+            path: &self.output.join(name),
+            scratch: self.scratch,
             subdomain: SubdomainId::new(self.cut).expect("fewer cuts than ranks"),
             generation: generation(stage),
             memory: self.memory,
@@ -83,22 +67,35 @@ impl StageFiles {
 }
 
 impl Stages {
-    /// Lists the files.
-    pub(crate) fn describe(&self, zone: &Zone, step: &mut Step) {
-        if self.sealed.is_empty() {
-            return;
+    /// A row for each file.
+    pub(crate) fn rows(&self, zone: &Zone) -> Vec<StageRow> {
+        let row = |(stage, sealed): &(Stage, Sealed)| StageRow {
+            cut: zone.cut,
+            stage: *stage,
+            normal: zone.surface.normal.to_array(),
+            offset: zone.surface.offset,
+            row: sealed.row.clone(),
+        };
+        self.sealed.iter().map(row).collect()
+    }
+
+    /// The faces of the interface, for [`list`].
+    pub(crate) fn face_bytes(&self) -> Vec<u8> {
+        match self.sealed.is_empty() {
+            true => Vec::new(),
+            false => to_bytes(&self.faces),
         }
-        for (stage, sealed) in &self.sealed {
-            step.list_file(zone.cut, generation(*stage));
-            step.set_stage(&StageRow {
-                cut: zone.cut,
-                stage: *stage,
-                normal: zone.surface.normal.to_array(),
-                offset: zone.surface.offset,
-                row: sealed.row.clone(),
-            });
-        }
-        step.set_blob(blob::FACES + zone.cut, &to_bytes(&self.faces));
+    }
+}
+
+/// Lists the files of a cut's stages.
+pub(crate) fn list(rows: &[StageRow], faces: &[u8], step: &mut Step) {
+    for stage in rows {
+        step.list_file(stage.cut, stage.row.generation);
+        step.set_stage(stage);
+    }
+    if let Some(stage) = rows.first() {
+        step.set_blob(blob::FACES + stage.cut, faces);
     }
 }
 

@@ -1,0 +1,364 @@
+//! Ranks of an MPI program share a mesh: rank 0 is the program as ever, the others do orders that come as messages.
+//!
+//! One thread of each process speaks MPI and looks for messages with pauses, so that who waits burns no core. A message is sent while others
+//! are taken in, so that two processes that send to each other never wait for each other.
+
+use std::collections::BTreeMap;
+use std::collections::VecDeque;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Condvar, Mutex, OnceLock, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use mpi::Threading;
+use mpi::topology::SimpleCommunicator;
+use mpi::traits::{Communicator, Destination, MatchedReceiveVec, Source};
+use serde_json::{Value, json};
+
+use super::args::Command;
+use super::console::Console;
+use super::failure::Failure;
+use super::{mesh, tasks};
+use crate::api::{Error, guarded};
+use crate::pipeline::{self, Hands, HelperFailure, Helpers, PipelineError, TaskSettings};
+use crate::storage::{Budget, RunContext, host_name};
+
+/// Tag of what is no order: jobs, their answers, the end.
+const CONTROL: i32 = 0;
+/// First byte of a message that begins a job or says that something is done; of the end; of an error.
+const DONE: u8 = 0;
+const END: u8 = 1;
+const FAILED: u8 = 2;
+/// Pauses between two looks for messages: short while they come, longer when none has come for a while.
+const PAUSE_LEAST: Duration = Duration::from_micros(200);
+const PAUSE_MOST: Duration = Duration::from_millis(20);
+/// How long files of other machines may be late.
+const WAIT: Duration = Duration::from_secs(60);
+
+static HELPERS: OnceLock<Arc<RankHelpers>> = OnceLock::new();
+
+/// What a rank got from another, by sender and tag.
+type Boxes = BTreeMap<(i32, i32), VecDeque<Vec<u8>>>;
+
+struct Letter {
+    to: i32,
+    tag: i32,
+    bytes: Vec<u8>,
+}
+
+#[derive(Default)]
+struct Inbox {
+    boxes: Mutex<Boxes>,
+    arrived: Condvar,
+}
+
+/// This process among the others.
+pub(super) struct Ranks {
+    pub rank: i32,
+    size: i32,
+    /// `None` once it ends.
+    out: Mutex<Option<Sender<Letter>>>,
+    inbox: Arc<Inbox>,
+    thread: Mutex<Option<JoinHandle<()>>>,
+}
+
+/// The ranks of this program; `None` where no launcher of MPI has started it.
+///
+/// Errors: a launcher of another MPI has.
+pub(super) fn begin() -> Result<Option<Arc<Ranks>>, Failure> {
+    let Some(launched) = launched() else {
+        return Ok(None);
+    };
+    let (out, outgoing) = channel();
+    let (ready, started) = channel();
+    let inbox = Arc::new(Inbox::default());
+    let of_thread = inbox.clone();
+    let thread = std::thread::spawn(move || speak(&ready, &outgoing, &of_thread));
+    let [rank, size] = started.recv().unwrap_or([0, 1]);
+    let ranks = Arc::new(Ranks {
+        rank,
+        size,
+        out: Mutex::new(Some(out)),
+        inbox,
+        thread: Mutex::new(Some(thread)),
+    });
+    if size == 1 && launched > 1 {
+        ranks.end();
+        let message = format!(
+            "the launcher has started {launched} processes, and the MPI that this program was built with sees one"
+        );
+        return Err(Failure::new("usage", message).help(
+            "start it with the mpirun of the MPI it was built with, or build it with this one",
+        ));
+    }
+    if size > 1 && rank == 0 {
+        let slots = OnceLock::new();
+        let ranks = ranks.clone();
+        let _ = HELPERS.set(Arc::new(RankHelpers { ranks, slots }));
+    }
+    Ok(Some(ranks))
+}
+
+/// How many processes a launcher says it has started.
+fn launched() -> Option<i32> {
+    let number = |name| std::env::var(name).ok()?.parse().ok();
+    let sizes = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"].map(number);
+    let one = std::env::var_os("PMIX_RANK").map(|_| 1);
+    sizes.into_iter().flatten().chain(one).max()
+}
+
+/// The other ranks, for a run of this process.
+pub(super) fn hands() -> Hands {
+    Hands(
+        HELPERS
+            .get()
+            .map(|helpers| helpers.clone() as Arc<dyn Helpers>),
+    )
+}
+
+fn speak(ready: &Sender<[i32; 2]>, outgoing: &Receiver<Letter>, inbox: &Inbox) {
+    // Dropped at the end of the thread, which waits for all others to end.
+    let Some((universe, _)) = mpi::initialize_with_threading(Threading::Funneled) else {
+        return;
+    };
+    let world = universe.world();
+    let _ = ready.send([world.rank(), world.size()]);
+    let mut pause = PAUSE_LEAST;
+    loop {
+        let mut is_busy = take_in(&world, inbox);
+        match outgoing.recv_timeout(if is_busy { Duration::ZERO } else { pause }) {
+            Ok(letter) => {
+                send(&world, &letter, inbox);
+                is_busy = true;
+            }
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => return,
+        }
+        pause = match is_busy {
+            true => PAUSE_LEAST,
+            false => (2 * pause).min(PAUSE_MOST),
+        };
+    }
+}
+
+/// Takes in what has come; whether anything has.
+fn take_in(world: &SimpleCommunicator, inbox: &Inbox) -> bool {
+    let Some((message, status)) = world.any_process().immediate_matched_probe() else {
+        return false;
+    };
+    let from = (status.source_rank(), status.tag());
+    let (bytes, _) = (message, status).matched_receive_vec::<u8>();
+    let mut boxes = inbox.boxes.lock().unwrap_or_else(PoisonError::into_inner);
+    boxes.entry(from).or_default().push_back(bytes);
+    inbox.arrived.notify_all();
+    true
+}
+
+fn send(world: &SimpleCommunicator, letter: &Letter, inbox: &Inbox) {
+    let to = world.process_at_rank(letter.to);
+    mpi::request::scope(|scope| {
+        let mut request = to.immediate_send_with_tag(scope, &letter.bytes[..], letter.tag);
+        while let Err(open) = request.test() {
+            request = open;
+            if !take_in(world, inbox) {
+                std::thread::sleep(PAUSE_LEAST);
+            }
+        }
+    });
+}
+
+impl Ranks {
+    fn send(&self, to: i32, tag: i32, bytes: Vec<u8>) {
+        let out = self.out.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(out) = &*out {
+            // The thread lives until this is gone.
+            let _ = out.send(Letter { to, tag, bytes });
+        }
+    }
+
+    /// Waits for what `wanted` finds; `None` once this run is to stop, where `stops` says that this counts.
+    fn receive<T>(&self, stops: bool, wanted: impl Fn(&mut Boxes) -> Option<T>) -> Option<T> {
+        let mut boxes = (self.inbox.boxes.lock()).unwrap_or_else(PoisonError::into_inner);
+        loop {
+            if let Some(found) = wanted(&mut boxes) {
+                return Some(found);
+            }
+            if stops && RunContext::is_current_cancelled() {
+                return None;
+            }
+            let waited = self
+                .inbox
+                .arrived
+                .wait_timeout(boxes, Duration::from_millis(100));
+            boxes = waited.unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+
+    /// From one rank, or `None` when the run is to stop.
+    fn receive_from(&self, rank: i32, tag: i32) -> Option<Vec<u8>> {
+        self.receive(true, |boxes| boxes.get_mut(&(rank, tag))?.pop_front())
+    }
+
+    /// Whatever rank 0 has sent.
+    fn receive_any(&self) -> (i32, Vec<u8>) {
+        let first = |boxes: &mut Boxes| {
+            let mut full = boxes.iter_mut().filter(|(_, list)| !list.is_empty());
+            // Orders before the end: they have the higher tags.
+            let (&(_, tag), list) = full.next_back()?;
+            Some((tag, list.pop_front()?))
+        };
+        self.receive(false, first).unwrap_or((CONTROL, vec![END]))
+    }
+
+    /// Lets all end, and waits for them.
+    pub fn end(&self) {
+        if self.rank == 0 {
+            (1..self.size).for_each(|rank| self.send(rank, CONTROL, vec![END]));
+        }
+        *self.out.lock().unwrap_or_else(PoisonError::into_inner) = None;
+        let thread = (self.thread.lock())
+            .unwrap_or_else(PoisonError::into_inner)
+            .take();
+        if let Some(thread) = thread {
+            let _ = thread.join();
+        }
+    }
+
+    /// Does what rank 0 asks for, until it says that this is the end.
+    pub fn serve(&self, command: &Command, console: &Console) -> u8 {
+        let run = match command {
+            Command::Mesh(args) => Some(&args.run),
+            Command::Resume(args) => Some(&args.run),
+            _ => None,
+        };
+        loop {
+            let (_, letter) = self.receive_any();
+            let job = match letter.split_first() {
+                Some((&DONE, job)) => job,
+                _ => return 0,
+            };
+            let done = match run {
+                Some(run) => mesh::begin(run, console).and_then(|settings| {
+                    let done = guarded(&settings, || {
+                        let budget = Budget::new(settings.cap()?);
+                        Ok(self.serve_job(job, &budget)?)
+                    });
+                    done.map_err(Failure::from)
+                }),
+                None => Err(Failure::new(
+                    "internal",
+                    "a rank was asked for what it cannot do",
+                )),
+            };
+            match done {
+                Ok(()) => return 0,
+                Err(failure) => self.send(0, CONTROL, failed(failure.code, &failure.message)),
+            }
+        }
+    }
+
+    fn serve_job(&self, job: &[u8], budget: &Budget) -> Result<(), PipelineError> {
+        let settings = TaskSettings {
+            scratch: tasks::scratch_of_machine(),
+            wait: WAIT,
+        };
+        let started = |slots: usize| {
+            let bytes = [vec![DONE], (slots as u32).to_le_bytes().to_vec()].concat();
+            self.send(0, CONTROL, bytes);
+        };
+        let mut next = || match self.receive_any() {
+            (CONTROL, _) => None,
+            (tag, order) => Some((tag as usize - 1, order)),
+        };
+        let answer = |slot: usize, done: Result<Vec<u8>, PipelineError>| {
+            let bytes = match done {
+                Ok(receipt) => [vec![DONE], receipt].concat(),
+                Err(error) => {
+                    let error = Error::from(error);
+                    failed(error.code(), error.message())
+                }
+            };
+            self.send(0, slot as i32 + 1, bytes);
+        };
+        pipeline::serve(job, &settings, budget, &|_| (), started, &mut next, &answer)
+    }
+}
+
+/// An error as a message, with the name of this machine.
+fn failed(code: &str, message: &str) -> Vec<u8> {
+    let text = json!({ "code": code, "message": format!("{message} (on {})", host_name()) });
+    [vec![FAILED], text.to_string().into_bytes()].concat()
+}
+
+/// Ranks 1 and up as helpers of rank 0.
+struct RankHelpers {
+    ranks: Arc<Ranks>,
+    /// Of each order at once: the rank, and which of its own it is.
+    slots: OnceLock<Vec<(i32, i32)>>,
+}
+
+impl RankHelpers {
+    fn ask(&self, rank: i32, tag: i32, message: Vec<u8>) -> Result<(), HelperFailure> {
+        if i32::try_from(message.len()).is_err() {
+            return Err(HelperFailure {
+                code: "memory".to_owned(),
+                message: format!(
+                    "an order of {} bytes is more than a message can hold",
+                    message.len()
+                ),
+            });
+        }
+        self.ranks.send(rank, tag, message);
+        Ok(())
+    }
+
+    fn answer(&self, rank: i32, tag: i32) -> Result<Vec<u8>, HelperFailure> {
+        let failure = |code: &str, message: &str| HelperFailure {
+            code: code.to_owned(),
+            message: message.to_owned(),
+        };
+        let bytes = self.ranks.receive_from(rank, tag);
+        let mut bytes =
+            bytes.ok_or_else(|| failure("stopped", "stopped while another rank was at work"))?;
+        match bytes.first() {
+            Some(&DONE) => Ok(bytes.split_off(1)),
+            _ => {
+                let error: Value =
+                    serde_json::from_slice(bytes.get(1..).unwrap_or_default()).unwrap_or_default();
+                let text = |key| error[key].as_str().unwrap_or_default().to_owned();
+                Err(failure(
+                    &text("code"),
+                    &format!("rank {rank}: {}", text("message")),
+                ))
+            }
+        }
+    }
+}
+
+impl Helpers for RankHelpers {
+    fn begin(&self, job: &[u8]) -> Result<usize, HelperFailure> {
+        let others = 1..self.ranks.size;
+        for rank in others.clone() {
+            self.ask(rank, CONTROL, [&[DONE], job].concat())?;
+        }
+        let mut slots = Vec::new();
+        for rank in others {
+            let answer = self.answer(rank, CONTROL)?;
+            let n = answer.first_chunk().map_or(0, |&n| u32::from_le_bytes(n));
+            slots.extend((0..n as i32).map(|slot| (rank, slot)));
+        }
+        // One order of each rank before the second of any.
+        slots.sort_by_key(|&(rank, slot)| (slot, rank));
+        Ok(self.slots.get_or_init(|| slots).len())
+    }
+
+    fn perform(&self, slot: usize, order: Vec<u8>) -> Result<Vec<u8>, HelperFailure> {
+        let slots = self.slots.get().map_or(&[][..], |slots| slots);
+        let &(rank, of_rank) = slots.get(slot).ok_or_else(|| HelperFailure {
+            code: "internal".to_owned(),
+            message: "an order for a rank that has not begun".to_owned(),
+        })?;
+        self.ask(rank, of_rank + 1, order)?;
+        self.answer(rank, of_rank + 1)
+    }
+}
