@@ -204,7 +204,12 @@ fn try_parts<P: Pages>(
     let n_facets: usize = local.iter().map(|p| p.facets.len()).sum();
     let is_whole =
         |p: &FlatPart| p.facets.len() > 1 || skin.faces.contains_key(&sorted(p.facets[0]));
-    let own: HashSet<u32> = local.iter().flat_map(|p| &p.facets).flatten().copied().collect();
+    let own: HashSet<u32> = local
+        .iter()
+        .flat_map(|p| &p.facets)
+        .flatten()
+        .copied()
+        .collect();
     let adds_none = skin.faces.keys().flatten().all(|v| own.contains(v));
     if !local.iter().all(is_whole)
         || skin.faces.len() != n_facets

@@ -184,6 +184,11 @@ impl<P: Pages> PagedSpace<'_, P> {
         }
     }
 
+    /// Whether `v` is not from the input.
+    pub(super) fn is_steiner(&mut self, v: u32) -> bool {
+        self.0.vertex_attribute(v).0 == VertexTag::Steiner
+    }
+
     /// Takes back a vertex no tetrahedron has any more.
     pub(super) fn drop_steiner(&mut self, v: u32) {
         self.0.free_vertex(v);

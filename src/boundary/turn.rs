@@ -20,8 +20,8 @@ use super::map::MissingFacets;
 use super::report::RecoveryReport;
 use super::space::{PagedSpace, Space, edge_key};
 use super::suppress::half_space;
-use super::walk::{EdgeRing, Exit, crossings, edge_at, shell};
-use crate::geom::Point;
+use super::walk::{EdgeRing, Exit, ball, crossings, edge_at, shell};
+use crate::geom::{Point, orient};
 use crate::mesh::Mesh;
 use crate::storage::Pages;
 
@@ -32,7 +32,13 @@ const CROSSINGS_MAX: usize = 2000;
 const TURNS_MAX: usize = 20;
 
 /// Times a place half as far from the crossing is tried.
-const HALVES_MAX: i32 = 40;
+const HALVES_MAX: i32 = 50;
+
+/// A place with less room than this, in units of the tetrahedra around it, is second choice.
+const ROOM_MIN: f64 = 1e-4;
+
+/// A move that gives less room than this many times the old is not worth it.
+const GAIN_MIN: f64 = 1.25;
 
 /// Turns edges until the segment `a b` is there, and protects it; takes away again what was added and is not needed.
 ///
@@ -130,7 +136,62 @@ impl<P: Pages> Turner<'_, '_, P> {
     }
 
     /// Turns `c d`, which the segment `a b` crosses; returns the new edge and whether it crosses the segment too.
+    ///
+    /// Added vertices lie the nearer to the plane the more of them there are: where they leave little room, those around the edge
+    /// go or rise first.
     fn turn(&mut self, t: u32, c: u32, d: u32, a: u32, b: u32) -> Option<(u32, u32, u32, bool)> {
+        if let Some(turned) = self.try_turn(t, c, d, a, b, false) {
+            return Some(turned);
+        }
+        let t = edge_at(self.s, t, c, d)?;
+        let mut free = shell(self.s, t, c, d)?.ring;
+        free.retain(|&v| self.s.is_steiner(v));
+        for v in free {
+            if remove_free(self.s, v) {
+                self.s.drop_steiner(v);
+                self.added.retain(|&a| a != v);
+            } else {
+                self.rise(v);
+            }
+        }
+        self.try_turn(t, c, d, a, b, true)
+    }
+
+    /// Moves a free vertex to where it sees its ball best.
+    fn rise(&mut self, v: u32) {
+        let old = self.s.position(v);
+        let ball = ball(self.s, v);
+        let mut reach = 0.0f64;
+        let mut planes: Vec<HalfSpace> = Vec::new();
+        for &t in &ball {
+            let tet = self.s.tet(t);
+            let Some(i) = tet.local(v) else { continue };
+            let corners = tet.face(i).map(|u| self.s.position(u) - old);
+            reach = corners.iter().map(|c| c.length()).fold(reach, f64::max);
+            planes.extend(half_space(corners));
+        }
+        let Some(way) = center(&planes, reach) else {
+            return;
+        };
+        if room(&planes, way) <= GAIN_MIN * room(&planes, Point::ZERO) {
+            return;
+        }
+        self.s.0.set_point(v, old + way);
+        let quads: Vec<[u32; 4]> = ball.iter().map(|&t| self.s.tet(t).vertices()).collect();
+        if self.least_volume(&quads) <= 0.0 {
+            self.s.0.set_point(v, old);
+        }
+    }
+
+    fn try_turn(
+        &mut self,
+        t: u32,
+        c: u32,
+        d: u32,
+        a: u32,
+        b: u32,
+        may_crowd: bool,
+    ) -> Option<(u32, u32, u32, bool)> {
         if self.s.protects(c, d) {
             return None;
         }
@@ -143,6 +204,7 @@ impl<P: Pages> Turner<'_, '_, P> {
         let in_plane: Vec<usize> = (0..n)
             .filter(|&i| self.s.orient([a, b, c, around.ring[i]]) == 0.0)
             .collect();
+
         let &[at_x, at_y] = in_plane.as_slice() else {
             return None;
         };
@@ -164,9 +226,9 @@ impl<P: Pages> Turner<'_, '_, P> {
             at_x,
             to_y: at_y - at_x,
         };
-        let mut new = self.half(&turn, true)?;
+        let mut new = self.half(&turn, true, may_crowd)?;
         let n_added = self.added.len();
-        let Some(mut below) = self.half(&turn, false) else {
+        let Some(mut below) = self.half(&turn, false, may_crowd) else {
             if let Some(p) = new.1 {
                 self.s.drop_steiner(p);
             }
@@ -182,7 +244,12 @@ impl<P: Pages> Turner<'_, '_, P> {
     }
 
     /// The tetrahedra on one side after the turn, and the vertex added for them.
-    fn half(&mut self, turn: &Turn, above: bool) -> Option<(Vec<[u32; 4]>, Option<u32>)> {
+    fn half(
+        &mut self,
+        turn: &Turn,
+        above: bool,
+        may_crowd: bool,
+    ) -> Option<(Vec<[u32; 4]>, Option<u32>)> {
         let n = turn.around.ring.len();
         let (from, len) = match above {
             true => (turn.at_x, turn.to_y),
@@ -202,7 +269,7 @@ impl<P: Pages> Turner<'_, '_, P> {
         if let Some((_, quads)) = best {
             return Some((quads, None));
         }
-        self.join_to_new(&ring, turn.c, turn.d)
+        self.join_to_new(&ring, turn.c, turn.d, may_crowd)
     }
 
     /// The ring and the new triangles joined to a new vertex near the crossing.
@@ -211,6 +278,7 @@ impl<P: Pages> Turner<'_, '_, P> {
         ring: &[u32],
         c: u32,
         d: u32,
+        may_crowd: bool,
     ) -> Option<(Vec<[u32; 4]>, Option<u32>)> {
         let (x, y) = (ring[0], ring[ring.len() - 1]);
         let [pc, pd, px, py] = [c, d, x, y].map(|v| self.s.position(v));
@@ -228,13 +296,26 @@ impl<P: Pages> Turner<'_, '_, P> {
         }
         plane(self.s, [y, c, x]);
         plane(self.s, [d, y, x]);
-        let way = center(&planes, reach)?;
-        let p = self.s.add_steiner(origin + way);
+        // Where all is seen best, or straight up from the crossing where that is too near for doubles to find.
+        let up = (py - px).cross(pd - pc).normalize_or_zero() * reach;
+        let up = if orient(pc, py, px, origin + up) > 0.0 {
+            up
+        } else {
+            -up
+        };
+        let best = center(&planes, reach);
+        let is_roomy = best.is_some_and(|way| room(&planes, way) > ROOM_MIN * reach);
+        if !is_roomy && !may_crowd {
+            return None;
+        }
+        let p = self.s.add_steiner(origin);
         let quads = joined(ring, c, d, p);
-        for k in 0..HALVES_MAX {
-            self.s.0.set_point(p, origin + way * 0.5f64.powi(k));
-            if self.least_volume(&quads) > 0.0 {
-                return Some((quads, Some(p)));
+        for way in best.into_iter().chain([up]) {
+            for k in 0..HALVES_MAX {
+                self.s.0.set_point(p, origin + way * 0.5f64.powi(k));
+                if self.least_volume(&quads) > 0.0 {
+                    return Some((quads, Some(p)));
+                }
             }
         }
         self.s.drop_steiner(p);
@@ -265,6 +346,12 @@ fn joined(ring: &[u32], c: u32, d: u32, p: u32) -> Vec<[u32; 4]> {
         quads.push([c, p, pair[0], pair[1]]);
     }
     quads
+}
+
+/// How far `at` is inside all half-spaces.
+fn room(planes: &[HalfSpace], at: Point) -> f64 {
+    let rooms = planes.iter().map(|h| h.offset - h.normal.dot(at));
+    rooms.fold(f64::INFINITY, f64::min)
 }
 
 /// Where the line through two points passes the line through two others, nearly.
