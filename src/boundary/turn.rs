@@ -54,12 +54,13 @@ pub(super) fn turn_segment<P: Pages>(
     let mut turner = Turner {
         s: &mut s,
         added: Vec::new(),
+        balance: 0,
         turns: 0,
     };
     let recovered = turner.recover(a, b);
     turner.clear();
     report.flips += turner.turns;
-    report.steiner += turner.added.len() as u32;
+    report.steiner = report.steiner.saturating_add_signed(turner.balance);
     if recovered {
         missing.protected.insert(edge_key(a, b));
     }
@@ -71,9 +72,20 @@ struct Turner<'s, 'm, P: Pages> {
     s: &'s mut PagedSpace<'m, P>,
     /// Vertices added and still there.
     added: Vec<u32>,
+    /// Vertices added less those taken away, which others may have added.
+    balance: i32,
     /// Edges turned.
     turns: u64,
 }
+
+/// An edge, by its ends and a tetrahedron that had it.
+type Crossed = (u32, u32, u32);
+
+/// The edge after the turn, and whether the segment crosses it too.
+type Turned = (Crossed, bool);
+
+/// Tetrahedra, and the vertex added for them.
+type Half = (Vec<[u32; 4]>, Option<u32>);
 
 /// An edge `c d` with its tetrahedra, as it turns to `x y`.
 struct Turn {
@@ -84,6 +96,8 @@ struct Turn {
     at_x: usize,
     /// Place of `y` in the ring, counted from `x`.
     to_y: usize,
+    /// Whether the segment crosses `x y` as well.
+    crosses: bool,
 }
 
 impl<P: Pages> Turner<'_, '_, P> {
@@ -92,7 +106,7 @@ impl<P: Pages> Turner<'_, '_, P> {
         let Ok(met) = crossings(self.s, a, b, CROSSINGS_MAX) else {
             return false;
         };
-        let mut queue: VecDeque<(u32, u32, u32)> = VecDeque::new();
+        let mut queue: VecDeque<Crossed> = VecDeque::new();
         for exit in met {
             let Exit::Edge { tet, c, d } = exit else {
                 return false;
@@ -105,11 +119,13 @@ impl<P: Pages> Turner<'_, '_, P> {
         }
         let mut turns_left = TURNS_MAX * queue.len();
         let mut in_vain = 0;
-        while let Some((t, c, d)) = queue.pop_front() {
-            let turned = self.turn(t, c, d, a, b);
-            let Some((t, x, y, crosses)) = turned.filter(|_| turns_left > 0) else {
+        while let Some(edge) = queue.pop_front() {
+            if turns_left == 0 {
+                return false;
+            }
+            let Some((new, crosses)) = self.turn(edge, a, b) else {
                 in_vain += 1;
-                queue.push_back((t, c, d));
+                queue.push_back(edge);
                 if in_vain == queue.len() {
                     return false;
                 }
@@ -118,7 +134,7 @@ impl<P: Pages> Turner<'_, '_, P> {
             turns_left -= 1;
             in_vain = 0;
             if crosses {
-                queue.push_back((t, x, y));
+                queue.push_back(new);
             }
         }
         true
@@ -126,35 +142,40 @@ impl<P: Pages> Turner<'_, '_, P> {
 
     /// Takes away the added vertices that nothing needs.
     fn clear(&mut self) {
-        for v in std::mem::take(&mut self.added) {
-            if remove_free(self.s, v) {
-                self.s.drop_steiner(v);
-            } else {
-                self.added.push(v);
-            }
+        for v in self.added.clone() {
+            self.remove(v);
         }
     }
 
-    /// Turns `c d`, which the segment `a b` crosses; returns the new edge and whether it crosses the segment too.
+    /// Turns `c d`, which the segment `a b` crosses, if that makes a new edge in the plane.
     ///
     /// Added vertices lie the nearer to the plane the more of them there are: where they leave little room, those around the edge
     /// go or rise first.
-    fn turn(&mut self, t: u32, c: u32, d: u32, a: u32, b: u32) -> Option<(u32, u32, u32, bool)> {
-        if let Some(turned) = self.try_turn(t, c, d, a, b, false) {
+    fn turn(&mut self, edge: Crossed, a: u32, b: u32) -> Option<Turned> {
+        let turn = self.plan(edge, a, b)?;
+        if let Some(turned) = self.carry_out(&turn, false) {
             return Some(turned);
         }
-        let t = edge_at(self.s, t, c, d)?;
-        let mut free = shell(self.s, t, c, d)?.ring;
+        let mut free = turn.around.ring;
         free.retain(|&v| self.s.is_steiner(v));
         for v in free {
-            if remove_free(self.s, v) {
-                self.s.drop_steiner(v);
-                self.added.retain(|&a| a != v);
-            } else {
+            if !self.remove(v) {
                 self.rise(v);
             }
         }
-        self.try_turn(t, c, d, a, b, true)
+        let turn = self.plan(edge, a, b)?;
+        self.carry_out(&turn, true)
+    }
+
+    /// Takes away a vertex that nothing needs.
+    fn remove(&mut self, v: u32) -> bool {
+        let removed = remove_free(self.s, v);
+        if removed {
+            self.s.drop_steiner(v);
+            self.balance -= 1;
+            self.added.retain(|&a| a != v);
+        }
+        removed
     }
 
     /// Moves a free vertex to where it sees its ball best.
@@ -183,15 +204,8 @@ impl<P: Pages> Turner<'_, '_, P> {
         }
     }
 
-    fn try_turn(
-        &mut self,
-        t: u32,
-        c: u32,
-        d: u32,
-        a: u32,
-        b: u32,
-        may_crowd: bool,
-    ) -> Option<(u32, u32, u32, bool)> {
+    /// Which edge `c d` becomes; `None` where it has to stay, or the four corners are not convex.
+    fn plan(&mut self, (t, c, d): Crossed, a: u32, b: u32) -> Option<Turn> {
         if self.s.protects(c, d) {
             return None;
         }
@@ -204,7 +218,6 @@ impl<P: Pages> Turner<'_, '_, P> {
         let in_plane: Vec<usize> = (0..n)
             .filter(|&i| self.s.orient([a, b, c, around.ring[i]]) == 0.0)
             .collect();
-
         let &[at_x, at_y] = in_plane.as_slice() else {
             return None;
         };
@@ -219,37 +232,40 @@ impl<P: Pages> Turner<'_, '_, P> {
             return None;
         }
         let crosses = opposite(self.s, [a, b], [x, y]);
-        let turn = Turn {
+        Some(Turn {
             around,
             c,
             d,
             at_x,
             to_y: at_y - at_x,
-        };
-        let mut new = self.half(&turn, true, may_crowd)?;
-        let n_added = self.added.len();
-        let Some(mut below) = self.half(&turn, false, may_crowd) else {
-            if let Some(p) = new.1 {
+            crosses,
+        })
+    }
+
+    /// Replaces the tetrahedra around the edge; `None`, and nothing changed, where there is no room.
+    fn carry_out(&mut self, turn: &Turn, may_crowd: bool) -> Option<Turned> {
+        let (mut new, over) = self.half(turn, true, may_crowd)?;
+        let Some((mut below, under)) = self.half(turn, false, may_crowd) else {
+            if let Some(p) = over {
                 self.s.drop_steiner(p);
             }
             return None;
         };
-        debug_assert_eq!(n_added, self.added.len());
-        self.added.extend(new.1.into_iter().chain(below.1));
-        new.0.append(&mut below.0);
-        let ids = self.s.replace(&turn.around.tets, &new.0);
+        for p in over.into_iter().chain(under) {
+            self.added.push(p);
+            self.balance += 1;
+        }
+        new.append(&mut below);
+        let ids = self.s.replace(&turn.around.tets, &new);
         self.turns += 1;
-        let at = new.0.iter().position(|q| q.contains(&x) && q.contains(&y));
-        at.map(|k| (ids[k], x, y, crosses))
+        let ring = &turn.around.ring;
+        let (x, y) = (ring[turn.at_x], ring[turn.at_x + turn.to_y]);
+        let at = new.iter().position(|q| q.contains(&x) && q.contains(&y))?;
+        Some(((ids[at], x, y), turn.crosses))
     }
 
     /// The tetrahedra on one side after the turn, and the vertex added for them.
-    fn half(
-        &mut self,
-        turn: &Turn,
-        above: bool,
-        may_crowd: bool,
-    ) -> Option<(Vec<[u32; 4]>, Option<u32>)> {
+    fn half(&mut self, turn: &Turn, above: bool, may_crowd: bool) -> Option<Half> {
         let n = turn.around.ring.len();
         let (from, len) = match above {
             true => (turn.at_x, turn.to_y),
@@ -273,13 +289,7 @@ impl<P: Pages> Turner<'_, '_, P> {
     }
 
     /// The ring and the new triangles joined to a new vertex near the crossing.
-    fn join_to_new(
-        &mut self,
-        ring: &[u32],
-        c: u32,
-        d: u32,
-        may_crowd: bool,
-    ) -> Option<(Vec<[u32; 4]>, Option<u32>)> {
+    fn join_to_new(&mut self, ring: &[u32], c: u32, d: u32, may_crowd: bool) -> Option<Half> {
         let (x, y) = (ring[0], ring[ring.len() - 1]);
         let [pc, pd, px, py] = [c, d, x, y].map(|v| self.s.position(v));
         let origin = crossing([pc, pd], [px, py]);
