@@ -17,12 +17,13 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 
 use super::chain::Trouble;
 use super::flips::Flipper;
+use super::free_vertex::moved;
 use super::kernel::HalfSpace;
 use super::patch::Patch;
 use super::polygon::triangulate;
 use super::space::{Space, sorted};
 use super::target::RecoveryTarget;
-use super::walk::{self, ball, edge_at, swapped};
+use super::walk::{self, ball, edge_at};
 use crate::geom::Point;
 use crate::mesh::FaceRef;
 use crate::storage::Pages;
@@ -30,9 +31,9 @@ use crate::storage::Pages;
 /// The facets of a patch and the faces that make them up.
 #[derive(Default)]
 pub(super) struct CavitySkin {
-    /// Corners of each facet.
+    /// Three corners of each flat part: its plane.
     pub facets: Vec<[u32; 3]>,
-    /// Sorted face to its facet and itself in the facet's direction.
+    /// Sorted face to its part and itself in the part's direction.
     pub faces: HashMap<[u32; 3], (usize, [u32; 3])>,
 }
 
@@ -159,66 +160,8 @@ impl<P: Pages> Patch<'_, P> {
         Ok(added)
     }
 
-    /// Takes free vertex `x` away if one of its neighbors can stand for it.
-    pub(super) fn remove_free(&mut self, x: u32) -> bool {
-        let ball = ball(self, x);
-        let link: HashSet<u32> = ball
-            .iter()
-            .flat_map(|&t| self.tets_vertices(t))
-            .filter(|&v| v != x)
-            .collect();
-        let mut link: Vec<u32> = link.into_iter().collect();
-        link.sort_unstable();
-        let mut best: Option<(f64, Vec<[u32; 4]>)> = None;
-        for u in link {
-            let Some(quads) = self.moved(x, u, &ball) else {
-                continue;
-            };
-            let worst = quads
-                .iter()
-                .map(|&q| self.flatness(q))
-                .fold(f64::INFINITY, f64::min);
-            if best.as_ref().is_none_or(|b| worst > b.0) {
-                best = Some((worst, quads));
-            }
-        }
-        match best {
-            Some((worst, quads)) if worst > 0.0 => {
-                self.replace(&ball, &quads);
-                true
-            }
-            _ => false,
-        }
-    }
-
     pub(super) fn tets_vertices(&mut self, t: u32) -> [u32; 4] {
         self.tet(t).vertices()
-    }
-
-    pub(super) fn flatness(&mut self, q: [u32; 4]) -> f64 {
-        let volume = self.orient(q);
-        let p = q.map(|v| self.position(v));
-        let longest = (0..4)
-            .flat_map(|i| (0..i).map(move |j| (i, j)))
-            .map(|(i, j)| p[i].distance(p[j]))
-            .fold(0.0, f64::max);
-        volume / (longest * longest * longest)
-    }
-
-    /// The ball with `x` moved to its neighbor `u`, if all volumes stay positive.
-    pub(super) fn moved(&mut self, x: u32, u: u32, ball: &[u32]) -> Option<Vec<[u32; 4]>> {
-        let mut quads = Vec::new();
-        for &t in ball {
-            let tet = self.tet(t);
-            if tet.local(u).is_none() {
-                let q = swapped(&tet, tet.local(x)?, u);
-                if self.orient(q) <= 0.0 {
-                    return None;
-                }
-                quads.push(q);
-            }
-        }
-        Some(quads)
     }
 
     /// The fans of the facets around `x`.
@@ -283,7 +226,7 @@ impl<P: Pages> Patch<'_, P> {
             ],
         };
         for u in candidates {
-            let Some(quads) = self.moved(x, u, ball) else {
+            let Some(quads) = moved(self, x, u, ball) else {
                 continue;
             };
             let faces: Vec<Vec<[u32; 3]>> = fans
