@@ -5,9 +5,11 @@ here=$(dirname "$(realpath "$0")")
 program=$(realpath "$1")
 mkdir -p "$2"
 cd "$2"
-trap '"$here/../tools/slurm-here.sh" stop slurm' EXIT
-"$here/../tools/slurm-here.sh" start slurm
-. slurm/env
+# Of its own, for munge's user has to come to it.
+slurm=$(mktemp -d)
+trap '"$here/../tools/slurm-here.sh" stop "$slurm"; rm -rf "$slurm"' EXIT
+"$here/../tools/slurm-here.sh" start "$slurm"
+. "$slurm/env"
 job=(sample:balls,count=40 --subdomains 6)
 "$program" mesh "${job[@]}" -o one.tetdb --no-verify -q
 "$program" mesh "${job[@]}" -o a.tetdb --coarse-only -q
