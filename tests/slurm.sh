@@ -7,7 +7,7 @@ mkdir -p "$2"
 cd "$2"
 # Of its own, for munge's user has to come to it.
 slurm=$(mktemp -d)
-trap '"$here/../tools/slurm-here.sh" stop "$slurm"; rm -rf "$slurm"' EXIT
+trap '"$here/../tools/slurm-here.sh" stop "$slurm"; rm -rf "$slurm" || true' EXIT
 "$here/../tools/slurm-here.sh" start "$slurm"
 . "$slurm/env"
 job=(sample:balls,count=40 --subdomains 6)
