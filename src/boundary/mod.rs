@@ -21,6 +21,7 @@ mod exact;
 mod find;
 mod flips;
 mod flood;
+mod free_edge;
 mod grow;
 mod kernel;
 mod map;

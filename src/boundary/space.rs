@@ -124,6 +124,13 @@ pub(super) trait Space {
         ids
     }
 
+    /// Marks a face as required on this side no more.
+    fn release(&mut self, face: FaceRef) {
+        let mut tet = self.tet(face.tet());
+        tet.node[face.face()] &= !REQUIRED;
+        self.set_tet(face.tet(), tet);
+    }
+
     /// Marks a face as required on both sides.
     fn require(&mut self, face: FaceRef) {
         let other = self.across(face.tet(), face.face());

@@ -22,7 +22,7 @@ use super::patch::Patch;
 use super::polygon::triangulate;
 use super::space::{Space, sorted};
 use super::target::RecoveryTarget;
-use super::walk::{ball, edge_at, swapped};
+use super::walk::{self, ball, edge_at, swapped};
 use crate::geom::Point;
 use crate::mesh::FaceRef;
 use crate::storage::Pages;
@@ -86,16 +86,34 @@ impl<P: Pages> Patch<'_, P> {
     }
 
     /// Takes vertex `x` off the surface. Returns the number of vertices that replace it.
+    ///
+    /// Where a sheet ends at `x`, a triangle on the other side of its segment stands in for the facet that is not there.
     pub(super) fn suppress(&mut self, skin: &mut CavitySkin, x: u32) -> Result<u32, Trouble> {
         self.thin_out(x);
         let ball = ball(self, x);
         let fans = self.fans(skin, x, &ball)?;
-        if fans.is_empty() {
-            return Ok(0);
+        match &fans[..] {
+            [] => Ok(0),
+            [only] if !only.closed => {
+                let n_facets = skin.facets.len();
+                self.continue_sheet(skin, x, &ball, only)?;
+                let ball = walk::ball(self, x);
+                let fans = self.fans(skin, x, &ball)?;
+                let done = self.suppress_fans(skin, x, ball, fans);
+                self.end_sheet(skin, n_facets);
+                done
+            }
+            _ => self.suppress_fans(skin, x, ball, fans),
         }
-        if fans.len() == 1 && !fans[0].closed {
-            return Err(Trouble::Broken("a segment with one facet"));
-        }
+    }
+
+    fn suppress_fans(
+        &mut self,
+        skin: &mut CavitySkin,
+        x: u32,
+        ball: Vec<u32>,
+        fans: Vec<Fan>,
+    ) -> Result<u32, Trouble> {
         if self.collapse_on_surface(skin, x, &ball, &fans) {
             return Ok(0);
         }
