@@ -131,6 +131,12 @@ impl<'s> Query<'s> {
         self
     }
 
+    /// They have a face on an embedded sheet.
+    pub fn touching_sheet(mut self) -> Self {
+        self.selection.touching_sheet = true;
+        self
+    }
+
     /// A condition on quality, region, subdomain, volume, x, y, z (of the centroid), edge_min, edge_max, angle_min, angle_max (degrees)
     /// and excess (quality over the least that the faces on the surface allow),
     /// such as `quality > 6 and region in [1, 2]`.

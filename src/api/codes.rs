@@ -126,6 +126,11 @@ pub const CODES: &[CodeRow] = &[
         3,
         "a region seed or a hole has no meaning, or contradicts the surface or another",
     ),
+    row(
+        "sheet-outside",
+        3,
+        "an embedded sheet lies where nothing is filled",
+    ),
     row("no-such-store", 3, "there is no store at this path"),
     row(
         "no-such-part",

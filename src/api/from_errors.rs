@@ -157,6 +157,10 @@ impl From<PipelineError> for Error {
             PipelineError::NothingToUndo { .. } => Self::new("nothing-to-undo", &e)
                 .with_help("only the last change can be undone, once, and not after its old version was dropped")
                 .with_remedy(Remedy::General),
+            PipelineError::SheetOutside { ref at, .. } => Self::new("sheet-outside", &e)
+                .at(show(*at))
+                .with_help("cut sheets off where they leave the filled regions, or fill the region they lie in")
+                .with_remedy(Remedy::General),
             PipelineError::BadSeed { option, .. } => Self::new("bad-seed", &e).with_help(match option {
                 "hole" => "such as 0.5,0.5,0.2",
                 _ => "such as 0.5,0.5,0.2,rock",

@@ -381,8 +381,12 @@ impl Mesher {
             let scratch = scratch_beside(surface, left, path)?;
             attempt(|| surface::validate_in(surface, &scratch))?.accept()?;
             settings.note(format!(
-                "{} triangles and {} vertices, closed and free of defects ({:.1} s)",
+                "{} triangles{} and {} vertices, closed and free of defects ({:.1} s)",
                 surface.n_triangles(),
+                match surface.n_sheet_triangles() {
+                    0 => String::new(),
+                    n => format!(", {n} of them in sheets,"),
+                },
                 surface.n_vertices(),
                 clock.elapsed().as_secs_f64()
             ));

@@ -79,6 +79,7 @@ pub(crate) fn refine(
     surface: &surface::Surface,
     options: &SizeOptions,
 ) -> Result<(surface::Surface, SplitReport), Error> {
+    refuse_sheets(surface, "refined")?;
     let wanted = (options.hsiz).map_or(f64::INFINITY, |l| l.resolve(surface.bounds().diagonal()));
     let field = SizeField::build(&surface.points, &surface.triangles, options)?;
     Ok(split(surface, &|p| field.h(p).min(wanted))?)
@@ -86,6 +87,23 @@ pub(crate) fn refine(
 
 /// What stands for the path of a surface that was given as arrays: a file in the store.
 pub(crate) const IN_STORE: &str = "store:surface.obj";
+
+/// Lines of the record that say what of the surface before them are sheets: a file and its name; triangles from a number on; all that is
+/// not closed.
+const SHEET: &str = "sheet:";
+const SHEETS_FROM: &str = "sheets-from:";
+const OPEN_PARTS: &str = "open-parts:";
+
+/// What cannot be done any more once there are sheets.
+fn refuse_sheets(surface: &surface::Surface, what: &str) -> Result<(), Error> {
+    match surface.has_sheets() {
+        false => Ok(()),
+        true => Err(Error::new(
+            "usage",
+            format!("a surface is {what} before sheets are embedded"),
+        )),
+    }
+}
 
 impl Surface {
     /// Reads files as one surface, each file a label unless it has labels of its own.
@@ -176,6 +194,7 @@ impl Surface {
             );
             return Err(Error::new("bad-size", message));
         }
+        refuse_sheets(&self.inner, "repaired")?;
         guarded(&Settings::new(), || {
             let distance = weld.map(|share| share * self.inner.bounds().diagonal());
             surface::repair(&mut self.inner, distance);
@@ -195,6 +214,64 @@ impl Surface {
             self.sources = vec![given(&self.inner)];
             Ok(self)
         })
+    }
+
+    /// The same with the triangles of `sheet` inside: faces of the mesh with tetrahedra on both sides, that part no region.
+    ///
+    /// A sheet may be open or closed, end inside, meet other sheets and the surface along edges and vertices that both have, and nowhere
+    /// else. Its labels are called `name:LABEL`, or `name` where it has one alone. Default name: that of its file.
+    pub fn embedded(mut self, sheet: Surface, name: Option<&str>) -> Result<Self, Error> {
+        let default = sheet.name();
+        let name = name.unwrap_or(&default);
+        let first = self.inner.n_triangles();
+        self.inner.embed(&sheet.inner, name)?;
+        self.turned += sheet.turned;
+        let is_in_store = |s: &SurfaceSource| s.path == IN_STORE;
+        match sheet.sources.as_slice() {
+            [only] if !is_in_store(only) && !self.sources.iter().any(is_in_store) => {
+                self.sources.push(SurfaceSource {
+                    path: format!("{SHEET}{name}={}", only.path),
+                    ..only.clone()
+                });
+            }
+            _ => {
+                let known = self
+                    .sources
+                    .iter()
+                    .find_map(|s| s.path.strip_prefix(SHEETS_FROM));
+                let first = known.map_or(first.to_string(), str::to_owned);
+                let is_open = self.sources.iter().any(|s| s.path == OPEN_PARTS);
+                self.sources = vec![given(&self.inner), mark(format!("{SHEETS_FROM}{first}"))];
+                self.sources
+                    .extend(is_open.then(|| mark(OPEN_PARTS.to_owned())));
+            }
+        }
+        Ok(self)
+    }
+
+    /// The same with what of it is not closed as sheets, see [`Surface::embedded`]: triangles at an edge without a second triangle, then
+    /// those that are at one without them, and so on.
+    pub fn open_parts_as_sheets(self) -> Result<Self, Error> {
+        guarded(&Settings::new(), || {
+            Ok(self.open_parts_in(&ScratchSpace::boundless())?.0)
+        })
+    }
+
+    /// The same, and how many triangles that are.
+    pub(crate) fn open_parts_in(mut self, scratch: &ScratchSpace) -> Result<(Self, usize), Error> {
+        let n = attempt(|| self.inner.open_parts_to_sheets(scratch))?;
+        self.sources.push(mark(OPEN_PARTS.to_owned()));
+        Ok((self, n))
+    }
+
+    /// What its first file is called, without folder and extension.
+    fn name(&self) -> String {
+        let file = self.inner.files.first().map(|file| Path::new(&file.name));
+        let stem = file
+            .and_then(Path::file_stem)
+            .map(|stem| stem.to_string_lossy());
+        stem.filter(|s| !s.is_empty())
+            .map_or("sheet".to_owned(), |s| s.into_owned())
     }
 
     /// Writes it as `.stl`, `.off`, `.obj` or `.ply`. Errors: `unknown-format`, `lossy-format`; the disk.
@@ -256,17 +333,31 @@ impl Surface {
         scratch: &ScratchSpace,
     ) -> Result<Self, Error> {
         let cap = Settings::new().cap()?;
-        let mut surface = match sources {
+        let is_of_sheets = |s: &SurfaceSource| {
+            [SHEET, SHEETS_FROM, OPEN_PARTS]
+                .iter()
+                .any(|mark| s.path.starts_with(mark))
+        };
+        let n = sources
+            .iter()
+            .position(is_of_sheets)
+            .unwrap_or(sources.len());
+        let (own, of_sheets) = sources.split_at(n);
+        let mut surface = match own {
             [only] if only.path == IN_STORE => {
                 let mut surface = Self::read_in(&[in_store(store)], cap)?;
                 surface.sources = vec![given(&surface.inner)];
                 surface
             }
-            _ => Self::load(
-                &sources.iter().map(|s| s.path.clone()).collect::<Vec<_>>(),
-                cap,
-            )?,
+            _ => Self::load(&own.iter().map(|s| s.path.clone()).collect::<Vec<_>>(), cap)?,
         };
+        // What the store keeps with sheets was turned before they came in.
+        if !of_sheets.iter().any(|s| s.path.starts_with(SHEETS_FROM)) {
+            surface = surface.oriented(scratch)?;
+        }
+        for source in of_sheets {
+            surface = surface.with_sheets(&source.path, cap, scratch)?;
+        }
         for (then, now) in sources.iter().zip(&surface.sources) {
             if (then.bytes, then.hash) != (now.bytes, now.hash) {
                 return Err(Error::new(
@@ -278,8 +369,30 @@ impl Surface {
                 .with_remedy(Remedy::General));
             }
         }
-        surface = surface.oriented(scratch)?;
         Ok(surface)
+    }
+
+    /// Adds what a line of the record says of sheets.
+    fn with_sheets(mut self, path: &str, cap: u64, scratch: &ScratchSpace) -> Result<Self, Error> {
+        if let Some(first) = path.strip_prefix(SHEETS_FROM) {
+            let first = first
+                .parse::<usize>()
+                .ok()
+                .filter(|&n| n <= self.inner.n_triangles());
+            let first = first
+                .ok_or_else(|| Error::new("damaged", "the record of sheets cannot be read"))?;
+            self.inner.sheets_from(first);
+            self.sources.push(mark(path.to_owned()));
+            return Ok(self);
+        }
+        if let Some((name, file)) = path
+            .strip_prefix(SHEET)
+            .and_then(|rest| rest.split_once('='))
+        {
+            let sheet = Self::load(&[file.to_owned()], cap)?.oriented(scratch)?;
+            return self.embedded(sheet, Some(name));
+        }
+        Ok(self.open_parts_in(scratch)?.0)
     }
 
     fn of(inner: surface::Surface, sources: Vec<SurfaceSource>) -> Self {
@@ -336,6 +449,14 @@ impl Surface {
         let inner = builder.finish();
         let source = given(&inner);
         Ok(Self::of(inner, vec![source]))
+    }
+}
+
+/// A line of the record that is no file.
+fn mark(path: String) -> SurfaceSource {
+    SurfaceSource {
+        path,
+        ..SurfaceSource::default()
     }
 }
 

@@ -102,21 +102,34 @@ impl<'a> Input<'a> {
     /// Counts what was seen; names what is missing.
     pub(super) fn finish(self, report: &mut Report) {
         for number in 0..self.surface.triangles.len() {
-            if get(&self.seen[0], number) || get(&self.seen[1], number) {
+            let sides = [0, 1].map(|side| get(&self.seen[side], number));
+            let is_sheet = self.surface.is_sheet(number as u32);
+            if sides == [true; 2] || (sides != [false; 2] && !is_sheet) {
                 report.triangles_present += 1;
+            } else if is_sheet {
+                report.triangles_missing += 1;
+                self.report_missing(
+                    number,
+                    "is part of a sheet and has not a tetrahedron on each side",
+                    report,
+                );
             } else if get(&self.seen[2], number) {
                 report.triangles_unfilled += 1;
             } else {
                 report.triangles_missing += 1;
-                let finding = Finding::MissingTriangle;
-                report.find(finding, || {
-                    let what = format!("input triangle {number} is not in the mesh");
-                    let mut offender = Offender::new(finding, None, what);
-                    let points = self.surface.corners(number as u32);
-                    offender.points = points.map(|p| p.to_array()).to_vec();
-                    offender
-                });
+                self.report_missing(number, "is not in the mesh", report);
             }
         }
+    }
+
+    fn report_missing(&self, number: usize, what: &str, report: &mut Report) {
+        let finding = Finding::MissingTriangle;
+        report.find(finding, || {
+            let what = format!("input triangle {number} {what}");
+            let mut offender = Offender::new(finding, None, what);
+            let points = self.surface.corners(number as u32);
+            offender.points = points.map(|p| p.to_array()).to_vec();
+            offender
+        });
     }
 }

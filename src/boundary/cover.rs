@@ -1,4 +1,4 @@
-//! A facet whose segments are chains becomes a set of faces, through points that lie in it exactly.
+//! A flat part whose rim is chains becomes a set of faces, through points that lie in it exactly.
 //!
 //! From each directed edge with the facet on its left, the shell shows what lies there: a face in the facet's
 //! plane, or a tetrahedron that the plane cuts. The latter has an edge with its ends on both sides, and that edge
@@ -9,6 +9,7 @@ use std::collections::HashSet;
 
 use super::chain::{TERMS, Trouble};
 use super::exact::ExactPoint;
+use super::flat::FlatPart;
 use super::flips::Flipper;
 use super::patch::Patch;
 use super::space::{Space, edge_key};
@@ -29,13 +30,17 @@ enum Left {
 }
 
 impl<P: Pages> Patch<'_, P> {
-    /// Covers the facet `f` by faces; `rim` is its boundary, in the direction of `f`.
+    /// Covers a flat part by faces; `rim` are the edges of its boundary, in its direction.
     ///
-    /// Returns the faces, each in the direction of `f`.
-    pub(super) fn cover(&mut self, f: [u32; 3], rim: &[u32]) -> Result<Vec<[u32; 3]>, Trouble> {
-        let on_rim: HashSet<(u32, u32)> = (0..rim.len())
-            .map(|i| (rim[i], rim[(i + 1) % rim.len()]))
-            .collect();
+    /// Returns the faces, each in the direction of the part.
+    pub(super) fn cover(
+        &mut self,
+        part: &FlatPart,
+        rim: &[(u32, u32)],
+    ) -> Result<Vec<[u32; 3]>, Trouble> {
+        let f = part.facets[0];
+        let on_rim: HashSet<(u32, u32)> = rim.iter().copied().collect();
+        let known: HashSet<u32> = part.facets.iter().flatten().copied().collect();
         let mut open: Vec<(u32, u32)> = on_rim.iter().copied().collect();
         open.sort_unstable();
         let mut done: HashSet<(u32, u32)> = HashSet::new();
@@ -47,7 +52,7 @@ impl<P: Pages> Patch<'_, P> {
             }
             match self.left_of(f, p, q)? {
                 Left::Face(r) => {
-                    if !rim.contains(&r) && !self.is_steiner(r) {
+                    if !known.contains(&r) && !self.is_steiner(r) {
                         return Err(Trouble::Vertex(r));
                     }
                     faces.push([p, q, r]);
@@ -62,17 +67,21 @@ impl<P: Pages> Patch<'_, P> {
                 Left::Crossing(t, above, below) => {
                     open.push((p, q));
                     points += 1;
-                    if points > POINTS_MAX {
+                    if points > POINTS_MAX * part.facets.len() {
                         return Err(Trouble::TooMuch);
                     }
                     let effort = self.effort;
-                    let mut flipper = Flipper::new(self, RecoveryTarget::Face(f));
+                    let target = match part.facets.len() {
+                        1 => RecoveryTarget::Face(f),
+                        _ => RecoveryTarget::Plane(f),
+                    };
+                    let mut flipper = Flipper::new(self, target);
                     flipper.work = effort.flip_work;
                     if flipper.remove_edge(t, above, below, effort.flip_level) {
                         flipper.keep();
                         continue;
                     }
-                    self.pierce(f, above, below)?;
+                    self.pierce(part, above, below)?;
                 }
             }
         }
@@ -116,8 +125,33 @@ impl<P: Pages> Patch<'_, P> {
         ))
     }
 
-    /// Takes the edge `above below` away by a point of the facet near its crossing.
-    fn pierce(&mut self, f: [u32; 3], above: u32, below: u32) -> Result<(), Trouble> {
+    /// The facet of `part` that the edge passes through, and where: volumes of the edge with the sides opposite the corners, as
+    /// parts of their sum.
+    fn facet_at(&self, part: &FlatPart, above: u32, below: u32) -> Option<([u32; 3], [Dyadic; 3])> {
+        let [p, q] = [above, below].map(|v| self.position_of(v));
+        // The one that doubles see first; where they err another one has it.
+        let depth = |f: &[u32; 3]| {
+            let c = f.map(|v| self.position_of(v));
+            let over = [(1, 2), (2, 0), (0, 1)].map(|(i, j)| (c[i] - p).cross(c[j] - p).dot(q - p));
+            let sum: f64 = over.iter().sum();
+            over.map(|o| o / sum)
+                .into_iter()
+                .fold(f64::INFINITY, f64::min)
+        };
+        let guess = part
+            .facets
+            .iter()
+            .max_by(|f, g| depth(f).total_cmp(&depth(g)));
+        guess.into_iter().chain(&part.facets).find_map(|&f| {
+            let over = [(1, 2), (2, 0), (0, 1)]
+                .map(|(i, j)| self.orient_exact([above, below, f[i], f[j]]));
+            let is_in = over.iter().all(|o| o.sign() >= 0) || over.iter().all(|o| o.sign() <= 0);
+            is_in.then_some((f, over))
+        })
+    }
+
+    /// Takes the edge `above below` away by a point of the part near its crossing.
+    fn pierce(&mut self, part: &FlatPart, above: u32, below: u32) -> Result<(), Trouble> {
         let around = find_edge(self, above, below)
             .and_then(|t| shell(self, t, above, below))
             .ok_or(Trouble::Broken("a crossing edge is on the hull"))?;
@@ -125,10 +159,10 @@ impl<P: Pages> Patch<'_, P> {
             return Err(Trouble::Crossed([above, below, below]));
         }
         let outer = self.outer_faces(&around.tets);
+        let (f, [over_a, over_b, over_c]) = self
+            .facet_at(part, above, below)
+            .ok_or(Trouble::Broken("an edge crosses no facet"))?;
         let [a, b, c] = f.map(|v| self.position(v));
-        // The crossing in shares of the sides from `a`: volumes of the edge with the sides, as parts of their sum.
-        let [over_a, over_b, over_c] =
-            [(1, 2), (2, 0), (0, 1)].map(|(i, j)| self.orient_exact([above, below, f[i], f[j]]));
         let sum = over_a.plus(&over_b).plus(&over_c);
         let share = |terms| Some((over_b.over(&sum, terms)?, over_c.over(&sum, terms)?));
         let (s, t) = share(TERMS[0]).ok_or(Trouble::Broken("an edge crosses no facet"))?;
@@ -151,7 +185,11 @@ impl<P: Pages> Patch<'_, P> {
                 }
             });
             let rest = Dyadic::from(1.0).minus(&short[0]).minus(&short[1]);
-            let inside = short[0].sign() > 0 && short[1].sign() > 0 && rest.sign() > 0;
+            // On a side of the facet only where the part goes on beyond it.
+            let least = if part.facets.len() > 1 { 0 } else { 1 };
+            let inside = [&short[0], &short[1], &rest]
+                .iter()
+                .all(|s| s.sign() >= least);
             inside.then(|| ExactPoint::combination(a, &[(b, &short[0]), (c, &short[1])]))
         };
         for slack in [0.02, 1e-4, 1e-7] {

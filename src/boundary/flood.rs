@@ -23,6 +23,8 @@ pub(super) struct Component {
 /// Components by number; 0 is none, 1 the outside.
 pub(super) struct Flood {
     pub components: Vec<Component>,
+    /// Of each component one of a lower number that is the same volume, or itself.
+    same: Vec<u32>,
 }
 
 impl Flood {
@@ -37,6 +39,7 @@ impl Flood {
         mesh.clear_scratch();
         let mut flood = Self {
             components: vec![Component::default()],
+            same: Vec::new(),
         };
         let mut stack = Stack::default();
         let outside = mesh.tet_of(0);
@@ -49,6 +52,7 @@ impl Flood {
             }
         }
         mesh.clear_scratch();
+        flood.same = (0..flood.components.len() as u32).collect();
         flood
     }
 
@@ -82,9 +86,40 @@ impl Flood {
         self.components.push(found);
     }
 
+    /// Two components on the sides of a sheet are one volume.
+    pub(super) fn join(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.volume(a), self.volume(b));
+        let (low, high) = (a.min(b), a.max(b));
+        if low == high {
+            return;
+        }
+        self.same[high as usize] = low;
+        let gone = std::mem::take(&mut self.components[high as usize]);
+        let kept = &mut self.components[low as usize];
+        kept.volume += gone.volume;
+        kept.tets += gone.tets;
+        kept.facets += gone.facets;
+        kept.side_first = kept.side_first.min(gone.side_first);
+        kept.labels.extend(gone.labels);
+    }
+
+    /// The component that stands for the volume of component `c`.
+    pub(super) fn volume(&self, mut c: u32) -> u32 {
+        while self.same[c as usize] != c {
+            c = self.same[c as usize];
+        }
+        c
+    }
+
+    /// The components that stand for a volume, but for the outside.
+    pub(super) fn volumes(&self) -> impl Iterator<Item = u32> {
+        (OUTSIDE + 1..self.components.len() as u32).filter(|&c| self.volume(c) == c)
+    }
+
     /// Facet `n` bounds component `c`.
     pub(super) fn touch(&mut self, c: u32, side: u64, label: u32) {
-        let component = &mut self.components[c as usize];
+        let volume = self.volume(c);
+        let component = &mut self.components[volume as usize];
         component.facets += 1;
         component.side_first = component.side_first.min(side);
         component.labels.insert(label);

@@ -35,7 +35,7 @@ pub(super) fn map<P: Pages>(mesh: &mut Mesh<P>) -> MissingFacets {
         if let SearchResult::Face(face) = find_face(&mut s, f) {
             s.require(face);
             // No region is known yet: the place serves whoever looks for the facet next.
-            facet.regions = [face.0, 0];
+            facet.regions[0] = face.0;
             mesh.set_facet(n, facet);
             continue;
         }

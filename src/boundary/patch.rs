@@ -251,6 +251,11 @@ impl<'m, P: Pages> Patch<'m, P> {
         self.exact_place(x).offset(&self.exact_place(v))
     }
 
+    /// Position of `v`, rounded.
+    pub(super) fn position_of(&self, v: u32) -> Point {
+        self.vertices[v as usize].point
+    }
+
     fn placed(&self, v: u32) -> Placed<'_> {
         let v = &self.vertices[v as usize];
         Placed {
@@ -382,7 +387,7 @@ impl<P: Pages> Space for Patch<'_, P> {
     }
 
     fn position(&mut self, v: u32) -> Point {
-        self.vertices[v as usize].point
+        self.position_of(v)
     }
 
     fn take_tet(&mut self) -> u32 {

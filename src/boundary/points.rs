@@ -5,11 +5,14 @@ use std::collections::{HashMap, HashSet};
 use super::chain::Trouble;
 use super::effort::{EFFORTS, Effort};
 use super::find::{SearchResult, find_face};
+use super::flat::{FlatPart, flat_parts, single_parts};
+use super::free_vertex::remove_free;
 use super::map::MissingFacets;
 use super::patch::Patch;
 use super::report::RecoveryReport;
 use super::space::{PagedSpace, Space, edge_key, sorted};
 use super::suppress::CavitySkin;
+use super::turn::turn_segment;
 use super::walk::{find_edge, shell};
 use crate::mesh::{FaceRef, Mesh};
 use crate::storage::{Pages, check_cancelled};
@@ -31,20 +34,13 @@ pub(super) fn recover_by_points<P: Pages>(
         for group in groups(mesh, &missing.facets, &mut missing.protected) {
             check_cancelled();
             report.patches += 1;
-            let mut outcome = Err(Trouble::TooMuch);
-            for effort in EFFORTS {
-                outcome = recover_group(mesh, &missing.protected, &group, effort, report);
-                if matches!(outcome, Ok(()) | Err(Trouble::Vertex(_))) {
-                    break;
-                }
-            }
-            match outcome {
-                Ok(()) => report.facets_by_points += group.len() as u32,
-                Err(trouble) => {
-                    troubles.extend(group.iter().map(|&n| (n, trouble)));
-                    left.extend(group);
-                }
-            }
+            let Err((facets, trouble)) = recover_group(mesh, missing, &group, report) else {
+                report.facets_by_points += group.len() as u32;
+                continue;
+            };
+            report.facets_by_points += (group.len() - facets.len()) as u32;
+            troubles.extend(facets.iter().map(|&n| (n, trouble)));
+            left.extend(facets);
         }
         missing.facets = left;
         if missing.facets.is_empty() || missing.facets.len() == before {
@@ -52,6 +48,73 @@ pub(super) fn recover_by_points<P: Pages>(
         }
     }
     troubles
+}
+
+/// Recovers the facets of `group`, those in one plane as one part if possible; returns those left and why.
+fn recover_group<P: Pages>(
+    mesh: &mut Mesh<P>,
+    missing: &mut MissingFacets,
+    group: &[u32],
+    report: &mut RecoveryReport,
+) -> Result<(), (Vec<u32>, Trouble)> {
+    // A triangle given twice is one face.
+    let mut seen = HashSet::new();
+    let corners: Vec<[u32; 3]> = group.iter().map(|&n| mesh.facet(n).vertices).collect();
+    let mut once = corners.clone();
+    once.retain(|&f| seen.insert(sorted(f)));
+    let parts = flat_parts(&mut PagedSpace(mesh, &missing.protected), &once);
+    let mut left = group.to_vec();
+    if parts.len() < once.len() && attempt(mesh, missing, &parts, report).is_ok() {
+        turn_inside(mesh, missing, &parts, report);
+        left.retain(|&n| !require_facet(mesh, n));
+        once = left.iter().map(|&n| mesh.facet(n).vertices).collect();
+        once.retain(|&f| seen.remove(&sorted(f)));
+    }
+    if !left.is_empty() {
+        let parts = single_parts(&once);
+        if let Err(trouble) = attempt(mesh, missing, &parts, report) {
+            return Err((left, trouble));
+        }
+    }
+    for n in left {
+        assert!(
+            require_facet(mesh, n),
+            "facet {n} was recovered and is not there"
+        );
+    }
+    Ok(())
+}
+
+/// Marks facet `n` as required, if it is a face.
+fn require_facet<P: Pages>(mesh: &mut Mesh<P>, n: u32) -> bool {
+    let f = mesh.facet(n).vertices;
+    let none = HashSet::new();
+    let mut s = PagedSpace(mesh, &none);
+    match find_face(&mut s, f) {
+        SearchResult::Face(face) => {
+            s.require(face);
+            true
+        }
+        _ => false,
+    }
+}
+
+/// Turns edges of the parts, which are sets of faces now, until their own segments are there.
+fn turn_inside<P: Pages>(
+    mesh: &mut Mesh<P>,
+    missing: &mut MissingFacets,
+    parts: &[FlatPart],
+    report: &mut RecoveryReport,
+) {
+    for part in parts {
+        let rim = part.rim.iter().map(|&(a, b)| edge_key(a, b));
+        missing.protected.extend(rim);
+    }
+    for part in parts {
+        for &(a, b) in &part.inner {
+            turn_segment(mesh, missing, report, a, b);
+        }
+    }
 }
 
 /// Facets that share missing segments belong together: a point on a segment needs all facets around it.
@@ -90,27 +153,45 @@ fn groups<P: Pages>(
     groups
 }
 
-fn recover_group<P: Pages>(
+/// Tries one effort after the other until the parts are sets of faces.
+///
+/// Of a part of several facets the faces are not required: they are not yet those of the surface.
+fn attempt<P: Pages>(
+    mesh: &mut Mesh<P>,
+    missing: &MissingFacets,
+    parts: &[FlatPart],
+    report: &mut RecoveryReport,
+) -> Result<(), Trouble> {
+    let mut outcome = Err(Trouble::TooMuch);
+    for effort in EFFORTS {
+        outcome = try_parts(mesh, &missing.protected, parts, effort, report);
+        if matches!(outcome, Ok(()) | Err(Trouble::Vertex(_))) {
+            break;
+        }
+    }
+    outcome
+}
+
+fn try_parts<P: Pages>(
     mesh: &mut Mesh<P>,
     protected: &HashSet<u64>,
-    group: &[u32],
+    parts: &[FlatPart],
     effort: Effort,
     report: &mut RecoveryReport,
 ) -> Result<(), Trouble> {
-    let corners: Vec<[u32; 3]> = group.iter().map(|&n| mesh.facet(n).vertices).collect();
-    // A triangle given twice is one face.
-    let mut once = corners.clone();
-    let mut seen = HashSet::new();
-    once.retain(|&f| seen.insert(sorted(f)));
-    if effort.reversed {
-        once.reverse();
-    }
     let mut patch = Patch::new(mesh, protected, effort);
+    let mut local: Vec<FlatPart> = parts
+        .iter()
+        .map(|p| p.renamed(|v| patch.vertex(v)))
+        .collect();
+    if effort.reversed {
+        local.reverse();
+    }
     let mut skin = CavitySkin {
-        facets: once.iter().map(|f| f.map(|v| patch.vertex(v))).collect(),
+        facets: local.iter().map(|p| p.facets[0]).collect(),
         ..CavitySkin::default()
     };
-    let outcome = build(&mut patch, &mut skin);
+    let outcome = build(&mut patch, &mut skin, &local);
     let named = |trouble| match trouble {
         Trouble::Vertex(v) => Trouble::Vertex(patch.mesh_id(v)),
         Trouble::Crossed(f) => Trouble::Crossed(f.map(|v| patch.mesh_id(v))),
@@ -120,65 +201,81 @@ fn recover_group<P: Pages>(
     if !patch.is_sound() {
         return Err(Trouble::Precision("doubles leave no volume beside it"));
     }
-    let whole = skin
-        .facets
+    let n_facets: usize = local.iter().map(|p| p.facets.len()).sum();
+    let is_whole =
+        |p: &FlatPart| p.facets.len() > 1 || skin.faces.contains_key(&sorted(p.facets[0]));
+    let own: HashSet<u32> = local
         .iter()
-        .all(|&f| skin.faces.contains_key(&sorted(f)));
-    if !whole || skin.faces.len() != skin.facets.len() || !patch.keeps_required() {
+        .flat_map(|p| &p.facets)
+        .flatten()
+        .copied()
+        .collect();
+    let adds_none = skin.faces.keys().flatten().all(|v| own.contains(v));
+    if !local.iter().all(is_whole)
+        || skin.faces.len() != n_facets
+        || !adds_none
+        || !patch.keeps_required()
+    {
         return Err(Trouble::Broken("a facet is not whole"));
     }
     report.points_on_surface += points;
+    let free: Vec<[u32; 3]> = skin
+        .faces
+        .iter()
+        .filter(|(_, (part, _))| local[*part].facets.len() > 1)
+        .map(|(face, _)| face.map(|v| patch.mesh_id(v)))
+        .collect();
     let added = patch.commit();
     report.steiner = report.steiner.saturating_add_signed(added as i32);
     let none = HashSet::new();
-    for f in corners {
-        let mut s = PagedSpace(mesh, &none);
-        match find_face(&mut s, f) {
-            SearchResult::Face(face) => s.require(face),
-            _ => panic!("facet {f:?} was recovered and is not there"),
+    let mut s = PagedSpace(mesh, &none);
+    for face in free {
+        match find_face(&mut s, face) {
+            SearchResult::Face(face) => s.release(face),
+            _ => panic!("face {face:?} of a flat part was recovered and is not there"),
         }
     }
     Ok(())
 }
 
 /// Chains, faces, suppression; returns how many vertices were on the surface for a while.
-fn build<P: Pages>(patch: &mut Patch<'_, P>, skin: &mut CavitySkin) -> Result<u32, Trouble> {
+fn build<P: Pages>(
+    patch: &mut Patch<'_, P>,
+    skin: &mut CavitySkin,
+    parts: &[FlatPart],
+) -> Result<u32, Trouble> {
     let mut chains: HashMap<(u32, u32), Vec<u32>> = HashMap::new();
-    let facets = skin.facets.clone();
     let mut on_segments: Vec<u32> = Vec::new();
-    for f in &facets {
-        for (a, b) in sides(*f) {
-            if chains.contains_key(&(a, b)) {
-                continue;
-            }
-            let chain = if patch.effort.reversed {
-                let mut chain = patch.chain(b, a)?;
-                chain.reverse();
-                chain
-            } else {
-                patch.chain(a, b)?
-            };
-            on_segments.extend(&chain[1..chain.len() - 1]);
-            chains.insert((b, a), chain.iter().rev().copied().collect());
-            chains.insert((a, b), chain);
+    for &(a, b) in parts.iter().flat_map(|p| &p.rim) {
+        if chains.contains_key(&(a, b)) {
+            continue;
         }
+        let chain = if patch.effort.reversed {
+            let mut chain = patch.chain(b, a)?;
+            chain.reverse();
+            chain
+        } else {
+            patch.chain(a, b)?
+        };
+        on_segments.extend(&chain[1..chain.len() - 1]);
+        chains.insert((b, a), chain.iter().rev().copied().collect());
+        chains.insert((a, b), chain);
     }
     let mut points = on_segments.len() as u32;
     let mut late: Vec<u32> = Vec::new();
-    for (k, &f) in facets.iter().enumerate() {
-        let rim: Vec<u32> = sides(f)
-            .into_iter()
-            .flat_map(|side| {
-                let chain = &chains[&side];
-                chain[..chain.len() - 1].to_vec()
-            })
+    for (k, part) in parts.iter().enumerate() {
+        let rim: Vec<(u32, u32)> = part
+            .rim
+            .iter()
+            .flat_map(|side| chains[side].windows(2).map(|edge| (edge[0], edge[1])))
             .collect();
-        let faces = patch.cover(f, &rim)?;
+        let faces = patch.cover(part, &rim)?;
+        let on_rim: HashSet<u32> = rim.iter().map(|edge| edge.0).collect();
         let mut inside: Vec<u32> = faces
             .iter()
             .flatten()
             .copied()
-            .filter(|v| !rim.contains(v))
+            .filter(|v| !on_rim.contains(v) && !part.has(*v))
             .collect();
         inside.sort_unstable();
         inside.dedup();
@@ -230,15 +327,11 @@ fn build<P: Pages>(patch: &mut Patch<'_, P>, skin: &mut CavitySkin) -> Result<u3
     }
     for v in 0..patch.n_vertices() {
         if patch.is_new(v) && patch.is_in_use(v) {
-            patch.remove_free(v);
+            remove_free(patch, v);
         }
     }
     if patch.effort.exact {
         patch.settle()?;
     }
     Ok(points)
-}
-
-fn sides([a, b, c]: [u32; 3]) -> [(u32, u32); 3] {
-    [(a, b), (b, c), (c, a)]
 }

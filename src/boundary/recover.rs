@@ -12,6 +12,7 @@ use super::points::recover_by_points;
 use super::report::RecoveryReport;
 use super::space::{PagedSpace, Space, edge_key};
 use super::target::RecoveryTarget;
+use super::turn::turn_segment;
 use crate::mesh::Mesh;
 use crate::storage::{Pages, check_cancelled};
 
@@ -35,6 +36,7 @@ pub fn recover<P: Pages>(mesh: &mut Mesh<P>) -> Result<RecoveryReport, BoundaryE
         ..RecoveryReport::default()
     };
     let clock = Instant::now();
+    turn_segments(mesh, &mut missing, &mut report);
     flip_segments(mesh, &mut missing, &mut report);
     flip_facets(mesh, &mut missing, &mut report);
     report.flip_time = clock.elapsed();
@@ -81,6 +83,24 @@ pub(super) fn place<P: Pages>(mesh: &mut Mesh<P>, n: u32) -> FacetPlace {
         input: facet.input,
         corners: facet.vertices.map(|v| mesh.point(v)),
     }
+}
+
+/// Segments that run within flat parts of the surface.
+fn turn_segments<P: Pages>(
+    mesh: &mut Mesh<P>,
+    missing: &mut MissingFacets,
+    report: &mut RecoveryReport,
+) {
+    let mut left = Vec::new();
+    for (a, b) in std::mem::take(&mut missing.segments) {
+        check_cancelled();
+        if turn_segment(mesh, missing, report, a, b) {
+            report.segments_by_flips += 1;
+        } else {
+            left.push((a, b));
+        }
+    }
+    missing.segments = left;
 }
 
 fn flip_segments<P: Pages>(

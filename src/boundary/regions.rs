@@ -11,7 +11,7 @@ use super::recover::place;
 use super::seeds::RegionRule;
 use super::space::PagedSpace;
 use crate::delaunay::Kernel;
-use crate::mesh::{Mesh, VertexTag};
+use crate::mesh::{Mesh, SHEET, VertexTag};
 use crate::storage::{Pages, check_cancelled};
 use tetdb_schema::page::NONE;
 
@@ -58,7 +58,7 @@ impl Regions {
 
 /// Colors the volumes, deletes everything that is not filled, and the enclosing box.
 ///
-/// Every facet must be a required face. Effects: faces to the outside have no neighbor, required bits stay; filled
+/// Every facet must be a required face; those of sheets part nothing. Effects: faces to the outside have no neighbor, required bits stay; filled
 /// tetrahedra carry their region as attribute; facets carry the regions in front and behind; `tet_of` is refreshed; vertices
 /// without tetrahedra are removed unless they are the surface's.
 ///
@@ -72,7 +72,7 @@ pub fn fill_regions<P: Pages>(
     let mut regions = Regions::default();
     let filled = choose(mesh, &flood, &walls, rule)?;
     regions.all_instead_of_parity = filled.all_instead_of_parity;
-    let mut order: Vec<u32> = (OUTSIDE + 1..flood.components.len() as u32).collect();
+    let mut order: Vec<u32> = flood.volumes().collect();
     order.sort_by_key(|&c| flood.components[c as usize].side_first);
     let mut number = vec![0u32; flood.components.len()];
     let mut n = 0;
@@ -90,6 +90,9 @@ pub fn fill_regions<P: Pages>(
             facets: component.facets,
             labels: component.labels.iter().copied().collect(),
         });
+    }
+    for c in 0..number.len() {
+        number[c] = number[flood.volume(c as u32) as usize];
     }
     apply(mesh, &number, &mut regions);
     Ok(regions)
@@ -120,9 +123,14 @@ fn survey<P: Pages>(mesh: &mut Mesh<P>, flood: &mut Flood) -> Result<Walls, Boun
         let [a, b, c] = facet.vertices;
         let f = tet.face(face.face());
         let behind = f == [a, b, c] || f == [b, c, a] || f == [c, a, b];
+        let is_sheet = facet.regions[1] == SHEET;
         facet.regions = if behind { [there, here] } else { [here, there] };
         mesh.set_facet(n, facet);
         let [front, back] = facet.regions;
+        if is_sheet {
+            flood.join(front, back);
+            continue;
+        }
         flood.touch(front, 2 * u64::from(n), facet.label);
         if front != back {
             flood.touch(back, 2 * u64::from(n) + 1, facet.label);
@@ -134,7 +142,26 @@ fn survey<P: Pages>(mesh: &mut Mesh<P>, flood: &mut Flood) -> Result<Walls, Boun
             }
         }
     }
-    Ok(walls)
+    Ok(between_volumes(&walls, flood))
+}
+
+/// The walls of volumes, from those of components.
+fn between_volumes(walls: &Walls, flood: &Flood) -> Walls {
+    let mut joined = Walls::new();
+    for (&(a, b), wall) in walls {
+        let (low, high) = (flood.volume(a), flood.volume(b));
+        // Between other components the lower number may be on the other side.
+        let (low, high, front, back) = match low <= high {
+            true => (low, high, wall.front, wall.back),
+            false => (high, low, wall.back, wall.front),
+        };
+        if low != high {
+            let sum = joined.entry((low, high)).or_default();
+            sum.front += front;
+            sum.back += back;
+        }
+    }
+    joined
 }
 
 fn choose<P: Pages>(
@@ -149,7 +176,7 @@ fn choose<P: Pages>(
     rule.apply(chosen, OUTSIDE, end, |p| {
         let start = mesh.tet_of(0);
         match kernel.locate(mesh, p, start) {
-            Ok(found) => mesh.tet_attribute(found.tet).0,
+            Ok(found) => flood.volume(mesh.tet_attribute(found.tet).0),
             Err(_) => OUTSIDE,
         }
     })

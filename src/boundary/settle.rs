@@ -12,6 +12,7 @@ use std::collections::HashSet;
 
 use super::chain::Trouble;
 use super::exact::ExactPoint;
+use super::free_vertex::remove_free;
 use super::kernel::{HalfSpace, center};
 use super::patch::Patch;
 use super::space::Space;
@@ -41,7 +42,7 @@ impl<P: Pages> Patch<'_, P> {
                     continue;
                 }
                 self.thin_out(v);
-                if self.remove_free(v) {
+                if remove_free(self, v) {
                     changed = true;
                     continue;
                 }

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use crate::geom::{Point, orient};
 use crate::mesh::anatomy::{FACES, REQUIRED};
-use crate::mesh::{FaceRef, Mesh, Tet};
+use crate::mesh::{FaceRef, Mesh, Tet, VertexTag};
 use crate::storage::Pages;
 
 /// A tetrahedral complex whose parts can be replaced.
@@ -124,6 +124,13 @@ pub(super) trait Space {
         ids
     }
 
+    /// Marks a face as required on this side no more.
+    fn release(&mut self, face: FaceRef) {
+        let mut tet = self.tet(face.tet());
+        tet.node[face.face()] &= !REQUIRED;
+        self.set_tet(face.tet(), tet);
+    }
+
     /// Marks a face as required on both sides.
     fn require(&mut self, face: FaceRef) {
         let other = self.across(face.tet(), face.face());
@@ -164,6 +171,37 @@ pub(super) struct PagedSpace<'m, P: Pages>(
     /// Edges that must stay.
     pub &'m HashSet<u64>,
 );
+
+impl<P: Pages> PagedSpace<'_, P> {
+    /// Adds a vertex in no tetrahedron, tagged as a Steiner point.
+    pub(super) fn add_steiner(&mut self, point: Point) -> u32 {
+        let v = self.0.add_vertex(point, 0.0);
+        self.0.set_vertex_attribute(v, VertexTag::Steiner, 0);
+        v
+    }
+
+    /// The face and its other side are required no longer.
+    pub(super) fn release(&mut self, face: FaceRef) {
+        for f in [face, self.0.tet(face.tet()).neighbor[face.face()]] {
+            if f.exists() {
+                let mut tet = self.0.tet(f.tet());
+                tet.node[f.face()] &= !REQUIRED;
+                self.0.set_tet(f.tet(), tet);
+            }
+        }
+    }
+
+    /// Whether `v` is not from the input.
+    pub(super) fn is_steiner(&mut self, v: u32) -> bool {
+        self.0.vertex_attribute(v).0 == VertexTag::Steiner
+    }
+
+    /// Takes back a vertex no tetrahedron has any more.
+    pub(super) fn drop_steiner(&mut self, v: u32) {
+        self.0.free_vertex(v);
+        self.0.set_vertex_attribute(v, VertexTag::Free, 0);
+    }
+}
 
 impl<P: Pages> Space for PagedSpace<'_, P> {
     #[inline]

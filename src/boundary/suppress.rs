@@ -17,12 +17,13 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 
 use super::chain::Trouble;
 use super::flips::Flipper;
+use super::free_vertex::moved;
 use super::kernel::HalfSpace;
 use super::patch::Patch;
 use super::polygon::triangulate;
 use super::space::{Space, sorted};
 use super::target::RecoveryTarget;
-use super::walk::{ball, edge_at, swapped};
+use super::walk::{self, ball, edge_at};
 use crate::geom::Point;
 use crate::mesh::FaceRef;
 use crate::storage::Pages;
@@ -30,9 +31,9 @@ use crate::storage::Pages;
 /// The facets of a patch and the faces that make them up.
 #[derive(Default)]
 pub(super) struct CavitySkin {
-    /// Corners of each facet.
+    /// Three corners of each flat part: its plane.
     pub facets: Vec<[u32; 3]>,
-    /// Sorted face to its facet and itself in the facet's direction.
+    /// Sorted face to its part and itself in the part's direction.
     pub faces: HashMap<[u32; 3], (usize, [u32; 3])>,
 }
 
@@ -86,16 +87,34 @@ impl<P: Pages> Patch<'_, P> {
     }
 
     /// Takes vertex `x` off the surface. Returns the number of vertices that replace it.
+    ///
+    /// Where a sheet ends at `x`, a triangle on the other side of its segment stands in for the facet that is not there.
     pub(super) fn suppress(&mut self, skin: &mut CavitySkin, x: u32) -> Result<u32, Trouble> {
         self.thin_out(x);
         let ball = ball(self, x);
         let fans = self.fans(skin, x, &ball)?;
-        if fans.is_empty() {
-            return Ok(0);
+        match &fans[..] {
+            [] => Ok(0),
+            [only] if !only.closed => {
+                let n_facets = skin.facets.len();
+                self.continue_sheet(skin, x, &ball, only)?;
+                let ball = walk::ball(self, x);
+                let fans = self.fans(skin, x, &ball)?;
+                let done = self.suppress_fans(skin, x, ball, fans);
+                self.end_sheet(skin, n_facets);
+                done
+            }
+            _ => self.suppress_fans(skin, x, ball, fans),
         }
-        if fans.len() == 1 && !fans[0].closed {
-            return Err(Trouble::Broken("a segment with one facet"));
-        }
+    }
+
+    fn suppress_fans(
+        &mut self,
+        skin: &mut CavitySkin,
+        x: u32,
+        ball: Vec<u32>,
+        fans: Vec<Fan>,
+    ) -> Result<u32, Trouble> {
         if self.collapse_on_surface(skin, x, &ball, &fans) {
             return Ok(0);
         }
@@ -141,66 +160,8 @@ impl<P: Pages> Patch<'_, P> {
         Ok(added)
     }
 
-    /// Takes free vertex `x` away if one of its neighbors can stand for it.
-    pub(super) fn remove_free(&mut self, x: u32) -> bool {
-        let ball = ball(self, x);
-        let link: HashSet<u32> = ball
-            .iter()
-            .flat_map(|&t| self.tets_vertices(t))
-            .filter(|&v| v != x)
-            .collect();
-        let mut link: Vec<u32> = link.into_iter().collect();
-        link.sort_unstable();
-        let mut best: Option<(f64, Vec<[u32; 4]>)> = None;
-        for u in link {
-            let Some(quads) = self.moved(x, u, &ball) else {
-                continue;
-            };
-            let worst = quads
-                .iter()
-                .map(|&q| self.flatness(q))
-                .fold(f64::INFINITY, f64::min);
-            if best.as_ref().is_none_or(|b| worst > b.0) {
-                best = Some((worst, quads));
-            }
-        }
-        match best {
-            Some((worst, quads)) if worst > 0.0 => {
-                self.replace(&ball, &quads);
-                true
-            }
-            _ => false,
-        }
-    }
-
     pub(super) fn tets_vertices(&mut self, t: u32) -> [u32; 4] {
         self.tet(t).vertices()
-    }
-
-    pub(super) fn flatness(&mut self, q: [u32; 4]) -> f64 {
-        let volume = self.orient(q);
-        let p = q.map(|v| self.position(v));
-        let longest = (0..4)
-            .flat_map(|i| (0..i).map(move |j| (i, j)))
-            .map(|(i, j)| p[i].distance(p[j]))
-            .fold(0.0, f64::max);
-        volume / (longest * longest * longest)
-    }
-
-    /// The ball with `x` moved to its neighbor `u`, if all volumes stay positive.
-    pub(super) fn moved(&mut self, x: u32, u: u32, ball: &[u32]) -> Option<Vec<[u32; 4]>> {
-        let mut quads = Vec::new();
-        for &t in ball {
-            let tet = self.tet(t);
-            if tet.local(u).is_none() {
-                let q = swapped(&tet, tet.local(x)?, u);
-                if self.orient(q) <= 0.0 {
-                    return None;
-                }
-                quads.push(q);
-            }
-        }
-        Some(quads)
     }
 
     /// The fans of the facets around `x`.
@@ -265,7 +226,7 @@ impl<P: Pages> Patch<'_, P> {
             ],
         };
         for u in candidates {
-            let Some(quads) = self.moved(x, u, ball) else {
+            let Some(quads) = moved(self, x, u, ball) else {
                 continue;
             };
             let faces: Vec<Vec<[u32; 3]>> = fans

@@ -7,6 +7,8 @@ use super::space::Space;
 pub(super) enum RecoveryTarget {
     Edge(u32, u32),
     Face([u32; 3]),
+    /// The plane of these three: no edge may cross it anywhere.
+    Plane([u32; 3]),
     /// Nothing is in the way of anything.
     Free,
 }
@@ -27,6 +29,10 @@ impl RecoveryTarget {
                 );
                 sx == 0.0 || sy == 0.0 || (sx > 0.0) == (sy > 0.0) || !edge_meets_face(s, x, y, f)
             }
+            Self::Plane([p, q, r]) => {
+                let (sx, sy) = (s.orient([p, q, r, x]), s.orient([p, q, r, y]));
+                sx == 0.0 || sy == 0.0 || (sx > 0.0) == (sy > 0.0)
+            }
         }
     }
 
@@ -34,7 +40,7 @@ impl RecoveryTarget {
     pub(super) fn allows_face<S: Space>(self, s: &mut S, face: [u32; 3]) -> bool {
         match self {
             Self::Edge(a, b) => !edge_meets_face(s, a, b, face),
-            Self::Face(_) | Self::Free => true,
+            Self::Face(_) | Self::Plane(_) | Self::Free => true,
         }
     }
 }

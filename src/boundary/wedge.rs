@@ -3,6 +3,7 @@
 use std::collections::{BTreeSet, HashSet};
 
 use super::chain::Trouble;
+use super::free_vertex::moved;
 use super::grow::{Grown, Obstacle};
 use super::kernel::center;
 use super::patch::Patch;
@@ -290,7 +291,7 @@ impl<P: Pages> Patch<'_, P> {
 
     /// The wedge with `x` moved to `p`, if all volumes stay positive.
     pub(super) fn join_all(&mut self, x: u32, wedge: &Wedge, p: u32) -> Option<Grown> {
-        let quads = self.moved(x, p, &wedge.tets)?;
+        let quads = moved(self, x, p, &wedge.tets)?;
         Some(Grown {
             cavity: wedge.tets.clone(),
             quads,

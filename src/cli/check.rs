@@ -26,12 +26,18 @@ struct Mended {
 
 pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
     // Options are checked before anything is read.
+    if args.repair && (args.sheets.allow_open || !args.sheets.embed.is_empty()) {
+        return Err(
+            Failure::new("usage", "a surface is repaired before sheets are embedded")
+                .help("repair each file for itself"),
+        );
+    }
     let weld_share = args.weld.as_deref().map(share).transpose()?;
     let inputs: Vec<PathBuf> = args.surfaces.iter().map(PathBuf::from).collect();
     for out in args.write.iter().chain(&args.write_bad) {
         check_target(out, &inputs)?;
     }
-    let mut input = input::load(&args.surfaces, Space::Boundless, console)?;
+    let mut input = input::load_with(&args.surfaces, &args.sheets, Space::Boundless, console)?;
     let mended = args.repair.then(|| mend(&mut input, weld_share));
     let findings = Findings::of(&input.inner, input.turned);
     let written = write_files(args, &input.inner, &findings, console)?;

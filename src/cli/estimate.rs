@@ -26,7 +26,7 @@ pub fn run(args: &EstimateArgs, console: &Console) -> Result<u8, Failure> {
     let threads = args.threads.unwrap_or_else(n_threads);
     let store = args.output.as_deref().unwrap_or(Path::new("."));
     let space = Space::Capped(cap, store);
-    let surface = input::load_valid(&args.surfaces, space, console)?;
+    let surface = input::load_valid(&args.surfaces, &args.sheets, space, console)?;
     take_seeds(&mut options, &surface.inner.seeds);
     let prepared = predict(&surface.inner, &options, cap, store)?;
     let estimate = &prepared.estimate;

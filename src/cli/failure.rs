@@ -159,6 +159,9 @@ fn help_of(code: &str) -> &'static str {
             "`--regions all` fills every volume whatever the orientation; or give each shared wall from both sides, once in each file"
         }
         "nothing-filled" => "try --regions all, and look at the surface with `tetdb check SURFACE`",
+        "sheet-outside" => {
+            "cut sheets off where they leave the filled regions, or fill the region they lie in (--regions)"
+        }
         "nothing-to-undo" => {
             "only the last `tetdb resaturate` can be undone, once, and not after --forget"
         }

@@ -2,9 +2,11 @@
 
 use std::path::Path;
 
+use super::args::SheetArgs;
 use super::console::Console;
 use super::failure::Failure;
 use super::memory;
+use super::words::count;
 use crate::api::Surface;
 use crate::api::preflight::scratch_beside;
 use crate::storage::{ScratchSpace, attempt};
@@ -44,13 +46,48 @@ pub fn load(arguments: &[String], space: Space, console: &Console) -> Result<Sur
     Ok(surface)
 }
 
-/// [`load`], and refuse a surface with defects.
-pub fn load_valid(
+/// [`load`], with the sheets in it.
+pub fn load_with(
     arguments: &[String],
+    sheets: &SheetArgs,
     space: Space,
     console: &Console,
 ) -> Result<Surface, Failure> {
-    let surface = load(arguments, space, console)?;
+    let mut names: Vec<(&str, &str)> = Vec::new();
+    for text in &sheets.name {
+        let (file, name) = text.rsplit_once('=').unwrap_or((text, ""));
+        if name.is_empty() || !sheets.embed.iter().any(|embedded| embedded == file) {
+            let message = format!("--name {text} is not a file of --embed, `=` and a name");
+            return Err(Failure::new("usage", message)
+                .help("such as --embed fault.stl --name fault.stl=north"));
+        }
+        names.push((file, name));
+    }
+    let mut surface = load(arguments, space, console)?;
+    if sheets.allow_open {
+        let (with, n) = surface.open_parts_in(&space.scratch(&Default::default())?)?;
+        surface = with;
+        console.note(&format!(
+            "note: sheets: {} of open parts",
+            count(n as u64, "triangle")
+        ));
+    }
+    for file in &sheets.embed {
+        let sheet = load(std::slice::from_ref(file), space, console)?;
+        let name = names.iter().find(|(known, _)| known == file);
+        surface = surface.embedded(sheet, name.map(|(_, name)| *name))?;
+    }
+    Ok(surface)
+}
+
+/// [`load_with`], and refuse a surface with defects.
+pub fn load_valid(
+    arguments: &[String],
+    sheets: &SheetArgs,
+    space: Space,
+    console: &Console,
+) -> Result<Surface, Failure> {
+    let surface = load_with(arguments, sheets, space, console)?;
     validated(&surface.inner, space)?;
     Ok(surface)
 }

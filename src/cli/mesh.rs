@@ -32,7 +32,9 @@ pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
     options.sizes()?;
     let settings = begin(&args.run, console)?;
     if !args.force {
-        let files = args.surfaces.iter().chain(&args.shape.sizes.size_field);
+        let files = (args.surfaces.iter())
+            .chain(&args.shape.sizes.size_field)
+            .chain(&args.sheets.embed);
         let inputs: Vec<PathBuf> = files.map(PathBuf::from).collect();
         (args.run.export.iter()).try_for_each(|out| check_target(out, &inputs))?;
     }
@@ -42,8 +44,9 @@ pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
         false => Existing::Keep,
     };
     Mesher::check_path(&path, existing)?;
-    let surface = input::load(
+    let surface = input::load_with(
         &args.surfaces,
+        &args.sheets,
         Space::Capped(settings.cap()?, &path),
         console,
     )?;

@@ -66,6 +66,7 @@ pub fn selection(args: &QueryArgs, inquiry: &mut QuerySession) -> Result<Selecti
         solids: solids(args)?,
         inside: args.inside,
         touching_surface: args.touching_surface,
+        touching_sheet: args.touching_sheet,
         ..Selection::default()
     };
     if args.inside && selection.solids.is_empty() {

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde_json::json;
 
-use super::args::RefineSurfaceArgs;
+use super::args::{RefineSurfaceArgs, SheetArgs};
 use super::console::Console;
 use super::failure::Failure;
 use super::input::{self, Space};
@@ -20,6 +20,7 @@ pub fn run(args: &RefineSurfaceArgs, console: &Console) -> Result<u8, Failure> {
     }
     let input = input::load_valid(
         std::slice::from_ref(&args.surface),
+        &SheetArgs::default(),
         Space::Boundless,
         console,
     )?;

@@ -2,7 +2,7 @@
 
 use std::fs::File;
 use std::io::{BufRead, BufReader};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
@@ -38,6 +38,13 @@ fn copy(file: &Path, console: &Console) -> std::io::Result<()> {
     }
 }
 
+/// The file for the sheets of a surface in `file`.
+fn beside(file: &Path) -> PathBuf {
+    let stem = file.file_stem().unwrap_or_default().to_string_lossy();
+    let end = file.extension().unwrap_or_default().to_string_lossy();
+    file.with_file_name(format!("{stem}_sheets.{end}"))
+}
+
 pub fn run(args: &SampleArgs, console: &Console) -> Result<u8, Failure> {
     let word = if args.sample.starts_with(PREFIX) {
         args.sample.clone()
@@ -54,7 +61,18 @@ pub fn run(args: &SampleArgs, console: &Console) -> Result<u8, Failure> {
     }
     check_target(&args.output, &[])?;
     let surface = input::load(&[word], Space::Boundless, console)?.inner;
-    write::surface(&surface, &args.output)?;
+    if surface.has_sheets() {
+        let sheets = beside(&args.output);
+        check_target(&sheets, &[])?;
+        write::surface(&surface.part(true), &sheets)?;
+        write::surface(&surface.part(false), &args.output)?;
+        let (shell, sheets) = (args.output.display(), sheets.display());
+        console.note(&format!(
+            "its sheets are in {sheets}: `tetdb mesh {shell} --embed {sheets}`"
+        ));
+    } else {
+        write::surface(&surface, &args.output)?;
+    }
     let (triangles, vertices) = (surface.n_triangles(), surface.n_vertices());
     if console.is_json() {
         let file = args.output.display().to_string();

@@ -15,9 +15,14 @@ pub struct Facet {
     pub label: u32,
     /// Number of the triangle in the input.
     pub input: u64,
-    /// Region on the side the normal points to, then on the other; 0 is outside or empty.
+    /// Region on the side the normal points to, then on the other; 0 is outside or empty. The same region on both sides: a sheet.
+    ///
+    /// Before regions are colored the second is [`SHEET`] for a triangle of a sheet, else 0.
     pub regions: [u32; 2],
 }
+
+/// What a facet of a sheet has in place of its second region before regions are colored.
+pub const SHEET: u32 = 1;
 
 /// A face on an interface, and of which cut.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -11,7 +11,7 @@ mod vertices;
 
 pub use anatomy::{FaceRef, Tet};
 pub use cursor::Mesh;
-pub use faces::{Facet, InterfaceFace};
+pub use faces::{Facet, InterfaceFace, SHEET};
 pub use renumber::{Workspace, renumber};
 pub use scan::{Scan, scan_parts, tets_of_page};
 pub use state::{MESH_STATE_WORDS, MeshState, dense, next_id, sparse};

@@ -2,6 +2,7 @@ use thiserror::Error;
 
 use super::work::HelperFailure;
 use crate::boundary::BoundaryError;
+use crate::geom::Point;
 use crate::sealed::SealedError;
 use crate::sizing::SizingError;
 use crate::storage::StorageError;
@@ -45,6 +46,20 @@ pub enum PipelineError {
         option: &'static str,
         /// The text it was given.
         found: String,
+    },
+    /// A sheet lies where there will be no tetrahedra.
+    #[error(
+        "{n} triangles of sheets lie where nothing is filled, the first is triangle {triangle} of {label:?}"
+    )]
+    SheetOutside {
+        /// The first such triangle.
+        triangle: u32,
+        /// Its label.
+        label: String,
+        /// Its middle.
+        at: Point,
+        /// How many there are.
+        n: u64,
     },
     /// The sizes of a file were not handed in.
     #[error("the sizes of {file} must be read before the mesh is begun")]

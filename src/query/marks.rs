@@ -5,7 +5,7 @@ use super::{QueryError, QuerySession};
 use crate::sealed::SealedError;
 use crate::storage::{Lease, check_cancelled};
 use crate::store::StoreError;
-use tetdb_schema::record::NO_TET;
+use tetdb_schema::record::{NO_TET, SealedFacet};
 
 /// A bit for each tetrahedron of a sub-domain.
 pub(crate) struct Marks {
@@ -55,15 +55,22 @@ impl QuerySession {
     ) -> Result<Option<Marks>, QueryError> {
         let mut marks = None;
         if let Some(labels) = &selection.labels {
-            marks = Some(self.on_labels(rank, labels)?);
+            marks = Some(self.on_facets(rank, |facet| labels.contains(&facet.label))?);
+        }
+        let only = |marks: &mut Option<Marks>, found: Marks| match marks {
+            Some(marks) => marks.and(&found),
+            None => *marks = Some(found),
+        };
+        if selection.touching_sheet {
+            // A triangle with one filled region on both sides parts nothing.
+            let is_sheet = |facet: &SealedFacet| facet.regions[0] == facet.regions[1];
+            let found = self.on_facets(rank, is_sheet)?;
+            only(&mut marks, found);
         }
         if let Some(pair) = selection.interface {
             let other = if pair[0] == rank { pair[1] } else { pair[0] };
             let faces = self.on_interface(rank, other)?;
-            match &mut marks {
-                Some(marks) => marks.and(&faces),
-                None => marks = Some(faces),
-            }
+            only(&mut marks, faces);
         }
         Ok(marks)
     }
@@ -77,14 +84,18 @@ impl QuerySession {
         })
     }
 
-    fn on_labels(&mut self, rank: u32, labels: &[u32]) -> Result<Marks, QueryError> {
+    fn on_facets(
+        &mut self,
+        rank: u32,
+        is_meant: impl Fn(&SealedFacet) -> bool,
+    ) -> Result<Marks, QueryError> {
         let mut marks = self.blank(rank)?;
         for chunk in 0..self.part(rank)?.subdomain.row().chunks[2] {
             check_cancelled();
             self.count_faces();
             let part = &mut self.part(rank)?.subdomain;
             for facet in part.facet_chunk(chunk)?.records {
-                if !labels.contains(&facet.label) {
+                if !is_meant(&facet) {
                     continue;
                 }
                 for tet in facet.tets.into_iter().filter(|&t| t != NO_TET) {

@@ -26,6 +26,8 @@ pub struct Selection {
     pub labels: Option<Vec<u32>>,
     /// They have a vertex of the input.
     pub touching_surface: bool,
+    /// They have a face on a sheet.
+    pub touching_sheet: bool,
     /// They have a face on the interface of these two sub-domains.
     pub interface: Option<[u32; 2]>,
     /// They share a vertex, an edge or a face with these.

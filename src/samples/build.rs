@@ -45,6 +45,18 @@ impl Builder {
         self.sample.labels.push(label);
     }
 
+    /// Triangles so far.
+    pub(super) fn n_triangles(&self) -> usize {
+        self.sample.triangles.len()
+    }
+
+    /// [`Builder::finish`]; the triangles from `first` on are sheets.
+    pub(super) fn finish_with_sheets(mut self, first: usize) -> Sample {
+        let n = self.sample.triangles.len();
+        self.sample.sheets = (0..n).map(|t| t >= first).collect();
+        self.finish()
+    }
+
     /// Ends a patch: later patches share no point with it.
     pub(super) fn close_seams(&mut self) {
         self.seam.clear();

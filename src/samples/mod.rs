@@ -4,7 +4,7 @@
 //! `balls,count=1000,seed=1,h=0.02`. The same word gives the same bits on every machine: only IEEE
 //! basic operations and square roots are used, and the random numbers are our own.
 //!
-//! Every surface is closed, without duplicate points, and oriented so that normals point out of the
+//! Every surface but for the sheets in it is closed, without duplicate points, and oriented so that normals point out of the
 //! parts that an odd number of shells separates from the outside: its signed volume is the volume
 //! that the parity rule fills.
 
@@ -13,6 +13,7 @@ mod boxes;
 mod build;
 mod caps;
 mod error;
+mod faults;
 mod grains;
 mod hull;
 mod knot;

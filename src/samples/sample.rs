@@ -7,7 +7,7 @@ use crate::surface::Surface;
 ///
 /// Shape: `labels` runs parallel to `triangles` and indexes `label_names`. Invariant: every point is
 /// used, no two points are equal, none has a −0.0, each edge is shared by two triangles in opposite
-/// directions; points are numbered in the order in which triangles first name them.
+/// directions, sheets set aside; points are numbered in the order in which triangles first name them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sample {
     /// Positions of the vertices.
@@ -18,6 +18,8 @@ pub struct Sample {
     pub labels: Vec<u32>,
     /// Names of the labels.
     pub label_names: Vec<String>,
+    /// Whether each triangle is part of a sheet in it; empty where none is.
+    pub sheets: Vec<bool>,
 }
 
 impl From<Sample> for Surface {
@@ -28,6 +30,7 @@ impl From<Sample> for Surface {
             triangles: sample.triangles,
             labels: sample.labels,
             label_names: sample.label_names,
+            sheets: sample.sheets,
             ..Self::default()
         }
     }

@@ -2,6 +2,7 @@
 
 use super::balls::Balls;
 use super::caps::Caps;
+use super::faults::Faults;
 use super::grains::Grains;
 use super::needles::Needles;
 use super::shells::{ShellKind, make_shells};
@@ -16,7 +17,7 @@ use std::str::FromStr;
 pub const PREFIX: &str = "sample:";
 /// The samples there are.
 pub const SAMPLES: &[&str] = &[
-    "balls", "box", "caps", "grains", "knot", "needles", "shells", "sphere", "steps",
+    "balls", "box", "caps", "faults", "grains", "knot", "needles", "shells", "sphere", "steps",
 ];
 
 /// A sample that can be made.
@@ -40,6 +41,8 @@ pub enum SampleKind {
     },
     /// A coplanar cap with many vertices, badly triangulated; see `caps.rs`.
     Caps(Caps),
+    /// A box with sheets in it; see `faults.rs`.
+    Faults(Faults),
     /// Grains that fill a box.
     Grains(Grains),
     /// A tube along a knot.
@@ -83,6 +86,7 @@ impl SampleSpec {
             "balls" => parse_balls(rest)?,
             "box" => parse_box(rest)?,
             "caps" => parse_caps(rest)?,
+            "faults" => parse_faults(rest)?,
             "grains" => parse_grains(rest)?,
             "knot" => {
                 let keys = Keys::new("knot", &["tube", "h"], rest)?;
@@ -120,6 +124,7 @@ impl SampleSpec {
             SampleKind::Balls(_) => "balls",
             SampleKind::Box { .. } => "box",
             SampleKind::Caps(_) => "caps",
+            SampleKind::Faults(_) => "faults",
             SampleKind::Grains(_) => "grains",
             SampleKind::Knot { .. } => "knot",
             SampleKind::Needles(_) => "needles",
@@ -143,6 +148,14 @@ impl SampleSpec {
             }
             SampleKind::Caps(Caps { count, seed }) => {
                 format!("{PREFIX}caps,count={count},seed={seed}")
+            }
+            SampleKind::Faults(Faults {
+                count,
+                seed,
+                cells,
+                shift,
+            }) => {
+                format!("{PREFIX}faults,count={count},seed={seed},cells={cells},shift={shift}")
             }
             SampleKind::Grains(Grains { count, seed, h }) => {
                 format!("{PREFIX}grains,count={count},seed={seed},h={h}")
@@ -175,6 +188,7 @@ impl SampleSpec {
             SampleKind::Balls(balls) => balls.make(),
             SampleKind::Box { sides, h } => boxes::make_box(*sides, *h),
             SampleKind::Caps(caps) => caps.make(),
+            SampleKind::Faults(faults) => faults.make(),
             SampleKind::Grains(grains) => grains.make(),
             SampleKind::Knot { tube, h } => knot::make_knot(*tube, *h),
             SampleKind::Needles(needles) => needles.make(),
@@ -221,6 +235,21 @@ fn parse_caps(rest: &str) -> Result<SampleKind, SampleError> {
     let count = keys.number("count", 60, 3, 20_000)?;
     let seed = keys.number("seed", 1, 0, u64::MAX)?;
     Ok(SampleKind::Caps(Caps { count, seed }))
+}
+
+fn parse_faults(rest: &str) -> Result<SampleKind, SampleError> {
+    let keys = Keys::new("faults", &["count", "seed", "cells", "shift"], rest)?;
+    let count = keys.number("count", 12, 1, 100_000)?;
+    let seed = keys.number("seed", 1, 0, u64::MAX)?;
+    let cells = keys.number("cells", 8, 2, 4000)?;
+    // Beyond this triangles of two sides could meet.
+    let shift = keys.number("shift", 0.1, 0.0, 0.15)?;
+    Ok(SampleKind::Faults(Faults {
+        count,
+        seed,
+        cells,
+        shift,
+    }))
 }
 
 fn parse_needles(rest: &str) -> Result<SampleKind, SampleError> {

@@ -43,7 +43,21 @@ pub enum SurfaceError {
     },
 }
 
+/// Vertices and triangles of a surface at most: ids keep two bits free in the mesh.
+const COUNT_MAX: usize = 1 << 30;
+
 impl SurfaceError {
+    /// Refuses more of `what` than can be numbered.
+    pub(super) fn check_size(what: &'static str, n: usize) -> Result<(), Self> {
+        match n <= COUNT_MAX {
+            true => Ok(()),
+            false => Err(Self::TooLarge {
+                what,
+                limit: COUNT_MAX,
+            }),
+        }
+    }
+
     /// The word for this error.
     pub fn code(&self) -> &'static str {
         match self {

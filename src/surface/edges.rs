@@ -17,6 +17,8 @@ pub struct Closedness {
     pub n_edges: usize,
     /// Triangle and vertices (in its direction) of each edge with one triangle only.
     pub open: Vec<(u32, [u32; 2])>,
+    /// Edges with one triangle that is part of a sheet, where the sheet ends inside.
+    pub n_free: usize,
     /// Connected groups of open edges: the rims of the holes.
     pub n_open_loops: usize,
     /// Edges with three or more facets.
@@ -178,7 +180,18 @@ impl Facets {
         let mut parts = Groups::new(surface.n_triangles());
         self.each_edge(|uses| {
             found.n_edges += 1;
+            let mut of_shells = Vec::new();
+            let uses = match surface.has_sheets() {
+                false => uses,
+                true => {
+                    found.n_free +=
+                        usize::from(matches!(uses, [u] if surface.is_sheet(u.triangle())));
+                    of_shells.extend(uses.iter().filter(|u| !surface.is_sheet(u.triangle())));
+                    &of_shells[..]
+                }
+            };
             match uses {
+                [] => {}
                 [only] => found.open.push((only.triangle(), only.vertices(surface))),
                 [a, b] => found.n_inconsistent += usize::from(same_direction(surface, *a, *b)),
                 more => {
@@ -229,6 +242,7 @@ fn repetitions(
         }
     }
     let (mut duplicates, mut two_sided) = (Vec::new(), Vec::new());
+    // A wall may be given from both sides, a sheet is given once, and not where a shell is.
     // Of the set at hand: its vertices, the first triangle, the first one of the other orientation.
     let mut set = None::<([u32; 3], u32, Option<u32>)>;
     for key in sorter.finish().unwrap_or_else(|e| raise(e)) {
@@ -242,7 +256,8 @@ fn repetitions(
         };
         is_left_out[t as usize] = true;
         let [known, new] = [*first, t].map(|t| is_odd(surface.triangles[t as usize]));
-        match (known == new, *opposite) {
+        let with_sheet = surface.is_sheet(*first) || surface.is_sheet(t);
+        match (known == new || with_sheet, *opposite) {
             (true, _) => duplicates.push([*first, t]),
             (false, Some(earlier)) => duplicates.push([earlier, t]),
             (false, None) => {

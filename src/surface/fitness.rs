@@ -163,13 +163,16 @@ fn shape(surface: &Surface, t: u32) -> Sums {
 /// Volume enclosed, each part counted positive.
 fn volume(surface: &Surface) -> f64 {
     let mut parts = Groups::new(surface.n_vertices());
-    for [a, b, c] in &surface.triangles {
+    let of_shells = |t: &u32| !surface.is_sheet(*t);
+    for t in (0..surface.n_triangles() as u32).filter(of_shells) {
+        let [a, b, c] = &surface.triangles[t as usize];
         parts.join(*a, *b);
         parts.join(*b, *c);
     }
     let origin = surface.bounds().low;
     let mut volumes = vec![0.0f64; surface.n_vertices()];
-    for (t, triangle) in (0u32..).zip(&surface.triangles) {
+    for t in (0..surface.n_triangles() as u32).filter(of_shells) {
+        let triangle = surface.triangles[t as usize];
         let [a, b, c] = surface.corners(t).map(|p| p - origin);
         volumes[parts.root(triangle[0]) as usize] += a.dot(b.cross(c)) / 6.0;
     }

@@ -5,7 +5,7 @@
 //! (how two triangles touch), `boxes`, `broad` and `stars` (which pairs to look at), `validate` (all of it together),
 //! `defect` (what can be wrong and what to do about it), `boundary_loops` (where it is open), `near` and `repair`
 //! (mending on demand), `fitness` (what mesh its triangles allow), `split` (finer triangles of the same surface),
-//! `seek` (distances and what lies above), `volumes` (what is enclosed), `seeds` (what points say of volumes).
+//! `seek` (distances and what lies above), `volumes` (what is enclosed), `seeds` (what points say of volumes), `sheets` (embedded triangles with volume on both sides).
 //!
 //! Is not: file formats (`io`), which volumes are filled (`boundary`).
 
@@ -22,6 +22,7 @@ mod point_tree;
 mod repair;
 mod seeds;
 mod seek;
+mod sheets;
 mod split;
 mod stars;
 mod triangles;

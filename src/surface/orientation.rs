@@ -2,6 +2,7 @@
 
 use super::Surface;
 use super::edges::{Facets, Groups, same_direction};
+use super::sheets::each_pair;
 use crate::storage::ScratchSpace;
 
 /// What [`orient_alike`] did.
@@ -86,10 +87,10 @@ fn patches_of_one_way(surface: &Surface, facets: &mut Facets) -> Option<usize> {
     let mut patches = Groups::new(surface.n_triangles());
     let mut is_one_way = true;
     facets.each_edge(|uses| {
-        if let [a, b] = uses {
-            is_one_way &= !same_direction(surface, *a, *b);
+        each_pair(surface, uses, |a, b| {
+            is_one_way &= !same_direction(surface, a, b);
             patches.join(a.triangle(), b.triangle());
-        }
+        });
     });
     let roots = (0u32..).zip(&facets.is_left_out);
     let roots = roots.filter(|(t, left_out)| !**left_out && patches.root(*t) == *t);
@@ -128,11 +129,11 @@ impl Link {
 fn links(surface: &Surface, facets: &mut Facets) -> Vec<[Option<Link>; 3]> {
     let mut links = vec![[None; 3]; surface.n_triangles()];
     facets.each_edge(|uses| {
-        if let [a, b] = uses {
-            let unlike = u32::from(same_direction(surface, *a, *b));
+        each_pair(surface, uses, |a, b| {
+            let unlike = u32::from(same_direction(surface, a, b));
             links[a.triangle() as usize][a.corner()] = Some(Link(b.triangle() << 1 | unlike));
             links[b.triangle() as usize][b.corner()] = Some(Link(a.triangle() << 1 | unlike));
-        }
+        });
     });
     links
 }

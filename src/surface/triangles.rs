@@ -25,6 +25,8 @@ pub struct Surface {
     pub label_names: Vec<String>,
     /// The files read, in order.
     pub files: Vec<SourceFile>,
+    /// Whether each triangle is part of an embedded sheet; empty where none is.
+    pub sheets: Vec<bool>,
     /// What a reader found worth telling, in order.
     pub notes: Vec<Note>,
     /// What the files say of volumes, in order.
@@ -79,6 +81,7 @@ impl Surface {
         self.points.shrink_to_fit();
         self.triangles.shrink_to_fit();
         self.labels.shrink_to_fit();
+        self.sheets.shrink_to_fit();
     }
 
     /// Bytes of memory held, for the budget.
@@ -91,6 +94,7 @@ impl Surface {
         self.points.capacity() * size_of::<Point>()
             + self.triangles.capacity() * size_of::<[u32; 3]>()
             + self.labels.capacity() * size_of::<u32>()
+            + self.sheets.capacity()
             + names
     }
 }

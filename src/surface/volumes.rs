@@ -66,6 +66,9 @@ impl Volumes {
             sides.join(2 * a + 1, 2 * b);
             shells.join(a, b);
         }
+        for t in (0..n as u32).filter(|&t| surface.is_sheet(t)) {
+            sides.join(2 * t, 2 * t + 1);
+        }
         let outside = 2 * n as u32;
         let lines = lines(surface, &facets, &mut shells);
         drop(shells);
@@ -79,7 +82,7 @@ impl Volumes {
             }
             sides.join(below, outside);
         }
-        let mut volumes = numbered(n, &mut sides);
+        let mut volumes = numbered(surface, &mut sides);
         drop(sides);
         facets.each_edge(|uses| volumes.add_angles(surface, uses));
         volumes
@@ -129,7 +132,7 @@ impl Volumes {
         let depth = |v: u32| depths[v as usize];
         let mut found = BTreeSet::new();
         for (&[front, back], _) in
-            (self.of_side.iter().zip(&surface.labels)).filter(|(_, l)| **l == label)
+            (self.of_side.iter().zip(&surface.labels)).filter(|([f, b], l)| **l == label && f != b)
         {
             let deepest = depth(front).max(depth(back));
             found.extend([front, back].into_iter().filter(|&v| depth(v) == deepest));
@@ -150,7 +153,11 @@ impl Volumes {
         for [this, next] in pairs_around(surface, uses) {
             let side = this.side_after(surface) as usize;
             let volume = self.of_side[side / 2][side % 2];
-            self.angles[volume as usize] += this.angle_to(next, surface);
+            // Around the end of a sheet there is one volume.
+            self.angles[volume as usize] += match uses.len() {
+                1 => std::f64::consts::TAU,
+                _ => this.angle_to(next, surface),
+            };
         }
     }
 
@@ -253,14 +260,16 @@ fn lines(surface: &Surface, facets: &Facets, shells: &mut Groups) -> Vec<Point> 
     best.values().map(middle).collect()
 }
 
-fn numbered(n: usize, sides: &mut Groups) -> Volumes {
-    let mut numbers = BTreeMap::from([(sides.root(2 * n as u32), OUTSIDE)]);
-    // Of one triangle the volume in front comes first, as the mesh's regions do.
-    let mut number = |side: u32| {
+fn numbered(surface: &Surface, sides: &mut Groups) -> Volumes {
+    let n = surface.n_triangles() as u32;
+    let mut numbers = BTreeMap::from([(sides.root(2 * n), OUTSIDE)]);
+    // Of one triangle the volume in front comes first, as the mesh's regions do; sheets bound none.
+    for side in (0..2 * n).filter(|side| !surface.is_sheet(side / 2)) {
         let next = numbers.len() as u32;
-        *numbers.entry(sides.root(side)).or_insert(next)
-    };
-    let of_side = (0..n as u32).map(|t| [number(2 * t), number(2 * t + 1)]);
+        numbers.entry(sides.root(side)).or_insert(next);
+    }
+    let mut number = |side: u32| numbers.get(&sides.root(side)).copied().unwrap_or(OUTSIDE);
+    let of_side = (0..n).map(|t| [number(2 * t), number(2 * t + 1)]);
     let of_side = of_side.collect();
     let n_volumes = numbers.len();
     Volumes {

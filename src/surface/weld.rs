@@ -5,9 +5,6 @@ use std::collections::HashMap;
 use super::{Note, NoteKind, Seed, SourceFile, Surface, SurfaceError};
 use crate::geom::Point;
 
-/// Vertices and triangles of a surface at most: ids keep two bits free in the mesh.
-const COUNT_MAX: usize = 1 << 30;
-
 /// Collects triangles from one file after the other and welds vertices with identical bits.
 ///
 /// Between [`begin_file`](Self::begin_file) and [`end_file`](Self::end_file) triangles name the
@@ -63,12 +60,7 @@ impl SurfaceBuilder {
     /// # Errors
     /// [`SurfaceError::TooLarge`] beyond 2^30 vertices.
     pub fn vertex(&mut self, p: Point) -> Result<(), SurfaceError> {
-        if self.file2vert.len() >= COUNT_MAX {
-            return Err(SurfaceError::TooLarge {
-                what: "vertices",
-                limit: COUNT_MAX,
-            });
-        }
+        SurfaceError::check_size("vertices", self.file2vert.len() + 1)?;
         let before = self.surface.points.len();
         let vert = self.weld(p)?;
         self.n_welded += u64::from((vert as usize) < before);
@@ -79,12 +71,7 @@ impl SurfaceBuilder {
     fn weld(&mut self, p: Point) -> Result<u32, SurfaceError> {
         debug_assert!(p.is_finite(), "{p:?}");
         let p = p + Point::ZERO; // -0.0 becomes +0.0
-        if self.surface.points.len() >= COUNT_MAX {
-            return Err(SurfaceError::TooLarge {
-                what: "vertices",
-                limit: COUNT_MAX,
-            });
-        }
+        SurfaceError::check_size("vertices", self.surface.points.len() + 1)?;
         Ok(self.table.find_or_add(p, &mut self.surface.points))
     }
 
@@ -104,12 +91,7 @@ impl SurfaceBuilder {
     /// # Errors
     /// [`SurfaceError::TooLarge`] beyond 2^30 triangles.
     pub fn triangle(&mut self, corners: [u32; 3], label: u32) -> Result<(), SurfaceError> {
-        if self.surface.triangles.len() >= COUNT_MAX {
-            return Err(SurfaceError::TooLarge {
-                what: "triangles",
-                limit: COUNT_MAX,
-            });
-        }
+        SurfaceError::check_size("triangles", self.surface.triangles.len() + 1)?;
         self.surface.triangles.push(corners);
         self.surface.labels.push(label);
         Ok(())
@@ -241,7 +223,7 @@ pub(super) fn drop_unused_points(surface: &mut Surface) -> u64 {
 }
 
 /// Keeps the labels that triangles carry, in their order.
-fn drop_unused_labels(surface: &mut Surface) {
+pub(super) fn drop_unused_labels(surface: &mut Surface) {
     let mut used = vec![false; surface.label_names.len()];
     for &label in &surface.labels {
         used[label as usize] = true;
@@ -269,13 +251,24 @@ fn drop_unused_labels(surface: &mut Surface) {
 
 /// Open-addressing table from coordinate bits to vertex ids; at most half full.
 #[derive(Default)]
-struct PointTable {
+pub(super) struct PointTable {
     /// Vertex id + 1; 0 is free. The length is a power of two.
     slots: Vec<u32>,
 }
 
 impl PointTable {
-    fn find_or_add(&mut self, p: Point, points: &mut Vec<Point>) -> u32 {
+    /// Of points that are all different.
+    pub(super) fn of(points: &[Point]) -> Self {
+        // Half of what it grows to.
+        let len = (points.len() + 1).next_power_of_two();
+        let mut table = Self {
+            slots: vec![0; len],
+        };
+        table.grow(points);
+        table
+    }
+
+    pub(super) fn find_or_add(&mut self, p: Point, points: &mut Vec<Point>) -> u32 {
         if points.len() * 2 >= self.slots.len() {
             self.grow(points);
         }

@@ -27,6 +27,8 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("task-file", "tasks.rs"),
     ("invalid-mesh", "below"),
     ("contradicting-orientation", "walls.rs"),
+    ("bad-seed", "seeds.rs"),
+    ("sheet-outside", "sheets.rs"),
 ];
 
 /// Words no test provokes, and why.

@@ -18,6 +18,7 @@ mod report;
 mod resaturate;
 mod same_mesh;
 mod seeds;
+mod sheets;
 mod shell;
 mod silent;
 mod size_files;

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::{RunArgs, ShapeArgs};
+use super::{RunArgs, ShapeArgs, SheetArgs};
 
 #[derive(Debug, clap::Args)]
 #[command(
@@ -16,6 +16,8 @@ pub struct MeshArgs {
     /// The store to make [default: the surface's name with .tetdb, here]
     #[arg(short, long, value_name = "STORE")]
     pub output: Option<PathBuf>,
+    #[command(flatten)]
+    pub sheets: SheetArgs,
     #[command(flatten)]
     pub shape: ShapeArgs,
     /// Replace the store if it is there
@@ -43,6 +45,8 @@ pub struct EstimateArgs {
     /// Where the store would be [default: here]
     #[arg(short, long, value_name = "STORE")]
     pub output: Option<PathBuf>,
+    #[command(flatten)]
+    pub sheets: SheetArgs,
     #[command(flatten)]
     pub shape: ShapeArgs,
     /// Most memory the run would hold [default: 60 % of what is free]

@@ -19,7 +19,7 @@ pub use resaturate::ResaturateArgs;
 pub use shape::{Optimize, Regions, ShapeArgs, SizeArgs};
 pub use show::{ColorBy, CompletionsArgs, ManArgs, ReportArgs, SnapshotArgs};
 pub use store::{CompareArgs, ExportArgs, StoreArgs, VerifyArgs};
-pub use surface::{CheckArgs, RefineSurfaceArgs, SampleArgs};
+pub use surface::{CheckArgs, RefineSurfaceArgs, SampleArgs, SheetArgs};
 pub use tasks::{GatherArgs, PlanArgs, WorkArgs};
 
 /// Tetrahedral meshes of any size in a database, every input triangle kept.

@@ -50,6 +50,9 @@ pub struct QueryArgs {
     /// With a vertex of the input
     #[arg(long)]
     pub touching_surface: bool,
+    /// With a face on an embedded sheet
+    #[arg(long)]
+    pub touching_sheet: bool,
     /// With a face on the interface of two sub-domains
     #[arg(long, value_name = "A,B")]
     pub interface: Option<String>,
@@ -95,7 +98,7 @@ pub struct QueryArgs {
 }
 
 /// What makes no sense together with points.
-const PLACES: [&str; 16] = [
+const PLACES: [&str; 17] = [
     "boxes",
     "sphere",
     "plane",
@@ -104,6 +107,7 @@ const PLACES: [&str; 16] = [
     "region",
     "label",
     "touching_surface",
+    "touching_sheet",
     "interface",
     "condition",
     "tet",

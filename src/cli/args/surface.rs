@@ -2,6 +2,20 @@
 
 use std::path::PathBuf;
 
+/// Sheets inside the surface.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct SheetArgs {
+    /// A file of sheets inside, open or closed: their triangles become faces with tetrahedra on both sides; may be repeated
+    #[arg(long, value_name = "FILE")]
+    pub embed: Vec<String>,
+    /// What an embedded file is called [default: its own name]; may be repeated
+    #[arg(long, value_name = "FILE=NAME", requires = "embed")]
+    pub name: Vec<String>,
+    /// Take for sheets what of the surface is not closed
+    #[arg(long)]
+    pub allow_open: bool,
+}
+
 /// What is wrong with a surface, and what mesh it allows. Nothing is changed unless --repair is given.
 #[derive(Debug, clap::Args)]
 #[command(
@@ -13,6 +27,8 @@ pub struct CheckArgs {
     /// Surface files, a sample such as sample:balls,count=100, or - for the standard input
     #[arg(required = true, value_name = "SURFACE")]
     pub surfaces: Vec<String>,
+    #[command(flatten)]
+    pub sheets: SheetArgs,
     /// Write the defective triangles to this .vtu file, the kind of defect as cell data
     #[arg(long, value_name = "FILE")]
     pub write_bad: Option<PathBuf>,
@@ -42,6 +58,7 @@ pub struct CheckArgs {
   balls   count, seed, h      a cube with empty balls of many sizes in it
   box     x, y, z, h          sides of a box
   caps    count, seed         a column with flat ends of many corners, badly cut into triangles
+  faults  count, seed, cells, shift  a box with sheets in it that cut each other and end inside
   grains  count, seed, h      disjoint convex polyhedra in a box; mesh them with --regions all
   knot    tube, h             a knotted tube
   needles count, holes, seed  a fan, slats and a perforated plate, as CAD programs write them
@@ -51,7 +68,7 @@ pub struct CheckArgs {
 h is the length of the edges."
 )]
 pub struct SampleArgs {
-    /// NAME,key=value,... with the names balls, box, caps, grains, knot, needles, shells, sphere, steps
+    /// NAME,key=value,... with the names balls, box, caps, faults, grains, knot, needles, shells, sphere, steps
     #[arg(value_name = "SAMPLE")]
     pub sample: String,
     /// The file to write: .stl (text), .off, .obj or .ply, all exact; - is the standard output

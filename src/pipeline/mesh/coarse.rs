@@ -3,7 +3,7 @@
 use crate::boundary::{RecoveryReport, Regions, fill_regions, recover};
 use crate::delaunay::{Kernel, KernelStats, Rejected, enclose, insertion_key};
 use crate::geom::HilbertFrame;
-use crate::mesh::{Facet, Mesh, VertexTag};
+use crate::mesh::{Facet, Mesh, SHEET, VertexTag};
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::Options;
 use crate::pipeline::progress::{Event, Watcher};
@@ -133,7 +133,7 @@ pub(crate) fn triangulate<P: Pages>(
             vertices: corners.map(|c| number.get(c as usize)),
             label,
             input: n as u64,
-            regions: [0, 0],
+            regions: [0, u32::from(surface.is_sheet(n as u32)) * SHEET],
         });
     }
     Ok(kernel.stats)

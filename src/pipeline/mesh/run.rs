@@ -160,6 +160,9 @@ pub(crate) struct Run<'a> {
     pub slots: Option<usize>,
 }
 
+/// One order at a time by other processes: they, and which of theirs it is.
+type Slot = (Arc<dyn Helpers>, usize);
+
 /// A finished sub-domain, and how it went where this process meshed it.
 type SubdomainDone = (Box<SubdomainReceipt>, Option<FineReport>);
 
@@ -388,7 +391,7 @@ impl<'a> Run<'a> {
     }
 
     /// Other processes that share the work, one entry for each order they do at once. Effects: they begin.
-    pub(crate) fn helpers(&mut self) -> Result<Vec<(Arc<dyn Helpers>, usize)>, PipelineError> {
+    pub(crate) fn helpers(&mut self) -> Result<Vec<Slot>, PipelineError> {
         let Some(helpers) = self.options.hands.0.clone() else {
             return Ok(Vec::new());
         };

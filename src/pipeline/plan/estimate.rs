@@ -170,6 +170,7 @@ fn prepare_in(
     let seeker = Seeker::of(surface, scratch, |_| true);
     let volumes = Volumes::of_in(&seeker, scratch);
     let chosen = chosen(&seeker, &volumes, options)?;
+    refuse_outer_sheets(surface, &volumes, &chosen)?;
     let filled: Vec<bool> = (0..volumes.n_volumes)
         .map(|v| chosen.volumes.contains(&v))
         .collect();
@@ -211,6 +212,27 @@ fn chosen(seeker: &Seeker, volumes: &Volumes, options: &Options) -> Result<Fille
     let (end, walls) = (volumes.n_volumes, volumes.walls());
     let chosen = rule.policy.filled(OUTSIDE, end, &walls)?;
     Ok(rule.apply(chosen, OUTSIDE, end, |p| volumes.at(seeker, p))?)
+}
+
+/// Errors: a sheet where nothing is filled.
+fn refuse_outer_sheets(
+    surface: &Surface,
+    volumes: &Volumes,
+    chosen: &Filled,
+) -> Result<(), PipelineError> {
+    let is_outer =
+        |&t: &u32| surface.is_sheet(t) && !chosen.volumes.contains(&volumes.of_side[t as usize][0]);
+    let mut outer = (0..surface.n_triangles() as u32).filter(is_outer);
+    let Some(triangle) = outer.next() else {
+        return Ok(());
+    };
+    let [a, b, c] = surface.corners(triangle);
+    Err(PipelineError::SheetOutside {
+        triangle,
+        label: surface.label_name(triangle).to_owned(),
+        at: (a + b + c) / 3.0,
+        n: 1 + outer.count() as u64,
+    })
 }
 
 /// What is worth knowing of seeds: where some regions have a name, how many have none; how many of the `n` volumes have no seed.

@@ -1,0 +1,66 @@
+//! Taking away a vertex that is on no facet.
+
+use std::collections::HashSet;
+
+use super::space::Space;
+use super::walk::{ball, swapped};
+use crate::mesh::anatomy::EDGES;
+
+/// Takes free vertex `x` away if one of its neighbors can stand for it: the best one does.
+pub(super) fn remove_free<S: Space>(s: &mut S, x: u32) -> bool {
+    let ball = ball(s, x);
+    let link: HashSet<u32> = ball
+        .iter()
+        .flat_map(|&t| s.tet(t).vertices())
+        .filter(|&v| v != x)
+        .collect();
+    let mut link: Vec<u32> = link.into_iter().collect();
+    link.sort_unstable();
+    let mut best: Option<(f64, Vec<[u32; 4]>)> = None;
+    for u in link {
+        let Some(quads) = moved(s, x, u, &ball) else {
+            continue;
+        };
+        let worst = quads
+            .iter()
+            .map(|&q| flatness(s, q))
+            .fold(f64::INFINITY, f64::min);
+        if best.as_ref().is_none_or(|b| worst > b.0) {
+            best = Some((worst, quads));
+        }
+    }
+    match best {
+        Some((worst, quads)) if worst > 0.0 => {
+            s.replace(&ball, &quads);
+            true
+        }
+        _ => false,
+    }
+}
+
+/// The ball with `x` moved to its neighbor `u`, if all volumes stay positive.
+pub(super) fn moved<S: Space>(s: &mut S, x: u32, u: u32, ball: &[u32]) -> Option<Vec<[u32; 4]>> {
+    let mut quads = Vec::new();
+    for &t in ball {
+        let tet = s.tet(t);
+        if tet.local(u).is_none() {
+            let q = swapped(&tet, tet.local(x)?, u);
+            if s.orient(q) <= 0.0 {
+                return None;
+            }
+            quads.push(q);
+        }
+    }
+    Some(quads)
+}
+
+/// Volume over cubed longest edge.
+fn flatness<S: Space>(s: &mut S, q: [u32; 4]) -> f64 {
+    let volume = s.orient(q);
+    let p = q.map(|v| s.position(v));
+    let longest = EDGES
+        .iter()
+        .map(|&[i, j]| p[i].distance(p[j]))
+        .fold(0.0, f64::max);
+    volume / (longest * longest * longest)
+}
