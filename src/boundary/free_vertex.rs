@@ -7,7 +7,9 @@ use super::walk::{ball, swapped};
 use crate::mesh::anatomy::EDGES;
 
 /// Takes free vertex `x` away if one of its neighbors can stand for it: the best one does.
-pub(super) fn remove_free<S: Space>(s: &mut S, x: u32) -> bool {
+///
+/// No tetrahedron may become flatter than `least`, and none flat.
+pub(super) fn remove_free<S: Space>(s: &mut S, x: u32, least: f64) -> bool {
     let ball = ball(s, x);
     let link: HashSet<u32> = ball
         .iter()
@@ -30,7 +32,7 @@ pub(super) fn remove_free<S: Space>(s: &mut S, x: u32) -> bool {
         }
     }
     match best {
-        Some((worst, quads)) if worst > 0.0 => {
+        Some((worst, quads)) if worst > 0.0 && worst >= least => {
             s.replace(&ball, &quads);
             true
         }
@@ -52,6 +54,13 @@ pub(super) fn moved<S: Space>(s: &mut S, x: u32, u: u32, ball: &[u32]) -> Option
         }
     }
     Some(quads)
+}
+
+/// The least flatness of a tetrahedron of `x`.
+pub(super) fn ball_flatness<S: Space>(s: &mut S, x: u32) -> f64 {
+    let quads: Vec<[u32; 4]> = ball(s, x).iter().map(|&t| s.tet(t).vertices()).collect();
+    let all = quads.into_iter().map(|q| flatness(s, q));
+    all.fold(f64::INFINITY, f64::min)
 }
 
 /// Volume over cubed longest edge.

@@ -43,6 +43,7 @@ mod space;
 mod star;
 mod suppress;
 mod target;
+mod tidy;
 mod turn;
 mod walk;
 mod wedge;

@@ -327,7 +327,7 @@ fn build<P: Pages>(
     }
     for v in 0..patch.n_vertices() {
         if patch.is_new(v) && patch.is_in_use(v) {
-            remove_free(patch, v);
+            remove_free(patch, v, 0.0);
         }
     }
     if patch.effort.exact {

@@ -12,6 +12,7 @@ use super::points::recover_by_points;
 use super::report::RecoveryReport;
 use super::space::{PagedSpace, Space, edge_key};
 use super::target::RecoveryTarget;
+use super::tidy::tidy;
 use super::turn::turn_segment;
 use crate::mesh::Mesh;
 use crate::storage::{Pages, check_cancelled};
@@ -42,6 +43,7 @@ pub fn recover<P: Pages>(mesh: &mut Mesh<P>) -> Result<RecoveryReport, BoundaryE
     report.flip_time = clock.elapsed();
     let clock = Instant::now();
     let troubles = recover_by_points(mesh, &mut missing, &mut report);
+    tidy(mesh, &mut report);
     report.point_time = clock.elapsed();
     match troubles.first() {
         None => Ok(report),

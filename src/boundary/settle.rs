@@ -42,7 +42,7 @@ impl<P: Pages> Patch<'_, P> {
                     continue;
                 }
                 self.thin_out(v);
-                if remove_free(self, v) {
+                if remove_free(self, v, 0.0) {
                     changed = true;
                     continue;
                 }

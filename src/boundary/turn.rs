@@ -20,7 +20,8 @@ use super::map::MissingFacets;
 use super::report::RecoveryReport;
 use super::space::{PagedSpace, Space, edge_key};
 use super::suppress::half_space;
-use super::walk::{EdgeRing, Exit, ball, crossings, edge_at, shell};
+use super::tidy::{rise, room};
+use super::walk::{EdgeRing, Exit, crossings, edge_at, shell};
 use crate::geom::{Point, orient};
 use crate::mesh::Mesh;
 use crate::storage::Pages;
@@ -36,9 +37,6 @@ const HALVES_MAX: i32 = 50;
 
 /// A place with less room than this, in units of the tetrahedra around it, is second choice.
 const ROOM_MIN: f64 = 1e-4;
-
-/// A move that gives less room than this many times the old is not worth it.
-const GAIN_MIN: f64 = 1.25;
 
 /// Turns edges until the segment `a b` is there, and protects it; takes away again what was added and is not needed.
 ///
@@ -160,7 +158,7 @@ impl<P: Pages> Turner<'_, '_, P> {
         free.retain(|&v| self.s.is_steiner(v));
         for v in free {
             if !self.remove(v) {
-                self.rise(v);
+                rise(self.s, v);
             }
         }
         let turn = self.plan(edge, a, b)?;
@@ -169,39 +167,13 @@ impl<P: Pages> Turner<'_, '_, P> {
 
     /// Takes away a vertex that nothing needs.
     fn remove(&mut self, v: u32) -> bool {
-        let removed = remove_free(self.s, v);
+        let removed = remove_free(self.s, v, 0.0);
         if removed {
             self.s.drop_steiner(v);
             self.balance -= 1;
             self.added.retain(|&a| a != v);
         }
         removed
-    }
-
-    /// Moves a free vertex to where it sees its ball best.
-    fn rise(&mut self, v: u32) {
-        let old = self.s.position(v);
-        let ball = ball(self.s, v);
-        let mut reach = 0.0f64;
-        let mut planes: Vec<HalfSpace> = Vec::new();
-        for &t in &ball {
-            let tet = self.s.tet(t);
-            let Some(i) = tet.local(v) else { continue };
-            let corners = tet.face(i).map(|u| self.s.position(u) - old);
-            reach = corners.iter().map(|c| c.length()).fold(reach, f64::max);
-            planes.extend(half_space(corners));
-        }
-        let Some(way) = center(&planes, reach) else {
-            return;
-        };
-        if room(&planes, way) <= GAIN_MIN * room(&planes, Point::ZERO) {
-            return;
-        }
-        self.s.0.set_point(v, old + way);
-        let quads: Vec<[u32; 4]> = ball.iter().map(|&t| self.s.tet(t).vertices()).collect();
-        if self.least_volume(&quads) <= 0.0 {
-            self.s.0.set_point(v, old);
-        }
     }
 
     /// Which edge `c d` becomes; `None` where it has to stay, or the four corners are not convex.
@@ -356,12 +328,6 @@ fn joined(ring: &[u32], c: u32, d: u32, p: u32) -> Vec<[u32; 4]> {
         quads.push([c, p, pair[0], pair[1]]);
     }
     quads
-}
-
-/// How far `at` is inside all half-spaces.
-fn room(planes: &[HalfSpace], at: Point) -> f64 {
-    let rooms = planes.iter().map(|h| h.offset - h.normal.dot(at));
-    rooms.fold(f64::INFINITY, f64::min)
 }
 
 /// Where the line through two points passes the line through two others, nearly.

@@ -1,0 +1,88 @@
+//! Steiner points at the end of recovery: those nobody needs go, the others move away from the planes they were put beside.
+
+use super::free_vertex::{ball_flatness, remove_free};
+use super::kernel::{HalfSpace, center};
+use super::report::RecoveryReport;
+use super::space::{PagedSpace, Space};
+use super::suppress::half_space;
+use super::walk::ball;
+use crate::geom::Point;
+use crate::mesh::{Mesh, VertexTag};
+use crate::storage::{Pages, check_cancelled};
+use std::collections::HashSet;
+
+/// Times all are visited: room grows by a factor each time.
+const ROUNDS_MAX: usize = 8;
+
+/// A move that gives less room than this many times the old is not worth it.
+const GAIN_MIN: f64 = 1.25;
+
+/// Visits the Steiner points until none goes or moves any more, a bounded number of times.
+pub(super) fn tidy<P: Pages>(mesh: &mut Mesh<P>, report: &mut RecoveryReport) {
+    if report.steiner == 0 {
+        return;
+    }
+    let steiner = |mesh: &mut Mesh<P>, v: u32| {
+        mesh.tet_of(v) != tetdb_schema::page::NONE
+            && mesh.vertex_attribute(v).0 == VertexTag::Steiner
+    };
+    let mut left: Vec<u32> = (0..mesh.n_vertices())
+        .filter(|&v| steiner(mesh, v))
+        .collect();
+    let none = HashSet::new();
+    for _ in 0..ROUNDS_MAX {
+        let mut changed = false;
+        left.retain(|&v| {
+            check_cancelled();
+            let mut s = PagedSpace(mesh, &none);
+            let flatness = ball_flatness(&mut s, v);
+            if remove_free(&mut s, v, flatness) {
+                s.drop_steiner(v);
+                report.steiner = report.steiner.saturating_sub(1);
+                changed = true;
+                return false;
+            }
+            changed |= rise(&mut s, v);
+            true
+        });
+        if !changed {
+            break;
+        }
+    }
+}
+
+/// Moves a free vertex to where it sees its ball best, if that gives it more room.
+pub(super) fn rise<P: Pages>(s: &mut PagedSpace<'_, P>, v: u32) -> bool {
+    let old = s.position(v);
+    let ball = ball(s, v);
+    let mut reach = 0.0f64;
+    let mut planes: Vec<HalfSpace> = Vec::new();
+    for &t in &ball {
+        let tet = s.tet(t);
+        let Some(i) = tet.local(v) else { continue };
+        let corners = tet.face(i).map(|u| s.position(u) - old);
+        reach = corners.iter().map(|c| c.length()).fold(reach, f64::max);
+        planes.extend(half_space(corners));
+    }
+    let Some(way) = center(&planes, reach) else {
+        return false;
+    };
+    if room(&planes, way) <= GAIN_MIN * room(&planes, Point::ZERO) {
+        return false;
+    }
+    s.0.set_point(v, old + way);
+    let holds = ball.iter().all(|&t| {
+        let q = s.tet(t).vertices();
+        s.orient(q) > 0.0
+    });
+    if !holds {
+        s.0.set_point(v, old);
+    }
+    holds
+}
+
+/// How far `at` is inside all half-spaces.
+pub(super) fn room(planes: &[HalfSpace], at: Point) -> f64 {
+    let rooms = planes.iter().map(|h| h.offset - h.normal.dot(at));
+    rooms.fold(f64::INFINITY, f64::min)
+}
