@@ -2,14 +2,11 @@
 
 use std::collections::HashSet;
 
-use super::flips::Flipper;
+use super::flips::{CROSSINGS_MAX, Flipper};
 use super::space::Space;
 use super::target::RecoveryTarget;
 use super::walk::{Exit, crossings, edge_at, find_edge, opposite, shell};
 use crate::mesh::FaceRef;
-
-/// A line that crosses more than this is not worth flipping for.
-const CROSSINGS_MAX: usize = 400;
 
 /// Where facet `a b c` stands.
 #[derive(Clone, Debug)]
@@ -131,7 +128,7 @@ impl<S: Space> Flipper<'_, S> {
         let mut is_paid = false;
         loop {
             self.keep();
-            let met = match crossings(self.s, a, b, CROSSINGS_MAX) {
+            let met = match crossings(self.s, a, b, self.crossings_max) {
                 Ok(met) if met.is_empty() => return Outcome::Recovered,
                 Ok(met) => met,
                 Err(Exit::Vertex(v)) => return Outcome::Touches(v),
@@ -186,6 +183,7 @@ impl<S: Space> Flipper<'_, S> {
                 return Outcome::Stuck;
             }
             let n = turning.len();
+            let crossings_max = self.crossings_max;
             let steps_max = NEUTRAL_MAX * n;
             let before = met.len();
             let turned = (0..n).any(|k| {
@@ -193,7 +191,7 @@ impl<S: Space> Flipper<'_, S> {
                 neutral < steps_max
                     && self.work > 0
                     && self.try_neutral(t, c, d, |s| {
-                        crossings(s, a, b, CROSSINGS_MAX).is_ok_and(|met| met.len() <= before)
+                        crossings(s, a, b, crossings_max).is_ok_and(|met| met.len() <= before)
                     })
             });
             if !turned {

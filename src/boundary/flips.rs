@@ -20,6 +20,9 @@ use crate::mesh::anatomy::EDGES;
 /// Larger rings are left alone: the search is cubic.
 const RING_MAX: usize = 20;
 
+/// A line that crosses more than this is not worth flipping for.
+pub(super) const CROSSINGS_MAX: usize = 400;
+
 /// One replacement, with what undoing needs.
 struct Done {
     old: Vec<u32>,
@@ -34,6 +37,8 @@ pub(super) struct Flipper<'a, S: Space> {
     log: Vec<Done>,
     /// Ring searches left for this target.
     pub work: u32,
+    /// A segment that crosses more is left alone.
+    pub crossings_max: usize,
     /// Replacements that lasted.
     pub flips: u64,
 }
@@ -45,6 +50,7 @@ impl<'a, S: Space> Flipper<'a, S> {
             target,
             log: Vec::new(),
             work: 0,
+            crossings_max: CROSSINGS_MAX,
             flips: 0,
         }
     }

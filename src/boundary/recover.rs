@@ -5,7 +5,7 @@ use std::time::Instant;
 use super::chain::Trouble;
 use super::error::{BoundaryError, FacetPlace};
 use super::find::{Outcome, SearchResult, find_face};
-use super::flips::Flipper;
+use super::flips::{CROSSINGS_MAX, Flipper};
 use super::map::{MissingFacets, map};
 use super::nearness::narrowest;
 use super::points::recover_by_points;
@@ -19,6 +19,10 @@ use crate::storage::{Pages, check_cancelled};
 
 /// How deep edge removals may nest, pass after pass, and the ring searches a target may cost then.
 const LEVELS: [(u32, u32); 3] = [(0, 40), (1, 80), (2, 160)];
+
+/// Parts a segment may cross to be flipped for before edges are turned. Flips alone leave the better tetrahedra, and cost the square
+/// of this: where a fan of slats lies across a Delaunay mesh its segments cross hundreds.
+const CROSSINGS_FIRST: usize = 24;
 
 /// Makes every facet of `mesh` a required face on both sides.
 ///
@@ -37,8 +41,9 @@ pub fn recover<P: Pages>(mesh: &mut Mesh<P>) -> Result<RecoveryReport, BoundaryE
         ..RecoveryReport::default()
     };
     let clock = Instant::now();
+    flip_segments(mesh, &mut missing, &mut report, CROSSINGS_FIRST);
     turn_segments(mesh, &mut missing, &mut report);
-    flip_segments(mesh, &mut missing, &mut report);
+    flip_segments(mesh, &mut missing, &mut report, CROSSINGS_MAX);
     flip_facets(mesh, &mut missing, &mut report);
     report.flip_time = clock.elapsed();
     let clock = Instant::now();
@@ -109,6 +114,7 @@ fn flip_segments<P: Pages>(
     mesh: &mut Mesh<P>,
     missing: &mut MissingFacets,
     report: &mut RecoveryReport,
+    crossings_max: usize,
 ) {
     for (level, work) in LEVELS {
         loop {
@@ -119,6 +125,7 @@ fn flip_segments<P: Pages>(
                 let mut s = PagedSpace(mesh, &missing.protected);
                 let mut flipper = Flipper::new(&mut s, RecoveryTarget::Edge(a, b));
                 flipper.work = work;
+                flipper.crossings_max = crossings_max;
                 let outcome = flipper.recover_edge(a, b, level);
                 report.flips += flipper.flips;
                 if outcome == Outcome::Recovered {
