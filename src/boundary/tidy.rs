@@ -17,6 +17,9 @@ const ROUNDS_MAX: usize = 8;
 /// A move that gives less room than this many times the old is not worth it.
 const GAIN_MIN: f64 = 1.25;
 
+/// Shares of the way to the best place that are tried.
+const SHARES: [f64; 6] = [1.0, 0.5, 0.1, 1e-2, 1e-4, 1e-6];
+
 /// Visits the Steiner points until none goes or moves any more, a bounded number of times.
 pub(super) fn tidy<P: Pages>(mesh: &mut Mesh<P>, report: &mut RecoveryReport) {
     if report.steiner == 0 {
@@ -67,18 +70,23 @@ pub(super) fn rise<P: Pages>(s: &mut PagedSpace<'_, P>, v: u32) -> bool {
     let Some(way) = center(&planes, reach) else {
         return false;
     };
-    if room(&planes, way) <= GAIN_MIN * room(&planes, Point::ZERO) {
-        return false;
+    let now = room(&planes, Point::ZERO);
+    // Where doubles see the best place too dimly, one on the way there may do.
+    for share in SHARES {
+        if room(&planes, way * share) <= GAIN_MIN * now.max(0.0) {
+            continue;
+        }
+        s.0.set_point(v, old + way * share);
+        let holds = ball.iter().all(|&t| {
+            let q = s.tet(t).vertices();
+            s.orient(q) > 0.0
+        });
+        if holds {
+            return true;
+        }
     }
-    s.0.set_point(v, old + way);
-    let holds = ball.iter().all(|&t| {
-        let q = s.tet(t).vertices();
-        s.orient(q) > 0.0
-    });
-    if !holds {
-        s.0.set_point(v, old);
-    }
-    holds
+    s.0.set_point(v, old);
+    false
 }
 
 /// How far `at` is inside all half-spaces.
