@@ -345,3 +345,58 @@ fn random_cuts_of_cospherical_and_random_hulls_are_recovered() {
         }
     }
 }
+
+/// A long thin plate, top and bottom cut into slats from corner to corner, with small tetrahedra above and below its middle.
+fn slats(n: u32) -> (Vec<Point>, Vec<[u32; 3]>) {
+    let (long, step, thick) = (30.0, 0.125, 0.25);
+    let mut points = Vec::new();
+    for z in [0.0, -thick] {
+        for x in [0.0, long] {
+            points.extend((0..=n).map(|i| Point::new(x, step * f64::from(i), z)));
+        }
+    }
+    let at = |low: u32, right: u32, i: u32| (2 * low + right) * (n + 1) + i;
+    let mut triangles = Vec::new();
+    for i in 0..n {
+        triangles.push([at(0, 0, 0), at(0, 1, i), at(0, 1, i + 1)]);
+        triangles.push([at(0, 1, n), at(0, 0, i + 1), at(0, 0, i)]);
+        triangles.push([at(1, 1, 0), at(1, 0, i), at(1, 0, i + 1)]);
+        triangles.push([at(1, 0, n), at(1, 1, i + 1), at(1, 1, i)]);
+        for (right, j, k) in [(0, i + 1, i), (1, i, i + 1)] {
+            triangles.push([at(0, right, j), at(1, right, j), at(1, right, k)]);
+            triangles.push([at(0, right, j), at(1, right, k), at(0, right, k)]);
+        }
+    }
+    for (i, from, to) in [(0, 0, 1), (n, 1, 0)] {
+        triangles.push([at(0, from, i), at(1, from, i), at(1, to, i)]);
+        triangles.push([at(0, from, i), at(1, to, i), at(0, to, i)]);
+    }
+    let mut next = random(3);
+    for k in 0..n {
+        let side = if k % 2 == 0 { 1.0 } else { -1.0 };
+        let middle = Point::new(
+            0.4 * long + 6.0 * next(),
+            step * f64::from(n) * next(),
+            side * (1.0 + next()) - thick / 2.0,
+        );
+        let first = points.len() as u32;
+        let corners = [Point::ZERO, Point::X, Point::Y, Point::Z];
+        points.extend(corners.map(|c| middle + c * 1e-3));
+        let faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
+        triangles.extend(faces.map(|f: [u32; 3]| f.map(|i| first + i)));
+    }
+    (points, triangles)
+}
+
+#[test]
+fn a_plate_of_slats_that_edges_pierce_is_recovered_by_turning_edges() {
+    for n in [8, 40] {
+        let (points, triangles) = slats(n);
+        let report = recovered("slats", &points, &triangles);
+        assert!(report.missing_segments > n, "{report:?}");
+        // A point for each crossing of a segment would be many times this.
+        assert!(report.points_on_surface < 40 * n, "{report:?}");
+        assert!(report.steiner < 20 * n, "{report:?}");
+        recovered("turned slats", &turned(&points), &triangles);
+    }
+}
