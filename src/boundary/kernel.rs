@@ -32,6 +32,12 @@ pub(super) fn center(half_spaces: &[HalfSpace], reach: f64) -> Option<Point> {
     Some(Point::new(x[0], x[1], x[2]) * reach)
 }
 
+/// How far `at` is inside all half-spaces; negative outside.
+pub(super) fn room(half_spaces: &[HalfSpace], at: Point) -> f64 {
+    let rooms = half_spaces.iter().map(|h| h.offset - h.normal.dot(at));
+    rooms.fold(f64::INFINITY, f64::min)
+}
+
 /// Maximizes `goal · x` under `row · x <= last of row` and `-1 <= x <= 1`.
 fn solve(rows: &[Vec<f64>], goal: &[f64]) -> Option<Vec<f64>> {
     let d = goal.len();

@@ -13,7 +13,7 @@ use std::collections::HashSet;
 use super::chain::Trouble;
 use super::exact::ExactPoint;
 use super::free_vertex::remove_free;
-use super::kernel::{HalfSpace, center};
+use super::kernel::{HalfSpace, center, room};
 use super::patch::Patch;
 use super::space::Space;
 use super::suppress::half_space;
@@ -79,19 +79,15 @@ impl<P: Pages> Patch<'_, P> {
         if !was_exact && !neighbors.iter().any(|&u| self.is_exact(u)) {
             return false;
         }
-        let room = |d: Point| {
-            let rooms = planes.iter().map(|h| h.offset - h.normal.dot(d));
-            rooms.fold(f64::INFINITY, f64::min)
-        };
         let Some(best) = center(&planes, reach) else {
             return false;
         };
         let old = self.placement(v);
-        let (now, then) = (room(Point::ZERO), room(best));
+        let (now, then) = (room(&planes, Point::ZERO), room(&planes, best));
         // As a double, at best in the middle, else on the way there.
         for share in [1.0, 0.5, 0.25, 0.0] {
             let place = self.position(v) + best * share;
-            let gains = was_exact || room(best * share) > now * GAIN_MIN;
+            let gains = was_exact || room(&planes, best * share) > now * GAIN_MIN;
             if gains && self.try_place(v, &ball, (place, None)) {
                 return true;
             }

@@ -1,7 +1,9 @@
 //! Steiner points at the end of recovery: those nobody needs go, the others move away from the planes they were put beside.
 
+use std::collections::HashSet;
+
 use super::free_vertex::{ball_flatness, remove_free};
-use super::kernel::{HalfSpace, center};
+use super::kernel::{HalfSpace, center, room};
 use super::report::RecoveryReport;
 use super::space::{PagedSpace, Space};
 use super::suppress::half_space;
@@ -9,7 +11,6 @@ use super::walk::ball;
 use crate::geom::Point;
 use crate::mesh::{Mesh, VertexTag};
 use crate::storage::{Pages, check_cancelled};
-use std::collections::HashSet;
 
 /// Times all are visited: room grows by a factor each time.
 const ROUNDS_MAX: usize = 8;
@@ -87,10 +88,4 @@ pub(super) fn rise<P: Pages>(s: &mut PagedSpace<'_, P>, v: u32) -> bool {
     }
     s.0.set_point(v, old);
     false
-}
-
-/// How far `at` is inside all half-spaces.
-pub(super) fn room(planes: &[HalfSpace], at: Point) -> f64 {
-    let rooms = planes.iter().map(|h| h.offset - h.normal.dot(at));
-    rooms.fold(f64::INFINITY, f64::min)
 }

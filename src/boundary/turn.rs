@@ -15,12 +15,12 @@
 use std::collections::VecDeque;
 
 use super::free_vertex::remove_free;
-use super::kernel::{HalfSpace, center};
+use super::kernel::{HalfSpace, center, room};
 use super::map::MissingFacets;
 use super::report::RecoveryReport;
 use super::space::{PagedSpace, Space, edge_key};
 use super::suppress::half_space;
-use super::tidy::{rise, room};
+use super::tidy::rise;
 use super::walk::{EdgeRing, Exit, crossings, edge_at, shell};
 use crate::geom::{Point, orient};
 use crate::mesh::Mesh;

@@ -5,7 +5,7 @@ use std::collections::{BTreeSet, HashSet};
 use super::chain::Trouble;
 use super::free_vertex::moved;
 use super::grow::{Grown, Obstacle};
-use super::kernel::center;
+use super::kernel::{center, room};
 use super::patch::Patch;
 use super::space::{Space, sorted};
 use super::suppress::{CavitySkin, Fan, half_space};
@@ -163,10 +163,7 @@ impl<P: Pages> Patch<'_, P> {
         }
         let mut proposals: Vec<(Point, bool)> = Vec::new();
         let best = center(&planes, reach);
-        let roomy = best.is_some_and(|d| {
-            let room = planes.iter().map(|h| h.offset - h.normal.dot(d));
-            room.fold(f64::INFINITY, f64::min) > ROOM_MIN * reach
-        });
+        let roomy = best.is_some_and(|d| room(&planes, d) > ROOM_MIN * reach);
         let heart = self.heart(x, wedge);
         let halves = |d: Point, n: i32| (0..n).map(move |k| d * 0.5f64.powi(k));
         if let Some(d) = best.filter(|_| roomy) {

@@ -238,7 +238,8 @@ fn only_what_a_size_reaches_is_changed() {
 #[test]
 fn lengths_of_the_first_run_hold_unless_new_ones_say_otherwise() {
     let place = Place::new();
-    let mesh = "mesh sample:box,h=0.2 --size-sphere 0.3,0.3,0.3,0.1,0.02 -o a.tetdb --no-verify";
+    // Places change with the last digits of recorded sizes: of 20,000 tetrahedra in so steep a field, by a hundredth.
+    let mesh = "mesh sample:box,h=0.1 --size-sphere 0.3,0.3,0.3,0.1,0.015 -o a.tetdb --no-verify";
     place.run_line(mesh).succeeds();
     let tets = || info(&place)["tets"].as_f64().expect("a number");
     let (digest, before) = (info(&place)["digest"].clone(), tets());
@@ -251,14 +252,13 @@ fn lengths_of_the_first_run_hold_unless_new_ones_say_otherwise() {
         ratio
     };
     let same = again("--refine-by 1");
-    // Recorded sizes differ in their last digits, and so do the places of vertices in so steep a field.
-    assert!((same - 1.0).abs() < 0.02, "{same}");
+    assert!((same - 1.0).abs() < 0.01, "{same}");
     let (some, more) = (again("--refine-by 0.9"), again("--refine-by 0.6"));
     assert!(some > 1.0 && more > some, "{some} {more}");
     // Nine tenths of the vertices are free.
     assert!((0.7..1.1).contains(&(more * 0.6f64.powi(3))), "{more}");
     let outside = again("--size-sphere 5,5,5,0.1,0.02");
-    assert!((outside - 1.0).abs() < 0.02, "{outside}");
+    assert!((outside - 1.0).abs() < 0.01, "{outside}");
     // The first run's sphere is there beside the new one.
     let beside = again("--size-sphere 0.8,0.8,0.8,0.05,0.02");
     assert!(beside > outside + 0.01, "{beside}");

@@ -96,8 +96,8 @@ fn cuts_are_good(info: &Value) {
             number(&found.unwrap_or_else(|| panic!("no {name}"))["value"])
         };
         assert!(measure("interface_faces") < 0.8 * measure("natural_faces"));
-        // Natural faces are as good where vertices stand in their places: 1.157 and 1.159.
-        assert!(measure("interface_face_quality") <= 1.01 * measure("natural_face_quality"));
+        // Of one cut 1.159, and 1.157 of natural faces, whose vertices stand in their places.
+        assert!(measure("interface_face_quality") <= 1.003 * measure("natural_face_quality"));
         assert!(measure("over_constrained") <= 0.05 * measure("natural_over_constrained"));
         assert_eq!(measure("pinched"), 0.0);
         assert_eq!(measure("frozen_hits"), 0.0);
