@@ -7,7 +7,7 @@ use std::fs::{self, File};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use super::place::{Place, TETRA};
+use super::place::{Place, TETRA, program};
 
 #[test]
 fn what_a_run_reads_is_never_what_it_writes() {
@@ -144,12 +144,9 @@ fn without_a_cap_a_run_goes_by_the_limits_of_its_process() {
     let place = Place::new();
     for limit in ["--as=1500000000", "--data=300000000"] {
         let run = Command::new("prlimit")
-            .args([
-                limit,
-                env!("CARGO_BIN_EXE_tetdb"),
-                "mesh",
-                "sample:box,h=0.3",
-            ])
+            .arg(limit)
+            .arg(program())
+            .args(["mesh", "sample:box,h=0.3"])
             .args(["-o", "l.tetdb", "--force", "--threads", "2"])
             .current_dir(place.path(""))
             .output();
