@@ -89,8 +89,7 @@ pub(super) fn triangles_checked(
     n_triangles: f64,
     bytes_max: u64,
 ) -> Result<(), SampleError> {
-    // Written so that a NaN is refused too.
-    if !(n_triangles <= TRIANGLES_MAX as f64) {
+    if n_triangles.is_nan() || n_triangles > TRIANGLES_MAX as f64 {
         return Err(SampleError::TooMany {
             name,
             found: n_triangles,

@@ -115,6 +115,30 @@ fn of_two_runs_at_once_onto_one_path_neither_is_replaced_in_silence() {
     }
 }
 
+#[test]
+fn no_message_repeats_all_that_was_typed_however_long() {
+    let place = Place::new();
+    let long = "x".repeat(100_000);
+    place.write("long.toml", format!("hsiz = '{long}'"));
+    let sample = format!("sample:{long}");
+    for words in [
+        &["check", &sample][..],
+        &["check", &long],
+        &["info", &long],
+        &["estimate", "sample:box", "--hsiz", &long],
+        &["estimate", "sample:box", "--memory", &long],
+        &["estimate", "sample:box", &format!("--{long}")],
+        &["estimate", "sample:box", "--config", "long.toml"],
+    ] {
+        for json in [&[][..], &["--json"]] {
+            let done = place.run(&[words, json].concat());
+            assert!(matches!(done.exit(), Some(2 | 3)), "{:?}", done.exit());
+            let n = done.stderr().len();
+            assert!((20..20_000).contains(&n), "{n} bytes of {}", words[0]);
+        }
+    }
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn an_export_that_is_stopped_leaves_no_file_behind() {
