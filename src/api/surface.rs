@@ -222,6 +222,14 @@ impl Surface {
         })
     }
 
+    /// Divides triangles until their edges are as short as `h` wants them where they are, and the result takes half of `cap` at most.
+    pub(crate) fn divide(&mut self, h: &dyn Fn(Point) -> f64, cap: u64) -> Result<(), Error> {
+        refuse_sheets(&self.inner, "refined")?;
+        (self.inner, _) = split(&self.inner, h, cap / 2)?;
+        self.sources = vec![given(&self.inner)];
+        Ok(())
+    }
+
     /// The same with the triangles of `sheet` inside: faces of the mesh with tetrahedra on both sides, that part no region.
     ///
     /// A sheet may be open or closed, end inside, meet other sheets and the surface along edges and vertices that both have, and nowhere

@@ -14,6 +14,7 @@ mod people;
 mod pieces;
 mod place;
 mod query;
+mod refined;
 mod regions;
 mod report;
 mod resaturate;
