@@ -25,7 +25,11 @@ pub fn run(args: &EstimateArgs, console: &Console) -> Result<u8, Failure> {
     };
     let threads = args.threads.unwrap_or_else(n_threads);
     let store = args.output.as_deref().unwrap_or(Path::new("."));
-    let space = Space::Capped(cap, store);
+    // The cap is that of the run to come; what is said of it needs the surface, however large.
+    let space = Space {
+        cap: cap.max(default_cap().0),
+        beside: store,
+    };
     let mut surface = input::load_valid(&args.surfaces, &args.sheets, space, console)?;
     take_seeds(&mut options, &surface.inner.seeds);
     if options.refine_surface {

@@ -8,6 +8,7 @@ mod exports;
 mod forms;
 mod guide;
 mod json;
+mod limits;
 mod odd_inputs;
 mod people;
 mod pieces;
