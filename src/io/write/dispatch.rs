@@ -9,7 +9,7 @@ use super::merged::Merged;
 use super::midpoints::Midpoints;
 use super::report::FileCounts;
 use super::selection::{Content, Order, Selection};
-use super::{abaqus, foam, gmsh, gmsh22, medit, npy_columns, tetgen, vtu, vtu_boundary};
+use super::{abaqus, foam, gmsh, gmsh22, medit, mfem, npy_columns, tetgen, vtu, vtu_boundary};
 
 /// Writes a mesh as one file, and what belongs to it.
 pub(super) fn write(
@@ -50,6 +50,7 @@ pub(super) fn write(
         #[cfg(feature = "parquet")]
         MeshFormat::Parquet => unreachable!("its pieces are written elsewhere"),
         MeshFormat::OpenFoam => counts = foam::write(mesh, draft, out, selection)?,
+        MeshFormat::Mfem => counts = mfem::write(mesh, draft, out, selection)?,
         MeshFormat::TetGen => tetgen::write(mesh, draft, out)?,
         MeshFormat::Topology => unreachable!("the topology is no mesh"),
     }

@@ -20,6 +20,8 @@ pub enum MeshFormat {
     Gmsh22,
     /// OpenFOAM's `constant/polyMesh` in the folder of `NAME.foam`; in pieces `processorN/constant/polyMesh`.
     OpenFoam,
+    /// MFEM 1.3, one mesh; in pieces `NAME.000000` and so on, a file for each process.
+    Mfem,
     /// TetGen: `NAME.node`, `NAME.ele` and `NAME.face`.
     TetGen,
     /// Abaqus input.
@@ -45,6 +47,7 @@ const WORDS: &[(&str, MeshFormat)] = &[
     ("msh22", MeshFormat::Gmsh22),
     ("mesh", MeshFormat::Medit),
     ("meshb", MeshFormat::MeditBinary),
+    ("mfem", MeshFormat::Mfem),
     ("ele", MeshFormat::TetGen),
     ("inp", MeshFormat::Abaqus),
     ("npy", MeshFormat::Numpy),
@@ -80,7 +83,7 @@ impl MeshFormat {
     fn is_text(self) -> bool {
         matches!(
             self,
-            Self::Medit | Self::Abaqus | Self::TetGen | Self::Topology
+            Self::Medit | Self::Abaqus | Self::Mfem | Self::TetGen | Self::Topology
         )
     }
 
@@ -96,7 +99,7 @@ impl MeshFormat {
 
     /// Whether pieces in it carry numbers in the whole, so that all of it is open while they are written.
     pub fn numbers_globally(self) -> bool {
-        matches!(self, Self::OpenFoam | Self::Gmsh)
+        matches!(self, Self::OpenFoam | Self::Gmsh | Self::Mfem)
     }
 
     /// Whether it is one file that is written from its beginning to its end.
@@ -107,6 +110,7 @@ impl MeshFormat {
                 | Self::MeditBinary
                 | Self::Gmsh
                 | Self::Gmsh22
+                | Self::Mfem
                 | Self::Abaqus
                 | Self::Topology
         )
@@ -115,7 +119,7 @@ impl MeshFormat {
 
 /// Endings of the formats.
 pub const ENDINGS: &str = if cfg!(feature = "parquet") {
-    ".vtu, .pvtu, .vtkhdf, .foam, .msh, .mesh, .meshb, .ele, .inp, .npy, .parquet or .json"
+    ".vtu, .pvtu, .vtkhdf, .foam, .msh, .mesh, .meshb, .mfem, .ele, .inp, .npy, .parquet or .json"
 } else {
-    ".vtu, .pvtu, .vtkhdf, .foam, .msh, .mesh, .meshb, .ele, .inp, .npy or .json (.parquet needs a build with the feature `parquet`)"
+    ".vtu, .pvtu, .vtkhdf, .foam, .msh, .mesh, .meshb, .mfem, .ele, .inp, .npy or .json (.parquet needs a build with the feature `parquet`)"
 };

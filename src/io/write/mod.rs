@@ -24,6 +24,7 @@ mod gmsh22;
 mod hdf5;
 mod medit;
 mod merged;
+mod mfem;
 mod midpoints;
 mod names;
 mod npy;
