@@ -158,3 +158,46 @@ fn some_parts_are_a_mesh_with_a_closed_boundary() {
         .run_line("export three.tetdb faces.vtu --interfaces")
         .succeeds();
 }
+
+#[test]
+fn regions_apart_are_closed_and_together_the_whole() {
+    let place = Place::new();
+    place
+        .run_line("mesh sample:balls,count=4 -o all.tetdb --regions all --subdomains 3")
+        .succeeds();
+    let info = place.run_line("info all.tetdb --json").succeeds().json();
+    let regions = info["regions"].as_array().expect("a list").iter();
+    let mut left = info["tets"].as_u64().expect("a number") as usize;
+    for row in regions.filter(|row| row["filled"] == true) {
+        let region = &row["region"];
+        let line = format!("export all.tetdb one.mesh --region {region}");
+        place.run_line(&line).succeeds();
+        let one = Piece::read(&place, "one.mesh");
+        assert_eq!(one.tets as u64, row["tets"]);
+        place.run_line("check one.mesh").succeeds();
+        place.run_line(&format!("{line} --pieces")).succeeds();
+        let pieces = (0..3).map(|rank| format!("one_{rank:05}.mesh"));
+        let there = pieces.filter(|name| place.path(name).exists());
+        let in_pieces: usize = there
+            .map(|name| {
+                let piece = Piece::read(&place, &name);
+                std::fs::remove_file(place.path(&name)).expect("it is there");
+                piece.tets
+            })
+            .sum();
+        assert_eq!(in_pieces, one.tets);
+        left -= one.tets;
+    }
+    assert_eq!(left, 0);
+    for (line, code) in [
+        ("export all.tetdb x.mesh --region 99", 3),
+        ("export all.tetdb x.mesh --region nowhere", 2),
+        ("export all.tetdb x.mfem --region 1 --pieces", 2),
+        ("export all.tetdb x.json --region 1", 2),
+        ("export all.tetdb x.json --subdomain 1", 2),
+        ("export all.tetdb x.mfem --order 2", 2),
+        ("export all.tetdb x.vtu --ghosts", 2),
+    ] {
+        assert_eq!(place.run_line(line).exit(), Some(code), "{line}");
+    }
+}

@@ -59,7 +59,7 @@ pub struct ExportArgs {
     /// The store, a directory that `tetdb mesh` wrote
     #[arg(value_name = "STORE")]
     pub store: PathBuf,
-    /// Files to write; the extension tells the format: .vtu, .pvtu, .vtkhdf, .foam (OpenFOAM, in its folder), .msh, .mesh, .meshb, .ele (TetGen),
+    /// Files to write; the extension tells the format: .vtu, .pvtu, .vtkhdf, .foam (OpenFOAM, in its folder), .msh, .mesh, .meshb, .mfem (MFEM), .ele (TetGen),
     /// .inp, .npy (an array a file), .json (topology), .parquet (where built in); `-` with --format is standard output
     #[arg(required = true, value_name = "OUT")]
     pub out: Vec<PathBuf>,
@@ -72,7 +72,7 @@ pub struct ExportArgs {
     /// Text instead of binary numbers (.msh, .foam)
     #[arg(long)]
     pub ascii: bool,
-    /// Nodes of the elements: 1, corners; 2, also the middles of edges (.vtu, .pvtu, .vtkhdf, .inp)
+    /// Nodes of the elements: 1, corners; 2, also the middles of edges (.vtu, .pvtu, .vtkhdf, .msh, .inp)
     #[arg(long, value_name = "ORDER", default_value = "1", value_parser = clap::value_parser!(u8).range(1..=2))]
     pub order: u8,
     /// List in .msh, for each partition, the tetrahedra of others that touch it
@@ -87,6 +87,9 @@ pub struct ExportArgs {
         alias = "subdomains"
     )]
     pub subdomain: Vec<u32>,
+    /// Only these regions, as numbers or names in `tetdb info`, with commas between them; what bounds them is boundary
+    #[arg(long, value_name = "LIST")]
+    pub region: Option<String>,
     /// Only input triangles and faces between sub-domains (.vtu, .vtkhdf)
     #[arg(long, conflicts_with = "interfaces")]
     pub boundary: bool,

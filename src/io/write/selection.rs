@@ -9,6 +9,8 @@ use super::format::MeshFormat;
 pub struct Selection {
     /// Ranks of sub-domains; none stands for all. What bounds them towards others is boundary.
     pub subdomains: BTreeSet<u32>,
+    /// Numbers of regions; none stands for all. What bounds them is boundary.
+    pub regions: BTreeSet<u32>,
     /// Each sub-domain in a file of its own.
     pub pieces: bool,
     /// Which elements are written.

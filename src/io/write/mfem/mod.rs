@@ -51,9 +51,7 @@ pub(super) fn write(
             shared.write(p as u32, stream)
         })?;
         mesh.advance((written.vertices + written.tets) as usize);
-        counts.vertices += written.vertices;
-        counts.tets += written.tets;
-        counts.triangles += written.triangles;
+        counts += written;
     }
     Ok(counts)
 }
