@@ -42,12 +42,17 @@ static double Solve(ParMesh &mesh, int order)
 {
    H1_FECollection elements(order, 3);
    ParFiniteElementSpace space(&mesh, &elements);
-   // What bounds the domain; faces between regions are boundary elements too, and are inside.
-   Array<int> outer_faces, fixed(space.GetVSize()), dofs, list;
+   // What bounds the domain; faces between regions are boundary elements too, and are inside. Only after an exchange are shared faces known as such.
+   mesh.ExchangeFaceNbrData();
+   Array<int> fixed(space.GetVSize()), dofs, list;
    fixed = 0;
    for (int e = 0; e < mesh.GetNBE(); e++)
    {
+#if MFEM_VERSION < 40700
+      int face = mesh.GetBdrElementEdgeIndex(e);
+#else
       int face = mesh.GetBdrElementFaceIndex(e);
+#endif
       if (!mesh.GetFaceInformation(face).IsBoundary()) { continue; }
       space.GetBdrElementDofs(e, dofs);
       for (int d : dofs) { fixed[d < 0 ? -1 - d : d] = 1; }

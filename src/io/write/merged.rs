@@ -109,11 +109,12 @@ impl<'a> Merged<'a> {
             let numbers = numbering.part(&parts, p)?;
             let rank = source.row.rank;
             let mut from = store.open_subdomain(rank, memory / 4)?;
+            let path = from.path().to_owned();
             let part = FaceSource {
                 rank,
                 numbers: &numbers,
                 scope,
-                path: &from.path().to_owned(),
+                path: &path,
             };
             collect_faces(&mut from, &part, first_label, &mut sorter)?;
         }
