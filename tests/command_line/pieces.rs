@@ -4,6 +4,7 @@
 //! How: one sample in four parts, each part read back from its own file and compared with the others and with what the store says.
 
 use std::collections::{BTreeMap, HashSet};
+use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
@@ -200,4 +201,60 @@ fn regions_apart_are_closed_and_together_the_whole() {
     ] {
         assert_eq!(place.run_line(line).exit(), Some(code), "{line}");
     }
+}
+
+#[test]
+fn pieces_are_the_same_whoever_writes_them() {
+    let place = Place::new();
+    place
+        .run_line("mesh sample:box,h=0.038 -o four.tetdb --subdomains 4")
+        .succeeds();
+    let outs = [
+        "part.mesh",
+        "part.vtu --order 2",
+        "part.inp",
+        "part.msh --ghosts --order 2",
+        "part.mfem",
+        "part.foam",
+    ];
+    for (i, out) in outs.iter().enumerate() {
+        for folder in ["all", "each"] {
+            std::fs::create_dir_all(place.path(&format!("{folder}{i}"))).expect("a folder");
+        }
+        let words = format!("export four.tetdb all{i}/{out} --pieces");
+        place.run_line(&words).succeeds();
+        // Four processes at once, none of which knows of the others.
+        let tasks: Vec<_> = (0..4)
+            .map(|rank| {
+                let words = format!("export four.tetdb each{i}/{out} --pieces --subdomain {rank}");
+                let words: Vec<&str> = words.split_whitespace().collect();
+                place.command(&words).spawn().expect("the program starts")
+            })
+            .collect();
+        for task in tasks {
+            let done = task.wait_with_output().expect("it ends");
+            assert!(done.status.success(), "{out}: {done:?}");
+        }
+        let files = |folder: &str| files_below(&place.path(&format!("{folder}{i}")));
+        let (all, each) = (files("all"), files("each"));
+        assert!(all.len() >= 4);
+        assert!(all == each, "{out}: {:?} {:?}", all.keys(), each.keys());
+    }
+}
+
+/// All files in a folder and in those in it, by their paths there.
+fn files_below(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    for entry in std::fs::read_dir(folder).expect("the folder is readable") {
+        let path = entry.expect("an entry is readable").path();
+        let name = PathBuf::from(path.file_name().expect("entries have names"));
+        if path.is_dir() {
+            let inner = files_below(&path).into_iter();
+            files.extend(inner.map(|(path, bytes)| (name.join(path), bytes)));
+        } else {
+            let bytes = std::fs::read(&path).expect("the file is readable");
+            files.insert(name, bytes);
+        }
+    }
+    files
 }

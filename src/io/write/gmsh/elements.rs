@@ -3,9 +3,9 @@
 use super::super::error::Result;
 use super::super::merged::{Merged, Opened};
 use super::super::midpoints::{ElementEdges, Midpoints};
-use super::Piece;
 use super::entities::Entities;
 use super::out::Out;
+use super::piece::Piece;
 use crate::storage::{Sorter, sort_record};
 
 /// Gmsh's numbers of the types of elements, of first and of second order.

@@ -6,8 +6,8 @@ use super::super::error::Result;
 use super::super::faces::Face;
 use super::super::merged::Merged;
 use super::super::names::quotable;
-use super::Piece;
 use super::out::Out;
+use super::piece::Piece;
 
 /// The least and the greatest coordinates.
 type Bounds = [[f64; 3]; 2];

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use super::super::error::Result;
 use super::super::merged::{Merged, Opened};
 use super::super::stream::{Records, scratch};
-use super::Piece;
 use super::out::Out;
 use crate::storage::{Payload, SortRecord, Sorter, sort_record};
 
@@ -114,8 +113,8 @@ impl Ghosts {
         Ok(())
     }
 
-    /// Lists those that the partitions of a file see: element, its partition, the one that sees it.
-    pub fn write(&self, out: &mut Out, piece: &Piece, mesh: &Merged) -> Result<()> {
+    /// Lists those that the partitions at places `which` see: element, its partition, the one that sees it.
+    pub fn write(&self, out: &mut Out, which: &[usize], mesh: &Merged) -> Result<()> {
         let counts = piece
             .which
             .iter()
@@ -123,7 +122,7 @@ impl Ghosts {
         out.size(counts.sum());
         out.end()?;
         let parts = mesh.parts();
-        for &p in piece.which {
+        for &p in which {
             self.each(p, |ghost| {
                 out.size(mesh.n_faces() + ghost.number + 1);
                 out.int(ghost.from + 1);

@@ -10,6 +10,7 @@ mod entities;
 mod ghosts;
 mod nodes;
 mod out;
+mod piece;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -21,27 +22,9 @@ use super::midpoints::Midpoints;
 use super::report::FileCounts;
 use super::selection::Selection;
 use entities::Entities;
-use ghosts::{Ghost, Ghosts};
+use ghosts::Ghosts;
 use out::Out;
-
-/// What a file is of.
-struct Piece<'a> {
-    /// Places of its partitions among all.
-    which: &'a [usize],
-    middles: Option<&'a Midpoints>,
-    /// In files of one partition, tetrahedra of others that it sees.
-    foreign: Option<&'a Ghosts>,
-}
-
-impl Piece<'_> {
-    /// Every tetrahedron of another partition that is in the file too.
-    fn each_ghost(&self, mut each: impl FnMut(&Ghost) -> Result<()>) -> Result<()> {
-        let Some(ghosts) = self.foreign else {
-            return Ok(());
-        };
-        (self.which.iter()).try_for_each(|&p| ghosts.each(p, &mut each))
-    }
-}
+use piece::Piece;
 
 /// Writes one file of all, or one of each partition.
 pub(super) fn write(
@@ -128,7 +111,7 @@ fn write_file(
         elements::write(mesh, out, piece, &entities)
     })?;
     if let Some(ghosts) = ghosts {
-        out.section("GhostElements", |out| ghosts.write(out, piece, mesh))?;
+        out.section("GhostElements", |out| ghosts.write(out, piece.which, mesh))?;
     }
     out.finish()?;
     Ok(FileCounts {

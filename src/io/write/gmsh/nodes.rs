@@ -6,9 +6,9 @@ use super::super::error::Result;
 use super::super::merged::{Merged, Opened};
 use super::super::midpoints::Midpoints;
 use super::super::stream::{Records, scratch};
-use super::Piece;
 use super::entities::Entities;
 use super::out::Out;
+use super::piece::Piece;
 use crate::storage::{Payload, SortRecord, Sorter, sort_record};
 
 sort_record! {

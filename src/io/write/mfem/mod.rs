@@ -4,6 +4,7 @@
 //! too, as MFEM allows. A part is a mesh of its own with the numbers of the store, followed by what it shares with others (`shared`).
 //! Source: MFEM's documentation, "Mesh formats"; the sections of parallel meshes as `ParMesh` prints and reads them.
 
+mod lines;
 mod shared;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -17,12 +18,9 @@ use super::report::FileCounts;
 use super::selection::Selection;
 use super::stream::Stream;
 use crate::sealed::Subdomain;
+use lines::{TETRAHEDRON, TRIANGLE, element, point};
 use shared::Shared;
 use tetdb_schema::record::{NO_TET, SealedFacet};
-
-/// MFEM's numbers of the two geometries.
-const TRIANGLE: u64 = 2;
-const TETRAHEDRON: u64 = 4;
 
 /// Writes one file of all, or one of each sub-domain.
 pub(super) fn write(
@@ -35,7 +33,7 @@ pub(super) fn write(
     mesh.expect_passes(1, 1);
     let sets = [region_sets(mesh)?, label_sets(mesh)];
     if !selection.pieces {
-        return whole(mesh, draft, out, &sets);
+        return write_serial(mesh, draft, out, &sets);
     }
     let ranks: &BTreeSet<u32> = &selection.subdomains;
     let mut shared = Shared::gather(mesh)?;
@@ -47,7 +45,7 @@ pub(super) fn write(
         let mut opened = mesh.open_part(p)?;
         let stem = out.file_stem().unwrap_or_default().to_string_lossy();
         let path = out.with_file_name(format!("{stem}.{:06}", row.rank));
-        let written = part(&mut opened, draft, &path, &sets, |stream| {
+        let written = write_part(&mut opened, draft, &path, &sets, |stream| {
             shared.write(p as u32, stream)
         })?;
         mesh.advance((written.vertices + written.tets) as usize);
@@ -56,7 +54,7 @@ pub(super) fn write(
     Ok(counts)
 }
 
-fn whole(
+fn write_serial(
     mesh: &mut Merged,
     draft: &mut Draft,
     out: &Path,
@@ -87,7 +85,7 @@ fn whole(
 }
 
 /// A sub-domain; `end` writes what follows the mesh.
-fn part(
+fn write_part(
     opened: &mut Opened,
     draft: &mut Draft,
     out: &Path,
@@ -167,28 +165,6 @@ fn vertices(stream: &mut Stream, n: u64, [_, labels]: &[String; 2]) {
     stream.text(&format!(
         "\nbdr_attribute_sets\n{labels}\nvertices\n{n}\n3\n"
     ));
-}
-
-fn element(stream: &mut Stream, attribute: u64, geometry: u64, vertices: &[u64]) -> Result<()> {
-    stream.integer(attribute, b' ');
-    stream.integer(geometry, b' ');
-    list(stream, vertices)
-}
-
-/// Numbers on a line.
-fn list(stream: &mut Stream, numbers: &[u64]) -> Result<()> {
-    for (i, &number) in numbers.iter().enumerate() {
-        let is_last = i + 1 == numbers.len();
-        stream.integer(number, if is_last { b'\n' } else { b' ' });
-    }
-    stream.end()
-}
-
-fn point(stream: &mut Stream, [x, y, z]: [f64; 3]) -> Result<()> {
-    stream.double(x, b' ');
-    stream.double(y, b' ');
-    stream.double(z, b'\n');
-    stream.end()
 }
 
 fn region_sets(mesh: &mut Merged) -> Result<String> {

@@ -10,7 +10,7 @@ use std::iter::Peekable;
 use super::super::error::Result;
 use super::super::merged::{Merged, Opened};
 use super::super::stream::Stream;
-use super::{TRIANGLE, list};
+use super::lines::{TRIANGLE, list};
 use crate::storage::{Sorted, Sorter, sort_record};
 use tetdb_schema::record::NO_TET;
 
