@@ -115,10 +115,7 @@ impl Ghosts {
 
     /// Lists those that the partitions at places `which` see: element, its partition, the one that sees it.
     pub fn write(&self, out: &mut Out, which: &[usize], mesh: &Merged) -> Result<()> {
-        let counts = piece
-            .which
-            .iter()
-            .map(|&p| self.firsts[p + 1] - self.firsts[p]);
+        let counts = which.iter().map(|&p| self.firsts[p + 1] - self.firsts[p]);
         out.size(counts.sum());
         out.end()?;
         let parts = mesh.parts();
