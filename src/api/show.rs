@@ -85,6 +85,12 @@ impl ExportOptions {
         self
     }
 
+    /// Sheets as slits: their vertices once for each side, their triangles boundary of both; the pairs in `NAME_pairs.csv`.
+    pub fn split_sheets(mut self) -> Self {
+        self.selection.split_sheets = true;
+        self
+    }
+
     /// For each partition the tetrahedra of others that touch it; `.msh`.
     pub fn ghosts(mut self) -> Self {
         self.selection.ghosts = true;

@@ -41,6 +41,7 @@ pub fn run(args: &ExportArgs, console: &Console) -> Result<u8, Failure> {
         format,
         ascii: args.ascii,
         ghosts: args.ghosts,
+        split_sheets: args.split_sheets,
         order: match args.order {
             2 => Order::Second,
             _ => Order::First,

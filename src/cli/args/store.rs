@@ -78,6 +78,9 @@ pub struct ExportArgs {
     /// List in .msh, for each partition, the tetrahedra of others that touch it
     #[arg(long)]
     pub ghosts: bool,
+    /// Split embedded sheets: their vertices stand once for each side, those on free edges once; NAME_pairs.csv lists the pairs
+    #[arg(long)]
+    pub split_sheets: bool,
     /// Only these sub-domains, as numbers with commas between them
     #[arg(
         long,

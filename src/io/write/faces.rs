@@ -8,7 +8,7 @@ use tetdb_schema::record::{InterfaceFace, NO_TET, SealedFacet};
 use super::error::Result;
 use super::numbering::PartNumbers;
 use super::scope::Scope;
-use super::stream::{Records, scratch};
+use super::stream::{Records, Stream, scratch};
 use crate::sealed::SealedError;
 use crate::storage::{SortRecord, Sorter, sort_record};
 
@@ -144,25 +144,42 @@ impl FaceSorter {
 
     /// Ends collecting. Errors: the disk.
     pub fn finish(self) -> Result<Faces> {
-        let mut faces = Faces {
-            n: 0,
-            labels: BTreeMap::new(),
-            path: self.path,
-        };
-        let mut stream = scratch(&faces.path)?;
+        let mut file = FaceFile::create(self.path)?;
         let mut last = None;
         for face in self.sorter.finish()? {
             let face = face?;
-            if last.replace(face.key) == Some(face.key) {
-                continue;
+            if last.replace(face.key) != Some(face.key) {
+                file.put(&face)?;
             }
-            faces.n += 1;
-            *faces.labels.entry(face.label).or_default() += 1;
-            stream.bytes(&face.to_bytes());
-            stream.end()?;
         }
-        stream.finish()?;
-        Ok(faces)
+        file.finish()
+    }
+}
+
+/// Faces being written to their scratch file.
+struct FaceFile {
+    faces: Faces,
+    stream: Stream,
+}
+
+impl FaceFile {
+    fn create(path: PathBuf) -> Result<Self> {
+        let stream = scratch(&path)?;
+        let (n, labels) = (0, BTreeMap::new());
+        let faces = Faces { n, labels, path };
+        Ok(Self { faces, stream })
+    }
+
+    fn put(&mut self, face: &Face) -> Result<()> {
+        self.faces.n += 1;
+        *self.faces.labels.entry(face.label).or_default() += 1;
+        self.stream.bytes(&face.to_bytes());
+        self.stream.end()
+    }
+
+    fn finish(self) -> Result<Faces> {
+        self.stream.finish()?;
+        Ok(self.faces)
     }
 }
 
@@ -182,5 +199,16 @@ impl Faces {
             each(&Face::from_bytes(&record))?;
         }
         Ok(())
+    }
+
+    /// The faces that `each` puts for these, at `path`. Errors: the disk, those of `each`.
+    pub fn rewritten(
+        &self,
+        path: &Path,
+        mut each: impl FnMut(&Face, &mut dyn FnMut(&Face) -> Result<()>) -> Result<()>,
+    ) -> Result<Self> {
+        let mut file = FaceFile::create(path.to_owned())?;
+        self.each(|face| each(face, &mut |face| file.put(face)))?;
+        file.finish()
     }
 }

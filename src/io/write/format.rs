@@ -39,7 +39,7 @@ pub enum MeshFormat {
 
 /// Something that can be asked of a format: a bit, and what one holds no.
 #[derive(Clone, Copy)]
-pub(super) struct Ability(u8, &'static str);
+pub(super) struct Ability(u16, &'static str);
 
 pub(super) const TEXT: Ability = Ability(1, "text");
 pub(super) const SECOND_ORDER: Ability = Ability(2, "elements of second order");
@@ -50,25 +50,31 @@ pub(super) const REGIONS_APART: Ability = Ability(32, "regions of sub-domains ap
 pub(super) const GHOSTS: Ability = Ability(64, "ghost cells");
 pub(super) const STREAM: Ability = Ability(128, "stream that is written from beginning to end");
 
+pub(super) const SLITS: Ability = Ability(256, "split sheets");
+
 /// All formats: the word, which is also the ending of names but for `msh22`, and what each can.
-const FORMATS: &[(&str, MeshFormat, u8)] = {
+const FORMATS: &[(&str, MeshFormat, u16)] = {
     use MeshFormat::*;
-    const PARTS: u8 = SUBDOMAINS.0 | REGIONS.0 | REGIONS_APART.0;
-    const ORDER_2: u8 = SECOND_ORDER.0;
+    const PARTS: u16 = SUBDOMAINS.0 | REGIONS.0 | REGIONS_APART.0;
+    const ORDER_2: u16 = SECOND_ORDER.0;
     &[
-        ("vtu", Vtu, ORDER_2 | FACES_ALONE.0 | PARTS),
+        ("vtu", Vtu, ORDER_2 | FACES_ALONE.0 | PARTS | SLITS.0),
         ("pvtu", Pvtu, ORDER_2 | PARTS),
         ("vtkhdf", VtkHdf, ORDER_2 | FACES_ALONE.0 | PARTS),
         // A process of MPI for each sub-domain, also where it has nothing of a region.
         ("foam", OpenFoam, TEXT.0 | SUBDOMAINS.0 | REGIONS.0),
         ("msh", Gmsh, TEXT.0 | ORDER_2 | PARTS | GHOSTS.0 | STREAM.0),
-        ("msh22", Gmsh22, PARTS | STREAM.0),
-        ("mesh", Medit, TEXT.0 | PARTS | STREAM.0),
-        ("meshb", MeditBinary, PARTS | STREAM.0),
-        ("mfem", Mfem, TEXT.0 | SUBDOMAINS.0 | REGIONS.0 | STREAM.0),
-        ("ele", TetGen, TEXT.0 | PARTS),
-        ("inp", Abaqus, TEXT.0 | ORDER_2 | PARTS | STREAM.0),
-        ("npy", Numpy, PARTS),
+        ("msh22", Gmsh22, PARTS | STREAM.0 | SLITS.0),
+        ("mesh", Medit, TEXT.0 | PARTS | STREAM.0 | SLITS.0),
+        ("meshb", MeditBinary, PARTS | STREAM.0 | SLITS.0),
+        (
+            "mfem",
+            Mfem,
+            TEXT.0 | SUBDOMAINS.0 | REGIONS.0 | STREAM.0 | SLITS.0,
+        ),
+        ("ele", TetGen, TEXT.0 | PARTS | SLITS.0),
+        ("inp", Abaqus, TEXT.0 | ORDER_2 | PARTS | STREAM.0 | SLITS.0),
+        ("npy", Numpy, PARTS | SLITS.0),
         #[cfg(feature = "parquet")]
         ("parquet", Parquet, SUBDOMAINS.0),
         ("json", Topology, TEXT.0 | STREAM.0),
@@ -92,7 +98,7 @@ impl MeshFormat {
         self.row().0
     }
 
-    fn row(self) -> &'static (&'static str, Self, u8) {
+    fn row(self) -> &'static (&'static str, Self, u16) {
         let row = FORMATS.iter().find(|row| row.1 == self);
         row.expect("every format is in the list")
     }

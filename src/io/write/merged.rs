@@ -8,8 +8,9 @@ use tetdb_schema::ids::TetId;
 use tetdb_schema::record::SealedVertex;
 
 use super::chosen::Chosen;
+use super::doubles::Doubles;
 use super::error::{Result, WriteError};
-use super::faces::{FaceSorter, FaceSource, Faces};
+use super::faces::{Face, FaceSorter, FaceSource, Faces};
 use super::numbering::{Numbering, PartNumbers, Sharer, Source, candidates, sharers};
 use super::scope::{FaceSet, Scope};
 use crate::sealed::SealedError;
@@ -82,6 +83,7 @@ pub(super) struct Merged<'a> {
     regions: BTreeSet<u32>,
     numbering: Numbering,
     faces: Faces,
+    doubles: Option<Doubles>,
     label_names: Vec<String>,
     region_names: Vec<String>,
     dir: PathBuf,
@@ -125,6 +127,7 @@ impl<'a> Merged<'a> {
             regions: scope.regions.clone(),
             numbering,
             faces,
+            doubles: None,
             label_names,
             region_names,
             dir: dir.to_owned(),
@@ -133,8 +136,23 @@ impl<'a> Merged<'a> {
         })
     }
 
+    /// Vertices and their doubles.
     pub fn n_vertices(&self) -> u64 {
-        self.numbering.n_vertices()
+        self.numbering.n_vertices() + self.doubles.as_ref().map_or(0, |doubles| doubles.n)
+    }
+
+    /// From now on vertices stand as often as this says.
+    pub fn set_doubles(&mut self, doubles: Doubles) {
+        self.doubles = Some(doubles);
+    }
+
+    /// Puts the faces that `each` puts in the place of the ones it gets. Errors: the disk, those of `each`.
+    pub fn rewrite_faces(
+        &mut self,
+        each: impl FnMut(&Face, &mut dyn FnMut(&Face) -> Result<()>) -> Result<()>,
+    ) -> Result<()> {
+        self.faces = self.faces.rewritten(&self.dir.join("split-faces"), each)?;
+        Ok(())
     }
 
     /// The sub-domains, by rank.
@@ -322,7 +340,11 @@ impl<'a> Merged<'a> {
                 self.progress.advance(chunk.records.len());
             }
         }
-        Ok(())
+        let first = self.numbering.n_vertices();
+        match &self.doubles {
+            Some(doubles) => doubles.each(|place, double| each(first + place, &double.sealed())),
+            None => Ok(()),
+        }
     }
 
     /// Every tetrahedron in the order of its number. Errors: damage, those of `each`.
@@ -336,6 +358,7 @@ impl<'a> Merged<'a> {
     }
 
     fn pass(&mut self, quality: bool, mut each: impl FnMut(&Tet) -> Result<()>) -> Result<()> {
+        let mut changes = self.doubles.as_ref().map(Doubles::changes).transpose()?;
         for (p, Source { row, .. }) in self.parts.iter().enumerate() {
             let numbers = self.numbers_of(p)?;
             let mut part = self.store.open_subdomain(row.rank, self.memory / 4)?;
@@ -347,9 +370,9 @@ impl<'a> Merged<'a> {
                         .filter(|_| local == expected && u64::from(local) < row.tets);
                     let id = id.ok_or_else(|| damaged(&part, local, expected))?;
                     expected += 1;
-                    if numbers.tet(local).is_none() {
+                    let Some(number) = numbers.tet(local) else {
                         continue;
-                    }
+                    };
                     if let Some(&v) = tet.nodes.iter().find(|&&v| u64::from(v) >= row.vertices) {
                         part.corner(v)?;
                     }
@@ -358,8 +381,12 @@ impl<'a> Merged<'a> {
                     } else {
                         f64::NAN
                     };
+                    let mut nodes = tet.nodes.map(|v| numbers.of(v));
+                    if let Some(changes) = &mut changes {
+                        changes.apply(number, &mut nodes)?;
+                    }
                     each(&Tet {
-                        nodes: tet.nodes.map(|v| numbers.of(v)),
+                        nodes,
                         region: tet.region,
                         subdomain: row.rank,
                         id,

@@ -15,6 +15,7 @@ mod chosen;
 #[cfg(any(test, feature = "cli", feature = "internals"))]
 mod defects;
 mod dispatch;
+mod doubles;
 mod draft;
 mod error;
 mod faces;
@@ -39,6 +40,7 @@ mod scope;
 #[cfg(any(test, feature = "cli", feature = "internals"))]
 mod selected;
 mod selection;
+mod split;
 mod stream;
 mod surface;
 #[cfg(test)]
@@ -57,7 +59,9 @@ pub use defects::defects;
 use error::Result;
 pub use error::WriteError;
 pub use format::{ENDINGS, MeshFormat};
-use format::{FACES_ALONE, GHOSTS, REGIONS, REGIONS_APART, SECOND_ORDER, STREAM, SUBDOMAINS, TEXT};
+use format::{
+    FACES_ALONE, GHOSTS, REGIONS, REGIONS_APART, SECOND_ORDER, SLITS, STREAM, SUBDOMAINS, TEXT,
+};
 pub use npy::TextFile;
 #[cfg(any(feature = "pictures", feature = "internals"))]
 pub use npy::bytes;
@@ -130,6 +134,9 @@ pub fn export(
                 let progress = Progress::new(report);
                 let dir = draft.dir().to_owned();
                 let mut mesh = Merged::open(store, scope, &dir, memory_bytes, progress)?;
+                if selection.split_sheets {
+                    split::split(&mut mesh, &mut draft, out)?;
+                }
                 dispatch::write(format, selection, &mut mesh, &mut draft, out)?
             }
         };
@@ -174,12 +181,15 @@ pub fn check(out: &Path, selection: &Selection) -> Result<MeshFormat> {
         (pieces || subdomains, SUBDOMAINS),
         (regions, REGIONS),
         (regions && (pieces || subdomains), REGIONS_APART),
+        (selection.split_sheets, SLITS),
         (stdout, STREAM),
     ];
     let refused = asked.into_iter().filter(|(is_asked, _)| *is_asked);
     let lacks = |(_, ability)| format.lacks(ability);
-    let one_stream = (stdout && pieces).then(|| "several files in one stream".to_owned());
-    match refused.filter_map(lacks).next().or(one_stream) {
+    let one_stream = (stdout && (pieces || selection.split_sheets))
+        .then(|| "several files in one stream".to_owned());
+    let slits = (pieces && selection.split_sheets).then(|| "split sheets in pieces".to_owned());
+    match refused.filter_map(lacks).next().or(one_stream).or(slits) {
         None => Ok(format),
         Some(what) => Err(WriteError::Unsupported {
             path: path(),

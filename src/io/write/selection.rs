@@ -21,6 +21,8 @@ pub struct Selection {
     pub ascii: bool,
     /// Of each part the tetrahedra that touch other parts, listed for those (`.msh`).
     pub ghosts: bool,
+    /// The vertices on sheets once for each side, and its triangles boundary of both.
+    pub split_sheets: bool,
     /// Nodes of the elements.
     pub order: Order,
 }
