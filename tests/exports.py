@@ -83,7 +83,7 @@ def by_meshio(path):
 
 def by_gmsh(path):
     import gmsh
-    gmsh.initialize(["-v", "1"])
+    gmsh.initialize(["gmsh", "-v", "1"])
     try:
         gmsh.open(path)
         tags, xyz, _ = gmsh.model.mesh.getNodes()

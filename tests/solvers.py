@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 """Do the solvers' own readers see the mesh that the store has?
 
-  solvers.py INFO.json NAME.vtkhdf | NAME.vtu | NAME.msh | NAME.inp | CASE.foam | NAME.ele ...
+  solvers.py INFO.json NAME.vtkhdf | NAME.vtu | NAME.msh | NAME.inp | NAME.mfem | CASE.foam | NAME.ele ...
 
 INFO.json: what `tetdb info --json` printed. A `.vtkhdf` is read by VTK and by h5py, an OpenFOAM case (whole and processors) by a reader of
-this file, and by checkMesh where it is installed, `.msh` by gmsh. Counts, volume per region, area per label and the neighbors of
+this file, and by checkMesh where it is installed, `.msh` by gmsh, `.mfem` by PyMFEM (and its parts NAME.000000 .. by MFEM itself where
+MFEM_PROGRAM names a build of tests/mfem_parallel.cpp). What has `.only` in its path holds region 1 alone. Counts, volume per region, area per label and the neighbors of
 each sub-domain are compared with the store's and with each other. With --require a program that is not installed is a failure; else it
 is named and skipped. Exit code 0 when all agree.
 """
@@ -51,11 +52,14 @@ def areas(points, tris):
     return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
 
 
-def corners_of(points, tets):
+VTK_EDGES = [(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)]
+GMSH_EDGES = [(0, 1), (1, 2), (0, 2), (0, 3), (2, 3), (1, 3)]
+
+
+def corners_of(points, tets, ends=VTK_EDGES):
     """The corners of tetrahedra; of those of second order also whether quadratics are integrated exactly."""
     if tets.shape[1] == 4:
         return tets
-    ends = [(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)]
     for node, (a, b) in enumerate(ends, 4):
         assert (points[tets[:, node]] == (points[tets[:, a]] / 2 + points[tets[:, b]] / 2)).all(), f"node {node} is not the middle"
     edges = np.concatenate([np.sort(tets[:, list(e)], axis=1) for e in ends])
@@ -125,7 +129,9 @@ def check_vtkhdf(path, want):
         parts[ranks[0]] = len(tets)
         quality = vtk_to_numpy(data.GetArray("quality"))
         assert quality.min() >= 1 and len(quality) == len(tets)
-    same(path, "tetrahedra by partition", parts, want["tets by part"])
+    if "tets by part" in want:
+        same(path, "tetrahedra by partition", parts, want["tets by part"])
+    same(path, "tetrahedra", sum(parts.values()), want["tets"])
     same(path, "volume by region", dict(volume), want["volume by region"])
     skin = path.replace(".vtkhdf", "_boundary.vtkhdf")
     (grid,) = grids(skin)
@@ -140,7 +146,8 @@ def check_vtkhdf(path, want):
     shared = collections.defaultdict(dict)
     for pair, n in collections.Counter(zip(rank[~outer].tolist(), neighbor[~outer].tolist())).items():
         shared[pair[0]][pair[1]] = shared[pair[1]][pair[0]] = n
-    same(path, "faces between parts", {k: v for k, v in shared.items()}, {k: v for k, v in want["faces between parts"].items() if v})
+    if "faces between parts" in want:
+        same(path, "faces between parts", dict(shared), {k: v for k, v in want["faces between parts"].items() if v})
     # The same by the HDF5 library, and where the boundary's vertices are in the other file.
     with h5py.File(path) as f, h5py.File(skin) as g:
         f, g = f["VTKHDF"], g["VTKHDF"]
@@ -183,7 +190,7 @@ def gmsh_file(gmsh, path):
     tags, xyz, _ = gmsh.model.mesh.getNodes()
     place = np.zeros(int(tags.max()) + 1, np.int64)
     place[tags] = np.arange(len(tags))
-    points, found = xyz.reshape(-1, 3), collections.defaultdict(list)
+    points, found, between = xyz.reshape(-1, 3), collections.defaultdict(list), {}
     names = {(d, t): gmsh.model.getPhysicalName(d, t) for d, t in gmsh.model.getPhysicalGroups()}
     for dim, tag in gmsh.model.getEntities():
         if dim < 2 or gmsh.model.getType(dim, tag) == "Ghost volume":
@@ -191,23 +198,38 @@ def gmsh_file(gmsh, path):
         groups = gmsh.model.getPhysicalGroupsForEntity(dim, tag).tolist()
         parts = gmsh.model.getPartitions(dim, tag).tolist()
         for kind, ids, nodes in zip(*gmsh.model.mesh.getElements(dim, tag)):
-            assert kind == (2 if dim == 2 else 4) and len(groups) == 1 and len(parts) <= 1
-            found[dim].append((parts[0] - 1 if parts else 0, names[dim, groups[0]], ids, place[nodes].reshape(-1, dim + 1)))
-    return points, tags, found
+            assert kind in ((2, 9) if dim == 2 else (4, 11)), f"elements of kind {kind}"
+            nodes = place[nodes].reshape(-1, {2: 3, 9: 6, 4: 4, 11: 10}[int(kind)])
+            if len(parts) == 2:
+                assert dim == 2 and not groups
+                between[tuple(sorted(p - 1 for p in parts))] = {tuple(sorted(f)) for f in tags[nodes[:, :3]].tolist()}
+                found["between"].append((None, None, ids, nodes))
+                continue
+            assert len(groups) == 1 and len(parts) <= 1
+            if dim == 3:
+                nodes = corners_of(points, nodes, GMSH_EDGES)
+            found[dim].append((parts[0] - 1 if parts else 0, names[dim, groups[0]], ids, nodes))
+    return points, tags, found, between
 
 
 def check_msh(path, want):
     import gmsh
-    gmsh.initialize(["-v", "1"])
+    gmsh.initialize(["gmsh", "-v", "1"])
     try:
-        pieces = path.endswith("_1.msh")
+        pieces, ghosts, only = path.endswith("_1.msh"), "ghost" in path or "second_1" in path, ".only" in path
         files = [path[:-5] + f"{p + 1}.msh" for p in range(want["parts"])] if pieces else [path]
-        parts, volume, area, corners, elements = {}, collections.defaultdict(float), collections.defaultdict(float), {}, set()
-        for file in files:
-            points, tags, found = gmsh_file(gmsh, file)
+        parts, volume, area, corners, elements, between = {}, collections.defaultdict(float), collections.defaultdict(float), {}, set(), {}
+        seen = {}
+        for number, file in enumerate(files):
+            points, tags, found, shared = gmsh_file(gmsh, file)
             used = np.unique(np.concatenate([nodes.ravel() for _, _, _, nodes in found[3]]))
-            assert len(used) == len(points), "a node without a tetrahedron"
+            second = any(nodes.shape[1] > 3 for _, _, _, nodes in found[2])
+            assert second or len(used) == len(points), "a node without a tetrahedron"
             for part, name, ids, tets in found[3]:
+                if pieces and part != number:
+                    assert ghosts, "a tetrahedron of another partition"
+                    seen.setdefault(number, {}).update(zip(ids.tolist(), np.sort(tags[tets], axis=1).tolist()))
+                    continue
                 parts[part] = parts.get(part, 0) + len(tets)
                 volume[int(name[7:])] += float(volumes(points, tets).sum())
                 corners.setdefault(part, []).append(np.sort(tags[tets], axis=1))
@@ -215,6 +237,16 @@ def check_msh(path, want):
             for part, name, ids, tris in found[2]:
                 area[name] += float(areas(points, tris).sum())
                 elements.update(ids.tolist())
+            for _, _, ids, _ in found["between"]:
+                elements.update(ids.tolist())
+            for pair, faces in shared.items():
+                assert between.setdefault(pair, faces) == faces, "faces between partitions differ in their files"
+        if only:
+            same(path, "volume by region", dict(volume), want["volume by region"])
+            same(path, "tetrahedra", sum(parts.values()), want["tets"])
+            same_areas(path, dict(area))
+            print(f"{path}: gmsh sees {sum(parts.values())} tetrahedra of region 1 alone, closed by {sum(area.values()):.6g} of area")
+            return
         same(path, "tetrahedra by partition", parts, want["tets by part"])
         same(path, "volume by region", dict(volume), want["volume by region"])
         same_areas(path, dict(area))
@@ -224,9 +256,18 @@ def check_msh(path, want):
                  for part, blocks in corners.items()}
         shared = {a: {b: len(faces[a] & faces[b]) for b in faces if b != a and faces[a] & faces[b]} for a in faces}
         same(path, "faces between parts", shared, want["faces between parts"])
-        if "ghost" in path:
+        assert between == {(a, b): faces[a] & faces[b] for a in shared for b in shared[a] if a < b}, "other faces between partitions"
+        if ghosts and pieces:
+            nodes = {part: np.unique(np.concatenate(blocks)) for part, blocks in corners.items()}
+            for part, blocks in corners.items():
+                others = np.concatenate([c for p, cs in corners.items() if p != part for c in cs])
+                expected = others[np.isin(others, nodes[part]).any(axis=1)]
+                got = {tuple(c) for c in seen[part].values()}
+                assert got == {tuple(c) for c in expected.tolist()} and len(seen[part]) == len(expected), f"ghosts of partition {part}"
+        elif ghosts:
             check_ghosts(gmsh, path, corners)
-        print(f"{path}: gmsh {gmsh.option.getString('General.Version')} sees {len(parts)} partitions, {sum(parts.values())} tetrahedra")
+        order = "second" if second else "first"
+        print(f"{path}: gmsh {gmsh.option.getString('General.Version')} sees {len(parts)} partitions, {sum(parts.values())} tetrahedra of {order} order")
     finally:
         gmsh.finalize()
 
@@ -250,6 +291,110 @@ def check_ghosts(gmsh, path, corners):
             assert all(owner[e][0] == p - 1 for e, p in zip(ids.tolist(), of.tolist())), "a ghost of another partition"
     same(path, "ghost cells by partition", {k: len(v) for k, v in found.items()}, {k: len(v) for k, v in expected.items()})
     assert dict(found) == expected, "other ghost cells"
+
+
+def mfem_sections(path):
+    """An MFEM file by its published format: sections by name, as lines of numbers; the groups of a part behind them."""
+    lines = [line for line in open(path).read().split("\n") if line and not line.startswith("#")]
+    assert lines[0] == "MFEM mesh v1.3" and lines[-1] == "mfem_mesh_end"
+    at = lambda word: lines.index(word)
+    def table(word, skip=1):
+        n = int(lines[at(word) + 1])
+        return np.array([line.split() for line in lines[at(word) + skip + 1:at(word) + skip + 1 + n]], float)
+    return lines, table("elements").astype(int), table("boundary").astype(int), table("vertices", 2)
+
+
+def check_mfem(path, want):
+    import mfem.ser as mfem
+    mesh = mfem.Mesh(path, 1, 1)
+    points = np.array([mesh.GetVertexArray(v) for v in range(mesh.GetNV())])
+    tets = np.array([mesh.GetElementVertices(e) for e in range(mesh.GetNE())])
+    tris = np.array([mesh.GetBdrElementVertices(e) for e in range(mesh.GetNBE())])
+    regions = np.array([mesh.GetAttribute(e) for e in range(mesh.GetNE())])
+    labels = np.array([mesh.GetBdrAttribute(e) for e in range(mesh.GetNBE())])
+    same(path, "volume by region", by(regions, volumes(points, tets)), want["volume by region"])
+    sizes = by(labels, areas(points, tris))
+    names = {name: list(mesh.bdr_attribute_sets.GetAttributeSet(name).ToList()) for name in mesh.bdr_attribute_sets.GetAttributeSetNames()}
+    same_areas(path, {name: sum(sizes[a] for a in members) for name, members in names.items()})
+    print(f"{path}: PyMFEM {mfem.__version__ if hasattr(mfem, '__version__') else ''} sees {len(tets)} tetrahedra, {len(tris)} boundary elements")
+    prefix = path[:-5] + "."
+    if os.path.exists(prefix + "000000"):
+        check_mfem_parts(mfem, path, prefix, want, len(tris))
+
+
+def check_mfem_parts(mfem, path, prefix, want, n_boundary):
+    """The parts read by PyMFEM, less what they share; that by this script: every side lists the same in the same order, and all of it."""
+    parts, volume, shared, found = [], collections.defaultdict(float), collections.defaultdict(dict), [{}, {}, {}]
+    for rank in range(want["parts"]):
+        lines, tets, tris, points = mfem_sections(prefix + f"{rank:06}")
+        end = lines.index("mfem_serial_mesh_end")
+        with tempfile.NamedTemporaryFile("w", suffix=".mesh") as alone:
+            alone.write("\n".join(lines[:end]) + "\nmfem_mesh_end\n")
+            alone.flush()
+            seen = mfem.Mesh(alone.name, 1, 1)
+            assert (seen.GetNE(), seen.GetNBE(), seen.GetNV()) == (len(tets), len(tris), len(points))
+        assert (tets[:, 1] == 4).all() and (tris[:, 1] == 2).all()
+        for region, v in by(tets[:, 0], volumes(points, tets[:, 2:])).items():
+            volume[region] += v
+        n_boundary -= len(tris)
+        words = " ".join(lines[end + 1:]).split()
+        take = lambda n: [int(words.pop(0)) for _ in range(n)]
+        def word(expected):
+            assert words.pop(0) == expected, expected
+            return take(1)[0]
+        assert words.pop(0) == "communication_groups"
+        groups = [tuple(take(take(1)[0])) for _ in range(word("number_of_groups"))]
+        assert groups[0] == (rank,) and len(set(groups)) == len(groups)
+        totals = [word(f"total_shared_{what}") for what in ("vertices", "edges", "faces")]
+        keys = [tuple(p) for p in points.tolist()]
+        for group in groups[1:]:
+            for dimension, what in enumerate(("vertices", "edges", "faces")):
+                listed = []
+                for _ in range(word(f"shared_{what}")):
+                    if dimension == 2:
+                        assert take(1) == [2]
+                    listed.append(tuple(keys[v] for v in take(dimension + 1)))
+                shared[group][dimension, rank] = listed
+                totals[dimension] -= len(listed)
+        assert totals == [0, 0, 0] and words == ["mfem_mesh_end"]
+        # All entities of the part, by hand.
+        for tet in tets[:, 2:].tolist():
+            names = sorted(keys[v] for v in tet)
+            for a in range(4):
+                found[0].setdefault((names[a],), set()).add(rank)
+                for b in range(a):
+                    found[1].setdefault((names[b], names[a]), set()).add(rank)
+                found[2].setdefault(tuple(names[:a] + names[a + 1:]), set()).add(rank)
+        parts.append(len(tets))
+    same(prefix, "tetrahedra by part", dict(enumerate(parts)), want["tets by part"])
+    same(prefix, "volume by region", dict(volume), want["volume by region"])
+    assert n_boundary == 0, "boundary elements are not each in one part"
+    n_faces = collections.defaultdict(dict)
+    for dimension in range(3):
+        expected = collections.defaultdict(set)
+        for entity, ranks in found[dimension].items():
+            if len(ranks) > 1:
+                expected[tuple(sorted(ranks))].add(entity)
+        for group, sides in shared.items():
+            first = sides[dimension, group[0]]
+            assert all(sides[dimension, rank] == first for rank in group), f"group {group} is listed differently"
+            listed = {tuple(sorted(entity)) for entity in first}
+            assert len(listed) == len(first) and listed == expected.pop(group, set()), f"group {group} lists others of dimension {dimension}"
+            if dimension == 2 and first:
+                a, b = group
+                n_faces[a][b] = n_faces[b][a] = len(first)
+        assert not expected, "something shared is not listed"
+    same(prefix, "faces between parts", dict(n_faces), {k: v for k, v in want["faces between parts"].items() if v})
+    print(f"{prefix}*: {len(parts)} parts of {sum(parts)} tetrahedra, {len(shared)} groups, alike on all sides and complete")
+    program = os.environ.get("MFEM_PROGRAM")
+    if not program:
+        skipped.append("MFEM in parallel: MFEM_PROGRAM names no build of tests/mfem_parallel.cpp")
+        return
+    run = ["mpirun", "--allow-run-as-root", "--oversubscribe", "-np", str(len(parts)), program, prefix, path]
+    out = subprocess.run(run, capture_output=True, text=True, env=FOAM_ENVIRONMENT)
+    print(out.stdout.strip())
+    if out.returncode:
+        complain(f"{' '.join(run)}: {out.stdout[-800:]}{out.stderr[-800:]}")
 
 
 def check_ele(path, want):
@@ -515,12 +660,21 @@ def compare_solutions(case, whole, ranks):
         complain(f"{case}: the parallel solution is another")
 
 
+def of_first_region(info):
+    """What a file of region 1 alone has."""
+    (row,) = [r for r in info["regions"] if r["region"] == 1]
+    return {"tets": row["tets"], "parts": 1, "volume by region": {1: row["volume"]}}
+
+
 def main():
+    global known_areas
     arguments = [a for a in sys.argv[1:] if a != "--require"]
     info, *files = arguments
-    want = store(json.load(open(info)))
+    info = json.load(open(info))
+    areas_of = {False: known_areas, True: {}}
     for path in files:
-        ending = os.path.splitext(path)[1][1:]
+        ending, is_only = os.path.splitext(path)[1][1:], ".only" in path
+        want, known_areas = (of_first_region if is_only else store)(info), areas_of[is_only]
         try:
             globals()["check_" + ending](path, want)
         except ImportError as error:

@@ -43,6 +43,12 @@ impl ExportOptions {
         self
     }
 
+    /// Only these regions, by their numbers; what bounds them is boundary.
+    pub fn regions(mut self, regions: &[u32]) -> Self {
+        self.selection.regions = regions.iter().copied().collect();
+        self
+    }
+
     /// Each sub-domain in a file of its own.
     pub fn pieces(mut self) -> Self {
         self.selection.pieces = true;
@@ -73,9 +79,15 @@ impl ExportOptions {
         self
     }
 
-    /// Elements with the middles of edges as nodes: tetrahedra of ten, triangles of six; `.vtu`, `.pvtu`, `.vtkhdf` and `.inp`.
+    /// Elements with the middles of edges as nodes: tetrahedra of ten, triangles of six; `.vtu`, `.pvtu`, `.vtkhdf`, `.msh` and `.inp`.
     pub fn second_order(mut self) -> Self {
         self.selection.order = Order::Second;
+        self
+    }
+
+    /// Sheets as slits: their vertices once for each side, their triangles boundary of both; the pairs in `NAME_pairs.csv`.
+    pub fn split_sheets(mut self) -> Self {
+        self.selection.split_sheets = true;
         self
     }
 
@@ -88,7 +100,7 @@ impl ExportOptions {
 
 impl Store {
     /// Writes the mesh for another program, in the format the ending of `out` names: `.vtu`, `.pvtu`, `.vtkhdf`, `.foam` (OpenFOAM), `.msh`,
-    /// `.mesh`, `.meshb`, `.ele` (TetGen), `.inp`, `.npy`, `.json` (who neighbors whom), and `.parquet` with that feature.
+    /// `.mesh`, `.meshb`, `.mfem`, `.ele` (TetGen), `.inp`, `.npy`, `.json` (who neighbors whom), and `.parquet` with that feature.
     ///
     /// Streamed; nothing has its name before it is whole. Errors: `usage` for a folder or the surface the store was made from; `unknown-format`, `format-limit`, `disk-full`; damage.
     pub fn export(
@@ -106,6 +118,12 @@ impl Store {
             )
         })
     }
+}
+
+/// What regions 1, 2, … of a finished store are called.
+#[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "for the program"))]
+pub(crate) fn region_names(store: &Path) -> Result<Vec<String>, Error> {
+    Ok(open_finished(store)?.region_names()?)
 }
 
 /// Writes one file, and what belongs to it.

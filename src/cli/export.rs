@@ -8,6 +8,7 @@ use super::args::ExportArgs;
 use super::console::Console;
 use super::failure::Failure;
 use super::memory;
+use super::query_ask::regions;
 use crate::api::targets::{check_target, inputs_of};
 use crate::api::{Error, Exported, Settings, show};
 use crate::io::write::{Content, ENDINGS, MeshFormat, Order, Selection, check};
@@ -24,8 +25,13 @@ pub fn run(args: &ExportArgs, console: &Console) -> Result<u8, Failure> {
         })?),
         None => None,
     };
+    let regions = match &args.region {
+        Some(text) => regions(text, &show::region_names(&args.store)?)?,
+        None => Vec::new(),
+    };
     let selection = Selection {
         subdomains: args.subdomain.iter().copied().collect(),
+        regions: regions.into_iter().collect(),
         pieces: args.pieces,
         content: match (args.boundary, args.interfaces) {
             (true, _) => Content::Boundary,
@@ -35,6 +41,7 @@ pub fn run(args: &ExportArgs, console: &Console) -> Result<u8, Failure> {
         format,
         ascii: args.ascii,
         ghosts: args.ghosts,
+        split_sheets: args.split_sheets,
         order: match args.order {
             2 => Order::Second,
             _ => Order::First,

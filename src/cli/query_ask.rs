@@ -4,7 +4,7 @@ use super::args::QueryArgs;
 use super::failure::Failure;
 use crate::expr::{ExprError, Expression, Kind};
 use crate::geom::{Aabb, Point};
-use crate::query::{QueryError, QuerySession, Selection, Solid, VARIABLES};
+use crate::query::{QueryError, QuerySession, Selection, Solid, VARIABLES, regions_called};
 
 /// An option's value that makes no sense.
 pub fn bad(option: &str, found: &str, expected: &str) -> Failure {
@@ -78,7 +78,7 @@ pub fn selection(args: &QueryArgs, inquiry: &mut QuerySession) -> Result<Selecti
     };
     selection.subdomains = ranks("--subdomain", &args.subdomain)?;
     if let Some(text) = &args.region {
-        selection.regions = Some(regions(text, inquiry)?);
+        selection.regions = Some(regions(text, &inquiry.region_names)?);
     }
     if let Some(text) = &args.label {
         let names = text.split(',').map(|name| label(inquiry, name.trim()));
@@ -115,16 +115,16 @@ pub fn selection(args: &QueryArgs, inquiry: &mut QuerySession) -> Result<Selecti
     Ok(selection)
 }
 
-/// Regions by number or name.
-fn regions(text: &str, inquiry: &QuerySession) -> Result<Vec<u32>, Failure> {
+/// Regions by number or name; `names` are those from region 1 on.
+pub(super) fn regions(text: &str, names: &[String]) -> Result<Vec<u32>, Failure> {
     let mut found = Vec::new();
     for word in text.split(',').map(str::trim) {
         match word.parse() {
             Ok(region) => found.push(region),
-            Err(_) if word.is_empty() || inquiry.region_names.is_empty() => {
+            Err(_) if word.is_empty() || names.is_empty() => {
                 return Err(bad("--region", text, RANKS));
             }
-            Err(_) => found.extend(inquiry.regions_called(word)?),
+            Err(_) => found.extend(regions_called(names, word)?),
         }
     }
     Ok(found)

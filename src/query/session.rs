@@ -198,12 +198,6 @@ impl QuerySession {
         &self.rows
     }
 
-    /// The regions of this name. Errors: there is none.
-    #[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "for the program"))]
-    pub fn regions_called(&self, name: &str) -> Result<Vec<u32>, QueryError> {
-        regions_called(&self.region_names, name)
-    }
-
     /// Names of the labels; their place is their number.
     #[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "for the program"))]
     pub fn labels(&self) -> &[String] {

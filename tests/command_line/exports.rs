@@ -16,7 +16,12 @@ fn two_parts() -> Place {
 #[test]
 fn the_standard_output_gets_the_bytes_of_the_file() {
     let place = two_parts();
-    for (name, word) in [("a.mesh", "mesh"), ("a.json", "json"), ("a.inp", "inp")] {
+    for (name, word) in [
+        ("a.mesh", "mesh"),
+        ("a.json", "json"),
+        ("a.inp", "inp"),
+        ("a.mfem", "mfem"),
+    ] {
         place
             .run_line(&format!("export two.tetdb {name}"))
             .succeeds();

@@ -4,6 +4,7 @@
 //! How: one sample in four parts, each part read back from its own file and compared with the others and with what the store says.
 
 use std::collections::{BTreeMap, HashSet};
+use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
@@ -157,4 +158,103 @@ fn some_parts_are_a_mesh_with_a_closed_boundary() {
     place
         .run_line("export three.tetdb faces.vtu --interfaces")
         .succeeds();
+}
+
+#[test]
+fn regions_apart_are_closed_and_together_the_whole() {
+    let place = Place::new();
+    place
+        .run_line("mesh sample:balls,count=4 -o all.tetdb --regions all --subdomains 3")
+        .succeeds();
+    let info = place.run_line("info all.tetdb --json").succeeds().json();
+    let regions = info["regions"].as_array().expect("a list").iter();
+    let mut left = info["tets"].as_u64().expect("a number") as usize;
+    for row in regions.filter(|row| row["filled"] == true) {
+        let region = &row["region"];
+        let line = format!("export all.tetdb one.mesh --region {region}");
+        place.run_line(&line).succeeds();
+        let one = Piece::read(&place, "one.mesh");
+        assert_eq!(one.tets as u64, row["tets"]);
+        place.run_line("check one.mesh").succeeds();
+        place.run_line(&format!("{line} --pieces")).succeeds();
+        let pieces = (0..3).map(|rank| format!("one_{rank:05}.mesh"));
+        let there = pieces.filter(|name| place.path(name).exists());
+        let in_pieces: usize = there
+            .map(|name| {
+                let piece = Piece::read(&place, &name);
+                std::fs::remove_file(place.path(&name)).expect("it is there");
+                piece.tets
+            })
+            .sum();
+        assert_eq!(in_pieces, one.tets);
+        left -= one.tets;
+    }
+    assert_eq!(left, 0);
+    for (line, code) in [
+        ("export all.tetdb x.mesh --region 99", 3),
+        ("export all.tetdb x.mesh --region nowhere", 2),
+        ("export all.tetdb x.mfem --region 1 --pieces", 2),
+        ("export all.tetdb x.json --region 1", 2),
+        ("export all.tetdb x.json --subdomain 1", 2),
+        ("export all.tetdb x.mfem --order 2", 2),
+        ("export all.tetdb x.vtu --ghosts", 2),
+    ] {
+        assert_eq!(place.run_line(line).exit(), Some(code), "{line}");
+    }
+}
+
+#[test]
+fn pieces_are_the_same_whoever_writes_them() {
+    let place = Place::new();
+    place
+        .run_line("mesh sample:box,h=0.038 -o four.tetdb --subdomains 4")
+        .succeeds();
+    let outs = [
+        "part.mesh",
+        "part.vtu --order 2",
+        "part.inp",
+        "part.msh --ghosts --order 2",
+        "part.mfem",
+        "part.foam",
+    ];
+    for (i, out) in outs.iter().enumerate() {
+        for folder in ["all", "each"] {
+            std::fs::create_dir_all(place.path(&format!("{folder}{i}"))).expect("a folder");
+        }
+        let words = format!("export four.tetdb all{i}/{out} --pieces");
+        place.run_line(&words).succeeds();
+        // Four processes at once, none of which knows of the others.
+        let tasks: Vec<_> = (0..4)
+            .map(|rank| {
+                let words = format!("export four.tetdb each{i}/{out} --pieces --subdomain {rank}");
+                let words: Vec<&str> = words.split_whitespace().collect();
+                place.command(&words).spawn().expect("the program starts")
+            })
+            .collect();
+        for task in tasks {
+            let done = task.wait_with_output().expect("it ends");
+            assert!(done.status.success(), "{out}: {done:?}");
+        }
+        let files = |folder: &str| files_below(&place.path(&format!("{folder}{i}")));
+        let (all, each) = (files("all"), files("each"));
+        assert!(all.len() >= 4);
+        assert!(all == each, "{out}: {:?} {:?}", all.keys(), each.keys());
+    }
+}
+
+/// All files in a folder and in those in it, by their paths there.
+fn files_below(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    for entry in std::fs::read_dir(folder).expect("the folder is readable") {
+        let path = entry.expect("an entry is readable").path();
+        let name = PathBuf::from(path.file_name().expect("entries have names"));
+        if path.is_dir() {
+            let inner = files_below(&path).into_iter();
+            files.extend(inner.map(|(path, bytes)| (name.join(path), bytes)));
+        } else {
+            let bytes = std::fs::read(&path).expect("the file is readable");
+            files.insert(name, bytes);
+        }
+    }
+    files
 }

@@ -62,7 +62,7 @@ pub struct ExportArgs {
     /// The store, a directory that `tetdb mesh` wrote
     #[arg(value_name = "STORE")]
     pub store: PathBuf,
-    /// Files to write; the extension tells the format: .vtu, .pvtu, .vtkhdf, .foam (OpenFOAM, in its folder), .msh, .mesh, .meshb, .ele (TetGen),
+    /// Files to write; the extension tells the format: .vtu, .pvtu, .vtkhdf, .foam (OpenFOAM, in its folder), .msh, .mesh, .meshb, .mfem (MFEM), .ele (TetGen),
     /// .inp, .npy (an array a file), .json (topology), .parquet (where built in); `-` with --format is standard output
     #[arg(required = true, value_name = "OUT")]
     pub out: Vec<PathBuf>,
@@ -75,12 +75,15 @@ pub struct ExportArgs {
     /// Text instead of binary numbers (.msh, .foam)
     #[arg(long)]
     pub ascii: bool,
-    /// Nodes of the elements: 1, corners; 2, also the middles of edges (.vtu, .pvtu, .vtkhdf, .inp)
+    /// Nodes of the elements: 1, corners; 2, also the middles of edges (.vtu, .pvtu, .vtkhdf, .msh, .inp)
     #[arg(long, value_name = "ORDER", default_value = "1", value_parser = clap::value_parser!(u8).range(1..=2))]
     pub order: u8,
     /// List in .msh, for each partition, the tetrahedra of others that touch it
     #[arg(long)]
     pub ghosts: bool,
+    /// Split embedded sheets: their vertices stand once for each side, those on free edges once; NAME_pairs.csv lists the pairs
+    #[arg(long)]
+    pub split_sheets: bool,
     /// Only these sub-domains, as numbers with commas between them
     #[arg(
         long,
@@ -90,6 +93,9 @@ pub struct ExportArgs {
         alias = "subdomains"
     )]
     pub subdomain: Vec<u32>,
+    /// Only these regions, as numbers or names in `tetdb info`, with commas between them; what bounds them is boundary
+    #[arg(long, value_name = "LIST")]
+    pub region: Option<String>,
     /// Only input triangles and faces between sub-domains (.vtu, .vtkhdf)
     #[arg(long, conflicts_with = "interfaces")]
     pub boundary: bool,

@@ -49,12 +49,12 @@ pub(super) fn write(
     mesh: &mut Merged,
     draft: &mut Draft,
     out: &Path,
-    mut middles: Option<Midpoints>,
+    middles: Option<&Midpoints>,
 ) -> Result<()> {
     mesh.check_limits(out, i32::MAX as u64)?;
     mesh.expect_passes(1, 1);
     let digits = u64::from(mesh.n_vertices().max(1).ilog10());
-    let n_middles = middles.as_ref().map_or(0, Midpoints::n);
+    let n_middles = middles.map_or(0, Midpoints::n);
     let numbers = if n_middles > 0 { 11 } else { 5 };
     let bytes = 60 * (mesh.n_vertices() + n_middles) + numbers * (digits + 2) * mesh.n_tets();
     let path = draft.create(out, bytes)?;
@@ -68,7 +68,7 @@ pub(super) fn write(
         stream.end()
     };
     mesh.vertices(|number, vertex| put(number, vertex.point))?;
-    if let Some(middles) = &middles {
+    if let Some(middles) = middles {
         let (mut points, mut number) = (middles.points()?, mesh.n_vertices());
         while let Some(point) = points.next()? {
             put(number, point)?;
@@ -79,10 +79,10 @@ pub(super) fn write(
     let dir = mesh.dir().to_owned();
     let regions = regions.iter().map(|&r| (r, mesh.region_name(r)));
     let regions = set_names(&regions.collect());
-    let sides = elements(mesh, &dir, &mut stream, &regions, middles.as_mut())?;
+    let sides = elements(mesh, &dir, &mut stream, &regions, middles)?;
     let names = set_names(&mesh.labels());
     surfaces(sides, &names, &mut stream)?;
-    node_sets(mesh, &dir, &names, &mut stream, middles.as_mut())?;
+    node_sets(mesh, &dir, &names, &mut stream, middles)?;
     stream.finish()
 }
 
@@ -92,7 +92,7 @@ fn elements(
     dir: &Path,
     stream: &mut Stream,
     regions: &BTreeMap<u32, String>,
-    mut middles: Option<&mut Midpoints>,
+    middles: Option<&Midpoints>,
 ) -> Result<Sorted<Side>> {
     let kind = if middles.is_some() { "C3D10" } else { "C3D4" };
     // With one region its set is named with the elements, else sets follow.
@@ -107,6 +107,7 @@ fn elements(
     let mut faces = faces_by_tet(mesh, dir)?.peekable();
     let mut number = 0u64;
     let first_middle = mesh.n_vertices() + 1;
+    let mut edges = middles.map(Midpoints::tets).transpose()?;
     mesh.tets(|tet| {
         while let Some(face) = faces.next_if(|f| f.as_ref().map_or(true, |f| f.tet <= number)) {
             let face = face?;
@@ -127,8 +128,8 @@ fn elements(
         stream.integer(b, b',');
         stream.integer(c, b',');
         stream.integer(d, if middles.is_some() { b',' } else { b'\n' });
-        if let Some(middles) = &mut middles {
-            for (i, edge) in middles.next::<6>()?.into_iter().enumerate() {
+        if let Some(edges) = &mut edges {
+            for (i, edge) in edges.next()?.into_iter().enumerate() {
                 stream.integer(first_middle + edge, if i < 5 { b',' } else { b'\n' });
             }
         }
@@ -210,16 +211,17 @@ fn node_sets(
     dir: &Path,
     names: &BTreeMap<u32, String>,
     stream: &mut Stream,
-    mut middles: Option<&mut Midpoints>,
+    middles: Option<&Midpoints>,
 ) -> Result<()> {
     let mut sorter = Sorter::new(dir, mesh.sorter_bytes());
+    let mut edges = middles.map(Midpoints::faces).transpose()?;
     mesh.faces().each(|face| {
         for v in face.vertices {
             let (set, number) = (face.label, v + 1);
             sorter.push(Member { set, number })?;
         }
-        if let Some(middles) = &mut middles {
-            for edge in middles.next::<3>()? {
+        if let Some(edges) = &mut edges {
+            for edge in edges.next()? {
                 let (set, number) = (face.label, mesh.n_vertices() + edge + 1);
                 sorter.push(Member { set, number })?;
             }

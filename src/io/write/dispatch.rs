@@ -9,7 +9,7 @@ use super::merged::Merged;
 use super::midpoints::Midpoints;
 use super::report::FileCounts;
 use super::selection::{Content, Order, Selection};
-use super::{abaqus, foam, gmsh, gmsh22, medit, npy_columns, tetgen, vtu, vtu_boundary};
+use super::{abaqus, foam, gmsh, gmsh22, medit, mfem, npy_columns, tetgen, vtu, vtu_boundary};
 
 /// Writes a mesh as one file, and what belongs to it.
 pub(super) fn write(
@@ -19,41 +19,38 @@ pub(super) fn write(
     draft: &mut Draft,
     out: &Path,
 ) -> Result<FileCounts> {
-    let mut counts = FileCounts {
-        vertices: mesh.n_vertices(),
-        tets: mesh.n_tets(),
-        triangles: mesh.n_faces(),
-    };
-    let mut middles = match selection.order {
+    let middles = match selection.order {
         Order::First => None,
         Order::Second => Some(Midpoints::gather(mesh)?),
     };
-    let mut n_middles = middles.as_ref().map_or(0, Midpoints::n);
+    let middles = middles.as_ref();
+    let mut counts = FileCounts {
+        vertices: mesh.n_vertices() + middles.map_or(0, Midpoints::n),
+        tets: mesh.n_tets(),
+        triangles: mesh.n_faces(),
+    };
     match format {
         MeshFormat::Vtu | MeshFormat::VtkHdf if selection.content != Content::Mesh => {
             mesh.expect_passes(1, 0);
             let is_hdf = format == MeshFormat::VtkHdf;
-            counts.vertices = vtu_boundary::write(mesh, draft, out, is_hdf, middles.as_mut())?;
+            counts.vertices = vtu_boundary::write(mesh, draft, out, is_hdf, middles)?;
             counts.tets = 0;
-            n_middles = 0;
         }
-        MeshFormat::Vtu | MeshFormat::Pvtu => {
-            vtu::write(mesh, draft, out, false, middles.as_mut())?
-        }
-        MeshFormat::VtkHdf => vtu::write(mesh, draft, out, true, middles.as_mut())?,
+        MeshFormat::Vtu | MeshFormat::Pvtu => vtu::write(mesh, draft, out, false, middles)?,
+        MeshFormat::VtkHdf => vtu::write(mesh, draft, out, true, middles)?,
         MeshFormat::Medit => medit::write_text(mesh, draft, out)?,
         MeshFormat::MeditBinary => medit::write_binary(mesh, draft, out)?,
-        MeshFormat::Gmsh => counts = gmsh::write(mesh, draft, out, selection)?,
+        MeshFormat::Gmsh => counts = gmsh::write(mesh, draft, out, (selection, middles))?,
         MeshFormat::Gmsh22 => gmsh22::write(mesh, draft, out)?,
         MeshFormat::Abaqus => abaqus::write(mesh, draft, out, middles)?,
         MeshFormat::Numpy => npy_columns::write(mesh, draft, out)?,
         #[cfg(feature = "parquet")]
         MeshFormat::Parquet => unreachable!("its pieces are written elsewhere"),
         MeshFormat::OpenFoam => counts = foam::write(mesh, draft, out, selection)?,
+        MeshFormat::Mfem => counts = mfem::write(mesh, draft, out, selection)?,
         MeshFormat::TetGen => tetgen::write(mesh, draft, out)?,
         MeshFormat::Topology => unreachable!("the topology is no mesh"),
     }
-    counts.vertices += n_middles;
     mesh.report_end();
     Ok(counts)
 }

@@ -1,7 +1,8 @@
 //! Files in the making: a folder beside the output, removed whatever happens; rename when all are whole.
 
-use crate::storage::available_bytes;
+use crate::storage::{available_bytes, host_name, is_process_gone};
 use std::fs::{self, File};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -31,9 +32,10 @@ impl Draft {
             true => std::env::temp_dir(),
             false => folder(out).to_owned(),
         };
-        let dir = folder.join(format!(".{name}.{}-{number}.tmp", std::process::id()));
+        let (host, process) = (host_name(), std::process::id());
+        let dir = folder.join(format!(".{name}.{host}.{process}-{number}.tmp"));
         if out.is_dir() {
-            let source = std::io::Error::from(std::io::ErrorKind::IsADirectory);
+            let source = std::io::Error::from(ErrorKind::IsADirectory);
             return Err(WriteError::io(out, source));
         }
         remove_abandoned(&name, &dir);
@@ -78,8 +80,13 @@ impl Draft {
             done.push((out.clone(), length));
         }
         if self.files.len() > 1 {
-            for (_, out) in self.files.iter().filter(|(_, out)| out.exists()) {
-                fs::remove_file(out).map_err(|e| WriteError::io(out, e))?;
+            for (_, out) in &self.files {
+                match fs::remove_file(out) {
+                    Err(e) if e.kind() != ErrorKind::NotFound => {
+                        return Err(WriteError::io(out, e));
+                    }
+                    _ => (),
+                }
             }
         }
         for (path, out) in &self.files {
@@ -100,21 +107,21 @@ impl Drop for Draft {
     }
 }
 
-/// Removes folders that writers of the same file left when they were killed, also one of `new`'s name: the system gives numbers of processes
-/// again. Nothing depends on it: what cannot be removed stays.
+/// Removes folders that writers of the same file left on this machine when they were killed, also one of `new`'s name: the system gives
+/// numbers of processes again. Nothing depends on it: what cannot be removed stays.
 fn remove_abandoned(name: &str, new: &Path) {
     let is_abandoned = |path: &Path| {
         let file_name = path.file_name().unwrap_or_default().to_string_lossy();
         let middle = file_name
             .strip_prefix(&format!(".{name}."))
-            .and_then(|rest| rest.strip_suffix(".tmp"));
-        let Some((process, number)) = middle.and_then(|m| m.split_once('-')) else {
-            return false;
-        };
-        let is_draft = [process, number].iter().all(|n| n.parse::<u32>().is_ok());
-        let processes = Path::new("/proc");
-        let is_gone = processes.join("self").exists() && !processes.join(process).exists();
-        is_draft && (is_gone || path == new)
+            .and_then(|rest| rest.strip_suffix(".tmp"))
+            .and_then(|rest| rest.rsplit_once('.'));
+        let writer = middle.and_then(|(host, writer)| {
+            let (process, number) = writer.split_once('-')?;
+            number.parse::<u32>().ok()?;
+            Some((host, process.parse().ok()?))
+        });
+        writer.is_some_and(|(host, process)| path == new || is_process_gone(host, process))
     };
     for entry in fs::read_dir(folder(new)).into_iter().flatten().flatten() {
         if is_abandoned(&entry.path()) {
@@ -138,16 +145,17 @@ mod tests {
     #[test]
     fn folders_of_killed_writers_go_and_others_stay() -> std::io::Result<()> {
         let dir = tempfile::tempdir()?;
-        let here = std::process::id();
+        let (host, here) = (host_name(), std::process::id());
         // No process has a number this high.
         let gone = [
-            ".a.vtu.4294967295-0.tmp".to_owned(),
-            format!(".a.vtu.{here}-77.tmp"),
+            format!(".a.vtu.{host}.4294967295-0.tmp"),
+            format!(".a.vtu.{host}.{here}-77.tmp"),
         ];
         let stay = [
-            format!(".a.vtu.{here}-78.tmp"),
-            ".b.vtu.4294967295-0.tmp".to_owned(),
-            ".a.vtu.mine.tmp".to_owned(),
+            format!(".a.vtu.{host}.{here}-78.tmp"),
+            format!(".b.vtu.{host}.4294967295-0.tmp"),
+            ".a.vtu.another.host.4294967295-0.tmp".to_owned(),
+            format!(".a.vtu.{host}.mine.tmp"),
         ];
         for name in gone.iter().chain(&stay) {
             fs::create_dir(dir.path().join(name))?;

@@ -28,7 +28,7 @@ pub enum WriteError {
         /// The format.
         format: &'static str,
         /// What it cannot hold.
-        what: &'static str,
+        what: String,
     },
     /// The format has only single precision, the surface needs double.
     #[error("{path}: this format would round the coordinates of vertex {vertex}")]
@@ -49,6 +49,14 @@ pub enum WriteError {
         limit: u64,
         /// How many there are.
         found: u64,
+    },
+    /// Such tetrahedra are not there.
+    #[error("no region {region} is filled, {}", among(filled))]
+    NoRegion {
+        /// Its number.
+        region: u32,
+        /// Numbers of those that are.
+        filled: Vec<u32>,
     },
     /// The file will not fit. Units: bytes.
     #[error("{path}: no space for it, {needed} bytes are needed and {available} are free")]
@@ -87,6 +95,7 @@ impl WriteError {
             Self::UnknownFormat { .. } => "unknown-format",
             Self::Unsupported { .. } => "usage",
             Self::Lossy { .. } => "lossy-format",
+            Self::NoRegion { .. } => "no-such-part",
             Self::TooLarge { .. } => "format-limit",
             Self::NoSpace { .. } | Self::DiskFull { .. } => "disk-full",
             Self::Io { .. } => "io",
@@ -104,7 +113,7 @@ impl WriteError {
             | Self::NoSpace { path, .. }
             | Self::DiskFull { path }
             | Self::Io { path, .. } => Some(path),
-            Self::Store(_) => None,
+            Self::NoRegion { .. } | Self::Store(_) => None,
         }
     }
 
@@ -116,6 +125,7 @@ impl WriteError {
             }
             Self::Unsupported { .. } => "choose another format, or leave that option out",
             Self::Lossy { .. } => "choose .ply, .obj, .off or .stl (text), which keep doubles",
+            Self::NoRegion { .. } => "choose one of those that `tetdb info` lists as filled",
             Self::TooLarge { .. } => "export to .vtu or .meshb, whose numbers have 64 bits",
             Self::NoSpace { .. } | Self::DiskFull { .. } => {
                 "free some space, or export to another disk; compare with `df -h`"
@@ -139,6 +149,15 @@ impl WriteError {
             return Self::DiskFull { path };
         }
         Self::Io { path, source }
+    }
+}
+
+/// Numbers as a sentence's end.
+fn among(filled: &[u32]) -> String {
+    match filled {
+        [] => "none at all is".to_owned(),
+        [one] => format!("only {one} is"),
+        [first, .., last] => format!("only {} from {first} to {last} are", filled.len()),
     }
 }
 

@@ -7,7 +7,9 @@ use tetdb_schema::record::{InterfaceFace, NO_TET, SealedFacet};
 
 use super::error::Result;
 use super::numbering::PartNumbers;
-use super::stream::{Records, scratch};
+use super::scope::Scope;
+use super::stream::{Records, Stream, scratch};
+use crate::sealed::SealedError;
 use crate::storage::{SortRecord, Sorter, sort_record};
 
 /// Marks the key of an interface face, and sorts it behind the input triangles; below it the number of the cut, then of the face.
@@ -54,8 +56,24 @@ impl Face {
 pub(super) struct FaceSource<'a> {
     pub rank: u32,
     pub numbers: &'a PartNumbers,
-    /// Number of its first tetrahedron.
-    pub tet_first: u64,
+    pub scope: Scope<'a>,
+    /// Its file.
+    pub path: &'a Path,
+}
+
+impl FaceSource<'_> {
+    /// Numbers of a face's vertices. Errors: damage; the tetrahedra have not these.
+    fn vertices(&self, vertices: [u32; 3]) -> Result<[u64; 3]> {
+        let mut numbers = [0; 3];
+        for (number, v) in numbers.iter_mut().zip(vertices) {
+            *number = self.numbers.vertex(v).ok_or_else(|| SealedError::Content {
+                path: self.path.to_owned(),
+                subdomain: self.rank,
+                what: format!("a face names vertices {vertices:?}"),
+            })?;
+        }
+        Ok(numbers)
+    }
 }
 
 /// Collects faces of one sub-domain after the other.
@@ -78,18 +96,23 @@ impl FaceSorter {
     /// A triangle between two sub-domains is in both: the one with its filled side, or with its front when both sides are
     /// filled, counts, unless it is not written. Errors: the disk.
     pub fn push(&mut self, f: &SealedFacet, part: &FaceSource) -> Result<()> {
-        let preferred = usize::from(f.regions[0] == 0);
-        let here = [preferred, 1 - preferred];
-        let Some(&side) = here.iter().find(|&&side| f.tets[side] != NO_TET) else {
+        let regions = f.regions.map(|region| part.scope.region(region));
+        let preferred = usize::from(regions[0] == 0);
+        let tet_of = |side: usize| match (f.tets[side], regions[side]) {
+            (NO_TET, _) | (_, 0) => None,
+            (tet, _) => part.numbers.tet(tet),
+        };
+        let sides = [preferred, 1 - preferred].into_iter();
+        let Some((side, tet)) = sides.filter_map(|side| Some((side, tet_of(side)?))).next() else {
             return Ok(());
         };
         let face = Face {
             key: f.triangle,
             is_second: side != preferred,
-            vertices: f.vertices.map(|v| part.numbers.of(v)),
+            vertices: part.vertices(f.vertices)?,
             label: f.label,
-            regions: f.regions,
-            tet: part.tet_first + u64::from(f.tets[side]),
+            regions,
+            tet,
             subdomain: part.rank,
             neighbor: part.rank,
         };
@@ -103,13 +126,16 @@ impl FaceSorter {
         label: u32,
         part: &FaceSource,
     ) -> Result<()> {
+        let Some(tet) = part.numbers.tet(f.tet) else {
+            return Ok(());
+        };
         let face = Face {
             key: INTERFACE | u64::from(f.cut) << 32 | u64::from(f.index),
             is_second: false,
-            vertices: f.vertices.map(|v| part.numbers.of(v)),
+            vertices: part.vertices(f.vertices)?,
             label,
             regions: [0, 0],
-            tet: part.tet_first + u64::from(f.tet),
+            tet,
             subdomain: part.rank,
             neighbor: f.other,
         };
@@ -118,25 +144,42 @@ impl FaceSorter {
 
     /// Ends collecting. Errors: the disk.
     pub fn finish(self) -> Result<Faces> {
-        let mut faces = Faces {
-            n: 0,
-            labels: BTreeMap::new(),
-            path: self.path,
-        };
-        let mut stream = scratch(&faces.path)?;
+        let mut file = FaceFile::create(self.path)?;
         let mut last = None;
         for face in self.sorter.finish()? {
             let face = face?;
-            if last.replace(face.key) == Some(face.key) {
-                continue;
+            if last.replace(face.key) != Some(face.key) {
+                file.put(&face)?;
             }
-            faces.n += 1;
-            *faces.labels.entry(face.label).or_default() += 1;
-            stream.bytes(&face.to_bytes());
-            stream.end()?;
         }
-        stream.finish()?;
-        Ok(faces)
+        file.finish()
+    }
+}
+
+/// Faces being written to their scratch file.
+struct FaceFile {
+    faces: Faces,
+    stream: Stream,
+}
+
+impl FaceFile {
+    fn create(path: PathBuf) -> Result<Self> {
+        let stream = scratch(&path)?;
+        let (n, labels) = (0, BTreeMap::new());
+        let faces = Faces { n, labels, path };
+        Ok(Self { faces, stream })
+    }
+
+    fn put(&mut self, face: &Face) -> Result<()> {
+        self.faces.n += 1;
+        *self.faces.labels.entry(face.label).or_default() += 1;
+        self.stream.bytes(&face.to_bytes());
+        self.stream.end()
+    }
+
+    fn finish(self) -> Result<Faces> {
+        self.stream.finish()?;
+        Ok(self.faces)
     }
 }
 
@@ -156,5 +199,16 @@ impl Faces {
             each(&Face::from_bytes(&record))?;
         }
         Ok(())
+    }
+
+    /// The faces that `each` puts for these, at `path`. Errors: the disk, those of `each`.
+    pub fn rewritten(
+        &self,
+        path: &Path,
+        mut each: impl FnMut(&Face, &mut dyn FnMut(&Face) -> Result<()>) -> Result<()>,
+    ) -> Result<Self> {
+        let mut file = FaceFile::create(path.to_owned())?;
+        self.each(|face| each(face, &mut |face| file.put(face)))?;
+        file.finish()
     }
 }

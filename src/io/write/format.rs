@@ -20,6 +20,8 @@ pub enum MeshFormat {
     Gmsh22,
     /// OpenFOAM's `constant/polyMesh` in the folder of `NAME.foam`; in pieces `processorN/constant/polyMesh`.
     OpenFoam,
+    /// MFEM 1.3, one mesh; in pieces `NAME.000000` and so on, a file for each process.
+    Mfem,
     /// TetGen: `NAME.node`, `NAME.ele` and `NAME.face`.
     TetGen,
     /// Abaqus input.
@@ -35,23 +37,49 @@ pub enum MeshFormat {
     Topology,
 }
 
-/// Words of the formats: each is also the ending of names, but for `msh22`.
-const WORDS: &[(&str, MeshFormat)] = &[
-    ("vtu", MeshFormat::Vtu),
-    ("pvtu", MeshFormat::Pvtu),
-    ("vtkhdf", MeshFormat::VtkHdf),
-    ("foam", MeshFormat::OpenFoam),
-    ("msh", MeshFormat::Gmsh),
-    ("msh22", MeshFormat::Gmsh22),
-    ("mesh", MeshFormat::Medit),
-    ("meshb", MeshFormat::MeditBinary),
-    ("ele", MeshFormat::TetGen),
-    ("inp", MeshFormat::Abaqus),
-    ("npy", MeshFormat::Numpy),
-    #[cfg(feature = "parquet")]
-    ("parquet", MeshFormat::Parquet),
-    ("json", MeshFormat::Topology),
-];
+/// Something that can be asked of a format: a bit, and what one holds no.
+#[derive(Clone, Copy)]
+pub(super) struct Ability(u16, &'static str);
+
+pub(super) const TEXT: Ability = Ability(1, "text");
+pub(super) const SECOND_ORDER: Ability = Ability(2, "elements of second order");
+pub(super) const FACES_ALONE: Ability = Ability(4, "faces without tetrahedra");
+pub(super) const SUBDOMAINS: Ability = Ability(8, "sub-domains apart");
+pub(super) const REGIONS: Ability = Ability(16, "regions alone");
+pub(super) const REGIONS_APART: Ability = Ability(32, "regions of sub-domains apart");
+pub(super) const GHOSTS: Ability = Ability(64, "ghost cells");
+pub(super) const STREAM: Ability = Ability(128, "stream that is written from beginning to end");
+
+pub(super) const SLITS: Ability = Ability(256, "split sheets");
+
+/// All formats: the word, which is also the ending of names but for `msh22`, and what each can.
+const FORMATS: &[(&str, MeshFormat, u16)] = {
+    use MeshFormat::*;
+    const PARTS: u16 = SUBDOMAINS.0 | REGIONS.0 | REGIONS_APART.0;
+    const ORDER_2: u16 = SECOND_ORDER.0;
+    &[
+        ("vtu", Vtu, ORDER_2 | FACES_ALONE.0 | PARTS | SLITS.0),
+        ("pvtu", Pvtu, ORDER_2 | PARTS),
+        ("vtkhdf", VtkHdf, ORDER_2 | FACES_ALONE.0 | PARTS),
+        // A process of MPI for each sub-domain, also where it has nothing of a region.
+        ("foam", OpenFoam, TEXT.0 | SUBDOMAINS.0 | REGIONS.0),
+        ("msh", Gmsh, TEXT.0 | ORDER_2 | PARTS | GHOSTS.0 | STREAM.0),
+        ("msh22", Gmsh22, PARTS | STREAM.0 | SLITS.0),
+        ("mesh", Medit, TEXT.0 | PARTS | STREAM.0 | SLITS.0),
+        ("meshb", MeditBinary, PARTS | STREAM.0 | SLITS.0),
+        (
+            "mfem",
+            Mfem,
+            TEXT.0 | SUBDOMAINS.0 | REGIONS.0 | STREAM.0 | SLITS.0,
+        ),
+        ("ele", TetGen, TEXT.0 | PARTS | SLITS.0),
+        ("inp", Abaqus, TEXT.0 | ORDER_2 | PARTS | STREAM.0 | SLITS.0),
+        ("npy", Numpy, PARTS | SLITS.0),
+        #[cfg(feature = "parquet")]
+        ("parquet", Parquet, SUBDOMAINS.0),
+        ("json", Topology, TEXT.0 | STREAM.0),
+    ]
+};
 
 impl MeshFormat {
     /// The format a file name's extension tells.
@@ -61,61 +89,40 @@ impl MeshFormat {
 
     /// The format of this word: an ending without its dot, or `msh22`.
     pub fn of_word(word: &str) -> Option<Self> {
-        let row = WORDS.iter().find(|row| row.0 == word)?;
+        let row = FORMATS.iter().find(|row| row.0 == word)?;
         Some(row.1)
     }
 
     /// The word of this format.
     pub fn word(self) -> &'static str {
-        let row = WORDS.iter().find(|row| row.1 == self);
-        row.expect("every format has a word").0
+        self.row().0
     }
 
-    /// Whether it can be written as text.
-    pub fn has_text(self) -> bool {
-        matches!(self, Self::Gmsh | Self::OpenFoam) || self.is_text()
+    fn row(self) -> &'static (&'static str, Self, u16) {
+        let row = FORMATS.iter().find(|row| row.1 == self);
+        row.expect("every format is in the list")
     }
 
-    /// Whether it is never anything but text.
-    fn is_text(self) -> bool {
-        matches!(
-            self,
-            Self::Medit | Self::Abaqus | Self::TetGen | Self::Topology
-        )
-    }
-
-    /// Whether elements of second order are written in it.
-    pub fn has_second_order(self) -> bool {
-        matches!(self, Self::Vtu | Self::Pvtu | Self::VtkHdf | Self::Abaqus)
-    }
-
-    /// Whether it can hold faces without tetrahedra.
-    pub fn holds_faces_alone(self) -> bool {
-        matches!(self, Self::Vtu | Self::VtkHdf)
+    /// Nothing if it can this, else what it cannot and which formats can.
+    pub(super) fn lacks(self, ability: Ability) -> Option<String> {
+        let Ability(bit, noun) = ability;
+        if self.row().2 & bit != 0 {
+            return None;
+        }
+        let able = FORMATS.iter().filter(|row| row.2 & bit != 0);
+        let words: Vec<_> = able.map(|row| row.0).collect();
+        Some(format!("{noun}; these do: {}", words.join(", ")))
     }
 
     /// Whether pieces in it carry numbers in the whole, so that all of it is open while they are written.
     pub fn numbers_globally(self) -> bool {
-        matches!(self, Self::OpenFoam | Self::Gmsh)
-    }
-
-    /// Whether it is one file that is written from its beginning to its end.
-    pub fn is_stream(self) -> bool {
-        matches!(
-            self,
-            Self::Medit
-                | Self::MeditBinary
-                | Self::Gmsh
-                | Self::Gmsh22
-                | Self::Abaqus
-                | Self::Topology
-        )
+        matches!(self, Self::OpenFoam | Self::Gmsh | Self::Mfem)
     }
 }
 
 /// Endings of the formats.
 pub const ENDINGS: &str = if cfg!(feature = "parquet") {
-    ".vtu, .pvtu, .vtkhdf, .foam, .msh, .mesh, .meshb, .ele, .inp, .npy, .parquet or .json"
+    ".vtu, .pvtu, .vtkhdf, .foam, .msh, .mesh, .meshb, .mfem, .ele, .inp, .npy, .parquet or .json"
 } else {
-    ".vtu, .pvtu, .vtkhdf, .foam, .msh, .mesh, .meshb, .ele, .inp, .npy or .json (.parquet needs a build with the feature `parquet`)"
+    ".vtu, .pvtu, .vtkhdf, .foam, .msh, .mesh, .meshb, .mfem, .ele, .inp, .npy or .json (.parquet needs a build with the feature `parquet`)"
 };

@@ -7,9 +7,12 @@ use std::path::{Path, PathBuf};
 use tetdb_schema::ids::TetId;
 use tetdb_schema::record::SealedVertex;
 
+use super::chosen::Chosen;
+use super::doubles::Doubles;
 use super::error::{Result, WriteError};
-use super::faces::{FaceSorter, FaceSource, Faces};
-use super::numbering::{Numbering, PartNumbers, Sharer, candidates, sharers};
+use super::faces::{Face, FaceSorter, FaceSource, Faces};
+use super::numbering::{Numbering, PartNumbers, Sharer, Source, candidates, sharers};
+use super::scope::{FaceSet, Scope};
 use crate::sealed::SealedError;
 use crate::sealed::{Shape, Subdomain};
 use crate::storage::{Sorted, check_cancelled};
@@ -54,26 +57,6 @@ pub(super) struct Tet {
     pub quality: f64,
 }
 
-/// Which faces bound what is written, beside those that it shares with sub-domains that are not written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum FaceSet {
-    /// Input triangles.
-    Skin,
-    /// Input triangles and all interface faces.
-    SkinAndInterfaces,
-    /// All interface faces, no input triangle.
-    Interfaces,
-}
-
-/// What is written: these sub-domains, or all when there are none, with these faces.
-#[derive(Clone, Copy)]
-pub(super) struct Scope<'s> {
-    pub ranks: &'s BTreeSet<u32>,
-    pub faces: FaceSet,
-    /// Each sub-domain numbers all its vertices, also those it shares.
-    pub apart: bool,
-}
-
 /// A sub-domain in the merged mesh.
 #[derive(Clone, Copy)]
 pub(super) struct Part {
@@ -89,19 +72,6 @@ pub(super) struct Part {
 pub(super) struct Opened {
     pub part: Subdomain,
     pub numbers: PartNumbers,
-    /// Number of its first tetrahedron.
-    pub first_tet: u64,
-}
-
-impl Scope<'_> {
-    fn holds(&self, rank: u32) -> bool {
-        self.ranks.is_empty() || self.ranks.contains(&rank)
-    }
-
-    /// Whether the face between sub-domain `rank`, which is written, and `other` is listed, and by this side.
-    fn lists(&self, rank: u32, other: u32) -> bool {
-        !self.holds(other) || (self.faces != FaceSet::Skin && rank < other)
-    }
 }
 
 /// Sub-domains of a finished store as one conforming mesh.
@@ -109,9 +79,11 @@ impl Scope<'_> {
 /// Shape: `parts` by rank. Each pass reads every chunk once and holds a quarter of the memory.
 pub(super) struct Merged<'a> {
     store: &'a mut Catalog,
-    parts: Vec<SubdomainRow>,
+    parts: Vec<Source>,
+    regions: BTreeSet<u32>,
     numbering: Numbering,
     faces: Faces,
+    doubles: Option<Doubles>,
     label_names: Vec<String>,
     region_names: Vec<String>,
     dir: PathBuf,
@@ -130,32 +102,32 @@ impl<'a> Merged<'a> {
         memory: usize,
         progress: Progress<'a>,
     ) -> Result<Self> {
-        let catalog = &mut *store;
-        let mut parts = catalog.subdomains()?;
-        parts.retain(|row| scope.holds(row.rank));
-        let (label_names, region_names) = (catalog.labels()?, catalog.region_names()?);
-        let counts: Vec<_> = parts.iter().map(|row| (row.rank, row.vertices)).collect();
-        let numbering = Numbering::new(store, &counts, scope.apart, dir, memory)?;
+        let (label_names, region_names) = (store.labels()?, store.region_names()?);
+        let parts = sources(store, scope, dir, memory)?;
+        let numbering = Numbering::new(store, &parts, scope.apart, dir, memory)?;
         let first_label = label_names.len() as u32;
         let mut sorter = FaceSorter::new(dir, memory as u64 / 4);
-        let mut tet_first = 0;
-        for (p, row) in parts.iter().enumerate() {
-            let numbers = numbering.part(p)?;
+        for (p, source) in parts.iter().enumerate() {
+            let numbers = numbering.part(&parts, p)?;
+            let rank = source.row.rank;
+            let mut from = store.open_subdomain(rank, memory / 4)?;
+            let path = from.path().to_owned();
             let part = FaceSource {
-                rank: row.rank,
+                rank,
                 numbers: &numbers,
-                tet_first,
+                scope,
+                path: &path,
             };
-            let mut from = store.open_subdomain(row.rank, memory / 4)?;
-            collect_faces(&mut from, &part, scope, first_label, &mut sorter)?;
-            tet_first += row.tets;
+            collect_faces(&mut from, &part, first_label, &mut sorter)?;
         }
         let faces = sorter.finish()?;
         Ok(Self {
             store,
             parts,
+            regions: scope.regions.clone(),
             numbering,
             faces,
+            doubles: None,
             label_names,
             region_names,
             dir: dir.to_owned(),
@@ -164,51 +136,72 @@ impl<'a> Merged<'a> {
         })
     }
 
+    /// Vertices and their doubles.
     pub fn n_vertices(&self) -> u64 {
-        self.numbering.n_vertices()
+        self.numbering.n_vertices() + self.doubles.as_ref().map_or(0, |doubles| doubles.n)
+    }
+
+    /// From now on vertices stand as often as this says.
+    pub fn set_doubles(&mut self, doubles: Doubles) {
+        self.doubles = Some(doubles);
+    }
+
+    /// Puts the faces that `each` puts in the place of the ones it gets. Errors: the disk, those of `each`.
+    pub fn rewrite_faces(
+        &mut self,
+        each: impl FnMut(&Face, &mut dyn FnMut(&Face) -> Result<()>) -> Result<()>,
+    ) -> Result<()> {
+        self.faces = self.faces.rewritten(&self.dir.join("split-faces"), each)?;
+        Ok(())
     }
 
     /// The sub-domains, by rank.
     pub fn parts(&self) -> Vec<Part> {
-        let part = |(p, row): (usize, &SubdomainRow)| Part {
-            rank: row.rank,
+        let part = |(p, source): (usize, &Source)| Part {
+            rank: source.row.rank,
             first_vertex: self.numbering.first(p),
-            n_vertices: row.vertices,
-            n_tets: row.tets,
+            n_vertices: source.n_vertices,
+            n_tets: source.n_tets,
         };
         self.parts.iter().enumerate().map(part).collect()
     }
 
     /// Sub-domain `p`, to be read as it is. Errors: damage, the disk.
     pub fn open_part(&mut self, p: usize) -> Result<Opened> {
-        let (numbers, first_tet) = self.numbers_of(p)?;
-        let rank = self.parts[p].rank;
+        let rank = self.parts[p].row.rank;
         Ok(Opened {
             part: self.store.open_subdomain(rank, self.memory / 4)?,
-            numbers,
-            first_tet,
+            numbers: self.numbers_of(p)?,
         })
     }
 
-    /// Numbers of the vertices of sub-domain `p`, and of its first tetrahedron. Errors: the disk.
-    pub fn numbers_of(&self, p: usize) -> Result<(PartNumbers, u64)> {
-        let before: u64 = self.parts[..p].iter().map(|row| row.tets).sum();
-        Ok((self.numbering.part(p)?, before))
+    /// Numbers of the vertices and tetrahedra of sub-domain `p`. Errors: the disk.
+    pub fn numbers_of(&self, p: usize) -> Result<PartNumbers> {
+        self.numbering.part(&self.parts, p)
     }
 
     /// Every vertex that several sub-domains have, by the places of these. Errors: damage, the disk.
     pub fn sharers(&mut self) -> Result<Sorted<Sharer>> {
-        let counts: Vec<_> = self.parts.iter().map(|r| (r.rank, r.vertices)).collect();
-        let by_id = candidates(self.store, &counts, &self.dir, self.memory)?;
+        let by_id = candidates(self.store, &self.parts, &self.dir, self.memory)?;
         sharers(by_id, &self.dir, self.sorter_bytes())
     }
 
-    /// Numbers of the filled regions, ascending. Errors: damage.
+    /// Numbers of the filled regions that are written, ascending. Errors: damage.
     pub fn filled_regions(&mut self) -> Result<Vec<u32>> {
         let rows = self.store.regions()?;
-        Ok((rows.iter().filter(|r| r.filled))
-            .map(|r| r.region)
-            .collect())
+        let filled = rows.iter().filter(|row| row.filled);
+        let regions = filled.map(|row| row.region);
+        Ok(regions.filter(|region| self.writes(*region)).collect())
+    }
+
+    /// Whether only some regions are written.
+    pub fn is_of_regions(&self) -> bool {
+        !self.regions.is_empty()
+    }
+
+    /// Whether the tetrahedra of a region are written.
+    pub fn writes(&self, region: u32) -> bool {
+        self.regions.is_empty() || self.regions.contains(&region)
     }
 
     /// How many labels the input has.
@@ -256,7 +249,7 @@ impl<'a> Merged<'a> {
         }
         Err(StoreError::Sealed(SealedError::Content {
             path: self.store.dir().to_owned(),
-            subdomain: self.parts.first().map_or(0, |row| row.rank),
+            subdomain: self.parts.first().map_or(0, |source| source.row.rank),
             what: format!("{found} {what} where {expected} were expected"),
         })
         .into())
@@ -268,7 +261,7 @@ impl<'a> Merged<'a> {
     }
 
     pub fn n_tets(&self) -> u64 {
-        self.parts.iter().map(|row| row.tets).sum()
+        self.parts.iter().map(|source| source.n_tets).sum()
     }
 
     pub fn n_faces(&self) -> u64 {
@@ -297,8 +290,8 @@ impl<'a> Merged<'a> {
 
     /// Announces how many passes will come, for progress.
     pub fn expect_passes(&self, vertices: u64, tets: u64) {
-        let v: u64 = self.parts.iter().map(|row| row.vertices).sum();
-        let total = vertices * v + tets * self.n_tets();
+        let all = |of: fn(&SubdomainRow) -> u64| self.parts.iter().map(|s| of(&s.row)).sum::<u64>();
+        let total = vertices * all(|row| row.vertices) + tets * all(|row| row.tets);
         self.progress.total.set(total);
     }
 
@@ -330,8 +323,8 @@ impl<'a> Merged<'a> {
         &mut self,
         mut each: impl FnMut(u64, &SealedVertex) -> Result<()>,
     ) -> Result<()> {
-        for (p, row) in self.parts.iter().enumerate() {
-            let numbers = self.numbering.part(p)?;
+        for (p, Source { row, .. }) in self.parts.iter().enumerate() {
+            let numbers = self.numbers_of(p)?;
             let mut part = self.store.open_subdomain(row.rank, self.memory / 4)?;
             for chunk in part.vertex_chunks() {
                 let chunk = chunk?;
@@ -347,7 +340,11 @@ impl<'a> Merged<'a> {
                 self.progress.advance(chunk.records.len());
             }
         }
-        Ok(())
+        let first = self.numbering.n_vertices();
+        match &self.doubles {
+            Some(doubles) => doubles.each(|place, double| each(first + place, &double.sealed())),
+            None => Ok(()),
+        }
     }
 
     /// Every tetrahedron in the order of its number. Errors: damage, those of `each`.
@@ -361,8 +358,9 @@ impl<'a> Merged<'a> {
     }
 
     fn pass(&mut self, quality: bool, mut each: impl FnMut(&Tet) -> Result<()>) -> Result<()> {
-        for (p, row) in self.parts.iter().enumerate() {
-            let numbers = self.numbering.part(p)?;
+        let mut changes = self.doubles.as_ref().map(Doubles::changes).transpose()?;
+        for (p, Source { row, .. }) in self.parts.iter().enumerate() {
+            let numbers = self.numbers_of(p)?;
             let mut part = self.store.open_subdomain(row.rank, self.memory / 4)?;
             let mut expected = 0;
             for chunk in 0..part.tet_summaries().len() {
@@ -372,6 +370,9 @@ impl<'a> Merged<'a> {
                         .filter(|_| local == expected && u64::from(local) < row.tets);
                     let id = id.ok_or_else(|| damaged(&part, local, expected))?;
                     expected += 1;
+                    let Some(number) = numbers.tet(local) else {
+                        continue;
+                    };
                     if let Some(&v) = tet.nodes.iter().find(|&&v| u64::from(v) >= row.vertices) {
                         part.corner(v)?;
                     }
@@ -380,8 +381,12 @@ impl<'a> Merged<'a> {
                     } else {
                         f64::NAN
                     };
+                    let mut nodes = tet.nodes.map(|v| numbers.of(v));
+                    if let Some(changes) = &mut changes {
+                        changes.apply(number, &mut nodes)?;
+                    }
                     each(&Tet {
-                        nodes: tet.nodes.map(|v| numbers.of(v)),
+                        nodes,
                         region: tet.region,
                         subdomain: row.rank,
                         id,
@@ -402,8 +407,9 @@ impl<'a> Merged<'a> {
     /// Errors: damage.
     pub fn regions(&mut self) -> Result<BTreeSet<u32>> {
         let mut regions = BTreeSet::new();
-        for row in &self.parts {
-            let mut part = self.store.open_subdomain(row.rank, self.memory / 4)?;
+        for source in &self.parts {
+            let rank = source.row.rank;
+            let mut part = self.store.open_subdomain(rank, self.memory / 4)?;
             for chunk in 0..part.tet_summaries().len() {
                 let [least, greatest] = part.tet_summaries()[chunk].regions;
                 regions.extend([least, greatest]);
@@ -413,8 +419,30 @@ impl<'a> Merged<'a> {
                 }
             }
         }
+        regions.retain(|&region| self.writes(region));
         Ok(regions)
     }
+}
+
+/// The sub-domains that `scope` holds, and what of them; one of which nothing is written is left out.
+fn sources(store: &mut Catalog, scope: Scope, dir: &Path, memory: usize) -> Result<Vec<Source>> {
+    let mut sources = Vec::new();
+    for row in store.subdomains()? {
+        if !scope.holds(row.rank) {
+            continue;
+        }
+        let mut source = Source::from(row);
+        if !scope.regions.is_empty() {
+            let path = dir.join(format!("chosen-{}", source.row.rank));
+            let mut part = store.open_subdomain(source.row.rank, memory / 4)?;
+            [source.n_tets, source.n_vertices] = Chosen::gather(&mut part, scope.regions, &path)?;
+            source.chosen = Some(path);
+        }
+        if source.n_tets > 0 || scope.regions.is_empty() {
+            sources.push(source);
+        }
+    }
+    Ok(sources)
 }
 
 fn damaged(part: &Subdomain, found: u32, expected: u32) -> StoreError {
@@ -439,36 +467,23 @@ fn too_many_vertices(catalog: &Catalog, row: &SubdomainRow, end: u64) -> StoreEr
     })
 }
 
-/// Hands the faces of a sub-domain that `scope` lists to `sorter`; interface faces are labelled by the sub-domain behind
+/// Hands the faces of a sub-domain that its scope lists to `sorter`; interface faces are labelled by the sub-domain behind
 /// them, from `first_label` on.
 fn collect_faces(
     from: &mut Subdomain,
     part: &FaceSource,
-    scope: Scope,
     first_label: u32,
     sorter: &mut FaceSorter,
 ) -> Result<()> {
-    let n_vertices = from.row().vertices;
-    let path = from.path().to_owned();
-    let checked = |vertices: [u32; 3]| match vertices.iter().any(|&v| u64::from(v) >= n_vertices) {
-        false => Ok(()),
-        true => Err(StoreError::Sealed(SealedError::Content {
-            path: path.clone(),
-            subdomain: part.rank,
-            what: format!("a face names vertices {vertices:?}"),
-        })),
-    };
-    if scope.faces != FaceSet::Interfaces {
+    if part.scope.faces != FaceSet::Interfaces {
         for facet in from.facets() {
             let facet = facet?;
-            checked(facet.vertices)?;
             sorter.push(&facet, part)?;
         }
     }
     for face in from.interfaces() {
         let face = face?;
-        if scope.lists(part.rank, face.other) {
-            checked(face.vertices)?;
+        if part.scope.lists(part.rank, face.other) {
             sorter.push_interface(&face, first_label + face.other, part)?;
         }
     }

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use super::error::Result;
 use super::merged::Merged;
 use super::stream::{Records, scratch};
-use crate::storage::{Payload, Sorted, Sorter, StorageError, sort_record};
+use crate::storage::{Payload, Sorter, StorageError, sort_record};
 
 /// The edges of a tetrahedron in the order in which VTK and Abaqus have their middles, behind its corners.
 pub(super) const TET_EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]];
@@ -54,7 +54,9 @@ sort_record! {
 pub(super) struct Midpoints {
     /// How many edges there are whose first end each sub-domain numbers.
     pub counts: Vec<u64>,
-    places: Sorted<Place>,
+    n_tets: u64,
+    /// Edges of the tetrahedra, six each, then of the boundary faces, three each; 8 bytes for each number.
+    elements: PathBuf,
     points: PathBuf,
 }
 
@@ -125,7 +127,7 @@ impl Midpoints {
             }
             Ok(())
         })?;
-        let points = dir.join("middles");
+        let [points, elements] = ["middles", "edges"].map(|name| dir.join(name));
         let mut stream = scratch(&points)?;
         for middle in middles.finish()? {
             for x in middle?.point.0 {
@@ -134,9 +136,16 @@ impl Midpoints {
             stream.end()?;
         }
         stream.finish()?;
+        let mut stream = scratch(&elements)?;
+        for place in places.finish()? {
+            stream.bytes(&place?.edge.to_le_bytes());
+            stream.end()?;
+        }
+        stream.finish()?;
         Ok(Self {
             counts,
-            places: places.finish()?,
+            n_tets: mesh.n_tets(),
+            elements,
             points,
         })
     }
@@ -146,19 +155,51 @@ impl Midpoints {
         self.counts.iter().sum()
     }
 
-    /// Numbers of the edges of the next element: of each tetrahedron six, then of each boundary face three.
-    pub fn next<const N: usize>(&mut self) -> Result<[u64; N]> {
-        let mut edges = [0; N];
-        for edge in &mut edges {
-            let place = self.places.next().expect("elements are read as they were");
-            *edge = place?.edge;
-        }
-        Ok(edges)
+    /// Number of the first edge whose first end sub-domain `p` numbers.
+    pub fn first_of(&self, p: usize) -> u64 {
+        self.counts[..p].iter().sum()
+    }
+
+    /// Of each tetrahedron the numbers of its edges. Errors: the disk.
+    pub fn tets(&self) -> Result<ElementEdges<6>> {
+        let records = Records::open(&self.elements, 0)?;
+        Ok(ElementEdges { records, first: 0 })
+    }
+
+    /// Of each boundary face the numbers of its edges. Errors: the disk.
+    pub fn faces(&self) -> Result<ElementEdges<3>> {
+        let first = 6 * self.n_tets;
+        let records = Records::open(&self.elements, first)?;
+        Ok(ElementEdges { records, first })
     }
 
     /// Where the middles are, in the order of their numbers. Errors: the disk.
     pub fn points(&self) -> Result<MiddlePoints> {
         Ok(MiddlePoints(Records::open(&self.points, 0)?))
+    }
+}
+
+/// Numbers of the edges of elements that have `N`, read one element after the other.
+pub(super) struct ElementEdges<const N: usize> {
+    records: Records<8>,
+    first: u64,
+}
+
+impl<const N: usize> ElementEdges<N> {
+    /// Those of the next element. Errors: the disk.
+    pub fn next(&mut self) -> Result<[u64; N]> {
+        let mut edges = [0; N];
+        for edge in &mut edges {
+            let number = self.records.next()?;
+            *edge = u64::from_le_bytes(number.expect("elements are read as they were"));
+        }
+        Ok(edges)
+    }
+
+    /// Those of the element with this number. Errors: the disk.
+    pub fn of(&mut self, element: u64) -> Result<[u64; N]> {
+        self.records.seek(self.first + N as u64 * element)?;
+        self.next()
     }
 }
 
@@ -173,5 +214,11 @@ impl MiddlePoints {
         };
         let (numbers, _) = bytes.as_chunks::<8>();
         Ok(Some([0, 1, 2].map(|i| f64::from_le_bytes(numbers[i]))))
+    }
+
+    /// That of the edge with this number. Errors: the disk.
+    pub fn of(&mut self, edge: u64) -> Result<[f64; 3]> {
+        self.0.seek(edge)?;
+        Ok(self.next()?.expect("every edge has its middle"))
     }
 }

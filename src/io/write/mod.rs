@@ -11,9 +11,11 @@
 //! `numbering` (shared vertices), `faces` (its boundary), `draft` and `stream` (files), then one file or folder per format.
 
 mod abaqus;
+mod chosen;
 #[cfg(any(test, feature = "cli", feature = "internals"))]
 mod defects;
 mod dispatch;
+mod doubles;
 mod draft;
 mod error;
 mod faces;
@@ -24,6 +26,7 @@ mod gmsh22;
 mod hdf5;
 mod medit;
 mod merged;
+mod mfem;
 mod midpoints;
 mod names;
 mod npy;
@@ -33,9 +36,11 @@ mod numbering;
 mod parquet;
 mod pieces;
 mod report;
+mod scope;
 #[cfg(any(test, feature = "cli", feature = "internals"))]
 mod selected;
 mod selection;
+mod split;
 mod stream;
 mod surface;
 #[cfg(test)]
@@ -54,6 +59,9 @@ pub use defects::defects;
 use error::Result;
 pub use error::WriteError;
 pub use format::{ENDINGS, MeshFormat};
+use format::{
+    FACES_ALONE, GHOSTS, REGIONS, REGIONS_APART, SECOND_ORDER, SLITS, STREAM, SUBDOMAINS, TEXT,
+};
 pub use npy::TextFile;
 #[cfg(any(feature = "pictures", feature = "internals"))]
 pub use npy::bytes;
@@ -69,7 +77,8 @@ pub use surface::{SurfaceReport, surface};
 use crate::storage::attempt;
 use crate::store::{Catalog, StoreError};
 use draft::{Draft, STDOUT};
-use merged::{FaceSet, Merged, Progress, Scope};
+use merged::{Merged, Progress};
+use scope::{FaceSet, Scope};
 
 /// Writes what `selection` says of the finished mesh of `store` to `out` in the format its extension tells, replacing what is there.
 ///
@@ -92,6 +101,7 @@ pub fn export(
         for &rank in &selection.subdomains {
             store.subdomain(rank)?;
         }
+        check_regions(store, selection)?;
         let mut draft = Draft::new(out)?;
         let counts = match format {
             MeshFormat::Topology => topology::write(store, &mut draft, out, memory_bytes)?,
@@ -110,8 +120,11 @@ pub fn export(
                         true => &BTreeSet::new(),
                         false => &selection.subdomains,
                     },
+                    regions: &selection.regions,
                     faces: match selection.content {
-                        Content::Mesh if apart => FaceSet::SkinAndInterfaces,
+                        Content::Mesh if apart || format == MeshFormat::Gmsh => {
+                            FaceSet::SkinAndInterfaces
+                        }
                         Content::Mesh => FaceSet::Skin,
                         Content::Boundary => FaceSet::SkinAndInterfaces,
                         Content::Interfaces => FaceSet::Interfaces,
@@ -121,6 +134,9 @@ pub fn export(
                 let progress = Progress::new(report);
                 let dir = draft.dir().to_owned();
                 let mut mesh = Merged::open(store, scope, &dir, memory_bytes, progress)?;
+                if selection.split_sheets {
+                    split::split(&mut mesh, &mut draft, out)?;
+                }
                 dispatch::write(format, selection, &mut mesh, &mut draft, out)?
             }
         };
@@ -133,6 +149,18 @@ pub fn export(
     })?
 }
 
+/// Refuses regions that the store does not have, or that are empty.
+fn check_regions(store: &mut Catalog, selection: &Selection) -> Result<()> {
+    let rows = store.regions()?;
+    let filled: Vec<u32> = (rows.iter().filter(|row| row.filled))
+        .map(|row| row.region)
+        .collect();
+    match (selection.regions.iter()).find(|region| !filled.contains(region)) {
+        Some(&region) => Err(WriteError::NoRegion { region, filled }),
+        None => Ok(()),
+    }
+}
+
 /// The format of `out`, if it can hold what is selected.
 pub fn check(out: &Path, selection: &Selection) -> Result<MeshFormat> {
     let path = || out.to_owned();
@@ -142,29 +170,31 @@ pub fn check(out: &Path, selection: &Selection) -> Result<MeshFormat> {
         path: path(),
         known,
     })?;
-    let cannot = |what| WriteError::Unsupported {
-        path: path(),
-        format: format.word(),
-        what,
-    };
     let stdout = out == Path::new(STDOUT);
-    match () {
-        () if selection.content != Content::Mesh && !format.holds_faces_alone() => {
-            Err(cannot("faces without tetrahedra; .vtu and .vtkhdf do"))
-        }
-        () if selection.ascii && !format.has_text() => Err(cannot("text")),
-        () if selection.order == Order::Second && !format.has_second_order() => Err(cannot(
-            "elements of second order; .vtu, .pvtu, .vtkhdf and .inp do",
-        )),
-        () if selection.ghosts && format != MeshFormat::Gmsh => {
-            Err(cannot("ghost cells; .msh does"))
-        }
-        () if selection.ghosts && selection.pieces => {
-            Err(cannot("ghost cells in files of one partition"))
-        }
-        () if stdout && (selection.pieces || !format.is_stream()) => {
-            Err(cannot("one file that is written from beginning to end"))
-        }
-        () => Ok(format),
+    let (pieces, regions) = (selection.pieces, !selection.regions.is_empty());
+    let subdomains = !selection.subdomains.is_empty();
+    let asked = [
+        (selection.content != Content::Mesh, FACES_ALONE),
+        (selection.ascii, TEXT),
+        (selection.order == Order::Second, SECOND_ORDER),
+        (selection.ghosts, GHOSTS),
+        (pieces || subdomains, SUBDOMAINS),
+        (regions, REGIONS),
+        (regions && (pieces || subdomains), REGIONS_APART),
+        (selection.split_sheets, SLITS),
+        (stdout, STREAM),
+    ];
+    let refused = asked.into_iter().filter(|(is_asked, _)| *is_asked);
+    let lacks = |(_, ability)| format.lacks(ability);
+    let one_stream = (stdout && (pieces || selection.split_sheets))
+        .then(|| "several files in one stream".to_owned());
+    let slits = (pieces && selection.split_sheets).then(|| "split sheets in pieces".to_owned());
+    match refused.filter_map(lacks).next().or(one_stream).or(slits) {
+        None => Ok(format),
+        Some(what) => Err(WriteError::Unsupported {
+            path: path(),
+            format: format.word(),
+            what,
+        }),
     }
 }

@@ -6,8 +6,10 @@
 
 use std::path::{Path, PathBuf};
 
+use tetdb_schema::catalog::SubdomainRow;
 use tetdb_schema::ids::{Owner, SubdomainId, VertexId};
 
+use super::chosen::Chosen;
 use super::error::Result;
 use super::stream::{Records, scratch};
 use crate::sealed::SealedError;
@@ -20,7 +22,7 @@ sort_record! {
         pub id: u64,
         /// Place in the list of parts.
         pub part: u32,
-        /// Number in the part.
+        /// Number in the part, among what is written of it.
         pub local: u32,
     }
 }
@@ -62,10 +64,39 @@ sort_record! {
 /// Bytes of an entry in the scratch file.
 const ENTRY: usize = size_of::<<TableEntry as SortRecord>::Bytes>();
 
+/// A sub-domain of which all or some is written.
+#[derive(Clone)]
+pub(super) struct Source {
+    pub row: SubdomainRow,
+    /// What is written of it.
+    pub n_tets: u64,
+    pub n_vertices: u64,
+    /// Where it stands which these are, unless it is all.
+    pub chosen: Option<PathBuf>,
+}
+
+impl Source {
+    pub fn chosen(&self) -> Result<Option<Chosen>> {
+        let load = |path| Chosen::load(path, self.row.tets);
+        self.chosen.as_deref().map(load).transpose()
+    }
+}
+
+impl From<SubdomainRow> for Source {
+    fn from(row: SubdomainRow) -> Self {
+        Self {
+            n_tets: row.tets,
+            n_vertices: row.vertices,
+            row,
+            chosen: None,
+        }
+    }
+}
+
 /// Numbers of all vertices.
 ///
 /// Shape: `firsts[p]` = number of the first own vertex of part `p`, `shared[p]` = how many of its
-/// vertices an earlier part numbers; parts are sub-domains by rank.
+/// vertices an earlier part numbers; parts are sub-domains by rank. Where not all of a sub-domain is written, what is counts densely.
 pub(super) struct Numbering {
     firsts: Vec<u64>,
     shared: Vec<u64>,
@@ -73,19 +104,51 @@ pub(super) struct Numbering {
     n_vertices: u64,
 }
 
-/// Numbers of the vertices of one part.
+/// Numbers of the vertices and tetrahedra of one part.
 ///
 /// Shape: `locals`, ascending, are numbered elsewhere, as `numbers[i]`; all others follow `first`.
 pub(super) struct PartNumbers {
     first: u64,
     locals: Vec<u32>,
     numbers: Vec<u64>,
+    n_locals: u32,
+    /// Number of the first tetrahedron.
+    pub first_tet: u64,
+    /// What is written, unless it is all.
+    chosen: Option<Chosen>,
 }
 
 impl PartNumbers {
-    /// The number of vertex `local`.
+    /// The number of vertex `local`; one that is not written has none.
+    #[inline]
+    pub fn vertex(&self, local: u32) -> Option<u64> {
+        match &self.chosen {
+            None if local < self.n_locals => Some(self.of_dense(local)),
+            None => None,
+            Some(chosen) => Some(self.of_dense(chosen.vertices.rank(local)?)),
+        }
+    }
+
+    /// The number of tetrahedron `local`; one that is not written has none.
+    #[inline]
+    pub fn tet(&self, local: u32) -> Option<u64> {
+        let dense = match &self.chosen {
+            None => local,
+            Some(chosen) => chosen.tets.rank(local)?,
+        };
+        Some(self.first_tet + u64::from(dense))
+    }
+
+    /// The number of vertex `local`, which is written.
     #[inline]
     pub fn of(&self, local: u32) -> u64 {
+        let number = self.vertex(local);
+        number.expect("vertices of what is written are written")
+    }
+
+    /// The number of a vertex that has this number among those of the part that are written.
+    #[inline]
+    pub fn of_dense(&self, local: u32) -> u64 {
         if self.locals.is_empty() {
             return self.first + u64::from(local);
         }
@@ -98,18 +161,17 @@ impl PartNumbers {
     /// The number of vertex `local` if this part is the one that numbers it.
     #[inline]
     pub fn own(&self, local: u32) -> Option<u64> {
-        let number = self.of(local);
-        (number >= self.first).then_some(number)
+        self.vertex(local).filter(|&number| number >= self.first)
     }
 }
 
 impl Numbering {
-    /// Numbers the vertices of all sub-domains; `parts` are their ranks and numbers of vertices. With `apart`, each has all of its own.
+    /// Numbers the vertices of all sub-domains. With `apart`, each has all of its own.
     ///
     /// Holds about `memory` bytes. Errors: damage, the disk.
     pub fn new(
         store: &mut Catalog,
-        parts: &[(u32, u64)],
+        parts: &[Source],
         apart: bool,
         dir: &Path,
         memory: usize,
@@ -127,7 +189,7 @@ impl Numbering {
         }
         for (part, shared) in parts.iter().zip(&numbering.shared) {
             numbering.firsts.push(numbering.n_vertices);
-            numbering.n_vertices += part.1 - shared;
+            numbering.n_vertices += part.n_vertices - shared;
         }
         let groups = numbering.number(places.finish()?, dir, memory)?;
         carry(groups, dir, memory, &numbering.table)?;
@@ -138,7 +200,7 @@ impl Numbering {
     fn group(
         &mut self,
         store: &mut Catalog,
-        parts: &[(u32, u64)],
+        parts: &[Source],
         by_id: Sorted<Candidate>,
         places: &mut Sorter<SharedVertex>,
     ) -> Result<()> {
@@ -149,7 +211,7 @@ impl Numbering {
             match &mut owner {
                 Some((first, several)) if first.id == candidate.id => {
                     if candidate.part == first.part {
-                        let rank = parts[candidate.part as usize].0;
+                        let rank = parts[candidate.part as usize].row.rank;
                         return Err(twice(store, rank, candidate.id));
                     }
                     if !*several {
@@ -207,15 +269,18 @@ impl Numbering {
         self.n_vertices
     }
 
-    /// The numbers of part `p`. Memory: 12 bytes per vertex that another part numbers.
+    /// The numbers of part `p` of `parts`. Memory: 12 bytes per vertex that another part numbers, and `Chosen` where that is not all.
     ///
     /// Errors: the disk.
-    pub fn part(&self, p: usize) -> Result<PartNumbers> {
+    pub fn part(&self, parts: &[Source], p: usize) -> Result<PartNumbers> {
         let n = self.shared[p] as usize;
         let mut part = PartNumbers {
             first: self.firsts[p],
             locals: Vec::with_capacity(n),
             numbers: Vec::with_capacity(n),
+            n_locals: parts[p].row.vertices as u32,
+            first_tet: parts[..p].iter().map(|part| part.n_tets).sum(),
+            chosen: parts[p].chosen()?,
         };
         if n > 0 {
             let before = self.shared[..p].iter().sum();
@@ -231,15 +296,17 @@ impl Numbering {
     }
 }
 
-/// All vertices that another sub-domain may also have.
+/// All vertices that are written and that another sub-domain may also have.
 pub(super) fn candidates(
     store: &mut Catalog,
-    parts: &[(u32, u64)],
+    parts: &[Source],
     dir: &Path,
     memory: usize,
 ) -> Result<Sorted<Candidate>> {
     let mut sorter = Sorter::new(dir, memory as u64 / 4);
-    for (p, &(rank, _)) in (0u32..).zip(parts) {
+    for (p, source) in (0u32..).zip(parts) {
+        let rank = source.row.rank;
+        let chosen = source.chosen()?;
         let mut part = store.open_subdomain(rank, memory / 4)?;
         let own = SubdomainId::new(rank).map(Owner::Subdomain);
         for (local, vertex) in (0u32..).zip(part.vertices()) {
@@ -247,7 +314,13 @@ pub(super) fn candidates(
             if VertexId::from_number(id).map(|v| v.owner) == own {
                 continue;
             }
-            sorter.push(Candidate { id, part: p, local })?;
+            let dense = match &chosen {
+                None => Some(local),
+                Some(chosen) => chosen.vertices.rank(local),
+            };
+            if let Some(local) = dense {
+                sorter.push(Candidate { id, part: p, local })?;
+            }
         }
     }
     Ok(sorter.finish()?)

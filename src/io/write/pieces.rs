@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 
 use super::dispatch;
 use super::draft::Draft;
-use super::merged::{FaceSet, Merged, Progress, Scope};
+use super::merged::{Merged, Progress};
+use super::scope::{FaceSet, Scope};
 use super::stream::Stream;
 use super::{FileCounts, MeshFormat, Result, Selection, WriteError};
 use crate::store::Catalog;
@@ -37,6 +38,7 @@ pub(super) fn write(
         let piece = piece_path(out, row.rank, extension);
         let scope = Scope {
             ranks: &BTreeSet::from([row.rank]),
+            regions: &selection.regions,
             faces: FaceSet::SkinAndInterfaces,
             apart: false,
         };
@@ -48,11 +50,13 @@ pub(super) fn write(
             report(counts.tets + (share * row.tets as f64) as u64, all);
         };
         let mut mesh = Merged::open(store, scope, &dir, memory, Progress::new(&report_piece))?;
+        if mesh.n_tets() == 0 {
+            fs::remove_dir_all(&dir).map_err(|e| WriteError::io(&dir, e))?;
+            continue;
+        }
         let written = dispatch::write(format, selection, &mut mesh, draft, &piece)?;
         fs::remove_dir_all(&dir).map_err(|e| WriteError::io(&dir, e))?;
-        counts.vertices += written.vertices;
-        counts.tets += written.tets;
-        counts.triangles += written.triangles;
+        counts += written;
         pieces.push(piece);
     }
     if parallel {

@@ -22,3 +22,11 @@ pub(super) struct FileCounts {
     pub tets: u64,
     pub triangles: u64,
 }
+
+impl std::ops::AddAssign for FileCounts {
+    fn add_assign(&mut self, other: Self) {
+        self.vertices += other.vertices;
+        self.tets += other.tets;
+        self.triangles += other.triangles;
+    }
+}

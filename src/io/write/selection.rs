@@ -9,6 +9,8 @@ use super::format::MeshFormat;
 pub struct Selection {
     /// Ranks of sub-domains; none stands for all. What bounds them towards others is boundary.
     pub subdomains: BTreeSet<u32>,
+    /// Numbers of regions; none stands for all. What bounds them is boundary.
+    pub regions: BTreeSet<u32>,
     /// Each sub-domain in a file of its own.
     pub pieces: bool,
     /// Which elements are written.
@@ -19,6 +21,8 @@ pub struct Selection {
     pub ascii: bool,
     /// Of each part the tetrahedra that touch other parts, listed for those (`.msh`).
     pub ghosts: bool,
+    /// The vertices on sheets once for each side, and its triangles boundary of both.
+    pub split_sheets: bool,
     /// Nodes of the elements.
     pub order: Order,
 }

@@ -128,6 +128,8 @@ impl Strip {
 pub(super) struct Records<const N: usize> {
     path: PathBuf,
     file: std::io::BufReader<File>,
+    /// Number of the next record.
+    next: u64,
 }
 
 impl<const N: usize> Records<N> {
@@ -138,11 +140,21 @@ impl<const N: usize> Records<N> {
         Ok(Self {
             path: path.to_owned(),
             file: std::io::BufReader::with_capacity(BUFFER_BYTES, file),
+            next: first,
         })
+    }
+
+    /// Goes to record `record`; what is in the buffer already is not read again.
+    pub fn seek(&mut self, record: u64) -> Result<()> {
+        let records = record.cast_signed() - self.next.cast_signed();
+        self.next = record;
+        let moved = self.file.seek_relative(records * N as i64);
+        moved.map_err(|e| WriteError::io(&self.path, e))
     }
 
     pub fn next(&mut self) -> Result<Option<[u8; N]>> {
         let mut record = [0; N];
+        self.next += 1;
         match self.file.read_exact(&mut record) {
             Ok(()) => Ok(Some(record)),
             Err(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => Ok(None),

@@ -8,13 +8,13 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::draft::Draft;
-use super::numbering::{Candidate, candidates};
+use super::numbering::{Candidate, Source, candidates};
 use super::stream::Stream;
 use super::{FileCounts, Result};
 use crate::sealed::SealedError;
 use crate::storage::{Sorted, Sorter, sort_record};
 use crate::store::{Catalog, StoreError};
-use tetdb_schema::catalog::NeighborRow;
+use tetdb_schema::catalog::{NeighborRow, SubdomainRow};
 
 sort_record! {
     /// A vertex of a pair of sub-domains, the lower rank first.
@@ -46,10 +46,10 @@ pub(super) fn write(
     memory: usize,
 ) -> Result<FileCounts> {
     let rows = store.subdomains()?;
-    let ranks: Vec<_> = rows.iter().map(|row| (row.rank, row.vertices)).collect();
+    let sources: Vec<Source> = rows.iter().cloned().map(Source::from).collect();
     let dir = draft.dir().to_owned();
-    let vertices = shared_vertices(store, &ranks, &dir, memory)?;
-    let faces = shared_faces(store, &ranks, &dir, memory)?;
+    let vertices = shared_vertices(store, &sources, &dir, memory)?;
+    let faces = shared_faces(store, &rows, &dir, memory)?;
     let neighbors: BTreeMap<u32, Vec<NeighborRow>> = (store.topology()?.into_iter())
         .map(|row| (row.subdomain, row.neighbors))
         .collect();
@@ -151,7 +151,7 @@ fn unequal(store: &mut Catalog, low: u32, high: u32) -> super::WriteError {
 /// Vertices by pair, those of one pair in an order that both sides know.
 fn shared_vertices(
     store: &mut Catalog,
-    ranks: &[(u32, u64)],
+    sources: &[Source],
     dir: &Path,
     memory: usize,
 ) -> Result<Sorted<SharedVertex>> {
@@ -162,7 +162,7 @@ fn shared_vertices(
         for (i, a) in group.iter().enumerate() {
             for b in &group[i + 1..] {
                 sorter.push(SharedVertex {
-                    pair: [a, b].map(|v| ranks[v.part as usize].0),
+                    pair: [a, b].map(|v| sources[v.part as usize].row.rank),
                     id,
                     numbers: [a.local, b.local],
                 })?;
@@ -171,7 +171,7 @@ fn shared_vertices(
         group.clear();
         Ok(())
     };
-    for candidate in candidates(store, ranks, dir, memory)? {
+    for candidate in candidates(store, sources, dir, memory)? {
         let candidate = candidate?;
         if candidate.id != id {
             hand_on(&mut group, id)?;
@@ -186,12 +186,12 @@ fn shared_vertices(
 /// Interface faces by pair.
 fn shared_faces(
     store: &mut Catalog,
-    ranks: &[(u32, u64)],
+    rows: &[SubdomainRow],
     dir: &Path,
     memory: usize,
 ) -> Result<Sorted<SharedFace>> {
     let mut sorter = Sorter::new(dir, memory as u64 / 4);
-    for &(rank, _) in ranks {
+    for &SubdomainRow { rank, .. } in rows {
         let mut part = store.open_subdomain(rank, memory / 4)?;
         for face in part.interfaces() {
             let face = face?;

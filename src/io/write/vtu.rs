@@ -26,10 +26,10 @@ pub(super) fn write(
     draft: &mut Draft,
     out: &Path,
     is_hdf: bool,
-    mut middles: Option<&mut Midpoints>,
+    middles: Option<&Midpoints>,
 ) -> Result<()> {
     mesh.expect_passes(2, 1);
-    let partitions = partitions(mesh, is_hdf, middles.as_deref());
+    let partitions = partitions(mesh, is_hdf, middles);
     let container = match is_hdf {
         true => Container::Hdf(
             partitions
@@ -73,7 +73,7 @@ pub(super) fn write(
         (point.iter()).try_for_each(|x| points.put(&x.to_le_bytes()))
     };
     // The middles of a partition stand behind its vertices.
-    let mut middle_points = middles.as_deref().map(Midpoints::points).transpose()?;
+    let mut middle_points = middles.map(Midpoints::points).transpose()?;
     let mut put_middles = |n: u64, put: &mut dyn FnMut(i64, [f64; 3]) -> Result<()>| {
         (0..n).try_for_each(|_| {
             let point = middle_points.as_mut().map(MiddlePoints::next).transpose()?;
@@ -94,6 +94,7 @@ pub(super) fn write(
         put_middles(part.n_middles, &mut put)?;
     }
     let mut part = &partitions[0];
+    let mut edges = middles.map(Midpoints::tets).transpose()?;
     let mut end = 0;
     let mut coming = partitions.iter().filter(|_| is_hdf).peekable();
     mesh.tets_with_quality(|tet| {
@@ -109,8 +110,8 @@ pub(super) fn write(
         for v in tet.nodes {
             index.put(&mut nodes, v - part.first_vertex)?;
         }
-        if let Some(middles) = &mut middles {
-            for edge in middles.next::<6>()? {
+        if let Some(edges) = &mut edges {
+            for edge in edges.next()? {
                 index.put(&mut nodes, part.n_vertices + edge - part.first_middle)?;
             }
         }

@@ -100,11 +100,11 @@ pub(super) fn write(
     draft: &mut Draft,
     out: &Path,
     is_hdf: bool,
-    middles: Option<&mut Midpoints>,
+    middles: Option<&Midpoints>,
 ) -> Result<u64> {
     let n_corners = if middles.is_some() { 6 } else { 3 };
-    let partitions = partitions(mesh, is_hdf, middles.as_deref());
-    let mut middle_points = middles.as_deref().map(Midpoints::points).transpose()?;
+    let partitions = partitions(mesh, is_hdf, middles);
+    let mut middle_points = middles.map(Midpoints::points).transpose()?;
     let corners = corners(mesh, mesh.dir(), middles)?;
     let n_faces = mesh.n_faces();
     let container = match is_hdf {
@@ -220,7 +220,8 @@ fn or_none(number: Option<u64>) -> i64 {
     number.map_or(-1, |n| n as i64)
 }
 
-fn corners(mesh: &Merged, dir: &Path, mut middles: Option<&mut Midpoints>) -> Result<Corners> {
+fn corners(mesh: &Merged, dir: &Path, middles: Option<&Midpoints>) -> Result<Corners> {
+    let mut edges = middles.map(Midpoints::faces).transpose()?;
     let mut by_vertex = Sorter::new(dir, mesh.sorter_bytes());
     let mut place = 0u64;
     mesh.faces().each(|face| {
@@ -228,8 +229,8 @@ fn corners(mesh: &Merged, dir: &Path, mut middles: Option<&mut Midpoints>) -> Re
             by_vertex.push(Corner { vertex, place })?;
             place += 1;
         }
-        if let Some(middles) = &mut middles {
-            for edge in middles.next::<3>()? {
+        if let Some(edges) = &mut edges {
+            for edge in edges.next()? {
                 let vertex = mesh.n_vertices() + edge;
                 by_vertex.push(Corner { vertex, place })?;
                 place += 1;

@@ -41,7 +41,8 @@ sort_record! {
         cut: u32,
         index: u32,
         rank: u32,
-        tet: u32,
+        /// Number in the whole.
+        cell: u32,
         other: u32,
         vertices: [u32; 3],
     }
@@ -159,43 +160,43 @@ impl FaceWalk {
     pub fn new(mesh: &mut Merged) -> Result<Self> {
         let parts = mesh.parts();
         let first_interface = mesh.n_labels();
-        let mut first_tets = BTreeMap::new();
-        let mut n = 0;
-        for part in &parts {
-            first_tets.insert(part.rank, n as u32);
-            n += part.n_tets;
-        }
+        let places: BTreeMap<u32, usize> = (parts.iter().enumerate())
+            .map(|(p, part)| (part.rank, p))
+            .collect();
         let mut census = Census::default();
         let (dir, bytes) = (mesh.dir().to_owned(), mesh.sorter_bytes());
         let mut sides = Sorter::new(&dir, bytes);
         for (p, row) in parts.iter().enumerate() {
-            let mut part = mesh.open_part(p)?.part;
-            let (mut patches, mut between) = (BTreeMap::new(), BTreeMap::new());
+            let Opened { mut part, numbers } = mesh.open_part(p)?;
+            let mut patches = BTreeMap::new();
             for facet in part.facets() {
                 let facet = facet?;
-                if is_inner(&facet) {
+                let is_cell = |&tet: &u32| tet != NO_TET && numbers.tet(tet).is_some();
+                if is_inner(mesh, &facet) {
                     *census.zones.entry(facet.label).or_default() += 1;
-                } else if facet.tets.iter().any(|&t| t != NO_TET) {
+                } else if facet.tets.iter().any(is_cell) {
                     *patches.entry(facet.label).or_default() += 1;
                 }
             }
             for face in part.interfaces() {
                 let face = face?;
-                match first_tets.contains_key(&face.other) {
-                    true => *between.entry(face.other).or_default() += 1,
-                    false => *patches.entry(first_interface + face.other).or_default() += 1,
+                let Some(cell) = numbers.tet(face.tet) else {
+                    continue;
+                };
+                if !places.contains_key(&face.other) && !mesh.is_of_regions() {
+                    *patches.entry(first_interface + face.other).or_default() += 1;
                 }
                 sides.push(Side {
                     cut: face.cut,
                     index: face.index,
                     rank: row.rank,
-                    tet: face.tet,
+                    cell: cell as u32,
                     other: face.other,
                     vertices: sorted_face(face.vertices).0,
                 })?;
             }
             census.patches.push(patches);
-            census.between.push(between);
+            census.between.push(BTreeMap::new());
         }
         let mut behind = Sorter::new(&dir, bytes);
         let mut sides = sides.finish()?.peekable();
@@ -203,7 +204,10 @@ impl FaceWalk {
             let side = side?;
             let same = |s: &std::result::Result<Side, StorageError>| matches!(s, Ok(s) if (s.cut, s.index) == (side.cut, side.index));
             let back = sides.next_if(same).transpose()?;
-            let cell = |s: &Side| first_tets[&s.rank] + s.tet;
+            // Where only some regions are written, what bounds them is of the input.
+            if back.is_none() && mesh.is_of_regions() {
+                continue;
+            }
             let mut push = |s: &Side, cell| {
                 behind.push(Behind {
                     rank: s.rank,
@@ -214,9 +218,13 @@ impl FaceWalk {
                     cell,
                 })
             };
-            push(&side, back.as_ref().map_or(NO_TET, cell))?;
+            push(&side, back.as_ref().map_or(NO_TET, |back| back.cell))?;
             if let Some(back) = back {
-                push(&back, cell(&side))?;
+                push(&back, side.cell)?;
+                for side in [&side, &back] {
+                    let between = &mut census.between[places[&side.rank]];
+                    *between.entry(side.other).or_default() += 1;
+                }
             }
         }
         Ok(Self {
@@ -229,20 +237,21 @@ impl FaceWalk {
     /// The faces of the next sub-domain, number `p`. Errors: damage, the disk.
     pub fn part(&mut self, mesh: &mut Merged, p: usize) -> Result<PartFaces> {
         let (dir, bytes) = (mesh.dir().to_owned(), mesh.sorter_bytes());
-        let Opened {
-            mut part,
-            first_tet,
-            ..
-        } = mesh.open_part(p)?;
+        let Opened { mut part, numbers } = mesh.open_part(p)?;
+        let first_tet = numbers.first_tet;
         let rank = part.id().rank();
         let mut cells = Sorter::new(&dir, bytes);
-        let n_tets = part.row().tets;
+        let n_tets = mesh.parts()[p].n_tets;
         for chunk in 0..part.tet_summaries().len() {
             let chunk = part.tet_chunk(chunk as u32)?;
             for (tet, record) in (chunk.first..).zip(&chunk.records) {
+                let Some(number) = numbers.tet(tet) else {
+                    continue;
+                };
+                let cell = (number - first_tet) as u32;
                 for face in FACES {
                     let (vertices, odd) = sorted_face(face.map(|v| record.nodes[v]));
-                    let cell_odd = tet << 1 | u32::from(odd);
+                    let cell_odd = cell << 1 | u32::from(odd);
                     cells.push(CellFace { vertices, cell_odd })?;
                 }
             }
@@ -256,7 +265,7 @@ impl FaceWalk {
                 vertices,
                 label: facet.label,
                 is_odd,
-                is_inner: is_inner(&facet),
+                is_inner: is_inner(mesh, &facet),
             })?;
         }
         let mut facets = facets.finish()?.peekable();
@@ -343,8 +352,10 @@ fn turned([a, b, c]: [u32; 3], odd: bool) -> [u32; 3] {
     if odd { [a, c, b] } else { [a, b, c] }
 }
 
-fn is_inner(facet: &SealedFacet) -> bool {
-    facet.regions.iter().all(|&region| region != 0)
+/// Whether cells are written on both sides.
+fn is_inner(mesh: &Merged, facet: &SealedFacet) -> bool {
+    let is_written = |&region: &u32| region != 0 && mesh.writes(region);
+    facet.regions.iter().all(is_written)
 }
 
 /// The record at this place of a sorted list, whose earlier records are passed over.

@@ -160,7 +160,7 @@ impl Job<'_> {
     ) -> Result<()> {
         let rank = mesh.parts()[p].rank;
         let dir = self.dir(rank);
-        let (numbers, _) = mesh.numbers_of(p)?;
+        let numbers = mesh.numbers_of(p)?;
         let mut files = match is_written {
             true => Some(FaceFiles::create(draft, &dir, size, self.ascii)?),
             false => None,
@@ -273,11 +273,8 @@ impl Job<'_> {
         size: Size,
     ) -> Result<()> {
         let (scratch, bytes) = (mesh.dir().to_owned(), mesh.sorter_bytes());
-        let Opened {
-            mut part,
-            numbers,
-            first_tet,
-        } = mesh.open_part(p)?;
+        let Opened { mut part, numbers } = mesh.open_part(p)?;
+        let first_tet = numbers.first_tet as u32;
         let (dir, ascii) = (self.dir(part.id().rank()), self.ascii);
         let what = (dir.as_path(), "points", "vectorField");
         let mut points = FoamFile::create(draft, what, "", ascii, 24 * size.points)?;
@@ -301,8 +298,7 @@ impl Job<'_> {
             size.cells,
             ascii,
             |file| {
-                (0..size.cells as u32)
-                    .try_for_each(|cell| file.label((first_tet as u32 + cell) as i32))
+                (0..size.cells as u32).try_for_each(|cell| file.label((first_tet + cell) as i32))
             },
         )?;
         let mut zones = Zones::new(&scratch, false, bytes);

@@ -122,8 +122,8 @@ fn write_faces(
     let mut n_outer = 0;
     for p in 0..mesh.n_parts() {
         let faces = walk.part(mesh, p)?;
-        let (numbers, first) = mesh.numbers_of(p)?;
-        let first = first as u32;
+        let numbers = mesh.numbers_of(p)?;
+        let first = numbers.first_tet as u32;
         let global = |vertices: [u32; 3]| vertices.map(|v| numbers.of(v) as u32);
         in_order(faces.inner, faces.uppers, |face| {
             let (owner, neighbor, vertices, zone) = match face {

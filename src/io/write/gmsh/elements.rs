@@ -2,13 +2,17 @@
 
 use super::super::error::Result;
 use super::super::merged::{Merged, Opened};
+use super::super::midpoints::{ElementEdges, Midpoints};
 use super::entities::Entities;
 use super::out::Out;
+use super::piece::Piece;
 use crate::storage::{Sorter, sort_record};
 
-/// Gmsh's numbers of the two types of elements.
-const TRIANGLE: u32 = 2;
-const TETRAHEDRON: u32 = 4;
+/// Gmsh's numbers of the types of elements, of first and of second order.
+const TRIANGLES: [u32; 2] = [2, 9];
+const TETRAHEDRA: [u32; 2] = [4, 11];
+/// The place of each middle of a tetrahedron's edges: Gmsh has the last two the other way round.
+const MIDDLES: [usize; 6] = [0, 1, 2, 3, 5, 4];
 
 sort_record! {
     /// A triangle by its entity.
@@ -23,104 +27,143 @@ sort_record! {
     /// A tetrahedron of a sub-domain by its entity.
     struct Tetrahedron {
         entity: u32,
-        number: u32,
+        number: u64,
         nodes: [u32; 4],
     }
+}
+
+/// What the elements of a file are written with.
+struct Elements<'a> {
+    out: &'a mut Out,
+    /// Of each entity dimension, tag and number of elements.
+    tags: Vec<(u32, u32, u64)>,
+    order: usize,
+    /// Elements before the first tetrahedron.
+    n_faces: u64,
+    /// Vertices before the first middle.
+    n_vertices: u64,
+    edges: Option<ElementEdges<6>>,
+    /// The entity whose elements are being written.
+    entity: Option<u32>,
 }
 
 pub(super) fn write(
     mesh: &mut Merged,
     out: &mut Out,
-    which: &[usize],
+    piece: &Piece,
     entities: &Entities,
 ) -> Result<()> {
-    let (tags, n_faces) = (entities.tags(), mesh.n_faces());
+    let n_faces = mesh.n_faces();
+    let tags = entities.tags();
     let total = entities.n_faces() + entities.n_tets();
     for n in [tags.len() as u64, total, 1, n_faces + mesh.n_tets()] {
         out.size(n);
     }
     out.end()?;
-    let begin = |out: &mut Out, entity: u32, kind: u32| {
-        let (dim, tag, n) = tags[entity as usize];
-        for word in [dim, tag, kind] {
-            out.int(word);
-        }
-        out.size(n);
-        out.end()
+    let mut elements = Elements {
+        out,
+        tags,
+        order: usize::from(piece.middles.is_some()),
+        n_faces,
+        n_vertices: mesh.n_vertices(),
+        edges: piece.middles.map(Midpoints::tets).transpose()?,
+        entity: None,
     };
-    triangles(mesh, out, entities, begin)?;
-    for &p in which {
-        let Opened {
-            mut part,
-            numbers,
-            first_tet,
-        } = mesh.open_part(p)?;
-        let first = n_faces + first_tet + 1;
-        let put = |out: &mut Out, number: u32, nodes: [u32; 4]| {
-            out.size(first + u64::from(number));
-            nodes.iter().for_each(|&v| out.size(numbers.of(v) + 1));
-            out.end()
-        };
+    triangles(mesh, &mut elements, piece, entities)?;
+    for &p in piece.which {
+        let Opened { mut part, numbers } = mesh.open_part(p)?;
         let rank = part.id().rank();
-        let volumes = entities.volumes_of(rank);
-        if let (1, Some(&entity)) = (volumes.len(), volumes.values().next()) {
-            begin(out, entity, TETRAHEDRON)?;
+        if let Some(entity) = entities.only_volume(rank) {
             for tet in part.tets() {
                 let (id, tet) = tet?;
-                put(out, id.local(), tet.nodes)?;
+                if let Some(number) = numbers.tet(id.local()) {
+                    elements.tet(entity, number, tet.nodes.map(|v| numbers.of(v)))?;
+                }
             }
         } else {
             let mut sorter = Sorter::new(mesh.dir(), mesh.sorter_bytes());
             for tet in part.tets() {
                 let (id, tet) = tet?;
-                sorter.push(Tetrahedron {
-                    entity: volumes[&tet.region],
-                    number: id.local(),
-                    nodes: tet.nodes,
-                })?;
+                if let Some(number) = numbers.tet(id.local()) {
+                    sorter.push(Tetrahedron {
+                        entity: entities.volume(tet.region, rank),
+                        number,
+                        nodes: tet.nodes,
+                    })?;
+                }
             }
-            let mut last = None;
             for tet in sorter.finish()? {
                 let tet = tet?;
-                if last.replace(tet.entity) != Some(tet.entity) {
-                    begin(out, tet.entity, TETRAHEDRON)?;
-                }
-                put(out, tet.number, tet.nodes)?;
+                elements.tet(tet.entity, tet.number, tet.nodes.map(|v| numbers.of(v)))?;
             }
         }
         mesh.advance(part.row().tets as usize);
     }
-    Ok(())
+    piece.each_ghost(|ghost| {
+        let entity = entities.volume(ghost.region, ghost.from);
+        elements.tet(entity, ghost.number, ghost.nodes.0)
+    })
+}
+
+impl Elements<'_> {
+    /// Begins the elements of an entity, unless they are begun.
+    fn begin(&mut self, entity: u32, types: [u32; 2]) -> Result<()> {
+        if self.entity.replace(entity) == Some(entity) {
+            return Ok(());
+        }
+        let (dim, tag, n) = self.tags[entity as usize];
+        for word in [dim, tag, types[self.order]] {
+            self.out.int(word);
+        }
+        self.out.size(n);
+        self.out.end()
+    }
+
+    fn tet(&mut self, entity: u32, number: u64, nodes: [u64; 4]) -> Result<()> {
+        self.begin(entity, TETRAHEDRA)?;
+        self.out.size(self.n_faces + number + 1);
+        nodes.iter().for_each(|v| self.out.size(v + 1));
+        if let Some(edges) = &mut self.edges {
+            let edges = edges.of(number)?;
+            MIDDLES
+                .iter()
+                .for_each(|&i| self.out.size(self.n_vertices + edges[i] + 1));
+        }
+        self.out.end()
+    }
 }
 
 fn triangles(
     mesh: &Merged,
-    out: &mut Out,
+    elements: &mut Elements,
+    piece: &Piece,
     entities: &Entities,
-    begin: impl Fn(&mut Out, u32, u32) -> Result<()>,
 ) -> Result<()> {
     let mut sorter = Sorter::new(mesh.dir(), mesh.sorter_bytes());
     let mut number = 0;
     mesh.faces().each(|face| {
-        number += 1;
-        if let Some(entity) = entities.surface(face.label, face.subdomain) {
+        if let Some(entity) = entities.surface(face) {
             sorter.push(Triangle {
                 entity,
                 number,
                 vertices: face.vertices,
             })?;
         }
+        number += 1;
         Ok(())
     })?;
-    let mut last = None;
+    let mut edges = piece.middles.map(Midpoints::faces).transpose()?;
     for face in sorter.finish()? {
         let face = face?;
-        if last.replace(face.entity) != Some(face.entity) {
-            begin(out, face.entity, TRIANGLE)?;
+        elements.begin(face.entity, TRIANGLES)?;
+        elements.out.size(face.number + 1);
+        face.vertices.iter().for_each(|v| elements.out.size(v + 1));
+        if let Some(edges) = &mut edges {
+            for edge in edges.of(face.number)? {
+                elements.out.size(elements.n_vertices + edge + 1);
+            }
         }
-        out.size(face.number);
-        face.vertices.iter().for_each(|&v| out.size(v + 1));
-        out.end()?;
+        elements.out.end()?;
     }
     Ok(())
 }

@@ -3,14 +3,18 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::super::error::Result;
+use super::super::faces::Face;
 use super::super::merged::Merged;
 use super::super::names::quotable;
 use super::out::Out;
+use super::piece::Piece;
 
 /// The least and the greatest coordinates.
 type Bounds = [[f64; 3]; 2];
 
 /// What is written: of each label and region, the elements in each partition. The place of an entity counts surfaces, then volumes.
+///
+/// A label behind all others is the faces towards a sub-domain; where that is written too, they have no physical group and lie in both partitions.
 pub(super) struct Entities {
     /// Label and rank, ascending, and how many faces.
     surfaces: Vec<((u32, u32), u64)>,
@@ -18,29 +22,38 @@ pub(super) struct Entities {
     volumes: Vec<((u32, u32), u64)>,
     /// Of all that is written; it bounds every entity, if not closely.
     bounds: Bounds,
-    is_partitioned: bool,
+    /// Ranks of all partitions, also of those in other files.
+    ranks: Vec<u32>,
+    n_labels: u32,
 }
 
 impl Entities {
-    /// Counts those of the sub-domains at places `which`. Errors: damage, the disk.
-    pub fn gather(mesh: &mut Merged, which: &[usize]) -> Result<Self> {
+    /// Counts those of a file. Errors: damage, the disk.
+    pub fn gather(mesh: &mut Merged, piece: &Piece) -> Result<Self> {
         let parts = mesh.parts();
-        let ranks: BTreeSet<u32> = which.iter().map(|&p| parts[p].rank).collect();
+        let mut entities = Self {
+            surfaces: Vec::new(),
+            volumes: Vec::new(),
+            bounds: [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]],
+            ranks: parts.iter().map(|part| part.rank).collect(),
+            n_labels: mesh.n_labels(),
+        };
+        let here: BTreeSet<u32> = piece.which.iter().map(|&p| parts[p].rank).collect();
         let mut surfaces = BTreeMap::<_, u64>::new();
         mesh.faces().each(|face| {
-            if ranks.contains(&face.subdomain) {
+            let neighbor = entities.neighbor(face.label);
+            if here.contains(&face.subdomain) || neighbor.is_some_and(|n| here.contains(&n)) {
                 *surfaces.entry((face.label, face.subdomain)).or_default() += 1;
             }
             Ok(())
         })?;
         let mut volumes = BTreeMap::<_, u64>::new();
-        let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-        for &p in which {
+        for &p in piece.which {
             let mut part = mesh.open_part(p)?.part;
             let rank = parts[p].rank;
             for chunk in 0..part.tet_summaries().len() {
                 let summary = part.tet_summaries()[chunk];
-                let [low, high] = &mut bounds;
+                let [low, high] = &mut entities.bounds;
                 for (axis, (low, high)) in low.iter_mut().zip(high).enumerate() {
                     *low = low.min(summary.bounds[0][axis]);
                     *high = high.max(summary.bounds[1][axis]);
@@ -55,12 +68,20 @@ impl Entities {
                 }
             }
         }
-        Ok(Self {
-            surfaces: surfaces.into_iter().collect(),
-            volumes: volumes.into_iter().collect(),
-            bounds,
-            is_partitioned: parts.len() > 1,
-        })
+        volumes.retain(|(region, _), _| mesh.writes(*region));
+        piece.each_ghost(|ghost| {
+            *volumes.entry((ghost.region, ghost.from)).or_default() += 1;
+            Ok(())
+        })?;
+        entities.surfaces = surfaces.into_iter().collect();
+        entities.volumes = volumes.into_iter().collect();
+        Ok(entities)
+    }
+
+    /// The partition behind faces of this label.
+    fn neighbor(&self, label: u32) -> Option<u32> {
+        let rank = label.checked_sub(self.n_labels)?;
+        self.ranks.contains(&rank).then_some(rank)
     }
 
     pub fn n_faces(&self) -> u64 {
@@ -72,20 +93,30 @@ impl Entities {
     }
 
     pub fn is_partitioned(&self) -> bool {
-        self.is_partitioned
+        self.ranks.len() > 1
     }
 
-    /// The place of a surface, if it is written.
-    pub fn surface(&self, label: u32, rank: u32) -> Option<u32> {
-        let found = self.surfaces.binary_search_by_key(&(label, rank), |s| s.0);
+    /// The place of a face's surface, if it is written.
+    pub fn surface(&self, face: &Face) -> Option<u32> {
+        let key = (face.label, face.subdomain);
+        let found = self.surfaces.binary_search_by_key(&key, |s| s.0);
         found.ok().map(|place| place as u32)
     }
 
-    /// The regions of a sub-domain, with the places of its volumes.
-    pub fn volumes_of(&self, rank: u32) -> BTreeMap<u32, u32> {
-        let all = (self.surfaces.len() as u32..).zip(&self.volumes);
-        let of_rank = all.filter(|(_, (key, _))| key.1 == rank);
-        of_rank.map(|(place, (key, _))| (key.0, place)).collect()
+    /// The place of a region's volume in a partition, which has tetrahedra of it.
+    pub fn volume(&self, region: u32, rank: u32) -> u32 {
+        let found = self.volumes.binary_search_by_key(&(region, rank), |v| v.0);
+        let place = found.expect("regions were counted from the same tetrahedra");
+        (self.surfaces.len() + place) as u32
+    }
+
+    /// The place of the volume of a partition's only region.
+    pub fn only_volume(&self, rank: u32) -> Option<u32> {
+        let mut of_rank = self.volumes.iter().filter(|(key, _)| key.1 == rank);
+        match (of_rank.next(), of_rank.next()) {
+            (Some(((region, _), _)), None) => Some(self.volume(*region, rank)),
+            _ => None,
+        }
     }
 
     /// Dimension and tag of the entity at each place, and how many elements it has.
@@ -94,15 +125,19 @@ impl Entities {
         let first = whole(&self.surfaces).max(whole(&self.volumes)) + 1;
         let parts = self.surfaces.iter().map(|(key, n)| (2, key.0 + 1, *n));
         let parts = parts.chain(self.volumes.iter().map(|(key, n)| (3, key.0, *n)));
-        let tag = |(place, (dim, whole, n))| match self.is_partitioned {
+        let tag = |(place, (dim, whole, n))| match self.is_partitioned() {
             true => (dim, first + place, n),
             false => (dim, whole, n),
         };
         (0..).zip(parts).map(tag).collect()
     }
 
+    /// Those with a physical group.
     fn labels(&self) -> BTreeSet<u32> {
-        self.surfaces.iter().map(|(key, _)| key.0).collect()
+        let labels = self.surfaces.iter().map(|(key, _)| key.0);
+        labels
+            .filter(|&label| self.neighbor(label).is_none())
+            .collect()
     }
 
     fn regions(&self) -> BTreeSet<u32> {
@@ -148,35 +183,53 @@ impl Entities {
     }
 
     /// What of them is in which partition.
-    pub fn write_partitioned(&self, out: &mut Out, n_parts: usize, ghosts: bool) -> Result<()> {
-        out.size(n_parts as u64);
+    pub fn write_partitioned(&self, out: &mut Out, ghosts: bool) -> Result<()> {
+        out.size(self.ranks.len() as u64);
         let tags = self.tags();
         let first_ghost = tags.iter().map(|t| t.1).max().unwrap_or(0) + 1;
-        let n_ghosts = if ghosts { n_parts as u32 } else { 0 };
-        out.size(n_ghosts.into());
-        for p in 0..n_ghosts {
-            out.int(first_ghost + p);
-            out.int(p + 1);
+        let of_ghosts = if ghosts { &self.ranks[..] } else { &[] };
+        out.size(of_ghosts.len() as u64);
+        for (tag, rank) in (first_ghost..).zip(of_ghosts) {
+            out.int(tag);
+            out.int(rank + 1);
         }
         out.end()?;
         for n in [0, 0, self.surfaces.len(), self.volumes.len()] {
             out.size(n as u64);
         }
         out.end()?;
-        let keys = self.surfaces.iter().map(|(key, _)| (key.0 + 1, key.1));
-        let keys = keys.chain(self.volumes.iter().map(|(key, _)| *key));
-        for ((dim, tag, _), (whole, rank)) in tags.into_iter().zip(keys) {
-            for n in [tag, dim, whole] {
-                out.int(n);
+        let (surfaces, volumes) = tags.split_at(self.surfaces.len());
+        for ((_, tag, _), ((label, rank), _)) in surfaces.iter().zip(&self.surfaces) {
+            match self.neighbor(*label) {
+                // Faces between partitions lie in a volume, which of the regions there matters to nobody.
+                Some(other) => {
+                    let region = self.regions().first().copied().unwrap_or_default();
+                    self.put(out, [*tag, 3, region], &[*rank, other], None)?;
+                }
+                None => self.put(out, [*tag, 2, label + 1], &[*rank], Some(label + 1))?,
             }
-            out.size(1);
-            out.int(rank + 1);
-            self.put_bounds(out);
-            out.size(1);
-            out.int(whole);
-            out.size(0);
-            out.end()?;
+        }
+        for ((_, tag, _), ((region, rank), _)) in volumes.iter().zip(&self.volumes) {
+            self.put(out, [*tag, 3, *region], &[*rank], Some(*region))?;
         }
         Ok(())
+    }
+
+    /// An entity of partitions: its tag, dimension and tag of what it is a part of, ranks, physical group.
+    fn put(
+        &self,
+        out: &mut Out,
+        head: [u32; 3],
+        ranks: &[u32],
+        physical: Option<u32>,
+    ) -> Result<()> {
+        head.into_iter().for_each(|n| out.int(n));
+        out.size(ranks.len() as u64);
+        ranks.iter().for_each(|rank| out.int(rank + 1));
+        self.put_bounds(out);
+        out.size(physical.is_some().into());
+        physical.into_iter().for_each(|tag| out.int(tag));
+        out.size(0);
+        out.end()
     }
 }

@@ -6,69 +6,128 @@ use super::super::error::Result;
 use super::super::merged::{Merged, Opened};
 use super::super::stream::{Records, scratch};
 use super::out::Out;
+use crate::storage::{Payload, SortRecord, Sorter, sort_record};
 
-/// Writes them to a scratch file, in the words of the format; returns how many.
-pub(super) fn gather(mesh: &mut Merged, which: &[usize], ascii: bool) -> Result<u64> {
-    let path = place(mesh);
-    scratch(&path)?.finish()?;
-    let mut out = Out::open(&path, ascii)?;
-    let mut sharers = mesh.sharers()?.peekable();
-    let mut n = 0;
-    for &p in which {
-        // Vertices of this sub-domain, ascending, and who else has them; both as places among all.
-        let mut shared: Vec<(u32, u32)> = Vec::new();
-        while let Some(sharer) =
-            sharers.next_if(|s| s.as_ref().map_or(true, |s| s.part as usize <= p))
-        {
-            let sharer = sharer?;
-            if sharer.part as usize == p {
-                shared.push((sharer.local, sharer.other));
-            }
-        }
-        let Opened {
-            mut part,
-            first_tet,
-            ..
-        } = mesh.open_part(p)?;
-        let first = mesh.n_faces() + first_tet + 1;
-        let mut others = Vec::new();
-        for tet in part.tets() {
-            let (id, tet) = tet?;
-            others.clear();
-            for v in tet.nodes {
-                let from = shared.partition_point(|s| s.0 < v);
-                let of_vertex = shared[from..].iter().take_while(|s| s.0 == v);
-                others.extend(of_vertex.map(|s| s.1));
-            }
-            others.sort_unstable();
-            others.dedup();
-            if others.is_empty() {
-                continue;
-            }
-            n += 1;
-            out.size(first + u64::from(id.local()));
-            out.int(p as u32 + 1);
-            out.size(others.len() as u64);
-            others.iter().for_each(|&other| out.int(other + 1));
-            out.end()?;
-        }
+sort_record! {
+    /// A tetrahedron as another partition sees it.
+    pub(super) struct Ghost {
+        /// Place of the partition that sees it.
+        to: u32,
+        pub region: u32,
+        /// Rank of its own.
+        pub from: u32,
+        /// Its number among all tetrahedra.
+        pub number: u64,
+        pub nodes: Payload<[u64; 4]>,
+        pub points: Payload<[f64; 12]>,
     }
-    out.finish()?;
-    Ok(n)
 }
 
-fn place(mesh: &Merged) -> PathBuf {
-    mesh.dir().join("ghosts")
+const BYTES: usize = size_of::<<Ghost as SortRecord>::Bytes>();
+
+/// Those of all partitions, in a scratch file.
+pub(super) struct Ghosts {
+    /// Where those of each partition begin.
+    firsts: Vec<u64>,
+    path: PathBuf,
 }
 
-/// Copies what was gathered behind its number.
-pub(super) fn write(mesh: &Merged, out: &mut Out, n: u64) -> Result<()> {
-    out.size(n);
-    out.end()?;
-    let mut bytes = Records::<1>::open(&place(mesh), 0)?;
-    while let Some(byte) = bytes.next()? {
-        out.stream.bytes(&byte);
-        out.stream.end()?;
+impl Ghosts {
+    /// Finds them. Errors: damage, the disk.
+    pub fn gather(mesh: &mut Merged) -> Result<Self> {
+        let mut sharers = mesh.sharers()?.peekable();
+        let mut sorter = Sorter::new(mesh.dir(), mesh.sorter_bytes());
+        for p in 0..mesh.n_parts() {
+            // Vertices of this sub-domain by number, ascending, and who else has them; places among all.
+            let mut shared: Vec<(u64, u32)> = Vec::new();
+            let Opened { mut part, numbers } = mesh.open_part(p)?;
+            while let Some(sharer) =
+                sharers.next_if(|s| s.as_ref().map_or(true, |s| s.part as usize == p))
+            {
+                let sharer = sharer?;
+                shared.push((numbers.of_dense(sharer.local), sharer.other));
+            }
+            shared.sort_unstable();
+            let rank = part.id().rank();
+            let mut others = Vec::new();
+            for chunk in 0..part.tet_summaries().len() {
+                let chunk = part.tet_chunk(chunk as u32)?;
+                for (local, tet) in (chunk.first..).zip(&chunk.records) {
+                    let Some(number) = numbers.tet(local) else {
+                        continue;
+                    };
+                    let nodes = tet.nodes.map(|v| numbers.of(v));
+                    others.clear();
+                    for v in nodes {
+                        let from = shared.partition_point(|s| s.0 < v);
+                        let of_vertex = shared[from..].iter().take_while(|s| s.0 == v);
+                        others.extend(of_vertex.map(|s| s.1));
+                    }
+                    if others.is_empty() {
+                        continue;
+                    }
+                    others.sort_unstable();
+                    others.dedup();
+                    let corners = part.corners(tet.nodes)?;
+                    let mut points = [0.0; 12];
+                    for (to, corner) in points.chunks_exact_mut(3).zip(corners) {
+                        to.copy_from_slice(&corner.point.to_array());
+                    }
+                    for &to in &others {
+                        sorter.push(Ghost {
+                            to,
+                            region: tet.region,
+                            from: rank,
+                            number,
+                            nodes: Payload(nodes),
+                            points: Payload(points),
+                        })?;
+                    }
+                }
+            }
+        }
+        let mut counts = vec![0; mesh.n_parts()];
+        let path = mesh.dir().join("ghosts");
+        let mut stream = scratch(&path)?;
+        for ghost in sorter.finish()? {
+            let ghost = ghost?;
+            counts[ghost.to as usize] += 1;
+            stream.bytes(&ghost.to_bytes());
+            stream.end()?;
+        }
+        stream.finish()?;
+        let mut firsts = vec![0];
+        for count in counts {
+            firsts.push(firsts[firsts.len() - 1] + count);
+        }
+        Ok(Self { firsts, path })
     }
-    Ok(())
+
+    /// Those that the partition at place `p` sees, by region and partition. Errors: the disk, those of `each`.
+    pub fn each(&self, p: usize, mut each: impl FnMut(&Ghost) -> Result<()>) -> Result<()> {
+        let mut records = Records::<BYTES>::open(&self.path, self.firsts[p])?;
+        for _ in self.firsts[p]..self.firsts[p + 1] {
+            let Some(record) = records.next()? else { break };
+            each(&Ghost::from_bytes(&record))?;
+        }
+        Ok(())
+    }
+
+    /// Lists those that the partitions at places `which` see: element, its partition, the one that sees it.
+    pub fn write(&self, out: &mut Out, which: &[usize], mesh: &Merged) -> Result<()> {
+        let counts = which.iter().map(|&p| self.firsts[p + 1] - self.firsts[p]);
+        out.size(counts.sum());
+        out.end()?;
+        let parts = mesh.parts();
+        for &p in which {
+            self.each(p, |ghost| {
+                out.size(mesh.n_faces() + ghost.number + 1);
+                out.int(ghost.from + 1);
+                out.size(1);
+                out.int(parts[p].rank + 1);
+                out.end()
+            })?;
+        }
+        Ok(())
+    }
 }

@@ -1,8 +1,8 @@
-//! Gmsh 4.1, binary or text: physical surfaces are labels, physical volumes regions.
+//! Gmsh 4.1, binary or text, of first or second order: physical surfaces are labels, physical volumes regions.
 //!
 //! Of several sub-domains each is a partition, numbered from 1, whose part of a label or region is an entity of its own below the label's or
 //! region's. Elements are numbered from 1, triangles first; all numbers are those of the whole, also in files of one partition, named
-//! `NAME_1.msh` and so on. Each vertex stands with the first entity it is on, surfaces before volumes.
+//! `NAME_1.msh` and so on. The faces between two partitions, each once, lie in both and have no physical group. Each vertex stands with the first entity it is on, surfaces before volumes.
 //! Source: the Gmsh reference manual, "MSH file format".
 
 mod elements;
@@ -10,6 +10,7 @@ mod entities;
 mod ghosts;
 mod nodes;
 mod out;
+mod piece;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -17,32 +18,48 @@ use std::path::{Path, PathBuf};
 use super::draft::Draft;
 use super::error::Result;
 use super::merged::Merged;
+use super::midpoints::Midpoints;
 use super::report::FileCounts;
 use super::selection::Selection;
 use entities::Entities;
+use ghosts::Ghosts;
 use out::Out;
+use piece::Piece;
 
 /// Writes one file of all, or one of each partition.
 pub(super) fn write(
     mesh: &mut Merged,
     draft: &mut Draft,
     out: &Path,
-    selection: &Selection,
+    (selection, middles): (&Selection, Option<&Midpoints>),
 ) -> Result<FileCounts> {
     mesh.expect_passes(1, 1);
+    let ghosts = match selection.ghosts {
+        true => Some(Ghosts::gather(mesh)?),
+        false => None,
+    };
+    let ghosts = ghosts.as_ref();
+    let foreign = ghosts.filter(|_| selection.pieces);
     if !selection.pieces {
         let all: Vec<usize> = (0..mesh.n_parts()).collect();
-        return write_file(mesh, draft, out, &all, selection);
+        let piece = Piece {
+            which: &all,
+            middles,
+            foreign,
+        };
+        return write_file(mesh, draft, out, &piece, (selection.ascii, ghosts));
     }
     let mut counts = FileCounts::default();
     for (p, part) in mesh.parts().into_iter().enumerate() {
         let ranks: &BTreeSet<u32> = &selection.subdomains;
         if ranks.is_empty() || ranks.contains(&part.rank) {
             let path = piece_path(out, part.rank);
-            let written = write_file(mesh, draft, &path, &[p], selection)?;
-            counts.vertices += written.vertices;
-            counts.tets += written.tets;
-            counts.triangles += written.triangles;
+            let piece = Piece {
+                which: &[p],
+                middles,
+                foreign,
+            };
+            counts += write_file(mesh, draft, &path, &piece, (selection.ascii, ghosts))?;
         }
     }
     Ok(counts)
@@ -55,21 +72,20 @@ fn piece_path(out: &Path, rank: u32) -> PathBuf {
     out.with_file_name(format!("{stem}_{}.{ending}", rank + 1))
 }
 
-/// Writes the partitions `which`, by their places among all.
 fn write_file(
     mesh: &mut Merged,
     draft: &mut Draft,
     path: &Path,
-    which: &[usize],
-    selection: &Selection,
+    piece: &Piece,
+    (ascii, ghosts): (bool, Option<&Ghosts>),
 ) -> Result<FileCounts> {
-    let entities = Entities::gather(mesh, which)?;
-    let (ascii, n_tets) = (selection.ascii, entities.n_tets());
-    let nodes = nodes::gather(mesh, which, &entities, path)?;
-    let elements_bytes = if ascii { 30 } else { 40 };
-    let vertex_bytes = if ascii { 55 } else { 32 };
-    let bytes = 1000 + vertex_bytes * nodes.n + elements_bytes * (n_tets + entities.n_faces());
-    let file = draft.create(path, bytes)?;
+    let entities = Entities::gather(mesh, piece)?;
+    let n_tets = entities.n_tets();
+    let nodes = nodes::gather(mesh, piece, &entities, path)?;
+    let [vertex_bytes, number_bytes] = if ascii { [55, 6] } else { [32, 8] };
+    let numbers = if piece.middles.is_some() { 11 } else { 5 };
+    let elements_bytes = number_bytes * numbers * (n_tets + entities.n_faces());
+    let file = draft.create(path, 1000 + vertex_bytes * nodes.n + elements_bytes)?;
     let mut out = Out::open(&file, ascii)?;
     out.section("MeshFormat", |out| {
         out.text(if ascii { "4.1 0 8\n" } else { "4.1 1 8\n" });
@@ -87,16 +103,15 @@ fn write_file(
     out.section("Entities", |out| entities.write_model(out))?;
     if entities.is_partitioned() {
         out.section("PartitionedEntities", |out| {
-            entities.write_partitioned(out, mesh.n_parts(), selection.ghosts)
+            entities.write_partitioned(out, ghosts.is_some())
         })?;
     }
     out.section("Nodes", |out| nodes.write(out, &entities))?;
     out.section("Elements", |out| {
-        elements::write(mesh, out, which, &entities)
+        elements::write(mesh, out, piece, &entities)
     })?;
-    if selection.ghosts {
-        let count = ghosts::gather(mesh, which, ascii)?;
-        out.section("GhostElements", |out| ghosts::write(mesh, out, count))?;
+    if let Some(ghosts) = ghosts {
+        out.section("GhostElements", |out| ghosts.write(out, piece.which, mesh))?;
     }
     out.finish()?;
     Ok(FileCounts {

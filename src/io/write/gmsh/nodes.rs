@@ -4,9 +4,11 @@ use std::path::{Path, PathBuf};
 
 use super::super::error::Result;
 use super::super::merged::{Merged, Opened};
+use super::super::midpoints::Midpoints;
 use super::super::stream::{Records, scratch};
 use super::entities::Entities;
 use super::out::Out;
+use super::piece::Piece;
 use crate::storage::{Payload, SortRecord, Sorter, sort_record};
 
 sort_record! {
@@ -40,15 +42,42 @@ pub(super) struct Nodes {
     path: PathBuf,
 }
 
-/// Gives each vertex of the sub-domains at places `which` its entity.
+/// Numbers that were seen, of a range; those outside are always new.
+struct Seen {
+    first: u64,
+    bits: Vec<u64>,
+}
+
+impl Seen {
+    fn new(first: u64, n: u64) -> Self {
+        let bits = vec![0; n.div_ceil(64) as usize];
+        Self { first, bits }
+    }
+
+    fn is_new(&mut self, number: u64) -> bool {
+        let Some(place) = number.checked_sub(self.first) else {
+            return true;
+        };
+        let (word, bit) = ((place / 64) as usize, 1 << (place % 64));
+        let Some(word) = self.bits.get_mut(word) else {
+            return true;
+        };
+        let is_new = *word & bit == 0;
+        *word |= bit;
+        is_new
+    }
+}
+
+/// Gives each vertex of a file, and each middle of an edge, its entity.
 pub(super) fn gather(
     mesh: &mut Merged,
-    which: &[usize],
+    piece: &Piece,
     entities: &Entities,
     name: &Path,
 ) -> Result<Nodes> {
     let parts = mesh.parts();
     let (dir, bytes) = (mesh.dir().to_owned(), mesh.sorter_bytes());
+    let n_vertices = mesh.n_vertices();
     let mut claims = Sorter::new(&dir, bytes);
     let mut claim = |vertex, entity, point| {
         claims.push(Claim {
@@ -57,42 +86,84 @@ pub(super) fn gather(
             point: Payload(point),
         })
     };
+    let mut edges = piece.middles.map(Midpoints::faces).transpose()?;
+    let mut number = 0;
     mesh.faces().each(|face| {
-        if let Some(entity) = entities.surface(face.label, face.subdomain) {
+        if let Some(entity) = entities.surface(face) {
             for vertex in face.vertices {
                 claim(vertex, entity, [0.0; 3])?;
             }
+            if let Some(edges) = &mut edges {
+                for edge in edges.of(number)? {
+                    claim(n_vertices + edge, entity, [0.0; 3])?;
+                }
+            }
         }
+        number += 1;
         Ok(())
     })?;
-    for &p in which {
-        let Opened {
-            mut part, numbers, ..
-        } = mesh.open_part(p)?;
-        let volumes = entities.volumes_of(parts[p].rank);
-        // Inside, all tetrahedra around a vertex are of one region, so that the first one tells it: a bit for each vertex.
-        let mut is_known = vec![0u64; parts[p].n_vertices.div_ceil(64) as usize];
-        if let (1, Some(&entity)) = (volumes.len(), volumes.values().next()) {
-            for v in 0..parts[p].n_vertices as u32 {
-                claim(numbers.of(v), entity, [0.0; 3])?;
+    let mut edges = piece.middles.map(Midpoints::tets).transpose()?;
+    for &p in piece.which {
+        let Opened { mut part, numbers } = mesh.open_part(p)?;
+        let rank = parts[p].rank;
+        let only = entities.only_volume(rank);
+        // Inside, all tetrahedra around a vertex are of one region, so that the first one tells it.
+        let mut vertices = Seen::new(parts[p].first_vertex, parts[p].n_vertices);
+        let of_edges = piece
+            .middles
+            .map_or((0, 0), |m| (m.first_of(p), m.counts[p]));
+        let mut middles = Seen::new(n_vertices + of_edges.0, of_edges.1);
+        let needs_tets = only.is_none() || edges.is_some();
+        for tet in part.tets().take_while(|_| needs_tets) {
+            let (id, tet) = tet?;
+            let Some(number) = numbers.tet(id.local()) else {
+                continue;
+            };
+            let entity = entities.volume(tet.region, rank);
+            for v in tet.nodes.map(|v| numbers.of(v)) {
+                if vertices.is_new(v) {
+                    claim(v, entity, [0.0; 3])?;
+                }
             }
-        } else {
-            for tet in part.tets() {
-                let tet = tet?.1;
-                for v in tet.nodes {
-                    let (word, bit) = (v as usize / 64, 1 << (v % 64));
-                    if is_known.get(word).is_some_and(|w| w & bit == 0) {
-                        is_known[word] |= bit;
-                        claim(numbers.of(v), volumes[&tet.region], [0.0; 3])?;
+            if let Some(edges) = &mut edges {
+                for v in edges.of(number)?.map(|edge| n_vertices + edge) {
+                    if middles.is_new(v) {
+                        claim(v, entity, [0.0; 3])?;
                     }
                 }
             }
         }
         for (v, vertex) in (0u32..).zip(part.vertices()) {
-            claim(numbers.of(v), POSITION, vertex?.point)?;
+            let vertex = vertex?;
+            let Some(number) = numbers.vertex(v) else {
+                continue;
+            };
+            claim(number, POSITION, vertex.point)?;
+            if let Some(entity) = only {
+                claim(number, entity, [0.0; 3])?;
+            }
         }
         mesh.advance(parts[p].n_vertices as usize);
     }
+    piece.each_ghost(|ghost| {
+        let entity = entities.volume(ghost.region, ghost.from);
+        for (v, point) in ghost
+            .nodes
+            .0
+            .into_iter()
+            .zip(ghost.points.0.as_chunks::<3>().0)
+        {
+            claim(v, entity, [0.0; 3])?;
+            claim(v, POSITION, *point)?;
+        }
+        if let Some(edges) = &mut edges {
+            for edge in edges.of(ghost.number)? {
+                claim(n_vertices + edge, entity, [0.0; 3])?;
+            }
+        }
+        Ok(())
+    })?;
+    let mut points = piece.middles.map(Midpoints::points).transpose()?;
     let mut sorter = Sorter::new(&dir, bytes);
     let mut last = None;
     for claim in claims.finish()? {
@@ -108,7 +179,19 @@ pub(super) fn gather(
                     last = Some((vertex, POSITION));
                 }
             }
-            _ => last = Some((claim.vertex, claim.entity)),
+            _ => {
+                last = Some((claim.vertex, claim.entity));
+                // Nobody claims the positions of middles: they stand in the order of their numbers.
+                if let (Some(points), Some(edge)) =
+                    (&mut points, claim.vertex.checked_sub(n_vertices))
+                {
+                    sorter.push(Node {
+                        entity: claim.entity,
+                        vertex: claim.vertex,
+                        point: Payload(points.of(edge)?),
+                    })?;
+                }
+            }
         }
     }
     let file = name.file_name().unwrap_or_default().to_string_lossy();

@@ -1,0 +1,115 @@
+//! Which of a sub-domain's tetrahedra and vertices are written when only some regions are.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use super::error::Result;
+use super::stream::{Records, scratch};
+use crate::sealed::Subdomain;
+
+/// A set of numbers that knows how many of them are below each number.
+///
+/// Shape: a bit for each number, and for each 64 of them how many there are before. Memory: 1.5 bits for each number.
+pub(super) struct RankedSet {
+    words: Vec<u64>,
+    before: Vec<u32>,
+}
+
+impl RankedSet {
+    fn new(words: Vec<u64>) -> Self {
+        let sums = words.iter().scan(0, |sum, word| {
+            let before = *sum;
+            *sum += word.count_ones();
+            Some(before)
+        });
+        let before = sums.collect();
+        Self { words, before }
+    }
+
+    fn len(&self) -> u64 {
+        self.words.iter().map(|w| u64::from(w.count_ones())).sum()
+    }
+
+    /// How many members are below `number`, if it is one.
+    #[inline]
+    pub fn rank(&self, number: u32) -> Option<u32> {
+        let (place, bit) = (number as usize / 64, number % 64);
+        let word = *self.words.get(place)?;
+        let below = (word & ((1 << bit) - 1)).count_ones();
+        (word >> bit & 1 == 1).then(|| self.before[place] + below)
+    }
+}
+
+/// Those of one sub-domain: the tetrahedra of some regions and their vertices.
+pub(super) struct Chosen {
+    pub tets: RankedSet,
+    pub vertices: RankedSet,
+}
+
+impl Chosen {
+    /// Finds them, in one pass, and keeps them at `path`; returns how many tetrahedra and vertices. Errors: damage, the disk.
+    pub fn gather(part: &mut Subdomain, regions: &BTreeSet<u32>, path: &Path) -> Result<[u64; 2]> {
+        let words = |n: u64| vec![0u64; n.div_ceil(64) as usize];
+        let (mut tets, mut vertices) = (words(part.row().tets), words(part.row().vertices));
+        let n_vertices = part.row().vertices;
+        for chunk in 0..part.tet_summaries().len() {
+            let [least, greatest] = part.tet_summaries()[chunk].regions;
+            if regions.range(least..=greatest).next().is_none() {
+                continue;
+            }
+            let chunk = part.tet_chunk(chunk as u32)?;
+            for (local, tet) in (chunk.first..).zip(&chunk.records) {
+                if regions.contains(&tet.region) {
+                    tets[local as usize / 64] |= 1 << (local % 64);
+                    for v in tet.nodes {
+                        if u64::from(v) >= n_vertices {
+                            part.corner(v)?;
+                        }
+                        vertices[v as usize / 64] |= 1 << (v % 64);
+                    }
+                }
+            }
+        }
+        let mut stream = scratch(path)?;
+        for word in tets.iter().chain(&vertices) {
+            stream.bytes(&word.to_le_bytes());
+            stream.end()?;
+        }
+        stream.finish()?;
+        Ok([tets, vertices].map(|words| RankedSet::new(words).len()))
+    }
+
+    /// Those of a sub-domain with `n` tetrahedra, kept at `path`. Errors: the disk.
+    pub fn load(path: &Path, n: u64) -> Result<Self> {
+        let mut records = Records::<8>::open(path, 0)?;
+        let mut words = Vec::new();
+        while let Some(word) = records.next()? {
+            words.push(u64::from_le_bytes(word));
+        }
+        let vertices = words.split_off(n.div_ceil(64) as usize);
+        Ok(Self {
+            tets: RankedSet::new(words),
+            vertices: RankedSet::new(vertices),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ranked_set_counts_what_is_below() {
+        let members: Vec<u32> = (0..500).filter(|n| n % 7 == 3 || n % 64 == 63).collect();
+        let mut words = vec![0u64; 8];
+        for &n in &members {
+            words[n as usize / 64] |= 1 << (n % 64);
+        }
+        let set = RankedSet::new(words);
+        assert_eq!(set.len(), members.len() as u64);
+        for n in 0..600 {
+            let expected = members.iter().position(|&m| m == n);
+            assert_eq!(set.rank(n), expected.map(|i| i as u32));
+        }
+    }
+}

@@ -1,0 +1,24 @@
+//! What of the mesh a file holds.
+
+use super::super::error::Result;
+use super::super::midpoints::Midpoints;
+use super::ghosts::{Ghost, Ghosts};
+
+/// What a file is of.
+pub(super) struct Piece<'a> {
+    /// Places of its partitions among all.
+    pub which: &'a [usize],
+    pub middles: Option<&'a Midpoints>,
+    /// In files of one partition, tetrahedra of others that it sees.
+    pub foreign: Option<&'a Ghosts>,
+}
+
+impl Piece<'_> {
+    /// Every tetrahedron of another partition that is in the file too.
+    pub fn each_ghost(&self, mut each: impl FnMut(&Ghost) -> Result<()>) -> Result<()> {
+        let Some(ghosts) = self.foreign else {
+            return Ok(());
+        };
+        (self.which.iter()).try_for_each(|&p| ghosts.each(p, &mut each))
+    }
+}

@@ -1,0 +1,35 @@
+//! Lines of an MFEM file.
+
+use super::super::error::Result;
+use super::super::stream::Stream;
+
+/// MFEM's numbers of the two geometries.
+pub(super) const TRIANGLE: u64 = 2;
+pub(super) const TETRAHEDRON: u64 = 4;
+
+pub(super) fn element(
+    stream: &mut Stream,
+    attribute: u64,
+    geometry: u64,
+    vertices: &[u64],
+) -> Result<()> {
+    stream.integer(attribute, b' ');
+    stream.integer(geometry, b' ');
+    list(stream, vertices)
+}
+
+/// Numbers on a line.
+pub(super) fn list(stream: &mut Stream, numbers: &[u64]) -> Result<()> {
+    for (i, &number) in numbers.iter().enumerate() {
+        let is_last = i + 1 == numbers.len();
+        stream.integer(number, if is_last { b'\n' } else { b' ' });
+    }
+    stream.end()
+}
+
+pub(super) fn point(stream: &mut Stream, [x, y, z]: [f64; 3]) -> Result<()> {
+    stream.double(x, b' ');
+    stream.double(y, b' ');
+    stream.double(z, b'\n');
+    stream.end()
+}

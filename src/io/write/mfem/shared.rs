@@ -1,0 +1,179 @@
+//! Vertices, edges and faces that several sub-domains have, in groups by who has them.
+//!
+//! What is shared lies on the boundary of each that has it: the corners, edges and faces of input triangles and interface faces, sorted by the
+//! numbers of their vertices in the whole, meet those of the others. So every side lists them alike, and begins each edge and face at the same
+//! vertex.
+
+use std::collections::BTreeMap;
+use std::iter::Peekable;
+
+use super::super::error::Result;
+use super::super::merged::{Merged, Opened};
+use super::super::stream::Stream;
+use super::lines::{TRIANGLE, list};
+use crate::storage::{Sorted, Sorter, sort_record};
+use tetdb_schema::record::NO_TET;
+
+sort_record! {
+    /// A vertex, an edge or a face on the boundary of a sub-domain.
+    struct Entity {
+        /// Numbers of its vertices in the whole, ascending, the last one as often as it takes.
+        key: [u64; 3],
+        part: u32,
+        /// The same in the sub-domain.
+        locals: [u32; 3],
+    }
+}
+
+sort_record! {
+    /// One that is shared, as one of those that have it lists it.
+    struct Member {
+        part: u32,
+        group: u32,
+        /// Vertices less one.
+        dimension: u32,
+        key: [u64; 3],
+        locals: [u32; 3],
+    }
+}
+
+/// All that is shared.
+pub(super) struct Shared {
+    members: Peekable<Sorted<Member>>,
+    /// Places of the sub-domains of each group.
+    groups: Vec<Vec<u32>>,
+    /// Vertices, edges and faces of each sub-domain's groups.
+    counts: BTreeMap<(u32, u32), [u64; 3]>,
+}
+
+impl Shared {
+    /// Finds it. Errors: damage, the disk.
+    pub fn gather(mesh: &mut Merged) -> Result<Self> {
+        let (dir, bytes) = (mesh.dir().to_owned(), mesh.sorter_bytes());
+        let mut entities = Sorter::new(&dir, bytes);
+        for p in 0..mesh.n_parts() {
+            let Opened {
+                mut part, numbers, ..
+            } = mesh.open_part(p)?;
+            let mut push = |face: [u32; 3]| -> Result<()> {
+                let mut ends = face.map(|v| (numbers.of(v), v));
+                ends.sort_unstable();
+                let [a, b, c] = ends;
+                for ends in [
+                    [a; 3],
+                    [b; 3],
+                    [c; 3],
+                    [a, b, b],
+                    [a, c, c],
+                    [b, c, c],
+                    ends,
+                ] {
+                    entities.push(Entity {
+                        key: ends.map(|end| end.0),
+                        part: p as u32,
+                        locals: ends.map(|end| end.1),
+                    })?;
+                }
+                Ok(())
+            };
+            for facet in part.facets() {
+                let facet = facet?;
+                if facet.tets.iter().any(|&tet| tet != NO_TET) {
+                    push(facet.vertices)?;
+                }
+            }
+            for face in part.interfaces() {
+                push(face?.vertices)?;
+            }
+        }
+        let mut members = Sorter::new(&dir, bytes);
+        let mut group_of = BTreeMap::new();
+        let mut counts = BTreeMap::<_, [u64; 3]>::new();
+        let mut entities = entities.finish()?.peekable();
+        while let Some(first) = entities.next() {
+            let first = first?;
+            let mut all = vec![first];
+            while let Some(next) =
+                entities.next_if(|e| e.as_ref().map_or(true, |e| e.key == first.key))
+            {
+                let next = next?;
+                if all.last() != Some(&next) {
+                    all.push(next);
+                }
+            }
+            if all.len() == 1 {
+                continue;
+            }
+            let ranks: Vec<u32> = all.iter().map(|e| e.part).collect();
+            let n = group_of.len() as u32;
+            let group = *group_of.entry(ranks).or_insert(n);
+            let [a, b, c] = first.key;
+            let dimension = u32::from(a != b) + u32::from(b != c);
+            for Entity { key, part, locals } in all {
+                counts.entry((part, group)).or_default()[dimension as usize] += 1;
+                members.push(Member {
+                    part,
+                    group,
+                    dimension,
+                    key,
+                    locals,
+                })?;
+            }
+        }
+        let mut groups = vec![Vec::new(); group_of.len()];
+        for (ranks, group) in group_of {
+            groups[group as usize] = ranks;
+        }
+        let members = members.finish()?.peekable();
+        Ok(Self {
+            members,
+            groups,
+            counts,
+        })
+    }
+
+    /// Writes what the sub-domain at place `p` shares; later calls are for later ones. Errors: the disk.
+    pub fn write(&mut self, p: u32, stream: &mut Stream) -> Result<()> {
+        let groups: Vec<_> = self.counts.range((p, 0)..(p + 1, 0)).collect();
+        // The first group is what the sub-domain has alone.
+        stream.text(&format!(
+            "\ncommunication_groups\nnumber_of_groups {}\n\n1 {p}\n",
+            groups.len() + 1
+        ));
+        for ((_, group), _) in &groups {
+            let ranks = &self.groups[*group as usize];
+            stream.integer(ranks.len() as u64, b' ');
+            list(
+                stream,
+                &ranks.iter().map(|&rank| rank.into()).collect::<Vec<_>>(),
+            )?;
+        }
+        stream.text("\n");
+        for (dimension, what) in ["vertices", "edges", "faces"].iter().enumerate() {
+            let total: u64 = groups.iter().map(|(_, n)| n[dimension]).sum();
+            stream.text(&format!("total_shared_{what} {total}\n"));
+        }
+        for (&(_, group), counts) in groups {
+            for (dimension, what) in (0..).zip(["vertices", "edges", "faces"]) {
+                stream.text(&format!("\nshared_{what} {}\n", counts[dimension as usize]));
+                let here = (p, group, dimension);
+                let order = |m: &Member| (m.part, m.group, m.dimension);
+                while let Some(member) = self
+                    .members
+                    .next_if(|m| m.as_ref().map_or(true, |m| order(m) <= here))
+                {
+                    let member = member?;
+                    if order(&member) < here {
+                        continue; // of a sub-domain that is not written
+                    }
+                    if dimension == 2 {
+                        stream.integer(TRIANGLE, b' ');
+                    }
+                    let locals = member.locals.map(u64::from);
+                    list(stream, &locals[..=dimension as usize])?;
+                }
+            }
+        }
+        Ok(())
+    }
+}

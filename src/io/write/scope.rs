@@ -1,0 +1,43 @@
+//! What of the sub-domains becomes one mesh.
+
+use std::collections::BTreeSet;
+
+/// Which faces bound what is written, beside those that it shares with sub-domains that are not written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum FaceSet {
+    /// Input triangles.
+    Skin,
+    /// Input triangles and all interface faces.
+    SkinAndInterfaces,
+    /// All interface faces, no input triangle.
+    Interfaces,
+}
+
+/// What is written: these sub-domains, or all when there are none, with these faces.
+#[derive(Clone, Copy)]
+pub(super) struct Scope<'s> {
+    pub ranks: &'s BTreeSet<u32>,
+    /// Only these regions, or all when there are none.
+    pub regions: &'s BTreeSet<u32>,
+    pub faces: FaceSet,
+    /// Each sub-domain numbers all its vertices, also those it shares.
+    pub apart: bool,
+}
+
+impl Scope<'_> {
+    /// Whether a sub-domain is written.
+    pub fn holds(&self, rank: u32) -> bool {
+        self.ranks.is_empty() || self.ranks.contains(&rank)
+    }
+
+    /// The region, or 0 where it is not written.
+    pub fn region(&self, region: u32) -> u32 {
+        let is_written = self.regions.is_empty() || self.regions.contains(&region);
+        if is_written { region } else { 0 }
+    }
+
+    /// Whether the face between sub-domain `rank`, which is written, and `other` is listed, and by this side.
+    pub fn lists(&self, rank: u32, other: u32) -> bool {
+        !self.holds(other) || (self.faces != FaceSet::Skin && rank < other)
+    }
+}
