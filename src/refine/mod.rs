@@ -18,6 +18,7 @@ mod pattern;
 mod placement;
 mod recent;
 mod report;
+mod settled;
 mod worker;
 
 use tetdb_schema::page::SLOT_BITS;
@@ -32,6 +33,7 @@ pub use field::{Field, Lengths};
 pub use placement::{Everywhere, PlacementRule};
 use recent::Recent;
 pub use report::RefineReport;
+use settled::Settled;
 use worker::Worker;
 
 /// Tetrahedra of one block. Small enough that a block's candidates fit a small lease, large enough that
@@ -65,6 +67,7 @@ pub fn saturate<P: Pages>(
         candidates: Vec::new(),
         recent: Recent::new(),
         active: Activity::all(mesh),
+        settled: Settled::new(mesh.n_facets()),
         last: 0,
         placing: true,
         examined_too: false,
@@ -92,6 +95,7 @@ pub fn saturate<P: Pages>(
             renumber(mesh, &worker.order, space)?;
             numbered = mesh.n_tets();
             worker.active = Activity::all(mesh);
+            worker.settled.clear();
             worker.last = 0;
         }
         let inserted = report.inserted - before;

@@ -3,6 +3,7 @@
 use super::activity::Activity;
 use super::candidate::Candidate;
 use super::recent::Recent;
+use super::settled::Settled;
 use crate::delaunay::Kernel;
 use crate::geom::HilbertFrame;
 
@@ -14,6 +15,7 @@ pub(super) struct Worker {
     pub candidates: Vec<Candidate>,
     pub recent: Recent,
     pub active: Activity,
+    pub settled: Settled,
     /// Whether points move to the nearest place of the pattern.
     pub placing: bool,
     /// Whether tetrahedra are examined again.

@@ -5,10 +5,8 @@ use std::collections::BinaryHeap;
 use std::io::{BufReader, BufWriter, Read, Write};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use rayon::slice::ParallelSliceMut;
-
 use super::sort_record::{SortBytes, SortRecord};
-use super::{DiskPath, StorageError, check_cancelled, parallel};
+use super::{DiskPath, StorageError, check_cancelled, sort_unstable_by};
 
 /// Numbers run files within the process.
 static RUNS: AtomicU64 = AtomicU64::new(0);
@@ -84,8 +82,7 @@ impl<R: SortRecord> Sorter<R> {
 
     fn spill(&mut self) -> Result<(), StorageError> {
         check_cancelled();
-        let records = &mut self.records;
-        parallel(|| records.par_sort_unstable_by(order));
+        sort_unstable_by(&mut self.records, order);
         let number = RUNS.fetch_add(1, Ordering::Relaxed);
         let path = self
             .dir
@@ -108,8 +105,7 @@ impl<R: SortRecord> Sorter<R> {
     /// Ends pushing. Errors: the disk.
     pub fn finish(mut self) -> Result<Sorted<R>, StorageError> {
         if self.runs.is_empty() {
-            let records = &mut self.records;
-            parallel(|| records.par_sort_unstable_by(order));
+            sort_unstable_by(&mut self.records, order);
             return Ok(Sorted {
                 memory: std::mem::take(&mut self.records).into_iter(),
                 heap: BinaryHeap::new(),
