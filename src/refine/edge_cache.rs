@@ -1,27 +1,16 @@
-//! Edges between fixed vertices that are known to need no point.
-//!
-//! Neither their ends nor the sizes along them nor the input's faces change, so what was decided once holds until vertices get other
-//! numbers. Without this every edge of the surface is looked at twenty times, whenever a tetrahedron at it is new.
+//! Edges met before, in a table that forgets.
 
-/// Places for each facet of the mesh: one and a half edges, and those between neighboring parts of the surface.
-const PLACES_FACET: u32 = 3;
-/// Most places: 4 MB. Where there are more edges, some are looked at again.
-const PLACES_MAX: u32 = 1 << 19;
-
-/// A table of such edges, in which one takes the place of another. What it forgets costs time alone.
-pub(super) struct Settled {
-    /// An edge as an ordered pair, or zero.
+/// Edges as ordered pairs of vertices; one takes the place of another. What it forgets costs time alone.
+pub(super) struct EdgeCache {
+    /// Zero where there is none.
     edges: Vec<u64>,
 }
 
-impl Settled {
-    /// A table for a mesh with so many facets.
-    pub fn new(n_facets: u32) -> Self {
-        let n = n_facets
-            .saturating_mul(PLACES_FACET)
-            .clamp(1 << 10, PLACES_MAX);
+impl EdgeCache {
+    /// A table with at least so many places.
+    pub fn new(places: usize) -> Self {
         Self {
-            edges: vec![0; n.next_power_of_two() as usize],
+            edges: vec![0; places.next_power_of_two()],
         }
     }
 
@@ -36,12 +25,14 @@ impl Settled {
         self.edges[self.place(edge)] == edge
     }
 
-    pub fn add(&mut self, edge: u64) {
+    /// Adds an edge; whether it was not there.
+    #[inline(always)]
+    pub fn add(&mut self, edge: u64) -> bool {
         let place = self.place(edge);
-        self.edges[place] = edge;
+        std::mem::replace(&mut self.edges[place], edge) != edge
     }
 
-    /// Forgets all, for vertices have other numbers.
+    /// Forgets all.
     pub fn clear(&mut self) {
         self.edges.fill(0);
     }

@@ -3,9 +3,9 @@
 use std::ops::Range;
 
 use super::candidate::Candidate;
+use super::edge_cache::EdgeCache;
 use super::field::{Field, Lengths};
 use super::pattern::Pattern;
-use super::settled::Settled;
 use super::worker::Worker;
 use crate::geom::{HilbertFrame, Point, mix};
 use crate::mesh::anatomy::mark::EXAMINED;
@@ -29,6 +29,8 @@ const JITTER_FROM: f64 = 2.0;
 const JITTER: f64 = 0.4;
 /// Largest shell that is looked at for required faces.
 const SHELL_MAX: usize = 64;
+/// Places for edges of a page that were listed already: five tetrahedra have the same one, and sorting is dear.
+const SEEN: usize = 1 << 12;
 /// Edges divided as one part.
 const EDGES_PART: usize = 1 << 12;
 
@@ -72,7 +74,9 @@ impl Worker {
         let mut found = Vec::new();
         for (candidates, settled) in scan_parts(mesh, &parts, &division) {
             found.extend(candidates);
-            settled.into_iter().for_each(|edge| self.settled.add(edge));
+            for edge in settled {
+                self.settled.add(edge);
+            }
         }
         // The points that share a key stay in the order of their edges.
         let mut order: Vec<(u64, u32)> = found.iter().map(|c: &Candidate| c.key).zip(0..).collect();
@@ -90,7 +94,7 @@ type Edge = (u64, u32);
 /// Lists the edges of a page's unexamined tetrahedra that may be long; none when all are examined.
 struct LongEdges<'a> {
     field: &'a Field<'a>,
-    settled: &'a Settled,
+    settled: &'a EdgeCache,
     examined_too: bool,
 }
 
@@ -99,19 +103,26 @@ impl Scan for LongEdges<'_> {
     type Output = Option<Vec<Edge>>;
 
     fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &page: &u32) -> Option<Vec<Edge>> {
-        let mut edges = None;
+        let mut found: Option<(Vec<Edge>, EdgeCache)> = None;
         tets_of_page(mesh, page, |mesh, t, tet| {
             if self.examined_too || tet.node[EXAMINED] & MARK == 0 {
-                self.list(mesh, t, &tet, edges.get_or_insert_default());
+                let found = found.get_or_insert_with(|| (Vec::new(), EdgeCache::new(SEEN)));
+                self.list(mesh, t, &tet, found);
             }
         });
-        edges
+        found.map(|(edges, _)| edges)
     }
 }
 
 impl LongEdges<'_> {
     #[inline(always)]
-    fn list<P: Pages>(&self, mesh: &mut Mesh<P>, t: u32, tet: &Tet, edges: &mut Vec<Edge>) {
+    fn list<P: Pages>(
+        &self,
+        mesh: &mut Mesh<P>,
+        t: u32,
+        tet: &Tet,
+        (edges, seen): &mut (Vec<Edge>, EdgeCache),
+    ) {
         let (v, ends) = (tet.vertices(), mesh.ends(tet));
         if self.field.place.is_partial() {
             // Spelled out, here and below: `map` on arrays is not always inlined.
@@ -126,7 +137,8 @@ impl LongEdges<'_> {
             if fixed || may_be_long(&ends[i], &ends[j]) {
                 let (a, b) = (v[i].min(v[j]), v[i].max(v[j]));
                 let edge = u64::from(a) << 32 | u64::from(b);
-                if !fixed || !self.settled.has(edge) {
+                // Of several tetrahedra with an edge the first counts.
+                if seen.add(edge) && !(fixed && self.settled.has(edge)) {
                     edges.push((edge, t));
                 }
             }

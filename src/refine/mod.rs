@@ -11,6 +11,7 @@
 
 mod activity;
 mod candidate;
+mod edge_cache;
 mod field;
 mod insert;
 mod long_edges;
@@ -18,7 +19,6 @@ mod pattern;
 mod placement;
 mod recent;
 mod report;
-mod settled;
 mod worker;
 
 use tetdb_schema::page::SLOT_BITS;
@@ -29,11 +29,11 @@ use crate::mesh::{Mesh, Workspace, dense, renumber, sparse};
 use crate::storage::{Pages, StorageError, check_cancelled};
 
 use activity::Activity;
+use edge_cache::EdgeCache;
 pub use field::{Field, Lengths};
 pub use placement::{Everywhere, PlacementRule};
 use recent::Recent;
 pub use report::RefineReport;
-use settled::Settled;
 use worker::Worker;
 
 /// Tetrahedra of one block. Small enough that a block's candidates fit a small lease, large enough that
@@ -48,6 +48,9 @@ const FEW: f64 = 0.02;
 /// A mesh that has grown so much since it was numbered along the curve is numbered again: below, a sweep over its pages
 /// jumps between layers created in different passes; above, sorting costs more than it saves.
 const GROWTH: f64 = 1.5;
+
+/// Places for edges that are settled: three for each facet, which has one and a half edges, and 4 MB at most.
+const SETTLED_MAX: usize = 1 << 19;
 
 /// Divides edges until none is left to divide.
 ///
@@ -67,7 +70,7 @@ pub fn saturate<P: Pages>(
         candidates: Vec::new(),
         recent: Recent::new(),
         active: Activity::all(mesh),
-        settled: Settled::new(mesh.n_facets()),
+        settled: EdgeCache::new((3 * mesh.n_facets() as usize).min(SETTLED_MAX)),
         last: 0,
         placing: true,
         examined_too: false,
