@@ -14,7 +14,10 @@ use crate::io::write;
 use crate::samples::{PREFIX, SampleSpec};
 use crate::sizing::{SizeField, SizeOptions};
 use crate::storage::{ScratchSpace, attempt};
-use crate::surface::{self, SplitReport, SurfaceBuilder, orient_alike_in, split};
+use crate::surface::{
+    self, BYTES_PER_TRIANGLE, SplitReport, SurfaceBuilder, SurfaceError, TRIANGLES_MAX,
+    orient_alike_in, split,
+};
 
 /// A triangle surface with labels, read or given, all triangles turned like their neighbors.
 ///
@@ -82,7 +85,7 @@ pub(crate) fn refine(
     refuse_sheets(surface, "refined")?;
     let wanted = (options.hsiz).map_or(f64::INFINITY, |l| l.resolve(surface.bounds().diagonal()));
     let field = SizeField::build(&surface.points, &surface.triangles, options)?;
-    Ok(split(surface, &|p| field.h(p).min(wanted))?)
+    Ok(split(surface, &|p| field.h(p).min(wanted), TRIANGLES_MAX)?)
 }
 
 /// What stands for the path of a surface that was given as arrays: a file in the store.
@@ -214,6 +217,23 @@ impl Surface {
             self.sources = vec![given(&self.inner)];
             Ok(self)
         })
+    }
+
+    /// Divides triangles until their edges are as short as `h` wants them where they are, and the result takes half of `cap` at most.
+    pub(crate) fn divide(&mut self, h: &dyn Fn(Point) -> f64, cap: u64) -> Result<(), Error> {
+        refuse_sheets(&self.inner, "refined")?;
+        let most = ((cap / 2 / BYTES_PER_TRIANGLE) as usize).min(TRIANGLES_MAX);
+        (self.inner, _) = split(&self.inner, h, most).map_err(|error| match error {
+            SurfaceError::TooLarge { limit, .. } if limit < TRIANGLES_MAX => Error::new(
+                "memory",
+                format!("at the wanted lengths the surface has more than {limit} triangles, which is more than the cap has room for"),
+            )
+            .with_help("ask for longer edges, or allow more memory")
+            .with_remedy(Remedy::General),
+            other => other.into(),
+        })?;
+        self.sources = vec![given(&self.inner)];
+        Ok(())
     }
 
     /// The same with the triangles of `sheet` inside: faces of the mesh with tetrahedra on both sides, that part no region.

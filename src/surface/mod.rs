@@ -45,6 +45,7 @@ pub use orientation::{Orientation, orient_alike, orient_alike_in};
 pub use repair::{Closing, Repair, closing, repair};
 pub use seeds::{Seed, SeedKind};
 pub use seek::{Crossing, Seeker};
+pub(crate) use split::{BYTES_PER_TRIANGLE, TRIANGLES_MAX};
 pub use split::{SplitReport, split};
 pub use triangles::{Note, NoteKind, SourceFile, Surface, VolumePoints};
 pub use validate::{Validation, validate, validate_in};

@@ -19,7 +19,9 @@ const LONG: f64 = std::f64::consts::SQRT_2;
 /// Passes of swaps end after this many even if they still gain.
 const SWAP_PASSES: u32 = 12;
 /// Triangles have 32-bit numbers; a wanted length that asks for more is refused before memory is.
-const TRIANGLES_MAX: usize = 1 << 30;
+pub(crate) const TRIANGLES_MAX: usize = 1 << 30;
+/// Memory for each triangle made.
+pub(crate) const BYTES_PER_TRIANGLE: u64 = 200;
 
 /// What was done.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
@@ -42,10 +44,11 @@ fn edge(a: u32, b: u32) -> Edge {
 /// Divides the triangles of `surface`; `h` tells the wanted edge length at a position.
 ///
 /// New triangles keep label and orientation; they stand in the place of the triangle they came from and behind the others.
-/// Memory: some 200 bytes a triangle made. Errors: more triangles than can be numbered.
+/// Memory: [`BYTES_PER_TRIANGLE`]. Errors: more than `triangles_max` triangles, at most [`TRIANGLES_MAX`].
 pub fn split(
     surface: &Surface,
     h: &dyn Fn(Point) -> f64,
+    triangles_max: usize,
 ) -> Result<(Surface, SplitReport), SurfaceError> {
     let mut splitter = Splitter::new(surface);
     let mut heap = BinaryHeap::new();
@@ -55,10 +58,10 @@ pub fn split(
     }
     // A heap by length and then by vertices: the order does not depend on that of a table.
     while let Some((_, Reverse(e))) = heap.pop() {
-        if splitter.surface.triangles.len() > TRIANGLES_MAX {
+        if splitter.surface.triangles.len() > triangles_max {
             return Err(SurfaceError::TooLarge {
                 what: "triangles",
-                limit: TRIANGLES_MAX,
+                limit: triangles_max,
             });
         }
         splitter.divide(e, h, &mut heap);

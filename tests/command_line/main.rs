@@ -13,6 +13,7 @@ mod people;
 mod pieces;
 mod place;
 mod query;
+mod refined;
 mod regions;
 mod report;
 mod resaturate;
