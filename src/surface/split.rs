@@ -279,7 +279,7 @@ mod tests {
     #[test]
     fn edges_get_the_wanted_length_and_the_surface_stays() {
         let h = |p: Point| 0.05 + 0.1 * p.x;
-        let (fine, report) = split(&cube(), &h).expect("few triangles");
+        let (fine, report) = split(&cube(), &h, TRIANGLES_MAX).expect("few triangles");
         assert!(validate(&fine).accept().is_ok());
         assert_eq!(report.deviation_max, 0.0);
         assert!(report.edges_divided > 1000 && report.edges_swapped > 0);
@@ -298,7 +298,7 @@ mod tests {
             }
         }
         assert_eq!(
-            split(&cube(), &h).expect("the same").0.triangles,
+            split(&cube(), &h, TRIANGLES_MAX).expect("the same").0.triangles,
             fine.triangles
         );
     }
