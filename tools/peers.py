@@ -7,8 +7,8 @@
 SURFACE: a file tetdb reads, or a sample (balls,count=100). `none` and `delaunay` are tetdb with that `--optimize`. Needs numpy,
 scipy, meshio, trimesh, and gmsh and tetgen (pip names) for those meshers.
 
-With --equal the others get lengths with which they make as many tetrahedra as tetdb, within 5 %: HXT and Gmsh their own from the
-surface times a factor, TetGen a greatest volume; found by trial, which is not timed. Without it each does what it does by
+With --equal the others get a greatest length with which they make as many tetrahedra as tetdb, within 5 % (TetGen a greatest volume);
+found by trial, which is not timed. Without it each does what it does by
 itself, and rates flatter whoever makes more tetrahedra.
 
 Each run is a process of its own; runs go round and round (a b c a b c), so that a machine that slows down slows all; medians
@@ -72,12 +72,16 @@ class Clock:
         self.peak = peak_bytes() - self.before
 
 
+def median_edge(points, triangles):
+    return float(np.median(np.linalg.norm(points[triangles[:, 0]] - points[triangles[:, 1]], axis=1)))
+
+
 def mesh_gmsh(points, triangles, algorithm, threads, scale):
     import gmsh
     part = parts(len(points), triangles)
     gmsh.initialize()
     for option, value in (("General.NumThreads", threads), ("Mesh.MaxNumThreads3D", threads), ("General.Verbosity", 2),
-                          ("Mesh.Algorithm3D", algorithm), ("Mesh.MeshSizeFactor", scale)):
+                          ("Mesh.Algorithm3D", algorithm)):
         gmsh.option.setNumber(option, value)
     surfaces = list(range(1, part.max() + 2))
     for tag in surfaces:
@@ -89,6 +93,8 @@ def mesh_gmsh(points, triangles, algorithm, threads, scale):
     loop = gmsh.model.geo.addSurfaceLoop(surfaces)
     gmsh.model.geo.addVolume([loop])
     gmsh.model.geo.synchronize()
+    if scale:
+        gmsh.option.setNumber("Mesh.MeshSizeMax", scale * median_edge(points, triangles))
     with Clock() as clock:
         gmsh.model.mesh.generate(3)
     tags, xyz, _ = gmsh.model.mesh.getNodes()
@@ -113,8 +119,7 @@ def mesh_tetgen(points, triangles, scale):
         if k != outer:
             mesher.add_hole(((low[k] + high[k]) / 2).tolist())
     # It grows tetrahedra without bound unless told: the volume of a regular one on the surface's median edge.
-    edge = np.median(np.linalg.norm(points[triangles[:, 0]] - points[triangles[:, 1]], axis=1))
-    volume = 2**0.5 / 12 * (scale * edge)**3
+    volume = 2**0.5 / 12 * ((scale or 1.0) * median_edge(points, triangles))**3
     with Clock() as clock:
         nodes, tets = mesher.tetrahedralize(switches=f"pqYQa{volume:.12g}")[:2]
     return np.asarray(nodes, float), np.asarray(tets, np.int64), clock
@@ -142,21 +147,20 @@ def run_other(mesher, arrays, keep, threads, scale, timeout):
 
 
 def scale_for(mesher, arrays, wanted, timeout):
-    """The factor on a mesher's lengths with which it makes `wanted` tetrahedra, by the secant rule on logarithms."""
+    """The share of the median edge, as a greatest length, with which a mesher makes `wanted` tetrahedra: by the secant rule on logarithms."""
     known = []
-    scale = 1.0
+    at = 0.0
     for _ in range(TRIALS):
-        n = run_other(mesher, arrays, None, 1, scale, timeout)["tets"]
-        known.append((np.log(scale), np.log(n)))
+        n = run_other(mesher, arrays, None, 1, float(np.exp(at)), timeout)["tets"]
+        known.append((at, np.log(n / wanted)))
         if abs(n / wanted - 1) <= EQUAL / 2:
             break
         slope = -3.0
-        if len(known) > 1 and known[-1][0] != known[-2][0]:
-            slope = (known[-1][1] - known[-2][1]) / (known[-1][0] - known[-2][0])
-        slope = min(slope, -0.5)
-        scale = float(np.exp(known[-1][0] + (np.log(wanted) - known[-1][1]) / slope))
-    best = min(known, key=lambda at: abs(at[1] - np.log(wanted)))
-    return float(np.exp(best[0]))
+        if len(known) > 1:
+            # Lengths above those of the surface change little.
+            slope = np.clip((known[-1][1] - known[-2][1]) / (known[-1][0] - known[-2][0]), -4.0, -1.0)
+        at -= known[-1][1] / slope
+    return float(np.exp(min(known, key=lambda trial: abs(trial[1]))[0]))
 
 
 def run_tetdb(program, surface, optimize, subdomains, threads, directory, keep):
@@ -309,7 +313,7 @@ def compare(surface, args, directory):
                         wanted = runs["tetdb", args.threads[0]][0]["tets"]
                         scales[mesher] = scale_for(mesher, arrays, wanted, args.timeout)
                     keep = os.path.join(directory, "mesh.npz") if measured else None
-                    runs[kind].append(run_other(mesher, arrays, keep, threads, scales.get(mesher, 1.0), args.timeout))
+                    runs[kind].append(run_other(mesher, arrays, keep, threads, scales.get(mesher, 0.0), args.timeout))
             except (subprocess.CalledProcessError, subprocess.TimeoutExpired) as failure:
                 print(f"# {mesher} on {surface}: {str(failure)[:200]}", file=sys.stderr)
                 continue
