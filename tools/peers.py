@@ -1,15 +1,23 @@
 #!/usr/bin/env python3
-"""tetdb and other meshers on the same surface, one thread each, in turn: speed and quality in one table.
+"""tetdb and other meshers on the same surface, in turn: speed and quality in one table.
 
-  peers.py SURFACE... [--tetdb PROGRAM] [--meshers tetdb,none,hxt,gmsh,tetgen] [--runs 3] [--subdomains N] [--no-measure] [--json FILE]
+  peers.py SURFACE... [--tetdb PROGRAM] [--meshers tetdb,none,hxt,gmsh,tetgen] [--runs 3] [--threads 1,2] [--equal] [--subdomains N]
+           [--no-measure] [--json FILE]
 
 SURFACE: a file tetdb reads, or a sample (balls,count=100). `none` and `delaunay` are tetdb with that `--optimize`. Needs numpy,
 scipy, meshio, trimesh, and gmsh and tetgen (pip names) for those meshers.
 
+With --equal the others get a greatest length with which they make as many tetrahedra as tetdb, within 5 % (TetGen a greatest volume);
+found by trial, which is not timed. Without it each does what it does by
+itself, and rates flatter whoever makes more tetrahedra.
+
 Each run is a process of its own; runs go round and round (a b c a b c), so that a machine that slows down slows all; medians
-are printed. CPU seconds are user + system. Those of tetdb are of the whole process, from the surface file to the sealed store
-(`--no-verify`; what verification adds is in the column "verify"); those of the others are of the meshing call alone,
-without reading or writing. Memory is the peak of the process less what it had before meshing began.
+are printed. CPU seconds are user + system. What is timed:
+  tetdb       the whole process: surface file read and validated, sizes, prediction, mesh, optimization, sealed store on disk
+              (`--no-verify`; what verification adds is in the column "verify")
+  hxt, gmsh   the call that meshes volumes alone: surface in memory already, no validation, result in memory
+  tetgen      the call `tetrahedralize` alone, likewise; it knows one thread only
+Memory is the peak of the process less what it had before meshing began.
 All meshers keep the surface: no vertex is added on it. HXT and Gmsh get each connected part as a discrete surface of its own.
 
 Every mesh is measured by the same code: q = (sqrt(6)/12) * longest edge / inradius. *Forced* tetrahedra have a triangle of the
@@ -32,6 +40,9 @@ FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 ALPHA = 6**0.5 / 12
 BLOCK = 1 << 19
+# Counts are equal when they differ by no more than this share; trials before a mesher is given up.
+EQUAL = 0.05
+TRIALS = 7
 
 
 def peak_bytes():
@@ -49,11 +60,27 @@ def parts(n, triangles):
     return np.unique(part[triangles[:, 0]], return_inverse=True)[1]
 
 
-def mesh_gmsh(points, triangles, algorithm):
+class Clock:
+    """CPU and clock seconds, and the memory that came on top, of a `with` block."""
+
+    def __enter__(self):
+        self.before, self.cpu, self.wall = peak_bytes(), time.process_time(), time.perf_counter()
+        return self
+
+    def __exit__(self, *_):
+        self.cpu, self.wall = time.process_time() - self.cpu, time.perf_counter() - self.wall
+        self.peak = peak_bytes() - self.before
+
+
+def median_edge(points, triangles):
+    return float(np.median(np.linalg.norm(points[triangles[:, 0]] - points[triangles[:, 1]], axis=1)))
+
+
+def mesh_gmsh(points, triangles, algorithm, threads, scale):
     import gmsh
     part = parts(len(points), triangles)
     gmsh.initialize()
-    for option, value in (("General.NumThreads", 1), ("Mesh.MaxNumThreads3D", 1), ("General.Verbosity", 2),
+    for option, value in (("General.NumThreads", threads), ("Mesh.MaxNumThreads3D", threads), ("General.Verbosity", 2),
                           ("Mesh.Algorithm3D", algorithm)):
         gmsh.option.setNumber(option, value)
     surfaces = list(range(1, part.max() + 2))
@@ -66,17 +93,18 @@ def mesh_gmsh(points, triangles, algorithm):
     loop = gmsh.model.geo.addSurfaceLoop(surfaces)
     gmsh.model.geo.addVolume([loop])
     gmsh.model.geo.synchronize()
-    before, cpu = peak_bytes(), time.process_time()
-    gmsh.model.mesh.generate(3)
-    cpu, peak = time.process_time() - cpu, peak_bytes() - before
+    if scale:
+        gmsh.option.setNumber("Mesh.MeshSizeMax", scale * median_edge(points, triangles))
+    with Clock() as clock:
+        gmsh.model.mesh.generate(3)
     tags, xyz, _ = gmsh.model.mesh.getNodes()
     position = np.zeros((int(tags.max()) + 1, 3))
     position[tags] = xyz.reshape(-1, 3)
     tets = gmsh.model.mesh.getElementsByType(4)[1].reshape(-1, 4).astype(np.int64)
-    return position, tets, cpu, peak
+    return position, tets, clock
 
 
-def mesh_tetgen(points, triangles):
+def mesh_tetgen(points, triangles, scale):
     import tetgen
     # A point inside each hollow part: all parts but the one with the largest box are hollow.
     part = parts(len(points), triangles)
@@ -90,38 +118,60 @@ def mesh_tetgen(points, triangles):
     for k in range(part.max() + 1):
         if k != outer:
             mesher.add_hole(((low[k] + high[k]) / 2).tolist())
-    before, cpu = peak_bytes(), time.process_time()
     # It grows tetrahedra without bound unless told: the volume of a regular one on the surface's median edge.
-    edge = np.median(np.linalg.norm(points[triangles[:, 0]] - points[triangles[:, 1]], axis=1))
-    nodes, tets = mesher.tetrahedralize(switches=f"pqYQa{2**0.5 / 12 * edge**3:.12g}")[:2]
-    cpu, peak = time.process_time() - cpu, peak_bytes() - before
-    return np.asarray(nodes, float), np.asarray(tets, np.int64), cpu, peak
+    volume = 2**0.5 / 12 * ((scale or 1.0) * median_edge(points, triangles))**3
+    with Clock() as clock:
+        nodes, tets = mesher.tetrahedralize(switches=f"pqYQa{volume:.12g}")[:2]
+    return np.asarray(nodes, float), np.asarray(tets, np.int64), clock
 
 
-def child(mesher, surface, out):
+def child(mesher, surface, out, threads, scale):
     with np.load(surface) as file:
         points, triangles = file["points"], file["triangles"]
+    threads, scale = int(threads), float(scale)
     if mesher in ("hxt", "gmsh"):
-        result = mesh_gmsh(points, triangles, 10 if mesher == "hxt" else 1)
+        position, tets, clock = mesh_gmsh(points, triangles, 10 if mesher == "hxt" else 1, threads, scale)
     else:
-        result = mesh_tetgen(points, triangles)
-    position, tets, cpu, peak = result
+        position, tets, clock = mesh_tetgen(points, triangles, scale)
     if len(tets) == 0:
         sys.exit(f"{mesher} made no tetrahedra")
     if out != "-":
         np.savez(out, points=position, tets=tets)
-    print(json.dumps({"tets": len(tets), "cpu": cpu, "peak": peak}))
+    print(json.dumps({"tets": len(tets), "cpu": clock.cpu, "wall": clock.wall, "peak": clock.peak}))
 
 
-def run_tetdb(program, surface, optimize, subdomains, directory, keep):
+def run_other(mesher, arrays, keep, threads, scale, timeout):
+    command = [sys.executable, __file__, "--child", mesher, arrays, keep or "-", str(threads), repr(scale)]
+    answer = subprocess.run(command, check=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=timeout).stdout
+    return json.loads(answer.decode().splitlines()[-1])
+
+
+def scale_for(mesher, arrays, wanted, timeout):
+    """The share of the median edge, as a greatest length, with which a mesher makes `wanted` tetrahedra: by the secant rule on logarithms."""
+    known = []
+    at = 0.0
+    for _ in range(TRIALS):
+        n = run_other(mesher, arrays, None, 1, float(np.exp(at)), timeout)["tets"]
+        known.append((at, np.log(n / wanted)))
+        if abs(n / wanted - 1) <= EQUAL / 2:
+            break
+        slope = -3.0
+        if len(known) > 1:
+            # Lengths above those of the surface change little.
+            slope = np.clip((known[-1][1] - known[-2][1]) / (known[-1][0] - known[-2][0]), -4.0, -1.0)
+        at -= known[-1][1] / slope
+    return float(np.exp(min(known, key=lambda trial: abs(trial[1]))[0]))
+
+
+def run_tetdb(program, surface, optimize, subdomains, threads, directory, keep):
     store = os.path.join(directory, "peer.tetdb")
     shutil.rmtree(store, ignore_errors=True)
-    command = [program, "mesh", surface, "-o", store, "--threads", "1", "--no-verify", "--json", "--optimize", optimize]
+    command = [program, "mesh", surface, "-o", store, "--threads", str(threads), "--no-verify", "--json", "--optimize", optimize]
     if subdomains:
         command += ["--subdomains", str(subdomains)]
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    before, wall = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     told = json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL).stdout)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    after, wall = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter() - wall
     subprocess.run([program, "verify", store], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     verified = resource.getrusage(resource.RUSAGE_CHILDREN)
 
@@ -131,7 +181,7 @@ def run_tetdb(program, surface, optimize, subdomains, directory, keep):
         subprocess.run([program, "export", store, keep], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     size = sum(os.path.getsize(os.path.join(store, f)) for f in os.listdir(store))
     shutil.rmtree(store)
-    return {"tets": told["tets"], "cpu": spent(before, after), "verify": spent(after, verified), "peak": told["peak_bytes"],
+    return {"tets": told["tets"], "cpu": spent(before, after), "wall": wall, "verify": spent(after, verified), "peak": told["peak_bytes"],
             "disk": size, "digest": told["digest"]}
 
 
@@ -245,51 +295,72 @@ def compare(surface, args, directory):
     points, number = np.unique(points, axis=0, return_inverse=True)
     triangles = number.reshape(-1)[triangles].astype(np.int64)
     np.savez(arrays, points=points, triangles=triangles)
-    runs, measures = {m: [] for m in args.meshers}, {}
+    # A mesher and its number of threads; more threads make another mesh only with HXT, and no better one.
+    kinds = [(m, n) for m in args.meshers for n in args.threads if n == args.threads[0] or m not in ("gmsh", "tetgen")]
+    runs, measures, scales = {k: [] for k in kinds}, {}, {}
     for turn in range(args.runs):
-        for mesher in args.meshers:
+        for mesher, threads in kinds:
+            kind = (mesher, threads)
+            measured = turn == 0 and threads == args.threads[0] and not args.no_measure
             keep = None
             try:
                 if mesher in ("tetdb", "none", "delaunay"):
-                    keep = os.path.join(directory, "mesh.meshb") if turn == 0 and not args.no_measure else None
-                    runs[mesher].append(run_tetdb(args.tetdb, path, "full" if mesher == "tetdb" else mesher, args.subdomains, directory, keep))
+                    keep = os.path.join(directory, "mesh.meshb") if measured else None
+                    optimize = "full" if mesher == "tetdb" else mesher
+                    runs[kind].append(run_tetdb(args.tetdb, path, optimize, args.subdomains, threads, directory, keep))
                 else:
-                    keep = os.path.join(directory, "mesh.npz") if turn == 0 and not args.no_measure else None
-                    answer = subprocess.run([sys.executable, __file__, "--child", mesher, arrays, keep or "-"], check=True,
-                                            stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=args.timeout).stdout
-                    runs[mesher].append(json.loads(answer.decode().splitlines()[-1]))
+                    if args.equal and mesher not in scales:
+                        wanted = runs["tetdb", args.threads[0]][0]["tets"]
+                        scales[mesher] = scale_for(mesher, arrays, wanted, args.timeout)
+                    keep = os.path.join(directory, "mesh.npz") if measured else None
+                    runs[kind].append(run_other(mesher, arrays, keep, threads, scales.get(mesher, 0.0), args.timeout))
             except (subprocess.CalledProcessError, subprocess.TimeoutExpired) as failure:
                 print(f"# {mesher} on {surface}: {str(failure)[:200]}", file=sys.stderr)
                 continue
             if keep:
                 measures[mesher] = measure(*read_mesh(keep), len(triangles))
                 os.remove(keep)
-    print(f"\n{surface}: {len(triangles)} triangles, {args.runs} runs in turn")
-    print("| mesher | tets | tets per CPU-second | of HXT's | q in [1,2[ | worst q | unforced: q in [1,2[ | worst | forced | min dihedral | "
-          "locally Delaunay | peak bytes/tet | verify, s |")
-    print("|---|---|---|---|---|---|---|---|---|---|---|---|---|")
-    reference = None
-    if runs.get("hxt"):
-        reference = median(runs["hxt"], "tets") / median(runs["hxt"], "cpu")
+    return print_table(surface, len(triangles), kinds, runs, measures, scales, args)
+
+
+def print_table(surface, n_triangles, kinds, runs, measures, scales, args):
+    print(f"\n{surface}: {n_triangles} triangles, {args.runs} runs in turn, " +
+          ("as many tetrahedra each" if args.equal else "each as by itself"))
+    print("| mesher, threads | tets | CPU s | s | tets per CPU-second | of HXT's | one thread's s / s | q in [1,2[ | worst q | "
+          "unforced: q in [1,2[ | worst | forced | min dihedral | locally Delaunay | peak bytes/tet | verify, s |")
+    print("|---" * 16 + "|")
     rows = []
-    for mesher in args.meshers:
-        if not runs[mesher]:
-            print(f"| {mesher} | failed |")
+    for mesher, threads in kinds:
+        own = runs[mesher, threads]
+        if not own:
+            print(f"| {mesher}, {threads} | failed |")
             continue
-        m = measures.get(mesher, dict.fromkeys(("q12", "worst", "q12_unforced", "worst_unforced", "forced", "dihedral", "delaunay"), np.nan))
-        tets = median(runs[mesher], "tets")
-        rate = tets / median(runs[mesher], "cpu")
-        share = f"{rate / reference:.2f}" if reference else ""
-        verify = f"{median(runs[mesher], 'verify'):.1f}" if "verify" in runs[mesher][0] else ""
-        print(f"| {mesher} | {tets:.0f} | {rate:.0f} | {share} | {m['q12']:.3f} % | {m['worst']:.2f} | {m['q12_unforced']:.3f} % | "
-              f"{m['worst_unforced']:.2f} | {m['forced']:.2f} % | {m['dihedral']:.1f} | {m['delaunay']:.2f} % | "
-              f"{median(runs[mesher], 'peak') / tets:.0f} | {verify} |", flush=True)
-        rows.append({"surface": surface, "mesher": mesher, "runs": runs[mesher], "measure": m})
+        tets, cpu, wall = (median(own, key) for key in ("tets", "cpu", "wall"))
+        share = faster = ""
+        if runs.get(("hxt", threads)):
+            hxt = runs["hxt", threads]
+            share = f"{tets / cpu * median(hxt, 'cpu') / median(hxt, 'tets'):.2f}"
+        first = runs[mesher, args.threads[0]]
+        if threads != args.threads[0] and first:
+            faster = f"{median(first, 'wall') / wall:.2f}"
+        verify = f"{median(own, 'verify'):.1f}" if "verify" in own[0] else ""
+        wanted = runs.get(("tetdb", args.threads[0])) if args.equal else None
+        unequal = " (not equal)" if wanted and abs(tets / wanted[0]["tets"] - 1) > EQUAL else ""
+        quality = [""] * 7
+        if threads == args.threads[0] and mesher in measures:
+            m = measures[mesher]
+            quality = [f"{m['q12']:.3f} %", f"{m['worst']:.2f}", f"{m['q12_unforced']:.3f} %", f"{m['worst_unforced']:.2f}",
+                       f"{m['forced']:.2f} %", f"{m['dihedral']:.1f}", f"{m['delaunay']:.2f} %"]
+        cells = [f"{mesher}, {threads}", f"{tets:.0f}{unequal}", f"{cpu:.2f}", f"{wall:.2f}", f"{tets / cpu:.0f}", share, faster,
+                 *quality, f"{median(own, 'peak') / tets:.0f}", verify]
+        print("| " + " | ".join(cells) + " |", flush=True)
+        rows.append({"surface": surface, "mesher": mesher, "threads": threads, "scale": scales.get(mesher), "runs": own,
+                     "measure": measures.get(mesher)})
     return rows
 
 
 def main():
-    if len(sys.argv) == 5 and sys.argv[1] == "--child":
+    if len(sys.argv) == 7 and sys.argv[1] == "--child":
         child(*sys.argv[2:])
         return
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -297,11 +368,16 @@ def main():
     parser.add_argument("--tetdb", default="tetdb")
     parser.add_argument("--meshers", default="tetdb,hxt,gmsh,tetgen", type=lambda text: text.split(","))
     parser.add_argument("--runs", default=3, type=int)
+    parser.add_argument("--threads", default="1", type=lambda text: [int(n) for n in text.split(",")], help="numbers of threads to run with")
+    parser.add_argument("--equal", action="store_true", help="give the others lengths with which they make as many tetrahedra as tetdb")
     parser.add_argument("--subdomains", type=int, help="how many sub-domains tetdb makes; without it, as many as it would")
     parser.add_argument("--no-measure", action="store_true", help="speed only: measuring 10 M tetrahedra takes minutes and 6 GB")
     parser.add_argument("--timeout", default=3600, type=float)
     parser.add_argument("--json")
     args = parser.parse_args()
+    if args.equal and args.meshers[0] != "tetdb":
+        parser.error("--equal needs tetdb as the first mesher")
+    print((__doc__ or "").split("What is timed:\n")[1].split("Memory is")[0].rstrip())
     rows = []
     for surface in args.surface:
         with tempfile.TemporaryDirectory() as directory:

@@ -44,20 +44,29 @@ fn rounded_differences(points: [Point; 4], e: Point) -> Option<[[i64; 3]; 4]> {
     let shift = DIFFERENCE_BITS as i32 - 1 - exponent;
     let per_unit = f64::from_bits(((1023 + shift) as u64) << 52);
     let mut is_whole = true;
-    let whole = seen.map(|x| {
-        (x * per_unit).to_array().map(|x| {
-            let whole = x as i64;
-            is_whole &= whole as f64 == x;
-            whole
-        })
-    });
+    // Loops here and below: `map` on arrays is not always inlined.
+    let mut whole = [[0i64; 3]; 4];
+    for (whole, x) in whole.iter_mut().zip(seen) {
+        for (whole, x) in whole.iter_mut().zip((x * per_unit).to_array()) {
+            *whole = x as i64;
+            is_whole &= *whole as f64 == x;
+        }
+    }
     is_whole.then_some(whole)
 }
 
 /// The differences as whole numbers of the smallest unit any coordinate needs.
 #[cold]
 fn integer_differences(points: [Point; 5]) -> Option<[[i64; 3]; 4]> {
-    let points = points.map(|p| p.to_array().map(parts));
+    let parts_of = |p: Point| [parts(p.x), parts(p.y), parts(p.z)];
+    let [a, b, c, d, e] = points;
+    let points = [
+        parts_of(a),
+        parts_of(b),
+        parts_of(c),
+        parts_of(d),
+        parts_of(e),
+    ];
     let unit = points.iter().flatten().map(|p| p.1).min()?;
     let mut whole = [[0i128; 3]; 5];
     for (whole, point) in whole.iter_mut().zip(&points) {
@@ -110,17 +119,15 @@ fn determinant_sign([a, b, c, d]: [[i64; 3]; 4]) -> Ordering {
     let (ab, bc, cd, da) = (minor(a, b), minor(b, c), minor(c, d), minor(d, a));
     let (ac, bd) = (minor(a, c), minor(b, d));
     // Three products of 61 and 123 bits.
-    let sum = |p: [(i64, i128); 3]| {
-        let [p, q, r] = p.map(|(x, y)| Triple::product(y, x));
-        p.plus(q).plus(r)
-    };
+    let product = |(x, y): (i64, i128)| Triple::product(y, x);
+    let sum = |[p, q, r]: [(i64, i128); 3]| product(p).plus(product(q)).plus(product(r));
     let bcd = sum([(b[2], cd), (-c[2], bd), (d[2], bc)]);
     let dab = sum([(d[2], ab), (a[2], bd), (b[2], da)]);
     let minus_abc = sum([(-a[2], bc), (b[2], ac), (-c[2], ab)]);
     let minus_cda = sum([(-c[2], da), (-d[2], ac), (-a[2], cd)]);
     let square = |p: [i64; 3]| {
-        let [x, y, z] = p.map(|x| i128::from(x) * i128::from(x));
-        (x + y + z) as u128
+        let square = |x: i64| i128::from(x) * i128::from(x);
+        (square(p[0]) + square(p[1]) + square(p[2])) as u128
     };
     let mut det = Columns::default();
     det.add(square(a), bcd);

@@ -47,15 +47,13 @@ impl<P: Pages> Mesh<P> {
 
     /// Facet `n`, counted from 0.
     pub fn facet(&mut self, n: u32) -> Facet {
-        let w = self
-            .pages
-            .read::<{ kind::FACETS }>(sparse(n))
-            .map(u32_le::to_native);
+        let slot = self.pages.read::<{ kind::FACETS }>(sparse(n));
+        let w = |i: usize| slot[i].to_native();
         Facet {
-            vertices: [w[0], w[1], w[2]],
-            label: w[3],
-            input: u64::from(w[4]) | u64::from(w[5]) << 32,
-            regions: [w[6], w[7]],
+            vertices: [w(0), w(1), w(2)],
+            label: w(3),
+            input: u64::from(w(4)) | u64::from(w(5)) << 32,
+            regions: [w(6), w(7)],
         }
     }
 
@@ -73,7 +71,10 @@ impl<P: Pages> Mesh<P> {
             f.regions[0],
             f.regions[1],
         ];
-        *self.pages.write::<{ kind::FACETS }>(sparse(n)) = words.map(u32_le::from_native);
+        let slot = self.pages.write::<{ kind::FACETS }>(sparse(n));
+        for (to, word) in slot.iter_mut().zip(words) {
+            *to = u32_le::from_native(word);
+        }
     }
 
     /// Adds a facet after the others.

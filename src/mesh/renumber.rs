@@ -4,14 +4,19 @@
 //! sweep in id order touches every page again and again. New records are written behind the old ones in sorted order, then
 //! the old pages are dropped from the front.
 
-use super::anatomy::VERTEX_MASK;
+use std::ops::Range;
+use std::sync::atomic::AtomicU64;
+use std::sync::atomic::Ordering::Relaxed;
+
+use super::anatomy::{Tet, VERTEX_MASK};
 use super::cursor::Mesh;
+use super::scan::{Scan, scan_parts, tets_of_page};
 use super::state::{dense, sparse};
 use super::vertices::VertexTag;
 use super::{FaceRef, MeshState};
 use crate::geom::HilbertFrame;
 use crate::storage::{DiskPath, Keyed, Pages, Sorter, StorageError, kind};
-use tetdb_schema::page::{NONE, SLOT_BITS};
+use tetdb_schema::page::{NONE, RECORDS, SLOT_BITS};
 
 /// Where sorting may put its runs, and how many bytes it may hold.
 #[derive(Clone, Copy, Debug)]
@@ -36,7 +41,9 @@ pub fn renumber<P: Pages>(
     let n_tets = renumber_tets(mesh, n_vertices);
     for n in 0..mesh.n_facets() {
         let mut facet = mesh.facet(n);
-        facet.vertices = facet.vertices.map(|v| mesh.scratch(dense(v)));
+        for v in &mut facet.vertices {
+            *v = mesh.scratch(dense(*v));
+        }
         mesh.set_facet(n, facet);
     }
     for n in 0..mesh.n_interface_faces() {
@@ -62,28 +69,21 @@ fn renumber_vertices<P: Pages>(
     space: &Workspace,
 ) -> Result<u32, StorageError> {
     let end = dense(mesh.vertex_ids_end());
-    for n in 0..end {
-        mesh.set_scratch(n, NONE);
-    }
-    let mut from = 0;
-    while let Some((t, tet)) = mesh.next_tet(from) {
-        from = t + 1;
-        for v in tet.vertices() {
-            mesh.set_scratch(dense(v), 0);
-        }
-    }
+    let in_use = InUse::new(end);
+    let pages: Vec<u32> = (0..mesh.pages().n_pages::<{ kind::TETS }>()).collect();
+    scan_parts(mesh, &pages, &in_use);
+    let keys = Keys { in_use, order };
     let mut sorter = Sorter::new(space.dir, space.memory);
-    for n in 0..end {
-        let v = sparse(n);
-        // A surface vertex may have no tetrahedron, when its facets lie between empty regions.
-        if mesh.scratch(n) == NONE && mesh.vertex_attribute(v).0 != VertexTag::Surface {
-            continue;
+    for batch in parts(end).chunks(BATCH) {
+        for key in scan_parts(mesh, batch, &keys).into_iter().flatten() {
+            sorter.push(key)?;
         }
-        let key = order.index(mesh.point(v));
-        sorter.push(Keyed { key, id: v })?;
     }
     let old_pages = mesh.pages().n_pages::<{ kind::VERTICES }>();
     let old_attributes = mesh.pages().n_pages::<{ kind::VERTEX_ATTRIBUTES }>();
+    for n in 0..end {
+        mesh.set_scratch(n, NONE);
+    }
     let mut n_new = 0;
     for sorted in sorter.finish()? {
         let v = sorted?.id;
@@ -99,6 +99,76 @@ fn renumber_vertices<P: Pages>(
     Ok(n_new)
 }
 
+/// Numbers looked at as one part: a page of records.
+const PART: usize = RECORDS;
+/// Parts looked at before what was found is written: 5 MB of tetrahedra.
+const BATCH: usize = 64;
+
+fn parts(end: u32) -> Vec<Range<u32>> {
+    let starts = (0..end).step_by(PART);
+    starts.map(|n| n..end.min(n + PART as u32)).collect()
+}
+
+/// One bit for each vertex that a tetrahedron has, set while pages are looked at.
+struct InUse(Vec<AtomicU64>);
+
+impl InUse {
+    fn new(end: u32) -> Self {
+        Self((0..end.div_ceil(64)).map(|_| AtomicU64::new(0)).collect())
+    }
+
+    #[inline(always)]
+    fn word(&self, n: u32) -> (&AtomicU64, u64) {
+        (&self.0[n as usize / 64], 1 << (n % 64))
+    }
+
+    fn has(&self, n: u32) -> bool {
+        let (word, bit) = self.word(n);
+        word.load(Relaxed) & bit != 0
+    }
+}
+
+impl Scan for InUse {
+    type Part = u32;
+    type Output = ();
+
+    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &page: &u32) {
+        tets_of_page(mesh, page, |_, _, tet| {
+            for i in 0..4 {
+                let (word, bit) = self.word(dense(tet.vertex(i)));
+                // Most are set by another tetrahedron already, and a look costs less.
+                if word.load(Relaxed) & bit == 0 {
+                    word.fetch_or(bit, Relaxed);
+                }
+            }
+        });
+    }
+}
+
+/// Lists vertices with their places along the curve.
+struct Keys<'a> {
+    in_use: InUse,
+    order: &'a HilbertFrame,
+}
+
+impl Scan for Keys<'_> {
+    type Part = Range<u32>;
+    type Output = Vec<Keyed>;
+
+    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, part: &Range<u32>) -> Vec<Keyed> {
+        let mut keys = Vec::with_capacity(part.len());
+        for n in part.clone() {
+            let id = sparse(n);
+            // A surface vertex may have no tetrahedron, when its facets lie between empty regions.
+            if self.in_use.has(n) || mesh.vertex_attribute(id).0 == VertexTag::Surface {
+                let key = self.order.index(mesh.point(id));
+                keys.push(Keyed { key, id });
+            }
+        }
+        keys
+    }
+}
+
 /// Sorts by counting: the vertices' new numbers follow the curve already, and the smallest one of a tetrahedron is its place.
 fn renumber_tets<P: Pages>(mesh: &mut Mesh<P>, n_vertices: u32) -> u32 {
     // In the scratch map behind that of vertices: of each tetrahedron its first vertex, then its new number; of each vertex how many
@@ -110,17 +180,15 @@ fn renumber_tets<P: Pages>(mesh: &mut Mesh<P>, n_vertices: u32) -> u32 {
     for n in before..old {
         mesh.set_scratch(n, 0);
     }
-    for n in 0..n_ids {
-        let tet = mesh.tet(sparse(n));
-        let mut least = NONE;
-        if tet.is_live() {
-            for v in tet.vertices() {
-                least = least.min(mesh.scratch(dense(v)));
+    for batch in parts(n_ids).chunks(BATCH) {
+        let found = scan_parts(mesh, batch, &FirstVertices);
+        for (n, least) in (batch[0].start..).zip(found.into_iter().flatten()) {
+            if least != NONE {
+                let count = mesh.scratch(before + dense(least));
+                mesh.set_scratch(before + dense(least), count + 1);
             }
-            let count = mesh.scratch(before + dense(least));
-            mesh.set_scratch(before + dense(least), count + 1);
+            mesh.set_scratch(numbers + n, least);
         }
-        mesh.set_scratch(numbers + n, least);
     }
     let mut n_new = 0;
     for n in before..old {
@@ -139,25 +207,68 @@ fn renumber_tets<P: Pages>(mesh: &mut Mesh<P>, n_vertices: u32) -> u32 {
     }
     let old_pages = mesh.pages().n_pages::<{ kind::TETS }>();
     let old_attributes = mesh.pages().n_pages::<{ kind::TET_ATTRIBUTES }>();
-    for n in 0..n_new {
-        let t = mesh.scratch(old + n);
-        let mut tet = mesh.tet(t);
-        for node in &mut tet.node {
-            let v = *node & VERTEX_MASK;
-            *node = *node - v + mesh.scratch(dense(v));
+    for batch in parts(n_new).chunks(BATCH) {
+        let found = scan_parts(mesh, batch, &Moved { numbers, old });
+        for (n, (t, tet)) in (batch[0].start..).zip(found.into_iter().flatten()) {
+            mesh.place_tet((old_pages << SLOT_BITS) + sparse(n), tet);
+            mesh.copy_attribute::<{ kind::TET_ATTRIBUTES }>(t, sparse(n), old_attributes);
         }
-        for face in &mut tet.neighbor {
-            if face.exists() {
-                *face = FaceRef::new(mesh.scratch(numbers + dense(face.tet())), face.face());
-            }
-        }
-        mesh.place_tet((old_pages << SLOT_BITS) + sparse(n), tet);
-        mesh.copy_attribute::<{ kind::TET_ATTRIBUTES }>(t, sparse(n), old_attributes);
     }
     mesh.pages_mut().drop_front::<{ kind::TETS }>(old_pages);
     mesh.pages_mut()
         .drop_front::<{ kind::TET_ATTRIBUTES }>(old_attributes);
     n_new
+}
+
+/// Finds the least new number among a tetrahedron's vertices; [`NONE`] for an id not in use.
+struct FirstVertices;
+
+impl Scan for FirstVertices {
+    type Part = Range<u32>;
+    type Output = Vec<u32>;
+
+    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, part: &Range<u32>) -> Vec<u32> {
+        let least = |n| {
+            let tet = mesh.tet(sparse(n));
+            if !tet.is_live() {
+                return NONE;
+            }
+            (0..4).fold(NONE, |least, i| {
+                least.min(mesh.scratch(dense(tet.vertex(i))))
+            })
+        };
+        part.clone().map(least).collect()
+    }
+}
+
+/// Tetrahedra in their new order and under new numbers, each with its old one.
+struct Moved {
+    numbers: u32,
+    old: u32,
+}
+
+impl Scan for Moved {
+    type Part = Range<u32>;
+    type Output = Vec<(u32, Tet)>;
+
+    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, part: &Range<u32>) -> Vec<(u32, Tet)> {
+        let moved = |n| {
+            let t = mesh.scratch(self.old + n);
+            let mut tet = mesh.tet(t);
+            for node in &mut tet.node {
+                let v = *node & VERTEX_MASK;
+                *node = *node - v + mesh.scratch(dense(v));
+            }
+            for face in &mut tet.neighbor {
+                if face.exists() {
+                    let to = mesh.scratch(self.numbers + dense(face.tet()));
+                    *face = FaceRef::new(to, face.face());
+                }
+            }
+            (t, tet)
+        };
+        part.clone().map(moved).collect()
+    }
 }
 
 #[cfg(test)]

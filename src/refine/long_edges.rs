@@ -2,9 +2,8 @@
 
 use std::ops::Range;
 
-use rayon::slice::ParallelSliceMut;
-
 use super::candidate::Candidate;
+use super::edge_cache::EdgeCache;
 use super::field::{Field, Lengths};
 use super::pattern::Pattern;
 use super::worker::Worker;
@@ -13,7 +12,7 @@ use crate::mesh::anatomy::mark::EXAMINED;
 use crate::mesh::anatomy::{EDGE_OF, EDGES, MARK};
 use crate::mesh::{End, Mesh, Scan, Tet, scan_parts, tets_of_page};
 use crate::reconnect::Shell;
-use crate::storage::{Pages, parallel};
+use crate::storage::{Pages, sort_unstable_by};
 
 /// Edges longer than this, in units of the wanted length, are divided.
 const LONG: f64 = std::f64::consts::SQRT_2;
@@ -30,6 +29,8 @@ const JITTER_FROM: f64 = 2.0;
 const JITTER: f64 = 0.4;
 /// Largest shell that is looked at for required faces.
 const SHELL_MAX: usize = 64;
+/// Places for edges of a page that were listed already: five tetrahedra have the same one, and sorting is dear.
+const SEEN: usize = 1 << 12;
 /// Edges divided as one part.
 const EDGES_PART: usize = 1 << 12;
 
@@ -44,6 +45,7 @@ impl Worker {
         self.edges.clear();
         let edges = LongEdges {
             field,
+            settled: &self.settled,
             examined_too: self.examined_too,
         };
         let found = scan_parts(mesh, pages, &edges);
@@ -53,8 +55,7 @@ impl Worker {
                 mark_examined(mesh, page);
             }
         }
-        let edges = &mut self.edges;
-        parallel(|| edges.par_sort_unstable());
+        sort_unstable_by(&mut self.edges, Edge::cmp);
         self.edges.dedup_by_key(|e| e.0);
     }
 
@@ -70,14 +71,20 @@ impl Worker {
             order: &self.order,
             placing: self.placing,
         };
-        for found in scan_parts(mesh, &parts, &division) {
-            self.candidates.extend(found);
+        let mut found = Vec::new();
+        for (candidates, settled) in scan_parts(mesh, &parts, &division) {
+            found.extend(candidates);
+            for edge in settled {
+                self.settled.add(edge);
+            }
         }
-        let candidates = &mut self.candidates;
-        // Stable: the points that share a key stay in the order of their edges, whoever sorts.
-        parallel(|| candidates.par_sort_by_key(|c| c.key));
+        // The points that share a key stay in the order of their edges.
+        let mut order: Vec<(u64, u32)> = found.iter().map(|c: &Candidate| c.key).zip(0..).collect();
+        sort_unstable_by(&mut order, Ord::cmp);
+        let in_order = order.into_iter().map(|(_, k)| found[k as usize]);
+        self.candidates.extend(in_order);
         // Points of many edges have moved to the same place.
-        candidates.dedup_by_key(|c| c.point);
+        self.candidates.dedup_by_key(|c| c.point);
     }
 }
 
@@ -87,6 +94,7 @@ type Edge = (u64, u32);
 /// Lists the edges of a page's unexamined tetrahedra that may be long; none when all are examined.
 struct LongEdges<'a> {
     field: &'a Field<'a>,
+    settled: &'a EdgeCache,
     examined_too: bool,
 }
 
@@ -95,19 +103,26 @@ impl Scan for LongEdges<'_> {
     type Output = Option<Vec<Edge>>;
 
     fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &page: &u32) -> Option<Vec<Edge>> {
-        let mut edges = None;
+        let mut found: Option<(Vec<Edge>, EdgeCache)> = None;
         tets_of_page(mesh, page, |mesh, t, tet| {
             if self.examined_too || tet.node[EXAMINED] & MARK == 0 {
-                self.list(mesh, t, &tet, edges.get_or_insert_default());
+                let found = found.get_or_insert_with(|| (Vec::new(), EdgeCache::new(SEEN)));
+                self.list(mesh, t, &tet, found);
             }
         });
-        edges
+        found.map(|(edges, _)| edges)
     }
 }
 
 impl LongEdges<'_> {
     #[inline(always)]
-    fn list<P: Pages>(&self, mesh: &mut Mesh<P>, t: u32, tet: &Tet, edges: &mut Vec<Edge>) {
+    fn list<P: Pages>(
+        &self,
+        mesh: &mut Mesh<P>,
+        t: u32,
+        tet: &Tet,
+        (edges, seen): &mut (Vec<Edge>, EdgeCache),
+    ) {
         let (v, ends) = (tet.vertices(), mesh.ends(tet));
         if self.field.place.is_partial() {
             // Spelled out, here and below: `map` on arrays is not always inlined.
@@ -118,9 +133,14 @@ impl LongEdges<'_> {
             }
         }
         for [i, j] in EDGES {
-            if may_be_long(&ends[i], &ends[j]) {
+            let fixed = ends[i].fixed && ends[j].fixed;
+            if fixed || may_be_long(&ends[i], &ends[j]) {
                 let (a, b) = (v[i].min(v[j]), v[i].max(v[j]));
-                edges.push((u64::from(a) << 32 | u64::from(b), t));
+                let edge = u64::from(a) << 32 | u64::from(b);
+                // Of several tetrahedra with an edge the first counts.
+                if seen.add(edge) && !(fixed && self.settled.has(edge)) {
+                    edges.push((edge, t));
+                }
             }
         }
     }
@@ -134,7 +154,16 @@ fn mark_examined<P: Pages>(mesh: &mut Mesh<P>, page: u32) {
     });
 }
 
-/// Finds the points that divide edges.
+/// What became of an edge.
+#[derive(PartialEq)]
+enum Verdict {
+    /// It joins fixed vertices, and will never be divided.
+    Settled,
+    /// It was divided, or may be another time.
+    Open,
+}
+
+/// Finds the points that divide edges, and the edges that are settled.
 struct Division<'a> {
     edges: &'a [Edge],
     field: &'a Field<'a>,
@@ -144,9 +173,9 @@ struct Division<'a> {
 
 impl Scan for Division<'_> {
     type Part = Range<usize>;
-    type Output = Vec<Candidate>;
+    type Output = (Vec<Candidate>, Vec<u64>);
 
-    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, part: &Range<usize>) -> Vec<Candidate> {
+    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, part: &Range<usize>) -> Self::Output {
         let mut divider = Divider {
             field: self.field,
             order: self.order,
@@ -154,10 +183,13 @@ impl Scan for Division<'_> {
             shell: Shell::default(),
             candidates: Vec::new(),
         };
-        for &(key, tet) in &self.edges[part.clone()] {
-            divider.divide(mesh, (key >> 32) as u32, key as u32, tet);
+        let mut settled = Vec::new();
+        for &(edge, tet) in &self.edges[part.clone()] {
+            if divider.divide(mesh, edge, tet) == Verdict::Settled {
+                settled.push(edge);
+            }
         }
-        divider.candidates
+        (divider.candidates, settled)
     }
 }
 
@@ -171,8 +203,9 @@ struct Divider<'a> {
 }
 
 impl Divider<'_> {
-    fn divide<P: Pages>(&mut self, mesh: &mut Mesh<P>, a: u32, b: u32, tet: u32) {
+    fn divide<P: Pages>(&mut self, mesh: &mut Mesh<P>, edge: u64, tet: u32) -> Verdict {
         let field = self.field;
+        let (a, b) = ((edge >> 32) as u32, edge as u32);
         let (pa, ha) = mesh.point_and_size(a);
         let (pb, hb) = mesh.point_and_size(b);
         let (ha, hb) = (f64::from(ha), f64::from(hb));
@@ -192,14 +225,18 @@ impl Divider<'_> {
             metric = metric.max(length * (1.0 / ha + 4.0 / hm + 1.0 / hb) / 6.0);
         }
         if metric <= long || fixed && self.is_required(mesh, a, b, tet) {
-            return;
+            return if fixed {
+                Verdict::Settled
+            } else {
+                Verdict::Open
+            };
         }
         let sizes = match field.lengths {
             Lengths::Field => [ha, hb],
             Lengths::Ends => [f64::INFINITY; 2],
         };
         let Some([from, to]) = field.place.stretch(pa, pb, sizes) else {
-            return;
+            return Verdict::Open;
         };
         // An edge short enough is divided as it is everywhere; of a long one only the stretch counts, so that its
         // few pieces at a time do not step over the place.
@@ -247,6 +284,7 @@ impl Divider<'_> {
                 try_point(u);
             }
         }
+        Verdict::Open
     }
 
     /// Whether the edge a b of `tet` belongs to a required face: its points would lie in that face.
@@ -262,11 +300,12 @@ impl Divider<'_> {
     }
 }
 
-/// Whether an edge has to be looked at: most are too short whatever the size between their ends, and need no sorting.
+/// Whether an edge with an end that is not fixed has to be looked at: most are too short whatever the size between their ends, and
+/// need no sorting.
 #[inline(always)]
 fn may_be_long(a: &End, b: &End) -> bool {
     let least = f64::from(if a.h < b.h { a.h } else { b.h });
-    a.fixed && b.fixed || (a.point - b.point).length_squared() > SHORT * least * least
+    (a.point - b.point).length_squared() > SHORT * least * least
 }
 
 /// Parameter along an edge at the fraction `f` of its metric length, sizes growing from 1 to `r`.

@@ -11,6 +11,7 @@
 
 mod activity;
 mod candidate;
+mod edge_cache;
 mod field;
 mod insert;
 mod long_edges;
@@ -28,6 +29,7 @@ use crate::mesh::{Mesh, Workspace, dense, renumber, sparse};
 use crate::storage::{Pages, StorageError, check_cancelled};
 
 use activity::Activity;
+use edge_cache::EdgeCache;
 pub use field::{Field, Lengths};
 pub use placement::{Everywhere, PlacementRule};
 use recent::Recent;
@@ -47,6 +49,9 @@ const FEW: f64 = 0.02;
 /// jumps between layers created in different passes; above, sorting costs more than it saves.
 const GROWTH: f64 = 1.5;
 
+/// Places for edges that are settled: three for each facet, which has one and a half edges, and 4 MB at most.
+const SETTLED_MAX: usize = 1 << 19;
+
 /// Divides edges until none is left to divide.
 ///
 /// The mesh must hold filled regions only, sizes set at all its vertices. `progress` receives the number of vertices
@@ -65,6 +70,7 @@ pub fn saturate<P: Pages>(
         candidates: Vec::new(),
         recent: Recent::new(),
         active: Activity::all(mesh),
+        settled: EdgeCache::new((3 * mesh.n_facets() as usize).min(SETTLED_MAX)),
         last: 0,
         placing: true,
         examined_too: false,
@@ -92,6 +98,7 @@ pub fn saturate<P: Pages>(
             renumber(mesh, &worker.order, space)?;
             numbered = mesh.n_tets();
             worker.active = Activity::all(mesh);
+            worker.settled.clear();
             worker.last = 0;
         }
         let inserted = report.inserted - before;

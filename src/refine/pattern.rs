@@ -6,7 +6,6 @@
 //! directions can be seen. Space is divided into grains, each with the pattern turned and shifted at random and with one size, so
 //! that nothing repeats and sizes may vary. A place depends on position and size alone: zones and sub-domains agree about it.
 
-use std::collections::HashMap;
 use std::sync::OnceLock;
 
 use super::field::Field;
@@ -33,17 +32,38 @@ struct Grain {
     h: f64,
 }
 
-/// Finds places of the pattern, and remembers the grains it met.
+/// Finds places of the pattern, and remembers the grains around the last points.
 pub(super) struct Pattern {
     tile: &'static Tile,
-    grains: HashMap<(u32, [i64; 3]), Grain>,
+    /// By the last bit of the octave: where sizes vary, points of two octaves take turns.
+    around: [Around; 2],
+}
+
+/// Grains that may hold points of one cell's width: the same ones for many points in a row.
+struct Around {
+    octave: u32,
+    base: Point,
+    sites: [Site; 8],
+}
+
+/// The displaced middle of a cell, in units of the grains' width, its seed, and its grain once a point was in it.
+#[derive(Clone, Copy, Default)]
+struct Site {
+    at: Point,
+    seed: u64,
+    grain: Option<Grain>,
 }
 
 impl Pattern {
     pub fn new() -> Self {
+        let none = || Around {
+            octave: u32::MAX,
+            base: Point::ZERO,
+            sites: [Site::default(); 8],
+        };
         Self {
             tile: Tile::get(),
-            grains: HashMap::new(),
+            around: [none(), none()],
         }
     }
 
@@ -53,14 +73,15 @@ impl Pattern {
         let octave = (h.to_bits() >> 52) as u32;
         let width = GRAIN * f64::from_bits(u64::from(octave) << 52);
         let at = (p - field.bounds.low) / width;
-        let (cell, site, seed) = nearest_site(at, octave);
-        let grain = *self.grains.entry((octave, cell)).or_insert_with(|| {
-            let site = field.bounds.low + site * width;
+        let around = &mut self.around[octave as usize & 1];
+        let site = around.nearest(at, octave);
+        let grain = *site.grain.get_or_insert_with(|| {
+            let (at, seed) = (field.bounds.low + site.at * width, site.seed);
             Grain {
-                site,
+                site: at,
                 axes: axes(seed),
                 shift: random(seed ^ 1),
-                h: (field.h)(site),
+                h: (field.h)(at),
             }
         });
         if (grain.h - h).abs() > MISMATCH * h {
@@ -75,23 +96,39 @@ impl Pattern {
     }
 }
 
-/// A grain's cell, its site in units of the grains' width, and its seed: the nearest of eight displaced middles.
-fn nearest_site(at: Point, octave: u32) -> ([i64; 3], Point, u64) {
-    let base = (at - Point::splat(0.5)).floor();
-    let mut best = (f64::INFINITY, [0; 3], Point::ZERO, 0);
-    for k in 0..8u32 {
+impl Around {
+    /// The nearest of the eight displaced middles of cells around a point.
+    fn nearest(&mut self, at: Point, octave: u32) -> &mut Site {
+        let base = (at - Point::splat(0.5)).floor();
+        if (self.octave, self.base) != (octave, base) {
+            (self.octave, self.base) = (octave, base);
+            for (k, site) in (0..).zip(&mut self.sites) {
+                *site = Site::of(base, k, octave);
+            }
+        }
+        let mut best = (f64::INFINITY, 0);
+        for (k, site) in self.sites.iter().enumerate() {
+            let squared = (site.at - at).length_squared();
+            if squared < best.0 {
+                best = (squared, k);
+            }
+        }
+        &mut self.sites[best.1]
+    }
+}
+
+impl Site {
+    fn of(base: Point, k: u32, octave: u32) -> Self {
         let corner = base + Point::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2));
         let cell = [corner.x as i64, corner.y as i64, corner.z as i64];
-        let seed = cell
-            .iter()
-            .fold(u64::from(octave), |seed, &c| mix(seed ^ c as u64));
-        let site = corner + Point::splat(0.5) + random(seed) * 0.4;
-        let squared = (site - at).length_squared();
-        if squared < best.0 {
-            best = (squared, cell, site, seed);
+        let mix_in = |seed, &c: &i64| mix(seed ^ c as u64);
+        let seed = cell.iter().fold(u64::from(octave), mix_in);
+        Self {
+            at: corner + Point::splat(0.5) + random(seed) * 0.4,
+            seed,
+            grain: None,
         }
     }
-    (best.1, best.2, best.3)
 }
 
 /// The pattern with side 1 and one layer of cells around it, cell by cell.

@@ -2,6 +2,7 @@
 
 use super::activity::Activity;
 use super::candidate::Candidate;
+use super::edge_cache::EdgeCache;
 use super::recent::Recent;
 use crate::delaunay::Kernel;
 use crate::geom::HilbertFrame;
@@ -14,6 +15,9 @@ pub(super) struct Worker {
     pub candidates: Vec<Candidate>,
     pub recent: Recent,
     pub active: Activity,
+    /// Edges between fixed vertices that need no point, which holds until vertices get other numbers: neither their ends change, nor
+    /// the sizes along them, nor the input's faces.
+    pub settled: EdgeCache,
     /// Whether points move to the nearest place of the pattern.
     pub placing: bool,
     /// Whether tetrahedra are examined again.

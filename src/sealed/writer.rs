@@ -17,7 +17,7 @@ use super::form::{Cut, Cutter};
 use super::totals::{RegionTotals, Totals, array, count_open};
 use super::{FacePairs, Form, VertexCache};
 use crate::geom::{Aabb, Point};
-use crate::storage::{DiskPath, StoreFile};
+use crate::storage::{DiskPath, StoreFile, parallel};
 use tetdb_schema::catalog::SubdomainRow;
 
 /// One side of an interface as this sub-domain has it.
@@ -44,6 +44,9 @@ pub struct Sealed {
     pub interfaces: Vec<InterfaceSide>,
 }
 
+/// Tetrahedra packed at once: a chunk or two, 2 MB.
+const TETS_AT_ONCE: usize = SealedTet::COUNT_MAX;
+
 /// Writes one sub-domain, once.
 ///
 /// Order of calls: all vertices, all tetrahedra, then facets and interface faces. The file holds
@@ -61,6 +64,9 @@ pub struct SealedWriter {
     vertex_chunks: Vec<VertexSummary>,
     cache: Option<VertexCache>,
     tets: Cutter<SealedTet>,
+    /// To be packed; packed, to be summed up and stored.
+    incoming: Vec<(SealedTet, TetPlace)>,
+    packed: Vec<Cut<SealedTet>>,
     tet_chunks: Vec<TetSummary>,
     facets: Cutter<SealedFacet>,
     facet_chunks: Vec<RangeSummary<false>>,
@@ -110,6 +116,8 @@ impl SealedWriter {
             vertex_chunks: Vec::new(),
             cache: None,
             tets: Cutter::new(form, rank, generation).map_err(io)?,
+            incoming: Vec::new(),
+            packed: Vec::new(),
             tet_chunks: Vec::new(),
             facets: Cutter::new(form, rank, generation).map_err(io)?,
             facet_chunks: Vec::new(),
@@ -193,28 +201,48 @@ impl SealedWriter {
         debug_assert_eq!(tet, tet.rotated());
         self.end_vertices()?;
         assert!(
-            self.tets.count() < u64::from(TetId::LOCAL_MAX),
+            self.tets.count() + (self.incoming.len() as u64) < u64::from(TetId::LOCAL_MAX),
             "sub-domain {} has more tetrahedra than ids",
             self.subdomain
         );
-        let cut = self.tets.push(tet, |tet| tet.to_working(place));
-        if let Some(chunk) = cut.map_err(self.io())? {
-            self.put_tets(chunk)?;
+        self.incoming.push((tet, *place));
+        if self.incoming.len() < TETS_AT_ONCE {
+            return Ok(());
         }
-        Ok(())
+        self.pack_tets()
     }
 
-    fn put_tets(&mut self, chunk: Cut<SealedTet>) -> Result<(), SealedError> {
-        let cache = self.cache.as_mut().expect("vertices have ended");
-        let (rank, file) = (self.subdomain.rank(), &mut self.file);
-        let corners_of = |tet: &SealedTet| cache.corners(file, tet.nodes);
-        let mut summary = self
-            .totals
-            .add(chunk.first, &chunk.records, rank, corners_of)?;
-        summary.open_faces = count_open(&mut self.pairs, &chunk.records);
-        summary.bytes = chunk.bytes();
-        self.tet_chunks.push(summary);
-        self.put(chunk.values)
+    /// Packs the tetrahedra that came in, while another thread sums up and stores those packed before.
+    fn pack_tets(&mut self) -> Result<(), SealedError> {
+        let (io, rank) = (self.io(), self.subdomain.rank());
+        let mut before = std::mem::take(&mut self.packed);
+        let (tets, incoming, packed) = (&mut self.tets, &mut self.incoming, &mut self.packed);
+        let pack = || {
+            for (tet, place) in incoming.drain(..) {
+                let cut = tets.push(tet, |tet| tet.to_working(&place));
+                packed.extend(cut.map_err(&io)?);
+            }
+            Ok(())
+        };
+        let (cache, file) = (self.cache.as_mut(), &mut self.file);
+        let (totals, pairs) = (&mut self.totals, &mut self.pairs);
+        let (chunks, batch) = (&mut self.tet_chunks, &mut self.batch);
+        let sum_up = || {
+            let cache = cache.expect("vertices have ended");
+            for chunk in before.drain(..) {
+                let corners_of = |tet: &SealedTet| cache.corners(file, tet.nodes);
+                let mut summary = totals.add(chunk.first, &chunk.records, rank, corners_of)?;
+                summary.open_faces = count_open(pairs, &chunk.records);
+                summary.bytes = chunk.bytes();
+                chunks.push(summary);
+                for (key, value) in chunk.values {
+                    batch.push(file, key, value)?;
+                }
+            }
+            Ok(())
+        };
+        let (packed, summed_up) = parallel(|| rayon::join(pack, sum_up));
+        packed.and(summed_up)
     }
 
     fn put(&mut self, values: Vec<(u64, Vec<u8>)>) -> Result<(), SealedError> {
@@ -292,9 +320,11 @@ impl SealedWriter {
     pub fn finish(mut self) -> Result<Sealed, SealedError> {
         let io = self.io();
         self.end_vertices()?;
+        self.pack_tets()?;
         while let Some(chunk) = self.tets.cut().map_err(&io)? {
-            self.put_tets(chunk)?;
+            self.packed.push(chunk);
         }
+        self.pack_tets()?;
         while let Some(chunk) = self.facets.cut().map_err(&io)? {
             self.put_facets(chunk)?;
         }

@@ -81,9 +81,14 @@ impl SizeField {
             let edges = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| {
                 let [v, w] = [i, j].map(|k: usize| corners[k] as usize);
                 let [a, b] = [v, w].map(|v| surface.points[v]);
-                let (length, least) = (a.distance(b), h[v].min(h[w]));
-                // Sizes between fall by no more than the slope allows.
-                if length * (1.0 + steepest) <= NEEDLE_FROM * least {
+                let length = a.distance(b);
+                // Between places where they are known, sizes fall by no more than the slope allows.
+                let is_ordinary = |parts: u32| {
+                    let at = |k: u32| a + (b - a) * (f64::from(k) / f64::from(parts));
+                    let least = (1..parts).fold(h[v].min(h[w]), |h, k| h.min(self.h(at(k))));
+                    length * (1.0 + steepest / f64::from(parts)) <= NEEDLE_FROM * least
+                };
+                if [1, 2, 4].into_iter().any(is_ordinary) {
                     return 0.0;
                 }
                 (self.lengths_along(a, b) - NEEDLE_FROM).max(0.0)

@@ -5,10 +5,8 @@ use std::collections::BinaryHeap;
 use std::io::{BufReader, BufWriter, Read, Write};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use rayon::slice::ParallelSliceMut;
-
 use super::sort_record::{SortBytes, SortRecord};
-use super::{DiskPath, StorageError, check_cancelled, parallel, reserve};
+use super::{DiskPath, StorageError, check_cancelled, reserve, sort_unstable_by};
 
 /// Numbers run files within the process.
 static RUNS: AtomicU64 = AtomicU64::new(0);
@@ -39,10 +37,16 @@ impl Drop for Run {
     }
 }
 
-/// Compares records by their bytes: the first eight as one number, which is what nearly always decides.
+/// Compares records by their bytes: the first sixteen, or eight, as one number, which is what nearly always decides.
 #[inline(always)]
 fn order<B: SortBytes>(a: &B, b: &B) -> std::cmp::Ordering {
     let (a, b) = (a.as_ref(), b.as_ref());
+    if let (Some((a, a_rest)), Some((b, b_rest))) =
+        (a.split_first_chunk::<16>(), b.split_first_chunk::<16>())
+    {
+        let first = u128::from_be_bytes(*a).cmp(&u128::from_be_bytes(*b));
+        return first.then_with(|| a_rest.cmp(b_rest));
+    }
     match (a.split_first_chunk::<8>(), b.split_first_chunk::<8>()) {
         (Some((a, a_rest)), Some((b, b_rest))) => u64::from_be_bytes(*a)
             .cmp(&u64::from_be_bytes(*b))
@@ -84,8 +88,7 @@ impl<R: SortRecord> Sorter<R> {
 
     fn spill(&mut self) -> Result<(), StorageError> {
         check_cancelled();
-        let records = &mut self.records;
-        parallel(|| records.par_sort_unstable_by(order));
+        sort_unstable_by(&mut self.records, order);
         let number = RUNS.fetch_add(1, Ordering::Relaxed);
         let path = self
             .dir
@@ -108,8 +111,7 @@ impl<R: SortRecord> Sorter<R> {
     /// Ends pushing. Errors: the disk.
     pub fn finish(mut self) -> Result<Sorted<R>, StorageError> {
         if self.runs.is_empty() {
-            let records = &mut self.records;
-            parallel(|| records.par_sort_unstable_by(order));
+            sort_unstable_by(&mut self.records, order);
             return Ok(Sorted {
                 memory: std::mem::take(&mut self.records).into_iter(),
                 heap: BinaryHeap::new(),

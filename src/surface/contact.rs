@@ -147,6 +147,9 @@ fn at_vertex(p: [Point; 3], q: [Point; 3]) -> Option<Contact> {
     }
     if (c, d) == (0, 0) {
         let plane = Projection::of(&p);
+        if plane.are_corners_apart(&p, &q) {
+            return None;
+        }
         let touch = worse(
             segment_in_plane(q[1], q[2], &p),
             segment_in_plane(p[1], p[2], &q),
@@ -261,6 +264,19 @@ impl Projection {
         sign(robust::orient2d(self.flat(a), self.flat(b), self.flat(c)))
     }
 
+    /// Whether two triangles of one plane with the same first vertex share nothing else: no side of either's corner there is in the
+    /// other's. Most that share a vertex in an even wall do not, and this costs a third of looking for contacts.
+    fn are_corners_apart(self, p: &[Point; 3], q: &[Point; 3]) -> bool {
+        let is_apart = |t: &[Point; 3], other: &[Point; 3]| {
+            let hand = self.turn(t[0], t[1], t[2]);
+            let holds = |x: Point| {
+                hand * self.turn(t[0], t[1], x) >= 0 && hand * self.turn(t[0], x, t[2]) >= 0
+            };
+            !holds(other[1]) && !holds(other[2])
+        };
+        is_apart(p, q) && is_apart(q, p)
+    }
+
     fn separation(self, p: &[Point; 3], q: &[Point; 3]) -> Separation {
         let mut found = Separation::None;
         for (t, other) in [(p, q), (q, p)] {
@@ -352,5 +368,33 @@ impl Projection {
         let area = |x| robust::orient2d(self.flat(c), self.flat(d), self.flat(x)).abs();
         let (x, y) = (area(a), area(b));
         a + (b - a) * (x / (x + y))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::mix;
+
+    #[test]
+    fn corners_are_apart_when_the_triangles_share_their_vertex_alone() {
+        let at = |k: u64| (mix(k) % 7) as f64 - 3.0;
+        let point = |k: u64| Point::new(at(k), at(k + 1), at(k) - 2.0 * at(k + 1));
+        let mut n_apart = 0;
+        for k in 0..20_000u64 {
+            let [p, q] = [8 * k, 8 * k + 4].map(|k| [Point::ZERO, point(k), point(k + 2)]);
+            let has_area = |t: &[Point; 3]| t[1].cross(t[2]) != Point::ZERO;
+            if !has_area(&p) || !has_area(&q) {
+                continue;
+            }
+            let touch = worse(
+                segment_in_plane(q[1], q[2], &p),
+                segment_in_plane(p[1], p[2], &q),
+            );
+            let apart = Projection::of(&p).are_corners_apart(&p, &q);
+            assert_eq!(apart, touch.is_none(), "{p:?} {q:?}");
+            n_apart += u32::from(apart);
+        }
+        assert!((2_000..18_000).contains(&n_apart), "{n_apart}");
     }
 }

@@ -15,11 +15,11 @@ use super::records::{Claim, RequiredFace, TetRecord};
 use super::target::SealTarget;
 use crate::geom::HilbertFrame;
 use crate::mesh::anatomy::FACES;
-use crate::mesh::{Mesh, VertexTag, dense};
+use crate::mesh::{Mesh, Scan, VertexTag, dense, scan_parts, tets_of_page};
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::progress::{Event, Watcher};
 use crate::sealed::{Form, Sealed, SealedWriter, sorted_face};
-use crate::storage::{Keyed, Pages, Sorted, Sorter, check_cancelled};
+use crate::storage::{Keyed, Pages, Sorted, Sorter, check_cancelled, kind};
 
 /// Writes `mesh` to `target`, in the order and under the numbers of a sealed sub-domain whatever the form. Effects: the mesh's scratch map is used up; `tet_of` must be right for all vertices.
 pub(crate) fn seal<P: Pages>(
@@ -115,31 +115,54 @@ fn vertices<P: Pages>(
     Ok(())
 }
 
+/// Pages looked at before what was found goes to the sorter: 4 MB of tetrahedra.
+const BATCH: usize = 64;
+
 fn sort_tets<P: Pages>(
     mesh: &mut Mesh<P>,
     target: &SealTarget,
 ) -> Result<Sorted<TetRecord>, PipelineError> {
     let mut sorter = Sorter::new(target.scratch, target.memory / 4);
-    let mut from = 0;
-    while let Some((t, tet)) = mesh.next_tet(from) {
-        from = t + 1;
-        let [a, b, c, d] = tet.vertices();
-        let nodes = [a, b, c, d].map(|v| mesh.scratch(dense(v)));
-        let (region, flags) = mesh.tet_attribute(t);
-        let rotated = SealedTet { nodes, region }.rotated();
-        let mut required = 0;
-        for (i, node) in rotated.nodes.into_iter().enumerate() {
-            let old = nodes.iter().position(|&n| n == node).unwrap_or(0);
-            required |= u8::from(tet.is_required(old)) << i;
+    let pages: Vec<u32> = (0..mesh.pages().n_pages::<{ kind::TETS }>()).collect();
+    for batch in pages.chunks(BATCH) {
+        check_cancelled();
+        for record in scan_parts(mesh, batch, &Records).into_iter().flatten() {
+            sorter.push(record)?;
         }
-        sorter.push(TetRecord {
-            nodes: rotated.nodes,
-            region,
-            flags,
-            required,
-        })?;
     }
     Ok(sorter.finish()?)
+}
+
+/// The tetrahedra of a page under their new numbers.
+struct Records;
+
+impl Scan for Records {
+    type Part = u32;
+    type Output = Vec<TetRecord>;
+
+    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &page: &u32) -> Vec<TetRecord> {
+        let mut records = Vec::new();
+        tets_of_page(mesh, page, |mesh, t, tet| {
+            let mut nodes = [0; 4];
+            for (i, node) in nodes.iter_mut().enumerate() {
+                *node = mesh.scratch(dense(tet.vertex(i)));
+            }
+            let (region, flags) = mesh.tet_attribute(t);
+            let rotated = SealedTet { nodes, region }.rotated();
+            let mut required = 0;
+            for (i, node) in rotated.nodes.into_iter().enumerate() {
+                let old = nodes.iter().position(|&n| n == node).unwrap_or(0);
+                required |= u8::from(tet.is_required(old)) << i;
+            }
+            records.push(TetRecord {
+                nodes: rotated.nodes,
+                region,
+                flags,
+                required,
+            });
+        });
+        records
+    }
 }
 
 fn tets(
