@@ -11,11 +11,9 @@ Other meshers count where every input triangle is a face of their mesh and nothi
 below their bound by more than 1 in 1000; there must be none.
 """
 import argparse
-import json
 import os
 import resource
 import subprocess
-import sys
 import tempfile
 
 import numpy as np
@@ -128,10 +126,9 @@ def run_program(program, surface, directory, seconds_max):
 
 def run_peer(mesher, arrays, directory, seconds_max):
     out = os.path.join(directory, "peer.npz")
-    answer = subprocess.run([sys.executable, peers.__file__, "--child", mesher, arrays, out], check=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-                            timeout=seconds_max).stdout
+    answer = peers.run_other(mesher, arrays, out, 1, 1.0, seconds_max)
     with np.load(out) as file:
-        return file["points"], file["tets"], json.loads(answer.decode().splitlines()[-1])["cpu"]
+        return file["points"], file["tets"], answer["cpu"]
 
 
 def compare(surface, args):

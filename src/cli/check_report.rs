@@ -3,6 +3,7 @@
 use serde_json::{Value, json};
 
 use super::console::Console;
+use super::cures::{Cure, cures};
 use super::failure::Failure;
 use super::input::Space;
 use super::memory;
@@ -11,7 +12,7 @@ use crate::api::predict;
 use crate::geom::Point;
 use crate::geom::short;
 use crate::optimize::face_least;
-use crate::pipeline::{Options, least_for};
+use crate::pipeline::{Options, Prepared, least_for};
 use crate::storage::attempt;
 use crate::surface::{
     BoundaryLoop, Closing, Defect, Fitness, Surface, Validation, boundary_loops, closing, fitness,
@@ -38,6 +39,7 @@ pub struct Findings<'a> {
     fitness: Fitness,
     /// Tetrahedra with default sizes, as they are estimated before a mesh; none of a surface that cannot be meshed.
     tets_expected: Option<f64>,
+    cures: Vec<Cure>,
 }
 
 impl<'a> Findings<'a> {
@@ -66,13 +68,17 @@ impl<'a> Findings<'a> {
             }
             false => closing(surface),
         };
+        let prepared = is_estimated.then(|| expected(surface, space)).flatten();
         Ok(Self {
+            cures: (prepared.as_ref()).map_or_else(Vec::new, |prepared| {
+                cures(surface, &fitness, &prepared.field, space)
+            }),
             surface,
             turned,
             boundary_loops: boundary_loops(surface, &validation.closedness),
             closing,
             fitness,
-            tets_expected: is_estimated.then(|| expected(surface, space)).flatten(),
+            tets_expected: prepared.map(|prepared| prepared.estimate.tets()),
             validation,
         })
     }
@@ -133,7 +139,7 @@ impl<'a> Findings<'a> {
             "defects": found.defects.iter().map(defect_json).collect::<Vec<_>>(),
             "open_loops": open_loops, "t_junctions": junctions,
             "closing": { "tried": self.closing, "smallest": self.closes().map(|c| c.share) },
-            "fitness": fitness, "advice": self.advice(),
+            "fitness": fitness, "advice": self.advice(), "cures": self.cures.iter().map(Cure::json).collect::<Vec<_>>(),
         })
     }
 
@@ -167,6 +173,9 @@ impl<'a> Findings<'a> {
         self.print_fitness(console);
         for advice in self.advice() {
             console.line(&format!("advice: {advice}"));
+        }
+        for cure in &self.cures {
+            console.line(&format!("cure: {}", cure.sentence(&surfaces.join(" "))));
         }
         if self.is_valid() {
             console.line("closed and free of defects: it can be meshed");
@@ -362,13 +371,12 @@ impl<'a> Findings<'a> {
     }
 }
 
-/// Tetrahedra with default sizes; none where no size makes sense.
-fn expected(surface: &Surface, space: Space) -> Option<f64> {
+/// Default sizes and what they make; none where no size makes sense.
+fn expected(surface: &Surface, space: Space) -> Option<Prepared> {
     if space.cap < least_for(surface) {
         return None;
     }
-    let prepared = predict(surface, &Options::default(), space.cap, space.beside);
-    Some(prepared.ok()?.estimate.tets())
+    predict(surface, &Options::default(), space.cap, space.beside).ok()
 }
 
 fn defect_json(defect: &Defect) -> Value {

@@ -207,6 +207,31 @@ fn fitness_is_told_and_advice_given() {
 }
 
 #[test]
+fn cures_of_needles_are_tried_and_keep_their_promise() {
+    let place = Place::new();
+    // A long prism: its sides are needles that dividing mends.
+    let mut long = cube_at(0.0, 0.0, 0.0);
+    for p in long.iter_mut().flatten() {
+        p[2] *= 40.0;
+    }
+    place.write("long.off", off(&long));
+    let answer = place.run_line("check long.off --json").succeeds().json();
+    let cure = &answer["cures"][0];
+    assert_eq!(cure["way"], "refine-surface", "{answer}");
+    let hopeless = answer["fitness"]["hopeless_triangles"].as_u64();
+    assert!(cure["hopeless_triangles"].as_u64() < hopeless, "{answer}");
+    let mesh = "mesh long.off -o long.tetdb --refine-surface --json";
+    let mesh = place.run_line(mesh).succeeds().json();
+    let triangles = mesh["subdomains"][0]["facets"].as_u64();
+    assert_eq!(triangles, cure["triangles"].as_u64());
+    let text = place.run_line("check long.off").succeeds().stdout();
+    assert!(
+        text.contains("cure: `tetdb mesh long.off --refine-surface`"),
+        "{text}"
+    );
+}
+
+#[test]
 fn options_without_meaning_are_refused_before_anything_is_written() {
     let place = Place::new();
     place.write("a.off", off(&cube_at(0.0, 0.0, 0.0)));
@@ -240,6 +265,7 @@ fn the_answer_has_its_fields() {
             "advice",
             "bounds",
             "closing",
+            "cures",
             "defects",
             "edges",
             "fitness",
