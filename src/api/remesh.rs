@@ -316,11 +316,14 @@ pub(crate) fn verify_changed(
         let sources = open.job()?.surfaces;
         let cap = settings.cap()?;
         let scratch = scratch_beside(&crate::surface::Surface::default(), cap, path)?;
-        let surface = Surface::of_record(&sources, path, &scratch).ok();
-        if surface.is_none() {
-            settings.note("note: the surface is not where it was; the mesh is verified without it");
+        let surface = Surface::of_record(&sources, path, &scratch);
+        if let Err(error) = &surface {
+            let why = error.message();
+            settings.note(format!(
+                "note: the mesh is verified without its surface, which cannot be read: {why}"
+            ));
         }
-        let surface = surface.as_ref().map(|surface| &surface.inner);
+        let surface = surface.as_ref().ok().map(|surface| &surface.inner);
         verify::check(&mut open, settings, surface, cap, Level::Delaunay)?
     };
     if !report.valid {

@@ -159,7 +159,7 @@ impl Console {
         if self.json {
             self.stderr_json(&serde_json::json!({ "note": text }));
         } else {
-            self.bar.suspend(|| eprintln!("{text}"));
+            self.bar.suspend(|| say(text));
         }
     }
 
@@ -256,7 +256,7 @@ impl Console {
                 let of = total.map_or(String::new(), |t| format!(" of {t}"));
                 let eta = eta.map_or(String::new(), |s| format!(", {s:.0} s to go"));
                 let rate = rate.map_or(String::new(), |r| format!(", {r:.0} per second"));
-                eprintln!("{}: {}{of} {}{rate}{eta}", stage, done, unit);
+                say(&format!("{stage}: {done}{of} {unit}{rate}{eta}"));
             }
         }
     }
@@ -279,20 +279,25 @@ impl Console {
             }));
         } else {
             let word = self.colored(RED, &format!("error[{}]:", failure.code));
-            eprintln!("{word} {message}");
+            say(&format!("{word} {message}"));
             if let Some(place) = &place {
-                eprintln!("  at: {place}");
+                say(&format!("  at: {place}"));
             }
             if let Some(help) = &help {
-                eprintln!("{} {help}", self.colored(GREEN, "help:"));
+                say(&format!("{} {help}", self.colored(GREEN, "help:")));
             }
         }
         exit
     }
 
     fn stderr_json(&self, value: &serde_json::Value) {
-        eprintln!("{value}");
+        say(&value.to_string());
     }
+}
+
+/// A line of talk. That nobody hears it is no reason to end.
+fn say(text: &str) {
+    let _ = writeln!(std::io::stderr(), "{text}");
 }
 
 fn style(known_total: bool) -> ProgressStyle {

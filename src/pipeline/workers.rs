@@ -38,6 +38,8 @@ pub(crate) fn work_off<J: Send, D: Send>(
             });
         }
         drop(tell);
+        // Who listens may unwind too: `watch` and `commit` are others' code.
+        let _alarm = Alarm(&list);
         let result = listen(&list, &hear, watch, commit);
         list.give_up();
         result
@@ -119,7 +121,7 @@ fn work<J, D>(
     }
 }
 
-/// Lets nobody wait for a job of a worker that panicked.
+/// Lets nobody wait for a job of one that panicked.
 struct Alarm<'a, J>(&'a JobQueue<J>);
 
 impl<J> Drop for Alarm<'_, J> {
@@ -235,5 +237,29 @@ mod tests {
             )
             .is_ok()
         );
+    }
+
+    #[test]
+    fn nobody_waits_when_the_listener_unwinds() {
+        let run = &|n: u32, watch: &Watcher| {
+            watch(Event::Step { name: "a step" });
+            Ok(n)
+        };
+        for (in_watch, in_commit) in [(true, false), (false, true)] {
+            let watch = |_: Event| assert!(!in_watch, "the caller's own trouble");
+            let ended = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+                work_off(
+                    vec![1, 2],
+                    &vec![run as Hand<u32, u32>; 2],
+                    &watch,
+                    &mut |n| {
+                        assert!(!in_commit, "the same here");
+                        // One job more than there will ever be.
+                        Ok(vec![n])
+                    },
+                )
+            }));
+            assert!(ended.is_err());
+        }
     }
 }

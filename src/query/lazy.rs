@@ -14,7 +14,7 @@ use tetdb_schema::record::SealedTet;
 
 use super::decoded::Spread;
 use super::hit::Hit;
-use super::locate::{Candidate, Search, leaders};
+use super::locate::{Candidate, Search, holds, leaders};
 use super::near::{Near, nearness};
 use super::session::{checked_chunk, vertex_chunk};
 use super::{QueryError, QuerySession};
@@ -135,15 +135,23 @@ impl QuerySession {
                 // Says what is wrong.
                 part.corner(v)?;
             }
-            let chunks = tet.nodes.map(|v| vertex_chunk(part, v, &mut place) as u32);
-            let id = TetId::new(part.id(), local);
-            let waiting = Waiting {
-                id: id.expect("the chunk was checked"),
-                tet,
-                chunks,
-            };
-            if may_hold(part, &waiting, lazy)? {
-                lazy.waiting.push(waiting);
+            // Nearly all are ruled out by the vertex that leads them: where the others are is not asked.
+            let (mut chunks, mut around) = ([0; 4], Some(Aabb::EMPTY));
+            for (v, chunk) in tet.nodes.into_iter().zip(&mut chunks) {
+                *chunk = vertex_chunk(part, v, &mut place) as u32;
+                let Some(bounds) = bounds_near(part, v, *chunk, lazy)? else {
+                    around = None;
+                    break;
+                };
+                around = around.map(|around| around.union(bounds));
+            }
+            if around.is_some_and(|around| holds(&around, lazy.point)) {
+                let id = TetId::new(part.id(), local);
+                lazy.waiting.push(Waiting {
+                    id: id.expect("the chunk was checked"),
+                    tet,
+                    chunks,
+                });
             }
         }
         Ok(())
@@ -221,17 +229,29 @@ fn is_led_near(
 
 /// Whether what is known of its vertices lets the tetrahedron hold the point.
 fn may_hold(part: &mut Subdomain, w: &Waiting, lazy: &mut Lazy) -> Result<bool, StoreError> {
-    let (p, mut around) = (lazy.point, Aabb::EMPTY);
+    let mut around = Aabb::EMPTY;
     for (v, chunk) in w.tet.nodes.into_iter().zip(w.chunks) {
-        let (near, is_read) = lazy.near(part, chunk);
-        let bounds = match is_read {
-            true => Aabb::around([part.corner(v)?.point]),
-            false => near.bounds,
-        };
-        if nearness(&bounds, p) > lazy.reach || bounds.low.x > bounds.high.x {
-            return Ok(false);
+        match bounds_near(part, v, chunk, lazy)? {
+            Some(bounds) => around = around.union(bounds),
+            None => return Ok(false),
         }
-        around = around.union(bounds);
     }
-    Ok(around.low.cmple(p).all() && p.cmple(around.high).all())
+    Ok(holds(&around, lazy.point))
+}
+
+/// Where a vertex of a chunk lies, as far as that is known; `None`: too far away.
+#[inline]
+fn bounds_near(
+    part: &mut Subdomain,
+    v: u32,
+    chunk: u32,
+    lazy: &mut Lazy,
+) -> Result<Option<Aabb>, StoreError> {
+    let (near, is_read) = lazy.near(part, chunk);
+    let bounds = match is_read {
+        true => Aabb::around([part.corner(v)?.point]),
+        false => near.bounds,
+    };
+    let is_far = bounds.low.x > bounds.high.x || nearness(&bounds, lazy.point) > lazy.reach;
+    Ok((!is_far).then_some(bounds))
 }

@@ -74,7 +74,8 @@ fn shares(corners: &[Point; 4], p: Point) -> Option<[f64; 4]> {
     Some(shares)
 }
 
-fn holds(bounds: &Aabb, p: Point) -> bool {
+/// Whether a box holds a point.
+pub(super) fn holds(bounds: &Aabb, p: Point) -> bool {
     bounds.low.cmple(p).all() && p.cmple(bounds.high).all()
 }
 

@@ -353,6 +353,7 @@ pub(crate) fn reach(part: &Subdomain, chunk: usize) -> f64 {
 }
 
 /// The chunk of vertices that holds vertex `v`, `place` being the one found last.
+#[inline]
 pub(crate) fn vertex_chunk(part: &Subdomain, v: u32, place: &mut usize) -> usize {
     let last = &part.vertex_summaries()[*place];
     if v < last.first || v - last.first >= last.count {

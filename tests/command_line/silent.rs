@@ -115,6 +115,24 @@ fn of_two_runs_at_once_onto_one_path_neither_is_replaced_in_silence() {
     }
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn a_run_that_nobody_hears_goes_on() {
+    let place = Place::new();
+    let lines = [
+        "mesh sample:box,h=0.1 -o b.tetdb --json",
+        "resaturate b.tetdb --subdomain 0 --refine-by 0.7 --json",
+    ];
+    for line in lines {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let mut child = place.command(&words).spawn().expect("the program starts");
+        drop((child.stderr.take(), child.stdout.take()));
+        let status = child.wait().expect("it ends");
+        assert_eq!(status.code(), Some(0), "{line}");
+    }
+    place.run_line("verify b.tetdb").succeeds();
+}
+
 #[test]
 fn no_message_repeats_all_that_was_typed_however_long() {
     let place = Place::new();
