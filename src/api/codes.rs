@@ -149,7 +149,11 @@ pub const CODES: &[CodeRow] = &[
         5,
         "another process changed the store while it was read; ask again",
     ),
-    row("memory", 6, "the memory cap is too small for this work"),
+    row(
+        "memory",
+        6,
+        "the memory cap, or what the system grants, is too small for this work",
+    ),
     row(
         "no-room",
         6,

@@ -49,6 +49,9 @@ impl From<SurfaceError> for Error {
 
 impl From<SampleError> for Error {
     fn from(e: SampleError) -> Self {
+        if let SampleError::Memory { needed, .. } = e {
+            return Self::new("memory", &e).with_remedy(Remedy::Memory(needed));
+        }
         Self::new("bad-sample", e)
             .with_help("for example balls,count=100 or box,h=0.1")
             .with_remedy(Remedy::General)
@@ -63,11 +66,18 @@ impl From<StorageError> for Error {
             StorageError::Damaged { .. }
             | StorageError::Page { .. }
             | StorageError::Missing { .. } => "damaged",
-            StorageError::Budget { .. } | StorageError::TooMany { .. } => "memory",
+            StorageError::Budget { .. }
+            | StorageError::NoMemory { .. }
+            | StorageError::TooMany { .. } => "memory",
             StorageError::Cancelled => "stopped",
             _ => "io",
         };
-        with_general_help(code, &e)
+        match e {
+            StorageError::NoMemory { .. } => Self::new(code, &e).with_help(
+                "end other programs, or raise the limit of this process; with a smaller memory cap more goes to the disk",
+            ),
+            _ => with_general_help(code, &e),
+        }
     }
 }
 

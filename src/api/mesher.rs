@@ -123,6 +123,7 @@ impl Mesher {
         self.options.coarse_only = old.coarse_only;
         self.options.region_seed = old.region_seed;
         self.options.hole = old.hole;
+        self.options.refine_surface = old.refine_surface;
         self
     }
 
@@ -182,6 +183,15 @@ impl Mesher {
     /// Whether meshes on the way (before each cut, with its zone refined) are kept to be looked at. Default: they are not.
     pub fn keep_stages(mut self, keep: bool) -> Self {
         self.options.keep_stages = keep;
+        self
+    }
+
+    /// Whether the surface's triangles are divided first until their edges are as short as the wanted lengths. Default: they are not, and
+    /// its edges bound how short those of the mesh can be near it.
+    ///
+    /// No point of the surface moves. The store keeps a copy of the divided surface, and the mesh is verified against that.
+    pub fn refine_surface(mut self, refine: bool) -> Self {
+        self.options.refine_surface = refine;
         self
     }
 
@@ -247,11 +257,14 @@ impl Mesher {
             let mut options = self.options.clone();
             job::identify_sizes(&mut options)?;
             job::take_seeds(&mut options, &self.surface.inner.seeds);
-            let scratch = scratch_beside(&self.surface.inner, cap, Path::new("."))?;
-            let surface = &self.surface.inner;
-            attempt(|| surface::validate_in(surface, &scratch))?.accept()?;
-            let field = self.field.as_deref();
-            let prepared = predict_with(surface, &options, field, cap, Path::new("."))?;
+            let (here, field) = (Path::new("."), self.field.as_deref());
+            let mut surface = Cow::Borrowed(&self.surface);
+            let scratch = scratch_beside(&surface.inner, cap, here)?;
+            attempt(|| surface::validate_in(&surface.inner, &scratch))?.accept()?;
+            if options.refine_surface {
+                divide(surface.to_mut(), &options, field, cap, here, &self.settings)?;
+            }
+            let prepared = predict_with(&surface.inner, &options, field, cap, here)?;
             Ok(Prediction::of(&prepared.estimate, cap, n_threads()))
         })
     }
@@ -290,6 +303,9 @@ impl Mesher {
         self.options.hands = settings.hands.clone();
         let cap = settings.cap()?;
         replace::settle(path, settings)?;
+        if self.options.refine_surface {
+            self.divide_surface(path, cap, settings)?;
+        }
         if self.is_there(path)? {
             return Ok(Created {
                 path: path.to_owned(),
@@ -365,6 +381,14 @@ impl Mesher {
             _ if job::is_same(&job, &self.options, &self.surface.sources) => Ok(true),
             _ => Err(StoreError::Finished { path }.into()),
         }
+    }
+
+    /// Divides the triangles of the surface, once it is known to have no defects.
+    fn divide_surface(&mut self, path: &Path, cap: u64, settings: &Settings) -> Result<(), Error> {
+        let scratch = scratch_beside(&self.surface.inner, cap, path)?;
+        attempt(|| surface::validate_in(&self.surface.inner, &scratch))?.accept()?;
+        let field = self.field.as_deref();
+        divide(&mut self.surface, &self.options, field, cap, path, settings)
     }
 
     /// Validates, builds the size field and looks whether everything fits; inserts vertices meanwhile.
@@ -488,6 +512,28 @@ pub(super) fn report(summary: &pipeline::Summary, settings: &Settings) {
             settings.warn(warning.to_string());
         }
     }
+}
+
+/// Divides the triangles of a surface without defects to the lengths that `options` want.
+pub(crate) fn divide(
+    surface: &mut Surface,
+    options: &Options,
+    field: Option<&FieldArrays>,
+    cap: u64,
+    store: &Path,
+    settings: &Settings,
+) -> Result<(), Error> {
+    let before = surface.n_triangles();
+    let diagonal = surface.inner.bounds().diagonal();
+    let wanted = options.sizes()?.hsiz;
+    let wanted = wanted.map_or(f64::INFINITY, |length| length.resolve(diagonal));
+    let sizes = predict_with(&surface.inner, options, field, cap, store)?.field;
+    surface.divide(&|p| sizes.h(p).min(wanted), cap)?;
+    settings.note(format!(
+        "the surface was divided into {} triangles, from {before}",
+        surface.n_triangles()
+    ));
+    Ok(())
 }
 
 /// The size field of a surface and what it predicts, within `cap`; what was given as arrays is read from `store`.

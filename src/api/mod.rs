@@ -47,9 +47,9 @@ pub(crate) use memory::default_cap;
 #[cfg(any(test, feature = "cli", feature = "internals"))]
 pub use memory::peak_bytes;
 pub(crate) use memory::show_bytes;
-#[cfg(feature = "cli")]
-pub(crate) use mesher::predict;
 pub use mesher::{Existing, Mesher, Prediction};
+#[cfg(feature = "cli")]
+pub(crate) use mesher::{divide, predict};
 pub use options::{Optimize, Regions, Seal, Subdomains};
 pub use picture::{ColorBy, Snapped, Snapshot};
 pub use remesh::{Remesh, Remeshed};

@@ -315,7 +315,7 @@ pub(crate) fn verify_changed(
         let mut open = open_finished(path)?;
         let sources = open.job()?.surfaces;
         let cap = settings.cap()?;
-        let scratch = crate::storage::ScratchSpace::boundless();
+        let scratch = scratch_beside(&crate::surface::Surface::default(), cap, path)?;
         let surface = Surface::of_record(&sources, path, &scratch).ok();
         if surface.is_none() {
             settings.note("note: the surface is not where it was; the mesh is verified without it");

@@ -12,7 +12,7 @@ use crate::geom::Point;
 use crate::io::read::{is_stream, read_surface};
 use crate::io::write;
 use crate::samples::{PREFIX, SampleSpec};
-use crate::sizing::{SizeField, SizeOptions};
+use crate::sizing::{Further, SizeField, SizeOptions};
 use crate::storage::{ScratchSpace, attempt};
 use crate::surface::{self, SplitReport, SurfaceBuilder, orient_alike_in, split};
 
@@ -75,14 +75,20 @@ impl CheckReport {
 pub(crate) const WELD_SHARE_MAX: f64 = 0.01;
 
 /// Divides triangles until their edges are as short as `options` want them; where the surface is finer, sizes grow from its edges.
+///
+/// Errors: more triangles than `scratch` has memory for.
 pub(crate) fn refine(
     surface: &surface::Surface,
     options: &SizeOptions,
+    scratch: &ScratchSpace,
 ) -> Result<(surface::Surface, SplitReport), Error> {
     refuse_sheets(surface, "refined")?;
     let wanted = (options.hsiz).map_or(f64::INFINITY, |l| l.resolve(surface.bounds().diagonal()));
-    let field = SizeField::build(&surface.points, &surface.triangles, options)?;
-    Ok(split(surface, &|p| field.h(p).min(wanted))?)
+    let (points, triangles) = (&surface.points, &surface.triangles);
+    let built = || SizeField::build_with(points, triangles, options, &Further::default(), scratch);
+    let (field, _) = attempt(built)??;
+    let left = scratch.available().saturating_sub(field.bytes() as u64);
+    Ok(split(surface, &|p| field.h(p).min(wanted), left)?)
 }
 
 /// What stands for the path of a surface that was given as arrays: a file in the store.
@@ -142,8 +148,8 @@ impl Surface {
     /// Errors: `bad-sample` names what is wrong.
     pub fn sample(spec: &str) -> Result<Self, Error> {
         guarded(&Settings::new(), || {
-            Self::generated(&format!("{PREFIX}{}", spec.trim_start_matches(PREFIX)))?
-                .oriented(&ScratchSpace::boundless())
+            let word = format!("{PREFIX}{}", spec.trim_start_matches(PREFIX));
+            Self::generated(&word, Settings::new().cap()?)?.oriented(&ScratchSpace::boundless())
         })
     }
 
@@ -210,10 +216,18 @@ impl Surface {
         guarded(&Settings::new(), || {
             surface::validate(&self.inner).accept()?;
             let options = SizeOptions::parse(Some(&h.to_string()), None, None, None)?;
-            (self.inner, _) = refine(&self.inner, &options)?;
+            (self.inner, _) = refine(&self.inner, &options, &ScratchSpace::boundless())?;
             self.sources = vec![given(&self.inner)];
             Ok(self)
         })
+    }
+
+    /// Divides triangles until their edges are as short as `h` wants them where they are, and the result takes half of `cap` at most.
+    pub(crate) fn divide(&mut self, h: &dyn Fn(Point) -> f64, cap: u64) -> Result<(), Error> {
+        refuse_sheets(&self.inner, "refined")?;
+        (self.inner, _) = split(&self.inner, h, cap / 2)?;
+        self.sources = vec![given(&self.inner)];
+        Ok(())
     }
 
     /// The same with the triangles of `sheet` inside: faces of the mesh with tetrahedra on both sides, that part no region.
@@ -282,11 +296,11 @@ impl Surface {
         })
     }
 
-    /// Reads files, or one sample; of packed files and pipes a quarter of `cap` is held.
+    /// Reads files, or one sample, in no more than `cap` bytes of memory.
     pub(crate) fn load(words: &[String], cap: u64) -> Result<Self, Error> {
         let samples = words.iter().filter(|word| word.starts_with(PREFIX)).count();
         match (samples, words) {
-            (1, [word]) => Self::generated(word),
+            (1, [word]) => Self::generated(word, cap),
             (0, _) => Self::read_in(&words.iter().map(PathBuf::from).collect::<Vec<_>>(), cap),
             _ => Err(
                 Error::new("usage", "a sample cannot be joined with other surfaces")
@@ -332,7 +346,7 @@ impl Surface {
         store: &Path,
         scratch: &ScratchSpace,
     ) -> Result<Self, Error> {
-        let cap = Settings::new().cap()?;
+        let cap = scratch.cap();
         let is_of_sheets = |s: &SurfaceSource| {
             [SHEET, SHEETS_FROM, OPEN_PARTS]
                 .iter()
@@ -403,20 +417,20 @@ impl Surface {
         }
     }
 
-    fn generated(word: &str) -> Result<Self, Error> {
+    fn generated(word: &str, cap: u64) -> Result<Self, Error> {
         let spec = SampleSpec::parse(word)?;
         let source = SurfaceSource {
             path: spec.canonical(),
             bytes: 0,
             hash: [0; 2],
         };
-        Ok(Self::of(spec.make()?.into(), vec![source]))
+        Ok(Self::of(spec.make_within(cap)?.into(), vec![source]))
     }
 
     fn read_in(paths: &[PathBuf], cap: u64) -> Result<Self, Error> {
         // What can be read but once is not there for a later run: the store keeps a copy.
         let is_stream = paths.iter().any(|path| is_stream(path));
-        let inner = read_surface(paths, cap / 4)?;
+        let inner = read_surface(paths, cap)?;
         let sources = match is_stream {
             true => vec![given(&inner)],
             false => paths.iter().map(|p| source(p)).collect::<Result<_, _>>()?,

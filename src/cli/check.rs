@@ -9,11 +9,14 @@ use super::check_report::Findings;
 use super::console::Console;
 use super::failure::Failure;
 use super::input::{self, Space};
+use super::memory;
 use crate::api;
+use crate::api::error::{Error, Remedy};
 use crate::api::surface::WELD_SHARE_MAX;
 use crate::api::targets::check_target;
 use crate::io::write;
-use crate::surface::{Repair, Surface, repair};
+use crate::storage::attempt;
+use crate::surface::{Repair, Surface, repair, repair_bytes, validate_in};
 
 /// A repair that was made.
 struct Mended {
@@ -37,9 +40,15 @@ pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
     for out in args.write.iter().chain(&args.write_bad) {
         check_target(out, &inputs)?;
     }
-    let mut input = input::load_with(&args.surfaces, &args.sheets, Space::Boundless, console)?;
-    let mended = args.repair.then(|| mend(&mut input, weld_share));
-    let findings = Findings::of(&input.inner, input.turned);
+    // A check writes nothing beside what it reads.
+    let beside = std::env::temp_dir().join("check");
+    let space = Space::of(args.memory.as_deref(), &beside)?;
+    let mut input = input::load_with(&args.surfaces, &args.sheets, space, console)?;
+    let mended = match args.repair {
+        true => Some(mend(&mut input, weld_share, space)?),
+        false => None,
+    };
+    let findings = Findings::of(&input.inner, input.turned, space, console)?;
     let written = write_files(args, &input.inner, &findings, console)?;
     if console.is_json() {
         let mut answer = findings.json();
@@ -72,21 +81,38 @@ fn share(text: &str) -> Result<f64, Failure> {
     }
 }
 
-fn mend(input: &mut api::Surface, weld_share: Option<f64>) -> Mended {
+/// Repairs; errors: too little memory for it.
+fn mend(
+    input: &mut api::Surface,
+    weld_share: Option<f64>,
+    space: Space,
+) -> Result<Mended, Failure> {
     let surface = &mut input.inner;
-    let n_defects = crate::surface::validate(surface).n_defects;
+    let least = repair_bytes(surface);
+    if space.cap < least {
+        let message = format!(
+            "a surface of {} triangles is repaired in {} of memory",
+            surface.n_triangles(),
+            memory::show(least)
+        );
+        return Err(Error::new("memory", message)
+            .with_remedy(Remedy::Memory(least))
+            .into());
+    }
+    let scratch = space.scratch(surface)?;
+    let n_defects = attempt(|| validate_in(surface, &scratch))?.n_defects;
     let before = (surface.n_triangles(), surface.n_vertices(), n_defects);
     let weld_distance = weld_share.map(|share| share * surface.bounds().diagonal());
     let mut done = repair(surface, weld_distance);
     // Those turned while reading count too.
     done.turned += input.turned;
     input.turned = done.turned;
-    Mended {
+    Ok(Mended {
         weld_share,
         weld_distance,
         done,
         before,
-    }
+    })
 }
 
 impl Mended {

@@ -1,23 +1,28 @@
 //! What `check` found, for people and for programs.
 
-use std::path::Path;
-
 use serde_json::{Value, json};
 
 use super::console::Console;
+use super::failure::Failure;
+use super::input::Space;
+use super::memory;
 use super::words::{self, count};
-use crate::api::{default_cap, predict};
+use crate::api::predict;
 use crate::geom::Point;
 use crate::geom::short;
 use crate::optimize::face_least;
-use crate::pipeline::Options;
+use crate::pipeline::{Options, least_for};
+use crate::storage::attempt;
 use crate::surface::{
     BoundaryLoop, Closing, Defect, Fitness, Surface, Validation, boundary_loops, closing, fitness,
-    show, validate,
+    repair_bytes, show, validate_in,
 };
 
 /// Defects of one kind, holes and junctions listed for people.
 const LISTED: usize = 8;
+/// Of more triangles only `estimate` says how many tetrahedra they make, and `check -v`: sizes and their sum take two to three times what all the
+/// rest of a check does.
+const ESTIMATED_MAX: usize = 100_000;
 /// Above this share of forced tetrahedra, or of triangles with small angles, better triangles are advised.
 const POOR_SHARE: f64 = 0.01;
 /// Above this ratio of edge lengths short edges are pointed at.
@@ -36,25 +41,40 @@ pub struct Findings<'a> {
 }
 
 impl<'a> Findings<'a> {
-    /// Looks at all of it; `turned` triangles were turned while reading.
-    pub fn of(surface: &'a Surface, turned: usize) -> Self {
-        let validation = validate(surface);
+    /// Looks at all of it; `turned` triangles were turned while reading. Errors: too little memory.
+    pub fn of(
+        surface: &'a Surface,
+        turned: usize,
+        space: Space,
+        console: &Console,
+    ) -> Result<Self, Failure> {
+        let scratch = space.scratch(surface)?;
+        let validation = attempt(|| validate_in(surface, &scratch))?;
+        drop(scratch);
         let is_closed = validation.closedness.is_closed();
         let fitness = fitness(surface, &validation.closedness);
-        let tets_expected = (validation.is_valid()).then(|| expected(surface)).flatten();
-        Self {
+        let is_estimated = validation.is_valid()
+            && (surface.n_triangles() <= ESTIMATED_MAX || console.is_verbose());
+        let closing = match is_closed {
+            true => Vec::new(),
+            false if space.cap < repair_bytes(surface) => {
+                console.note(&format!(
+                    "note: what would close it was not tried, which takes {} of memory",
+                    memory::show(repair_bytes(surface))
+                ));
+                Vec::new()
+            }
+            false => closing(surface),
+        };
+        Ok(Self {
             surface,
             turned,
             boundary_loops: boundary_loops(surface, &validation.closedness),
-            closing: if is_closed {
-                Vec::new()
-            } else {
-                closing(surface)
-            },
+            closing,
             fitness,
-            tets_expected,
+            tets_expected: is_estimated.then(|| expected(surface, space)).flatten(),
             validation,
-        }
+        })
     }
 
     fn bounds(&self) -> [[f64; 3]; 2] {
@@ -266,6 +286,13 @@ impl<'a> Findings<'a> {
                 "mesh: about {} tetrahedra with default sizes; {forced}",
                 rounded(tets)
             ));
+        } else if self.is_valid() {
+            console.line(&format!(
+                "mesh: `tetdb estimate` says what to expect; {} of the triangles make quality 2 or worse on them",
+                f.forcing_triangles
+            ));
+        }
+        if self.is_valid() {
             let (least, at) = self.least_quality();
             if f.forcing_triangles > 0 && least.is_finite() {
                 console.line(&format!(
@@ -336,13 +363,11 @@ impl<'a> Findings<'a> {
 }
 
 /// Tetrahedra with default sizes; none where no size makes sense.
-fn expected(surface: &Surface) -> Option<f64> {
-    let prepared = predict(
-        surface,
-        &Options::default(),
-        default_cap().0,
-        Path::new("."),
-    );
+fn expected(surface: &Surface, space: Space) -> Option<f64> {
+    if space.cap < least_for(surface) {
+        return None;
+    }
+    let prepared = predict(surface, &Options::default(), space.cap, space.beside);
     Some(prepared.ok()?.estimate.tets())
 }
 

@@ -42,6 +42,7 @@ pub fn options(args: &ShapeArgs) -> Result<Options, Failure> {
     }
     options.drop_coarse |= args.drop_coarse;
     options.keep_stages |= args.keep_stages;
+    options.refine_surface |= args.refine_surface;
     take_seeds(args, &mut options)?;
     let is_seeded = !(options.region_seed.is_empty() && options.hole.is_empty());
     // The words are stored in full, so that a store tells all of what made it.

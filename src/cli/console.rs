@@ -8,6 +8,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use serde::Serialize;
 
 use super::failure::{Failure, in_flags};
+use super::words;
 use crate::api::{Bytes, Event, Settings};
 use crate::geom::short;
 use crate::storage::CancelToken;
@@ -269,18 +270,20 @@ impl Console {
     pub fn fail(&self, failure: &Failure) -> u8 {
         self.done();
         let exit = failure.exit();
+        let message = words::shortened(&failure.message);
+        let place = failure.place.as_deref().map(words::shortened);
+        let help = failure.help.as_deref().map(words::shortened);
         if self.json {
             self.stderr_json(&serde_json::json!({
-                "error": { "code": failure.code, "exit": exit, "message": failure.message,
-                    "where": failure.place, "help": failure.help }
+                "error": { "code": failure.code, "exit": exit, "message": message, "where": place, "help": help }
             }));
         } else {
             let word = self.colored(RED, &format!("error[{}]:", failure.code));
-            eprintln!("{word} {}", failure.message);
-            if let Some(place) = &failure.place {
+            eprintln!("{word} {message}");
+            if let Some(place) = &place {
                 eprintln!("  at: {place}");
             }
-            if let Some(help) = &failure.help {
+            if let Some(help) = &help {
                 eprintln!("{} {help}", self.colored(GREEN, "help:"));
             }
         }

@@ -5,9 +5,12 @@ use serde_json::json;
 use super::args::StoreArgs;
 use super::console::Console;
 use super::failure::Failure;
+use super::memory;
 use crate::api::store::open_finished;
 
 pub fn run(args: &StoreArgs, console: &Console) -> Result<u8, Failure> {
+    // One row of the catalog is read.
+    memory::asked(args.memory.as_deref())?;
     let mut store = open_finished(&args.store)?;
     let [tets, interfaces] = store.digest()?;
     if console.is_json() {

@@ -12,7 +12,7 @@ use super::words::count;
 use super::{config, input, memory};
 use crate::api::job::take_seeds;
 use crate::api::preflight::free_at;
-use crate::api::{default_cap, predict};
+use crate::api::{default_cap, divide, predict};
 use crate::geom::short;
 use crate::storage::n_threads;
 
@@ -25,9 +25,17 @@ pub fn run(args: &EstimateArgs, console: &Console) -> Result<u8, Failure> {
     };
     let threads = args.threads.unwrap_or_else(n_threads);
     let store = args.output.as_deref().unwrap_or(Path::new("."));
-    let space = Space::Capped(cap, store);
-    let surface = input::load_valid(&args.surfaces, &args.sheets, space, console)?;
+    // The cap is that of the run to come; what is said of it needs the surface, however large.
+    let space = Space {
+        cap: cap.max(default_cap().0),
+        beside: store,
+    };
+    let mut surface = input::load_valid(&args.surfaces, &args.sheets, space, console)?;
     take_seeds(&mut options, &surface.inner.seeds);
+    if options.refine_surface {
+        let settings = console.settings(Some(cap), args.threads);
+        divide(&mut surface, &options, None, cap, store, &settings)?;
+    }
     let prepared = predict(&surface.inner, &options, cap, store)?;
     let estimate = &prepared.estimate;
     let disk_free = free_at(store);

@@ -123,7 +123,7 @@ fn help_of(code: &str) -> &'static str {
         "damaged" => {
             "`tetdb verify STORE` lists what is damaged; `tetdb resaturate STORE --repair` meshes damaged sub-domains again, `--forget` drops a damaged previous version"
         }
-        "memory" => "give more with --memory, or mesh a coarser surface",
+        "memory" => "give more with --memory, or take a coarser surface",
         "stopped" if super::signals::has_store() => {
             "`tetdb resume STORE` goes on from the last finished step"
         }

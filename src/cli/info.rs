@@ -25,6 +25,8 @@ const TETS_MEASURED: u64 = 10_000;
 const SUBDOMAINS_LISTED: usize = 32;
 
 pub fn run(args: &StoreArgs, console: &Console) -> Result<u8, Failure> {
+    // The rows of a catalog are far less than the least cap.
+    memory::asked(args.memory.as_deref())?;
     if console.is_json() {
         console.answer(&object(&args.store)?);
     } else {

@@ -14,30 +14,29 @@ use crate::surface;
 
 /// The memory a command may hold, and where its scratch files go.
 #[derive(Clone, Copy)]
-pub enum Space<'a> {
-    /// All in memory.
-    Boundless,
-    /// Bytes in all, and the place of a store: scratch files are created beside it.
-    Capped(u64, &'a Path),
+pub struct Space<'a> {
+    /// Bytes in all.
+    pub cap: u64,
+    /// Scratch files are created beside this, which need not exist.
+    pub beside: &'a Path,
 }
 
-impl Space<'_> {
+impl<'a> Space<'a> {
+    /// As the option asks.
+    pub fn of(option: Option<&str>, beside: &'a Path) -> Result<Self, Failure> {
+        let cap = memory::cap(option)?;
+        Ok(Self { cap, beside })
+    }
+
     /// What is left beside a surface.
     pub fn scratch(self, surface: &surface::Surface) -> Result<ScratchSpace, Failure> {
-        match self {
-            Self::Boundless => Ok(ScratchSpace::boundless()),
-            Self::Capped(cap, store) => Ok(scratch_beside(surface, cap, store)?),
-        }
+        Ok(scratch_beside(surface, self.cap, self.beside)?)
     }
 }
 
 /// Reads files or generates a sample.
 pub fn load(arguments: &[String], space: Space, console: &Console) -> Result<Surface, Failure> {
-    let cap = match space {
-        Space::Boundless => memory::cap(None)?,
-        Space::Capped(cap, _) => cap,
-    };
-    let surface = Surface::load(arguments, cap)?;
+    let surface = Surface::load(arguments, space.cap)?;
     let scratch = space.scratch(&surface.inner)?;
     let surface = surface.oriented(&scratch)?;
     for note in surface.notes() {

@@ -47,7 +47,10 @@ pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
     let surface = input::load_with(
         &args.surfaces,
         &args.sheets,
-        Space::Capped(settings.cap()?, &path),
+        Space {
+            cap: settings.cap()?,
+            beside: &path,
+        },
         console,
     )?;
     let created = Mesher::of_options(surface, options)

@@ -50,6 +50,7 @@ pub use failure::{CODES, CodeRow};
 pub fn run() -> ExitCode {
     heap::keep_little();
     heap::keep_sweeping();
+    signals::end_without_memory();
     #[cfg(feature = "mpi")]
     let ranks = match ranks::begin() {
         Ok(ranks) => ranks,

@@ -18,15 +18,16 @@ pub fn run(args: &RefineSurfaceArgs, console: &Console) -> Result<u8, Failure> {
     if !args.force {
         check_target(&args.output, &[PathBuf::from(&args.surface)])?;
     }
+    let space = Space::of(args.memory.as_deref(), &args.output)?;
     let input = input::load_valid(
         std::slice::from_ref(&args.surface),
         &SheetArgs::default(),
-        Space::Boundless,
+        space,
         console,
     )?;
     let surface = input.inner;
-    let (fine, report) = refine(&surface, &options)?;
-    input::validated(&fine, Space::Boundless)?;
+    let (fine, report) = refine(&surface, &options, &space.scratch(&surface)?)?;
+    input::validated(&fine, space)?;
     write::surface(&fine, &args.output)?;
     let (triangles, vertices) = (fine.n_triangles(), fine.n_vertices());
     if console.is_json() {

@@ -15,8 +15,8 @@ use crate::io::write;
 use crate::samples::PREFIX;
 
 /// Writes to the standard output.
-fn to_stdout(word: &str, format: &str, console: &Console) -> Result<u8, Failure> {
-    let surface = input::load(&[word.to_owned()], Space::Boundless, console)?.inner;
+fn to_stdout(word: &str, format: &str, space: Space, console: &Console) -> Result<u8, Failure> {
+    let surface = input::load(&[word.to_owned()], space, console)?.inner;
     // A file first, with a name nobody else has: the writers know files alone.
     let file = std::env::temp_dir().join(format!("tetdb-sample-{}.{format}", std::process::id()));
     let copied = write::surface(&surface, &file)
@@ -52,15 +52,19 @@ pub fn run(args: &SampleArgs, console: &Console) -> Result<u8, Failure> {
         format!("{PREFIX}{}", args.sample)
     };
     let format = args.format.as_deref().unwrap_or("stl");
-    if args.output == Path::new("-") {
-        return to_stdout(&word, format, console);
+    let temporary = std::env::temp_dir().join("sample");
+    let is_stdout = args.output == Path::new("-");
+    let place = if is_stdout { &temporary } else { &args.output };
+    let space = Space::of(args.memory.as_deref(), place)?;
+    if is_stdout {
+        return to_stdout(&word, format, space, console);
     }
     if args.format.is_some() {
         let message = "--format is for -o -; a file's ending says its format";
         return Err(Failure::new("usage", message).help("name the file .stl, .off, .obj or .ply"));
     }
     check_target(&args.output, &[])?;
-    let surface = input::load(&[word], Space::Boundless, console)?.inner;
+    let surface = input::load(&[word], space, console)?.inner;
     if surface.has_sheets() {
         let sheets = beside(&args.output);
         check_target(&sheets, &[])?;

@@ -1,9 +1,11 @@
 //! Ctrl-C and SIGTERM end a run between two page accesses; a second one ends it at once.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
 use std::time::Duration;
 
-use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::consts::{SIGABRT, SIGINT, SIGTERM};
+use signal_hook::flag::register_conditional_shutdown;
 use signal_hook::iterator::Signals;
 
 use super::console::Console;
@@ -17,6 +19,18 @@ static HAS_STORE: AtomicBool = AtomicBool::new(false);
 static IN_ORDER: AtomicBool = AtomicBool::new(false);
 /// What reads, validates and sizes a surface looks for signals here and there only; it has so long to end by itself.
 const PATIENCE: Duration = Duration::from_millis(1000);
+
+/// From now on memory that the system refuses ends the process like any other lack of memory.
+///
+/// Long arrays ask for memory in a way that can fail (`storage::reserve`). All the rest, libraries too, ends in the standard library, which says how
+/// many bytes were refused and aborts. Panics do not abort, so nothing else comes by here but a stack that is full.
+pub fn end_without_memory() {
+    // Errors: the system knows no such signal; the process then ends by it.
+    let _ = register_conditional_shutdown(SIGABRT, NO_MEMORY, Arc::new(AtomicBool::new(true)));
+}
+
+/// The exit code of too little memory.
+const NO_MEMORY: i32 = 6;
 
 /// Listens from now on. Errors: the system refuses; the run then simply cannot be stopped gently.
 pub fn listen(console: &Console) {

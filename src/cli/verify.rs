@@ -20,7 +20,10 @@ pub fn run(args: &VerifyArgs, console: &Console) -> Result<u8, Failure> {
     let mut open = open_finished(&args.store)?;
     // The store may be one that can only be read.
     let scratch = std::env::temp_dir().join("verify");
-    let space = Space::Capped(cap, &scratch);
+    let space = Space {
+        cap,
+        beside: &scratch,
+    };
     let surface = match args.against.is_empty() {
         true => {
             let sources = open.job()?.surfaces;

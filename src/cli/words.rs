@@ -1,5 +1,7 @@
 //! Counts, lists and sizes in words.
 
+use std::borrow::Cow;
+
 use crate::geom::short;
 
 /// Names listed for people.
@@ -27,6 +29,24 @@ pub fn listed<T: AsRef<str>>(names: &[T]) -> String {
 pub fn bounds([low, high]: [[f64; 3]; 2]) -> String {
     let corner = |p: [f64; 3]| p.map(short).join(", ");
     format!("({}) to ({})", corner(low), corner(high))
+}
+
+/// Letters of a message that are shown: more than the longest path has.
+const TEXT_MAX: usize = 5000;
+
+/// The begin and the end of a text that is longer than anybody reads, which repeats what was typed.
+pub fn shortened(text: &str) -> Cow<'_, str> {
+    let n = text.chars().count();
+    if n <= TEXT_MAX {
+        return text.into();
+    }
+    let begin = text.chars().take(TEXT_MAX / 2);
+    let end = text.chars().skip(n - TEXT_MAX / 2);
+    begin
+        .chain(" … ".chars())
+        .chain(end)
+        .collect::<String>()
+        .into()
 }
 
 #[cfg(test)]

@@ -97,16 +97,21 @@ fn cube_points(n: i32, seed: u64) -> (Vec<Point>, usize) {
     (points, n_skin)
 }
 
-/// Delaunay mesh of the cube, hull faces required, vertices of the skin tagged, region 1.
-fn cube<P: Pages>(mut mesh: Mesh<P>, n: i32, seed: u64) -> Mesh<P> {
+/// Delaunay mesh of the cube.
+fn cube<P: Pages>(mesh: Mesh<P>, n: i32, seed: u64) -> Mesh<P> {
     let (points, n_skin) = cube_points(n, seed);
+    delaunay(mesh, &points, n_skin, 1.0 / n as f32)
+}
+
+/// Delaunay mesh of points, hull faces required, the first `n_skin` vertices tagged, region 1.
+fn delaunay<P: Pages>(mut mesh: Mesh<P>, points: &[Point], n_skin: usize, h: f32) -> Mesh<P> {
     let frame = HilbertFrame::new(&Aabb::around(points.iter().copied()));
     let mut order: Vec<usize> = (0..points.len()).collect();
     order.sort_by_key(|&i| insertion_key(&frame, points[i]));
     let mut kernel = Kernel::default();
     let mut hint = enclose(&mut mesh, &Aabb::around(points.iter().copied()));
     for i in order {
-        let v = mesh.add_vertex(points[i], 1.0 / n as f32);
+        let v = mesh.add_vertex(points[i], h);
         if i < n_skin {
             mesh.set_vertex_attribute(v, VertexTag::Surface, i as u32);
         }
@@ -327,6 +332,36 @@ fn what_is_flat_but_for_rounding_is_mended_and_the_skin_stays() {
         mender.counts
     );
     assert!(mender.counts.vertices_moved + mender.counts.vertices_inserted > 0);
+}
+
+#[test]
+fn a_vertex_of_hundreds_of_tetrahedra_leaves_the_plane_it_lies_beside() {
+    let turn = std::f64::consts::PI * (3.0 - 5.0f64.sqrt());
+    let mut points: Vec<Point> = (0..150)
+        .map(|i| {
+            let z = 1.0 - (2.0 * f64::from(i) + 1.0) / 150.0;
+            let (y, x) = (turn * f64::from(i)).sin_cos();
+            let r = (1.0 - z * z).sqrt();
+            Point::new(r * x, r * y, z)
+        })
+        .collect();
+    points.push(Point::new(0.01, 0.02, 0.03));
+    let mut mesh = delaunay(Mesh::new(FlatPages::default()), &points, 150, 0.3);
+    let all = live(&mut mesh);
+    let (_, tet) = all[0];
+    let center = (tet.vertices().into_iter()).find(|&v| !mesh.is_fixed(v));
+    let center = center.expect("one inside");
+    let star = all.iter().filter(|(_, tet)| tet.local(center).is_some());
+    assert!(star.count() > 200);
+    let i = tet.local(center).expect("it has it");
+    let [a, b, c] = tet.face(i).map(|v| mesh.point(v));
+    mesh.set_point(center, (a + b + c) / 3.0 * (1.0 - 1e-9));
+    assert!(measure(&mut mesh).worst > 1e8);
+    let mut mender = Mender::default();
+    let mut pages = PageFlags::all(&mesh);
+    mender.run(&mut mesh, &mut pages, &mut |_| ());
+    let table = measure(&mut mesh);
+    assert!(table.worst < 50.0, "{table:?} {:?}", mender.counts);
 }
 
 #[test]

@@ -279,7 +279,7 @@ impl QuerySession {
     /// The faces of a sub-domain that are input triangles, kept until another's are wanted.
     ///
     /// Errors: damage; a budget without 16 bytes for each of their sides.
-    pub(super) fn surface_of(&mut self, rank: u32) -> Result<Arc<SurfaceFaces>, QueryError> {
+    pub(crate) fn surface_of(&mut self, rank: u32) -> Result<Arc<SurfaceFaces>, QueryError> {
         if let Some(known) = self.surface.as_ref().filter(|s| s.rank == rank) {
             return Ok(known.clone());
         }

@@ -7,7 +7,7 @@ use crate::storage::{Lease, check_cancelled};
 use crate::store::StoreError;
 
 /// The faces of one sub-domain that are input triangles.
-pub(super) struct SurfaceFaces {
+pub(crate) struct SurfaceFaces {
     pub rank: u32,
     /// A tetrahedron and the vertices of one of its faces, sorted.
     faces: Vec<(u32, [u32; 3])>,

@@ -49,7 +49,7 @@ impl Balls {
     }
 
     /// Makes the surface: labels `walls` and `balls`.
-    pub(super) fn make(&self) -> Result<Sample, SampleError> {
+    pub(super) fn make(&self, bytes_max: u64) -> Result<Sample, SampleError> {
         let mut random = Random::new(self.seed);
         let placed = self.place(&mut random)?;
         let bounds = Aabb {
@@ -61,7 +61,7 @@ impl Balls {
             .map(|(_, r)| sphere_triangles(sphere_pieces(*r, self.h)))
             .sum::<f64>()
             + box_triangles(&bounds, self.h);
-        triangles_checked("balls", n_triangles)?;
+        triangles_checked("balls", n_triangles, bytes_max)?;
         let mut build = Builder::default();
         let walls = build.label("walls");
         let label = build.label("balls");

@@ -15,12 +15,12 @@ use super::sample::Sample;
 use crate::geom::{Aabb, Point};
 
 /// A box `box,x=X,y=Y,z=Z,h=H` with a corner at the origin; one label per face.
-pub(super) fn make_box(sides: Point, h: f64) -> Result<Sample, SampleError> {
+pub(super) fn make_box(sides: Point, h: f64, bytes_max: u64) -> Result<Sample, SampleError> {
     let bounds = Aabb {
         low: Point::ZERO,
         high: sides,
     };
-    triangles_checked("box", box_triangles(&bounds, h))?;
+    triangles_checked("box", box_triangles(&bounds, h), bytes_max)?;
     let mut build = Builder::default();
     let labels = ["x-low", "x-high", "y-low", "y-high", "z-low", "z-high"];
     let labels = labels.map(|name| build.label(name));

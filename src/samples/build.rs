@@ -2,6 +2,7 @@
 
 use super::{Sample, SampleError};
 use crate::geom::Point;
+use crate::storage::{filled, push, reserve};
 use std::collections::HashMap;
 
 /// A surface being made.
@@ -22,7 +23,7 @@ impl Builder {
     /// A new point; the caller knows that it is not there yet.
     pub(super) fn point(&mut self, p: Point) -> u32 {
         // Adding zero turns -0.0 into 0.0.
-        self.sample.points.push(p + Point::ZERO);
+        push(&mut self.sample.points, p + Point::ZERO);
         // Makers refuse surfaces of more triangles than u32 can number before they begin.
         (self.sample.points.len() - 1) as u32
     }
@@ -41,8 +42,8 @@ impl Builder {
     /// A triangle, turned over when `inward`.
     pub(super) fn triangle(&mut self, [a, b, c]: [u32; 3], inward: bool, label: u32) {
         let corners = if inward { [a, c, b] } else { [a, b, c] };
-        self.sample.triangles.push(corners);
-        self.sample.labels.push(label);
+        push(&mut self.sample.triangles, corners);
+        push(&mut self.sample.labels, label);
     }
 
     /// Triangles so far.
@@ -66,8 +67,9 @@ impl Builder {
     /// file of it would.
     pub(super) fn finish(mut self) -> Sample {
         const UNNAMED: u32 = u32::MAX;
-        let mut old2new = vec![UNNAMED; self.sample.points.len()];
-        let mut points = Vec::with_capacity(self.sample.points.len());
+        let mut old2new = filled(self.sample.points.len(), UNNAMED);
+        let mut points = Vec::new();
+        reserve(&mut points, self.sample.points.len());
         for v in self.sample.triangles.iter_mut().flatten() {
             let new = &mut old2new[*v as usize];
             if *new == UNNAMED {
@@ -82,17 +84,26 @@ impl Builder {
 }
 
 /// Refuses a surface too large to be made in memory.
-pub(super) fn triangles_checked(name: &'static str, n_triangles: f64) -> Result<(), SampleError> {
-    // Written so that a NaN is refused too.
-    if n_triangles <= TRIANGLES_MAX as f64 {
-        return Ok(());
+pub(super) fn triangles_checked(
+    name: &'static str,
+    n_triangles: f64,
+    bytes_max: u64,
+) -> Result<(), SampleError> {
+    if n_triangles.is_nan() || n_triangles > TRIANGLES_MAX as f64 {
+        return Err(SampleError::TooMany {
+            name,
+            found: n_triangles,
+            expected: TRIANGLES_MAX,
+        });
     }
-    Err(SampleError::TooMany {
-        name,
-        found: n_triangles,
-        expected: TRIANGLES_MAX,
-    })
+    let needed = BYTES_TRIANGLE * n_triangles as u64;
+    match needed <= bytes_max {
+        true => Ok(()),
+        false => Err(SampleError::Memory { name, needed }),
+    }
 }
 
-/// Above this a sample is refused: it is made in memory, about 40 bytes per triangle.
+/// Above this a sample is refused.
 const TRIANGLES_MAX: u64 = 100_000_000;
+/// Bytes held for a triangle while a sample is made: half a point and another half while points are numbered, corners, a label, growth.
+const BYTES_TRIANGLE: u64 = 50;

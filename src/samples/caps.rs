@@ -24,8 +24,8 @@ pub struct Caps {
 }
 
 impl Caps {
-    pub(super) fn make(&self) -> Result<Sample, SampleError> {
-        triangles_checked("caps", 4.0 * self.count as f64)?;
+    pub(super) fn make(&self, bytes_max: u64) -> Result<Sample, SampleError> {
+        triangles_checked("caps", 4.0 * self.count as f64, bytes_max)?;
         let mut random = Random::new(self.seed);
         let mut turn = 0.0;
         let gaps = pieces(self.count, || power(GAPS, random.unit()));

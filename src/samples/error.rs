@@ -75,6 +75,14 @@ pub enum SampleError {
         /// The most it may have.
         expected: u64,
     },
+    /// It takes more memory than is allowed.
+    #[error("sample `{name}` takes about {needed} bytes while it is generated")]
+    Memory {
+        /// Name of the sample.
+        name: &'static str,
+        /// Bytes, about.
+        needed: u64,
+    },
     /// A ball found no free place.
     #[error(
         "no room was found for ball {placed} of {count} (radius {radius}) with seed {seed}; try another seed or count"

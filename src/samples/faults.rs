@@ -32,9 +32,13 @@ pub struct Faults {
 type CellSide = (usize, [u32; 3]);
 
 impl Faults {
-    pub(super) fn make(&self) -> Result<Sample, SampleError> {
+    pub(super) fn make(&self, bytes_max: u64) -> Result<Sample, SampleError> {
         let squares = f64::from(self.cells) * f64::from(self.cells);
-        triangles_checked("faults", 2.0 * squares * (6.0 + self.count as f64))?;
+        triangles_checked(
+            "faults",
+            2.0 * squares * (6.0 + self.count as f64),
+            bytes_max,
+        )?;
         let mut build = Builder::default();
         let shell = build.label("box");
         for axis in 0..3 {

@@ -41,14 +41,14 @@ impl Grains {
     }
 
     /// Makes the surface: labels `walls` and `grains`.
-    pub(super) fn make(&self) -> Result<Sample, SampleError> {
+    pub(super) fn make(&self, bytes_max: u64) -> Result<Sample, SampleError> {
         let bounds = Aabb {
             low: Point::ZERO,
             high: Point::ONE,
         };
         let each = (POINTS_LEAST + POINTS_MOST - 4) as f64;
         let n_triangles = each * self.count as f64 + box_triangles(&bounds, self.h);
-        triangles_checked("grains", n_triangles)?;
+        triangles_checked("grains", n_triangles, bytes_max)?;
         let mut build = Builder::default();
         let walls = build.label("walls");
         let label = build.label("grains");

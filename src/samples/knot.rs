@@ -19,7 +19,7 @@ const TURNS_RING: f64 = 3.0;
 const TABLE: usize = 6000;
 
 /// A knot `knot,tube=R,h=H`.
-pub(super) fn make_knot(tube: f64, h: f64) -> Result<Sample, SampleError> {
+pub(super) fn make_knot(tube: f64, h: f64, bytes_max: u64) -> Result<Sample, SampleError> {
     let table = arc_table();
     let length = table[TABLE];
     let around = (TAU * tube / h + 0.5).floor().max(5.0);
@@ -28,7 +28,7 @@ pub(super) fn make_knot(tube: f64, h: f64) -> Result<Sample, SampleError> {
         * (length / (h * 0.75f64.sqrt()) / 2.0 + 0.5)
             .floor()
             .max(12.0);
-    triangles_checked("knot", 2.0 * around * rings)?;
+    triangles_checked("knot", 2.0 * around * rings, bytes_max)?;
     let (m, n) = (around as u32, rings as u32);
     let mut build = Builder::default();
     let label = build.label("knot");

@@ -34,10 +34,14 @@ pub struct Needles {
 }
 
 impl Needles {
-    pub(super) fn make(&self) -> Result<Sample, SampleError> {
+    pub(super) fn make(&self, bytes_max: u64) -> Result<Sample, SampleError> {
         let quarter = self.count.div_ceil(4).max(QUARTER_MIN);
         let circle = 4.0 * quarter as f64;
-        triangles_checked("needles", circle * (8.0 + 4.0 * self.holes as f64))?;
+        triangles_checked(
+            "needles",
+            circle * (8.0 + 4.0 * self.holes as f64),
+            bytes_max,
+        )?;
         let mut random = Random::new(self.seed);
         let mut build = Builder::default();
         let turn = random.unit();

@@ -17,7 +17,12 @@ pub enum ShellKind {
 
 /// `count` concentric shells of radius (half side) 1, 1 − 1/count, …, 1/count; labels `shell-1` …
 /// from the outside.
-pub(super) fn make_shells(count: usize, kind: ShellKind, h: f64) -> Result<Sample, SampleError> {
+pub(super) fn make_shells(
+    count: usize,
+    kind: ShellKind,
+    h: f64,
+    bytes_max: u64,
+) -> Result<Sample, SampleError> {
     let radii: Vec<f64> = (0..count)
         .map(|i| (count - i) as f64 / count as f64)
         .collect();
@@ -25,7 +30,7 @@ pub(super) fn make_shells(count: usize, kind: ShellKind, h: f64) -> Result<Sampl
         ShellKind::Spheres => sphere_triangles(sphere_pieces(r, h)),
         ShellKind::Boxes => box_triangles(&cube(r), h),
     });
-    triangles_checked("shells", n_triangles.sum())?;
+    triangles_checked("shells", n_triangles.sum(), bytes_max)?;
     let mut build = Builder::default();
     let mut spheres = Spheres::default();
     for (i, &radius) in radii.iter().enumerate() {

@@ -184,17 +184,25 @@ impl SampleSpec {
     /// [`SampleError::TooMany`] before anything large is allocated; [`SampleError::NoRoom`] when
     /// balls find no place.
     pub fn make(&self) -> Result<Sample, SampleError> {
+        self.make_within(u64::MAX)
+    }
+
+    /// The same in no more than about `bytes_max` of memory.
+    ///
+    /// # Errors
+    /// [`SampleError::Memory`] too, before anything large is allocated.
+    pub fn make_within(&self, bytes_max: u64) -> Result<Sample, SampleError> {
         match &self.kind {
-            SampleKind::Balls(balls) => balls.make(),
-            SampleKind::Box { sides, h } => boxes::make_box(*sides, *h),
-            SampleKind::Caps(caps) => caps.make(),
-            SampleKind::Faults(faults) => faults.make(),
-            SampleKind::Grains(grains) => grains.make(),
-            SampleKind::Knot { tube, h } => knot::make_knot(*tube, *h),
-            SampleKind::Needles(needles) => needles.make(),
-            SampleKind::Shells { count, kind, h } => make_shells(*count, *kind, *h),
-            SampleKind::Sphere { radius, h } => sphere::make_sphere(*radius, *h),
-            SampleKind::Steps(steps) => steps.make(),
+            SampleKind::Balls(balls) => balls.make(bytes_max),
+            SampleKind::Box { sides, h } => boxes::make_box(*sides, *h, bytes_max),
+            SampleKind::Caps(caps) => caps.make(bytes_max),
+            SampleKind::Faults(faults) => faults.make(bytes_max),
+            SampleKind::Grains(grains) => grains.make(bytes_max),
+            SampleKind::Knot { tube, h } => knot::make_knot(*tube, *h, bytes_max),
+            SampleKind::Needles(needles) => needles.make(bytes_max),
+            SampleKind::Shells { count, kind, h } => make_shells(*count, *kind, *h, bytes_max),
+            SampleKind::Sphere { radius, h } => sphere::make_sphere(*radius, *h, bytes_max),
+            SampleKind::Steps(steps) => steps.make(bytes_max),
         }
     }
 

@@ -22,9 +22,9 @@ const ICOSAHEDRON_ARC: f64 = 1.107_148_717_794_090_4;
 const PIECES_MIN: f64 = 3.0;
 
 /// A sphere `sphere,radius=R,h=H` around the origin.
-pub(super) fn make_sphere(radius: f64, h: f64) -> Result<Sample, SampleError> {
+pub(super) fn make_sphere(radius: f64, h: f64, bytes_max: u64) -> Result<Sample, SampleError> {
     let pieces = sphere_pieces(radius, h);
-    triangles_checked("sphere", sphere_triangles(pieces))?;
+    triangles_checked("sphere", sphere_triangles(pieces), bytes_max)?;
     let mut build = Builder::default();
     let label = build.label("sphere");
     let mut spheres = Spheres::default();

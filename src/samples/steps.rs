@@ -29,8 +29,8 @@ pub struct Steps {
 }
 
 impl Steps {
-    pub(super) fn make(&self) -> Result<Sample, SampleError> {
-        triangles_checked("steps", 12.0 * self.count as f64)?;
+    pub(super) fn make(&self, bytes_max: u64) -> Result<Sample, SampleError> {
+        triangles_checked("steps", 12.0 * self.count as f64, bytes_max)?;
         let mut random = Random::new(self.seed);
         let widths = pieces(self.count, || LEAST + random.unit());
         let mut height = HEIGHT;

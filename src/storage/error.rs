@@ -73,6 +73,12 @@ pub enum StorageError {
         /// Bytes left.
         available: u64,
     },
+    /// The system refuses the memory for an array.
+    #[error("the system refuses {bytes} bytes of memory")]
+    NoMemory {
+        /// Bytes asked for.
+        bytes: u64,
+    },
     /// More records than 30-bit ids can name.
     #[error("a sub-domain cannot hold more than 2^30 {what}")]
     TooMany {

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use bytemuck::Pod;
 
 use super::scratch::ScratchFile;
-use super::{DiskPath, Lease, check_cancelled, raise};
+use super::{DiskPath, Lease, check_cancelled, raise, reserve};
 
 /// Bytes of a page: small, for what is near in an array is near in space only mostly.
 pub(super) const PAGE_BYTES: usize = 1 << 14;
@@ -177,7 +177,7 @@ impl<T: Pod> PagedVec<T> {
             let more = (self.pages.len() / 2).clamp(1, self.frames_max - self.pages.len());
             let n = self.pages.len() + 1;
             if self.frames.capacity() < n * Self::PER {
-                self.frames.reserve_exact(more * Self::PER);
+                reserve(&mut self.frames, more * Self::PER);
             }
             self.frames.resize(n * Self::PER, self.initial);
             self.pages.push((u32::MAX, 0));

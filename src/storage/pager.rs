@@ -70,8 +70,14 @@ impl Pager {
     /// A pool of `bytes / 64 KiB` frames (at least 16) over `backing`; without one, more pages than frames are an error.
     pub fn new(bytes: u64, backing: Option<Backing>) -> Self {
         let frames_max = frames_of(bytes);
+        let frames =
+            bytemuck::allocation::try_zeroed_vec(frames_max * SLOTS).unwrap_or_else(|()| {
+                raise(StorageError::NoMemory {
+                    bytes: (frames_max * FRAME_BYTES) as u64,
+                })
+            });
         Self {
-            frames: bytemuck::allocation::zeroed_vec(frames_max * SLOTS),
+            frames,
             frames_max,
             free: Vec::new(),
             tables: Default::default(),

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use rayon::slice::ParallelSliceMut;
 
 use super::sort_record::{SortBytes, SortRecord};
-use super::{DiskPath, StorageError, check_cancelled, parallel};
+use super::{DiskPath, StorageError, check_cancelled, parallel, reserve};
 
 /// Numbers run files within the process.
 static RUNS: AtomicU64 = AtomicU64::new(0);
@@ -76,7 +76,7 @@ impl<R: SortRecord> Sorter<R> {
             // Grow by halves up to the exact bound: doubling would hold three times the records while it copies.
             let more = (self.records.len() / 2).max(4096);
             let more = more.min(self.records_max - self.records.len());
-            self.records.reserve_exact(more);
+            reserve(&mut self.records, more);
         }
         self.records.push(record.to_bytes());
         Ok(())

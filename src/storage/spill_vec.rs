@@ -8,7 +8,7 @@ use std::sync::Arc;
 use bytemuck::Pod;
 
 use super::paged_vec::{FRAMES_MIN, PAGE_BYTES, PagedVec, SharedPagedVec, per_page};
-use super::{Budget, DiskPath, Lease, SortRecord, Sorter};
+use super::{Budget, DiskPath, Lease, SortRecord, Sorter, filled, reserve};
 
 /// Memory for arrays and sorts, and a folder for those it does not hold.
 #[derive(Clone)]
@@ -67,7 +67,7 @@ impl ScratchSpace {
                 }
             }
             _ => SpillVec {
-                place: Residence::Memory(vec![value; n]),
+                place: Residence::Memory(filled(n, value)),
                 lease: self.budget.lease(bytes, "an array").ok(),
             },
         }
@@ -199,7 +199,7 @@ impl<T: Pod> SpillVecBuilder<T> {
             }
             let more = (self.memory.len() / 2).max(1024);
             let more = more.min(self.memory_max - self.memory.len());
-            self.memory.reserve_exact(more);
+            reserve(&mut self.memory, more);
         }
         self.memory.push(value);
     }

@@ -106,11 +106,7 @@ impl Catalog {
     /// Whether `dir` is a directory where a store can be created: empty, or left by a run that was killed before its first commit.
     pub fn is_vacant(dir: impl Into<DiskPath>) -> bool {
         let names = dir.into().list();
-        names.is_ok_and(|names| {
-            names
-                .iter()
-                .all(|name| [CATALOG_NEW, LOCK].contains(&&**name))
-        })
+        names.is_ok_and(|names| holds_nothing(&names))
     }
 
     /// Opens a store for reading; others may read and change it meanwhile.
@@ -675,13 +671,20 @@ fn refuse_existing(dir: &DiskPath) -> Result<(), StoreError> {
         let reason = "it is a file";
         return Err(StoreError::NotOurs { path, reason });
     }
-    if Catalog::is_vacant(dir) {
+    // A folder that cannot be listed may hold anything.
+    if holds_nothing(&dir.list()?) {
         return Ok(());
     }
     match Catalog::open(dir)?.state()?.is_finished() {
         true => Err(StoreError::Finished { path }),
         false => Err(StoreError::Unfinished { path }),
     }
+}
+
+/// Whether a folder with these names is one where a store can be created.
+fn holds_nothing(names: &[String]) -> bool {
+    let is_left_over = |name: &String| [CATALOG_NEW, LOCK].contains(&&**name);
+    names.iter().all(is_left_over)
 }
 
 /// First words of the names of files.

@@ -15,6 +15,18 @@ pub enum SurfaceError {
         /// The most allowed.
         limit: usize,
     },
+    /// It does not fit the memory allowed.
+    #[error(
+        "{triangles} triangles and {vertices} vertices, and there are more, take more than the {bytes_max} bytes of memory allowed"
+    )]
+    Memory {
+        /// Bytes allowed.
+        bytes_max: u64,
+        /// Triangles read so far.
+        triangles: usize,
+        /// Vertices read so far.
+        vertices: usize,
+    },
     /// A triangle names a vertex that is not there.
     #[error("triangle {triangle} names vertex {vertex}, but there are {n_vertices}")]
     NoSuchVertex {
@@ -62,6 +74,7 @@ impl SurfaceError {
     pub fn code(&self) -> &'static str {
         match self {
             Self::TooLarge { .. } => "surface-too-large",
+            Self::Memory { .. } => "memory",
             Self::NoSuchVertex { .. } => "index-out-of-range",
             Self::TooSmall { .. } => "coordinate-range",
             Self::Invalid { defect, .. } => defect.code(),
@@ -72,6 +85,7 @@ impl SurfaceError {
     pub fn help(&self) -> &'static str {
         match self {
             Self::TooLarge { .. } => "split the surface into parts and mesh them one by one",
+            Self::Memory { .. } => "allow more memory, or take a coarser surface",
             Self::NoSuchVertex { .. } => "write the file again from the program that made it",
             Self::TooSmall { .. } => "scale the surface to ordinary units, for example metres",
             Self::Invalid { defect, .. } => defect.help(),

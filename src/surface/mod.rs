@@ -42,7 +42,7 @@ pub use edges::{Closedness, closedness};
 pub use fitness::{Fitness, fitness};
 pub use near::weld_near;
 pub use orientation::{Orientation, orient_alike, orient_alike_in};
-pub use repair::{Closing, Repair, closing, repair};
+pub use repair::{Closing, Repair, closing, repair, repair_bytes};
 pub use seeds::{Seed, SeedKind};
 pub use seek::{Crossing, Seeker};
 pub use split::{SplitReport, split};

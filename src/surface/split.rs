@@ -21,6 +21,10 @@ const SWAP_PASSES: u32 = 12;
 /// Triangles have 32-bit numbers; a wanted length that asks for more is refused before memory is.
 const TRIANGLES_MAX: usize = 1 << 30;
 
+/// Bytes held for a triangle: itself, its input triangle, and one and a half edges in a table that doubles. Measured with the sizes it is divided by:
+/// 226 to 235.
+const BYTES_TRIANGLE: u64 = 240;
+
 /// What was done.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct SplitReport {
@@ -42,11 +46,21 @@ fn edge(a: u32, b: u32) -> Edge {
 /// Divides the triangles of `surface`; `h` tells the wanted edge length at a position.
 ///
 /// New triangles keep label and orientation; they stand in the place of the triangle they came from and behind the others.
-/// Memory: some 200 bytes a triangle made. Errors: more triangles than can be numbered.
+/// Memory: `bytes_max` at most. Errors: more triangles than fit it, or than can be numbered.
 pub fn split(
     surface: &Surface,
     h: &dyn Fn(Point) -> f64,
+    bytes_max: u64,
 ) -> Result<(Surface, SplitReport), SurfaceError> {
+    let fits = |surface: &Surface| match bytes_max / BYTES_TRIANGLE < surface.n_triangles() as u64 {
+        false => Ok(()),
+        true => Err(SurfaceError::Memory {
+            bytes_max,
+            triangles: surface.n_triangles(),
+            vertices: surface.n_vertices(),
+        }),
+    };
+    fits(surface)?;
     let mut splitter = Splitter::new(surface);
     let mut heap = BinaryHeap::new();
     let edges: Vec<Edge> = splitter.around.keys().copied().collect();
@@ -61,6 +75,7 @@ pub fn split(
                 limit: TRIANGLES_MAX,
             });
         }
+        fits(&splitter.surface)?;
         splitter.divide(e, h, &mut heap);
     }
     for _ in 0..SWAP_PASSES {
@@ -276,7 +291,7 @@ mod tests {
     #[test]
     fn edges_get_the_wanted_length_and_the_surface_stays() {
         let h = |p: Point| 0.05 + 0.1 * p.x;
-        let (fine, report) = split(&cube(), &h).expect("few triangles");
+        let (fine, report) = split(&cube(), &h, u64::MAX).expect("few triangles");
         assert!(validate(&fine).accept().is_ok());
         assert_eq!(report.deviation_max, 0.0);
         assert!(report.edges_divided > 1000 && report.edges_swapped > 0);
@@ -294,8 +309,9 @@ mod tests {
                 assert!(a.distance(b) < 1.5 * LONG * h((a + b) * 0.5));
             }
         }
+        assert!(split(&cube(), &h, 1000 * BYTES_TRIANGLE).is_err());
         assert_eq!(
-            split(&cube(), &h).expect("the same").0.triangles,
+            split(&cube(), &h, u64::MAX).expect("the same").0.triangles,
             fine.triangles
         );
     }

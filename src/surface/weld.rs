@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use super::{Note, NoteKind, Seed, SourceFile, Surface, SurfaceError};
 use crate::geom::Point;
+use crate::storage::{filled, push};
 
 /// Collects triangles from one file after the other and welds vertices with identical bits.
 ///
@@ -25,12 +26,40 @@ pub struct SurfaceBuilder {
     n_fanned: u64,
     /// Triangles of this file are given by position, not by the file's vertex numbers.
     by_position: bool,
+    /// Bytes it may hold; `None` for as many as there are.
+    bytes_max: Option<u64>,
 }
 
 impl SurfaceBuilder {
     /// A builder without files.
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// A builder that refuses what it cannot hold in so many bytes.
+    pub fn within(bytes_max: u64) -> Self {
+        Self {
+            bytes_max: Some(bytes_max),
+            ..Self::default()
+        }
+    }
+
+    /// Bytes held: the surface, and what finds its vertices.
+    fn bytes(&self) -> u64 {
+        let ids = self.file2vert.capacity() + self.table.slots.len();
+        (self.surface.bytes() + ids * size_of::<u32>()) as u64
+    }
+
+    /// Refuses more than fits; to be asked when something is about to grow.
+    fn check_bytes(&self) -> Result<(), SurfaceError> {
+        match self.bytes_max.filter(|&most| self.bytes() > most) {
+            None => Ok(()),
+            Some(bytes_max) => Err(SurfaceError::Memory {
+                bytes_max,
+                triangles: self.surface.n_triangles(),
+                vertices: self.surface.n_vertices(),
+            }),
+        }
     }
 
     /// Starts a file whose triangles will name its own vertices.
@@ -58,13 +87,16 @@ impl SurfaceBuilder {
     /// Adds the next vertex of the file; the coordinates must be finite.
     ///
     /// # Errors
-    /// [`SurfaceError::TooLarge`] beyond 2^30 vertices.
+    /// [`SurfaceError::TooLarge`] beyond 2^30 vertices; [`SurfaceError::Memory`] beyond the builder's bytes, as for all that follow.
     pub fn vertex(&mut self, p: Point) -> Result<(), SurfaceError> {
         SurfaceError::check_size("vertices", self.file2vert.len() + 1)?;
+        if self.file2vert.len() == self.file2vert.capacity() {
+            self.check_bytes()?;
+        }
         let before = self.surface.points.len();
         let vert = self.weld(p)?;
         self.n_welded += u64::from((vert as usize) < before);
-        self.file2vert.push(vert);
+        push(&mut self.file2vert, vert);
         Ok(())
     }
 
@@ -92,8 +124,11 @@ impl SurfaceBuilder {
     /// [`SurfaceError::TooLarge`] beyond 2^30 triangles.
     pub fn triangle(&mut self, corners: [u32; 3], label: u32) -> Result<(), SurfaceError> {
         SurfaceError::check_size("triangles", self.surface.triangles.len() + 1)?;
-        self.surface.triangles.push(corners);
-        self.surface.labels.push(label);
+        if self.surface.triangles.len() == self.surface.triangles.capacity() {
+            self.check_bytes()?;
+        }
+        push(&mut self.surface.triangles, corners);
+        push(&mut self.surface.labels, label);
         Ok(())
     }
 
@@ -200,7 +235,7 @@ impl SurfaceBuilder {
 /// Keeps the points that triangles use, in their order; returns how many went.
 pub(super) fn drop_unused_points(surface: &mut Surface) -> u64 {
     const UNUSED: u32 = u32::MAX;
-    let mut new_ids = vec![UNUSED; surface.points.len()];
+    let mut new_ids = filled(surface.points.len(), UNUSED);
     for v in surface.triangles.iter().flatten() {
         new_ids[*v as usize] = 0;
     }
@@ -262,7 +297,7 @@ impl PointTable {
         // Half of what it grows to.
         let len = (points.len() + 1).next_power_of_two();
         let mut table = Self {
-            slots: vec![0; len],
+            slots: filled(len, 0),
         };
         table.grow(points);
         table
@@ -277,7 +312,7 @@ impl PointTable {
         loop {
             match self.slots[slot] {
                 0 => {
-                    points.push(p);
+                    push(points, p);
                     self.slots[slot] = points.len() as u32;
                     return points.len() as u32 - 1;
                 }
@@ -289,7 +324,8 @@ impl PointTable {
 
     fn grow(&mut self, points: &[Point]) {
         let len = (self.slots.len() * 2).max(1024);
-        self.slots = vec![0; len];
+        self.slots = Vec::new();
+        self.slots = filled(len, 0);
         for (i, &p) in points.iter().enumerate() {
             let mut slot = point_hash(p) as usize & (len - 1);
             while self.slots[slot] != 0 {

@@ -5,6 +5,7 @@ use tetdb_schema::record::FACES;
 
 use super::sample::{EdgeLengths, EdgeSample, SAMPLE_BYTES};
 use crate::geom::Point;
+use crate::optimize::excess;
 use crate::query::checked_chunk;
 use crate::query::{QueryError, QuerySession};
 use crate::sealed::{Corner, Shape};
@@ -15,6 +16,8 @@ const QUALITY_BINS: usize = 101;
 const QUALITY_PER_UNIT: f64 = 50.0;
 /// Bins of dihedral angles, two degrees each.
 const ANGLE_BINS: usize = 90;
+/// Tetrahedra that one thread counts at a time.
+const RUN: usize = 1024;
 /// Tetrahedra with their corners that are at hand at once: those of a chunk.
 const CHUNK_BYTES: u64 = 32_768 * size_of::<[Corner; 4]>() as u64;
 
@@ -42,8 +45,19 @@ pub struct Statistics {
     pub angles: Histogram,
     /// Least and greatest mean of a tetrahedron's longest and shortest edge.
     pub size: [f64; 2],
+    /// Quality over the least that the input triangles of a tetrahedron allow.
+    pub excess: Excess,
     /// Edges by length, against the wanted one.
     pub edges: EdgeLengths,
+}
+
+/// What is worse than the surface forces.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Excess {
+    /// The greatest.
+    pub worst: f64,
+    /// Tetrahedra above 2.
+    pub above_two: u64,
 }
 
 /// Counts of some tetrahedra; whole numbers and extremes, so that any order gives the same.
@@ -54,7 +68,11 @@ struct BinCounts {
     /// Sum of q in units of 2⁻³², which no order of adding changes.
     sum: u128,
     size: [f64; 2],
+    excess: Excess,
 }
+
+/// From here on a tetrahedron's excess may be above 2.
+const EXCESS_FROM: f64 = 2.0;
 
 impl BinCounts {
     fn none() -> Self {
@@ -63,15 +81,25 @@ impl BinCounts {
             angles: vec![0; ANGLE_BINS],
             sum: 0,
             size: [f64::INFINITY, 0.0],
+            excess: Excess {
+                worst: 1.0,
+                above_two: 0,
+            },
         }
     }
 
-    fn add(mut self, corners: &[Corner; 4]) -> Self {
+    /// `on_surface` says which faces are input triangles.
+    fn add(mut self, corners: &[Corner; 4], on_surface: impl FnOnce() -> [bool; 4]) -> Self {
         let points = corners.map(|c| c.point);
         let quality = Shape::of(points).quality;
         let bin = ((quality - 1.0) * QUALITY_PER_UNIT) as usize;
         self.quality[bin.min(QUALITY_BINS - 1)] += 1;
         self.sum += (quality.min(1e6) * 2f64.powi(32)) as u128;
+        if quality > EXCESS_FROM {
+            let excess = excess(points, on_surface());
+            self.excess.worst = self.excess.worst.max(excess);
+            self.excess.above_two += u64::from(excess > EXCESS_FROM);
+        }
         let [a, b, c, d] = points;
         let lengths = [b - a, c - a, d - a, c - b, d - b, d - c].map(Point::length);
         let least = lengths.into_iter().fold(f64::INFINITY, f64::min);
@@ -102,12 +130,14 @@ impl BinCounts {
         self.sum += other.sum;
         let [least, most] = other.size;
         self.size = [self.size[0].min(least), self.size[1].max(most)];
+        self.excess.worst = self.excess.worst.max(other.excess.worst);
+        self.excess.above_two += other.excess.above_two;
         self
     }
 }
 
 impl QuerySession {
-    /// Measures every tetrahedron, with some ten MiB of `budget`; tells how many are done.
+    /// Measures every tetrahedron, with some ten MiB of `budget` and 32 bytes for each input triangle of a sub-domain; tells how many are done.
     ///
     /// Errors: damage; a budget too small.
     pub fn statistics(
@@ -121,11 +151,13 @@ impl QuerySession {
         let mut corners = Vec::new();
         for rank in 0..self.rows.len() {
             let (rank, chunks) = (self.rows[rank].rank, self.rows[rank].chunks[0]);
+            let surface = self.surface_of(rank)?;
             for chunk in 0..chunks {
                 check_cancelled();
                 self.count_tets();
                 let part = &mut self.part(rank)?.subdomain;
-                let records = checked_chunk(part, chunk)?.records;
+                let chunk = checked_chunk(part, chunk)?;
+                let (first, records) = (chunk.first, chunk.records);
                 corners.clear();
                 for tet in &records {
                     let found = part.corners(tet.nodes)?;
@@ -134,8 +166,18 @@ impl QuerySession {
                 }
                 let found = parallel(|| {
                     corners
-                        .par_chunks(1024)
-                        .map(|some| some.iter().fold(BinCounts::none(), BinCounts::add))
+                        .par_chunks(RUN)
+                        .zip(records.par_chunks(RUN))
+                        .enumerate()
+                        .map(|(run, (corners, tets))| {
+                            let first = first + (run * RUN) as u32;
+                            (first..).zip(corners.iter().zip(tets)).fold(
+                                BinCounts::none(),
+                                |counts, (local, (corners, tet))| {
+                                    counts.add(corners, || surface.of(local, tet))
+                                },
+                            )
+                        })
                         .reduce(BinCounts::none, BinCounts::and)
                 });
                 counts = counts.and(found);
@@ -157,6 +199,7 @@ impl QuerySession {
                 bins: counts.angles,
             },
             size: counts.size,
+            excess: counts.excess,
             edges: sample.finish(),
         })
     }

@@ -132,7 +132,7 @@ fn is_like(line: &str, shown: &str) -> bool {
 }
 
 fn path_with_program() -> String {
-    let program = Path::new(env!("CARGO_BIN_EXE_tetdb"));
+    let program = super::place::program();
     let folder = program.parent().expect("a program lies in a folder");
     let path = std::env::var("PATH").unwrap_or_default();
     format!("{}:{path}", folder.display())

@@ -15,6 +15,12 @@ pub const TETRA: &str =
 pub const TETRA_INWARD: &str =
     "OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 2\n3 0 3 1\n3 1 3 2\n3 0 2 3\n";
 
+/// The program that is tested: the one built with the tests, or one that `TETDB_PROGRAM` names, such as that of an older commit, of which tests of what
+/// was mended since must fail.
+pub fn program() -> PathBuf {
+    std::env::var_os("TETDB_PROGRAM").map_or(env!("CARGO_BIN_EXE_tetdb").into(), PathBuf::from)
+}
+
 /// A folder of its own for one test, gone afterwards.
 pub struct Place {
     dir: TempDir,
@@ -52,7 +58,7 @@ impl Place {
 
     /// The program with these words, to be run in the folder.
     pub fn command(&self, words: &[&str]) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_tetdb"));
+        let mut command = Command::new(program());
         command
             .args(words)
             .current_dir(self.dir.path())

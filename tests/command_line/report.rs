@@ -44,6 +44,14 @@ fn a_page_tells_what_info_tells() {
     assert_eq!(sum(&data["bins"]), tets);
     assert_eq!(sum(&statistics["quality"]["bins"]), tets);
     assert_eq!(sum(&statistics["angles"]["bins"]), 6 * tets);
+    let line = "query a.tetdb --order-by excess --desc --limit 1 --select excess --json";
+    let worst = place.run_line(line).succeeds().stdout();
+    let worst: Value = serde_json::from_str(worst.lines().next().expect("one")).expect("JSON");
+    assert_eq!(statistics["excess"]["worst"], worst["excess"]);
+    let line = "query a.tetdb --where excess>2 --select id --json";
+    let above = place.run_line(line).succeeds().stdout().lines().count() as u64;
+    let found = statistics["excess"]["above_two"].as_u64();
+    assert_eq!(found, Some(above));
     let edges = &statistics["edges"];
     assert_eq!(
         sum(&edges["bins"]) + sum(&edges["given_bins"]),

@@ -7,7 +7,7 @@ use std::fs::{self, File};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use super::place::{Place, TETRA};
+use super::place::{Place, TETRA, program};
 
 #[test]
 fn what_a_run_reads_is_never_what_it_writes() {
@@ -115,6 +115,30 @@ fn of_two_runs_at_once_onto_one_path_neither_is_replaced_in_silence() {
     }
 }
 
+#[test]
+fn no_message_repeats_all_that_was_typed_however_long() {
+    let place = Place::new();
+    let long = "x".repeat(100_000);
+    place.write("long.toml", format!("hsiz = '{long}'"));
+    let sample = format!("sample:{long}");
+    for words in [
+        &["check", &sample][..],
+        &["check", &long],
+        &["info", &long],
+        &["estimate", "sample:box", "--hsiz", &long],
+        &["estimate", "sample:box", "--memory", &long],
+        &["estimate", "sample:box", &format!("--{long}")],
+        &["estimate", "sample:box", "--config", "long.toml"],
+    ] {
+        for json in [&[][..], &["--json"]] {
+            let done = place.run(&[words, json].concat());
+            assert!(matches!(done.exit(), Some(2 | 3)), "{:?}", done.exit());
+            let n = done.stderr().len();
+            assert!((20..20_000).contains(&n), "{n} bytes of {}", words[0]);
+        }
+    }
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn an_export_that_is_stopped_leaves_no_file_behind() {
@@ -144,12 +168,9 @@ fn without_a_cap_a_run_goes_by_the_limits_of_its_process() {
     let place = Place::new();
     for limit in ["--as=1500000000", "--data=300000000"] {
         let run = Command::new("prlimit")
-            .args([
-                limit,
-                env!("CARGO_BIN_EXE_tetdb"),
-                "mesh",
-                "sample:box,h=0.3",
-            ])
+            .arg(limit)
+            .arg(program())
+            .args(["mesh", "sample:box,h=0.3"])
             .args(["-o", "l.tetdb", "--force", "--threads", "2"])
             .current_dir(place.path(""))
             .output();

@@ -6,7 +6,7 @@
 use std::io::Write;
 use std::process::Stdio;
 
-use super::place::{Place, TETRA};
+use super::place::{Place, TETRA, program};
 
 /// CRC-32 and a stored block: gzip without compression.
 fn gzip(bytes: &[u8]) -> Vec<u8> {
@@ -109,10 +109,9 @@ fn endless_and_enormous_inputs_are_refused_at_once() {
         ),
     ] {
         let words: Vec<&str> = line.split(' ').chain(["--json"]).collect();
-        let mut limited = vec!["20", env!("CARGO_BIN_EXE_tetdb")];
-        limited.extend(words);
         let mut command = std::process::Command::new("timeout");
-        let command = command.args(limited).current_dir(place.path("."));
+        command.arg("20").arg(program()).args(words);
+        let command = command.current_dir(place.path("."));
         let output = command.output().expect("it starts");
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(said.contains(code), "{line}: {:?} {said}", output.status);

@@ -5,6 +5,8 @@
 
 #[path = "../../tools/fuzz/src/mutate.rs"]
 mod mutate;
+#[path = "../../tools/fuzz/src/store.rs"]
+mod store;
 #[path = "../../tools/fuzz/src/targets.rs"]
 mod targets;
 

@@ -9,6 +9,9 @@ pub struct StoreArgs {
     /// The store, a directory that `tetdb mesh` wrote
     #[arg(value_name = "STORE")]
     pub store: PathBuf,
+    /// Most memory to hold
+    #[arg(long, value_name = "SIZE")]
+    pub memory: Option<String>,
     /// Answer with one JSON object
     #[arg(long)]
     pub json: bool,

@@ -46,6 +46,9 @@ pub struct CheckArgs {
     /// With --repair: where to write the repaired surface (.stl, .ply, .obj, .off)
     #[arg(long, value_name = "OUT", requires = "repair")]
     pub write: Option<PathBuf>,
+    /// Most memory to hold, such as 512MiB or 8GiB [default: 60 % of what is free]
+    #[arg(long, value_name = "SIZE")]
+    pub memory: Option<String>,
     /// Answer with one JSON object
     #[arg(long)]
     pub json: bool,
@@ -77,6 +80,9 @@ pub struct SampleArgs {
     /// With -o -: stl, off, obj or ply [default: stl]
     #[arg(long, value_name = "FORMAT")]
     pub format: Option<String>,
+    /// Most memory to hold, such as 512MiB or 8GiB [default: 60 % of what is free]
+    #[arg(long, value_name = "SIZE")]
+    pub memory: Option<String>,
     /// Answer with one JSON object
     #[arg(long)]
     pub json: bool,
@@ -101,6 +107,9 @@ pub struct RefineSurfaceArgs {
     /// Write even over the surface that is read
     #[arg(long)]
     pub force: bool,
+    /// Most memory to hold, such as 512MiB or 8GiB [default: 60 % of what is free]
+    #[arg(long, value_name = "SIZE")]
+    pub memory: Option<String>,
     /// Answer with one JSON object
     #[arg(long)]
     pub json: bool,

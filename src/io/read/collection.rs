@@ -52,7 +52,7 @@ fn the_collection_reads_and_validates_as_its_index_says() {
         let (name, class) = (column[0], column[8]);
         let mut raise = |what: String| wrong.push(format!("{name}: {what}"));
         let start = Instant::now();
-        let surface = read_surface(&[folder.join(name)], 1 << 20);
+        let surface = read_surface(&[folder.join(name)], 1 << 22);
         let read_ms = start.elapsed().as_secs_f64() * 1e3;
         let mut surface = match surface {
             Ok(surface) => surface,

@@ -132,12 +132,13 @@ const EXTENT_MIN: f64 = 1e-24;
 
 /// Reads files as one surface, each with its name before its labels when there are several.
 ///
-/// Packed files (`.gz`, `.zst`), pipes and `-`, the standard input, are held unpacked while they are read: `limit` bytes at most.
+/// `cap`: bytes of memory that the surface may take. Packed files (`.gz`, `.zst`), pipes and `-`, the standard input, are held unpacked while
+/// they are read: in a quarter of it at most.
 ///
 /// # Errors
 /// The first [`ReadError`], with its file and place; nothing is repaired beyond welding and fanning.
-pub fn read_surface(paths: &[PathBuf], limit: u64) -> Result<Surface> {
-    let mut builder = SurfaceBuilder::new();
+pub fn read_surface(paths: &[PathBuf], cap: u64) -> Result<Surface> {
+    let mut builder = SurfaceBuilder::within(cap);
     let mut prefixes: Vec<String> = Vec::new();
     for path in paths {
         let stem = stem(path);
@@ -148,7 +149,7 @@ pub fn read_surface(paths: &[PathBuf], limit: u64) -> Result<Surface> {
             stem,
             prefix,
         };
-        read_file(path, limit, &mut target)?;
+        read_file(path, cap / 4, &mut target)?;
     }
     let surface = builder.finish();
     let bounds = surface.bounds();

@@ -60,7 +60,7 @@ fn files_on_disk() {
     .unwrap();
     std::fs::write(path("c"), "OFF 4 4 0\n".to_owned() + &off_body()).unwrap();
     std::fs::write(path("d"), "what is this").unwrap();
-    let surface = read_surface(&[path("a.stl"), path("b.OBJ")], 1 << 20).unwrap();
+    let surface = read_surface(&[path("a.stl"), path("b.OBJ")], 1 << 22).unwrap();
     assert_eq!(surface.label_names, ["a", "b:top"]);
     assert_eq!((surface.n_triangles(), surface.n_vertices()), (8, 8));
     assert_eq!(
@@ -68,12 +68,12 @@ fn files_on_disk() {
         Some((true, 1))
     );
     assert_eq!(
-        read_surface(&[path("c")], 1 << 20).unwrap().n_triangles(),
+        read_surface(&[path("c")], 1 << 22).unwrap().n_triangles(),
         4
     );
-    let twice = read_surface(&[path("a.stl"), path("a.stl")], 1 << 20).unwrap();
+    let twice = read_surface(&[path("a.stl"), path("a.stl")], 1 << 22).unwrap();
     assert_eq!(twice.label_names, ["a", "a~2"]);
-    let code = |name: &str| read_surface(&[path(name)], 1 << 20).unwrap_err().code();
+    let code = |name: &str| read_surface(&[path(name)], 1 << 22).unwrap_err().code();
     assert_eq!(
         [code("d"), code("none.stl"), code("")],
         ["unknown-format", "unreadable-file", "unreadable-file"]

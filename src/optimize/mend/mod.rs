@@ -4,7 +4,7 @@
 //! volume stay through all rounds before: a flip cannot remove them, and the cavity that a Delaunay kernel would open for a vertex
 //! does not fit. Nothing forces them.
 //!
-//! 1. `vertex`: inner vertices of bad tetrahedra move for the product of their ball, in sweeps; that takes clusters apart;
+//! 1. `vertex`: inner vertices of bad tetrahedra move for the product of their ball, in sweeps; that takes clusters apart, each pass a bit further;
 //! 2. then, for each bad tetrahedron in order, the first that makes it good enough, or else the best, of: a flip, or an edge or a vertex
 //!    removed; a vertex moved for the worst of its ball; a vertex put on one of its edges; a vertex put into a cavity that grows (`cavity`).
 //!
@@ -179,17 +179,19 @@ impl Mender {
         progress: &mut dyn FnMut(f64),
     ) {
         // The last stage's are the most.
-        let [first, .., last] = &STAGES;
+        let [.., last] = &STAGES;
         if self.list(mesh, pages, last).is_empty() {
             return;
         }
-        let list = self.list(mesh, &mut pages.clone(), first);
-        self.lift(mesh, &list);
         for stage in &STAGES {
             let mut flags = pages.clone();
             self.failed.clear();
             for _ in 0..stage.passes_max {
                 let before = self.counts.changes();
+                if !stage.fewer {
+                    let list = self.list(mesh, &mut flags.clone(), stage);
+                    self.lift(mesh, &list);
+                }
                 let list = self.list(mesh, &mut flags, stage);
                 self.queue.extend(list);
                 self.pass(mesh, &mut flags, stage, progress);

@@ -9,14 +9,14 @@ use crate::reconnect::Ball;
 use crate::storage::Pages;
 
 /// Largest ball whose vertex moves.
-const BALL_MAX: usize = 128;
+const BALL_MAX: usize = 1024;
 /// Steps of a search.
 const STEPS: u32 = 60;
 /// A move for the sum must at least raise the product of a ball by this much in powers of two: less is worth no sweep.
 const GAIN_MIN: f64 = 0.1;
 
 /// A tetrahedron below this value is flat but for rounding.
-const FLAT: f64 = 1e-6;
+const FLAT: f64 = 1e-4;
 
 /// Scratch of moves.
 #[derive(Default)]

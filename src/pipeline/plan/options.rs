@@ -77,6 +77,9 @@ pub struct Options {
     /// Whether meshes on their way are kept to be looked at; the finished mesh is the same.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub keep_stages: bool,
+    /// Whether the surface's triangles are divided to the wanted lengths first. The store keeps the divided surface.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub refine_surface: bool,
     /// Whether the run ends with the coarse mesh: tasks do the rest. Not stored: it does not shape the mesh.
     #[serde(skip)]
     pub coarse_only: bool,

@@ -6,7 +6,7 @@
 use std::collections::BTreeSet;
 
 use super::request::Resaturation;
-use super::run::{RemeshRun, recorded_field};
+use super::run::{RemeshRun, recorded_field, room};
 use super::sizes::{NewSizes, Recorded, predicted};
 use super::summary::ResaturateSummary;
 use crate::pipeline::error::PipelineError;
@@ -39,7 +39,7 @@ pub fn resaturate(
     budget: &Budget,
     watch: &Watcher,
 ) -> Result<ResaturateSummary, PipelineError> {
-    let mut again = RemeshRun::open(catalog, options, what)?;
+    let mut again = RemeshRun::open(catalog, options, what, budget)?;
     attempt(|| {
         let fields = again.fields(budget)?;
         again.run(fields, budget, watch)
@@ -54,13 +54,14 @@ pub fn forecast(
     what: &Resaturation,
     budget: &Budget,
 ) -> Result<Vec<Forecast>, PipelineError> {
-    let mut again = RemeshRun::open(catalog, options, what)?;
+    let mut again = RemeshRun::open(catalog, options, what, budget)?;
     attempt(|| {
         let memory = budget.available() / 4;
         let mut list = Vec::new();
         for (rank, new) in again.fields(budget)? {
             let recorded = Recorded {
                 whole: &again.field,
+                room: &room(again.catalog, budget)?,
             };
             let old = recorded.own(again.catalog, rank)?;
             let old = old.as_ref().unwrap_or(&again.field);
@@ -87,8 +88,12 @@ pub fn changed(
     sizes: &NewSizes,
     budget: &Budget,
 ) -> Result<BTreeSet<u32>, PipelineError> {
-    let field = recorded_field(catalog, options)?;
-    let recorded = Recorded { whole: &field };
+    let room = room(catalog, budget)?;
+    let field = recorded_field(catalog, options, &room)?;
+    let recorded = Recorded {
+        whole: &field,
+        room: &room,
+    };
     let mut ranks = BTreeSet::new();
     for row in catalog.subdomains()? {
         let memory = budget.available() / 4;

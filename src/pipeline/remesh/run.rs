@@ -23,7 +23,7 @@ use crate::pipeline::workers::{Hand, map_bounded};
 use crate::sealed::SealedError;
 use crate::sealed::{CoarseSnapshot, Form};
 use crate::sizing::{BackgroundMesh, SizeField};
-use crate::storage::{Backing, Budget, DiskPath, PagerStats, attempt};
+use crate::storage::{Backing, Budget, DiskPath, PagerStats, ScratchSpace, attempt};
 use crate::store::{Catalog, StoreError};
 use tetdb_schema::catalog::{CoarseRow, StoreState, SubdomainRow};
 
@@ -82,6 +82,7 @@ impl<'a> RemeshRun<'a> {
         catalog: &'a mut Catalog,
         options: &'a Options,
         what: &'a Resaturation,
+        budget: &Budget,
     ) -> Result<Self, PipelineError> {
         let clock = Instant::now();
         let mut rows = Vec::new();
@@ -100,7 +101,7 @@ impl<'a> RemeshRun<'a> {
             *newest = file.generation.max(*newest);
         }
         Ok(Self {
-            field: Arc::new(recorded_field(catalog, options)?),
+            field: Arc::new(recorded_field(catalog, options, &room(catalog, budget)?)?),
             last,
             steps: catalog.journal()?.len() as u32,
             n: tree::n_subdomains(catalog)?,
@@ -117,7 +118,6 @@ impl<'a> RemeshRun<'a> {
         &mut self,
         budget: &Budget,
     ) -> Result<BTreeMap<u32, Option<SizeField>>, PipelineError> {
-        let recorded = Recorded { whole: &self.field };
         let memory = budget.available() / 4;
         let mut fields = BTreeMap::new();
         let values = self.what.sizes.as_ref().and_then(|s| s.values.as_ref());
@@ -127,6 +127,11 @@ impl<'a> RemeshRun<'a> {
         let _lease = match &self.what.sizes {
             Some(_) => Some(budget.lease(self.field_bytes(values), "building size fields")?),
             None => None,
+        };
+        let room = room(self.catalog, budget)?;
+        let recorded = Recorded {
+            whole: &self.field,
+            room: &room,
         };
         let mut from = 0;
         for (row, _) in &self.rows {
@@ -143,24 +148,24 @@ impl<'a> RemeshRun<'a> {
         Ok(fields)
     }
 
-    /// What it takes to build one field after the other.
+    /// What it takes to build one field after the other, beside the arrays that go to scratch files where they are too large.
     fn field_bytes(&self, values: Option<&Values>) -> u64 {
-        /// Bytes of the octree while it is built, for each face of a skin.
-        const SKIN_FACE: u64 = 300;
-        /// The same for each leaf of the field that the sub-domain has.
-        const LEAF: u64 = 150;
+        /// Bytes of a point of the skin, with its size and its place in lists; of a face; of a leaf of the octree while it is built.
+        const POINT: u64 = 24 + 40;
+        const FACE: u64 = 12;
+        const LEAF: u64 = 16;
         let one = |(row, kept): &(SubdomainRow, CoarseRow)| {
             let [low, high] = row.bounds.map(Point::from_array);
             let leaves = self.field.n_leaves_in(&Aabb { low, high }) as u64;
             let faces = kept.facets + kept.interface_faces;
-            let skin = 24 * kept.vertices + SKIN_FACE * faces + LEAF * leaves;
+            let skin = POINT * kept.vertices + FACE * faces + LEAF * leaves;
             match values {
                 Some(_) => skin + BackgroundMesh::bytes(row.vertices, row.tets),
                 None => skin,
             }
         };
         let most = self.rows.iter().map(one).max().unwrap_or(0);
-        most + values.map_or(0, Values::bytes)
+        self.field.bytes() as u64 + most + values.map_or(0, Values::bytes)
     }
 
     /// Refuses lengths that are not one for each.
@@ -194,7 +199,12 @@ impl<'a> RemeshRun<'a> {
         let own: u64 = fields.values().flatten().map(of).sum();
         let asked = self.what.sizes.as_ref().and_then(|s| s.field.as_ref());
         // Those of the sub-domains are held as bytes, too, until they are committed.
-        let held = 2 * own + of(&self.field) + asked.map_or(0, of);
+        let made: BTreeMap<u32, Vec<u8>> = (fields.iter())
+            .filter_map(|(&rank, field)| Some((rank, field.as_ref()?.to_bytes())))
+            .filter(|_| self.what.sizes.is_some())
+            .collect();
+        let encoded: u64 = made.values().map(|bytes| bytes.len() as u64).sum();
+        let held = own + encoded + of(&self.field) + asked.map_or(0, of);
         let _fields = budget.lease(held, "the size fields")?;
         let plan = Plan::new(budget.cap(), held)?;
         let leased = plan.frames + plan.redb + plan.redb / 2 + plan.buffers;
@@ -202,11 +212,6 @@ impl<'a> RemeshRun<'a> {
         let bounds = tree::bounds(self.catalog)?;
         let workers = plan.workers().min(self.rows.len()).max(1);
         let share = plan.shared_by(workers as u64).without_file();
-        let own_sizes = self.what.sizes.is_some();
-        let made: BTreeMap<u32, Vec<u8>> = (fields.iter())
-            .filter_map(|(&rank, field)| Some((rank, field.as_ref()?.to_bytes())))
-            .filter(|_| own_sizes)
-            .collect();
         let parts = tree::parts(self.catalog, self.n)?;
         let whole = Arc::clone(&self.field);
         let common = Common::of(self.options, &whole, bounds)?;
@@ -398,13 +403,24 @@ impl<'a> RemeshRun<'a> {
     }
 }
 
+/// What is left of the budget, for arrays of size fields.
+pub(super) fn room(catalog: &Catalog, budget: &Budget) -> Result<ScratchSpace, PipelineError> {
+    // A store that is only read may be one that can only be read.
+    let folder = match catalog.lock() {
+        Some(_) => catalog.scratch_dir()?,
+        None => std::env::temp_dir().into(),
+    };
+    Ok(ScratchSpace::new(budget.available(), folder))
+}
+
 /// The recorded field of the whole.
 pub(crate) fn recorded_field(
     catalog: &mut Catalog,
     options: &Options,
+    room: &ScratchSpace,
 ) -> Result<SizeField, PipelineError> {
     let bytes = catalog.blob(blob::SIZE_FIELD)?.unwrap_or_default();
     let diagonal = tree::bounds(catalog)?.diagonal();
-    let field = SizeField::from_bytes(&bytes)?;
+    let field = SizeField::from_bytes_in(&bytes, room)?;
     Ok(field.with_sources(&options.sizes()?, diagonal)?)
 }

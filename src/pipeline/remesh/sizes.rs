@@ -9,7 +9,7 @@ use crate::geom::Point;
 use crate::sizing::{
     BackgroundMesh, SizeConstraint, SizeField, SizingError, TETS_PER_LOAD, load_of_tet,
 };
-use crate::storage::check_cancelled;
+use crate::storage::{ScratchSpace, check_cancelled};
 
 /// Sizes that differ by less than this share are the same to `--changed`: where a field is divided differently its values
 /// between the same wishes are off by so much.
@@ -88,6 +88,8 @@ impl SizeConstraint for Wanted<'_> {
 /// Fields as the catalog has them.
 pub(crate) struct Recorded<'a> {
     pub whole: &'a SizeField,
+    /// For arrays of fields, and for those that are built.
+    pub room: &'a ScratchSpace,
 }
 
 impl Recorded<'_> {
@@ -98,7 +100,7 @@ impl Recorded<'_> {
         rank: u32,
     ) -> Result<Option<SizeField>, PipelineError> {
         match catalog.blob(blob::FIELD + rank)? {
-            Some(bytes) => Ok(Some(SizeField::from_bytes(&bytes)?)),
+            Some(bytes) => Ok(Some(SizeField::from_bytes_in(&bytes, self.room)?)),
             None => Ok(None),
         }
     }
@@ -129,7 +131,7 @@ impl Recorded<'_> {
             }
         };
         let (points, triangles) = skin(catalog, rank, memory)?;
-        Ok(had.within(&points, &triangles, wish, sizes.beta)?)
+        Ok(had.within(&points, &triangles, wish, sizes.beta, self.room)?)
     }
 
     fn wanted<'b>(&'b self, had: &'b SizeField, sizes: &'b NewSizes) -> Wanted<'b> {

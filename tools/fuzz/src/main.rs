@@ -5,6 +5,7 @@
 #![forbid(unsafe_code)]
 
 mod mutate;
+mod store;
 mod targets;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};

@@ -84,6 +84,11 @@ pub const TARGETS: &[Target] = &[
         format: None,
         run: chunk,
     },
+    Target {
+        name: "store",
+        format: None,
+        run: crate::store::changed,
+    },
 ];
 
 /// An expression of sizes or of a query: parsed, and its value at some points.

@@ -37,5 +37,5 @@ fn tetgen_layouts() {
     let (node, file) = (folder.path().join("a.node"), folder.path().join("a.smesh"));
     std::fs::write(&node, points).unwrap();
     std::fs::write(&file, smesh.replace(points, "0 3 0 0\n")).unwrap();
-    assert_eq!(read_surface(&[file], 1 << 20).unwrap().n_vertices(), 4);
+    assert_eq!(read_surface(&[file], 1 << 22).unwrap().n_vertices(), 4);
 }

@@ -24,7 +24,7 @@ function quality() {
     ["share", ([, n]) => percent(n / total, 4)],
     ["", ([, n]) => fill(n / total), "track"],
   ], rows));
-  byId("quality").append(make("p", { className: "note", textContent: `mean ${statistics.quality_mean.toFixed(4)}, worst ${number(counts.worst)}; dihedral angles from ${counts.dihedral[0].toFixed(2)}° to ${counts.dihedral[1].toFixed(2)}°` }));
+  byId("quality").append(make("p", { className: "note", textContent: `mean ${statistics.quality_mean.toFixed(4)}, worst ${number(counts.worst)}; dihedral angles from ${counts.dihedral[0].toFixed(2)}° to ${counts.dihedral[1].toFixed(2)}°. Excess, the quality over the least that the input triangles allow: worst ${number(statistics.excess.worst)}, above 2 for ${percent(statistics.excess.above_two / total, 3)}` }));
   byId("quality-chart").append(histogram([[statistics.quality.bins, "", ""]], { least: 1, width: statistics.quality.width, step: 0.25, marks: [[statistics.quality_mean, "mean"]] }));
   byId("angles").append(histogram([[statistics.angles.bins, "", ""]], { least: 0, width: 2, unit: "°", step: 30, marks: [[70.5288, "regular: 70.5°"]] }));
 }

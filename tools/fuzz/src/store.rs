@@ -1,0 +1,134 @@
+//! A whole store of which something was changed: bytes of a file, or a value in it that is then sealed again.
+//!
+//! Opened, summed up, verified on every level and asked. Any answer will do, also that nothing is wrong where nothing was; a bug of ours (`internal`)
+//! will not.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, OnceLock};
+
+use redb::{Database, ReadableDatabase, ReadableTable, TableDefinition};
+use tetdb::{Mesher, Store, Surface, VerifyLevel};
+use xxhash_rust::xxh3::xxh3_64_with_seed;
+
+/// Of every file of a store: values by key.
+const TABLE: TableDefinition<u64, &[u8]> = TableDefinition::new("pages");
+/// All values begin with the sum of what follows; in a chunk this comes next, in the catalog the key is the sum's seed.
+const CHUNK: &[u8] = b"TETC";
+
+struct Sound {
+    _dir: tempfile::TempDir,
+    path: PathBuf,
+    files: Vec<(PathBuf, Vec<u8>)>,
+}
+
+/// A store of one sub-domain in memory, where the system has files there.
+fn sound() -> Sound {
+    let shared = Path::new("/dev/shm");
+    let dir = match shared.is_dir() {
+        true => tempfile::tempdir_in(shared),
+        false => tempfile::tempdir(),
+    };
+    let dir = dir.expect("a folder");
+    let path = dir.path().join("a.tetdb");
+    let surface = Surface::sample("box,h=0.4").expect("a box");
+    let made = Mesher::new(surface).threads(1).create(&path);
+    made.expect("a mesh");
+    let entries = std::fs::read_dir(&path).expect("a store is a folder");
+    let mut files: Vec<PathBuf> = entries.map(|e| e.expect("readable").path()).collect();
+    files.sort();
+    files.retain(|path| path.extension().is_some_and(|e| e == "redb"));
+    let read = |path: PathBuf| (path.clone(), std::fs::read(path).expect("readable"));
+    Sound {
+        _dir: dir,
+        path,
+        files: files.into_iter().map(read).collect(),
+    }
+}
+
+/// Each eight bytes are a change: file, whether of a value, where (four bytes), what, and how.
+pub fn changed(bytes: &[u8]) {
+    static SOUND: OnceLock<Mutex<Sound>> = OnceLock::new();
+    let sound = SOUND.get_or_init(|| Mutex::new(sound()));
+    let sound = sound.lock().unwrap_or_else(|e| e.into_inner());
+    for change in bytes.chunks_exact(8).take(8) {
+        let (path, content) = &sound.files[usize::from(change[0]) % sound.files.len()];
+        let at = u32::from_le_bytes([change[2], change[3], change[4], change[5]]) as usize;
+        match change[1] % 4 {
+            0 => {
+                let mut content = std::fs::read(path).unwrap_or_else(|_| content.clone());
+                put(&mut content, at, change);
+                std::fs::write(path, content).expect("writable");
+            }
+            // Of a file that was changed before, redb may want nothing.
+            _ => drop(change_value(path, at, change)),
+        }
+    }
+    ask(&sound.path);
+    for (path, content) in &sound.files {
+        std::fs::write(path, content).expect("writable");
+    }
+}
+
+/// Another byte, or the same bits turned, or the end cut off.
+fn put(content: &mut Vec<u8>, at: usize, change: &[u8]) {
+    if content.is_empty() {
+        return;
+    }
+    let at = at % content.len();
+    match change[7] % 8 {
+        0..=2 => content[at] ^= 1 << (change[6] % 8),
+        3..=5 => content[at] = change[6],
+        6 => content[at..]
+            .iter_mut()
+            .take(8)
+            .for_each(|b| *b = change[6]),
+        _ => content.truncate(at),
+    }
+}
+
+/// A value changed as it would be by one who knows the format: redb's sums are right, and those of a chunk.
+fn change_value(path: &Path, at: usize, change: &[u8]) -> Option<()> {
+    let unwound = std::panic::AssertUnwindSafe(|| {
+        let file = Database::open(path).ok()?;
+        let mut keys = Vec::new();
+        {
+            let read = file.begin_read().ok()?;
+            let table = read.open_table(TABLE).ok()?;
+            for row in table.iter().ok()? {
+                let (key, value) = row.ok()?;
+                keys.push((key.value(), value.value().to_vec()));
+            }
+        }
+        let (key, mut value) = keys.get(at % keys.len().max(1))?.clone();
+        put(&mut value, at / keys.len(), change);
+        if let Some((sum, rest)) = value.split_first_chunk_mut::<8>() {
+            let seed = if rest.starts_with(CHUNK) { 0 } else { key };
+            *sum = xxh3_64_with_seed(rest, seed).to_le_bytes();
+        }
+        let write = file.begin_write().ok()?;
+        write.open_table(TABLE).ok()?.insert(key, &value[..]).ok()?;
+        write.commit().ok()
+    });
+    std::panic::catch_unwind(unwound).ok()?
+}
+
+fn ask(path: &Path) {
+    let done = |error: tetdb::Error| assert_ne!(error.code(), "internal", "{error}");
+    let mut store = match Store::open(path) {
+        Ok(store) => store,
+        Err(error) => return done(error),
+    };
+    if let Err(error) = store.verify(VerifyLevel::Delaunay) {
+        done(error);
+    }
+    if let Err(error) = store.locate(&[[0.3, 0.4, 0.5], [2.0, 0.0, 0.0]]) {
+        done(error);
+    }
+    let asked = store
+        .query()
+        .where_("quality > 1.2")
+        .and_then(|q| q.collect());
+    if let Err(error) = asked {
+        done(error);
+    }
+}
