@@ -21,6 +21,8 @@ struct Mesh<'a, 'b, R> {
     names: HashMap<i64, String>,
     /// Surface entity -> its first physical group (4.1).
     groups: HashMap<i64, i64>,
+    /// Surface entities inside a volume, where two partitions meet (4.1).
+    inside: HashSet<i64>,
     /// The label used last and the group it came from.
     last: Option<(i64, u32)>,
     n_solids: u64,
@@ -70,6 +72,7 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
         nodes: NodeTags::default(),
         names: HashMap::new(),
         groups: HashMap::new(),
+        inside: HashSet::new(),
         last: None,
         n_solids: 0,
         volume_names: HashMap::new(),
@@ -313,7 +316,10 @@ impl<R: BufRead> Mesh<'_, '_, R> {
                 let entity = self.numbers.int()?;
                 if partitioned {
                     // Dimension and number of what it is a part of, and the partitions.
-                    self.numbers.int()?;
+                    let whole = self.numbers.int()?;
+                    if (dimension, whole) == (2, 3) {
+                        self.inside.insert(entity);
+                    }
                     self.numbers.int()?;
                     self.int_list()?;
                 }
@@ -423,6 +429,7 @@ impl<R: BufRead> Mesh<'_, '_, R> {
                 _ => None,
             };
             let group = groups.and_then(|g| g.get(&entity)).copied().unwrap_or(0);
+            let is_inside = dimension == 2 && self.inside.contains(&entity);
             for k in 0..n {
                 self.numbers.need_record("elements", n, k)?;
                 self.numbers.size()?;
@@ -434,6 +441,7 @@ impl<R: BufRead> Mesh<'_, '_, R> {
                     }
                 }
                 match role {
+                    Role::Face if is_inside => {}
                     Role::Face => self.face(&tags[..n_nodes], group)?,
                     Role::Solid => self.solid(kind, &tags, group, entity)?,
                     _ => {}

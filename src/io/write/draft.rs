@@ -1,6 +1,7 @@
 //! Files in the making: a folder beside the output, removed whatever happens; rename when all are whole.
 
 use crate::storage::{available_bytes, host_name, is_process_gone};
+use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -89,12 +90,17 @@ impl Draft {
                 }
             }
         }
+        // Nothing between the renames: a kill finds all files there or none, but for the moment that these take.
+        let folders: BTreeSet<&Path> = self.files.iter().map(|(_, out)| folder(out)).collect();
+        for folder in &folders {
+            fs::create_dir_all(folder).map_err(|e| WriteError::io(folder, e))?;
+        }
         for (path, out) in &self.files {
-            fs::create_dir_all(folder(out)).map_err(|e| WriteError::io(out, e))?;
             fs::rename(path, out).map_err(|e| WriteError::io(out, e))?;
-            let parent = folder(out);
-            let synced = File::open(parent).and_then(|d| d.sync_all());
-            synced.map_err(|e| WriteError::io(parent, e))?;
+        }
+        for folder in folders {
+            let synced = File::open(folder).and_then(|d| d.sync_all());
+            synced.map_err(|e| WriteError::io(folder, e))?;
         }
         Ok(done)
     }
