@@ -242,22 +242,22 @@ mod tests {
     #[test]
     fn nobody_waits_when_the_listener_unwinds() {
         let run = &|n: u32, watch: &Watcher| {
-            watch(Event::Step { name: "a step" });
+            watch(Event {
+                stage: "a step",
+                done: 1,
+                total: None,
+                unit: "jobs",
+            });
             Ok(n)
         };
         for (in_watch, in_commit) in [(true, false), (false, true)] {
             let watch = |_: Event| assert!(!in_watch, "the caller's own trouble");
             let ended = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
-                work_off(
-                    vec![1, 2],
-                    &vec![run as Hand<u32, u32>; 2],
-                    &watch,
-                    &mut |n| {
-                        assert!(!in_commit, "the same here");
-                        // One job more than there will ever be.
-                        Ok(vec![n])
-                    },
-                )
+                work_off(vec![1, 2], &[run as Hand<u32, u32>; 2], &watch, &mut |n| {
+                    assert!(!in_commit, "the same here");
+                    // One job more than there will ever be.
+                    Ok(vec![n])
+                })
             }));
             assert!(ended.is_err());
         }
