@@ -78,6 +78,28 @@ fn a_mesh_file_named_as_the_store_is_sent_to_export() {
 }
 
 #[test]
+fn rows_of_all_tetrahedra_are_exported_as_a_question_about_all_answers_them() {
+    let place = Place::new();
+    place
+        .run_line("mesh sample:box,h=0.5 -o b.tetdb --no-verify")
+        .succeeds();
+    for (format, option) in [("csv", "--csv"), ("jsonl", "--json")] {
+        let rows = |line: &str| place.run_line(line).succeeds().stdout();
+        let exported = rows(&format!("export b.tetdb - --format {format}"));
+        assert_eq!(exported, rows(&format!("query b.tetdb {option}")));
+        for command in ["export b.tetdb a", "query b.tetdb -o b"] {
+            place.run_line(&format!("{command}.{format}")).succeeds();
+        }
+        let [a, b] = ["a", "b"].map(|name| std::fs::read(place.path(&format!("{name}.{format}"))));
+        assert_eq!(a.expect("exported"), b.expect("answered"));
+    }
+    for line in ["a.csv a.vtu", "a.csv --pieces", "- --format csv --order 2"] {
+        let done = place.run_line(&format!("export b.tetdb {line} --json"));
+        assert_eq!(done.error()["code"], "usage", "{line}");
+    }
+}
+
+#[test]
 fn solid_models_get_advice() {
     let place = Place::new();
     place.write("part.step", "ISO-10303-21;\nHEADER;\n");
@@ -106,6 +128,12 @@ fn negative_numbers_reach_the_option_before_them() {
         error["message"].to_string().contains("negative number"),
         "{error}"
     );
+    for apart in ["0.1 0.2 0.3", "-0.1 -0.2 -0.3"] {
+        let error = place
+            .run_line(&format!("query part.tetdb --point {apart} --json"))
+            .error();
+        assert!(error["help"].to_string().contains("with commas"), "{error}");
+    }
 }
 
 #[test]
