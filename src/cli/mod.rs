@@ -152,7 +152,9 @@ fn is_apart(error: &clap::Error) -> bool {
     let words: Vec<String> = std::env::args_os()
         .map(|word| word.to_string_lossy().into_owned())
         .collect();
-    (words.windows(2)).any(|two| is_number(&two[0]) && two[1] == *found && is_number(found))
+    // Of one with a minus only the sign and the first digit are named.
+    (words.windows(2))
+        .any(|two| is_number(&two[0]) && is_number(&two[1]) && two[1].starts_with(found.as_str()))
 }
 
 fn is_command(word: &str) -> bool {

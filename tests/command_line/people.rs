@@ -219,3 +219,36 @@ fn pages_of_the_manual_have_examples() {
     let page = said(&Place::new(), "man query");
     assert!(page.contains(".SH EXAMPLES\n.nf\ntetdb query"), "{page}");
 }
+
+#[test]
+fn many_regions_are_summed_and_few_listed() {
+    let place = Place::new();
+    let few = place.run_line("mesh sample:box,h=0.5 --no-verify -o few.tetdb");
+    assert!(few.succeeds().stdout().contains("\n  region    1: volume"));
+    let many = place.run_line("mesh sample:balls,count=20,h=0.1 --no-verify -o many.tetdb");
+    let said = many.succeeds().stdout();
+    assert!(said.contains("--json lists them"), "{said}");
+    assert!(!said.contains("\n  region "), "{said}");
+}
+
+#[test]
+fn help_wraps_at_the_width_of_the_terminal() {
+    let place = Place::new();
+    for width in [60, 100] {
+        let mut command = place.command(&["query", "--help"]);
+        let done = command.env("COLUMNS", width.to_string()).output();
+        let text = done.expect("it starts").stdout;
+        // Examples are lines to be copied.
+        let options = String::from_utf8_lossy(&text).into_owned();
+        let options = options
+            .split("Examples:")
+            .next()
+            .unwrap_or_default()
+            .to_owned();
+        let widest = options.lines().map(|line| line.chars().count()).max();
+        assert!(
+            widest.is_some_and(|w| w <= width && w > width - 20),
+            "{widest:?} of {width}"
+        );
+    }
+}
