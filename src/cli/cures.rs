@@ -14,7 +14,7 @@ use crate::surface::{
 /// Shares of the box diagonal within which points are joined on trial.
 const WELDS: [f64; 4] = [1e-6, 1e-5, 1e-4, 1e-3];
 /// A cure is named when it leaves at most this part of what is wrong.
-const GAIN: f64 = 0.5;
+const GAIN: f64 = 0.6;
 /// Memory for a trial of divided triangles: those of a surface small enough to be checked in a second or two.
 const BYTES_MAX: u64 = 64 << 20;
 

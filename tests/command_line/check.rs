@@ -3,8 +3,10 @@
 //! Why: a surface changed without a word is another surface. How: cubes with holes, cracks and repeated triangles are checked,
 //! repaired, checked again and meshed; the folder is compared before and after.
 
+use super::json::NEEDLES;
 use super::odd_inputs::{Triangles, cube_at, off};
 use super::place::Place;
+use serde_json::json;
 
 /// A cube whose sides are moved by `step` more from one to the next.
 fn cracked(step: f64) -> Triangles {
@@ -209,26 +211,23 @@ fn fitness_is_told_and_advice_given() {
 #[test]
 fn cures_of_needles_are_tried_and_keep_their_promise() {
     let place = Place::new();
-    // A long prism: its sides are needles that dividing mends.
-    let mut long = cube_at(0.0, 0.0, 0.0);
-    for p in long.iter_mut().flatten() {
-        p[2] *= 40.0;
-    }
-    place.write("long.off", off(&long));
-    let answer = place.run_line("check long.off --json").succeeds().json();
+    place.write("needles.off", NEEDLES);
+    let answer = place.run_line("check needles.off --json").succeeds().json();
+    assert!(answer["fitness"]["least_quality"].as_f64() > Some(1e4));
     let cure = &answer["cures"][0];
-    assert_eq!(cure["way"], "refine-surface", "{answer}");
-    let hopeless = answer["fitness"]["hopeless_triangles"].as_u64();
-    assert!(cure["hopeless_triangles"].as_u64() < hopeless, "{answer}");
-    let mesh = "mesh long.off -o long.tetdb --refine-surface --json";
-    let mesh = place.run_line(mesh).succeeds().json();
-    let triangles = mesh["subdomains"][0]["facets"].as_u64();
-    assert_eq!(triangles, cure["triangles"].as_u64());
-    let text = place.run_line("check long.off").succeeds().stdout();
-    assert!(
-        text.contains("cure: `tetdb mesh long.off --refine-surface`"),
-        "{text}"
+    assert_eq!(
+        (&cure["way"], &cure["weld"]),
+        (&json!("weld"), &json!(1e-5))
     );
+    let text = place.run_line("check needles.off").succeeds().stdout();
+    let command = "`tetdb check needles.off --repair --weld 1e-5 --write OUT`";
+    assert!(text.contains(&format!("cure: {command}")), "{text}");
+    let command = "check needles.off --repair --weld 1e-5 --write mended.off";
+    place.run_line(command).succeeds();
+    let mended = place.run_line("check mended.off --json").succeeds().json();
+    assert_eq!(mended["triangles"], cure["triangles"]);
+    assert_eq!(mended["fitness"]["hopeless_triangles"], 0);
+    assert_eq!(mended["cures"], json!([]));
 }
 
 #[test]

@@ -33,6 +33,7 @@ const RUNS: [(&str, &[&str]); 16] = [
             "check sphere.stl",
             "check holes.off --write-bad bad.vtu",
             "check crossing.off",
+            "check needles.off",
             "check holes.off --repair --weld 1e-3 --write fixed.off",
         ],
     ),
@@ -152,12 +153,17 @@ fn settle(found: &mut BTreeSet<String>, named: &BTreeSet<String>) {
         named.contains(key) || !named.iter().any(|t| parts.iter().any(|p| t.starts_with(p)))
     });
 }
+/// A cube with a corner twice, all but 1e-5 of an edge apart.
+pub const NEEDLES: &str = "OFF\n9 14 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n1 0 1\n1 1 1\n0 1 1\n1e-5 0 1\n\
+    3 0 2 1\n3 0 3 2\n3 4 8 6\n3 8 5 6\n3 4 6 7\n3 0 1 5\n3 0 5 8\n3 0 8 4\n\
+    3 1 2 6\n3 1 6 5\n3 2 3 7\n3 2 7 6\n3 3 0 4\n3 3 4 7\n";
 
 #[test]
 fn every_key_is_documented_and_no_other() {
     let place = Place::new();
     place.write("holes.off", HOLES);
     place.write("crossing.off", CROSSING);
+    place.write("needles.off", NEEDLES);
     let talk = documented("stderr");
     let (mut said, mut of_info) = (BTreeSet::new(), BTreeSet::new());
     for (section, lines) in RUNS {
