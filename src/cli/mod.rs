@@ -134,7 +134,8 @@ fn unparsed(error: &clap::Error) -> ExitCode {
         );
     }
     if is_apart(error) {
-        let help = "the numbers of one option are one word with commas, as in --point 0.1,0.2,0.3";
+        let message = "numbers of one option stand apart";
+        let help = "write them as one word with commas, as in --point 0.1,0.2,0.3";
         return ExitCode::from(
             Console::new(is_json).fail(&Failure::new("usage", message).help(help)),
         );

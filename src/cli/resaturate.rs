@@ -142,7 +142,7 @@ fn print_forecast(list: &[Forecast], console: &Console) {
     }
     for f in list {
         console.line(&format!(
-            "sub-domain {:>4}: {:>10} tetrahedra, about {:.3e} to expect",
+            "sub-domain {:>4}: {:>10} tetrahedra, about {:.0} to expect",
             f.rank, f.tets, f.predicted
         ));
     }
