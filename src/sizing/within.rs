@@ -331,7 +331,7 @@ mod tests {
         };
         assert!(within(&had).is_none());
         let field = within(&But(&had)).expect("another length");
-        for p in places().filter(|p| p.x < 1.5) {
+        for p in places().filter(|p| p.x < 0.8) {
             let (old, new) = (had.h(p), field.h(p));
             assert!((new / old - 1.0).abs() < 1e-3, "{p} {old} {new}");
         }
