@@ -320,7 +320,10 @@ fn draw(
     match snapshot.color {
         ColorBy::Subdomain => picture.kind(piece.subdomain),
         ColorBy::Region => picture.kind(piece.region),
-        ColorBy::Label => picture.kind(piece.label.unwrap_or(u32::MAX)),
+        ColorBy::Label => piece
+            .label
+            .into_iter()
+            .for_each(|label| picture.kind(label)),
         ColorBy::Quality | ColorBy::Size => {}
     }
     let color = color(snapshot.color, extent, piece);

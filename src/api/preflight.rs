@@ -61,7 +61,7 @@ pub(crate) fn preflight(
     let needed = estimate.disk_peak_bytes(cap, n_threads());
     if (free as f64) < REFUSED_BELOW * needed as f64 {
         let message = format!(
-            "about {:.3e} tetrahedra are expected, which need {} of disk on the way; {} are free",
+            "about {:.0} tetrahedra are expected, which need {} of disk on the way; {} are free",
             estimate.tets(),
             show_bytes(needed),
             show_bytes(free)

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::mesher::predict;
 use super::preflight::scratch_beside;
@@ -217,40 +217,77 @@ impl Remesh {
             );
             return Err(Error::new("bad-size", message));
         }
-        let given = self.sizes.clone().unwrap_or_default();
-        if given.field.is_some() {
+        let given = self.sizes.clone();
+        if given.as_ref().is_some_and(|given| given.field.is_some()) {
             let message = "a background mesh of arrays is for a new mesh";
             return Err(Error::new("usage", message)
                 .with_help("give a length for each tetrahedron or vertex instead"));
         }
-        let mut asked = given.options;
-        job::identify_sizes(&mut asked)?;
+        let asked = AskedSizes {
+            options: given.map(|given| given.options),
+            values: self.lengths.clone(),
+            file: None,
+            factor: self.factor,
+            limits: [0.0, f64::INFINITY],
+            refine_by: json!(self.factor),
+        };
+        Ok(Some(asked.new_sizes(open, options, &self.settings)?))
+    }
+}
+
+/// What is asked for in place of the sizes on record.
+pub(crate) struct AskedSizes {
+    /// Sizes beside those on record.
+    pub options: Option<Options>,
+    /// Lengths one by one: of the options only the gradation counts beside them.
+    pub values: Option<Values>,
+    /// Where those were read from.
+    pub file: Option<String>,
+    /// Times this.
+    pub factor: f64,
+    /// No length of `values` is taken below or above these.
+    pub limits: [f64; 2],
+    /// The factor as it was given, to be recorded.
+    pub refine_by: Value,
+}
+
+impl AskedSizes {
+    /// Errors: sizes without a meaning; a surface that is not what it was, where its edges are needed.
+    pub fn new_sizes(
+        self,
+        open: &mut Catalog,
+        options: &Options,
+        settings: &Settings,
+    ) -> Result<NewSizes, Error> {
+        let mut asked = self.options.clone().unwrap_or_default();
         let beta = match &asked.hgrad {
             Some(_) => asked.sizes()?.beta(),
             None => options.sizes()?.beta(),
         };
-        let field = match &self.sizes {
-            Some(_) => {
+        let field = match (&self.options, &self.values) {
+            (Some(_), None) => {
+                job::identify_sizes(&mut asked)?;
                 let mut all = options.clone();
                 all.add_sizes(&asked);
-                Some(field_of_surface(open, &all, &self.settings)?)
+                Some(field_of_surface(open, &all, settings)?)
             }
-            None => None,
+            _ => None,
         };
+        asked.size_field = self.file.or(asked.size_field);
         let asked = serde_json::to_value(&asked).unwrap_or_default();
-        Ok(Some(NewSizes {
+        Ok(NewSizes {
             field,
-            values: self.lengths.clone(),
+            values: self.values,
             factor: self.factor,
-            limits: [0.0, f64::INFINITY],
+            limits: self.limits,
             beta,
-            asked: json!({ "options": asked, "refine_by": self.factor }).to_string(),
-        }))
+            asked: json!({ "options": asked, "refine_by": self.refine_by }).to_string(),
+        })
     }
 }
 
 /// The field of the surface a store was made from, with these options. Errors: a surface that is not what it was.
-pub(crate) fn field_of_surface(
+fn field_of_surface(
     open: &mut Catalog,
     all: &Options,
     settings: &Settings,

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::Settings;
 use super::error::{Error, Remedy};
 use crate::audit::{self, Level, Report, VerifyOptions};
+use crate::geom::short;
 use crate::storage::attempt;
 use crate::store::{Catalog, StoreError, WriterLock};
 use crate::surface::Surface;
@@ -88,8 +89,9 @@ pub(crate) fn sentence(report: &Report) -> String {
     }
     if report.delaunay_tested > 0 {
         text += &format!(
-            "; {:.3} % of free faces locally Delaunay",
-            100.0 * report.delaunay_share()
+            "; {} % of free faces locally Delaunay",
+            // Rounded down: 100 is said of all alone.
+            short((1e4 * report.delaunay_share()).floor() / 100.0)
         );
     }
     text

@@ -51,7 +51,9 @@ mod wedge;
 pub use error::{BoundaryError, FacetPlace};
 pub use nearness::{Nearness, NearnessKind};
 pub use policy::{Filled, RegionPolicy, Walls};
+#[cfg(any(test, feature = "internals"))]
 pub use recover::recover;
+pub use recover::recover_watched;
 pub use regions::{RegionSummary, Regions, fill_regions};
 pub use report::RecoveryReport;
 pub use seeds::RegionRule;

@@ -9,7 +9,7 @@ use super::flat::{FlatPart, flat_parts, single_parts};
 use super::free_vertex::remove_free;
 use super::map::MissingFacets;
 use super::patch::Patch;
-use super::report::RecoveryReport;
+use super::report::{RecoveryReport, RecoveryWatcher};
 use super::space::{PagedSpace, Space, edge_key, sorted};
 use super::suppress::CavitySkin;
 use super::turn::turn_segment;
@@ -25,6 +25,7 @@ pub(super) fn recover_by_points<P: Pages>(
     mesh: &mut Mesh<P>,
     missing: &mut MissingFacets,
     report: &mut RecoveryReport,
+    watch: &RecoveryWatcher,
 ) -> Vec<(u32, Trouble)> {
     let mut troubles = Vec::new();
     for _ in 0..ROUNDS_MAX {
@@ -33,6 +34,7 @@ pub(super) fn recover_by_points<P: Pages>(
         let mut left = Vec::new();
         for group in groups(mesh, &missing.facets, &mut missing.protected) {
             check_cancelled();
+            report.tell(watch);
             report.patches += 1;
             let Err((facets, trouble)) = recover_group(mesh, missing, &group, report) else {
                 report.facets_by_points += group.len() as u32;
@@ -321,6 +323,8 @@ fn build<P: Pages>(
         }
         late = left;
         match trouble {
+            // Mostly a few of thousands have no room: they alone go where no double is, all else is as good as it was.
+            Some(_) if late.len() == before && !patch.effort.exact => patch.effort.exact = true,
             Some(trouble) if late.len() == before => return Err(trouble),
             _ => {}
         }

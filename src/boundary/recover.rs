@@ -9,7 +9,7 @@ use super::flips::{CROSSINGS_MAX, Flipper};
 use super::map::{MissingFacets, map};
 use super::nearness::narrowest;
 use super::points::recover_by_points;
-use super::report::RecoveryReport;
+use super::report::{RecoveryReport, RecoveryWatcher};
 use super::space::{PagedSpace, Space, edge_key};
 use super::target::RecoveryTarget;
 use super::tidy::tidy;
@@ -30,7 +30,16 @@ const CROSSINGS_FIRST: usize = 24;
 /// Vertices are added only inside volumes, tagged as Steiner points. Bounded work; ids and order depend on the mesh alone.
 ///
 /// Errors: [`BoundaryError`] names the facets; the mesh is then valid but without them.
+#[cfg(any(test, feature = "internals"))]
 pub fn recover<P: Pages>(mesh: &mut Mesh<P>) -> Result<RecoveryReport, BoundaryError> {
+    recover_watched(mesh, &|_, _| {})
+}
+
+/// As [`recover`]; `watch` gets the segments and facets that are there, of those that were missing.
+pub fn recover_watched<P: Pages>(
+    mesh: &mut Mesh<P>,
+    watch: &RecoveryWatcher,
+) -> Result<RecoveryReport, BoundaryError> {
     let clock = Instant::now();
     let mut missing = map(mesh);
     let mut report = RecoveryReport {
@@ -41,13 +50,13 @@ pub fn recover<P: Pages>(mesh: &mut Mesh<P>) -> Result<RecoveryReport, BoundaryE
         ..RecoveryReport::default()
     };
     let clock = Instant::now();
-    flip_segments(mesh, &mut missing, &mut report, CROSSINGS_FIRST);
-    turn_segments(mesh, &mut missing, &mut report);
-    flip_segments(mesh, &mut missing, &mut report, CROSSINGS_MAX);
-    flip_facets(mesh, &mut missing, &mut report);
+    flip_segments(mesh, &mut missing, &mut report, CROSSINGS_FIRST, watch);
+    turn_segments(mesh, &mut missing, &mut report, watch);
+    flip_segments(mesh, &mut missing, &mut report, CROSSINGS_MAX, watch);
+    flip_facets(mesh, &mut missing, &mut report, watch);
     report.flip_time = clock.elapsed();
     let clock = Instant::now();
-    let troubles = recover_by_points(mesh, &mut missing, &mut report);
+    let troubles = recover_by_points(mesh, &mut missing, &mut report, watch);
     tidy(mesh, &mut report);
     report.point_time = clock.elapsed();
     match troubles.first() {
@@ -97,10 +106,12 @@ fn turn_segments<P: Pages>(
     mesh: &mut Mesh<P>,
     missing: &mut MissingFacets,
     report: &mut RecoveryReport,
+    watch: &RecoveryWatcher,
 ) {
     let mut left = Vec::new();
     for (a, b) in std::mem::take(&mut missing.segments) {
         check_cancelled();
+        report.tell(watch);
         if turn_segment(mesh, missing, report, a, b) {
             report.segments_by_flips += 1;
         } else {
@@ -115,6 +126,7 @@ fn flip_segments<P: Pages>(
     missing: &mut MissingFacets,
     report: &mut RecoveryReport,
     crossings_max: usize,
+    watch: &RecoveryWatcher,
 ) {
     for (level, work) in LEVELS {
         loop {
@@ -122,6 +134,7 @@ fn flip_segments<P: Pages>(
             let mut left = Vec::new();
             for (a, b) in std::mem::take(&mut missing.segments) {
                 check_cancelled();
+                report.tell(watch);
                 let mut s = PagedSpace(mesh, &missing.protected);
                 let mut flipper = Flipper::new(&mut s, RecoveryTarget::Edge(a, b));
                 flipper.work = work;
@@ -151,6 +164,7 @@ fn flip_facets<P: Pages>(
     mesh: &mut Mesh<P>,
     missing: &mut MissingFacets,
     report: &mut RecoveryReport,
+    watch: &RecoveryWatcher,
 ) {
     for (level, work) in LEVELS {
         loop {
@@ -158,6 +172,7 @@ fn flip_facets<P: Pages>(
             let mut left = Vec::new();
             for n in std::mem::take(&mut missing.facets) {
                 check_cancelled();
+                report.tell(watch);
                 let f = mesh.facet(n).vertices;
                 let mut s = PagedSpace(mesh, &missing.protected);
                 let mut flipper = Flipper::new(&mut s, RecoveryTarget::Face(f));

@@ -1,5 +1,8 @@
 use std::time::Duration;
 
+/// Gets how much is done and how much there is to do.
+pub type RecoveryWatcher<'a> = dyn Fn(u64, u64) + 'a;
+
 /// What recovery found and did.
 #[derive(Clone, Debug, Default)]
 pub struct RecoveryReport {
@@ -31,4 +34,13 @@ pub struct RecoveryReport {
     pub flip_time: Duration,
     /// Time to recover with vertices on the surface, which are then moved into the volumes.
     pub point_time: Duration,
+}
+
+impl RecoveryReport {
+    /// Tells how much is there of what was missing. A segment that comes with the facets around it is never counted.
+    pub(super) fn tell(&self, watch: &RecoveryWatcher) {
+        let done = self.segments_by_flips + self.facets_by_flips + self.facets_by_points;
+        let total = self.missing_segments + self.missing_facets;
+        watch(u64::from(done), u64::from(total));
+    }
 }

@@ -14,6 +14,7 @@ use crate::api;
 use crate::api::error::{Error, Remedy};
 use crate::api::surface::WELD_SHARE_MAX;
 use crate::api::targets::check_target;
+use crate::geom::short;
 use crate::io::write;
 use crate::storage::attempt;
 use crate::surface::{Repair, Surface, repair, repair_bytes, validate_in};
@@ -134,8 +135,9 @@ impl Mended {
         let done = &self.done;
         let joined = match (self.weld_share, self.weld_distance) {
             (Some(share), Some(distance)) => format!(
-                "{} points joined (nearer than {share:e} of the box diagonal, {distance:.3e}), ",
-                done.points_joined
+                "{} points joined (nearer than {share:e} of the box diagonal, {}), ",
+                done.points_joined,
+                short(distance)
             ),
             _ => String::new(),
         };

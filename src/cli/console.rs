@@ -61,7 +61,8 @@ impl Console {
     pub fn with(json: bool, quiet: bool, verbose: bool) -> Self {
         let terminal = std::io::stderr().is_terminal() && !json && !quiet;
         let bar = if terminal {
-            ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr_with_hz(10))
+            let target = ProgressDrawTarget::stderr_with_hz(10);
+            ProgressBar::with_draw_target(None, target).with_style(style(false))
         } else {
             ProgressBar::hidden()
         };
@@ -230,9 +231,10 @@ impl Console {
         }
         if self.terminal {
             if new_stage {
-                self.bar.reset();
+                // Resetting draws.
                 self.bar.set_style(style(total.is_some()));
                 self.bar.set_message(stage.to_owned());
+                self.bar.reset();
             }
             if let Some(total) = total {
                 self.bar.set_length(total);

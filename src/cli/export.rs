@@ -1,19 +1,23 @@
 //! `export`: files for other programs.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
-use super::args::ExportArgs;
+use super::args::{ExportArgs, QueryArgs};
 use super::console::Console;
 use super::failure::Failure;
 use super::memory;
+use super::query;
 use super::query_ask::regions;
 use crate::api::targets::{check_target, inputs_of};
 use crate::api::{Error, Exported, Settings, show};
 use crate::io::write::{Content, ENDINGS, MeshFormat, Order, Selection, check};
 
 pub fn run(args: &ExportArgs, console: &Console) -> Result<u8, Failure> {
+    if let Some(all) = rows(args)? {
+        return query::run(&all, console);
+    }
     let settings = console.settings(memory::asked(args.read.memory.as_deref())?, None);
     let format = match &args.format {
         Some(word) => Some(MeshFormat::of_word(word).ok_or_else(|| {
@@ -75,6 +79,46 @@ pub fn run(args: &ExportArgs, console: &Console) -> Result<u8, Failure> {
         console.answer(&json!({ "schema": 1, "exports": reports }));
     }
     Ok(0)
+}
+
+/// The question about all tetrahedra whose answer is to be written, where that is asked for: rows of values.
+fn rows(args: &ExportArgs) -> Result<Option<QueryArgs>, Failure> {
+    let word = |out: &PathBuf| match &args.format {
+        Some(word) => word.to_ascii_lowercase(),
+        None => (out.extension().unwrap_or_default().to_string_lossy()).to_ascii_lowercase(),
+    };
+    let is_rows = |out: &PathBuf| matches!(word(out).as_str(), "csv" | "jsonl");
+    if !args.out.iter().any(is_rows) {
+        return Ok(None);
+    }
+    let of_meshes = [
+        args.pieces,
+        args.ascii,
+        args.boundary,
+        args.interfaces,
+        args.ghosts,
+        args.split_sheets,
+        args.order != 1,
+        args.read.json,
+    ];
+    let ([out], false) = (&args.out[..], of_meshes.contains(&true)) else {
+        let message = ".csv and .jsonl are one file of rows, a tetrahedron each, and no mesh";
+        return Err(Failure::new("usage", message).help(
+            "export it alone, with --subdomain, --region or --memory only; `tetdb query` chooses rows and columns",
+        ));
+    };
+    let to_stdout = out == Path::new("-");
+    let subdomains: Vec<String> = args.subdomain.iter().map(u32::to_string).collect();
+    Ok(Some(QueryArgs {
+        store: args.store.clone(),
+        subdomain: (!subdomains.is_empty()).then(|| subdomains.join(",")),
+        region: args.region.clone(),
+        csv: to_stdout && word(out) == "csv",
+        json: to_stdout && word(out) == "jsonl",
+        output: (!to_stdout).then(|| out.clone()),
+        memory: args.read.memory.clone(),
+        ..QueryArgs::default()
+    }))
 }
 
 /// Refuses names whose format cannot be told, before any work.

@@ -44,6 +44,7 @@ use console::Console;
 use failure::Failure;
 
 use crate::api::guarded;
+use crate::storage::StorageError;
 
 pub use failure::{CODES, CodeRow};
 
@@ -76,8 +77,16 @@ fn run_rank(ranks: &ranks::Ranks) -> ExitCode {
         return ExitCode::SUCCESS;
     };
     let console = Console::with(false, true, false);
-    signals::listen(&console);
-    ExitCode::from(ranks.serve(&args.command, &console))
+    listen(&console);
+    ExitCode::from(ranks.serve(&args.command, |run| mesh::begin(run, &console)))
+}
+
+/// Signals end the run from now on.
+fn listen(console: &Console) {
+    let is_json = console.is_json();
+    signals::listen(console.cancel(), move || {
+        Console::new(is_json).fail(&StorageError::Cancelled.into())
+    });
 }
 
 fn run_alone() -> ExitCode {
@@ -87,7 +96,7 @@ fn run_alone() -> ExitCode {
     };
     let console = Console::with(args.command.is_json(), args.quiet, args.verbose);
     let settings = console.settings(None, None);
-    signals::listen(&console);
+    listen(&console);
     let done = guarded(&settings, || Ok(dispatch(&args.command, &console)));
     let done = done.map(|done| console.end_answer().and(done));
     let exit = match done {
@@ -110,7 +119,8 @@ fn unparsed(error: &clap::Error) -> ExitCode {
     let text = text.split("\n\nUsage:").next().unwrap_or(&text);
     let message = text.strip_prefix("error: ").unwrap_or(text).trim_end();
     let command = std::env::args().nth(1).filter(|c| is_command(c));
-    if let Some(ContextValue::String(word)) = error.get(ContextKind::InvalidArg)
+    if !is_apart(error)
+        && let Some(ContextValue::String(word)) = error.get(ContextKind::InvalidArg)
         && error.kind() == ErrorKind::UnknownArgument
         && word.starts_with('-')
         && word[1..].starts_with(|c: char| c.is_ascii_digit() || c == '.')
@@ -123,8 +133,29 @@ fn unparsed(error: &clap::Error) -> ExitCode {
             Console::new(is_json).fail(&Failure::new("usage", message).help(help)),
         );
     }
+    if is_apart(error) {
+        let message = "numbers of one option stand apart";
+        let help = "write them as one word with commas, as in --point 0.1,0.2,0.3";
+        return ExitCode::from(
+            Console::new(is_json).fail(&Failure::new("usage", message).help(help)),
+        );
+    }
     let help = format!("`tetdb {} --help`", command.unwrap_or_default()).replace("  ", " ");
     ExitCode::from(Console::new(is_json).fail(&Failure::new("usage", message).help(help)))
+}
+
+/// Whether what was not expected is a number behind another one.
+fn is_apart(error: &clap::Error) -> bool {
+    let is_number = |word: &str| word.trim_end_matches(',').parse::<f64>().is_ok();
+    let Some(ContextValue::String(found)) = error.get(ContextKind::InvalidArg) else {
+        return false;
+    };
+    let words: Vec<String> = std::env::args_os()
+        .map(|word| word.to_string_lossy().into_owned())
+        .collect();
+    // Of one with a minus only the sign and the first digit are named.
+    (words.windows(2))
+        .any(|two| is_number(&two[0]) && is_number(&two[1]) && two[1].starts_with(found.as_str()))
 }
 
 fn is_command(word: &str) -> bool {

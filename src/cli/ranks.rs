@@ -15,11 +15,10 @@ use mpi::topology::SimpleCommunicator;
 use mpi::traits::{Communicator, Destination, MatchedReceiveVec, Source};
 use serde_json::{Value, json};
 
-use super::args::Command;
-use super::console::Console;
+use super::args::{Command, RunArgs};
 use super::failure::Failure;
-use super::{mesh, tasks};
-use crate::api::{Error, guarded};
+use super::tasks;
+use crate::api::{Error, Settings, guarded};
 use crate::pipeline::{self, Hands, HelperFailure, Helpers, PipelineError, TaskSettings};
 use crate::storage::{Budget, RunContext, host_name};
 
@@ -224,8 +223,12 @@ impl Ranks {
         }
     }
 
-    /// Does what rank 0 asks for, until it says that this is the end.
-    pub fn serve(&self, command: &Command, console: &Console) -> u8 {
+    /// Does what rank 0 asks for, until it says that this is the end; `begin` tells how the command runs.
+    pub fn serve(
+        &self,
+        command: &Command,
+        begin: impl Fn(&RunArgs) -> Result<Settings, Failure>,
+    ) -> u8 {
         let run = match command {
             Command::Mesh(args) => Some(&args.run),
             Command::Resume(args) => Some(&args.run),
@@ -238,7 +241,7 @@ impl Ranks {
                 _ => return 0,
             };
             let done = match run {
-                Some(run) => mesh::begin(run, console).and_then(|settings| {
+                Some(run) => begin(run).and_then(|settings| {
                     let done = guarded(&settings, || {
                         let budget = Budget::new(settings.cap()?);
                         Ok(self.serve_job(job, &budget)?)

@@ -9,11 +9,13 @@ use super::console::Console;
 use super::failure::Failure;
 use super::info::{hex, share_below_two};
 use super::resaturate_sizes::{self, new_sizes};
+use super::words::count;
 use super::{memory, mesh};
 use crate::api::job::options_of;
 use crate::api::remesh::{damaged, verify_changed};
 use crate::api::store::{open_finished, open_to_change};
 use crate::api::{Remesh, Settings};
+use crate::geom::short;
 use crate::pipeline::{self, Forecast, NewSizes, Options, Remade, ResaturateSummary, Resaturation};
 use crate::storage::Budget;
 use crate::store::Catalog;
@@ -126,7 +128,8 @@ fn forget(mut catalog: Catalog, console: &Console) -> Result<u8, Failure> {
         console.answer(&json!({ "schema": 1, "forgotten": n }));
     } else {
         console.line(&format!(
-            "dropped the previous version of {n} sub-domain(s)"
+            "dropped the previous version of {}",
+            count(n as u64, "sub-domain")
         ));
     }
     Ok(0)
@@ -142,7 +145,7 @@ fn print_forecast(list: &[Forecast], console: &Console) {
     }
     for f in list {
         console.line(&format!(
-            "sub-domain {:>4}: {:>10} tetrahedra, about {:.3e} to expect",
+            "sub-domain {:>4}: {:>10} tetrahedra, about {:.0} to expect",
             f.rank, f.tets, f.predicted
         ));
     }
@@ -174,28 +177,30 @@ fn finish(
     for part in &summary.parts {
         let (old, new) = (&part.before, &part.after);
         console.line(&format!(
-            "sub-domain {}: {} -> {} tetrahedra; {:.2} -> {:.2} % of quality below 2; worst {:.3} -> {:.3}",
+            "sub-domain {}: {} -> {} tetrahedra; {} -> {} % of quality below 2; worst {} -> {}",
             new.rank,
             old.tets,
             new.tets,
-            share_below_two(&old.quality),
-            share_below_two(&new.quality),
-            old.quality.worst,
-            new.quality.worst
+            short(share_below_two(&old.quality)),
+            short(share_below_two(&new.quality)),
+            short(old.quality.worst),
+            short(new.quality.worst)
         ));
         console.line(&match old.digest == new.digest {
             true => format!("  digest {} as before", hex(new.digest)),
             false => format!("  digest {} -> {}", hex(old.digest), hex(new.digest)),
         });
-        console.line(&format!(
-            "  {} interface faces as before, digest {}",
-            new.interface_faces,
-            hex(new.interface_digest)
-        ));
+        if new.interface_faces > 0 {
+            console.line(&format!(
+                "  {} interface faces as before, digest {}",
+                new.interface_faces,
+                hex(new.interface_digest)
+            ));
+        }
     }
     console.line(&format!(
-        "{} other sub-domain(s) as before; digest of all {digest}",
-        all - summary.parts.len()
+        "{} as before; digest of all {digest}",
+        count((all - summary.parts.len()) as u64, "other sub-domain")
     ));
     Ok(0)
 }

@@ -9,8 +9,7 @@ use super::args::SizeArgs;
 use super::config;
 use super::failure::Failure;
 use crate::api::Settings;
-use crate::api::job::identify_sizes;
-use crate::api::remesh::field_of_surface;
+use crate::api::remesh::AskedSizes;
 use crate::io::read::read_lengths;
 use crate::pipeline::{NewSizes, Options, Values};
 use crate::sizing::SizingError;
@@ -33,24 +32,19 @@ pub fn new_sizes(
     if !are_given(args) {
         return Ok(None);
     }
-    let factor = factor(args.refine_by.as_deref())?;
     let mut asked = Options::default();
     config::take_sizes(&args.sizes, &mut asked);
-    let lengths = asked.size_field.take_if(|file| file.ends_with(".npy"));
-    let parsed = asked.sizes()?;
-    let beta = match args.sizes.hgrad {
-        Some(_) => parsed.beta(),
-        None => options.sizes()?.beta(),
-    };
-    let mut sizes = NewSizes {
-        field: None,
+    let file = asked.size_field.take_if(|file| file.ends_with(".npy"));
+    asked.sizes()?;
+    let mut sizes = AskedSizes {
+        options: (args.sizes != SizeArgs::default()).then_some(asked),
         values: None,
-        factor,
+        file,
+        factor: factor(args.refine_by.as_deref())?,
         limits: [0.0, f64::INFINITY],
-        beta,
-        asked: String::new(),
+        refine_by: json!(args.refine_by),
     };
-    if let Some(file) = &lengths {
+    if let Some(file) = &sizes.file {
         let others = SizeArgs {
             hmin: None,
             hmax: None,
@@ -68,16 +62,8 @@ pub fn new_sizes(
         }
         sizes.limits = limits(open, args)?;
         sizes.values = Some(values(Path::new(file), open, args, settings.cap()?)?);
-    } else if args.sizes != SizeArgs::default() {
-        identify_sizes(&mut asked)?;
-        let mut all = options.clone();
-        all.add_sizes(&asked);
-        sizes.field = Some(field_of_surface(open, &all, settings)?);
     }
-    asked.size_field = lengths.or(asked.size_field);
-    let asked = serde_json::to_value(&asked).unwrap_or_default();
-    sizes.asked = json!({ "options": asked, "refine_by": args.refine_by }).to_string();
-    Ok(Some(sizes))
+    Ok(Some(sizes.new_sizes(open, options, settings)?))
 }
 
 fn factor(text: Option<&str>) -> Result<f64, Failure> {

@@ -8,9 +8,7 @@ use signal_hook::consts::{SIGABRT, SIGINT, SIGTERM};
 use signal_hook::flag::register_conditional_shutdown;
 use signal_hook::iterator::Signals;
 
-use super::console::Console;
-use super::failure::Failure;
-use crate::storage::StorageError;
+use crate::storage::CancelToken;
 
 static RECEIVED: AtomicI32 = AtomicI32::new(0);
 /// Whether there is a store that can be resumed.
@@ -32,30 +30,29 @@ pub fn end_without_memory() {
 /// The exit code of too little memory.
 const NO_MEMORY: i32 = 6;
 
-/// Listens from now on. Errors: the system refuses; the run then simply cannot be stopped gently.
-pub fn listen(console: &Console) {
+/// Listens from now on, and cancels the run; where nothing would be left behind it ends soon after what `last` says, whose answer is the exit code.
+///
+/// Errors: the system refuses; the run then simply cannot be stopped gently.
+pub fn listen(cancel: &CancelToken, last: impl Fn() -> u8 + Send + Sync + 'static) {
     let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) else {
         return;
     };
-    let (token, is_json) = (console.cancel().clone(), console.is_json());
+    let (token, last) = (cancel.clone(), Arc::new(last));
     std::thread::spawn(move || {
         for signal in signals.forever() {
             if RECEIVED.swap(signal, Ordering::Relaxed) != 0 {
                 std::process::exit(128 + signal);
             }
             token.cancel();
-            std::thread::spawn(move || end_early(is_json));
+            let last = last.clone();
+            std::thread::spawn(move || {
+                std::thread::sleep(PATIENCE);
+                if !IN_ORDER.load(Ordering::SeqCst) {
+                    std::process::exit(last().into());
+                }
+            });
         }
     });
-}
-
-/// Ends the process if nothing is under way that would leave something behind.
-fn end_early(is_json: bool) {
-    std::thread::sleep(PATIENCE);
-    if !IN_ORDER.load(Ordering::SeqCst) {
-        let stopped = Failure::from(StorageError::Cancelled);
-        std::process::exit(Console::new(is_json).fail(&stopped).into());
-    }
 }
 
 /// From now on there is a store: a step under way ends in order, however long that takes.

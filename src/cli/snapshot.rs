@@ -15,7 +15,10 @@ const SIDE: std::ops::RangeInclusive<u32> = 64..=16_384;
 pub fn run(args: &SnapshotArgs, console: &Console) -> Result<u8, Failure> {
     check_target(&args.output, &inputs_of(&args.store))?;
     let settings = console.settings(memory::asked(args.read.memory.as_deref())?, None);
-    let snapshot = snapshot(args)?;
+    let snapshot = snapshot(args).map_err(|error| match error.code {
+        "bad-query" => error.help("`tetdb snapshot --help` has examples"),
+        _ => error,
+    })?;
     let snapped = take(&args.store, &args.output, &snapshot, &settings);
     let snapped = snapped.map_err(|error| match (error.code(), &args.plane) {
         ("bad-query", Some(plane)) => {

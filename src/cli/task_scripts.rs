@@ -5,11 +5,19 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use super::tasks::kind;
-use crate::pipeline::{Planned, Stage};
+use crate::pipeline::{Planned, Stage, StageKind};
 
 /// Beside the cap: code and stacks.
 const MEMORY_BESIDE: u64 = 64 << 20;
+
+/// What the tasks of a stage do, in words.
+pub(super) fn kind(kind: StageKind) -> &'static str {
+    match kind {
+        StageKind::Cuts => "one cut each",
+        StageKind::Subtrees => "all cuts of a part",
+        StageKind::Subdomains => "sub-domains",
+    }
+}
 
 /// What a script is written from.
 pub(super) struct Script<'a> {

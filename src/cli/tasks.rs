@@ -10,10 +10,10 @@ use super::args::{GatherArgs, PlanArgs, WorkArgs};
 use super::console::Console;
 use super::failure::Failure;
 use super::memory;
-use super::task_scripts::Script;
+use super::task_scripts::{Script, kind};
 use crate::api::Tasks;
 use crate::api::tasks::ranges;
-use crate::pipeline::{Planned, StageKind, TaskState};
+use crate::pipeline::{Planned, TaskState};
 
 /// Sub-domains a task of the last stage should have, so that tasks end at about the same time.
 const SUBDOMAINS_PER_TASK: u32 = 4;
@@ -121,15 +121,6 @@ pub fn gather(args: &GatherArgs, console: &Console) -> Result<u8, Failure> {
         ));
     }
     Ok(0)
-}
-
-/// What the tasks of a stage do, in words.
-pub(super) fn kind(kind: StageKind) -> &'static str {
-    match kind {
-        StageKind::Cuts => "one cut each",
-        StageKind::Subtrees => "all cuts of a part",
-        StageKind::Subdomains => "sub-domains",
-    }
 }
 
 /// The tasks of a store for `info`.

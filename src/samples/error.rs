@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use crate::geom::short;
+
 /// Why a sample cannot be made. Each message names the offending word and what would do.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -65,7 +67,8 @@ pub enum SampleError {
     },
     /// The sample would have too many triangles.
     #[error(
-        "sample `{name}` would have about {found:.3e} triangles, more than {expected}; choose a larger h or a smaller count"
+        "sample `{name}` would have about {} triangles, more than {expected}; choose a larger h or a smaller count",
+        short(*found)
     )]
     TooMany {
         /// Name of the sample.

@@ -114,7 +114,7 @@ impl SizeConstraints<'_> {
         Ok(shape)
     }
 
-    fn is_in_bounds(&self, cell: Leaf) -> bool {
+    pub fn is_in_bounds(&self, cell: Leaf) -> bool {
         let width = cell.side() * self.frame.side;
         let beside = Point::splat(self.beside * width);
         let low = self.frame.low + cell.low() * self.frame.side - beside;

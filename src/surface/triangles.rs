@@ -197,7 +197,7 @@ impl fmt::Display for Note {
                         "are named by it, and are what is filled where regions are filled by seeds",
                     ),
                 };
-                write!(f, "{n} {what} {use_of}")
+                write!(f, "{what} ({n}) {use_of}")
             }
             NoteKind::SplitFacets { n } => write!(
                 f,

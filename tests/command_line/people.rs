@@ -78,6 +78,28 @@ fn a_mesh_file_named_as_the_store_is_sent_to_export() {
 }
 
 #[test]
+fn rows_of_all_tetrahedra_are_exported_as_a_question_about_all_answers_them() {
+    let place = Place::new();
+    place
+        .run_line("mesh sample:box,h=0.5 -o b.tetdb --no-verify")
+        .succeeds();
+    for (format, option) in [("csv", "--csv"), ("jsonl", "--json")] {
+        let rows = |line: &str| place.run_line(line).succeeds().stdout();
+        let exported = rows(&format!("export b.tetdb - --format {format}"));
+        assert_eq!(exported, rows(&format!("query b.tetdb {option}")));
+        for command in ["export b.tetdb a", "query b.tetdb -o b"] {
+            place.run_line(&format!("{command}.{format}")).succeeds();
+        }
+        let [a, b] = ["a", "b"].map(|name| std::fs::read(place.path(&format!("{name}.{format}"))));
+        assert_eq!(a.expect("exported"), b.expect("answered"));
+    }
+    for line in ["a.csv a.vtu", "a.csv --pieces", "- --format csv --order 2"] {
+        let done = place.run_line(&format!("export b.tetdb {line} --json"));
+        assert_eq!(done.error()["code"], "usage", "{line}");
+    }
+}
+
+#[test]
 fn solid_models_get_advice() {
     let place = Place::new();
     place.write("part.step", "ISO-10303-21;\nHEADER;\n");
@@ -106,6 +128,12 @@ fn negative_numbers_reach_the_option_before_them() {
         error["message"].to_string().contains("negative number"),
         "{error}"
     );
+    for apart in ["0.1 0.2 0.3", "-0.1 -0.2 -0.3"] {
+        let error = place
+            .run_line(&format!("query part.tetdb --point {apart} --json"))
+            .error();
+        assert!(error["help"].to_string().contains("with commas"), "{error}");
+    }
 }
 
 #[test]
@@ -190,4 +218,37 @@ fn a_ply_of_one_label_is_corners_alone() {
 fn pages_of_the_manual_have_examples() {
     let page = said(&Place::new(), "man query");
     assert!(page.contains(".SH EXAMPLES\n.nf\ntetdb query"), "{page}");
+}
+
+#[test]
+fn many_regions_are_summed_and_few_listed() {
+    let place = Place::new();
+    let few = place.run_line("mesh sample:box,h=0.5 --no-verify -o few.tetdb");
+    assert!(few.succeeds().stdout().contains("\n  region    1: volume"));
+    let many = place.run_line("mesh sample:balls,count=20,h=0.1 --no-verify -o many.tetdb");
+    let said = many.succeeds().stdout();
+    assert!(said.contains("--json lists them"), "{said}");
+    assert!(!said.contains("\n  region "), "{said}");
+}
+
+#[test]
+fn help_wraps_at_the_width_of_the_terminal() {
+    let place = Place::new();
+    for width in [60, 100] {
+        let mut command = place.command(&["query", "--help"]);
+        let done = command.env("COLUMNS", width.to_string()).output();
+        let text = done.expect("it starts").stdout;
+        // Examples are lines to be copied.
+        let options = String::from_utf8_lossy(&text).into_owned();
+        let options = options
+            .split("Examples:")
+            .next()
+            .unwrap_or_default()
+            .to_owned();
+        let widest = options.lines().map(|line| line.chars().count()).max();
+        assert!(
+            widest.is_some_and(|w| w <= width && w > width - 20),
+            "{widest:?} of {width}"
+        );
+    }
 }

@@ -187,6 +187,11 @@ fn a_surface_that_is_cut_open_shows_tetrahedra_and_labels_have_colors() {
         "{whole} {cut} {n_cut}"
     );
     assert_eq!(pieces("--color label"), whole);
+    // What was cut has no label, and no color among those explained.
+    let line = "snapshot box.tetdb a.svg --surface --plane 0.5,0.5,0.5,1,0,0 --color label";
+    place.run_line(line).succeeds();
+    let picture = std::fs::read_to_string(place.path("a.svg")).expect("a picture");
+    assert!(!picture.contains(&u32::MAX.to_string()));
     let refused = place.run_line("snapshot box.tetdb a.png --color label --json");
     assert_eq!(refused.error()["code"], "bad-query");
 }

@@ -117,3 +117,44 @@ fn endless_and_enormous_inputs_are_refused_at_once() {
         assert!(said.contains(code), "{line}: {:?} {said}", output.status);
     }
 }
+
+/// A flat polygon of so many corners, or as many triangles on one edge.
+fn around_a_circle(n: usize, is_polygon: bool) -> String {
+    let corner = |k| {
+        let (y, x) = (k as f64 / n as f64 * std::f64::consts::TAU).sin_cos();
+        format!("{x} {y} 0\n")
+    };
+    let corners: String = (0..n).map(corner).collect();
+    match is_polygon {
+        true => {
+            let all: Vec<String> = (0..n).map(|k| k.to_string()).collect();
+            format!("OFF\n{n} 1 0\n{corners}{n} {}\n", all.join(" "))
+        }
+        false => {
+            let triangles: String = (0..n).map(|k| format!("3 {k} {n} {}\n", n + 1)).collect();
+            let head = format!("OFF\n{} {n} 0\n", n + 2);
+            format!("{head}{corners}0 0 -1\n0 0 1\n{triangles}")
+        }
+    }
+}
+
+#[test]
+fn check_of_four_times_the_corners_or_triangles_takes_no_eight_times_as_long() {
+    let place = Place::new();
+    for is_polygon in [true, false] {
+        let seconds = [3_000, 12_000].map(|n| {
+            let name = format!("{n}.off");
+            place.write(&name, around_a_circle(n, is_polygon));
+            let one = |_| {
+                let clock = std::time::Instant::now();
+                let done = place.run(&["check", &name]);
+                assert_eq!(done.exit(), Some(3), "{}", done.stderr());
+                clock.elapsed().as_secs_f64()
+            };
+            // Others on the machine only make it longer.
+            (0..3).map(one).fold(f64::INFINITY, f64::min)
+        });
+        let [few, many] = seconds;
+        assert!(many < 8.0 * few, "{is_polygon}: {few} s, {many} s");
+    }
+}

@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use super::{RunArgs, ShapeArgs, SheetArgs};
+use super::run::RunArgs;
+use super::{ShapeArgs, SheetArgs};
 
 #[derive(Debug, clap::Args)]
 #[command(

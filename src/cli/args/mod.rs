@@ -3,19 +3,19 @@
 mod mesh;
 mod query;
 mod resaturate;
+mod run;
 mod shape;
 mod show;
 mod store;
 mod surface;
 mod tasks;
 
-use std::path::PathBuf;
-
 use clap::{Parser, Subcommand};
 
 pub use mesh::{EstimateArgs, MeshArgs, ResumeArgs};
 pub use query::QueryArgs;
 pub use resaturate::ResaturateArgs;
+pub use run::RunArgs;
 pub use shape::{Optimize, Regions, ShapeArgs, SizeArgs};
 pub use show::{ColorBy, CompletionsArgs, ManArgs, ReportArgs, SnapshotArgs};
 pub use store::{CompareArgs, ExportArgs, StoreArgs, VerifyArgs};
@@ -149,35 +149,4 @@ impl Command {
             Self::Completions(_) | Self::Man(_) => false,
         }
     }
-}
-
-/// How to read a store; none of this changes the answer.
-#[derive(Debug, clap::Args)]
-pub struct ReadArgs {
-    /// Most memory to hold
-    #[arg(long, value_name = "SIZE")]
-    pub memory: Option<String>,
-    /// Answer with one JSON object
-    #[arg(long)]
-    pub json: bool,
-}
-
-/// How to run; none of this changes the mesh.
-#[derive(Debug, clap::Args)]
-pub struct RunArgs {
-    /// Most memory to hold, such as 512MiB or 8GiB [default: 60 % of what is free]
-    #[arg(long, value_name = "SIZE")]
-    pub memory: Option<String>,
-    /// Threads to use [default: all cores]
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
-    pub threads: Option<usize>,
-    /// Skip the verification at the end
-    #[arg(long)]
-    pub no_verify: bool,
-    /// Also write these mesh files (.vtu, .pvtu, .mesh, .meshb, .msh, .inp, .npy, .json, .parquet where built in)
-    #[arg(long, value_name = "FILE")]
-    pub export: Vec<PathBuf>,
-    /// Answer with one JSON object
-    #[arg(long)]
-    pub json: bool,
 }

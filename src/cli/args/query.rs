@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 /// Tetrahedra by place, number, neighborhood or condition. All that is given must hold; nothing given means all.
-#[derive(Debug, clap::Args)]
+#[derive(Debug, Default, clap::Args)]
 #[command(
     after_help = "Examples:\n  tetdb query part.tetdb --point 0.1,0.2,0.3\n  tetdb query part.tetdb --points probes.txt --json\n  \
     tetdb query part.tetdb --sphere 0,0,0,0.5 --inside -o ball.vtu\n  \

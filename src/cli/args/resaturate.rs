@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use super::{RunArgs, SizeArgs};
+use super::SizeArgs;
+use super::run::RunArgs;
 
 /// Mesh sub-domains of a finished store again, from their coarse snapshots. Interfaces and all other sub-domains stay as they are.
 ///

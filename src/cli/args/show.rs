@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::ValueEnum;
 
-use super::ReadArgs;
+use super::run::ReadArgs;
 
 /// What colors stand for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::ReadArgs;
+use super::run::ReadArgs;
 
 #[derive(Debug, clap::Args)]
 pub struct StoreArgs {
@@ -63,7 +63,7 @@ pub struct ExportArgs {
     #[arg(value_name = "STORE")]
     pub store: PathBuf,
     /// Files to write; the extension tells the format: .vtu, .pvtu, .vtkhdf, .foam (OpenFOAM, in its folder), .msh, .mesh, .meshb, .mfem (MFEM), .ele (TetGen),
-    /// .inp, .npy (an array a file), .json (topology), .parquet (where built in); `-` with --format is standard output
+    /// .inp, .npy (an array a file), .json (topology), .csv and .jsonl (the rows of `tetdb query`), .parquet (where built in); `-` with --format is standard output
     #[arg(required = true, value_name = "OUT")]
     pub out: Vec<PathBuf>,
     /// The format, by the word of its ending, where the name does not tell it: vtu, msh, ..; msh22 is Gmsh's old one

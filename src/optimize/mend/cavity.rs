@@ -53,7 +53,6 @@ pub(super) struct Cavity {
     shell: Shell,
     /// Goodness and value of each.
     old: Vec<[f64; 2]>,
-    new: Vec<[u32; 4]>,
     replacement: Replacement,
 }
 
@@ -66,8 +65,7 @@ impl Cavity {
         aim: Aim,
         bounds: &mut FaceBounds,
     ) -> Option<Proposal> {
-        self.clear();
-        self.add(mesh, t, bounds);
+        self.begin(mesh, t, bounds);
         let points = mesh.points(&self.records[0]);
         let mut at = (points[0] + points[1] + points[2] + points[3]) * 0.25;
         let mut best: Option<Proposal> = None;
@@ -157,28 +155,32 @@ impl Cavity {
     /// Makes the proposal, the last one returned; `false`, with nothing changed, when a vertex that must stay would go.
     pub(super) fn apply<P: Pages>(&mut self, mesh: &mut Mesh<P>, proposal: Proposal) -> bool {
         assert_eq!(self.tets.len(), proposal.n, "the cavity of the proposal");
-        let gone = self.inside();
-        if gone.iter().any(|&v| !is_free(mesh, v)) {
-            return false;
-        }
         let v = proposal.corner.unwrap_or_else(|| {
             let h = self.records[0].vertices().map(|v| mesh.size(v));
             let v = mesh.add_vertex(proposal.at, (h[0] + h[1] + h[2] + h[3]) * 0.25);
             mesh.set_vertex_attribute(v, VertexTag::Free, 0);
             v
         });
-        self.new.clear();
-        for side in &self.star.sides {
-            let [a, b, c] = side.vertices;
-            if !side.vertices.contains(&v) {
-                self.new.push([v, a, b, c]);
-            }
+        let sides = self.star.sides.iter().map(|side| side.vertices);
+        let new: Vec<[u32; 4]> = sides
+            .filter(|face| !face.contains(&v))
+            .map(|[a, b, c]| [v, a, b, c])
+            .collect();
+        let done = self.exchange(mesh, &new);
+        if !done && proposal.corner.is_none() {
+            mesh.free_vertex(v);
         }
-        let done = (self.replacement).apply(mesh, &self.tets, &self.records, &self.new);
+        done
+    }
+
+    /// Replaces the cavity's tetrahedra by `new`, all exactly positive; `false`, with nothing changed, when a vertex that must stay would go.
+    pub(super) fn exchange<P: Pages>(&mut self, mesh: &mut Mesh<P>, new: &[[u32; 4]]) -> bool {
+        let mut gone = self.corners();
+        gone.retain(|v| !new.iter().any(|tet| tet.contains(v)));
+        let done = gone.iter().all(|&v| is_free(mesh, v))
+            && (self.replacement).apply(mesh, &self.tets, &self.records, new);
         if done {
             gone.into_iter().for_each(|v| mesh.free_vertex(v));
-        } else if proposal.corner.is_none() {
-            mesh.free_vertex(v);
         }
         done
     }
@@ -197,11 +199,72 @@ impl Cavity {
 
     /// Whether the vertex at `at`, where the least value is `value`, makes the cavity better.
     fn is_better(&self, at: Point, value: f64, aim: Aim) -> bool {
-        let mut old = Cost::default();
+        self.star.cost(at).is_better(&self.cost(), value, aim)
+    }
+
+    /// What its tetrahedra cost.
+    pub(super) fn cost(&self) -> Cost {
+        let mut cost = Cost::default();
         for &[good, value] in &self.old {
-            old.add(good, value);
+            cost.add(good, value);
         }
-        self.star.cost(at).is_better(&old, value, aim)
+        cost
+    }
+
+    pub(super) fn n_tets(&self) -> usize {
+        self.tets.len()
+    }
+
+    pub(super) fn records(&self) -> &[Tet] {
+        &self.records
+    }
+
+    pub(super) fn sides(&self) -> &[Side] {
+        &self.star.sides
+    }
+
+    /// Begins with one tetrahedron.
+    pub(super) fn begin<P: Pages>(&mut self, mesh: &mut Mesh<P>, t: u32, bounds: &mut FaceBounds) {
+        self.clear();
+        self.add(mesh, t, bounds);
+    }
+
+    /// Adds the worst tetrahedron beyond a face, and then all that have no vertex more; `false` when none may be added or there are too many.
+    pub(super) fn grow_by_vertex<P: Pages>(
+        &mut self,
+        mesh: &mut Mesh<P>,
+        tets_max: usize,
+        corners_max: usize,
+        bounds: &mut FaceBounds,
+    ) -> bool {
+        let mut order: Vec<(f64, u32)> = Vec::new();
+        for t in self.beyond() {
+            let record = mesh.tet(t);
+            order.push((value_of(mesh, &record, bounds)[1], t));
+        }
+        order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        if !order.into_iter().any(|(_, t)| self.add(mesh, t, bounds)) {
+            return false;
+        }
+        let corners = self.corners();
+        let mut has_grown = true;
+        while has_grown && self.tets.len() <= tets_max {
+            has_grown = false;
+            for t in self.beyond() {
+                let has_all = mesh.tet(t).vertices().iter().all(|v| corners.contains(v));
+                has_grown |= has_all && self.add(mesh, t, bounds);
+            }
+        }
+        self.tets.len() <= tets_max && corners.len() <= corners_max
+    }
+
+    /// Tetrahedra beyond faces that may be crossed, each once.
+    fn beyond(&self) -> Vec<u32> {
+        let open = (self.star.sides.iter()).filter(|side| !side.required && side.across.exists());
+        let mut tets: Vec<u32> = open.map(|side| side.across.tet()).collect();
+        tets.sort_unstable();
+        tets.dedup();
+        tets
     }
 
     /// Adds a tetrahedron; `false`, with nothing changed, when a required face would be inside.
@@ -241,7 +304,12 @@ impl Cavity {
     }
 
     /// Leaves the first `n` tetrahedra.
-    fn shrink<P: Pages>(&mut self, mesh: &mut Mesh<P>, n: usize, bounds: &mut FaceBounds) {
+    pub(super) fn shrink<P: Pages>(
+        &mut self,
+        mesh: &mut Mesh<P>,
+        n: usize,
+        bounds: &mut FaceBounds,
+    ) {
         if n < self.tets.len() {
             let tets = std::mem::take(&mut self.tets);
             self.clear();
@@ -251,14 +319,11 @@ impl Cavity {
         }
     }
 
-    /// Vertices that no face of the cavity has.
-    fn inside(&self) -> Vec<u32> {
+    /// All vertices, in ascending order.
+    pub(super) fn corners(&self) -> Vec<u32> {
         let mut all: Vec<u32> = self.records.iter().flat_map(Tet::vertices).collect();
         all.sort_unstable();
         all.dedup();
-        let mut outer: Vec<u32> = (self.star.sides.iter()).flat_map(|s| s.vertices).collect();
-        outer.sort_unstable();
-        all.retain(|v| outer.binary_search(v).is_err());
         all
     }
 }

@@ -6,9 +6,10 @@
 //!
 //! 1. `vertex`: inner vertices of bad tetrahedra move for the product of their ball, in sweeps; that takes clusters apart, each pass a bit further;
 //! 2. then, for each bad tetrahedron in order, the first that makes it good enough, or else the best, of: a flip, or an edge or a vertex
-//!    removed; a vertex moved for the worst of its ball; a vertex put on one of its edges; a vertex put into a cavity that grows (`cavity`).
+//!    removed; a vertex moved for the worst of its ball; a vertex put into a cavity that grows (`cavity`), or on one of its edges; where all
+//!    that gains little, a cavity filled anew with tetrahedra of its own vertices (`refill`).
 //!
-//! The last gains most. What is tried in vain is remembered until something changes it. All this three times, judged differently
+//! The vertex in a cavity gains most. What is tried in vain is remembered until something changes it. All this three times, judged differently
 //! ([`STAGES`]): by q, because what stands beside a needle is as bad as what stands on it and by excess nothing could take its place; by q over the bound
 //! (`bound`); and by the number of those of q ≥ 10.
 //!
@@ -16,6 +17,7 @@
 
 mod cavity;
 mod kernel;
+mod refill;
 mod star;
 mod vertex;
 
@@ -32,6 +34,7 @@ use crate::geom::{Point, STEP, mix};
 use crate::mesh::{Mesh, Tet, tets_of_page};
 use crate::storage::{Pages, check_cancelled};
 use cavity::{Cavity, Proposal};
+use refill::Refill;
 use star::{Aim, FaceBounds, Measure, value_of};
 use vertex::Mover;
 
@@ -108,6 +111,8 @@ pub struct MendCounts {
     pub tried: u64,
     /// Flips, and edges removed.
     pub reconnected: u64,
+    /// Cavities filled anew with tetrahedra of their own vertices.
+    pub refilled: u64,
     /// Moves of a vertex, each counted.
     pub vertices_moved: u64,
     /// Vertices put into cavities and on edges.
@@ -118,7 +123,11 @@ pub struct MendCounts {
 
 impl MendCounts {
     fn changes(&self) -> u64 {
-        self.reconnected + self.vertices_moved + self.vertices_inserted + self.vertices_removed
+        self.reconnected
+            + self.refilled
+            + self.vertices_moved
+            + self.vertices_inserted
+            + self.vertices_removed
     }
 }
 
@@ -157,6 +166,7 @@ pub(super) struct Mender {
     cavity: Cavity,
     /// The cavity of the best proposal so far.
     best_cavity: Cavity,
+    refill: Refill,
     bounds: FaceBounds,
     swapper: Swapper<Worst>,
     collapser: Collapser<Worst>,
@@ -353,6 +363,12 @@ impl Mender {
                 self.weigh(proposal, &mut best, &mut way);
             }
         }
+        if best < 2.0 * own {
+            let found = (self.refill).grow(mesh, t, aim, best, &mut self.bounds);
+            if let Some(value) = found {
+                (best, way) = (value, Way::Refill);
+            }
+        }
         if best < 2.0 * own && self.reconnect(mesh, t, tet, own) {
             return true;
         }
@@ -394,6 +410,14 @@ impl Mender {
                 self.changed.extend_from_slice(&self.mover.ball.tets);
                 true
             }
+            Way::Refill => {
+                let done = self.refill.apply(mesh, &mut self.bounds);
+                if done {
+                    self.counts.refilled += 1;
+                    self.changed.extend_from_slice(self.refill.new_tets());
+                }
+                done
+            }
             Way::Insert(proposal) => {
                 let done = self.best_cavity.apply(mesh, proposal);
                 if done {
@@ -411,6 +435,8 @@ impl Mender {
 enum Way {
     None,
     Move(u32, Point),
+    /// The filling found last.
+    Refill,
     /// A vertex in the best cavity.
     Insert(Proposal),
 }

@@ -24,7 +24,7 @@ pub(super) struct Side {
     /// Square of the volume below which rounding may decide, over the squared distance of the vertex.
     doubt: f64,
     /// See [`Measure::weight`].
-    weight: f64,
+    pub(super) weight: f64,
     /// The face beyond, or none.
     pub(super) across: FaceRef,
     pub(super) required: bool,

@@ -1,6 +1,6 @@
 //! The coarse mesh: the Delaunay mesh of the surface's vertices with every triangle of it, emptied outside.
 
-use crate::boundary::{RecoveryReport, Regions, fill_regions, recover};
+use crate::boundary::{RecoveryReport, Regions, fill_regions, recover_watched};
 use crate::delaunay::{Kernel, KernelStats, Rejected, enclose, insertion_key};
 use crate::geom::HilbertFrame;
 use crate::mesh::{Facet, Mesh, SHEET, VertexTag};
@@ -62,7 +62,14 @@ pub(crate) fn recovered<P: Pages>(
 ) -> Result<CoarseReport, PipelineError> {
     watch(stage("recover the surface"));
     mesh.refresh_tet_of();
-    let recovery = recover(mesh)?;
+    let recovery = recover_watched(mesh, &|done, total| {
+        watch(Event {
+            done,
+            total: (total > 0).then_some(total),
+            unit: "edges and triangles",
+            ..stage("recover the surface")
+        });
+    })?;
     watch(stage("color the regions"));
     let regions = fill_regions(mesh, &options.region_rule()?)?;
     if mesh.n_tets() == 0 {

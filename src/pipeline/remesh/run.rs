@@ -137,9 +137,9 @@ impl<'a> RemeshRun<'a> {
         for (row, _) in &self.rows {
             let field = match &self.what.sizes {
                 Some(sizes) => {
-                    let made = recorded.build_new(self.catalog, row.rank, sizes, from, memory)?;
+                    let first = from;
                     from += row.tets as usize;
-                    Some(made)
+                    recorded.build_new(self.catalog, row.rank, sizes, first, memory)?
                 }
                 None => recorded.own(self.catalog, row.rank)?,
             };
@@ -298,8 +298,8 @@ impl<'a> RemeshRun<'a> {
                 .into());
             }
             is_new |= sealed.row.digest != row.digest;
-            is_new |= made.get(&rank) != self.catalog.blob(blob::FIELD + rank)?.as_ref()
-                && !made.is_empty();
+            let own = made.get(&rank);
+            is_new |= own.is_some() && own != self.catalog.blob(blob::FIELD + rank)?.as_ref();
             totals.insert(rank, SealedTotals::of(sealed));
             for (now, then) in VERSIONED {
                 old_blobs.push((then + rank, self.catalog.blob(now + rank)?));

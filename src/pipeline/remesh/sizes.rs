@@ -105,7 +105,9 @@ impl Recorded<'_> {
         }
     }
 
-    /// The field with which `rank` is to be made. `from`: where its lengths begin in those given one by one.
+    /// The field with which `rank` is to be made, `None` for that of the whole. `from`: where its lengths begin in those given one by one.
+    ///
+    /// Where nothing else is wanted than what it has, that is its field, to the bit.
     ///
     /// Errors: lengths that are not as many as there should be; sizes that make no sense; damage.
     pub fn build_new(
@@ -115,7 +117,7 @@ impl Recorded<'_> {
         sizes: &NewSizes,
         from: usize,
         memory: u64,
-    ) -> Result<SizeField, PipelineError> {
+    ) -> Result<Option<SizeField>, PipelineError> {
         let own = self.own(catalog, rank)?;
         let had = own.as_ref().unwrap_or(self.whole);
         let background;
@@ -131,7 +133,8 @@ impl Recorded<'_> {
             }
         };
         let (points, triangles) = skin(catalog, rank, memory)?;
-        Ok(had.within(&points, &triangles, wish, sizes.beta, self.room)?)
+        let made = had.within(&points, &triangles, wish, sizes.beta, self.room)?;
+        Ok(made.or(own))
     }
 
     fn wanted<'b>(&'b self, had: &'b SizeField, sizes: &'b NewSizes) -> Wanted<'b> {
@@ -162,7 +165,7 @@ impl Recorded<'_> {
         let (old, new): (&SizeField, &dyn SizeConstraint) = match &own {
             Some(own) => {
                 made = self.build_new(catalog, rank, sizes, 0, memory)?;
-                (own, &made)
+                (own, made.as_ref().unwrap_or(own))
             }
             None => {
                 wanted = self.wanted(self.whole, sizes);

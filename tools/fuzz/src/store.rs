@@ -50,18 +50,20 @@ pub fn changed(bytes: &[u8]) {
     static SOUND: OnceLock<Mutex<Sound>> = OnceLock::new();
     let sound = SOUND.get_or_init(|| Mutex::new(sound()));
     let sound = sound.lock().unwrap_or_else(|e| e.into_inner());
-    for change in bytes.chunks_exact(8).take(8) {
-        let (path, content) = &sound.files[usize::from(change[0]) % sound.files.len()];
-        let at = u32::from_le_bytes([change[2], change[3], change[4], change[5]]) as usize;
-        match change[1] % 4 {
-            0 => {
-                let mut content = std::fs::read(path).unwrap_or_else(|_| content.clone());
-                put(&mut content, at, change);
-                std::fs::write(path, content).expect("writable");
-            }
-            // Of a file that was changed before, redb may want nothing.
-            _ => drop(change_value(path, at, change)),
-        }
+    let changes = || bytes.chunks_exact(8).take(8);
+    let file = |change: &[u8]| &sound.files[usize::from(change[0]) % sound.files.len()];
+    let place =
+        |change: &[u8]| u32::from_le_bytes([change[2], change[3], change[4], change[5]]) as usize;
+    let is_of_bytes = |change: &&[u8]| change[1].is_multiple_of(4);
+    // Values before bytes: redb may panic where it writes to a file that was changed, and again in a destructor, which ends the process.
+    for change in changes().filter(|change| !is_of_bytes(change)) {
+        let _ = change_value(&file(change).0, place(change), change);
+    }
+    for change in changes().filter(is_of_bytes) {
+        let (path, content) = file(change);
+        let mut content = std::fs::read(path).unwrap_or_else(|_| content.clone());
+        put(&mut content, place(change), change);
+        std::fs::write(path, content).expect("writable");
     }
     ask(&sound.path);
     for (path, content) in &sound.files {
