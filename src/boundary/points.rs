@@ -34,7 +34,7 @@ pub(super) fn recover_by_points<P: Pages>(
         let mut left = Vec::new();
         for group in groups(mesh, &missing.facets, &mut missing.protected) {
             check_cancelled();
-            report.tell(watch);
+            report.notify(watch);
             report.patches += 1;
             let Err((facets, trouble)) = recover_group(mesh, missing, &group, report) else {
                 report.facets_by_points += group.len() as u32;

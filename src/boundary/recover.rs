@@ -111,7 +111,7 @@ fn turn_segments<P: Pages>(
     let mut left = Vec::new();
     for (a, b) in std::mem::take(&mut missing.segments) {
         check_cancelled();
-        report.tell(watch);
+        report.notify(watch);
         if turn_segment(mesh, missing, report, a, b) {
             report.segments_by_flips += 1;
         } else {
@@ -134,7 +134,7 @@ fn flip_segments<P: Pages>(
             let mut left = Vec::new();
             for (a, b) in std::mem::take(&mut missing.segments) {
                 check_cancelled();
-                report.tell(watch);
+                report.notify(watch);
                 let mut s = PagedSpace(mesh, &missing.protected);
                 let mut flipper = Flipper::new(&mut s, RecoveryTarget::Edge(a, b));
                 flipper.work = work;
@@ -172,7 +172,7 @@ fn flip_facets<P: Pages>(
             let mut left = Vec::new();
             for n in std::mem::take(&mut missing.facets) {
                 check_cancelled();
-                report.tell(watch);
+                report.notify(watch);
                 let f = mesh.facet(n).vertices;
                 let mut s = PagedSpace(mesh, &missing.protected);
                 let mut flipper = Flipper::new(&mut s, RecoveryTarget::Face(f));

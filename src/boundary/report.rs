@@ -38,7 +38,7 @@ pub struct RecoveryReport {
 
 impl RecoveryReport {
     /// Tells how much is there of what was missing. A segment that comes with the facets around it is never counted.
-    pub(super) fn tell(&self, watch: &RecoveryWatcher) {
+    pub(super) fn notify(&self, watch: &RecoveryWatcher) {
         let done = self.segments_by_flips + self.facets_by_flips + self.facets_by_points;
         let total = self.missing_segments + self.missing_facets;
         watch(u64::from(done), u64::from(total));
