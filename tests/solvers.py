@@ -275,20 +275,23 @@ def check_msh(path, want):
 def check_ghosts(gmsh, path, corners):
     """The ghosts of a partition: those that share a vertex with it, found again by hand."""
     nodes = {part: np.unique(np.concatenate(blocks)) for part, blocks in corners.items()}
-    owner = {}
+    owners, elements, vertices = [], [], []
     for dim, tag in gmsh.model.getEntities(3):
-        parts = gmsh.model.getPartitions(dim, tag)
         if gmsh.model.getType(dim, tag) != "Ghost volume":
             for ids, corner in zip(*gmsh.model.mesh.getElements(dim, tag)[1:]):
-                owner.update(zip(ids.tolist(), ((int(parts[0]) - 1, tuple(c)) for c in corner.reshape(-1, 4).tolist())))
-    expected = {part: {e for e, (mine, corner) in owner.items() if mine != part and np.isin(corner, nodes[part]).any()} for part in nodes}
+                owners.append(np.full(len(ids), int(gmsh.model.getPartitions(dim, tag)[0]) - 1))
+                elements.append(ids)
+                vertices.append(corner.reshape(-1, 4))
+    owners, elements, vertices = map(np.concatenate, (owners, elements, vertices))
+    owner = dict(zip(elements.tolist(), owners.tolist()))
+    expected = {part: set(elements[(owners != part) & np.isin(vertices, nodes[part]).any(axis=1)].tolist()) for part in nodes}
     found = collections.defaultdict(set)
     for dim, tag in gmsh.model.getEntities(3):
         ids, of = gmsh.model.mesh.getGhostElements(dim, tag)
         if len(ids):
             parts = gmsh.model.getPartitions(dim, tag).tolist()
             found[parts[0] - 1 if parts else tag].update(ids.tolist())
-            assert all(owner[e][0] == p - 1 for e, p in zip(ids.tolist(), of.tolist())), "a ghost of another partition"
+            assert all(owner[e] == p - 1 for e, p in zip(ids.tolist(), of.tolist())), "a ghost of another partition"
     same(path, "ghost cells by partition", {k: len(v) for k, v in found.items()}, {k: len(v) for k, v in expected.items()})
     assert dict(found) == expected, "other ghost cells"
 

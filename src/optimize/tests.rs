@@ -11,7 +11,7 @@ use crate::mesh::{FaceRef, Mesh, Tet, VertexTag};
 use crate::storage::{Backing, FlatPages, Pager, Pages};
 
 /// Deterministic pseudo-random numbers in [0, 1).
-fn random(seed: u64) -> impl FnMut() -> f64 {
+pub(super) fn random(seed: u64) -> impl FnMut() -> f64 {
     let mut state = seed;
     move || {
         state = state
@@ -104,7 +104,12 @@ fn cube<P: Pages>(mesh: Mesh<P>, n: i32, seed: u64) -> Mesh<P> {
 }
 
 /// Delaunay mesh of points, hull faces required, the first `n_skin` vertices tagged, region 1.
-fn delaunay<P: Pages>(mut mesh: Mesh<P>, points: &[Point], n_skin: usize, h: f32) -> Mesh<P> {
+pub(super) fn delaunay<P: Pages>(
+    mut mesh: Mesh<P>,
+    points: &[Point],
+    n_skin: usize,
+    h: f32,
+) -> Mesh<P> {
     let frame = HilbertFrame::new(&Aabb::around(points.iter().copied()));
     let mut order: Vec<usize> = (0..points.len()).collect();
     order.sort_by_key(|&i| insertion_key(&frame, points[i]));
@@ -143,7 +148,7 @@ fn delaunay<P: Pages>(mut mesh: Mesh<P>, points: &[Point], n_skin: usize, h: f32
     mesh
 }
 
-fn live<P: Pages>(mesh: &mut Mesh<P>) -> Vec<(u32, Tet)> {
+pub(super) fn live<P: Pages>(mesh: &mut Mesh<P>) -> Vec<(u32, Tet)> {
     let mut all = Vec::new();
     let mut from = 0;
     while let Some((t, tet)) = mesh.next_tet(from) {
@@ -154,7 +159,7 @@ fn live<P: Pages>(mesh: &mut Mesh<P>) -> Vec<(u32, Tet)> {
 }
 
 /// Checks the mesh; returns the hull's faces by coordinates, all required, and the volume.
-fn checked<P: Pages>(mesh: &mut Mesh<P>) -> (Vec<[[u64; 3]; 3]>, f64) {
+pub(super) fn checked<P: Pages>(mesh: &mut Mesh<P>) -> (Vec<[[u64; 3]; 3]>, f64) {
     let (mut hull, mut volume) = (Vec::new(), 0.0);
     let all = live(mesh);
     assert_eq!(all.len(), mesh.n_tets() as usize);

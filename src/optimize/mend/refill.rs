@@ -359,7 +359,10 @@ fn sorted<const N: usize>(mut corners: [u8; N]) -> ([u8; N], bool) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::star::value_of;
     use super::*;
+    use crate::optimize::tests::{checked, delaunay, live, random};
+    use crate::storage::FlatPages;
 
     #[test]
     fn sets_of_corners_have_numbers_of_their_own() {
@@ -377,5 +380,48 @@ mod tests {
             numbers.sort_unstable();
             assert_eq!(numbers, (0..count).collect::<Vec<_>>());
         }
+    }
+
+    #[test]
+    fn fillings_found_are_better_and_the_same_polyhedra() {
+        let mut n_found = 0;
+        for seed in 0..60 {
+            let mut next = random(seed);
+            let points: Vec<Point> = (0..11)
+                .map(|_| Point::new(next() - 0.5, next() - 0.5, next() - 0.5).normalize())
+                .map(|p| Point::new(p.x, p.y, 0.4 * p.z))
+                .collect();
+            let mut mesh = delaunay(Mesh::new(FlatPages::default()), &points, points.len(), 1.0);
+            let (hull, volume) = checked(&mut mesh);
+            let mut bounds = FaceBounds::default();
+            let values = live(&mut mesh).into_iter().map(|(t, tet)| {
+                let [_, value] = value_of(&mut mesh, &tet, &mut bounds);
+                (value, t)
+            });
+            let (own, worst) = values
+                .min_by(|a, b| a.0.total_cmp(&b.0))
+                .expect("not empty");
+            let aim = Aim {
+                own,
+                enough: 1.0,
+                fewer: false,
+                more: 0,
+                tets_max: 40,
+            };
+            let mut refill = Refill::default();
+            let Some(value) = refill.grow(&mut mesh, worst, aim, own, &mut bounds) else {
+                continue;
+            };
+            assert!(value > own);
+            assert!(refill.apply(&mut mesh, &mut bounds));
+            let after = checked(&mut mesh);
+            assert!(after.0 == hull && (after.1 - volume).abs() < 1e-12);
+            for &t in refill.new_tets() {
+                let tet = mesh.tet(t);
+                assert!(value_of(&mut mesh, &tet, &mut bounds)[1] >= value);
+            }
+            n_found += 1;
+        }
+        assert!(n_found >= 10, "{n_found} of 60");
     }
 }

@@ -1,6 +1,6 @@
 //! The native half of the Python package `tetdb`: arrays in and out of the library's front door.
 //!
-//! Reading order: `failure` (errors), `watched` (work that can be interrupted), `surface`, `sizes` and `run` (what is asked for), `store` and
+//! Reading order: `failure` (errors), `watched` (work that can be interrupted), `surface`, `sizes` and `run` (what is asked for), `tasks` (many processes), `store` and
 //! `part` (a finished mesh). Shapes, defaults, docstrings and reports are the Python half's; this half checks nothing that half has
 //! checked, and the library checks the rest. Is not: public; its names may change.
 
@@ -10,6 +10,7 @@ mod run;
 mod sizes;
 mod store;
 mod surface;
+mod tasks;
 mod watched;
 
 use pyo3::prelude::*;
@@ -26,6 +27,8 @@ mod _native {
     use super::store::Store;
     #[pymodule_export]
     use super::surface::Surface;
+    #[pymodule_export]
+    use super::tasks::{gather, plan, run_task};
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -18,6 +18,9 @@ use crate::watched::{Board, Listener, watched};
 pub struct JobWords<'py> {
     sizes: SizeWords<'py>,
     regions: String,
+    seeds: Vec<([f64; 3], Option<String>)>,
+    holes: Vec<[f64; 3]>,
+    refine_surface: bool,
     optimize: String,
     subdomains: Option<u32>,
     keep_coarse: bool,
@@ -54,6 +57,7 @@ fn mesher(py: Python<'_>, surface: &Surface, job: &JobWords<'_>) -> PyResult<Mes
         "all" => Regions::All,
         "outer" => Regions::Outer,
         "by-orientation" => Regions::ByOrientation,
+        "seeds" => Regions::Seeds,
         _ => return Err(unknown()),
     };
     let optimize = match job.optimize.as_str() {
@@ -63,16 +67,23 @@ fn mesher(py: Python<'_>, surface: &Surface, job: &JobWords<'_>) -> PyResult<Mes
         _ => return Err(unknown()),
     };
     let subdomains = job.subdomains.map_or(Subdomains::Auto, Subdomains::Exactly);
-    let mesher = Mesher::new(tetdb::Surface::clone(&surface.inner))
+    let mut mesher = Mesher::new(tetdb::Surface::clone(&surface.inner))
         .sizes(job.sizes.sizes(py)?)
         .regions(regions)
         .optimize(optimize)
         .subdomains(subdomains)
-        .keep_coarse(job.keep_coarse);
+        .keep_coarse(job.keep_coarse)
+        .refine_surface(job.refine_surface);
+    for (point, name) in &job.seeds {
+        mesher = mesher.region_seed(*point, name.as_deref());
+    }
+    for point in &job.holes {
+        mesher = mesher.hole(*point);
+    }
     Ok(mesher)
 }
 
-/// Meshes into a new store. Whether the finished mesh of the same job is returned, or any other replaced, `replace` says.
+/// Meshes into a new store, or begins one. Whether the finished mesh of the same job is returned, or any other replaced, `replace` says.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "called by the Python half alone")]
 pub fn mesh(
@@ -83,6 +94,7 @@ pub fn mesh(
     settings: SettingWords,
     replace: bool,
     verify: bool,
+    coarse_only: bool,
     callable: Option<Py<PyAny>>,
 ) -> PyResult<()> {
     let (token, board) = (CancelToken::new(), Arc::new(Board::default()));
@@ -93,12 +105,13 @@ pub fn mesh(
     let mesher = mesher(py, surface, &job)?
         .settings(settings.settings(&token, Some(&board)))
         .existing(existing)
-        .verify(verify);
+        .verify(verify)
+        .coarse_only(coarse_only);
     let listener = Listener {
         board: &board,
         callable: callable.as_ref(),
     };
-    let work = || mesher.create(path).map(drop).map_err(Failure::from);
+    let work = || mesher.create_unfinished(path).map_err(Failure::from);
     watched(py, &token, Some(&listener), work)
 }
 

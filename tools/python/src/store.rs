@@ -47,6 +47,16 @@ struct QueryWords {
     limit: Option<usize>,
 }
 
+/// What of a mesh is written, and how.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+struct ExportWords {
+    subdomains: Vec<u32>,
+    regions: Vec<u32>,
+    is_second_order: bool,
+    flags: Vec<String>,
+}
+
 /// A picture.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
@@ -255,20 +265,26 @@ impl Store {
         &self,
         py: Python<'_>,
         out: PathBuf,
-        subdomains: Vec<u32>,
-        pieces: bool,
-        content: String,
+        words: ExportWords,
     ) -> PyResult<Vec<(PathBuf, u64)>> {
         self.alone(py, |store| {
-            let mut options = ExportOptions::new().subdomains(&subdomains);
-            if pieces {
-                options = options.pieces();
+            let mut options = ExportOptions::new()
+                .subdomains(&words.subdomains)
+                .regions(&words.regions);
+            if words.is_second_order {
+                options = options.second_order();
             }
-            options = match content.as_str() {
-                "boundary" => options.boundary(),
-                "interfaces" => options.interfaces(),
-                _ => options,
-            };
+            for flag in &words.flags {
+                options = match flag.as_str() {
+                    "boundary" => options.boundary(),
+                    "interfaces" => options.interfaces(),
+                    "pieces" => options.pieces(),
+                    "ascii" => options.ascii(),
+                    "ghosts" => options.ghosts(),
+                    "split_sheets" => options.split_sheets(),
+                    _ => options,
+                };
+            }
             Ok(store.export(out, &options)?.files)
         })
     }

@@ -129,6 +129,13 @@ impl Surface {
         })
     }
 
+    fn embedded(&self, py: Python<'_>, sheet: &Surface, name: String) -> PyResult<Self> {
+        made(py, || {
+            let sheet = tetdb::Surface::clone(&sheet.inner);
+            tetdb::Surface::clone(&self.inner).embedded(sheet, Some(&name))
+        })
+    }
+
     fn write(&self, py: Python<'_>, out: PathBuf) -> PyResult<()> {
         let work = || Ok(self.inner.write(out)?);
         watched(py, &CancelToken::new(), None, work)

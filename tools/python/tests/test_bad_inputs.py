@@ -24,7 +24,7 @@ def bad_surfaces(chance: random.Random) -> list[Callable[[], Any]]:
         return lambda: (points, triangles, labels)
 
     made = []
-    for _ in range(20):
+    for _ in range(85):
         p, t = chance.randrange(len(POINTS)), chance.randrange(len(TRIANGLES))
         for value in (np.nan, np.inf, -np.inf):
             points = POINTS.copy()
@@ -54,7 +54,7 @@ def bad_surfaces(chance: random.Random) -> list[Callable[[], Any]]:
 
 def test_bad_surfaces_are_refused_with_a_place(tmp_path: Path) -> None:
     makers = bad_surfaces(random.Random(1))
-    assert len(makers) > 250
+    assert len(makers) > 1000
     for maker in makers:
         points, triangles, labels = maker()
         with pytest.raises(tetdb.SurfaceError) as caught:
@@ -66,12 +66,15 @@ def test_bad_surfaces_are_refused_with_a_place(tmp_path: Path) -> None:
 OPTIONS: list[dict[str, Any]] = [
     *({key: value} for key in ("hsiz", "hmin", "hmax") for value in (0, -1, np.nan, np.inf, "", "x", "1%%x", "-2%", "0%", b"1", True, [], {}, object())),
     *({"hgrad": value} for value in ("x", np.nan, np.inf, [], object(), [1, 2], 0.5, 1.0, -3)),
-    *({"regions": value} for value in ("odd", "", 1, None, "ALL")),
+    *({"regions": value} for value in ("odd", "", 1, "ALL")),
     *({"optimize": value} for value in ("much", "", 1, None)),
     *({"existing": value} for value in ("drop", "", 1, None)),
     *({"subdomains": value} for value in (0, -1, 1.5, "2", True, 2**40)),
     *({"threads": value} for value in (0, -1, 1.5, "2", True, 2**40)),
     *({"memory": value} for value in ("8", "GiB", "8 GX", "-1GiB", -1, 1.5, True, "", [], "1KiB", 0, "63MiB")),
+    *({"seeds": value} for value in ([0, 0, 0], [[0, 0]], [[0, 0, np.nan]], "abc", {"a": "x"}, {"a": (9, 9, 9)}, [[9, 9, 9]], 3)),
+    *({"holes": value} for value in ([0, 0, 0], [[0, 0]], [[0, 0, np.inf]], "abc", {"a": (0, 0, 0)}, [[9, 9, 9]], [[0.5, 0.5, 0.5]])),
+    *({"embed": value} for value in ([BOX], BOX, {"": BOX}, {3: BOX}, {"a": "missing.stl"}, {"a": (0, 0, 0)}, {"a": BOX})),
     *({"progress": value} for value in (1, "yes", [])),
     *({"size": value} for value in (
         3.0, object(), "x +", "1 < 2", "-1", "q", "0*x", b"x", {"h": 1}, Path("missing.sol"), Path("x.txt"),
@@ -142,13 +145,17 @@ def test_bad_questions_are_refused(parts: tetdb.Store, tmp_path: Path) -> None:
     for n in (0, -1, 1.5, "x"):
         with pytest.raises(tetdb.TetdbError):
             parts.chunks(n)  # type: ignore[arg-type]
+    wrong: list[dict[str, Any]] = [{"order": 3}, {"order": "2"}, {"ghosts": True}, {"regions": [99]}, {"subdomains": "x"}, {"content": "all"}, {"ascii": True}]
+    for options in wrong:
+        with pytest.raises(tetdb.TetdbError):
+            parts.export(tmp_path / "s.vtu", **options)
     for name in ("s.xyz", "s", "."):
         with pytest.raises(tetdb.TetdbError):
             parts.export(tmp_path / name)
         with pytest.raises(tetdb.TetdbError):
             parts.snapshot(tmp_path / name)
     before = parts.digest
-    wrong: list[dict[str, Any]] = [
+    wrong = [
         {"sizes": [1.0]}, {"sizes": "x"}, {"sizes": lambda p: -np.ones(len(p))}, {"scale": 0}, {"scale": -1}, {"scale": np.nan},
         {"hsiz": "x"}, {"size": 3}, {"size": lambda p: p}, {"size": tetdb.Field(np.eye(4, 3), [[0, 1, 2, 3]], np.ones(4))},
     ]  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,9 @@ CASES: list[tuple[str, list[str], dict[str, Any]]] = [
      {"size": [tetdb.Box((-1, -1, -1), (1, 1, 1), 0.1, "20%")]}),
     ("box,h=0.3", ["--size-expr", "0.06+0.3*abs(z)"], {"size": "0.06+0.3*abs(z)"}),
     ("box,h=0.06", ["--subdomains", "2", "--hsiz", "0.04"], {"subdomains": 2, "hsiz": 0.04}),
+    ("balls,count=3", ["--region-seed=0.01,0.01,0.01,rock"], {"seeds": {"rock": (0.01, 0.01, 0.01)}}),
+    ("balls,count=3", ["--regions", "all", "--hole", "0.01,0.01,0.01"], {"regions": "all", "holes": [(0.01, 0.01, 0.01)]}),
+    ("box,h=0.5", ["--hsiz", "0.1", "--refine-surface"], {"hsiz": 0.1, "refine_surface": True}),
     ("sphere,h=0.3", ["--hmax", "20%", "--optimize", "delaunay"], {"hmax": "20%", "optimize": "delaunay"}),
 ]  # fmt: skip
 
@@ -42,3 +46,16 @@ def test_digests_are_those_of_the_program(
         assert two.digest == wanted
     # What one wrote is the same job for the other: nothing is meshed again.
     assert tetdb.mesh(surface, tmp_path / "program", **options).digest == wanted
+
+
+def test_sheets_are_those_of_the_program(run: Callable[..., str], tmp_path: Path) -> None:
+    run("sample", "faults,cells=6", "-o", "faults.obj")
+    run("mesh", "faults.obj", "--embed", "faults_sheets.obj", "-o", "program", "--name", "faults_sheets.obj=cut")
+    wanted = run("digest", "program").split()[0]
+    sheet = tetdb.Surface(tmp_path / "faults_sheets.obj")
+    with tetdb.mesh(tmp_path / "faults.obj", tmp_path / "s", embed={"cut": sheet}) as store:
+        assert store.digest == wanted and any(label.startswith("cut") for label in store.labels)
+    both = pickle.loads(pickle.dumps(tetdb.Surface(tmp_path / "faults.obj").embedded(sheet, "cut")))
+    assert tetdb.mesh(both, tmp_path / "again").digest == wanted
+    with pytest.raises(tetdb.TetdbError):
+        both.refined(0.1)

@@ -16,7 +16,7 @@ import pytest
 import tetdb
 
 ROOT = Path(os.environ.get("TETDB_ROOT", Path(__file__).parents[3]))
-EXAMPLE = ROOT / "tools/python/examples/poisson.py"
+EXAMPLES = ROOT / "tools/python/examples"
 
 
 def test_blocks_of_the_guide_run_one_after_the_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -44,12 +44,12 @@ def test_everything_public_is_documented() -> None:
 def test_types_hold_in_package_and_examples() -> None:
     pytest.importorskip("mypy")
     words = [sys.executable, "-m", "mypy", "--strict", "-p", "tetdb"]
-    for more in (words, [*words[:-2], str(EXAMPLE)]):
+    for more in (words, [*words[:-2], *map(str, EXAMPLES.glob("*.py"))]):
         done = subprocess.run(more, capture_output=True, text=True, check=False, cwd=Path(__file__).parent)
         assert done.returncode == 0, done.stdout
 
 
 def test_the_adaptive_loop_lowers_its_error(tmp_path: Path) -> None:
     pytest.importorskip("scipy")
-    done = subprocess.run([sys.executable, str(EXAMPLE), str(tmp_path)], capture_output=True, text=True, check=False)
+    done = subprocess.run([sys.executable, str(EXAMPLES / "poisson.py"), str(tmp_path)], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr

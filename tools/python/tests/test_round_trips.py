@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -94,3 +96,25 @@ def test_arrow_streams_all_tetrahedra(tmp_path: Path) -> None:
         assert (table.column("region").to_numpy() == part.regions).all()
         vertices = np.array(table.column("vertices").to_pylist()[:50])
         assert (vertices == part.vertex_ids[part.tets[:50]]).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "words", "options"),
+    [
+        ("a.msh", ["--order", "2", "--ghosts", "--ascii"], {"order": 2, "ghosts": True, "ascii": True}),
+        ("a.vtkhdf", ["--region", "2"], {"regions": 2}),
+        ("a.mesh", ["--pieces", "--subdomain", "1"], {"pieces": True, "subdomains": [1]}),
+        ("a.vtu", ["--interfaces"], {"content": "interfaces"}),
+        ("a.npy", ["--split-sheets"], {"split_sheets": True}),
+    ],
+)
+def test_exports_are_those_of_the_program(
+    name: str, words: list[str], options: dict[str, Any], parts: tetdb.Store, run: Callable[..., str], tmp_path: Path
+) -> None:
+    for folder in ("program", "module"):
+        (tmp_path / folder).mkdir()
+    run("export", parts.path, f"program/{name}", *words)
+    written = parts.export(tmp_path / "module" / name, **options)
+    assert written and len(list((tmp_path / "program").iterdir())) == len(written)
+    for file in map(Path, written):
+        assert file.read_bytes() == (tmp_path / "program" / file.name).read_bytes()

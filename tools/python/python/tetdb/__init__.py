@@ -22,6 +22,7 @@ from ._options import Event
 from ._sizes import Box, Cylinder, Field, Function, InRegion, Sphere
 from ._store import Chunk, Merged, Quality, Region, Store, Subdomain, SubdomainInfo, Verification
 from ._surface import CheckReport, Defects, Estimate, Surface, sample
+from ._tasks import begin, gather, plan, run_task
 
 __all__ = [
     "Box",
@@ -52,10 +53,14 @@ __all__ = [
     "TetdbError",
     "Verification",
     "__version__",
+    "begin",
     "compare",
+    "gather",
     "mesh",
     "open",
+    "plan",
     "resume",
+    "run_task",
     "sample",
     "tetrahedralize",
 ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _native, _options
-from ._options import Progress
+from ._options import Progress, Seeds
 from ._sizes import Length, Size
 from ._store import Store
 from ._surface import Surface
@@ -29,7 +29,11 @@ def mesh(
     hmax: Length | None = None,
     hgrad: float | None = None,
     size: Size | Iterable[Size] | None = None,
-    regions: str = "parity",
+    regions: str | None = None,
+    seeds: Seeds | None = None,
+    holes: npt.ArrayLike | None = None,
+    embed: Mapping[str, Any] | None = None,
+    refine_surface: bool = False,
     optimize: str = "full",
     subdomains: int | None = None,
     memory: int | str | None = None,
@@ -57,8 +61,16 @@ def mesh(
     size : Box, Sphere, Cylinder, InRegion, Field, Function, callable, str, path, or a list of them, optional
         Where edges are shorter. Of everything that applies the least length counts. A callable takes points (k, 3) and returns lengths
         (k,); it is asked once, on a regular grid (see :class:`Function`), and what it said is kept in the store.
-    regions : {"parity", "all", "outer", "by-orientation"}
-        Which enclosed regions are filled.
+    regions : {"parity", "all", "outer", "by-orientation", "seeds"}
+        Which enclosed regions are filled. Default: ``"parity"``, or ``"seeds"`` where there are seeds or holes.
+    seeds : dict or array, optional
+        Points inside regions, by the names these get; or (k, 3) without names.
+    holes : (k, 3) array, optional
+        Points inside regions that stay empty.
+    embed : dict, optional
+        Sheets inside, by name, see :meth:`Surface.embedded`.
+    refine_surface : bool
+        Whether the surface's triangles are divided first until their edges are as short as the wanted lengths; no point moves.
     optimize : {"full", "delaunay", "none"}
         How far tetrahedra are improved.
     subdomains : int, optional
@@ -99,16 +111,40 @@ def mesh(
     ...         store.n_tets > 0, store.is_verified
     (True, True)
     """
+    where = _create(
+        surface, path, False, hsiz=hsiz, hmin=hmin, hmax=hmax, hgrad=hgrad, size=size, regions=regions, seeds=seeds, holes=holes,
+        embed=embed, refine_surface=refine_surface, optimize=optimize, subdomains=subdomains, memory=memory, threads=threads,
+        progress=progress, existing=existing, keep_coarse=keep_coarse, verify=verify,
+    )  # fmt: skip
+    return Store(where, memory=memory, threads=threads)
+
+
+def _create(
+    surface: Any,
+    path: str | os.PathLike[str],
+    coarse_only: bool,
+    *,
+    embed: Mapping[str, Any] | None = None,
+    memory: int | str | None = None,
+    threads: int | None = None,
+    progress: bool | Progress | None = None,
+    existing: str = "keep",
+    verify: bool = True,
+    **shape: Any,
+) -> str:
+    """Meshes, or with `coarse_only` begins; where the store is."""
     given = surface if isinstance(surface, Surface) else Surface(surface)
-    job = _options.job(
-        given.bounds, hsiz, hmin, hmax, hgrad, size, regions, optimize, subdomains, keep_coarse
-    )
+    if not isinstance(embed or {}, Mapping):
+        raise _options.usage(f"{embed!r}: expected sheets by name", "embed")
+    for name, sheet in (embed or {}).items():
+        given = given.embedded(sheet, name)
+    job = _options.job(given.bounds, **shape)
     settings = _options.settings(memory, threads)
     replace = _options.one_of(existing, ("keep", "replace"), "existing") == "replace"
     listener = _options.listener(progress)
     where = _path(path)
-    _native.mesh(given._inner, where, job, settings, replace, bool(verify), listener)
-    return Store(where, memory=memory, threads=threads)
+    _native.mesh(given._inner, where, job, settings, replace, bool(verify), coarse_only, listener)
+    return where
 
 
 def resume(

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import operator
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
+import numpy.typing as npt
 
 from . import _sizes
 from ._errors import TetdbError
@@ -118,22 +121,53 @@ def ranks(value: Any, where: str) -> list[int]:
         raise usage(f"{value!r} is no list of sub-domains", where) from None
 
 
+Seeds = Mapping[str, Sequence[float]] | npt.ArrayLike
+
+
 def job(
     bounds: Sequence[Sequence[float]],
-    hsiz: Length | None,
-    hmin: Length | None,
-    hmax: Length | None,
-    hgrad: float | None,
-    size: Size | Iterable[Size] | None,
-    regions: str,
-    optimize: str,
-    subdomains: int | None,
-    keep_coarse: bool,
+    hsiz: Length | None = None,
+    hmin: Length | None = None,
+    hmax: Length | None = None,
+    hgrad: float | None = None,
+    size: Size | Iterable[Size] | None = None,
+    regions: str | None = None,
+    seeds: Seeds | None = None,
+    holes: npt.ArrayLike | None = None,
+    refine_surface: bool = False,
+    optimize: str = "full",
+    subdomains: int | None = None,
+    keep_coarse: bool = True,
 ) -> dict[str, Any]:
+    """What shapes a mesh, in the words of the native half."""
+    rules = ("parity", "all", "outer", "by-orientation", "seeds")
+    names: list[str | None]
+    if isinstance(seeds, Mapping):
+        names, inside = [str(name) for name in seeds], _points(list(seeds.values()), "seeds")
+    else:
+        inside = _points(seeds, "seeds")
+        names = [None] * len(inside)
+    empty = _points(holes, "holes")
+    if regions is None:
+        regions = "seeds" if inside or empty else "parity"
     return {
         "sizes": _sizes.words(bounds, hsiz, hmin, hmax, hgrad, size),
-        "regions": one_of(regions, ("parity", "all", "outer", "by-orientation"), "regions"),
+        "regions": one_of(regions, rules, "regions"),
+        "seeds": list(zip(inside, names)),
+        "holes": empty,
+        "refine_surface": bool(refine_surface),
         "optimize": one_of(optimize, ("none", "delaunay", "full"), "optimize"),
         "subdomains": None if subdomains is None else count(subdomains, 1, "subdomains"),
         "keep_coarse": bool(keep_coarse),
     }
+
+
+def _points(value: Any, where: str) -> list[list[float]]:
+    """Finite points (k, 3), or none."""
+    try:
+        points = np.asarray([] if value is None else value, dtype=np.float64)
+    except (TypeError, ValueError):
+        points = np.full(1, np.nan)
+    if points.size and (points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all()):
+        raise usage(f"{value!r}: expected points (k, 3)", where)
+    return [] if not points.size else [[float(x) for x in point] for point in points]

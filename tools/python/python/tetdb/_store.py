@@ -521,29 +521,52 @@ class Store:
         path: str | os.PathLike[str],
         *,
         subdomains: int | Sequence[int] | None = None,
+        regions: int | Sequence[int] | None = None,
         pieces: bool = False,
         content: str = "mesh",
+        order: int = 1,
+        ascii: bool = False,
+        ghosts: bool = False,
+        split_sheets: bool = False,
     ) -> list[str]:
-        """Writes the mesh for another program: ``.vtu``, ``.pvtu``, ``.mesh``, ``.meshb``, ``.msh``, ``.inp``, ``.npy``, ``.json``.
+        """Writes the mesh for another program, in the format that the ending says, as ``tetdb export`` does.
+
+        ``.vtu``, ``.pvtu``, ``.vtkhdf``, ``.foam`` (OpenFOAM), ``.msh``, ``.mesh``, ``.meshb``, ``.mfem``, ``.inp``, ``.ele``, ``.npy``,
+        ``.json``; the guide says which can do what.
 
         Parameters
         ----------
-        subdomains : optional
+        subdomains, regions : optional
             Only these.
         pieces : bool
             Each sub-domain in a file of its own.
         content : {"mesh", "boundary", "interfaces"}
-            All of it, or only faces (``.vtu``).
+            All of it, or only faces (``.vtu``, ``.vtkhdf``).
+        order : {1, 2}
+            Nodes of the elements: corners, or also the middles of edges.
+        ascii : bool
+            Text where the format has both.
+        ghosts : bool
+            With each partition the tetrahedra of others that touch it (``.msh``).
+        split_sheets : bool
+            Sheets as slits, with vertices of their own on both sides.
 
         Returns
         -------
         list of str
             The files that were written.
         """
-        ranks = [] if subdomains is None else _options.ranks(subdomains, "subdomains")
+        if isinstance(order, bool) or order not in (1, 2):
+            raise _options.usage(f"{order!r}: expected 1 or 2", "order")
         _options.one_of(content, ("mesh", "boundary", "interfaces"), "content")
-        files = self._native.export(os.fspath(path), ranks, bool(pieces), content)
-        return [str(file) for file, _ in files]
+        flags = {"pieces": pieces, "ascii": ascii, "ghosts": ghosts, "split_sheets": split_sheets}
+        words = {
+            "subdomains": [] if subdomains is None else _options.ranks(subdomains, "subdomains"),
+            "regions": [] if regions is None else _options.ranks(regions, "regions"),
+            "is_second_order": order == 2,
+            "flags": [content, *(flag for flag, is_set in flags.items() if is_set)],
+        }
+        return [str(file) for file, _ in self._native.export(os.fspath(path), words)]
 
     def snapshot(
         self,

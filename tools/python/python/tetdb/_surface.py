@@ -113,6 +113,8 @@ class Surface:
     """
 
     _inner: _native.Surface
+    _parts: tuple[Surface, Surface, str] | None = None
+    """What :meth:`embedded` joined: its triangles alone do not say which are sheets."""
 
     def __init__(
         self,
@@ -122,7 +124,7 @@ class Surface:
     ) -> None:
         if triangles is None:
             if isinstance(points, Surface):
-                self._inner = points._inner
+                self._inner, self._parts = points._inner, points._parts
                 return
             if _is_path(points):
                 self._inner = _native.Surface.read([os.fspath(points)])
@@ -198,6 +200,23 @@ class Surface:
         """The same surface with edges of `hsiz` at most; new vertices lie on the old triangles."""
         return self._of(self._inner.refined(length(hsiz, "hsiz")))
 
+    def embedded(self, sheet: Any, name: str) -> Surface:
+        """The same with the triangles of `sheet` inside: faces of the mesh with tetrahedra on both sides, that part no region.
+
+        Parameters
+        ----------
+        sheet : Surface, or what it takes
+            Open or closed. It may end inside, and meet other sheets and the surface along edges and vertices that both have.
+        name : str
+            Of its label; where it has several, they are called ``name:LABEL``.
+        """
+        if not isinstance(name, str) or not name:
+            raise TetdbError("usage", f"{name!r} is no name of a sheet", "name")
+        inside = sheet if isinstance(sheet, Surface) else Surface(sheet)
+        both = self._of(self._inner.embedded(inside._inner, name))
+        both._parts = self, inside, name
+        return both
+
     def write(self, path: str | os.PathLike[str]) -> None:
         """Writes ``.stl``, ``.off``, ``.obj`` or ``.ply``."""
         self._inner.write(os.fspath(path))
@@ -210,7 +229,10 @@ class Surface:
         hmax: Length | None = None,
         hgrad: float | None = None,
         size: Size | Iterable[Size] | None = None,
-        regions: str = "parity",
+        regions: str | None = None,
+        seeds: _options.Seeds | None = None,
+        holes: npt.ArrayLike | None = None,
+        refine_surface: bool = False,
         subdomains: int | None = None,
         memory: int | str | None = None,
         threads: int | None = None,
@@ -224,12 +246,15 @@ class Surface:
         True
         """
         job = _options.job(
-            self.bounds, hsiz, hmin, hmax, hgrad, size, regions, "full", subdomains, True
-        )
+            self.bounds, hsiz, hmin, hmax, hgrad, size, regions, seeds, holes, refine_surface,
+            subdomains=subdomains,
+        )  # fmt: skip
         settings = _options.settings(memory, threads)
         return Estimate(**json.loads(_native.predict(self._inner, job, settings)))
 
     def __reduce__(self) -> tuple[Any, ...]:
+        if self._parts:
+            return Surface.embedded, self._parts
         return Surface, (self.points, self.triangles, self.labels)
 
     def __repr__(self) -> str:
