@@ -49,6 +49,21 @@ impl DamageFound {
         }
     }
 
+    /// Reads one after the other, until no more damage is listed: a count of chunks that was changed may be any. Whether all were sound.
+    fn all<T, E: Into<StoreError>>(
+        &mut self,
+        chunks: impl Iterator<Item = Result<T, E>>,
+    ) -> Result<bool, StoreError> {
+        let mut is_sound = true;
+        for chunk in chunks {
+            is_sound &= self.note(chunk)?;
+            if self.0.len() >= LISTED_MAX {
+                break;
+            }
+        }
+        Ok(is_sound)
+    }
+
     fn of_snapshots(&mut self, store: &mut Catalog) -> Result<(), StoreError> {
         for row in store.coarse_snapshots()? {
             self.of_snapshot(store, row)?;
@@ -68,19 +83,10 @@ impl DamageFound {
             Ok(part) => part,
             Err(error) => return self.note::<(), _>(Err(error)).map(drop),
         };
-        let mut is_sound = true;
-        for chunk in 0..vertices {
-            is_sound &= self.note(part.vertex_chunk(chunk))?;
-        }
-        for chunk in 0..tets {
-            is_sound &= self.note(part.tet_chunk(chunk))?;
-        }
-        for chunk in 0..facets {
-            is_sound &= self.note(part.facet_chunk(chunk))?;
-        }
-        for chunk in 0..faces {
-            is_sound &= self.note(part.interface_chunk(chunk))?;
-        }
+        let mut is_sound = self.all((0..vertices).map(|chunk| part.vertex_chunk(chunk)))?;
+        is_sound &= self.all((0..tets).map(|chunk| part.tet_chunk(chunk)))?;
+        is_sound &= self.all((0..facets).map(|chunk| part.facet_chunk(chunk)))?;
+        is_sound &= self.all((0..faces).map(|chunk| part.interface_chunk(chunk)))?;
         // Damage of chunks was reported with their places by now; what is left is in the tree between them.
         if is_sound {
             self.note(part.check())?;
@@ -93,22 +99,34 @@ impl DamageFound {
             Ok(leaf) => leaf,
             Err(error) => return self.note::<(), StoreError>(Err(error)).map(drop),
         };
-        let mut is_sound = true;
-        for chunk in leaf.vertices() {
-            is_sound &= self.note(chunk)?;
-        }
-        for chunk in leaf.tets() {
-            is_sound &= self.note(chunk)?;
-        }
-        for chunk in leaf.facets() {
-            is_sound &= self.note(chunk)?;
-        }
-        for chunk in leaf.faces() {
-            is_sound &= self.note(chunk)?;
-        }
+        let mut is_sound = self.all(leaf.vertices())?;
+        is_sound &= self.all(leaf.tets())?;
+        is_sound &= self.all(leaf.facets())?;
+        is_sound &= self.all(leaf.faces())?;
         if is_sound {
             self.note(leaf.check())?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sealed::SealedError;
+
+    #[test]
+    fn a_count_without_end_is_not_followed_to_it() {
+        let missing = || {
+            Err::<(), _>(SealedError::Content {
+                path: "part.redb".into(),
+                subdomain: 0,
+                what: "a chunk is missing".to_owned(),
+            })
+        };
+        let mut found = DamageFound(Vec::new());
+        let is_sound = found.all(std::iter::repeat_with(missing));
+        assert!(!is_sound.expect("damage alone"));
+        assert_eq!(found.0.len(), LISTED_MAX);
     }
 }
