@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::error::{Error, Remedy};
 use super::{Settings, show_bytes};
+use crate::geom::short;
 use crate::pipeline::{self, Estimate};
 use crate::storage::{ScratchSpace, available_bytes, n_threads};
 use crate::surface::Surface;
@@ -61,8 +62,8 @@ pub(crate) fn preflight(
     let needed = estimate.disk_peak_bytes(cap, n_threads());
     if (free as f64) < REFUSED_BELOW * needed as f64 {
         let message = format!(
-            "about {:.0} tetrahedra are expected, which need {} of disk on the way; {} are free",
-            estimate.tets(),
+            "about {} tetrahedra are expected, which need {} of disk on the way; {} are free",
+            short(estimate.tets().round()),
             show_bytes(needed),
             show_bytes(free)
         );

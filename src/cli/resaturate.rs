@@ -145,8 +145,10 @@ fn print_forecast(list: &[Forecast], console: &Console) {
     }
     for f in list {
         console.line(&format!(
-            "sub-domain {:>4}: {:>10} tetrahedra, about {:.0} to expect",
-            f.rank, f.tets, f.predicted
+            "sub-domain {:>4}: {:>10} tetrahedra, about {} to expect",
+            f.rank,
+            f.tets,
+            short(f.predicted.round())
         ));
     }
 }
