@@ -62,6 +62,7 @@ pub(super) fn crossing_edges<S: Space>(
     let mut seen: HashSet<u32> = HashSet::from([t]);
     let mut cut = vec![t];
     let mut edges: Vec<(u32, u32, u32)> = Vec::new();
+    let mut known: HashSet<(u32, u32)> = HashSet::new();
     let mut next = 0;
     while next < cut.len() {
         let at = cut[next];
@@ -77,10 +78,7 @@ pub(super) fn crossing_edges<S: Space>(
         });
         for i in 0..4 {
             for j in 0..4 {
-                if side[i] > 0.0
-                    && side[j] < 0.0
-                    && !edges.iter().any(|e| (e.1, e.2) == (v[i], v[j]))
-                {
+                if side[i] > 0.0 && side[j] < 0.0 && known.insert((v[i], v[j])) {
                     edges.push((at, v[i], v[j]));
                 }
             }

@@ -418,7 +418,8 @@ mod tests {
             assert!(refill.apply(&mut mesh, &mut bounds));
             let after = checked(&mut mesh);
             assert!(after.0 == hull && (after.1 - volume).abs() < 1e-12);
-            assert!(measure(&mut mesh).worst <= before.max(10.0));
+            // One that is there again has its vertices in another order.
+            assert!(measure(&mut mesh).worst <= before.max(10.0) * (1.0 + 1e-9));
             n_found += 1;
         }
         assert!(n_found >= 10, "{n_found} of 60");
