@@ -34,22 +34,30 @@ pub(super) fn tidy<P: Pages>(mesh: &mut Mesh<P>, report: &mut RecoveryReport) {
         .filter(|&v| steiner(mesh, v))
         .collect();
     let none = HashSet::new();
+    // Beside what changed: for all others the answer is as it was.
+    let mut beside: HashSet<u32> = left.iter().copied().collect();
     for _ in 0..ROUNDS_MAX {
-        let mut changed = false;
+        let due = std::mem::take(&mut beside);
         left.retain(|&v| {
+            if !due.contains(&v) && !beside.contains(&v) {
+                return true;
+            }
             check_cancelled();
             let mut s = PagedSpace(mesh, &none);
+            let ball = ball(&mut s, v);
+            let near: Vec<u32> = ball.iter().flat_map(|&t| s.tet(t).vertices()).collect();
             let flatness = ball_flatness(&mut s, v);
-            if remove_free(&mut s, v, flatness) {
+            let is_gone = remove_free(&mut s, v, flatness);
+            if is_gone {
                 s.drop_steiner(v);
                 report.steiner = report.steiner.saturating_sub(1);
-                changed = true;
-                return false;
             }
-            changed |= rise(&mut s, v);
-            true
+            if is_gone || rise(&mut s, v) {
+                beside.extend(near);
+            }
+            !is_gone
         });
-        if !changed {
+        if beside.is_empty() {
             break;
         }
     }
