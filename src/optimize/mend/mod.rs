@@ -28,7 +28,6 @@ use super::collapse::Collapser;
 use super::objective::Worst;
 use super::pages::PageFlags;
 use super::quality::{is_below, quality};
-use super::smooth::raised;
 use super::swap::Swapper;
 use crate::geom::{Point, STEP, mix};
 use crate::mesh::{Mesh, Tet, tets_of_page};
@@ -99,6 +98,8 @@ impl Stage {
 const EXCESS_MAX: f64 = 2.0;
 /// Searches stop at this value, and an operation that reaches it is done without trying others.
 const ENOUGH: f64 = 0.5;
+/// An operation is to raise the value of what is mended by this factor at least: less is worth no change.
+const GAIN_MIN: f64 = 1.1;
 /// Sweeps of moves for the product at most: where vertices hold each other, heights double in each.
 const SWEEPS_MAX: u32 = 60;
 /// Tetrahedra listed and tried at least; see [`Stage::one_in`]. On a wing of sixteen thousand needles all but a few are bad.
@@ -342,7 +343,7 @@ impl Mender {
         if self.reconnect(mesh, t, tet, enough) {
             return true;
         }
-        let mut best = raised(own);
+        let mut best = GAIN_MIN * own;
         let mut way = Way::None;
         for v in tet.vertices() {
             if best < enough && self.mover.gather(mesh, v, t, &mut self.bounds) {
