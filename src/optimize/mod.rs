@@ -24,6 +24,7 @@ mod bound;
 mod climb;
 mod collapse;
 mod deficit;
+mod goals;
 mod insertion;
 mod lawson;
 mod measure;
@@ -43,9 +44,9 @@ mod tests;
 mod vertex_operations;
 
 pub use bound::{excess, face_floor, face_least, least};
+pub use goals::OperationCounts;
 pub use lawson::LawsonStats;
 pub use measure::{Histogram, QualityTable, measure};
 pub use mend::MendCounts;
 pub use quality::{GOODNESS_WANTED, inverse_quality, is_forcing, quality};
-pub use rounds::OperationCounts;
 pub use run::{Mode, OptimizeReport, Progress, Settings, run, run_with};
