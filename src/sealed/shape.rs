@@ -20,7 +20,8 @@ pub struct Shape {
 }
 
 impl Shape {
-    /// Of the positive tetrahedron with these corners.
+    /// Of the positive tetrahedron with these corners. What the caller does not use is not computed.
+    #[inline]
     pub fn of([a, b, c, d]: [Point; 4]) -> Self {
         let (ab, ac, ad, bc, bd) = (b - a, c - a, d - a, c - b, d - b);
         // Twice the areas, outward.
