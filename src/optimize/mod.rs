@@ -27,6 +27,7 @@ mod deficit;
 mod goals;
 mod insertion;
 mod lawson;
+#[cfg(test)]
 mod measure;
 mod mend;
 mod objective;
@@ -46,6 +47,7 @@ mod vertex_operations;
 pub use bound::{excess, face_floor, face_least, least};
 pub use goals::OperationCounts;
 pub use lawson::LawsonStats;
+#[cfg(test)]
 pub use measure::{Histogram, QualityTable, measure};
 pub use mend::MendCounts;
 pub use quality::{GOODNESS_WANTED, inverse_quality, is_forcing, quality};

@@ -26,7 +26,9 @@ impl Shape {
         let (ab, ac, ad, bc, bd) = (b - a, c - a, d - a, c - b, d - b);
         // Twice the areas, outward.
         let normals = [bc.cross(bd), ad.cross(ac), ab.cross(ad), ac.cross(ab)];
-        let lengths = normals.map(Point::length);
+        // Not by `map`, which calls a function for each: a quarter of all the time here.
+        let [e, f, g, h] = &normals;
+        let lengths = [e.length(), f.length(), g.length(), h.length()];
         let six_volumes = ab.dot(ac.cross(ad));
         let edges = [ab, ac, ad, bc, bd, d - c];
         let longest = edges

@@ -334,13 +334,13 @@ class Store:
         for row in self.subdomains:
             part = self._native.part(row.rank)
             for first in range(0, row.n_tets, n):
-                arrays = part.block(first, n)
-                points, vertex_ids, tets, regions = map(_locked, arrays)
-                del arrays
+                points, vertex_ids, tets, regions = part.block(first, n)
+                for array in (points, vertex_ids, tets, regions):
+                    _locked(array)
                 start = (row.rank << _TET_BITS) + first
                 ids = _locked(np.arange(start, start + len(tets), dtype=np.int64))
                 chunk = Chunk(row.rank, points, tets, regions, ids, vertex_ids)
-                del points, vertex_ids, tets, regions, ids
+                del points, vertex_ids, tets, regions, ids, array
                 yield chunk
                 # What the caller let go of is gone before the next is read.
                 del chunk
