@@ -25,8 +25,10 @@ mod bound_table;
 mod climb;
 mod collapse;
 mod deficit;
+mod goals;
 mod insertion;
 mod lawson;
+#[cfg(test)]
 mod measure;
 mod mend;
 mod objective;
@@ -45,9 +47,10 @@ mod vertex_operations;
 
 pub use bound::{excess, face_floor, face_least, least};
 pub use bound_table::excess_near;
+pub use goals::OperationCounts;
 pub use lawson::LawsonStats;
+#[cfg(test)]
 pub use measure::{Histogram, QualityTable, measure};
 pub use mend::MendCounts;
 pub use quality::{GOODNESS_WANTED, inverse_quality, is_forcing, quality};
-pub use rounds::OperationCounts;
 pub use run::{Mode, OptimizeReport, Progress, Settings, run, run_with};
