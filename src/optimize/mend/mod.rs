@@ -69,11 +69,11 @@ const WORST: Stage = Stage {
 };
 
 /// A solver fails on the worst ones, which have millions: first these are brought down, then what is farthest from what the surface allows, then again
-/// the worst, whatever it costs the others beside them: in a fan of needles no sum falls when one of them is made better. Then the number of
+/// the worst, whatever it costs the others beside them: in a fan of needles no sum falls when one of them is made better. So with the worst excess, which the surface's needles hide. Then the number of
 /// those of q ≥ 10, and the worst again. On balls and even scans the rounds before leave next to nothing of the kind, so that little is touched there.
 ///
 /// Cavities of flat tetrahedra need 20 in the median, 37 for nine in ten.
-const STAGES: [Stage; 5] = [
+const STAGES: [Stage; 6] = [
     Stage {
         goal: Goal::Quality,
         quality_max: 50.0,
@@ -96,6 +96,11 @@ const STAGES: [Stage; 5] = [
     },
     WORST,
     Stage {
+        goal: Goal::WorstExcess,
+        excess_max: 4.0,
+        ..WORST
+    },
+    Stage {
         goal: Goal::Count,
         quality_max: 10.0,
         excess_max: EXCESS_MAX,
@@ -113,18 +118,21 @@ impl Stage {
         TRIED_MIN + (n_tets / self.one_in) as usize
     }
 
-    /// What is done about the bad ones listed; `None` when nothing is. Of the worst, those that are better than the worst that the surface forces may
-    /// stay as they are, and those that are much better than the worst until that is better.
+    /// What is done about the bad ones listed; `None` when nothing is. Of the worst, those that are much better than the worst may stay as they are until
+    /// that is better, and those of a q better than the worst that the surface forces.
     fn at(&self, list: &[(u64, u32)], forced: f64) -> Option<Self> {
         let worst = f64::from_bits(list.first()?.0);
-        if self.goal != Goal::Worst {
-            return Some(*self);
+        let mut stage = *self;
+        let limit = match self.goal {
+            Goal::Quality | Goal::Excess | Goal::Count => return Some(stage),
+            Goal::Worst => &mut stage.quality_max,
+            Goal::WorstExcess => &mut stage.excess_max,
+        };
+        *limit = limit.max(WORST_SHARE * worst);
+        if self.goal == Goal::Worst {
+            *limit = limit.max(forced);
         }
-        let quality_max = (self.quality_max.max(forced)).max(WORST_SHARE * worst);
-        (worst > quality_max).then_some(Self {
-            quality_max,
-            ..*self
-        })
+        (worst > *limit).then_some(stage)
     }
 }
 
@@ -132,7 +140,7 @@ impl Stage {
 const EXCESS_MAX: f64 = 2.0;
 /// Searches stop at this value, and an operation that reaches it is done without trying others.
 const ENOUGH: f64 = 0.5;
-/// Beside the worst, those of q above this share of its q are mended.
+/// Beside the worst, those above this share of its q or excess are mended.
 const WORST_SHARE: f64 = 0.9;
 /// Sweeps of moves for the product at most: where vertices hold each other, heights double in each.
 const SWEEPS_MAX: u32 = 60;
@@ -207,7 +215,7 @@ fn judge<P: Pages>(
         return Judgment::Forced(q);
     }
     Judgment::Bad(match stage.goal {
-        Goal::Excess => excess,
+        Goal::Excess | Goal::WorstExcess => excess,
         Goal::Quality | Goal::Count | Goal::Worst => q,
     })
 }
@@ -439,7 +447,7 @@ impl Mender {
             }
         }
         let floor = match stage.goal {
-            Goal::Worst => best,
+            Goal::Worst | Goal::WorstExcess => best,
             Goal::Quality | Goal::Excess | Goal::Count => own,
         };
         if best < 2.0 * own && self.reconnect(mesh, t, tet, floor) {

@@ -228,7 +228,7 @@ impl Cost {
 
     /// Whether this, of least value `value`, may take the place of `old`: the worst q does not rise above 10, and
     /// - to have fewer of q ≥ 10: there are fewer;
-    /// - for the worst of the mesh: there are not many more of them;
+    /// - for the worst of the mesh, of q or of excess: there are not many more of them;
     /// - else the sum falls or what is aimed at was very bad and becomes much better, and there are hardly more of them.
     ///   Without the sum, tetrahedra just over the threshold would be divided for little; with it alone, needles near their bound keep
     ///   their neighbors from being mended.
@@ -245,7 +245,7 @@ impl Cost {
                 (is_much || self.sum < old.sum) && self.n_poor <= old.n_poor + more
             }
             Goal::Count => (self.n_poor, self.sum) < (old.n_poor, old.sum),
-            Goal::Worst => self.n_poor <= old.n_poor + aim.more,
+            Goal::Worst | Goal::WorstExcess => self.n_poor <= old.n_poor + aim.more,
         };
         self.worst_goodness >= old.worst_goodness.min(0.1) && value > aim.own && is_wanted
     }
@@ -266,6 +266,8 @@ pub(super) enum Goal {
     Count,
     /// The worst q of the mesh, whatever becomes of those that are not the worst.
     Worst,
+    /// The worst excess, likewise.
+    WorstExcess,
 }
 
 impl Goal {
@@ -273,7 +275,7 @@ impl Goal {
     pub(super) fn measure(self, q: f64) -> Measure {
         match self {
             Self::Quality | Self::Count => Measure::Quality(q),
-            Self::Excess => Measure::Excess,
+            Self::Excess | Self::WorstExcess => Measure::Excess,
             // No triangle's bound counts.
             Self::Worst => Measure::Quality(f64::INFINITY),
         }
@@ -288,7 +290,7 @@ pub(super) struct Aim {
     /// Where searches stop.
     pub(super) enough: f64,
     pub(super) goal: Goal,
-    /// How many more of q ≥ 10 there may be for each time that the value doubles; for [`Goal::Worst`], in all.
+    /// How many more of q ≥ 10 there may be for each time that the value doubles; for the worst of the mesh, in all.
     pub(super) more: u32,
     /// Tetrahedra of a cavity at most.
     pub(super) tets_max: usize,
