@@ -60,6 +60,10 @@ const LONG_FILES: &[(&str, &str)] = &[
         "optimize/mend/mod.rs",
         "one search from the worst tetrahedron on, with the scratch that its operations share",
     ),
+    (
+        "io/write/merged.rs",
+        "one walk over all sub-domains as one mesh, which every format has its vertices, tetrahedra and faces from",
+    ),
 ];
 
 /// Functions above [`FUNCTION_LINES_MAX`].
