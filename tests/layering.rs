@@ -56,6 +56,14 @@ const LONG_FILES: &[(&str, &str)] = &[
         "io/read/feed.rs",
         "the words, numbers and places that every text format reads by",
     ),
+    (
+        "optimize/mend/mod.rs",
+        "one search from the worst tetrahedron on, with the scratch that its operations share",
+    ),
+    (
+        "io/write/merged.rs",
+        "one walk over all sub-domains as one mesh, which every format has its vertices, tetrahedra and faces from",
+    ),
 ];
 
 /// Functions above [`FUNCTION_LINES_MAX`].

@@ -6,7 +6,7 @@ use std::path::Path;
 use tetdb_schema::record::NO_TET;
 
 use super::error::Result;
-use super::split::here;
+use super::stream::here;
 use crate::sealed::Subdomain;
 use crate::storage::{Sorted, Sorter, check_cancelled, sort_record};
 

@@ -11,8 +11,8 @@ use super::draft::Draft;
 use super::error::Result;
 use super::faces::Face;
 use super::merged::Merged;
-use super::stream::{Records, Stream, scratch};
-use crate::storage::{Payload, SortRecord, Sorted, Sorter, StorageError, sort_record};
+use super::stream::{Records, Stream, here, scratch};
+use crate::storage::{Payload, SortRecord, Sorted, Sorter, sort_record};
 use tetdb_schema::record::FACES;
 
 sort_record! {
@@ -115,14 +115,6 @@ pub(super) fn split(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
     split_faces(mesh, face_changes.finish()?)?;
     mesh.set_doubles(doubles);
     Ok(())
-}
-
-/// Whether a record that was read is one that is looked for; errors are, to be seen.
-pub(super) fn here<R>(
-    record: &std::result::Result<R, StorageError>,
-    is: impl Fn(&R) -> bool,
-) -> bool {
-    record.as_ref().map_or(true, is)
 }
 
 fn save<R: SortRecord>(records: Sorted<R>, path: &Path) -> Result<()> {

@@ -168,3 +168,11 @@ pub(super) fn scratch(path: &Path) -> Result<Stream> {
     File::create_new(path).map_err(|e| WriteError::io(path, e))?;
     Stream::open(path)
 }
+
+/// Whether a record that was read is one that is looked for; errors are, to be seen.
+pub(super) fn here<R>(
+    record: &std::result::Result<R, crate::storage::StorageError>,
+    is: impl Fn(&R) -> bool,
+) -> bool {
+    record.as_ref().map_or(true, is)
+}

@@ -6,7 +6,7 @@ use numpy::{Element, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use tetdb::CancelToken;
 use tetdb::data::schema::record::SealedTet;
-use tetdb::data::{Chunk, DVec3, SealedError, Shape, Subdomain};
+use tetdb::data::{Chunk, SealedError, Shape, Subdomain};
 
 use crate::failure::Failure;
 use crate::watched::watched;
@@ -284,16 +284,15 @@ pub fn qualities<'py>(
     points: PyReadonlyArray2<'py, f64>,
     tets: PyReadonlyArray2<'py, i32>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let points = points.as_slice()?.as_chunks::<3>().0;
-    let tets = tets.as_slice()?.as_chunks::<4>().0;
+    let (points, tets) = (points.as_slice()?, tets.as_slice()?.as_chunks::<4>().0);
     let all = PyArray1::zeros(py, tets.len(), false);
     {
         let mut filled = all.readwrite();
         let out = filled.as_slice_mut()?;
-        let corner = |v: i32| DVec3::from_array(points[v as usize]);
+        let corner = |v: i32| tetdb::data::DVec3::from_slice(&points[3 * v as usize..]);
         py.detach(|| {
-            for (&[a, b, c, d], quality) in tets.iter().zip(out) {
-                *quality = Shape::of([corner(a), corner(b), corner(c), corner(d)]).quality;
+            for (tet, quality) in tets.iter().zip(out) {
+                *quality = Shape::of(tet.map(corner)).quality;
             }
         });
     }
