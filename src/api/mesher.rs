@@ -406,7 +406,7 @@ impl Mesher {
             attempt(|| surface::validate_in(surface, &scratch))?.accept()?;
             settings.note(format!(
                 "{} triangles{} and {} vertices, closed and free of defects ({:.1} s)",
-                surface.n_triangles(),
+                surface.n_own_triangles(),
                 match surface.n_sheet_triangles() {
                     0 => String::new(),
                     n => format!(", {n} of them in sheets,"),

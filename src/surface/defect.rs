@@ -1,5 +1,6 @@
 //! What can be wrong with a surface, in words, with the place and the way out.
 
+use super::WireError;
 use super::contact::ContactKind;
 use crate::geom::Point;
 
@@ -53,6 +54,9 @@ pub enum SurfaceError {
         /// Defects in all.
         n_defects: u64,
     },
+    /// An embedded edge or point cannot be there.
+    #[error(transparent)]
+    Wire(#[from] WireError),
 }
 
 /// Vertices and triangles of a surface at most: ids keep two bits free in the mesh.
@@ -78,6 +82,7 @@ impl SurfaceError {
             Self::NoSuchVertex { .. } => "index-out-of-range",
             Self::TooSmall { .. } => "coordinate-range",
             Self::Invalid { defect, .. } => defect.code(),
+            Self::Wire(wire) => wire.code(),
         }
     }
 
@@ -89,6 +94,7 @@ impl SurfaceError {
             Self::NoSuchVertex { .. } => "write the file again from the program that made it",
             Self::TooSmall { .. } => "scale the surface to ordinary units, for example metres",
             Self::Invalid { defect, .. } => defect.help(),
+            Self::Wire(wire) => wire.help(),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Surface files read as streams: STL, OFF, OBJ, PLY, MEDIT, Gmsh, TetGen; sizes at the vertices of MEDIT meshes.
+//! Surface files read as streams: STL, OFF, OBJ, PLY, MEDIT, Gmsh, TetGen; sizes at the vertices of MEDIT meshes; files of edges and points.
 //!
 //! A declared count is believed only after it was compared with the length of the file; every error
 //! tells its line (text) or byte (binary). Decimal text becomes the nearest double, binary floats
@@ -20,6 +20,8 @@ mod sink;
 mod sizes;
 mod stl;
 mod tetgen;
+mod vtk;
+mod wires;
 
 #[cfg(test)]
 mod collection;
@@ -37,6 +39,7 @@ pub use open::is_stream;
 use open::{open, unpacked_name};
 use sink::SurfaceSink;
 pub use sizes::{read_sizes, size_files};
+pub use wires::{WireKind, read_wires};
 
 use crate::surface::{Surface, SurfaceBuilder, SurfaceError};
 
