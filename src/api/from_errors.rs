@@ -42,7 +42,7 @@ impl From<SurfaceError> for Error {
                 };
                 error.at(defect.place() + &more)
             }
-            SurfaceError::Wire(wire) => error.at(wire.place()),
+            SurfaceError::Wire(wire) => error.at(show(wire.at())),
             _ => error,
         }
     }

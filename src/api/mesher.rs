@@ -411,7 +411,7 @@ impl Mesher {
                     0 => String::new(),
                     n => format!(", {n} of them in sheets,"),
                 },
-                surface.n_vertices(),
+                surface.n_own_vertices(),
                 clock.elapsed().as_secs_f64()
             ));
             settings.note(format!("memory: {}", settings.cap_in_words()));

@@ -158,12 +158,12 @@ impl Surface {
 
     /// Number of triangles.
     pub fn n_triangles(&self) -> usize {
-        self.inner.n_triangles()
+        self.inner.n_own_triangles()
     }
 
     /// Number of vertices, those with the same coordinates counted once.
     pub fn n_vertices(&self) -> usize {
-        self.inner.n_vertices()
+        self.inner.n_own_vertices()
     }
 
     /// Low and high corner of the smallest box around it.
@@ -354,10 +354,13 @@ impl Surface {
             .map_or("sheet".to_owned(), |s| s.into_owned())
     }
 
-    /// Writes it as `.stl`, `.off`, `.obj` or `.ply`. Errors: `unknown-format`, `lossy-format`; the disk.
+    /// Writes it, without embedded edges and points, as `.stl`, `.off`, `.obj` or `.ply`. Errors: `unknown-format`, `lossy-format`; the disk.
     pub fn write(&self, out: impl AsRef<Path>) -> Result<(), Error> {
         guarded(&Settings::new(), || {
-            write::surface(&self.inner, out.as_ref())?;
+            match self.inner.has_wires() {
+                true => write::surface(&self.inner.without_wires(), out.as_ref())?,
+                false => write::surface(&self.inner, out.as_ref())?,
+            };
             Ok(())
         })
     }

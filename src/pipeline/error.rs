@@ -62,7 +62,7 @@ pub enum PipelineError {
         n: u64,
     },
     /// An edge or a point lies where there will be no tetrahedra.
-    #[error("{n} {what} lie where nothing is filled, the first of {label:?}")]
+    #[error("{n} of the embedded {what} lie where nothing is filled, the first of {label:?}")]
     WireOutside {
         /// Edges or points.
         what: &'static str,

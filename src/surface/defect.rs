@@ -1,7 +1,7 @@
 //! What can be wrong with a surface, in words, with the place and the way out.
 
-use super::WireError;
 use super::contact::ContactKind;
+use super::wire_set::WireError;
 use crate::geom::Point;
 
 /// A surface that cannot be built or meshed.

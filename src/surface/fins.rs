@@ -12,7 +12,8 @@
 use super::contact::contact;
 use super::point_tree::PointTree;
 use super::seek::Seeker;
-use super::wires::{NEAR_SHARE, WireError};
+use super::wire_set::WireError;
+use super::wires::NEAR_SHARE;
 use super::{BoxTree, Surface, SurfaceError};
 use crate::geom::{Aabb, Point};
 use crate::storage::ScratchSpace;
@@ -265,5 +266,78 @@ fn between_edges([a, b]: [Point; 2], [c, d]: [Point; 2]) -> f64 {
     match (0.0..=1.0).contains(&s) && (0.0..=1.0).contains(&t) {
         true => least.min(w.dot(normal).abs() / squared.sqrt()),
         false => least,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::samples::SampleSpec;
+    use crate::surface::{fitness, validate};
+
+    fn wells(word: &str) -> Surface {
+        let spec = SampleSpec::parse(word).expect("a sample");
+        let mut surface = Surface::from(spec.make().expect("small enough"));
+        surface
+            .hold_wires(&ScratchSpace::boundless())
+            .expect("room for fins");
+        surface
+    }
+
+    #[test]
+    fn fins_touch_nothing_and_are_well_shaped() {
+        for word in [
+            "wells,count=30,cells=9,shift=0",
+            "wells,count=40,cells=9,seed=5,shift=0.15",
+        ] {
+            let surface = wells(word);
+            let found = validate(&surface);
+            assert!(found.is_valid(), "{:?}", found.defects.first());
+            assert_eq!(
+                surface.n_triangles() - surface.n_own_triangles(),
+                surface.wires.edges.len()
+            );
+            assert_eq!(
+                fitness(&surface, &found.closedness).forcing_triangles,
+                0,
+                "{word}"
+            );
+            // Held once more they are the same, and without them it is the surface of before.
+            let mut again = surface.clone();
+            again
+                .hold_wires(&ScratchSpace::boundless())
+                .expect("as before");
+            assert_eq!(again, surface);
+            assert!(!surface.without_wires().has_wires());
+        }
+    }
+
+    #[test]
+    fn edges_of_triangles_need_no_fin_and_points_there_no_size() {
+        let mut surface = wells("wells,count=2,layers=2,points=1");
+        let [a, b, _] = surface.triangles[0];
+        surface.wires.edges.push([a, b, 0]);
+        surface.wires.points.push([a, 0]);
+        let n = surface.n_triangles();
+        surface
+            .hold_wires(&ScratchSpace::boundless())
+            .expect("room for fins");
+        assert_eq!(surface.n_triangles(), n);
+        assert_eq!(surface.wires.sizes[1], 0.0);
+        assert!(surface.wires.sizes[0] > 0.0 && surface.lone_points().len() == 1);
+    }
+
+    #[test]
+    fn distances_of_edges_are_those_of_their_points() {
+        let at = |k: u32, i: u32| f64::from((k * 7919 + i * 104_729) % 1009) / 100.0;
+        let point = |k: u32, i: u32| Point::new(at(k, i), at(k, i + 1), at(k, i + 2));
+        for k in 0..500 {
+            let [e, f] = [0, 7].map(|i| [point(k, i), point(k, i + 13)]);
+            let found = between_edges(e, f);
+            let along = |[a, b]: [Point; 2], n: u32| a + (b - a) * (f64::from(n) / 60.0);
+            let all = (0..=60).map(|n| to_edge(along(e, n), f));
+            let sampled = all.fold(f64::INFINITY, f64::min);
+            assert!(found <= sampled + 1e-12 && sampled <= found + e[0].distance(e[1]) / 60.0);
+        }
     }
 }

@@ -6,7 +6,7 @@
 //! `defect` (what can be wrong and what to do about it), `boundary_loops` (where it is open), `near` and `repair`
 //! (mending on demand), `fitness` (what mesh its triangles allow), `split` (finer triangles of the same surface),
 //! `seek` (distances and what lies above), `volumes` (what is enclosed), `seeds` (what points say of volumes), `sheets` (embedded triangles with volume on both sides),
-//! `wires` (embedded edges and points), `wire_contact` (how they touch), `fins` (what holds them).
+//! `wire_set` and `wires` (embedded edges and points), `wire_contact` (how they touch), `fins` (what holds them).
 //!
 //! Is not: file formats (`io`), which volumes are filled (`boundary`).
 
@@ -32,6 +32,7 @@ mod validate;
 mod volumes;
 mod weld;
 mod wire_contact;
+mod wire_set;
 mod wires;
 
 #[cfg(test)]
@@ -54,4 +55,4 @@ pub use triangles::{Note, NoteKind, SourceFile, Surface, VolumePoints};
 pub use validate::{Validation, validate, validate_in};
 pub use volumes::{OUTSIDE, Volumes, Wall};
 pub use weld::SurfaceBuilder;
-pub use wires::{WireError, WireSet, Wires};
+pub use wire_set::{WireError, WireSet, Wires};

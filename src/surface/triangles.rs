@@ -3,7 +3,8 @@
 use std::fmt;
 use std::mem::size_of;
 
-use super::{Seed, Wires};
+use super::Seed;
+use super::wire_set::Wires;
 use crate::geom::{Aabb, Point};
 
 /// An indexed triangle surface with a label on each triangle.

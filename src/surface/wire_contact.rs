@@ -124,3 +124,114 @@ pub(super) fn point_at_triangle(p: Point, t: &[Point; 3]) -> Option<Contact> {
 pub(super) fn is_on_edge(p: Point, [a, b]: [Point; 2]) -> bool {
     a.min(b).cmple(p).all() && p.cmple(a.max(b)).all() && !has_area(&[a, b, p])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::mix;
+
+    type Whole = [i64; 3];
+
+    fn cross(a: Whole, b: Whole) -> Whole {
+        [0, 1, 2].map(|i| a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3])
+    }
+
+    fn dot(a: Whole, b: Whole) -> i64 {
+        a.iter().zip(b).map(|(x, y)| x * y).sum()
+    }
+
+    fn less(a: Whole, b: Whole) -> Whole {
+        [0, 1, 2].map(|i| a[i] - b[i])
+    }
+
+    /// Whether two closed edges between whole points share a point, by solving for it.
+    fn share_a_point([p, a]: [Whole; 2], [q, b]: [Whole; 2]) -> bool {
+        let (u, v, w) = (less(a, p), less(b, q), less(q, p));
+        let n = cross(u, v);
+        if n != [0; 3] {
+            let within = |x: i64| (0..=dot(n, n)).contains(&x);
+            return dot(w, n) == 0 && within(dot(cross(w, v), n)) && within(dot(cross(w, u), n));
+        }
+        let at = |x: Whole| dot(less(x, p), u);
+        let (low, high) = (at(q).min(at(b)), at(q).max(at(b)));
+        cross(w, u) == [0; 3] && low <= dot(u, u) && high >= 0
+    }
+
+    #[test]
+    fn edges_touch_where_an_equation_says_so() {
+        let whole = |k: u64| [0, 1, 2].map(|i| (mix(k ^ i << 40) % 4) as i64);
+        let point = |p: Whole| Point::from_array(p.map(|x| x as f64));
+        let mut counts = [0; 2];
+        for k in 0..200_000u64 {
+            let p = [0, 1, 2, 3].map(|i| whole(4 * k + i));
+            // Equal points have equal numbers.
+            let id = |i: usize| {
+                p.iter()
+                    .position(|q| *q == p[i])
+                    .map(|at| at as u32)
+                    .unwrap_or_default()
+            };
+            let edge = |i: usize, j: usize| Edge {
+                ids: [id(i), id(j)],
+                ends: [point(p[i]), point(p[j])],
+            };
+            if p[0] == p[1] || p[2] == p[3] {
+                continue;
+            }
+            let ids = [edge(0, 1).ids, edge(2, 3).ids];
+            let shared: Vec<u32> = ids[0].into_iter().filter(|v| ids[1].contains(v)).collect();
+            let expected = match shared[..] {
+                [] => share_a_point([p[0], p[1]], [p[2], p[3]]),
+                [v] => {
+                    let others = ids.map(|ends| ends.into_iter().find(|&w| w != v).unwrap_or(v));
+                    let [x, y] = others.map(|w| less(p[w as usize], p[v as usize]));
+                    cross(x, y) == [0; 3] && dot(x, y) > 0
+                }
+                _ => false,
+            };
+            assert_eq!(edge(0, 1).at_edge(&edge(2, 3)).is_some(), expected, "{p:?}");
+            counts[usize::from(expected)] += 1;
+        }
+        assert!(counts.iter().all(|&n| n > 10_000), "{counts:?}");
+    }
+
+    #[test]
+    fn points_of_triangles_and_edges_are_found() {
+        let t = [
+            Point::ZERO,
+            Point::new(4.0, 0.0, 2.0),
+            Point::new(0.0, 4.0, 2.0),
+        ];
+        assert!(
+            point_at_triangle(Point::new(1.0, 1.0, 1.0), &t)
+                .is_some_and(|c| c.kind == ContactKind::VertexOnFace)
+        );
+        assert!(
+            point_at_triangle(Point::new(2.0, 2.0, 2.0), &t)
+                .is_some_and(|c| c.kind == ContactKind::VertexOnEdge)
+        );
+        assert!(point_at_triangle(Point::new(3.0, 3.0, 3.0), &t).is_none());
+        assert!(point_at_triangle(Point::new(1.0, 1.0, 1.000_000_1), &t).is_none());
+        assert!(is_on_edge(Point::new(2.0, 0.0, 1.0), [t[0], t[1]]));
+        assert!(!is_on_edge(Point::new(6.0, 0.0, 3.0), [t[0], t[1]]));
+        let edge = |a, b| Edge {
+            ids: [0, 9],
+            ends: [a, b],
+        };
+        let own = [0, 1, 2];
+        let kind = |b: Point| match edge(t[0], b).at_triangle(t, own) {
+            EdgeAtTriangle::Touching(c) => Some(c.kind),
+            _ => None,
+        };
+        assert_eq!(
+            kind(Point::new(1.0, 1.0, 1.0)),
+            Some(ContactKind::CoplanarOverlap)
+        );
+        assert_eq!(
+            kind(Point::new(2.0, 0.0, 1.0)),
+            Some(ContactKind::EdgeOnEdge)
+        );
+        assert_eq!(kind(Point::new(-1.0, -1.0, -1.0)), None);
+        assert_eq!(kind(Point::new(1.0, 1.0, 5.0)), None);
+    }
+}

@@ -1,132 +1,16 @@
-//! Wires: edges and points inside a volume that the mesh has as its edges and vertices.
+//! A surface with wires in it: they are added, checked and held.
 //!
 //! A point is a vertex that no triangle uses. An edge that no triangle has is held by a fin: a triangle of its own beside it, see `fins`.
 
 use std::collections::HashMap;
 
 use super::contact::ContactKind;
-use super::defect::show;
 use super::weld::PointTable;
 use super::wire_contact::{Edge, EdgeAtTriangle, has_area, is_on_edge, point_at_triangle};
+use super::wire_set::{WireError, WireSet, Wires};
 use super::{BoxTree, Surface, SurfaceError};
 use crate::geom::{Aabb, Point};
 use crate::storage::ScratchSpace;
-
-/// Edges and points of a surface that are no parts of its triangles, or are to be known by a name of their own.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Wires {
-    /// The vertices of each edge, and its label.
-    pub edges: Vec<[u32; 3]>,
-    /// The vertex of each point, and its label.
-    pub points: Vec<[u32; 2]>,
-    /// How long edges at each point should be, at most; 0 where the point is a vertex of triangles, which say it.
-    pub sizes: Vec<f64>,
-    /// The first triangle that is a fin, and the first vertex that belongs to fins alone.
-    pub fins: Option<[u32; 2]>,
-}
-
-/// What a file says of edges and points.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct WireSet {
-    /// Positions of the vertices, equal ones among them.
-    pub points: Vec<Point>,
-    /// The vertices of each edge, and its label.
-    pub edges: Vec<[u32; 3]>,
-    /// The vertices that are points, and their labels.
-    pub marks: Vec<[u32; 2]>,
-    /// Names of the labels.
-    pub label_names: Vec<String>,
-}
-
-/// Why edges and points cannot be embedded.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum WireError {
-    /// Both ends of an edge are one vertex.
-    #[error("{edge} has no length")]
-    NoLength {
-        /// The edge.
-        edge: String,
-        /// Where.
-        at: Point,
-    },
-    /// An edge or a point is given twice.
-    #[error("{what} is there twice: it is {other} too")]
-    Repeated {
-        /// The later one.
-        what: String,
-        /// The earlier one.
-        other: String,
-        /// Where.
-        at: Point,
-    },
-    /// It touches something elsewhere than in common vertices.
-    #[error("{what} and {other} meet where they should not: {kind}{}", more(*n))]
-    Touching {
-        /// The edge or the point.
-        what: String,
-        /// The triangle or the edge.
-        other: String,
-        /// How they touch.
-        kind: ContactKind,
-        /// Where.
-        at: Point,
-        /// How many such pairs there are.
-        n: usize,
-    },
-    /// There is no room for a tetrahedron of computable size.
-    #[error("{what} is nearer to something else than can be meshed{}", more(*n))]
-    TooNear {
-        /// The first of them, and at most nine others.
-        what: String,
-        /// Where.
-        at: Point,
-        /// How many there are.
-        n: usize,
-    },
-}
-
-fn more(n: usize) -> String {
-    match n {
-        0 | 1 => String::new(),
-        n => format!(" (and {} more)", n - 1),
-    }
-}
-
-impl WireError {
-    /// The word for this error.
-    pub fn code(&self) -> &'static str {
-        match self {
-            Self::NoLength { .. } => "degenerate-edge",
-            Self::Repeated { .. } => "duplicate-wire",
-            Self::Touching { .. } => "wire-contact",
-            Self::TooNear { .. } => "wire-too-near",
-        }
-    }
-
-    /// Where it is.
-    pub fn place(&self) -> String {
-        match self {
-            Self::NoLength { at, .. }
-            | Self::Repeated { at, .. }
-            | Self::Touching { at, .. }
-            | Self::TooNear { at, .. } => show(*at),
-        }
-    }
-
-    /// What to do about it.
-    pub fn help(&self) -> &'static str {
-        match self {
-            Self::NoLength { .. } | Self::Repeated { .. } => {
-                "give each edge and each point once, of different vertices"
-            }
-            Self::Touching { .. } => {
-                "edges and points meet triangles, and edges each other, in common vertices alone: divide the triangle or the edge there"
-            }
-            Self::TooNear { .. } => "join what is meant to meet, or move it apart",
-        }
-    }
-}
 
 /// An edge or a point this near to something else, as a share of the box diagonal, is refused: a vertex beside it is rounded to some 1e-16
 /// of the diagonal, and directions must stay known to several digits.
@@ -156,6 +40,13 @@ impl Surface {
         self.wires
             .fins
             .map_or(self.n_triangles(), |[first, _]| first as usize)
+    }
+
+    /// Number of vertices, without those that only hold edges of wires.
+    pub fn n_own_vertices(&self) -> usize {
+        self.wires
+            .fins
+            .map_or(self.n_vertices(), |[_, first]| first as usize)
     }
 
     /// Adds edges and points, and what holds them; vertices with the same coordinates become one.

@@ -6,7 +6,7 @@
 use super::place::Place;
 
 /// Enough tetrahedra for four sub-domains.
-const MANY: &str = "sample:wells,count=40,points=60,cells=14";
+const MANY: &str = "sample:wells,count=40,points=60,cells=22";
 
 /// A box from 0 to 1 of twelve triangles.
 const BOX: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n\
@@ -43,13 +43,13 @@ fn wells_and_sensors_are_edges_and_vertices_in_one_piece_and_in_several() {
             "query {store}.tetdb --json --select id --touching-sheet --label well-1"
         ));
         let sheets = sheets.succeeds().stdout().lines().count();
-        assert!(sheets < found("well-1") && sheets > 0);
+        assert!(sheets < found("well-1"));
     }
     let again = format!("mesh {MANY} -o again.tetdb --subdomains 4 --threads 1 --memory 128MiB");
     place.run_line(&again).succeeds();
     assert_eq!(place.digest("four.tetdb"), place.digest("again.tetdb"));
     place
-        .run_line("resaturate four.tetdb --subdomain 1 --factor 0.8")
+        .run_line("resaturate four.tetdb --subdomain 1 --hgrad 1.2")
         .succeeds();
     place.run_line("verify four.tetdb --full").succeeds();
 }
@@ -140,10 +140,15 @@ fn every_kind_of_file_gives_the_same_mesh() {
     );
     place.write("p.csv", "x,y,z,name\n0.7,0.25,0.5,north\n0.75, 0.7, 0.2\n");
     place.write("p.node", "2 3 0 1\n0 0.7 0.25 0.5 4\n1 0.75 0.7 0.2 0\n");
+    // What a head says of attributes may be anything: lines end where they end.
+    place.write(
+        "mad.node",
+        "2 3 999999999991 1\n0 0.7 0.25 0.5 4\n1 0.75 0.7 0.2 0\n",
+    );
     place.write("p.txt", "# two\n0.7 0.25 0.5 north\n0.75\t0.7 0.2\n");
     let mut digests = Vec::new();
     for edges in ["e.obj", "e.vtk", "e5.vtk", "eb.vtk", "e.poly"] {
-        for points in ["p.csv", "p.node", "p.txt"] {
+        for points in ["p.csv", "p.node", "p.txt", "mad.node"] {
             let line = format!(
                 "mesh box.obj --embed-edges {edges} --embed-points {points} -o s.tetdb --force"
             );

@@ -21,6 +21,7 @@ mod sizes;
 mod stl;
 mod tetgen;
 mod vtk;
+mod wire_sink;
 mod wires;
 
 #[cfg(test)]
@@ -36,10 +37,11 @@ use feed::{Feed, Result};
 #[cfg(any(test, feature = "cli", feature = "internals"))]
 pub use lengths::read_lengths;
 pub use open::is_stream;
-use open::{open, unpacked_name};
+use open::{open, stem, unpacked_name};
 use sink::SurfaceSink;
 pub use sizes::{read_sizes, size_files};
-pub use wires::{WireKind, read_wires};
+pub use wire_sink::WireKind;
+pub use wires::read_wires;
 
 use crate::surface::{Surface, SurfaceBuilder, SurfaceError};
 
@@ -189,17 +191,6 @@ pub fn read_memory(format: Format, file: &str, bytes: &[u8]) -> Result<Surface> 
     let feed = Feed::new(file, bytes, bytes.len() as u64);
     read_feed(format, feed, None, 0, &mut target)?;
     Ok(builder.finish())
-}
-
-fn stem(path: &Path) -> String {
-    let name = unpacked_name(path);
-    let text = name.file_stem().unwrap_or_default().to_string_lossy();
-    let name = feed::name(text.as_bytes());
-    if name.is_empty() {
-        "surface".to_owned()
-    } else {
-        name
-    }
 }
 
 fn unique(stem: &str, taken: &[String]) -> String {

@@ -6,7 +6,7 @@
 use std::io::BufRead;
 
 use super::feed::{Feed, parse, quote};
-use super::wires::{WireKind, WireSink};
+use super::wire_sink::{WireKind, WireSink};
 use super::{ReadError, Result, SurfaceSink};
 use crate::geom::Point;
 use crate::surface::NoteKind;

@@ -8,7 +8,7 @@ use std::io::BufRead;
 use std::path::Path;
 
 use super::feed::{Feed, name, parse};
-use super::wires::WireSink;
+use super::wire_sink::WireSink;
 use super::{ReadError, Result, SurfaceSink, open};
 use crate::geom::Point;
 use crate::surface::{NoteKind, Seed, SeedKind, SurfaceError, VolumePoints};
@@ -238,8 +238,12 @@ fn read_points<R: BufRead>(
         }
         let p = feed.point()?;
         let mut marker = 0;
-        for _ in 0..=place_of_marker.unwrap_or(0) {
-            if feed.next_word_in_line()? && place_of_marker.is_some() {
+        // The line ends the search: what the head says of attributes may be anything.
+        for place in 0..=place_of_marker.unwrap_or(0) {
+            if !feed.next_word_in_line()? {
+                break;
+            }
+            if place_of_marker == Some(place) {
                 marker = parse(feed.word()).unwrap_or(0);
             }
         }

@@ -6,7 +6,8 @@ use std::io::BufRead;
 
 use super::ReadError;
 use super::feed::{Feed, Result};
-use super::wires::{WireKind, WireSink, checked_point};
+use super::wire_sink::{WireKind, WireSink};
+use crate::geom::Point;
 
 /// Kinds of cells with one vertex or several, and lines of two or more.
 const VERTEX: i64 = 1;
@@ -122,7 +123,11 @@ impl<R: BufRead> Vtk<R> {
         self.begin_data()?;
         for _ in 0..self.n_points {
             let p = [self.real(&kind)?, self.real(&kind)?, self.real(&kind)?];
-            sink.set.points.push(checked_point(&self.feed, p)?);
+            let mut checked = [0.0; 3];
+            for (x, found) in checked.iter_mut().zip(p) {
+                *x = self.feed.checked(found)?;
+            }
+            sink.set.points.push(Point::from_array(checked));
         }
         Ok(())
     }

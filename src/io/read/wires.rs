@@ -1,52 +1,14 @@
 //! Files of edges and points to embed: OBJ (`l`, `p`), legacy VTK, TetGen `.poly` and `.node`, and text of one point a line.
 
-use std::io::BufRead;
 use std::path::Path;
 
 use super::error::{FilePlace, ReadError, Spot};
 use super::feed::{Feed, Result, name, parse};
-use super::open::{Reader, open, unpacked_name};
-use super::{obj, stem, tetgen, vtk};
+use super::open::{Reader, open, stem, unpacked_name};
+use super::wire_sink::{WireKind, WireSink};
+use super::{obj, tetgen, vtk};
 use crate::geom::Point;
 use crate::surface::WireSet;
-
-/// What is wanted of a file that may have both.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum WireKind {
-    /// Edges: `.obj`, `.vtk`, `.poly`.
-    Edges,
-    /// Points: `.obj`, `.vtk`, `.node`, `.csv`, `.txt`.
-    Points,
-}
-
-/// Edges or points being read.
-#[derive(Default)]
-pub(super) struct WireSink {
-    pub set: WireSet,
-    /// What is called by no name of its own is called so.
-    stem: String,
-}
-
-impl WireSink {
-    pub fn label(&mut self, name: &str) -> u32 {
-        let name = if name.is_empty() { &self.stem } else { name };
-        let known = self.set.label_names.iter().position(|n| n == name);
-        let place = known.unwrap_or_else(|| {
-            self.set.label_names.push(name.to_owned());
-            self.set.label_names.len() - 1
-        });
-        place as u32
-    }
-
-    pub fn line(&mut self, vertices: &[u32], label: u32) {
-        let pairs = vertices.windows(2).map(|v| [v[0], v[1], label]);
-        self.set.edges.extend(pairs);
-    }
-
-    pub fn mark(&mut self, v: u32, label: u32) {
-        self.set.marks.push([v, label]);
-    }
-}
 
 /// Reads the edges or the points of a file, labels after its groups or markers, else after the file. `cap`: bytes of memory it may take.
 ///
@@ -55,10 +17,7 @@ impl WireSink {
 pub fn read_wires(path: &Path, kind: WireKind, cap: u64) -> Result<WireSet> {
     let mut feed = open(path, cap / 4)?;
     let file = feed.file().to_owned();
-    let mut sink = WireSink {
-        stem: stem(path),
-        ..WireSink::default()
-    };
+    let mut sink = WireSink::called(stem(path));
     let named = unpacked_name(path);
     let extension = named.extension().unwrap_or_default().to_string_lossy();
     match (extension.to_ascii_lowercase().as_str(), kind) {
@@ -141,14 +100,4 @@ fn read_table(feed: &mut Feed<Reader>, sink: &mut WireSink) -> Result<()> {
         sink.mark(sink.set.points.len() as u32, label);
         sink.set.points.push(Point::from_array(p));
     }
-}
-
-/// A coordinate of text or not.
-pub(super) fn checked_point<R: BufRead>(feed: &Feed<R>, p: [f64; 3]) -> Result<Point> {
-    let [x, y, z] = p;
-    Ok(Point::new(
-        feed.checked(x)?,
-        feed.checked(y)?,
-        feed.checked(z)?,
-    ))
 }
