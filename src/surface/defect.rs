@@ -56,7 +56,13 @@ pub enum SurfaceError {
     },
     /// An embedded edge or point cannot be there.
     #[error(transparent)]
-    Wire(#[from] WireError),
+    Wire(Box<WireError>),
+}
+
+impl From<WireError> for SurfaceError {
+    fn from(error: WireError) -> Self {
+        Self::Wire(Box::new(error))
+    }
 }
 
 /// Vertices and triangles of a surface at most: ids keep two bits free in the mesh.

@@ -208,14 +208,14 @@ impl Surface {
         };
         let triangle_name = |t: u32| format!("triangle {t} of {:?}", self.label_name(t));
         let mut is_free = vec![true; self.wires.edges.len()];
-        for e in 0..is_free.len() {
+        for (e, is_free) in is_free.iter_mut().enumerate() {
             let edge = self.wire(e as u32);
             let bounds = Aabb::around(edge.ends);
             let what = || self.edge_name(e);
             triangles.meeting(&bounds, |t| {
                 match edge.at_triangle(self.corners(t), self.triangles[t as usize]) {
                     EdgeAtTriangle::Apart => {}
-                    EdgeAtTriangle::Own => is_free[e] = false,
+                    EdgeAtTriangle::Own => *is_free = false,
                     EdgeAtTriangle::Touching(c) => touch(&what, &|| triangle_name(t), c.kind, c.at),
                 }
             });
