@@ -21,6 +21,7 @@
 
 mod bad_fraction;
 mod bound;
+mod bound_table;
 mod climb;
 mod collapse;
 mod deficit;
@@ -43,6 +44,7 @@ mod tests;
 mod vertex_operations;
 
 pub use bound::{excess, face_floor, face_least, least};
+pub use bound_table::excess_near;
 pub use lawson::LawsonStats;
 pub use measure::{Histogram, QualityTable, measure};
 pub use mend::MendCounts;
