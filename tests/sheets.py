@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
-"""Is a mesh conforming, of the right volume, and has every triangle of a sheet a tetrahedron on both sides?
+"""Is a mesh conforming, of the right volume, and has it every triangle of a sheet, every edge and every point inside?
 
-  sheets.py MESH.mesh SHELL.obj SHEETS.obj
+  sheets.py MESH.mesh SHELL.obj SHEETS.obj [WIRES.obj]
 
 MESH.mesh: the export of a mesh of SHELL.obj with SHEETS.obj embedded, all of its inside filled. Reads both formats by itself. Checked:
 tetrahedra are positive (rationals decide where doubles cannot); a face has one tetrahedron, or two that see it from opposite sides;
 the faces with one are the triangles of the shell, bit for bit; each triangle of a sheet is a face of two; each is listed among the
-triangles of the file; volumes add up to what the shell encloses. Exit code 0 when all of it holds.
+triangles of the file; each line of WIRES.obj is an edge of a tetrahedron and listed with a reference of its own group, each of its
+points a vertex of one and required, and no other is listed; volumes add up to what the shell encloses. Exit code 0 when all of it holds.
 """
 import sys
 from fractions import Fraction
@@ -28,18 +29,28 @@ def read_mesh(path):
     points = block("Vertices", 4, float)[:, :3]
     triangles = block("Triangles", 4, np.int64)
     tets = block("Tetrahedra", 5, np.int64)
-    return points, triangles[:, :3] - 1, triangles[:, 3], tets[:, :4] - 1
+    edges = block("Edges", 3, np.int64) if "Edges" in at else np.zeros((0, 3), np.int64)
+    required = block("RequiredVertices", 1, np.int64)[:, 0] - 1 if "RequiredVertices" in at else np.zeros(0, np.int64)
+    references = block("Vertices", 4, float)[:, 3].astype(int)
+    return points, triangles[:, :3] - 1, triangles[:, 3], tets[:, :4] - 1, (edges, required, references)
 
 
 def read_obj(path):
-    points, faces = [], []
+    points, faces, lines, marks, group = [], [], [], [], ""
     for line in open(path):
         word = line.split()
         if word and word[0] == "v":
             points.append([float(x) for x in word[1:4]])
+        elif word and word[0] == "g":
+            group = line[1:].strip()
+        elif word and word[0] == "l":
+            ends = [int(v) - 1 for v in word[1:]]
+            lines += [(a, b, group) for a, b in zip(ends, ends[1:])]
+        elif word and word[0] == "p":
+            marks += [(int(v) - 1, group) for v in word[1:]]
         elif word and word[0] == "f":
             faces.append([int(v.split("/")[0]) - 1 for v in word[1:4]])
-    return np.array(points), np.array(faces, np.int64)
+    return np.array(points), np.array(faces, np.int64), lines, marks
 
 
 def volume6(points, tets):
@@ -58,7 +69,7 @@ def volume6(points, tets):
 
 def main():
     mesh, shell, sheets = sys.argv[1:4]
-    points, triangles, labels, tets = read_mesh(mesh)
+    points, triangles, labels, tets, (edges, required, references) = read_mesh(mesh)
     wrong = []
 
     def expect(holds, what):
@@ -81,7 +92,7 @@ def main():
     place = {p.tobytes(): i for i, p in enumerate(points + 0.0)}
 
     def known(surface, name):
-        own, found = read_obj(surface)
+        own, found, *_ = read_obj(surface)
         numbers = [place.get((p + 0.0).tobytes(), -1) for p in own]
         expect(-1 not in numbers, f"{numbers.count(-1)} vertices of {name} are not in the mesh")
         return own, found, [tuple(sorted(numbers[v] for v in t)) for t in found]
@@ -100,9 +111,29 @@ def main():
     enclosed = np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6
     total = six.sum() / 6
     expect(abs(total - enclosed) <= 1e-9 * abs(enclosed), f"volume {total}, the shell encloses {enclosed}")
+    wires = sys.argv[4:5]
+    at, _, lines, marks = read_obj(wires[0]) if wires else ([], [], [], [])
+    number = [place.get((p + 0.0).tobytes(), -1) for p in at]
+    expect(-1 not in number, f"{number.count(-1)} vertices of edges and points are not in the mesh")
+    pairs = np.sort(np.concatenate([tets[:, [i, j]] for i in range(4) for j in range(i)]), axis=1)
+    has_edge = set(map(tuple, pairs.tolist()))
+    lost = [w for w in lines if tuple(sorted(number[v] for v in w[:2])) not in has_edge]
+    expect(not lost, f"{len(lost)} of {len(lines)} edges inside are no edges of tetrahedra")
+    in_tets = set(tets.ravel().tolist())
+    lost = [v for v, _ in marks if number[v] not in in_tets]
+    expect(not lost, f"{len(lost)} of {len(marks)} points inside are no vertices of tetrahedra")
+    listed = {tuple(sorted((a - 1, b - 1))): r for a, b, r in edges.tolist()}
+    wanted = {tuple(sorted(number[v] for v in w[:2])): w[2] for w in lines}
+    expect(listed.keys() == wanted.keys(), "the edges of the file are not those inside")
+    expect(set(required.tolist()) == {number[v] for v, _ in marks}, "the required vertices of the file are not the points inside")
+    names = {}
+    for kind, pairs in ((1, [(listed.get(k), n) for k, n in wanted.items()]), (0, [(references[number[v]], n) for v, n in marks])):
+        for reference, name in pairs:
+            expect(names.setdefault((kind, name), reference) == reference, f"{name} has several references")
+    expect(len(set(names.values())) == len(names) and None not in names.values() and 0 not in names.values(), "names share a reference")
     for what in wrong[:20]:
         print("sheets.py:", what)
-    print(f"{len(tets)} tetrahedra, {len(outer)} triangles outside, {len(inner)} of sheets, {len(of_sheets)} labels: {'wrong' if wrong else 'right'}")
+    print(f"{len(tets)} tetrahedra, {len(outer)} triangles outside, {len(inner)} of sheets, {len(of_sheets)} labels, {len(lines)} edges and {len(marks)} points: {'wrong' if wrong else 'right'}")
     return 1 if wrong else 0
 
 

@@ -105,6 +105,17 @@ pub struct RegionRow {
     pub labels: Vec<u32>,
 }
 
+/// Edges and points of the input that are edges and vertices of the mesh; vertices by their numbers in the input.
+#[derive(Archive, Serialize, Deserialize, Clone, Debug, PartialEq, Default, serde::Serialize)]
+pub struct WiresRow {
+    /// The vertices of each edge, and its label.
+    pub edges: Vec<[u32; 3]>,
+    /// The vertex of each point, and its label.
+    pub points: Vec<[u32; 2]>,
+    /// Facets with this number or a higher one are no triangles of the input: each holds an edge.
+    pub fin_first: u64,
+}
+
 /// Qualities of a sub-domain.
 #[derive(Archive, Serialize, Deserialize, Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct QualityRow {

@@ -131,6 +131,31 @@ pub const CODES: &[CodeRow] = &[
         3,
         "an embedded sheet lies where nothing is filled",
     ),
+    row(
+        "wire-outside",
+        3,
+        "an embedded edge or point lies where nothing is filled",
+    ),
+    row(
+        "degenerate-edge",
+        3,
+        "both ends of an embedded edge are one vertex",
+    ),
+    row(
+        "duplicate-wire",
+        3,
+        "an embedded edge or point is given twice",
+    ),
+    row(
+        "wire-contact",
+        3,
+        "an embedded edge or point meets a triangle or an edge elsewhere than in common vertices",
+    ),
+    row(
+        "wire-too-near",
+        3,
+        "an embedded edge or point is nearer to something else than can be meshed",
+    ),
     row("no-such-store", 3, "there is no store at this path"),
     row(
         "no-such-part",

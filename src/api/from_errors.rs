@@ -42,6 +42,7 @@ impl From<SurfaceError> for Error {
                 };
                 error.at(defect.place() + &more)
             }
+            SurfaceError::Wire(wire) => error.at(show(wire.at())),
             _ => error,
         }
     }
@@ -170,6 +171,10 @@ impl From<PipelineError> for Error {
             PipelineError::SheetOutside { ref at, .. } => Self::new("sheet-outside", &e)
                 .at(show(*at))
                 .with_help("cut sheets off where they leave the filled regions, or fill the region they lie in")
+                .with_remedy(Remedy::General),
+            PipelineError::WireOutside { ref at, .. } => Self::new("wire-outside", &e)
+                .at(show(*at))
+                .with_help("leave out what is outside the filled regions, or fill the region it lies in")
                 .with_remedy(Remedy::General),
             PipelineError::BadSeed { option, .. } => Self::new("bad-seed", &e).with_help(match option {
                 "hole" => "such as 0.5,0.5,0.2",

@@ -406,12 +406,12 @@ impl Mesher {
             attempt(|| surface::validate_in(surface, &scratch))?.accept()?;
             settings.note(format!(
                 "{} triangles{} and {} vertices, closed and free of defects ({:.1} s)",
-                surface.n_triangles(),
+                surface.n_own_triangles(),
                 match surface.n_sheet_triangles() {
                     0 => String::new(),
                     n => format!(", {n} of them in sheets,"),
                 },
-                surface.n_vertices(),
+                surface.n_own_vertices(),
                 clock.elapsed().as_secs_f64()
             ));
             settings.note(format!("memory: {}", settings.cap_in_words()));

@@ -9,7 +9,7 @@ use xxhash_rust::xxh3::Xxh3;
 use super::error::{Error, Remedy};
 use super::{DefectPlace, Length, Settings, guarded};
 use crate::geom::Point;
-use crate::io::read::{is_stream, read_surface};
+use crate::io::read::{WireKind, is_stream, read_surface, read_wires};
 use crate::io::write;
 use crate::samples::{PREFIX, SampleSpec};
 use crate::sizing::{Further, SizeField, SizeOptions};
@@ -99,14 +99,17 @@ pub(crate) const IN_STORE: &str = "store:surface.obj";
 const SHEET: &str = "sheet:";
 const SHEETS_FROM: &str = "sheets-from:";
 const OPEN_PARTS: &str = "open-parts:";
+/// Lines that name a file of edges, or of points, as that of a sheet.
+const EDGES: &str = "edges:";
+const POINTS: &str = "points:";
 
 /// What cannot be done any more once there are sheets.
 fn refuse_sheets(surface: &surface::Surface, what: &str) -> Result<(), Error> {
-    match surface.has_sheets() {
+    match surface.has_sheets() || surface.has_wires() {
         false => Ok(()),
         true => Err(Error::new(
             "usage",
-            format!("a surface is {what} before sheets are embedded"),
+            format!("a surface is {what} before anything is embedded"),
         )),
     }
 }
@@ -155,12 +158,12 @@ impl Surface {
 
     /// Number of triangles.
     pub fn n_triangles(&self) -> usize {
-        self.inner.n_triangles()
+        self.inner.n_own_triangles()
     }
 
     /// Number of vertices, those with the same coordinates counted once.
     pub fn n_vertices(&self) -> usize {
-        self.inner.n_vertices()
+        self.inner.n_own_vertices()
     }
 
     /// Low and high corner of the smallest box around it.
@@ -235,6 +238,7 @@ impl Surface {
     /// A sheet may be open or closed, end inside, meet other sheets and the surface along edges and vertices that both have, and nowhere
     /// else. Its labels are called `name:LABEL`, or `name` where it has one alone. Default name: that of its file.
     pub fn embedded(mut self, sheet: Surface, name: Option<&str>) -> Result<Self, Error> {
+        self.refuse_wires()?;
         let default = sheet.name();
         let name = name.unwrap_or(&default);
         let first = self.inner.n_triangles();
@@ -273,9 +277,71 @@ impl Surface {
 
     /// The same, and how many triangles that are.
     pub(crate) fn open_parts_in(mut self, scratch: &ScratchSpace) -> Result<(Self, usize), Error> {
+        self.refuse_wires()?;
         let n = attempt(|| self.inner.open_parts_to_sheets(scratch))?;
         self.sources.push(mark(OPEN_PARTS.to_owned()));
         Ok((self, n))
+    }
+
+    /// The same with the edges of a file inside: `.obj` (`l`), legacy `.vtk` or `.poly` (facets of two corners).
+    ///
+    /// Each becomes an edge of the mesh, whole and in its place. Edges meet each other, sheets and the surface in vertices that both have,
+    /// and nowhere else. Names: as in [`Surface::embedded`], after which this comes.
+    /// Errors: what cannot be read; `degenerate-edge`, `duplicate-wire`, `wire-contact`, `wire-too-near` name the edge and the place.
+    pub fn embedded_edges(self, file: impl AsRef<Path>, name: Option<&str>) -> Result<Self, Error> {
+        self.with_wires_of(file.as_ref(), WireKind::Edges, name)
+    }
+
+    /// The same with the points of a file inside: `.csv` (x, y, z and a name), `.node`, `.obj` (`p`) or legacy `.vtk`.
+    ///
+    /// Each becomes a vertex of the mesh that is not moved; a point on a triangle is one of its corners. Names and errors: as in
+    /// [`Surface::embedded_edges`].
+    pub fn embedded_points(
+        self,
+        file: impl AsRef<Path>,
+        name: Option<&str>,
+    ) -> Result<Self, Error> {
+        self.with_wires_of(file.as_ref(), WireKind::Points, name)
+    }
+
+    fn with_wires_of(self, file: &Path, kind: WireKind, name: Option<&str>) -> Result<Self, Error> {
+        guarded(&Settings::new(), || {
+            let scratch = ScratchSpace::boundless();
+            self.with_wires(file, kind, name, &scratch)
+        })
+    }
+
+    pub(crate) fn with_wires(
+        mut self,
+        file: &Path,
+        kind: WireKind,
+        name: Option<&str>,
+        scratch: &ScratchSpace,
+    ) -> Result<Self, Error> {
+        let source = source(file)?;
+        let set = read_wires(file, kind, scratch.cap())?;
+        let stem = file.file_stem().unwrap_or_default().to_string_lossy();
+        let name = name.unwrap_or(&stem);
+        attempt(|| self.inner.embed_wires(&set, name, scratch))??;
+        let mark = match kind {
+            WireKind::Edges => EDGES,
+            WireKind::Points => POINTS,
+        };
+        self.sources.push(SurfaceSource {
+            path: format!("{mark}{name}={}", source.path),
+            ..source
+        });
+        Ok(self)
+    }
+
+    fn refuse_wires(&self) -> Result<(), Error> {
+        match self.inner.has_wires() {
+            false => Ok(()),
+            true => Err(Error::new(
+                "usage",
+                "sheets are embedded before edges and points",
+            )),
+        }
     }
 
     /// What its first file is called, without folder and extension.
@@ -288,10 +354,13 @@ impl Surface {
             .map_or("sheet".to_owned(), |s| s.into_owned())
     }
 
-    /// Writes it as `.stl`, `.off`, `.obj` or `.ply`. Errors: `unknown-format`, `lossy-format`; the disk.
+    /// Writes it, without embedded edges and points, as `.stl`, `.off`, `.obj` or `.ply`. Errors: `unknown-format`, `lossy-format`; the disk.
     pub fn write(&self, out: impl AsRef<Path>) -> Result<(), Error> {
         guarded(&Settings::new(), || {
-            write::surface(&self.inner, out.as_ref())?;
+            match self.inner.has_wires() {
+                true => write::surface(&self.inner.without_wires(), out.as_ref())?,
+                false => write::surface(&self.inner, out.as_ref())?,
+            };
             Ok(())
         })
     }
@@ -333,7 +402,7 @@ impl Surface {
     /// Puts a copy of a surface that came from no file into the store's folder. Errors: the disk.
     pub(crate) fn keep_in(&self, store: &Path) -> Result<(), Error> {
         if self.sources.iter().any(|source| source.path == IN_STORE) {
-            write::surface(&self.inner, &in_store(store))?;
+            write::surface(&self.inner.without_wires(), &in_store(store))?;
         }
         Ok(())
     }
@@ -348,7 +417,7 @@ impl Surface {
     ) -> Result<Self, Error> {
         let cap = scratch.cap();
         let is_of_sheets = |s: &SurfaceSource| {
-            [SHEET, SHEETS_FROM, OPEN_PARTS]
+            [SHEET, SHEETS_FROM, OPEN_PARTS, EDGES, POINTS]
                 .iter()
                 .any(|mark| s.path.starts_with(mark))
         };
@@ -406,6 +475,12 @@ impl Surface {
             let sheet = Self::load(&[file.to_owned()], cap)?.oriented(scratch)?;
             return self.embedded(sheet, Some(name));
         }
+        for (mark, kind) in [(EDGES, WireKind::Edges), (POINTS, WireKind::Points)] {
+            let line = path.strip_prefix(mark);
+            if let Some((name, file)) = line.and_then(|rest| rest.split_once('=')) {
+                return self.with_wires(Path::new(file), kind, Some(name), scratch);
+            }
+        }
         Ok(self.open_parts_in(scratch)?.0)
     }
 
@@ -424,7 +499,9 @@ impl Surface {
             bytes: 0,
             hash: [0; 2],
         };
-        Ok(Self::of(spec.make_within(cap)?.into(), vec![source]))
+        let mut inner = surface::Surface::from(spec.make_within(cap)?);
+        inner.hold_wires(&ScratchSpace::boundless())?;
+        Ok(Self::of(inner, vec![source]))
     }
 
     fn read_in(paths: &[PathBuf], cap: u64) -> Result<Self, Error> {

@@ -87,6 +87,12 @@ pub(crate) fn sentence(report: &Report) -> String {
             report.triangles_present + report.triangles_unfilled
         );
     }
+    if report.edges_present + report.points_present > 0 {
+        text += &format!(
+            "; all {} embedded edges and {} points present",
+            report.edges_present, report.points_present
+        );
+    }
     if report.delaunay_tested > 0 {
         text += &format!(
             "; {} % of free faces locally Delaunay",

@@ -28,10 +28,13 @@ fn get(bits: &[u64], at: usize) -> bool {
 
 /// The surface vertices of a facet's corners, where they are the input's.
 fn input_vertices(corners: &[Corner; 3]) -> [Option<u32>; 3] {
-    corners.map(|c| {
-        let id = VertexId::from_number(c.id)?;
-        (id.owner == Owner::Surface).then_some(id.index)
-    })
+    corners.each_ref().map(input_vertex)
+}
+
+/// The number in the input of a vertex that is of it.
+pub(super) fn input_vertex(corner: &Corner) -> Option<u32> {
+    let id = VertexId::from_number(corner.id)?;
+    (id.owner == Owner::Surface).then_some(id.index)
 }
 
 /// Every vertex of a facet is the input's, whether the input is at hand or not.
@@ -104,13 +107,17 @@ impl<'a> Input<'a> {
         for number in 0..self.surface.triangles.len() {
             let sides = [0, 1].map(|side| get(&self.seen[side], number));
             let is_sheet = self.surface.is_sheet(number as u32);
+            let is_fin = self.surface.is_fin(number as u32);
             if sides == [true; 2] || (sides != [false; 2] && !is_sheet) {
-                report.triangles_present += 1;
+                report.triangles_present += u64::from(!is_fin);
             } else if is_sheet {
-                report.triangles_missing += 1;
+                report.triangles_missing += u64::from(!is_fin);
                 self.report_missing(
                     number,
-                    "is part of a sheet and has not a tetrahedron on each side",
+                    match is_fin {
+                        true => "holds an embedded edge and has not a tetrahedron on each side",
+                        false => "is part of a sheet and has not a tetrahedron on each side",
+                    },
                     report,
                 );
             } else if get(&self.seen[2], number) {

@@ -11,7 +11,7 @@
 //!
 //! Reading order: [`Report`] (what is found), `claims` (facets say which tetrahedra they touch),
 //! `pass` (once through a sub-domain), `pairing` (faces across chunks), `interface` (faces across
-//! sub-domains), `against` (the input), `rows` (summaries and the catalog). `damage` lists all that cannot be read.
+//! sub-domains), `against` and `wires` (the input), `rows` (summaries and the catalog). `damage` lists all that cannot be read.
 
 mod against;
 mod claims;
@@ -26,6 +26,7 @@ mod report;
 mod rows;
 #[cfg(test)]
 mod tests;
+mod wires;
 
 use std::path::{Path, PathBuf};
 

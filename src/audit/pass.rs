@@ -12,6 +12,7 @@ use super::claims::{Claims, FACET, INTERFACE, SortedClaims};
 use super::interface::Interfaces;
 use super::pairing::{OpenSides, Side};
 use super::rows::{Rederived, RegionSums, check_regions};
+use super::wires::WireSearch;
 use super::{Finding, Level, Offender, Report, VerifyOptions};
 use crate::geom::{Point, insphere, orient};
 use crate::sealed::SealedError;
@@ -29,6 +30,7 @@ pub(super) struct Audit<'a> {
     options: &'a VerifyOptions,
     scratch: &'a Path,
     input: Option<Input<'a>>,
+    wires: Option<WireSearch<'a>>,
     interfaces: Interfaces,
     pairs: FacePairs,
     report: Report,
@@ -60,6 +62,7 @@ impl<'a> Audit<'a> {
             options,
             scratch,
             input: surface.map(Input::new),
+            wires: surface.and_then(WireSearch::new),
             interfaces: Interfaces::new(scratch, options.memory_bytes / 16),
             pairs: FacePairs::new(SealedTet::COUNT_MAX),
             report,
@@ -204,6 +207,9 @@ impl<'a> Audit<'a> {
                 let c = part.corners(tet.nodes)?;
                 mark(used, &tet.nodes);
                 self.distinct(rank, chunk.first + i as u32, tet, &c);
+                if let Some(wires) = &mut self.wires {
+                    wires.see(&c);
+                }
                 corners.push(c);
             }
             rows.add(tets, &corners, &summary, &mut self.report);
@@ -501,6 +507,9 @@ impl<'a> Audit<'a> {
             }
             if let Some(input) = self.input.take() {
                 input.finish(&mut self.report);
+            }
+            if let Some(wires) = self.wires.take() {
+                wires.finish(&mut self.report);
             }
         }
         self.report.digest = self.digests[0].to_string();

@@ -56,6 +56,10 @@ pub enum Finding {
     NotAnInputTriangle,
     /// An input triangle that is nowhere in the mesh.
     MissingTriangle,
+    /// An embedded edge that no tetrahedron has.
+    MissingEdge,
+    /// An embedded point that is no vertex of a tetrahedron, or is elsewhere.
+    MissingPoint,
     /// A vertex of a facet that is no vertex of the input.
     AddedVertex,
     /// The volume of the tetrahedra is not the volume within their boundary.
@@ -108,6 +112,14 @@ pub struct Report {
     pub triangles_unfilled: u64,
     /// Input triangles that are no faces of the mesh.
     pub triangles_missing: u64,
+    /// Embedded edges that are edges of tetrahedra.
+    pub edges_present: u64,
+    /// Embedded edges that are not.
+    pub edges_missing: u64,
+    /// Embedded points that are vertices of tetrahedra.
+    pub points_present: u64,
+    /// Embedded points that are not.
+    pub points_missing: u64,
     /// Sum over the tetrahedra in order, and over the boundary.
     pub volume: f64,
     /// Volume enclosed by the boundary, by the divergence theorem; in cubed input units.
@@ -142,6 +154,10 @@ impl Report {
             triangles_present: 0,
             triangles_unfilled: 0,
             triangles_missing: 0,
+            edges_present: 0,
+            edges_missing: 0,
+            points_present: 0,
+            points_missing: 0,
             volume: 0.0,
             volume_within_boundary: 0.0,
             delaunay_tested: 0,

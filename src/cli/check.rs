@@ -30,7 +30,7 @@ struct Mended {
 
 pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
     // Options are checked before anything is read.
-    if args.repair && (args.sheets.allow_open || !args.sheets.embed.is_empty()) {
+    if args.repair && (args.sheets.allow_open || args.sheets.files().next().is_some()) {
         return Err(
             Failure::new("usage", "a surface is repaired before sheets are embedded")
                 .help("repair each file for itself"),

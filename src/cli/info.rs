@@ -70,7 +70,7 @@ pub fn object(path: &Path) -> Result<Value, Failure> {
     Ok(json!({
         "schema": 1, "store": path.display().to_string(), "state": state, "finished": state.is_finished(),
         "surfaces": job.surfaces, "options": serde_json::from_str::<Value>(&job.options).unwrap_or(Value::Null),
-        "tool_version": job.tool_version, "labels": catalog.labels()?, "regions": named_regions(catalog)?,
+        "tool_version": job.tool_version, "labels": catalog.labels()?, "wires": named_wires(catalog)?, "regions": named_regions(catalog)?,
         "tets": rows.iter().map(|r| r.tets).sum::<u64>(),
         "vertices": rows.iter().map(|r| r.vertices).sum::<u64>(), "bounds": bounds(&rows),
         "bytes": rows.iter().map(|r| r.bytes).sum::<u64>(),
@@ -80,6 +80,23 @@ pub fn object(path: &Path) -> Result<Value, Failure> {
         "stages": stages, "subdomains": subdomains, "interfaces": catalog.interfaces()?,
         "tasks": planned.as_ref().map(tasks::object), "journal": catalog.journal()?,
     }))
+}
+
+/// Of each label of embedded edges and points its name, and how many of both it has.
+fn named_wires(catalog: &mut Catalog) -> Result<Vec<Value>, Failure> {
+    let (wires, labels) = (catalog.wires()?, catalog.labels()?);
+    let mut counts = std::collections::BTreeMap::<u32, [u64; 2]>::new();
+    for [.., label] in wires.edges {
+        counts.entry(label).or_default()[0] += 1;
+    }
+    for [_, label] in wires.points {
+        counts.entry(label).or_default()[1] += 1;
+    }
+    let named = |(label, [edges, points]): (u32, [u64; 2])| {
+        let name = labels.get(label as usize);
+        json!({ "name": name, "edges": edges, "points": points })
+    };
+    Ok(counts.into_iter().map(named).collect())
 }
 
 /// The regions' rows, each with its name or null.
@@ -166,6 +183,12 @@ pub fn print(path: &Path, console: &Console) -> Result<(), Failure> {
     console.line(&format!("box {}", words::bounds(bounds(&rows))));
     let labels = catalog.labels()?;
     console.line(&format!("labels: {}", words::listed(&labels)));
+    let wires = catalog.wires()?;
+    if !wires.edges.is_empty() || !wires.points.is_empty() {
+        let (edges, points) = (wires.edges.len() as u64, wires.points.len() as u64);
+        let (edges, points) = (count(edges, "edge"), count(points, "point"));
+        console.line(&format!("inside: {edges} and {points}"));
+    }
     print_bytes(catalog, &rows, console)?;
     print_subdomains(catalog, &rows, console)?;
     let names = catalog.region_names()?;

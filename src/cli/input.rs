@@ -9,6 +9,7 @@ use super::memory;
 use super::words::count;
 use crate::api::Surface;
 use crate::api::preflight::scratch_beside;
+use crate::io::read::WireKind;
 use crate::storage::{ScratchSpace, attempt};
 use crate::surface;
 
@@ -55,8 +56,8 @@ pub fn load_with(
     let mut names: Vec<(&str, &str)> = Vec::new();
     for text in &sheets.name {
         let (file, name) = text.rsplit_once('=').unwrap_or((text, ""));
-        if name.is_empty() || !sheets.embed.iter().any(|embedded| embedded == file) {
-            let message = format!("--name {text} is not a file of --embed, `=` and a name");
+        if name.is_empty() || !sheets.files().any(|embedded| embedded == file) {
+            let message = format!("--name {text} is not an embedded file, `=` and a name");
             return Err(Failure::new("usage", message)
                 .help("such as --embed fault.stl --name fault.stl=north"));
         }
@@ -71,10 +72,34 @@ pub fn load_with(
             count(n as u64, "triangle")
         ));
     }
+    let name_of = |file: &String| {
+        let name = names.iter().find(|(known, _)| known == file);
+        name.map(|(_, name)| *name)
+    };
     for file in &sheets.embed {
         let sheet = load(std::slice::from_ref(file), space, console)?;
-        let name = names.iter().find(|(known, _)| known == file);
-        surface = surface.embedded(sheet, name.map(|(_, name)| *name))?;
+        surface = surface.embedded(sheet, name_of(file))?;
+    }
+    let edges = sheets
+        .embed_edges
+        .iter()
+        .map(|file| (file, WireKind::Edges));
+    let points = sheets
+        .embed_points
+        .iter()
+        .map(|file| (file, WireKind::Points));
+    for (file, kind) in edges.chain(points) {
+        let scratch = space.scratch(&surface.inner)?;
+        surface = surface.with_wires(Path::new(file), kind, name_of(file), &scratch)?;
+    }
+    if surface.inner.has_wires() {
+        let wires = &surface.inner.wires;
+        let (edges, points) = (wires.edges.len() as u64, wires.points.len() as u64);
+        console.note(&format!(
+            "note: inside: {} and {}",
+            count(edges, "edge"),
+            count(points, "point")
+        ));
     }
     Ok(surface)
 }

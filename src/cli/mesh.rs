@@ -34,7 +34,7 @@ pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
     if !args.force {
         let files = (args.surfaces.iter())
             .chain(&args.shape.sizes.size_field)
-            .chain(&args.sheets.embed);
+            .chain(args.sheets.files());
         let inputs: Vec<PathBuf> = files.map(PathBuf::from).collect();
         (args.run.export.iter()).try_for_each(|out| check_target(out, &inputs))?;
     }

@@ -38,11 +38,11 @@ fn copy(file: &Path, console: &Console) -> std::io::Result<()> {
     }
 }
 
-/// The file for the sheets of a surface in `file`.
-fn beside(file: &Path) -> PathBuf {
+/// The file for what is inside a surface in `file`.
+fn beside(file: &Path, what: &str, end: Option<&str>) -> PathBuf {
     let stem = file.file_stem().unwrap_or_default().to_string_lossy();
-    let end = file.extension().unwrap_or_default().to_string_lossy();
-    file.with_file_name(format!("{stem}_sheets.{end}"))
+    let own = file.extension().unwrap_or_default().to_string_lossy();
+    file.with_file_name(format!("{stem}_{what}.{}", end.unwrap_or(&own)))
 }
 
 pub fn run(args: &SampleArgs, console: &Console) -> Result<u8, Failure> {
@@ -65,19 +65,37 @@ pub fn run(args: &SampleArgs, console: &Console) -> Result<u8, Failure> {
     }
     check_target(&args.output, &[])?;
     let surface = input::load(&[word], space, console)?.inner;
-    if surface.has_sheets() {
-        let sheets = beside(&args.output);
+    let mut embed = String::new();
+    if surface.n_sheet_triangles() > 0 {
+        let sheets = beside(&args.output, "sheets", None);
         check_target(&sheets, &[])?;
         write::surface(&surface.part(true), &sheets)?;
-        write::surface(&surface.part(false), &args.output)?;
-        let (shell, sheets) = (args.output.display(), sheets.display());
-        console.note(&format!(
-            "its sheets are in {sheets}: `tetdb mesh {shell} --embed {sheets}`"
-        ));
-    } else {
-        write::surface(&surface, &args.output)?;
+        embed += &format!(" --embed {}", sheets.display());
     }
-    let (triangles, vertices) = (surface.n_triangles(), surface.n_vertices());
+    if surface.has_wires() {
+        let wires = beside(&args.output, "wires", Some("obj"));
+        check_target(&wires, &[])?;
+        write::wires(&surface, &wires)?;
+        for (option, n) in [
+            ("edges", surface.wires.edges.len()),
+            ("points", surface.wires.points.len()),
+        ] {
+            if n > 0 {
+                embed += &format!(" --embed-{option} {}", wires.display());
+            }
+        }
+    }
+    match embed.is_empty() {
+        true => write::surface(&surface, &args.output)?,
+        false => write::surface(&surface.part(false), &args.output)?,
+    };
+    if !embed.is_empty() {
+        let shell = args.output.display();
+        console.note(&format!(
+            "what is inside has files of its own: `tetdb mesh {shell}{embed}`"
+        ));
+    }
+    let (triangles, vertices) = (surface.n_own_triangles(), surface.n_vertices());
     if console.is_json() {
         let file = args.output.display().to_string();
         console.answer(

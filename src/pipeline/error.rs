@@ -61,6 +61,18 @@ pub enum PipelineError {
         /// How many there are.
         n: u64,
     },
+    /// An edge or a point lies where there will be no tetrahedra.
+    #[error("{n} of the embedded {what} lie where nothing is filled, the first of {label:?}")]
+    WireOutside {
+        /// Edges or points.
+        what: &'static str,
+        /// Label of the first.
+        label: String,
+        /// Where it is.
+        at: Point,
+        /// How many there are.
+        n: u64,
+    },
     /// The sizes of a file were not handed in.
     #[error("the sizes of {file} must be read before the mesh is begun")]
     SizeField {

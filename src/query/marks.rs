@@ -5,6 +5,8 @@ use super::{QueryError, QuerySession};
 use crate::sealed::SealedError;
 use crate::storage::{Lease, check_cancelled};
 use crate::store::StoreError;
+use std::collections::{HashMap, HashSet};
+use tetdb_schema::ids::{Owner, VertexId};
 use tetdb_schema::record::{NO_TET, SealedFacet};
 
 /// A bit for each tetrahedron of a sub-domain.
@@ -55,7 +57,12 @@ impl QuerySession {
     ) -> Result<Option<Marks>, QueryError> {
         let mut marks = None;
         if let Some(labels) = &selection.labels {
-            marks = Some(self.on_facets(rank, |facet| labels.contains(&facet.label))?);
+            let fin_first = self.wires.fin_first;
+            let is_meant =
+                |facet: &SealedFacet| facet.triangle < fin_first && labels.contains(&facet.label);
+            let mut found = self.on_facets(rank, is_meant)?;
+            self.add_on_wires(rank, labels, &mut found)?;
+            marks = Some(found);
         }
         let only = |marks: &mut Option<Marks>, found: Marks| match marks {
             Some(marks) => marks.and(&found),
@@ -63,7 +70,10 @@ impl QuerySession {
         };
         if selection.touching_sheet {
             // A triangle with one filled region on both sides parts nothing.
-            let is_sheet = |facet: &SealedFacet| facet.regions[0] == facet.regions[1];
+            let fin_first = self.wires.fin_first;
+            let is_sheet = |facet: &SealedFacet| {
+                facet.triangle < fin_first && facet.regions[0] == facet.regions[1]
+            };
             let found = self.on_facets(rank, is_sheet)?;
             only(&mut marks, found);
         }
@@ -104,6 +114,56 @@ impl QuerySession {
             }
         }
         Ok(marks)
+    }
+
+    /// Marks tetrahedra with an edge or a point of the labels.
+    fn add_on_wires(
+        &mut self,
+        rank: u32,
+        labels: &[u32],
+        marks: &mut Marks,
+    ) -> Result<(), QueryError> {
+        let edges = self
+            .wires
+            .edges
+            .iter()
+            .filter(|edge| labels.contains(&edge[2]));
+        let edges: HashSet<[u32; 2]> = edges.map(|&[a, b, _]| [a.min(b), a.max(b)]).collect();
+        let points = self.wires.points.iter().filter(|p| labels.contains(&p[1]));
+        let points: HashSet<u32> = points.map(|&[v, _]| v).collect();
+        if edges.is_empty() && points.is_empty() {
+            return Ok(());
+        }
+        let on_wires: HashSet<u32> = (edges.iter().flatten()).chain(&points).copied().collect();
+        let part = &mut self.part(rank)?.subdomain;
+        let mut inputs = HashMap::new();
+        for (local, vertex) in (0u32..).zip(part.vertices()) {
+            let id = VertexId::from_number(vertex?.id);
+            if let Some(VertexId {
+                owner: Owner::Surface,
+                index,
+            }) = id
+                && on_wires.contains(&index)
+            {
+                inputs.insert(local, index);
+            }
+        }
+        for chunk in 0..part.tet_summaries().len() {
+            check_cancelled();
+            let chunk = part.tet_chunk(chunk as u32)?;
+            for (local, tet) in (chunk.first..).zip(&chunk.records) {
+                let found = tet.nodes.map(|v| inputs.get(&v).copied());
+                let is_edge = |i: usize, j: usize| match (found[i], found[j]) {
+                    (Some(a), Some(b)) => edges.contains(&[a.min(b), a.max(b)]),
+                    _ => false,
+                };
+                let has_point = found.iter().flatten().any(|v| points.contains(v));
+                if has_point || (0..4).any(|j| (0..j).any(|i| is_edge(i, j))) {
+                    set(marks, local, part)?;
+                }
+            }
+        }
+        Ok(())
     }
 
     fn on_interface(&mut self, rank: u32, other: u32) -> Result<Marks, QueryError> {

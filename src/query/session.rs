@@ -15,7 +15,7 @@ use crate::sealed::SealedError;
 use crate::sealed::{Chunk, Subdomain};
 use crate::storage::{Budget, Lease, check_cancelled};
 use crate::store::{Catalog, StoreError};
-use tetdb_schema::catalog::{Stage, SubdomainRow};
+use tetdb_schema::catalog::{Stage, SubdomainRow, WiresRow};
 
 /// Memory of one open sub-domain: half for redb, half for decoded vertices.
 const PART_BYTES: u64 = 8 << 20;
@@ -89,6 +89,8 @@ pub struct QuerySession {
     /// Of region 1, 2, …; empty for one without a name.
     #[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "for the program"))]
     pub(crate) region_names: Vec<String>,
+    /// Embedded edges and points.
+    pub(crate) wires: WiresRow,
     /// Over the boxes of the sub-domains.
     pub(super) tree: BoxTree,
     bounds: Aabb,
@@ -141,6 +143,7 @@ impl QuerySession {
         budget: &Budget,
     ) -> Result<Self, QueryError> {
         let (labels, region_names) = (store.labels()?, store.region_names()?);
+        let wires = store.wires()?;
         let cap = budget.cap();
         let frames_bytes_max = (cap / 2).min(FRAMES_BYTES_MAX);
         let parts_max = (cap / 4 / PART_BYTES).clamp(1, PARTS_MAX);
@@ -160,6 +163,7 @@ impl QuerySession {
             rows,
             labels,
             region_names,
+            wires,
             bounds,
             parts: LruCache::unbounded(),
             parts_max: parts_max as usize,

@@ -46,6 +46,16 @@ impl Builder {
         push(&mut self.sample.labels, label);
     }
 
+    /// An edge inside.
+    pub(super) fn edge(&mut self, [a, b]: [u32; 2], label: u32) {
+        push(&mut self.sample.edges, [a, b, label]);
+    }
+
+    /// A vertex that is a point inside.
+    pub(super) fn mark(&mut self, v: u32, label: u32) {
+        push(&mut self.sample.marks, [v, label]);
+    }
+
     /// Triangles so far.
     pub(super) fn n_triangles(&self) -> usize {
         self.sample.triangles.len()
@@ -70,11 +80,15 @@ impl Builder {
         let mut old2new = filled(self.sample.points.len(), UNNAMED);
         let mut points = Vec::new();
         reserve(&mut points, self.sample.points.len());
-        for v in self.sample.triangles.iter_mut().flatten() {
+        let sample = &mut self.sample;
+        let corners = sample.triangles.iter_mut().flatten();
+        let ends = sample.edges.iter_mut().flat_map(|edge| &mut edge[..2]);
+        let marks = sample.marks.iter_mut().map(|mark| &mut mark[0]);
+        for v in corners.chain(ends).chain(marks) {
             let new = &mut old2new[*v as usize];
             if *new == UNNAMED {
                 *new = points.len() as u32;
-                points.push(self.sample.points[*v as usize]);
+                points.push(sample.points[*v as usize]);
             }
             *v = *new;
         }

@@ -29,7 +29,7 @@ pub struct Faults {
 }
 
 /// A side of a cell: the axis it is orthogonal to, and the grid point at its low corner.
-type CellSide = (usize, [u32; 3]);
+pub(super) type CellSide = (usize, [u32; 3]);
 
 impl Faults {
     pub(super) fn make(&self, bytes_max: u64) -> Result<Sample, SampleError> {
@@ -39,15 +39,13 @@ impl Faults {
             2.0 * squares * (6.0 + self.count as f64),
             bytes_max,
         )?;
+        let grid = Grid {
+            cells: self.cells,
+            seed: self.seed,
+            shift: self.shift,
+        };
         let mut build = Builder::default();
-        let shell = build.label("box");
-        for axis in 0..3 {
-            for at in [0, self.cells] {
-                for side in rectangle(axis, at, [0, 0], [self.cells; 2]) {
-                    self.push(&mut build, side, at == 0, shell);
-                }
-            }
-        }
+        grid.shell(&mut build);
         let first = build.n_triangles();
         let mut sides = BTreeMap::new();
         for (label, fault) in self.faults().into_iter().enumerate() {
@@ -57,7 +55,7 @@ impl Faults {
             }
         }
         for (side, label) in sides {
-            self.push(&mut build, side, false, label);
+            grid.push(&mut build, side, false, label);
         }
         Ok(build.finish_with_sheets(first))
     }
@@ -79,8 +77,35 @@ impl Faults {
         };
         (0..self.count).map(one).collect()
     }
+}
 
-    fn push(&self, build: &mut Builder, (axis, low): CellSide, inward: bool, label: u32) {
+/// The grid points of the unit box.
+pub(super) struct Grid {
+    pub cells: u32,
+    pub seed: u64,
+    pub shift: f64,
+}
+
+impl Grid {
+    /// The sides of the box, with a label of their own.
+    pub(super) fn shell(&self, build: &mut Builder) {
+        let shell = build.label("box");
+        for axis in 0..3 {
+            for at in [0, self.cells] {
+                for side in rectangle(axis, at, [0, 0], [self.cells; 2]) {
+                    self.push(build, side, at == 0, shell);
+                }
+            }
+        }
+    }
+
+    pub(super) fn push(
+        &self,
+        build: &mut Builder,
+        (axis, low): CellSide,
+        inward: bool,
+        label: u32,
+    ) {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
         let [a, b, c, d] = [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[du, dv]| {
             let mut at = low;
@@ -99,7 +124,7 @@ impl Faults {
     }
 
     /// A point of the grid; those on the box are where they are.
-    fn point(&self, at: [u32; 3]) -> Point {
+    pub(super) fn point(&self, at: [u32; 3]) -> Point {
         let n = self.cells;
         let whole = Point::from_array(at.map(f64::from));
         if at.iter().any(|&i| i == 0 || i == n) {
@@ -115,7 +140,7 @@ impl Faults {
 }
 
 /// The sides orthogonal to `axis` at `at`, from `low` to `high` along the two axes that follow.
-fn rectangle(axis: usize, at: u32, low: [u32; 2], high: [u32; 2]) -> Vec<CellSide> {
+pub(super) fn rectangle(axis: usize, at: u32, low: [u32; 2], high: [u32; 2]) -> Vec<CellSide> {
     let mut sides = Vec::new();
     for i in low[0]..high[0] {
         for j in low[1]..high[1] {

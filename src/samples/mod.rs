@@ -26,6 +26,7 @@ mod spec;
 mod sphere;
 mod steps;
 mod trig;
+mod wells;
 
 #[cfg(test)]
 mod tests;

@@ -1,7 +1,7 @@
 //! The surface that a maker returns.
 
 use crate::geom::Point;
-use crate::surface::Surface;
+use crate::surface::{Surface, Wires};
 
 /// A closed labeled surface in memory.
 ///
@@ -20,10 +20,14 @@ pub struct Sample {
     pub label_names: Vec<String>,
     /// Whether each triangle is part of a sheet in it; empty where none is.
     pub sheets: Vec<bool>,
+    /// The vertices of each edge inside, and its label.
+    pub edges: Vec<[u32; 3]>,
+    /// The vertex of each point inside, and its label.
+    pub marks: Vec<[u32; 2]>,
 }
 
 impl From<Sample> for Surface {
-    /// The same surface, from no file.
+    /// The same surface, from no file; what holds its edges is added by [`Surface::hold_wires`].
     fn from(sample: Sample) -> Self {
         Self {
             points: sample.points,
@@ -31,6 +35,11 @@ impl From<Sample> for Surface {
             labels: sample.labels,
             label_names: sample.label_names,
             sheets: sample.sheets,
+            wires: Wires {
+                edges: sample.edges,
+                points: sample.marks,
+                ..Wires::default()
+            },
             ..Self::default()
         }
     }

@@ -7,6 +7,7 @@ use super::grains::Grains;
 use super::needles::Needles;
 use super::shells::{ShellKind, make_shells};
 use super::steps::Steps;
+use super::wells::Wells;
 use super::{Sample, SampleError, boxes, knot, sphere};
 use crate::geom::Point;
 use std::fmt::Display;
@@ -17,6 +18,7 @@ pub const PREFIX: &str = "sample:";
 /// The samples there are.
 pub const SAMPLES: &[&str] = &[
     "balls", "box", "caps", "faults", "grains", "knot", "needles", "shells", "sphere", "steps",
+    "wells",
 ];
 
 /// A sample that can be made.
@@ -71,6 +73,8 @@ pub enum SampleKind {
     },
     /// Plates with steps of a small share of their size; see `steps.rs`.
     Steps(Steps),
+    /// A box with layers, wells and sensors in it; see `wells.rs`.
+    Wells(Wells),
 }
 
 impl SampleSpec {
@@ -102,6 +106,7 @@ impl SampleSpec {
                 SampleKind::Sphere { radius, h }
             }
             "steps" => parse_steps(rest)?,
+            "wells" => parse_wells(rest)?,
             _ => {
                 return Err(SampleError::UnknownName {
                     found: name.to_owned(),
@@ -153,6 +158,18 @@ impl SampleSpec {
             SampleKind::Steps(Steps { count, step, seed }) => {
                 format!("{PREFIX}steps,count={count},step={step},seed={seed}")
             }
+            SampleKind::Wells(Wells {
+                count,
+                seed,
+                cells,
+                layers,
+                points,
+                shift,
+            }) => {
+                format!(
+                    "{PREFIX}wells,count={count},seed={seed},cells={cells},layers={layers},points={points},shift={shift}"
+                )
+            }
         }
     }
 
@@ -182,6 +199,7 @@ impl SampleSpec {
             SampleKind::Shells { count, kind, h } => make_shells(*count, *kind, *h, bytes_max),
             SampleKind::Sphere { radius, h } => sphere::make_sphere(*radius, *h, bytes_max),
             SampleKind::Steps(steps) => steps.make(bytes_max),
+            SampleKind::Wells(wells) => wells.make(bytes_max),
         }
     }
 }
@@ -240,6 +258,26 @@ fn parse_steps(rest: &str) -> Result<SampleKind, SampleError> {
     let step = keys.number("step", 1e-7, 1e-8, 1e-2)?;
     let seed = keys.number("seed", 1, 0, u64::MAX)?;
     Ok(SampleKind::Steps(Steps { count, step, seed }))
+}
+
+fn parse_wells(rest: &str) -> Result<SampleKind, SampleError> {
+    let expected = &["count", "seed", "cells", "layers", "points", "shift"];
+    let keys = Keys::new("wells", expected, rest)?;
+    let count = keys.number("count", 20, 1, 1_000_000)?;
+    let seed = keys.number("seed", 1, 0, u64::MAX)?;
+    let least = Wells::cells_least(count);
+    let cells = keys.number("cells", Wells::cells_default(count), least.max(3), 4000)?;
+    let layers = keys.number("layers", 3, 0, cells - 1)?;
+    let points = keys.number("points", count, 0, (cells as usize).pow(3))?;
+    let shift = keys.number("shift", 0.1, 0.0, 0.15)?;
+    Ok(SampleKind::Wells(Wells {
+        count,
+        seed,
+        cells,
+        layers,
+        points,
+        shift,
+    }))
 }
 
 fn parse_grains(rest: &str) -> Result<SampleKind, SampleError> {

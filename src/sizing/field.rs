@@ -60,6 +60,8 @@ pub struct Further<'a> {
     pub constraints: &'a [&'a dyn SizeConstraint],
     /// One for each vertex of the surface.
     pub at_vertices: Option<&'a [f64]>,
+    /// Of vertices that no triangle uses: vertex and size.
+    pub at_points: &'a [(u32, f64)],
 }
 
 /// Where the descent begins: the entry and its level, for each cell of a regular grid.
@@ -99,7 +101,10 @@ impl SizeField {
         let (frame, bounds) = frame_of(points, triangles);
         let targets = options.resolve(bounds.diagonal())?;
         let scaled = targets.scaled(1.0 / frame.side);
-        let seeds = seeds_of(points, triangles, frame, &scaled, further.at_vertices, room)?;
+        let mut seeds = seeds_of(points, triangles, frame, &scaled, further.at_vertices, room)?;
+        for &(v, h) in further.at_points {
+            seeds.h[v as usize] = h * seeds.per_side;
+        }
         let mut list = further.constraints.to_vec();
         list.extend(options.formula.iter().map(|f| f as &dyn SizeConstraint));
         let constraints = SizeConstraints {

@@ -18,7 +18,7 @@ use crate::sealed::{CoarseSnapshot, Form, SealedError, Subdomain};
 use crate::storage::{DiskPath, FileId, StoreFile};
 use tetdb_schema::catalog::{
     CoarseRow, FileRow, InterfaceRow, Job, JournalRow, RegionRow, StageRow, StoreState,
-    SubdomainRow, TopologyRow,
+    SubdomainRow, TopologyRow, WiresRow,
 };
 
 /// First bytes of the format row; the version follows as two bytes.
@@ -420,6 +420,15 @@ impl Catalog {
     pub fn region_names(&mut self) -> Result<Vec<String>, StoreError> {
         let names = self.row(RowKind::RegionNames.key(0, 0))?;
         Ok(names.unwrap_or_default())
+    }
+
+    /// Edges and points that are edges and vertices of the mesh.
+    pub fn wires(&mut self) -> Result<WiresRow, StoreError> {
+        let wires = self.row(RowKind::Wires.key(0, 0))?;
+        Ok(wires.unwrap_or(WiresRow {
+            fin_first: u64::MAX,
+            ..WiresRow::default()
+        }))
     }
 
     /// All sub-domains by rank.

@@ -27,6 +27,7 @@ pub(super) enum RowKind {
     Previous = 76,
     Stage = 77,
     RegionNames = 78,
+    Wires = 79,
 }
 
 impl RowKind {

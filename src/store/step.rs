@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::rows::{self, RowKind};
 use tetdb_schema::catalog::{
     CoarseRow, FileRow, InterfaceRow, Job, JournalRow, RegionRow, StageRow, StoreState,
-    SubdomainRow, TopologyRow,
+    SubdomainRow, TopologyRow, WiresRow,
 };
 
 /// Length of the pieces a blob is cut into; with 16 bytes of redb and 8 of checksum within 64 KiB.
@@ -78,6 +78,11 @@ impl Step {
     /// What regions are called, from region 1 on.
     pub fn set_region_names(&mut self, names: &Vec<String>) {
         self.put(RowKind::RegionNames.key(0, 0), names);
+    }
+
+    /// Edges and points, where there are any.
+    pub fn set_wires(&mut self, wires: &WiresRow) {
+        self.put(RowKind::Wires.key(0, 0), wires);
     }
 
     /// A sub-domain, new or changed.

@@ -90,7 +90,7 @@ pub fn contact(p: [Point; 3], p_ids: [u32; 3], q: [Point; 3], q_ids: [u32; 3]) -
 
 /// The side of the plane of `t` on which `x` lies: 1, 0 or −1.
 #[inline]
-fn side(t: &[Point; 3], x: Point) -> i8 {
+pub(super) fn side(t: &[Point; 3], x: Point) -> i8 {
     let [a, b, c] = *t;
     // Four points of an axis plane are so common in made surfaces that they get a way past the
     // expansions: they always end there, because the determinant is zero.
@@ -187,7 +187,13 @@ fn at_edge(p: [Point; 3], y: Point) -> Option<Contact> {
 }
 
 /// The closed edge `a b`, its ends on the given sides of the plane of `t`, against the closed `t`.
-fn edge_meets(a: Point, b: Point, a_side: i8, b_side: i8, t: &[Point; 3]) -> Option<Contact> {
+pub(super) fn edge_meets(
+    a: Point,
+    b: Point,
+    a_side: i8,
+    b_side: i8,
+    t: &[Point; 3],
+) -> Option<Contact> {
     if a_side * b_side > 0 {
         return None;
     }
@@ -233,13 +239,13 @@ enum Separation {
 
 /// A projection along an axis that keeps the triangles of one plane from collapsing.
 #[derive(Clone, Copy)]
-struct Projection {
+pub(super) struct Projection {
     axis: usize,
 }
 
 impl Projection {
     /// A projection for the plane of `t`, which must have area.
-    fn of(t: &[Point; 3]) -> Self {
+    pub(super) fn of(t: &[Point; 3]) -> Self {
         let normal = (t[1] - t[0]).cross(t[2] - t[0]).abs().to_array();
         let best = (0..3)
             .max_by(|&i, &j| normal[i].total_cmp(&normal[j]))
@@ -260,7 +266,7 @@ impl Projection {
     }
 
     /// 1 when `a b c` turn to the left, exactly.
-    fn turn(self, a: Point, b: Point, c: Point) -> i8 {
+    pub(super) fn turn(self, a: Point, b: Point, c: Point) -> i8 {
         sign(robust::orient2d(self.flat(a), self.flat(b), self.flat(c)))
     }
 
@@ -295,7 +301,7 @@ impl Projection {
     }
 
     /// Turns of `x` about the edges of `t`, made positive inside.
-    fn turns_about(self, t: &[Point; 3], x: Point) -> [i8; 3] {
+    pub(super) fn turns_about(self, t: &[Point; 3], x: Point) -> [i8; 3] {
         let hand = self.turn(t[0], t[1], t[2]);
         [0, 1, 2].map(|k| hand * self.turn(t[k], t[(k + 1) % 3], x))
     }
@@ -322,7 +328,7 @@ fn in_plane(p: &[Point; 3], q: &[Point; 3]) -> Option<Contact> {
 }
 
 /// The closed segment `a b` in the plane of `t` against the closed `t`.
-fn segment_in_plane(a: Point, b: Point, t: &[Point; 3]) -> Option<Contact> {
+pub(super) fn segment_in_plane(a: Point, b: Point, t: &[Point; 3]) -> Option<Contact> {
     let plane = Projection::of(t);
     let (about_a, about_b) = (plane.turns_about(t, a), plane.turns_about(t, b));
     let mut found = None;
@@ -364,7 +370,7 @@ fn segment_in_plane(a: Point, b: Point, t: &[Point; 3]) -> Option<Contact> {
 
 impl Projection {
     /// The rounded point where `a b` crosses the line `c d`.
-    fn crossing(self, a: Point, b: Point, c: Point, d: Point) -> Point {
+    pub(super) fn crossing(self, a: Point, b: Point, c: Point, d: Point) -> Point {
         let area = |x| robust::orient2d(self.flat(c), self.flat(d), self.flat(x)).abs();
         let (x, y) = (area(a), area(b));
         a + (b - a) * (x / (x + y))

@@ -1,6 +1,7 @@
 //! What can be wrong with a surface, in words, with the place and the way out.
 
 use super::contact::ContactKind;
+use super::wire_set::WireError;
 use crate::geom::Point;
 
 /// A surface that cannot be built or meshed.
@@ -53,6 +54,15 @@ pub enum SurfaceError {
         /// Defects in all.
         n_defects: u64,
     },
+    /// An embedded edge or point cannot be there.
+    #[error(transparent)]
+    Wire(Box<WireError>),
+}
+
+impl From<WireError> for SurfaceError {
+    fn from(error: WireError) -> Self {
+        Self::Wire(Box::new(error))
+    }
 }
 
 /// Vertices and triangles of a surface at most: ids keep two bits free in the mesh.
@@ -78,6 +88,7 @@ impl SurfaceError {
             Self::NoSuchVertex { .. } => "index-out-of-range",
             Self::TooSmall { .. } => "coordinate-range",
             Self::Invalid { defect, .. } => defect.code(),
+            Self::Wire(wire) => wire.code(),
         }
     }
 
@@ -89,6 +100,7 @@ impl SurfaceError {
             Self::NoSuchVertex { .. } => "write the file again from the program that made it",
             Self::TooSmall { .. } => "scale the surface to ordinary units, for example metres",
             Self::Invalid { defect, .. } => defect.help(),
+            Self::Wire(wire) => wire.help(),
         }
     }
 }

@@ -5,7 +5,8 @@
 //! (how two triangles touch), `boxes`, `broad` and `stars` (which pairs to look at), `validate` (all of it together),
 //! `defect` (what can be wrong and what to do about it), `boundary_loops` (where it is open), `near` and `repair`
 //! (mending on demand), `fitness` (what mesh its triangles allow), `split` (finer triangles of the same surface),
-//! `seek` (distances and what lies above), `volumes` (what is enclosed), `seeds` (what points say of volumes), `sheets` (embedded triangles with volume on both sides).
+//! `seek` (distances and what lies above), `volumes` (what is enclosed), `seeds` (what points say of volumes), `sheets` (embedded triangles with volume on both sides),
+//! `wire_set` and `wires` (embedded edges and points), `wire_contact` (how they touch), `fins` (what holds them).
 //!
 //! Is not: file formats (`io`), which volumes are filled (`boundary`).
 
@@ -15,6 +16,7 @@ mod broad;
 mod contact;
 mod defect;
 mod edges;
+mod fins;
 mod fitness;
 mod near;
 mod orientation;
@@ -29,6 +31,9 @@ mod triangles;
 mod validate;
 mod volumes;
 mod weld;
+mod wire_contact;
+mod wire_set;
+mod wires;
 
 #[cfg(test)]
 mod tests;
@@ -50,3 +55,4 @@ pub use triangles::{Note, NoteKind, SourceFile, Surface, VolumePoints};
 pub use validate::{Validation, validate, validate_in};
 pub use volumes::{OUTSIDE, Volumes, Wall};
 pub use weld::SurfaceBuilder;
+pub use wire_set::{WireError, WireSet, Wires};

@@ -51,8 +51,16 @@ impl<'a> Seeker<'a> {
         room: &ScratchSpace,
         keep: impl Fn(u32) -> bool + Sync,
     ) -> Self {
-        let tree = tree_of(surface, room, keep);
+        Self::with_tree(surface, tree_of(surface, room, keep))
+    }
+
+    /// Sees the triangles that `tree` has.
+    pub(super) fn with_tree(surface: &'a Surface, tree: BoxTree) -> Self {
         Self { surface, tree }
+    }
+
+    pub(super) fn tree(&self) -> &BoxTree {
+        &self.tree
     }
 
     /// The surface it answers for.

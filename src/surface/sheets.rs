@@ -21,16 +21,18 @@ impl Surface {
 
     /// Triangles of embedded sheets.
     pub fn n_sheet_triangles(&self) -> usize {
-        self.sheets.iter().filter(|&&is_sheet| is_sheet).count()
+        let own = self.sheets.iter().take(self.n_own_triangles());
+        own.filter(|&&is_sheet| is_sheet).count()
     }
 
     /// The sheets alone, as triangles like others, or what they are in.
     pub fn part(&self, sheets: bool) -> Self {
-        let mut part = self.clone();
-        part.sheets = Vec::new();
-        let mut kept = (0..self.n_triangles() as u32).map(|t| self.is_sheet(t) == sheets);
+        let mut part = self.without_wires();
+        let flags = std::mem::take(&mut part.sheets);
+        let is_kept = |t: usize| flags.get(t).copied().unwrap_or(false) == sheets;
+        let mut kept = (0..part.n_triangles()).map(is_kept);
         part.triangles.retain(|_| kept.next() == Some(true));
-        let mut kept = (0..self.n_triangles() as u32).map(|t| self.is_sheet(t) == sheets);
+        let mut kept = (0..part.labels.len()).map(is_kept);
         part.labels.retain(|_| kept.next() == Some(true));
         drop_unused_points(&mut part);
         drop_unused_labels(&mut part);
@@ -58,20 +60,7 @@ impl Surface {
         }
         SurfaceError::check_size("vertices", self.points.len())?;
         SurfaceError::check_size("triangles", first + other.n_triangles())?;
-        let first_label = self.label_names.len() as u32;
-        for label in &other.label_names {
-            let wanted = match other.label_names.len() {
-                1 => name.to_owned(),
-                _ => format!("{name}:{label}"),
-            };
-            let taken = |name: &String| self.label_names.contains(name);
-            let numbered = (2..).map(|n| format!("{wanted}~{n}"));
-            let free = [wanted.clone()]
-                .into_iter()
-                .chain(numbered)
-                .find(|n| !taken(n));
-            self.label_names.extend(free);
-        }
+        let first_label = self.add_labels(&other.label_names, name);
         let triangles = other.triangles.iter();
         (self.triangles).extend(triangles.map(|t| t.map(|v| verts[v as usize])));
         (self.labels).extend(other.labels.iter().map(|label| first_label + label));
@@ -85,6 +74,25 @@ impl Surface {
         self.sheets.resize(known, false);
         self.sheets.resize(first + other.n_triangles(), true);
         Ok(())
+    }
+
+    /// Adds labels called `name:LABEL`, or `name` for one alone; a name that is taken gets a number. Returns the first one's number.
+    pub(super) fn add_labels(&mut self, labels: &[String], name: &str) -> u32 {
+        let first = self.label_names.len() as u32;
+        for label in labels {
+            let wanted = match labels.len() {
+                1 => name.to_owned(),
+                _ => format!("{name}:{label}"),
+            };
+            let taken = |name: &String| self.label_names.contains(name);
+            let numbered = (2..).map(|n| format!("{wanted}~{n}"));
+            let free = [wanted.clone()]
+                .into_iter()
+                .chain(numbered)
+                .find(|n| !taken(n));
+            self.label_names.extend(free);
+        }
+        first
     }
 
     /// Takes for sheets what is not closed: triangles at an open edge, then those that are at one without them, and so on.

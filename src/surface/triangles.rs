@@ -4,6 +4,7 @@ use std::fmt;
 use std::mem::size_of;
 
 use super::Seed;
+use super::wire_set::Wires;
 use crate::geom::{Aabb, Point};
 
 /// An indexed triangle surface with a label on each triangle.
@@ -11,7 +12,7 @@ use crate::geom::{Aabb, Point};
 /// Shape: `labels` runs parallel to `triangles` and indexes `label_names`; a triangle's position is
 /// its input id: file order, polygons fanned from their first vertex, files one after the other.
 /// Invariant (when made by [`SurfaceBuilder`](super::SurfaceBuilder)): points are finite, pairwise
-/// different, free of −0.0, each used by a triangle, in order of first appearance in the files.
+/// different, free of −0.0, each used by a triangle or a wire, in order of first appearance in the files.
 /// Is not: validated. A triangle may be degenerate, the surface open; see [`validate`](super::validate).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Surface {
@@ -27,6 +28,8 @@ pub struct Surface {
     pub files: Vec<SourceFile>,
     /// Whether each triangle is part of an embedded sheet; empty where none is.
     pub sheets: Vec<bool>,
+    /// Embedded edges and points, and what holds them.
+    pub wires: Wires,
     /// What a reader found worth telling, in order.
     pub notes: Vec<Note>,
     /// What the files say of volumes, in order.
@@ -96,6 +99,8 @@ impl Surface {
             + self.triangles.capacity() * size_of::<[u32; 3]>()
             + self.labels.capacity() * size_of::<u32>()
             + self.sheets.capacity()
+            + self.wires.edges.capacity() * size_of::<[u32; 3]>()
+            + self.wires.points.capacity() * size_of::<[u32; 4]>()
             + names
     }
 }

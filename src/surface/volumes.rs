@@ -74,7 +74,7 @@ impl Volumes {
         let outside = 2 * n as u32;
         let lines = lines(surface, &facets, &mut shells);
         drop(shells);
-        for line in lines {
+        for (line, t) in lines {
             let crossings = seeker.on_line(line);
             let mut below = outside;
             for crossing in &crossings {
@@ -83,6 +83,11 @@ impl Volumes {
                 below = up;
             }
             sides.join(below, outside);
+            // A sheet that is upright, or as good as, is on no line along z; what it lies in is what lies above its middle.
+            if surface.is_sheet(t) && crossings.iter().all(|c| c.triangle != t) {
+                let above = crossings.iter().find(|c| c.z > line.z);
+                sides.join(2 * t, above.map_or(outside, |c| c.sides()[0]));
+            }
         }
         let mut volumes = numbered(surface, &mut sides);
         drop(sides);
@@ -239,8 +244,8 @@ fn sort_around(surface: &Surface, uses: &mut [EdgeUse]) {
     });
 }
 
-/// For each shell the middle of the triangle that shows most from above.
-fn lines(surface: &Surface, facets: &Facets, shells: &mut Groups) -> Vec<Point> {
+/// For each shell the middle of the triangle that shows most from above, and that triangle.
+fn lines(surface: &Surface, facets: &Facets, shells: &mut Groups) -> Vec<(Point, u32)> {
     let mut best: BTreeMap<u32, (f64, u32)> = BTreeMap::new();
     for t in (0..surface.n_triangles() as u32).filter(|&t| !facets.is_left_out[t as usize]) {
         let [a, b, c] = surface.corners(t);
@@ -252,7 +257,7 @@ fn lines(surface: &Surface, facets: &Facets, shells: &mut Groups) -> Vec<Point> 
     }
     let middle = |&(_, t): &(f64, u32)| {
         let [a, b, c] = surface.corners(t);
-        (a + b + c) / 3.0
+        ((a + b + c) / 3.0, t)
     };
     best.values().map(middle).collect()
 }
@@ -365,6 +370,25 @@ mod tests {
                 assert_eq!(volumes.at(&seeker, Point::new(x, 0.4, 0.3)), volume);
             }
         }
+    }
+
+    #[test]
+    fn upright_sheets_lie_in_what_is_around_them() {
+        let mut surface = cubes(&[([0.0; 3], 3.0, false), ([1.0; 3], 1.0, false)]);
+        let n = surface.triangles.len() as u32;
+        // One in the inner cube, one between the cubes, one outside.
+        for x in [1.5, 0.5, 4.5] {
+            let first = surface.points.len() as u32;
+            for (y, z) in [(1.2, 1.25), (1.7, 1.3), (1.4, 1.75)] {
+                surface.points.push(Point::new(x, y, z));
+            }
+            surface.triangles.push([first, first + 1, first + 2]);
+            surface.labels.push(0);
+        }
+        surface.sheets_from(n as usize);
+        let volumes = Volumes::of(&Seeker::new(&surface));
+        assert_eq!(volumes.n_volumes, 3);
+        assert_eq!(volumes.of_side[n as usize..], [[2; 2], [1; 2], [0; 2]]);
     }
 
     #[test]

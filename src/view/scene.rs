@@ -79,8 +79,12 @@ impl Scene<'_> {
             for chunk in 0..chunks {
                 check_cancelled();
                 self.inquiry.count_faces();
+                let fin_first = self.inquiry.wires.fin_first;
                 let part = &mut self.inquiry.part(rank)?.subdomain;
                 for facet in part.facet_chunk(chunk)?.records {
+                    if facet.triangle >= fin_first {
+                        continue;
+                    }
                     // Behind it first: that is the side its normal points away from.
                     let Some(side) = [1, 0].into_iter().find(|&s| facet.tets[s] != NO_TET) else {
                         continue;

@@ -92,8 +92,12 @@ impl QuerySession {
         for chunk in 0..self.part(rank)?.subdomain.row().chunks[2] {
             check_cancelled();
             self.count_faces();
+            let fin_first = self.wires.fin_first;
             let part = &mut self.part(rank)?.subdomain;
             for facet in part.facet_chunk(chunk)?.records {
+                if facet.triangle >= fin_first {
+                    continue;
+                }
                 // Behind it first: that is the side its normal points away from.
                 let Some(side) = [1, 0].into_iter().find(|&s| facet.tets[s] != NO_TET) else {
                     continue;

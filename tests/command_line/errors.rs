@@ -29,6 +29,11 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("contradicting-orientation", "walls.rs"),
     ("bad-seed", "seeds.rs"),
     ("sheet-outside", "sheets.rs"),
+    ("wire-outside", "wires.rs"),
+    ("degenerate-edge", "wires.rs"),
+    ("duplicate-wire", "wires.rs"),
+    ("wire-contact", "wires.rs"),
+    ("wire-too-near", "wires.rs"),
 ];
 
 /// Words no test provokes, and why.

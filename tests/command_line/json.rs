@@ -46,6 +46,7 @@ const RUNS: [(&str, &[&str]); 16] = [
         &[
             "mesh box.stl -o a.tetdb --subdomains 2 --keep-stages --memory 256MiB",
             "resume a.tetdb",
+            "mesh sample:wells,count=1,points=1 -o wells.tetdb",
             "mesh box.stl -o t.tetdb --subdomains 2 --coarse-only --memory 256MiB",
         ],
     ),

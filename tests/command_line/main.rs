@@ -31,4 +31,5 @@ mod subdomains;
 mod tasks;
 mod together;
 mod walls;
+mod wires;
 mod zone;

@@ -8,12 +8,27 @@ pub struct SheetArgs {
     /// A file of sheets inside, open or closed: their triangles become faces with tetrahedra on both sides; may be repeated
     #[arg(long, value_name = "FILE")]
     pub embed: Vec<String>,
+    /// A file of edges inside (.obj, .vtk, .poly): they become edges of the mesh; may be repeated
+    #[arg(long, value_name = "FILE")]
+    pub embed_edges: Vec<String>,
+    /// A file of points inside (.csv, .node, .obj, .vtk): they become vertices of the mesh; may be repeated
+    #[arg(long, value_name = "FILE")]
+    pub embed_points: Vec<String>,
     /// What an embedded file is called [default: its own name]; may be repeated
-    #[arg(long, value_name = "FILE=NAME", requires = "embed")]
+    #[arg(long, value_name = "FILE=NAME")]
     pub name: Vec<String>,
     /// Take for sheets what of the surface is not closed
     #[arg(long)]
     pub allow_open: bool,
+}
+
+impl SheetArgs {
+    /// All files to embed.
+    pub fn files(&self) -> impl Iterator<Item = &String> {
+        (self.embed.iter())
+            .chain(&self.embed_edges)
+            .chain(&self.embed_points)
+    }
 }
 
 /// What is wrong with a surface, and what mesh it allows. Nothing is changed unless --repair is given.
@@ -68,10 +83,11 @@ pub struct CheckArgs {
   shells  count, kind, h      one inside the other; kind is spheres or boxes
   sphere  radius, h
   steps   count, step, seed   a slab with steps of 1e-2 to 1e-8 of its length
+  wells   count, seed, cells, layers, points, shift  a box with layers, wells through them, and sensors
 h is the length of the edges."
 )]
 pub struct SampleArgs {
-    /// NAME,key=value,... with the names balls, box, caps, faults, grains, knot, needles, shells, sphere, steps
+    /// NAME,key=value,... with the names balls, box, caps, faults, grains, knot, needles, shells, sphere, steps, wells
     #[arg(value_name = "SAMPLE")]
     pub sample: String,
     /// The file to write: .stl (text), .off, .obj or .ply, all exact; - is the standard output

@@ -326,6 +326,20 @@ impl<R: BufRead> Feed<R> {
         }
     }
 
+    /// A word of a line that began at `place` as a finite coordinate.
+    pub fn coordinate_of(&self, word: &[u8], place: &FilePlace) -> Result<f64> {
+        let value = parse(word).filter(|x: &f64| x.is_finite());
+        let value = value.ok_or_else(|| ReadError::NotANumber {
+            place: place.clone(),
+            what: "a coordinate",
+            found: quote(word),
+        })?;
+        self.checked(value).map_err(|_| ReadError::CoordinateRange {
+            place: place.clone(),
+            found: value,
+        })
+    }
+
     /// Takes three coordinates.
     pub fn point(&mut self) -> Result<Point> {
         Ok(Point::new(

@@ -1,4 +1,4 @@
-//! Surface files read as streams: STL, OFF, OBJ, PLY, MEDIT, Gmsh, TetGen; sizes at the vertices of MEDIT meshes.
+//! Surface files read as streams: STL, OFF, OBJ, PLY, MEDIT, Gmsh, TetGen; sizes at the vertices of MEDIT meshes; files of edges and points.
 //!
 //! A declared count is believed only after it was compared with the length of the file; every error
 //! tells its line (text) or byte (binary). Decimal text becomes the nearest double, binary floats
@@ -20,6 +20,9 @@ mod sink;
 mod sizes;
 mod stl;
 mod tetgen;
+mod vtk;
+mod wire_sink;
+mod wires;
 
 #[cfg(test)]
 mod collection;
@@ -34,9 +37,11 @@ use feed::{Feed, Result};
 #[cfg(any(test, feature = "cli", feature = "internals"))]
 pub use lengths::read_lengths;
 pub use open::is_stream;
-use open::{open, unpacked_name};
+use open::{open, stem, unpacked_name};
 use sink::SurfaceSink;
 pub use sizes::{read_sizes, size_files};
+pub use wire_sink::WireKind;
+pub use wires::read_wires;
 
 use crate::surface::{Surface, SurfaceBuilder, SurfaceError};
 
@@ -186,17 +191,6 @@ pub fn read_memory(format: Format, file: &str, bytes: &[u8]) -> Result<Surface> 
     let feed = Feed::new(file, bytes, bytes.len() as u64);
     read_feed(format, feed, None, 0, &mut target)?;
     Ok(builder.finish())
-}
-
-fn stem(path: &Path) -> String {
-    let name = unpacked_name(path);
-    let text = name.file_stem().unwrap_or_default().to_string_lossy();
-    let name = feed::name(text.as_bytes());
-    if name.is_empty() {
-        "surface".to_owned()
-    } else {
-        name
-    }
 }
 
 fn unique(stem: &str, taken: &[String]) -> String {

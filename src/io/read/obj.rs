@@ -6,6 +6,7 @@
 use std::io::BufRead;
 
 use super::feed::{Feed, parse, quote};
+use super::wire_sink::{WireKind, WireSink};
 use super::{ReadError, Result, SurfaceSink};
 use crate::geom::Point;
 use crate::surface::NoteKind;
@@ -46,22 +47,8 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
             .filter(|w| !w.is_empty());
         match words.next().unwrap_or_default() {
             b"v" => {
-                let mut p = [0.0; 3];
-                for x in &mut p {
-                    let word = words
-                        .next()
-                        .ok_or_else(|| unexpected(&place, "three coordinates", b"fewer"))?;
-                    let value =
-                        parse(word).ok_or_else(|| not_a_number(&place, "a coordinate", word))?;
-                    *x = match feed.checked(value) {
-                        Ok(value) => value,
-                        Err(ReadError::CoordinateRange { found, .. }) => {
-                            return Err(ReadError::CoordinateRange { place, found });
-                        }
-                        Err(_) => return Err(not_a_number(&place, "a coordinate", word)),
-                    };
-                }
-                feed.placed(target.builder.vertex(Point::from_array(p)))?;
+                let p = vertex(&feed, words, &place)?;
+                feed.placed(target.builder.vertex(p))?;
             }
             b"f" | b"fo" => {
                 corners.clear();
@@ -119,6 +106,73 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
         });
     }
     feed.finish(target.builder)
+}
+
+/// The three coordinates of a vertex.
+fn vertex<'a, R: BufRead>(
+    feed: &Feed<R>,
+    mut words: impl Iterator<Item = &'a [u8]>,
+    place: &super::FilePlace,
+) -> Result<Point> {
+    let mut p = [0.0; 3];
+    for x in &mut p {
+        let word = words
+            .next()
+            .ok_or_else(|| unexpected(place, "three coordinates", b"fewer"))?;
+        *x = feed.coordinate_of(word, place)?;
+    }
+    Ok(Point::from_array(p))
+}
+
+/// Reads `l` lines as edges, or `p` lines as points; a line of them may name vertices that come later.
+pub(super) fn read_wires<R: BufRead>(
+    mut feed: Feed<R>,
+    kind: WireKind,
+    sink: &mut WireSink,
+) -> Result<()> {
+    let mut names = Names::default();
+    let mut line = Vec::new();
+    let mut ahead = Vec::new();
+    loop {
+        let place = feed.place();
+        line.clear();
+        if !read_logical_line(&mut feed, &mut line)? {
+            break;
+        }
+        let mut words = line
+            .split(u8::is_ascii_whitespace)
+            .filter(|w| !w.is_empty());
+        match (words.next().unwrap_or_default(), kind) {
+            (b"v", _) => sink.set.points.push(vertex(&feed, words, &place)?),
+            (b"l", WireKind::Edges) | (b"p", WireKind::Points) => {
+                let known = sink.set.points.len() as u32;
+                let corners = words.map(|word| corner(word, known, &place));
+                let corners = corners.collect::<Result<Vec<u32>>>()?;
+                let label = sink.label(names.best());
+                ahead.extend(corners.iter().max().map(|&v| (v, place)));
+                match kind {
+                    WireKind::Edges => sink.line(&corners, label),
+                    WireKind::Points => corners.iter().for_each(|&v| sink.mark(v, label)),
+                }
+            }
+            (b"g", _) => names.group = super::feed::name(&line[1..]),
+            (b"o", _) => {
+                names.object = super::feed::name(&line[1..]);
+                names.group.clear();
+            }
+            _ => {}
+        }
+    }
+    let n = sink.set.points.len();
+    match ahead.into_iter().find(|(v, _)| *v as usize >= n) {
+        None => Ok(()),
+        Some((v, place)) => Err(ReadError::IndexOutOfRange {
+            place,
+            index: i64::from(v) + 1,
+            low: 1,
+            high: n as i64,
+        }),
+    }
 }
 
 /// A line with its continuations, leading white space removed.

@@ -5,7 +5,7 @@ use std::io::{BufRead, BufReader, Cursor, Read};
 use std::path::{Path, PathBuf};
 
 use super::error::{FilePlace, ReadError};
-use super::feed::{Feed, Result};
+use super::feed::{self, Feed, Result};
 
 /// Bytes of the read buffer of one file.
 const BUFFER_BYTES: usize = 256 << 10;
@@ -36,6 +36,18 @@ fn packing(path: &Path) -> Option<(Packing, PathBuf)> {
 /// A file's name without the ending of its packing.
 pub(super) fn unpacked_name(path: &Path) -> PathBuf {
     packing(path).map_or_else(|| path.to_owned(), |(_, inner)| inner)
+}
+
+/// What a file is called, without folder and endings.
+pub(super) fn stem(path: &Path) -> String {
+    let name = unpacked_name(path);
+    let text = name.file_stem().unwrap_or_default().to_string_lossy();
+    let name = feed::name(text.as_bytes());
+    if name.is_empty() {
+        "surface".to_owned()
+    } else {
+        name
+    }
 }
 
 /// Whether what stands here can be read but once: a pipe, or `-`, the standard input.

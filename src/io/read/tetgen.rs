@@ -8,8 +8,10 @@ use std::io::BufRead;
 use std::path::Path;
 
 use super::feed::{Feed, name, parse};
+use super::wire_sink::WireSink;
 use super::{ReadError, Result, SurfaceSink, open};
-use crate::surface::{NoteKind, Seed, SeedKind, VolumePoints};
+use crate::geom::Point;
+use crate::surface::{NoteKind, Seed, SeedKind, SurfaceError, VolumePoints};
 
 /// The two layouts of the facet part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,7 +37,7 @@ pub(super) fn read<R: BufRead>(
     target: &mut SurfaceSink,
 ) -> Result<()> {
     feed.comment = Some(b'#');
-    let numbering = match read_points(&mut feed, target)? {
+    let numbering = match surface_points(&mut feed, target)? {
         Some(numbering) => numbering,
         None => read_node_file(&feed, nodes, limit, target)?,
     };
@@ -111,16 +113,94 @@ fn read_node_file<R: BufRead>(
     };
     let mut feed = open(path, limit)?;
     feed.comment = Some(b'#');
-    match read_points(&mut feed, target)? {
+    match surface_points(&mut feed, target)? {
         Some(numbering) => Ok(numbering),
         None => Err(feed.unexpected("points in the .node file", b"0")),
     }
 }
 
-/// The point part; `None` when it says that the points are elsewhere.
-fn read_points<R: BufRead>(
+/// The point part as vertices of a surface.
+fn surface_points<R: BufRead>(
     feed: &mut Feed<R>,
     target: &mut SurfaceSink,
+) -> Result<Option<Numbering>> {
+    read_points(feed, |p, _| target.builder.vertex(p))
+}
+
+/// The points of a `.node` file, called by their markers.
+pub(super) fn read_nodes<R: BufRead>(feed: &mut Feed<R>, sink: &mut WireSink) -> Result<()> {
+    feed.comment = Some(b'#');
+    let numbering = read_points(feed, |p, marker| {
+        let label = sink.label(&marker_name(marker));
+        sink.mark(sink.set.points.len() as u32, label);
+        sink.set.points.push(p);
+        Ok(())
+    })?;
+    match numbering {
+        Some(_) => Ok(()),
+        None => Err(feed.unexpected("points in the .node file", b"0")),
+    }
+}
+
+/// The facets of two corners in a `.poly` file, called by their markers.
+pub(super) fn read_segments<R: BufRead>(
+    mut feed: Feed<R>,
+    nodes: &Path,
+    limit: u64,
+    sink: &mut WireSink,
+) -> Result<()> {
+    feed.comment = Some(b'#');
+    let mut add = |p, _| {
+        sink.set.points.push(p);
+        Ok(())
+    };
+    let numbering = match read_points(&mut feed, &mut add)? {
+        Some(numbering) => numbering,
+        None => {
+            let mut nodes = open(nodes, limit)?;
+            nodes.comment = Some(b'#');
+            let found = read_points(&mut nodes, &mut add)?;
+            found.ok_or_else(|| nodes.unexpected("points in the .node file", b"0"))?
+        }
+    };
+    let n_facets = feed.count("facets", 4)?;
+    feed.skip_line()?;
+    for i in 0..n_facets {
+        if feed.at_end()? {
+            return Err(feed.too_few("facets", n_facets, i));
+        }
+        let n_polygons = feed.count("polygons", 4)?;
+        let rest = rest_of_line(&mut feed)?;
+        let label = marker_name(rest.get(1).copied().unwrap_or(0));
+        for _ in 0..n_polygons {
+            let n = feed.count("corners", 2)?;
+            let corners = (0..n).map(|_| feed.index(numbering.first, numbering.n));
+            let corners = corners.collect::<Result<Vec<u32>>>()?;
+            if n == 2 {
+                let label = sink.label(&label);
+                sink.line(&corners, label);
+            }
+        }
+        for _ in 0..rest.first().copied().unwrap_or(0) {
+            feed.need_word("a hole of the facet")?;
+            feed.skip_line()?;
+        }
+    }
+    Ok(())
+}
+
+/// What a marker is called; zero stands for none.
+fn marker_name(marker: i64) -> String {
+    match marker {
+        0 => String::new(),
+        marker => marker.to_string(),
+    }
+}
+
+/// The point part, each with its marker or 0; `None` when it says that the points are elsewhere.
+fn read_points<R: BufRead>(
+    feed: &mut Feed<R>,
+    mut each: impl FnMut(Point, i64) -> std::result::Result<(), SurfaceError>,
 ) -> Result<Option<Numbering>> {
     let n = feed.integer("the number of points")?;
     if n == 0 {
@@ -134,7 +214,11 @@ fn read_points<R: BufRead>(
             return Err(feed.unsupported(format!("points of dimension {dimension}")));
         }
     }
-    feed.skip_line()?;
+    let rest = rest_of_line(feed)?;
+    let place_of_marker = match rest[..] {
+        [n_attributes, n_markers] if n_markers > 0 => usize::try_from(n_attributes).ok(),
+        _ => None,
+    };
     let mut first = 0;
     for i in 0..n {
         if !feed.next_word()? {
@@ -153,8 +237,18 @@ fn read_points<R: BufRead>(
             return Err(feed.unexpected(expected, feed.word()));
         }
         let p = feed.point()?;
+        let mut marker = 0;
+        // The line ends the search: what the head says of attributes may be anything.
+        for place in 0..=place_of_marker.unwrap_or(0) {
+            if !feed.next_word_in_line()? {
+                break;
+            }
+            if place_of_marker == Some(place) {
+                marker = parse(feed.word()).unwrap_or(0);
+            }
+        }
         feed.skip_line()?;
-        feed.placed(target.builder.vertex(p))?;
+        feed.placed(each(p, marker))?;
     }
     Ok(Some(Numbering { first, n }))
 }
@@ -188,11 +282,7 @@ fn add<R: BufRead>(
     marker: i64,
     target: &mut SurfaceSink,
 ) -> Result<()> {
-    let label = if marker == 0 {
-        target.label("")
-    } else {
-        target.label(&marker.to_string())
-    };
+    let label = target.label(&marker_name(marker));
     feed.placed(target.builder.polygon(corners, label))
 }
 

@@ -9,6 +9,7 @@ use super::merged::Merged;
 use super::midpoints::Midpoints;
 use super::report::FileCounts;
 use super::selection::{Content, Order, Selection};
+use super::wires::write_list;
 use super::{abaqus, foam, gmsh, gmsh22, medit, mfem, npy_columns, tetgen, vtu, vtu_boundary};
 
 /// Writes a mesh as one file, and what belongs to it.
@@ -50,6 +51,18 @@ pub(super) fn write(
         MeshFormat::Mfem => counts = mfem::write(mesh, draft, out, selection)?,
         MeshFormat::TetGen => tetgen::write(mesh, draft, out)?,
         MeshFormat::Topology => unreachable!("the topology is no mesh"),
+    }
+    let has_lines = matches!(
+        format,
+        MeshFormat::Medit
+            | MeshFormat::MeditBinary
+            | MeshFormat::Gmsh
+            | MeshFormat::Gmsh22
+            | MeshFormat::Abaqus
+            | MeshFormat::TetGen
+    );
+    if !has_lines && selection.content == Content::Mesh {
+        write_list(mesh, draft, out)?;
     }
     mesh.report_end();
     Ok(counts)

@@ -11,7 +11,9 @@ use super::merged::Merged;
 use super::names::quotable;
 use super::stream::Stream;
 
-/// Gmsh's numbers of the two types of elements.
+/// Gmsh's numbers of the types of elements.
+const LINE: u32 = 1;
+const POINT: u32 = 15;
 const TRIANGLE: u32 = 2;
 const TETRAHEDRON: u32 = 4;
 /// Tags of an element: physical, elementary; of several sub-domains also the number of its partitions, 1, and the partition.
@@ -45,7 +47,10 @@ pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
         stream.end()
     })?;
     let (n_faces, n_tets) = (mesh.n_faces(), mesh.n_tets());
-    stream.text(&format!("\n$EndNodes\n$Elements\n{}\n", n_faces + n_tets));
+    let wires = mesh.wires();
+    let n_wires = (wires.edges.len() + wires.points.len()) as u64;
+    let n = n_faces + n_tets + n_wires;
+    stream.text(&format!("\n$EndNodes\n$Elements\n{n}\n"));
     elements(mesh, &mut stream)?;
     stream.text("\n$EndElements\n");
     stream.finish()
@@ -89,6 +94,29 @@ fn elements(mesh: &mut Merged, stream: &mut Stream) -> Result<()> {
             stream.end()
         })?;
     }
+    // Of several sub-domains they are said to be of the first: the format wants one.
+    let wires = mesh.wires();
+    if !wires.edges.is_empty() {
+        put(stream, &[LINE, wires.edges.len() as u32, n_tags]);
+        for (ends, label) in &wires.edges {
+            number += 1;
+            put_head(stream, number, label + 1, 0);
+            put(stream, &ends.map(|v| v as u32 + 1));
+            stream.end()?;
+        }
+    }
+    if !wires.points.is_empty() {
+        put(stream, &[POINT, wires.points.len() as u32, n_tags]);
+        for (place, point) in (1u32..).zip(&wires.points) {
+            number += 1;
+            put(stream, &[number, point.label + 1, place]);
+            if partitioned {
+                put(stream, &[1, 1]);
+            }
+            put(stream, &[point.vertex as u32 + 1]);
+            stream.end()?;
+        }
+    }
     Ok(())
 }
 
@@ -96,7 +124,15 @@ fn elements(mesh: &mut Merged, stream: &mut Stream) -> Result<()> {
 fn physical_names(mesh: &mut Merged) -> Result<String> {
     let labels = mesh.labels();
     let regions = mesh.regions()?;
-    let mut text = format!("$PhysicalNames\n{}\n", labels.len() + regions.len());
+    let points = mesh.wires().point_labels().into_keys().map(|l| (0, l));
+    let edges = mesh.wires().edge_labels().into_keys().map(|l| (1, l));
+    let wires: Vec<(u32, u32)> = points.chain(edges).collect();
+    let n = wires.len() + labels.len() + regions.len();
+    let mut text = format!("$PhysicalNames\n{n}\n");
+    for (dim, label) in wires {
+        let name = mesh.label_name(label);
+        text += &format!("{dim} {} \"{}\"\n", label + 1, quotable(&name));
+    }
     for (label, name) in labels {
         text += &format!("2 {} \"{}\"\n", label + 1, quotable(&name));
     }

@@ -13,9 +13,11 @@ use super::stream::Stream;
 const VERTEX_BYTES_LEAST: u64 = 48;
 
 const VERTICES: (&str, u32) = ("Vertices", 4);
+const EDGES: (&str, u32) = ("Edges", 5);
 const TRIANGLES: (&str, u32) = ("Triangles", 6);
 const TETRAHEDRA: (&str, u32) = ("Tetrahedra", 8);
 const DIMENSION: u32 = 3;
+const REQUIRED_VERTICES: (&str, u32) = ("RequiredVertices", 15);
 const END: u32 = 54;
 
 /// A MEDIT file being written.
@@ -25,6 +27,8 @@ trait Medit {
     fn vertex(&mut self, point: [f64; 3], reference: u64) -> Result<()>;
     /// Vertices are counted from 0 here, from 1 in the file.
     fn element(&mut self, vertices: &[u64], reference: u64) -> Result<()>;
+    /// A vertex in a list of them.
+    fn listed(&mut self, vertex: u64) -> Result<()>;
 }
 
 struct Text(Stream);
@@ -47,6 +51,11 @@ impl Medit for Text {
             self.0.integer(v + 1, b' ');
         }
         self.0.integer(reference, b'\n');
+        self.0.end()
+    }
+
+    fn listed(&mut self, vertex: u64) -> Result<()> {
+        self.0.integer(vertex + 1, b'\n');
         self.0.end()
     }
 }
@@ -77,12 +86,48 @@ impl Medit for Binary {
         self.0.bytes(&reference.to_le_bytes());
         self.0.end()
     }
+
+    fn listed(&mut self, vertex: u64) -> Result<()> {
+        self.0.bytes(&(vertex + 1).to_le_bytes());
+        self.0.end()
+    }
+}
+
+/// The reference of an embedded point is its label + 1, that of other vertices 0.
+fn vertices(mesh: &mut Merged, file: &mut impl Medit) -> Result<()> {
+    let points = mesh.wires().points.iter();
+    let mut points: Vec<(u64, u32)> = points.map(|p| (p.vertex, p.label)).collect();
+    points.sort_unstable();
+    let mut points = points.into_iter().peekable();
+    file.section(VERTICES, mesh.n_vertices(), 32);
+    mesh.vertices(|number, vertex| {
+        let point = points.next_if(|(v, _)| *v == number);
+        let reference = point.map_or(0, |(_, label)| u64::from(label) + 1);
+        file.vertex(vertex.point, reference)
+    })
+}
+
+fn wires(mesh: &Merged, file: &mut impl Medit) -> Result<()> {
+    let wires = mesh.wires();
+    if !wires.edges.is_empty() {
+        file.section(EDGES, wires.edges.len() as u64, 24);
+        for (ends, label) in &wires.edges {
+            file.element(ends, u64::from(*label) + 1)?;
+        }
+    }
+    if !wires.points.is_empty() {
+        file.section(REQUIRED_VERTICES, wires.points.len() as u64, 8);
+        for point in &wires.points {
+            file.listed(point.vertex)?;
+        }
+    }
+    Ok(())
 }
 
 fn sections(mesh: &mut Merged, file: &mut impl Medit) -> Result<()> {
     mesh.expect_passes(1, 1);
-    file.section(VERTICES, mesh.n_vertices(), 32);
-    mesh.vertices(|_, vertex| file.vertex(vertex.point, 0))?;
+    vertices(mesh, file)?;
+    wires(mesh, file)?;
     file.section(TRIANGLES, mesh.n_faces(), 32);
     mesh.faces()
         .each(|face| file.element(&face.vertices, u64::from(face.label) + 1))?;

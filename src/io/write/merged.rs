@@ -14,6 +14,7 @@ use super::faces::{Face, FaceSorter, FaceSource, Faces};
 use super::numbering::{Numbering, PartNumbers, Sharer, Source, candidates, sharers};
 use super::on_surface::OnSurface;
 use super::scope::{FaceSet, Scope};
+use super::wires::WrittenWires;
 use crate::optimize;
 use crate::sealed::SealedError;
 use crate::sealed::{Shape, Subdomain};
@@ -98,6 +99,8 @@ pub(super) struct Merged<'a> {
     numbering: Numbering,
     faces: Faces,
     doubles: Option<Doubles>,
+    wires: WrittenWires,
+    fin_first: u64,
     label_names: Vec<String>,
     region_names: Vec<String>,
     dir: PathBuf,
@@ -120,6 +123,8 @@ impl<'a> Merged<'a> {
         let parts = sources(store, scope, dir, memory)?;
         let numbering = Numbering::new(store, &parts, scope.apart, dir, memory)?;
         let first_label = label_names.len() as u32;
+        let row = store.wires()?;
+        let mut wires = WrittenWires::gather(store, &row, (&parts, &numbering), memory)?;
         let mut sorter = FaceSorter::new(dir, memory as u64 / 4);
         for (p, source) in parts.iter().enumerate() {
             let numbers = numbering.part(&parts, p)?;
@@ -132,22 +137,45 @@ impl<'a> Merged<'a> {
                 scope,
                 path: &path,
             };
-            collect_faces(&mut from, &part, first_label, &mut sorter)?;
+            collect_faces(
+                &mut from,
+                &part,
+                [first_label.into(), row.fin_first],
+                &mut sorter,
+            )?;
         }
         let faces = sorter.finish()?;
-        Ok(Self {
+        let is_whole = scope.regions.is_empty() && scope.ranks.is_empty();
+        let mut mesh = Self {
             store,
             parts,
             regions: scope.regions.clone(),
             numbering,
             faces,
             doubles: None,
+            wires: WrittenWires::default(),
+            fin_first: row.fin_first,
             label_names,
             region_names,
             dir: dir.to_owned(),
             memory,
             progress,
-        })
+        };
+        if !wires.edges.is_empty() && !is_whole {
+            wires.keep_those_of(&mut mesh)?;
+        }
+        mesh.wires = wires;
+        Ok(mesh)
+    }
+
+    /// Embedded edges and points that are in it.
+    pub fn wires(&self) -> &WrittenWires {
+        &self.wires
+    }
+
+    /// Facets from this number on are no triangles of the input: each holds an embedded edge.
+    pub fn fin_first(&self) -> u64 {
+        self.fin_first
     }
 
     /// Vertices and their doubles.
@@ -497,23 +525,25 @@ fn too_many_vertices(catalog: &Catalog, row: &SubdomainRow, end: u64) -> StoreEr
 }
 
 /// Hands the faces of a sub-domain that its scope lists to `sorter`; interface faces are labelled by the sub-domain behind
-/// them, from `first_label` on.
+/// them, from `first_label` on; facets from `fin_first` on are no triangles of the input.
 fn collect_faces(
     from: &mut Subdomain,
     part: &FaceSource,
-    first_label: u32,
+    [first_label, fin_first]: [u64; 2],
     sorter: &mut FaceSorter,
 ) -> Result<()> {
     if part.scope.faces != FaceSet::Interfaces {
         for facet in from.facets() {
             let facet = facet?;
-            sorter.push(&facet, part)?;
+            if facet.triangle < fin_first {
+                sorter.push(&facet, part)?;
+            }
         }
     }
     for face in from.interfaces() {
         let face = face?;
         if part.scope.lists(part.rank, face.other) {
-            sorter.push_interface(&face, first_label + face.other, part)?;
+            sorter.push_interface(&face, first_label as u32 + face.other, part)?;
         }
     }
     Ok(())

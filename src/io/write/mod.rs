@@ -51,6 +51,7 @@ mod topology;
 mod vtu;
 mod vtu_boundary;
 mod vtu_layout;
+mod wires;
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -73,7 +74,7 @@ use report::FileCounts;
 #[cfg(any(test, feature = "cli", feature = "internals"))]
 pub use selected::{SelectedTet, SelectedVtu};
 pub use selection::{Content, Order, Selection};
-pub use surface::{SurfaceReport, surface};
+pub use surface::{SurfaceReport, surface, wires};
 
 use crate::storage::attempt;
 use crate::store::{Catalog, StoreError};

@@ -172,6 +172,45 @@ fn obj(surface: &Surface, stream: &mut Stream) -> Result<()> {
     Ok(())
 }
 
+/// Writes embedded edges and points to `out` as an `.obj` file of lines (`l`) and points (`p`), exactly.
+///
+/// Errors: [`WriteError`]; `out` is not touched then.
+pub fn wires(surface: &Surface, out: &Path) -> Result<()> {
+    let mut draft = Draft::new(out)?;
+    let path = draft.create(out, 0)?;
+    let mut stream = Stream::open(&path)?;
+    let mut number = std::collections::HashMap::new();
+    let wires = &surface.wires;
+    let ends = wires.edges.iter().flat_map(|&[a, b, _]| [a, b]);
+    for v in ends.chain(wires.points.iter().map(|&[v, _]| v)) {
+        let next = number.len() as u64 + 1;
+        if *number.entry(v).or_insert(next) == next {
+            doubles(&mut stream, "v ", surface.points[v as usize].to_array());
+            stream.end()?;
+        }
+    }
+    let mut last = None;
+    let mut group = |stream: &mut Stream, label: u32| {
+        if last.replace(label) != Some(label) {
+            let name = surface.label_names[label as usize].replace(['\n', '\r'], " ");
+            stream.text(&format!("g {name}\n"));
+        }
+    };
+    for &[a, b, label] in &wires.edges {
+        group(&mut stream, label);
+        stream.text(&format!("l {} {}\n", number[&a], number[&b]));
+        stream.end()?;
+    }
+    for &[v, label] in &wires.points {
+        group(&mut stream, label);
+        stream.text(&format!("p {}\n", number[&v]));
+        stream.end()?;
+    }
+    stream.finish()?;
+    draft.publish()?;
+    Ok(())
+}
+
 fn ply(surface: &Surface, stream: &mut Stream) -> Result<()> {
     stream.text("ply\nformat binary_little_endian 1.0\n");
     // Where all triangles have one, a property of it says nothing, and some readers take lists of corners alone.

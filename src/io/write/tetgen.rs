@@ -1,4 +1,4 @@
-//! TetGen: `NAME.node`, `NAME.ele` and `NAME.face`, text, numbered from 0; the region of a tetrahedron is its attribute, label + 1 a face's marker.
+//! TetGen: `NAME.node`, `NAME.ele`, `NAME.face` and, of embedded edges, `NAME.edge`, text, numbered from 0; the region of a tetrahedron is its attribute, label + 1 a face's marker.
 //!
 //! A vertex's marker is 1 where it was given or fixed: on the input's surface or an interface. Source: the TetGen user's manual, "File formats".
 
@@ -49,5 +49,17 @@ pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
         number += 1;
         faces.end()
     })?;
-    faces.finish()
+    faces.finish()?;
+    let wires = mesh.wires();
+    if wires.edges.is_empty() {
+        return Ok(());
+    }
+    let mut edges = begin("edge", 0, format!("{} 1\n", wires.edges.len()))?;
+    for (number, (ends, label)) in (0u64..).zip(&wires.edges) {
+        edges.integer(number, b' ');
+        ends.iter().for_each(|&v| edges.integer(v, b' '));
+        edges.integer(u64::from(*label) + 1, b'\n');
+        edges.end()?;
+    }
+    edges.finish()
 }

@@ -30,7 +30,7 @@ use crate::sizing::{SizeField, SizeSummary, TETS_PER_LOAD};
 use crate::storage::{Backing, Budget, Pager, PagerStats, ScratchSpace, attempt};
 use crate::store::Catalog;
 use crate::surface::Surface;
-use tetdb_schema::catalog::{RegionRow, StoreState};
+use tetdb_schema::catalog::{RegionRow, StoreState, WiresRow};
 
 /// Generation of the coarse mesh.
 const COARSE: u32 = 1;
@@ -256,6 +256,7 @@ impl<'a> Run<'a> {
             }
         };
         let label_names = surface.label_names.clone();
+        let wires = surface.has_wires().then(|| wires_row(&surface));
         // All that is needed from here on is in the mesh.
         drop(surface);
         let report = recovered(&mut mesh, kernel, self.options, self.watch)?;
@@ -286,6 +287,9 @@ impl<'a> Run<'a> {
             let names = report.regions.names();
             if !names.is_empty() {
                 step.set_region_names(&names);
+            }
+            if let Some(wires) = &wires {
+                step.set_wires(wires);
             }
             step.set_blob(blob::SIZE_FIELD, &field);
             step.set_blob(blob::BOUNDS, &tree::bounds_bytes(&bounds));
@@ -407,6 +411,14 @@ impl<'a> Run<'a> {
     pub(crate) fn count(&mut self, traffic: Traffic) {
         self.pages.add(traffic.pages());
         self.frames_used = self.frames_used.max(traffic.frames_used as usize);
+    }
+}
+
+fn wires_row(surface: &Surface) -> WiresRow {
+    WiresRow {
+        edges: surface.wires.edges.clone(),
+        points: surface.wires.points.clone(),
+        fin_first: surface.n_own_triangles() as u64,
     }
 }
 

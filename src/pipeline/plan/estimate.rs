@@ -141,6 +141,7 @@ fn prepare_in(
         return Err(PipelineError::SizeField { file: file.clone() });
     }
     let asked = options.sizes()?;
+    let lone_points = surface.lone_points();
     let built = |regions: &[Region]| {
         let mut constraints: Vec<&dyn SizeConstraint> =
             regions.iter().map(|r| r as &dyn SizeConstraint).collect();
@@ -153,6 +154,7 @@ fn prepare_in(
         let further = Further {
             constraints: &constraints,
             at_vertices,
+            at_points: &lone_points,
         };
         SizeField::build_with(
             &surface.points,
@@ -171,6 +173,7 @@ fn prepare_in(
     let volumes = Volumes::of_in(&seeker, scratch);
     let chosen = chosen(&seeker, &volumes, options)?;
     refuse_outer_sheets(surface, &volumes, &chosen)?;
+    refuse_outer_points(surface, &seeker, &volumes, &chosen)?;
     let filled: Vec<bool> = (0..volumes.n_volumes)
         .map(|v| chosen.volumes.contains(&v))
         .collect();
@@ -214,7 +217,7 @@ fn chosen(seeker: &Seeker, volumes: &Volumes, options: &Options) -> Result<Fille
     Ok(rule.apply(chosen, OUTSIDE, end, |p| volumes.at(seeker, p))?)
 }
 
-/// Errors: a sheet where nothing is filled.
+/// Errors: a sheet, or an edge of a wire, where nothing is filled.
 fn refuse_outer_sheets(
     surface: &Surface,
     volumes: &Volumes,
@@ -227,10 +230,43 @@ fn refuse_outer_sheets(
         return Ok(());
     };
     let [a, b, c] = surface.corners(triangle);
+    if surface.is_fin(triangle) {
+        return Err(PipelineError::WireOutside {
+            what: "edges",
+            label: surface.label_name(triangle).to_owned(),
+            at: a.midpoint(b),
+            n: 1 + outer.count() as u64,
+        });
+    }
     Err(PipelineError::SheetOutside {
         triangle,
         label: surface.label_name(triangle).to_owned(),
         at: (a + b + c) / 3.0,
+        n: 1 + outer.count() as u64,
+    })
+}
+
+/// Errors: a point where nothing is filled.
+fn refuse_outer_points(
+    surface: &Surface,
+    seeker: &Seeker,
+    volumes: &Volumes,
+    chosen: &Filled,
+) -> Result<(), PipelineError> {
+    let wires = &surface.wires;
+    let alone = (wires.points.iter().zip(&wires.sizes)).filter(|(_, size)| **size > 0.0);
+    let is_outer =
+        |&v: &u32| !(chosen.volumes).contains(&volumes.at(seeker, surface.points[v as usize]));
+    let mut outer = alone
+        .map(|(&[v, label], _)| (v, label))
+        .filter(|(v, _)| is_outer(v));
+    let Some((v, label)) = outer.next() else {
+        return Ok(());
+    };
+    Err(PipelineError::WireOutside {
+        what: "points",
+        label: surface.label_names[label as usize].clone(),
+        at: surface.points[v as usize],
         n: 1 + outer.count() as u64,
     })
 }

@@ -171,6 +171,9 @@ impl FaceWalk {
             let mut patches = BTreeMap::new();
             for facet in part.facets() {
                 let facet = facet?;
+                if facet.triangle >= mesh.fin_first() {
+                    continue;
+                }
                 let is_cell = |&tet: &u32| tet != NO_TET && numbers.tet(tet).is_some();
                 if is_inner(mesh, &facet) {
                     *census.zones.entry(facet.label).or_default() += 1;
@@ -260,6 +263,9 @@ impl FaceWalk {
         let mut facets = Sorter::new(&dir, bytes / 4);
         for facet in part.facets() {
             let facet = facet?;
+            if facet.triangle >= mesh.fin_first() {
+                continue;
+            }
             let (vertices, is_odd) = sorted_face(facet.vertices);
             facets.push(FacetFace {
                 vertices,

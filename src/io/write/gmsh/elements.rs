@@ -1,5 +1,7 @@
 //! Triangles and tetrahedra, entity by entity.
 
+use std::collections::BTreeMap;
+
 use super::super::error::Result;
 use super::super::merged::{Merged, Opened};
 use super::super::midpoints::{ElementEdges, Midpoints};
@@ -9,6 +11,8 @@ use super::piece::Piece;
 use crate::storage::{Sorter, sort_record};
 
 /// Gmsh's numbers of the types of elements, of first and of second order.
+const POINT: u32 = 15;
+const LINE: u32 = 1;
 const TRIANGLES: [u32; 2] = [2, 9];
 const TETRAHEDRA: [u32; 2] = [4, 11];
 /// The place of each middle of a tetrahedron's edges: Gmsh has the last two the other way round.
@@ -55,8 +59,22 @@ pub(super) fn write(
 ) -> Result<()> {
     let n_faces = mesh.n_faces();
     let tags = entities.tags();
-    let total = entities.n_faces() + entities.n_tets();
-    for n in [tags.len() as u64, total, 1, n_faces + mesh.n_tets()] {
+    let wires = &entities.wires;
+    // A line of second order would need the middle of its edge, which no table of tetrahedra or faces has by its ends.
+    let n_lines = if piece.middles.is_none() {
+        wires.edges.len()
+    } else {
+        0
+    };
+    let n_wires = (n_lines + wires.points.len()) as u64;
+    let curves = if n_lines > 0 {
+        wires.edge_labels()
+    } else {
+        BTreeMap::new()
+    };
+    let blocks = tags.len() + curves.len() + wires.points.len();
+    let total = entities.n_faces() + entities.n_tets() + n_wires;
+    for n in [blocks as u64, total, 1, n_faces + mesh.n_tets() + n_wires] {
         out.size(n);
     }
     out.end()?;
@@ -102,7 +120,32 @@ pub(super) fn write(
     piece.each_ghost(|ghost| {
         let entity = entities.volume(ghost.region, ghost.from);
         elements.tet(entity, ghost.number, ghost.nodes.0)
-    })
+    })?;
+    let mut number = n_faces + mesh.n_tets();
+    let mut lines = wires.edges.iter();
+    for (label, n) in curves {
+        for word in [1, label + 1, LINE] {
+            out.int(word);
+        }
+        out.size(n);
+        out.end()?;
+        for ([a, b], _) in lines.by_ref().take(n as usize) {
+            number += 1;
+            [number, a + 1, b + 1].into_iter().for_each(|n| out.size(n));
+            out.end()?;
+        }
+    }
+    for (tag, point) in (1u32..).zip(&wires.points) {
+        for word in [0, tag, POINT] {
+            out.int(word);
+        }
+        number += 1;
+        [1, number, point.vertex + 1]
+            .into_iter()
+            .for_each(|n| out.size(n));
+        out.end()?;
+    }
+    Ok(())
 }
 
 impl Elements<'_> {

@@ -6,6 +6,7 @@ use super::super::error::Result;
 use super::super::faces::Face;
 use super::super::merged::Merged;
 use super::super::names::quotable;
+use super::super::wires::WrittenWires;
 use super::out::Out;
 use super::piece::Piece;
 
@@ -25,6 +26,8 @@ pub(super) struct Entities {
     /// Ranks of all partitions, also of those in other files.
     ranks: Vec<u32>,
     n_labels: u32,
+    /// Edges are in a curve for each label, each point is an entity of its own, numbered from 1. None in a file of one partition.
+    pub wires: WrittenWires,
 }
 
 impl Entities {
@@ -37,7 +40,11 @@ impl Entities {
             bounds: [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]],
             ranks: parts.iter().map(|part| part.rank).collect(),
             n_labels: mesh.n_labels(),
+            wires: WrittenWires::default(),
         };
+        if piece.which.len() == parts.len() {
+            entities.wires = mesh.wires().clone();
+        }
         let here: BTreeSet<u32> = piece.which.iter().map(|&p| parts[p].rank).collect();
         let mut surfaces = BTreeMap::<_, u64>::new();
         mesh.faces().each(|face| {
@@ -146,7 +153,15 @@ impl Entities {
 
     pub fn physical_names(&self, mesh: &Merged) -> String {
         let (labels, regions) = (self.labels(), self.regions());
-        let mut text = format!("{}\n", labels.len() + regions.len());
+        let points = self.wires.point_labels().into_keys().map(|l| (0, l));
+        let edges = self.wires.edge_labels().into_keys().map(|l| (1, l));
+        let wires: Vec<(u32, u32)> = points.chain(edges).collect();
+        let n = wires.len() + labels.len() + regions.len();
+        let mut text = format!("{n}\n");
+        for (dim, label) in wires {
+            let name = mesh.label_name(label);
+            text += &format!("{dim} {} \"{}\"\n", label + 1, quotable(&name));
+        }
         for label in labels {
             text += &format!(
                 "2 {} \"{}\"\n",
@@ -167,11 +182,24 @@ impl Entities {
     /// Labels and regions as surfaces and volumes: tag, bounds, physical tag; what bounds them is not listed.
     pub fn write_model(&self, out: &mut Out) -> Result<()> {
         let (labels, regions) = (self.labels(), self.regions());
-        for n in [0, 0, labels.len(), regions.len()] {
+        let curves = self.wires.edge_labels();
+        let points = &self.wires.points;
+        for n in [points.len(), curves.len(), labels.len(), regions.len()] {
             out.size(n as u64);
         }
         out.end()?;
-        for tag in labels.iter().map(|label| label + 1).chain(regions) {
+        for (tag, point) in (1u32..).zip(points) {
+            out.int(tag);
+            point.point.iter().for_each(|&x| out.double(x));
+            out.size(1);
+            out.int(point.label + 1);
+            out.end()?;
+        }
+        let curves = curves.into_keys().map(|label| label + 1);
+        for tag in curves
+            .chain(labels.iter().map(|label| label + 1))
+            .chain(regions)
+        {
             out.int(tag);
             self.put_bounds(out);
             out.size(1);

@@ -1,0 +1,155 @@
+//! Embedded edges and points in the merged mesh.
+
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::path::Path;
+
+use tetdb_schema::catalog::WiresRow;
+use tetdb_schema::ids::{Owner, VertexId};
+
+use super::draft::Draft;
+use super::error::Result;
+use super::merged::Merged;
+use super::numbering::{Numbering, Source};
+use super::stream::Stream;
+use crate::store::Catalog;
+
+/// A point of the merged mesh.
+#[derive(Clone, Copy)]
+pub(super) struct WirePoint {
+    /// Number of its vertex.
+    pub vertex: u64,
+    pub label: u32,
+    pub point: [f64; 3],
+}
+
+/// What of the edges and points is in what is written. Memory: some 100 bytes for each.
+#[derive(Clone, Default)]
+pub(super) struct WrittenWires {
+    /// Numbers of the vertices of each edge, and its label, by which they are sorted.
+    pub edges: Vec<([u64; 2], u32)>,
+    /// By label.
+    pub points: Vec<WirePoint>,
+}
+
+impl WrittenWires {
+    /// Those whose vertices are written. Errors: damage, the disk.
+    pub fn gather(
+        store: &mut Catalog,
+        row: &WiresRow,
+        (parts, numbering): (&[Source], &Numbering),
+        memory: usize,
+    ) -> Result<Self> {
+        let ends = row.edges.iter().flat_map(|&[a, b, _]| [a, b]);
+        let all = ends.chain(row.points.iter().map(|&[v, _]| v));
+        let wanted: HashSet<u32> = all.collect();
+        let mut known = HashMap::new();
+        for (p, source) in parts.iter().enumerate().filter(|_| !wanted.is_empty()) {
+            let numbers = numbering.part(parts, p)?;
+            let mut part = store.open_subdomain(source.row.rank, memory / 4)?;
+            for (local, vertex) in (0u32..).zip(part.vertices()) {
+                let vertex = vertex?;
+                let Some(VertexId {
+                    owner: Owner::Surface,
+                    index,
+                }) = VertexId::from_number(vertex.id)
+                else {
+                    continue;
+                };
+                if let (true, Some(number)) = (wanted.contains(&index), numbers.vertex(local)) {
+                    known.insert(index, (number, vertex.point));
+                }
+            }
+        }
+        let number = |v: u32| known.get(&v).map(|(number, _)| *number);
+        let mut edges: Vec<_> = (row.edges.iter())
+            .filter_map(|&[a, b, label]| Some(([number(a)?, number(b)?], label)))
+            .collect();
+        edges.sort_by_key(|(_, label)| *label);
+        let mut points: Vec<_> = (row.points.iter())
+            .filter_map(|&[v, label]| {
+                let &(vertex, point) = known.get(&v)?;
+                Some(WirePoint {
+                    vertex,
+                    label,
+                    point,
+                })
+            })
+            .collect();
+        points.sort_by_key(|point| point.label);
+        Ok(Self { edges, points })
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.edges.is_empty() && self.points.is_empty()
+    }
+
+    /// Keeps the edges that are edges of tetrahedra of `mesh`: where not all is written, both ends may be and the edge not. Errors: damage.
+    pub fn keep_those_of(&mut self, mesh: &mut Merged) -> Result<()> {
+        let ascending = |[a, b]: [u64; 2]| [a.min(b), a.max(b)];
+        let mut seen: HashMap<[u64; 2], bool> = self
+            .edges
+            .iter()
+            .map(|(ends, _)| (ascending(*ends), false))
+            .collect();
+        mesh.tets(|tet| {
+            for (i, &a) in tet.nodes.iter().enumerate() {
+                for &b in &tet.nodes[i + 1..] {
+                    if let Some(is_seen) = seen.get_mut(&ascending([a, b])) {
+                        *is_seen = true;
+                    }
+                }
+            }
+            Ok(())
+        })?;
+        self.edges.retain(|(ends, _)| seen[&ascending(*ends)]);
+        Ok(())
+    }
+
+    /// How many edges each label has.
+    pub fn edge_labels(&self) -> BTreeMap<u32, u64> {
+        let mut labels = BTreeMap::new();
+        for (_, label) in &self.edges {
+            *labels.entry(*label).or_default() += 1;
+        }
+        labels
+    }
+
+    /// How many points each label has.
+    pub fn point_labels(&self) -> BTreeMap<u32, u64> {
+        let mut labels = BTreeMap::new();
+        for point in &self.points {
+            *labels.entry(point.label).or_default() += 1;
+        }
+        labels
+    }
+}
+
+/// For formats without lines: `NAME_wires.csv` with the name of each edge and point and the numbers of its vertices, from 0. Errors: the disk.
+pub(super) fn write_list(mesh: &Merged, draft: &mut Draft, out: &Path) -> Result<()> {
+    let wires = mesh.wires();
+    if wires.is_empty() {
+        return Ok(());
+    }
+    let stem = out.file_stem().unwrap_or_default().to_string_lossy();
+    let path = draft.create(&out.with_file_name(format!("{stem}_wires.csv")), 0)?;
+    let mut stream = Stream::open(&path)?;
+    stream.text("kind,name,vertex,to\n");
+    let name = |label| {
+        mesh.label_name(label)
+            .replace('"', "\"\"")
+            .replace(['\n', '\r'], " ")
+    };
+    for ([a, b], label) in &wires.edges {
+        stream.text(&format!("edge,\"{}\",{a},{b}\n", name(*label)));
+        stream.end()?;
+    }
+    for point in &wires.points {
+        stream.text(&format!(
+            "point,\"{}\",{},\n",
+            name(point.label),
+            point.vertex
+        ));
+        stream.end()?;
+    }
+    stream.finish()
+}

@@ -1,0 +1,265 @@
+//! A surface with wires in it: they are added, checked and held.
+//!
+//! A point is a vertex that no triangle uses. An edge that no triangle has is held by a fin: a triangle of its own beside it, see `fins`.
+
+use std::collections::HashMap;
+
+use super::contact::ContactKind;
+use super::weld::PointTable;
+use super::wire_contact::{Edge, EdgeAtTriangle, has_area, is_on_edge, point_at_triangle};
+use super::wire_set::{WireError, WireSet, Wires};
+use super::{BoxTree, Surface, SurfaceError};
+use crate::geom::{Aabb, Point};
+use crate::storage::ScratchSpace;
+
+/// An edge or a point this near to something else, as a share of the box diagonal, is refused: a vertex beside it is rounded to some 1e-16
+/// of the diagonal, and directions must stay known to several digits.
+pub(super) const NEAR_SHARE: f64 = 1e-10;
+
+impl Surface {
+    /// Whether it has embedded edges or points.
+    pub fn has_wires(&self) -> bool {
+        !self.wires.edges.is_empty() || !self.wires.points.is_empty()
+    }
+
+    /// Points that no triangle uses, and how long edges there should be at most.
+    pub fn lone_points(&self) -> Vec<(u32, f64)> {
+        let points = self.wires.points.iter().zip(&self.wires.sizes);
+        let alone = points.filter(|(_, size)| **size > 0.0);
+        alone.map(|(&[v, _], &size)| (v, size)).collect()
+    }
+
+    /// Whether triangle `t` is not of the input, but holds an edge of a wire.
+    #[inline]
+    pub fn is_fin(&self, t: u32) -> bool {
+        self.wires.fins.is_some_and(|[first, _]| t >= first)
+    }
+
+    /// Number of triangles, without those that hold edges of wires.
+    pub fn n_own_triangles(&self) -> usize {
+        self.wires
+            .fins
+            .map_or(self.n_triangles(), |[first, _]| first as usize)
+    }
+
+    /// Number of vertices, without those that only hold edges of wires.
+    pub fn n_own_vertices(&self) -> usize {
+        self.wires
+            .fins
+            .map_or(self.n_vertices(), |[_, first]| first as usize)
+    }
+
+    /// Adds edges and points, and what holds them; vertices with the same coordinates become one.
+    ///
+    /// Labels are called as those of sheets: see [`Surface::embed`].
+    ///
+    /// # Errors
+    /// [`SurfaceError::Wire`] with the place; [`SurfaceError::TooLarge`].
+    pub fn embed_wires(
+        &mut self,
+        other: &WireSet,
+        name: &str,
+        room: &ScratchSpace,
+    ) -> Result<(), SurfaceError> {
+        self.drop_fins();
+        let mut table = PointTable::of(&self.points);
+        let mut vert = |points: &mut Vec<Point>, v: u32| {
+            table.find_or_add(other.points[v as usize] + Point::ZERO, points)
+        };
+        let first = self.add_labels(&other.label_names, name);
+        for &[a, b, label] in &other.edges {
+            let ends = [a, b].map(|v| vert(&mut self.points, v));
+            self.wires.edges.push([ends[0], ends[1], first + label]);
+        }
+        for &[v, label] in &other.marks {
+            let v = vert(&mut self.points, v);
+            self.wires.points.push([v, first + label]);
+        }
+        SurfaceError::check_size("vertices", self.points.len() + self.wires.edges.len())?;
+        SurfaceError::check_size("triangles", self.n_triangles() + self.wires.edges.len())?;
+        self.hold_wires(room)
+    }
+
+    /// Without the triangles that hold edges of wires, and their vertices.
+    pub(super) fn drop_fins(&mut self) {
+        if let Some([triangle, vertex]) = self.wires.fins.take() {
+            self.triangles.truncate(triangle as usize);
+            self.labels.truncate(triangle as usize);
+            self.sheets.truncate(triangle as usize);
+            self.points.truncate(vertex as usize);
+        }
+        if self.sheets.iter().all(|&is_sheet| !is_sheet) {
+            self.sheets.clear();
+        }
+    }
+
+    /// The same without edges and points.
+    pub fn without_wires(&self) -> Self {
+        let mut plain = self.clone();
+        plain.drop_fins();
+        plain.wires = Wires::default();
+        super::weld::drop_unused_points(&mut plain);
+        super::weld::drop_unused_labels(&mut plain);
+        plain
+    }
+
+    /// Checks edges and points, adds fins, and finds the sizes at points.
+    ///
+    /// # Errors
+    /// As [`Surface::embed_wires`].
+    pub fn hold_wires(&mut self, room: &ScratchSpace) -> Result<(), SurfaceError> {
+        self.drop_fins();
+        if !self.has_wires() {
+            return Ok(());
+        }
+        self.refuse_repeated()?;
+        let triangles = super::broad::tree_of(self, room, |t| has_area(&self.corners(t)));
+        let edges = self.wire_tree(room, |_| true);
+        let is_free = self.refuse_contacts(&triangles, &edges)?;
+        drop(edges);
+        self.add_fins(&is_free, triangles, room)?;
+        self.set_sizes(room)
+    }
+
+    /// Edge `e` of the wires.
+    pub(super) fn wire(&self, e: u32) -> Edge {
+        let [a, b, _] = self.wires.edges[e as usize];
+        let ids = [a, b];
+        Edge {
+            ids,
+            ends: ids.map(|v| self.points[v as usize]),
+        }
+    }
+
+    /// A tree over those edges of wires that `keep` accepts.
+    pub(super) fn wire_tree(
+        &self,
+        room: &ScratchSpace,
+        keep: impl Fn(u32) -> bool + Sync,
+    ) -> BoxTree {
+        let box_of = |e: u32| Aabb::around(self.wire(e).ends);
+        BoxTree::new(
+            &self.bounds(),
+            self.wires.edges.len() as u32,
+            room,
+            keep,
+            box_of,
+        )
+    }
+
+    pub(super) fn edge_name(&self, e: usize) -> String {
+        let label = self.wires.edges[e][2];
+        let number = self.wires.edges[..e]
+            .iter()
+            .filter(|edge| edge[2] == label)
+            .count();
+        format!("edge {number} of {:?}", self.label_names[label as usize])
+    }
+
+    pub(super) fn point_name(&self, p: usize) -> String {
+        let [_, label] = self.wires.points[p];
+        let number = self.wires.points[..p]
+            .iter()
+            .filter(|point| point[1] == label)
+            .count();
+        format!("point {number} of {:?}", self.label_names[label as usize])
+    }
+
+    fn refuse_repeated(&self) -> Result<(), WireError> {
+        let mut known = HashMap::new();
+        for (e, &[a, b, _]) in self.wires.edges.iter().enumerate() {
+            let at = self.points[a as usize].midpoint(self.points[b as usize]);
+            if a == b {
+                return Err(WireError::NoLength {
+                    edge: self.edge_name(e),
+                    at,
+                });
+            }
+            if let Some(other) = known.insert([a.min(b), a.max(b)], e) {
+                let [what, other] = [e, other].map(|e| self.edge_name(e));
+                return Err(WireError::Repeated { what, other, at });
+            }
+        }
+        let mut known = HashMap::new();
+        for (p, &[v, _]) in self.wires.points.iter().enumerate() {
+            if let Some(other) = known.insert(v, p) {
+                let [what, other] = [p, other].map(|p| self.point_name(p));
+                return Err(WireError::Repeated {
+                    what,
+                    other,
+                    at: self.points[v as usize],
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Of each edge whether no triangle has it. Errors: what touches triangles and edges elsewhere than in common vertices.
+    fn refuse_contacts(
+        &self,
+        triangles: &BoxTree,
+        edges: &BoxTree,
+    ) -> Result<Vec<bool>, WireError> {
+        let mut first = None;
+        let mut n = 0;
+        let mut touch = |what: &dyn Fn() -> String, other: &dyn Fn() -> String, kind, at| {
+            n += 1;
+            first.get_or_insert_with(|| (what(), other(), kind, at));
+        };
+        let triangle_name = |t: u32| format!("triangle {t} of {:?}", self.label_name(t));
+        let mut is_free = vec![true; self.wires.edges.len()];
+        for (e, is_free) in is_free.iter_mut().enumerate() {
+            let edge = self.wire(e as u32);
+            let bounds = Aabb::around(edge.ends);
+            let what = || self.edge_name(e);
+            triangles.meeting(&bounds, |t| {
+                match edge.at_triangle(self.corners(t), self.triangles[t as usize]) {
+                    EdgeAtTriangle::Apart => {}
+                    EdgeAtTriangle::Own => *is_free = false,
+                    EdgeAtTriangle::Touching(c) => touch(&what, &|| triangle_name(t), c.kind, c.at),
+                }
+            });
+            edges.meeting(&bounds, |f| {
+                if let Some(c) = (f as usize > e)
+                    .then(|| edge.at_edge(&self.wire(f)))
+                    .flatten()
+                {
+                    touch(&what, &|| self.edge_name(f as usize), c.kind, c.at);
+                }
+            });
+        }
+        for (i, &[v, _]) in self.wires.points.iter().enumerate() {
+            let p = self.points[v as usize];
+            let bounds = Aabb::around([p]);
+            let what = || self.point_name(i);
+            triangles.meeting(&bounds, |t| {
+                if !self.triangles[t as usize].contains(&v)
+                    && let Some(c) = point_at_triangle(p, &self.corners(t))
+                {
+                    touch(&what, &|| triangle_name(t), c.kind, p);
+                }
+            });
+            edges.meeting(&bounds, |e| {
+                let edge = self.wire(e);
+                if !edge.ids.contains(&v) && is_on_edge(p, edge.ends) {
+                    touch(
+                        &what,
+                        &|| self.edge_name(e as usize),
+                        ContactKind::VertexOnEdge,
+                        p,
+                    );
+                }
+            });
+        }
+        match first {
+            None => Ok(is_free),
+            Some((what, other, kind, at)) => Err(WireError::Touching {
+                what,
+                other,
+                kind,
+                at,
+                n,
+            }),
+        }
+    }
+}

@@ -1,0 +1,351 @@
+//! Edges and points inside a volume: whole and in their place through every step, or refused with the place.
+//!
+//! Why: a well whose edges the mesher moved is in other rock, and a sensor that is no vertex measures nothing.
+//! How: a box with layers, wells and sensors, from a sample and from files of every kind; edges and points where they must not be.
+
+use super::place::Place;
+
+/// Enough tetrahedra for four sub-domains.
+const MANY: &str = "sample:wells,count=40,points=60,cells=22";
+
+/// A box from 0 to 1 of twelve triangles.
+const BOX: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n\
+    f 1 3 4\nf 1 4 2\nf 5 6 8\nf 5 8 7\nf 1 2 6\nf 1 6 5\nf 3 7 8\nf 3 8 4\nf 1 5 7\nf 1 7 3\nf 2 4 8\nf 2 8 6\n";
+
+#[test]
+fn wells_and_sensors_are_edges_and_vertices_in_one_piece_and_in_several() {
+    let place = Place::new();
+    for (store, n) in [("one", 1), ("four", 4)] {
+        let line = format!("mesh {MANY} -o {store}.tetdb --subdomains {n}");
+        place.run_line(&line).succeeds();
+        let verified = place
+            .run_line(&format!("verify {store}.tetdb --full --json"))
+            .succeeds()
+            .json();
+        for (what, count) in [("edges", 0), ("points", 0), ("triangles", 0)] {
+            assert_eq!(verified[format!("{what}_missing")], count, "{store}");
+        }
+        assert_eq!(verified["points_present"], 60);
+        let info = place.run_line(&format!("info {store}.tetdb --json"));
+        let info = info.succeeds().json();
+        assert_eq!(info["subdomains"].as_array().map(Vec::len), Some(n));
+        assert_eq!(info["regions"].as_array().map(Vec::len), Some(1));
+        let edges = info["wires"].as_array().expect("a list").iter();
+        let edges: u64 = edges.filter_map(|w| w["edges"].as_u64()).sum();
+        assert_eq!(verified["edges_present"], edges);
+        let found = |label: &str| {
+            let line = format!("query {store}.tetdb --json --select id --label {label}");
+            place.run_line(&line).succeeds().stdout().lines().count()
+        };
+        assert!(found("well-1") > 10 && found("sensors") > 60 * 4);
+        // What holds the edges is no sheet.
+        let sheets = place.run_line(&format!(
+            "query {store}.tetdb --json --select id --touching-sheet --label well-1"
+        ));
+        let sheets = sheets.succeeds().stdout().lines().count();
+        assert!(sheets < found("well-1"));
+    }
+    let again = format!("mesh {MANY} -o again.tetdb --subdomains 4 --threads 1 --memory 128MiB");
+    place.run_line(&again).succeeds();
+    assert_eq!(place.digest("four.tetdb"), place.digest("again.tetdb"));
+    place
+        .run_line("resaturate four.tetdb --subdomain 1 --hgrad 1.2")
+        .succeeds();
+    place.run_line("verify four.tetdb --full").succeeds();
+}
+
+#[test]
+fn wires_of_files_keep_their_names_and_give_the_mesh_of_the_sample() {
+    let place = Place::new();
+    place
+        .run_line("sample wells,count=5,points=4 -o box.obj")
+        .succeeds();
+    let from_files = "mesh box.obj --embed box_sheets.obj --embed-edges box_wires.obj --embed-points box_wires.obj \
+         --name box_wires.obj=inside -o files.tetdb";
+    place.run_line(from_files).succeeds();
+    place
+        .run_line("mesh sample:wells,count=5,points=4 -o sample.tetdb")
+        .succeeds();
+    assert_eq!(place.digest("files.tetdb"), place.digest("sample.tetdb"));
+    let known = place.run_line(from_files).succeeds().stderr();
+    assert!(known.contains("already holds"), "{known}");
+    place.run_line("verify files.tetdb --full").succeeds();
+    for (file, words) in [
+        (
+            "out.msh",
+            &["0 ", "\"inside\"", "1 ", "\"inside:well-3\""][..],
+        ),
+        ("out.mesh", &["\nEdges\n", "\nRequiredVertices\n4\n"]),
+        (
+            "out.inp",
+            &[
+                "TYPE=T3D2, ELSET=edges_inside_well-3",
+                "*NSET, NSET=points_inside",
+            ],
+        ),
+        ("out.vtu", &[]),
+    ] {
+        place
+            .run_line(&format!("export files.tetdb {file}"))
+            .succeeds();
+        let text = std::fs::read(place.path(file)).expect("it was written");
+        let text = String::from_utf8_lossy(&text);
+        assert!(words.iter().all(|word| text.contains(word)), "{file}");
+    }
+    let list = std::fs::read_to_string(place.path("out_wires.csv")).expect("it was written");
+    assert!(list.contains("edge,\"inside:well-1\",") && list.contains("point,\"inside\","));
+    place.run_line("export files.tetdb out.ele").succeeds();
+    let info = place.run_line("info files.tetdb --json").succeeds().json();
+    let edges: u64 = (info["wires"].as_array().expect("a list").iter())
+        .filter_map(|w| w["edges"].as_u64())
+        .sum();
+    let list = std::fs::read_to_string(place.path("out.edge")).expect("it was written");
+    assert!(list.starts_with(&format!("{edges} 1\n")));
+}
+
+#[test]
+fn every_kind_of_file_gives_the_same_mesh() {
+    let place = Place::new();
+    place.write("box.obj", BOX);
+    place.write(
+        "e.obj",
+        "v .25 .25 .25\nv .25 .25 .75\nv .5 .75 .5\nl 1 2 3\n",
+    );
+    place.write(
+        "e.vtk",
+        "# vtk DataFile Version 3.0\nt\nASCII\nDATASET POLYDATA\nPOINTS 3 double\n.25 .25 .25 .25 .25 .75 .5 .75 .5\nLINES 1 4\n3 0 1 2\n",
+    );
+    place.write(
+        "e5.vtk",
+        "# vtk DataFile Version 5.1\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 3 float\n.25 .25 .25 .25 .25 .75 .5 .75 .5\n\
+         CELLS 3 4\nOFFSETS vtktypeint64\n0 2 4\nCONNECTIVITY vtktypeint64\n0 1 1 2\nCELL_TYPES 2\n3\n3\n",
+    );
+    let mut binary =
+        b"# vtk DataFile Version 5.1\nt\nBINARY\nDATASET POLYDATA\nPOINTS 3 double\n".to_vec();
+    for x in [0.25, 0.25, 0.25, 0.25, 0.25, 0.75, 0.5, 0.75, 0.5f64] {
+        binary.extend(x.to_be_bytes());
+    }
+    binary.extend(b"\nMETADATA\nINFORMATION 0\n\nLINES 2 3\nOFFSETS vtktypeint64\n");
+    [0, 3i64]
+        .iter()
+        .for_each(|n| binary.extend(n.to_be_bytes()));
+    binary.extend(b"\nCONNECTIVITY vtktypeint64\n");
+    [0, 1, 2i64]
+        .iter()
+        .for_each(|n| binary.extend(n.to_be_bytes()));
+    place.write("eb.vtk", binary);
+    place.write(
+        "e.poly",
+        "3 3 0 0\n1 .25 .25 .25\n2 .25 .25 .75\n3 .5 .75 .5\n2 1\n1 0 7\n2 1 2\n1 0 7\n2 2 3\n0\n0\n",
+    );
+    place.write("p.csv", "x,y,z,name\n0.7,0.25,0.5,north\n0.75, 0.7, 0.2\n");
+    place.write("p.node", "2 3 0 1\n0 0.7 0.25 0.5 4\n1 0.75 0.7 0.2 0\n");
+    // What a head says of attributes may be anything: lines end where they end.
+    place.write(
+        "mad.node",
+        "2 3 999999999991 1\n0 0.7 0.25 0.5 4\n1 0.75 0.7 0.2 0\n",
+    );
+    place.write("p.txt", "# two\n0.7 0.25 0.5 north\n0.75\t0.7 0.2\n");
+    let mut digests = Vec::new();
+    for edges in ["e.obj", "e.vtk", "e5.vtk", "eb.vtk", "e.poly"] {
+        for points in ["p.csv", "p.node", "p.txt", "mad.node"] {
+            let line = format!(
+                "mesh box.obj --embed-edges {edges} --embed-points {points} -o s.tetdb --force"
+            );
+            place.run_line(&line).succeeds();
+            digests.push(place.digest("s.tetdb"));
+        }
+    }
+    assert!(digests.windows(2).all(|d| d[0] == d[1]), "{digests:?}");
+    let verified = place.run_line("verify s.tetdb --full --json").succeeds();
+    let verified = verified.json();
+    assert_eq!(
+        (&verified["edges_present"], &verified["points_present"]),
+        (&2.into(), &2.into())
+    );
+    // On an edge of the surface, on its corner and inside: nothing is added where a triangle has it.
+    place.write(
+        "on.obj",
+        "v 0 0 0\nv 1 0 0\nv .5 .5 .5\nl 1 2\nl 2 3\np 1\n",
+    );
+    place
+        .run_line("mesh box.obj --embed-edges on.obj --embed-points on.obj -o on.tetdb")
+        .succeeds();
+    place.run_line("verify on.tetdb --full").succeeds();
+}
+
+#[test]
+fn edges_and_points_in_wrong_places_are_refused_with_the_place() {
+    let place = Place::new();
+    place.write("box.obj", BOX);
+    let inside = "v .25 .25 .25\nv .25 .25 .75\nv .5 .75 .5\nv .25 .25 .5\n";
+    for (file, option, text, code) in [
+        (
+            "out.obj",
+            "edges",
+            "v 2 0 0\nv 3 0 0\nl 1 2\n",
+            "wire-outside",
+        ),
+        (
+            "leave.obj",
+            "edges",
+            "v .5 .5 .5\nv .5 .4 1.5\nl 1 2\n",
+            "wire-contact",
+        ),
+        (
+            "end.obj",
+            "edges",
+            "v .5 .5 .5\nv .5 .4 1\nl 1 2\n",
+            "wire-contact",
+        ),
+        (
+            "side.obj",
+            "edges",
+            "v .5 .5 .5\nv .5 0 0\nl 1 2\n",
+            "wire-contact",
+        ),
+        (
+            "in_face.obj",
+            "edges",
+            "v 1 0 0\nv 0 1 0\nl 1 2\n",
+            "wire-contact",
+        ),
+        (
+            "along.obj",
+            "edges",
+            "v 0 0 0\nv .5 0 0\nl 1 2\n",
+            "wire-contact",
+        ),
+        (
+            "cross.obj",
+            "edges",
+            "v .4 .4 .4\nv .6 .6 .4\nv .4 .6 .4\nv .6 .4 .4\nl 1 2\nl 3 4\n",
+            "wire-contact",
+        ),
+        (
+            "touch.obj",
+            "edges",
+            "v .4 .4 .4\nv .6 .6 .6\nv .5 .5 .5\nv .5 .5 .1\nl 1 2\nl 3 4\n",
+            "wire-contact",
+        ),
+        (
+            "fold.obj",
+            "edges",
+            "v .4 .4 .4\nv .6 .6 .6\nv .5 .5 .5\nl 1 2\nl 1 3\n",
+            "wire-contact",
+        ),
+        (
+            "point.obj",
+            "edges",
+            "v .5 .5 .5\nl 1 1\n",
+            "degenerate-edge",
+        ),
+        (
+            "equal.obj",
+            "edges",
+            "v .5 .5 .5\nv .5 .5 .5\nl 1 2\n",
+            "degenerate-edge",
+        ),
+        (
+            "twice.obj",
+            "edges",
+            "v .4 .4 .4\nv .6 .6 .6\nl 1 2\nl 2 1\n",
+            "duplicate-wire",
+        ),
+        (
+            "near.obj",
+            "edges",
+            "v .4 .4 .4\nv .6 .6 .4\nv .4 .6 .40000000000001\nv .6 .4 .40000000000001\nl 1 2\nl 3 4\n",
+            "wire-too-near",
+        ),
+        (
+            "nan.obj",
+            "edges",
+            "v .4 .4 nan\nv .6 .6 .6\nl 1 2\n",
+            "not-a-number",
+        ),
+        (
+            "index.obj",
+            "edges",
+            "v .4 .4 .4\nv .6 .6 .6\nl 1 3\n",
+            "index-out-of-range",
+        ),
+        (
+            "none.obj",
+            "edges",
+            "v .4 .4 .4\nv .6 .6 .6\np 1\n",
+            "unexpected-text",
+        ),
+        ("edges.stl", "edges", "solid\nendsolid\n", "unknown-format"),
+        (
+            "short.vtk",
+            "edges",
+            "# vtk DataFile Version 3.0\nt\nASCII\nDATASET POLYDATA\nPOINTS 2 double\n.4 .4 .4 .5\n",
+            "truncated-file",
+        ),
+        ("text.vtk", "edges", "no such file\n", "unexpected-text"),
+        (
+            "cells.vtk",
+            "edges",
+            "# vtk DataFile Version 3.0\nt\nASCII\nDATASET POLYDATA\nPOINTS 2 double\n.4 .4 .4 .5 .5 .5\nLINES 1 3\n9 0 1\n",
+            "count-mismatch",
+        ),
+        ("far.csv", "points", "1,1,7\n", "wire-outside"),
+        ("face.csv", "points", "0.5,0.25,0\n", "wire-contact"),
+        ("edge.csv", "points", "0.5,0,0\n", "wire-contact"),
+        (
+            "same.csv",
+            "points",
+            "0.5,0.5,0.5,a\n0.5,0.5,0.5,b\n",
+            "duplicate-wire",
+        ),
+        (
+            "close.csv",
+            "points",
+            "0.5,0.5,0.5,a\n0.5,0.5,0.50000000000001,b\n",
+            "wire-too-near",
+        ),
+        (
+            "word.csv",
+            "points",
+            "0.5,0.5,0.5\n0.1,x,0.1\n",
+            "not-a-number",
+        ),
+        ("inf.csv", "points", "0.5,0.5,inf\n", "not-a-number"),
+        ("huge.csv", "points", "0.5,0.5,1e200\n", "coordinate-range"),
+        ("two.csv", "points", "0.5,0.5\n", "not-a-number"),
+        (
+            "flat.node",
+            "points",
+            "1 2 0 0\n1 0.5 0.5\n",
+            "unsupported-content",
+        ),
+        ("empty.csv", "points", "", "unexpected-text"),
+    ] {
+        place.write(file, text);
+        let run = place.run_line(&format!(
+            "mesh box.obj --embed-{option} {file} -o s.tetdb --json"
+        ));
+        let error = run.error();
+        assert_eq!(
+            (run.exit(), &error["code"]),
+            (Some(3), &code.into()),
+            "{file}: {error}"
+        );
+        assert!(!error["where"].is_null(), "{file}: {error}");
+        assert!(!place.path("s.tetdb").exists(), "{file}");
+    }
+    // A point on an edge that is embedded, too, and beside a hole of the filled regions.
+    place.write("edge.obj", inside.to_owned() + "l 1 2\n");
+    place.write("on.csv", "0.25,0.25,0.5\n");
+    let run = place.run_line("mesh box.obj --embed-edges edge.obj --embed-points on.csv --json");
+    assert_eq!(run.error()["code"], "wire-contact");
+    let run =
+        place.run_line("mesh box.obj --embed-points on.csv --refine-surface --hsiz 0.2 --json");
+    assert_eq!(run.error()["code"], "usage");
+    let run = place.run_line("check box.obj --embed-edges edge.obj --repair --write r.obj --json");
+    assert_eq!(run.error()["code"], "usage");
+    place
+        .run_line("mesh box.obj --embed-edges edge.obj")
+        .succeeds();
+}
