@@ -51,7 +51,7 @@ impl Flips {
         };
         let mesh = [
             "mesh",
-            "sample:box,h=0.045",
+            "sample:box,h=0.05",
             "-o",
             "a.tetdb",
             "--subdomains",
