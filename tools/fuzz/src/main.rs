@@ -2,9 +2,10 @@
 //!
 //! Runs on stable Rust, without coverage: seeds are files of every shape a format has, mutations know numbers that readers
 //! trip over. An input that panics, ends the process, or takes longer than a second, is written beside the corpus as
-//! `TARGET/found-HASH`. Whole stores are fed to a process of their own, for one that panics twice is gone.
+//! `TARGET/found-HASH`. Stores and their files are fed to a process of their own, for one that panics twice is gone.
 #![forbid(unsafe_code)]
 
+mod file;
 mod mutate;
 mod store;
 mod targets;
@@ -23,6 +24,8 @@ const SLOW: Duration = Duration::from_secs(1);
 const HANGS: Duration = Duration::from_secs(60);
 /// So many findings are enough.
 const FOUND_MAX: u32 = 10;
+/// Targets whose inputs may end the process.
+const APART: [&str; 2] = ["file", "store"];
 /// Where a process that runs on behalf of another leaves each input before it runs it.
 const INPUT_FILE: &str = "TETDB_FUZZ_INPUT";
 
@@ -47,7 +50,7 @@ fn main() -> ExitCode {
     {
         let folder = corpus.join(target.name);
         let time = Duration::from_secs(seconds);
-        let is_apart = target.name == "store" && std::env::var_os(INPUT_FILE).is_none();
+        let is_apart = APART.contains(&target.name) && std::env::var_os(INPUT_FILE).is_none();
         let done = match is_apart {
             true => run_apart(target, &folder, time, seed),
             false => run(target, &folder, time, seed),

@@ -71,7 +71,8 @@ impl Sound {
 /// Each eight bytes are a change: file, whether of a value, where (four bytes), what, and how.
 pub fn changed(bytes: &[u8]) {
     static SOUND: OnceLock<[Mutex<Sound>; 2]> = OnceLock::new();
-    let sound = SOUND.get_or_init(|| [Seal::Packed, Seal::None].map(|seal| Mutex::new(sound(seal))));
+    let sound =
+        SOUND.get_or_init(|| [Seal::Packed, Seal::None].map(|seal| Mutex::new(sound(seal))));
     let choice = xxh3_64_with_seed(bytes, 0);
     let sound = &sound[choice as usize % 2];
     let sound = sound.lock().unwrap_or_else(|e| e.into_inner());
