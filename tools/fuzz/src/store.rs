@@ -92,7 +92,7 @@ pub fn changed(bytes: &[u8]) {
         std::fs::write(path, content).expect("writable");
     }
     ask(&sound.path);
-    if choice / 2 % 8 == 0 {
+    if (choice / 2).is_multiple_of(8) {
         write(&sound.path, choice / 16 % 5);
     }
     sound.restore();
