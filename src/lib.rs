@@ -43,19 +43,17 @@ mod house {
     // Floor 2.
     pub mod mesh;
     pub mod sealed;
-    #[cfg_attr(not(feature = "internals"), allow(dead_code))]
+    #[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "for the program"))]
     pub mod surface;
     // Floor 3.
     pub mod delaunay;
     pub mod reconnect;
-    #[cfg_attr(not(feature = "internals"), allow(dead_code))]
     pub mod samples;
-    #[cfg_attr(not(feature = "internals"), allow(dead_code))]
     pub mod sizing;
     pub mod store;
     // Floor 4.
     pub mod boundary;
-    #[cfg_attr(not(feature = "internals"), allow(dead_code))]
+    #[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "for the program"))]
     pub mod optimize;
     pub mod refine;
     // Floor 5.

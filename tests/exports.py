@@ -46,7 +46,9 @@ def by_pyvista(path):
     import pyvista
     mesh, skin = pyvista.read(path), pyvista.read(path[:-4] + "_boundary.vtu")
     names = bytes(skin.field_data["label_names"]).decode().split("\0")
-    assert {"subdomain", "region", "quality", "global_id"} <= set(mesh.cell_data.keys())
+    assert {"subdomain", "region", "quality", "excess", "global_id"} <= set(mesh.cell_data.keys())
+    excess, quality = mesh.cell_data["excess"], mesh.cell_data["quality"]
+    assert (1 <= excess).all() and (excess <= quality * (1 + 1e-12)).all() and (excess < quality).any()
     assert {"label", "input_id", "region_front", "region_back"} <= set(skin.cell_data.keys())
     assert np.array_equal(mesh.points[skin.point_data["mesh_vertex"]], skin.points)
     assert (np.diff(skin.cell_data["input_id"]) > 0).all()

@@ -30,8 +30,101 @@ const HOUSE: &[&[&str]] = &[
 /// Files and modules at the top of the crate that are no rooms.
 const NOT_ROOMS: &[&str] = &["lib", "main", "guide"];
 
-/// Rooms whose files still form circles. A room that no longer does must leave this list.
-const WITH_CIRCLES: &[&str] = &["optimize"];
+/// Longer files and functions are looked at a second time: those left are below, each with its reason.
+const FILE_LINES_MAX: usize = 500;
+const FUNCTION_LINES_MAX: usize = 80;
+
+/// Files above [`FILE_LINES_MAX`], tests at their feet not counted.
+const LONG_FILES: &[(&str, &str)] = &[
+    (
+        "api/mesher.rs",
+        "a method with its documentation for each option of a mesh",
+    ),
+    (
+        "api/surface.rs",
+        "a method with its documentation for all that is done to a surface",
+    ),
+    (
+        "store/catalog.rs",
+        "one transaction type: a reader and a writer for each table",
+    ),
+    (
+        "audit/pass.rs",
+        "one walk over a sub-domain that all five levels of checks share",
+    ),
+    (
+        "io/read/feed.rs",
+        "the words, numbers and places that every text format reads by",
+    ),
+];
+
+/// Functions above [`FUNCTION_LINES_MAX`].
+const LONG_FUNCTIONS: &[(&str, &str)] = &[
+    (
+        "boundary/grow.rs grow",
+        "a cavity is grown, then refused for any of five reasons that need what was grown",
+    ),
+    (
+        "boundary/points.rs build",
+        "chains, faces and suppression of one attempt, which hand on four lists",
+    ),
+    (
+        "boundary/space.rs replace",
+        "pairs of sides are matched; each step uses the list before",
+    ),
+    (
+        "cli/estimate.rs run",
+        "an answer line by line, for people and for programs",
+    ),
+    (
+        "io/read/obj.rs read",
+        "one match over the words that begin a line",
+    ),
+    (
+        "io/write/foam/faces.rs part",
+        "one merge of four sorted streams; what a face is depends on all four",
+    ),
+    (
+        "io/write/foam/processors.rs faces",
+        "three kinds of faces in the order of one file",
+    ),
+    (
+        "io/write/foam/processors.rs write",
+        "two passes that share their counts",
+    ),
+    (
+        "io/write/gmsh/nodes.rs claims",
+        "faces, tetrahedra, vertices and ghosts claim in turn, into one sorter",
+    ),
+    (
+        "io/write/midpoints.rs gather",
+        "five passes, each sorted for the next",
+    ),
+    (
+        "io/write/vtu.rs write",
+        "nine arrays named, opened, filled and closed in one order",
+    ),
+    (
+        "io/write/vtu_boundary.rs write",
+        "fourteen arrays named, opened, filled and closed in one order",
+    ),
+    (
+        "pipeline/mesh/run.rs coarse_step",
+        "one step of the recipe and its commit",
+    ),
+    (
+        "pipeline/remesh/run.rs commit",
+        "one commit: what it checks and all that it writes",
+    ),
+    (
+        "pipeline/tasks/serve.rs serve",
+        "what orders need is set up once and lent to the threads that do them",
+    ),
+    (
+        "refine/long_edges.rs divide",
+        "one edge from its length to its points",
+    ),
+];
 
 fn floor(room: &str) -> Option<usize> {
     HOUSE.iter().position(|rooms| rooms.contains(&room))
@@ -76,21 +169,15 @@ fn files_of_a_room_form_no_circle() {
         n_edges > 200,
         "only {n_edges} imports between the files of a room found: does the test still read the sources?"
     );
-    let found = circles(&graph);
-    let rooms: BTreeSet<&str> = found.iter().flatten().map(|file| first(file)).collect();
-    for room in WITH_CIRCLES {
-        assert!(rooms.contains(room), "{room} has no circles any more");
-    }
-    let new: Vec<_> = found
+    let found: Vec<_> = circles(&graph)
         .iter()
-        .filter(|files| files.iter().all(|f| !WITH_CIRCLES.contains(&first(f))))
         .map(|files| describe(files, &graph))
         .collect();
     assert!(
-        new.is_empty(),
+        found.is_empty(),
         "{} circles of files inside a room:\n{}",
-        new.len(),
-        new.join("\n")
+        found.len(),
+        found.join("\n")
     );
 }
 
@@ -131,6 +218,80 @@ fn the_readme_names_every_room_and_no_file_that_is_not_there() {
         let found = src().join(file).exists() || src().join("..").join(file).exists();
         assert!(found, "src/README.md names {file}, which does not exist");
     }
+}
+
+#[test]
+fn long_files_and_functions_are_those_with_a_reason() {
+    let (mut files, mut functions) = (BTreeSet::new(), BTreeSet::new());
+    let mut n_functions = 0;
+    for path in sources(&src()) {
+        let text = fs::read_to_string(&path).expect("a source file is readable");
+        let name = path.strip_prefix(src()).expect("it is below src");
+        let name = name.to_string_lossy().replace('\\', "/");
+        if before_tests(&text).lines().count() > FILE_LINES_MAX {
+            files.insert(name.clone());
+        }
+        for (function, lines) in functions_of(&text) {
+            n_functions += 1;
+            if lines > FUNCTION_LINES_MAX {
+                functions.insert(format!("{name} {function}"));
+            }
+        }
+    }
+    assert!(
+        n_functions > 3000,
+        "only {n_functions} functions found: does the test still read the sources?"
+    );
+    let listed = |list: &[(&str, &str)]| list.iter().map(|row| row.0.to_owned()).collect();
+    assert_eq!(files, listed(LONG_FILES));
+    assert_eq!(functions, listed(LONG_FUNCTIONS));
+}
+
+/// The text up to the tests at its foot.
+fn before_tests(text: &str) -> &str {
+    text.split("\n#[cfg(test)]\nmod tests {")
+        .next()
+        .unwrap_or(text)
+}
+
+/// Functions with a body and the lines of each, as `cargo fmt` leaves them: from the name to the brace below it. Tests are left out.
+fn functions_of(text: &str) -> Vec<(String, usize)> {
+    let lines: Vec<&str> = before_tests(text).lines().collect();
+    let mut found = Vec::new();
+    for (i, line) in lines.iter().enumerate() {
+        let code = line.trim_start();
+        let Some(at) = code.find("fn ").filter(|&at| {
+            let words = code[..at].split_whitespace();
+            words
+                .map(|w| w.split('(').next().unwrap_or(w))
+                .all(|w| ["pub", "const", "unsafe"].contains(&w))
+        }) else {
+            continue;
+        };
+        let attributes = lines[..i].iter().rev().map(|l| l.trim());
+        let mut attributes = attributes.take_while(|l| l.starts_with("#["));
+        let head = lines[i..].iter().find(|l| l.ends_with(['{', '}', ';']));
+        if attributes.any(|l| l == "#[test]") || head.is_none_or(|l| l.ends_with(';')) {
+            continue;
+        }
+        let end = format!("{}}}", &line[..line.len() - code.len()]);
+        let ended = |l: &&str| {
+            **l == end
+                || l.len() > end.len() && l.starts_with(&end) && l.as_bytes()[end.len()] == b';'
+        };
+        if let Some(length) = lines[i..].iter().position(ended) {
+            found.push((name(&code[at + "fn ".len()..]), length + 1));
+        }
+    }
+    found
+}
+
+#[test]
+fn functions_are_measured_to_their_last_brace() {
+    let text = "trait T {\n    fn only_named(\n        &self,\n    );\n}\n\nfn a() {\n    1\n}\n\nimpl B {\n    pub(super) fn b(\n        c: u32,\n    ) -> u32 {\n        c\n    }\n}\n\
+        #[test]\n#[ignore]\nfn left_out() {\n}\n";
+    let found = functions_of(text);
+    assert_eq!(found, [("a".to_owned(), 3), ("b".to_owned(), 5)]);
 }
 
 #[test]

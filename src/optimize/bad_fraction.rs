@@ -6,21 +6,13 @@
 
 use super::collapse::Collapser;
 use super::deficit::{Deficit, GAIN};
+use super::goals::OperationCounts;
 use super::insertion::{Better, Inserter};
 use super::objective::Sum;
-use super::quality::GOODNESS_WANTED;
-use super::rounds::{Means, OperationCounts, RoundGoal};
 use super::smooth::{Star, is_free};
 use super::swap::Swapper;
 use crate::mesh::{Mesh, Tet};
 use crate::storage::Pages;
-
-/// The third aim: what is still at q >= 2 after the others.
-pub(super) const SHARE: RoundGoal = RoundGoal {
-    below: GOODNESS_WANTED,
-    enough: GOODNESS_WANTED,
-    means: Means::Sum,
-};
 
 /// Largest ball that is smoothed: as in the rounds before.
 const BALL_MAX: usize = 128;

@@ -21,11 +21,14 @@
 
 mod bad_fraction;
 mod bound;
+mod bound_table;
 mod climb;
 mod collapse;
 mod deficit;
+mod goals;
 mod insertion;
 mod lawson;
+#[cfg(test)]
 mod measure;
 mod mend;
 mod objective;
@@ -43,9 +46,11 @@ mod tests;
 mod vertex_operations;
 
 pub use bound::{excess, face_floor, face_least, least};
+pub use bound_table::excess_near;
+pub use goals::OperationCounts;
 pub use lawson::LawsonStats;
+#[cfg(test)]
 pub use measure::{Histogram, QualityTable, measure};
 pub use mend::MendCounts;
 pub use quality::{GOODNESS_WANTED, inverse_quality, is_forcing, quality};
-pub use rounds::OperationCounts;
 pub use run::{Mode, OptimizeReport, Progress, Settings, run, run_with};

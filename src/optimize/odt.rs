@@ -9,11 +9,11 @@
 //!
 //! Source: L. Chen and M. Holst, "Efficient mesh optimization schemes based on optimal Delaunay triangulations" (2011).
 
-use tetdb_schema::page::{RECORDS, SLOT_BITS, Slot, u32_le};
+use tetdb_schema::page::{RECORDS, SLOT_BITS, Slot};
 
 use super::pages::Way;
 use super::smooth::is_free;
-use super::sums::Sums;
+use super::sums::{Sums, four, set_four};
 use crate::geom::{Point, orient};
 use crate::mesh::anatomy::FACES;
 use crate::mesh::{Mesh, Scan, Tet, dense, scan_parts, sparse, tets_of_page};
@@ -56,26 +56,6 @@ pub(super) fn sweep<P: Pages>(mesh: &mut Mesh<P>, way: Way) -> Moves {
     restore(mesh, way.turned(), &mut moves);
     mesh.pages_mut().clear::<{ kind::SCRATCH }>();
     moves
-}
-
-/// Four numbers beside a vertex: first the sum of weighted circumcenters times two and the sum of weights (both as
-/// six volumes), then the position before the move and what is left of its patience: 1 when moved, 0 when not.
-#[inline(always)]
-pub(super) fn four(slot: &Slot) -> [f64; 4] {
-    let f = |i: usize| {
-        let (low, high) = (slot[i].to_native(), slot[i + 1].to_native());
-        f64::from_bits(u64::from(low) | u64::from(high) << 32)
-    };
-    [f(0), f(2), f(4), f(6)]
-}
-
-#[inline(always)]
-pub(super) fn set_four(slot: &mut Slot, numbers: [f64; 4]) {
-    for (i, number) in numbers.into_iter().enumerate() {
-        let bits = number.to_bits();
-        slot[2 * i] = u32_le::from_native(bits as u32);
-        slot[2 * i + 1] = u32_le::from_native((bits >> 32) as u32);
-    }
 }
 
 /// Adds up circumcenters at all vertices; those of required and hull faces get a sum that is not a number.

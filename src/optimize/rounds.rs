@@ -1,9 +1,10 @@
 //! Rounds over the pages that hold bad tetrahedra.
 
 use super::bad_fraction::BadFraction;
+use super::goals::{Means, OperationCounts, RoundGoal};
 use super::objective::Worst;
 use super::pages::{PageFlags, clear_marks, is_examined, reopen};
-use super::quality::{CONTENT, GOODNESS_WANTED, face_bound, inverse_quality, is_below};
+use super::quality::{CONTENT, face_bound, inverse_quality, is_below};
 use super::smooth::{Star, is_free, raised};
 use super::swap::Swapper;
 use super::vertex_operations::VertexOperations;
@@ -18,64 +19,6 @@ const ROUNDS_MAX: u32 = 8;
 const GAIN_MIN: f64 = 1e-3;
 /// Largest ball that is smoothed.
 const BALL_MAX: usize = 128;
-
-/// Accepted operations.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct OperationCounts {
-    /// Bad tetrahedra looked at, over all rounds.
-    pub attacked: u64,
-    /// Edges removed.
-    pub edges_removed: u64,
-    /// Faces swapped for edges.
-    pub faces_swapped: u64,
-    /// Vertices moved by smoothing.
-    pub vertices_smoothed: u64,
-    /// Edges collapsed.
-    pub edges_collapsed: u64,
-    /// Vertices inserted.
-    pub vertices_inserted: u64,
-    /// Rounds done.
-    pub rounds: u32,
-}
-
-impl OperationCounts {
-    /// Changes to the mesh.
-    pub(super) fn changes(&self) -> u64 {
-        self.edges_removed
-            + self.faces_swapped
-            + self.vertices_smoothed
-            + self.edges_collapsed
-            + self.vertices_inserted
-    }
-}
-
-/// What a round aims at.
-#[derive(Clone, Copy)]
-pub(super) struct RoundGoal {
-    /// Tetrahedra below this goodness are attacked.
-    pub(super) below: f64,
-    /// Searches for a position stop here.
-    pub(super) enough: f64,
-    pub(super) means: Means,
-}
-
-/// What may be done, and what it is judged by.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Means {
-    /// Connections change and vertices move where that raises the worst goodness.
-    Connections,
-    /// Vertices are removed and added, too.
-    Vertices,
-    /// All this where it lowers the sum of what is missing.
-    Sum,
-}
-
-/// The first aim: every tetrahedron of q ≥ 2, without changing the vertices' number.
-pub(super) const BAD: RoundGoal = RoundGoal {
-    below: GOODNESS_WANTED,
-    enough: GOODNESS_WANTED * 1.02,
-    means: Means::Connections,
-};
 
 /// Scratch and queues of all rounds.
 pub(super) struct Rounds {

@@ -1,12 +1,11 @@
 //! The schedule.
 
-use super::bad_fraction::SHARE;
+use super::goals::{BAD, OperationCounts, SHARE, WORST};
 use super::lawson::{Lawson, LawsonStats};
 use super::mend::{MendCounts, Mender};
 use super::odt;
 use super::pages::{PageFlags, Way, clear_marks};
-use super::rounds::{BAD, OperationCounts, Rounds};
-use super::vertex_operations::WORST;
+use super::rounds::Rounds;
 use crate::mesh::{Mesh, dense, sparse};
 use crate::storage::Pages;
 

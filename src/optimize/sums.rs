@@ -3,7 +3,8 @@
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
-use super::odt::{four, set_four};
+use tetdb_schema::page::{Slot, u32_le};
+
 use crate::mesh::Mesh;
 use crate::storage::{Pages, kind};
 
@@ -27,6 +28,26 @@ impl Hasher for Spread {
         self.0 = u64::from(block)
             .wrapping_mul(0x9E37_79B9_7F4A_7C15)
             .rotate_left(29);
+    }
+}
+
+/// Four numbers beside a vertex: first the sum of weighted circumcenters times two and the sum of weights (both as
+/// six volumes), then the position before the move and what is left of its patience: 1 when moved, 0 when not.
+#[inline(always)]
+pub(super) fn four(slot: &Slot) -> [f64; 4] {
+    let f = |i: usize| {
+        let (low, high) = (slot[i].to_native(), slot[i + 1].to_native());
+        f64::from_bits(u64::from(low) | u64::from(high) << 32)
+    };
+    [f(0), f(2), f(4), f(6)]
+}
+
+#[inline(always)]
+pub(super) fn set_four(slot: &mut Slot, numbers: [f64; 4]) {
+    for (i, number) in numbers.into_iter().enumerate() {
+        let bits = number.to_bits();
+        slot[2 * i] = u32_le::from_native(bits as u32);
+        slot[2 * i + 1] = u32_le::from_native((bits >> 32) as u32);
     }
 }
 

@@ -1,6 +1,6 @@
 //! A cube with prescribed skin and a random inside: what optimization must reach and must not touch.
 
-use super::bad_fraction::SHARE;
+use super::goals::SHARE;
 use super::mend::Mender;
 use super::pages::PageFlags;
 use super::rounds::Rounds;

@@ -1,18 +1,11 @@
 //! Operations that change the number of vertices, for the worst tetrahedra only.
 
 use super::collapse::Collapser;
+use super::goals::OperationCounts;
 use super::insertion::{Better, Inserter};
 use super::objective::Worst;
-use super::rounds::{Means, OperationCounts, RoundGoal};
 use crate::mesh::{Mesh, Tet};
 use crate::storage::Pages;
-
-/// The second aim: what is still at q ≥ 3 after the first.
-pub(super) const WORST: RoundGoal = RoundGoal {
-    below: 1.0 / 3.0,
-    enough: 0.5,
-    means: Means::Vertices,
-};
 
 /// Scratch of collapse and insertion.
 #[derive(Default)]

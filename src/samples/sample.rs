@@ -38,6 +38,7 @@ impl From<Sample> for Surface {
 
 impl Sample {
     /// Volume enclosed, by the divergence theorem; positive for the orientation promised here.
+    #[cfg(test)]
     pub fn signed_volume(&self) -> f64 {
         let corner = |v: u32| self.points[v as usize];
         let six: f64 = self

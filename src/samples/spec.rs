@@ -9,7 +9,6 @@ use super::shells::{ShellKind, make_shells};
 use super::steps::Steps;
 use super::{Sample, SampleError, boxes, knot, sphere};
 use crate::geom::Point;
-use crate::surface::{SourceFile, Surface};
 use std::fmt::Display;
 use std::str::FromStr;
 
@@ -113,27 +112,6 @@ impl SampleSpec {
         Ok(Self { kind })
     }
 
-    /// What was asked for, defaults filled in.
-    pub fn kind(&self) -> &SampleKind {
-        &self.kind
-    }
-
-    /// The sample's name, which also names a store when no other name is given.
-    pub fn name(&self) -> &'static str {
-        match self.kind {
-            SampleKind::Balls(_) => "balls",
-            SampleKind::Box { .. } => "box",
-            SampleKind::Caps(_) => "caps",
-            SampleKind::Faults(_) => "faults",
-            SampleKind::Grains(_) => "grains",
-            SampleKind::Knot { .. } => "knot",
-            SampleKind::Needles(_) => "needles",
-            SampleKind::Shells { .. } => "shells",
-            SampleKind::Sphere { .. } => "sphere",
-            SampleKind::Steps(_) => "steps",
-        }
-    }
-
     /// The word with every key spelled out: equal words make equal surfaces.
     pub fn canonical(&self) -> String {
         match &self.kind {
@@ -183,6 +161,7 @@ impl SampleSpec {
     /// # Errors
     /// [`SampleError::TooMany`] before anything large is allocated; [`SampleError::NoRoom`] when
     /// balls find no place.
+    #[cfg_attr(not(feature = "internals"), allow(dead_code, reason = "for benches"))]
     pub fn make(&self) -> Result<Sample, SampleError> {
         self.make_within(u64::MAX)
     }
@@ -204,19 +183,6 @@ impl SampleSpec {
             SampleKind::Sphere { radius, h } => sphere::make_sphere(*radius, *h, bytes_max),
             SampleKind::Steps(steps) => steps.make(bytes_max),
         }
-    }
-
-    /// Makes the surface as if read from a file called by the canonical word.
-    ///
-    /// # Errors
-    /// As [`SampleSpec::make`].
-    pub fn make_surface(&self) -> Result<Surface, SampleError> {
-        let mut surface = Surface::from(self.make()?);
-        surface.files.push(SourceFile {
-            name: self.canonical(),
-            triangle_first: 0,
-        });
-        Ok(surface)
     }
 }
 

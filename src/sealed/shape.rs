@@ -20,12 +20,15 @@ pub struct Shape {
 }
 
 impl Shape {
-    /// Of the positive tetrahedron with these corners.
+    /// Of the positive tetrahedron with these corners. What the caller does not use is not computed.
+    #[inline]
     pub fn of([a, b, c, d]: [Point; 4]) -> Self {
         let (ab, ac, ad, bc, bd) = (b - a, c - a, d - a, c - b, d - b);
         // Twice the areas, outward.
         let normals = [bc.cross(bd), ad.cross(ac), ab.cross(ad), ac.cross(ab)];
-        let lengths = normals.map(Point::length);
+        // Not by `map`, which calls a function for each: a quarter of all the time here.
+        let [e, f, g, h] = &normals;
+        let lengths = [e.length(), f.length(), g.length(), h.length()];
         let six_volumes = ab.dot(ac.cross(ad));
         let edges = [ab, ac, ad, bc, bd, d - c];
         let longest = edges

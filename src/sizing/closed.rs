@@ -1,6 +1,6 @@
 //! Lengths and loads in closed form, for a size that is linear along an edge or in a tetrahedron.
 
-use super::math::{atanh_ratio, exp_m1, ln};
+use super::math::{atanh_ratio, ln};
 
 /// Tetrahedra per unit of load ∫ h⁻³ after saturation and optimization.
 ///
@@ -14,22 +14,6 @@ pub fn metric_length(length: f64, ha: f64, hb: f64) -> f64 {
     // ln(hb/ha)/(hb-ha) = 2 atanh(e)/(hb-ha) = (2/(ha+hb)) * atanh(e)/e with e = (hb-ha)/(hb+ha).
     let sum = ha + hb;
     2.0 * length / sum * atanh_ratio((hb - ha) / sum)
-}
-
-/// Parameters in ]0, 1[ that divide an edge into `n` pieces of equal metric length, from `a` to `b`.
-pub fn divide_parameters(ha: f64, hb: f64, n: u32) -> impl Iterator<Item = f64> {
-    // u_k = (r^(k/n) - 1)/(r - 1) with r = hb/ha.
-    let sum = ha + hb;
-    let e = (hb - ha) / sum;
-    let log_ratio = 2.0 * e * atanh_ratio(e);
-    let whole = exp_m1(log_ratio);
-    (1..n).map(move |k| {
-        let share = f64::from(k) / f64::from(n);
-        if whole == 0.0 {
-            return share;
-        }
-        exp_m1(log_ratio * share) / whole
-    })
 }
 
 /// Load ∫ h⁻³ of a tetrahedron of that volume with h linear between its four vertices.
@@ -167,23 +151,10 @@ mod tests {
     }
 
     #[test]
-    fn edges_are_measured_and_divided() {
+    fn edges_are_measured_the_same_from_both_ends() {
         assert_eq!(metric_length(3.0, 1.0, 1.0), 3.0);
         let exact = 2.0 * 3f64.ln() / 2.0;
         assert!((metric_length(2.0, 1.0, 3.0) - exact).abs() < 1e-15);
         assert_eq!(metric_length(2.0, 1.0, 3.0), metric_length(2.0, 3.0, 1.0));
-        let thirds: Vec<f64> = divide_parameters(2.0, 2.0, 3).collect();
-        assert_eq!(thirds, [1.0 / 3.0, 2.0 / 3.0]);
-        for (ha, hb, n) in [(1.0, 3.0, 5), (2.0, 0.1, 7), (1.0, 1.0 + 1e-13, 4)] {
-            let mut cuts = vec![0.0];
-            cuts.extend(divide_parameters(ha, hb, n));
-            cuts.push(1.0);
-            let h = |u: f64| ha + (hb - ha) * u;
-            let whole = metric_length(1.0, ha, hb);
-            for pair in cuts.windows(2) {
-                let piece = metric_length(pair[1] - pair[0], h(pair[0]), h(pair[1]));
-                assert!((piece * f64::from(n) / whole - 1.0).abs() < 1e-12);
-            }
-        }
     }
 }

@@ -113,18 +113,16 @@ impl SizeField {
         }
     }
 
-    /// Reads what [`SizeField::to_bytes`] wrote, checking all of it.
-    ///
-    /// # Errors
-    /// [`SizingError::Damaged`] names what is wrong.
+    /// [`SizeField::from_bytes_in`] in memory.
+    #[cfg(test)]
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, SizingError> {
         Self::from_bytes_in(bytes, &ScratchSpace::boundless())
     }
 
-    /// [`SizeField::from_bytes`] with values that go to a scratch file where their share of `room` is too small.
+    /// Reads what [`SizeField::to_bytes`] wrote, checking all of it; values go to a scratch file where their share of `room` is too small.
     ///
     /// # Errors
-    /// As there. A scratch file that fails unwinds.
+    /// [`SizingError::Damaged`] names what is wrong. A scratch file that fails unwinds.
     pub fn from_bytes_in(bytes: &[u8], room: &ScratchSpace) -> Result<Self, SizingError> {
         if bytes.len() < HEADER_BYTES {
             return Err(damaged("length", bytes.len(), "at least 64"));

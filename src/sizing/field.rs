@@ -1,7 +1,6 @@
 //! The size field: built once, read from every thread.
 
 use super::SizingError;
-use super::closed::{divide_parameters, metric_length};
 use super::constraint::SizeConstraint;
 use super::constraints::{BEND_MAX, SizeConstraints};
 use super::corners::Corners;
@@ -12,9 +11,8 @@ use super::sources::ResolvedSource;
 use super::summary::SizeSummary;
 use super::tree::{CELLS_PER_SIZE, DEPTH, LATTICE, LEAF, Leaf, Tree, octant_of};
 use super::values::Maker;
-use crate::geom::{Aabb, Point, lex_cmp};
+use crate::geom::{Aabb, Point};
 use crate::storage::{FrozenSpillVec, ScratchSpace, SpillVec};
-use std::cmp::Ordering;
 
 /// Levels that one look into the jump table replaces: 32,768 entries of 8 bytes stay in cache.
 const JUMP: u32 = 5;
@@ -76,6 +74,7 @@ impl SizeField {
     ///
     /// # Errors
     /// Options that make no sense for this surface; a surface without edges.
+    #[cfg_attr(not(feature = "internals"), allow(dead_code, reason = "for benches"))]
     pub fn build(
         points: &[Point],
         triangles: &[[u32; 3]],
@@ -240,26 +239,6 @@ impl SizeField {
         let at = (p - self.frame.low) * self.per_lattice;
         let clamped = |x: f64| x.clamp(0.0, f64::from(LATTICE));
         [clamped(at.x), clamped(at.y), clamped(at.z)]
-    }
-
-    /// Length of the edge `a b` in the metric of the sizes at its ends, taken as linear between them.
-    #[inline]
-    pub fn edge_length_metric(&self, a: Point, b: Point) -> f64 {
-        metric_length(a.distance(b), self.h(a), self.h(b))
-    }
-
-    /// The points that divide `a b` into `n` pieces of equal metric length, from `a` to `b`.
-    ///
-    /// The same points, bit by bit, in reverse for `b a`.
-    pub fn divide(&self, a: Point, b: Point, n: u32) -> Vec<Point> {
-        let swapped = lex_cmp(a, b) == Ordering::Greater;
-        let (low, high) = if swapped { (b, a) } else { (a, b) };
-        let parameters = divide_parameters(self.h(low), self.h(high), n);
-        let mut points: Vec<Point> = parameters.map(|u| low + (high - low) * u).collect();
-        if swapped {
-            points.reverse();
-        }
-        points
     }
 
     /// Slope that the gradation allows, `ln(hgrad)`.

@@ -37,23 +37,6 @@ pub(super) fn ln(x: f64) -> f64 {
     f64::from(exponent) * LN_2 + 2.0 * e * atanh_series(e * e)
 }
 
-/// `exp(x) - 1` for `|x| < 700`, accurate near zero.
-pub(super) fn exp_m1(x: f64) -> f64 {
-    let quotient = (x / LN_2 + 0.5).floor();
-    let rest = x - quotient * LN_2;
-    // |rest| <= 0.35: the first term left out is below 1e-17.
-    let mut sum = 0.0;
-    for k in (2..=14).rev() {
-        sum = rest / f64::from(k) * (1.0 + sum);
-    }
-    let small = rest * (1.0 + sum);
-    if quotient == 0.0 {
-        return small;
-    }
-    let power = f64::from_bits(((quotient as i64 + 1023) as u64) << 52);
-    power * small + (power - 1.0)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -67,19 +50,12 @@ mod tests {
                 "{x}"
             );
             assert!((ln(x * 1e-200) - (x * 1e-200).ln()).abs() < 1e-12);
-            let y = (x - 13.0) * 0.7;
-            assert!(
-                (exp_m1(y) - y.exp_m1()).abs() <= 2e-14 * y.exp_m1().abs(),
-                "{y}"
-            );
             let e = (x / 26.0) * 0.999;
             assert!(
                 (atanh_ratio(e) * e - e.atanh()).abs() < 1e-14 * e.atanh(),
                 "{e}"
             );
         }
-        assert_eq!(exp_m1(0.0), 0.0);
         assert_eq!(atanh_ratio(0.0), 1.0);
-        assert!((exp_m1(1e-12) / 1e-12 - 1.0).abs() < 1e-11);
     }
 }

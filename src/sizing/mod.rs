@@ -48,7 +48,7 @@ mod within;
 mod tests;
 
 pub use background::{Background, BackgroundMesh};
-pub use closed::{TETS_PER_LOAD, divide_parameters, load_of_tet, metric_length};
+pub use closed::{TETS_PER_LOAD, load_of_tet, metric_length};
 pub use constraint::SizeConstraint;
 pub use count::TetCounts;
 pub use error::SizingError;

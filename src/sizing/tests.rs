@@ -420,22 +420,6 @@ fn bytes_are_read_back_and_damage_is_named() {
     }
 }
 
-#[test]
-fn edges_are_divided_the_same_from_both_ends() {
-    let field = build(&graded(50.0, 60), &SizeOptions::default());
-    let mut dice = Dice(5);
-    for _ in 0..100 {
-        let (a, b) = (dice.point(), dice.point());
-        let mut back = field.divide(b, a, 5);
-        back.reverse();
-        assert_eq!(field.divide(a, b, 5), back);
-        assert_eq!(
-            field.edge_length_metric(a, b),
-            field.edge_length_metric(b, a)
-        );
-    }
-}
-
 /// The cube's surface with what is asked of it.
 fn with_domain<T>(surface: &(Vec<Point>, Vec<[u32; 3]>), ask: impl FnOnce(&Domain) -> T) -> T {
     // Walls are welded: each grid has its own points.

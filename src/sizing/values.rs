@@ -13,7 +13,10 @@ use crate::storage::{ScratchSpace, SpillVec, check_cancelled, raise, sort_record
 
 /// Rounds of averaging that smooth what was filled in. The graph is shallow (cells grow with the
 /// distance to the surface), so values are within 2 % of the limit after these.
-const FILL_ROUNDS: u32 = 60;
+const FILL_ROUNDS: u32 = 18;
+/// What a round leaves of the slowest part of the error, were it mere averaging: sixty such rounds would do no better than these, which look back
+/// at the round before (the Chebyshev semi-iteration: Golub, Varga 1961).
+const SLOWEST: f32 = 0.98;
 /// The twelve edges of a cell come first in `PAIRS`.
 const N_EDGES: usize = 12;
 
@@ -168,9 +171,16 @@ impl Maker<'_> {
             return h;
         }
         let mut sums = self.room.column(h.len(), [0.0f32; 2]);
-        let mut smooth = 0;
+        // Of the round before.
+        let mut before = self.room.column(h.len(), 0.0f32);
+        let (mut smooth, mut over) = (0, 1.0);
         while smooth < FILL_ROUNDS {
             check_cancelled();
+            over = match smooth {
+                0 => 1.0,
+                1 => 1.0 / (1.0 - 0.5 * SLOWEST * SLOWEST),
+                _ => 1.0 / (1.0 - 0.25 * SLOWEST * SLOWEST * over),
+            };
             sums.fill([0.0; 2]);
             for k in 0..open.len() {
                 let [leaf, weight] = open.get(k);
@@ -182,10 +192,18 @@ impl Maker<'_> {
                 if is_open.get(i as u32) {
                     let [sum, weight] = sums.get(i);
                     if weight > 0.0 {
-                        h.change(i, |h| {
-                            complete &= h.is_finite();
-                            *h = sum / weight;
-                        });
+                        let (old, older) = (h.get(i), before.get(i));
+                        complete &= old.is_finite();
+                        before.set(i, old);
+                        let mean = sum / weight;
+                        h.set(
+                            i,
+                            if over > 1.0 {
+                                older + over * (mean - older)
+                            } else {
+                                mean
+                            },
+                        );
                     }
                 }
             }

@@ -38,6 +38,7 @@ pub struct Seeker<'a> {
 
 impl<'a> Seeker<'a> {
     /// Sees all triangles of the surface.
+    #[cfg(test)]
     pub fn new(surface: &'a Surface) -> Self {
         Self::of(surface, &ScratchSpace::boundless(), |_| true)
     }

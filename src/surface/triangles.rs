@@ -65,6 +65,7 @@ impl Surface {
     }
 
     /// The file triangle `t` came from and its number in that file, counted from 0.
+    #[cfg(test)]
     pub fn source(&self, t: u32) -> Option<(&str, u32)> {
         let next = self.files.partition_point(|f| f.triangle_first <= t);
         let file = self.files.get(next.checked_sub(1)?)?;

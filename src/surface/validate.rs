@@ -1,7 +1,9 @@
 //! Exact validation: everything that keeps a surface from bounding volumes, found and listed.
 
 use super::boundary_loops::{JUNCTION_SHARE, TJunction, t_junctions};
-use super::contact::{ContactKind, contact};
+#[cfg(test)]
+use super::contact::ContactKind;
+use super::contact::contact;
 use super::edges::{Closedness, Facets};
 use super::stars::touching;
 use super::{Defect, Surface, SurfaceError};
@@ -45,12 +47,8 @@ impl Validation {
         }
     }
 
-    /// How many listed defects have this code.
-    pub fn n_with_code(&self, code: &str) -> usize {
-        self.defects.iter().filter(|d| d.code() == code).count()
-    }
-
     /// How many listed self-intersections are of this kind.
+    #[cfg(test)]
     pub fn n_of_kind(&self, kind: ContactKind) -> usize {
         let is_kind =
             |d: &&Defect| matches!(d, Defect::SelfIntersection { kind: k, .. } if *k == kind);

@@ -43,12 +43,14 @@ pub struct Volumes {
 }
 
 impl Volumes {
-    /// Errors: none; sides at open edges are joined, so an open surface encloses nothing.
+    /// [`Volumes::of_in`] in memory.
+    #[cfg(test)]
     pub fn of(seeker: &Seeker) -> Self {
         Self::of_in(seeker, &ScratchSpace::boundless())
     }
 
-    /// [`Volumes::of`] in a room: 21 bytes a triangle are held at most. A scratch file that fails unwinds.
+    /// Sides at open edges are joined, so an open surface encloses nothing. In the room 21 bytes a triangle are held at most; a scratch
+    /// file that fails unwinds.
     pub fn of_in(seeker: &Seeker, room: &ScratchSpace) -> Self {
         let surface = seeker.surface();
         let n = surface.n_triangles();
@@ -159,11 +161,6 @@ impl Volumes {
                 _ => this.angle_to(next, surface),
             };
         }
-    }
-
-    /// Memory held, in bytes.
-    pub fn bytes(&self) -> usize {
-        self.of_side.capacity() * size_of::<[u32; 2]>()
     }
 }
 

@@ -33,11 +33,25 @@ pub(super) fn decode_nodes(
     columns: &mut Reader<'_>,
     records: &mut [SealedTet],
 ) -> Result<(), Malformed> {
-    let mut scratch = vec![0; records.len()];
-    decode_node::<0>(columns, &mut scratch, records)?;
-    decode_node::<1>(columns, &mut scratch, records)?;
-    decode_node::<2>(columns, &mut scratch, records)?;
-    decode_node::<3>(columns, &mut scratch, records)
+    let mut steps = [const { Vec::new() }; 4];
+    for column in &mut steps {
+        column.resize(records.len(), 0);
+        columns.planes32(column)?;
+    }
+    let [first, second, third, fourth] = &steps;
+    let rest = second.iter().zip(third).zip(fourth);
+    let mut before = [0; 4];
+    // In one pass, for each node's base is among those just found.
+    for (tet, (&a, ((&b, &c), &d))) in records.iter_mut().zip(first.iter().zip(rest)) {
+        let mut nodes = [0; 4];
+        nodes[0] = unzigzag32(a, base::<0>(&nodes, &before));
+        nodes[1] = unzigzag32(b, base::<1>(&nodes, &before));
+        nodes[2] = unzigzag32(c, base::<2>(&nodes, &before));
+        nodes[3] = unzigzag32(d, base::<3>(&nodes, &before));
+        tet.nodes = nodes;
+        before = nodes;
+    }
+    Ok(())
 }
 
 fn encode_node<const I: usize>(records: &[SealedTet], scratch: &mut [u32], columns: &mut Columns) {
@@ -47,20 +61,6 @@ fn encode_node<const I: usize>(records: &[SealedTet], scratch: &mut [u32], colum
         before = t.nodes;
     }
     columns.planes32(scratch);
-}
-
-fn decode_node<const I: usize>(
-    columns: &mut Reader<'_>,
-    scratch: &mut [u32],
-    records: &mut [SealedTet],
-) -> Result<(), Malformed> {
-    columns.planes32(scratch)?;
-    let mut before = [0; 4];
-    for (t, &z) in records.iter_mut().zip(scratch.iter()) {
-        t.nodes[I] = unzigzag32(z, base::<I>(&t.nodes, &before));
-        before = t.nodes;
-    }
-    Ok(())
 }
 
 impl ChunkRecord for SealedTet {

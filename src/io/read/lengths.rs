@@ -2,7 +2,8 @@
 //!
 //! Source: the NPY format, versions 1 to 3, of NumPy's documentation (NEP 1).
 
-use std::io::{BufRead, Read};
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
 use super::error::{FilePlace, ReadError, Spot};
@@ -20,80 +21,17 @@ const HEAD_MAX: usize = 1 << 16;
 /// # Errors
 /// What is no such file, not one-dimensional, not of 4 or 8 byte floating point numbers; the place of what is no length.
 pub fn read_lengths(path: &Path, limit: u64) -> Result<Vec<f64>> {
-    let place = |spot| FilePlace {
-        file: path.display().to_string(),
-        spot,
+    let (from, length_of_file) = open_plain(path)?;
+    let mut file = ArrayFile {
+        from,
+        name: path.display().to_string(),
+        at: 0,
     };
-    let (mut from, length_of_file) = open_plain(path)?;
-    let mut at = 0;
-    let mut take = |n: usize| -> Result<Vec<u8>> {
-        let mut bytes = vec![0; n];
-        from.read_exact(&mut bytes)
-            .map_err(|e| ReadError::Truncated {
-                place: place(Spot::Byte(at)),
-                expected: format!("{n} more bytes"),
-                found: e.to_string(),
-            })?;
-        at += n as u64;
-        Ok(bytes)
-    };
-    let unexpected = |spot, expected: &str, found: String| ReadError::Unexpected {
-        place: place(spot),
-        expected: expected.to_owned(),
-        found,
-    };
-    let start = take(8)?;
-    if !start.starts_with(MAGIC) {
-        let found = format!("{:x?}", &start[..6]);
-        return Err(unexpected(Spot::Byte(0), "an array file of NumPy", found));
-    }
-    let length = match start[6] {
-        1 => take(2)?
-            .iter()
-            .rev()
-            .fold(0, |n, &b| n << 8 | usize::from(b)),
-        _ => take(4)?
-            .iter()
-            .rev()
-            .fold(0, |n, &b| n << 8 | usize::from(b)),
-    };
-    if length > HEAD_MAX {
-        return Err(unexpected(
-            Spot::Byte(8),
-            "a short head",
-            format!("{length} bytes"),
-        ));
-    }
-    let head = String::from_utf8_lossy(&take(length)?).into_owned();
-    let kind = value_of(&head, "descr").unwrap_or_default();
-    let kind = kind.trim_matches(['\'', '"']).to_owned();
-    let (bytes, big) = match kind.as_str() {
-        "<f8" | "=f8" => (8, false),
-        "<f4" | "=f4" => (4, false),
-        ">f8" => (8, true),
-        ">f4" => (4, true),
-        _ => {
-            let expected = "floating point numbers of 4 or 8 bytes (float32 or float64)";
-            return Err(unexpected(Spot::Byte(8), expected, format!("type {kind}")));
-        }
-    };
-    let shape = value_of(&head, "shape").unwrap_or_default();
-    let sides: Vec<&str> = (shape.trim_matches(['(', ')']).split(','))
-        .map(str::trim)
-        .filter(|side| !side.is_empty())
-        .collect();
-    let n: u64 = match &sides[..] {
-        [n] => n.parse().unwrap_or(u64::MAX),
-        _ => u64::MAX,
-    };
-    if n == u64::MAX {
-        let found = format!("an array of shape {shape}");
-        return Err(unexpected(Spot::Byte(8), "a list of one dimension", found));
-    }
+    let (n, kind) = file.head()?;
     let needed = n.saturating_mul(8);
     if needed > limit {
         return Err(ReadError::TooLarge {
-            place: place(Spot::Totals),
+            place: file.place(Spot::Totals),
             what: "the lengths",
             needed,
             limit,
@@ -101,32 +39,109 @@ pub fn read_lengths(path: &Path, limit: u64) -> Result<Vec<f64>> {
     }
     let mut lengths = Vec::with_capacity(n.min(length_of_file) as usize);
     for i in 0..n {
-        let mut word = take(bytes)?;
-        if big {
-            word.reverse();
-        }
-        let h = match bytes {
-            8 => f64::from_le_bytes(std::array::from_fn(|i| word[i])),
-            _ => f64::from(f32::from_le_bytes(std::array::from_fn(|i| word[i]))),
-        };
+        let h = file.number(kind)?;
         if !(LENGTH_MIN..1.0 / LENGTH_MIN).contains(&h) {
-            return Err(ReadError::Unexpected {
-                place: place(Spot::Totals),
-                expected: format!("a length from {LENGTH_MIN:e} to {:e}", 1.0 / LENGTH_MIN),
-                found: format!("{h} as number {i}"),
-            });
+            let expected = format!("a length from {LENGTH_MIN:e} to {:e}", 1.0 / LENGTH_MIN);
+            return Err(file.unexpected(Spot::Totals, &expected, format!("{h} as number {i}")));
         }
         lengths.push(h);
     }
-    if !from.fill_buf().is_ok_and(<[u8]>::is_empty) {
-        let found = "more bytes".to_owned();
-        return Err(unexpected(
-            Spot::Totals,
-            "the end of the file behind its last number",
-            found,
-        ));
+    if !file.from.fill_buf().is_ok_and(<[u8]>::is_empty) {
+        let expected = "the end of the file behind its last number";
+        return Err(file.unexpected(Spot::Totals, expected, "more bytes".to_owned()));
     }
     Ok(lengths)
+}
+
+/// Bytes of a number, and whether the high ones come first.
+type Kind = (usize, bool);
+
+/// An array file, read from its beginning on.
+struct ArrayFile {
+    from: BufReader<File>,
+    name: String,
+    at: u64,
+}
+
+impl ArrayFile {
+    fn place(&self, spot: Spot) -> FilePlace {
+        FilePlace {
+            file: self.name.clone(),
+            spot,
+        }
+    }
+
+    fn unexpected(&self, spot: Spot, expected: &str, found: String) -> ReadError {
+        ReadError::Unexpected {
+            place: self.place(spot),
+            expected: expected.to_owned(),
+            found,
+        }
+    }
+
+    fn take(&mut self, n: usize) -> Result<Vec<u8>> {
+        let mut bytes = vec![0; n];
+        let read = self.from.read_exact(&mut bytes);
+        read.map_err(|e| ReadError::Truncated {
+            place: self.place(Spot::Byte(self.at)),
+            expected: format!("{n} more bytes"),
+            found: e.to_string(),
+        })?;
+        self.at += n as u64;
+        Ok(bytes)
+    }
+
+    fn number(&mut self, (bytes, big): Kind) -> Result<f64> {
+        let mut word = self.take(bytes)?;
+        if big {
+            word.reverse();
+        }
+        Ok(match bytes {
+            8 => f64::from_le_bytes(std::array::from_fn(|i| word[i])),
+            _ => f64::from(f32::from_le_bytes(std::array::from_fn(|i| word[i]))),
+        })
+    }
+
+    /// Reads the head: how many numbers follow, and their kind.
+    fn head(&mut self) -> Result<(u64, Kind)> {
+        let start = self.take(8)?;
+        if !start.starts_with(MAGIC) {
+            let found = format!("{:x?}", &start[..6]);
+            return Err(self.unexpected(Spot::Byte(0), "an array file of NumPy", found));
+        }
+        let length = self.take(if start[6] == 1 { 2 } else { 4 })?;
+        let length = (length.iter().rev()).fold(0, |n, &b| n << 8 | usize::from(b));
+        if length > HEAD_MAX {
+            let found = format!("{length} bytes");
+            return Err(self.unexpected(Spot::Byte(8), "a short head", found));
+        }
+        let head = String::from_utf8_lossy(&self.take(length)?).into_owned();
+        let kind = value_of(&head, "descr").unwrap_or_default();
+        let kind = match kind.trim_matches(['\'', '"']) {
+            "<f8" | "=f8" => (8, false),
+            "<f4" | "=f4" => (4, false),
+            ">f8" => (8, true),
+            ">f4" => (4, true),
+            kind => {
+                let expected = "floating point numbers of 4 or 8 bytes (float32 or float64)";
+                return Err(self.unexpected(Spot::Byte(8), expected, format!("type {kind}")));
+            }
+        };
+        let shape = value_of(&head, "shape").unwrap_or_default();
+        let sides: Vec<&str> = (shape.trim_matches(['(', ')']).split(','))
+            .map(str::trim)
+            .filter(|side| !side.is_empty())
+            .collect();
+        let n = match sides[..] {
+            [n] => n.parse().ok(),
+            _ => None,
+        };
+        let n = n.ok_or_else(|| {
+            let found = format!("an array of shape {shape}");
+            self.unexpected(Spot::Byte(8), "a list of one dimension", found)
+        })?;
+        Ok((n, kind))
+    }
 }
 
 /// The text of a key's value in a head, up to the comma that ends it.

@@ -69,7 +69,7 @@ pub enum WriteError {
         available: u64,
     },
     /// The disk filled up while the file was written.
-    #[error("{path}: no space left to write it")]
+    #[error("no space left to write {path}")]
     DiskFull {
         /// The file to be written.
         path: PathBuf,

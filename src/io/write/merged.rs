@@ -12,7 +12,9 @@ use super::doubles::Doubles;
 use super::error::{Result, WriteError};
 use super::faces::{Face, FaceSorter, FaceSource, Faces};
 use super::numbering::{Numbering, PartNumbers, Sharer, Source, candidates, sharers};
+use super::on_surface::OnSurface;
 use super::scope::{FaceSet, Scope};
+use crate::optimize;
 use crate::sealed::SealedError;
 use crate::sealed::{Shape, Subdomain};
 use crate::storage::{Sorted, check_cancelled};
@@ -55,6 +57,18 @@ pub(super) struct Tet {
     pub id: TetId,
     /// NaN in a pass that does not ask for it.
     pub quality: f64,
+    /// Its quality over the least that its faces on the surface allow; NaN in a pass that does not ask for it.
+    pub excess: f64,
+}
+
+/// What is computed of tetrahedra in a pass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Measured {
+    Nothing,
+    /// [`Tet::quality`].
+    Quality,
+    /// This and [`Tet::excess`].
+    Excess,
 }
 
 /// A sub-domain in the merged mesh.
@@ -349,19 +363,26 @@ impl<'a> Merged<'a> {
 
     /// Every tetrahedron in the order of its number. Errors: damage, those of `each`.
     pub fn tets(&mut self, each: impl FnMut(&Tet) -> Result<()>) -> Result<()> {
-        self.pass(false, each)
+        self.measured_tets(Measured::Nothing, each)
     }
 
-    /// As [`Merged::tets`], with qualities.
-    pub fn tets_with_quality(&mut self, each: impl FnMut(&Tet) -> Result<()>) -> Result<()> {
-        self.pass(true, each)
-    }
-
-    fn pass(&mut self, quality: bool, mut each: impl FnMut(&Tet) -> Result<()>) -> Result<()> {
+    /// As [`Merged::tets`], measured. Errors: the disk, too.
+    pub fn measured_tets(
+        &mut self,
+        measured: Measured,
+        mut each: impl FnMut(&Tet) -> Result<()>,
+    ) -> Result<()> {
         let mut changes = self.doubles.as_ref().map(Doubles::changes).transpose()?;
         for (p, Source { row, .. }) in self.parts.iter().enumerate() {
             let numbers = self.numbers_of(p)?;
             let mut part = self.store.open_subdomain(row.rank, self.memory / 4)?;
+            let mut on_surface = match measured {
+                Measured::Nothing | Measured::Quality => None,
+                Measured::Excess => {
+                    let memory = self.memory as u64 / 8;
+                    Some(OnSurface::of_part(&mut part, &self.dir, memory)?)
+                }
+            };
             let mut expected = 0;
             for chunk in 0..part.tet_summaries().len() {
                 let chunk = part.tet_chunk(chunk as u32)?;
@@ -376,11 +397,18 @@ impl<'a> Merged<'a> {
                     if let Some(&v) = tet.nodes.iter().find(|&&v| u64::from(v) >= row.vertices) {
                         part.corner(v)?;
                     }
-                    let quality = if quality {
-                        Shape::of(part.corners(tet.nodes)?.map(|c| c.point)).quality
-                    } else {
-                        f64::NAN
-                    };
+                    let (mut quality, mut excess) = (f64::NAN, f64::NAN);
+                    if measured != Measured::Nothing {
+                        let points = part.corners(tet.nodes)?.map(|c| c.point);
+                        quality = Shape::of(points).quality;
+                        if let Some(on_surface) = &mut on_surface {
+                            let faces = on_surface.faces(local, tet.nodes)?;
+                            excess = match faces.contains(&true) {
+                                true => optimize::excess_near(points, faces),
+                                false => quality,
+                            };
+                        }
+                    }
                     let mut nodes = tet.nodes.map(|v| numbers.of(v));
                     if let Some(changes) = &mut changes {
                         changes.apply(number, &mut nodes)?;
@@ -391,6 +419,7 @@ impl<'a> Merged<'a> {
                         subdomain: row.rank,
                         id,
                         quality,
+                        excess,
                     })?;
                 }
                 self.progress.advance(chunk.records.len());

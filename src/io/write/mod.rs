@@ -32,6 +32,7 @@ mod names;
 mod npy;
 mod npy_columns;
 mod numbering;
+mod on_surface;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod pieces;

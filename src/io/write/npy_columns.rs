@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::draft::Draft;
 use super::error::Result;
-use super::merged::Merged;
+use super::merged::{Measured, Merged};
 use super::npy::{HEAD_BYTES, head};
 use super::stream::Strip;
 use super::vtu_layout::Index;
@@ -68,7 +68,7 @@ pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
     let mut ranks = columns.open("subdomain", "<u4", n_tets, 0)?;
     let mut qualities = columns.open("quality", "<f8", n_tets, 0)?;
     let mut ids = columns.open("global_id", "<i8", n_tets, 0)?;
-    mesh.tets_with_quality(|tet| {
+    mesh.measured_tets(Measured::Quality, |tet| {
         tet.nodes
             .iter()
             .try_for_each(|&v| index.put(&mut nodes, v))?;

@@ -87,6 +87,7 @@ fn head(draft: &mut Draft, out: &Path, pieces: &[PathBuf]) -> Result<()> {
                 ("subdomain", "UInt32"),
                 ("region", "UInt32"),
                 ("quality", "Float64"),
+                ("excess", "Float64"),
                 ("global_id", "Int64"),
             ],
         ),

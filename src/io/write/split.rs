@@ -118,7 +118,10 @@ pub(super) fn split(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
 }
 
 /// Whether a record that was read is one that is looked for; errors are, to be seen.
-fn here<R>(record: &std::result::Result<R, StorageError>, is: impl Fn(&R) -> bool) -> bool {
+pub(super) fn here<R>(
+    record: &std::result::Result<R, StorageError>,
+    is: impl Fn(&R) -> bool,
+) -> bool {
     record.as_ref().map_or(true, is)
 }
 

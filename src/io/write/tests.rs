@@ -374,6 +374,11 @@ fn shared_vertices_are_one_and_the_boundary_is_whole() -> Outcome {
     assert!(seen.points.iter().flatten().any(|x| *x == 0.1 * 3.0));
     let qualities = vtu.numbers("CellData.quality", f64::from_le_bytes);
     assert!(qualities.iter().all(|q| (1.0..3.0).contains(q)));
+    // The cubes' six tetrahedra have faces on the surface where the cube has, and there the surface forces a part of it.
+    let excesses = vtu.numbers("CellData.excess", f64::from_le_bytes);
+    let pairs = || excesses.iter().zip(&qualities);
+    assert!(pairs().all(|(e, q)| (1.0..=*q).contains(e)));
+    assert!(pairs().any(|(e, q)| e == q) && pairs().any(|(e, q)| e < q));
     let ids = vtu.numbers("CellData.global_id", u64::from_le_bytes);
     assert!(ids.windows(2).all(|w| w[0] < w[1]));
     assert_eq!(ids[ids.len() / 2], 1 << 29);

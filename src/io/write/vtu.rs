@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use super::draft::Draft;
 use super::error::Result;
-use super::merged::Merged;
+use super::merged::{Measured, Merged};
 use super::midpoints::{MiddlePoints, Midpoints};
 use super::vtu_boundary::{self, Partition, partitions};
 use super::vtu_layout::{Array, Container, Group, Index, Layout};
@@ -47,6 +47,7 @@ pub(super) fn write(
         Array::new(Group::CellData, "subdomain", "UInt32"),
         Array::new(Group::CellData, "region", "UInt32"),
         Array::new(Group::CellData, "quality", "Float64"),
+        Array::new(Group::CellData, "excess", "Float64"),
         Array::new(Group::CellData, "global_id", "Int64"),
         Array::new(Group::Points, "Points", "Float64").vectors(),
         Array::new(Group::Cells, "connectivity", index.kind()),
@@ -62,6 +63,7 @@ pub(super) fn write(
         mut ranks,
         mut regions,
         mut qualities,
+        mut excesses,
         mut ids,
         mut points,
         mut nodes,
@@ -97,7 +99,7 @@ pub(super) fn write(
     let mut edges = middles.map(Midpoints::tets).transpose()?;
     let mut end = 0;
     let mut coming = partitions.iter().filter(|_| is_hdf).peekable();
-    mesh.tets_with_quality(|tet| {
+    mesh.measured_tets(Measured::Excess, |tet| {
         if let Some(next) = coming.next_if(|part| part.rank == tet.subdomain) {
             (part, end) = (next, 0);
             index.put(&mut ends, end)?;
@@ -106,6 +108,7 @@ pub(super) fn write(
         ranks.put(&tet.subdomain.to_le_bytes())?;
         regions.put(&tet.region.to_le_bytes())?;
         qualities.put(&tet.quality.to_le_bytes())?;
+        excesses.put(&tet.excess.to_le_bytes())?;
         ids.put(&tet.id.number().to_le_bytes())?;
         for v in tet.nodes {
             index.put(&mut nodes, v - part.first_vertex)?;
@@ -123,7 +126,7 @@ pub(super) fn write(
         }])
     })?;
     for strip in [
-        vertex_ids, ranks, regions, qualities, ids, points, nodes, ends, types,
+        vertex_ids, ranks, regions, qualities, excesses, ids, points, nodes, ends, types,
     ] {
         strip.finish()?;
     }

@@ -9,9 +9,9 @@
 //!    removed; a vertex moved for the worst of its ball; a vertex put into a cavity that grows (`cavity`), or on one of its edges; where all
 //!    that gains little, a cavity filled anew with tetrahedra of its own vertices (`refill`).
 //!
-//! The vertex in a cavity gains most. What is tried in vain is remembered until something changes it. All this three times, judged differently
+//! The vertex in a cavity gains most. What is tried in vain is remembered until something changes it. All this four times, judged differently
 //! ([`STAGES`]): by q, because what stands beside a needle is as bad as what stands on it and by excess nothing could take its place; by q over the bound
-//! (`bound`); and by the number of those of q ≥ 10.
+//! (`bound`); by the worst q of all; and by the number of those of q ≥ 10.
 //!
 //! Deterministic: order follows q or excess, then ids, and neither depends on paging.
 
@@ -34,16 +34,18 @@ use crate::mesh::{Mesh, Tet, tets_of_page};
 use crate::storage::{Pages, check_cancelled};
 use cavity::{Cavity, Proposal};
 use refill::Refill;
-use star::{Aim, FaceBounds, Measure, value_of};
+use star::{Aim, FaceBounds, Goal, value_of};
 use vertex::Mover;
 
 /// What a part of the work is about.
+#[derive(Clone, Copy)]
 struct Stage {
-    /// Tetrahedra are bad above this q and [`EXCESS_MAX`].
+    goal: Goal,
+    /// Tetrahedra are bad above this q and this excess.
     quality_max: f64,
-    by_excess: bool,
-    /// See [`Aim::fewer`].
-    fewer: bool,
+    excess_max: f64,
+    /// An operation is to raise the value of what is mended by this factor at least: less is worth no change.
+    gain_min: f64,
     /// See [`Aim::more`].
     more: u32,
     /// See [`Aim::tets_max`].
@@ -54,43 +56,75 @@ struct Stage {
     one_in: u32,
 }
 
-/// A solver fails on the worst ones, which have millions: first these are brought down, then what is farthest from what the surface allows, then the
-/// number of those of q ≥ 10. On balls and even scans the rounds before leave next to nothing of the kind, so that little is touched there.
+/// What brings the worst q of all down.
+const WORST: Stage = Stage {
+    goal: Goal::Worst,
+    quality_max: 10.0,
+    excess_max: 1.05,
+    gain_min: 1.03,
+    more: 16,
+    tets_max: 40,
+    passes_max: 20,
+    one_in: 200,
+};
+
+/// A solver fails on the worst ones, which have millions: first these are brought down, then what is farthest from what the surface allows, then again
+/// the worst, whatever it costs the others beside them: in a fan of needles no sum falls when one of them is made better. Then the number of
+/// those of q ≥ 10, and the worst again. On balls and even scans the rounds before leave next to nothing of the kind, so that little is touched there.
 ///
 /// Cavities of flat tetrahedra need 20 in the median, 37 for nine in ten.
-const STAGES: [Stage; 3] = [
+const STAGES: [Stage; 5] = [
     Stage {
+        goal: Goal::Quality,
         quality_max: 50.0,
-        by_excess: false,
-        fewer: false,
+        excess_max: EXCESS_MAX,
+        gain_min: 1.1,
         more: 3,
         tets_max: 40,
         passes_max: 3,
         one_in: 100,
     },
     Stage {
+        goal: Goal::Excess,
         quality_max: 50.0,
-        by_excess: true,
-        fewer: false,
+        excess_max: EXCESS_MAX,
+        gain_min: 1.1,
         more: 1,
         tets_max: 40,
         passes_max: 2,
         one_in: 100,
     },
+    WORST,
     Stage {
+        goal: Goal::Count,
         quality_max: 10.0,
-        by_excess: false,
-        fewer: true,
+        excess_max: EXCESS_MAX,
+        gain_min: 1.1,
         more: 0,
         tets_max: 24,
         passes_max: 2,
         one_in: 60,
     },
+    WORST,
 ];
 
 impl Stage {
     fn tried_max(&self, n_tets: u32) -> usize {
         TRIED_MIN + (n_tets / self.one_in) as usize
+    }
+
+    /// What is done about the bad ones listed; `None` when nothing is. Of the worst, those that are better than the worst that the surface forces may
+    /// stay as they are, and those that are much better than the worst until that is better.
+    fn at(&self, list: &[(u64, u32)], forced: f64) -> Option<Self> {
+        let worst = f64::from_bits(list.first()?.0);
+        if self.goal != Goal::Worst {
+            return Some(*self);
+        }
+        let quality_max = (self.quality_max.max(forced)).max(WORST_SHARE * worst);
+        (worst > quality_max).then_some(Self {
+            quality_max,
+            ..*self
+        })
     }
 }
 
@@ -98,8 +132,8 @@ impl Stage {
 const EXCESS_MAX: f64 = 2.0;
 /// Searches stop at this value, and an operation that reaches it is done without trying others.
 const ENOUGH: f64 = 0.5;
-/// An operation is to raise the value of what is mended by this factor at least: less is worth no change.
-const GAIN_MIN: f64 = 1.1;
+/// Beside the worst, those of q above this share of its q are mended.
+const WORST_SHARE: f64 = 0.9;
 /// Sweeps of moves for the product at most: where vertices hold each other, heights double in each.
 const SWEEPS_MAX: u32 = 60;
 /// Tetrahedra listed and tried at least; see [`Stage::one_in`]. On a wing of sixteen thousand needles all but a few are bad.
@@ -132,26 +166,50 @@ impl MendCounts {
     }
 }
 
-/// How bad a tetrahedron is where it is a bad one: its excess, or its q.
-fn badness<P: Pages>(
+/// A tetrahedron in the eyes of a stage.
+#[derive(Clone, Copy, PartialEq)]
+enum Judgment {
+    Good,
+    /// Its q, which the surface forces.
+    Forced(f64),
+    /// Its q, or its excess.
+    Bad(f64),
+}
+
+impl Judgment {
+    fn bad(self) -> Option<f64> {
+        match self {
+            Self::Good | Self::Forced(_) => None,
+            Self::Bad(badness) => Some(badness),
+        }
+    }
+}
+
+fn judge<P: Pages>(
     mesh: &mut Mesh<P>,
     tet: &Tet,
     stage: &Stage,
     bounds: &mut FaceBounds,
-) -> Option<f64> {
+) -> Judgment {
     let points = mesh.points(tet);
     if !is_below(points, 1.0 / stage.quality_max) {
-        return None;
+        return Judgment::Good;
     }
     let q = quality(points);
     for i in (0..4).filter(|&i| tet.is_required(i)) {
-        if q <= EXCESS_MAX * face_floor(tet.face(i).map(|v| mesh.point(v))) {
-            return None;
+        if q <= stage.excess_max * face_floor(tet.face(i).map(|v| mesh.point(v))) {
+            return Judgment::Forced(q);
         }
     }
     // A face without area in doubles is no reason to do anything.
     let excess = q / bounds.of_tet(tet, points);
-    (excess > EXCESS_MAX).then_some(if stage.by_excess { excess } else { q })
+    if excess.is_nan() || excess <= stage.excess_max {
+        return Judgment::Forced(q);
+    }
+    Judgment::Bad(match stage.goal {
+        Goal::Excess => excess,
+        Goal::Quality | Goal::Count | Goal::Worst => q,
+    })
 }
 
 /// A tetrahedron by its vertices' positions.
@@ -175,6 +233,8 @@ pub(super) struct Mender {
     queue: BinaryHeap<(u64, u32)>,
     /// Names of what was tried in vain.
     failed: HashSet<u64>,
+    /// The worst q in the last list's pages that the surface forces.
+    forced: f64,
     /// Vertices around which something changed in this pass, and in the one before.
     touched: [HashSet<u32>; 2],
     changed: Vec<u32>,
@@ -189,9 +249,8 @@ impl Mender {
         pages: &mut PageFlags,
         progress: &mut dyn FnMut(f64),
     ) {
-        // The last stage's are the most.
-        let [.., last] = &STAGES;
-        if self.list(mesh, pages, last).is_empty() {
+        // Nothing else is bad in any stage.
+        if self.list(mesh, pages, &WORST).is_empty() {
             return;
         }
         for stage in &STAGES {
@@ -199,13 +258,15 @@ impl Mender {
             self.failed.clear();
             for _ in 0..stage.passes_max {
                 let before = self.counts.changes();
-                if !stage.fewer {
+                if matches!(stage.goal, Goal::Quality | Goal::Excess) {
                     let list = self.list(mesh, &mut flags.clone(), stage);
                     self.lift(mesh, &list);
                 }
                 let list = self.list(mesh, &mut flags, stage);
-                self.queue.extend(list);
-                self.pass(mesh, &mut flags, stage, progress);
+                let Some(stage) = stage.at(&list, self.forced) else {
+                    break;
+                };
+                self.pass(mesh, list, &mut flags, &stage, progress);
                 if self.counts.changes() == before {
                     break;
                 }
@@ -224,15 +285,22 @@ impl Mender {
         let most = stage.tried_max(mesh.n_tets());
         let bounds = &mut self.bounds;
         let mut list = Vec::new();
+        let mut forced = 0.0f64;
         let mut bad = PageFlags::default();
         let mut from = 0;
         while let Some(page) = pages.take_next(from) {
             check_cancelled();
             from = page + 1;
             tets_of_page(mesh, page, |mesh, t, tet| {
-                if let Some(badness) = badness(mesh, &tet, stage, bounds) {
-                    list.push((badness.to_bits(), t));
-                    bad.raise(t);
+                match judge(mesh, &tet, stage, bounds) {
+                    Judgment::Good => {}
+                    // One without volume in doubles says nothing about others.
+                    Judgment::Forced(q) if q.is_infinite() => {}
+                    Judgment::Forced(q) => forced = forced.max(q),
+                    Judgment::Bad(badness) => {
+                        list.push((badness.to_bits(), t));
+                        bad.raise(t);
+                    }
                 }
             });
             if list.len() >= 2 * most {
@@ -241,6 +309,7 @@ impl Mender {
             }
         }
         *pages = bad;
+        self.forced = forced;
         list.sort_unstable_by(|a, b| b.cmp(a));
         list.truncate(most);
         list
@@ -276,10 +345,12 @@ impl Mender {
     fn pass<P: Pages>(
         &mut self,
         mesh: &mut Mesh<P>,
+        list: Vec<(u64, u32)>,
         pages: &mut PageFlags,
         stage: &Stage,
         progress: &mut dyn FnMut(f64),
     ) {
+        self.queue.extend(list);
         self.touched.swap(0, 1);
         self.touched[0].clear();
         let total = self.queue.len();
@@ -291,7 +362,7 @@ impl Mender {
             let tet = mesh.tet(t);
             // Changed since it was listed: then it was listed anew.
             let is_current = tet.is_live()
-                && badness(mesh, &tet, stage, &mut self.bounds)
+                && (judge(mesh, &tet, stage, &mut self.bounds).bad())
                     .is_some_and(|b| b.to_bits() == bits);
             if left == 0 {
                 self.queue.clear();
@@ -309,7 +380,7 @@ impl Mender {
             for &t in &self.changed {
                 let tet = mesh.tet(t);
                 self.touched[0].extend(tet.vertices());
-                if let Some(badness) = badness(mesh, &tet, stage, &mut self.bounds) {
+                if let Some(badness) = judge(mesh, &tet, stage, &mut self.bounds).bad() {
                     pages.raise(t);
                     self.queue.push((badness.to_bits(), t));
                 }
@@ -327,23 +398,20 @@ impl Mender {
     /// Tries everything on the bad tetrahedron `t`; after success `changed` lists the tetrahedra that are new or moved.
     fn attack<P: Pages>(&mut self, mesh: &mut Mesh<P>, t: u32, tet: &Tet, stage: &Stage) -> bool {
         self.changed.clear();
-        self.bounds.measure = match stage.by_excess {
-            true => Measure::Excess,
-            false => Measure::Quality(quality(mesh.points(tet))),
-        };
+        self.bounds.measure = stage.goal.measure(quality(mesh.points(tet)));
         let [_, own] = value_of(mesh, tet, &mut self.bounds);
         let enough = ENOUGH.max(2.0 * own);
         let aim = Aim {
             own,
             enough,
-            fewer: stage.fewer,
+            goal: stage.goal,
             more: stage.more,
             tets_max: stage.tets_max,
         };
         if self.reconnect(mesh, t, tet, enough) {
             return true;
         }
-        let mut best = GAIN_MIN * own;
+        let mut best = stage.gain_min * own;
         let mut way = Way::None;
         for v in tet.vertices() {
             if best < enough && self.mover.gather(mesh, v, t, &mut self.bounds) {
@@ -370,7 +438,11 @@ impl Mender {
                 (best, way) = (value, Way::Refill);
             }
         }
-        if best < 2.0 * own && self.reconnect(mesh, t, tet, own) {
+        let floor = match stage.goal {
+            Goal::Worst => best,
+            Goal::Quality | Goal::Excess | Goal::Count => own,
+        };
+        if best < 2.0 * own && self.reconnect(mesh, t, tet, floor) {
             return true;
         }
         self.go(mesh, t, way)

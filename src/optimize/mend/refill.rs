@@ -14,7 +14,7 @@
 use super::super::quality::inverse_quality;
 use super::super::smooth::is_free;
 use super::cavity::Cavity;
-use super::star::{Aim, Cost, FaceBounds};
+use super::star::{Aim, Cost, FaceBounds, Goal};
 use crate::geom::{Point, orient};
 use crate::mesh::Mesh;
 use crate::storage::Pages;
@@ -105,7 +105,7 @@ impl Refill {
         while (self.cavity).grow_by_vertex(mesh, aim.tets_max, CORNERS_MAX, bounds) {
             let start = self.begin(mesh);
             self.search(aim, start);
-            if self.n_best > 0 && (aim.fewer || self.floor >= aim.enough) {
+            if self.n_best > 0 && (aim.goal == Goal::Count || self.floor >= aim.enough) {
                 break;
             }
         }
@@ -255,7 +255,7 @@ impl Refill {
             && four.value > self.floor
             && four.inverse_quality >= worst
             && four.volume <= progress.volume
-            && !(aim.fewer && (poor, progress.cost.sum) >= self.fewest);
+            && !(aim.goal == Goal::Count && (poor, progress.cost.sum) >= self.fewest);
         fits.then_some(four)
     }
 
@@ -315,12 +315,12 @@ impl Refill {
         self.best.clear();
         (self.best).extend((self.filling.iter()).map(|tet| tet.map(|v| corners[usize::from(v)])));
         self.n_best = self.cavity.n_tets();
-        if aim.fewer {
+        if aim.goal == Goal::Count {
             self.fewest = (cost.n_poor, cost.sum);
         } else {
             self.floor = least;
         }
-        !aim.fewer && least >= aim.enough
+        aim.goal != Goal::Count && least >= aim.enough
     }
 }
 
@@ -406,7 +406,7 @@ mod tests {
             let aim = Aim {
                 own,
                 enough: 1.0,
-                fewer: false,
+                goal: Goal::Quality,
                 more: 0,
                 tets_max: 40,
             };

@@ -228,6 +228,7 @@ impl Cost {
 
     /// Whether this, of least value `value`, may take the place of `old`: the worst q does not rise above 10, and
     /// - to have fewer of q ≥ 10: there are fewer;
+    /// - for the worst of the mesh: there are not many more of them;
     /// - else the sum falls or what is aimed at was very bad and becomes much better, and there are hardly more of them.
     ///   Without the sum, tetrahedra just over the threshold would be divided for little; with it alone, needles near their bound keep
     ///   their neighbors from being mended.
@@ -239,9 +240,12 @@ impl Cost {
         } else {
             0
         };
-        let is_wanted = match aim.fewer {
-            true => (self.n_poor, self.sum) < (old.n_poor, old.sum),
-            false => (is_much || self.sum < old.sum) && self.n_poor <= old.n_poor + more,
+        let is_wanted = match aim.goal {
+            Goal::Quality | Goal::Excess => {
+                (is_much || self.sum < old.sum) && self.n_poor <= old.n_poor + more
+            }
+            Goal::Count => (self.n_poor, self.sum) < (old.n_poor, old.sum),
+            Goal::Worst => self.n_poor <= old.n_poor + aim.more,
         };
         self.worst_goodness >= old.worst_goodness.min(0.1) && value > aim.own && is_wanted
     }
@@ -251,6 +255,31 @@ impl Cost {
 const VERY_BAD: f64 = 0.02;
 const MUCH: f64 = 1.5;
 
+/// What is to become better.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Goal {
+    /// q, where triangles of the surface do not force it, and the sum over its neighbors.
+    Quality,
+    /// q over the bound, and the sum over its neighbors.
+    Excess,
+    /// The number of those of q ≥ 10.
+    Count,
+    /// The worst q of the mesh, whatever becomes of those that are not the worst.
+    Worst,
+}
+
+impl Goal {
+    /// What is judged by while a tetrahedron of this q is mended.
+    pub(super) fn measure(self, q: f64) -> Measure {
+        match self {
+            Self::Quality | Self::Count => Measure::Quality(q),
+            Self::Excess => Measure::Excess,
+            // No triangle's bound counts.
+            Self::Worst => Measure::Quality(f64::INFINITY),
+        }
+    }
+}
+
 /// What an operation on a bad tetrahedron is to reach.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Aim {
@@ -258,9 +287,8 @@ pub(super) struct Aim {
     pub(super) own: f64,
     /// Where searches stop.
     pub(super) enough: f64,
-    /// Whether there are to be fewer of q ≥ 10, and nothing else.
-    pub(super) fewer: bool,
-    /// How many more of q ≥ 10 there may be for each time that the value doubles.
+    pub(super) goal: Goal,
+    /// How many more of q ≥ 10 there may be for each time that the value doubles; for [`Goal::Worst`], in all.
     pub(super) more: u32,
     /// Tetrahedra of a cavity at most.
     pub(super) tets_max: usize,

@@ -20,7 +20,7 @@ mod _native {
     use super::*;
 
     #[pymodule_export]
-    use super::part::Part;
+    use super::part::{Part, qualities};
     #[pymodule_export]
     use super::run::{mesh, predict, resume};
     #[pymodule_export]

@@ -2,11 +2,11 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use numpy::{Element, PyArray1, PyArray2, PyArrayMethods};
+use numpy::{Element, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use tetdb::CancelToken;
 use tetdb::data::schema::record::SealedTet;
-use tetdb::data::{Chunk, SealedError, Shape, Subdomain};
+use tetdb::data::{Chunk, DVec3, SealedError, Shape, Subdomain};
 
 use crate::failure::Failure;
 use crate::watched::watched;
@@ -173,7 +173,7 @@ impl Part {
         })
     }
 
-    /// Tetrahedra `first..first + count` with their own points: points, vertex ids, tetrahedra, regions, qualities.
+    /// Tetrahedra `first..first + count` with their own points: points, vertex ids, tetrahedra, regions.
     #[expect(clippy::type_complexity, reason = "what Python takes apart at once")]
     fn block<'py>(
         &self,
@@ -185,13 +185,11 @@ impl Part {
         Bound<'py, PyArray1<i64>>,
         Bound<'py, PyArray2<i32>>,
         Bound<'py, PyArray1<i32>>,
-        Bound<'py, PyArray1<f64>>,
     )> {
         let end = first.saturating_add(count).min(self.n_tets);
         let n = end.saturating_sub(first);
         let tets = PyArray2::zeros(py, [n, 4], false);
         let regions = PyArray1::zeros(py, n, false);
-        let qualities = PyArray1::zeros(py, n, false);
         let token = CancelToken::new();
         let (points, ids);
         {
@@ -204,15 +202,14 @@ impl Part {
             ids = PyArray1::zeros(py, n_points, false);
             let (mut points, mut ids) = (points.readwrite(), ids.readwrite());
             let (points, ids) = (points.as_slice_mut()?, ids.as_slice_mut()?);
-            let mut qualities = qualities.readwrite();
-            let qualities = qualities.as_slice_mut()?;
             watched(py, &token, None, || {
-                points_of_block(&mut self.lock(), &places, (&mut *points, ids), &token)?;
-                number_in_block(&places, tets, points, qualities);
+                points_of_block(&mut self.lock(), &places, (points, ids), &token)?;
+                let place = |v: &mut i32| *v = places[*v as usize].cast_signed();
+                tets.iter_mut().for_each(place);
                 Ok(())
             })?;
         }
-        Ok((points, ids, tets, regions, qualities))
+        Ok((points, ids, tets, regions))
     }
 }
 
@@ -280,11 +277,25 @@ fn points_of_block(
     Ok(())
 }
 
-/// Lets tetrahedra name the block's points, and measures them.
-fn number_in_block(places: &[u32], tets: &mut [i32], points: &[f64], qualities: &mut [f64]) {
-    for (tet, quality) in tets.as_chunks_mut::<4>().0.iter_mut().zip(qualities) {
-        *tet = tet.map(|v| places[v as usize].cast_signed());
-        let corner = |v: i32| tetdb::data::DVec3::from_slice(&points[3 * v as usize..]);
-        *quality = Shape::of(tet.map(corner)).quality;
+/// Qualities of tetrahedra that name rows of `points`.
+#[pyfunction]
+pub fn qualities<'py>(
+    py: Python<'py>,
+    points: PyReadonlyArray2<'py, f64>,
+    tets: PyReadonlyArray2<'py, i32>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let points = points.as_slice()?.as_chunks::<3>().0;
+    let tets = tets.as_slice()?.as_chunks::<4>().0;
+    let all = PyArray1::zeros(py, tets.len(), false);
+    {
+        let mut filled = all.readwrite();
+        let out = filled.as_slice_mut()?;
+        let corner = |v: i32| DVec3::from_array(points[v as usize]);
+        py.detach(|| {
+            for (&[a, b, c, d], quality) in tets.iter().zip(out) {
+                *quality = Shape::of([corner(a), corner(b), corner(c), corner(d)]).quality;
+            }
+        });
     }
+    Ok(all)
 }

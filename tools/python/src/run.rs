@@ -149,7 +149,7 @@ pub fn predict(
     let mesher = mesher(py, surface, &job)?.settings(settings.settings(&token, None));
     let said = watched(py, &token, None, || Ok(mesher.predict()?))?;
     let words = json!({
-        "tets": said.tets, "vertices": said.vertices, "subdomains": said.subdomains,
+        "tets": said.tets.round() as u64, "vertices": said.vertices.round() as u64, "subdomains": said.subdomains,
         "store_bytes": said.store.0, "disk_peak_bytes": said.disk_peak.0,
         "memory_least_bytes": said.memory_least.0, "seconds": said.seconds,
     });

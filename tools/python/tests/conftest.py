@@ -7,6 +7,7 @@ import shutil
 import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -14,6 +15,10 @@ import tetdb
 
 RUNS = int(os.environ.get("TETDB_RUNS", "20"))
 """Cancelled runs; many more than in the checks may be asked for."""
+
+SPEC = "balls,count=2,h=0.07"
+OPTIONS: dict[str, Any] = {"regions": "all", "hsiz": 0.048, "subdomains": 2}
+"""A cube with two filled balls: about the least that is divided into two sub-domains."""
 
 
 @pytest.fixture(scope="session")
@@ -34,11 +39,10 @@ def run(program: str, tmp_path: Path) -> Callable[..., str]:
     return call
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def parts(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tetdb.Store]:
-    """A cube with two filled balls in two sub-domains."""
+    """The mesh of `SPEC` with `OPTIONS`, which tests read and do not change."""
     path = tmp_path_factory.mktemp("parts") / "parts.tetdb"
-    surface = tetdb.sample("balls,count=2,h=0.06")
-    with tetdb.mesh(surface, path, regions="all", subdomains=2, hsiz=0.035, threads=2) as store:
+    with tetdb.mesh(tetdb.sample(SPEC), path, threads=2, **OPTIONS) as store:
         assert len(store.subdomains) == 2
         yield store

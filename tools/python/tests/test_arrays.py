@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import OPTIONS, SPEC
 
 import tetdb
 
@@ -48,7 +49,7 @@ def test_interfaces_are_alike_on_both_sides(parts: tetdb.Store) -> None:
 
 
 def test_facets_are_the_input_triangles(parts: tetdb.Store) -> None:
-    surface = tetdb.sample("balls,count=2,h=0.06")
+    surface = tetdb.sample(SPEC)
     seen = np.zeros(surface.n_triangles, bool)
     for rank in (0, 1):
         part = parts.subdomain(rank)
@@ -81,7 +82,7 @@ def test_a_merged_mesh_conforms(parts: tetdb.Store) -> None:
     counts = np.unique(faces, axis=0, return_counts=True)[1]
     assert counts.max() == 2
     # The balls' triangles are inside, filled on both sides: the walls alone are the boundary.
-    surface = tetdb.sample("balls,count=2,h=0.06")
+    surface = tetdb.sample(SPEC)
     assert (counts == 1).sum() == (surface.labels == "walls").sum()
     assert len(np.unique(mesh.points, axis=0)) == len(mesh.points)
 
@@ -138,7 +139,7 @@ def test_handles_and_surfaces_survive_pickling(parts: tetdb.Store) -> None:
 
 
 def test_subdomains_are_meshed_again_and_brought_back(tmp_path: Path) -> None:
-    with tetdb.mesh(tetdb.sample("box,h=0.06"), tmp_path / "s", subdomains=2, hsiz=0.04) as store:
+    with tetdb.mesh(tetdb.sample(SPEC), tmp_path / "s", **OPTIONS) as store:
         before, rows = store.digest, store.subdomains
         store.query(limit=1)
         store.resaturate([1], scale=0.8)

@@ -23,7 +23,7 @@ CASES: list[tuple[str, list[str], dict[str, Any]]] = [
     ("knot,h=0.3", ["--size-box", "-1,-1,-1,1,1,1,0.1,20%"],
      {"size": [tetdb.Box((-1, -1, -1), (1, 1, 1), 0.1, "20%")]}),
     ("box,h=0.3", ["--size-expr", "0.06+0.3*abs(z)"], {"size": "0.06+0.3*abs(z)"}),
-    ("box,h=0.06", ["--subdomains", "2", "--hsiz", "0.04"], {"subdomains": 2, "hsiz": 0.04}),
+    ("box,h=0.07", ["--subdomains", "2", "--hsiz", "0.045"], {"subdomains": 2, "hsiz": 0.045}),
     ("balls,count=3", ["--region-seed=0.01,0.01,0.01,rock"], {"seeds": {"rock": (0.01, 0.01, 0.01)}}),
     ("balls,count=3", ["--regions", "all", "--hole", "0.01,0.01,0.01"], {"regions": "all", "holes": [(0.01, 0.01, 0.01)]}),
     ("box,h=0.5", ["--hsiz", "0.1", "--refine-surface"], {"hsiz": 0.1, "refine_surface": True}),

@@ -14,12 +14,9 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
-from conftest import RUNS
+from conftest import OPTIONS, RUNS, SPEC
 
 import tetdb
-
-SPEC = "balls,count=2,h=0.06"
-OPTIONS = {"regions": "all", "hsiz": 0.035, "subdomains": 2}
 
 
 def test_runs_cancelled_at_any_time_end_soon_and_go_on_to_the_same_mesh(tmp_path: Path, parts: tetdb.Store) -> None:

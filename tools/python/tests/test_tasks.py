@@ -10,6 +10,7 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import pytest
+from conftest import OPTIONS, SPEC
 
 import tetdb
 
@@ -18,8 +19,7 @@ ROOT = Path(os.environ.get("TETDB_ROOT", Path(__file__).parents[3]))
 
 def test_tasks_in_processes_of_their_own_give_the_same_mesh(tmp_path: Path, parts: tetdb.Store) -> None:
     path = tmp_path / "s"
-    options = {"regions": "all", "subdomains": 2, "hsiz": 0.035}
-    tetdb.begin(tetdb.sample("balls,count=2,h=0.06"), path, **options)
+    tetdb.begin(tetdb.sample(SPEC), path, **OPTIONS)
     with pytest.raises(tetdb.TetdbError, match="store-unfinished"):
         tetdb.open(path)
     first = stage = tetdb.plan(path, 2)
@@ -42,7 +42,7 @@ def test_tasks_in_processes_of_their_own_give_the_same_mesh(tmp_path: Path, part
 
 
 def test_a_task_that_was_not_done_is_named(tmp_path: Path) -> None:
-    tetdb.begin(tetdb.sample("box,h=0.06"), tmp_path / "s", subdomains=2, hsiz=0.04)
+    tetdb.begin(tetdb.sample(SPEC), tmp_path / "s", **OPTIONS)
     (first,) = tetdb.plan(tmp_path / "s", 2)
     tetdb.run_task(tmp_path / "s", first)
     stage = tetdb.gather(tmp_path / "s")

@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use super::super::error::Result;
 use super::super::merged::{Merged, Opened};
-use super::super::midpoints::Midpoints;
+use super::super::midpoints::{MiddlePoints, Midpoints};
 use super::super::stream::{Records, scratch};
 use super::entities::Entities;
 use super::out::Out;
 use super::piece::Piece;
-use crate::storage::{Payload, SortRecord, Sorter, sort_record};
+use crate::storage::{Payload, SortRecord, Sorted, Sorter, sort_record};
 
 sort_record! {
     /// An entity that a vertex is on, or, behind all of these, where it is.
@@ -75,10 +75,24 @@ pub(super) fn gather(
     entities: &Entities,
     name: &Path,
 ) -> Result<Nodes> {
-    let parts = mesh.parts();
     let (dir, bytes) = (mesh.dir().to_owned(), mesh.sorter_bytes());
+    let claims = claims(mesh, piece, entities)?;
+    let mut points = piece.middles.map(Midpoints::points).transpose()?;
+    let nodes = granted(
+        claims,
+        mesh.n_vertices(),
+        &mut points,
+        Sorter::new(&dir, bytes),
+    )?;
+    let file = name.file_name().unwrap_or_default().to_string_lossy();
+    stored(nodes, entities, dir.join(format!("nodes-{file}")))
+}
+
+/// What faces, tetrahedra and ghosts of the piece say of their vertices and middles, by vertex.
+fn claims(mesh: &mut Merged, piece: &Piece, entities: &Entities) -> Result<Sorted<Claim>> {
+    let parts = mesh.parts();
     let n_vertices = mesh.n_vertices();
-    let mut claims = Sorter::new(&dir, bytes);
+    let mut claims = Sorter::new(mesh.dir(), mesh.sorter_bytes());
     let mut claim = |vertex, entity, point| {
         claims.push(Claim {
             vertex,
@@ -163,10 +177,18 @@ pub(super) fn gather(
         }
         Ok(())
     })?;
-    let mut points = piece.middles.map(Midpoints::points).transpose()?;
-    let mut sorter = Sorter::new(&dir, bytes);
+    Ok(claims.finish()?)
+}
+
+/// The first claim of each vertex, which is the strongest, with its position; by entity.
+fn granted(
+    claims: Sorted<Claim>,
+    n_vertices: u64,
+    points: &mut Option<MiddlePoints>,
+    mut sorter: Sorter<Node>,
+) -> Result<Sorted<Node>> {
     let mut last = None;
-    for claim in claims.finish()? {
+    for claim in claims {
         let claim = claim?;
         match last {
             Some((vertex, entity)) if vertex == claim.vertex => {
@@ -182,9 +204,8 @@ pub(super) fn gather(
             _ => {
                 last = Some((claim.vertex, claim.entity));
                 // Nobody claims the positions of middles: they stand in the order of their numbers.
-                if let (Some(points), Some(edge)) =
-                    (&mut points, claim.vertex.checked_sub(n_vertices))
-                {
+                let edge = claim.vertex.checked_sub(n_vertices);
+                if let (Some(points), Some(edge)) = (&mut *points, edge) {
                     sorter.push(Node {
                         entity: claim.entity,
                         vertex: claim.vertex,
@@ -194,15 +215,19 @@ pub(super) fn gather(
             }
         }
     }
-    let file = name.file_name().unwrap_or_default().to_string_lossy();
+    Ok(sorter.finish()?)
+}
+
+/// Counts them and puts them into a file at `path`.
+fn stored(sorted: Sorted<Node>, entities: &Entities, path: PathBuf) -> Result<Nodes> {
     let mut nodes = Nodes {
         n: 0,
         counts: vec![0; entities.tags().len()],
         span: [u64::MAX, 0],
-        path: dir.join(format!("nodes-{file}")),
+        path,
     };
     let mut stream = scratch(&nodes.path)?;
-    for node in sorter.finish()? {
+    for node in sorted {
         let node = node?;
         nodes.n += 1;
         nodes.counts[node.entity as usize] += 1;

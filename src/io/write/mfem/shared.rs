@@ -37,6 +37,47 @@ sort_record! {
     }
 }
 
+/// Those on the boundaries of all sub-domains, each as often as one has it, equal ones together.
+fn entities(mesh: &mut Merged) -> Result<Sorted<Entity>> {
+    let mut entities = Sorter::new(mesh.dir(), mesh.sorter_bytes());
+    for p in 0..mesh.n_parts() {
+        let Opened {
+            mut part, numbers, ..
+        } = mesh.open_part(p)?;
+        let mut push = |face: [u32; 3]| -> Result<()> {
+            let mut ends = face.map(|v| (numbers.of(v), v));
+            ends.sort_unstable();
+            let [a, b, c] = ends;
+            for ends in [
+                [a; 3],
+                [b; 3],
+                [c; 3],
+                [a, b, b],
+                [a, c, c],
+                [b, c, c],
+                ends,
+            ] {
+                entities.push(Entity {
+                    key: ends.map(|end| end.0),
+                    part: p as u32,
+                    locals: ends.map(|end| end.1),
+                })?;
+            }
+            Ok(())
+        };
+        for facet in part.facets() {
+            let facet = facet?;
+            if facet.tets.iter().any(|&tet| tet != NO_TET) {
+                push(facet.vertices)?;
+            }
+        }
+        for face in part.interfaces() {
+            push(face?.vertices)?;
+        }
+    }
+    Ok(entities.finish()?)
+}
+
 /// All that is shared.
 pub(super) struct Shared {
     members: Peekable<Sorted<Member>>,
@@ -49,47 +90,10 @@ pub(super) struct Shared {
 impl Shared {
     /// Finds it. Errors: damage, the disk.
     pub fn gather(mesh: &mut Merged) -> Result<Self> {
-        let (dir, bytes) = (mesh.dir().to_owned(), mesh.sorter_bytes());
-        let mut entities = Sorter::new(&dir, bytes);
-        for p in 0..mesh.n_parts() {
-            let Opened {
-                mut part, numbers, ..
-            } = mesh.open_part(p)?;
-            let mut push = |face: [u32; 3]| -> Result<()> {
-                let mut ends = face.map(|v| (numbers.of(v), v));
-                ends.sort_unstable();
-                let [a, b, c] = ends;
-                for ends in [
-                    [a; 3],
-                    [b; 3],
-                    [c; 3],
-                    [a, b, b],
-                    [a, c, c],
-                    [b, c, c],
-                    ends,
-                ] {
-                    entities.push(Entity {
-                        key: ends.map(|end| end.0),
-                        part: p as u32,
-                        locals: ends.map(|end| end.1),
-                    })?;
-                }
-                Ok(())
-            };
-            for facet in part.facets() {
-                let facet = facet?;
-                if facet.tets.iter().any(|&tet| tet != NO_TET) {
-                    push(facet.vertices)?;
-                }
-            }
-            for face in part.interfaces() {
-                push(face?.vertices)?;
-            }
-        }
-        let mut members = Sorter::new(&dir, bytes);
+        let mut entities = entities(mesh)?.peekable();
+        let mut members = Sorter::new(mesh.dir(), mesh.sorter_bytes());
         let mut group_of = BTreeMap::new();
         let mut counts = BTreeMap::<_, [u64; 3]>::new();
-        let mut entities = entities.finish()?.peekable();
         while let Some(first) = entities.next() {
             let first = first?;
             let mut all = vec![first];

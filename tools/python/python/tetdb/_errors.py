@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
+from typing import Any
+
 __all__ = [
     "InvalidMesh",
     "NoRoom",
@@ -101,9 +104,24 @@ _CLASSES: dict[str, type[TetdbError]] = {
 )
 
 
+_HELP = {
+    "memory": "give a larger `memory`",
+    "no-tasks": "`tetdb.plan` and `tetdb.gather` say which can be done now",
+    "store-exists": "`existing=\"replace\"` replaces it",
+    "store-unfinished": "`tetdb.resume` finishes it",
+}
+"""Which argument or call helps, where the library does not say more."""
+
+
 def of_code(
     code: str, message: str, where: str | None = None, help: str | None = None
 ) -> TetdbError:
-    if code == "memory" and where is None and help is None:
-        help = "give a larger memory"
-    return _CLASSES.get(code, TetdbError)(code, message, where, help)
+    return _CLASSES.get(code, TetdbError)(code, message, where, help or _HELP.get(code))
+
+
+def needed(package: str) -> Any:
+    """A package that only some calls need. Raises ImportError with what to install."""
+    try:
+        return importlib.import_module(package)
+    except ModuleNotFoundError as error:
+        raise ImportError(f"this needs the package {package}: pip install {package}", name=package) from error

@@ -67,8 +67,11 @@ class Part:
         npt.NDArray[np.int64],
         npt.NDArray[np.int32],
         npt.NDArray[np.int32],
-        npt.NDArray[np.float64],
     ]: ...
+
+def qualities(
+    points: npt.NDArray[np.float64], tets: npt.NDArray[np.int32]
+) -> npt.NDArray[np.float64]: ...
 
 class Store:
     def __init__(self, path: str, settings: dict[str, Any]) -> None: ...

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _native, _options, _sizes
-from ._errors import TetdbError
+from ._errors import TetdbError, needed
 from ._options import Progress
 from ._sizes import Length, Size
 
@@ -113,8 +113,6 @@ class Chunk:
         Positions in `points`; positive volume in this order.
     regions : (m,) int32
         Region of each.
-    quality : (m,) float64
-        q of each.
     ids : (m,) int64
         Lasting id of each: ``subdomain << 29 | number``.
     vertex_ids : (k,) int64
@@ -125,9 +123,13 @@ class Chunk:
     points: Floats
     tets: Ints
     regions: Ints
-    quality: Floats
     ids: Ids
     vertex_ids: Ids
+
+    @cached_property
+    def quality(self) -> Floats:
+        """(m,) float64: q of each tetrahedron, computed when it is first asked for."""
+        return _locked(_native.qualities(self.points, self.tets))
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,7 +252,8 @@ class Store:
         return _reopened, (self.path, self._how)
 
     def __repr__(self) -> str:
-        return f"<tetdb.Store {self.path!r}: {self.n_tets} tetrahedra in {len(self.subdomains)} sub-domains>"
+        n = len(self.subdomains)
+        return f"<tetdb.Store {self.path!r}: {self.n_tets} tetrahedra in {n} sub-domain{'s' * (n > 1)}>"
 
     # Reports.
 
@@ -296,7 +299,7 @@ class Store:
     def _info(self, rank: int) -> SubdomainInfo:
         rows = self._said()["subdomains"]
         if not 0 <= _options.count(rank, 0, "rank") < len(rows):
-            raise TetdbError("no-such-part", f"there is no sub-domain {rank}, but {len(rows)} from 0", "rank")
+            raise TetdbError("no-such-part", f"there is no sub-domain {rank}: they are numbered from 0 to {len(rows) - 1}", "rank")
         return _info_of(rows[rank])
 
     def quality(self) -> Quality:
@@ -331,15 +334,13 @@ class Store:
         for row in self.subdomains:
             part = self._native.part(row.rank)
             for first in range(0, row.n_tets, n):
-                arrays = part.block(first, n)
-                points, vertex_ids, tets, regions, quality = arrays
-                for array in (points, vertex_ids, tets, regions, quality):
+                points, vertex_ids, tets, regions = part.block(first, n)
+                for array in (points, vertex_ids, tets, regions):
                     _locked(array)
-                del arrays
                 start = (row.rank << _TET_BITS) + first
                 ids = _locked(np.arange(start, start + len(tets), dtype=np.int64))
-                chunk = Chunk(row.rank, points, tets, regions, quality, ids, vertex_ids)
-                del points, vertex_ids, tets, regions, quality, ids, array
+                chunk = Chunk(row.rank, points, tets, regions, ids, vertex_ids)
+                del points, vertex_ids, tets, regions, ids, array
                 yield chunk
                 # What the caller let go of is gone before the next is read.
                 del chunk
@@ -362,8 +363,7 @@ class Store:
 
     def to_pyvista(self, subdomain: int | Sequence[int] | None = None) -> Any:
         """A PyVista ``UnstructuredGrid`` with cell data `region` and `subdomain`; needs the package pyvista."""
-        import pyvista
-
+        pyvista = needed("pyvista")
         mesh = self.merged(subdomain)
         cells = {pyvista.CellType.TETRA: mesh.tets}
         grid = pyvista.UnstructuredGrid(cells, mesh.points)
@@ -376,7 +376,7 @@ class Store:
 
         Columns: `id`, `subdomain`, `region`, `quality`, `vertices` (4 lasting ids), `centroid` (3).
         """
-        import pyarrow as pa  # type: ignore[import-untyped]
+        pa = needed("pyarrow")
 
         def fixed(array: npt.NDArray[Any], width: int) -> Any:
             return pa.FixedSizeListArray.from_arrays(pa.array(array.reshape(-1)), width)

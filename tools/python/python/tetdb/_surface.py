@@ -77,8 +77,8 @@ class CheckReport:
 class Estimate:
     """What to expect of a mesh: counts, bytes, seconds on a server of 2.6 GHz."""
 
-    tets: float
-    vertices: float
+    tets: int
+    vertices: int
     subdomains: int
     store_bytes: int
     disk_peak_bytes: int
