@@ -8,6 +8,7 @@ use super::anatomy::{MARK, REQUIRED, VERTEX_MASK};
 use super::cursor::Mesh;
 use super::state::{dense, sparse};
 use super::{FaceRef, Facet, InterfaceFace, Tet, Workspace};
+use crate::geom::orient;
 use crate::storage::{Pages, Sorter, StorageError, check_cancelled, sort_record};
 
 sort_record! {
@@ -17,6 +18,22 @@ sort_record! {
         vertices: [u32; 3],
         /// A [`FaceRef`].
         place: u32,
+        /// Whether the order in which they turn is an odd one of the ascending.
+        is_odd: bool,
+    }
+}
+
+impl SortedFace {
+    fn of(tet: &Tet, place: FaceRef) -> Self {
+        let [a, b, c] = tet.face(place.face());
+        let mut vertices = [a, b, c];
+        vertices.sort_unstable();
+        Self {
+            vertices,
+            place: place.0,
+            // Each pair in the wrong order is one exchange.
+            is_odd: (a > b) ^ (b > c) ^ (a > c),
+        }
     }
 }
 
@@ -121,32 +138,39 @@ impl<P: Pages> Mesh<P> {
         });
     }
 
-    /// Makes neighbors of all pairs of tetrahedra with a common face. Errors: the disk, while sorting.
-    pub fn match_neighbors(&mut self, space: &Workspace) -> Result<(), StorageError> {
+    /// Makes neighbors of all pairs of tetrahedra with a common face.
+    ///
+    /// `false`: it is no mesh. A tetrahedron is not positive, or a face is of more than two, or of two on one side of it; flips rely on
+    /// neither. Errors: the disk, while sorting.
+    pub fn match_neighbors(&mut self, space: &Workspace) -> Result<bool, StorageError> {
         let mut faces = Sorter::new(space.dir, space.memory);
         let mut from = 0;
         while let Some((t, tet)) = self.next_tet(from) {
             from = t + 1;
+            let [a, b, c, d] = self.points(&tet);
+            if orient(a, b, c, d) <= 0.0 {
+                return Ok(false);
+            }
             for i in 0..4 {
-                let mut vertices = tet.face(i);
-                vertices.sort_unstable();
-                let place = FaceRef::new(t, i).0;
-                faces.push(SortedFace { vertices, place })?;
+                faces.push(SortedFace::of(&tet, FaceRef::new(t, i)))?;
             }
             if t & 1023 == 0 {
                 check_cancelled();
             }
         }
-        let mut open = None::<SortedFace>;
+        // The face before, and whether it has its neighbor.
+        let mut last = None::<(SortedFace, bool)>;
         for face in faces.finish()? {
             let face = face?;
-            match open.take() {
-                Some(before) if before.vertices == face.vertices => {
-                    self.link(FaceRef(before.place), FaceRef(face.place));
+            let same = last.filter(|(before, _)| before.vertices == face.vertices);
+            if let Some((before, is_linked)) = same {
+                if is_linked || before.is_odd == face.is_odd {
+                    return Ok(false);
                 }
-                _ => open = Some(face),
+                self.link(FaceRef(before.place), FaceRef(face.place));
             }
+            last = Some((face, same.is_some()));
         }
-        Ok(())
+        Ok(true)
     }
 }

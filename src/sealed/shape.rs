@@ -56,8 +56,11 @@ impl Shape {
     }
 }
 
-/// The bin of a quality.
+/// The bin of a quality; what is no number, as of a vertex without a place, is in the worst.
 pub fn quality_bin(quality: f64) -> usize {
+    if quality.is_nan() {
+        return QUALITY_BINS - 1;
+    }
     (quality.clamp(1.0, 10.0) as usize).min(QUALITY_BINS) - 1
 }
 
@@ -83,8 +86,8 @@ mod tests {
             }
         }
         assert_eq!(
-            [0.999, 1.0, 1.99, 2.0, 9.99, 10.0, f64::INFINITY].map(quality_bin),
-            [0, 0, 0, 1, 8, 9, 9]
+            [0.999, 1.0, 1.99, 2.0, 9.99, 10.0, f64::INFINITY, f64::NAN].map(quality_bin),
+            [0, 0, 0, 1, 8, 9, 9, 9]
         );
     }
 }

@@ -1,6 +1,7 @@
 //! One redb file of keyed values: a sub-domain in one generation.
 
 use std::io::ErrorKind;
+use std::mem::ManuallyDrop;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -252,7 +253,15 @@ impl StoreFile {
     pub fn check(&self) -> Result<(), StorageError> {
         let mut builder = Database::builder();
         builder.set_cache_size(CHECK_CACHE_BYTES);
-        let sound = guarded(|| open_private(&self.path, &builder)?.check_integrity());
+        // As in opening: one that is damaged is not closed, or a panic while it is could end the process.
+        let sound = guarded(|| {
+            let mut db = ManuallyDrop::new(open_private(&self.path, &builder)?);
+            let is_sound = db.check_integrity()?;
+            if is_sound {
+                drop(ManuallyDrop::into_inner(db));
+            }
+            Ok::<_, DatabaseError>(is_sound)
+        });
         match sound.map_err(|e| e.at(self.path())) {
             Ok(true) => Ok(()),
             Ok(false) | Err(StorageError::Damaged { .. }) => Err(StorageError::Damaged {

@@ -3,6 +3,8 @@
 //! Why: whatever a file or a disk holds is answered with an error, never with a panic. How: `tools/fuzz` mutates its corpus
 //! for as long as one likes and keeps what was found; here every file of it runs, and a few mutations of each target.
 
+#[path = "../../tools/fuzz/src/file.rs"]
+mod file;
 #[path = "../../tools/fuzz/src/mutate.rs"]
 mod mutate;
 #[path = "../../tools/fuzz/src/store.rs"]

@@ -8,6 +8,9 @@ use crate::storage::{Backing, DiskPath, Pager, Pages, check_cancelled};
 use crate::store::StoreError;
 use tetdb_schema::catalog::CoarseRow;
 
+/// What readers of surfaces refuse, for signs would not be exact.
+const COORDINATE_MAX: f64 = 1e30;
+
 /// Writes the working mesh of sub-domain `rank`, which has no gaps, to `path`. Errors: the disk.
 pub(crate) fn save<P: Pages>(
     mesh: &mut Mesh<P>,
@@ -58,10 +61,12 @@ pub(crate) fn reopen(
     };
     let mut mesh = Mesh::new(Pager::new(frames, Some(backing)));
     for chunk in snapshot.vertices() {
-        chunk?
-            .records
-            .iter()
-            .for_each(|v| mesh.add_snapshot_vertex(v));
+        for vertex in &chunk?.records {
+            if !vertex.point.into_iter().all(|x| x.abs() < COORDINATE_MAX) {
+                return Err(damaged("a vertex without a place").into());
+            }
+            mesh.add_snapshot_vertex(vertex);
+        }
     }
     for chunk in snapshot.tets() {
         for tet in &chunk?.records {
@@ -88,8 +93,10 @@ pub(crate) fn reopen(
             mesh.add_snapshot_face(face);
         }
     }
-    mesh.match_neighbors(space)?;
-    Ok(mesh)
+    match mesh.match_neighbors(space)? {
+        true => Ok(mesh),
+        false => Err(damaged("tetrahedra that overlap or are flat").into()),
+    }
 }
 
 #[cfg(test)]
@@ -98,6 +105,7 @@ mod tests {
     use crate::delaunay::{Kernel, enclose};
     use crate::geom::{Aabb, HilbertFrame, Point};
     use crate::mesh::{FaceRef, Facet, InterfaceFace, VertexTag, renumber};
+    use tetdb_schema::record::{CoarseTet, CoarseVertex};
 
     /// A random Delaunay mesh numbered along the curve, with tags, regions, flags, required faces and faces of both kinds.
     fn made(space: &Workspace) -> Mesh {
@@ -182,6 +190,77 @@ mod tests {
                 assert_eq!(again.facet(n), mesh.facet(n));
                 assert_eq!(again.interface_face(n), mesh.interface_face(n));
             }
+        }
+    }
+
+    /// Whoever knows the format can write a snapshot whose sums are right: flips must not meet what is no mesh.
+    #[test]
+    fn tetrahedra_that_are_no_mesh_are_damage() {
+        let dir = tempfile::tempdir().expect("a temporary folder");
+        let scratch = DiskPath::from(dir.path());
+        let space = Workspace {
+            dir: &scratch,
+            memory: 1 << 20,
+        };
+        let opened = |name: &str, points: [[f64; 3]; 5], tets: &[[u32; 4]]| {
+            let path = scratch.join(name);
+            let writer = CoarseWriter::create(&path, 0, 1, 1 << 20);
+            let mut writer = writer.expect("space for the snapshot");
+            let (tag, owner) = (0, 0);
+            for point in points {
+                let vertex = CoarseVertex { point, tag, owner };
+                writer.push_vertex(vertex).expect("space for the snapshot");
+            }
+            for &nodes in tets {
+                let tet = CoarseTet {
+                    nodes,
+                    bits: 0,
+                    region: 1,
+                    flags: 0,
+                };
+                writer.push_tet(tet).expect("space for the snapshot");
+            }
+            let row = writer.finish().expect("space for the snapshot");
+            let mut snapshot = CoarseSnapshot::open(&path, row, 1 << 20).expect("just written");
+            let backing = Backing {
+                subdomain: 0,
+                generation: 2,
+                spill: scratch.clone(),
+                made: None,
+                base: None,
+                cache_bytes: 1 << 20,
+            };
+            reopen(&mut snapshot, backing, 1 << 20, &space).map(|mesh| mesh.n_tets())
+        };
+        // One on either side of the triangle 0 1 2.
+        let points = [
+            [0., 0., 0.],
+            [1., 0., 0.],
+            [0., 1., 0.],
+            [0., 0., 1.],
+            [0.2, 0.2, -1.],
+        ];
+        let (above, below) = ([0, 1, 2, 3], [0, 2, 1, 4]);
+        let sound = opened("sound", points, &[above, below]);
+        assert_eq!(sound.expect("a mesh"), 2);
+        let mut far = points;
+        far[4][0] = f64::NAN;
+        let mut same_side = points;
+        same_side[4][2] = 2.0;
+        let bad: [(&str, _, &[[u32; 4]]); 5] = [
+            ("no place", far, &[above, below]),
+            ("negative", points, &[above, [0, 1, 2, 4]]),
+            ("flat", points, &[above, [0, 1, 2, 2]]),
+            ("same side", same_side, &[above, [0, 1, 2, 4]]),
+            ("thrice", points, &[above, below, below]),
+        ];
+        for (name, points, tets) in bad {
+            let error = opened(name, points, tets).expect_err(name);
+            let is_damage = matches!(
+                error,
+                PipelineError::Store(StoreError::Sealed(SealedError::Content { .. }))
+            );
+            assert!(is_damage, "{name}: {error}");
         }
     }
 }

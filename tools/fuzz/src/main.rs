@@ -1,16 +1,18 @@
 //! Mutates a corpus and feeds what comes of it to a target: `tetdb-fuzz TARGET|all [SECONDS] [SEED] [CORPUS]`.
 //!
 //! Runs on stable Rust, without coverage: seeds are files of every shape a format has, mutations know numbers that readers
-//! trip over. An input that panics, or takes longer than a second, is written beside the corpus as `TARGET/found-HASH`.
+//! trip over. An input that panics, ends the process, or takes longer than a second, is written beside the corpus as
+//! `TARGET/found-HASH`. Stores and their files are fed to a process of their own, for one that panics twice is gone.
 #![forbid(unsafe_code)]
 
+mod file;
 mod mutate;
 mod store;
 mod targets;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
+use std::process::{Command, ExitCode};
 use std::time::{Duration, Instant};
 
 use mutate::Mutator;
@@ -18,6 +20,14 @@ use targets::{TARGETS, Target};
 
 /// An input that takes longer is a finding.
 const SLOW: Duration = Duration::from_secs(1);
+/// An input that takes longer than this is not waited for, where it has a process of its own.
+const HANGS: Duration = Duration::from_secs(60);
+/// So many findings are enough.
+const FOUND_MAX: u32 = 10;
+/// Targets whose inputs may end the process.
+const APART: [&str; 2] = ["file", "store"];
+/// Where a process that runs on behalf of another leaves each input before it runs it.
+const INPUT_FILE: &str = "TETDB_FUZZ_INPUT";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -38,12 +48,14 @@ fn main() -> ExitCode {
         .iter()
         .filter(|t| wanted == "all" || t.name == wanted)
     {
-        match run(
-            target,
-            &corpus.join(target.name),
-            Duration::from_secs(seconds),
-            seed,
-        ) {
+        let folder = corpus.join(target.name);
+        let time = Duration::from_secs(seconds);
+        let is_apart = APART.contains(&target.name) && std::env::var_os(INPUT_FILE).is_none();
+        let done = match is_apart {
+            true => run_apart(target, &folder, time, seed),
+            false => run(target, &folder, time, seed),
+        };
+        match done {
             Ok(n) => found += n,
             Err(error) => {
                 eprintln!("{}: {error}", target.name);
@@ -70,8 +82,12 @@ fn run(target: &Target, folder: &Path, time: Duration, seed: u64) -> std::io::Re
     let mut mutator = Mutator::new(seed);
     let (clock, mut n, mut found) = (Instant::now(), 0u64, 0);
     let mut slowest = Duration::ZERO;
-    while clock.elapsed() < time && found < 10 {
+    let input_file = std::env::var_os(INPUT_FILE);
+    while clock.elapsed() < time && found < FOUND_MAX {
         let input = mutator.mutated(&seeds);
+        if let Some(path) = &input_file {
+            std::fs::write(path, &input)?;
+        }
         let (mut ended, mut took) = timed(target, &input);
         if ended && took > SLOW {
             // A busy machine is no finding.
@@ -80,10 +96,7 @@ fn run(target: &Target, folder: &Path, time: Duration, seed: u64) -> std::io::Re
         (n, slowest) = (n + 1, slowest.max(took));
         if !ended || took > SLOW {
             found += 1;
-            let hash = xxhash_rust::xxh3::xxh3_64(&input);
-            let path = folder.join(format!("found-{hash:016x}"));
-            std::fs::write(&path, &input)?;
-            println!("{}: {} after {took:?}", target.name, path.display());
+            keep(target, folder, &input, &format!("after {took:?}"))?;
         }
     }
     println!(
@@ -93,6 +106,52 @@ fn run(target: &Target, folder: &Path, time: Duration, seed: u64) -> std::io::Re
         clock.elapsed().as_secs_f64()
     );
     Ok(found)
+}
+
+/// Feeds a target in processes of their own, one after the other; an input that ends one is a finding.
+fn run_apart(target: &Target, folder: &Path, time: Duration, seed: u64) -> std::io::Result<u32> {
+    let dir = tempfile::tempdir()?;
+    let input = dir.path().join("input");
+    let (clock, mut found, mut part) = (Instant::now(), 0, 0);
+    while clock.elapsed() < time && found < FOUND_MAX {
+        let left = time.saturating_sub(clock.elapsed()).as_secs().max(1);
+        let mut child = Command::new(std::env::current_exe()?)
+            .args([target.name, &left.to_string(), &(seed + part).to_string()])
+            .arg(folder.parent().unwrap_or(folder))
+            .env(INPUT_FILE, &input)
+            .spawn()?;
+        let status = loop {
+            if let Some(status) = child.try_wait()? {
+                break status;
+            }
+            std::thread::sleep(Duration::from_millis(100));
+            let begun = std::fs::metadata(&input).and_then(|m| m.modified());
+            let runs = begun.ok().and_then(|begun| begun.elapsed().ok());
+            if runs.is_some_and(|runs| runs > HANGS) {
+                child.kill()?;
+            }
+        };
+        part += 1_000_000;
+        match status.code() {
+            Some(0) => {}
+            Some(1) => found += 1,
+            Some(_) => break,
+            None => {
+                found += 1;
+                keep(target, folder, &std::fs::read(&input)?, &status.to_string())?;
+            }
+        }
+    }
+    Ok(found)
+}
+
+/// Writes a finding beside the corpus.
+fn keep(target: &Target, folder: &Path, input: &[u8], what: &str) -> std::io::Result<()> {
+    let hash = xxhash_rust::xxh3::xxh3_64(input);
+    let path = folder.join(format!("found-{hash:016x}"));
+    std::fs::write(&path, input)?;
+    println!("{}: {} {what}", target.name, path.display());
+    Ok(())
 }
 
 /// Runs one input; whether it ended without a panic, and how long it took.

@@ -1,13 +1,13 @@
 //! A whole store of which something was changed: bytes of a file, or a value in it that is then sealed again.
 //!
-//! Opened, summed up, verified on every level and asked. Any answer will do, also that nothing is wrong where nothing was; a bug of ours (`internal`)
-//! will not.
+//! Opened, summed up, verified on every level and asked; one in eight is then written to. Any answer will do, also that nothing is wrong
+//! where nothing was; a bug of ours (`internal`) will not.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, OnceLock};
 
 use redb::{Database, ReadableDatabase, ReadableTable, TableDefinition};
-use tetdb::{Mesher, Store, Surface, VerifyLevel};
+use tetdb::{Mesher, Seal, Settings, Store, Surface, VerifyLevel};
 use xxhash_rust::xxh3::xxh3_64_with_seed;
 
 /// Of every file of a store: values by key.
@@ -21,8 +21,8 @@ struct Sound {
     files: Vec<(PathBuf, Vec<u8>)>,
 }
 
-/// A store of one sub-domain in memory, where the system has files there.
-fn sound() -> Sound {
+/// A store of one sub-domain, of which there is a previous version; in memory, where the system has files there.
+fn sound(seal: Seal) -> Sound {
     let shared = Path::new("/dev/shm");
     let dir = match shared.is_dir() {
         true => tempfile::tempdir_in(shared),
@@ -31,11 +31,10 @@ fn sound() -> Sound {
     let dir = dir.expect("a folder");
     let path = dir.path().join("a.tetdb");
     let surface = Surface::sample("box,h=0.4").expect("a box");
-    let made = Mesher::new(surface).threads(1).create(&path);
-    made.expect("a mesh");
-    let entries = std::fs::read_dir(&path).expect("a store is a folder");
-    let mut files: Vec<PathBuf> = entries.map(|e| e.expect("readable").path()).collect();
-    files.sort();
+    let made = Mesher::new(surface).threads(1).seal(seal).create(&path);
+    let change = made.expect("a mesh").remesh().subdomains(&[0]).scaled(0.9);
+    drop(change.run().expect("a finer mesh"));
+    let mut files = entries(&path);
     files.retain(|path| path.extension().is_some_and(|e| e == "redb"));
     let read = |path: PathBuf| (path.clone(), std::fs::read(path).expect("readable"));
     Sound {
@@ -45,10 +44,37 @@ fn sound() -> Sound {
     }
 }
 
+fn entries(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).expect("a store is a folder");
+    let mut paths: Vec<PathBuf> = entries.map(|e| e.expect("readable").path()).collect();
+    paths.sort();
+    paths
+}
+
+impl Sound {
+    /// As it was; nothing beside it.
+    fn restore(&self) {
+        for path in entries(&self.path) {
+            if !self.files.iter().any(|(file, _)| *file == path) {
+                let _ = match path.is_dir() {
+                    true => std::fs::remove_dir_all(path),
+                    false => std::fs::remove_file(path),
+                };
+            }
+        }
+        for (path, content) in &self.files {
+            std::fs::write(path, content).expect("writable");
+        }
+    }
+}
+
 /// Each eight bytes are a change: file, whether of a value, where (four bytes), what, and how.
 pub fn changed(bytes: &[u8]) {
-    static SOUND: OnceLock<Mutex<Sound>> = OnceLock::new();
-    let sound = SOUND.get_or_init(|| Mutex::new(sound()));
+    static SOUND: OnceLock<[Mutex<Sound>; 2]> = OnceLock::new();
+    let sound =
+        SOUND.get_or_init(|| [Seal::Packed, Seal::None].map(|seal| Mutex::new(sound(seal))));
+    let choice = xxh3_64_with_seed(bytes, 0);
+    let sound = &sound[choice as usize % 2];
     let sound = sound.lock().unwrap_or_else(|e| e.into_inner());
     let changes = || bytes.chunks_exact(8).take(8);
     let file = |change: &[u8]| &sound.files[usize::from(change[0]) % sound.files.len()];
@@ -66,9 +92,10 @@ pub fn changed(bytes: &[u8]) {
         std::fs::write(path, content).expect("writable");
     }
     ask(&sound.path);
-    for (path, content) in &sound.files {
-        std::fs::write(path, content).expect("writable");
+    if (choice / 2).is_multiple_of(8) {
+        write(&sound.path, choice / 16 % 5);
     }
+    sound.restore();
 }
 
 /// Another byte, or the same bits turned, or the end cut off.
@@ -114,23 +141,37 @@ fn change_value(path: &Path, at: usize, change: &[u8]) -> Option<()> {
     std::panic::catch_unwind(unwound).ok()?
 }
 
+fn answered<T>(result: Result<T, tetdb::Error>) {
+    if let Err(error) = result {
+        assert_ne!(error.code(), "internal", "{error}");
+    }
+}
+
 fn ask(path: &Path) {
-    let done = |error: tetdb::Error| assert_ne!(error.code(), "internal", "{error}");
     let mut store = match Store::open(path) {
         Ok(store) => store,
-        Err(error) => return done(error),
+        error => return answered(error),
     };
-    if let Err(error) = store.verify(VerifyLevel::Delaunay) {
-        done(error);
+    answered(store.verify(VerifyLevel::Delaunay));
+    answered(store.locate(&[[0.3, 0.4, 0.5], [2.0, 0.0, 0.0]]));
+    let asked = store.query().where_("quality > 1.2");
+    answered(asked.and_then(|q| q.collect()));
+}
+
+/// One of the ways to change a store.
+fn write(path: &Path, way: u64) {
+    let settings = Settings::default().threads(1);
+    if way == 0 {
+        return answered(Store::resume(path, settings));
     }
-    if let Err(error) = store.locate(&[[0.3, 0.4, 0.5], [2.0, 0.0, 0.0]]) {
-        done(error);
-    }
-    let asked = store
-        .query()
-        .where_("quality > 1.2")
-        .and_then(|q| q.collect());
-    if let Err(error) = asked {
-        done(error);
+    let mut store = match Store::open_with(path, settings) {
+        Ok(store) => store,
+        error => return answered(error),
+    };
+    match way {
+        1 => answered(store.undo()),
+        2 => answered(store.forget_previous()),
+        3 => answered(store.remesh().repair().run()),
+        _ => answered(store.remesh().subdomains(&[0]).scaled(1.2).run()),
     }
 }

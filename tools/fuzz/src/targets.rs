@@ -85,6 +85,11 @@ pub const TARGETS: &[Target] = &[
         run: chunk,
     },
     Target {
+        name: "file",
+        format: None,
+        run: crate::file::changed,
+    },
+    Target {
         name: "store",
         format: None,
         run: crate::store::changed,

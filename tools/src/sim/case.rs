@@ -59,9 +59,10 @@ impl Case {
         Self::new("box,h=0.08", 8)
     }
 
-    /// A smaller one, not optimized, for what is done to every single call: the disk is asked for much the same.
+    /// A smaller one, not optimized, for what is done to every single call: the disk is asked for much the same. With a quarter of
+    /// the tetrahedra that eight sub-domains of edges of 0.12 have, a run takes half the time for as many calls.
     pub fn tiny() -> Self {
-        let mut case = Self::new("box,h=0.12", 8);
+        let mut case = Self::new("box,h=0.2", 8);
         case.options.optimize = Some("none".to_owned());
         case
     }

@@ -36,7 +36,17 @@ struct File {
 }
 
 impl Flips {
-    pub fn new(program: &Path) -> Self {
+    /// Two sub-domains of several chunks.
+    pub fn large(program: &Path) -> Self {
+        Self::new(program, "sample:box,h=0.05", "1")
+    }
+
+    /// One of few chunks, which is asked four times as soon.
+    pub fn small(program: &Path) -> Self {
+        Self::new(program, "sample:box,h=0.1", "0")
+    }
+
+    fn new(program: &Path, surface: &str, changed: &str) -> Self {
         let program = program.canonicalize().expect("the program to be asked");
         let shared = Path::new("/dev/shm");
         let dir = match shared.is_dir() {
@@ -49,24 +59,11 @@ impl Flips {
             files: Vec::new(),
             answers: Vec::new(),
         };
-        let mesh = [
-            "mesh",
-            "sample:box,h=0.045",
-            "-o",
-            "a.tetdb",
-            "--subdomains",
-            "2",
-        ];
+        let mesh = ["mesh", surface, "-o", "a.tetdb", "--subdomains", "2"];
         assert_eq!(flips.ask(&mesh).0, Some(0), "a store is made");
         // Files of the previous version are kept beside those that count, and the coarse leaves.
-        let change = [
-            "resaturate",
-            "a.tetdb",
-            "--subdomain",
-            "1",
-            "--refine-by",
-            "0.9",
-        ];
+        let words = "resaturate a.tetdb --refine-by 0.9 --subdomain";
+        let change: Vec<&str> = words.split(' ').chain([changed]).collect();
         assert_eq!(flips.ask(&change).0, Some(0), "a sub-domain is made again");
         let store = flips.dir.path().join("a.tetdb");
         for entry in std::fs::read_dir(store).expect("a store is a folder") {

@@ -9,7 +9,7 @@ use crate::sim::Rng;
 
 const MESH: &[&str] = &[
     "mesh",
-    "sample:box,h=0.045",
+    "sample:box,h=0.05",
     "-o",
     "a.tetdb",
     "--subdomains",
@@ -17,6 +17,9 @@ const MESH: &[&str] = &[
     "--memory",
     "64MiB",
 ];
+
+/// The duration of a run is measured again after so many items, for the load of the machine changes.
+const REMEASURED: u64 = 20;
 
 /// A folder to mesh in, and what comes out of it undisturbed.
 pub struct Kills {
@@ -36,13 +39,24 @@ impl Kills {
             digest: String::new(),
             duration: Duration::ZERO,
         };
-        let clock = Instant::now();
-        kills.succeed(MESH).expect("an undisturbed run");
-        kills.duration = clock.elapsed();
+        kills.measure().expect("an undisturbed run");
         kills.digest = kills
             .succeed(&["digest", "a.tetdb"])
             .expect("a finished store");
         kills
+    }
+
+    /// How long a run takes that nothing disturbs, at the load the machine has now.
+    fn measure(&mut self) -> Result<(), String> {
+        self.clear();
+        let clock = Instant::now();
+        self.succeed(MESH)?;
+        self.duration = clock.elapsed();
+        Ok(())
+    }
+
+    fn clear(&self) {
+        let _ = std::fs::remove_dir_all(self.dir.path().join("a.tetdb"));
     }
 
     fn command(&self, words: &[&str]) -> Command {
@@ -64,8 +78,8 @@ impl Kills {
         }
     }
 
-    /// Starts a run and kills it after `delay`; whether it was still running.
-    fn kill(&self, words: &[&str], delay: Duration) -> Result<bool, String> {
+    /// Starts a run and kills it after `delay`; how long it took when it had ended before that.
+    fn kill(&self, words: &[&str], delay: Duration) -> Result<Option<Duration>, String> {
         let mut command = self.command(words);
         command.stdout(Stdio::null()).stderr(Stdio::null());
         let mut child = command.spawn().map_err(|e| e.to_string())?;
@@ -73,39 +87,48 @@ impl Kills {
         while clock.elapsed() < delay {
             if let Ok(Some(status)) = child.try_wait() {
                 return match status.success() {
-                    true => Ok(false),
+                    true => Ok(Some(clock.elapsed())),
                     false => Err(format!("{words:?} ended with {status}")),
                 };
             }
             std::thread::sleep(Duration::from_millis(1));
         }
         child.kill().map_err(|e| e.to_string())?;
-        child.wait().map_err(|e| e.to_string())?;
-        Ok(true)
+        let status = child.wait().map_err(|e| e.to_string())?;
+        // It may have ended between the last look and the signal.
+        Ok(status.success().then(|| clock.elapsed()))
     }
 
     /// Every tenth run is killed a second time while it is resumed.
     pub fn item(&mut self, seed: u64, item: u64) -> Item {
         let mut rng = Rng(seed ^ item.wrapping_mul(0xD6E8_FEB8_6659_FD93));
         let mut done = Item::default();
-        let result = self.one(&mut rng, item.is_multiple_of(10), &mut done);
+        let result = self.one(&mut rng, item, &mut done);
         done.note("killed", result);
-        let _ = std::fs::remove_dir_all(self.dir.path().join("a.tetdb"));
+        self.clear();
         done
     }
 
-    fn one(&self, rng: &mut Rng, twice: bool, done: &mut Item) -> Result<(), String> {
-        let _ = std::fs::remove_dir_all(self.dir.path().join("a.tetdb"));
-        let any = |rng: &mut Rng| self.duration.mul_f64(rng.below(1000) as f64 / 1000.0);
-        let first = any(rng);
-        done.count(match self.kill(MESH, first)? {
-            true => "killed",
-            false => "finished first",
-        });
+    fn one(&mut self, rng: &mut Rng, item: u64, done: &mut Item) -> Result<(), String> {
+        if item.is_multiple_of(REMEASURED) {
+            self.measure()?;
+        }
+        let any = |rng: &mut Rng, of: Duration| of.mul_f64(rng.below(1000) as f64 / 1000.0);
+        // Until the signal finds a run: a machine that has become faster ends it before.
+        let first = loop {
+            self.clear();
+            let delay = any(rng, self.duration);
+            match self.kill(MESH, delay)? {
+                None => break delay,
+                Some(took) => self.duration = took,
+            }
+            done.count("finished first");
+        };
+        done.count("killed");
         let begun = self.dir.path().join("a.tetdb/catalog.redb").exists();
-        if twice && begun {
-            let second = any(rng);
-            if self.kill(&["resume", "a.tetdb"], second)? {
+        if item.is_multiple_of(10) && begun {
+            let second = any(rng, self.duration - first.min(self.duration));
+            if self.kill(&["resume", "a.tetdb"], second)?.is_none() {
                 done.count("killed again");
             }
         }

@@ -33,7 +33,8 @@ impl Item {
 /// A campaign.
 pub enum Mode {
     Kills(kills::Kills),
-    Flips(flips::Flips),
+    /// Bits of a small store, and one in nine of a larger one.
+    Flips([flips::Flips; 2]),
     /// Two writers at once.
     Races(races::Races),
     /// Many readers beside a writer.
@@ -153,7 +154,7 @@ impl Mode {
     pub fn new(mode: &str, program: &Path) -> Option<Self> {
         Some(match mode {
             "kills" => Self::Kills(kills::Kills::new(program)),
-            "flips" => Self::Flips(flips::Flips::new(program)),
+            "flips" => Self::Flips([flips::Flips::large(program), flips::Flips::small(program)]),
             "races" => Self::Races(races::Races::new(program)),
             "readers" => Self::Readers(readers::Readers::new(program)),
             "swaps" => Self::Swaps(swaps::Swaps::new(program)),
@@ -179,7 +180,7 @@ impl Mode {
     pub fn item(&mut self, seed: u64, item: u64) -> Item {
         match self {
             Self::Kills(kills) => kills.item(seed, item),
-            Self::Flips(flips) => flips.item(seed, item),
+            Self::Flips(flips) => flips[usize::from(!item.is_multiple_of(9))].item(seed, item),
             Self::Races(races) => races.item(seed, item),
             Self::Readers(readers) => readers.item(item),
             Self::Swaps(swaps) => swaps.item(seed, item),

@@ -3,16 +3,20 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 use tetdb::audit;
 use tetdb::store::{Catalog, StoreError};
 
 use super::Item;
+use crate::sim::Rng;
 
-const READERS: usize = 20;
+const READERS: u64 = 20;
 /// A reader that is told so often in a row that the store was changed is refused.
 const CHANGED_MAX: u64 = 3;
 const MEMORY: usize = 4 << 20;
+/// A reader asks, and asks again after at most so long: twenty that never pause leave the change next to no processor, so that it takes minutes.
+const PAUSE_MAX_MS: u64 = 2000;
 
 /// A finished store of two sub-domains.
 pub struct Readers {
@@ -35,7 +39,7 @@ impl Readers {
             program,
             dir: tempfile::tempdir().expect("a folder for a store"),
         };
-        let mesh = "mesh sample:box,h=0.045 -o a.tetdb --subdomains 2";
+        let mesh = "mesh sample:box,h=0.05 -o a.tetdb --subdomains 2";
         readers.run(mesh).expect("an undisturbed run");
         readers
     }
@@ -70,23 +74,21 @@ impl Readers {
     }
 
     fn one(&self, item: u64, done: &mut Item) -> Result<(), String> {
+        // Four that come to nothing together: else the mesh would grow, or shrink, from one to the next.
         let line = match item % 4 {
-            3 => "resaturate a.tetdb --undo".to_owned(),
-            k => {
-                let factor = ["0.8", "0.9", "1.1"][k as usize];
-                format!(
-                    "resaturate a.tetdb --subdomain {} --refine-by {factor}",
-                    item % 2
-                )
-            }
+            0 => "resaturate a.tetdb --subdomain 0 --refine-by 0.8",
+            1 => "resaturate a.tetdb --subdomain 1 --refine-by 0.9",
+            2 => "resaturate a.tetdb --undo",
+            _ => "resaturate a.tetdb --subdomain 0 --refine-by 1.25",
         };
         let before = self.digest()?;
         let is_over = AtomicBool::new(false);
         let (changed, seen) = std::thread::scope(|scope| {
+            let is_over = &is_over;
             let readers: Vec<_> = (0..READERS)
-                .map(|_| scope.spawn(|| self.watch(&is_over)))
+                .map(|k| scope.spawn(move || self.watch(is_over, Rng(READERS * item + k))))
                 .collect();
-            let changed = self.run(&line);
+            let changed = self.run(line);
             is_over.store(true, Ordering::Release);
             let seen = readers.into_iter().map(|reader| reader.join());
             (changed, seen.collect::<Vec<_>>())
@@ -108,7 +110,7 @@ impl Readers {
         Ok(())
     }
 
-    fn watch(&self, is_over: &AtomicBool) -> Seen {
+    fn watch(&self, is_over: &AtomicBool, mut rng: Rng) -> Seen {
         let (mut seen, mut in_a_row) = (Seen::default(), 0);
         // At least one answer each, for the change may be quicker.
         while !is_over.load(Ordering::Acquire) || seen.digests.is_empty() {
@@ -128,6 +130,11 @@ impl Readers {
                     seen.wrong.push(error.to_string());
                     break;
                 }
+            }
+            let pause = Duration::from_millis(rng.below(PAUSE_MAX_MS));
+            let clock = Instant::now();
+            while clock.elapsed() < pause && !is_over.load(Ordering::Acquire) {
+                std::thread::sleep(Duration::from_millis(5));
             }
         }
         seen

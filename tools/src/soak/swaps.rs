@@ -36,7 +36,7 @@ impl Swaps {
                 _ => "",
             };
             for line in [
-                format!("mesh sample:box,h=0.045 -o {name} --subdomains 2 {seal}"),
+                format!("mesh sample:box,h=0.05 -o {name} --subdomains 2 {seal}"),
                 format!("resaturate {name} --subdomain 1 --refine-by 0.9"),
                 format!("resaturate {name} --undo"),
                 format!("resaturate {name} --subdomain 1 --refine-by 0.8"),
