@@ -85,10 +85,6 @@ const LONG_FUNCTIONS: &[(&str, &str)] = &[
         "an answer line by line, for people and for programs",
     ),
     (
-        "io/read/obj.rs read",
-        "one match over the words that begin a line",
-    ),
-    (
         "io/write/foam/faces.rs part",
         "one merge of four sorted streams; what a face is depends on all four",
     ),
@@ -99,6 +95,10 @@ const LONG_FUNCTIONS: &[(&str, &str)] = &[
     (
         "io/write/foam/processors.rs write",
         "two passes that share their counts",
+    ),
+    (
+        "io/write/gmsh/elements.rs write",
+        "points, lines, triangles and tetrahedra in turn, with one count of what was written",
     ),
     (
         "io/write/gmsh/nodes.rs claims",
