@@ -175,6 +175,7 @@ fn obj(surface: &Surface, stream: &mut Stream) -> Result<()> {
 /// Writes embedded edges and points to `out` as an `.obj` file of lines (`l`) and points (`p`), exactly.
 ///
 /// Errors: [`WriteError`]; `out` is not touched then.
+#[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "for the program"))]
 pub fn wires(surface: &Surface, out: &Path) -> Result<()> {
     let mut draft = Draft::new(out)?;
     let path = draft.create(out, 0)?;

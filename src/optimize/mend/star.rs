@@ -226,7 +226,7 @@ impl Cost {
         }
     }
 
-    /// Whether this, of least value `value`, may take the place of `old`: the worst q does not rise above 10, and
+    /// Whether this, of least value `value`, may take the place of `old`: the worst q does not rise above 10 (hardly, for the worst excess), and
     /// - to have fewer of q ≥ 10: there are fewer;
     /// - for the worst of the mesh, of q or of excess: there are not many more of them;
     /// - else the sum falls or what is aimed at was very bad and becomes much better, and there are hardly more of them.
@@ -247,7 +247,12 @@ impl Cost {
             Goal::Count => (self.n_poor, self.sum) < (old.n_poor, old.sum),
             Goal::Worst | Goal::WorstExcess => self.n_poor <= old.n_poor + aim.more,
         };
-        self.worst_goodness >= old.worst_goodness.min(0.1) && value > aim.own && is_wanted
+        // Where needles are forced to a q of millions, five in a thousand of it are the difference between millions and ten for what is not forced.
+        let least = match aim.goal {
+            Goal::WorstExcess => 0.995 * old.worst_goodness,
+            Goal::Quality | Goal::Excess | Goal::Count | Goal::Worst => old.worst_goodness,
+        };
+        self.worst_goodness >= least.min(0.1) && value > aim.own && is_wanted
     }
 }
 
