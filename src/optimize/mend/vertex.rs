@@ -2,7 +2,7 @@
 
 use super::super::climb::Climb;
 use super::super::smooth::is_free;
-use super::star::{Aim, Cost, FaceBounds, Side, Star, value_of};
+use super::star::{Aim, Cost, FaceBounds, Goal, Side, Star, value_of};
 use crate::geom::Point;
 use crate::mesh::Mesh;
 use crate::reconnect::Ball;
@@ -12,6 +12,8 @@ use crate::storage::Pages;
 const BALL_MAX: usize = 1024;
 /// Steps of a search.
 const STEPS: u32 = 60;
+/// Places tried on the way back to where a vertex is, each half as far.
+const HALVINGS: u32 = 12;
 /// A move for the sum must at least raise the product of a ball by this much in powers of two: less is worth no sweep.
 const GAIN_MIN: f64 = 0.1;
 
@@ -87,7 +89,8 @@ impl Mover {
         self.was_flat
     }
 
-    /// Where the worst of the ball gathered is best, and its value there, where the ball gets better.
+    /// Where the worst of the ball gathered is best, and its value there, where the ball gets better. For the worst excess, where that place costs the
+    /// worst q too much, a place on the way there.
     pub(super) fn raise_least<P: Pages>(
         &mut self,
         mesh: &mut Mesh<P>,
@@ -101,7 +104,20 @@ impl Mover {
             let [good, value] = value_of(mesh, record, bounds);
             old.add(good, value);
         }
-        let is_better = value > 0.0 && self.star.cost(at).is_better(&old, value, aim);
-        is_better.then_some((at, value))
+        let is_better =
+            |star: &Star, at, value| value > 0.0 && star.cost(at).is_better(&old, value, aim);
+        if is_better(&self.star, at, value) {
+            return Some((at, value));
+        }
+        if aim.goal != Goal::WorstExcess {
+            return None;
+        }
+        let mut way = at - start;
+        (0..HALVINGS).find_map(|_| {
+            way *= 0.5;
+            let at = start + way;
+            let value = self.star.least(at, f64::NEG_INFINITY);
+            is_better(&self.star, at, value).then_some((at, value))
+        })
     }
 }
