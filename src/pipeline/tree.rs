@@ -73,7 +73,17 @@ impl TreePart {
         f64::from(self.count / 2) / f64::from(self.count)
     }
 
-    /// The cuts above it, from the top, in a tree of `n` sub-domains.
+    /// Whether a tree of `n` sub-domains has it.
+    fn is_of(self, n: u32) -> bool {
+        let mut at = Self { first: 0, count: n };
+        while at != self && at.count > 1 {
+            let [low, high] = at.children();
+            at = if self.first < high.first { low } else { high };
+        }
+        at == self
+    }
+
+    /// The cuts above it, from the top, in a tree of `n` sub-domains that has it.
     pub(crate) fn cuts_above(self, n: u32) -> Vec<u32> {
         let mut cuts = Vec::new();
         let mut at = Self { first: 0, count: n };
@@ -149,8 +159,9 @@ pub(crate) fn parts(catalog: &mut Catalog, n: u32) -> Result<Vec<PartMesh>, Stor
     let mut first = 0;
     while first < n {
         let bytes = catalog.blob(blob::PART + first)?.unwrap_or_default();
-        let part = PartMesh::from_bytes(first, &bytes).ok_or_else(|| damaged(catalog, first))?;
-        first += part.part.count.max(1);
+        let part = PartMesh::from_bytes(first, &bytes).filter(|part| part.part.is_of(n));
+        let part = part.ok_or_else(|| damaged(catalog, first))?;
+        first += part.part.count;
         parts.push(part);
     }
     Ok(parts)
@@ -276,6 +287,7 @@ mod tests {
                     leaves += 1;
                     continue;
                 }
+                assert!(part.is_of(n));
                 let above = part.cuts_above(n);
                 assert!(above.len() <= 12);
                 cuts.push(part.cut());
@@ -287,6 +299,21 @@ mod tests {
             cuts.sort_unstable();
             assert_eq!(leaves, n);
             assert_eq!(cuts, (1..n).collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
+    fn only_parts_of_the_tree_are_parts() {
+        let part = |first, count| TreePart { first, count };
+        assert!(part(0, 1).is_of(1) && part(2, 1).is_of(5) && part(2, 3).is_of(5));
+        for (first, count, n) in [
+            (0, 0x99_0001, 1),
+            (0, 0, 1),
+            (1, 1, 1),
+            (0, 3, 5),
+            (1, 2, 4),
+        ] {
+            assert!(!part(first, count).is_of(n), "{first} {count} of {n}");
         }
     }
 }
