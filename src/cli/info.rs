@@ -5,16 +5,18 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use super::args::StoreArgs;
+use super::args::InfoArgs;
 use super::console::Console;
 use super::failure::Failure;
 use super::memory;
 use super::tasks;
 use super::words::{self, count};
 use crate::api::Tasks;
+use crate::api::page::measure_excess;
 use crate::geom::{Aabb, Point, short};
 use crate::pipeline;
 use crate::store::Catalog;
+use crate::view::Excess;
 use tetdb_schema::catalog::{QualityRow, RegionRow, StoreState, SubdomainRow};
 
 /// Regions listed for people.
@@ -24,13 +26,29 @@ const TETS_MEASURED: u64 = 10_000;
 /// Sub-domains listed for people.
 const SUBDOMAINS_LISTED: usize = 32;
 
-pub fn run(args: &StoreArgs, console: &Console) -> Result<u8, Failure> {
+pub fn run(args: &InfoArgs, console: &Console) -> Result<u8, Failure> {
     // The rows of a catalog are far less than the least cap.
-    memory::asked(args.memory.as_deref())?;
+    let memory = memory::asked(args.of.memory.as_deref())?;
+    let path = &args.of.store;
+    let excess = (args.excess)
+        .then(|| measure_excess(path, &console.settings(memory, None)))
+        .transpose()?;
+    console.done();
     if console.is_json() {
-        console.answer(&object(&args.store)?);
-    } else {
-        print(&args.store, console)?;
+        let mut all = object(path)?;
+        if let Some(excess) = excess {
+            all["excess"] = json!(excess);
+        }
+        console.answer(&all);
+        return Ok(0);
+    }
+    print(path, console)?;
+    if let Some(Excess { worst, above_two }) = excess {
+        console.line(&format!(
+            "excess (q over the least that the surface allows): {} at most; above 2: {}",
+            short(worst),
+            count(above_two, "tetrahedron").replace("tetrahedrons", "tetrahedra")
+        ));
     }
     Ok(0)
 }

@@ -7,7 +7,7 @@
 //! 1. `vertex`: inner vertices of bad tetrahedra move for the product of their ball, in sweeps; that takes clusters apart, each pass a bit further;
 //! 2. then, for each bad tetrahedron in order, the first that makes it good enough, or else the best, of: a flip, or an edge or a vertex
 //!    removed; a vertex moved for the worst of its ball; a vertex put into a cavity that grows (`cavity`), or on one of its edges; where all
-//!    that gains little, a cavity filled anew with tetrahedra of its own vertices (`refill`).
+//!    that gains little, but not for the number of q ≥ 10, a cavity filled anew with tetrahedra of its own vertices (`refill`).
 //!
 //! The vertex in a cavity gains most. What is tried in vain is remembered until something changes it. All this in
 //! several stages, judged differently (`stages`).
@@ -115,7 +115,7 @@ impl Mender {
             self.failed.clear();
             for _ in 0..stage.passes_max {
                 let before = self.counts.changes();
-                if matches!(stage.goal, Goal::Quality | Goal::Excess) {
+                if stage.goal == Goal::Quality {
                     let list = self.list(mesh, &mut flags.clone(), stage);
                     self.lift(mesh, &list);
                 }
@@ -289,7 +289,8 @@ impl Mender {
                 self.weigh(proposal, &mut best, &mut way);
             }
         }
-        if best < 2.0 * own {
+        // It takes a quarter of the time, and one success of twenty where the number of q ≥ 10 is to fall.
+        if best < 2.0 * own && stage.goal != Goal::Count {
             let found = (self.refill).grow(mesh, t, aim, best, &mut self.bounds);
             if let Some(value) = found {
                 (best, way) = (value, Way::Refill);
@@ -297,7 +298,7 @@ impl Mender {
         }
         let floor = match stage.goal {
             Goal::Worst | Goal::WorstExcess => best,
-            Goal::Quality | Goal::Excess | Goal::Count => own,
+            Goal::Quality | Goal::Count => own,
         };
         if best < 2.0 * own && self.reconnect(mesh, t, tet, floor) {
             return true;

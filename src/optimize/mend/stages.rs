@@ -2,11 +2,12 @@
 //!
 //! 1. By q: a solver fails on the worst ones, which have millions. What stands beside a needle of the surface is as bad as what stands on it, and by
 //!    excess nothing could take its place.
-//! 2. By excess, q over the bound: what is farthest from what the surface allows.
-//! 3. The worst q of all, whatever it costs the others beside it: in a fan of needles no sum falls when one of them is made better.
-//! 4. The worst excess of all, likewise: the surface's needles hide it from 3.
-//! 5. The number of those of q ≥ 10.
-//! 6. The worst q once more.
+//! 2. The worst q of all, whatever it costs the others beside it: in a fan of needles no sum falls when one of them is made better.
+//! 3. The worst excess of all, q over the bound, likewise: the surface's needles hide it from 2.
+//! 4. The number of those of q ≥ 10.
+//! 5. The worst q once more.
+//!
+//! Between 1 and 2 excess was once brought down like q: of a hundred tries three had success, and the worst got no better.
 
 use super::super::bound::face_floor;
 use super::super::quality::{is_below, quality};
@@ -55,7 +56,7 @@ pub(super) const WORST: Stage = Stage {
 /// On balls and even scans the rounds before leave next to nothing of the kind, so that little is touched there.
 ///
 /// Cavities of flat tetrahedra need 20 in the median, 37 for nine in ten.
-pub(super) const STAGES: [Stage; 6] = [
+pub(super) const STAGES: [Stage; 5] = [
     Stage {
         goal: Goal::Quality,
         quality_max: 50.0,
@@ -64,16 +65,6 @@ pub(super) const STAGES: [Stage; 6] = [
         more: 3,
         tets_max: 40,
         passes_max: 3,
-        one_in: 100,
-    },
-    Stage {
-        goal: Goal::Excess,
-        quality_max: 50.0,
-        excess_max: EXCESS_MAX,
-        gain_min: 1.1,
-        more: 1,
-        tets_max: 40,
-        passes_max: 2,
         one_in: 100,
     },
     WORST,
@@ -107,7 +98,7 @@ impl Stage {
         let worst = f64::from_bits(list.first()?.0);
         let mut stage = *self;
         let limit = match self.goal {
-            Goal::Quality | Goal::Excess | Goal::Count => return Some(stage),
+            Goal::Quality | Goal::Count => return Some(stage),
             Goal::Worst => &mut stage.quality_max,
             Goal::WorstExcess => &mut stage.excess_max,
         };
@@ -162,7 +153,7 @@ pub(super) fn judge<P: Pages>(
         return Judgment::Forced(q);
     }
     Judgment::Bad(match stage.goal {
-        Goal::Excess | Goal::WorstExcess => excess,
+        Goal::WorstExcess => excess,
         Goal::Quality | Goal::Count | Goal::Worst => q,
     })
 }
