@@ -171,9 +171,14 @@ pub fn print(path: &Path, console: &Console) -> Result<(), Failure> {
         surfaces.join(", ")
     ));
     if console.is_verbose() {
-        for row in catalog.journal()? {
-            console.line(&format!("  {:<28} {:>9.2} s", row.step, row.seconds));
+        let journal = catalog.journal()?;
+        for row in &journal {
+            let of = (row.subdomain).map_or(String::new(), |rank| format!(" (sub-domain {rank})"));
+            let step = row.step.clone() + &of;
+            console.line(&format!("  {step:<48} {:>9.2} s", row.seconds));
         }
+        let seconds: f64 = journal.iter().map(|row| row.seconds).sum();
+        console.line(&format!("  {:<48} {seconds:>9.2} s", "all steps"));
     }
     if let Some(planned) = Tasks::of(path).status()? {
         tasks::print(&planned, console);

@@ -25,7 +25,7 @@ pub struct RunArgs {
     /// Skip the verification at the end
     #[arg(long)]
     pub no_verify: bool,
-    /// Also write these mesh files (.vtu, .pvtu, .mesh, .meshb, .msh, .inp, .npy, .json, .parquet where built in)
+    /// Also write this mesh file, its format by its ending as `tetdb export --help` lists them; may be repeated
     #[arg(long, value_name = "FILE")]
     pub export: Vec<PathBuf>,
     /// Answer with one JSON object
