@@ -15,6 +15,7 @@ pub struct ReadArgs {
 
 /// How to run; none of this changes the mesh.
 #[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Run")]
 pub struct RunArgs {
     /// Most memory to hold, such as 512MiB or 8GiB [default: 60 % of what is free]
     #[arg(long, value_name = "SIZE")]
