@@ -44,7 +44,8 @@ pub(super) struct Stage {
 /// What brings the worst q of all down.
 pub(super) const WORST: Stage = Stage {
     goal: Goal::Worst,
-    quality_max: 10.0,
+    // Rounds leave even surfaces below it.
+    quality_max: 4.0,
     excess_max: 1.05,
     gain_min: 1.03,
     more: 16,
