@@ -192,10 +192,13 @@ pub fn print(path: &Path, console: &Console) -> Result<(), Failure> {
         return Ok(());
     }
     let rows = catalog.subdomains()?;
-    let (tets, bytes) = (
-        rows.iter().map(|r| r.tets).sum::<u64>(),
-        rows.iter().map(|r| r.bytes).sum::<u64>(),
-    );
+    let tets: u64 = rows.iter().map(|r| r.tets).sum();
+    let bytes = rows.iter().map(|r| r.bytes).sum::<u64>()
+        + (catalog.coarse_snapshots()?.iter())
+            .map(|c| c.bytes)
+            .sum::<u64>()
+        + catalog.previous()?.iter().map(|r| r.bytes).sum::<u64>()
+        + catalog.file_bytes()?;
     console.line(&format!(
         "{tets} tetrahedra, {} vertices, {} input triangles in {}; {} on disk",
         rows.iter().map(|r| r.vertices).sum::<u64>(),
@@ -281,7 +284,7 @@ fn print_subdomains(
             row.tets,
             row.interface_faces,
             count(neighbors as u64, "neighbor"),
-            short(row.quality.worst)
+            worst(row.quality.worst)
         ));
     }
     if rows.len() > SUBDOMAINS_LISTED {
