@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 """Are sheets slits in what --split-sheets writes?
 
-  split.py TETDB FOLDER
+  split.py TETDB FOLDER [N]
 
 Meshes boxes with sheets in FOLDER, exports each as it is and split, as .npy, and checks: with every double put back the two are the same; the
 doubles are those that the geometry says; each triangle of a sheet stands twice, with a tetrahedron of its own side each; across a sheet no
-two tetrahedra share a face. Then heat flows through a box that a sheet cuts in two, whose resistance makes the temperature jump: the error
-against the exact solution must fall with the square of the edge length. Exit code 0 when all of it holds.
+two tetrahedra share a face. Then heat flows through a box that a sheet cuts in two, whose resistance makes the temperature jump: with linear
+elements of scikit-fem the error against the exact solution must fall with the square of the edge length, from 1/N to 1/4N. Exit code 0 when all of it holds.
 """
 import collections
 import os
@@ -15,7 +15,8 @@ import sys
 
 import numpy as np
 import scipy.sparse as sp
-import scipy.sparse.linalg
+import skfem
+import skfem.models.poisson
 
 TETDB, FOLDER = sys.argv[1:3]
 
@@ -102,39 +103,35 @@ def heat(n, conductance=2.0):
     """Error of the temperature in the mean square, and how far it jumps, where a sheet with this conductance lies at z = 1/2."""
     _, mesh, pairs = exports(f"heat{n}", n, [list(grid((0, 0, .5), (1, 0, 0), (0, 1, 0), n))], 1)
     assert len(pairs) == (n + 1) ** 2, "the box is not cut in two"
-    corners = mesh.points[mesh.tets]
-    edges = corners[:, 1:] - corners[:, :1]
-    volume = np.linalg.det(edges) / 6
-    inner = np.linalg.inv(edges).transpose(0, 2, 1)
-    gradients = np.concatenate([-inner.sum(1, keepdims=True), inner], 1)
-    local = np.einsum("nik,njk,n->nij", gradients, gradients, volume)
-    size = (len(mesh.points),) * 2
-    rows = lambda elements, k: (np.repeat(elements, k, 1).ravel(), np.tile(elements, (1, k)).ravel())
-    matrix = sp.csr_matrix((local.ravel(), rows(mesh.tets, 4)), shape=size)
-    order = np.argsort(mesh.input, kind="stable")
-    twice = np.flatnonzero(mesh.input[order][1:] == mesh.input[order][:-1])
-    front, back = mesh.triangles[order[twice]], mesh.triangles[order[twice + 1]]
-    a, b, c = (mesh.points[front[:, i]] for i in range(3))
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
-    mass = conductance * area[:, None, None] * (np.ones((3, 3)) + np.eye(3)) / 12
-    jump = np.concatenate([front, back], axis=1)
-    signs = np.array([1, 1, 1, -1, -1, -1])
-    blocks = np.tile(mass, (1, 2, 2)) * signs[:, None] * signs
-    matrix = matrix + sp.csr_matrix((blocks.ravel(), rows(jump, 6)), shape=size)
     # u = cos(pi x) g(z), g'' = pi^2 g, g(0) = 0, g(1) = 1, the flux conductance * jump.
     s, h, pi = np.sinh(np.pi / 2), np.cosh(np.pi / 2), np.pi
     c = (-pi * s - conductance * (h + s * s / h)) / (pi * h + 2 * conductance * s)
     a = -s / h - c
-    x, _, z = mesh.points.T
-    above = np.zeros(len(z), bool)
-    above[np.unique(mesh.tets[corners[:, :, 2].mean(1) > .5])] = True
-    exact = np.cos(pi * x) * np.where(above, np.cosh(pi * (1 - z)) + c * np.sinh(pi * (1 - z)), a * np.sinh(pi * z))
-    given = (z == 0) | (z == 1)
-    values = np.where(given, exact, 0)
-    free = ~given
-    values[free] = sp.linalg.spsolve(matrix[free][:, free].tocsc(), -matrix[free][:, given] @ values[given])
-    squares = ((values - exact) ** 2)[mesh.tets].mean(1)
-    return float(np.sqrt((volume * squares).sum())), float(np.ptp(exact[np.abs(z - .5) < 1e-9]))
+
+    def exact(x, z, is_above):
+        return np.cos(pi * x) * np.where(is_above, np.cosh(pi * (1 - z)) + c * np.sinh(pi * (1 - z)), a * np.sinh(pi * z))
+    both = skfem.MeshTet(mesh.points.T, mesh.tets.T)
+    basis = skfem.Basis(both, skfem.ElementTetP1())
+    sheet = both.facets_satisfying(lambda x: np.abs(x[2] - .5) < 1e-9, boundaries_only=True)
+    middles = both.p[2][both.t].mean(axis=0)
+    below = sheet[middles[both.f2t[0, sheet]] < .5]
+    assert 2 * len(below) == len(sheet), "a sheet has not two sides"
+    # The jump at a vertex below is the difference to its double.
+    partner = np.arange(len(mesh.points))
+    partner[pairs[:, 0]], partner[pairs[:, 1]] = pairs[:, 1], pairs[:, 0]
+    vertices = np.unique(both.facets[:, below])
+    jump = sp.coo_matrix((np.repeat([1., -1.], len(vertices)),
+                          (np.tile(vertices, 2), np.concatenate([vertices, partner[vertices]]))), shape=(len(partner),) * 2).tocsr()
+    mass = skfem.models.poisson.mass.assemble(skfem.FacetBasis(both, skfem.ElementTetP1(), facets=below))
+    matrix = skfem.models.poisson.laplace.assemble(basis) + conductance * jump.T @ mass @ jump
+    x, _, z = both.p
+    given = np.flatnonzero((z == 0) | (z == 1))
+    start = np.zeros(len(z))
+    start[given] = exact(x[given], z[given], z[given] > .5)
+    found = skfem.solve(*skfem.condense(matrix, x=start, D=given), solver=skfem.solver_iter_pcg(rtol=1e-12))
+    square = skfem.Functional(lambda w: (w.u - exact(w.x[0], w.x[2], w.x[2] > .5)) ** 2)
+    error = np.sqrt(square.assemble(basis, u=basis.interpolate(found)))
+    return float(error), float(np.ptp(exact(x, np.full_like(x, .5), True) - exact(x, np.full_like(x, .5), False)) / 2)
 
 
 def main():
@@ -152,9 +149,12 @@ def main():
     # One that cuts the box in two: its rim has doubles too.
     rim = {tuple(np.round((i / 8, j / 8, .5), 12).tolist()): 2 for i in range(9) for j in range(9)}
     check("through", 8, [list(grid((0, 0, .5), (1, 0, 0), (0, 1, 0), 8))], rim)
-    (coarse, jump), (fine, _) = heat(8), heat(16)
-    print(f"heat through a sheet: jump up to {jump:.3f}, errors {coarse:.2e} and {fine:.2e} at half the edges: {coarse / fine:.2f} times less")
-    assert coarse / fine > 3.3 and fine < .01 * jump
+    n = int(sys.argv[3]) if len(sys.argv) > 3 else 6
+    solved = [heat(n * 2 ** i) for i in range(3)]
+    errors, jump = [error for error, _ in solved], solved[0][1]
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    print(f"heat through a sheet: jump up to {jump:.3f}, errors", *(f"{e:.2e}" for e in errors), "at halves of the edges, order", *(f"{o:.2f}" for o in orders))
+    assert (orders > 1.7).all() and errors[-1] < .01 * jump
 
 
 main()

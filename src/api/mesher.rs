@@ -528,7 +528,8 @@ pub(crate) fn divide(
     let wanted = options.sizes()?.hsiz;
     let wanted = wanted.map_or(f64::INFINITY, |length| length.resolve(diagonal));
     let sizes = predict_with(&surface.inner, options, field, cap, store)?.field;
-    surface.divide(&|p| sizes.h(p).min(wanted), cap)?;
+    let scratch = scratch_beside(&surface.inner, cap, store)?;
+    surface.divide(&|p| sizes.h(p).min(wanted), cap, &scratch)?;
     settings.note(format!(
         "the surface was divided into {} triangles, from {before}",
         surface.n_triangles()

@@ -30,6 +30,7 @@ mod sizes;
 pub(crate) mod store;
 pub(crate) mod surface;
 mod surface_arrays;
+mod surface_wires;
 pub(crate) mod targets;
 pub(crate) mod tasks;
 pub(crate) mod verify;

@@ -143,7 +143,7 @@ fn of_catalog(path: &Path, catalog: &mut Catalog, title: &str) -> Result<Value, 
         "options": serde_json::from_str::<Value>(&job.options).unwrap_or(Value::Null),
         "digest": catalog.digest()?[0].to_string(),
         "counts": {
-            "tets": sum(&|r| r.tets), "vertices": sum(&|r| r.vertices), "triangles": sum(&|r| r.facets),
+            "tets": sum(&|r| r.tets), "vertices": sum(&|r| r.vertices), "triangles": catalog.n_input_triangles()?,
             "subdomains": rows.len(), "bytes": sum(&|r| r.bytes), "volume": rows.iter().map(|r| r.volume).sum::<f64>(),
             "worst": rows.iter().map(|r| r.quality.worst).fold(0.0, f64::max), "dihedral": dihedral,
         },

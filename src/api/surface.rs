@@ -9,7 +9,7 @@ use xxhash_rust::xxh3::Xxh3;
 use super::error::{Error, Remedy};
 use super::{DefectPlace, Length, Settings, guarded};
 use crate::geom::Point;
-use crate::io::read::{WireKind, is_stream, read_surface, read_wires};
+use crate::io::read::{WireKind, is_stream, read_surface};
 use crate::io::write;
 use crate::samples::{PREFIX, SampleSpec};
 use crate::sizing::{Further, SizeField, SizeOptions};
@@ -25,6 +25,8 @@ pub struct Surface {
     pub(crate) sources: Vec<SurfaceSource>,
     /// Triangles that were turned round.
     pub(crate) turned: usize,
+    /// Whether triangles are divided where edges and points to come lie on them.
+    pub(super) divides: bool,
 }
 
 /// What is wrong with a surface, and what its triangles allow.
@@ -97,11 +99,20 @@ pub(crate) const IN_STORE: &str = "store:surface.obj";
 /// Lines of the record that say what of the surface before them are sheets: a file and its name; triangles from a number on; all that is
 /// not closed.
 const SHEET: &str = "sheet:";
-const SHEETS_FROM: &str = "sheets-from:";
+pub(super) const SHEETS_FROM: &str = "sheets-from:";
 const OPEN_PARTS: &str = "open-parts:";
-/// Lines that name a file of edges, or of points, as that of a sheet.
+/// Lines that name a file of edges, or of points, as that of a sheet; and how many edges and points the store has in a file of its own.
 const EDGES: &str = "edges:";
 const POINTS: &str = "points:";
+pub(super) const WIRES: &str = "wires:";
+
+/// What begins the line of a file.
+pub(super) fn mark_of(kind: WireKind) -> &'static str {
+    match kind {
+        WireKind::Edges => EDGES,
+        WireKind::Points => POINTS,
+    }
+}
 
 /// What cannot be done any more once there are sheets.
 fn refuse_sheets(surface: &surface::Surface, what: &str) -> Result<(), Error> {
@@ -226,11 +237,14 @@ impl Surface {
     }
 
     /// Divides triangles until their edges are as short as `h` wants them where they are, and the result takes half of `cap` at most.
-    pub(crate) fn divide(&mut self, h: &dyn Fn(Point) -> f64, cap: u64) -> Result<(), Error> {
-        refuse_sheets(&self.inner, "refined")?;
+    pub(crate) fn divide(
+        &mut self,
+        h: &dyn Fn(Point) -> f64,
+        cap: u64,
+        scratch: &ScratchSpace,
+    ) -> Result<(), Error> {
         (self.inner, _) = split(&self.inner, h, cap / 2)?;
-        self.sources = vec![given(&self.inner)];
-        Ok(())
+        self.keep_all(scratch)
     }
 
     /// The same with the triangles of `sheet` inside: faces of the mesh with tetrahedra on both sides, that part no region.
@@ -281,57 +295,6 @@ impl Surface {
         let n = attempt(|| self.inner.open_parts_to_sheets(scratch))?;
         self.sources.push(mark(OPEN_PARTS.to_owned()));
         Ok((self, n))
-    }
-
-    /// The same with the edges of a file inside: `.obj` (`l`), legacy `.vtk` or `.poly` (facets of two corners).
-    ///
-    /// Each becomes an edge of the mesh, whole and in its place. Edges meet each other, sheets and the surface in vertices that both have,
-    /// and nowhere else. Names: as in [`Surface::embedded`], after which this comes.
-    /// Errors: what cannot be read; `degenerate-edge`, `duplicate-wire`, `wire-contact`, `wire-too-near` name the edge and the place.
-    pub fn embedded_edges(self, file: impl AsRef<Path>, name: Option<&str>) -> Result<Self, Error> {
-        self.with_wires_of(file.as_ref(), WireKind::Edges, name)
-    }
-
-    /// The same with the points of a file inside: `.csv` (x, y, z and a name), `.node`, `.obj` (`p`) or legacy `.vtk`.
-    ///
-    /// Each becomes a vertex of the mesh that is not moved; a point on a triangle is one of its corners. Names and errors: as in
-    /// [`Surface::embedded_edges`].
-    pub fn embedded_points(
-        self,
-        file: impl AsRef<Path>,
-        name: Option<&str>,
-    ) -> Result<Self, Error> {
-        self.with_wires_of(file.as_ref(), WireKind::Points, name)
-    }
-
-    fn with_wires_of(self, file: &Path, kind: WireKind, name: Option<&str>) -> Result<Self, Error> {
-        guarded(&Settings::new(), || {
-            let scratch = ScratchSpace::boundless();
-            self.with_wires(file, kind, name, &scratch)
-        })
-    }
-
-    pub(crate) fn with_wires(
-        mut self,
-        file: &Path,
-        kind: WireKind,
-        name: Option<&str>,
-        scratch: &ScratchSpace,
-    ) -> Result<Self, Error> {
-        let source = source(file)?;
-        let set = read_wires(file, kind, scratch.cap())?;
-        let stem = file.file_stem().unwrap_or_default().to_string_lossy();
-        let name = name.unwrap_or(&stem);
-        attempt(|| self.inner.embed_wires(&set, name, scratch))??;
-        let mark = match kind {
-            WireKind::Edges => EDGES,
-            WireKind::Points => POINTS,
-        };
-        self.sources.push(SurfaceSource {
-            path: format!("{mark}{name}={}", source.path),
-            ..source
-        });
-        Ok(self)
     }
 
     fn refuse_wires(&self) -> Result<(), Error> {
@@ -404,7 +367,7 @@ impl Surface {
         if self.sources.iter().any(|source| source.path == IN_STORE) {
             write::surface(&self.inner.without_wires(), &in_store(store))?;
         }
-        Ok(())
+        self.keep_wires_in(store)
     }
 
     /// The surface a store at `store` was made from, as it was read then.
@@ -417,7 +380,7 @@ impl Surface {
     ) -> Result<Self, Error> {
         let cap = scratch.cap();
         let is_of_sheets = |s: &SurfaceSource| {
-            [SHEET, SHEETS_FROM, OPEN_PARTS, EDGES, POINTS]
+            [SHEET, SHEETS_FROM, OPEN_PARTS, EDGES, POINTS, WIRES]
                 .iter()
                 .any(|mark| s.path.starts_with(mark))
         };
@@ -439,7 +402,7 @@ impl Surface {
             surface = surface.oriented(scratch)?;
         }
         for source in of_sheets {
-            surface = surface.with_sheets(&source.path, cap, scratch)?;
+            surface = surface.with_sheets(&source.path, store, scratch)?;
         }
         for (then, now) in sources.iter().zip(&surface.sources) {
             if (then.bytes, then.hash) != (now.bytes, now.hash) {
@@ -456,7 +419,12 @@ impl Surface {
     }
 
     /// Adds what a line of the record says of sheets.
-    fn with_sheets(mut self, path: &str, cap: u64, scratch: &ScratchSpace) -> Result<Self, Error> {
+    fn with_sheets(
+        mut self,
+        path: &str,
+        store: &Path,
+        scratch: &ScratchSpace,
+    ) -> Result<Self, Error> {
         if let Some(first) = path.strip_prefix(SHEETS_FROM) {
             let first = first
                 .parse::<usize>()
@@ -472,11 +440,14 @@ impl Surface {
             .strip_prefix(SHEET)
             .and_then(|rest| rest.split_once('='))
         {
-            let sheet = Self::load(&[file.to_owned()], cap)?.oriented(scratch)?;
+            let sheet = Self::load(&[file.to_owned()], scratch.cap())?.oriented(scratch)?;
             return self.embedded(sheet, Some(name));
         }
-        for (mark, kind) in [(EDGES, WireKind::Edges), (POINTS, WireKind::Points)] {
-            let line = path.strip_prefix(mark);
+        if let Some(counts) = path.strip_prefix(WIRES) {
+            return self.with_kept_wires(counts, store, scratch);
+        }
+        for kind in [WireKind::Edges, WireKind::Points] {
+            let line = path.strip_prefix(mark_of(kind));
             if let Some((name, file)) = line.and_then(|rest| rest.split_once('=')) {
                 return self.with_wires(Path::new(file), kind, Some(name), scratch);
             }
@@ -489,6 +460,7 @@ impl Surface {
             inner,
             sources,
             turned: 0,
+            divides: false,
         }
     }
 
@@ -544,7 +516,7 @@ impl Surface {
 }
 
 /// A line of the record that is no file.
-fn mark(path: String) -> SurfaceSource {
+pub(super) fn mark(path: String) -> SurfaceSource {
     SurfaceSource {
         path,
         ..SurfaceSource::default()
@@ -552,7 +524,7 @@ fn mark(path: String) -> SurfaceSource {
 }
 
 /// What identifies a surface that came from no file.
-fn given(surface: &surface::Surface) -> SurfaceSource {
+pub(super) fn given(surface: &surface::Surface) -> SurfaceSource {
     let mut hash = Xxh3::new();
     for x in surface.points.iter().flat_map(|p| p.to_array()) {
         hash.update(&x.to_le_bytes());
@@ -606,7 +578,7 @@ pub(crate) fn source(path: &Path) -> Result<SurfaceSource, Error> {
 }
 
 /// Low half first.
-fn halves(hash: &Xxh3) -> [u64; 2] {
+pub(super) fn halves(hash: &Xxh3) -> [u64; 2] {
     let digest = hash.digest128();
     [digest as u64, (digest >> 64) as u64]
 }

@@ -54,7 +54,7 @@ pub(crate) fn check(
     cap: u64,
     level: Level,
 ) -> Result<Report, Error> {
-    let held = surface.map_or(0, Surface::bytes) as u64;
+    let held = surface.map_or(0, |s| s.bytes() as u64 + audit::wire_bytes(s));
     let memory = cap.saturating_sub(held).min(1 << 30) / 2;
     let options = VerifyOptions {
         level,

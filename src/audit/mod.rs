@@ -35,6 +35,7 @@ pub use compare::{Population, Qualities, qualities};
 pub use damage::damage;
 pub use options::VerifyOptions;
 pub use report::{Finding, Level, Offender, Report};
+pub use wires::wire_bytes;
 
 use tetdb_schema::digest::Digest;
 

@@ -7,13 +7,22 @@ use super::{Finding, Offender, Report};
 use crate::sealed::Corner;
 use crate::surface::Surface;
 
-/// Edges and points that are looked for. Memory: some 100 bytes for each.
+/// Bytes for each edge and point.
+const BYTES_EACH: u64 = 100;
+
+/// Edges and points that are looked for.
 pub(super) struct WireSearch<'a> {
     surface: &'a Surface,
     /// Of vertices, the lower number first: which edge, and whether it was seen.
     edges: HashMap<[u32; 2], (usize, bool)>,
     /// Of a vertex of a wire: which point it is, if it is one, and whether it was seen.
     vertices: HashMap<u32, (Option<usize>, bool)>,
+}
+
+/// Bytes that the search for the edges and points of a surface holds.
+pub fn wire_bytes(surface: &Surface) -> u64 {
+    let wires = &surface.wires;
+    BYTES_EACH * (wires.edges.len() + wires.points.len()) as u64
 }
 
 impl<'a> WireSearch<'a> {
@@ -82,11 +91,17 @@ impl<'a> WireSearch<'a> {
         };
         for (e, _) in edges.iter().enumerate().filter(|(_, is_seen)| !**is_seen) {
             let [a, b, _] = wires.edges[e];
-            let what = format!("embedded edge {e} is no edge of a tetrahedron");
+            let what = format!(
+                "embedded {} is no edge of a tetrahedron",
+                self.surface.edge_name(e)
+            );
             lose(Finding::MissingEdge, what, &[a, b]);
         }
         for (i, _) in points.iter().enumerate().filter(|(_, is_seen)| !**is_seen) {
-            let what = format!("embedded point {i} is no vertex of a tetrahedron");
+            let what = format!(
+                "embedded {} is no vertex of a tetrahedron",
+                self.surface.point_name(i)
+            );
             lose(Finding::MissingPoint, what, &wires.points[i][..1]);
         }
     }

@@ -45,7 +45,7 @@ pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
     // A check writes nothing beside what it reads.
     let beside = std::env::temp_dir().join("check");
     let space = Space::of(args.memory.as_deref(), &beside)?;
-    let mut input = input::load_with(&args.surfaces, &args.sheets, space, console)?;
+    let mut input = input::load_with(&args.surfaces, (&args.sheets, false), space, console)?;
     let mended = match args.repair {
         true => Some(mend(&mut input, weld_share, space)?),
         false => None,

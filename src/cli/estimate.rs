@@ -30,7 +30,12 @@ pub fn run(args: &EstimateArgs, console: &Console) -> Result<u8, Failure> {
         cap: cap.max(default_cap().0),
         beside: store,
     };
-    let mut surface = input::load_valid(&args.surfaces, &args.sheets, space, console)?;
+    let mut surface = input::load_valid(
+        &args.surfaces,
+        (&args.sheets, options.refine_surface),
+        space,
+        console,
+    )?;
     take_seeds(&mut options, &surface.inner.seeds);
     if options.refine_surface {
         let settings = console.settings(Some(cap), args.threads);

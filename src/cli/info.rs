@@ -89,7 +89,7 @@ pub fn object(path: &Path) -> Result<Value, Failure> {
         "schema": 1, "store": path.display().to_string(), "state": state, "finished": state.is_finished(),
         "surfaces": job.surfaces, "options": serde_json::from_str::<Value>(&job.options).unwrap_or(Value::Null),
         "tool_version": job.tool_version, "labels": catalog.labels()?, "wires": named_wires(catalog)?, "regions": named_regions(catalog)?,
-        "tets": rows.iter().map(|r| r.tets).sum::<u64>(),
+        "tets": rows.iter().map(|r| r.tets).sum::<u64>(), "input_triangles": catalog.n_input_triangles()?,
         "vertices": rows.iter().map(|r| r.vertices).sum::<u64>(), "bounds": bounds(&rows),
         "bytes": rows.iter().map(|r| r.bytes).sum::<u64>(),
         "coarse_bytes": coarse.iter().map(|c| c.bytes).sum::<u64>(),
@@ -200,9 +200,16 @@ pub fn print(path: &Path, console: &Console) -> Result<(), Failure> {
         + catalog.previous()?.iter().map(|r| r.bytes).sum::<u64>()
         + catalog.file_bytes()?;
     console.line(&format!(
-        "{tets} tetrahedra, {} vertices, {} input triangles in {}; {} on disk",
+        "{tets} tetrahedra, {} vertices, {} in {}; {} on disk",
         rows.iter().map(|r| r.vertices).sum::<u64>(),
-        rows.iter().map(|r| r.facets).sum::<u64>(),
+        match catalog.n_input_triangles()? {
+            Some(n) => count(n, "input triangle"),
+            // Those between sub-domains are in both.
+            None => format!(
+                "at most {} input triangles",
+                rows.iter().map(|r| r.facets).sum::<u64>()
+            ),
+        },
         count(rows.len() as u64, "sub-domain"),
         memory::show(bytes),
     ));

@@ -46,10 +46,10 @@ pub fn load(arguments: &[String], space: Space, console: &Console) -> Result<Sur
     Ok(surface)
 }
 
-/// [`load`], with the sheets in it.
+/// [`load`], with the sheets in it, divided where edges and points lie on triangles if it `divides`.
 pub fn load_with(
     arguments: &[String],
-    sheets: &SheetArgs,
+    (sheets, divides): (&SheetArgs, bool),
     space: Space,
     console: &Console,
 ) -> Result<Surface, Failure> {
@@ -80,6 +80,9 @@ pub fn load_with(
         let sheet = load(std::slice::from_ref(file), space, console)?;
         surface = surface.embedded(sheet, name_of(file))?;
     }
+    if divides {
+        surface = surface.dividing();
+    }
     let edges = sheets
         .embed_edges
         .iter()
@@ -107,7 +110,7 @@ pub fn load_with(
 /// [`load_with`], and refuse a surface with defects.
 pub fn load_valid(
     arguments: &[String],
-    sheets: &SheetArgs,
+    sheets: (&SheetArgs, bool),
     space: Space,
     console: &Console,
 ) -> Result<Surface, Failure> {

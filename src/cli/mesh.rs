@@ -43,7 +43,7 @@ pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
     Mesher::check_path(&path, existing)?;
     let surface = input::load_with(
         &args.surfaces,
-        &args.sheets,
+        (&args.sheets, options.refine_surface),
         Space {
             cap: settings.cap()?,
             beside: &path,

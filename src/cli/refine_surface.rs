@@ -22,7 +22,7 @@ pub fn run(args: &RefineSurfaceArgs, console: &Console) -> Result<u8, Failure> {
     let space = Space::of(args.memory.as_deref(), &args.output)?;
     let input = input::load_valid(
         std::slice::from_ref(&args.surface),
-        &SheetArgs::default(),
+        (&SheetArgs::default(), false),
         space,
         console,
     )?;

@@ -75,7 +75,7 @@ pub fn run(args: &SampleArgs, console: &Console) -> Result<u8, Failure> {
     if surface.has_wires() {
         let wires = beside(&args.output, "wires", Some("obj"));
         check_target(&wires, &[])?;
-        write::wires(&surface, &wires)?;
+        write::wires(&surface.wire_set(), &wires)?;
         for (option, n) in [
             ("edges", surface.wires.edges.len()),
             ("points", surface.wires.points.len()),

@@ -9,6 +9,9 @@ use std::collections::{HashMap, HashSet};
 use tetdb_schema::ids::{Owner, VertexId};
 use tetdb_schema::record::{NO_TET, SealedFacet};
 
+/// Bytes in tables for an embedded edge that is asked for: itself, its ends and their numbers in a sub-domain.
+const WIRE_BYTES: u64 = 128;
+
 /// A bit for each tetrahedron of a sub-domain.
 pub(crate) struct Marks {
     bits: Vec<u64>,
@@ -134,6 +137,9 @@ impl QuerySession {
         if edges.is_empty() && points.is_empty() {
             return Ok(());
         }
+        let n_wires = (edges.len() + points.len()) as u64;
+        let what = "embedded edges and points";
+        let _lease = self.budget.lease(n_wires * WIRE_BYTES, what)?;
         let on_wires: HashSet<u32> = (edges.iter().flatten()).chain(&points).copied().collect();
         let part = &mut self.part(rank)?.subdomain;
         let mut inputs = HashMap::new();

@@ -147,9 +147,10 @@ impl QuerySession {
         let cap = budget.cap();
         let frames_bytes_max = (cap / 2).min(FRAMES_BYTES_MAX);
         let parts_max = (cap / 4 / PART_BYTES).clamp(1, PARTS_MAX);
+        let n_wires = (wires.edges.len() + wires.points.len()) as u64;
         let lease = budget.lease(
-            frames_bytes_max + parts_max * PART_BYTES,
-            "decoded chunks and open sub-domains",
+            frames_bytes_max + parts_max * PART_BYTES + n_wires * size_of::<[u32; 3]>() as u64,
+            "decoded chunks, open sub-domains and embedded edges",
         )?;
         let measures = Measures {
             tet_chunks: rows.iter().map(|r| u64::from(r.chunks[0])).sum(),

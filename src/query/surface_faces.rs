@@ -1,12 +1,12 @@
-//! Which faces of a sub-domain's tetrahedra are input triangles: what their excess depends on.
+//! Which faces of a sub-domain's tetrahedra are required, input triangles and what holds embedded edges: what their excess depends on.
 
 use tetdb_schema::record::{NO_TET, SealedTet};
 
-use crate::sealed::Subdomain;
+use crate::sealed::{Subdomain, face_of};
 use crate::storage::{Lease, check_cancelled};
 use crate::store::StoreError;
 
-/// The faces of one sub-domain that are input triangles.
+/// The faces of one sub-domain that are required.
 pub(crate) struct SurfaceFaces {
     pub rank: u32,
     /// A tetrahedron and the vertices of one of its faces, sorted.
@@ -38,15 +38,13 @@ impl SurfaceFaces {
         })
     }
 
-    /// Whether each face of a tetrahedron, number `local`, is an input triangle.
+    /// Whether each face of a tetrahedron, number `local`, is required.
     pub fn of(&self, local: u32, tet: &SealedTet) -> [bool; 4] {
         let mut on_surface = [false; 4];
         let first = self.faces.partition_point(|face| face.0 < local);
         for (_, face) in self.faces[first..].iter().take_while(|f| f.0 == local) {
-            for (on_surface, v) in on_surface.iter_mut().zip(tet.nodes) {
-                // The face opposite the vertex it lacks.
-                *on_surface |= !face.contains(&v);
-            }
+            let own = face_of(*face, tet.nodes);
+            on_surface = [0, 1, 2, 3].map(|i| on_surface[i] || own[i]);
         }
         on_surface
     }

@@ -11,6 +11,11 @@ pub fn sorted_face([a, b, c]: [u32; 3]) -> ([u32; 3], bool) {
     ([low.min(mid), low.max(mid), top], ab ^ bc ^ (low > mid))
 }
 
+/// Which face of a tetrahedron has these three of its vertices: the one opposite the vertex it lacks.
+pub fn face_of(face: [u32; 3], nodes: [u32; 4]) -> [bool; 4] {
+    nodes.map(|v| !face.contains(&v))
+}
+
 /// What became of a face that was added.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Paired {

@@ -19,7 +19,7 @@ mod writer;
 
 pub use coarse_snapshot::{CoarseSnapshot, CoarseWriter};
 pub use error::SealedError;
-pub use face_pairs::{FacePairs, Paired, sorted_face};
+pub use face_pairs::{FacePairs, Paired, face_of, sorted_face};
 pub use form::Form;
 pub use shape::{Shape, quality_bin};
 pub use subdomain::{Chunk, Chunks, Subdomain};

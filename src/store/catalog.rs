@@ -53,6 +53,9 @@ pub struct Catalog {
     journal_rows: u32,
 }
 
+/// The measure of the coarse mesh that says how many triangles the input has.
+pub(crate) const INPUT_TRIANGLES: &str = "input_triangles";
+
 impl Catalog {
     /// Makes a new store: the directory, the catalog, the job.
     ///
@@ -429,6 +432,22 @@ impl Catalog {
             fin_first: u64::MAX,
             ..WiresRow::default()
         }))
+    }
+
+    /// Triangles of the input, which sub-domains have each for itself: one on a face between two counts in both. None in a store that does
+    /// not say: one of several sub-domains from before this was on record.
+    pub fn n_input_triangles(&mut self) -> Result<Option<u64>, StoreError> {
+        let journal = self.journal()?;
+        let mut measures = journal.iter().flat_map(|row| &row.measures);
+        if let Some(found) = measures.find(|measure| measure.name == INPUT_TRIANGLES) {
+            return Ok(Some(found.value as u64));
+        }
+        let wires = self.wires()?;
+        if wires.fin_first != u64::MAX {
+            return Ok(Some(wires.fin_first));
+        }
+        let rows = self.subdomains()?;
+        Ok((rows.len() == 1).then(|| rows.iter().map(|row| row.facets).sum()))
     }
 
     /// All sub-domains by rank.

@@ -15,6 +15,7 @@ mod tests;
 mod writer_lock;
 
 pub use catalog::Catalog;
+pub(crate) use catalog::INPUT_TRIANGLES;
 pub use error::StoreError;
 pub use step::Step;
 #[cfg(test)]

@@ -28,6 +28,16 @@ pub enum SurfaceError {
         /// Vertices read so far.
         vertices: usize,
     },
+    /// Edges or points to embed do not fit the memory allowed.
+    #[error(
+        "edges and points of {vertices} vertices, or more, take more than the {bytes_max} bytes of memory allowed"
+    )]
+    WireMemory {
+        /// Bytes allowed.
+        bytes_max: u64,
+        /// Vertices known so far.
+        vertices: usize,
+    },
     /// A triangle names a vertex that is not there.
     #[error("triangle {triangle} names vertex {vertex}, but there are {n_vertices}")]
     NoSuchVertex {
@@ -84,7 +94,7 @@ impl SurfaceError {
     pub fn code(&self) -> &'static str {
         match self {
             Self::TooLarge { .. } => "surface-too-large",
-            Self::Memory { .. } => "memory",
+            Self::Memory { .. } | Self::WireMemory { .. } => "memory",
             Self::NoSuchVertex { .. } => "index-out-of-range",
             Self::TooSmall { .. } => "coordinate-range",
             Self::Invalid { defect, .. } => defect.code(),
@@ -97,6 +107,7 @@ impl SurfaceError {
         match self {
             Self::TooLarge { .. } => "split the surface into parts and mesh them one by one",
             Self::Memory { .. } => "allow more memory, or take a coarser surface",
+            Self::WireMemory { .. } => "allow more memory, or take fewer edges and points",
             Self::NoSuchVertex { .. } => "write the file again from the program that made it",
             Self::TooSmall { .. } => "scale the surface to ordinary units, for example metres",
             Self::Invalid { defect, .. } => defect.help(),

@@ -1,4 +1,4 @@
-//! Fins: what holds the edges of wires, and the sizes at points.
+//! Fins: what holds the edges of wires.
 //!
 //! ```text
 //!            c           Every step of the mesher keeps triangles, and none of them edges. So an edge a b that no triangle has
@@ -14,7 +14,7 @@ use super::point_tree::PointTree;
 use super::seek::Seeker;
 use super::wire_set::WireError;
 use super::wires::NEAR_SHARE;
-use super::{BoxTree, Surface, SurfaceError};
+use super::{BoxTree, Surface};
 use crate::geom::{Aabb, Point};
 use crate::storage::ScratchSpace;
 use std::f64::consts::FRAC_1_SQRT_2;
@@ -51,8 +51,9 @@ impl Surface {
         room: &ScratchSpace,
     ) -> Result<(), WireError> {
         let least = NEAR_SHARE * self.bounds().diagonal();
-        let heights = self.heights(is_free, room);
         let seeker = Seeker::with_tree(self, triangles);
+        self.refuse_near_ends(&seeker)?;
+        let heights = self.heights(is_free, room);
         let mut apexes = Vec::new();
         let mut near = Vec::new();
         for (e, height) in heights.into_iter().enumerate().filter(|(e, _)| is_free[*e]) {
@@ -61,15 +62,7 @@ impl Surface {
                 None => near.push(e),
             }
         }
-        if let Some(&first) = near.first() {
-            let names: Vec<String> = near.iter().take(10).map(|&e| self.edge_name(e)).collect();
-            let [a, b] = self.wire(first as u32).ends;
-            return Err(WireError::TooNear {
-                what: names.join(", "),
-                at: a.midpoint(b),
-                n: near.len(),
-            });
-        }
+        self.refuse_near(&near, None)?;
         if apexes.is_empty() {
             return Ok(());
         }
@@ -166,73 +159,7 @@ impl Surface {
         }
         None
     }
-
-    /// Sizes at points that no triangle uses: how far the nearest triangle or other point is. Errors: points too near to something else.
-    pub(super) fn set_sizes(&mut self, room: &ScratchSpace) -> Result<(), SurfaceError> {
-        let mut is_used = vec![false; self.points.len()];
-        for v in self.triangles.iter().flatten() {
-            is_used[*v as usize] = true;
-        }
-        let alone = self
-            .wires
-            .points
-            .iter()
-            .map(|&[v, _]| (v, self.points[v as usize]));
-        let alone: Vec<(u32, Point)> = alone.filter(|(v, _)| !is_used[*v as usize]).collect();
-        let diagonal = self.bounds().diagonal();
-        let least = NEAR_SHARE * diagonal;
-        let tree = PointTree::new(alone.clone());
-        let seeker = Seeker::of(self, room, |_| true);
-        let mean = diagonal / (alone.len().max(1) as f64).cbrt();
-        let mut near = Vec::new();
-        let size = |(v, p): (u32, Point)| {
-            let to_triangles = seeker.distance(p, f64::INFINITY).min(diagonal);
-            let mut best = to_triangles;
-            let mut reach = 0.5 * mean;
-            loop {
-                let half = Point::splat(reach.min(to_triangles));
-                let around = Aabb {
-                    low: p - half,
-                    high: p + half,
-                };
-                tree.within(&around, |other, q| {
-                    if other != v {
-                        best = best.min(p.distance(q));
-                    }
-                });
-                if best <= reach || reach >= to_triangles {
-                    return best;
-                }
-                reach *= 2.0;
-            }
-        };
-        let sizes: HashSizes = alone.iter().map(|&(v, p)| (v, size((v, p)))).collect();
-        drop((seeker, tree));
-        self.wires.sizes.clear();
-        for (i, [v, _]) in self.wires.points.iter().enumerate() {
-            let size = sizes.get(v).copied();
-            near.extend(size.filter(|&s| s < least).map(|_| i));
-            self.wires.sizes.push(size.unwrap_or(0.0));
-        }
-        match near.first() {
-            None => Ok(()),
-            Some(&first) => {
-                let names: Vec<String> =
-                    near.iter().take(10).map(|&p| self.point_name(p)).collect();
-                let [v, _] = self.wires.points[first];
-                let at = self.points[v as usize];
-                Err(WireError::TooNear {
-                    what: names.join(", "),
-                    at,
-                    n: near.len(),
-                }
-                .into())
-            }
-        }
-    }
 }
-
-type HashSizes = std::collections::HashMap<u32, f64>;
 
 /// Tangent of half the angle of two directions.
 fn tangent_of_half(u: Point, v: Point) -> f64 {

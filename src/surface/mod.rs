@@ -6,7 +6,8 @@
 //! `defect` (what can be wrong and what to do about it), `boundary_loops` (where it is open), `near` and `repair`
 //! (mending on demand), `fitness` (what mesh its triangles allow), `split` (finer triangles of the same surface),
 //! `seek` (distances and what lies above), `volumes` (what is enclosed), `seeds` (what points say of volumes), `sheets` (embedded triangles with volume on both sides),
-//! `wire_set` and `wires` (embedded edges and points), `wire_contact` (how they touch), `fins` (what holds them).
+//! `wire_set` and `wires` (embedded edges and points), `wire_contact` (how they touch), `divide` (triangles divided where they lie
+//! on them), `fins` (what holds edges), `point_sizes`.
 //!
 //! Is not: file formats (`io`), which volumes are filled (`boundary`).
 
@@ -15,11 +16,13 @@ mod boxes;
 mod broad;
 mod contact;
 mod defect;
+mod divide;
 mod edges;
 mod fins;
 mod fitness;
 mod near;
 mod orientation;
+mod point_sizes;
 mod point_tree;
 mod repair;
 mod seeds;

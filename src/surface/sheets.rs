@@ -45,6 +45,16 @@ impl Surface {
         self.sheets.resize(self.n_triangles(), true);
     }
 
+    /// Puts sheets behind all other triangles, which stay in their order, as they do. Returns where they begin.
+    pub fn sheets_last(&mut self) -> usize {
+        let mut order: Vec<u32> = (0..self.n_triangles() as u32).collect();
+        order.sort_by_key(|&t| self.is_sheet(t));
+        self.triangles = order.iter().map(|&t| self.triangles[t as usize]).collect();
+        self.labels = order.iter().map(|&t| self.labels[t as usize]).collect();
+        self.sheets.sort_unstable();
+        self.n_triangles() - self.n_sheet_triangles()
+    }
+
     /// Adds the triangles of `other` as sheets, behind those that are here; vertices with the same coordinates become one.
     ///
     /// Its labels are called `name:LABEL`, or `name` where it has one alone; a name that is taken gets a number.

@@ -45,7 +45,8 @@ fn edge(a: u32, b: u32) -> Edge {
 
 /// Divides the triangles of `surface`; `h` tells the wanted edge length at a position.
 ///
-/// New triangles keep label and orientation; they stand in the place of the triangle they came from and behind the others.
+/// New triangles keep label and orientation; they stand in the place of the triangle they came from and behind the others. Edges of wires
+/// are divided with those of triangles; what holds them goes, see [`Surface::hold_wires`].
 /// Memory: `bytes_max` at most. Errors: more triangles than fit it, or than can be numbered.
 pub fn split(
     surface: &Surface,
@@ -61,7 +62,10 @@ pub fn split(
         }),
     };
     fits(surface)?;
-    let mut splitter = Splitter::new(surface);
+    let mut plain = surface.clone();
+    plain.drop_fins();
+    let parent = (0..plain.triangles.len() as u32).collect();
+    let mut splitter = Splitter::new(plain, parent, |_| true);
     let mut heap = BinaryHeap::new();
     let edges: Vec<Edge> = splitter.around.keys().copied().collect();
     for e in edges {
@@ -78,14 +82,22 @@ pub fn split(
         fits(&splitter.surface)?;
         splitter.divide(e, h, &mut heap);
     }
-    for _ in 0..SWAP_PASSES {
-        if splitter.swap_all() == 0 {
-            break;
-        }
-    }
+    splitter.swap_until_best();
     splitter.report.deviation_max = splitter.deviation(surface);
     splitter.surface.notes.clear();
     Ok((splitter.surface, splitter.report))
+}
+
+/// Swaps edges inside the triangles that `is_divided` where that makes the least angle larger; `parent`: of each triangle the one it is a
+/// part of. Those of wires stay.
+pub(super) fn swap_inside(
+    surface: Surface,
+    parent: Vec<u32>,
+    is_divided: impl Fn(u32) -> bool,
+) -> Surface {
+    let mut splitter = Splitter::new(surface, parent, is_divided);
+    splitter.swap_until_best();
+    splitter.surface
 }
 
 struct Splitter {
@@ -93,6 +105,8 @@ struct Splitter {
     /// Input triangle of each triangle.
     parent: Vec<u32>,
     around: HashMap<Edge, Vec<u32>>,
+    /// Edges of wires, by their places among these. They are not swapped, and divided with the triangles they are edges of.
+    wires: HashMap<Edge, usize>,
     report: SplitReport,
 }
 
@@ -100,16 +114,20 @@ struct Splitter {
 type Ordered = (u64, Reverse<Edge>);
 
 impl Splitter {
-    fn new(surface: &Surface) -> Self {
+    /// Knows the edges of those triangles whose parents `is_meant`.
+    fn new(surface: Surface, parent: Vec<u32>, is_meant: impl Fn(u32) -> bool) -> Self {
         let mut around: HashMap<Edge, Vec<u32>> = HashMap::new();
-        for (t, &[a, b, c]) in (0u32..).zip(&surface.triangles) {
+        let triangles = (0u32..).zip(&surface.triangles);
+        for (t, &[a, b, c]) in triangles.filter(|(t, _)| is_meant(parent[*t as usize])) {
             for e in [edge(a, b), edge(b, c), edge(c, a)] {
                 around.entry(e).or_default().push(t);
             }
         }
+        let wires = surface.wires.edges.iter().map(|&[a, b, _]| edge(a, b));
         Self {
-            surface: surface.clone(),
-            parent: (0..surface.triangles.len() as u32).collect(),
+            wires: wires.zip(0..).collect(),
+            surface,
+            parent,
             around,
             report: SplitReport::default(),
         }
@@ -140,6 +158,14 @@ impl Splitter {
         self.report.edges_divided += 1;
         let m = self.surface.points.len() as u32;
         self.surface.points.push(middle);
+        if let Some(i) = self.wires.remove(&e) {
+            let wires = &mut self.surface.wires.edges;
+            let [from, to, label] = wires[i];
+            self.wires
+                .extend([(edge(from, m), i), (edge(m, to), wires.len())]);
+            wires[i] = [from, m, label];
+            wires.push([m, to, label]);
+        }
         for t in triangles {
             let corners = self.surface.triangles[t as usize];
             let k = (0..3).find(|&k| edge(corners[k], corners[(k + 1) % 3]) == e);
@@ -150,6 +176,10 @@ impl Splitter {
             self.surface.triangles.push([m, q, r]);
             let label = self.surface.labels[t as usize];
             self.surface.labels.push(label);
+            if self.surface.has_sheets() {
+                let is_sheet = self.surface.is_sheet(t);
+                self.surface.sheets.push(is_sheet);
+            }
             self.parent.push(self.parent[t as usize]);
             let beside = self.around.get_mut(&edge(q, r)).expect("an edge of it");
             for other in beside.iter_mut().filter(|o| **o == t) {
@@ -165,24 +195,31 @@ impl Splitter {
         }
     }
 
-    /// Swaps edges within input triangles where that raises the least angle; returns how many.
-    fn swap_all(&mut self) -> u64 {
-        let mut swapped = 0;
-        for t in 0..self.surface.triangles.len() as u32 {
-            for k in 0..3 {
-                swapped += u64::from(self.swap(t, k));
+    /// Swaps edges within input triangles where that raises the least angle.
+    fn swap_until_best(&mut self) {
+        for _ in 0..SWAP_PASSES {
+            let mut swapped = 0;
+            for t in 0..self.surface.triangles.len() as u32 {
+                for k in 0..3 {
+                    swapped += u64::from(self.swap(t, k));
+                }
+            }
+            self.report.edges_swapped += swapped;
+            if swapped == 0 {
+                return;
             }
         }
-        self.report.edges_swapped += swapped;
-        swapped
     }
 
     fn swap(&mut self, t: u32, k: usize) -> bool {
         let corners = self.surface.triangles[t as usize];
         let [a, b, c] = [corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]];
-        let &[x, y] = &self.around[&edge(a, b)][..] else {
+        let Some(&[x, y]) = self.around.get(&edge(a, b)).map(Vec::as_slice) else {
             return false;
         };
+        if self.wires.contains_key(&edge(a, b)) {
+            return false;
+        }
         let other = if x == t { y } else { x };
         if self.parent[t as usize] != self.parent[other as usize] {
             return false;

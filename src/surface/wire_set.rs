@@ -1,7 +1,9 @@
 //! Wires: edges and points inside a volume that the mesh has as its edges and vertices.
 
+use super::SurfaceError;
 use super::contact::ContactKind;
 use crate::geom::Point;
+use crate::storage::ScratchSpace;
 
 /// Edges and points of a surface that are no parts of its triangles, or are to be known by a name of their own.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -27,6 +29,33 @@ pub struct WireSet {
     pub marks: Vec<[u32; 2]>,
     /// Names of the labels.
     pub label_names: Vec<String>,
+}
+
+impl WireSet {
+    /// Bytes of memory held, for the budget.
+    pub fn bytes(&self) -> u64 {
+        let names = self.label_names.len() * 2 * size_of::<String>();
+        let points = self.points.capacity() * size_of::<Point>();
+        let edges = self.edges.capacity() * size_of::<[u32; 3]>();
+        (names + points + edges + self.marks.capacity() * size_of::<[u32; 2]>()) as u64
+    }
+
+    /// Bytes it takes to embed it: tables of its vertices, edges and points, and trees over them.
+    fn bytes_to_embed(&self) -> u64 {
+        const EACH: usize = 256;
+        self.bytes() + (EACH * (self.edges.len() + self.marks.len())) as u64
+    }
+
+    /// Refuses a set that `room` has not the memory to embed.
+    pub(super) fn check_room(&self, room: &ScratchSpace) -> Result<(), SurfaceError> {
+        match self.bytes_to_embed() > room.available() {
+            true => Err(SurfaceError::WireMemory {
+                bytes_max: room.available(),
+                vertices: self.points.len(),
+            }),
+            false => Ok(()),
+        }
+    }
 }
 
 /// Why edges and points cannot be embedded.
@@ -66,12 +95,14 @@ pub enum WireError {
         n: usize,
     },
     /// There is no room for a tetrahedron of computable size.
-    #[error("{what} is nearer to something else than can be meshed{}", more(*n))]
+    #[error("{what} is nearer to something else than can be meshed{}{}", far(*distance), more(*n))]
     TooNear {
         /// The first of them, and at most nine others.
         what: String,
         /// Where.
         at: Point,
+        /// How far the first one is from it, if that is known.
+        distance: Option<f64>,
         /// How many there are.
         n: usize,
     },
@@ -82,6 +113,12 @@ fn more(n: usize) -> String {
         0 | 1 => String::new(),
         n => format!(" (and {} more)", n - 1),
     }
+}
+
+fn far(distance: Option<f64>) -> String {
+    distance.map_or(String::new(), |distance| {
+        format!(": {distance:.1e} from it")
+    })
 }
 
 impl WireError {
@@ -114,7 +151,10 @@ impl WireError {
             Self::Touching { .. } => {
                 "edges and points meet triangles, and edges each other, in common vertices alone: divide the triangle or the edge there"
             }
-            Self::TooNear { .. } => "join what is meant to meet, or move it apart",
+            Self::TooNear { .. } => {
+                "join what is meant to meet, or move it apart: what is not exactly on a triangle is beside it, however near, \
+                 so give the triangle a vertex there"
+            }
         }
     }
 }

@@ -61,23 +61,81 @@ impl Surface {
         name: &str,
         room: &ScratchSpace,
     ) -> Result<(), SurfaceError> {
+        let first = self.add_labels(&other.label_names, name);
+        self.add_wires(other, |label| first + label, room)?;
+        self.hold_wires(room)
+    }
+
+    /// Its edges and points by themselves, numbered in the order in which they first appear.
+    pub fn wire_set(&self) -> WireSet {
+        let mut set = WireSet::default();
+        let (mut verts, mut labels) = (HashMap::new(), HashMap::new());
+        let mut vert = |v: u32, points: &mut Vec<Point>| {
+            *verts.entry(v).or_insert_with(|| {
+                points.push(self.points[v as usize]);
+                points.len() as u32 - 1
+            })
+        };
+        let mut named = |label: u32, names: &mut Vec<String>| {
+            *labels.entry(label).or_insert_with(|| {
+                names.push(self.label_names[label as usize].clone());
+                names.len() as u32 - 1
+            })
+        };
+        for &[a, b, label] in &self.wires.edges {
+            let ends = [a, b].map(|v| vert(v, &mut set.points));
+            let label = named(label, &mut set.label_names);
+            set.edges.push([ends[0], ends[1], label]);
+        }
+        for &[v, label] in &self.wires.points {
+            let v = vert(v, &mut set.points);
+            set.marks.push([v, named(label, &mut set.label_names)]);
+        }
+        set
+    }
+
+    /// Adds edges and points whose labels are called as they are.
+    ///
+    /// # Errors
+    /// As [`Surface::embed_wires`].
+    pub fn embed_named(&mut self, set: &WireSet, room: &ScratchSpace) -> Result<(), SurfaceError> {
+        let known = self.label_names.iter().cloned().zip(0u32..);
+        let mut known: HashMap<String, u32> = known.collect();
+        let mut labels = Vec::new();
+        for name in &set.label_names {
+            let next = self.label_names.len() as u32;
+            let label = *known.entry(name.clone()).or_insert(next);
+            if label == next {
+                self.label_names.push(name.clone());
+            }
+            labels.push(label);
+        }
+        self.add_wires(set, |label| labels[label as usize], room)?;
+        self.hold_wires(room)
+    }
+
+    fn add_wires(
+        &mut self,
+        other: &WireSet,
+        label_of: impl Fn(u32) -> u32,
+        room: &ScratchSpace,
+    ) -> Result<(), SurfaceError> {
+        other.check_room(room)?;
         self.drop_fins();
         let mut table = PointTable::of(&self.points);
         let mut vert = |points: &mut Vec<Point>, v: u32| {
             table.find_or_add(other.points[v as usize] + Point::ZERO, points)
         };
-        let first = self.add_labels(&other.label_names, name);
         for &[a, b, label] in &other.edges {
             let ends = [a, b].map(|v| vert(&mut self.points, v));
-            self.wires.edges.push([ends[0], ends[1], first + label]);
+            self.wires.edges.push([ends[0], ends[1], label_of(label)]);
         }
         for &[v, label] in &other.marks {
             let v = vert(&mut self.points, v);
-            self.wires.points.push([v, first + label]);
+            self.wires.points.push([v, label_of(label)]);
         }
         SurfaceError::check_size("vertices", self.points.len() + self.wires.edges.len())?;
-        SurfaceError::check_size("triangles", self.n_triangles() + self.wires.edges.len())?;
-        self.hold_wires(room)
+        SurfaceError::check_size("triangles", self.n_triangles() + self.wires.edges.len())
     }
 
     /// Without the triangles that hold edges of wires, and their vertices.
@@ -147,22 +205,24 @@ impl Surface {
         )
     }
 
-    pub(super) fn edge_name(&self, e: usize) -> String {
-        let label = self.wires.edges[e][2];
-        let number = self.wires.edges[..e]
-            .iter()
-            .filter(|edge| edge[2] == label)
-            .count();
-        format!("edge {number} of {:?}", self.label_names[label as usize])
+    /// What edge `e` is called in messages: its number among those of its label.
+    pub fn edge_name(&self, e: usize) -> String {
+        let labels = self.wires.edges[..=e].iter().map(|edge| edge[2]);
+        self.name_of("edge", labels)
     }
 
-    pub(super) fn point_name(&self, p: usize) -> String {
-        let [_, label] = self.wires.points[p];
-        let number = self.wires.points[..p]
-            .iter()
-            .filter(|point| point[1] == label)
-            .count();
-        format!("point {number} of {:?}", self.label_names[label as usize])
+    /// The same of point `p`.
+    pub fn point_name(&self, p: usize) -> String {
+        let labels = self.wires.points[..=p].iter().map(|point| point[1]);
+        self.name_of("point", labels)
+    }
+
+    /// `labels`: of the wires up to the one to be named.
+    fn name_of(&self, kind: &str, labels: impl DoubleEndedIterator<Item = u32>) -> String {
+        let mut labels = labels.rev();
+        let label = labels.next().unwrap_or_default();
+        let number = labels.filter(|&other| other == label).count();
+        format!("{kind} {number} of {:?}", self.label_names[label as usize])
     }
 
     fn refuse_repeated(&self) -> Result<(), WireError> {

@@ -29,6 +29,8 @@ fn wells_and_sensors_are_edges_and_vertices_in_one_piece_and_in_several() {
         let info = place.run_line(&format!("info {store}.tetdb --json"));
         let info = info.succeeds().json();
         assert_eq!(info["subdomains"].as_array().map(Vec::len), Some(n));
+        // Those on faces between sub-domains once, and none that hold edges.
+        assert_eq!(info["input_triangles"], verified["triangles_present"]);
         assert_eq!(info["regions"].as_array().map(Vec::len), Some(1));
         let edges = info["wires"].as_array().expect("a list").iter();
         let edges: u64 = edges.filter_map(|w| w["edges"].as_u64()).sum();
@@ -172,6 +174,67 @@ fn every_kind_of_file_gives_the_same_mesh() {
         .run_line("mesh box.obj --embed-edges on.obj --embed-points on.obj -o on.tetdb")
         .succeeds();
     place.run_line("verify on.tetdb --full").succeeds();
+}
+
+#[test]
+fn points_and_ends_on_triangles_are_put_into_a_surface_that_may_be_divided() {
+    let place = Place::new();
+    place.write("box.obj", BOX);
+    place.write(
+        "sheet.obj",
+        "v .25 .25 .5\nv .75 .25 .5\nv .75 .75 .75\nv .25 .75 .75\nf 1 2 3\nf 1 3 4\n",
+    );
+    // Inside triangles, on edges of two of them, on the sheet, and where nothing is.
+    place.write(
+        "on.csv",
+        "0.5,0.25,0,a\n0.5,0,0,a\n0.75,0.125,0,b\n0.5,0.5,0.625,b\n.125,.125,.125,b\n",
+    );
+    place.write(
+        "rod.obj",
+        "v .5 .5 .875\nv .5 .25 1\nv 0 0 1\nv 0 .5 1\nl 1 2\nl 3 4\n",
+    );
+    let inside = "--embed sheet.obj --embed-edges rod.obj --embed-points on.csv";
+    let refused = place.run_line(&format!("mesh box.obj {inside} --json"));
+    assert_eq!(refused.error()["code"], "wire-contact");
+    let line = format!("mesh box.obj {inside} --refine-surface --hsiz 0.2 -o s.tetdb");
+    place.run_line(&line).succeeds();
+    let again = place.run_line(&line).succeeds().stderr();
+    assert!(again.contains("already holds"), "{again}");
+    place
+        .run_line("resaturate s.tetdb --subdomain 0 --hgrad 1.2")
+        .succeeds();
+    let verified = place
+        .run_line("verify s.tetdb --full --json")
+        .succeeds()
+        .json();
+    assert_eq!(
+        (&verified["edges_present"], &verified["points_present"]),
+        (&2.into(), &5.into())
+    );
+    let info = place.run_line("info s.tetdb --json").succeeds().json();
+    assert_eq!(info["input_triangles"], verified["triangles_present"]);
+    assert_eq!(info["wires"].as_array().map(Vec::len), Some(3));
+    let found = |label: &str| {
+        let line = format!("query s.tetdb --json --select id --touching-sheet --label {label}");
+        place.run_line(&line).succeeds().stdout().lines().count()
+    };
+    assert!(found("sheet") > 20);
+    // Beside the bottom by less than can be meshed, which is as wide as long.
+    for (file, text, option) in [
+        ("near.csv", "0.5,0.25,1e-17\n", "points"),
+        ("near.obj", "v .5 .5 .5\nv .5 .25 1e-17\nl 1 2\n", "edges"),
+    ] {
+        place.write(file, text);
+        let line = format!("mesh box.obj --embed-{option} {file} --refine-surface --json");
+        let error = place.run_line(&line).error();
+        assert_eq!(error["code"], "wire-too-near", "{file}: {error}");
+        assert!(
+            error["message"]
+                .as_str()
+                .is_some_and(|m| m.contains("1.0e-17 from it")),
+            "{error}"
+        );
+    }
 }
 
 #[test]
@@ -340,9 +403,6 @@ fn edges_and_points_in_wrong_places_are_refused_with_the_place() {
     place.write("on.csv", "0.25,0.25,0.5\n");
     let run = place.run_line("mesh box.obj --embed-edges edge.obj --embed-points on.csv --json");
     assert_eq!(run.error()["code"], "wire-contact");
-    let run =
-        place.run_line("mesh box.obj --embed-points on.csv --refine-surface --hsiz 0.2 --json");
-    assert_eq!(run.error()["code"], "usage");
     let run = place.run_line("check box.obj --embed-edges edge.obj --repair --write r.obj --json");
     assert_eq!(run.error()["code"], "usage");
     place

@@ -88,7 +88,8 @@ pub struct ShapeArgs {
     /// Options from a TOML file, such as hsiz = "2%"; what the command line says goes first
     #[arg(long, value_name = "FILE", help_heading = None)]
     pub config: Option<PathBuf>,
-    /// First divide the surface's triangles until their edges are as short as the wanted lengths, without moving the surface
+    /// First divide the surface's triangles where embedded points lie on them, and until their edges are as short as the wanted lengths,
+    /// without moving the surface
     #[arg(long, help_heading = "Sizes")]
     pub refine_surface: bool,
     /// Which regions to fill [default: parity; with seeds or holes: seeds]

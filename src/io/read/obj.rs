@@ -143,17 +143,17 @@ pub(super) fn read_wires<R: BufRead>(
             .split(u8::is_ascii_whitespace)
             .filter(|w| !w.is_empty());
         match (words.next().unwrap_or_default(), kind) {
-            (b"v", _) => sink.set.points.push(vertex(&feed, words, &place)?),
+            (b"v", _) => feed.placed(sink.point(vertex(&feed, words, &place)?))?,
             (b"l", WireKind::Edges) | (b"p", WireKind::Points) => {
                 let known = sink.set.points.len() as u32;
                 let corners = words.map(|word| corner(word, known, &place));
                 let corners = corners.collect::<Result<Vec<u32>>>()?;
                 let label = sink.label(names.best());
                 ahead.extend(corners.iter().max().map(|&v| (v, place)));
-                match kind {
+                feed.placed(match kind {
                     WireKind::Edges => sink.line(&corners, label),
-                    WireKind::Points => corners.iter().for_each(|&v| sink.mark(v, label)),
-                }
+                    WireKind::Points => corners.iter().try_for_each(|&v| sink.mark(v, label)),
+                })?;
             }
             (b"g", _) => names.group = super::feed::name(&line[1..]),
             (b"o", _) => {

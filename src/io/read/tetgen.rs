@@ -132,9 +132,8 @@ pub(super) fn read_nodes<R: BufRead>(feed: &mut Feed<R>, sink: &mut WireSink) ->
     feed.comment = Some(b'#');
     let numbering = read_points(feed, |p, marker| {
         let label = sink.label(&marker_name(marker));
-        sink.mark(sink.set.points.len() as u32, label);
-        sink.set.points.push(p);
-        Ok(())
+        sink.mark(sink.set.points.len() as u32, label)?;
+        sink.point(p)
     })?;
     match numbering {
         Some(_) => Ok(()),
@@ -150,10 +149,7 @@ pub(super) fn read_segments<R: BufRead>(
     sink: &mut WireSink,
 ) -> Result<()> {
     feed.comment = Some(b'#');
-    let mut add = |p, _| {
-        sink.set.points.push(p);
-        Ok(())
-    };
+    let mut add = |p, _| sink.point(p);
     let numbering = match read_points(&mut feed, &mut add)? {
         Some(numbering) => numbering,
         None => {
@@ -178,7 +174,7 @@ pub(super) fn read_segments<R: BufRead>(
             let corners = corners.collect::<Result<Vec<u32>>>()?;
             if n == 2 {
                 let label = sink.label(&label);
-                sink.line(&corners, label);
+                feed.placed(sink.line(&corners, label))?;
             }
         }
         for _ in 0..rest.first().copied().unwrap_or(0) {

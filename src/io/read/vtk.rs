@@ -17,6 +17,8 @@ const POLY_LINE: i64 = 4;
 
 /// A list of cells: the vertices of each.
 type Cells = Vec<Vec<u32>>;
+/// Bytes of a cell beside its vertices.
+const CELL_BYTES: u64 = 56;
 
 struct Vtk<R> {
     feed: Feed<R>,
@@ -54,10 +56,10 @@ pub(super) fn read<R: BufRead>(feed: Feed<R>, kind: WireKind, sink: &mut WireSin
     while vtk.feed.next_word()? {
         match vtk.feed.word() {
             b"POINTS" => vtk.points(sink)?,
-            b"LINES" => lines = vtk.cells()?,
-            b"VERTICES" => vertices = vtk.cells()?,
-            b"CELLS" => mixed = vtk.cells()?,
-            b"POLYGONS" | b"TRIANGLE_STRIPS" => drop(vtk.cells()?),
+            b"LINES" => lines = vtk.cells(sink)?,
+            b"VERTICES" => vertices = vtk.cells(sink)?,
+            b"CELLS" => mixed = vtk.cells(sink)?,
+            b"POLYGONS" | b"TRIANGLE_STRIPS" => drop(vtk.cells(sink)?),
             b"METADATA" => vtk.skip_metadata()?,
             b"CELL_TYPES" => {
                 let n = vtk.feed.count("cell types", 1)?;
@@ -81,11 +83,10 @@ pub(super) fn read<R: BufRead>(feed: Feed<R>, kind: WireKind, sink: &mut WireSin
         }
     }
     let label = sink.label("");
-    match kind {
-        WireKind::Edges => lines.iter().for_each(|line| sink.line(line, label)),
-        WireKind::Points => vertices.iter().flatten().for_each(|&v| sink.mark(v, label)),
-    }
-    Ok(())
+    vtk.feed.placed(match kind {
+        WireKind::Edges => lines.iter().try_for_each(|line| sink.line(line, label)),
+        WireKind::Points => (vertices.iter().flatten()).try_for_each(|&v| sink.mark(v, label)),
+    })
 }
 
 impl<R: BufRead> Vtk<R> {
@@ -127,17 +128,19 @@ impl<R: BufRead> Vtk<R> {
             for (x, found) in checked.iter_mut().zip(p) {
                 *x = self.feed.checked(found)?;
             }
-            sink.set.points.push(Point::from_array(checked));
+            self.feed.placed(sink.point(Point::from_array(checked)))?;
         }
         Ok(())
     }
 
     /// Cells: each with its number of vertices before them, or, since version 5.1, offsets and then all vertices.
-    fn cells(&mut self) -> Result<Cells> {
+    fn cells(&mut self, sink: &WireSink) -> Result<Cells> {
         let n = self.feed.integer("the number of cells")?;
         let size = self.feed.integer("how many numbers follow")?;
         let n = self.feed.check_count("cells", n, 1)?;
         let size = self.feed.check_count("numbers of cells", size, 1)?;
+        let bytes = n.saturating_mul(CELL_BYTES).saturating_add(8 * size);
+        self.feed.placed(sink.check_bytes(bytes))?;
         self.feed.skip_line()?;
         if self.feed.peek()? == Some(b'O') {
             return self.cells_of_offsets(n, size);

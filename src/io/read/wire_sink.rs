@@ -1,6 +1,9 @@
 //! Where readers of edges and points put them.
 
-use crate::surface::WireSet;
+use std::collections::HashMap;
+
+use crate::geom::Point;
+use crate::surface::{SurfaceError, WireSet};
 
 /// What is wanted of a file that may have both.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,33 +20,55 @@ pub(super) struct WireSink {
     pub set: WireSet,
     /// What is called by no name of its own is called so.
     stem: String,
+    labels: HashMap<String, u32>,
+    bytes_max: u64,
 }
 
 impl WireSink {
-    /// For a file of this name.
-    pub fn called(stem: String) -> Self {
+    /// For a file of this name, and at most so many bytes.
+    pub fn called(stem: String, bytes_max: u64) -> Self {
         Self {
             stem,
+            bytes_max,
             ..Self::default()
+        }
+    }
+
+    /// Refuses `more` bytes that do not fit beside what it holds.
+    pub fn check_bytes(&self, more: u64) -> Result<(), SurfaceError> {
+        match self.set.bytes() + more > self.bytes_max {
+            true => Err(SurfaceError::WireMemory {
+                bytes_max: self.bytes_max,
+                vertices: self.set.points.len(),
+            }),
+            false => Ok(()),
         }
     }
 
     pub fn label(&mut self, name: &str) -> u32 {
         let name = if name.is_empty() { &self.stem } else { name };
-        let known = self.set.label_names.iter().position(|n| n == name);
-        let place = known.unwrap_or_else(|| {
-            self.set.label_names.push(name.to_owned());
-            self.set.label_names.len() - 1
-        });
-        place as u32
+        if let Some(&label) = self.labels.get(name) {
+            return label;
+        }
+        let label = self.set.label_names.len() as u32;
+        self.set.label_names.push(name.to_owned());
+        self.labels.insert(name.to_owned(), label);
+        label
     }
 
-    pub fn line(&mut self, vertices: &[u32], label: u32) {
+    pub fn point(&mut self, p: Point) -> Result<(), SurfaceError> {
+        self.set.points.push(p);
+        self.check_bytes(0)
+    }
+
+    pub fn line(&mut self, vertices: &[u32], label: u32) -> Result<(), SurfaceError> {
         let pairs = vertices.windows(2).map(|v| [v[0], v[1], label]);
         self.set.edges.extend(pairs);
+        self.check_bytes(0)
     }
 
-    pub fn mark(&mut self, v: u32, label: u32) {
+    pub fn mark(&mut self, v: u32, label: u32) -> Result<(), SurfaceError> {
         self.set.marks.push([v, label]);
+        self.check_bytes(0)
     }
 }

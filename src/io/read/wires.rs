@@ -17,7 +17,7 @@ use crate::surface::WireSet;
 pub fn read_wires(path: &Path, kind: WireKind, cap: u64) -> Result<WireSet> {
     let mut feed = open(path, cap / 4)?;
     let file = feed.file().to_owned();
-    let mut sink = WireSink::called(stem(path));
+    let mut sink = WireSink::called(stem(path), cap / 4);
     let named = unpacked_name(path);
     let extension = named.extension().unwrap_or_default().to_string_lossy();
     match (extension.to_ascii_lowercase().as_str(), kind) {
@@ -98,7 +98,7 @@ fn read_table(feed: &mut Feed<Reader>, sink: &mut WireSink) -> Result<()> {
             false => Some(name(&words.get(3..).unwrap_or_default().join(&b' '))),
         };
         let label = sink.label(label.unwrap_or_default().trim_matches('"'));
-        sink.mark(sink.set.points.len() as u32, label);
-        sink.set.points.push(Point::from_array(p));
+        feed.placed(sink.mark(sink.set.points.len() as u32, label))?;
+        feed.placed(sink.point(Point::from_array(p)))?;
     }
 }

@@ -22,7 +22,7 @@ pub(super) fn write(
 ) -> Result<FileCounts> {
     let middles = match selection.order {
         Order::First => None,
-        Order::Second => Some(Midpoints::gather(mesh)?),
+        Order::Second => Some(Midpoints::gather(mesh, format == MeshFormat::Gmsh)?),
     };
     let middles = middles.as_ref();
     let mut counts = FileCounts {

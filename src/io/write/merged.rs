@@ -14,7 +14,7 @@ use super::faces::{Face, FaceSorter, FaceSource, Faces};
 use super::numbering::{Numbering, PartNumbers, Sharer, Source, candidates, sharers};
 use super::on_surface::OnSurface;
 use super::scope::{FaceSet, Scope};
-use super::wires::WrittenWires;
+use super::wires::{WrittenWires, beside};
 use crate::optimize;
 use crate::sealed::SealedError;
 use crate::sealed::{Shape, Subdomain};
@@ -120,10 +120,11 @@ impl<'a> Merged<'a> {
         progress: Progress<'a>,
     ) -> Result<Self> {
         let (label_names, region_names) = (store.labels()?, store.region_names()?);
+        let row = store.wires()?;
+        let memory = beside(&row, memory)?;
         let parts = sources(store, scope, dir, memory)?;
         let numbering = Numbering::new(store, &parts, scope.apart, dir, memory)?;
         let first_label = label_names.len() as u32;
-        let row = store.wires()?;
         let mut wires = WrittenWires::gather(store, &row, (&parts, &numbering), memory)?;
         let mut sorter = FaceSorter::new(dir, memory as u64 / 4);
         for (p, source) in parts.iter().enumerate() {

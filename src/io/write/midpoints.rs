@@ -15,6 +15,8 @@ pub(super) const TET_EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [0, 2], [0, 3], [
 const FACE_EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [0, 2]];
 /// Begins the places of boundary faces, behind those of all tetrahedra.
 const FACE: u64 = 1 << 63;
+/// Begins the places of embedded edges, behind those.
+const LINE: u64 = FACE | 1 << 62;
 const POINT_BYTES: usize = 24;
 
 sort_record! {
@@ -22,7 +24,7 @@ sort_record! {
     struct EdgeUse {
         low: u64,
         high: u64,
-        /// 6 · tetrahedron + edge, or [`FACE`] and 3 · face + edge.
+        /// 6 · tetrahedron + edge, or [`FACE`] and 3 · face + edge, or [`LINE`] and the edge.
         place: u64,
     }
 }
@@ -55,14 +57,15 @@ pub(super) struct Midpoints {
     /// How many edges there are whose first end each sub-domain numbers.
     pub counts: Vec<u64>,
     n_tets: u64,
-    /// Edges of the tetrahedra, six each, then of the boundary faces, three each; 8 bytes for each number.
+    n_faces: u64,
+    /// Edges of the tetrahedra, six each, then of the boundary faces, three each, then embedded ones; 8 bytes for each number.
     elements: PathBuf,
     points: PathBuf,
 }
 
 impl Midpoints {
-    /// Numbers them, in two passes over vertices and one over tetrahedra. Errors: damage, the disk.
-    pub fn gather(mesh: &mut Merged) -> Result<Self> {
+    /// Numbers them, in two passes over vertices and one over tetrahedra, those of embedded edges too if `has_lines`. Errors: damage, the disk.
+    pub fn gather(mesh: &mut Merged, has_lines: bool) -> Result<Self> {
         let dir = mesh.dir().to_owned();
         let bytes = mesh.sorter_bytes();
         let mut uses = Sorter::new(&dir, bytes);
@@ -70,6 +73,10 @@ impl Midpoints {
             let [low, high] = [nodes[0].min(nodes[1]), nodes[0].max(nodes[1])];
             uses.push(EdgeUse { low, high, place })
         };
+        let lines = mesh.wires().edges.iter().filter(|_| has_lines);
+        for (place, (ends, _)) in (LINE..).zip(lines) {
+            push(*ends, place)?;
+        }
         let mut place = 0;
         mesh.tets(|tet| {
             for edge in TET_EDGES {
@@ -145,6 +152,7 @@ impl Midpoints {
         Ok(Self {
             counts,
             n_tets: mesh.n_tets(),
+            n_faces: mesh.n_faces(),
             elements,
             points,
         })
@@ -169,6 +177,13 @@ impl Midpoints {
     /// Of each boundary face the numbers of its edges. Errors: the disk.
     pub fn faces(&self) -> Result<ElementEdges<3>> {
         let first = 6 * self.n_tets;
+        let records = Records::open(&self.elements, first)?;
+        Ok(ElementEdges { records, first })
+    }
+
+    /// Of each embedded edge its number. Errors: the disk.
+    pub fn lines(&self) -> Result<ElementEdges<1>> {
+        let first = 6 * self.n_tets + 3 * self.n_faces;
         let records = Records::open(&self.elements, first)?;
         Ok(ElementEdges { records, first })
     }

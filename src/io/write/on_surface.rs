@@ -1,4 +1,4 @@
-//! Which faces of tetrahedra are input triangles, beside a pass over them.
+//! Which faces of tetrahedra are required, beside a pass over them: input triangles, and what holds embedded edges.
 
 use std::iter::Peekable;
 use std::path::Path;
@@ -7,7 +7,7 @@ use tetdb_schema::record::NO_TET;
 
 use super::error::Result;
 use super::stream::here;
-use crate::sealed::Subdomain;
+use crate::sealed::{Subdomain, face_of};
 use crate::storage::{Sorted, Sorter, check_cancelled, sort_record};
 
 sort_record! {
@@ -18,7 +18,7 @@ sort_record! {
     }
 }
 
-/// The faces of one sub-domain's tetrahedra that are input triangles, asked for in ascending order of tetrahedra.
+/// The faces of one sub-domain's tetrahedra that are required, asked for in ascending order of tetrahedra.
 pub(super) struct OnSurface {
     faces: Peekable<Sorted<TetFace>>,
 }
@@ -42,7 +42,7 @@ impl OnSurface {
         Ok(Self { faces })
     }
 
-    /// Whether each face of tetrahedron `local` of these vertices, opposite the vertex of its place, is an input triangle. Errors: the disk.
+    /// Whether each face of tetrahedron `local` of these vertices, opposite the vertex of its place, is required. Errors: the disk.
     pub fn faces(&mut self, local: u32, nodes: [u32; 4]) -> Result<[bool; 4]> {
         let mut on_surface = [false; 4];
         while let Some(face) = self
@@ -50,8 +50,9 @@ impl OnSurface {
             .next_if(|face| here(face, |face| face.tet <= local))
         {
             let face = face?;
-            for (on_surface, v) in on_surface.iter_mut().zip(nodes) {
-                *on_surface |= face.tet == local && !face.vertices.contains(&v);
+            if face.tet == local {
+                let own = face_of(face.vertices, nodes);
+                on_surface = [0, 1, 2, 3].map(|i| on_surface[i] || own[i]);
             }
         }
         Ok(on_surface)

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::draft::Draft;
 use super::error::{Result, WriteError};
 use super::stream::Stream;
-use crate::surface::Surface;
+use crate::surface::{Surface, WireSet};
 
 /// A writer of one format.
 type Write = fn(&Surface, &mut Stream) -> Result<()>;
@@ -172,39 +172,30 @@ fn obj(surface: &Surface, stream: &mut Stream) -> Result<()> {
     Ok(())
 }
 
-/// Writes embedded edges and points to `out` as an `.obj` file of lines (`l`) and points (`p`), exactly.
+/// Writes edges and points to `out` as an `.obj` file of lines (`l`) and points (`p`), exactly.
 ///
 /// Errors: [`WriteError`]; `out` is not touched then.
-#[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "for the program"))]
-pub fn wires(surface: &Surface, out: &Path) -> Result<()> {
+pub fn wires(set: &WireSet, out: &Path) -> Result<()> {
     let mut draft = Draft::new(out)?;
     let path = draft.create(out, 0)?;
     let mut stream = Stream::open(&path)?;
-    let mut number = std::collections::HashMap::new();
-    let wires = &surface.wires;
-    let ends = wires.edges.iter().flat_map(|&[a, b, _]| [a, b]);
-    for v in ends.chain(wires.points.iter().map(|&[v, _]| v)) {
-        let next = number.len() as u64 + 1;
-        if *number.entry(v).or_insert(next) == next {
-            doubles(&mut stream, "v ", surface.points[v as usize].to_array());
-            stream.end()?;
-        }
-    }
-    let mut last = None;
-    let mut group = |stream: &mut Stream, label: u32| {
-        if last.replace(label) != Some(label) {
-            let name = surface.label_names[label as usize].replace(['\n', '\r'], " ");
-            stream.text(&format!("g {name}\n"));
-        }
-    };
-    for &[a, b, label] in &wires.edges {
-        group(&mut stream, label);
-        stream.text(&format!("l {} {}\n", number[&a], number[&b]));
+    for p in &set.points {
+        doubles(&mut stream, "v ", p.to_array());
         stream.end()?;
     }
-    for &[v, label] in &wires.points {
-        group(&mut stream, label);
-        stream.text(&format!("p {}\n", number[&v]));
+    let mut last = None;
+    let edges = set.edges.iter().map(|&[a, b, label]| (vec![a, b], label));
+    let points = set.marks.iter().map(|&[v, label]| (vec![v], label));
+    for (vertices, label) in edges.chain(points) {
+        if last.replace(label) != Some(label) {
+            let name = set.label_names[label as usize].replace(['\n', '\r'], " ");
+            stream.text(&format!("g {name}\n"));
+        }
+        stream.text(if vertices.len() == 2 { "l" } else { "p" });
+        for v in vertices {
+            stream.text(&format!(" {}", v + 1));
+        }
+        stream.text("\n");
         stream.end()?;
     }
     stream.finish()?;

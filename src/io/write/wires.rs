@@ -11,6 +11,7 @@ use super::error::Result;
 use super::merged::Merged;
 use super::numbering::{Numbering, Source};
 use super::stream::Stream;
+use crate::storage::StorageError;
 use crate::store::Catalog;
 
 /// A point of the merged mesh.
@@ -22,7 +23,22 @@ pub(super) struct WirePoint {
     pub point: [f64; 3],
 }
 
-/// What of the edges and points is in what is written. Memory: some 100 bytes for each.
+/// Bytes for each edge and point while they are gathered: two vertices in two tables, and itself.
+const BYTES_EACH: u64 = 256;
+
+/// What is left of `memory` beside the embedded edges and points of a store. Errors: nothing.
+pub(super) fn beside(row: &WiresRow, memory: usize) -> Result<usize> {
+    let needed = BYTES_EACH * (row.edges.len() + row.points.len()) as u64;
+    let left = (memory as u64).checked_sub(needed);
+    let left = left.ok_or(StorageError::Budget {
+        what: "embedded edges and points",
+        needed,
+        available: memory as u64,
+    })?;
+    Ok(left as usize)
+}
+
+/// What of the edges and points is in what is written.
 #[derive(Clone, Default)]
 pub(super) struct WrittenWires {
     /// Numbers of the vertices of each edge, and its label, by which they are sorted.

@@ -28,7 +28,7 @@ use crate::pipeline::work::{
 use crate::pipeline::workers::{Hand, map_bounded};
 use crate::sizing::{SizeField, SizeSummary, TETS_PER_LOAD};
 use crate::storage::{Backing, Budget, Pager, PagerStats, ScratchSpace, attempt};
-use crate::store::Catalog;
+use crate::store::{Catalog, INPUT_TRIANGLES};
 use crate::surface::Surface;
 use tetdb_schema::catalog::{RegionRow, StoreState, WiresRow};
 
@@ -257,6 +257,7 @@ impl<'a> Run<'a> {
         };
         let label_names = surface.label_names.clone();
         let wires = surface.has_wires().then(|| wires_row(&surface));
+        let n_triangles = surface.n_own_triangles();
         // All that is needed from here on is in the mesh.
         drop(surface);
         let report = recovered(&mut mesh, kernel, self.options, self.watch)?;
@@ -306,6 +307,7 @@ impl<'a> Run<'a> {
                         f64::from(report.recovery.missing_segments),
                     ),
                     ("missing_facets", f64::from(report.recovery.missing_facets)),
+                    (INPUT_TRIANGLES, n_triangles as f64),
                     ("predicted_tets", predicted),
                     ("head_start_s", head_start),
                     ("pages_read", pages.pages_read as f64),

@@ -136,10 +136,97 @@ impl Surface {
         })
     }
 
+    /// Edges of a file, or, with `points`, of arrays; if it `divides`, triangles are divided where ends lie on them.
+    fn embedded_edges(
+        &self,
+        py: Python<'_>,
+        edges: EdgesGiven<'_>,
+        name: String,
+        divides: bool,
+    ) -> PyResult<Self> {
+        let given = match edges {
+            EdgesGiven::File(file) => Err(file),
+            EdgesGiven::Arrays(points, edges, labels) => Ok((
+                bytemuck::cast_slice::<_, [f64; 3]>(points.as_slice()?).to_vec(),
+                bytemuck::cast_slice::<_, [u32; 2]>(edges.as_slice()?).to_vec(),
+                labels,
+            )),
+        };
+        made(py, || {
+            let surface = self.to_embed_in(divides);
+            match given {
+                Err(file) => surface.embedded_edges(file, Some(&name)),
+                Ok((points, edges, labels)) => {
+                    let labels = labels.as_ref().map(|l| words(l));
+                    surface.embedded_edges_of(&points, &edges, labels.as_deref(), &name)
+                }
+            }
+        })
+    }
+
+    /// The same of points.
+    fn embedded_points(
+        &self,
+        py: Python<'_>,
+        points: PointsGiven<'_>,
+        name: String,
+        divides: bool,
+    ) -> PyResult<Self> {
+        let given = match points {
+            PointsGiven::File(file) => Err(file),
+            PointsGiven::Arrays(points, labels) => Ok((
+                bytemuck::cast_slice::<_, [f64; 3]>(points.as_slice()?).to_vec(),
+                labels,
+            )),
+        };
+        made(py, || {
+            let surface = self.to_embed_in(divides);
+            match given {
+                Err(file) => surface.embedded_points(file, Some(&name)),
+                Ok((points, labels)) => {
+                    let labels = labels.as_ref().map(|l| words(l));
+                    surface.embedded_points_of(&points, labels.as_deref(), &name)
+                }
+            }
+        })
+    }
+
     fn write(&self, py: Python<'_>, out: PathBuf) -> PyResult<()> {
         let work = || Ok(self.inner.write(out)?);
         watched(py, &CancelToken::new(), None, work)
     }
+}
+
+impl Surface {
+    fn to_embed_in(&self, divides: bool) -> tetdb::Surface {
+        let surface = tetdb::Surface::clone(&self.inner);
+        match divides {
+            true => surface.dividing(),
+            false => surface,
+        }
+    }
+}
+
+/// A file, or points, edges and a label for each.
+#[derive(FromPyObject)]
+pub enum EdgesGiven<'py> {
+    File(PathBuf),
+    Arrays(
+        PyReadonlyArray2<'py, f64>,
+        PyReadonlyArray2<'py, u32>,
+        Option<Vec<String>>,
+    ),
+}
+
+/// A file, or points and a label for each.
+#[derive(FromPyObject)]
+pub enum PointsGiven<'py> {
+    File(PathBuf),
+    Arrays(PyReadonlyArray2<'py, f64>, Option<Vec<String>>),
+}
+
+fn words(all: &[String]) -> Vec<&str> {
+    all.iter().map(String::as_str).collect()
 }
 
 /// A matrix of `width` columns.

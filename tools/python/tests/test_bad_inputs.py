@@ -75,6 +75,9 @@ OPTIONS: list[dict[str, Any]] = [
     *({"seeds": value} for value in ([0, 0, 0], [[0, 0]], [[0, 0, np.nan]], "abc", {"a": "x"}, {"a": (9, 9, 9)}, [[9, 9, 9]], 3)),
     *({"holes": value} for value in ([0, 0, 0], [[0, 0]], [[0, 0, np.inf]], "abc", {"a": (0, 0, 0)}, [[9, 9, 9]], [[0.5, 0.5, 0.5]])),
     *({"embed": value} for value in ([BOX], BOX, {"": BOX}, {3: BOX}, {"a": "missing.stl"}, {"a": (0, 0, 0)}, {"a": BOX})),
+    *({"embed_edges": value} for value in ([BOX], {"": "a.obj"}, {"a": "missing.obj"}, {"a": BOX}, {"a": ([[0.1, 0.1, 0.1]], [[0, 1]])}, {"a": ([[0.1, 0.1]], [[0, 0]])},
+                                           {"a": ([[0.1, 0.1, 0.1], [0.2, 0.2, 0.2]], [[0, 1]], ["x", "y"])}, {"a": ([[0.1, 0.1, np.nan], [0.2, 0.2, 0.2]], [[0, 1]])})),
+    *({"embed_points": value} for value in ([BOX], {"": [[0.1, 0.1, 0.1]]}, {"a": "missing.csv"}, {"a": BOX}, {"a": [[0.1, 0.1]]}, {"a": [[9, 9, 9]]}, {"a": ([[0.1, 0.1, 0.1]], ["x", "y"])})),
     *({"progress": value} for value in (1, "yes", [])),
     *({"size": value} for value in (
         3.0, object(), "x +", "1 < 2", "-1", "q", "0*x", b"x", {"h": 1}, Path("missing.sol"), Path("x.txt"),

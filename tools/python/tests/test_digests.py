@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import tetdb
@@ -59,3 +60,47 @@ def test_sheets_are_those_of_the_program(run: Callable[..., str], tmp_path: Path
     assert tetdb.mesh(both, tmp_path / "again").digest == wanted
     with pytest.raises(tetdb.TetdbError):
         both.refined(0.1)
+
+
+def test_edges_and_points_are_those_of_the_program(run: Callable[..., str], tmp_path: Path) -> None:
+    run("sample", "wells,count=4,points=5,cells=6", "-o", "w.obj")
+    words = "mesh w.obj --embed w_sheets.obj --embed-edges w_wires.obj --embed-points w_wires.obj -o program"
+    run(*words.split(), "--subdomains", "2")
+    wanted = run("digest", "program").split()[0]
+    wires = tmp_path / "w_wires.obj"
+    layers = {"layers": tmp_path / "w_sheets.obj"}
+    lines = [line.split(maxsplit=1) for line in wires.read_text().splitlines()]
+    points = np.array([rest.split() for word, rest in lines if word == "v"], dtype=float)
+    edges, marks, group = [], [], ""
+    for word, rest in lines:
+        group = rest if word == "g" else group
+        if word == "l":
+            edges.append((group, [int(v) - 1 for v in rest.split()]))
+        if word == "p":
+            marks.append(int(rest) - 1)
+    arrays = points, [ends for _, ends in edges], [name for name, _ in edges]
+    for name, inside in {"files": (wires, wires), "arrays": (arrays, points[marks])}.items():
+        options = {"embed": layers, "embed_edges": {"in": inside[0]}, "embed_points": {"at": inside[1]}}
+        with tetdb.mesh(tmp_path / "w.obj", tmp_path / name, subdomains=2, **options) as store:
+            assert store.digest == wanted and {"in:well-1", "at"} <= set(store.labels)
+            store.verify()
+    whole = tetdb.Surface(tmp_path / "w.obj").embedded(tmp_path / "w_sheets.obj", "layers")
+    whole = whole.embedded_edges(arrays, "in").embedded_points((points[marks], [f"s{i}" for i in range(5)]), "at")
+    with tetdb.mesh(pickle.loads(pickle.dumps(whole)), tmp_path / "again", subdomains=2) as store:
+        assert store.digest == wanted and "at:s4" in store.labels
+    run("verify", "arrays", "--full")
+
+
+def test_points_on_triangles_are_put_in_where_the_surface_is_refined(run: Callable[..., str], tmp_path: Path) -> None:
+    box, on_top = tetdb.sample("box,h=0.5"), [[0.3, 0.4, 1.0], [0.5, 0.25, 1.0], [0.2, 0.3, 0.6]]
+    edges = {"rod": (on_top, [[0, 2]])}
+    options: dict[str, Any] = {"embed_edges": edges, "embed_points": {"sensors": on_top}, "hsiz": 0.3}
+    with pytest.raises(tetdb.TetdbError, match="meet where they should not"):
+        tetdb.mesh(box, tmp_path / "refused", **options)
+    with tetdb.mesh(box, tmp_path / "s", refine_surface=True, **options) as store:
+        store.verify()
+        assert store.merged().points.tolist().count([0.3, 0.4, 1.0]) == 1
+    run("verify", "s", "--full")
+    options["embed_points"] = {"sensors": [[0.3, 0.4, float(np.nextafter(1.0, 0.0))]]}
+    with pytest.raises(tetdb.TetdbError, match="1.1e-16 from it"):
+        tetdb.mesh(box, tmp_path / "near", refine_surface=True, **options)

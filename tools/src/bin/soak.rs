@@ -1,7 +1,7 @@
 //! Long campaigns against the store, seeded and unattended.
 //!
 //! ```text
-//! soak MODE RESULTS [--seed N] [--items N] [--minutes N] [--program PATH]
+//! soak MODE RESULTS [--seed N] [--items N] [--minutes N] [--program PATH] [--model box|faults|wells]
 //! ```
 //! Modes: `kills`, `flips`, `swaps`, `races` and `readers` (of the program at PATH), `images`, `faults`, `deaths`, `space` (of the library, on a disk in memory). Each item
 //! appends a line of JSON to the file RESULTS; a campaign that was stopped goes on behind its last line. Exit 1 when something was wrong.
@@ -13,7 +13,7 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
-use tetdb_tools::soak::{Item, Mode};
+use tetdb_tools::soak::{Item, Mode, Model};
 
 struct Args {
     mode: String,
@@ -22,6 +22,7 @@ struct Args {
     items: u64,
     minutes: u64,
     program: PathBuf,
+    model: String,
 }
 
 fn args() -> Option<Args> {
@@ -33,6 +34,7 @@ fn args() -> Option<Args> {
         items: u64::MAX,
         minutes: u64::MAX / 60,
         program: "tetdb".into(),
+        model: "box".to_owned(),
     };
     while let Some(word) = words.next() {
         let value = words.next()?;
@@ -41,6 +43,7 @@ fn args() -> Option<Args> {
             "--items" => args.items = value.parse().ok()?,
             "--minutes" => args.minutes = value.parse().ok()?,
             "--program" => args.program = value.into(),
+            "--model" => args.model = value,
             _ => return None,
         }
     }
@@ -53,7 +56,8 @@ fn first_item(args: &Args) -> u64 {
     let lines = text
         .lines()
         .filter_map(|l| serde_json::from_str::<Value>(l).ok());
-    let ours = lines.filter(|l| l["mode"] == args.mode && l["seed"] == args.seed);
+    let ours = lines
+        .filter(|l| l["mode"] == args.mode && l["seed"] == args.seed && l["model"] == args.model);
     ours.filter_map(|l| l["item"].as_u64())
         .max()
         .map_or(0, |last| last + 1)
@@ -61,11 +65,17 @@ fn first_item(args: &Args) -> u64 {
 
 fn main() -> ExitCode {
     let Some(args) = args() else {
-        eprintln!("soak MODE RESULTS [--seed N] [--items N] [--minutes N] [--program PATH]");
+        eprintln!(
+            "soak MODE RESULTS [--seed N] [--items N] [--minutes N] [--program PATH] [--model NAME]"
+        );
         return ExitCode::from(2);
     };
     let first = first_item(&args);
-    let Some(mut mode) = Mode::new(&args.mode, &args.program) else {
+    let Some(model) = Model::called(&args.model) else {
+        eprintln!("models: box, faults, wells");
+        return ExitCode::from(2);
+    };
+    let Some(mut mode) = Mode::new(&args.mode, &args.program, &model) else {
         eprintln!("modes: kills, flips, swaps, races, readers, images, faults, deaths, space");
         return ExitCode::from(2);
     };
@@ -81,7 +91,7 @@ fn main() -> ExitCode {
         let Item { counts, wrong } = mode.item(args.seed, item);
         n_wrong += wrong.len();
         let line = json!({
-            "mode": args.mode, "seed": args.seed, "item": item, "counts": counts, "wrong": wrong,
+            "mode": args.mode, "model": args.model, "seed": args.seed, "item": item, "counts": counts, "wrong": wrong,
             "seconds": clock.elapsed().as_secs_f64(),
         });
         let file = OpenOptions::new()

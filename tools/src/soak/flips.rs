@@ -7,15 +7,14 @@ use std::process::Command;
 use serde_json::Value;
 use tetdb::storage::StoreFile;
 
-use super::Item;
+use super::{Item, Model};
 use crate::sim::Rng;
 
 /// What is asked; answers must be right, or the damage be told.
-const QUESTIONS: &[&[&str]] = &[
+const QUESTIONS: [&[&str]; 3] = [
     &["verify", "a.tetdb", "--full", "--json"],
     &["info", "a.tetdb", "--json"],
     &["digest", "a.tetdb", "--json"],
-    &["query", "a.tetdb", "--where", "quality > 2", "--json"],
 ];
 /// A panic of the program that it did not make an error of.
 const PANIC: i32 = 101;
@@ -25,6 +24,7 @@ pub struct Flips {
     program: PathBuf,
     dir: tempfile::TempDir,
     files: Vec<File>,
+    questions: Vec<Vec<&'static str>>,
     answers: Vec<String>,
 }
 
@@ -37,16 +37,19 @@ struct File {
 
 impl Flips {
     /// Two sub-domains of several chunks.
-    pub fn large(program: &Path) -> Self {
-        Self::new(program, "sample:box,h=0.05", "1")
+    pub fn large(program: &Path, model: &Model) -> Self {
+        Self::new(program, model, (model.large, "1"))
     }
 
     /// One of few chunks, which is asked four times as soon.
-    pub fn small(program: &Path) -> Self {
-        Self::new(program, "sample:box,h=0.1", "0")
+    pub fn small(program: &Path, model: &Model) -> Self {
+        Self::new(program, model, (model.small, "0"))
     }
 
-    fn new(program: &Path, surface: &str, changed: &str) -> Self {
+    fn new(program: &Path, model: &Model, (surface, changed): (&str, &str)) -> Self {
+        let asked = ["query", "a.tetdb", "--json"].into_iter();
+        let asked = asked.chain(model.question.split(' ')).collect();
+        let questions = QUESTIONS.map(<[_]>::to_vec).into_iter();
         let program = program.canonicalize().expect("the program to be asked");
         let shared = Path::new("/dev/shm");
         let dir = match shared.is_dir() {
@@ -57,6 +60,7 @@ impl Flips {
             program,
             dir: dir.expect("a folder for a store"),
             files: Vec::new(),
+            questions: questions.chain([asked]).collect(),
             answers: Vec::new(),
         };
         let mesh = ["mesh", surface, "-o", "a.tetdb", "--subdomains", "2"];
@@ -77,7 +81,7 @@ impl Flips {
             });
         }
         flips.files.sort_by(|a, b| a.path.cmp(&b.path));
-        flips.answers = QUESTIONS.iter().map(|q| flips.ask(q).1).collect();
+        flips.answers = flips.questions.iter().map(|q| flips.ask(q).1).collect();
         flips
     }
 
@@ -128,7 +132,7 @@ impl Flips {
             .into_owned();
         let value = file.value_at(offset);
         let (mut found, mut named, mut silent) = (false, true, false);
-        for (question, answer) in QUESTIONS.iter().zip(&self.answers) {
+        for (question, answer) in self.questions.iter().zip(&self.answers) {
             let (exit, stdout, stderr) = self.ask(question);
             let context = format!("{name} byte {offset} bit {bit}: {}", question[0]);
             match exit {

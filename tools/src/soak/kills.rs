@@ -4,19 +4,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use super::Item;
+use super::{Item, Model};
 use crate::sim::Rng;
-
-const MESH: &[&str] = &[
-    "mesh",
-    "sample:box,h=0.05",
-    "-o",
-    "a.tetdb",
-    "--subdomains",
-    "2",
-    "--memory",
-    "64MiB",
-];
 
 /// The duration of a run is measured again after so many items, for the load of the machine changes.
 const REMEASURED: u64 = 20;
@@ -25,17 +14,28 @@ const REMEASURED: u64 = 20;
 pub struct Kills {
     program: PathBuf,
     dir: tempfile::TempDir,
+    mesh: [&'static str; 8],
     digest: String,
     duration: Duration,
 }
 
 impl Kills {
-    pub fn new(program: &Path) -> Self {
+    pub fn new(program: &Path, model: &Model) -> Self {
         let program = program.canonicalize().expect("the program to be killed");
         let dir = tempfile::tempdir().expect("a folder for stores");
         let mut kills = Self {
             program,
             dir,
+            mesh: [
+                "mesh",
+                model.large,
+                "-o",
+                "a.tetdb",
+                "--subdomains",
+                "2",
+                "--memory",
+                "64MiB",
+            ],
             digest: String::new(),
             duration: Duration::ZERO,
         };
@@ -50,7 +50,7 @@ impl Kills {
     fn measure(&mut self) -> Result<(), String> {
         self.clear();
         let clock = Instant::now();
-        self.succeed(MESH)?;
+        self.succeed(&self.mesh)?;
         self.duration = clock.elapsed();
         Ok(())
     }
@@ -118,7 +118,7 @@ impl Kills {
         let first = loop {
             self.clear();
             let delay = any(rng, self.duration);
-            match self.kill(MESH, delay)? {
+            match self.kill(&self.mesh, delay)? {
                 None => break delay,
                 Some(took) => self.duration = took,
             }
@@ -136,7 +136,7 @@ impl Kills {
             true => self.succeed(&["resume", "a.tetdb"])?,
             false => {
                 done.count("before the first commit");
-                self.succeed(MESH)?
+                self.succeed(&self.mesh)?
             }
         };
         match self.succeed(&["digest", "a.tetdb"])? == self.digest {

@@ -11,6 +11,38 @@ use std::path::Path;
 
 use crate::sim::{Case, End, Reference, Rng, Trouble, unclean};
 
+/// What is meshed: samples that give two sub-domains and one, and a question to them.
+pub struct Model {
+    large: &'static str,
+    small: &'static str,
+    question: &'static str,
+}
+
+impl Model {
+    /// `box`, or with sheets `faults`, or with sheets, edges and points `wells`; `None`: there is no such model.
+    pub fn called(name: &str) -> Option<Self> {
+        let (large, small, question) = match name {
+            "box" => ("sample:box,h=0.05", "sample:box,h=0.1", "--where quality>2"),
+            "faults" => (
+                "sample:faults,count=4,cells=20",
+                "sample:faults,count=3,cells=6",
+                "--touching-sheet",
+            ),
+            "wells" => (
+                "sample:wells,count=20,points=20,cells=18",
+                "sample:wells,count=4,points=4,cells=6",
+                "--label well-1",
+            ),
+            _ => return None,
+        };
+        Some(Self {
+            large,
+            small,
+            question,
+        })
+    }
+}
+
 /// Result of one item: counts by name, and what was wrong.
 #[derive(Default)]
 pub struct Item {
@@ -150,14 +182,17 @@ impl Sim {
 }
 
 impl Mode {
-    /// `None`: there is no such mode.
-    pub fn new(mode: &str, program: &Path) -> Option<Self> {
+    /// `None`: there is no such mode. Kills, flips and swaps are of the model, the others of a box.
+    pub fn new(mode: &str, program: &Path, model: &Model) -> Option<Self> {
         Some(match mode {
-            "kills" => Self::Kills(kills::Kills::new(program)),
-            "flips" => Self::Flips([flips::Flips::large(program), flips::Flips::small(program)]),
+            "kills" => Self::Kills(kills::Kills::new(program, model)),
+            "flips" => Self::Flips([
+                flips::Flips::large(program, model),
+                flips::Flips::small(program, model),
+            ]),
             "races" => Self::Races(races::Races::new(program)),
             "readers" => Self::Readers(readers::Readers::new(program)),
-            "swaps" => Self::Swaps(swaps::Swaps::new(program)),
+            "swaps" => Self::Swaps(swaps::Swaps::new(program, model)),
             "images" => Self::Images(Sim::new(Case::small())),
             "faults" => Self::Faults(Sim::new(Case::tiny())),
             "deaths" => Self::Deaths(Sim::new(Case::tiny())),

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use super::Item;
+use super::{Item, Model};
 use crate::sim::Rng;
 
 /// Bytes of a page in a file.
@@ -23,7 +23,7 @@ const STORES: [(&str, &str); 2] = [("chunks", "zstd"), ("pages", "none")];
 const QUESTION: &str = "--where quality>1.5 --json";
 
 impl Swaps {
-    pub fn new(program: &Path) -> Self {
+    pub fn new(program: &Path, model: &Model) -> Self {
         let program = program.canonicalize().expect("the program to be asked");
         let mut swaps = Self {
             program,
@@ -36,7 +36,7 @@ impl Swaps {
                 _ => "",
             };
             for line in [
-                format!("mesh sample:box,h=0.05 -o {name} --subdomains 2 {seal}"),
+                format!("mesh {} -o {name} --subdomains 2 {seal}", model.large),
                 format!("resaturate {name} --subdomain 1 --refine-by 0.9"),
                 format!("resaturate {name} --undo"),
                 format!("resaturate {name} --subdomain 1 --refine-by 0.8"),

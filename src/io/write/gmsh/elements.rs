@@ -1,10 +1,9 @@
 //! Triangles and tetrahedra, entity by entity.
 
-use std::collections::BTreeMap;
-
 use super::super::error::Result;
 use super::super::merged::{Merged, Opened};
 use super::super::midpoints::{ElementEdges, Midpoints};
+use super::super::wires::WrittenWires;
 use super::entities::Entities;
 use super::out::Out;
 use super::piece::Piece;
@@ -12,7 +11,7 @@ use crate::storage::{Sorter, sort_record};
 
 /// Gmsh's numbers of the types of elements, of first and of second order.
 const POINT: u32 = 15;
-const LINE: u32 = 1;
+const LINES: [u32; 2] = [1, 8];
 const TRIANGLES: [u32; 2] = [2, 9];
 const TETRAHEDRA: [u32; 2] = [4, 11];
 /// The place of each middle of a tetrahedron's edges: Gmsh has the last two the other way round.
@@ -60,18 +59,8 @@ pub(super) fn write(
     let n_faces = mesh.n_faces();
     let tags = entities.tags();
     let wires = &entities.wires;
-    // A line of second order would need the middle of its edge, which no table of tetrahedra or faces has by its ends.
-    let n_lines = if piece.middles.is_none() {
-        wires.edges.len()
-    } else {
-        0
-    };
-    let n_wires = (n_lines + wires.points.len()) as u64;
-    let curves = if n_lines > 0 {
-        wires.edge_labels()
-    } else {
-        BTreeMap::new()
-    };
+    let n_wires = (wires.edges.len() + wires.points.len()) as u64;
+    let curves = wires.edge_labels();
     let blocks = tags.len() + curves.len() + wires.points.len();
     let total = entities.n_faces() + entities.n_tets() + n_wires;
     for n in [blocks as u64, total, 1, n_faces + mesh.n_tets() + n_wires] {
@@ -121,20 +110,9 @@ pub(super) fn write(
         let entity = entities.volume(ghost.region, ghost.from);
         elements.tet(entity, ghost.number, ghost.nodes.0)
     })?;
-    let mut number = n_faces + mesh.n_tets();
-    let mut lines = wires.edges.iter();
-    for (label, n) in curves {
-        for word in [1, label + 1, LINE] {
-            out.int(word);
-        }
-        out.size(n);
-        out.end()?;
-        for ([a, b], _) in lines.by_ref().take(n as usize) {
-            number += 1;
-            [number, a + 1, b + 1].into_iter().for_each(|n| out.size(n));
-            out.end()?;
-        }
-    }
+    let n_before = n_faces + mesh.n_tets();
+    lines(mesh, out, piece, (wires, n_before))?;
+    let mut number = n_before + wires.edges.len() as u64;
     for (tag, point) in (1u32..).zip(&wires.points) {
         for word in [0, tag, POINT] {
             out.int(word);
@@ -144,6 +122,32 @@ pub(super) fn write(
             .into_iter()
             .for_each(|n| out.size(n));
         out.end()?;
+    }
+    Ok(())
+}
+
+/// Embedded edges, those of each label as a curve, numbered behind `n_before` other elements.
+fn lines(
+    mesh: &Merged,
+    out: &mut Out,
+    piece: &Piece,
+    (wires, n_before): (&WrittenWires, u64),
+) -> Result<()> {
+    let mut middles = piece.middles.map(Midpoints::lines).transpose()?;
+    let mut edges = (n_before + 1..).zip(&wires.edges);
+    for (label, n) in wires.edge_labels() {
+        for word in [1, label + 1, LINES[usize::from(middles.is_some())]] {
+            out.int(word);
+        }
+        out.size(n);
+        out.end()?;
+        for (number, ([a, b], _)) in edges.by_ref().take(n as usize) {
+            [number, a + 1, b + 1].into_iter().for_each(|n| out.size(n));
+            if let Some(middles) = &mut middles {
+                out.size(mesh.n_vertices() + middles.next()?[0] + 1);
+            }
+            out.end()?;
+        }
     }
     Ok(())
 }

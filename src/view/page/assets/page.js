@@ -6,7 +6,7 @@ function figures() {
   const card = (value, what) => byId("figures").append(make("div", {}, make("b", { textContent: value }), make("span", { textContent: what })));
   card(count(counts.tets), "tetrahedra");
   card(count(counts.vertices), "vertices");
-  card(count(counts.triangles), "input triangles, all kept");
+  if (counts.triangles !== null) card(count(counts.triangles), "input triangles, all kept");
   card(count(counts.subdomains), counts.subdomains === 1 ? "sub-domain" : "sub-domains");
   card(number(counts.volume, 6), "volume");
   card(percent(data.bins[0] / counts.tets), "with quality below 2");

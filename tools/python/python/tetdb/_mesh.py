@@ -33,6 +33,8 @@ def mesh(
     seeds: Seeds | None = None,
     holes: npt.ArrayLike | None = None,
     embed: Mapping[str, Any] | None = None,
+    embed_edges: Mapping[str, Any] | None = None,
+    embed_points: Mapping[str, Any] | None = None,
     refine_surface: bool = False,
     optimize: str = "full",
     subdomains: int | None = None,
@@ -69,8 +71,11 @@ def mesh(
         Points inside regions that stay empty.
     embed : dict, optional
         Sheets inside, by name, see :meth:`Surface.embedded`.
+    embed_edges, embed_points : dict, optional
+        Edges and points inside, by name: files or arrays, see :meth:`Surface.embedded_edges` and :meth:`Surface.embedded_points`.
     refine_surface : bool
-        Whether the surface's triangles are divided first until their edges are as short as the wanted lengths; no point moves.
+        Whether the surface's triangles are divided first where embedded points lie exactly on them, and until their edges are as short as
+        the wanted lengths; no point moves.
     optimize : {"full", "delaunay", "none"}
         How far tetrahedra are improved.
     subdomains : int, optional
@@ -113,7 +118,7 @@ def mesh(
     """
     where = _create(
         surface, path, False, hsiz=hsiz, hmin=hmin, hmax=hmax, hgrad=hgrad, size=size, regions=regions, seeds=seeds, holes=holes,
-        embed=embed, refine_surface=refine_surface, optimize=optimize, subdomains=subdomains, memory=memory, threads=threads,
+        embed=embed, embed_edges=embed_edges, embed_points=embed_points, refine_surface=refine_surface, optimize=optimize, subdomains=subdomains, memory=memory, threads=threads,
         progress=progress, existing=existing, keep_coarse=keep_coarse, verify=verify,
     )  # fmt: skip
     return Store(where, memory=memory, threads=threads)
@@ -125,6 +130,8 @@ def _create(
     coarse_only: bool,
     *,
     embed: Mapping[str, Any] | None = None,
+    embed_edges: Mapping[str, Any] | None = None,
+    embed_points: Mapping[str, Any] | None = None,
     memory: int | str | None = None,
     threads: int | None = None,
     progress: bool | Progress | None = None,
@@ -134,10 +141,16 @@ def _create(
 ) -> str:
     """Meshes, or with `coarse_only` begins; where the store is."""
     given = surface if isinstance(surface, Surface) else Surface(surface)
-    if not isinstance(embed or {}, Mapping):
-        raise _options.usage(f"{embed!r}: expected sheets by name", "embed")
+    for word, by_name in (("embed", embed), ("embed_edges", embed_edges), ("embed_points", embed_points)):
+        if by_name is not None and not isinstance(by_name, Mapping):
+            raise _options.usage(f"{by_name!r}: expected what is inside by name", word)
+    divide = bool(shape.get("refine_surface"))
     for name, sheet in (embed or {}).items():
         given = given.embedded(sheet, name)
+    for name, edges in (embed_edges or {}).items():
+        given = given.embedded_edges(edges, name, divide)
+    for name, points in (embed_points or {}).items():
+        given = given.embedded_points(points, name, divide)
     job = _options.job(given.bounds, **shape)
     settings = _options.settings(memory, threads)
     replace = _options.one_of(existing, ("keep", "replace"), "existing") == "replace"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -113,8 +113,8 @@ class Surface:
     """
 
     _inner: _native.Surface
-    _parts: tuple[Surface, Surface, str] | None = None
-    """What :meth:`embedded` joined: its triangles alone do not say which are sheets."""
+    _parts: tuple[Callable[..., Surface], tuple[Any, ...]] | None = None
+    """How it was embedded, and what: its triangles alone do not say which are sheets."""
 
     def __init__(
         self,
@@ -210,11 +210,61 @@ class Surface:
         name : str
             Of its label; where it has several, they are called ``name:LABEL``.
         """
-        if not isinstance(name, str) or not name:
-            raise TetdbError("usage", f"{name!r} is no name of a sheet", "name")
+        _check_name(name)
         inside = sheet if isinstance(sheet, Surface) else Surface(sheet)
         both = self._of(self._inner.embedded(inside._inner, name))
-        both._parts = self, inside, name
+        both._parts = Surface.embedded, (self, inside, name)
+        return both
+
+    def embedded_edges(self, edges: Any, name: str, divide: bool = False) -> Surface:
+        """The same with edges inside: each is an edge of the mesh, whole and in its place. To be called after :meth:`embedded`.
+
+        Parameters
+        ----------
+        edges : path, or tuple
+            An ``.obj``, legacy ``.vtk`` or ``.poly`` file; or points (n, 3), positions in them (m, 2), and, if it has three parts, m labels.
+        name : str
+            Of their label; where there are several, they are called ``name:LABEL``.
+        divide : bool
+            Whether triangles are divided where ends of edges lie exactly on them. Edges otherwise meet them, and each other, in common
+            vertices alone.
+        """
+        _check_name(name)
+        if _is_path(edges):
+            given: Any = os.fspath(edges)
+        elif isinstance(edges, tuple) and len(edges) in (2, 3):
+            points, pairs = _points_of(edges[0]), np.asarray(edges[1])
+            if pairs.dtype.kind not in "iu" or pairs.ndim != 2 or pairs.shape[1] != 2:
+                raise SurfaceError("unsupported-content", f"expected integers (m, 2), found {pairs.dtype} {pairs.shape}", "edges")
+            bad = np.flatnonzero(((pairs < 0) | (pairs >= len(points))).any(axis=1))
+            if bad.size:
+                raise SurfaceError("index-out-of-range", f"it names point {pairs[bad[0]].tolist()}, but there are {len(points)}", f"edge {bad[0]}")
+            given = points, np.ascontiguousarray(pairs, dtype=np.uint32), _words(edges[2:], len(pairs))
+        else:
+            raise SurfaceError("unsupported-content", f"{type(edges).__name__} is no edges", "edges", "give a path, or points and pairs of them")
+        both = self._of(self._inner.embedded_edges(given, name, bool(divide)))
+        both._parts = Surface.embedded_edges, (self, edges, name, divide)
+        return both
+
+    def embedded_points(self, points: Any, name: str, divide: bool = False) -> Surface:
+        """The same with points inside: each is a vertex of the mesh that is not moved.
+
+        Parameters
+        ----------
+        points : path, array or tuple
+            A ``.csv``, ``.node``, ``.obj`` or legacy ``.vtk`` file; or (n, 3); or both of this and n labels.
+        name, divide
+            As of :meth:`embedded_edges`.
+        """
+        _check_name(name)
+        if _is_path(points):
+            given: Any = os.fspath(points)
+        else:
+            xyz, *labels = points if isinstance(points, tuple) and len(points) == 2 else (points,)
+            xyz = _points_of(xyz)
+            given = xyz, _words(labels, len(xyz))
+        both = self._of(self._inner.embedded_points(given, name, bool(divide)))
+        both._parts = Surface.embedded_points, (self, points, name, divide)
         return both
 
     def write(self, path: str | os.PathLike[str]) -> None:
@@ -254,7 +304,7 @@ class Surface:
 
     def __reduce__(self) -> tuple[Any, ...]:
         if self._parts:
-            return Surface.embedded, self._parts
+            return self._parts
         return Surface, (self.points, self.triangles, self.labels)
 
     def __repr__(self) -> str:
@@ -266,6 +316,21 @@ def sample(spec: str) -> Surface:
     if not isinstance(spec, str):
         raise SurfaceError("bad-sample", f"{spec!r} is no text", "spec")
     return Surface._of(_native.Surface.sample(spec))
+
+
+def _check_name(name: object) -> None:
+    if not isinstance(name, str) or not name:
+        raise TetdbError("usage", f"{name!r} is no name of a sheet, edges or points", "name")
+
+
+def _words(labels: Sequence[Any], n: int) -> list[str] | None:
+    """`labels`: one sequence of them, or none."""
+    if not labels or labels[0] is None:
+        return None
+    each = np.asarray(labels[0])
+    if each.shape != (n,) or each.dtype.kind not in "UiuO":
+        raise SurfaceError("count-mismatch", f"expected {n} labels, found {each.dtype} {each.shape}", "labels")
+    return [str(label) for label in each]
 
 
 def _is_path(value: object) -> bool:
@@ -286,14 +351,22 @@ def _of_mesh(mesh: Any) -> tuple[Any, Any, Any]:
     raise SurfaceError("unsupported-content", f"{type(mesh).__name__} is no surface", "points", "give points and triangles, a mesh of PyVista, trimesh or meshio, or paths")
 
 
-def _of_arrays(points: Any, triangles: Any, labels: Any) -> _native.Surface:
+def _points_of(points: Any) -> npt.NDArray[np.float64]:
     try:
         xyz = np.asarray(points)
-        tri = np.asarray(triangles)
     except (TypeError, ValueError) as error:
-        raise SurfaceError("unsupported-content", f"no array: {error}", "points or triangles") from None
+        raise SurfaceError("unsupported-content", f"no array: {error}", "points") from None
     if xyz.dtype.kind not in "fiu" or xyz.ndim != 2 or xyz.shape[1] != 3:
         raise SurfaceError("unsupported-content", f"expected real numbers (n, 3), found {xyz.dtype} {xyz.shape}", "points")
+    return np.ascontiguousarray(xyz, dtype=np.float64)
+
+
+def _of_arrays(points: Any, triangles: Any, labels: Any) -> _native.Surface:
+    xyz = _points_of(points)
+    try:
+        tri = np.asarray(triangles)
+    except (TypeError, ValueError) as error:
+        raise SurfaceError("unsupported-content", f"no array: {error}", "triangles") from None
     if tri.size == 0 and tri.ndim == 2 and tri.shape[1] == 3:
         tri = tri.astype(np.int64)
     if tri.dtype.kind not in "iu" or tri.ndim != 2 or tri.shape[1] != 3:
@@ -313,7 +386,7 @@ def _of_arrays(points: Any, triangles: Any, labels: Any) -> _native.Surface:
         names, codes = np.unique(each.astype(np.str_), return_inverse=True)
         named = [str(n) for n in names], codes.astype(np.int64)
     return _native.Surface.of_arrays(
-        np.ascontiguousarray(xyz, dtype=np.float64),
+        xyz,
         np.ascontiguousarray(tri, dtype=np.uint32),
         named,
     )
