@@ -79,6 +79,12 @@ fn run_rank(ranks: &ranks::Ranks) -> ExitCode {
     };
     let console = Console::with(false, true, false);
     listen(&console);
+    if let Command::Export(export) = &args.command {
+        return match export::run(export, &console) {
+            Ok(exit) => ExitCode::from(exit),
+            Err(failure) => ExitCode::from(failure.exit()),
+        };
+    }
     ExitCode::from(ranks.serve(&args.command, |run| mesh::begin(run, &[], &console)))
 }
 
