@@ -263,7 +263,7 @@ mod tests {
             mesher.sizes(sizes).create(dir.path().join(name)).unwrap()
         };
         let sizes = || Sizes::interior(Length::units(0.2));
-        let mut store = mesh("a", sizes());
+        let store = mesh("a", sizes());
         // From what the store keeps alone.
         assert!(store.verify(VerifyLevel::Delaunay).unwrap().is_valid());
         assert_eq!(mesh("b", sizes()).summary().digest, store.summary().digest);
