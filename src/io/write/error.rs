@@ -136,9 +136,7 @@ impl WriteError {
     /// What to do about it.
     pub fn help(&self) -> &'static str {
         match self {
-            Self::UnknownFormat { .. } => {
-                "end the name with one of these; `tetdb export --help` and `tetdb snapshot --help` say what each is for"
-            }
+            Self::UnknownFormat { .. } => "end the name with one of those that are expected",
             Self::Unsupported { .. } => "choose another format, or leave that option out",
             Self::Lossy { .. } => "choose .ply, .obj, .off or .stl (text), which keep doubles",
             Self::NoRegion { .. } => "choose one of those that `tetdb info` lists as filled",
