@@ -182,7 +182,7 @@ pub fn changed(bytes: &[u8]) {
         std::fs::write(path, content).expect("writable");
     }
     ask(&sound.path);
-    if (choice % 4) == 0 {
+    if choice.is_multiple_of(4) {
         show(&sound.path, sound.dir.path(), choice / 4 % 18);
     }
     if (choice / 128).is_multiple_of(8) {
