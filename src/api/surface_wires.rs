@@ -256,14 +256,14 @@ mod tests {
             .embedded_edges_of(&rod, &[[0, 1], [0, 2]], Some(&["up", "down"]), "rod")
             .and_then(|s| s.embedded_points_of(&rod[1..], None, "ends"))
             .unwrap();
-        assert_eq!(surface.labels()[1..], ["rod:up", "rod:down", "ends"]);
+        assert_eq!(surface.labels()[6..], ["rod:up", "rod:down", "ends"]);
         let dir = tempfile::tempdir().unwrap();
         let mesh = |name: &str, sizes: Sizes| {
             let mesher = Mesher::new(surface.clone()).refine_surface(true);
             mesher.sizes(sizes).create(dir.path().join(name)).unwrap()
         };
         let sizes = || Sizes::interior(Length::units(0.2));
-        let mut store = mesh("a", sizes());
+        let store = mesh("a", sizes());
         // From what the store keeps alone.
         assert!(store.verify(VerifyLevel::Delaunay).unwrap().is_valid());
         assert_eq!(mesh("b", sizes()).summary().digest, store.summary().digest);
