@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::store::open_finished;
 use super::targets::{check_target, inputs_of};
 use super::{Error, Settings, Store, guarded};
-use crate::io::write::{self, Content, MeshFormat, Order, Selection};
+use crate::io::write::{self, Content, MeshFormat, Order, Selection, Share};
 
 /// A writer holds no more than this, however large the cap.
 const MEMORY_MAX: u64 = 512 << 20;
@@ -18,7 +18,7 @@ pub struct ExportOptions {
 }
 
 /// What was written.
-#[derive(Clone, Debug, serde::Serialize)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 #[non_exhaustive]
 pub struct Exported {
     /// Each file with its length in bytes.
@@ -52,6 +52,12 @@ impl ExportOptions {
     /// Each sub-domain in a file of its own.
     pub fn pieces(mut self) -> Self {
         self.selection.pieces = true;
+        self
+    }
+
+    /// Of the pieces the `number`-th of so many shares, from 1, for processes that together write all of them.
+    pub fn share(mut self, number: u32, of: u32) -> Self {
+        self.selection.share = Some(Share { number, of });
         self
     }
 

@@ -7,7 +7,17 @@ use super::surface::IN_STORE;
 use crate::samples::PREFIX;
 use crate::store::Catalog;
 
-/// Refuses to write to `out` where that is a folder, or one of `inputs`, through whatever links.
+/// Endings of files, and of those that are read with them: TetGen's points, the background mesh of sizes.
+const READ: [(&str, &[&str]); 4] = [
+    ("poly", &["node"]),
+    ("smesh", &["node"]),
+    ("sol", &["mesh", "meshb"]),
+    ("solb", &["mesh", "meshb"]),
+];
+/// The same of files that are written.
+const WRITTEN: [(&str, &[&str]); 1] = [("ele", &["node", "face", "edge"])];
+
+/// Refuses to write to `out` where that is a folder, or one of `inputs`, through whatever links; so too for what goes beside either.
 ///
 /// Errors: `usage`.
 pub(crate) fn check_target(out: &Path, inputs: &[PathBuf]) -> Result<(), Error> {
@@ -24,14 +34,28 @@ pub(crate) fn check_target(out: &Path, inputs: &[PathBuf]) -> Result<(), Error> 
             out.display()
         ));
     }
-    match inputs.iter().find(|input| is_same_file(input, out)) {
-        Some(input) => refused(format!(
-            "{} would be overwritten: it is {}, which this run reads or the store was meshed from",
-            out.display(),
-            input.display()
-        )),
-        None => Ok(()),
+    let written = with_others(out, &WRITTEN);
+    let read = inputs.iter().flat_map(|input| with_others(input, &READ));
+    for input in read {
+        if let Some(out) = written.iter().find(|out| is_same_file(&input, out)) {
+            return refused(format!(
+                "{} would be overwritten: it is {}, which this run reads or the store was meshed from",
+                out.display(),
+                input.display()
+            ));
+        }
     }
+    Ok(())
+}
+
+/// A file, and those that `others` name by its ending.
+fn with_others(file: &Path, others: &[(&str, &[&str])]) -> Vec<PathBuf> {
+    let ending = file.extension().unwrap_or_default().to_string_lossy();
+    let others = others
+        .iter()
+        .filter(|(of, _)| ending.eq_ignore_ascii_case(of));
+    let others = others.flat_map(|(_, endings)| endings.iter().map(|e| file.with_extension(e)));
+    [file.to_owned()].into_iter().chain(others).collect()
 }
 
 /// The files a store was made from.

@@ -37,7 +37,8 @@ pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
         );
     }
     let weld_share = args.weld.as_deref().map(share).transpose()?;
-    let inputs: Vec<PathBuf> = args.surfaces.iter().map(PathBuf::from).collect();
+    let inputs = args.surfaces.iter().chain(args.sheets.files());
+    let inputs: Vec<PathBuf> = inputs.map(PathBuf::from).collect();
     for out in args.write.iter().chain(&args.write_bad) {
         check_target(out, &inputs)?;
     }

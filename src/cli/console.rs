@@ -72,7 +72,8 @@ impl Console {
             quiet,
             verbose,
             colors: std::io::stderr().is_terminal()
-                && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty()),
+                && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty())
+                && std::env::var_os("TERM").is_none_or(|v| v != "dumb"),
             terminal,
             bar,
             state: Arc::new(Mutex::new(State {
@@ -195,18 +196,8 @@ impl Console {
             answer.refused = Some(error);
         }
         match answer.refused.take() {
-            Some(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
-                let code = match error.kind() {
-                    std::io::ErrorKind::StorageFull => "disk-full",
-                    _ => "io",
-                };
-                let message = format!(
-                    "the answer could not be written to the standard output: {error}; of it {} bytes were",
-                    answer.bytes
-                );
-                Err(Failure::new(code, message).help("send it to a disk with more space"))
-            }
-            _ => Ok(()),
+            Some(error) => unwritten(&error, &format!("; of it {} bytes were", answer.bytes)),
+            None => Ok(()),
         }
     }
 
@@ -300,6 +291,19 @@ impl Console {
 /// A line of talk. That nobody hears it is no reason to end.
 fn say(text: &str) {
     let _ = writeln!(std::io::stderr(), "{text}");
+}
+
+/// The standard output took no more; `written` says how much it took. Errors: unless its reader has enough.
+pub(super) fn unwritten(error: &std::io::Error, written: &str) -> Result<(), Failure> {
+    use std::io::ErrorKind::{BrokenPipe, StorageFull};
+    let code = match error.kind() {
+        BrokenPipe => return Ok(()),
+        StorageFull => "disk-full",
+        _ => "io",
+    };
+    let message =
+        format!("the answer could not be written to the standard output: {error}{written}");
+    Err(Failure::new(code, message).help("send it to a disk with more space"))
 }
 
 fn style(known_total: bool) -> ProgressStyle {

@@ -65,6 +65,13 @@ pub fn run(args: &EstimateArgs, console: &Console) -> Result<u8, Failure> {
             "memory_full_bytes": estimate.memory_full_bytes(threads),
             "threads": threads,
             "wall_s": estimate.seconds(threads),
+            "workers": args.workers.map(|n| {
+                let forecast = estimate.forecast(n);
+                json!({
+                    "n": n, "wall_s": forecast.wall_s(), "serial_s": forecast.serial_s, "cuts_s": forecast.cuts_s,
+                    "subdomains_s": forecast.subdomains_s, "wall_least_s": estimate.forecast(u32::MAX).wall_s(),
+                })
+            }),
             "fits": { "memory": fits_memory, "disk": fits_disk },
         }));
         return Ok(0);
@@ -83,12 +90,19 @@ pub fn run(args: &EstimateArgs, console: &Console) -> Result<u8, Failure> {
             n => format!("{n} sub-domains"),
         }
     ));
+    let (least, full) = (
+        estimate.memory_least_bytes(),
+        estimate.memory_full_bytes(threads),
+    );
     console.line(&format!(
-        "memory: {} with a cap of {} ({whence}); the smallest cap is {}, and more than {} brings nothing",
+        "memory: {} with a cap of {} ({whence}); the smallest cap is {}{}",
         memory::show(estimate.memory_bytes(cap, threads)),
         memory::show(cap),
-        memory::show(estimate.memory_least_bytes()),
-        memory::show(estimate.memory_full_bytes(threads)),
+        memory::show(least),
+        match full > least {
+            true => format!(", and more than {} brings nothing", memory::show(full)),
+            false => String::new(),
+        }
     ));
     let free = disk_free.map_or(String::new(), |free| {
         format!("; {} are free", memory::show(free))
@@ -103,6 +117,19 @@ pub fn run(args: &EstimateArgs, console: &Console) -> Result<u8, Failure> {
         short(estimate.seconds(threads).max(1.0).round()),
         count(threads as u64, "thread")
     ));
+    if let Some(n) = args.workers {
+        let forecast = estimate.forecast(n);
+        let seconds = |s: f64| short(s.max(1.0).round());
+        console.line(&format!(
+            "time: about {} s with {}, of these {} for what one process does, {} for cuts, {} for sub-domains; no number of them takes less than {} s",
+            seconds(forecast.wall_s()),
+            count(n, "worker"),
+            seconds(forecast.serial_s),
+            seconds(forecast.cuts_s),
+            seconds(forecast.subdomains_s),
+            seconds(estimate.forecast(u32::MAX).wall_s()),
+        ));
+    }
     console.line(match (fits_memory, fits_disk) {
         (true, true) => "fits: yes",
         (true, false) => "fits: no, the disk is too small",

@@ -12,12 +12,51 @@ use super::query;
 use super::query_ask::regions;
 use crate::api::targets::{check_target, inputs_of};
 use crate::api::{Error, Exported, Settings, show};
-use crate::io::write::{Content, ENDINGS, MeshFormat, Order, Selection, check};
+use crate::io::write::{Content, ENDINGS, MeshFormat, Order, Selection, Share, check};
 
 pub fn run(args: &ExportArgs, console: &Console) -> Result<u8, Failure> {
+    let is_first = share_of_ranks().is_none_or(|share| share.number == 1);
     if let Some(all) = rows(args)? {
-        return query::run(&all, console);
+        return match is_first {
+            true => query::run(&all, console),
+            false => Ok(0),
+        };
     }
+    let reports = write_share(args, console, is_first);
+    #[cfg(feature = "mpi")]
+    let reports = super::ranks::gather(reports, |all, others| add(all, others, console));
+    let reports = reports?;
+    if console.is_json() {
+        console.answer(&json!({ "schema": 1, "exports": reports }));
+    }
+    Ok(0)
+}
+
+/// What this rank writes of pieces, unless that was said; what is no piece the first one writes.
+fn share_of_ranks() -> Option<Share> {
+    #[cfg(feature = "mpi")]
+    return super::ranks::share();
+    #[cfg(not(feature = "mpi"))]
+    None
+}
+
+/// Adds what another rank wrote.
+#[cfg(feature = "mpi")]
+fn add(all: &mut [Exported], others: Vec<Exported>, console: &Console) {
+    for (exported, other) in all.iter_mut().zip(others) {
+        note(&other, console);
+        exported.files.extend(other.files);
+        exported.vertices += other.vertices;
+        exported.tets += other.tets;
+        exported.triangles += other.triangles;
+    }
+}
+
+fn write_share(
+    args: &ExportArgs,
+    console: &Console,
+    is_first: bool,
+) -> Result<Vec<Exported>, Failure> {
     let settings = console.settings(memory::asked(args.read.memory.as_deref())?, None);
     let format = match &args.format {
         Some(word) => Some(MeshFormat::of_word(word).ok_or_else(|| {
@@ -33,10 +72,11 @@ pub fn run(args: &ExportArgs, console: &Console) -> Result<u8, Failure> {
         Some(text) => regions(text, &show::region_names(&args.store)?)?,
         None => Vec::new(),
     };
-    let selection = Selection {
+    let mut selection = Selection {
         subdomains: args.subdomain.iter().copied().collect(),
         regions: regions.into_iter().collect(),
         pieces: args.pieces,
+        share: args.share,
         content: match (args.boundary, args.interfaces) {
             (true, _) => Content::Boundary,
             (_, true) => Content::Interfaces,
@@ -51,11 +91,15 @@ pub fn run(args: &ExportArgs, console: &Console) -> Result<u8, Failure> {
             _ => Order::First,
         },
     };
+    let mut outs = Vec::new();
     for out in &args.out {
         if format.is_none() {
             check_format(out)?;
         }
-        check(out, &selection).map_err(Error::from)?;
+        let format = check(out, &selection).map_err(Error::from)?;
+        let of_ranks = share_of_ranks().filter(|_| selection.in_pieces(format));
+        let is_ours = is_first || (of_ranks.is_some() && args.share.is_none());
+        outs.push((out, args.share.or(of_ranks), is_ours));
     }
     let to_stdout = args.out.iter().any(|out| out == Path::new("-"));
     if to_stdout && (console.is_json() || args.out.len() > 1) {
@@ -72,13 +116,14 @@ pub fn run(args: &ExportArgs, console: &Console) -> Result<u8, Failure> {
             .try_for_each(|out| check_target(out, &inputs))?;
     }
     let mut reports = Vec::new();
-    for out in &args.out {
-        reports.push(write(&args.store, out, &selection, &settings, console)?);
+    for (out, share, is_ours) in outs {
+        selection.share = share;
+        reports.push(match is_ours {
+            true => write(&args.store, out, &selection, &settings, console)?,
+            false => Exported::default(),
+        });
     }
-    if console.is_json() {
-        console.answer(&json!({ "schema": 1, "exports": reports }));
-    }
-    Ok(0)
+    Ok(reports)
 }
 
 /// The question about all tetrahedra whose answer is to be written, where that is asked for: rows of values.
@@ -144,6 +189,11 @@ pub fn write(
 ) -> Result<Exported, Failure> {
     let exported = show::export(path, out, selection, settings)?;
     console.done();
+    note(&exported, console);
+    Ok(exported)
+}
+
+fn note(exported: &Exported, console: &Console) {
     for (file, bytes) in &exported.files {
         console.note(&format!(
             "wrote {} ({})",
@@ -151,5 +201,4 @@ pub fn write(
             memory::show(*bytes)
         ));
     }
-    Ok(exported)
 }

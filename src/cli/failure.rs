@@ -144,7 +144,7 @@ fn help_of(code: &str) -> &'static str {
             "`tetdb check SURFACE` lists all such triangles; `tetdb check SURFACE --repair --write OUT` drops them"
         }
         "open-surface" => {
-            "`tetdb check SURFACE` lists the holes and says whether a repair closes them; otherwise close them where the surface was made"
+            "`tetdb check SURFACE` lists the holes and says whether a repair closes them; otherwise close them where the surface was made; a sheet inside is none: give it with --embed FILE, or --allow-open"
         }
         "self-intersection" => {
             "`tetdb check SURFACE` lists the places; unite or separate the parts where the surface was made"

@@ -9,7 +9,7 @@ use super::console::Console;
 use super::failure::Failure;
 use super::input::{self, Space};
 use super::{config, export, info, memory};
-use crate::api::targets::check_target;
+use crate::api::targets::{check_target, inputs_of};
 use crate::api::{Existing, Mesher, Settings, resume_reported};
 use crate::io::write::Selection;
 use crate::pipeline::Summary;
@@ -30,14 +30,11 @@ pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
     let options = config::options(&args.shape)?;
     // Sizes are checked before anything is read.
     options.sizes()?;
-    let settings = begin(&args.run, console)?;
-    if !args.force {
-        let files = (args.surfaces.iter())
-            .chain(&args.shape.sizes.size_field)
-            .chain(args.sheets.files());
-        let inputs: Vec<PathBuf> = files.map(PathBuf::from).collect();
-        (args.run.export.iter()).try_for_each(|out| check_target(out, &inputs))?;
-    }
+    let files = (args.surfaces.iter())
+        .chain(&args.shape.sizes.size_field)
+        .chain(args.sheets.files());
+    let inputs: Vec<PathBuf> = files.map(PathBuf::from).collect();
+    let settings = begin(&args.run, if args.force { &[] } else { &inputs }, console)?;
     let path = output(args);
     let existing = match args.force {
         true => Existing::Replace,
@@ -98,7 +95,7 @@ fn begun(path: &Path, settings: &Settings, console: &Console) -> Result<u8, Fail
 }
 
 pub fn resume(args: &ResumeArgs, console: &Console) -> Result<u8, Failure> {
-    let settings = begin(&args.run, console)?;
+    let settings = begin(&args.run, &inputs_of(&args.store), console)?;
     let created = resume_reported(&args.store, &settings, !args.run.no_verify)?;
     console.done();
     finish(
@@ -110,14 +107,19 @@ pub fn resume(args: &ResumeArgs, console: &Console) -> Result<u8, Failure> {
     )
 }
 
-/// Threads, signals, and the cap.
-pub(super) fn begin(args: &RunArgs, console: &Console) -> Result<Settings, Failure> {
+/// Threads, signals, and the cap; nothing that is written may be one of `inputs`.
+pub(super) fn begin(
+    args: &RunArgs,
+    inputs: &[PathBuf],
+    console: &Console,
+) -> Result<Settings, Failure> {
     if args.threads == Some(0) {
         let message = "--threads 0 is no thread to work with";
         return Err(Failure::new("usage", message).help("give 1 or more"));
     }
     for out in &args.export {
         export::check_format(out)?;
+        check_target(out, inputs)?;
     }
     let cap = memory::asked(args.memory.as_deref())?;
     #[cfg_attr(not(feature = "mpi"), allow(unused_mut))]

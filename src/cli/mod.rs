@@ -34,6 +34,7 @@ mod tasks;
 mod verify;
 mod words;
 
+use std::io::Write;
 use std::process::ExitCode;
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
@@ -78,7 +79,13 @@ fn run_rank(ranks: &ranks::Ranks) -> ExitCode {
     };
     let console = Console::with(false, true, false);
     listen(&console);
-    ExitCode::from(ranks.serve(&args.command, |run| mesh::begin(run, &console)))
+    if let Command::Export(export) = &args.command {
+        return match export::run(export, &console) {
+            Ok(exit) => ExitCode::from(exit),
+            Err(failure) => ExitCode::from(failure.exit()),
+        };
+    }
+    ExitCode::from(ranks.serve(&args.command, |run| mesh::begin(run, &[], &console)))
 }
 
 /// Signals end the run from now on.
@@ -111,8 +118,12 @@ fn run_alone() -> ExitCode {
 fn unparsed(error: &clap::Error) -> ExitCode {
     let is_help = error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand;
     if is_help || !error.use_stderr() {
-        let _ = error.print();
-        return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
+        let printed = error.print().and_then(|()| std::io::stdout().flush());
+        return ExitCode::from(match printed.or_else(|e| console::unwritten(&e, "")) {
+            Ok(()) if error.use_stderr() => 2,
+            Ok(()) => 0,
+            Err(failure) => Console::new(false).fail(&failure),
+        });
     }
     let is_json = std::env::args_os().any(|word| word == "--json");
     let text = error.render().to_string();

@@ -29,7 +29,10 @@ const POINTS_MAX: u64 = 1 << 17;
 
 pub fn run(args: &QueryArgs, console: &Console) -> Result<u8, Failure> {
     if let Some(out) = &args.output {
-        check_target(out, &inputs_of(&args.store))?;
+        let inputs = inputs_of(&args.store)
+            .into_iter()
+            .chain(args.points.clone());
+        check_target(out, &inputs.collect::<Vec<_>>())?;
     }
     let cap = memory::cap(args.memory.as_deref())?;
     let budget = Budget::new(cap);

@@ -13,12 +13,15 @@ use std::time::Duration;
 use mpi::Threading;
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::{Communicator, Destination, MatchedReceiveVec, Source};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 
 use super::args::{Command, RunArgs};
 use super::failure::Failure;
 use super::tasks;
 use crate::api::{Error, Settings, guarded};
+use crate::io::write::Share;
 use crate::pipeline::{self, Hands, HelperFailure, Helpers, PipelineError, TaskSettings};
 use crate::storage::{Budget, RunContext, host_name};
 
@@ -34,6 +37,7 @@ const PAUSE_MOST: Duration = Duration::from_millis(20);
 /// How long files of other machines may be late.
 const WAIT: Duration = Duration::from_secs(60);
 
+static RANKS: OnceLock<Arc<Ranks>> = OnceLock::new();
 static HELPERS: OnceLock<Arc<RankHelpers>> = OnceLock::new();
 
 /// What a rank got from another, by sender and tag.
@@ -90,6 +94,9 @@ pub(super) fn begin() -> Result<Option<Arc<Ranks>>, Failure> {
             "start it with the mpirun of the MPI it was built with, or build it with this one",
         ));
     }
+    if size > 1 {
+        let _ = RANKS.set(ranks.clone());
+    }
     if size > 1 && rank == 0 {
         let slots = OnceLock::new();
         let ranks = ranks.clone();
@@ -104,6 +111,49 @@ fn launched() -> Option<i32> {
     let sizes = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"].map(number);
     let one = std::env::var_os("PMIX_RANK").map(|_| 1);
     sizes.into_iter().flatten().chain(one).max()
+}
+
+/// What this rank does of work that all ranks share; `None` where there are no others.
+pub(super) fn share() -> Option<Share> {
+    let ranks = RANKS.get()?;
+    Some(Share {
+        number: ranks.rank as u32 + 1,
+        of: ranks.size as u32,
+    })
+}
+
+/// Adds to what rank 0 did of such work what the others did; they send theirs. Errors: of any rank.
+pub(super) fn gather<T: Serialize + DeserializeOwned>(
+    mine: Result<T, Failure>,
+    add: impl Fn(&mut T, T),
+) -> Result<T, Failure> {
+    let Some(ranks) = RANKS.get() else {
+        return mine;
+    };
+    if ranks.rank > 0 {
+        let bytes = match &mine {
+            Ok(done) => [vec![DONE], json!(done).to_string().into_bytes()].concat(),
+            Err(failure) => failed(failure.code, &failure.message),
+        };
+        ranks.send(0, CONTROL, bytes);
+        return mine;
+    }
+    let slots = OnceLock::new();
+    let helpers = RankHelpers {
+        ranks: ranks.clone(),
+        slots,
+    };
+    // All are heard, whatever one of them says, so that none sends to who is gone.
+    let others: Vec<_> = (1..ranks.size)
+        .map(|rank| helpers.answer(rank, CONTROL))
+        .collect();
+    let mut all = mine?;
+    for answer in others {
+        let answer = answer.map_err(PipelineError::from)?;
+        let theirs = serde_json::from_slice(&answer);
+        add(&mut all, theirs.map_err(|e| Failure::new("internal", e))?);
+    }
+    Ok(all)
 }
 
 /// The other ranks, for a run of this process.

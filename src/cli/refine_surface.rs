@@ -10,6 +10,7 @@ use super::failure::Failure;
 use super::input::{self, Space};
 use crate::api::surface::refine;
 use crate::api::targets::check_target;
+use crate::geom::short;
 use crate::io::write;
 use crate::sizing::SizeOptions;
 
@@ -37,10 +38,10 @@ pub fn run(args: &RefineSurfaceArgs, console: &Console) -> Result<u8, Failure> {
         }));
     } else {
         console.note(&format!(
-            "wrote {triangles} triangles ({} before) and {vertices} vertices to {}; new vertices are at most {:e} off the triangles they divide",
+            "wrote {triangles} triangles ({} before) and {vertices} vertices to {}; new vertices are at most {} off the triangles they divide",
             surface.n_triangles(),
             args.output.display(),
-            report.deviation_max
+            short(report.deviation_max)
         ));
     }
     Ok(0)

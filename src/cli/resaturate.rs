@@ -1,6 +1,7 @@
 //! `resaturate`: sub-domains of a finished store made again.
 
 use std::collections::BTreeSet;
+use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
@@ -14,6 +15,7 @@ use super::{memory, mesh};
 use crate::api::job::options_of;
 use crate::api::remesh::{damaged, verify_changed};
 use crate::api::store::{open_finished, open_to_change};
+use crate::api::targets::inputs_of;
 use crate::api::{Remesh, Settings};
 use crate::geom::short;
 use crate::pipeline::{self, Forecast, NewSizes, Options, Remade, ResaturateSummary, Resaturation};
@@ -22,7 +24,9 @@ use crate::store::Catalog;
 
 pub fn run(args: &ResaturateArgs, console: &Console) -> Result<u8, Failure> {
     check(args)?;
-    let settings = mesh::begin(&args.run, console)?;
+    let mut inputs = inputs_of(&args.store);
+    inputs.extend(args.sizes.size_field.iter().map(PathBuf::from));
+    let settings = mesh::begin(&args.run, &inputs, console)?;
     let cap = settings.cap()?;
     let budget = Budget::new(cap);
     let mut open = match args.dry_run {
@@ -126,7 +130,7 @@ fn forget(mut catalog: Catalog, console: &Console) -> Result<u8, Failure> {
     catalog.close()?;
     if console.is_json() {
         console.answer(&json!({ "schema": 1, "forgotten": n }));
-    } else {
+    } else if !console.is_quiet() {
         console.line(&format!(
             "dropped the previous version of {}",
             count(n as u64, "sub-domain")
@@ -174,6 +178,9 @@ fn finish(
             "pages_read": summary.pages.pages_read, "pages_written": summary.pages.pages_written,
             "frames_used": summary.frames_used,
         }));
+        return Ok(0);
+    }
+    if console.is_quiet() {
         return Ok(0);
     }
     for part in &summary.parts {

@@ -26,6 +26,8 @@ pub(super) struct Script<'a> {
     pub memory_bytes: u64,
     pub threads: usize,
     pub scratch: Option<PathBuf>,
+    /// A mesh file to be written in pieces at the end.
+    pub export: Option<PathBuf>,
     pub planned: &'a Planned,
 }
 
@@ -48,6 +50,19 @@ impl Script<'_> {
             line += &format!(" --scratch {}", quoted(dir));
         }
         line
+    }
+
+    /// The export of one share, where one is wanted, and how many there are.
+    fn export(&self, share: &str) -> Option<(String, u32)> {
+        let of = self.planned.tasks.min(self.planned.subdomains);
+        let line = format!(
+            "{} export {} {} --pieces --share {share}/{of} --memory {}MiB",
+            quoted(&self.program),
+            quoted(&self.store),
+            quoted(self.export.as_ref()?),
+            self.memory_bytes >> 20,
+        );
+        Some((line, of))
     }
 
     fn command(&self, name: &str) -> String {
@@ -91,10 +106,17 @@ impl Script<'_> {
         );
         let _ = writeln!(
             text,
-            "# Verified as one.\nsubmit{after} --job-name=tetdb-verify --mem={megabytes}M --cpus-per-task={} --wrap {}",
+            "# Verified as one.\nv=$(submit{after} --job-name=tetdb-verify --mem={megabytes}M --cpus-per-task={} --wrap {})",
             self.threads,
             single_quoted(&resume),
         );
+        if let Some((line, of)) = self.export("$SLURM_ARRAY_TASK_ID") {
+            let _ = writeln!(
+                text,
+                "# Exported in pieces.\nsubmit --dependency=afterok:$v --job-name=tetdb-export --requeue --array=1-{of} --mem={megabytes}M --wrap {}",
+                single_quoted(&line),
+            );
+        }
         text
     }
 
@@ -115,6 +137,13 @@ impl Script<'_> {
             );
         }
         let _ = writeln!(text, "# Verified as one.\n{}", self.command("resume"));
+        if let Some((line, of)) = self.export("{}") {
+            let _ = writeln!(
+                text,
+                "# Exported in pieces.\nseq {of} | parallel ${{PARALLEL_OPTIONS:-}} --retries 3 {}",
+                single_quoted(&line),
+            );
+        }
         text
     }
 
@@ -124,10 +153,20 @@ impl Script<'_> {
         let flags = self.store.with_extension("tasks");
         let flag = |name: String| format!("{:?}", flags.join(name).to_string_lossy());
         let last = self.planned.stages.len();
+        let export = self.export("{wildcards.share}");
+        if let Some((line, of)) = &export {
+            let _ = writeln!(
+                text,
+                "rule exported:\n    input: expand({0}, share=range(1, {of} + 1))\n\nrule export:\n    input: {1}\n    output: touch({0})\n    shell: {line:?}\n",
+                flag("share-{share}".to_owned()),
+                flag("verified".to_owned()),
+            );
+        }
         let _ = writeln!(
             text,
-            "rule verified:\n    input: {}\n    shell: {:?}\n",
+            "rule verified:\n    input: {}\n    output: touch({})\n    shell: {:?}\n",
             flag(format!("stage-{last}")),
+            flag("verified".to_owned()),
             self.command("resume"),
         );
         for (number, stage) in self.stages() {
@@ -174,6 +213,9 @@ impl Script<'_> {
             );
         }
         let _ = writeln!(text, "at the end:\n  {}", self.command("resume"));
+        if let Some((line, of)) = self.export("K") {
+            let _ = writeln!(text, "then, K from 1 to {of}:\n  {line}");
+        }
         text
     }
 }

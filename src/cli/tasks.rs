@@ -11,8 +11,9 @@ use super::console::Console;
 use super::failure::Failure;
 use super::memory;
 use super::task_scripts::{Script, kind};
-use crate::api::Tasks;
 use crate::api::tasks::ranges;
+use crate::api::{Error, Tasks};
+use crate::io::write::{Selection, check};
 use crate::pipeline::{Planned, TaskState};
 
 /// Sub-domains a task of the last stage should have, so that tasks end at about the same time.
@@ -22,6 +23,13 @@ const MEMORY_PER_TASK: u64 = 4 << 30;
 
 pub fn plan(args: &PlanArgs, console: &Console) -> Result<u8, Failure> {
     let memory_bytes = memory::asked(args.memory_per_task.as_deref())?.unwrap_or(MEMORY_PER_TASK);
+    if let Some(out) = &args.export {
+        let pieces = Selection {
+            pieces: true,
+            ..Selection::default()
+        };
+        check(out, &pieces).map_err(Error::from)?;
+    }
     let tasks = Tasks::of(&args.store).settings(console.settings(None, None));
     tasks.plan(args.tasks)?;
     console.done();
@@ -42,6 +50,8 @@ pub fn plan(args: &PlanArgs, console: &Console) -> Result<u8, Failure> {
         memory_bytes,
         threads: args.threads_per_task.max(1),
         scratch: args.scratch.clone(),
+        export: (args.export.as_ref())
+            .map(|out| std::path::absolute(out).unwrap_or_else(|_| out.clone())),
         planned: &planned,
     };
     if console.is_json() {

@@ -12,6 +12,7 @@ use crate::pipeline::error::PipelineError;
 use crate::sealed::SealedError;
 use crate::storage::{Backing, DiskPath, Pager, StoreFile, kind};
 use crate::store::{Catalog, StoreError};
+use tetdb_schema::page::STORED_BYTES;
 
 /// Numbers of the catalog's blobs.
 pub(crate) mod blob {
@@ -254,6 +255,20 @@ pub(crate) fn zones_above(
 /// Generations from a part to what is made of it.
 pub(crate) const DONE: u32 = 2;
 
+/// Refuses a part of more pages than the file has bytes for, before there is a table of them.
+fn check_extents(part: &PartMesh, base: &DiskPath) -> Result<(), StoreError> {
+    let pages: u64 = part.extents.iter().map(|&[_, n]| u64::from(n)).sum();
+    let fits = (part.extents.iter()).all(|[first, n]| first.checked_add(*n).is_some());
+    if fits && pages * STORED_BYTES as u64 <= base.bytes()? {
+        return Ok(());
+    }
+    Err(StoreError::Sealed(SealedError::Content {
+        path: base.path().to_owned(),
+        subdomain: part.part.first,
+        what: "it has fewer pages than its row in the bisection tree says".to_owned(),
+    }))
+}
+
 /// Opens a part's mesh from the file `base`.
 pub(crate) fn open_part(
     part: PartMesh,
@@ -261,6 +276,7 @@ pub(crate) fn open_part(
     mut backing: Backing,
     frames: u64,
 ) -> Result<Mesh, PipelineError> {
+    check_extents(&part, &base)?;
     backing.base = Some(StoreFile::open_repaired(
         &base,
         backing.cache_bytes / 2,
@@ -274,6 +290,29 @@ pub(crate) fn open_part(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_part_has_no_more_pages_than_its_file_has_bytes_for() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let path = dir.path().join("base.redb");
+        std::fs::write(&path, vec![0; 5 * STORED_BYTES]).expect("room");
+        let base = DiskPath::from(path.as_path());
+        let mut part = PartMesh {
+            part: TreePart { first: 0, count: 1 },
+            generation: 1,
+            state: MeshState::from_words([0; MESH_STATE_WORDS]),
+            extents: [[0; 2]; kind::ALL.len()],
+            load: 1.0,
+        };
+        part.extents[1] = [7, 2];
+        part.extents[2] = [0, 3];
+        assert!(check_extents(&part, &base).is_ok());
+        for extent in [[0, 4], [0, u32::MAX], [u32::MAX, 3]] {
+            part.extents[2] = extent;
+            let refused = check_extents(&part, &base);
+            assert!(refused.is_err_and(|e| e.is_damage()), "{extent:?}");
+        }
+    }
 
     #[test]
     fn every_number_of_sub_domains_has_a_tree() {

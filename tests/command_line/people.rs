@@ -61,7 +61,14 @@ fn internals_are_for_those_who_ask_and_quiet_is_quiet() {
         more.contains("catalog,") && more.contains("coarse mesh"),
         "{more}"
     );
-    assert_eq!(said(&place, "mesh part.off -o c.tetdb --quiet"), "");
+    for quiet in [
+        "mesh part.off -o c.tetdb --quiet",
+        "resaturate c.tetdb --subdomain 0 --refine-by 0.5 --quiet",
+        "resaturate c.tetdb --undo --quiet",
+        "resaturate c.tetdb --forget --quiet",
+    ] {
+        assert_eq!(said(&place, quiet), "", "{quiet}");
+    }
 }
 
 #[test]

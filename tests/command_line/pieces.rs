@@ -204,6 +204,60 @@ fn regions_apart_are_closed_and_together_the_whole() {
 }
 
 #[test]
+fn shares_of_an_export_in_pieces_are_together_that_of_one_process() {
+    let place = Place::new();
+    place
+        .run_line("mesh sample:box,h=0.038 -o four.tetdb --subdomains 4")
+        .succeeds();
+    std::fs::create_dir(place.path("one")).expect("a folder");
+    for out in ["a.pvtu", "a.vtu --region 1", "a.msh", "a.mfem", "a.foam"] {
+        let export = |folder: &str, more: &str| {
+            let line = format!("export four.tetdb {folder}/{out} --pieces {more}");
+            place.run_line(&line).succeeds();
+        };
+        export("one", "");
+        // More shares than sub-domains: some are empty.
+        for of in [2, 5] {
+            let folder = format!("of-{of}");
+            std::fs::create_dir_all(place.path(&folder)).expect("a folder");
+            (1..=of).for_each(|k| export(&folder, &format!("--share {k}/{of}")));
+        }
+    }
+    let expected = contents(&place.path("one"));
+    for of in ["of-2", "of-5"] {
+        assert!(contents(&place.path(of)) == expected, "{of}");
+    }
+    for refused in [
+        "a.vtu --share 1/2",
+        "a.pvtu --share 3/2",
+        "a.pvtu --share 0/0",
+    ] {
+        let line = format!("export four.tetdb {refused}");
+        assert_eq!(place.run_line(&line).exit(), Some(2), "{refused}");
+    }
+}
+
+/// Bytes of all files in a folder and those below, by their paths in it.
+fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(next) = folders.pop() {
+        for entry in std::fs::read_dir(next).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            match path.is_dir() {
+                true => folders.push(path),
+                false => {
+                    let name = path.strip_prefix(folder).expect("it is below");
+                    let bytes = std::fs::read(&path).expect("it is there");
+                    found.insert(name.to_owned(), bytes);
+                }
+            }
+        }
+    }
+    found
+}
+
+#[test]
 fn pieces_are_the_same_whoever_writes_them() {
     let place = Place::new();
     place

@@ -50,6 +50,35 @@ fn what_a_run_reads_is_never_what_it_writes() {
     place.run_line("export k.tetdb k.mesh --force").succeeds();
 }
 
+#[test]
+fn what_is_read_or_written_beside_a_file_is_never_overwritten_either() {
+    let place = Place::new();
+    let points = "4 3 0 0\n0 0 0 0\n1 1 0 0\n2 0 1 0\n3 0 0 1\n# mine\n";
+    let facets = "0 3 0 0\n4 0\n1\n3 0 2 1\n1\n3 0 1 3\n1\n3 1 2 3\n1\n3 0 3 2\n0\n0\n";
+    let asked = "0.1 0.1 0.1\n";
+    let all = [("k.poly", facets), ("k.node", points), ("asked.csv", asked)];
+    for (name, content) in all {
+        place.write(name, content);
+    }
+    place.run_line("mesh k.poly").succeeds();
+    for line in [
+        "mesh k.poly -o other.tetdb --export k.ele",
+        "export k.tetdb k.ele",
+        "resume k.tetdb --export k.ele",
+        "resaturate k.tetdb --subdomain 0 --refine-by 0.5 --export k.ele",
+        "query k.tetdb --points asked.csv -o asked.csv",
+    ] {
+        let done = place.run_line(line);
+        assert_eq!(done.exit(), Some(2), "{line}");
+        assert!(!place.path("other.tetdb").exists(), "{line}");
+        for (name, content) in all {
+            let found = fs::read_to_string(place.path(name)).expect("it is still there");
+            assert_eq!(found, content, "{line}");
+        }
+    }
+    place.run_line("export k.tetdb k.ele --force").succeeds();
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn an_answer_that_cannot_be_written_is_an_error_and_a_closed_pipe_is_none() {
@@ -69,6 +98,10 @@ fn an_answer_that_cannot_be_written_is_an_error_and_a_closed_pipe_is_none() {
         "estimate a.off",
         "completions bash",
         "man",
+        "--help",
+        "--version",
+        "help mesh",
+        "export a.tetdb - --format mesh",
     ];
     for line in lines {
         let words: Vec<&str> = line.split_whitespace().collect();

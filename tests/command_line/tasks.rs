@@ -348,12 +348,15 @@ fn the_printed_scripts_run() {
     place.write("bin/sbatch", SBATCH);
     shell(&place, "chmod +x bin/sbatch");
     let script = |engine: &str| {
-        let line = format!("plan a.tetdb --tasks 2 --{engine} --memory-per-task 96MiB");
+        let line = format!(
+            "plan a.tetdb --tasks 2 --{engine} --memory-per-task 96MiB --export {engine}.pvtu"
+        );
         place.run_line(&line).succeeds().stdout()
     };
     place.write("run.sh", script("slurm"));
     shell(&place, "PATH=$PWD/bin:$PATH sh run.sh");
     is_as_of_one_process(&place, &expected);
+    assert!(place.path("slurm.pvtu").exists());
     for (engine, program, command) in [
         ("parallel", "parallel", "sh run.sh"),
         ("snakemake", "snakemake", "snakemake -q -c2 -s run.sh"),
@@ -370,6 +373,7 @@ fn the_printed_scripts_run() {
             true => {
                 shell(&place, command);
                 is_as_of_one_process(&place, &expected);
+                assert!(place.path(&format!("{engine}_00003.vtu")).exists());
             }
             false => println!("skipped: {program} is not installed"),
         }

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use super::run::ReadArgs;
+use crate::io::write::Share;
 
 #[derive(Debug, clap::Args)]
 pub struct StoreArgs {
@@ -15,6 +16,18 @@ pub struct StoreArgs {
     /// Answer with one JSON object
     #[arg(long)]
     pub json: bool,
+}
+
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  tetdb info part.tetdb\n  tetdb info part.tetdb --json\n  tetdb info part.tetdb --excess"
+)]
+pub struct InfoArgs {
+    #[command(flatten)]
+    pub of: StoreArgs,
+    /// Also measure how much worse than the surface forces tetrahedra are (reads all of them)
+    #[arg(long)]
+    pub excess: bool,
 }
 
 #[derive(Debug, clap::Args)]
@@ -52,6 +65,17 @@ pub struct CompareArgs {
     pub read: ReadArgs,
 }
 
+/// `3/64`.
+fn share(text: &str) -> Result<Share, String> {
+    let numbers = text
+        .split_once('/')
+        .and_then(|(k, n)| Some((k.parse().ok()?, n.parse().ok()?)));
+    match numbers {
+        Some((number, of)) if (1..=of).contains(&number) => Ok(Share { number, of }),
+        _ => Err("give which share and of how many, such as 3/64".to_owned()),
+    }
+}
+
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  tetdb export part.tetdb part.vtu part.msh\n  tetdb export part.tetdb part.pvtu topology.json\n  \
@@ -72,6 +96,9 @@ pub struct ExportArgs {
     /// A file for each sub-domain, NAME_00007.mesh, with the faces it shares with others; .pvtu always does so; of .foam processorN
     #[arg(long)]
     pub pieces: bool,
+    /// Of the pieces the K-th of N shares, for processes that write all of them together, such as the tasks of an array
+    #[arg(long, value_name = "K/N", value_parser = share)]
+    pub share: Option<Share>,
     /// Text instead of binary numbers (.msh, .foam)
     #[arg(long)]
     pub ascii: bool,

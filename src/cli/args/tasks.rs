@@ -40,6 +40,9 @@ pub struct PlanArgs {
     /// A folder of each machine for its tasks, as `tetdb work` takes it
     #[arg(long, value_name = "DIR")]
     pub scratch: Option<PathBuf>,
+    /// At the end, also export the mesh in pieces by tasks that write a share each, as `tetdb export --pieces --share K/N` does
+    #[arg(long, value_name = "FILE")]
+    pub export: Option<PathBuf>,
     /// Answer with one JSON object
     #[arg(long)]
     pub json: bool,

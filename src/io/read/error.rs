@@ -61,6 +61,8 @@ pub enum ReadError {
     UnknownFormat {
         /// Where in the file.
         place: FilePlace,
+        /// What to call it.
+        help: &'static str,
     },
     /// The file holds curved faces of a solid model, not triangles.
     #[error("the file is a solid model ({kind}): it has curved faces and no triangles")]
@@ -200,7 +202,7 @@ impl ReadError {
     pub fn place(&self) -> &FilePlace {
         match self {
             Self::Unreadable { place, .. }
-            | Self::UnknownFormat { place }
+            | Self::UnknownFormat { place, .. }
             | Self::SolidModel { place, .. }
             | Self::Truncated { place, .. }
             | Self::Unexpected { place, .. }
@@ -220,9 +222,7 @@ impl ReadError {
     pub fn help(&self) -> &'static str {
         match self {
             Self::Unreadable { .. } => "check the path and that the file may be read: `ls -l FILE`",
-            Self::UnknownFormat { .. } => {
-                "name the file .stl, .off, .obj, .ply, .mesh, .meshb, .msh, .smesh or .poly after what it holds, with .gz or .zst behind it where it is packed"
-            }
+            Self::UnknownFormat { help, .. } => help,
             Self::SolidModel { .. } => {
                 "write its surface as triangles first: in a CAD program export STL with a fine tolerance, or with Gmsh `gmsh -2 part.step -o part.stl`"
             }

@@ -221,7 +221,10 @@ fn read_file(path: &Path, limit: u64, target: &mut SurfaceSink) -> Result<()> {
                 let place = FilePlace::of_file(path);
                 match kind {
                     Some(kind) => ReadError::SolidModel { place, kind },
-                    None => ReadError::UnknownFormat { place },
+                    None => ReadError::UnknownFormat {
+                        place,
+                        help: "name the file .stl, .off, .obj, .ply, .mesh, .meshb, .msh, .smesh or .poly after what it holds, with .gz or .zst behind it where it is packed",
+                    },
                 }
             })?
         }

@@ -46,7 +46,10 @@ pub fn size_files(path: &Path) -> Result<(PathBuf, Option<PathBuf>)> {
                 expected: path.with_extension("sol").display().to_string(),
             }),
         },
-        _ => Err(ReadError::UnknownFormat { place: place() }),
+        _ => Err(ReadError::UnknownFormat {
+            place: place(),
+            help: "sizes are read from .sol or .solb, with their mesh beside them, and by `tetdb resaturate` also from .npy",
+        }),
     }
 }
 

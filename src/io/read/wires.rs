@@ -32,6 +32,7 @@ pub fn read_wires(path: &Path, kind: WireKind, cap: u64) -> Result<WireSet> {
         _ => {
             return Err(ReadError::UnknownFormat {
                 place: FilePlace::of_file(path),
+                help: "edges are read from .obj, .vtk and .poly, points from .csv, .node, .obj and .vtk",
             });
         }
     }

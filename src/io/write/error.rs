@@ -74,6 +74,17 @@ pub enum WriteError {
         /// The file to be written.
         path: PathBuf,
     },
+    /// The standard output took no more.
+    #[error(
+        "the mesh could not be written to the standard output: {source}; of it {written} bytes were"
+    )]
+    StandardOutput {
+        /// Bytes that it took.
+        written: u64,
+        /// What the operating system said.
+        #[source]
+        source: std::io::Error,
+    },
     /// A file operation failed.
     #[error("{path}: {source}")]
     Io {
@@ -98,7 +109,12 @@ impl WriteError {
             Self::NoRegion { .. } => "no-such-part",
             Self::TooLarge { .. } => "format-limit",
             Self::NoSpace { .. } | Self::DiskFull { .. } => "disk-full",
-            Self::Io { .. } => "io",
+            Self::StandardOutput { source, .. }
+                if source.kind() == std::io::ErrorKind::StorageFull =>
+            {
+                "disk-full"
+            }
+            Self::Io { .. } | Self::StandardOutput { .. } => "io",
             Self::Store(error) => word_of(error),
         }
     }
@@ -113,16 +129,14 @@ impl WriteError {
             | Self::NoSpace { path, .. }
             | Self::DiskFull { path }
             | Self::Io { path, .. } => Some(path),
-            Self::NoRegion { .. } | Self::Store(_) => None,
+            Self::NoRegion { .. } | Self::StandardOutput { .. } | Self::Store(_) => None,
         }
     }
 
     /// What to do about it.
     pub fn help(&self) -> &'static str {
         match self {
-            Self::UnknownFormat { .. } => {
-                "end the name of a mesh with .vtu, .mesh, .meshb, .msh, .inp or .npy, of a surface with .stl, .off, .obj or .ply"
-            }
+            Self::UnknownFormat { .. } => "end the name with one of those that are expected",
             Self::Unsupported { .. } => "choose another format, or leave that option out",
             Self::Lossy { .. } => "choose .ply, .obj, .off or .stl (text), which keep doubles",
             Self::NoRegion { .. } => "choose one of those that `tetdb info` lists as filled",
@@ -130,6 +144,7 @@ impl WriteError {
             Self::NoSpace { .. } | Self::DiskFull { .. } => {
                 "free some space, or export to another disk; compare with `df -h`"
             }
+            Self::StandardOutput { .. } => "send it to a disk with more space",
             Self::Io { .. } => "check that the folder exists and may be written: `ls -ld FOLDER`",
             Self::Store(error) if error.is_damage() => {
                 "verify the store to see what is left; copy it again or mesh the surface again"

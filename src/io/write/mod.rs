@@ -73,7 +73,7 @@ pub use report::ExportReport;
 use report::FileCounts;
 #[cfg(any(test, feature = "cli", feature = "internals"))]
 pub use selected::{SelectedTet, SelectedVtu};
-pub use selection::{Content, Order, Selection};
+pub use selection::{Content, Order, Selection, Share};
 pub use surface::{SurfaceReport, surface, wires};
 
 use crate::storage::attempt;
@@ -191,7 +191,11 @@ pub fn check(out: &Path, selection: &Selection) -> Result<MeshFormat> {
     let one_stream = (stdout && (pieces || selection.split_sheets))
         .then(|| "several files in one stream".to_owned());
     let slits = (pieces && selection.split_sheets).then(|| "split sheets in pieces".to_owned());
-    match refused.filter_map(lacks).next().or(one_stream).or(slits) {
+    let share = (selection.share)
+        .filter(|share| !selection.in_pieces(format) || !(1..=share.of).contains(&share.number))
+        .map(|share| format!("share {} of {} in one file", share.number, share.of));
+    let several = one_stream.or(slits).or(share);
+    match refused.filter_map(lacks).next().or(several) {
         None => Ok(format),
         Some(what) => Err(WriteError::Unsupported {
             path: path(),

@@ -109,9 +109,7 @@ pub(super) fn write(
     report: &dyn Fn(u64, u64),
 ) -> Result<FileCounts> {
     let mut rows = store.subdomains()?;
-    if !selection.subdomains.is_empty() {
-        rows.retain(|row| selection.subdomains.contains(&row.rank));
-    }
+    rows.retain(|row| selection.writes_piece(row.rank));
     let all: u64 = rows.iter().map(|row| row.tets).sum();
     let mut counts = FileCounts::default();
     for row in rows {

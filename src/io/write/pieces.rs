@@ -32,10 +32,17 @@ pub(super) fn write(
     if !selection.subdomains.is_empty() {
         rows.retain(|row| selection.subdomains.contains(&row.rank));
     }
-    let all: u64 = rows.iter().map(|row| row.tets).sum();
+    let names_all = parallel && selection.writes_head();
+    let mine = rows.iter().filter(|row| selection.writes_piece(row.rank));
+    let all: u64 = mine.map(|row| row.tets).sum();
     let (mut counts, mut pieces) = (FileCounts::default(), Vec::new());
     for row in rows {
         let piece = piece_path(out, row.rank, extension);
+        let is_written = selection.writes_piece(row.rank);
+        if !is_written && !(names_all && !selection.regions.is_empty()) {
+            pieces.push(piece);
+            continue;
+        }
         let scope = Scope {
             ranks: &BTreeSet::from([row.rank]),
             regions: &selection.regions,
@@ -50,16 +57,18 @@ pub(super) fn write(
             report(counts.tets + (share * row.tets as f64) as u64, all);
         };
         let mut mesh = Merged::open(store, scope, &dir, memory, Progress::new(&report_piece))?;
-        if mesh.n_tets() == 0 {
-            fs::remove_dir_all(&dir).map_err(|e| WriteError::io(&dir, e))?;
-            continue;
-        }
-        let written = dispatch::write(format, selection, &mut mesh, draft, &piece)?;
+        let is_empty = mesh.n_tets() == 0;
+        let written = match is_written && !is_empty {
+            true => dispatch::write(format, selection, &mut mesh, draft, &piece)?,
+            false => FileCounts::default(),
+        };
         fs::remove_dir_all(&dir).map_err(|e| WriteError::io(&dir, e))?;
         counts += written;
-        pieces.push(piece);
+        if !is_empty {
+            pieces.push(piece);
+        }
     }
-    if parallel {
+    if names_all {
         head(draft, out, &pieces)?;
     }
     Ok(counts)

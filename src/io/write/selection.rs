@@ -13,6 +13,8 @@ pub struct Selection {
     pub regions: BTreeSet<u32>,
     /// Each sub-domain in a file of its own.
     pub pieces: bool,
+    /// Of the pieces those that this process writes; by default all.
+    pub share: Option<Share>,
     /// Which elements are written.
     pub content: Content,
     /// The format; by default the one that the file's name tells.
@@ -25,6 +27,37 @@ pub struct Selection {
     pub split_sheets: bool,
     /// Nodes of the elements.
     pub order: Order,
+}
+
+/// The pieces of one of several processes, which together write all.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Share {
+    /// Which of them, from 1.
+    pub number: u32,
+    /// How many there are.
+    pub of: u32,
+}
+
+impl Selection {
+    /// Whether this process writes the piece of a sub-domain.
+    pub(super) fn writes_piece(&self, rank: u32) -> bool {
+        let is_asked = self.subdomains.is_empty() || self.subdomains.contains(&rank);
+        is_asked && (self.share).is_none_or(|share| rank % share.of == share.number - 1)
+    }
+
+    /// Whether each sub-domain has files of its own.
+    pub fn in_pieces(&self, format: MeshFormat) -> bool {
+        #[cfg(feature = "parquet")]
+        if format == MeshFormat::Parquet {
+            return true;
+        }
+        self.pieces || format == MeshFormat::Pvtu
+    }
+
+    /// Whether this process writes what names the pieces of all.
+    pub(super) fn writes_head(&self) -> bool {
+        self.share.is_none_or(|share| share.number == 1)
+    }
 }
 
 /// Nodes of the elements.

@@ -14,6 +14,8 @@ const BUFFER_BYTES: usize = 256 << 10;
 pub(super) struct Stream {
     path: PathBuf,
     file: Box<dyn Write>,
+    /// Bytes that are.
+    written: u64,
     buffer: Vec<u8>,
     integers: itoa::Buffer,
     doubles: zmij::Buffer,
@@ -32,6 +34,7 @@ impl Stream {
         Ok(Self {
             path: path.to_owned(),
             file,
+            written: 0,
             buffer: Vec::with_capacity(BUFFER_BYTES + 4096),
             integers: itoa::Buffer::new(),
             doubles: zmij::Buffer::new(),
@@ -72,15 +75,26 @@ impl Stream {
     fn flush(&mut self) -> Result<()> {
         let written = self.file.write_all(&self.buffer);
         let written = written.and_then(|()| self.file.flush());
+        let bytes = self.buffer.len() as u64;
         self.buffer.clear();
-        if self.path == Path::new(STDOUT)
-            && (written.as_ref()).is_err_and(|e| e.kind() == std::io::ErrorKind::BrokenPipe)
-        {
-            // Whoever reads has enough; what follows goes nowhere.
-            self.file = Box::new(std::io::sink());
-            return Ok(());
+        match written {
+            Ok(()) => {
+                self.written += bytes;
+                Ok(())
+            }
+            Err(source) if self.path != Path::new(STDOUT) => {
+                Err(WriteError::io(&self.path, source))
+            }
+            Err(source) if source.kind() == std::io::ErrorKind::BrokenPipe => {
+                // Whoever reads has enough; what follows goes nowhere.
+                self.file = Box::new(std::io::sink());
+                Ok(())
+            }
+            Err(source) => Err(WriteError::StandardOutput {
+                written: self.written,
+                source,
+            }),
         }
-        written.map_err(|e| WriteError::io(&self.path, e))
     }
 
     /// Writes the rest.

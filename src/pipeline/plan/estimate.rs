@@ -74,10 +74,10 @@ const BESIDE_TRIANGLE: f64 = 200.0;
 const BEYOND_CAP: f64 = 18e6;
 
 /// CPU seconds for each tetrahedron and each triangle on one core of an EPYC at 2.6 GHz. Where needles make recovery slow it may take ten times that.
-const SECONDS_TET: f64 = 1.0 / 240e3;
-const SECONDS_TRIANGLE: f64 = 12e-6;
+pub(super) const SECONDS_TET: f64 = 1.0 / 240e3;
+pub(super) const SECONDS_TRIANGLE: f64 = 12e-6;
 /// For verification.
-const SECONDS_VERIFY: f64 = 0.42e-6;
+pub(super) const SECONDS_VERIFY: f64 = 0.42e-6;
 
 /// What to expect of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -281,7 +281,7 @@ fn notes(chosen: &Filled, options: &Options, n: u32) -> Vec<String> {
     }
     if options.region_policy() == Some(RegionPolicy::Seeds) && empty > 0 {
         notes.push(format!(
-            "{empty} of {n} regions have no seed, or a hole, and stay empty"
+            "{empty} of {n} regions stay empty: no seed is inside, or a hole"
         ));
     }
     notes

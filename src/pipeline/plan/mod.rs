@@ -1,6 +1,8 @@
 //! What is decided before anything is written: options, sizes and what they predict, the shares of the memory cap.
 
 pub(super) mod estimate;
+#[cfg(any(test, feature = "cli"))]
+mod forecast;
 pub(super) mod leases;
 mod memory;
 mod option_text;

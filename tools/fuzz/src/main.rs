@@ -87,6 +87,7 @@ fn run(target: &Target, folder: &Path, time: Duration, seed: u64) -> std::io::Re
         let input = mutator.mutated(&seeds);
         if let Some(path) = &input_file {
             std::fs::write(path, &input)?;
+            std::fs::write(counted(path), (n + 1).to_string())?;
         }
         let (mut ended, mut took) = timed(target, &input);
         if ended && took > SLOW {
@@ -108,11 +109,16 @@ fn run(target: &Target, folder: &Path, time: Duration, seed: u64) -> std::io::Re
     Ok(found)
 }
 
+/// The file beside the input that says how many there were.
+fn counted(input: impl AsRef<Path>) -> PathBuf {
+    input.as_ref().with_extension("count")
+}
+
 /// Feeds a target in processes of their own, one after the other; an input that ends one is a finding.
 fn run_apart(target: &Target, folder: &Path, time: Duration, seed: u64) -> std::io::Result<u32> {
     let dir = tempfile::tempdir()?;
     let input = dir.path().join("input");
-    let (clock, mut found, mut part) = (Instant::now(), 0, 0);
+    let (clock, mut found, mut part, mut n) = (Instant::now(), 0, 0, 0);
     while clock.elapsed() < time && found < FOUND_MAX {
         let left = time.saturating_sub(clock.elapsed()).as_secs().max(1);
         let mut child = Command::new(std::env::current_exe()?)
@@ -132,6 +138,8 @@ fn run_apart(target: &Target, folder: &Path, time: Duration, seed: u64) -> std::
             }
         };
         part += 1_000_000;
+        let count = std::fs::read_to_string(counted(&input));
+        n += count.map_or(0, |count| count.parse::<u64>().unwrap_or(0));
         match status.code() {
             Some(0) => {}
             Some(1) => found += 1,
@@ -142,6 +150,7 @@ fn run_apart(target: &Target, folder: &Path, time: Duration, seed: u64) -> std::
             }
         }
     }
+    println!("{}: {n} inputs in all", target.name);
     Ok(found)
 }
 

@@ -1,28 +1,59 @@
 //! A whole store of which something was changed: bytes of a file, or a value in it that is then sealed again.
 //!
-//! Opened, summed up, verified on every level and asked; one in eight is then written to. Any answer will do, also that nothing is wrong
-//! where nothing was; a bug of ours (`internal`) will not.
+//! Opened, summed up, verified and asked; one in four is also written to files, drawn, compared, and one in eight is then written to. Any
+//! answer will do, also that nothing is wrong where nothing was; a bug of ours (`internal`) will not. Stores are of a dozen to two
+//! thousand tetrahedra and in memory: an input takes a few milliseconds.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, OnceLock};
 
 use redb::{Database, ReadableDatabase, ReadableTable, TableDefinition};
-use tetdb::{Mesher, Seal, Settings, Store, Surface, VerifyLevel};
+use tetdb::pipeline::{self, Options, Trial};
+use tetdb::storage::Budget;
+use tetdb::store::Catalog;
+use tetdb::{
+    Bytes, CancelToken, ColorBy, Event, ExportOptions, MeshFormat, Mesher, Seal, Settings,
+    Snapshot, Store, Surface, VerifyLevel,
+};
+use tetdb_schema::catalog::{Job, StoreState};
 use xxhash_rust::xxh3::xxh3_64_with_seed;
 
 /// Of every file of a store: values by key.
 const TABLE: TableDefinition<u64, &[u8]> = TableDefinition::new("pages");
 /// All values begin with the sum of what follows; in a chunk this comes next, in the catalog the key is the sum's seed.
 const CHUNK: &[u8] = b"TETC";
+const MEMORY: u64 = 64 << 20;
 
 struct Sound {
-    _dir: tempfile::TempDir,
+    dir: tempfile::TempDir,
     path: PathBuf,
     files: Vec<(PathBuf, Vec<u8>)>,
 }
 
-/// A store of one sub-domain, of which there is a previous version; in memory, where the system has files there.
-fn sound(seal: Seal) -> Sound {
+/// What stores there are.
+#[derive(Clone, Copy)]
+enum Made {
+    /// One sub-domain, of which there is a previous version.
+    Whole(Seal),
+    /// Four sub-domains, two of them with a previous version.
+    Divided,
+    /// Ended behind the coarse mesh.
+    Begun,
+}
+
+const MADE: [Made; 4] = [
+    Made::Whole(Seal::Packed),
+    Made::Whole(Seal::None),
+    Made::Divided,
+    Made::Begun,
+];
+
+fn settings() -> Settings {
+    Settings::default().threads(1).memory(Bytes(MEMORY))
+}
+
+/// A store in memory, where the system has files there.
+fn sound(made: Made) -> Sound {
     let shared = Path::new("/dev/shm");
     let dir = match shared.is_dir() {
         true => tempfile::tempdir_in(shared),
@@ -30,18 +61,76 @@ fn sound(seal: Seal) -> Sound {
     };
     let dir = dir.expect("a folder");
     let path = dir.path().join("a.tetdb");
-    let surface = Surface::sample("box,h=0.4").expect("a box");
-    let made = Mesher::new(surface).threads(1).seal(seal).create(&path);
-    let change = made.expect("a mesh").remesh().subdomains(&[0]).scaled(0.9);
-    drop(change.run().expect("a finer mesh"));
+    match made {
+        Made::Whole(seal) => {
+            let surface = Surface::sample("box,h=0.9").expect("a box");
+            let mesher = Mesher::new(surface).settings(settings()).seal(seal);
+            let change = mesher.create(&path).expect("a mesh").remesh();
+            let change = change.subdomains(&[0]).scaled(0.6);
+            drop(change.run().expect("a finer mesh"));
+        }
+        Made::Divided => {
+            divided(&path);
+            let store = Store::open_with(&path, settings()).expect("a finished store");
+            let change = store.remesh().subdomains(&[1, 2]).scaled(0.8);
+            // The job names no surface, which a verification would miss.
+            let change = change.verify(false);
+            drop(change.run().expect("a finer mesh"));
+        }
+        Made::Begun => {
+            let token = CancelToken::new();
+            let cancelled = token.clone();
+            let ending = settings().cancel(&token).progress(move |event| {
+                if let Event::Progress {
+                    stage: "divide edges",
+                    ..
+                } = event
+                {
+                    cancelled.cancel();
+                }
+            });
+            let surface = Surface::sample("box,h=0.4").expect("a box");
+            let ended = Mesher::new(surface).settings(ending).create(&path);
+            assert_eq!(ended.err().map(|e| e.code()), Some("stopped"));
+        }
+    }
     let mut files = entries(&path);
     files.retain(|path| path.extension().is_some_and(|e| e == "redb"));
     let read = |path: PathBuf| (path.clone(), std::fs::read(path).expect("readable"));
     Sound {
-        _dir: dir,
         path,
         files: files.into_iter().map(read).collect(),
+        dir,
     }
+}
+
+/// Meshes a box into sub-domains far smaller than those of the front door.
+fn divided(path: &Path) {
+    let surface = tetdb::samples::SampleSpec::parse("box,h=0.2").and_then(|spec| spec.make());
+    let options = Options {
+        subdomains: Some("4".to_owned()),
+        trial: Trial {
+            subdomains_small: true,
+            ..Trial::default()
+        },
+        ..Options::default()
+    };
+    let job = Job {
+        options: "{}".to_owned(),
+        ..Job::default()
+    };
+    let mut catalog = Catalog::create(path, &job).expect("a new store");
+    let surface = surface.expect("a box").into();
+    let budget = Budget::new(MEMORY);
+    let made = pipeline::mesh(&mut catalog, &surface, &options, &budget, &pipeline::silent);
+    made.expect("a mesh");
+    let verified = catalog.commit(|step| {
+        step.set_state(StoreState::Verified);
+        Ok(())
+    });
+    verified.expect("room");
+    assert_eq!(catalog.subdomains().expect("rows").len(), 4);
+    catalog.close().expect("room");
 }
 
 fn entries(folder: &Path) -> Vec<PathBuf> {
@@ -70,11 +159,12 @@ impl Sound {
 
 /// Each eight bytes are a change: file, whether of a value, where (four bytes), what, and how.
 pub fn changed(bytes: &[u8]) {
-    static SOUND: OnceLock<[Mutex<Sound>; 2]> = OnceLock::new();
-    let sound =
-        SOUND.get_or_init(|| [Seal::Packed, Seal::None].map(|seal| Mutex::new(sound(seal))));
+    static SOUND: OnceLock<[Mutex<Sound>; MADE.len()]> = OnceLock::new();
+    let sound = SOUND.get_or_init(|| MADE.map(|made| Mutex::new(sound(made))));
     let choice = xxh3_64_with_seed(bytes, 0);
-    let sound = &sound[choice as usize % 2];
+    // One in seven is a store that is not finished.
+    let sound = &sound[choice as usize % 7 * MADE.len() / 8];
+    let choice = choice / 7;
     let sound = sound.lock().unwrap_or_else(|e| e.into_inner());
     let changes = || bytes.chunks_exact(8).take(8);
     let file = |change: &[u8]| &sound.files[usize::from(change[0]) % sound.files.len()];
@@ -92,8 +182,11 @@ pub fn changed(bytes: &[u8]) {
         std::fs::write(path, content).expect("writable");
     }
     ask(&sound.path);
-    if (choice / 2).is_multiple_of(8) {
-        write(&sound.path, choice / 16 % 5);
+    if (choice % 4) == 0 {
+        show(&sound.path, sound.dir.path(), choice / 4 % 18);
+    }
+    if (choice / 128).is_multiple_of(8) {
+        write(&sound.path, choice / 1024 % 5);
     }
     sound.restore();
 }
@@ -148,7 +241,7 @@ fn answered<T>(result: Result<T, tetdb::Error>) {
 }
 
 fn ask(path: &Path) {
-    let mut store = match Store::open(path) {
+    let mut store = match Store::open_with(path, settings()) {
         Ok(store) => store,
         error => return answered(error),
     };
@@ -158,14 +251,59 @@ fn ask(path: &Path) {
     answered(asked.and_then(|q| q.collect()));
 }
 
+/// Formats by number, then pictures, then the page.
+fn show(path: &Path, folder: &Path, way: u64) {
+    let store = match Store::open_with(path, settings()) {
+        Ok(store) => store,
+        error => return answered(error),
+    };
+    let out = folder.join("out");
+    let _ = std::fs::remove_dir_all(&out);
+    std::fs::create_dir(&out).expect("room");
+    let export = |name: &str, options: &ExportOptions| {
+        answered(store.export(out.join(name), options));
+    };
+    let whole = ExportOptions::new();
+    match way {
+        0 => export("a.vtu", &whole),
+        1 => export("a.vtkhdf", &whole),
+        2 => export("a.mesh", &whole),
+        3 => export("a.meshb", &whole.second_order()),
+        4 => export("a.msh", &whole.ghosts()),
+        5 => export("a.msh", &whole.format(MeshFormat::Gmsh22)),
+        6 => export("a.foam", &whole.pieces()),
+        7 => export("a.mfem", &whole),
+        8 => export("a.ele", &whole.split_sheets()),
+        9 => export("a.inp", &whole),
+        10 => export("a.npy", &whole),
+        11 => export("a.pvtu", &whole),
+        12 => export("a.json", &whole),
+        13 => export("a.vtu", &whole.boundary()),
+        14 => export("a.mesh", &whole.interfaces()),
+        15 => answered(store.report(out.join("a.html"))),
+        16 => {
+            let cut = Snapshot::cut().plane([0.5; 3], [1.0, 2.0, 3.0]);
+            let cut = cut.color(ColorBy::Quality).pixels(64, 48);
+            answered(store.snapshot(out.join("a.svg"), &cut));
+        }
+        _ => {
+            let surface = Snapshot::surface().color(ColorBy::Label).pixels(64, 48);
+            answered(store.snapshot(out.join("a.png"), &surface));
+        }
+    }
+}
+
 /// One of the ways to change a store.
 fn write(path: &Path, way: u64) {
-    let settings = Settings::default().threads(1);
     if way == 0 {
-        return answered(Store::resume(path, settings));
+        return answered(Store::resume(path, settings()));
     }
-    let mut store = match Store::open_with(path, settings) {
+    let mut store = match Store::open_with(path, settings()) {
         Ok(store) => store,
+        // One that is not finished.
+        Err(error) if error.code() == "store-unfinished" => {
+            return answered(Store::resume(path, settings()));
+        }
         error => return answered(error),
     };
     match way {

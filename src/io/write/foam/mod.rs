@@ -42,8 +42,7 @@ pub(super) fn write(
     draft.create(out, needed_bytes(mesh, ascii))?;
     if selection.pieces {
         refuse_more_processors(&case, mesh.parts().len())?;
-        let ranks = &selection.subdomains;
-        return processors::write(mesh, draft, &case, (&mut walk, &names), ranks, ascii);
+        return processors::write(mesh, draft, &case, (&mut walk, &names), selection);
     }
     serial::write(mesh, draft, &case, (&mut walk, &names), ascii)
 }

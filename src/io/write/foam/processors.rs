@@ -1,12 +1,13 @@
 //! Each sub-domain as the `polyMesh` of a processor, with its numbers in the whole.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::super::draft::Draft;
 use super::super::error::Result;
 use super::super::merged::{Merged, Opened};
 use super::super::report::FileCounts;
+use super::super::selection::Selection;
 use super::super::stream::{Records, scratch};
 use super::faces::{FaceWalk, PartFaces, zone_of};
 use super::file::FoamFile;
@@ -39,16 +40,16 @@ struct Job<'j> {
     patch_starts: BTreeMap<u32, u64>,
 }
 
-/// Writes the processors of `ranks`, or all when there are none; all are read, for numbers in the whole depend on those before.
+/// Writes the processors that are selected; all are read, for numbers in the whole depend on those before.
 pub(super) fn write(
     mesh: &mut Merged,
     draft: &mut Draft,
     case: &Path,
     (walk, names): (&mut FaceWalk, &Names),
-    ranks: &BTreeSet<u32>,
-    ascii: bool,
+    selection: &Selection,
 ) -> Result<FileCounts> {
     mesh.expect_passes(0, 2);
+    let ascii = selection.ascii;
     let parts = mesh.parts();
     let mut counts = FileCounts::default();
     let n_between: u64 = (walk.census.between.iter().flat_map(|b| b.values())).sum();
@@ -70,7 +71,7 @@ pub(super) fn write(
     let mut addresses = Sorter::new(mesh.dir(), mesh.sorter_bytes() / 4);
     let mut next = 0;
     for (p, part) in parts.iter().enumerate() {
-        let is_written = ranks.is_empty() || ranks.contains(&part.rank);
+        let is_written = selection.writes_piece(part.rank);
         let faces = walk.part(mesh, p)?;
         let sizes = sizes(walk, p, part.n_vertices, part.n_tets);
         job.faces(
@@ -91,7 +92,7 @@ pub(super) fn write(
     mesh.expect_count("inner faces", job.n_inner, next)?;
     let mut addresses = addresses.finish()?.peekable();
     for (p, part) in parts.iter().enumerate() {
-        let is_written = ranks.is_empty() || ranks.contains(&part.rank);
+        let is_written = selection.writes_piece(part.rank);
         let of_part = std::iter::from_fn(|| {
             addresses.next_if(|a| a.as_ref().map_or(true, |a| a.rank == part.rank))
         });

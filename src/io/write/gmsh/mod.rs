@@ -12,7 +12,6 @@ mod nodes;
 mod out;
 mod piece;
 
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use super::draft::Draft;
@@ -51,8 +50,7 @@ pub(super) fn write(
     }
     let mut counts = FileCounts::default();
     for (p, part) in mesh.parts().into_iter().enumerate() {
-        let ranks: &BTreeSet<u32> = &selection.subdomains;
-        if ranks.is_empty() || ranks.contains(&part.rank) {
+        if selection.writes_piece(part.rank) {
             let path = piece_path(out, part.rank);
             let piece = Piece {
                 which: &[p],

@@ -7,7 +7,7 @@
 mod lines;
 mod shared;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::draft::Draft;
@@ -35,11 +35,10 @@ pub(super) fn write(
     if !selection.pieces {
         return write_serial(mesh, draft, out, &sets);
     }
-    let ranks: &BTreeSet<u32> = &selection.subdomains;
     let mut shared = Shared::gather(mesh)?;
     let mut counts = FileCounts::default();
     for (p, row) in mesh.parts().into_iter().enumerate() {
-        if !ranks.is_empty() && !ranks.contains(&row.rank) {
+        if !selection.writes_piece(row.rank) {
             continue;
         }
         let mut opened = mesh.open_part(p)?;
