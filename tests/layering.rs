@@ -93,10 +93,6 @@ const LONG_FUNCTIONS: &[(&str, &str)] = &[
         "two passes that share their counts",
     ),
     (
-        "io/write/gmsh/elements.rs write",
-        "points, lines, triangles and tetrahedra in turn, with one count of what was written",
-    ),
-    (
         "io/write/gmsh/nodes.rs claims",
         "faces, tetrahedra, vertices and ghosts claim in turn, into one sorter",
     ),

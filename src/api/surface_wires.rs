@@ -256,7 +256,7 @@ mod tests {
             .embedded_edges_of(&rod, &[[0, 1], [0, 2]], Some(&["up", "down"]), "rod")
             .and_then(|s| s.embedded_points_of(&rod[1..], None, "ends"))
             .unwrap();
-        assert_eq!(surface.labels()[1..], ["rod:up", "rod:down", "ends"]);
+        assert_eq!(surface.labels()[6..], ["rod:up", "rod:down", "ends"]);
         let dir = tempfile::tempdir().unwrap();
         let mesh = |name: &str, sizes: Sizes| {
             let mesher = Mesher::new(surface.clone()).refine_surface(true);

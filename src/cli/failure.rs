@@ -169,12 +169,10 @@ fn help_of(code: &str) -> &'static str {
             "give each edge and each point once, edges between different vertices"
         }
         "wire-contact" => {
-            "edges and points meet triangles, and edges each other, in common vertices alone: `--refine-surface` divides triangles where points \
-             and ends of edges lie exactly on them"
+            "edges and points meet triangles, and edges each other, in common vertices alone; `--refine-surface` puts in what lies exactly on one"
         }
         "wire-too-near" => {
-            "join what is meant to meet, or move it apart: what is not exactly on a triangle is beside it, however near; give the surface a \
-             vertex there, with `--refine-surface` after its coordinates were rounded alike, or by the program it comes from"
+            "join what is meant to meet, or move it apart: beside a triangle is not on it"
         }
         "nothing-to-undo" => {
             "only the last `tetdb resaturate` can be undone, once, and not after --forget"

@@ -1,9 +1,7 @@
 //! Wires: edges and points inside a volume that the mesh has as its edges and vertices.
 
-use super::SurfaceError;
 use super::contact::ContactKind;
 use crate::geom::Point;
-use crate::storage::ScratchSpace;
 
 /// Edges and points of a surface that are no parts of its triangles, or are to be known by a name of their own.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -38,23 +36,6 @@ impl WireSet {
         let points = self.points.capacity() * size_of::<Point>();
         let edges = self.edges.capacity() * size_of::<[u32; 3]>();
         (names + points + edges + self.marks.capacity() * size_of::<[u32; 2]>()) as u64
-    }
-
-    /// Bytes it takes to embed it: tables of its vertices, edges and points, and trees over them.
-    fn bytes_to_embed(&self) -> u64 {
-        const EACH: usize = 256;
-        self.bytes() + (EACH * (self.edges.len() + self.marks.len())) as u64
-    }
-
-    /// Refuses a set that `room` has not the memory to embed.
-    pub(super) fn check_room(&self, room: &ScratchSpace) -> Result<(), SurfaceError> {
-        match self.bytes_to_embed() > room.available() {
-            true => Err(SurfaceError::WireMemory {
-                bytes_max: room.available(),
-                vertices: self.points.len(),
-            }),
-            false => Ok(()),
-        }
     }
 }
 

@@ -16,6 +16,9 @@ use crate::storage::ScratchSpace;
 /// of the diagonal, and directions must stay known to several digits.
 pub(super) const NEAR_SHARE: f64 = 1e-10;
 
+/// Bytes it takes to embed an edge or a point.
+const BYTES_EACH: u64 = 256;
+
 impl Surface {
     /// Whether it has embedded edges or points.
     pub fn has_wires(&self) -> bool {
@@ -120,7 +123,14 @@ impl Surface {
         label_of: impl Fn(u32) -> u32,
         room: &ScratchSpace,
     ) -> Result<(), SurfaceError> {
-        other.check_room(room)?;
+        // Tables of its vertices, edges and points, and trees over them.
+        let needed = other.bytes() + BYTES_EACH * (other.edges.len() + other.marks.len()) as u64;
+        if needed > room.available() {
+            return Err(SurfaceError::WireMemory {
+                bytes_max: room.available(),
+                vertices: other.points.len(),
+            });
+        }
         self.drop_fins();
         let mut table = PointTable::of(&self.points);
         let mut vert = |points: &mut Vec<Point>, v: u32| {

@@ -80,6 +80,17 @@ impl Place {
         self.run(&line.split_whitespace().collect::<Vec<_>>())
     }
 
+    /// `four.tetdb`, `sample` in four sub-domains, is the mesh of one thread in little memory, and valid when one of them is meshed again.
+    pub fn check_four(&self, sample: &str) {
+        let again =
+            format!("mesh {sample} -o again.tetdb --subdomains 4 --threads 1 --memory 128MiB");
+        self.run_line(&again).succeeds();
+        assert_eq!(self.digest("four.tetdb"), self.digest("again.tetdb"));
+        self.run_line("resaturate four.tetdb --subdomain 1 --hgrad 1.2")
+            .succeeds();
+        self.run_line("verify four.tetdb --full").succeeds();
+    }
+
     /// The digest of a store in the folder.
     pub fn digest(&self, store: &str) -> String {
         self.run(&["digest", store])

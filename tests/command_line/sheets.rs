@@ -62,13 +62,7 @@ fn faults_are_faces_with_tetrahedra_on_both_sides_in_one_piece_and_in_several() 
         );
     }
     assert!(counts.iter().all(|&n| n > 100), "{counts:?}");
-    let again = format!("mesh {MANY} -o again.tetdb --subdomains 4 --threads 1 --memory 128MiB");
-    place.run_line(&again).succeeds();
-    assert_eq!(place.digest("four.tetdb"), place.digest("again.tetdb"));
-    place
-        .run_line("resaturate four.tetdb --subdomain 1 --hgrad 1.2")
-        .succeeds();
-    place.run_line("verify four.tetdb --full").succeeds();
+    place.check_four(MANY);
 }
 
 #[test]

@@ -20,6 +20,21 @@ struct Names {
 }
 
 impl Names {
+    /// Takes a line that names what follows; says whether it is one.
+    fn take(&mut self, word: &[u8], line: &[u8]) -> bool {
+        let name = || super::feed::name(&line[word.len()..]);
+        match word {
+            b"g" => self.group = name(),
+            b"o" => {
+                self.object = name();
+                self.group.clear();
+            }
+            b"usemtl" => self.material = name(),
+            _ => return false,
+        }
+        true
+    }
+
     fn best(&self) -> &str {
         let all = [&self.group, &self.object, &self.material];
         all.into_iter()
@@ -42,9 +57,7 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
         if !read_logical_line(&mut feed, &mut line)? {
             break;
         }
-        let mut words = line
-            .split(u8::is_ascii_whitespace)
-            .filter(|w| !w.is_empty());
+        let mut words = words(&line);
         match words.next().unwrap_or_default() {
             b"v" => {
                 let p = vertex(&feed, words, &place)?;
@@ -67,19 +80,7 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
                 feed.placed(target.builder.polygon(&corners, label))?;
             }
             b"l" | b"p" => n_lines_points += 1,
-            b"g" => {
-                names.group = super::feed::name(&line[1..]);
-                label = None;
-            }
-            b"o" => {
-                names.object = super::feed::name(&line[1..]);
-                names.group.clear();
-                label = None;
-            }
-            b"usemtl" => {
-                names.material = super::feed::name(&line[6..]);
-                label = None;
-            }
+            word if names.take(word, &line) => label = None,
             b"curv" | b"curv2" | b"surf" => {
                 return Err(ReadError::Unsupported {
                     place,
@@ -106,6 +107,11 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
         });
     }
     feed.finish(target.builder)
+}
+
+fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
+    let all = line.split(u8::is_ascii_whitespace);
+    all.filter(|w| !w.is_empty())
 }
 
 /// The three coordinates of a vertex.
@@ -139,9 +145,7 @@ pub(super) fn read_wires<R: BufRead>(
         if !read_logical_line(&mut feed, &mut line)? {
             break;
         }
-        let mut words = line
-            .split(u8::is_ascii_whitespace)
-            .filter(|w| !w.is_empty());
+        let mut words = words(&line);
         match (words.next().unwrap_or_default(), kind) {
             (b"v", _) => feed.placed(sink.point(vertex(&feed, words, &place)?))?,
             (b"l", WireKind::Edges) | (b"p", WireKind::Points) => {
@@ -155,12 +159,9 @@ pub(super) fn read_wires<R: BufRead>(
                     WireKind::Points => corners.iter().try_for_each(|&v| sink.mark(v, label)),
                 })?;
             }
-            (b"g", _) => names.group = super::feed::name(&line[1..]),
-            (b"o", _) => {
-                names.object = super::feed::name(&line[1..]);
-                names.group.clear();
+            (word, _) => {
+                names.take(word, &line);
             }
-            _ => {}
         }
     }
     let n = sink.set.points.len();
