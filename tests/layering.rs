@@ -57,10 +57,6 @@ const LONG_FILES: &[(&str, &str)] = &[
         "the words, numbers and places that every text format reads by",
     ),
     (
-        "optimize/mend/mod.rs",
-        "one search from the worst tetrahedron on, with the scratch that its operations share",
-    ),
-    (
         "io/write/merged.rs",
         "one walk over all sub-domains as one mesh, which every format has its vertices, tetrahedra and faces from",
     ),

@@ -31,9 +31,12 @@ impl From<WriteError> for Error {
 
 impl From<SurfaceError> for Error {
     fn from(e: SurfaceError) -> Self {
-        let error = Self::new(e.code(), &e)
-            .with_help(e.help())
-            .with_remedy(Remedy::General);
+        let error = Self::new(e.code(), &e).with_help(e.help());
+        // What helps against these is the same everywhere.
+        let error = match &e {
+            SurfaceError::Wire(_) => error,
+            _ => error.with_remedy(Remedy::General),
+        };
         match &e {
             SurfaceError::Invalid { defect, n_defects } => {
                 let more = match n_defects.saturating_sub(1) {

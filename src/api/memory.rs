@@ -38,8 +38,10 @@ impl fmt::Display for Bytes {
 pub(crate) fn show_bytes(bytes: u64) -> String {
     let b = bytes as f64;
     match bytes {
-        0..=0xfffff => format!("{:.0} KiB", b / 1024.0),
-        0x10_0000..=0x3fff_ffff => format!("{:.0} MiB", b / 1048576.0),
+        0..=0x3ff => format!("{bytes} bytes"),
+        0x400..=0xfffff => format!("{:.0} KiB", b / 1024.0),
+        0x10_0000..=0x9f_ffff => format!("{:.1} MiB", b / 1048576.0),
+        0xa0_0000..=0x3fff_ffff => format!("{:.0} MiB", b / 1048576.0),
         _ => format!("{:.1} GiB", b / 1073741824.0),
     }
 }

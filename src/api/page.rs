@@ -13,7 +13,7 @@ use crate::query::{Measures, QuerySession};
 use crate::storage::{Budget, attempt};
 use crate::store::Catalog;
 use crate::view::page::{self, Page, Surface};
-use crate::view::{Cross, Patch, SceneCut, Statistics};
+use crate::view::{Cross, Excess, Patch, SceneCut, Statistics};
 use tetdb_schema::catalog::{JournalRow, QUALITY_BINS};
 
 /// Qualities from here on have the last color, as in pictures.
@@ -77,6 +77,17 @@ pub(crate) fn write_page(path: &Path, out: &Path, settings: &Settings) -> Result
             scene: data["scene"].take(),
             measures: session.measures(),
         })
+    })?
+}
+
+/// Quality over the least that the surface allows, of all tetrahedra of the store at `path`.
+#[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "for the program"))]
+pub(crate) fn measure_excess(path: &Path, settings: &Settings) -> Result<Excess, Error> {
+    let cap = settings.cap()?;
+    let mut session = QuerySession::open(open_finished(path)?, &Budget::new(cap / 2))?;
+    attempt(|| -> Result<Excess, Error> {
+        let tell = |done, total| settings.count("measure", done, total, "tetrahedra");
+        Ok(session.statistics(&Budget::new(cap / 8 * 3), &tell)?.excess)
     })?
 }
 

@@ -305,7 +305,7 @@ impl<'a> Findings<'a> {
             let (least, at) = self.least_quality();
             if f.forcing_triangles > 0 && least.is_finite() {
                 console.line(&format!(
-                    "worst: no tetrahedron on triangle {} at {} {} {} can have a quality below {}",
+                    "worst: no tetrahedron on triangle {} at ({}, {}, {}) can have a quality below {}",
                     f.worst_triangle,
                     short(at.x),
                     short(at.y),

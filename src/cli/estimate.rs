@@ -85,12 +85,19 @@ pub fn run(args: &EstimateArgs, console: &Console) -> Result<u8, Failure> {
             n => format!("{n} sub-domains"),
         }
     ));
+    let (least, full) = (
+        estimate.memory_least_bytes(),
+        estimate.memory_full_bytes(threads),
+    );
     console.line(&format!(
-        "memory: {} with a cap of {} ({whence}); the smallest cap is {}, and more than {} brings nothing",
+        "memory: {} with a cap of {} ({whence}); the smallest cap is {}{}",
         memory::show(estimate.memory_bytes(cap, threads)),
         memory::show(cap),
-        memory::show(estimate.memory_least_bytes()),
-        memory::show(estimate.memory_full_bytes(threads)),
+        memory::show(least),
+        match full > least {
+            true => format!(", and more than {} brings nothing", memory::show(full)),
+            false => String::new(),
+        }
     ));
     let free = disk_free.map_or(String::new(), |free| {
         format!("; {} are free", memory::show(free))

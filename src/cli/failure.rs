@@ -144,7 +144,7 @@ fn help_of(code: &str) -> &'static str {
             "`tetdb check SURFACE` lists all such triangles; `tetdb check SURFACE --repair --write OUT` drops them"
         }
         "open-surface" => {
-            "`tetdb check SURFACE` lists the holes and says whether a repair closes them; otherwise close them where the surface was made"
+            "`tetdb check SURFACE` lists the holes and says whether a repair closes them; otherwise close them where the surface was made; a sheet inside is none: give it with --embed FILE, or --allow-open"
         }
         "self-intersection" => {
             "`tetdb check SURFACE` lists the places; unite or separate the parts where the surface was made"
@@ -165,13 +165,6 @@ fn help_of(code: &str) -> &'static str {
         "wire-outside" => {
             "leave out what is outside the filled regions, or fill the region it lies in (--regions)"
         }
-        "degenerate-edge" | "duplicate-wire" => {
-            "give each edge and each point once, edges between different vertices"
-        }
-        "wire-contact" => {
-            "edges and points meet triangles, and edges each other, in common vertices alone: divide the triangle or the edge there"
-        }
-        "wire-too-near" => "join what is meant to meet, or move it apart",
         "nothing-to-undo" => {
             "only the last `tetdb resaturate` can be undone, once, and not after --forget"
         }

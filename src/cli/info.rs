@@ -5,16 +5,18 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use super::args::StoreArgs;
+use super::args::InfoArgs;
 use super::console::Console;
 use super::failure::Failure;
 use super::memory;
 use super::tasks;
 use super::words::{self, count};
 use crate::api::Tasks;
+use crate::api::page::measure_excess;
 use crate::geom::{Aabb, Point, short};
 use crate::pipeline;
 use crate::store::Catalog;
+use crate::view::Excess;
 use tetdb_schema::catalog::{QualityRow, RegionRow, StoreState, SubdomainRow};
 
 /// Regions listed for people.
@@ -24,13 +26,29 @@ const TETS_MEASURED: u64 = 10_000;
 /// Sub-domains listed for people.
 const SUBDOMAINS_LISTED: usize = 32;
 
-pub fn run(args: &StoreArgs, console: &Console) -> Result<u8, Failure> {
+pub fn run(args: &InfoArgs, console: &Console) -> Result<u8, Failure> {
     // The rows of a catalog are far less than the least cap.
-    memory::asked(args.memory.as_deref())?;
+    let memory = memory::asked(args.of.memory.as_deref())?;
+    let path = &args.of.store;
+    let excess = (args.excess)
+        .then(|| measure_excess(path, &console.settings(memory, None)))
+        .transpose()?;
+    console.done();
     if console.is_json() {
-        console.answer(&object(&args.store)?);
-    } else {
-        print(&args.store, console)?;
+        let mut all = object(path)?;
+        if let Some(excess) = excess {
+            all["excess"] = json!(excess);
+        }
+        console.answer(&all);
+        return Ok(0);
+    }
+    print(path, console)?;
+    if let Some(Excess { worst, above_two }) = excess {
+        console.line(&format!(
+            "excess (q over the least that the surface allows): {} at most; above 2: {}",
+            short(worst),
+            count(above_two, "tetrahedron").replace("tetrahedrons", "tetrahedra")
+        ));
     }
     Ok(0)
 }
@@ -153,9 +171,14 @@ pub fn print(path: &Path, console: &Console) -> Result<(), Failure> {
         surfaces.join(", ")
     ));
     if console.is_verbose() {
-        for row in catalog.journal()? {
-            console.line(&format!("  {:<28} {:>9.2} s", row.step, row.seconds));
+        let journal = catalog.journal()?;
+        for row in &journal {
+            let of = (row.subdomain).map_or(String::new(), |rank| format!(" (sub-domain {rank})"));
+            let step = row.step.clone() + &of;
+            console.line(&format!("  {step:<48} {:>9.2} s", row.seconds));
         }
+        let seconds: f64 = journal.iter().map(|row| row.seconds).sum();
+        console.line(&format!("  {:<48} {seconds:>9.2} s", "all steps"));
     }
     if let Some(planned) = Tasks::of(path).status()? {
         tasks::print(&planned, console);
@@ -169,10 +192,13 @@ pub fn print(path: &Path, console: &Console) -> Result<(), Failure> {
         return Ok(());
     }
     let rows = catalog.subdomains()?;
-    let (tets, bytes) = (
-        rows.iter().map(|r| r.tets).sum::<u64>(),
-        rows.iter().map(|r| r.bytes).sum::<u64>(),
-    );
+    let tets: u64 = rows.iter().map(|r| r.tets).sum();
+    let bytes = rows.iter().map(|r| r.bytes).sum::<u64>()
+        + (catalog.coarse_snapshots()?.iter())
+            .map(|c| c.bytes)
+            .sum::<u64>()
+        + catalog.previous()?.iter().map(|r| r.bytes).sum::<u64>()
+        + catalog.file_bytes()?;
     console.line(&format!(
         "{tets} tetrahedra, {} vertices, {} input triangles in {}; {} on disk",
         rows.iter().map(|r| r.vertices).sum::<u64>(),
@@ -258,7 +284,7 @@ fn print_subdomains(
             row.tets,
             row.interface_faces,
             count(neighbors as u64, "neighbor"),
-            short(row.quality.worst)
+            worst(row.quality.worst)
         ));
     }
     if rows.len() > SUBDOMAINS_LISTED {

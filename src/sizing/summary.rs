@@ -96,7 +96,7 @@ impl fmt::Display for SizeSummary {
         let Range { low, median, high } = self.surface;
         write!(
             f,
-            "sizes from {}; surface median {} ({} to {}), wanted in the volume {} ({} to {})",
+            "sizes from {}; surface median {} ({} to {}), wanted in the box around it {} ({} to {})",
             self.source,
             short(median),
             short(low),

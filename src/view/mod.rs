@@ -17,4 +17,4 @@ pub use sample::EdgeLengths;
 pub use scene::{ClippedSkin, Cross, Scene, SceneCut};
 pub use section::{Extent, Piece, Section, View};
 pub use shell::{Clip, ShellView};
-pub use statistics::{Histogram, Statistics};
+pub use statistics::{Excess, Histogram, Statistics};

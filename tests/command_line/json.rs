@@ -85,7 +85,7 @@ const RUNS: [(&str, &[&str]); 16] = [
         &[
             "resaturate a.tetdb --subdomain 1 --refine-by 0.9 --dry-run",
             "resaturate a.tetdb --subdomain 1 --refine-by 0.9",
-            "info a.tetdb",
+            "info a.tetdb --excess",
             "resaturate a.tetdb --undo",
             "resaturate a.tetdb --repair --subdomain 0",
             "resaturate a.tetdb --forget",

@@ -48,6 +48,11 @@ fn a_page_tells_what_info_tells() {
     let worst = place.run_line(line).succeeds().stdout();
     let worst: Value = serde_json::from_str(worst.lines().next().expect("one")).expect("JSON");
     assert_eq!(statistics["excess"]["worst"], worst["excess"]);
+    let info = place
+        .run_line("info a.tetdb --excess --json")
+        .succeeds()
+        .json();
+    assert_eq!(info["excess"], statistics["excess"]);
     let line = "query a.tetdb --where excess>2 --select id --json";
     let above = place.run_line(line).succeeds().stdout().lines().count() as u64;
     let found = statistics["excess"]["above_two"].as_u64();

@@ -22,10 +22,10 @@ pub struct MeshArgs {
     #[command(flatten)]
     pub shape: ShapeArgs,
     /// Replace the store if it is there
-    #[arg(long)]
+    #[arg(long, help_heading = "Store")]
     pub force: bool,
     /// End with the coarse mesh, and leave the rest to `tetdb plan` or `tetdb resume`
-    #[arg(long, conflicts_with_all = ["force", "export"])]
+    #[arg(long, conflicts_with_all = ["force", "export"], help_heading = "Run")]
     pub coarse_only: bool,
     /// Begin even when disk or memory are expected not to hold the mesh
     #[arg(long, hide = true)]
@@ -51,16 +51,21 @@ pub struct EstimateArgs {
     #[command(flatten)]
     pub shape: ShapeArgs,
     /// Most memory the run would hold [default: 60 % of what is free]
-    #[arg(long, value_name = "SIZE")]
+    #[arg(long, value_name = "SIZE", help_heading = "Run")]
     pub memory: Option<String>,
     /// Threads the run would use [default: all cores]
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(
+        long,
+        value_name = "N",
+        allow_negative_numbers = true,
+        help_heading = "Run"
+    )]
     pub threads: Option<usize>,
     /// Also say how long so many ranks or tasks at once would take, with a thread each
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub workers: Option<u32>,
     /// Answer with one JSON object
-    #[arg(long)]
+    #[arg(long, help_heading = "Run")]
     pub json: bool,
 }
 

@@ -18,7 +18,7 @@ pub use resaturate::ResaturateArgs;
 pub use run::RunArgs;
 pub use shape::{Optimize, Regions, ShapeArgs, SizeArgs};
 pub use show::{ColorBy, CompletionsArgs, ManArgs, ReportArgs, SnapshotArgs};
-pub use store::{CompareArgs, ExportArgs, StoreArgs, VerifyArgs};
+pub use store::{CompareArgs, ExportArgs, InfoArgs, StoreArgs, VerifyArgs};
 pub use surface::{CheckArgs, RefineSurfaceArgs, SampleArgs, SheetArgs};
 pub use tasks::{GatherArgs, PlanArgs, WorkArgs};
 
@@ -82,8 +82,7 @@ pub enum Command {
     /// --repair is given.
     Check(CheckArgs),
     /// Say what a store holds
-    #[command(after_help = "Examples:\n  tetdb info part.tetdb\n  tetdb info part.tetdb --json")]
-    Info(StoreArgs),
+    Info(InfoArgs),
     /// Ask for tetrahedra by place, number, neighborhood or condition
     ///
     /// All that is given must hold; nothing given means all tetrahedra. Only the parts of the store that matter are read.
@@ -137,7 +136,8 @@ impl Command {
             Self::Gather(a) => a.json,
             Self::Resaturate(a) => a.run.json,
             Self::Check(a) => a.json,
-            Self::Info(a) | Self::Digest(a) => a.json,
+            Self::Info(a) => a.of.json,
+            Self::Digest(a) => a.json,
             Self::Query(a) => a.json,
             Self::Verify(a) => a.read.json,
             Self::Compare(a) => a.read.json,

@@ -38,16 +38,16 @@ pub struct ResaturateArgs {
     #[arg(long, value_name = "FACTOR")]
     pub refine_by: Option<String>,
     /// Only list what would be meshed again, with the predicted tetrahedra
-    #[arg(long, conflicts_with_all = ["undo", "forget", "repair"])]
+    #[arg(long, conflicts_with_all = ["undo", "forget", "repair"], help_heading = None)]
     pub dry_run: bool,
     /// Bring back what was before the last change
-    #[arg(long, conflicts_with_all = ["subdomain", "forget", "repair"])]
+    #[arg(long, conflicts_with_all = ["subdomain", "forget", "repair"], help_heading = None)]
     pub undo: bool,
     /// Drop what was before the last change: the store gets smaller, --undo impossible
-    #[arg(long, conflicts_with_all = ["subdomain", "repair"])]
+    #[arg(long, conflicts_with_all = ["subdomain", "repair"], help_heading = None)]
     pub forget: bool,
     /// Make damaged sub-domains again as they were; without --subdomain all that are damaged
-    #[arg(long)]
+    #[arg(long, help_heading = None)]
     pub repair: bool,
     #[command(flatten)]
     pub run: RunArgs,

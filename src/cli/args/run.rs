@@ -15,6 +15,7 @@ pub struct ReadArgs {
 
 /// How to run; none of this changes the mesh.
 #[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Run")]
 pub struct RunArgs {
     /// Most memory to hold, such as 512MiB or 8GiB [default: 60 % of what is free]
     #[arg(long, value_name = "SIZE")]
@@ -25,7 +26,7 @@ pub struct RunArgs {
     /// Skip the verification at the end
     #[arg(long)]
     pub no_verify: bool,
-    /// Also write these mesh files (.vtu, .pvtu, .mesh, .meshb, .msh, .inp, .npy, .json, .parquet where built in)
+    /// Also write this mesh file, its format by its ending as `tetdb export --help` lists them; may be repeated
     #[arg(long, value_name = "FILE")]
     pub export: Vec<PathBuf>,
     /// Answer with one JSON object

@@ -38,6 +38,7 @@ pub enum Seal {
 
 /// Wanted edge lengths.
 #[derive(Clone, Debug, Default, PartialEq, clap::Args)]
+#[command(next_help_heading = "Sizes")]
 pub struct SizeArgs {
     /// Edge length inside: a length, or 1% of the box diagonal [default: from the surface's edges]
     #[arg(long, value_name = "H", allow_hyphen_values = true)]
@@ -85,36 +86,46 @@ pub struct ShapeArgs {
     #[command(flatten)]
     pub sizes: SizeArgs,
     /// Options from a TOML file, such as hsiz = "2%"; what the command line says goes first
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = None)]
     pub config: Option<PathBuf>,
     /// First divide the surface's triangles until their edges are as short as the wanted lengths, without moving the surface
-    #[arg(long)]
+    #[arg(long, help_heading = "Sizes")]
     pub refine_surface: bool,
     /// Which regions to fill [default: parity; with seeds or holes: seeds]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = "Regions")]
     pub regions: Option<Regions>,
     /// A point inside a region, and what it is called; may be repeated
-    #[arg(long, value_name = "X,Y,Z[,NAME]", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "X,Y,Z[,NAME]",
+        allow_hyphen_values = true,
+        help_heading = "Regions"
+    )]
     pub region_seed: Vec<String>,
     /// A point inside a region that stays empty; may be repeated
-    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        allow_hyphen_values = true,
+        help_heading = "Regions"
+    )]
     pub hole: Vec<String>,
     /// Seeds and holes from a file: a line `x y z name` or `x y z hole` for each
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Regions")]
     pub seeds: Option<PathBuf>,
     /// How far to optimize [default: full]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = None)]
     pub optimize: Option<Optimize>,
     /// Do not keep what sub-domains are meshed from: a smaller store, in which none can be meshed again by `tetdb resaturate`
-    #[arg(long)]
+    #[arg(long, help_heading = "Store")]
     pub drop_coarse: bool,
     /// How finished sub-domains are kept [default: packed]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = "Store")]
     pub seal: Option<Seal>,
     /// Number of sub-domains: auto, or a number [default: auto, one for each 2 million tetrahedra]
-    #[arg(long, value_name = "N", alias = "domains")]
+    #[arg(long, value_name = "N", alias = "domains", help_heading = "Store")]
     pub subdomains: Option<String>,
     /// Keep the meshes before and after each cut is refined, and the interface before and after it is chosen, for `tetdb snapshot --stage`
-    #[arg(long)]
+    #[arg(long, help_heading = "Store")]
     pub keep_stages: bool,
 }

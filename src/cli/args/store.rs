@@ -20,6 +20,18 @@ pub struct StoreArgs {
 
 #[derive(Debug, clap::Args)]
 #[command(
+    after_help = "Examples:\n  tetdb info part.tetdb\n  tetdb info part.tetdb --json\n  tetdb info part.tetdb --excess"
+)]
+pub struct InfoArgs {
+    #[command(flatten)]
+    pub of: StoreArgs,
+    /// Also measure how much worse than the surface forces tetrahedra are (reads all of them)
+    #[arg(long)]
+    pub excess: bool,
+}
+
+#[derive(Debug, clap::Args)]
+#[command(
     after_help = "Examples:\n  tetdb verify part.tetdb\n  tetdb verify part.tetdb --full --against part.stl\n\n\
     Exit code 0: the mesh is valid; 7: it is not; 4: the store is damaged, and what is damaged is listed."
 )]

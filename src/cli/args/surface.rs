@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 /// Sheets inside the surface.
 #[derive(Clone, Debug, Default, clap::Args)]
+#[command(next_help_heading = "Inside the surface")]
 pub struct SheetArgs {
     /// A file of sheets inside, open or closed: their triangles become faces with tetrahedra on both sides; may be repeated
     #[arg(long, value_name = "FILE")]

@@ -121,7 +121,7 @@ impl WriteError {
     pub fn help(&self) -> &'static str {
         match self {
             Self::UnknownFormat { .. } => {
-                "end the name of a mesh with .vtu, .mesh, .meshb, .msh, .inp or .npy, of a surface with .stl, .off, .obj or .ply"
+                "end the name with one of these; `tetdb export --help` and `tetdb snapshot --help` say what each is for"
             }
             Self::Unsupported { .. } => "choose another format, or leave that option out",
             Self::Lossy { .. } => "choose .ply, .obj, .off or .stl (text), which keep doubles",

@@ -14,7 +14,7 @@
 use super::super::quality::inverse_quality;
 use super::super::smooth::is_free;
 use super::cavity::Cavity;
-use super::star::{Aim, Cost, FaceBounds, Goal};
+use super::star::{Aim, Cost, FaceBounds};
 use crate::geom::{Point, orient};
 use crate::mesh::Mesh;
 use crate::storage::Pages;
@@ -84,7 +84,6 @@ pub(super) struct Refill {
     old: Cost,
     /// What a filling is to be better than: values must be above the floor.
     floor: f64,
-    fewest: (u32, f64),
     /// The best filling found, and how many of the cavity's tetrahedra it takes the place of.
     best: Vec<[u32; 4]>,
     n_best: usize,
@@ -105,7 +104,7 @@ impl Refill {
         while (self.cavity).grow_by_vertex(mesh, aim.tets_max, CORNERS_MAX, bounds) {
             let start = self.begin(mesh);
             self.search(aim, start);
-            if self.n_best > 0 && (aim.goal == Goal::Count || self.floor >= aim.enough) {
+            if self.n_best > 0 && self.floor >= aim.enough {
                 break;
             }
         }
@@ -156,7 +155,6 @@ impl Refill {
             }
         }
         self.old = self.cavity.cost();
-        self.fewest = (self.old.n_poor, self.old.sum);
         let volumes = self.cavity.records().iter().map(|record| {
             let [a, b, c, d] = mesh.points(record);
             orient(a, b, c, d)
@@ -174,7 +172,7 @@ impl Refill {
         if self.open.is_empty() {
             return self.end(aim, progress);
         }
-        let Some((face, choices)) = self.tightest_face(aim, progress) else {
+        let Some((face, choices)) = self.tightest_face(progress) else {
             return false;
         };
         for (v, four) in choices {
@@ -206,7 +204,7 @@ impl Refill {
     }
 
     /// The open face with the fewest vertices to choose from, and these, best first; `None` when there is one without any.
-    fn tightest_face(&mut self, aim: Aim, progress: Progress) -> Option<(Face, Vec<(u8, Four)>)> {
+    fn tightest_face(&mut self, progress: Progress) -> Option<(Face, Vec<(u8, Four)>)> {
         let bits = |face: &Face| face.iter().fold(0, |bits, &v| bits | 1 << v);
         let front = self.open.iter().fold(0, |all, face| all | bits(face));
         let allowed = front | self.inside & !progress.used;
@@ -217,7 +215,7 @@ impl Refill {
             for v in
                 (0..self.corners.len() as u8).filter(|&v| (allowed & !bits(&face)) >> v & 1 == 1)
             {
-                choices.extend(self.choice(aim, progress, face, v).map(|four| (v, four)));
+                choices.extend(self.choice(progress, face, v).map(|four| (v, four)));
             }
             if choices.is_empty() {
                 return None;
@@ -238,7 +236,7 @@ impl Refill {
     }
 
     /// The tetrahedron of `v` on an open face, where it may be put.
-    fn choice(&mut self, aim: Aim, progress: Progress, [a, b, c]: Face, v: u8) -> Option<Four> {
+    fn choice(&mut self, progress: Progress, [a, b, c]: Face, v: u8) -> Option<Four> {
         for outward in [[v, c, b], [v, a, c], [v, b, a]] {
             let (ascending, is_even) = sorted(outward);
             match self.seen[triple(ascending)] {
@@ -250,12 +248,10 @@ impl Refill {
         let (ascending, is_even) = sorted([v, a, b, c]);
         let four = self.four(ascending);
         let worst = self.old.worst_goodness.min(0.1);
-        let poor = progress.cost.n_poor + u32::from(four.inverse_quality < 0.1);
         let fits = four.ascending == is_even
             && four.value > self.floor
             && four.inverse_quality >= worst
-            && four.volume <= progress.volume
-            && !(aim.goal == Goal::Count && (poor, progress.cost.sum) >= self.fewest);
+            && four.volume <= progress.volume;
         fits.then_some(four)
     }
 
@@ -315,12 +311,8 @@ impl Refill {
         self.best.clear();
         (self.best).extend((self.filling.iter()).map(|tet| tet.map(|v| corners[usize::from(v)])));
         self.n_best = self.cavity.n_tets();
-        if aim.goal == Goal::Count {
-            self.fewest = (cost.n_poor, cost.sum);
-        } else {
-            self.floor = least;
-        }
-        aim.goal != Goal::Count && least >= aim.enough
+        self.floor = least;
+        least >= aim.enough
     }
 }
 
@@ -359,7 +351,7 @@ fn sorted<const N: usize>(mut corners: [u8; N]) -> ([u8; N], bool) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::star::value_of;
+    use super::super::star::{Goal, value_of};
     use super::*;
     use crate::optimize::measure;
     use crate::optimize::tests::{checked, delaunay, live, random};

@@ -241,16 +241,14 @@ impl Cost {
             0
         };
         let is_wanted = match aim.goal {
-            Goal::Quality | Goal::Excess => {
-                (is_much || self.sum < old.sum) && self.n_poor <= old.n_poor + more
-            }
+            Goal::Quality => (is_much || self.sum < old.sum) && self.n_poor <= old.n_poor + more,
             Goal::Count => (self.n_poor, self.sum) < (old.n_poor, old.sum),
             Goal::Worst | Goal::WorstExcess => self.n_poor <= old.n_poor + aim.more,
         };
         // Where needles are forced to a q of millions, five in a thousand of it are the difference between millions and ten for what is not forced.
         let least = match aim.goal {
             Goal::WorstExcess => 0.995 * old.worst_goodness,
-            Goal::Quality | Goal::Excess | Goal::Count | Goal::Worst => old.worst_goodness,
+            Goal::Quality | Goal::Count | Goal::Worst => old.worst_goodness,
         };
         self.worst_goodness >= least.min(0.1) && value > aim.own && is_wanted
     }
@@ -265,13 +263,11 @@ const MUCH: f64 = 1.5;
 pub(super) enum Goal {
     /// q, where triangles of the surface do not force it, and the sum over its neighbors.
     Quality,
-    /// q over the bound, and the sum over its neighbors.
-    Excess,
     /// The number of those of q ≥ 10.
     Count,
     /// The worst q of the mesh, whatever becomes of those that are not the worst.
     Worst,
-    /// The worst excess, likewise.
+    /// The worst excess, q over the bound, likewise.
     WorstExcess,
 }
 
@@ -280,7 +276,7 @@ impl Goal {
     pub(super) fn measure(self, q: f64) -> Measure {
         match self {
             Self::Quality | Self::Count => Measure::Quality(q),
-            Self::Excess | Self::WorstExcess => Measure::Excess,
+            Self::WorstExcess => Measure::Excess,
             // No triangle's bound counts.
             Self::Worst => Measure::Quality(f64::INFINITY),
         }

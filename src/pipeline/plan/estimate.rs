@@ -281,7 +281,7 @@ fn notes(chosen: &Filled, options: &Options, n: u32) -> Vec<String> {
     }
     if options.region_policy() == Some(RegionPolicy::Seeds) && empty > 0 {
         notes.push(format!(
-            "{empty} of {n} regions have no seed, or a hole, and stay empty"
+            "{empty} of {n} regions stay empty: no seed is inside, or a hole"
         ));
     }
     notes
