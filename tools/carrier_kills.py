@@ -4,7 +4,7 @@
   carrier_kills.py TETDB FOLDER [--mpi PROGRAM=MPIRUN] [--job "SURFACE --subdomains N"] [--memory 96MiB] [--ranks 100] [--tasks 100]
                    [--gathers 50] [--steps] [--slurm 20] [--races 50] [--late] [--seed 1]
 
---ranks: so many SIGKILLs of a random rank of four at a random time; after each the same command goes on.
+--ranks: so many SIGKILLs of a random rank of four at a random time; after each `resume` goes on, or `mesh` where there is no store yet.
 --tasks, --gathers: so many SIGKILLs of `tetdb work` and `tetdb gather` at a random time of theirs.
 --steps: SIGKILL at every single rename, link, unlink, sync and folder of one task and one gather of each stage, by strace.
 --slurm: so many SIGKILLs of random tasks of arrays of a Slurm of one node, started here; after each script the same script again.
@@ -94,17 +94,22 @@ class Kills(Bench):
     def ranks(self, n):
         program, launcher = self.mpis[0]
         store = os.path.join(self.folder, "killed.tetdb")
-        words = [launcher, "-n", "4", program, "mesh", *self.job, "-o", store, *self.run_options()]
+
+        def words():
+            what = ["resume", store] if os.path.exists(store) else ["mesh", *self.job, "-o", store]
+            return [launcher, "-n", "4", program, *what, *self.run_options()]
+
         begun = time.time()
         shutil.rmtree(store, ignore_errors=True)
-        run(words)
+        run(words())
         whole = time.time() - begun
         self.check(store)
         while self.known("rank") < n:
             killed = []
             while len(killed) < KILLS_PER_MESH:
-                child = self.spawn(words, cwd=self.folder)
-                time.sleep(self.draw.uniform(0.2, max(0.4, whole)))
+                child = self.spawn(words(), cwd=self.folder)
+                # Later kills find less to do.
+                time.sleep(self.draw.uniform(0.1, 0.8) * whole / (1 + len(killed)))
                 ranks = self.processes(program)
                 if child.poll() is None and ranks:
                     victim = self.draw.choice(ranks)
@@ -116,7 +121,7 @@ class Kills(Bench):
                 child.communicate(timeout=120)
                 if child.returncode == 0:
                     break
-            run(words)
+            run(words())
             self.check(store)
             self.note("rank", len(killed), mpirun=os.path.basename(launcher))
 
@@ -284,7 +289,7 @@ def main():
     parser.add_argument("tetdb")
     parser.add_argument("folder")
     parser.add_argument("--mpi", action="append", default=[])
-    parser.add_argument("--job", default="sample:balls,count=10 --subdomains 6")
+    parser.add_argument("--job", default="sample:box,h=0.04 --subdomains 4")
     parser.add_argument("--memory", default="96MiB")
     for kind in ("ranks", "tasks", "gathers", "slurm", "races"):
         parser.add_argument(f"--{kind}", type=int, default=0, metavar="N")

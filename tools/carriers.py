@@ -223,7 +223,7 @@ def main():
     if os.path.exists(path):
         results = map(json.loads, open(path))
         known = {(r["job"], r["carrier"]) for r in results if r["program"] == program and r["same"]}
-    for job in args.job or ["sample:balls,count=40 --subdomains 6"]:
+    for job in args.job or ["sample:box,h=0.04 --subdomains 4"]:
         left = [c for c in carriers if (job, c[0]) not in known]
         if left:
             bench.begin(job)

@@ -39,7 +39,7 @@ const RUNS: [(&str, &[&str]); 16] = [
     ),
     (
         "estimate",
-        &["estimate box.stl --subdomains 2 --memory 256MiB"],
+        &["estimate box.stl --subdomains 2 --memory 256MiB --workers 4"],
     ),
     (
         "info",

@@ -62,7 +62,7 @@ pub struct EstimateArgs {
     )]
     pub threads: Option<usize>,
     /// Also say how long so many ranks or tasks at once would take, with a thread each
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", help_heading = "Run", value_parser = clap::value_parser!(u32).range(1..))]
     pub workers: Option<u32>,
     /// Answer with one JSON object
     #[arg(long, help_heading = "Run")]

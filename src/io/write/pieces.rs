@@ -39,7 +39,9 @@ pub(super) fn write(
     for row in rows {
         let piece = piece_path(out, row.rank, extension);
         let is_written = selection.writes_piece(row.rank);
-        if !is_written && !(names_all && !selection.regions.is_empty()) {
+        // Who names the pieces of all looks which of them have anything of the regions.
+        let is_read = is_written || names_all && !selection.regions.is_empty();
+        if !is_read {
             pieces.push(piece);
             continue;
         }
