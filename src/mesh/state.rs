@@ -55,6 +55,16 @@ impl MeshState {
         }
     }
 
+    /// Whether so many pages of tetrahedra, vertices, facets and interface faces have room for the ids counted here: false only for damage.
+    pub fn fits(&self, n_pages: [u32; 4]) -> bool {
+        let arenas = [self.tets, self.vertices, self.facets, self.interface_faces];
+        arenas.iter().zip(n_pages).all(|(arena, n)| {
+            let ids = u64::from(dense(arena.fresh));
+            let is_free = arena.free_head == NONE || u64::from(dense(arena.free_head)) < ids;
+            ids <= u64::from(n) * RECORDS as u64 && u64::from(arena.n_live) <= ids && is_free
+        })
+    }
+
     /// Tetrahedra in use.
     pub fn n_tets(&self) -> u32 {
         self.tets.n_live

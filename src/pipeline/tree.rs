@@ -255,17 +255,25 @@ pub(crate) fn zones_above(
 /// Generations from a part to what is made of it.
 pub(crate) const DONE: u32 = 2;
 
-/// Refuses a part of more pages than the file has bytes for, before there is a table of them.
+/// Refuses a part of more pages than the file has bytes for, before there is a table of them, and of more records than pages have room for.
 fn check_extents(part: &PartMesh, base: &DiskPath) -> Result<(), StoreError> {
     let pages: u64 = part.extents.iter().map(|&[_, n]| u64::from(n)).sum();
     let fits = (part.extents.iter()).all(|[first, n]| first.checked_add(*n).is_some());
-    if fits && pages * STORED_BYTES as u64 <= base.bytes()? {
+    let of = |kind: usize| part.extents[kind][1];
+    let has_room = part.state.fits([
+        of(kind::TETS),
+        of(kind::VERTICES),
+        of(kind::FACETS),
+        of(kind::INTERFACE_FACES),
+    ]);
+    if fits && pages * STORED_BYTES as u64 <= base.bytes()? && has_room {
         return Ok(());
     }
     Err(StoreError::Sealed(SealedError::Content {
         path: base.path().to_owned(),
         subdomain: part.part.first,
-        what: "it has fewer pages than its row in the bisection tree says".to_owned(),
+        what: "its row in the bisection tree says of more pages or records than there are"
+            .to_owned(),
     }))
 }
 
@@ -300,7 +308,7 @@ mod tests {
         let mut part = PartMesh {
             part: TreePart { first: 0, count: 1 },
             generation: 1,
-            state: MeshState::from_words([0; MESH_STATE_WORDS]),
+            state: MeshState::default(),
             extents: [[0; 2]; kind::ALL.len()],
             load: 1.0,
         };
@@ -311,6 +319,19 @@ mod tests {
             part.extents[2] = extent;
             let refused = check_extents(&part, &base);
             assert!(refused.is_err_and(|e| e.is_damage()), "{extent:?}");
+        }
+        part.extents[2] = [0, 3];
+        for (word, number) in [(0, 1), (3, 3 << 11 | 1), (2, 7), (4, 5)] {
+            let mut words = [0; MESH_STATE_WORDS];
+            for free_head in [1, 4, 7, 10] {
+                words[free_head] = u32::MAX;
+            }
+            part.state = MeshState::from_words(words);
+            assert!(check_extents(&part, &base).is_ok());
+            words[word] = number;
+            part.state = MeshState::from_words(words);
+            let refused = check_extents(&part, &base);
+            assert!(refused.is_err_and(|e| e.is_damage()), "{word} {number}");
         }
     }
 

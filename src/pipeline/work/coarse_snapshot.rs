@@ -19,10 +19,14 @@ pub(crate) fn save<P: Pages>(
     generation: u32,
     memory: u64,
 ) -> Result<CoarseRow, PipelineError> {
-    assert!(
-        mesh.is_dense(),
-        "the coarse mesh of sub-domain {rank} has gaps"
-    );
+    if !mesh.is_dense() {
+        // Cuts leave none.
+        return Err(PipelineError::from(SealedError::Content {
+            path: path.path().to_owned(),
+            subdomain: rank,
+            what: "the mesh it begins with has ids without a record".to_owned(),
+        }));
+    }
     let mut writer = CoarseWriter::create(path, rank, generation, memory as usize)?;
     for n in 0..mesh.n_vertices() {
         writer.push_vertex(mesh.snapshot_vertex(n))?;
