@@ -6,10 +6,10 @@ use std::sync::Arc;
 use super::Settings;
 use super::error::{Error, Remedy};
 use crate::audit::{self, Level, Report, VerifyOptions};
-use crate::geom::short;
+use crate::geom::{Point, short};
 use crate::storage::attempt;
 use crate::store::{Catalog, StoreError, WriterLock};
-use crate::surface::Surface;
+use crate::surface::{Surface, show};
 use tetdb_schema::catalog::StoreState;
 
 /// How much is checked, each level with all before it.
@@ -103,12 +103,24 @@ pub(crate) fn sentence(report: &Report) -> String {
     text
 }
 
+/// `NotAnInputTriangle` as `not an input triangle`.
+fn words_of(name: &str) -> String {
+    let mut words = String::new();
+    for c in name.chars() {
+        if c.is_uppercase() && !words.is_empty() {
+            words.push(' ');
+        }
+        words.extend(c.to_lowercase());
+    }
+    words
+}
+
 /// The error for an invalid mesh.
 pub(crate) fn invalid(report: &Report, path: &Path) -> Error {
     let findings: Vec<String> = report
         .findings
         .iter()
-        .map(|(f, n)| format!("{n} x {f:?}"))
+        .map(|(f, n)| format!("{n} x {}", words_of(&format!("{f:?}"))))
         .collect();
     let first = report.offenders.first();
     Error::new(
@@ -120,12 +132,11 @@ pub(crate) fn invalid(report: &Report, path: &Path) -> Error {
         ),
     )
     .at(first.map_or_else(String::new, |o| {
-        format!(
-            "{} {} {:?}",
-            o.tet.as_deref().unwrap_or("-"),
-            o.what,
-            o.points
-        )
+        let tet = (o.tet.as_ref()).map_or(String::new(), |id| format!("tetrahedron {id}: "));
+        let corners: Vec<String> = (o.points.iter())
+            .map(|&p| show(Point::from_array(p)))
+            .collect();
+        format!("{tet}{} {}", o.what, corners.join(" "))
     }))
     .with_help("a full verification lists examples of each kind")
     .with_remedy(Remedy::General)

@@ -192,7 +192,7 @@ fn help_of(code: &str) -> &'static str {
         "no-room" => {
             "`tetdb estimate SURFACE` tells what a mesh takes; ask for longer edges (--hsiz), give more --memory, or put the store on another disk with -o"
         }
-        "invalid-mesh" => "`tetdb verify STORE --full --json` lists examples of each kind",
+        "invalid-mesh" => "`tetdb verify STORE --full --json` has examples; --embed names sheets",
         _ => "check the path and its permissions",
     }
 }

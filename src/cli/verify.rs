@@ -30,7 +30,7 @@ pub fn run(args: &VerifyArgs, console: &Console) -> Result<u8, Failure> {
             let left = scratch_beside(&surface::Surface::default(), cap, &scratch)?;
             Surface::of_record(&sources, &args.store, &left).map_err(Failure::from)
         }
-        false => input::load(&args.against, space, console),
+        false => input::load_with(&args.against, (&args.sheets, false), space, console),
     };
     let surface = match surface {
         Ok(surface) => Some(surface.inner),

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use super::run::ReadArgs;
+use super::surface::SheetArgs;
 use crate::io::write::Share;
 
 #[derive(Debug, clap::Args)]
@@ -42,11 +43,14 @@ pub struct VerifyArgs {
     /// Also count the faces that are locally Delaunay
     #[arg(long)]
     pub full: bool,
-    /// The surface whose triangles must all be there [default: what the store was meshed from]
+    /// The surface whose triangles must all be there [default: what the store was meshed from]; may be repeated
     #[arg(long, value_name = "SURFACE")]
     pub against: Vec<String>,
     #[command(flatten)]
     pub read: ReadArgs,
+    /// What was embedded, where --against names the surface.
+    #[command(flatten)]
+    pub sheets: SheetArgs,
 }
 
 /// Two meshes side by side: tetrahedra by quality; those forced by the surface and those at interfaces apart.
