@@ -98,12 +98,12 @@ pub(crate) const IN_STORE: &str = "store:surface.obj";
 
 /// Lines of the record that say what of the surface before them are sheets: a file and its name; triangles from a number on; all that is
 /// not closed.
-const SHEET: &str = "sheet:";
+pub(super) const SHEET: &str = "sheet:";
 pub(super) const SHEETS_FROM: &str = "sheets-from:";
-const OPEN_PARTS: &str = "open-parts:";
+pub(super) const OPEN_PARTS: &str = "open-parts:";
 /// Lines that name a file of edges, or of points, as that of a sheet; and how many edges and points the store has in a file of its own.
-const EDGES: &str = "edges:";
-const POINTS: &str = "points:";
+pub(super) const EDGES: &str = "edges:";
+pub(super) const POINTS: &str = "points:";
 pub(super) const WIRES: &str = "wires:";
 
 /// What begins the line of a file.

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::Error;
-use super::surface::IN_STORE;
+use super::surface::{EDGES, IN_STORE, OPEN_PARTS, POINTS, SHEET, SHEETS_FROM, WIRES};
 use crate::samples::PREFIX;
 use crate::store::Catalog;
 
@@ -62,11 +62,19 @@ fn with_others(file: &Path, others: &[(&str, &[&str])]) -> Vec<PathBuf> {
 pub(crate) fn inputs_of(store: &Path) -> Vec<PathBuf> {
     let job = Catalog::open(store).and_then(|mut catalog| catalog.job());
     let sources = job.map(|job| job.surfaces).unwrap_or_default();
-    let files = sources.into_iter().map(|source| source.path);
-    files
-        .filter(|path| path != IN_STORE && !path.starts_with(PREFIX))
-        .map(PathBuf::from)
-        .collect()
+    let files = sources.iter().filter_map(|source| file_of(&source.path));
+    files.map(PathBuf::from).collect()
+}
+
+/// The file that a line of the record names, where it names one.
+fn file_of(line: &str) -> Option<&str> {
+    let embedded = [SHEET, EDGES, POINTS];
+    if let Some(named) = embedded.iter().find_map(|mark| line.strip_prefix(mark)) {
+        return named.split_once('=').map(|(_, file)| file);
+    }
+    let others = [IN_STORE, PREFIX, SHEETS_FROM, OPEN_PARTS, WIRES];
+    let is_file = !others.iter().any(|mark| line.starts_with(mark));
+    is_file.then_some(line)
 }
 
 /// Whether two paths lead to one file.

@@ -51,6 +51,23 @@ fn what_a_run_reads_is_never_what_it_writes() {
 }
 
 #[test]
+fn files_that_were_embedded_are_not_overwritten() {
+    let place = Place::new();
+    place
+        .run_line("sample wells,count=2,cells=6 -o w.obj")
+        .succeeds();
+    place
+        .run_line("mesh w.obj --embed w_sheets.obj --embed-edges w_wires.obj --embed-points w_wires.obj --no-verify")
+        .succeeds();
+    for name in ["w.obj", "w_sheets.obj", "w_wires.obj"] {
+        let before = fs::read(place.path(name)).expect("it is there");
+        let done = place.run_line(&format!("query w.tetdb --limit 1 -o {name}"));
+        assert_eq!(done.exit(), Some(2), "{name}");
+        assert_eq!(fs::read(place.path(name)).expect("still"), before, "{name}");
+    }
+}
+
+#[test]
 fn what_is_read_or_written_beside_a_file_is_never_overwritten_either() {
     let place = Place::new();
     let points = "4 3 0 0\n0 0 0 0\n1 1 0 0\n2 0 1 0\n3 0 0 1\n# mine\n";
