@@ -17,6 +17,8 @@ const FILL_ROUNDS: u32 = 18;
 /// What a round leaves of the slowest part of the error, were it mere averaging: sixty such rounds would do no better than these, which look back
 /// at the round before (the Chebyshev semi-iteration: Golub, Varga 1961).
 const SLOWEST: f32 = 0.98;
+/// How far from the mean of its neighbors a value may be, as a factor.
+const REACH: f32 = 2.0;
 /// The twelve edges of a cell come first in `PAIRS`.
 const N_EDGES: usize = 12;
 
@@ -196,14 +198,12 @@ impl Maker<'_> {
                         complete &= old.is_finite();
                         before.set(i, old);
                         let mean = sum / weight;
-                        h.set(
-                            i,
-                            if over > 1.0 {
-                                older + over * (mean - older)
-                            } else {
-                                mean
-                            },
-                        );
+                        // Beside steep steps, and where corners hang between others, what looks back would run away, even below zero.
+                        let next = match over > 1.0 {
+                            true => older + over * (mean - older),
+                            false => mean,
+                        };
+                        h.set(i, next.clamp(mean / REACH, mean * REACH));
                     }
                 }
             }
