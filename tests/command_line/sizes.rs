@@ -11,6 +11,31 @@ fn number(value: &Value, name: &str) -> f64 {
     found.unwrap_or_else(|| panic!("no number {name} in {value}"))
 }
 
+/// A box with two tiny notches in a side of a few large triangles.
+const NOTCHES: &str = "OFF\n20 36 0\n-1 -1 -1\n-1 -1 1\n-1 1 -1\n-1 1 1\n-0.1525 0.497 1\n-0.0969 0.497 0.9852\n\
+    -0.2082 0.5526 1\n-0.2082 0.6082 0.9852\n-0.1525 0.6082 1\n-0.0969 0.5526 1\n1 -1 -1\n\
+    1 -1 1\n1 1 -1\n0.1791 0.089 1\n0.1774 0.0907 1\n0.1774 0.0924 0.9984\n0.1791 0.0924 1\n\
+    0.1808 0.089 0.9984\n0.1808 0.0907 1\n1 1 1\n3 0 10 1\n3 0 2 10\n3 0 1 3\n3 1 11 3\n\
+    3 0 3 2\n3 3 11 6\n3 4 16 9\n3 2 3 19\n3 3 6 8\n3 3 8 19\n3 10 12 11\n3 1 10 11\n\
+    3 11 13 14\n3 11 18 13\n3 11 14 4\n3 2 12 10\n3 2 19 12\n3 4 14 16\n3 11 4 6\n3 19 16 18\n\
+    3 19 9 16\n3 19 8 9\n3 11 12 19\n3 11 19 18\n3 7 6 4\n3 7 8 6\n3 7 4 5\n3 7 5 9\n3 7 9 8\n\
+    3 5 4 9\n3 15 14 13\n3 15 13 17\n3 15 17 16\n3 15 16 14\n3 17 13 18\n3 17 18 16\n";
+
+#[test]
+fn beside_tiny_notches_lengths_stay_those_of_the_surface() {
+    let place = Place::new();
+    place.write("notches.off", NOTCHES);
+    // Lengths filled in between theirs once ran away below zero here, and 1e16 tetrahedra were expected.
+    let expected = place.run_line("estimate notches.off --json");
+    let expected = number(&expected.succeeds().json(), "tets");
+    place
+        .run_line("mesh notches.off -o n.tetdb --quiet")
+        .succeeds();
+    let found = place.run_line("info n.tetdb --json").succeeds().json();
+    let ratio = expected / number(&found, "tets");
+    assert!((0.5..2.0).contains(&ratio), "{expected} expected, {ratio}");
+}
+
 #[test]
 fn estimates_come_true() {
     let place = Place::new();
