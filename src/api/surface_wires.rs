@@ -234,9 +234,11 @@ fn labels_of(
             .with_help(format!("give one label for each of the {what}")));
     }
     let mut known = HashMap::new();
-    let number = |&label: &&str| {
-        *known.entry(label.to_owned()).or_insert_with(|| {
-            set.label_names.push(label.to_owned());
+    let number = |label: &&str| {
+        // As it is read again from the store's copy, a line of which it is.
+        let label = label.trim().replace(['\n', '\r'], " ");
+        *known.entry(label.clone()).or_insert_with(|| {
+            set.label_names.push(label);
             set.label_names.len() as u32 - 1
         })
     };
@@ -253,7 +255,7 @@ mod tests {
         let rod = [[0.5, 0.5, 0.5], [0.3, 0.4, 1.0], [0.7, 0.6, 0.2]];
         let surface = Surface::sample("box,h=0.5").unwrap().dividing();
         let surface = surface
-            .embedded_edges_of(&rod, &[[0, 1], [0, 2]], Some(&["up", "down"]), "rod")
+            .embedded_edges_of(&rod, &[[0, 1], [0, 2]], Some(&[" up", "down\n"]), "rod")
             .and_then(|s| s.embedded_points_of(&rod[1..], None, "ends"))
             .unwrap();
         assert_eq!(surface.labels()[6..], ["rod:up", "rod:down", "ends"]);

@@ -15,6 +15,13 @@ use crate::audit::Level;
 use crate::surface;
 
 pub fn run(args: &VerifyArgs, console: &Console) -> Result<u8, Failure> {
+    let embeds = args.sheets.files().next().is_some() || args.sheets.allow_open;
+    if embeds && args.against.is_empty() {
+        let message =
+            "what was embedded is named beside the surface alone, and --against names none";
+        return Err(Failure::new("usage", message)
+            .help("name all files with --against and --embed…, or none: the store knows them"));
+    }
     let cap = memory::cap(args.read.memory.as_deref())?;
     let settings = console.settings(Some(cap), None);
     let mut open = open_finished(&args.store)?;

@@ -38,7 +38,9 @@ pub enum StoreError {
         reason: &'static str,
     },
     /// A finished store is already there.
-    #[error("{path} is already a finished store, of another surface or other options")]
+    #[error(
+        "{path} is already a finished store; a run of another surface or other options does not replace it"
+    )]
     Finished {
         /// The file or folder.
         path: PathBuf,

@@ -26,7 +26,7 @@ pub(super) struct WirePoint {
 /// Bytes for each edge and point while they are gathered: two vertices in two tables, and itself.
 const BYTES_EACH: u64 = 256;
 
-/// What is left of `memory` beside the embedded edges and points of a store. Errors: nothing.
+/// What is left of `memory` beside the embedded edges and points of a store. Errors: less than these take.
 pub(super) fn beside(row: &WiresRow, memory: usize) -> Result<usize> {
     let needed = BYTES_EACH * (row.edges.len() + row.points.len()) as u64;
     let left = (memory as u64).checked_sub(needed);

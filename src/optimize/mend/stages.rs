@@ -7,7 +7,7 @@
 //! 4. The number of those of q ≥ 10.
 //! 5. The worst q once more.
 //!
-//! Between 1 and 2 excess was once brought down like q: of a hundred tries three had success, and the worst got no better.
+//! Between 1 and 2 excess was once brought down like q: of a hundred tries four had success, and the worst got no better.
 
 use super::super::bound::face_floor;
 use super::super::quality::{is_below, quality};
