@@ -10,6 +10,7 @@ use super::goals::OperationCounts;
 use super::insertion::{Better, Inserter};
 use super::objective::Sum;
 use super::smooth::{Star, is_free};
+use super::stuck::Stuck;
 use super::swap::Swapper;
 use crate::mesh::{Mesh, Tet};
 use crate::storage::Pages;
@@ -29,23 +30,24 @@ pub(super) struct BadFraction {
 impl BadFraction {
     /// Does the first thing that lowers what is missing around the bad tetrahedron `t`; what changes vertices' number only when
     /// `dear`. After success `changed` lists the tetrahedra that are new or moved.
+    #[allow(clippy::too_many_arguments)]
     pub(super) fn attack<P: Pages>(
         &mut self,
         mesh: &mut Mesh<P>,
         t: u32,
         (tet, good): (&Tet, f64),
         dear: bool,
+        stuck: &mut Stuck,
         counts: &mut OperationCounts,
         changed: &mut Vec<u32>,
     ) -> bool {
-        if self.swapper.remove_best_edge(mesh, t, tet, good) {
+        if (self.swapper).remove_best_edge(mesh, t, tet, good, Some(&mut *stuck)) {
             counts.edges_removed += 1;
             changed.extend_from_slice(self.swapper.new_tets());
         } else if self.swapper.swap_best_face(mesh, t, tet, good) {
             counts.faces_swapped += 1;
             changed.extend_from_slice(self.swapper.new_tets());
-        } else if (tet.vertices().into_iter()).any(|v| is_free(mesh, v) && self.smooth(mesh, v, t))
-        {
+        } else if (tet.vertices().into_iter()).any(|v| self.smooth(mesh, v, t, stuck)) {
             counts.vertices_smoothed += 1;
             changed.extend_from_slice(&self.star.ball.tets);
         } else if dear && self.collapser.collapse_best_edge(mesh, t, tet, good) {
@@ -60,8 +62,19 @@ impl BadFraction {
         true
     }
 
-    /// Moves `v`, a vertex of `t`.
-    fn smooth<P: Pages>(&mut self, mesh: &mut Mesh<P>, v: u32, t: u32) -> bool {
+    /// Moves `v`, a vertex of `t`, unless it is stuck or fixed.
+    fn smooth<P: Pages>(&mut self, mesh: &mut Mesh<P>, v: u32, t: u32, stuck: &mut Stuck) -> bool {
+        if stuck.has_vertex(v) || !is_free(mesh, v) {
+            return false;
+        }
+        let is_moved = self.search(mesh, v, t);
+        if !is_moved {
+            stuck.add_vertex(v);
+        }
+        is_moved
+    }
+
+    fn search<P: Pages>(&mut self, mesh: &mut Mesh<P>, v: u32, t: u32) -> bool {
         if !self.star.gather(mesh, v, t, BALL_MAX) {
             return false;
         }

@@ -39,6 +39,7 @@ mod rounds;
 mod run;
 mod smooth;
 mod sphere;
+mod stuck;
 mod sums;
 mod swap;
 #[cfg(test)]

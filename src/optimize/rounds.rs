@@ -6,6 +6,7 @@ use super::objective::Worst;
 use super::pages::{PageFlags, clear_marks, is_examined, reopen};
 use super::quality::{CONTENT, face_bound, inverse_quality, is_below};
 use super::smooth::{Star, is_free, raised};
+use super::stuck::Stuck;
 use super::swap::Swapper;
 use super::vertex_operations::VertexOperations;
 use crate::mesh::anatomy::MARK;
@@ -30,6 +31,8 @@ pub(super) struct Rounds {
     star: Star,
     rescue: VertexOperations,
     share: BadFraction,
+    /// What gains nothing.
+    stuck: Stuck,
     /// The page's bad tetrahedra, worst first, then what its operations left bad.
     work: Vec<(f64, u32)>,
     changed: Vec<u32>,
@@ -52,6 +55,7 @@ impl Rounds {
             star: Star::default(),
             rescue: VertexOperations::default(),
             share: BadFraction::default(),
+            stuck: Stuck::default(),
             work: Vec::new(),
             changed: Vec::new(),
             counts: OperationCounts::default(),
@@ -65,6 +69,7 @@ impl Rounds {
         target: RoundGoal,
         progress: &mut dyn FnMut(u32, u32),
     ) {
+        self.stuck.clear();
         for _ in 0..ROUNDS_MAX {
             let before = self.counts;
             self.counts.rounds += 1;
@@ -132,6 +137,7 @@ impl Rounds {
                 self.mark(mesh, t, EXAMINED);
                 continue;
             }
+            self.stuck.forget(mesh, &self.changed);
             for k in 0..self.changed.len() {
                 let t = self.changed[k];
                 let tet = mesh.tet(t);
@@ -174,11 +180,12 @@ impl Rounds {
                 t,
                 (tet, good),
                 dear,
+                &mut self.stuck,
                 &mut self.counts,
                 &mut self.changed,
             );
         }
-        if self.swapper.remove_best_edge(mesh, t, tet, good) {
+        if (self.swapper).remove_best_edge(mesh, t, tet, good, Some(&mut self.stuck)) {
             self.counts.edges_removed += 1;
             self.changed.extend_from_slice(self.swapper.new_tets());
             return true;
@@ -191,15 +198,15 @@ impl Rounds {
         for (i, v) in tet.vertices().into_iter().enumerate() {
             // The face opposite the vertex stays, and may forbid what is wanted.
             let face = tet.face(i).map(|v| mesh.point(v));
-            if is_free(mesh, v)
-                && face_bound(face) > raised(good)
-                && self.star.gather(mesh, v, t, BALL_MAX)
-                && self.star.improve(mesh, target.enough)
-            {
+            if self.stuck.has_vertex(v) || !is_free(mesh, v) || face_bound(face) <= raised(good) {
+                continue;
+            }
+            if self.star.gather(mesh, v, t, BALL_MAX) && self.star.improve(mesh, target.enough) {
                 self.counts.vertices_smoothed += 1;
                 self.changed.extend_from_slice(&self.star.ball.tets);
                 return true;
             }
+            self.stuck.add_vertex(v);
         }
         // Rescue is dear: once a tetrahedron, whatever changes around it.
         if target.means == Means::Connections || tet.node[RESCUED] & MARK != 0 {

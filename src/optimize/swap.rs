@@ -4,6 +4,7 @@ use std::marker::PhantomData;
 
 use super::objective::Objective;
 use super::quality::inverse_quality;
+use super::stuck::Stuck;
 use crate::geom::Point;
 use crate::mesh::{FaceRef, Mesh, Tet};
 use crate::reconnect::{FaceSwap, RingTriangulation, Shell, remove_edge};
@@ -25,18 +26,26 @@ pub(super) struct Swapper<J> {
 }
 
 impl<J: Objective> Swapper<J> {
-    /// Removes the edge of `t`, whose goodness is `own`, that is worth most to remove, if any is worth enough.
+    /// Removes the edge of `t`, whose goodness is `own`, that is worth most to remove, if any is worth enough; those that are `stuck` are not tried.
     pub(super) fn remove_best_edge<P: Pages>(
         &mut self,
         mesh: &mut Mesh<P>,
         t: u32,
         tet: &Tet,
         own: f64,
+        mut stuck: Option<&mut Stuck>,
     ) -> bool {
         let mut best = J::least(own);
         let mut found = false;
         for e in 0..6 {
-            if let Some(worth) = self.try_edge(mesh, t, tet, e, best) {
+            if (stuck.as_ref()).is_some_and(|stuck| stuck.has_edge(tet, e, best)) {
+                continue;
+            }
+            let worth = self.try_edge(mesh, t, tet, e, best);
+            if let (None, Some(stuck)) = (worth, &mut stuck) {
+                stuck.add_edge(tet, e, best);
+            }
+            if let Some(worth) = worth {
                 best = worth;
                 found = true;
                 std::mem::swap(&mut self.shell, &mut self.best_shell);

@@ -316,7 +316,7 @@ impl Mender {
 
     /// A flip, or an edge or a vertex removed, that leaves no new tetrahedron of 1 / q below `own` and a bit.
     fn reconnect<P: Pages>(&mut self, mesh: &mut Mesh<P>, t: u32, tet: &Tet, own: f64) -> bool {
-        let done = self.swapper.remove_best_edge(mesh, t, tet, own)
+        let done = self.swapper.remove_best_edge(mesh, t, tet, own, None)
             || self.swapper.swap_best_face(mesh, t, tet, own);
         if done {
             self.counts.reconnected += 1;

@@ -208,31 +208,32 @@ impl Refill {
         let bits = |face: &Face| face.iter().fold(0, |bits, &v| bits | 1 << v);
         let front = self.open.iter().fold(0, |all, face| all | bits(face));
         let allowed = front | self.inside & !progress.used;
-        let mut tightest: Option<(Face, Vec<(u8, Four)>)> = None;
+        // Those of the tightest face so far, and room for those of another.
+        let (mut tightest, mut choices) = (Vec::new(), Vec::new());
+        let mut face_of = None;
         for k in 0..self.open.len() {
             let face = self.open[k];
-            let mut choices = Vec::new();
-            for v in
-                (0..self.corners.len() as u8).filter(|&v| (allowed & !bits(&face)) >> v & 1 == 1)
-            {
+            choices.clear();
+            let mut left = allowed & !bits(&face);
+            // As many as the tightest face has are too many.
+            while left != 0 && (face_of.is_none() || choices.len() < tightest.len()) {
+                let v = left.trailing_zeros() as u8;
+                left &= left - 1;
                 choices.extend(self.choice(progress, face, v).map(|four| (v, four)));
             }
             if choices.is_empty() {
                 return None;
             }
-            let is_tighter = (tightest.as_ref()).is_none_or(|t| choices.len() < t.1.len());
-            if is_tighter {
-                let is_forced = choices.len() == 1;
-                tightest = Some((face, choices));
-                if is_forced {
+            if face_of.is_none() || choices.len() < tightest.len() {
+                face_of = Some(face);
+                std::mem::swap(&mut tightest, &mut choices);
+                if tightest.len() == 1 {
                     break;
                 }
             }
         }
-        if let Some((_, choices)) = &mut tightest {
-            choices.sort_by(|a, b| b.1.value.total_cmp(&a.1.value));
-        }
-        tightest
+        tightest.sort_by(|a, b| b.1.value.total_cmp(&a.1.value));
+        face_of.map(|face| (face, tightest))
     }
 
     /// The tetrahedron of `v` on an open face, where it may be put.

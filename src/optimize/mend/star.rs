@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use super::super::bound::{face_least, least};
 use super::super::climb::Climb;
 use super::super::quality::{ALPHA, inverse_quality};
-use super::kernel::farthest_inside;
+use super::kernel::{self, farthest_inside};
 use crate::geom::{Point, orient};
 use crate::mesh::anatomy::FACES;
 use crate::mesh::{FaceRef, Mesh, Tet};
@@ -301,6 +301,7 @@ pub(super) struct Aim {
 #[derive(Default)]
 pub(super) struct Star {
     pub(super) sides: Vec<Side>,
+    scratch: kernel::Scratch,
 }
 
 impl Star {
@@ -388,13 +389,14 @@ impl Star {
 
     /// The point that is farthest in front of all sides, in radii of their inscribed circles, up to one: what is nearer makes a flat
     /// tetrahedron. Behind some, where no point is in front of all; `p` where rounding leaves no answer.
-    pub(super) fn moved_into_kernel(&self, p: Point) -> Point {
+    pub(super) fn moved_into_kernel(&mut self, p: Point) -> Point {
+        let reach = 4.0 * self.radius(p);
         let sides = (self.sides.iter()).filter(|side| side.area > 0.0);
         let planes = sides.map(|side| {
             let n = side.normal / side.area;
             (n, n.dot(side.points[0] - p), side.radius())
         });
-        farthest_inside(p, 4.0 * self.radius(p), planes).unwrap_or(p)
+        farthest_inside(p, reach, planes, &mut self.scratch).unwrap_or(p)
     }
 
     /// The best of moves of `p` away from the nearest sides, in steps from the least of the heights to the size of the star, each twice the one
