@@ -43,17 +43,21 @@ impl PageTable {
         self.entries.len()
     }
 
-    /// Position in the pool of record `id`, beyond it when its page may not be read at once.
+    /// Position in the pool of record `id`, beyond it when its page may not be read at once, or is none.
     #[inline(always)]
     pub(super) fn to_read(&self, id: u32) -> usize {
-        let quick = self.quick[(id >> SLOT_BITS) as usize];
+        let Some(&quick) = self.quick.get((id >> SLOT_BITS) as usize) else {
+            return usize::MAX;
+        };
         (quick & !SLOT_MASK | id & SLOT_MASK) as usize
     }
 
-    /// Position in the pool of record `id`, beyond it when its page may not be changed at once.
+    /// Position in the pool of record `id`, beyond it when its page may not be changed at once, or is none.
     #[inline(always)]
     pub(super) fn to_write(&self, id: u32) -> usize {
-        let quick = self.quick[(id >> SLOT_BITS) as usize];
+        let Some(&quick) = self.quick.get((id >> SLOT_BITS) as usize) else {
+            return usize::MAX;
+        };
         if quick & CLEAN != 0 {
             return usize::MAX;
         }
