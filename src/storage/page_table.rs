@@ -43,21 +43,17 @@ impl PageTable {
         self.entries.len()
     }
 
-    /// Position in the pool of record `id`, beyond it when its page may not be read at once, or is none.
+    /// Position in the pool of record `id`, beyond it when its page may not be read at once.
     #[inline(always)]
     pub(super) fn to_read(&self, id: u32) -> usize {
-        let Some(&quick) = self.quick.get((id >> SLOT_BITS) as usize) else {
-            return usize::MAX;
-        };
+        let quick = self.quick[(id >> SLOT_BITS) as usize];
         (quick & !SLOT_MASK | id & SLOT_MASK) as usize
     }
 
-    /// Position in the pool of record `id`, beyond it when its page may not be changed at once, or is none.
+    /// Position in the pool of record `id`, beyond it when its page may not be changed at once.
     #[inline(always)]
     pub(super) fn to_write(&self, id: u32) -> usize {
-        let Some(&quick) = self.quick.get((id >> SLOT_BITS) as usize) else {
-            return usize::MAX;
-        };
+        let quick = self.quick[(id >> SLOT_BITS) as usize];
         if quick & CLEAN != 0 {
             return usize::MAX;
         }

@@ -12,7 +12,6 @@ use tetdb_schema::page::{FRAME_BYTES, PageAddress, SLOT_BITS, SLOTS, Slot, u32_l
 use super::page_table::{
     DIRTY, FRAMES_LIMIT, IN_BASE, IN_OUTPUT, PageTable, REFERENCED, RESIDENT, frame_of,
 };
-use super::pages::raise_beyond;
 use super::places::{Backing, Places};
 use super::{DiskPath, Pages, SharedPages, StorageError, check_cancelled, kind, raise};
 
@@ -219,9 +218,6 @@ impl Pager {
     #[inline(never)]
     fn open_slow<const K: usize>(&mut self, id: u32, flags: u32) -> usize {
         let page = id >> SLOT_BITS;
-        if page as usize >= self.tables[K].len() {
-            raise_beyond(self.places.base(), K, page);
-        }
         let entry = self.tables[K].entry(page);
         let opened = if entry & RESIDENT != 0 {
             entry | flags
@@ -453,7 +449,7 @@ impl Pages for Pager {
 
     fn shared(&mut self) -> Option<SharedPages<'_>> {
         let all = self.tables.iter_mut().all(PageTable::make_readable);
-        all.then(|| SharedPages::new(&self.frames, &self.tables, self.places.base()))
+        all.then(|| SharedPages::new(&self.frames, &self.tables))
     }
 }
 

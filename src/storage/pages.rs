@@ -1,11 +1,8 @@
 //! Records by kind and id, whatever holds their pages.
 
-use std::path::Path;
-
-use tetdb_schema::page::{SLOT_BITS, Slot};
+use tetdb_schema::page::Slot;
 
 use super::page_table::PageTable;
-use super::{StorageError, raise};
 
 /// Kinds of working pages an accessor may name, as positions in a page table.
 pub mod kind {
@@ -61,50 +58,19 @@ pub trait Pages {
     }
 }
 
-/// A record names one of page `page`, which there is not: pages that came from the file `base` were damaged, others are wrong by a bug.
-#[cold]
-#[inline(never)]
-pub(super) fn raise_beyond(base: Option<&Path>, kind: usize, page: u32) -> ! {
-    let what = format!(
-        "page {page} of {:?}, which a record names,",
-        kind::ALL[kind]
-    );
-    match base {
-        Some(path) => raise(StorageError::Missing {
-            path: path.to_owned(),
-            what,
-        }),
-        None => panic!("{what} is missing"),
-    }
-}
-
 /// A view of pages that are all in memory. Is not: a way to change them; those methods panic.
 #[derive(Clone, Copy)]
 pub struct SharedPages<'a> {
     frames: &'a [Slot],
     tables: [&'a PageTable; kind::ALL.len()],
-    base: Option<&'a Path>,
 }
 
 impl<'a> SharedPages<'a> {
     /// Every page of the tables must be readable at once.
-    pub(super) fn new(
-        frames: &'a [Slot],
-        tables: &'a [PageTable; kind::ALL.len()],
-        base: Option<&'a Path>,
-    ) -> Self {
+    pub(super) fn new(frames: &'a [Slot], tables: &'a [PageTable; kind::ALL.len()]) -> Self {
         Self {
             frames,
             tables: tables.each_ref(),
-            base,
-        }
-    }
-
-    #[inline(always)]
-    fn slot<const K: usize>(&self, id: u32) -> &Slot {
-        match self.frames.get(self.tables[K].to_read(id)) {
-            Some(slot) => slot,
-            None => raise_beyond(self.base, K, id >> SLOT_BITS),
         }
     }
 }
@@ -112,12 +78,18 @@ impl<'a> SharedPages<'a> {
 impl Pages for SharedPages<'_> {
     #[inline(always)]
     fn read<const K: usize>(&mut self, id: u32) -> &Slot {
-        self.slot::<K>(id)
+        &self.frames[self.tables[K].to_read(id)]
     }
 
     #[inline(always)]
     fn read_four<const K: usize>(&mut self, [a, b, c, d]: [u32; 4]) -> [&Slot; 4] {
-        [a, b, c, d].map(|id| self.slot::<K>(id))
+        let (frames, table) = (self.frames, self.tables[K]);
+        [
+            &frames[table.to_read(a)],
+            &frames[table.to_read(b)],
+            &frames[table.to_read(c)],
+            &frames[table.to_read(d)],
+        ]
     }
 
     fn write<const K: usize>(&mut self, id: u32) -> &mut Slot {

@@ -1,7 +1,5 @@
 //! The files behind a pool: where pages come from, and where they go that leave memory.
 
-use std::path::Path;
-
 use tetdb_schema::page::{
     PageAddress, Slot, check_page, open_page, page_key, seal_page, stored_bytes,
 };
@@ -51,11 +49,6 @@ impl Places {
         self.backing.as_ref().map_or(0, |b| b.subdomain)
     }
 
-    /// The file of the pages it began with, if it began with any.
-    pub fn base(&self) -> Option<&Path> {
-        Some(self.backing.as_ref()?.base.as_ref()?.path())
-    }
-
     /// Whether pages of this kind go to the output file.
     pub fn goes_to_output(&self, kind: usize) -> bool {
         kind != kind::SCRATCH && self.backing.as_ref().is_some_and(|b| b.made.is_some())
@@ -72,7 +65,7 @@ impl Places {
         address: PageAddress,
         frame: &mut [Slot],
     ) -> Result<(), StorageError> {
-        let damaged = |path: &Path, source| StorageError::Page {
+        let damaged = |path: &std::path::Path, source| StorageError::Page {
             path: path.to_owned(),
             source,
         };
