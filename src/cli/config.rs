@@ -195,4 +195,20 @@ mod tests {
             assert_eq!(read(text).err().map(|f| f.exit()), Some(2), "{text}");
         }
     }
+
+    #[test]
+    fn a_list_is_no_number() {
+        for text in [
+            "hsiz = [1]",
+            "hgrad = [1, 2]",
+            "size_box = [[[0, 0], 0, 1]]",
+        ] {
+            let failure = read(text).err().unwrap_or_else(|| panic!("{text}"));
+            let message = failure.message;
+            let key = text.split(' ').next().unwrap_or_default();
+            for word in [key, "sequence", "a text or a number"] {
+                assert!(message.contains(word), "{text}: {message}");
+            }
+        }
+    }
 }

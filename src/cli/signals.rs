@@ -1,10 +1,10 @@
-//! Ctrl-C and SIGTERM end a run between two page accesses; a second one ends it at once.
+//! Ctrl-C, SIGTERM and SIGHUP end a run between two page accesses; a second one ends it at once.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
 use std::time::Duration;
 
-use signal_hook::consts::{SIGABRT, SIGINT, SIGTERM};
+use signal_hook::consts::{SIGABRT, SIGHUP, SIGINT, SIGTERM};
 use signal_hook::flag::register_conditional_shutdown;
 use signal_hook::iterator::Signals;
 
@@ -34,7 +34,11 @@ const NO_MEMORY: i32 = 6;
 ///
 /// Errors: the system refuses; the run then simply cannot be stopped gently.
 pub fn listen(cancel: &CancelToken, last: impl Fn() -> u8 + Send + Sync + 'static) {
-    let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) else {
+    let mut which = vec![SIGINT, SIGTERM];
+    if !is_ignored(SIGHUP) {
+        which.push(SIGHUP);
+    }
+    let Ok(mut signals) = Signals::new(which) else {
         return;
     };
     let (token, last) = (cancel.clone(), Arc::new(last));
@@ -53,6 +57,14 @@ pub fn listen(cancel: &CancelToken, last: impl Fn() -> u8 + Send + Sync + 'stati
             });
         }
     });
+}
+
+/// Whether the process was begun to ignore a signal, as `nohup` does with SIGHUP; also where the system does not say.
+fn is_ignored(signal: i32) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|l| l.strip_prefix("SigIgn:"));
+    let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    mask.is_none_or(|mask| mask >> (signal - 1) & 1 != 0)
 }
 
 /// From now on there is a store: a step under way ends in order, however long that takes.
@@ -74,7 +86,7 @@ pub fn has_store() -> bool {
 /// 128 + the signal that stopped the run.
 pub fn exit_code() -> u8 {
     match RECEIVED.load(Ordering::Relaxed) {
-        SIGTERM => 143,
-        _ => 130,
+        0 => 128 + SIGINT as u8,
+        signal => 128 + signal as u8,
     }
 }

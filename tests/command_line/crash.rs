@@ -113,7 +113,7 @@ fn a_store_being_written_is_busy() {
 fn a_stopped_run_says_so_and_can_be_resumed() {
     let place = Place::new();
     let expected = undisturbed(&place);
-    for (signal, exit) in [("-INT", 130), ("-TERM", 143)] {
+    for (signal, exit) in [("-INT", 130), ("-TERM", 143), ("-HUP", 129)] {
         let mut child = started(&place);
         std::thread::sleep(Duration::from_millis(30));
         let id = child.id().to_string();

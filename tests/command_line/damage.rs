@@ -195,3 +195,24 @@ fn damage_in_what_is_only_kept_is_found_and_all_of_it_listed() {
     assert_eq!(place.digest("a.tetdb"), digest);
     refused("verify a.tetdb --json", &[&leaf]);
 }
+
+#[test]
+fn an_older_file_of_a_part_in_the_place_of_the_newer_is_found() {
+    let (place, old) = finished();
+    place
+        .run_line("resaturate box.tetdb --subdomain 0 --refine-by 0.8")
+        .succeeds();
+    let files = fs::read_dir(place.path("box.tetdb")).expect("a store is a folder");
+    let new = files
+        .map(|entry| entry.expect("an entry is readable").path())
+        .find(|path| path.to_string_lossy().contains("subdomain-") && *path != old)
+        .expect("the change made a file");
+    place.run_line("verify box.tetdb").succeeds();
+    fs::copy(&old, &new).expect("the file is writable");
+    for line in ["verify box.tetdb --json", "verify box.tetdb --full --json"] {
+        let done = place.run_line(line);
+        let error = done.error();
+        let found = (error["code"].as_str(), done.exit());
+        assert_eq!(found, (Some("damaged"), Some(4)), "{error}");
+    }
+}

@@ -259,3 +259,32 @@ fn help_wraps_at_the_width_of_the_terminal() {
         );
     }
 }
+
+/// `script` of util-linux gives a command a terminal.
+#[cfg(target_os = "linux")]
+#[test]
+fn errors_have_colors_on_a_terminal_that_may_have_them() {
+    let place = Place::new();
+    let line = format!("{} check none.off", super::place::program().display());
+    let said = |no_color: &str| {
+        let run = std::process::Command::new("script")
+            .args(["-qec", &line, "/dev/null"])
+            .env("NO_COLOR", no_color)
+            .env("TERM", "xterm")
+            .stdin(std::process::Stdio::null())
+            .current_dir(place.path("."))
+            .output();
+        run.ok()
+            .map(|run| String::from_utf8_lossy(&run.stdout).into_owned())
+    };
+    let (Some(with), Some(without)) = (said(""), said("1")) else {
+        return;
+    };
+    for text in [&with, &without] {
+        assert!(text.contains("error"), "{text}");
+    }
+    assert!(with.contains("\u{1b}[1;31m"), "{with:?}");
+    assert!(!without.contains("\u{1b}["), "{without:?}");
+    let piped = place.run_line("check none.off").stderr();
+    assert!(!piped.contains("\u{1b}["), "{piped:?}");
+}

@@ -51,6 +51,32 @@ fn what_a_run_reads_is_never_what_it_writes() {
 }
 
 #[test]
+fn a_folder_is_no_file_to_be_written() {
+    let place = Place::new();
+    place
+        .run_line("mesh sample:box,h=0.5 -o k.tetdb --no-verify")
+        .succeeds();
+    for (name, command) in [
+        ("d.vtu", "export k.tetdb"),
+        ("d.csv", "query k.tetdb -o"),
+        ("d.png", "snapshot k.tetdb"),
+        ("d.html", "report k.tetdb"),
+        ("d.off", "sample box,h=0.5 -o"),
+        ("e.off", "refine-surface sample:box,h=0.5 --hsiz 0.3"),
+        ("e.vtu", "mesh sample:box,h=0.5 -o other.tetdb --export"),
+    ] {
+        fs::create_dir(place.path(name)).expect("a folder");
+        let done = place.run_line(&format!("{command} {name} --json"));
+        assert_eq!(done.exit(), Some(2), "{command}: {}", done.stderr());
+        assert_eq!(done.error()["code"], "usage", "{command}");
+        let holds = fs::read_dir(place.path(name)).expect("it stays").count();
+        assert_eq!(holds, 0, "{command}");
+        // Before work begins.
+        assert!(!place.path("other.tetdb").exists());
+    }
+}
+
+#[test]
 fn files_that_were_embedded_are_not_overwritten() {
     let place = Place::new();
     place

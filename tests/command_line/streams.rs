@@ -118,6 +118,32 @@ fn endless_and_enormous_inputs_are_refused_at_once() {
     }
 }
 
+#[test]
+fn lengths_that_no_mesh_can_have_are_refused_before_work_begins() {
+    let place = Place::new();
+    place
+        .run_line("mesh sample:box,h=0.5 -o b.tetdb --no-verify")
+        .succeeds();
+    let info = place.run_line("info b.tetdb --json").succeeds().json();
+    let n = info["subdomains"][0]["vertices"].as_u64().expect("a count");
+    let head = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({n},), }}");
+    let mut bytes = format!("\u{0}NUMPY\u{1}\u{0}\u{76}\u{0}{head:<117}\n").into_bytes();
+    bytes[0] = 0x93;
+    (0..n).for_each(|_| bytes.extend_from_slice(&1e-300_f64.to_le_bytes()));
+    place.write("h.npy", bytes);
+    let mut command = std::process::Command::new("timeout");
+    command
+        .arg("20")
+        .arg(program())
+        .current_dir(place.path("."));
+    let words = "resaturate b.tetdb --subdomain 0 --size-field h.npy --json";
+    let output = command.args(words.split(' ')).output();
+    let output = output.expect("it starts");
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(3), "{said}");
+    assert!(said.contains("expected a length"), "{said}");
+}
+
 /// A flat polygon of so many corners, or as many triangles on one edge.
 fn around_a_circle(n: usize, is_polygon: bool) -> String {
     let corner = |k| {

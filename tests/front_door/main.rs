@@ -319,3 +319,68 @@ fn on_steps_needles_and_caps_what_the_surface_does_not_force_is_mended() -> Outc
     }
     Ok(())
 }
+
+/// Whoever knows the format can write a page whose sums are right: what a run meets then is damage, never a bug of the program.
+#[test]
+fn pages_that_are_no_mesh_are_damage() -> Outcome {
+    use redb::{Database, ReadableTable, TableDefinition};
+    use tetdb_schema::page::{FRAME_BYTES, PageAddress, PageKind, Slot, page_key};
+    use tetdb_schema::page::{open_page, seal_page, stored_bytes, u32_le};
+
+    const TABLE: TableDefinition<u64, &[u8]> = TableDefinition::new("pages");
+    let dir = tempfile::tempdir()?;
+    let (path, token) = (dir.path().join("a.tetdb"), CancelToken::new());
+    let inner = token.clone();
+    let begun = mesher()?.cancel(&token).progress(move |event| {
+        if let Event::Progress {
+            stage: "divide edges",
+            ..
+        } = event
+        {
+            inner.cancel();
+        }
+    });
+    let error = begun.create(&path).err().ok_or("it was cancelled")?;
+    assert!(error.is_cancelled(), "{error}");
+    let file = path.join("subdomain-00000-g1.redb");
+    let good = std::fs::read(&file)?;
+    // The first node and the first neighbor of a tetrahedron, the first corner of a facet; numbers beyond the last page, and of others.
+    let beyond = [0x00ff_ff00, 0x0001_0000];
+    for (kind, word, others) in [
+        (PageKind::Tets, 0, [77, u32::MAX]),
+        (PageKind::Tets, 4, [1500, 1501]),
+        (PageKind::Facets, 0, beyond),
+    ] {
+        for number in beyond.into_iter().chain(others) {
+            std::fs::write(&file, &good)?;
+            let database = Database::open(&file)?;
+            let write = database.begin_write()?;
+            {
+                let mut table = write.open_table(TABLE)?;
+                let of_kind = page_key(kind, 0)..=page_key(kind, u32::MAX);
+                let (key, stored) = match table.range(of_kind)?.next() {
+                    Some(row) => row.map(|(key, page)| (key.value(), page.value().to_vec()))?,
+                    None => return Err(format!("no page of {kind:?}").into()),
+                };
+                let address = PageAddress {
+                    kind,
+                    subdomain: 0,
+                    page: key as u32,
+                };
+                let mut frame: Vec<Slot> = bytemuck::zeroed_vec(FRAME_BYTES / size_of::<Slot>());
+                let generation = open_page(&stored, address, &mut frame)?;
+                frame[20][word] = u32_le::from_native(number);
+                seal_page(&mut frame, address, generation);
+                table.insert(key, stored_bytes(&frame))?;
+            }
+            write.commit()?;
+            drop(database);
+            for threads in [1, 2] {
+                let resumed = Store::resume(&path, Settings::new().threads(threads));
+                let code = resumed.err().map(|e| e.code());
+                assert_eq!(code, Some("damaged"), "word {word} of {kind:?}, {number}");
+            }
+        }
+    }
+    Ok(())
+}

@@ -31,7 +31,7 @@ pub use tasks::{GatherArgs, PlanArgs, WorkArgs};
     wherever a surface file can.\n\n\
     Examples:\n  tetdb check part.stl\n  tetdb mesh part.stl --export part.vtu\n  tetdb info part.tetdb\n  tetdb report part.tetdb part.html\n  \
     tetdb mesh sample:balls,count=100 -o balls.tetdb --memory 256MiB\n\nExit codes: 0 done, 1 internal error, 2 usage, 3 bad input, 4 store damaged, 5 store busy, \
-    6 memory or disk, 7 the answer is no, 8 store unusable as it is, 130/143 stopped."
+    6 memory or disk, 7 the answer is no, 8 store unusable as it is, 129/130/143 stopped."
 )]
 pub struct Args {
     /// Say nothing but warnings, errors and what a command is asked for

@@ -4,6 +4,41 @@ use std::fmt;
 
 use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Visitor};
 
+/// A text, as it would be typed, of a text or a number.
+struct Word(String);
+
+struct WordVisitor;
+
+impl Visitor<'_> for WordVisitor {
+    type Value = Word;
+
+    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str("a text or a number")
+    }
+
+    fn visit_str<E: Error>(self, text: &str) -> Result<Word, E> {
+        Ok(Word(text.to_owned()))
+    }
+
+    fn visit_i64<E: Error>(self, x: i64) -> Result<Word, E> {
+        Ok(Word(x.to_string()))
+    }
+
+    fn visit_u64<E: Error>(self, x: u64) -> Result<Word, E> {
+        Ok(Word(x.to_string()))
+    }
+
+    fn visit_f64<E: Error>(self, x: f64) -> Result<Word, E> {
+        Ok(Word(x.to_string()))
+    }
+}
+
+impl<'de> Deserialize<'de> for Word {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        from.deserialize_any(WordVisitor)
+    }
+}
+
 /// A text, as it would be typed, of a text, a number or a list of both.
 struct Typed(String);
 
@@ -34,7 +69,7 @@ impl<'de> Visitor<'de> for TypedVisitor {
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Typed, A::Error> {
         let mut parts = Vec::new();
-        while let Some(Typed(part)) = list.next_element()? {
+        while let Some(Word(part)) = list.next_element()? {
             parts.push(part);
         }
         Ok(Typed(parts.join(",")))
@@ -49,7 +84,7 @@ impl<'de> Deserialize<'de> for Typed {
 
 /// One option.
 pub(super) fn text<'de, D: Deserializer<'de>>(from: D) -> Result<Option<String>, D::Error> {
-    Ok(Option::<Typed>::deserialize(from)?.map(|Typed(text)| text))
+    Ok(Option::<Word>::deserialize(from)?.map(|Word(text)| text))
 }
 
 /// A list of options.

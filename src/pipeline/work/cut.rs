@@ -7,6 +7,7 @@ use super::cut_journal::CutJournal;
 use super::order::CutOrder;
 use super::receipt::InheritedFace;
 use super::receipt::{CutReceipt, Traffic};
+use super::soundness::panic_is_damage_of;
 use super::stages::{StageFiles, Stages};
 use crate::bisect::{self, CutPlan, CutReport, Opened, Zone};
 use crate::mesh::{Mesh, Workspace};
@@ -43,7 +44,9 @@ struct Child {
 impl CutJob<'_> {
     /// Does the whole job; a failed page access ends here.
     pub fn run(self, watch: &Watcher) -> Result<(CutReceipt, CutReport), PipelineError> {
-        let divided = attempt(|| self.divide(watch))??;
+        let place = (&self.base, self.order.parent.part.first);
+        let divide = || panic_is_damage_of(place, || self.open(), || self.divide(watch));
+        let divided = attempt(divide)??;
         // Empty by now; thousands of cuts would leave as many folders.
         let _ = self.scratch.remove_dir_all();
         Ok(divided)
@@ -57,8 +60,7 @@ impl CutJob<'_> {
             dir: &self.scratch,
             memory: self.share.buffers / 2,
         };
-        let backing = self.backing(part.first, None, 2);
-        let mut host = open_part(parent, self.base.clone(), backing, self.share.frames / 2)?;
+        let mut host = self.open()?;
         let mut core = Mesh::new(Pager::new(
             self.share.frames / 4,
             Some(self.backing(part.first, None, 4)),
@@ -127,6 +129,13 @@ impl CutJob<'_> {
             traffic: Traffic::new(pages, journal.frames_used),
         };
         Ok((receipt, opened.report))
+    }
+
+    /// The part's mesh as its file holds it.
+    fn open(&self) -> Result<Mesh, PipelineError> {
+        let parent = self.order.parent;
+        let backing = self.backing(parent.part.first, None, 2);
+        open_part(parent, self.base.clone(), backing, self.share.frames / 2)
     }
 
     fn child(

@@ -9,6 +9,7 @@ use super::coarse_snapshot::save;
 use super::common::Common;
 use super::receipt::{SubdomainReceipt, Traffic};
 use super::saturate::{FineReport, saturate_and_optimize};
+use super::soundness::panic_is_damage_of;
 use crate::bisect::Zone;
 use crate::mesh::{Mesh, Workspace};
 use crate::pipeline::error::PipelineError;
@@ -65,17 +66,23 @@ impl SubdomainJob {
         common: Common,
         watch: &Watcher,
     ) -> Result<FinishedSubdomain, PipelineError> {
-        attempt(|| {
+        let (part, base) = (self.part, self.base.clone());
+        let (generation, scratch, share) = (self.generation, self.scratch.clone(), self.share);
+        let open = || {
             let backing = Backing {
-                subdomain: self.part.part.first,
-                generation: self.generation,
-                spill: self.scratch.clone(),
+                subdomain: part.part.first,
+                generation,
+                spill: scratch.clone(),
                 made: None,
                 base: None,
-                cache_bytes: self.share.redb as usize,
+                cache_bytes: share.redb as usize,
             };
-            let mesh = open_part(self.part, self.base.clone(), backing, self.share.frames)?;
-            self.finish(mesh, common, watch)
+            open_part(part, base.clone(), backing, share.frames)
+        };
+        attempt(|| {
+            panic_is_damage_of((&base, part.part.first), open, || {
+                self.finish(open()?, common, watch)
+            })
         })?
     }
 
