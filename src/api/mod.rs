@@ -34,6 +34,7 @@ mod surface_wires;
 pub(crate) mod targets;
 pub(crate) mod tasks;
 pub(crate) mod verify;
+pub(crate) mod verify_shared;
 
 pub use crate::io::write::MeshFormat;
 pub use crate::storage::CancelToken;

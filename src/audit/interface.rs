@@ -14,6 +14,7 @@ use tetdb_schema::catalog::InterfaceRow;
 
 sort_record! {
     /// An interface face of one sub-domain.
+    #[derive(rkyv::Archive, rkyv::Serialize, rkyv::Deserialize)]
     struct FaceSide {
         cut: u32,
         index: u32,
@@ -46,6 +47,14 @@ pub(super) struct Interfaces {
     sorter: Sorter<FaceSide>,
     /// From the lower and from the higher side.
     sides: BTreeMap<CutPair, [SharedFaces; 2]>,
+}
+
+/// The interface faces of some sub-domains.
+#[derive(rkyv::Archive, rkyv::Serialize, rkyv::Deserialize, Clone, Debug)]
+pub(super) struct InterfaceSides {
+    faces: Vec<FaceSide>,
+    /// Cut and sub-domains of each pair, then how many and their digest, from either side.
+    pairs: Vec<([u32; 3], [(u64, [u64; 2]); 2])>,
 }
 
 impl CutPair {
@@ -102,6 +111,30 @@ impl Interfaces {
             ids,
             sum,
         })
+    }
+
+    /// What was pushed, for [`add`](Self::add) elsewhere. Memory: all of it. Errors: the disk.
+    pub(super) fn into_sides(self) -> Result<InterfaceSides, StorageError> {
+        let bare = |side: SharedFaces| (side.count, side.digest.lanes);
+        let pairs = self.sides.into_iter();
+        Ok(InterfaceSides {
+            faces: self.sorter.finish()?.collect::<Result<_, _>>()?,
+            pairs: pairs
+                .map(|(pair, sides)| ([pair.cut, pair.low, pair.high], sides.map(bare)))
+                .collect(),
+        })
+    }
+
+    /// Adds the faces of other sub-domains. Errors: the disk.
+    pub(super) fn add(&mut self, other: InterfaceSides) -> Result<(), StorageError> {
+        for ([cut, low, high], more) in other.pairs {
+            let sides = self.sides.entry(CutPair { cut, low, high }).or_default();
+            for (side, (count, lanes)) in sides.iter_mut().zip(more) {
+                side.count += count;
+                side.digest.merge(&Digest { lanes });
+            }
+        }
+        (other.faces.into_iter()).try_for_each(|face| self.sorter.push(face))
     }
 
     /// Matches the faces and compares the digests with the catalog's rows.
