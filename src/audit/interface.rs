@@ -53,8 +53,17 @@ pub(super) struct Interfaces {
 #[derive(rkyv::Archive, rkyv::Serialize, rkyv::Deserialize, Clone, Debug)]
 pub(super) struct InterfaceSides {
     faces: Vec<FaceSide>,
-    /// Cut and sub-domains of each pair, then how many and their digest, from either side.
-    pairs: Vec<([u32; 3], [(u64, [u64; 2]); 2])>,
+    pairs: Vec<PairSides>,
+}
+
+/// Two sub-domains at a cut: how many faces they have there, and their digest, from the lower and from the higher side.
+#[derive(rkyv::Archive, rkyv::Serialize, rkyv::Deserialize, Clone, Debug)]
+struct PairSides {
+    cut: u32,
+    low: u32,
+    high: u32,
+    counts: [u64; 2],
+    digests: [[u64; 2]; 2],
 }
 
 impl CutPair {
@@ -115,20 +124,26 @@ impl Interfaces {
 
     /// What was pushed, for [`add`](Self::add) elsewhere. Memory: all of it. Errors: the disk.
     pub(super) fn into_sides(self) -> Result<InterfaceSides, StorageError> {
-        let bare = |side: SharedFaces| (side.count, side.digest.lanes);
         let pairs = self.sides.into_iter();
+        let pairs = pairs.map(|(CutPair { cut, low, high }, sides)| PairSides {
+            cut,
+            low,
+            high,
+            counts: sides.map(|side| side.count),
+            digests: sides.map(|side| side.digest.lanes),
+        });
         Ok(InterfaceSides {
             faces: self.sorter.finish()?.collect::<Result<_, _>>()?,
-            pairs: pairs
-                .map(|(pair, sides)| ([pair.cut, pair.low, pair.high], sides.map(bare)))
-                .collect(),
+            pairs: pairs.collect(),
         })
     }
 
     /// Adds the faces of other sub-domains. Errors: the disk.
     pub(super) fn add(&mut self, other: InterfaceSides) -> Result<(), StorageError> {
-        for ([cut, low, high], more) in other.pairs {
+        for pair in other.pairs {
+            let PairSides { cut, low, high, .. } = pair;
             let sides = self.sides.entry(CutPair { cut, low, high }).or_default();
+            let more = pair.counts.into_iter().zip(pair.digests);
             for (side, (count, lanes)) in sides.iter_mut().zip(more) {
                 side.count += count;
                 side.digest.merge(&Digest { lanes });

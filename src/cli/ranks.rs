@@ -19,7 +19,7 @@ use serde_json::{Value, json};
 
 use super::failure::Failure;
 use super::tasks;
-use crate::api::verify_shared::Server;
+use crate::api::verify_server::Server;
 use crate::api::{Error, Settings, guarded};
 use crate::io::write::Share;
 use crate::pipeline::{self, Hands, HelperFailure, Helpers, PipelineError, TaskSettings};
