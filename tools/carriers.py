@@ -4,7 +4,7 @@
   carriers.py TETDB FOLDER [--mpi PROGRAM=MPIRUN ...] [--ranks 2,4] [--job "SURFACE --subdomains N ..." ...] [--memory 96MiB]
               [--tasks 3] [--only WORD,...] [--require]
 
-Carriers: `ranks` (N of each MPI), `exports` (pieces of several formats by three ranks), `handover` (begun by one process and ended by ranks, and the
+Carriers: `ranks` (N of each MPI), `verifies` (the report of ranks, and what they say of damage), `exports` (pieces of several formats by three ranks), `handover` (begun by one process and ended by ranks, and the
 other way round), `launcher` (a program of one MPI under the launcher of another), `parallel`, `snakemake`, `slurm` (a Slurm of one node,
 started here), `twice` (tasks in random order, each done twice, two at once). --mpi may be repeated: a program and the mpirun of the MPI it was
 built with. A line of JSON for each result goes to FOLDER/results.jsonl; what is there already with the same program is not done again. What is
@@ -80,6 +80,27 @@ class Bench:
         store = self.store("ranks")
         self.mpirun(mpi, n, "mesh", *self.job, "-o", store, *self.run_options())
         self.check(store)
+
+    def verifies(self, mpi, n):
+        """The report of so many ranks is that of one process, of a sound store and of a damaged one."""
+        store = self.store("verified")
+        shutil.copytree(self.one, store)
+        words = ["verify", store, "--full", "--json"]
+        for is_sound in (True, False):
+            if not is_sound:
+                damaged = max(f for f in os.listdir(store) if f.startswith("subdomain-"))
+                with open(os.path.join(store, damaged), "r+b") as file:
+                    file.seek(os.path.getsize(file.name) // 2)
+                    file.write(64 * b"\xa5")
+            alone, shared = (
+                subprocess.run([*before, self.tetdb if not before else mpi[0], *words], capture_output=True, text=True, env=ENV, timeout=3600)
+                for before in ([], [mpi[1], "-n", str(n)])
+            )
+            if (alone.returncode == 0) != is_sound or alone.stdout != shared.stdout or (shared.returncode == 0) != is_sound:
+                raise Differs(f"verify: exit {alone.returncode} and {shared.returncode}\n{alone.stdout[-700:]}\n{shared.stdout[-700:]}{shared.stderr[-700:]}")
+            if "one process" in shared.stderr:
+                raise Differs(f"verify: {shared.stderr[-700:]}")
+        shutil.rmtree(store)
 
     def exports(self, mpi, n):
         """Pieces by so many ranks have the bytes of those by one process."""
@@ -208,6 +229,7 @@ def main():
     for mpi in bench.mpis:
         name = os.path.basename(mpi[1])
         carriers += [(f"ranks {n} {name}", lambda mpi=mpi, n=int(n): bench.ranks(mpi, n)) for n in args.ranks.split(",")]
+        carriers.append((f"verifies {name}", lambda mpi=mpi: bench.verifies(mpi, 3)))
         carriers.append((f"exports {name}", lambda mpi=mpi: bench.exports(mpi, 3)))
         carriers.append((f"handover {name}", lambda mpi=mpi: bench.handover(mpi)))
         carriers.append((f"launcher {name}", lambda mpi=mpi: bench.launcher(mpi)))

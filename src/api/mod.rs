@@ -34,6 +34,9 @@ mod surface_wires;
 pub(crate) mod targets;
 pub(crate) mod tasks;
 pub(crate) mod verify;
+#[cfg(any(test, feature = "mpi"))]
+pub(crate) mod verify_server;
+mod verify_shared;
 
 pub use crate::io::write::MeshFormat;
 pub use crate::storage::CancelToken;

@@ -3,9 +3,9 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::Settings;
 use super::error::{Error, Remedy};
-use crate::audit::{self, Level, Report, VerifyOptions};
+use super::{Settings, verify_shared};
+use crate::audit::{self, Level, Report};
 use crate::geom::{Point, short};
 use crate::storage::attempt;
 use crate::store::{Catalog, StoreError, WriterLock};
@@ -54,14 +54,8 @@ pub(crate) fn check(
     cap: u64,
     level: Level,
 ) -> Result<Report, Error> {
-    let held = surface.map_or(0, |s| s.bytes() as u64 + audit::wire_bytes(s));
-    let memory = cap.saturating_sub(held).min(1 << 30) / 2;
-    let options = VerifyOptions {
-        level,
-        memory_bytes: memory as usize,
-        temp_dir: std::env::temp_dir(),
-    };
-    let verified = attempt(|| audit::verify(store, surface, &options));
+    let options = verify_shared::options(cap, surface, level);
+    let verified = attempt(|| verify_shared::verify(store, settings, surface, &options));
     let error = match verified.map_err(StoreError::from) {
         Ok(Ok(report)) => return Ok(report),
         Ok(Err(error)) | Err(error) => error,

@@ -12,6 +12,18 @@ pub(super) struct Input<'a> {
     surface: &'a Surface,
     /// Seen with a filled front, with a filled back, at all.
     seen: [Vec<u64>; 3],
+    doubled: Vec<DoubledSide>,
+}
+
+/// The number of a triangle, and which of its sides is filled twice.
+type DoubledSide = (u32, u8);
+
+/// The triangles that one part of the mesh has.
+#[derive(rkyv::Archive, rkyv::Serialize, rkyv::Deserialize, Clone, Debug)]
+pub(super) struct SeenTriangles {
+    /// Of words that are not all zero: which, and their bits as in [`Input`].
+    words: Vec<(u32, [u64; 3])>,
+    doubled: Vec<DoubledSide>,
 }
 
 /// Sets a bit; says whether it was set before.
@@ -54,6 +66,35 @@ impl<'a> Input<'a> {
         Self {
             surface,
             seen: [(); 3].map(|()| vec![0; words]),
+            doubled: Vec::new(),
+        }
+    }
+
+    /// What was seen, for [`add`](Self::add) elsewhere.
+    pub(super) fn into_seen(self) -> SeenTriangles {
+        let word = |at: usize| (at as u32, self.seen.each_ref().map(|bits| bits[at]));
+        let words = (0..self.seen[0].len()).map(word);
+        SeenTriangles {
+            words: words.filter(|(_, bits)| *bits != [0; 3]).collect(),
+            doubled: self.doubled,
+        }
+    }
+
+    /// Adds what was seen of another part of the mesh.
+    pub(super) fn add(&mut self, other: SeenTriangles) {
+        self.doubled.extend(other.doubled);
+        for (at, bits) in other.words {
+            for (side, more) in (0..).zip(bits) {
+                let Some(word) = self.seen[side].get_mut(at as usize) else {
+                    continue;
+                };
+                let both = *word & more;
+                *word |= more;
+                if side < 2 {
+                    let set = (0..64).filter(|bit| both >> bit & 1 != 0);
+                    (self.doubled).extend(set.map(|bit| (at * 64 + bit, side as u8)));
+                }
+            }
         }
     }
 
@@ -96,14 +137,20 @@ impl<'a> Input<'a> {
         set(&mut self.seen[2], number);
         for side in 0..2 {
             if facet.tets[side] != NO_TET && set(&mut self.seen[side], number) {
-                return Some("is there twice");
+                self.doubled.push((number as u32, side as u8));
             }
         }
         None
     }
 
     /// Counts what was seen; names what is missing.
-    pub(super) fn finish(self, report: &mut Report) {
+    pub(super) fn finish(mut self, report: &mut Report) {
+        self.doubled.sort_unstable();
+        for &(number, side) in &self.doubled {
+            let side = ["front", "back"][usize::from(side)];
+            let what = format!("input triangle {number} is there twice with its {side} filled");
+            self.report(Finding::NotAnInputTriangle, number as usize, what, report);
+        }
         for number in 0..self.surface.triangles.len() {
             let sides = [0, 1].map(|side| get(&self.seen[side], number));
             let is_sheet = self.surface.is_sheet(number as u32);
@@ -130,9 +177,12 @@ impl<'a> Input<'a> {
     }
 
     fn report_missing(&self, number: usize, what: &str, report: &mut Report) {
-        let finding = Finding::MissingTriangle;
+        let what = format!("input triangle {number} {what}");
+        self.report(Finding::MissingTriangle, number, what, report);
+    }
+
+    fn report(&self, finding: Finding, number: usize, what: String, report: &mut Report) {
         report.find(finding, || {
-            let what = format!("input triangle {number} {what}");
             let mut offender = Offender::new(finding, None, what);
             let points = self.surface.corners(number as u32);
             offender.points = points.map(|p| p.to_array()).to_vec();

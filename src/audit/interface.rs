@@ -14,6 +14,7 @@ use tetdb_schema::catalog::InterfaceRow;
 
 sort_record! {
     /// An interface face of one sub-domain.
+    #[derive(rkyv::Archive, rkyv::Serialize, rkyv::Deserialize)]
     struct FaceSide {
         cut: u32,
         index: u32,
@@ -46,6 +47,23 @@ pub(super) struct Interfaces {
     sorter: Sorter<FaceSide>,
     /// From the lower and from the higher side.
     sides: BTreeMap<CutPair, [SharedFaces; 2]>,
+}
+
+/// The interface faces of some sub-domains.
+#[derive(rkyv::Archive, rkyv::Serialize, rkyv::Deserialize, Clone, Debug)]
+pub(super) struct InterfaceSides {
+    faces: Vec<FaceSide>,
+    pairs: Vec<PairSides>,
+}
+
+/// Two sub-domains at a cut: how many faces they have there, and their digest, from the lower and from the higher side.
+#[derive(rkyv::Archive, rkyv::Serialize, rkyv::Deserialize, Clone, Debug)]
+struct PairSides {
+    cut: u32,
+    low: u32,
+    high: u32,
+    counts: [u64; 2],
+    digests: [[u64; 2]; 2],
 }
 
 impl CutPair {
@@ -102,6 +120,36 @@ impl Interfaces {
             ids,
             sum,
         })
+    }
+
+    /// What was pushed, for [`add`](Self::add) elsewhere. Memory: all of it. Errors: the disk.
+    pub(super) fn into_sides(self) -> Result<InterfaceSides, StorageError> {
+        let pairs = self.sides.into_iter();
+        let pairs = pairs.map(|(CutPair { cut, low, high }, sides)| PairSides {
+            cut,
+            low,
+            high,
+            counts: sides.map(|side| side.count),
+            digests: sides.map(|side| side.digest.lanes),
+        });
+        Ok(InterfaceSides {
+            faces: self.sorter.finish()?.collect::<Result<_, _>>()?,
+            pairs: pairs.collect(),
+        })
+    }
+
+    /// Adds the faces of other sub-domains. Errors: the disk.
+    pub(super) fn add(&mut self, other: InterfaceSides) -> Result<(), StorageError> {
+        for pair in other.pairs {
+            let PairSides { cut, low, high, .. } = pair;
+            let sides = self.sides.entry(CutPair { cut, low, high }).or_default();
+            let more = pair.counts.into_iter().zip(pair.digests);
+            for (side, (count, lanes)) in sides.iter_mut().zip(more) {
+                side.count += count;
+                side.digest.merge(&Digest { lanes });
+            }
+        }
+        (other.faces.into_iter()).try_for_each(|face| self.sorter.push(face))
     }
 
     /// Matches the faces and compares the digests with the catalog's rows.

@@ -9,8 +9,10 @@
 //! local tests have shown it. It does not matter which of several equal faces cancels which, therefore
 //! faces are first matched inside each chunk, and only the open ones are sorted externally.
 //!
+//! Sub-domains are looked at one by one, by whatever process; what is found of each is added up in their order.
+//!
 //! Reading order: [`Report`] (what is found), `claims` (facets say which tetrahedra they touch),
-//! `pass` (once through a sub-domain), `pairing` (faces across chunks), `interface` (faces across
+//! `pass` (once through a sub-domain), `part_report` (what is found there), `pairing` (faces across chunks), `interface` (faces across
 //! sub-domains), `against` and `wires` (the input), `rows` (summaries and the catalog). `damage` lists all that cannot be read.
 
 mod against;
@@ -21,6 +23,7 @@ mod damage;
 mod interface;
 mod options;
 mod pairing;
+mod part_report;
 mod pass;
 mod report;
 mod rows;
@@ -34,11 +37,16 @@ use std::path::{Path, PathBuf};
 pub use compare::{Population, Qualities, qualities};
 pub use damage::damage;
 pub use options::VerifyOptions;
+pub use part_report::PartReport;
 pub use report::{Finding, Level, Offender, Report};
 pub use wires::wire_bytes;
 
+use tetdb_schema::catalog::SubdomainRow;
+#[cfg(any(test, feature = "internals"))]
 use tetdb_schema::digest::Digest;
 
+use crate::geom::Point;
+use crate::sealed::Subdomain;
 use crate::storage::StorageError;
 use crate::store::{Catalog, StoreError};
 use crate::surface::Surface;
@@ -52,15 +60,61 @@ pub fn verify(
     options: &VerifyOptions,
 ) -> Result<Report, StoreError> {
     let scratch = Scratch::new(&options.temp_dir)?;
-    let mut audit = pass::Audit::new(surface, options, &scratch.path);
-    let rows = store.subdomains()?;
-    for row in &rows {
-        let memory = options.memory_bytes / 4;
-        let mut part = store.open_subdomain(row.rank, memory)?;
-        audit.subdomain(&mut part)?;
-        // Damage of chunks was reported with their places by now; what is left is in the tree between them.
-        part.check()?;
+    let mut audit = pass::Audit::new(surface, options, &scratch.path, None);
+    for row in store.subdomains()? {
+        audit.subdomain(&mut store.open_row(row, options.memory_bytes / 4)?)?;
     }
+    end(store, audit)
+}
+
+/// Looks at the sub-domains of a verification: is given their rows, the apex for [`verify_part`], and who takes what was found of each, in the
+/// order of the rows.
+pub type EachPart<'a> = &'a mut dyn FnMut(
+    &[SubdomainRow],
+    Option<Point>,
+    &mut dyn FnMut(PartReport) -> Result<(), StoreError>,
+) -> Result<(), StoreError>;
+
+/// The same as [`verify`], sub-domains being looked at by `each`. Errors: also those of `each`.
+pub fn verify_shared(
+    store: &mut Catalog,
+    surface: Option<&Surface>,
+    options: &VerifyOptions,
+    each: EachPart,
+) -> Result<Report, StoreError> {
+    let scratch = Scratch::new(&options.temp_dir)?;
+    let rows = store.subdomains()?;
+    let apex = apex(store, &rows, options);
+    let mut audit = pass::Audit::new(surface, options, &scratch.path, apex);
+    each(&rows, apex, &mut |part| audit.add(part))?;
+    end(store, audit)
+}
+
+/// The first corner of the boundary; `None` where there is none, or damage, which is found later.
+fn apex(store: &mut Catalog, rows: &[SubdomainRow], options: &VerifyOptions) -> Option<Point> {
+    let first = rows.iter().find(|row| row.facets > 0)?;
+    let mut part = store
+        .open_row(first.clone(), options.memory_bytes / 4)
+        .ok()?;
+    let facet = *part.facet_chunk(0).ok()?.records.first()?;
+    Some(part.corners(facet.vertices).ok()?[0].point)
+}
+
+/// What a verification finds of one sub-domain. Errors: as [`verify`].
+pub fn verify_part(
+    part: &mut Subdomain,
+    apex: Option<Point>,
+    surface: Option<&Surface>,
+    options: &VerifyOptions,
+) -> Result<PartReport, StoreError> {
+    let scratch = Scratch::new(&options.temp_dir)?;
+    let mut audit = pass::Audit::new(surface, options, &scratch.path, apex);
+    audit.subdomain(part)?;
+    audit.into_part()
+}
+
+/// What can be said of the whole alone.
+fn end(store: &mut Catalog, audit: pass::Audit) -> Result<Report, StoreError> {
     // What is only kept is no part of the mesh, but who wants it one day must not learn of its damage then.
     if let Some(first) = damage::damage_of_snapshots(store)?.into_iter().next() {
         return Err(first);

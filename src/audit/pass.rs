@@ -11,6 +11,7 @@ use super::against::{Input, check_owners};
 use super::claims::{Claims, FACET, INTERFACE, SortedClaims};
 use super::interface::Interfaces;
 use super::pairing::{OpenSides, Side};
+use super::part_report::{PartReport, Volumes};
 use super::rows::{Rederived, RegionSums, check_regions};
 use super::wires::WireSearch;
 use super::{Finding, Level, Offender, Report, VerifyOptions};
@@ -36,10 +37,7 @@ pub(super) struct Audit<'a> {
     report: Report,
     digests: [Digest; 2],
     regions: RegionSums,
-    /// Sum of the absolute values of what the volume within the boundary is made of.
-    volume_scale: f64,
-    /// What rounding of those values adds up to at most: of needles and thin plates, more than the tolerance.
-    volume_rounding: f64,
+    volumes: Volumes,
     /// The first corner of the boundary: seen from near, cones do not cancel.
     apex: Option<Point>,
 }
@@ -51,10 +49,12 @@ struct Pair {
 }
 
 impl<'a> Audit<'a> {
+    /// `apex`: the first corner of the boundary, where the first sub-domains are looked at elsewhere.
     pub(super) fn new(
         surface: Option<&'a crate::surface::Surface>,
         options: &'a VerifyOptions,
         scratch: &'a Path,
+        apex: Option<Point>,
     ) -> Self {
         let mut report = Report::new(options.level);
         report.against_input = surface.is_some() && options.level >= Level::Geometry;
@@ -68,9 +68,8 @@ impl<'a> Audit<'a> {
             report,
             digests: [Digest::default(); 2],
             regions: RegionSums::new(),
-            volume_scale: 0.0,
-            volume_rounding: 0.0,
-            apex: None,
+            volumes: Volumes::default(),
+            apex,
         }
     }
 
@@ -79,6 +78,15 @@ impl<'a> Audit<'a> {
     }
 
     pub(super) fn subdomain(&mut self, part: &mut Subdomain) -> Result<(), StoreError> {
+        // Summed by itself, for sums must not depend on who looked at which.
+        let others = std::mem::take(&mut self.volumes);
+        self.walk(part)?;
+        self.volumes = others.and(&self.volumes);
+        // Damage of chunks was reported with their places by now; what is left is in the tree between them.
+        Ok(part.check()?)
+    }
+
+    fn walk(&mut self, part: &mut Subdomain) -> Result<(), StoreError> {
         let row = part.row().clone();
         let report = &mut self.report;
         report.subdomains += 1;
@@ -170,9 +178,10 @@ impl<'a> Audit<'a> {
         let (u, v) = (b - a, c - a);
         let cone = a.dot(u.cross(v)) / 6.0;
         let sides = tets.map(|t| f64::from(u8::from(t != NO_TET)));
-        self.report.volume_within_boundary += cone * (sides[1] - sides[0]);
-        self.volume_scale += cone.abs();
-        self.volume_rounding += 4.0 * f64::EPSILON * a.length() * u.length() * v.length();
+        let sums = &mut self.volumes;
+        sums.within_boundary += cone * (sides[1] - sides[0]);
+        sums.scale += cone.abs();
+        sums.rounding += 4.0 * f64::EPSILON * a.length() * u.length() * v.length();
     }
 
     fn tets(
@@ -295,7 +304,7 @@ impl<'a> Audit<'a> {
                 .collect()
         });
         for (i, &six_volumes) in volumes.iter().enumerate() {
-            self.report.volume += six_volumes / 6.0;
+            self.volumes.of_tets += six_volumes / 6.0;
             if six_volumes <= 0.0 {
                 let finding = Finding::NotPositive;
                 self.report.find(finding, || {
@@ -484,6 +493,43 @@ impl<'a> Audit<'a> {
         Ok(())
     }
 
+    /// What was found, for [`add`](Self::add) elsewhere. Errors: the disk.
+    pub(super) fn into_part(mut self) -> Result<PartReport, StoreError> {
+        Ok(PartReport {
+            digests: self.digests.map(|digest| digest.lanes),
+            regions: (self.regions.iter())
+                .map(|(&region, sum)| (region, sum.tets, sum.volume))
+                .collect(),
+            volumes: self.volumes,
+            interfaces: self.interfaces.into_sides()?,
+            triangles: self.input.take().map(Input::into_seen),
+            wires: self.wires.take().map(WireSearch::into_seen),
+            report: self.report,
+        })
+    }
+
+    /// Adds what was found of the next sub-domain. Errors: the disk.
+    pub(super) fn add(&mut self, part: PartReport) -> Result<(), StoreError> {
+        self.report.add(part.report);
+        for (sum, lanes) in self.digests.iter_mut().zip(part.digests) {
+            sum.merge(&Digest { lanes });
+        }
+        for (region, tets, volume) in part.regions {
+            let sum = self.regions.entry(region).or_default();
+            sum.tets += tets;
+            sum.volume += volume;
+        }
+        self.volumes = self.volumes.and(&part.volumes);
+        self.interfaces.add(part.interfaces)?;
+        if let (Some(input), Some(seen)) = (&mut self.input, part.triangles) {
+            input.add(seen);
+        }
+        if let (Some(wires), Some(seen)) = (&mut self.wires, part.wires) {
+            wires.add(&seen);
+        }
+        Ok(())
+    }
+
     pub(super) fn finish(
         mut self,
         interfaces: &[InterfaceRow],
@@ -493,9 +539,12 @@ impl<'a> Audit<'a> {
             self.interfaces.finish(interfaces, &mut self.report)?;
         }
         check_regions(regions, &self.regions, &mut self.report);
+        self.report.volume = self.volumes.of_tets;
+        self.report.volume_within_boundary = self.volumes.within_boundary;
         if self.options.level >= Level::Geometry {
             let (found, expected) = (self.report.volume, self.report.volume_within_boundary);
-            let tolerance = VOLUME_TOLERANCE * self.volume_scale.max(found) + self.volume_rounding;
+            let tolerance =
+                VOLUME_TOLERANCE * self.volumes.scale.max(found) + self.volumes.rounding;
             if (found - expected).abs() > tolerance {
                 let finding = Finding::VolumeDiffers;
                 self.report.find(finding, || {

@@ -11,7 +11,19 @@ use crate::sealed::Corner;
 const OFFENDERS_KEPT: u64 = 10;
 
 /// The levels of checking, each with those before it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Serialize,
+    rkyv::Archive,
+    rkyv::Serialize,
+    rkyv::Deserialize,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum Level {
     /// Every record can be read and counts agree; nodes exist and differ; digests are right.
@@ -28,7 +40,20 @@ pub enum Level {
 }
 
 /// Kinds of things that make a mesh invalid.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Serialize,
+    rkyv::Archive,
+    rkyv::Serialize,
+    rkyv::Deserialize,
+)]
+#[rkyv(derive(PartialEq, Eq, PartialOrd, Ord))]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Finding {
@@ -67,7 +92,7 @@ pub enum Finding {
 }
 
 /// One example of a finding.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, rkyv::Archive, rkyv::Serialize, rkyv::Deserialize)]
 pub struct Offender {
     /// The kind of fault.
     pub finding: Finding,
@@ -84,7 +109,7 @@ pub struct Offender {
 }
 
 /// The result of a verification.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, rkyv::Archive, rkyv::Serialize, rkyv::Deserialize)]
 pub struct Report {
     /// How much was checked.
     pub level: Level,
@@ -166,6 +191,33 @@ impl Report {
             interface_digest: String::new(),
             findings: BTreeMap::new(),
             offenders: Vec::new(),
+        }
+    }
+
+    /// Adds what was found of another part of the mesh. What is said of the whole alone, volumes, digests and the input, is left.
+    pub(super) fn add(&mut self, part: Self) {
+        for (sum, n) in [
+            (&mut self.subdomains, part.subdomains),
+            (&mut self.tets, part.tets),
+            (&mut self.vertices, part.vertices),
+            (&mut self.facets, part.facets),
+            (&mut self.interface_faces, part.interface_faces),
+            (&mut self.inner_faces, part.inner_faces),
+            (&mut self.boundary_faces, part.boundary_faces),
+            (&mut self.delaunay_tested, part.delaunay_tested),
+            (&mut self.delaunay_faces, part.delaunay_faces),
+        ] {
+            *sum += n;
+        }
+        for offender in part.offenders {
+            let listed = (self.offenders.iter()).filter(|o| o.finding == offender.finding);
+            if (listed.count() as u64) < OFFENDERS_KEPT {
+                self.offenders.push(offender);
+            }
+        }
+        for (finding, n) in part.findings {
+            self.valid = false;
+            *self.findings.entry(finding).or_default() += n;
         }
     }
 

@@ -143,6 +143,16 @@ fn verified(draft: &Draft, level: Level) -> Result<Report, StoreError> {
     };
     let report = verify(&mut store, Some(&draft.surface), &options)?;
     assert_eq!(report.digest, tets.to_string());
+    let surface = Some(&draft.surface);
+    let catalog = store.share();
+    let shared = verify_shared(&mut store, surface, &options, &mut |rows, apex, add| {
+        for row in rows {
+            let mut part = catalog.open_row(row.clone(), 1 << 20)?;
+            add(verify_part(&mut part, apex, surface, &options)?)?;
+        }
+        Ok(())
+    })?;
+    assert_eq!(shared, report, "looked at apart and added up");
     Ok(report)
 }
 

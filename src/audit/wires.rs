@@ -19,6 +19,14 @@ pub(super) struct WireSearch<'a> {
     vertices: HashMap<u32, (Option<usize>, bool)>,
 }
 
+/// The edges and points that one part of the mesh has.
+#[derive(rkyv::Archive, rkyv::Serialize, rkyv::Deserialize, Clone, Debug)]
+pub(super) struct SeenWires {
+    /// The vertices of each edge, the lower number first.
+    edges: Vec<[u32; 2]>,
+    vertices: Vec<u32>,
+}
+
 /// Bytes that the search for the edges and points of a surface holds.
 pub fn wire_bytes(surface: &Surface) -> u64 {
     let wires = &surface.wires;
@@ -60,6 +68,30 @@ impl<'a> WireSearch<'a> {
                 {
                     *is_seen = true;
                 }
+            }
+        }
+    }
+
+    /// What was seen, for [`add`](Self::add) elsewhere.
+    pub fn into_seen(self) -> SeenWires {
+        let edges = self.edges.into_iter().filter(|(_, (_, is_seen))| *is_seen);
+        let vertices = (self.vertices.into_iter()).filter(|(_, (_, is_seen))| *is_seen);
+        SeenWires {
+            edges: edges.map(|(ends, _)| ends).collect(),
+            vertices: vertices.map(|(v, _)| v).collect(),
+        }
+    }
+
+    /// Adds what was seen of another part of the mesh.
+    pub fn add(&mut self, other: &SeenWires) {
+        for ends in &other.edges {
+            if let Some((_, is_seen)) = self.edges.get_mut(ends) {
+                *is_seen = true;
+            }
+        }
+        for v in &other.vertices {
+            if let Some((_, is_seen)) = self.vertices.get_mut(v) {
+                *is_seen = true;
             }
         }
     }

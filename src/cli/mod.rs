@@ -85,7 +85,15 @@ fn run_rank(ranks: &ranks::Ranks) -> ExitCode {
             Err(failure) => ExitCode::from(failure.exit()),
         };
     }
-    ExitCode::from(ranks.serve(&args.command, |run| mesh::begin(run, &[], &console)))
+    ExitCode::from(ranks.serve(|| match &args.command {
+        Command::Mesh(args) => mesh::begin(&args.run, &[], &console),
+        Command::Resume(args) => mesh::begin(&args.run, &[], &console),
+        Command::Verify(args) => verify::settings(args, &console),
+        _ => Err(Failure::new(
+            "internal",
+            "a rank was asked for what it cannot do",
+        )),
+    }))
 }
 
 /// Signals end the run from now on.

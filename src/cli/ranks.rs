@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
-use std::sync::{Arc, Condvar, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -17,9 +17,9 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 
-use super::args::{Command, RunArgs};
 use super::failure::Failure;
 use super::tasks;
+use crate::api::verify_server::Server;
 use crate::api::{Error, Settings, guarded};
 use crate::io::write::Share;
 use crate::pipeline::{self, Hands, HelperFailure, Helpers, PipelineError, TaskSettings};
@@ -98,9 +98,7 @@ pub(super) fn begin() -> Result<Option<Arc<Ranks>>, Failure> {
         let _ = RANKS.set(ranks.clone());
     }
     if size > 1 && rank == 0 {
-        let slots = OnceLock::new();
-        let ranks = ranks.clone();
-        let _ = HELPERS.set(Arc::new(RankHelpers { ranks, slots }));
+        let _ = HELPERS.set(Arc::new(RankHelpers::of(&ranks)));
     }
     Ok(Some(ranks))
 }
@@ -138,11 +136,7 @@ pub(super) fn gather<T: Serialize + DeserializeOwned>(
         ranks.send(0, CONTROL, bytes);
         return mine;
     }
-    let slots = OnceLock::new();
-    let helpers = RankHelpers {
-        ranks: ranks.clone(),
-        slots,
-    };
+    let helpers = RankHelpers::of(ranks);
     // All are heard, whatever one of them says, so that none sends to who is gone.
     let others: Vec<_> = (1..ranks.size)
         .map(|rank| helpers.answer(rank, CONTROL))
@@ -274,66 +268,58 @@ impl Ranks {
     }
 
     /// Does what rank 0 asks for, until it says that this is the end; `begin` tells how the command runs.
-    pub fn serve(
-        &self,
-        command: &Command,
-        begin: impl Fn(&RunArgs) -> Result<Settings, Failure>,
-    ) -> u8 {
-        let run = match command {
-            Command::Mesh(args) => Some(&args.run),
-            Command::Resume(args) => Some(&args.run),
-            _ => None,
-        };
-        loop {
-            let (_, letter) = self.receive_any();
-            let job = match letter.split_first() {
-                Some((&DONE, job)) => job,
-                _ => return 0,
-            };
-            let done = match run {
-                Some(run) => begin(run).and_then(|settings| {
-                    let done = guarded(&settings, || {
-                        let budget = Budget::new(settings.cap()?);
-                        Ok(self.serve_job(job, &budget)?)
-                    });
-                    done.map_err(Failure::from)
-                }),
-                None => Err(Failure::new(
-                    "internal",
-                    "a rank was asked for what it cannot do",
-                )),
-            };
-            match done {
-                Ok(()) => return 0,
-                Err(failure) => self.send(0, CONTROL, failed(failure.code, &failure.message)),
-            }
+    pub fn serve(&self, begin: impl Fn() -> Result<Settings, Failure>) -> u8 {
+        let (_, mut letter) = self.receive_any();
+        while let Some((&DONE, job)) = letter.split_first() {
+            let done = begin().and_then(|settings| {
+                let done = guarded(&settings, || self.serve_job(job, &settings));
+                done.map_err(Failure::from)
+            });
+            letter = done.unwrap_or_else(|failure| {
+                self.send(0, CONTROL, failed(failure.code, &failure.message));
+                self.receive_any().1
+            });
         }
+        0
     }
 
-    fn serve_job(&self, job: &[u8], budget: &Budget) -> Result<(), PipelineError> {
-        let settings = TaskSettings {
-            scratch: tasks::scratch_of_machine(),
-            wait: WAIT,
-        };
+    /// Does orders of a job; what came after the last of them.
+    fn serve_job(&self, job: &[u8], settings: &Settings) -> Result<Vec<u8>, Error> {
         let started = |slots: usize| {
             let bytes = [vec![DONE], (slots as u32).to_le_bytes().to_vec()].concat();
             self.send(0, CONTROL, bytes);
         };
+        let mut end = vec![END];
         let mut next = || match self.receive_any() {
-            (CONTROL, _) => None,
+            (CONTROL, letter) => {
+                end = letter;
+                None
+            }
             (tag, order) => Some((tag as usize - 1, order)),
         };
-        let answer = |slot: usize, done: Result<Vec<u8>, PipelineError>| {
+        let answer = |slot: usize, done: Result<Vec<u8>, Error>| {
             let bytes = match done {
                 Ok(receipt) => [vec![DONE], receipt].concat(),
-                Err(error) => {
-                    let error = Error::from(error);
-                    failed(error.code(), error.message())
-                }
+                Err(error) => failed(error.code(), error.message()),
             };
             self.send(0, slot as i32 + 1, bytes);
         };
-        pipeline::serve(job, &settings, budget, &|_| (), started, &mut next, &answer)
+        if let Some(server) = Server::begin(job, settings) {
+            let server = server?;
+            started(1);
+            while let Some((slot, order)) = next() {
+                answer(slot, server.perform(&order));
+            }
+            return Ok(end);
+        }
+        let how = TaskSettings {
+            scratch: tasks::scratch_of_machine(),
+            wait: WAIT,
+        };
+        let answer = |slot, done: Result<_, PipelineError>| answer(slot, done.map_err(Error::from));
+        let budget = Budget::new(settings.cap()?);
+        pipeline::serve(job, &how, &budget, &|_| (), started, &mut next, &answer)?;
+        Ok(end)
     }
 }
 
@@ -347,10 +333,21 @@ fn failed(code: &str, message: &str) -> Vec<u8> {
 struct RankHelpers {
     ranks: Arc<Ranks>,
     /// Of each order at once: the rank, and which of its own it is.
-    slots: OnceLock<Vec<(i32, i32)>>,
+    slots: Mutex<Vec<(i32, i32)>>,
 }
 
 impl RankHelpers {
+    fn of(ranks: &Arc<Ranks>) -> Self {
+        Self {
+            ranks: ranks.clone(),
+            slots: Mutex::default(),
+        }
+    }
+
+    fn slots(&self) -> MutexGuard<'_, Vec<(i32, i32)>> {
+        self.slots.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     fn ask(&self, rank: i32, tag: i32, message: Vec<u8>) -> Result<(), HelperFailure> {
         if i32::try_from(message.len()).is_err() {
             return Err(HelperFailure {
@@ -394,20 +391,26 @@ impl Helpers for RankHelpers {
         for rank in others.clone() {
             self.ask(rank, CONTROL, [&[DONE], job].concat())?;
         }
+        // All are heard, whatever one of them says.
+        let answers: Vec<_> = others
+            .map(|rank| (rank, self.answer(rank, CONTROL)))
+            .collect();
         let mut slots = Vec::new();
-        for rank in others {
-            let answer = self.answer(rank, CONTROL)?;
+        for (rank, answer) in answers {
+            let answer = answer?;
             let n = answer.first_chunk().map_or(0, |&n| u32::from_le_bytes(n));
             slots.extend((0..n as i32).map(|slot| (rank, slot)));
         }
         // One order of each rank before the second of any.
         slots.sort_by_key(|&(rank, slot)| (slot, rank));
-        Ok(self.slots.get_or_init(|| slots).len())
+        let n = slots.len();
+        *self.slots() = slots;
+        Ok(n)
     }
 
     fn perform(&self, slot: usize, order: Vec<u8>) -> Result<Vec<u8>, HelperFailure> {
-        let slots = self.slots.get().map_or(&[][..], |slots| slots);
-        let &(rank, of_rank) = slots.get(slot).ok_or_else(|| HelperFailure {
+        let found = self.slots().get(slot).copied();
+        let (rank, of_rank) = found.ok_or_else(|| HelperFailure {
             code: "internal".to_owned(),
             message: "an order for a rank that has not begun".to_owned(),
         })?;

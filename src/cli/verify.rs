@@ -7,10 +7,10 @@ use super::console::Console;
 use super::failure::Failure;
 use super::input::{self, Space};
 use super::memory;
-use crate::api::Surface;
 use crate::api::preflight::scratch_beside;
 use crate::api::store::open_finished;
 use crate::api::verify::{check, invalid, sentence};
+use crate::api::{Settings, Surface};
 use crate::audit::Level;
 use crate::surface;
 
@@ -22,8 +22,8 @@ pub fn run(args: &VerifyArgs, console: &Console) -> Result<u8, Failure> {
         return Err(Failure::new("usage", message)
             .help("name all files with --against and --embed…, or none: the store knows them"));
     }
-    let cap = memory::cap(args.read.memory.as_deref())?;
-    let settings = console.settings(Some(cap), None);
+    let settings = settings(args, console)?;
+    let cap = settings.cap()?;
     let mut open = open_finished(&args.store)?;
     // The store may be one that can only be read.
     let scratch = std::env::temp_dir().join("verify");
@@ -64,4 +64,16 @@ pub fn run(args: &VerifyArgs, console: &Console) -> Result<u8, Failure> {
     }
     console.line(&sentence(&report));
     Ok(0)
+}
+
+/// The cap, and who helps.
+pub(super) fn settings(args: &VerifyArgs, console: &Console) -> Result<Settings, Failure> {
+    let cap = memory::cap(args.read.memory.as_deref())?;
+    #[cfg_attr(not(feature = "mpi"), allow(unused_mut))]
+    let mut settings = console.settings(Some(cap), None);
+    #[cfg(feature = "mpi")]
+    {
+        settings.hands = super::ranks::hands();
+    }
+    Ok(settings)
 }

@@ -32,6 +32,12 @@ pub(crate) enum Kind {
     Receipts = 3,
     /// A size field.
     SizeField = 4,
+    /// What is the same for all sub-domains of a verification.
+    Verification = 5,
+    /// The row of a sub-domain to be verified.
+    PartOrder = 6,
+    /// What was found of a sub-domain.
+    PartReport = 7,
 }
 
 /// What stands before a body.

@@ -19,7 +19,8 @@ pub(super) mod stages;
 pub(super) mod subdomain;
 mod worker;
 
-pub(super) use bytes::{Kind, body, from_bytes, head, to_bytes};
+pub(crate) use bytes::{Kind, from_bytes, to_bytes};
+pub(super) use bytes::{body, head};
 pub use helpers::{Hands, HelperFailure, Helpers};
 pub(super) use order::{CutOrder, Order, SubdomainOrder};
 pub(super) use receipt::{CutReceipt, InheritedFace, Receipt, SubdomainReceipt, Traffic};
