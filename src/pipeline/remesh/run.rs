@@ -18,6 +18,7 @@ use crate::pipeline::seal::totals::{SealedTotals, journal, sum_totals};
 use crate::pipeline::tree::{self, PartMesh, blob};
 use crate::pipeline::work::coarse_snapshot::reopen;
 use crate::pipeline::work::common::Common;
+use crate::pipeline::work::soundness::{check_owners, panic_is_damage_of};
 use crate::pipeline::work::subdomain::{FinishedSubdomain, SubdomainJob};
 use crate::pipeline::workers::{Hand, map_bounded};
 use crate::sealed::SealedError;
@@ -54,25 +55,35 @@ struct Job {
 
 impl Job {
     fn run(self, common: Common, watch: &Watcher) -> Result<FinishedSubdomain, PipelineError> {
-        attempt(|| {
-            let share = self.subdomain.share;
+        let Self {
+            subdomain,
+            kept,
+            path,
+        } = self;
+        let (share, generation) = (subdomain.share, subdomain.generation);
+        let (rank, scratch) = (kept.rank, subdomain.scratch.clone());
+        let open = || {
             let backing = Backing {
-                subdomain: self.kept.rank,
-                generation: self.subdomain.generation,
-                spill: self.subdomain.scratch.clone(),
+                subdomain: rank,
+                generation,
+                spill: scratch.clone(),
                 made: None,
                 base: None,
                 cache_bytes: share.redb as usize,
             };
             let space = Workspace {
-                dir: &self.subdomain.scratch,
+                dir: &scratch,
                 memory: share.buffers / 2,
             };
-            let cache = (share.redb / 2) as usize;
-            let mut kept = CoarseSnapshot::open(&self.path, self.kept, cache)?;
-            let mesh = reopen(&mut kept, backing, share.frames, &space)?;
-            drop(kept);
-            self.subdomain.finish(mesh, common, watch)
+            let mut kept = CoarseSnapshot::open(&path, kept, (share.redb / 2) as usize)?;
+            reopen(&mut kept, backing, share.frames, &space)
+        };
+        attempt(|| {
+            panic_is_damage_of((&path, rank), open, || {
+                let mut mesh = open()?;
+                check_owners(&mut mesh, &subdomain.owners, (&path, rank))?;
+                subdomain.finish(mesh, common, watch)
+            })
         })?
     }
 }

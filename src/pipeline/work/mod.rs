@@ -14,7 +14,7 @@ mod helpers;
 mod order;
 mod receipt;
 mod saturate;
-mod soundness;
+pub(super) mod soundness;
 pub(super) mod stages;
 pub(super) mod subdomain;
 mod worker;

@@ -1,17 +1,19 @@
 //! Whether a mesh that a job began with is one: asked when the job panics, for whoever knows the format can change pages and make their
 //! sums right again.
 
+use std::collections::{BTreeMap, HashSet};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 use crate::mesh::{FaceRef, Mesh};
 use crate::pipeline::error::PipelineError;
 use crate::sealed::SealedError;
 use crate::storage::{DiskPath, Pages, StorageError, attempt};
+use crate::topology::FacesAcross;
 use tetdb_schema::page::{RECORDS, SLOT_MASK};
 
 /// Does `work`. Errors: its own; damage, when it panics and what `open` opens, which it began with, is no mesh. Other panics are bugs and
 /// go on unwinding.
-pub(super) fn panic_is_damage_of<T>(
+pub(crate) fn panic_is_damage_of<T>(
     (base, part): (&DiskPath, u32),
     open: impl Fn() -> Result<Mesh, PipelineError>,
     work: impl FnOnce() -> Result<T, PipelineError>,
@@ -26,18 +28,49 @@ pub(super) fn panic_is_damage_of<T>(
     }
     match attempt(|| open().map(|mut mesh| is_sound(&mut mesh)))?? {
         true => resume_unwind(panic),
-        false => Err(PipelineError::from(SealedError::Content {
-            path: base.path().to_owned(),
-            subdomain: part,
-            what: "tetrahedra of its working mesh do not fit together".to_owned(),
-        })),
+        false => Err(damaged(
+            (base, part),
+            "tetrahedra of its working mesh do not fit together",
+        )),
     }
 }
 
-/// Whether every tetrahedron and face has vertices of the mesh, and every neighbor the same face. Unwinds on errors.
+fn damaged((base, part): (&DiskPath, u32), what: &str) -> PipelineError {
+    PipelineError::from(SealedError::Content {
+        path: base.path().to_owned(),
+        subdomain: part,
+        what: what.to_owned(),
+    })
+}
+
+/// Looks at the mesh of a part before work begins. Errors: damage, a face between sub-domains that nobody has beyond.
+pub(crate) fn check_owners<P: Pages>(
+    mesh: &mut Mesh<P>,
+    owners: &BTreeMap<u32, FacesAcross>,
+    place: (&DiskPath, u32),
+) -> Result<(), PipelineError> {
+    let all = (0..mesh.n_interface_faces()).map(|n| mesh.interface_face(n));
+    let mut beyond = all.map(|face| owners.get(&face.cut)?.other(face.index));
+    match beyond.all(|other| other.is_some()) {
+        true => Ok(()),
+        false => Err(damaged(
+            place,
+            "a face between sub-domains that none has beyond",
+        )),
+    }
+}
+
+/// Whether every tetrahedron and face has vertices of the mesh, every neighbor the same face, and each face between sub-domains a tetrahedron.
+/// Unwinds on errors.
 fn is_sound<P: Pages>(mesh: &mut Mesh<P>) -> bool {
     let (tets, vertices) = (mesh.tet_ids_end(), mesh.vertex_ids_end());
     let is_id = |id: u32, end: u32| id < end && ((id & SLOT_MASK) as usize) < RECORDS;
+    let sorted = |mut face: [u32; 3]| {
+        face.sort_unstable();
+        face
+    };
+    let between = (0..mesh.n_interface_faces()).map(|n| sorted(mesh.interface_face(n).vertices));
+    let mut alone: HashSet<[u32; 3]> = between.collect();
     let mut from = 0;
     while let Some((t, tet)) = mesh.next_tet(from) {
         from = t + 1;
@@ -47,6 +80,7 @@ fn is_sound<P: Pages>(mesh: &mut Mesh<P>) -> bool {
             return false;
         }
         for face in 0..4 {
+            alone.remove(&sorted(tet.face(face)));
             let across = tet.neighbor[face];
             if !across.exists() {
                 continue;
@@ -55,10 +89,6 @@ fn is_sound<P: Pages>(mesh: &mut Mesh<P>) -> bool {
                 return false;
             }
             let other = mesh.tet(across.tet());
-            let sorted = |mut face: [u32; 3]| {
-                face.sort_unstable();
-                face
-            };
             let is_same = sorted(other.face(across.face())) == sorted(tet.face(face));
             let is_mutual = other.neighbor[across.face()] == FaceRef::new(t, face);
             if !other.is_live() || !is_mutual || !is_same {
@@ -66,7 +96,49 @@ fn is_sound<P: Pages>(mesh: &mut Mesh<P>) -> bool {
             }
         }
     }
-    (0..mesh.n_facets()).all(|n| mesh.facet(n).vertices.iter().all(|&v| is_id(v, vertices)))
-        && (0..mesh.n_interface_faces())
-            .all(|n| (mesh.interface_face(n).vertices.iter()).all(|&v| is_id(v, vertices)))
+    alone.is_empty()
+        && (0..mesh.n_facets()).all(|n| mesh.facet(n).vertices.iter().all(|&v| is_id(v, vertices)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::delaunay::enclose;
+    use crate::geom::{Aabb, Point};
+    use crate::mesh::InterfaceFace;
+    use crate::storage::FlatPages;
+
+    fn face(vertices: [u32; 3]) -> InterfaceFace {
+        InterfaceFace {
+            vertices,
+            cut: 2,
+            index: 43,
+            side: 0,
+        }
+    }
+
+    #[test]
+    fn a_face_between_sub_domains_belongs_to_the_mesh_and_to_a_neighbor() {
+        let mut mesh = Mesh::new(FlatPages::default());
+        let t = enclose(&mut mesh, &Aabb::around([Point::ZERO, Point::ONE]));
+        assert!(is_sound(&mut mesh));
+        let tet = mesh.tet(t);
+        mesh.add_interface_face(face(tet.face(0)));
+        assert!(is_sound(&mut mesh));
+        let path = DiskPath::from(std::path::Path::new("part"));
+        let error = check_owners(&mut mesh, &BTreeMap::new(), (&path, 1)).expect_err("no owner");
+        assert!(error.to_string().contains("none has beyond"), "{error}");
+        // Three of eight corners that are no face.
+        let mut tets = Vec::new();
+        while let Some((t, tet)) = mesh.next_tet(tets.last().map_or(0, |&(t, _)| t + 1)) {
+            tets.push((t, tet));
+        }
+        let corners: Vec<u32> = mesh.vertex_ids().collect();
+        let triples = corners.windows(3).map(|v| [v[0], v[1], v[2]]);
+        let is_face =
+            |v: &[u32; 3]| (tets.iter()).any(|(_, tet)| v.iter().all(|&v| tet.local(v).is_some()));
+        let none = triples.into_iter().find(|v| !is_face(v));
+        mesh.add_interface_face(face(none.expect("three that are no face")));
+        assert!(!is_sound(&mut mesh));
+    }
 }
