@@ -9,7 +9,6 @@ use super::error::Result;
 use super::numbering::PartNumbers;
 use super::scope::Scope;
 use super::stream::{Records, Stream, scratch};
-use crate::sealed::SealedError;
 use crate::storage::{SortRecord, Sorter, sort_record};
 
 /// Marks the key of an interface face, and sorts it behind the input triangles; below it the number of the cut, then of the face.
@@ -57,23 +56,6 @@ pub(super) struct FaceSource<'a> {
     pub rank: u32,
     pub numbers: &'a PartNumbers,
     pub scope: Scope<'a>,
-    /// Its file.
-    pub path: &'a Path,
-}
-
-impl FaceSource<'_> {
-    /// Numbers of a face's vertices. Errors: damage; the tetrahedra have not these.
-    fn vertices(&self, vertices: [u32; 3]) -> Result<[u64; 3]> {
-        let mut numbers = [0; 3];
-        for (number, v) in numbers.iter_mut().zip(vertices) {
-            *number = self.numbers.vertex(v).ok_or_else(|| SealedError::Content {
-                path: self.path.to_owned(),
-                subdomain: self.rank,
-                what: format!("a face names vertices {vertices:?}"),
-            })?;
-        }
-        Ok(numbers)
-    }
 }
 
 /// Collects faces of one sub-domain after the other.
@@ -109,7 +91,7 @@ impl FaceSorter {
         let face = Face {
             key: f.triangle,
             is_second: side != preferred,
-            vertices: part.vertices(f.vertices)?,
+            vertices: part.numbers.of(f.vertices)?,
             label: f.label,
             regions,
             tet,
@@ -132,7 +114,7 @@ impl FaceSorter {
         let face = Face {
             key: INTERFACE | u64::from(f.cut) << 32 | u64::from(f.index),
             is_second: false,
-            vertices: part.vertices(f.vertices)?,
+            vertices: part.numbers.of(f.vertices)?,
             label,
             regions: [0, 0],
             tet,

@@ -128,15 +128,13 @@ impl<'a> Merged<'a> {
         let mut wires = WrittenWires::gather(store, &row, (&parts, &numbering), memory)?;
         let mut sorter = FaceSorter::new(dir, memory as u64 / 4);
         for (p, source) in parts.iter().enumerate() {
-            let numbers = numbering.part(&parts, p)?;
+            let numbers = numbering.part(store, &parts, p)?;
             let rank = source.row.rank;
             let mut from = store.open_subdomain(rank, memory / 4)?;
-            let path = from.path().to_owned();
             let part = FaceSource {
                 rank,
                 numbers: &numbers,
                 scope,
-                path: &path,
             };
             collect_faces(
                 &mut from,
@@ -220,7 +218,7 @@ impl<'a> Merged<'a> {
 
     /// Numbers of the vertices and tetrahedra of sub-domain `p`. Errors: the disk.
     pub fn numbers_of(&self, p: usize) -> Result<PartNumbers> {
-        self.numbering.part(&self.parts, p)
+        self.numbering.part(self.store, &self.parts, p)
     }
 
     /// Every vertex that several sub-domains have, by the places of these. Errors: damage, the disk.
@@ -423,9 +421,6 @@ impl<'a> Merged<'a> {
                     let Some(number) = numbers.tet(local) else {
                         continue;
                     };
-                    if let Some(&v) = tet.nodes.iter().find(|&&v| u64::from(v) >= row.vertices) {
-                        part.corner(v)?;
-                    }
                     let (mut quality, mut excess) = (f64::NAN, f64::NAN);
                     if measured != Measured::Nothing {
                         let points = part.corners(tet.nodes)?.map(|c| c.point);
@@ -438,7 +433,7 @@ impl<'a> Merged<'a> {
                             };
                         }
                     }
-                    let mut nodes = tet.nodes.map(|v| numbers.of(v));
+                    let mut nodes = numbers.of(tet.nodes)?;
                     if let Some(changes) = &mut changes {
                         changes.apply(number, &mut nodes)?;
                     }

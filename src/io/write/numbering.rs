@@ -108,6 +108,8 @@ pub(super) struct Numbering {
 ///
 /// Shape: `locals`, ascending, are numbered elsewhere, as `numbers[i]`; all others follow `first`.
 pub(super) struct PartNumbers {
+    /// Its file and sub-domain.
+    place: (PathBuf, u32),
     first: u64,
     locals: Vec<u32>,
     numbers: Vec<u64>,
@@ -139,11 +141,24 @@ impl PartNumbers {
         Some(self.first_tet + u64::from(dense))
     }
 
-    /// The number of vertex `local`, which is written.
+    /// The numbers of the vertices of a record that is written, so that they are too. Errors: damage; the record names others.
     #[inline]
-    pub fn of(&self, local: u32) -> u64 {
-        let number = self.vertex(local);
-        number.expect("vertices of what is written are written")
+    pub fn of<const N: usize>(&self, locals: [u32; N]) -> Result<[u64; N]> {
+        let mut numbers = [0; N];
+        for (number, local) in numbers.iter_mut().zip(locals) {
+            *number = self.vertex(local).ok_or_else(|| self.names(&locals))?;
+        }
+        Ok(numbers)
+    }
+
+    #[cold]
+    fn names(&self, locals: &[u32]) -> SealedError {
+        let (path, subdomain) = self.place.clone();
+        SealedError::Content {
+            path,
+            subdomain,
+            what: format!("a record names vertices {locals:?}"),
+        }
     }
 
     /// The number of a vertex that has this number among those of the part that are written.
@@ -269,16 +284,19 @@ impl Numbering {
         self.n_vertices
     }
 
-    /// The numbers of part `p` of `parts`. Memory: 12 bytes per vertex that another part numbers, and `Chosen` where that is not all.
+    /// The numbers of part `p` of `parts` of `store`. Memory: 12 bytes per vertex that another part numbers, and `Chosen` where that is not all.
     ///
     /// Errors: the disk.
-    pub fn part(&self, parts: &[Source], p: usize) -> Result<PartNumbers> {
+    pub fn part(&self, store: &Catalog, parts: &[Source], p: usize) -> Result<PartNumbers> {
+        let row = &parts[p].row;
+        let path = store.file_path(row.rank, row.generation);
         let n = self.shared[p] as usize;
         let mut part = PartNumbers {
+            place: (path.path().to_owned(), row.rank),
             first: self.firsts[p],
             locals: Vec::with_capacity(n),
             numbers: Vec::with_capacity(n),
-            n_locals: parts[p].row.vertices as u32,
+            n_locals: row.vertices as u32,
             first_tet: parts[..p].iter().map(|part| part.n_tets).sum(),
             chosen: parts[p].chosen()?,
         };
@@ -400,4 +418,30 @@ fn twice(store: &mut Catalog, rank: u32, id: u64) -> super::WriteError {
         what: format!("two vertices have the id {id}"),
     })
     .into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn records_that_name_vertices_beyond_the_last_are_damage() {
+        let numbers = PartNumbers {
+            place: ("a.redb".into(), 7),
+            first: 10,
+            locals: vec![1],
+            numbers: vec![4],
+            n_locals: 4,
+            first_tet: 0,
+            chosen: None,
+        };
+        assert_eq!(numbers.of([0, 1, 2, 3]).unwrap(), [10, 4, 11, 12]);
+        let error = numbers.of([0, 4, 2]).unwrap_err();
+        assert_eq!(error.code(), "damaged");
+        let text = error.to_string();
+        assert!(
+            text.contains("a.redb") && text.contains("[0, 4, 2]"),
+            "{text}"
+        );
+    }
 }

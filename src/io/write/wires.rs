@@ -60,7 +60,7 @@ impl WrittenWires {
         let wanted: HashSet<u32> = all.collect();
         let mut known = HashMap::new();
         for (p, source) in parts.iter().enumerate().filter(|_| !wanted.is_empty()) {
-            let numbers = numbering.part(parts, p)?;
+            let numbers = numbering.part(store, parts, p)?;
             let mut part = store.open_subdomain(source.row.rank, memory / 4)?;
             for (local, vertex) in (0u32..).zip(part.vertices()) {
                 let vertex = vertex?;

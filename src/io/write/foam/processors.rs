@@ -218,7 +218,7 @@ impl Job<'_> {
             }
             // Both sides begin with the vertex that has the least number in the whole; its neighbor then goes round the other way.
             let [a, b, c] = face.vertices;
-            let [i, j, k] = face.vertices.map(|v| numbers.of(v));
+            let [i, j, k] = numbers.of(face.vertices)?;
             let turned = match i.min(j).min(k) {
                 least if least == i => [a, b, c],
                 least if least == j => [b, c, a],
@@ -291,7 +291,7 @@ impl Job<'_> {
             (&dir, "pointProcAddressing"),
             size.points,
             ascii,
-            |file| (0..size.points as u32).try_for_each(|v| file.label(numbers.of(v) as i32)),
+            |file| (0..size.points as u32).try_for_each(|v| file.label(numbers.of([v])?[0] as i32)),
         )?;
         write_labels(
             draft,

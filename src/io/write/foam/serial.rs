@@ -124,7 +124,7 @@ fn write_faces(
         let faces = walk.part(mesh, p)?;
         let numbers = mesh.numbers_of(p)?;
         let first = numbers.first_tet as u32;
-        let global = |vertices: [u32; 3]| vertices.map(|v| numbers.of(v) as u32);
+        let global = |vertices| numbers.of(vertices).map(|v| v.map(|v| v as u32));
         in_order(faces.inner, faces.uppers, |face| {
             let (owner, neighbor, vertices, zone) = match face {
                 WithTwoCells::Here(f) => (f.owner, first + f.neighbor, f.vertices, f.zone),
@@ -133,7 +133,7 @@ fn write_faces(
             if let Some((zone, is_flipped)) = zone_of(zone) {
                 zones.push(zone, files.written() as u32, is_flipped)?;
             }
-            files.inner(first + owner, neighbor, global(vertices))
+            files.inner(first + owner, neighbor, global(vertices)?)
         })?;
         for face in faces.outer {
             let face = face?;
@@ -141,7 +141,7 @@ fn write_faces(
                 patch: face.patch,
                 place: n_outer,
                 owner: first + face.owner,
-                vertices: global(face.vertices),
+                vertices: global(face.vertices)?,
             })?;
             n_outer += 1;
         }

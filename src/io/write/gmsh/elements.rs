@@ -84,7 +84,7 @@ pub(super) fn write(
             for tet in part.tets() {
                 let (id, tet) = tet?;
                 if let Some(number) = numbers.tet(id.local()) {
-                    elements.tet(entity, number, tet.nodes.map(|v| numbers.of(v)))?;
+                    elements.tet(entity, number, numbers.of(tet.nodes)?)?;
                 }
             }
         } else {
@@ -101,7 +101,7 @@ pub(super) fn write(
             }
             for tet in sorter.finish()? {
                 let tet = tet?;
-                elements.tet(tet.entity, tet.number, tet.nodes.map(|v| numbers.of(v)))?;
+                elements.tet(tet.entity, tet.number, numbers.of(tet.nodes)?)?;
             }
         }
         mesh.advance(part.row().tets as usize);

@@ -56,7 +56,7 @@ impl Ghosts {
                     let Some(number) = numbers.tet(local) else {
                         continue;
                     };
-                    let nodes = tet.nodes.map(|v| numbers.of(v));
+                    let nodes = numbers.of(tet.nodes)?;
                     others.clear();
                     for v in nodes {
                         let from = shared.partition_point(|s| s.0 < v);

@@ -134,7 +134,7 @@ fn claims(mesh: &mut Merged, piece: &Piece, entities: &Entities) -> Result<Sorte
                 continue;
             };
             let entity = entities.volume(tet.region, rank);
-            for v in tet.nodes.map(|v| numbers.of(v)) {
+            for v in numbers.of(tet.nodes)? {
                 if vertices.is_new(v) {
                     claim(v, entity, [0.0; 3])?;
                 }

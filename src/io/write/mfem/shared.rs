@@ -45,7 +45,8 @@ fn entities(mesh: &mut Merged) -> Result<Sorted<Entity>> {
             mut part, numbers, ..
         } = mesh.open_part(p)?;
         let mut push = |face: [u32; 3]| -> Result<()> {
-            let mut ends = face.map(|v| (numbers.of(v), v));
+            let [i, j, k] = numbers.of(face)?;
+            let mut ends = [(i, face[0]), (j, face[1]), (k, face[2])];
             ends.sort_unstable();
             let [a, b, c] = ends;
             for ends in [
