@@ -1,6 +1,7 @@
-//! A point that divides an edge.
+//! Points that divide edges.
 
 use crate::geom::Point;
+use crate::storage::sort_unstable_by;
 
 /// A point to insert.
 #[derive(Clone, Copy, Debug)]
@@ -11,4 +12,43 @@ pub(super) struct Candidate {
     pub tet: u32,
     /// Length class (long first), then the position along the curve.
     pub key: u64,
+}
+
+/// Bits for the place in a part, which is of fewer candidates.
+const PLACE_BITS: u32 = 16;
+
+/// The points of one block in order of insertion: as they were found, part by part, and an order. Where lengths fall fast nearly every edge
+/// has its five, and copies of them would not fit small leases.
+#[derive(Default)]
+pub(super) struct Candidates {
+    parts: Vec<Vec<Candidate>>,
+    /// Key, then part and place in it: points that share a key stay in the order of their edges.
+    order: Vec<(u64, u32)>,
+}
+
+impl Candidates {
+    /// Replaces them by those of `parts`.
+    pub fn set(&mut self, parts: Vec<Vec<Candidate>>) {
+        self.parts = parts;
+        self.order.clear();
+        self.order
+            .reserve_exact(self.parts.iter().map(Vec::len).sum());
+        for (part, candidates) in (0u32..).zip(&self.parts) {
+            assert!(candidates.len() < 1 << PLACE_BITS, "parts are small");
+            let places = (0u32..).map(|place| part << PLACE_BITS | place);
+            let keys = candidates.iter().map(|c| c.key);
+            self.order.extend(keys.zip(places));
+        }
+        sort_unstable_by(&mut self.order, Ord::cmp);
+    }
+
+    /// Each once, although points of many edges have moved to the same place.
+    pub fn iter(&self) -> impl Iterator<Item = &Candidate> {
+        let in_order = self.order.iter().map(|&(_, at)| {
+            let place = at & ((1 << PLACE_BITS) - 1);
+            &self.parts[(at >> PLACE_BITS) as usize][place as usize]
+        });
+        let mut last = None;
+        in_order.filter(move |c| last.replace(c.point) != Some(c.point))
+    }
 }

@@ -59,9 +59,9 @@ impl Worker {
         self.edges.dedup_by_key(|e| e.0);
     }
 
-    /// Fills `candidates` with the points that divide the gathered edges, in order of insertion.
+    /// The points that divide the gathered edges.
     pub(super) fn make_candidates<P: Pages>(&mut self, mesh: &mut Mesh<P>, field: &Field) {
-        self.candidates.clear();
+        self.candidates.set(Vec::new());
         let n = self.edges.len();
         let starts = (0..n).step_by(EDGES_PART);
         let parts: Vec<Range<usize>> = starts.map(|i| i..n.min(i + EDGES_PART)).collect();
@@ -71,20 +71,14 @@ impl Worker {
             order: &self.order,
             placing: self.placing,
         };
-        let mut found = Vec::new();
-        for (candidates, settled) in scan_parts(mesh, &parts, &division) {
-            found.extend(candidates);
+        let found = scan_parts(mesh, &parts, &division);
+        let candidates = found.into_iter().map(|(candidates, settled)| {
             for edge in settled {
                 self.settled.add(edge);
             }
-        }
-        // The points that share a key stay in the order of their edges.
-        let mut order: Vec<(u64, u32)> = found.iter().map(|c: &Candidate| c.key).zip(0..).collect();
-        sort_unstable_by(&mut order, Ord::cmp);
-        let in_order = order.into_iter().map(|(_, k)| found[k as usize]);
-        self.candidates.extend(in_order);
-        // Points of many edges have moved to the same place.
-        self.candidates.dedup_by_key(|c| c.point);
+            candidates
+        });
+        self.candidates.set(candidates.collect());
     }
 }
 
@@ -189,6 +183,7 @@ impl Scan for Division<'_> {
                 settled.push(edge);
             }
         }
+        divider.candidates.shrink_to_fit();
         (divider.candidates, settled)
     }
 }

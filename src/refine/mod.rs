@@ -29,6 +29,7 @@ use crate::mesh::{Mesh, Workspace, dense, renumber, sparse};
 use crate::storage::{Pages, StorageError, check_cancelled};
 
 use activity::Activity;
+use candidate::Candidates;
 use edge_cache::EdgeCache;
 pub use field::{Field, Lengths};
 pub use placement::{Everywhere, PlacementRule};
@@ -67,7 +68,7 @@ pub fn saturate<P: Pages>(
         kernel: Kernel::default(),
         order: HilbertFrame::new(&field.bounds),
         edges: Vec::new(),
-        candidates: Vec::new(),
+        candidates: Candidates::default(),
         recent: Recent::new(),
         active: Activity::all(mesh),
         settled: EdgeCache::new((3 * mesh.n_facets() as usize).min(SETTLED_MAX)),
@@ -142,10 +143,10 @@ impl Worker {
     ) {
         self.collect_edges(mesh, field, pages);
         self.make_candidates(mesh, field);
-        report.candidates += self.candidates.len() as u64;
         let candidates = std::mem::take(&mut self.candidates);
         self.recent.clear();
-        for candidate in &candidates {
+        for candidate in candidates.iter() {
+            report.candidates += 1;
             self.try_insert(mesh, field, candidate, report);
         }
         self.candidates = candidates;

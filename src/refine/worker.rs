@@ -1,7 +1,7 @@
 //! Who divides edges: the kernel and the scratch of one block.
 
 use super::activity::Activity;
-use super::candidate::Candidate;
+use super::candidate::Candidates;
 use super::edge_cache::EdgeCache;
 use super::recent::Recent;
 use crate::delaunay::Kernel;
@@ -12,7 +12,7 @@ pub(super) struct Worker {
     pub order: HilbertFrame,
     /// Scratch: (edge as ordered pair, a tetrahedron that has it).
     pub edges: Vec<(u64, u32)>,
-    pub candidates: Vec<Candidate>,
+    pub candidates: Candidates,
     pub recent: Recent,
     pub active: Activity,
     /// Edges between fixed vertices that need no point, which holds until vertices get other numbers: neither their ends change, nor

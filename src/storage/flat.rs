@@ -3,7 +3,7 @@ use tetdb_schema::page::{SLOTS, Slot, u32_le};
 use super::{Pages, kind};
 
 /// The same accessors over plain arrays, without a cap: what paging is measured against.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub struct FlatPages {
     arrays: [Vec<Slot>; kind::ALL.len()],
 }

@@ -461,11 +461,22 @@ impl Catalog {
     fn check_row(&self, row: &SubdomainRow) -> Result<(), StoreError> {
         let is_finished = Form::of(row.state).is_some() && row.vertices > 0;
         let is_sound = is_box(&row.bounds) && !row.volume.is_nan() && !row.quality.worst.is_nan();
-        match !is_finished || is_sound {
+        let counts = [row.tets, row.vertices, row.facets, row.interface_faces];
+        let reason = match !is_finished || is_sound {
+            false => "gives a sub-domain a box, volume or quality that none can have",
+            true if !are_counts(counts) => "counts more than a sub-domain can have",
+            true => return Ok(()),
+        };
+        Err(self.damaged_row(RowKind::Subdomain.key(0, row.rank), reason.to_owned()))
+    }
+
+    /// The same for a coarse snapshot.
+    fn check_coarse(&self, row: &CoarseRow) -> Result<(), StoreError> {
+        match are_counts([row.tets, row.vertices, row.facets, row.interface_faces]) {
             true => Ok(()),
             false => {
-                let reason = "gives a sub-domain a box, volume or quality that none can have";
-                Err(self.damaged_row(RowKind::Subdomain.key(0, row.rank), reason.to_owned()))
+                let reason = "counts more than a sub-domain can have".to_owned();
+                Err(self.damaged_row(RowKind::Coarse.key(0, row.rank), reason))
             }
         }
     }
@@ -582,12 +593,16 @@ impl Catalog {
 
     /// The coarse snapshots that were kept, by sub-domain.
     pub fn coarse_snapshots(&mut self) -> Result<Vec<CoarseRow>, StoreError> {
-        self.rows(RowKind::Coarse)
+        let rows: Vec<CoarseRow> = self.rows(RowKind::Coarse)?;
+        rows.iter().try_for_each(|row| self.check_coarse(row))?;
+        Ok(rows)
     }
 
     /// The coarse snapshot of one sub-domain, if it was kept.
     pub fn coarse_snapshot(&mut self, rank: u32) -> Result<Option<CoarseRow>, StoreError> {
-        self.row(RowKind::Coarse.key(0, rank))
+        let row: Option<CoarseRow> = self.row(RowKind::Coarse.key(0, rank))?;
+        row.iter().try_for_each(|row| self.check_coarse(row))?;
+        Ok(row)
     }
 
     /// The interfaces by cut, then by ranks.
@@ -734,4 +749,9 @@ fn parsed(kind: &str, name: &str) -> Option<FileRow> {
         generation: generation.parse().ok()?,
     };
     (named(kind, file) == name).then_some(file)
+}
+
+/// Whether records can be counted so: their numbers have 32 bits.
+fn are_counts(counts: [u64; 4]) -> bool {
+    counts.iter().all(|&n| n <= u64::from(u32::MAX))
 }

@@ -248,6 +248,42 @@ fn a_store_of_two_subdomains_reads_back() -> Outcome {
 }
 
 #[test]
+fn a_row_that_counts_more_than_there_can_be_is_damage() -> Outcome {
+    let dir = tempfile::tempdir()?;
+    let path = dir.path().join("two.tetdb");
+    two_subdomains(&path)?;
+    let mut store = Catalog::open_writable(&path)?;
+    let mut row = store.subdomain(1)?;
+    row.facets = u64::MAX;
+    let kept = CoarseRow {
+        rank: 1,
+        generation: 1,
+        tets: u64::from(u32::MAX),
+        vertices: u64::MAX,
+        facets: 0,
+        interface_faces: 0,
+        chunks: [0; 4],
+        bytes: 0,
+    };
+    store.commit(|step| {
+        step.set_subdomain(&row);
+        step.list_coarse(&kept);
+        Ok(())
+    })?;
+    let found = [
+        no_error(store.subdomain(1)),
+        no_error(store.subdomains()),
+        no_error(store.coarse_snapshot(1)),
+        no_error(store.coarse_snapshots()),
+    ];
+    for error in found {
+        assert!(error.is_damage(), "{error}");
+        assert!(error.to_string().contains("counts more"), "{error}");
+    }
+    Ok(())
+}
+
+#[test]
 fn a_damaged_file_is_an_error_that_names_the_place() -> Outcome {
     let dir = tempfile::tempdir()?;
     let path = dir.path().join("two.tetdb");

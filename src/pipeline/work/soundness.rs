@@ -60,7 +60,8 @@ pub(crate) fn check_owners<P: Pages>(
     }
 }
 
-/// Whether every tetrahedron and face has vertices of the mesh, every neighbor the same face, and each face between sub-domains a tetrahedron.
+/// Whether every tetrahedron and face has vertices of the mesh, every neighbor the same face, and each face between sub-domains a tetrahedron
+/// behind it that keeps it.
 /// Unwinds on errors.
 fn is_sound<P: Pages>(mesh: &mut Mesh<P>) -> bool {
     let (tets, vertices) = (mesh.tet_ids_end(), mesh.vertex_ids_end());
@@ -69,7 +70,13 @@ fn is_sound<P: Pages>(mesh: &mut Mesh<P>) -> bool {
         face.sort_unstable();
         face
     };
-    let between = (0..mesh.n_interface_faces()).map(|n| sorted(mesh.interface_face(n).vertices));
+    // As it turns, from its least vertex on.
+    let turned = |[a, b, c]: [u32; 3]| match a.min(b).min(c) {
+        least if least == a => [a, b, c],
+        least if least == b => [b, c, a],
+        _ => [c, a, b],
+    };
+    let between = (0..mesh.n_interface_faces()).map(|n| turned(mesh.interface_face(n).vertices));
     let mut alone: HashSet<[u32; 3]> = between.collect();
     let mut from = 0;
     while let Some((t, tet)) = mesh.next_tet(from) {
@@ -80,7 +87,9 @@ fn is_sound<P: Pages>(mesh: &mut Mesh<P>) -> bool {
             return false;
         }
         for face in 0..4 {
-            alone.remove(&sorted(tet.face(face)));
+            if tet.is_required(face) {
+                alone.remove(&turned(tet.face(face)));
+            }
             let across = tet.neighbor[face];
             if !across.exists() {
                 continue;
@@ -123,7 +132,8 @@ mod tests {
         let t = enclose(&mut mesh, &Aabb::around([Point::ZERO, Point::ONE]));
         assert!(is_sound(&mut mesh));
         let tet = mesh.tet(t);
-        mesh.add_interface_face(face(tet.face(0)));
+        mesh.set_required(FaceRef::new(t, 1), true);
+        mesh.add_interface_face(face(tet.face(1)));
         assert!(is_sound(&mut mesh));
         let path = DiskPath::from(std::path::Path::new("part"));
         let error = check_owners(&mut mesh, &BTreeMap::new(), (&path, 1)).expect_err("no owner");
@@ -138,7 +148,15 @@ mod tests {
         let is_face =
             |v: &[u32; 3]| (tets.iter()).any(|(_, tet)| v.iter().all(|&v| tet.local(v).is_some()));
         let none = triples.into_iter().find(|v| !is_face(v));
-        mesh.add_interface_face(face(none.expect("three that are no face")));
-        assert!(!is_sound(&mut mesh));
+        let [a, b, c] = tet.face(1);
+        let with = |vertices| {
+            let mut mesh = mesh.clone();
+            mesh.add_interface_face(face(vertices));
+            is_sound(&mut mesh)
+        };
+        assert!(with([b, c, a]));
+        // The other way round it lies before its tetrahedron; another face may change.
+        assert!(!with([a, c, b]) && !with(tet.face(0)));
+        assert!(!with(none.expect("three that are no face")));
     }
 }

@@ -1,4 +1,5 @@
-//! Mutates a corpus and feeds what comes of it to a target: `tetdb-fuzz TARGET|all [SECONDS] [SEED] [CORPUS]`.
+//! Mutates a corpus and feeds what comes of it to a target: `tetdb-fuzz TARGET|all [SECONDS] [SEED] [CORPUS]`. `tetdb-fuzz TARGET FILE`
+//! feeds one input as it is.
 //!
 //! Runs on stable Rust, without coverage: seeds are files of every shape a format has, mutations know numbers that readers
 //! trip over. An input that panics, ends the process, or takes longer than a second, is written beside the corpus as
@@ -38,6 +39,9 @@ fn main() -> ExitCode {
             .unwrap_or(default)
     };
     let wanted = arguments.first().map_or("all", String::as_str);
+    if let Some(file) = arguments.get(1).filter(|word| Path::new(word).is_file()) {
+        return again(wanted, Path::new(file));
+    }
     let (seconds, seed) = (number(1, 60), number(2, 1));
     let corpus = arguments.get(3).map_or_else(
         || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/corpus")),
@@ -64,6 +68,23 @@ fn main() -> ExitCode {
         }
     }
     ExitCode::from(u8::from(found > 0))
+}
+
+/// Feeds one input.
+fn again(wanted: &str, file: &Path) -> ExitCode {
+    let (Some(target), Ok(input)) = (
+        TARGETS.iter().find(|t| t.name == wanted),
+        std::fs::read(file),
+    ) else {
+        eprintln!(
+            "{wanted}: no such target, or {} cannot be read",
+            file.display()
+        );
+        return ExitCode::from(2);
+    };
+    let (ended, took) = timed(target, &input);
+    println!("{wanted}: {took:?}");
+    ExitCode::from(u8::from(!ended))
 }
 
 /// Feeds a target for some time; returns the number of findings.

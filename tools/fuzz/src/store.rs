@@ -6,6 +6,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, OnceLock};
+use std::time::{Duration, Instant};
 
 use redb::{Database, ReadableDatabase, ReadableTable, TableDefinition};
 use tetdb::pipeline::{self, Options, Trial};
@@ -23,6 +24,8 @@ const TABLE: TableDefinition<u64, &[u8]> = TableDefinition::new("pages");
 /// All values begin with the sum of what follows; in a chunk this comes next, in the catalog the key is the sum's seed.
 const CHUNK: &[u8] = b"TETC";
 const MEMORY: u64 = 64 << 20;
+/// A change of a store is not let go on for longer.
+const LONG: Duration = Duration::from_millis(500);
 
 struct Sound {
     dir: tempfile::TempDir,
@@ -50,6 +53,17 @@ const MADE: [Made; 4] = [
 
 fn settings() -> Settings {
     Settings::default().threads(1).memory(Bytes(MEMORY))
+}
+
+/// As these, but what takes long is cancelled: changed lengths may ask for a billion tetrahedra.
+fn limited() -> Settings {
+    let (token, clock) = (CancelToken::new(), Instant::now());
+    let cancelled = token.clone();
+    settings().cancel(&token).progress(move |_| {
+        if clock.elapsed() > LONG {
+            cancelled.cancel();
+        }
+    })
 }
 
 /// A store in memory, where the system has files there.
@@ -296,13 +310,13 @@ fn show(path: &Path, folder: &Path, way: u64) {
 /// One of the ways to change a store.
 fn write(path: &Path, way: u64) {
     if way == 0 {
-        return answered(Store::resume(path, settings()));
+        return answered(Store::resume(path, limited()));
     }
-    let mut store = match Store::open_with(path, settings()) {
+    let mut store = match Store::open_with(path, limited()) {
         Ok(store) => store,
         // One that is not finished.
         Err(error) if error.code() == "store-unfinished" => {
-            return answered(Store::resume(path, settings()));
+            return answered(Store::resume(path, limited()));
         }
         error => return answered(error),
     };
