@@ -4,7 +4,7 @@
   carriers.py TETDB FOLDER [--mpi PROGRAM=MPIRUN ...] [--ranks 2,4] [--job "SURFACE --subdomains N ..." ...] [--memory 96MiB]
               [--tasks 3] [--only WORD,...] [--require]
 
-Carriers: `ranks` (N of each MPI), `verifies` (the report of ranks, and what they say of damage), `exports` (pieces of several formats by three ranks), `handover` (begun by one process and ended by ranks, and the
+Carriers: `ranks` (N of each MPI), `verifies` (the report of ranks, and what they say of damage), `exports` (pieces of several formats, and one `.vtkhdf`, by three ranks), `handover` (begun by one process and ended by ranks, and the
 other way round), `launcher` (a program of one MPI under the launcher of another), `parallel`, `snakemake`, `slurm` (a Slurm of one node,
 started here), `twice` (tasks in random order, each done twice, two at once). --mpi may be repeated: a program and the mpirun of the MPI it was
 built with. A line of JSON for each result goes to FOLDER/results.jsonl; what is there already with the same program is not done again. What is
@@ -24,7 +24,7 @@ import time
 HERE = os.path.dirname(os.path.abspath(__file__))
 ENV = dict(os.environ, OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1", OMPI_MCA_rmaps_base_oversubscribe="1")
 # Formats of which each rank writes pieces.
-PIECES = ["a.vtu", "a.pvtu", "a.msh", "a.foam", "a.mfem", "a.mesh"]
+PIECES = ["a.vtu", "a.pvtu", "a.vtkhdf", "a.msh", "a.foam", "a.mfem", "a.mesh"]
 
 
 class Differs(Exception):
@@ -114,6 +114,10 @@ class Bench:
             words = ["export", self.one, "-q", "--pieces"]
             run([self.tetdb, *words, os.path.join(alone, name)])
             self.mpirun(mpi, n, *words, os.path.join(shared, name))
+        # One file that all ranks write, each its partitions.
+        words = ["export", self.one, "-q"]
+        run([self.tetdb, *words, os.path.join(alone, "one.vtkhdf")])
+        self.mpirun(mpi, n, *words, os.path.join(shared, "one.vtkhdf"))
         alike(alone, shared)
         shutil.rmtree(alone)
         shutil.rmtree(shared)

@@ -21,6 +21,9 @@ impl From<ReadError> for Error {
 
 impl From<WriteError> for Error {
     fn from(e: WriteError) -> Self {
+        if let WriteError::Elsewhere(failure) = e {
+            return PipelineError::from(failure).into();
+        }
         let error = Self::new(e.code(), &e).with_help(e.help());
         match e.place() {
             Some(path) => error.at(path.display()),

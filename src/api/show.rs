@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::store::open_finished;
 use super::targets::{check_target, inputs_of};
 use super::{Error, Settings, Store, guarded};
-use crate::io::write::{self, Content, MeshFormat, Order, Selection, Share};
+use crate::io::write::{self, Content, MeshFormat, Order, Selection, Share, Writers};
 
 /// A writer holds no more than this, however large the cap.
 const MEMORY_MAX: u64 = 512 << 20;
@@ -139,11 +139,26 @@ pub(crate) fn export(
     selection: &Selection,
     settings: &Settings,
 ) -> Result<Exported, Error> {
+    export_with(store, (out, selection), settings, None)
+}
+
+/// The same, as one of several processes that write the file together.
+pub(crate) fn export_with(
+    store: &Path,
+    (out, selection): (&Path, &Selection),
+    settings: &Settings,
+    writers: Option<&dyn Writers>,
+) -> Result<Exported, Error> {
     let mut catalog = open_finished(store)?;
     let memory = (settings.cap()? / 2).min(MEMORY_MAX) as usize;
-    let report = write::export(&mut catalog, out, selection, memory, &|done, total| {
-        settings.count("export", done, total, "records");
-    })?;
+    let what = (out, selection);
+    let report = write::export_with(
+        &mut catalog,
+        what,
+        memory,
+        &|done, total| settings.count("export", done, total, "records"),
+        writers,
+    )?;
     Ok(Exported {
         files: report.files,
         vertices: report.vertices,

@@ -12,7 +12,7 @@ use super::query;
 use super::query_ask::regions;
 use crate::api::targets::{check_target, inputs_of};
 use crate::api::{Error, Exported, Settings, show};
-use crate::io::write::{Content, ENDINGS, MeshFormat, Order, Selection, Share, check};
+use crate::io::write::{Content, ENDINGS, MeshFormat, Order, Selection, Share, Writers, check};
 
 pub fn run(args: &ExportArgs, console: &Console) -> Result<u8, Failure> {
     let is_first = share_of_ranks().is_none_or(|share| share.number == 1);
@@ -36,6 +36,14 @@ pub fn run(args: &ExportArgs, console: &Console) -> Result<u8, Failure> {
 fn share_of_ranks() -> Option<Share> {
     #[cfg(feature = "mpi")]
     return super::ranks::share();
+    #[cfg(not(feature = "mpi"))]
+    None
+}
+
+/// The ranks as writers of one file, where there are several.
+fn writers() -> Option<Box<dyn Writers>> {
+    #[cfg(feature = "mpi")]
+    return super::ranks::SharedFile::new().map(|file| Box::new(file) as Box<dyn Writers>);
     #[cfg(not(feature = "mpi"))]
     None
 }
@@ -98,8 +106,9 @@ fn write_share(
         }
         let format = check(out, &selection).map_err(Error::from)?;
         let of_ranks = share_of_ranks().filter(|_| selection.in_pieces(format));
-        let is_ours = is_first || (of_ranks.is_some() && args.share.is_none());
-        outs.push((out, args.share.or(of_ranks), is_ours));
+        let writers = selection.is_shared_file(format).then(writers).flatten();
+        let is_shared = of_ranks.is_some() && args.share.is_none() || writers.is_some();
+        outs.push((out, args.share.or(of_ranks), is_first || is_shared, writers));
     }
     let to_stdout = args.out.iter().any(|out| out == Path::new("-"));
     if to_stdout && (console.is_json() || args.out.len() > 1) {
@@ -116,10 +125,11 @@ fn write_share(
             .try_for_each(|out| check_target(out, &inputs))?;
     }
     let mut reports = Vec::new();
-    for (out, share, is_ours) in outs {
-        selection.share = share;
+    for (out, share, is_ours, writers) in &outs {
+        selection.share = *share;
+        let writers = writers.as_deref();
         reports.push(match is_ours {
-            true => write(&args.store, out, &selection, &settings, console)?,
+            true => write_with((&args.store, out), &selection, &settings, console, writers)?,
             false => Exported::default(),
         });
     }
@@ -187,7 +197,18 @@ pub fn write(
     settings: &Settings,
     console: &Console,
 ) -> Result<Exported, Failure> {
-    let exported = show::export(path, out, selection, settings)?;
+    write_with((path, out), selection, settings, console, None)
+}
+
+/// The same, as one of several processes that write the file together.
+fn write_with(
+    (path, out): (&Path, &Path),
+    selection: &Selection,
+    settings: &Settings,
+    console: &Console,
+    writers: Option<&dyn Writers>,
+) -> Result<Exported, Failure> {
+    let exported = show::export_with(path, (out, selection), settings, writers)?;
     console.done();
     note(&exported, console);
     Ok(exported)

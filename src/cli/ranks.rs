@@ -3,12 +3,16 @@
 //! One thread of each process speaks MPI and looks for messages with pauses, so that who waits burns no core. A message is sent while others
 //! are taken in, so that two processes that send to each other never wait for each other.
 
+use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::collections::VecDeque;
+use std::ffi::OsStr;
+use std::os::unix::ffi::OsStrExt;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use mpi::Threading;
 use mpi::topology::SimpleCommunicator;
@@ -21,12 +25,14 @@ use super::failure::Failure;
 use super::tasks;
 use crate::api::verify_server::Server;
 use crate::api::{Error, Settings, guarded};
-use crate::io::write::Share;
+use crate::io::write::{Share, Writers};
 use crate::pipeline::{self, Hands, HelperFailure, Helpers, PipelineError, TaskSettings};
 use crate::storage::{Budget, RunContext, host_name};
 
 /// Tag of what is no order: jobs, their answers, the end.
 const CONTROL: i32 = 0;
+/// Tag of what is said about a file that all write.
+const FILE: i32 = 32_000;
 /// First byte of a message that begins a job or says that something is done; of the end; of an error.
 const DONE: u8 = 0;
 const END: u8 = 1;
@@ -113,11 +119,7 @@ fn launched() -> Option<i32> {
 
 /// What this rank does of work that all ranks share; `None` where there are no others.
 pub(super) fn share() -> Option<Share> {
-    let ranks = RANKS.get()?;
-    Some(Share {
-        number: ranks.rank as u32 + 1,
-        of: ranks.size as u32,
-    })
+    RANKS.get().map(|ranks| ranks.share())
 }
 
 /// Adds to what rank 0 did of such work what the others did; they send theirs. Errors: of any rank.
@@ -148,6 +150,75 @@ pub(super) fn gather<T: Serialize + DeserializeOwned>(
         add(&mut all, theirs.map_err(|e| Failure::new("internal", e))?);
     }
     Ok(all)
+}
+
+/// A file that all ranks write together, each its partitions.
+pub(super) struct SharedFile {
+    ranks: Arc<Ranks>,
+    /// Whether rank 0 has told the others.
+    is_told: Cell<bool>,
+}
+
+impl SharedFile {
+    /// `None` where there are no other ranks.
+    pub fn new() -> Option<Self> {
+        Some(Self {
+            ranks: RANKS.get()?.clone(),
+            is_told: Cell::new(false),
+        })
+    }
+
+    fn tell_all(&self, letter: &[u8]) {
+        self.is_told.set(true);
+        (1..self.ranks.size).for_each(|rank| self.ranks.send(rank, FILE, letter.to_vec()));
+    }
+}
+
+impl Writers for SharedFile {
+    fn share(&self) -> Share {
+        self.ranks.share()
+    }
+
+    fn tell(&self, file: &Path) {
+        self.tell_all(&[&[DONE], file.as_os_str().as_bytes()].concat());
+    }
+
+    fn hear(&self) -> Option<PathBuf> {
+        let letter = self.ranks.receive_from(0, FILE)?;
+        let path = PathBuf::from(OsStr::from_bytes(letter.strip_prefix(&[DONE])?));
+        // A file of another machine may be late.
+        let begun = Instant::now();
+        while !path.exists() && begun.elapsed() < WAIT {
+            std::thread::sleep(PAUSE_MOST);
+        }
+        Some(path)
+    }
+
+    fn say(&self, done: Result<(), HelperFailure>) {
+        let letter = match done {
+            Ok(()) => vec![DONE],
+            Err(failure) => failed(&failure.code, &failure.message),
+        };
+        self.ranks.send(0, FILE, letter);
+    }
+
+    fn wait(&self) -> Result<(), HelperFailure> {
+        let helpers = RankHelpers::of(&self.ranks);
+        // All are heard: none writes any more when the file goes.
+        let others: Vec<_> = (1..self.ranks.size)
+            .map(|rank| helpers.answer(rank, FILE))
+            .collect();
+        others.into_iter().try_for_each(|done| done.map(drop))
+    }
+}
+
+impl Drop for SharedFile {
+    /// Where rank 0 failed before there was a file, the others wait for none.
+    fn drop(&mut self) {
+        if self.ranks.rank == 0 && !self.is_told.get() {
+            self.tell_all(&[END]);
+        }
+    }
 }
 
 /// The other ranks, for a run of this process.
@@ -211,6 +282,13 @@ fn send(world: &SimpleCommunicator, letter: &Letter, inbox: &Inbox) {
 }
 
 impl Ranks {
+    fn share(&self) -> Share {
+        Share {
+            number: self.rank as u32 + 1,
+            of: self.size as u32,
+        }
+    }
+
     fn send(&self, to: i32, tag: i32, bytes: Vec<u8>) {
         let out = self.out.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(out) = &*out {

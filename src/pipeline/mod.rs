@@ -44,8 +44,6 @@ pub use tasks::{
     Gathered, Performed, Planned, Stage, StageKind, TASKS_MAX, TaskSettings, TaskState, end_plan,
     gather, is_being_worked, perform, plan as plan_tasks, status,
 };
-#[cfg(any(test, feature = "mpi"))]
-pub use work::HelperFailure;
-pub use work::{FineReport, Hands, Helpers, stage_faces};
+pub use work::{FineReport, Hands, HelperFailure, Helpers, stage_faces};
 pub(crate) use work::{Kind, from_bytes, to_bytes};
 pub(crate) use workers::{Hand, work_off};

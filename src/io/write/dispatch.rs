@@ -10,15 +10,17 @@ use super::midpoints::Midpoints;
 use super::report::FileCounts;
 use super::selection::{Content, Order, Selection};
 use super::wires::write_list;
+use super::writers::{Writers, is_first};
 use super::{abaqus, foam, gmsh, gmsh22, medit, mfem, npy_columns, tetgen, vtu, vtu_boundary};
 
-/// Writes a mesh as one file, and what belongs to it.
+/// Writes a mesh as one file, and what belongs to it; the tetrahedra of `.vtkhdf` as one of several `writers`, of whom the first does the rest.
 pub(super) fn write(
     format: MeshFormat,
     selection: &Selection,
     mesh: &mut Merged,
     draft: &mut Draft,
     out: &Path,
+    writers: Option<&dyn Writers>,
 ) -> Result<FileCounts> {
     let middles = match selection.order {
         Order::First => None,
@@ -37,8 +39,13 @@ pub(super) fn write(
             counts.vertices = vtu_boundary::write(mesh, draft, out, is_hdf, middles)?;
             counts.tets = 0;
         }
-        MeshFormat::Vtu | MeshFormat::Pvtu => vtu::write(mesh, draft, out, false, middles)?,
-        MeshFormat::VtkHdf => vtu::write(mesh, draft, out, true, middles)?,
+        MeshFormat::Vtu | MeshFormat::Pvtu => vtu::write(mesh, draft, out, false, middles, None)?,
+        MeshFormat::VtkHdf => {
+            vtu::write(mesh, draft, out, true, middles, writers)?;
+            if !is_first(writers) {
+                return Ok(FileCounts::default());
+            }
+        }
         MeshFormat::Medit => medit::write_text(mesh, draft, out)?,
         MeshFormat::MeditBinary => medit::write_binary(mesh, draft, out)?,
         MeshFormat::Gmsh => counts = gmsh::write(mesh, draft, out, (selection, middles))?,

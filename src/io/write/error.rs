@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
+use crate::pipeline::HelperFailure;
 use crate::sealed::SealedError;
 use crate::storage::StorageError;
 use crate::store::StoreError;
@@ -97,6 +98,9 @@ pub enum WriteError {
     /// The store cannot be read as it is: damaged, unfinished, busy.
     #[error(transparent)]
     Store(StoreError),
+    /// Another process could not write its part.
+    #[error("{}", .0.message)]
+    Elsewhere(HelperFailure),
 }
 
 impl WriteError {
@@ -114,7 +118,7 @@ impl WriteError {
             {
                 "disk-full"
             }
-            Self::Io { .. } | Self::StandardOutput { .. } => "io",
+            Self::Io { .. } | Self::StandardOutput { .. } | Self::Elsewhere(_) => "io",
             Self::Store(error) => word_of(error),
         }
     }
@@ -129,7 +133,8 @@ impl WriteError {
             | Self::NoSpace { path, .. }
             | Self::DiskFull { path }
             | Self::Io { path, .. } => Some(path),
-            Self::NoRegion { .. } | Self::StandardOutput { .. } | Self::Store(_) => None,
+            Self::NoRegion { .. } | Self::StandardOutput { .. } => None,
+            Self::Store(_) | Self::Elsewhere(_) => None,
         }
     }
 
@@ -153,7 +158,7 @@ impl WriteError {
             Self::Store(StoreError::Changed { .. }) => {
                 "run the command again: the file is then of the store as it is now"
             }
-            Self::Store(_) => "look at the state of the store",
+            Self::Store(_) | Self::Elsewhere(_) => "look at the state of the store",
         }
     }
 

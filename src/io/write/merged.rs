@@ -2,6 +2,7 @@
 
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use tetdb_schema::ids::TetId;
@@ -106,6 +107,8 @@ pub(super) struct Merged<'a> {
     dir: PathBuf,
     memory: usize,
     progress: Progress<'a>,
+    /// Sub-domains whose vertices and tetrahedra are read, by place.
+    window: Range<usize>,
 }
 
 impl<'a> Merged<'a> {
@@ -127,7 +130,8 @@ impl<'a> Merged<'a> {
         let first_label = label_names.len() as u32;
         let mut wires = WrittenWires::gather(store, &row, (&parts, &numbering), memory)?;
         let mut sorter = FaceSorter::new(dir, memory as u64 / 4);
-        for (p, source) in parts.iter().enumerate() {
+        let with_faces = scope.faces != FaceSet::Nothing;
+        for (p, source) in parts.iter().enumerate().filter(|_| with_faces) {
             let numbers = numbering.part(store, &parts, p)?;
             let rank = source.row.rank;
             let mut from = store.open_subdomain(rank, memory / 4)?;
@@ -147,6 +151,7 @@ impl<'a> Merged<'a> {
         let is_whole = scope.regions.is_empty() && scope.ranks.is_empty();
         let mut mesh = Self {
             store,
+            window: 0..parts.len(),
             parts,
             regions: scope.regions.clone(),
             numbering,
@@ -336,6 +341,11 @@ impl<'a> Merged<'a> {
         self.progress.total.set(total);
     }
 
+    /// From now on only the vertices and tetrahedra of some sub-domains are read; of what is counted and numbered nothing changes.
+    pub fn look_at(&mut self, window: Range<usize>) {
+        self.window = window;
+    }
+
     /// Tells that all is done.
     pub fn report_end(&self) {
         let total = self.progress.total.get().max(self.progress.done.get());
@@ -364,7 +374,8 @@ impl<'a> Merged<'a> {
         &mut self,
         mut each: impl FnMut(u64, &SealedVertex) -> Result<()>,
     ) -> Result<()> {
-        for (p, Source { row, .. }) in self.parts.iter().enumerate() {
+        for p in self.window.clone() {
+            let Source { row, .. } = &self.parts[p];
             let numbers = self.numbers_of(p)?;
             let mut part = self.store.open_subdomain(row.rank, self.memory / 4)?;
             for chunk in part.vertex_chunks() {
@@ -400,7 +411,8 @@ impl<'a> Merged<'a> {
         mut each: impl FnMut(&Tet) -> Result<()>,
     ) -> Result<()> {
         let mut changes = self.doubles.as_ref().map(Doubles::changes).transpose()?;
-        for (p, Source { row, .. }) in self.parts.iter().enumerate() {
+        for p in self.window.clone() {
+            let Source { row, .. } = &self.parts[p];
             let numbers = self.numbers_of(p)?;
             let mut part = self.store.open_subdomain(row.rank, self.memory / 4)?;
             let mut on_surface = match measured {

@@ -7,7 +7,7 @@
 //! grow with the mesh. Files are written in a folder beside their place and renamed when they are whole
 //! and synced. Coordinates are never rounded.
 //!
-//! Reading order: [`export`] (what is written, in which format), `pieces` (a file for each sub-domain), `merged` (sub-domains as one mesh),
+//! Reading order: [`export_with`] (what is written, in which format), `pieces` (a file for each sub-domain), `merged` (sub-domains as one mesh),
 //! `numbering` (shared vertices), `faces` (its boundary), `draft` and `stream` (files), then one file or folder per format.
 
 mod abaqus;
@@ -52,6 +52,7 @@ mod vtu;
 mod vtu_boundary;
 mod vtu_layout;
 mod wires;
+mod writers;
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -81,17 +82,32 @@ use crate::store::{Catalog, StoreError};
 use draft::{Draft, STDOUT};
 use merged::{Merged, Progress};
 use scope::{FaceSet, Scope};
+pub use writers::Writers;
+use writers::is_first;
 
-/// Writes what `selection` says of the finished mesh of `store` to `out` in the format its extension tells, replacing what is there.
-///
-/// Holds about `memory_bytes`, and reports progress as (done, total) in records read. The files depend on the
-/// mesh alone. Errors: [`WriteError`]; no file of `out`'s name is touched before all are whole.
+/// [`export_with`] by one process.
+#[cfg(any(test, feature = "internals"))]
 pub fn export(
     store: &mut Catalog,
     out: &Path,
     selection: &Selection,
     memory_bytes: usize,
     report: &dyn Fn(u64, u64),
+) -> Result<ExportReport> {
+    export_with(store, (out, selection), memory_bytes, report, None)
+}
+
+/// Writes what `selection` says of the finished mesh of `store` to `out` in the format its extension tells, replacing what is there.
+///
+/// Holds about `memory_bytes`, and reports progress as (done, total) in records read. The files depend on the
+/// mesh alone. Where [`Selection::is_shared_file`] says so, several `writers` may each call this; files and counts are those of the first.
+/// Errors: [`WriteError`], also of others; no file of `out`'s name is touched before all are whole.
+pub fn export_with(
+    store: &mut Catalog,
+    (out, selection): (&Path, &Selection),
+    memory_bytes: usize,
+    report: &dyn Fn(u64, u64),
+    writers: Option<&dyn Writers>,
 ) -> Result<ExportReport> {
     let format = check(out, selection)?;
     attempt(|| {
@@ -124,6 +140,7 @@ pub fn export(
                     },
                     regions: &selection.regions,
                     faces: match selection.content {
+                        _ if !is_first(writers) => FaceSet::Nothing,
                         Content::Mesh if apart || format == MeshFormat::Gmsh => {
                             FaceSet::SkinAndInterfaces
                         }
@@ -139,7 +156,7 @@ pub fn export(
                 if selection.split_sheets {
                     split::split(&mut mesh, &mut draft, out)?;
                 }
-                dispatch::write(format, selection, &mut mesh, &mut draft, out)?
+                dispatch::write(format, selection, &mut mesh, &mut draft, out, writers)?
             }
         };
         Ok(ExportReport {

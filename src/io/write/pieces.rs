@@ -61,7 +61,7 @@ pub(super) fn write(
         let mut mesh = Merged::open(store, scope, &dir, memory, Progress::new(&report_piece))?;
         let is_empty = mesh.n_tets() == 0;
         let written = match is_written && !is_empty {
-            true => dispatch::write(format, selection, &mut mesh, draft, &piece)?,
+            true => dispatch::write(format, selection, &mut mesh, draft, &piece, None)?,
             false => FileCounts::default(),
         };
         fs::remove_dir_all(&dir).map_err(|e| WriteError::io(&dir, e))?;

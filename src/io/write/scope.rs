@@ -11,6 +11,8 @@ pub(super) enum FaceSet {
     SkinAndInterfaces,
     /// All interface faces, no input triangle.
     Interfaces,
+    /// No face, whatever is beyond: for who writes no faces.
+    Nothing,
 }
 
 /// What is written: these sub-domains, or all when there are none, with these faces.

@@ -54,6 +54,13 @@ impl Selection {
         self.pieces || format == MeshFormat::Pvtu
     }
 
+    /// Whether several processes can write the one file together: the tetrahedra of `.vtkhdf`, a partition for each sub-domain.
+    #[cfg_attr(not(feature = "mpi"), allow(dead_code, reason = "for ranks"))]
+    pub fn is_shared_file(&self, format: MeshFormat) -> bool {
+        let is_plain = self.content == Content::Mesh && self.order == Order::First;
+        format == MeshFormat::VtkHdf && is_plain && !self.pieces && !self.split_sheets
+    }
+
     /// Whether this process writes what names the pieces of all.
     pub(super) fn writes_head(&self) -> bool {
         self.share.is_none_or(|share| share.number == 1)

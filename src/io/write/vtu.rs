@@ -3,14 +3,18 @@
 //! A `.vtkhdf` file has a partition for each sub-domain, with vertices of its own. Source: the VTK file formats document, appended
 //! raw data with 64-bit lengths; for `.vtkhdf` see `vtu_layout`.
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use super::draft::Draft;
-use super::error::Result;
+use super::error::{Result, WriteError};
 use super::merged::{Measured, Merged};
 use super::midpoints::{MiddlePoints, Midpoints};
+use super::selection::Share;
 use super::vtu_boundary::{self, Partition, partitions};
 use super::vtu_layout::{Array, Container, Group, Index, Layout};
+use super::writers::Writers;
+use crate::pipeline::HelperFailure;
 
 /// VTK's number of a tetrahedron.
 pub(super) const TETRA: u8 = 10;
@@ -20,28 +24,70 @@ const QUADRATIC_TETRA: u8 = 24;
 /// The lasting id of a vertex that has none: the middle of an edge.
 const NO_ID: i64 = -1;
 
-/// Writes both; for `.vtkhdf` the mesh is one whose vertices are numbered apart.
+/// Writes both; for `.vtkhdf` the mesh is one whose vertices are numbered apart, and several processes may write partitions.
 pub(super) fn write(
     mesh: &mut Merged,
     draft: &mut Draft,
     out: &Path,
     is_hdf: bool,
     middles: Option<&Midpoints>,
+    writers: Option<&dyn Writers>,
 ) -> Result<()> {
     mesh.expect_passes(2, 1);
     let partitions = partitions(mesh, is_hdf, middles);
+    let layout = layout(mesh, &partitions, is_hdf, middles.is_some());
+    let mut begin = || {
+        let path = draft.create(out, layout.file_bytes())?;
+        layout.begin(&path).map(|()| path)
+    };
+    let n = partitions.len();
+    let Some(writers) = writers else {
+        let path = begin()?;
+        write_partitions(mesh, (&layout, &path), &partitions, 0..n, (is_hdf, middles))?;
+        return vtu_boundary::write(mesh, draft, &boundary_path(out), is_hdf, middles).map(drop);
+    };
+    let Share { number, of } = writers.share();
+    let write_own = |mesh: &mut Merged, path: &Path| -> Result<()> {
+        for p in (0..n).filter(|&p| p as u32 % of == number - 1) {
+            mesh.look_at(p..p + 1);
+            write_partitions(mesh, (&layout, path), &partitions, p..p + 1, (true, None))?;
+        }
+        Ok(())
+    };
+    if number == 1 {
+        let path = begin().inspect(|path| writers.tell(path))?;
+        write_own(mesh, &path)?;
+        mesh.look_at(0..n);
+        vtu_boundary::write(mesh, draft, &boundary_path(out), true, None)?;
+        return writers.wait().map_err(WriteError::Elsewhere);
+    }
+    let Some(path) = writers.hear() else {
+        return Ok(());
+    };
+    let done = write_own(mesh, &path);
+    writers.say(done.as_ref().copied().map_err(|error| HelperFailure {
+        code: error.code().to_owned(),
+        message: error.to_string(),
+    }));
+    done
+}
+
+/// Connectivity and offsets of the file of the tetrahedra.
+fn index(partitions: &[Partition], is_hdf: bool, corners: u64) -> Index {
+    let n_points = partitions.iter().map(Partition::n_points).sum();
+    let n_tets: u64 = partitions.iter().map(|p| p.n_tets).sum();
+    Index::within(is_hdf, n_points, corners * n_tets)
+}
+
+/// Of the file of the tetrahedra.
+fn layout(mesh: &Merged, partitions: &[Partition], is_hdf: bool, is_quadratic: bool) -> Layout {
+    let counts_of = |p: &Partition| [p.n_points(), p.n_tets];
     let container = match is_hdf {
-        true => Container::Hdf(
-            partitions
-                .iter()
-                .map(|p| [p.n_points(), p.n_tets])
-                .collect(),
-        ),
+        true => Container::Hdf(partitions.iter().map(counts_of).collect()),
         false => Container::Xml,
     };
-    let n_points = partitions.iter().map(Partition::n_points).sum();
-    let corners = if middles.is_some() { 10 } else { 4 };
-    let index = Index::within(&container, n_points, corners * mesh.n_tets());
+    let corners = corners(is_quadratic);
+    let index = index(partitions, is_hdf, corners);
     let arrays = vec![
         Array::new(Group::PointData, "global_id", "Int64"),
         Array::new(Group::CellData, "subdomain", "UInt32"),
@@ -54,10 +100,38 @@ pub(super) fn write(
         Array::new(Group::Cells, "offsets", index.kind()),
         Array::new(Group::Cells, "types", "UInt8"),
     ];
-    let names = mesh.region_names();
+    let n_points = partitions.iter().map(Partition::n_points).sum();
     let counts = [n_points, mesh.n_tets(), corners];
-    let layout = Layout::new(&container, &arrays, counts, ("region_names", &names));
-    let path = draft.create(out, layout.file_bytes())?;
+    Layout::new(
+        &container,
+        &arrays,
+        counts,
+        ("region_names", &mesh.region_names()),
+    )
+}
+
+fn corners(is_quadratic: bool) -> u64 {
+    if is_quadratic { 10 } else { 4 }
+}
+
+/// Points, cells and partitions of some.
+fn rows(partitions: &[Partition]) -> [u64; 3] {
+    let points = partitions.iter().map(Partition::n_points).sum();
+    let cells = partitions.iter().map(|p| p.n_tets).sum();
+    [points, cells, partitions.len() as u64]
+}
+
+/// Writes partitions of the file of the tetrahedra, those that the mesh now looks at.
+fn write_partitions(
+    mesh: &mut Merged,
+    (layout, path): (&Layout, &Path),
+    all: &[Partition],
+    which: Range<usize>,
+    (is_hdf, middles): (bool, Option<&Midpoints>),
+) -> Result<()> {
+    let corners = corners(middles.is_some());
+    let index = index(all, is_hdf, corners);
+    let partitions = &all[which.clone()];
     let [
         mut vertex_ids,
         mut ranks,
@@ -69,7 +143,7 @@ pub(super) fn write(
         mut nodes,
         mut ends,
         mut types,
-    ] = layout.open(&path)?;
+    ] = layout.strips(path, rows(&all[..which.start]), rows(partitions))?;
     let mut put = |id: i64, point: [f64; 3]| {
         vertex_ids.put(&id.to_le_bytes())?;
         (point.iter()).try_for_each(|x| points.put(&x.to_le_bytes()))
@@ -130,7 +204,6 @@ pub(super) fn write(
     ] {
         strip.finish()?;
     }
-    vtu_boundary::write(mesh, draft, &boundary_path(out), is_hdf, middles)?;
     Ok(())
 }
 

@@ -111,7 +111,7 @@ pub(super) fn write(
         true => Container::Hdf(vec![[corners.n_vertices, n_faces]]),
         false => Container::Xml,
     };
-    let index = Index::within(&container, corners.n_vertices, n_corners * n_faces);
+    let index = Index::within(is_hdf, corners.n_vertices, n_corners * n_faces);
     let arrays = vec![
         Array::new(Group::PointData, "mesh_vertex", "Int64"),
         Array::new(Group::PointData, "global_id", "Int64"),

@@ -52,13 +52,16 @@ impl Array {
         }
     }
 
-    fn bytes(&self, [n_points, n_cells, corners]: Counts) -> u64 {
-        let tuples = match self.group {
-            Group::Points | Group::PointData => n_points,
-            Group::Cells if self.name == "connectivity" => corners * n_cells,
-            Group::CellData | Group::Cells => n_cells,
-        };
-        tuples * self.components * self.width
+    /// Bytes for each point, each cell, and each partition; a cell has so many corners.
+    fn bytes_per(&self, corners: u64, container: &Container) -> [u64; 3] {
+        let bytes = self.components * self.width;
+        match (self.group, self.name) {
+            (Group::Points | Group::PointData, _) => [bytes, 0, 0],
+            (Group::Cells, "connectivity") => [0, corners * bytes, 0],
+            // Offsets of each partition begin with a 0.
+            (Group::Cells, "offsets") if *container != Container::Xml => [0, bytes, bytes],
+            (Group::CellData | Group::Cells, _) => [0, bytes, 0],
+        }
     }
 
     /// The same with three components.
@@ -84,10 +87,10 @@ impl Index {
     }
 
     /// As [`Index::new`], but with 64 bits where the container asks for them.
-    pub fn within(container: &Container, n_points: u64, n_corners: u64) -> Self {
-        match container {
-            Container::Xml => Self::new(n_points, n_corners),
-            Container::Hdf(_) => Self { narrow: false },
+    pub fn within(is_hdf: bool, n_points: u64, n_corners: u64) -> Self {
+        match is_hdf {
+            false => Self::new(n_points, n_corners),
+            true => Self { narrow: false },
         }
     }
 
@@ -120,6 +123,8 @@ pub(super) struct Layout {
     fixed: Vec<(u64, Vec<u8>)>,
     /// First byte and length of each array.
     places: Vec<[u64; 2]>,
+    /// What each array has for each point, cell and partition.
+    bytes_per: Vec<[u64; 3]>,
     bytes: u64,
 }
 
@@ -135,7 +140,7 @@ impl Layout {
     pub fn new(container: &Container, arrays: &[Array], counts: Counts, texts: Texts) -> Self {
         match container {
             Container::Xml => Self::xml(arrays, counts, texts),
-            Container::Hdf(partitions) => Self::hdf(partitions, arrays, counts, texts),
+            Container::Hdf(partitions) => Self::hdf((container, partitions), arrays, counts, texts),
         }
     }
 
@@ -144,8 +149,9 @@ impl Layout {
         let mut at = head.len() as u64;
         let mut fixed = vec![(0, head)];
         let mut places = Vec::new();
-        for array in arrays {
-            let bytes = array.bytes(counts);
+        let bytes_per = all_bytes_per(arrays, counts, &Container::Xml);
+        for per in &bytes_per {
+            let bytes = of_rows(per, [counts[0], counts[1], 1]);
             fixed.push((at, bytes.to_le_bytes().to_vec()));
             places.push([at + 8, bytes]);
             at += 8 + bytes;
@@ -154,12 +160,18 @@ impl Layout {
         Self {
             fixed,
             places,
+            bytes_per,
             bytes: at + TAIL.len() as u64,
         }
     }
 
     /// Source: the VTKHDF file format in the VTK documentation, version 2, unstructured grids.
-    fn hdf(partitions: &[[u64; 2]], arrays: &[Array], counts: Counts, texts: Texts) -> Self {
+    fn hdf(
+        (container, partitions): (&Container, &[[u64; 2]]),
+        arrays: &[Array],
+        counts: Counts,
+        texts: Texts,
+    ) -> Self {
         let n_partitions = partitions.len() as u64;
         let children = |group: Group| -> Vec<Object> {
             let of_group = arrays.iter().filter(|a| a.group == group);
@@ -211,6 +223,7 @@ impl Layout {
         Self {
             fixed,
             places: plan.arrays,
+            bytes_per: all_bytes_per(arrays, counts, container),
             bytes: plan.file_bytes,
         }
     }
@@ -220,20 +233,55 @@ impl Layout {
         self.bytes
     }
 
-    /// Writes what is known, and opens a strip for each array.
-    pub fn open<const N: usize>(&self, path: &Path) -> Result<[Strip; N]> {
+    /// Writes what is known.
+    pub fn begin(&self, path: &Path) -> Result<()> {
         for (at, bytes) in &self.fixed {
             let mut strip = Strip::open(path, *at, bytes.len() as u64)?;
             strip.put(bytes)?;
             strip.finish()?;
         }
+        Ok(())
+    }
+
+    /// Opens a strip of each array for `here` points, cells and partitions, behind as many as `before` says.
+    pub fn strips<const N: usize>(
+        &self,
+        path: &Path,
+        before: [u64; 3],
+        here: [u64; 3],
+    ) -> Result<[Strip; N]> {
+        let all = self.places.iter().zip(&self.bytes_per);
+        let open = |(&[at, _], per): (&[u64; 2], &[u64; 3])| {
+            Strip::open(path, at + of_rows(per, before), of_rows(per, here))
+        };
+        let strips = all.map(open).collect::<Result<Vec<_>>>()?;
+        Self::as_expected(strips, path)
+    }
+
+    /// Writes what is known, and opens a strip for each array.
+    pub fn open<const N: usize>(&self, path: &Path) -> Result<[Strip; N]> {
+        self.begin(path)?;
         let open = |&[at, bytes]: &[u64; 2]| Strip::open(path, at, bytes);
         let strips = self.places.iter().map(open).collect::<Result<Vec<_>>>()?;
+        Self::as_expected(strips, path)
+    }
+
+    fn as_expected<const N: usize>(strips: Vec<Strip>, path: &Path) -> Result<[Strip; N]> {
         strips.try_into().map_err(|_| WriteError::Io {
             path: path.to_owned(),
             source: std::io::Error::other("the arrays of the file were miscounted"),
         })
     }
+}
+
+fn all_bytes_per(arrays: &[Array], counts: Counts, container: &Container) -> Vec<[u64; 3]> {
+    let per = |array: &Array| array.bytes_per(counts[2], container);
+    arrays.iter().map(per).collect()
+}
+
+/// Bytes of so many points, cells and partitions.
+fn of_rows(per: &[u64; 3], rows: [u64; 3]) -> u64 {
+    per.iter().zip(rows).map(|(bytes, n)| bytes * n).sum()
 }
 
 fn xml_head(arrays: &[Array], counts: Counts, texts: Texts) -> String {
@@ -267,7 +315,8 @@ fn xml_head(arrays: &[Array], counts: Counts, texts: Texts) -> String {
                 "        <DataArray type=\"{}\" Name=\"{}\" NumberOfComponents=\"{}\" format=\"appended\" offset=\"{offset}\"/>\n",
                 array.kind, array.name, array.components
             );
-            offset += 8 + array.bytes(counts);
+            let per = array.bytes_per(counts[2], &Container::Xml);
+            offset += 8 + of_rows(&per, [counts[0], counts[1], 1]);
         }
         text += &format!("      </{group:?}>\n");
     }
