@@ -71,7 +71,7 @@ pub fn run(args: &QueryArgs, console: &Console) -> Result<u8, Failure> {
             end(writer, console)?;
             n
         };
-        tell(n, &inquiry, console);
+        tell(n, args.limit, &inquiry, console);
         Ok(0)
     })?
 }
@@ -107,12 +107,16 @@ fn end(writer: Writer, console: &Console) -> Result<(), Failure> {
     Ok(())
 }
 
-fn tell(n: u64, inquiry: &QuerySession, console: &Console) {
+fn tell(n: u64, limit: Option<u64>, inquiry: &QuerySession, console: &Console) {
     let measures = inquiry.measures();
     console.measures(&serde_json::json!({ "found": n, "chunks": measures }));
     if !console.is_json() {
+        let found = match limit == Some(n) {
+            true => format!("{n} shown, as many as were asked for"),
+            false => format!("{n} found"),
+        };
         console.note(&format!(
-            "{n} found; read {} of {} chunks of tetrahedra, {} of {} of vertices",
+            "{found}; read {} of {} chunks of tetrahedra, {} of {} of vertices",
             measures.tet_chunks_read,
             measures.tet_chunks,
             measures.vertex_chunks_read,

@@ -10,8 +10,13 @@ pub(super) struct Candidate {
     pub h: f32,
     /// A tetrahedron that had the divided edge.
     pub tet: u32,
-    /// Length class (long first), then the position along the curve.
-    pub key: u64,
+}
+
+/// Some candidates in the order of their edges, and the key of each: length class (long first), then the position along the curve.
+#[derive(Default)]
+pub(super) struct Keyed {
+    pub candidates: Vec<Candidate>,
+    pub keys: Vec<u64>,
 }
 
 /// Bits for the place in a part, which is of fewer candidates.
@@ -28,16 +33,16 @@ pub(super) struct Candidates {
 
 impl Candidates {
     /// Replaces them by those of `parts`.
-    pub fn set(&mut self, parts: Vec<Vec<Candidate>>) {
-        self.parts = parts;
+    pub fn set(&mut self, parts: Vec<Keyed>) {
+        self.parts.clear();
         self.order.clear();
-        self.order
-            .reserve_exact(self.parts.iter().map(Vec::len).sum());
-        for (part, candidates) in (0u32..).zip(&self.parts) {
-            assert!(candidates.len() < 1 << PLACE_BITS, "parts are small");
-            let places = (0u32..).map(|place| part << PLACE_BITS | place);
-            let keys = candidates.iter().map(|c| c.key);
-            self.order.extend(keys.zip(places));
+        let n = parts.iter().map(|part| part.keys.len()).sum();
+        self.order.reserve_exact(n);
+        for (number, part) in (0u32..).zip(parts) {
+            assert!(part.keys.len() < 1 << PLACE_BITS, "parts are small");
+            let places = (0u32..).map(|place| number << PLACE_BITS | place);
+            self.order.extend(part.keys.into_iter().zip(places));
+            self.parts.push(part.candidates);
         }
         sort_unstable_by(&mut self.order, Ord::cmp);
     }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::candidate::Candidate;
+use super::candidate::{Candidate, Keyed};
 use super::edge_cache::EdgeCache;
 use super::field::{Field, Lengths};
 use super::pattern::Pattern;
@@ -167,7 +167,7 @@ struct Division<'a> {
 
 impl Scan for Division<'_> {
     type Part = Range<usize>;
-    type Output = (Vec<Candidate>, Vec<u64>);
+    type Output = (Keyed, Vec<u64>);
 
     fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, part: &Range<usize>) -> Self::Output {
         let mut divider = Divider {
@@ -175,7 +175,7 @@ impl Scan for Division<'_> {
             order: self.order,
             pattern: self.placing.then(Pattern::new),
             shell: Shell::default(),
-            candidates: Vec::new(),
+            found: Keyed::default(),
         };
         let mut settled = Vec::new();
         for &(edge, tet) in &self.edges[part.clone()] {
@@ -183,8 +183,8 @@ impl Scan for Division<'_> {
                 settled.push(edge);
             }
         }
-        divider.candidates.shrink_to_fit();
-        (divider.candidates, settled)
+        divider.found.candidates.shrink_to_fit();
+        (divider.found, settled)
     }
 }
 
@@ -194,7 +194,7 @@ struct Divider<'a> {
     order: &'a HilbertFrame,
     pattern: Option<Pattern>,
     shell: Shell,
-    candidates: Vec<Candidate>,
+    found: Keyed,
 }
 
 impl Divider<'_> {
@@ -255,12 +255,10 @@ impl Divider<'_> {
                 h = length_at(u, point);
             }
             if field.place.admits(point, h) {
-                self.candidates.push(Candidate {
-                    point,
-                    h: h as f32,
-                    tet,
-                    key: class << 62 | self.order.index(point) >> 2,
-                });
+                let h = h as f32;
+                self.found.candidates.push(Candidate { point, h, tet });
+                let place = self.order.index(point) >> 2;
+                self.found.keys.push(class << 62 | place);
             }
         };
         if whole {

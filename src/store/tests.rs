@@ -255,6 +255,7 @@ fn a_row_that_counts_more_than_there_can_be_is_damage() -> Outcome {
     let mut store = Catalog::open_writable(&path)?;
     let mut row = store.subdomain(1)?;
     row.facets = u64::MAX;
+    std::fs::write(path.join("coarse-00001-g1.redb"), [])?;
     let kept = CoarseRow {
         rank: 1,
         generation: 1,

@@ -1,7 +1,8 @@
 //! Small stores exported and read back by other means than those that wrote them.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, Sender, channel};
 
 use tetdb_schema::ids::{Owner, SubdomainId, VertexId};
 use tetdb_schema::record::{
@@ -11,6 +12,7 @@ use tetdb_schema::record::{
 use super::*;
 use crate::geom::Point;
 use crate::io::read::read_surface;
+use crate::pipeline::HelperFailure;
 use crate::sealed::SealedWriter;
 use crate::store::{Catalog, two_subdomains};
 use crate::surface::{Surface, SurfaceBuilder};
@@ -551,6 +553,71 @@ fn pieces_are_the_same_written_together_or_alone() -> Outcome {
                 assert!(*first == bytes, "{}", file.display());
             }
         }
+    }
+    Ok(())
+}
+
+/// One of two writers in one process: ends of what the first tells, and of what the second says.
+struct OneOfTwo {
+    number: u32,
+    file: (Sender<PathBuf>, Receiver<PathBuf>),
+    done: (Sender<bool>, Receiver<bool>),
+}
+
+impl Writers for OneOfTwo {
+    fn share(&self) -> Share {
+        Share {
+            number: self.number,
+            of: 2,
+        }
+    }
+    fn tell(&self, file: &Path) {
+        self.file.0.send(file.to_owned()).expect("a receiver");
+    }
+    fn hear(&self) -> Option<PathBuf> {
+        self.file.1.recv().ok()
+    }
+    fn say(&self, done: std::result::Result<(), HelperFailure>) {
+        self.done.0.send(done.is_ok()).expect("a receiver");
+    }
+    fn wait(&self) -> std::result::Result<(), HelperFailure> {
+        assert!(self.done.1.recv().expect("a sender"));
+        Ok(())
+    }
+}
+
+#[test]
+fn partitions_by_several_writers_are_those_of_one() -> Outcome {
+    let dir = tempfile::tempdir()?;
+    let path = dir.path().join("cubes.tetdb");
+    cubes(&path, 12)?;
+    let out = |name: &str| dir.path().join(name);
+    let selection = Selection::default();
+    assert!(selection.is_shared_file(MeshFormat::VtkHdf));
+    let mut store = Catalog::open(&path)?;
+    let alone = out("alone.vtkhdf");
+    let one = export(&mut store, &alone, &selection, 1 << 20, &quiet)?;
+    let (to_second, told) = channel();
+    let (to_first, said) = channel();
+    let writers = [
+        (1, (to_second, channel().1), (channel().0, said)),
+        (2, (channel().0, told), (to_first, channel().1)),
+    ];
+    let export_part = |(number, file, done)| {
+        let writer = OneOfTwo { number, file, done };
+        let mut store = Catalog::open(&path).expect("a store");
+        let what = (&out("shared.vtkhdf") as &Path, &selection);
+        export_with(&mut store, what, 1 << 20, &quiet, Some(&writer)).expect("a file")
+    };
+    let [first, second] = std::thread::scope(|threads| {
+        let both = writers.map(|writer| threads.spawn(|| export_part(writer)));
+        both.map(|thread| thread.join().expect("no panic"))
+    });
+    assert_eq!((first.tets, first.vertices), (one.tets, one.vertices));
+    assert_eq!((second.tets, second.files.len()), (0, 0));
+    assert_eq!(first.files.len(), one.files.len());
+    for ((own, _), (other, _)) in one.files.iter().zip(&first.files) {
+        assert!(std::fs::read(own)? == std::fs::read(other)?, "{own:?}");
     }
     Ok(())
 }
