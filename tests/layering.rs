@@ -101,7 +101,7 @@ const LONG_FUNCTIONS: &[(&str, &str)] = &[
         "five passes, each sorted for the next",
     ),
     (
-        "io/write/vtu.rs write",
+        "io/write/vtu.rs write_partitions",
         "nine arrays named, opened, filled and closed in one order",
     ),
     (

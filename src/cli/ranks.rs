@@ -155,8 +155,8 @@ pub(super) fn gather<T: Serialize + DeserializeOwned>(
 /// A file that all ranks write together, each its partitions.
 pub(super) struct SharedFile {
     ranks: Arc<Ranks>,
-    /// Whether rank 0 has told the others.
-    is_told: Cell<bool>,
+    /// Whether rank 0 has announced it.
+    is_announced: Cell<bool>,
 }
 
 impl SharedFile {
@@ -164,12 +164,12 @@ impl SharedFile {
     pub fn new() -> Option<Self> {
         Some(Self {
             ranks: RANKS.get()?.clone(),
-            is_told: Cell::new(false),
+            is_announced: Cell::new(false),
         })
     }
 
-    fn tell_all(&self, letter: &[u8]) {
-        self.is_told.set(true);
+    fn announce_to_all(&self, letter: &[u8]) {
+        self.is_announced.set(true);
         (1..self.ranks.size).for_each(|rank| self.ranks.send(rank, FILE, letter.to_vec()));
     }
 }
@@ -179,8 +179,8 @@ impl Writers for SharedFile {
         self.ranks.share()
     }
 
-    fn tell(&self, file: &Path) {
-        self.tell_all(&[&[DONE], file.as_os_str().as_bytes()].concat());
+    fn announce(&self, file: &Path) {
+        self.announce_to_all(&[&[DONE], file.as_os_str().as_bytes()].concat());
     }
 
     fn hear(&self) -> Option<PathBuf> {
@@ -215,8 +215,8 @@ impl Writers for SharedFile {
 impl Drop for SharedFile {
     /// Where rank 0 failed before there was a file, the others wait for none.
     fn drop(&mut self) {
-        if self.ranks.rank == 0 && !self.is_told.get() {
-            self.tell_all(&[END]);
+        if self.ranks.rank == 0 && !self.is_announced.get() {
+            self.announce_to_all(&[END]);
         }
     }
 }

@@ -571,7 +571,7 @@ impl Writers for OneOfTwo {
             of: 2,
         }
     }
-    fn tell(&self, file: &Path) {
+    fn announce(&self, file: &Path) {
         self.file.0.send(file.to_owned()).expect("a receiver");
     }
     fn hear(&self) -> Option<PathBuf> {

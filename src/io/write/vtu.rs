@@ -55,7 +55,7 @@ pub(super) fn write(
         Ok(())
     };
     if number == 1 {
-        let path = begin().inspect(|path| writers.tell(path))?;
+        let path = begin().inspect(|path| writers.announce(path))?;
         write_own(mesh, &path)?;
         mesh.look_at(0..n);
         vtu_boundary::write(mesh, draft, &boundary_path(out), true, None)?;

@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 use super::selection::Share;
 use crate::pipeline::HelperFailure;
 
-/// The processes. The first makes the file, tells the others where it is, and renames it when all have done their parts.
+/// The processes. The first makes the file, announces where it is, and renames it when all have done their parts.
 pub trait Writers {
     /// Which of them this one is.
     fn share(&self) -> Share;
-    /// The first tells where the unfinished file is, its head written.
-    fn tell(&self, file: &Path);
-    /// What the first has told; `None` when there will be no file.
+    /// The first says where the unfinished file is, its head written.
+    fn announce(&self, file: &Path);
+    /// What the first has said; `None` when there will be no file.
     fn hear(&self) -> Option<PathBuf>;
     /// The others say how their part went.
     fn say(&self, done: Result<(), HelperFailure>);
