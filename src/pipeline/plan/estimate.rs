@@ -74,10 +74,10 @@ const BESIDE_TRIANGLE: f64 = 200.0;
 const BEYOND_CAP: f64 = 18e6;
 
 /// CPU seconds for each tetrahedron and each triangle on one core of an EPYC at 2.6 GHz. Where needles make recovery slow it may take ten times that.
-pub(super) const SECONDS_TET: f64 = 1.0 / 240e3;
-pub(super) const SECONDS_TRIANGLE: f64 = 12e-6;
+const SECONDS_TET: f64 = 1.0 / 240e3;
+pub(super) const SECONDS_TRIANGLE: f64 = 7.5e-6;
 /// For verification.
-pub(super) const SECONDS_VERIFY: f64 = 0.42e-6;
+pub(super) const SECONDS_VERIFY: f64 = 0.6e-6;
 
 /// What to expect of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]

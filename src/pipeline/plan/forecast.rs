@@ -3,13 +3,15 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use super::estimate::{Estimate, SECONDS_TET, SECONDS_TRIANGLE, SECONDS_VERIFY};
+use super::estimate::{Estimate, SECONDS_TRIANGLE, SECONDS_VERIFY};
 
 /// CPU seconds of a cut: for each triangle of the part's surface, and for each tetrahedron at a plane, of which the part has as many as the power 2/3 of all.
-/// Fitted to the cuts of two meshes on an EPYC at 2.6 GHz: of 924 million (418 s for the first, 5,945 s for all 430; these say 328 and 5,790) and of 21
-/// million (18.4 and 64; 19.5 and 69).
-const CUT_TRIANGLE: f64 = 4e-6;
-const CUT_PLANE: f64 = 1.7e-4;
+/// Fitted to the cuts of two meshes on an idle EPYC at 2.6 GHz: of 211 million (34.9 s for the first, 408 s for all 99; these say 33.4 and 396) and of 20
+/// million (7.7 and 28.0; 7.0 and 29.2).
+const CUT_TRIANGLE: f64 = 1.4e-6;
+const CUT_PLANE: f64 = 6.5e-5;
+/// CPU seconds of a sub-domain for each of its tetrahedra, of the same meshes: 2.65 and 2.82.
+const SUBDOMAIN_TET: f64 = 2.75e-6;
 
 /// Wall seconds of workers with a thread each.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,7 +35,7 @@ impl Estimate {
     /// What `workers` take, of any number of machines; 0 counts as 1.
     pub fn forecast(&self, workers: u32) -> Forecast {
         let (workers, n) = (workers.max(1), self.subdomains);
-        let per_subdomain = SECONDS_TET * self.tets() / f64::from(n);
+        let per_subdomain = SUBDOMAIN_TET * self.tets() / f64::from(n);
         Forecast {
             serial_s: SECONDS_TRIANGLE * self.triangles as f64 + SECONDS_VERIFY * self.tets(),
             cuts_s: tree_seconds(n, workers, |count| {
