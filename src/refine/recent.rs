@@ -3,8 +3,8 @@
 use super::candidate::Candidate;
 use crate::geom::Point;
 
-/// Points inserted that are compared with the next one before anything else is done about it. With 16 they refuse half of what is too
-/// near in the end, with 64 a little more.
+/// Points inserted that are compared with the next one before anything else is done about it. They refuse three in five of what is too near
+/// in the end, with 64 a little more.
 const RECENT: usize = 32;
 
 /// The last points inserted. Candidates come along the curve, so what refuses one is often among them, and else the nearest of
