@@ -24,10 +24,10 @@ pub struct MeshArgs {
     /// Replace the store if it is there
     #[arg(long, help_heading = "Store")]
     pub force: bool,
-    /// End with the coarse mesh, and leave the rest to `tetdb plan` or `tetdb resume`
+    /// Stop after the coarse mesh, and leave the rest to `tetdb plan` or `tetdb resume`
     #[arg(long, conflicts_with_all = ["force", "export"], help_heading = "Run")]
     pub coarse_only: bool,
-    /// Begin even when disk or memory are expected not to hold the mesh
+    /// Start even when disk or memory are expected not to hold the mesh
     #[arg(long, hide = true)]
     pub no_preflight: bool,
     #[command(flatten)]
