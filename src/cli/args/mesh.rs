@@ -14,7 +14,7 @@ pub struct MeshArgs {
     /// Surface files (STL, PLY, OBJ, OFF, MEDIT, Gmsh, TetGen), or a sample such as sample:balls,count=100
     #[arg(required = true, value_name = "SURFACE")]
     pub surfaces: Vec<String>,
-    /// The store to make [default: the surface's name with .tetdb, here]
+    /// The store to write [default: the surface's name with .tetdb, in the current folder]
     #[arg(short, long, value_name = "STORE")]
     pub output: Option<PathBuf>,
     #[command(flatten)]
@@ -43,7 +43,7 @@ pub struct EstimateArgs {
     /// Surface files, or a sample such as sample:balls,count=100
     #[arg(required = true, value_name = "SURFACE")]
     pub surfaces: Vec<String>,
-    /// Where the store would be [default: here]
+    /// Where the store would be [default: in the current folder]
     #[arg(short, long, value_name = "STORE")]
     pub output: Option<PathBuf>,
     #[command(flatten)]

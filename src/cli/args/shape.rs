@@ -85,7 +85,7 @@ pub struct SizeArgs {
 pub struct ShapeArgs {
     #[command(flatten)]
     pub sizes: SizeArgs,
-    /// Options from a TOML file, such as hsiz = "2%"; what the command line says goes first
+    /// Options from a TOML file, such as hsiz = "2%"; the command line takes precedence
     #[arg(long, value_name = "FILE", help_heading = None)]
     pub config: Option<PathBuf>,
     /// First divide the surface's triangles where embedded points lie on them, and until their edges are as short as the wanted lengths,
