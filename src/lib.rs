@@ -4,6 +4,8 @@
 // The page names the modules, which are public with `internals` alone.
 #![cfg_attr(not(feature = "internals"), allow(rustdoc::private_intra_doc_links))]
 #![doc = include_str!("README.md")]
+// Without the program its row in the table of modules leads to this page.
+#![cfg_attr(not(feature = "cli"), doc = "", doc = "[`cli`]: crate")]
 
 #[doc(inline)]
 pub use api::{

@@ -113,7 +113,7 @@ pub fn run(args: &EstimateArgs, console: &Console) -> Result<u8, Failure> {
         memory::show(estimate.store_bytes()),
     ));
     console.line(&format!(
-        "time: about {} s on {} of a 2.6 GHz server; needles in the surface make it more",
+        "time: about {} s on {} of a 2.6 GHz server; needle-shaped triangles make it longer",
         short(estimate.seconds(threads).max(1.0).round()),
         count(threads as u64, "thread")
     ));

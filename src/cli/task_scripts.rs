@@ -83,14 +83,14 @@ impl Script<'_> {
         let megabytes = (self.memory_bytes + MEMORY_BESIDE).div_ceil(1 << 20);
         text += "# SBATCH may hold more options of sbatch, such as SBATCH='--partition=long --time=4:00:00'.\n";
         text += "submit() { sbatch --parsable --kill-on-invalid-dep=yes ${SBATCH:-} \"$@\" | cut -d';' -f1; }\n";
-        let mut after = String::new();
+        let (mut after, mut and) = (String::new(), "");
         for (number, stage) in self.stages() {
             let offset = stage.first - 1;
             let work = self.work(&format!("$((SLURM_ARRAY_TASK_ID + {offset}))"));
             let _ = writeln!(
                 text,
                 "# Stage {number}: {}.\na=$(submit{after} --job-name=tetdb-{number} --requeue --array=1-{} --mem={megabytes}M --cpus-per-task={} --wrap {})\n\
-                 g=$(submit --dependency=afterany:$a --job-name=tetdb-gather --mem=1G --wrap {})",
+                 g=$(submit --dependency=afterany:$a{and} --job-name=tetdb-gather --mem=1G --wrap {})",
                 kind(stage.kind),
                 stage.tasks().len(),
                 self.threads,
@@ -98,6 +98,8 @@ impl Script<'_> {
                 single_quoted(&self.command("gather")),
             );
             after = " --dependency=afterok:$g".to_owned();
+            // Tasks that are cancelled because a stage failed count as ended: nothing is there to be gathered.
+            and = ",afterok:$g";
         }
         let resume = format!(
             "{} --memory {}MiB",

@@ -96,7 +96,7 @@ impl fmt::Display for SizeSummary {
         let Range { low, median, high } = self.surface;
         write!(
             f,
-            "sizes from {}; surface median {} ({} to {}), wanted in the box around it {} ({} to {})",
+            "sizes from {}; surface median {} ({} to {}), wanted inside its box {} ({} to {})",
             self.source,
             short(median),
             short(low),

@@ -14,7 +14,7 @@ pub struct MeshArgs {
     /// Surface files (STL, PLY, OBJ, OFF, MEDIT, Gmsh, TetGen), or a sample such as sample:balls,count=100
     #[arg(required = true, value_name = "SURFACE")]
     pub surfaces: Vec<String>,
-    /// The store to make [default: the surface's name with .tetdb, here]
+    /// The store to write [default: the surface's name with .tetdb, in the current folder]
     #[arg(short, long, value_name = "STORE")]
     pub output: Option<PathBuf>,
     #[command(flatten)]
@@ -24,10 +24,10 @@ pub struct MeshArgs {
     /// Replace the store if it is there
     #[arg(long, help_heading = "Store")]
     pub force: bool,
-    /// End with the coarse mesh, and leave the rest to `tetdb plan` or `tetdb resume`
+    /// Stop after the coarse mesh, and leave the rest to `tetdb plan` or `tetdb resume`
     #[arg(long, conflicts_with_all = ["force", "export"], help_heading = "Run")]
     pub coarse_only: bool,
-    /// Begin even when disk or memory are expected not to hold the mesh
+    /// Start even when disk or memory are expected not to hold the mesh
     #[arg(long, hide = true)]
     pub no_preflight: bool,
     #[command(flatten)]
@@ -43,7 +43,7 @@ pub struct EstimateArgs {
     /// Surface files, or a sample such as sample:balls,count=100
     #[arg(required = true, value_name = "SURFACE")]
     pub surfaces: Vec<String>,
-    /// Where the store would be [default: here]
+    /// Where the store would be [default: in the current folder]
     #[arg(short, long, value_name = "STORE")]
     pub output: Option<PathBuf>,
     #[command(flatten)]

@@ -54,7 +54,7 @@ pub struct Args {
 pub enum Command {
     /// Mesh a closed surface into a store, and verify it
     Mesh(Box<MeshArgs>),
-    /// Say what a mesh will be and what it will take, without making it
+    /// Predict a mesh and the memory, disk and time it takes, without meshing
     ///
     /// Nothing is refused but a bad surface or option.
     Estimate(Box<EstimateArgs>),
@@ -71,10 +71,11 @@ pub enum Command {
     Work(WorkArgs),
     /// Commit what tasks have done, and let the next ones begin
     Gather(GatherArgs),
-    /// Make sub-domains again: with other sizes, or damaged ones
+    /// Mesh sub-domains again: with other sizes, or damaged ones
     ///
-    /// Each is meshed from the coarse mesh kept in the store. Interfaces and all other sub-domains stay as they are. Size options take the
-    /// place of all sizes that the sub-domains were meshed with; without any, they are meshed as they were.
+    /// Each is meshed from its coarse snapshot in the store. Interfaces and all other sub-domains stay as they are. Sizes stay what they were
+    /// unless options say otherwise: single lengths replace those of the first run, shapes and regions are added to its. Without any, the
+    /// sub-domains are meshed as they were.
     Resaturate(Box<ResaturateArgs>),
     /// Say whether a surface can be meshed, and where it cannot
     ///
@@ -83,7 +84,7 @@ pub enum Command {
     Check(CheckArgs),
     /// Say what a store holds
     Info(InfoArgs),
-    /// Ask for tetrahedra by place, number, neighborhood or condition
+    /// Find tetrahedra by place, number, neighborhood or condition
     ///
     /// All that is given must hold; nothing given means all tetrahedra. Only the parts of the store that matter are read.
     Query(Box<QueryArgs>),
@@ -92,9 +93,9 @@ pub enum Command {
     /// All tetrahedra positive by exact signs, each face paired or on the surface, each input triangle there, checksums and digest as they
     /// were written.
     Verify(VerifyArgs),
-    /// Set the qualities of two meshes side by side
+    /// Compare the qualities of two meshes
     ///
-    /// Tetrahedra by quality; those that the surface forces to be bad and those at interfaces apart.
+    /// Tetrahedra by quality; those that the surface forces to be bad and those at interfaces are also counted separately.
     Compare(CompareArgs),
     /// Print the digest of a store's mesh
     ///
@@ -118,7 +119,7 @@ pub enum Command {
     Report(ReportArgs),
     /// Write a generated surface to a file
     Sample(SampleArgs),
-    /// Print the completions of a shell
+    /// Print a completion script for a shell
     Completions(CompletionsArgs),
     /// Print a manual page, or write them all
     Man(ManArgs),

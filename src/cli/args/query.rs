@@ -38,37 +38,37 @@ pub struct QueryArgs {
     /// Only those that lie wholly in the boxes and balls
     #[arg(long, conflicts_with = "plane")]
     pub inside: bool,
-    /// Of these sub-domains, such as 0,3
+    /// Tetrahedra of these sub-domains, such as 0,3
     #[arg(long, value_name = "LIST", alias = "domain")]
     pub subdomain: Option<String>,
-    /// Of these regions, as numbers or names in `tetdb info`
+    /// Tetrahedra of these regions, as numbers or names in `tetdb info`
     #[arg(long, value_name = "LIST")]
     pub region: Option<String>,
-    /// With a face on an input triangle of one of these labels, names or numbers
+    /// Tetrahedra with a face on an input triangle of one of these labels, names or numbers
     #[arg(long, value_name = "LIST")]
     pub label: Option<String>,
-    /// With a vertex of the input
+    /// Tetrahedra with a vertex of the surface
     #[arg(long)]
     pub touching_surface: bool,
-    /// With a face on an embedded sheet
+    /// Tetrahedra with a face on an embedded sheet
     #[arg(long)]
     pub touching_sheet: bool,
-    /// With a face on the interface of two sub-domains
+    /// Tetrahedra with a face on the interface of two sub-domains
     #[arg(long, value_name = "A,B")]
     pub interface: Option<String>,
-    /// Of which this holds, such as "quality > 6 and region = 2"
+    /// Tetrahedra for which this holds, such as "quality > 6 and region = 2"
     #[arg(long = "where", value_name = "EXPRESSION", allow_hyphen_values = true)]
     pub condition: Option<String>,
-    /// These, such as 7:1048211
+    /// These tetrahedra, by id, such as 7:1048211
     #[arg(long, value_name = "LIST")]
     pub tet: Option<String>,
-    /// Those that share a face with this one
+    /// Tetrahedra that share a face with this one
     #[arg(long, value_name = "TETRAHEDRON", conflicts_with_all = ["ball", "shell"])]
     pub neighbors: Option<String>,
-    /// Those that have this vertex, such as surface:12 or 7:40
+    /// Tetrahedra that have this vertex, such as surface:12 or 7:40
     #[arg(long, value_name = "VERTEX", conflicts_with = "shell")]
     pub ball: Option<String>,
-    /// Those that have both vertices of an edge
+    /// Tetrahedra that have both vertices of an edge
     #[arg(long, value_name = "VERTEX,VERTEX")]
     pub shell: Option<String>,
     /// Columns to answer with, such as id,quality,vertices
@@ -92,7 +92,7 @@ pub struct QueryArgs {
     /// Most memory to hold
     #[arg(long, value_name = "SIZE")]
     pub memory: Option<String>,
-    /// Answer with a JSON object a line
+    /// Answer with one JSON object per line
     #[arg(long)]
     pub json: bool,
 }

@@ -20,7 +20,7 @@ pub struct ResaturateArgs {
     /// The store, a directory that `tetdb mesh` wrote
     #[arg(value_name = "STORE")]
     pub store: PathBuf,
-    /// The sub-domains to make again, as numbers with commas between them
+    /// The sub-domains to mesh again, as numbers with commas between them
     #[arg(
         long,
         value_name = "LIST",
@@ -29,7 +29,7 @@ pub struct ResaturateArgs {
         alias = "subdomains"
     )]
     pub subdomain: Vec<u32>,
-    /// Make those again whose sizes would be others (by 5 % somewhere)
+    /// Mesh those again whose wanted lengths would differ by 5 % somewhere
     #[arg(long, conflicts_with_all = ["subdomain", "undo", "forget", "repair"])]
     pub changed: bool,
     #[command(flatten)]
@@ -43,10 +43,10 @@ pub struct ResaturateArgs {
     /// Bring back what was before the last change
     #[arg(long, conflicts_with_all = ["subdomain", "forget", "repair"], help_heading = None)]
     pub undo: bool,
-    /// Drop what was before the last change: the store gets smaller, --undo impossible
+    /// Drop what was before the last change: the store gets smaller, and --undo becomes impossible
     #[arg(long, conflicts_with_all = ["subdomain", "repair"], help_heading = None)]
     pub forget: bool,
-    /// Make damaged sub-domains again as they were; without --subdomain all that are damaged
+    /// Mesh damaged sub-domains again as they were; without --subdomain all that are damaged
     #[arg(long, help_heading = None)]
     pub repair: bool,
     #[command(flatten)]

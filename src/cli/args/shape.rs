@@ -6,15 +6,15 @@ use clap::ValueEnum;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Regions {
-    /// What an odd number of shells separates from the outside: a shell in a shell is a hole
+    /// Regions that an odd number of shells separates from the outside: a shell in a shell is a hole
     Parity,
     /// Every bounded region
     All,
-    /// Only what lies behind the outermost shells
+    /// Only the region directly behind the outermost shells
     Outer,
-    /// What lies behind triangles that look away from it
+    /// Regions behind triangles whose front side looks away from them
     ByOrientation,
-    /// What has a seed (--region-seed, --seeds, or the regions of the surface's files); where only holes are given, all others
+    /// Regions with a seed (--region-seed, --seeds, or regions in the surface's files); where only holes are given, all others
     Seeds,
 }
 
@@ -85,7 +85,7 @@ pub struct SizeArgs {
 pub struct ShapeArgs {
     #[command(flatten)]
     pub sizes: SizeArgs,
-    /// Options from a TOML file, such as hsiz = "2%"; what the command line says goes first
+    /// Options from a TOML file, such as hsiz = "2%"; the command line takes precedence
     #[arg(long, value_name = "FILE", help_heading = None)]
     pub config: Option<PathBuf>,
     /// First divide the surface's triangles where embedded points lie on them, and until their edges are as short as the wanted lengths,
@@ -114,10 +114,10 @@ pub struct ShapeArgs {
     /// Seeds and holes from a file: a line `x y z name` or `x y z hole` for each
     #[arg(long, value_name = "FILE", help_heading = "Regions")]
     pub seeds: Option<PathBuf>,
-    /// How far to optimize [default: full]
+    /// How much to improve the shapes of tetrahedra [default: full]
     #[arg(long, value_enum, help_heading = None)]
     pub optimize: Option<Optimize>,
-    /// Do not keep what sub-domains are meshed from: a smaller store, in which none can be meshed again by `tetdb resaturate`
+    /// Do not keep coarse snapshots: the store is smaller, and `tetdb resaturate` cannot mesh its sub-domains again
     #[arg(long, help_heading = "Store")]
     pub drop_coarse: bool,
     /// How finished sub-domains are kept [default: packed]
@@ -126,7 +126,7 @@ pub struct ShapeArgs {
     /// Number of sub-domains: auto, or a number [default: auto, one for each 2 million tetrahedra]
     #[arg(long, value_name = "N", alias = "domains", help_heading = "Store")]
     pub subdomains: Option<String>,
-    /// Keep the meshes before and after each cut is refined, and the interface before and after it is chosen, for `tetdb snapshot --stage`
+    /// Keep the meshes before and after refinement for each cut, and its interface before and after faces are chosen, for `tetdb snapshot --stage`
     #[arg(long, help_heading = "Store")]
     pub keep_stages: bool,
 }

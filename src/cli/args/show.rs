@@ -39,13 +39,13 @@ pub struct SnapshotArgs {
     /// Draw the tetrahedra that meet the plane whole, not the polygons it cuts out of them
     #[arg(long)]
     pub crinkle: bool,
-    /// The whole surface in space, shaded; with --plane, what lies beyond it is left out and the tetrahedra it cuts are seen
+    /// The whole surface in space, shaded; with --plane, the part in front of the plane is left out, and the tetrahedra it cuts are seen
     #[arg(long, conflicts_with_all = ["crinkle", "condition"])]
     pub surface: bool,
-    /// What bounds one sub-domain in space, shaded: input triangles in its color, interfaces in that of the neighbor; with --plane as above
+    /// The faces around one sub-domain in space, shaded: input triangles in its color, interfaces in that of the neighbor; with --plane as above
     #[arg(long, value_name = "SUBDOMAIN", conflicts_with_all = ["surface", "crinkle", "condition"])]
     pub shell: Option<u32>,
-    /// What a cut had on its way, of a store meshed with --keep-stages: coarse or refined (the mesh, with the plane of the cut as a line),
+    /// An intermediate stage of a cut, of a store meshed with --keep-stages: coarse or refined (the mesh, with the plane of the cut as a line),
     /// natural or interface (the interface in space, before and after its faces were chosen)
     #[arg(long, value_name = "CUT:WHAT", conflicts_with_all = ["surface", "shell"])]
     pub stage: Option<String>,
@@ -55,7 +55,7 @@ pub struct SnapshotArgs {
     /// What colors stand for: size is the mean of the longest and the shortest edge, label that of input triangles with --surface or --shell
     #[arg(long, value_enum, default_value = "subdomain", value_name = "WHAT")]
     pub color: ColorBy,
-    /// Draw only tetrahedra of which this holds, as in `tetdb query`
+    /// Draw only tetrahedra for which this holds, as in `tetdb query`
     #[arg(long = "where", value_name = "EXPRESSION", allow_hyphen_values = true)]
     pub condition: Option<String>,
     /// Width and height in pixels

@@ -26,7 +26,7 @@ pub struct StoreArgs {
 pub struct InfoArgs {
     #[command(flatten)]
     pub of: StoreArgs,
-    /// Also measure how much worse than the surface forces tetrahedra are (reads all of them)
+    /// Also measure by how much tetrahedra are worse than the surface forces them to be (reads all of them)
     #[arg(long)]
     pub excess: bool,
 }
@@ -91,28 +91,28 @@ pub struct ExportArgs {
     #[arg(value_name = "STORE")]
     pub store: PathBuf,
     /// Files to write; the extension tells the format: .vtu, .pvtu, .vtkhdf, .foam (OpenFOAM, in its folder), .msh, .mesh, .meshb, .mfem (MFEM), .ele (TetGen),
-    /// .inp, .npy (an array a file), .json (topology), .csv and .jsonl (the rows of `tetdb query`), .parquet (where built in); `-` with --format is standard output
+    /// .inp, .npy (one file per array), .json (topology), .csv and .jsonl (the rows of `tetdb query`), .parquet (where built in); `-` with --format is standard output
     #[arg(required = true, value_name = "OUT")]
     pub out: Vec<PathBuf>,
-    /// The format, by the word of its ending, where the name does not tell it: vtu, msh, ..; msh22 is Gmsh's old one
+    /// The format, where the name does not tell it: vtu, msh and so on, or msh22 for Gmsh's old format
     #[arg(long, value_name = "FORMAT")]
     pub format: Option<String>,
-    /// A file for each sub-domain, NAME_00007.mesh, with the faces it shares with others; .pvtu always does so; of .foam processorN
+    /// A file for each sub-domain, NAME_00007.mesh, with the faces it shares with others; .pvtu always does so; for .foam folders processorN
     #[arg(long)]
     pub pieces: bool,
-    /// Of the pieces the K-th of N shares, for processes that write all of them together, such as the tasks of an array
+    /// Write the K-th of N shares of the pieces, for several processes that write all of them together, such as the tasks of an array
     #[arg(long, value_name = "K/N", value_parser = share)]
     pub share: Option<Share>,
     /// Text instead of binary numbers (.msh, .foam)
     #[arg(long)]
     pub ascii: bool,
-    /// Nodes of the elements: 1, corners; 2, also the middles of edges (.vtu, .pvtu, .vtkhdf, .msh, .inp)
+    /// Nodes of the elements: 1, corners; 2, also the midpoints of edges (.vtu, .pvtu, .vtkhdf, .msh, .inp)
     #[arg(long, value_name = "ORDER", default_value = "1", value_parser = clap::value_parser!(u8).range(1..=2))]
     pub order: u8,
     /// List in .msh, for each partition, the tetrahedra of others that touch it
     #[arg(long)]
     pub ghosts: bool,
-    /// Split embedded sheets: their vertices stand once for each side, those on free edges once; NAME_pairs.csv lists the pairs
+    /// Split embedded sheets: their vertices are written once for each side, those on free edges once; NAME_pairs.csv lists the pairs
     #[arg(long)]
     pub split_sheets: bool,
     /// Only these sub-domains, as numbers with commas between them
@@ -124,7 +124,7 @@ pub struct ExportArgs {
         alias = "subdomains"
     )]
     pub subdomain: Vec<u32>,
-    /// Only these regions, as numbers or names in `tetdb info`, with commas between them; what bounds them is boundary
+    /// Only these regions, as numbers or names in `tetdb info`, with commas between them; their outer faces become boundary
     #[arg(long, value_name = "LIST")]
     pub region: Option<String>,
     /// Only input triangles and faces between sub-domains (.vtu, .vtkhdf)

@@ -18,7 +18,7 @@ pub struct SheetArgs {
     /// What an embedded file is called [default: its own name]; may be repeated
     #[arg(long, value_name = "FILE=NAME")]
     pub name: Vec<String>,
-    /// Take for sheets what of the surface is not closed
+    /// Treat the parts of the surface that are not closed as sheets
     #[arg(long)]
     pub allow_open: bool,
 }
@@ -48,7 +48,7 @@ pub struct CheckArgs {
     /// Write the defective triangles to this .vtu file, the kind of defect as cell data
     #[arg(long, value_name = "FILE")]
     pub write_bad: Option<PathBuf>,
-    /// Drop triangles without area and repeated ones, divide triangles at T-junctions, turn neighbors alike
+    /// Drop triangles without area and repeated ones, divide triangles at T-junctions, turn triangles so that neighbors face the same side
     #[arg(long, requires = "write")]
     pub repair: bool,
     /// With --repair: first join points not farther apart than this share of the box diagonal

@@ -37,7 +37,7 @@ pub struct PlanArgs {
     /// Threads of a task
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub threads_per_task: usize,
-    /// A folder of each machine for its tasks, as `tetdb work` takes it
+    /// A folder on each machine for the files of its tasks, as in `tetdb work --scratch`
     #[arg(long, value_name = "DIR")]
     pub scratch: Option<PathBuf>,
     /// At the end, also export the mesh in pieces by tasks that write a share each, as `tetdb export --pieces --share K/N` does
@@ -65,10 +65,10 @@ pub struct WorkArgs {
     /// Threads to use [default: all cores]
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub threads: Option<usize>,
-    /// A folder of this machine to write in before files are copied [default: $SLURM_TMPDIR, $TMPDIR, or the store's folder]
+    /// A folder of this machine to write in before files are copied to the store [default: $SLURM_TMPDIR, $TMPDIR, or the store's folder]
     #[arg(long, value_name = "DIR")]
     pub scratch: Option<PathBuf>,
-    /// Seconds that files of other machines may be late
+    /// Seconds to wait for files of other machines that show up late
     #[arg(long, value_name = "SECONDS", default_value_t = 60)]
     pub wait: u64,
     /// Answer with one JSON object
@@ -84,7 +84,7 @@ pub struct GatherArgs {
     /// The store whose tasks have run
     #[arg(value_name = "STORE")]
     pub store: PathBuf,
-    /// Seconds that files of other machines may be late
+    /// Seconds to wait for files of other machines that show up late
     #[arg(long, value_name = "SECONDS", default_value_t = 60)]
     pub wait: u64,
     /// Answer with one JSON object
