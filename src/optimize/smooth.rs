@@ -13,6 +13,8 @@ const FRACTIONS: [f64; 5] = [0.1, 0.25, 0.45, 0.7, 1.0];
 /// steps keep queues full around tetrahedra that the surface spoils, and end lower, for each takes the room of the next.
 const GAIN_MIN: f64 = 1.03;
 const GAIN_LEAST: f64 = 0.003;
+/// More than rounding makes of sums and of bounds.
+const ROUNDING: f64 = 1e-9;
 /// Steps of the search per vertex.
 const SEARCH_STEPS: usize = 12;
 /// A search without any gain so far ends after this many halvings of its step: what is nearer gains too little.
@@ -141,6 +143,18 @@ impl Star {
             }
         }
         (best > floor).then_some((at, best))
+    }
+
+    /// What the star is not worth more than with the vertex anywhere; of at most `f64::INFINITY`.
+    pub(super) fn most(&self) -> f64 {
+        let Some(bar) = self.bar else {
+            return self.bound() * (1.0 + ROUNDING);
+        };
+        let mut most = 0.0;
+        for &face in &self.faces {
+            most += bar.worth(face_bound(face) * (1.0 + ROUNDING));
+        }
+        most + ROUNDING
     }
 
     /// What no position of the vertex can exceed, given the faces opposite it.

@@ -57,12 +57,13 @@ pub(super) struct Cavity {
 }
 
 impl Cavity {
-    /// The best vertex in the cavities that grow from `t`.
+    /// The best vertex in the cavities that grow from `t`, if its value is to be above `floor`.
     pub(super) fn grow<P: Pages>(
         &mut self,
         mesh: &mut Mesh<P>,
         t: u32,
         aim: Aim,
+        floor: f64,
         bounds: &mut FaceBounds,
     ) -> Option<Proposal> {
         self.begin(mesh, t, bounds);
@@ -71,15 +72,19 @@ impl Cavity {
         let mut best: Option<Proposal> = None;
         let mut n_hidden = 0;
         loop {
-            let mut value = self.star.least(at, f64::NEG_INFINITY);
+            // Required faces stay the cavity's, however it grows.
+            if self.star.most_required() <= best.map_or(floor, |b| b.value.max(floor)) {
+                break;
+            }
+            let mut value = self.star.least(at, 0.0);
             n_hidden += 1;
             if value <= 0.0 {
                 at = self.star.moved_into_kernel(at);
-                value = self.star.least(at, f64::NEG_INFINITY);
+                value = self.star.least(at, 0.0);
             }
             if value > 0.0 {
                 n_hidden = 0;
-                (at, value) = self.star.raise_least(at, STEPS_GROWING, aim.enough);
+                (at, value) = (self.star).raise_least(at, value, STEPS_GROWING, aim.enough);
             }
             let n = self.tets.len();
             if value > best.map_or(0.0, |b| b.value) && self.is_better(at, value, aim) {
@@ -115,7 +120,8 @@ impl Cavity {
         if best.corner.is_some() {
             return Some(best);
         }
-        let (at, value) = self.star.raise_least(best.at, STEPS, aim.enough);
+        let value = self.star.least(best.at, f64::NEG_INFINITY);
+        let (at, value) = (self.star).raise_least(best.at, value, STEPS, aim.enough);
         Some(if self.is_better(at, value, aim) {
             Proposal { at, value, ..best }
         } else {
@@ -123,13 +129,15 @@ impl Cavity {
         })
     }
 
-    /// The best vertex in the shell of edge `e` of `t`, an inner edge.
+    /// The best vertex in the shell of edge `e` of `t`, an inner edge, if its value is to be above `floor`.
+    #[allow(clippy::too_many_arguments)]
     pub(super) fn split<P: Pages>(
         &mut self,
         mesh: &mut Mesh<P>,
         t: u32,
         e: usize,
         aim: Aim,
+        floor: f64,
         bounds: &mut FaceBounds,
     ) -> Option<Proposal> {
         if !self.shell.gather(mesh, t, e, RING_MAX) || !self.shell.closed || self.shell.required {
@@ -140,8 +148,12 @@ impl Cavity {
             let t = self.shell.tets[k];
             self.add(mesh, t, bounds);
         }
+        if self.star.most() <= floor {
+            return None;
+        }
         let middle = (mesh.point(self.shell.a) + mesh.point(self.shell.b)) * 0.5;
-        let (at, value) = self.star.raise_least(middle, STEPS, aim.enough);
+        let value = self.star.least(middle, f64::NEG_INFINITY);
+        let (at, value) = (self.star).raise_least(middle, value, STEPS, aim.enough);
         let n = self.tets.len();
         let proposal = Proposal {
             n,
