@@ -26,8 +26,10 @@ use crate::storage::Pages;
 /// Steps of the search after each growth, and after the last.
 const STEPS_GROWING: u32 = 20;
 const STEPS: u32 = 80;
-/// Growth without any place that sees all faces ends after so many tetrahedra.
-const HIDDEN_MAX: u32 = 24;
+/// Growth without any place that sees all faces from far enough ends after so many tetrahedra.
+const HIDDEN_MAX: u32 = 12;
+/// Growth past the best size so far ends after so many.
+const IDLE_MAX: u32 = 8;
 /// Longest ring of an edge that gets a vertex.
 const RING_MAX: usize = 24;
 
@@ -70,24 +72,27 @@ impl Cavity {
         let points = mesh.points(&self.records[0]);
         let mut at = (points[0] + points[1] + points[2] + points[3]) * 0.25;
         let mut best: Option<Proposal> = None;
-        let mut n_hidden = 0;
+        let (mut n_hidden, mut n_idle) = (0, 0);
         loop {
+            let wanted = best.map_or(floor, |b| b.value.max(floor));
             // Required faces stay the cavity's, however it grows.
-            if self.star.most_required() <= best.map_or(floor, |b| b.value.max(floor)) {
+            if self.star.most_required() <= wanted {
                 break;
             }
-            let mut value = self.star.least(at, 0.0);
+            let (mut value, mut most) = (self.star.least(at, 0.0), f64::INFINITY);
             n_hidden += 1;
+            n_idle += 1;
             if value <= 0.0 {
-                at = self.star.moved_into_kernel(at);
+                (at, most) = self.star.moved_into_kernel(at);
                 value = self.star.least(at, 0.0);
             }
-            if value > 0.0 {
+            if value > 0.0 && most > wanted {
                 n_hidden = 0;
                 (at, value) = (self.star).raise_least(at, value, STEPS_GROWING, aim.enough);
             }
             let n = self.tets.len();
             if value > best.map_or(0.0, |b| b.value) && self.is_better(at, value, aim) {
+                n_idle = 0;
                 best = Some(Proposal {
                     n,
                     at,
@@ -100,6 +105,7 @@ impl Cavity {
                 && self.is_better(at, value, aim)
             {
                 let corner = Some(v);
+                n_idle = 0;
                 best = Some(Proposal {
                     n,
                     at,
@@ -110,6 +116,7 @@ impl Cavity {
             if best.is_some_and(|b| b.value >= aim.enough)
                 || n >= aim.tets_max
                 || n_hidden > HIDDEN_MAX
+                || best.is_some() && n_idle > IDLE_MAX
                 || !self.add_worst(mesh, at, bounds)
             {
                 break;

@@ -485,15 +485,25 @@ impl Star {
     }
 
     /// The point that is farthest in front of all sides, in radii of their inscribed circles, up to one: what is nearer makes a flat
-    /// tetrahedron. Behind some, where no point is in front of all; `p` where rounding leaves no answer.
-    pub(super) fn moved_into_kernel(&mut self, p: Point) -> Point {
+    /// tetrahedron. Behind some, where no point is in front of all; `p` where rounding leaves no answer. And what the least value of the sides
+    /// is not above, wherever the vertex is.
+    pub(super) fn moved_into_kernel(&mut self, p: Point) -> (Point, f64) {
         let reach = 4.0 * self.radius(p);
+        let mut most = 0.0f64;
+        self.sides
+            .iter()
+            .for_each(|side| most = most.max(side.most));
         let sides = (self.sides.iter()).filter(|side| side.area > 0.0);
         let planes = sides.map(|side| {
             let n = side.normal / side.area;
             (n, n.dot(side.points[0] - p), side.radius())
         });
-        farthest_inside(p, reach, planes, &mut self.scratch).unwrap_or(p)
+        match farthest_inside(p, reach, planes, &mut self.scratch) {
+            // An inscribed sphere fits between a face and the apex over it.
+            Some((at, radii)) if radii < 1.0 => (at, 0.5 * radii * most + ROUNDING),
+            Some((at, _)) => (at, f64::INFINITY),
+            None => (p, f64::INFINITY),
+        }
     }
 
     /// The best of moves of `p` away from the nearest sides, in steps from the least of the heights to the size of the star, each twice the one
