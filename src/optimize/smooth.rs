@@ -185,3 +185,29 @@ impl Star {
 pub(super) fn raised(worst: f64) -> f64 {
     (worst * GAIN_MIN + GAIN_LEAST).min(worst * 2.0 + 1e-9)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::deficit::Deficit;
+    use super::*;
+    use crate::optimize::tests::random;
+
+    #[test]
+    fn no_place_is_worth_more_than_faces_allow() {
+        let mut next = random(5);
+        for flat in [1.0, 0.1, 1e-3] {
+            let mut point = || Point::new(next(), next(), flat * next());
+            let mut star = Star::default();
+            star.faces = (0..6).map(|_| [point(), point(), point()]).collect();
+            let mut old = Deficit::default();
+            old.add(0.0);
+            for bar in [None, Some(old.bar())] {
+                star.bar = bar;
+                for _ in 0..200 {
+                    let value = star.value(point(), f64::NEG_INFINITY);
+                    assert!(value <= star.most(), "{value}, at most {}", star.most());
+                }
+            }
+        }
+    }
+}

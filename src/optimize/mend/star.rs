@@ -573,6 +573,53 @@ fn unit(x: f64, exponent: &mut f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::optimize::tests::{delaunay, live, random};
+    use crate::storage::FlatPages;
+
+    #[test]
+    fn no_place_is_worth_more_than_the_bounds_of_a_star() {
+        for flat in [1.0, 1e-3] {
+            let mut next = random(11);
+            let points: Vec<Point> = (0..30)
+                .map(|_| Point::new(next(), next(), flat * next()))
+                .collect();
+            let mut mesh = delaunay(Mesh::new(FlatPages::default()), &points, points.len(), 1.0);
+            let mut bounds = FaceBounds {
+                measure: Measure::Quality(20.0),
+                ..FaceBounds::default()
+            };
+            for (t, tet) in live(&mut mesh) {
+                let across = tet.neighbor.into_iter().find(|across| across.exists());
+                let mut star = Star::default();
+                for record in [tet, across.map_or(tet, |across| mesh.tet(across.tet()))] {
+                    (0..4).for_each(|i| {
+                        star.sides
+                            .push(Side::new(&mut mesh, &record, i, &mut bounds))
+                    });
+                }
+                let center = star.sides[0].points[0];
+                let (_, most) = star.moved_into_kernel(center);
+                for _ in 0..20 {
+                    let p = Point::new(next(), next(), flat * next());
+                    let least = star.least(p, f64::NEG_INFINITY);
+                    assert!(least <= star.most() && star.most() <= star.most_required());
+                    assert!(
+                        least <= most.max(0.0),
+                        "{t}: {least} at {p}, at most {most}"
+                    );
+                }
+                let points = mesh.points(&tet);
+                let own = 1.0 / inverse_quality(points);
+                let excess = own / bounds.of_tet(&tet, points);
+                if bounds.is_surely_above(&tet, points, own, 1.3) {
+                    assert!(excess > 1.3);
+                }
+                let several = bounds.of_several(&tet, points);
+                let required = [0, 1, 2, 3].map(|i| tet.is_required(i));
+                assert_eq!(several, least(points, required));
+            }
+        }
+    }
 
     #[test]
     fn products_of_any_size_are_ordered() {
