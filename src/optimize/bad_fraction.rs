@@ -80,6 +80,10 @@ impl BadFraction {
         }
         let old = Deficit::of(mesh, &self.star.ball.records);
         self.star.bar = Some(old.bar());
+        // Where the faces around it make the ball what it is, no place helps.
+        if self.star.most() <= old.sum + GAIN {
+            return false;
+        }
         let Some((p, _)) = self.star.search(old.sum + GAIN, 0.0) else {
             return false;
         };

@@ -8,7 +8,8 @@ use super::deficit::{Deficit, GAIN};
 use super::quality::inverse_quality;
 use super::smooth::{Star, raised};
 use crate::delaunay::{Kernel, Located};
-use crate::mesh::anatomy::EDGES;
+use crate::geom::orient;
+use crate::mesh::anatomy::{EDGES, FACES};
 use crate::mesh::{Mesh, Tet};
 use crate::reconnect::Inherited;
 use crate::storage::Pages;
@@ -56,6 +57,14 @@ impl Inserter {
             points,
         };
         for p in [centroid, middle(longest), middle(5 - longest)] {
+            // The tetrahedron itself would not be left in the cavity: most of the middles are on the surface.
+            let is_blocked = |i: usize| {
+                let [f, g, h] = FACES[i].map(|k| points[k]);
+                (tet.is_required(i) || !tet.neighbor[i].exists()) && orient(p, f, g, h) <= 0.0
+            };
+            if (0..4).any(is_blocked) {
+                continue;
+            }
             let mut room = VERTICES_MAX;
             let gathered = self.kernel.gather_constrained(mesh, p, &start, |_, _| {
                 room -= 1;
@@ -109,6 +118,9 @@ impl Inserter {
                 (deficit.sum + GAIN, 0.0)
             }
         };
+        if self.star.most() <= floor {
+            return false;
+        }
         let Some((best, _)) = self.star.search(floor, enough) else {
             return false;
         };

@@ -13,6 +13,8 @@ const FRACTIONS: [f64; 5] = [0.1, 0.25, 0.45, 0.7, 1.0];
 /// steps keep queues full around tetrahedra that the surface spoils, and end lower, for each takes the room of the next.
 const GAIN_MIN: f64 = 1.03;
 const GAIN_LEAST: f64 = 0.003;
+/// More than rounding makes of sums and of bounds.
+const ROUNDING: f64 = 1e-9;
 /// Steps of the search per vertex.
 const SEARCH_STEPS: usize = 12;
 /// A search without any gain so far ends after this many halvings of its step: what is nearer gains too little.
@@ -143,6 +145,18 @@ impl Star {
         (best > floor).then_some((at, best))
     }
 
+    /// What the star is not worth more than with the vertex anywhere; of at most `f64::INFINITY`.
+    pub(super) fn most(&self) -> f64 {
+        let Some(bar) = self.bar else {
+            return self.bound() * (1.0 + ROUNDING);
+        };
+        let mut most = 0.0;
+        for &face in &self.faces {
+            most += bar.worth(face_bound(face) * (1.0 + ROUNDING));
+        }
+        most + ROUNDING
+    }
+
     /// What no position of the vertex can exceed, given the faces opposite it.
     fn bound(&self) -> f64 {
         let bounds = self.faces.iter().map(|&face| face_bound(face));
@@ -170,4 +184,30 @@ impl Star {
 #[inline]
 pub(super) fn raised(worst: f64) -> f64 {
     (worst * GAIN_MIN + GAIN_LEAST).min(worst * 2.0 + 1e-9)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::deficit::Deficit;
+    use super::*;
+    use crate::optimize::tests::random;
+
+    #[test]
+    fn no_place_is_worth_more_than_faces_allow() {
+        let mut next = random(5);
+        for flat in [1.0, 0.1, 1e-3] {
+            let mut point = || Point::new(next(), next(), flat * next());
+            let mut star = Star::default();
+            star.faces = (0..6).map(|_| [point(), point(), point()]).collect();
+            let mut old = Deficit::default();
+            old.add(0.0);
+            for bar in [None, Some(old.bar())] {
+                star.bar = bar;
+                for _ in 0..200 {
+                    let value = star.value(point(), f64::NEG_INFINITY);
+                    assert!(value <= star.most(), "{value}, at most {}", star.most());
+                }
+            }
+        }
+    }
 }

@@ -26,8 +26,10 @@ use crate::storage::Pages;
 /// Steps of the search after each growth, and after the last.
 const STEPS_GROWING: u32 = 20;
 const STEPS: u32 = 80;
-/// Growth without any place that sees all faces ends after so many tetrahedra.
-const HIDDEN_MAX: u32 = 24;
+/// Growth without any place that sees all faces from far enough ends after so many tetrahedra.
+const HIDDEN_MAX: u32 = 12;
+/// Growth past the best size so far ends after so many.
+const IDLE_MAX: u32 = 8;
 /// Longest ring of an edge that gets a vertex.
 const RING_MAX: usize = 24;
 
@@ -57,32 +59,40 @@ pub(super) struct Cavity {
 }
 
 impl Cavity {
-    /// The best vertex in the cavities that grow from `t`.
+    /// The best vertex in the cavities that grow from `t`, if its value is to be above `floor`.
     pub(super) fn grow<P: Pages>(
         &mut self,
         mesh: &mut Mesh<P>,
         t: u32,
         aim: Aim,
+        floor: f64,
         bounds: &mut FaceBounds,
     ) -> Option<Proposal> {
         self.begin(mesh, t, bounds);
         let points = mesh.points(&self.records[0]);
         let mut at = (points[0] + points[1] + points[2] + points[3]) * 0.25;
         let mut best: Option<Proposal> = None;
-        let mut n_hidden = 0;
+        let (mut n_hidden, mut n_idle) = (0, 0);
         loop {
-            let mut value = self.star.least(at, f64::NEG_INFINITY);
-            n_hidden += 1;
-            if value <= 0.0 {
-                at = self.star.moved_into_kernel(at);
-                value = self.star.least(at, f64::NEG_INFINITY);
+            let wanted = best.map_or(floor, |b| b.value.max(floor));
+            // Required faces stay the cavity's, however it grows.
+            if self.star.most_required() <= wanted {
+                break;
             }
-            if value > 0.0 {
+            let (mut value, mut most) = (self.star.least(at, 0.0), f64::INFINITY);
+            n_hidden += 1;
+            n_idle += 1;
+            if value <= 0.0 {
+                (at, most) = self.star.moved_into_kernel(at);
+                value = self.star.least(at, 0.0);
+            }
+            if value > 0.0 && most > wanted {
                 n_hidden = 0;
-                (at, value) = self.star.raise_least(at, STEPS_GROWING, aim.enough);
+                (at, value) = (self.star).raise_least(at, value, STEPS_GROWING, aim.enough);
             }
             let n = self.tets.len();
             if value > best.map_or(0.0, |b| b.value) && self.is_better(at, value, aim) {
+                n_idle = 0;
                 best = Some(Proposal {
                     n,
                     at,
@@ -95,6 +105,7 @@ impl Cavity {
                 && self.is_better(at, value, aim)
             {
                 let corner = Some(v);
+                n_idle = 0;
                 best = Some(Proposal {
                     n,
                     at,
@@ -105,6 +116,7 @@ impl Cavity {
             if best.is_some_and(|b| b.value >= aim.enough)
                 || n >= aim.tets_max
                 || n_hidden > HIDDEN_MAX
+                || best.is_some() && n_idle > IDLE_MAX
                 || !self.add_worst(mesh, at, bounds)
             {
                 break;
@@ -115,7 +127,8 @@ impl Cavity {
         if best.corner.is_some() {
             return Some(best);
         }
-        let (at, value) = self.star.raise_least(best.at, STEPS, aim.enough);
+        let value = self.star.least(best.at, f64::NEG_INFINITY);
+        let (at, value) = (self.star).raise_least(best.at, value, STEPS, aim.enough);
         Some(if self.is_better(at, value, aim) {
             Proposal { at, value, ..best }
         } else {
@@ -123,13 +136,15 @@ impl Cavity {
         })
     }
 
-    /// The best vertex in the shell of edge `e` of `t`, an inner edge.
+    /// The best vertex in the shell of edge `e` of `t`, an inner edge, if its value is to be above `floor`.
+    #[allow(clippy::too_many_arguments)]
     pub(super) fn split<P: Pages>(
         &mut self,
         mesh: &mut Mesh<P>,
         t: u32,
         e: usize,
         aim: Aim,
+        floor: f64,
         bounds: &mut FaceBounds,
     ) -> Option<Proposal> {
         if !self.shell.gather(mesh, t, e, RING_MAX) || !self.shell.closed || self.shell.required {
@@ -140,8 +155,12 @@ impl Cavity {
             let t = self.shell.tets[k];
             self.add(mesh, t, bounds);
         }
+        if self.star.most() <= floor {
+            return None;
+        }
         let middle = (mesh.point(self.shell.a) + mesh.point(self.shell.b)) * 0.5;
-        let (at, value) = self.star.raise_least(middle, STEPS, aim.enough);
+        let value = self.star.least(middle, f64::NEG_INFINITY);
+        let (at, value) = (self.star).raise_least(middle, value, STEPS, aim.enough);
         let n = self.tets.len();
         let proposal = Proposal {
             n,

@@ -18,7 +18,7 @@ pub(super) struct Scratch {
 }
 
 /// The point p at most `reach` from `center` along each axis, for which the least of (bᵢ − nᵢ · (p − center)) / sᵢ over `planes` (nᵢ, bᵢ, sᵢ) is
-/// largest, or one where all of these are 1 at least. `None` where rounding leaves no answer.
+/// largest, or one where all of these are 1 at least, and that least number, at most 1. `None` where rounding leaves no answer.
 ///
 /// nᵢ: unit vectors; sᵢ: how far in front of the plane is far enough.
 pub(super) fn farthest_inside(
@@ -26,19 +26,17 @@ pub(super) fn farthest_inside(
     reach: f64,
     planes: impl Iterator<Item = (Point, f64, f64)>,
     scratch: &mut Scratch,
-) -> Option<Point> {
+) -> Option<(Point, f64)> {
     let Scratch { rows, fewer } = scratch;
     rows.clear();
     rows.extend(planes.map(|(n, b, s)| ([n.x, n.y, n.z, s / reach], b / reach)));
-    // Any order will do, but an order of places may be the slowest.
-    for i in (1..rows.len()).rev() {
-        rows.swap(i, (i * 7919 + 13) % (i + 1));
-    }
+    // Any order will do; those that the center is farthest behind are likely to decide, and the rest is soon looked through.
+    rows.sort_by(|one, two| (one.1 * two.0[3]).total_cmp(&(two.1 * one.0[3])));
     // The last variable is the least of the quotients; a scale of 1e9 has room for planes that leave nothing between them.
     let low = [-1.0, -1.0, -1.0, -1e9];
     let x = solve::<4>(rows, [0.0, 0.0, 0.0, 1.0], low, [1.0; 4], fewer)?;
     let shift = Point::new(x[0], x[1], x[2]) * reach;
-    shift.is_finite().then_some(center + shift)
+    shift.is_finite().then_some((center + shift, x[3]))
 }
 
 /// The x between `low` and `high` with the largest c · x that keeps all rows; of the arrays the first `D` numbers count.
@@ -142,7 +140,7 @@ mod tests {
                 planes(low, high, 1.0).into_iter(),
                 &mut Scratch::default(),
             );
-            let p = found.expect("it has an inside");
+            let (p, _) = found.expect("it has an inside");
             let inscribed = 0.5 * (high - low).min_element();
             let least = (p - low).min(high - p).min_element();
             assert!(least > 0.4 * inscribed, "{p} {thickness}");
@@ -153,13 +151,16 @@ mod tests {
     fn where_nothing_is_inside_the_least_behind_is_found() {
         // Two planes that face away from each other, 0.2 apart.
         let planes = [(Point::X, -0.1, 0.5), (-Point::X, -0.1, 0.5)];
-        let p = farthest_inside(
+        let (p, least) = farthest_inside(
             Point::ZERO,
             1.0,
             planes.into_iter(),
             &mut Scratch::default(),
         )
         .expect("an answer");
-        assert!(p.x.abs() < 1e-9, "{p}");
+        assert!(
+            p.x.abs() < 1e-9 && (least + 0.2).abs() < 1e-9,
+            "{p} {least}"
+        );
     }
 }

@@ -142,13 +142,17 @@ impl Mender {
         let most = stage.tried_max(mesh.n_tets());
         let bounds = &mut self.bounds;
         let mut list = Vec::new();
-        let mut forced = 0.0f64;
+        let (mut forced, mut worst) = (0.0f64, 0.0f64);
         let mut bad = PageFlags::default();
         let mut from = 0;
         while let Some(page) = pages.take_next(from) {
             check_cancelled();
             from = page + 1;
             tets_of_page(mesh, page, |mesh, t, tet| {
+                if stage.is_for_later(mesh, &tet, worst) {
+                    bad.raise(t);
+                    return;
+                }
                 match judge(mesh, &tet, stage, bounds) {
                     Judgment::Good => {}
                     // One without volume in doubles says nothing about others.
@@ -157,6 +161,7 @@ impl Mender {
                     Judgment::Bad(badness) => {
                         list.push((badness.to_bits(), t));
                         bad.raise(t);
+                        worst = worst.max(badness);
                     }
                 }
             });
@@ -272,20 +277,20 @@ impl Mender {
         let mut way = Way::None;
         for v in tet.vertices() {
             if best < enough && self.mover.gather(mesh, v, t, &mut self.bounds) {
-                let found = self.mover.raise_least(mesh, aim, &mut self.bounds);
+                let found = (self.mover).raise_least(mesh, aim, best, &mut self.bounds);
                 if let Some((at, value)) = found.filter(|found| found.1 > best) {
                     (best, way) = (value, Way::Move(v, at));
                 }
             }
         }
         if best < enough {
-            let proposal = self.cavity.grow(mesh, t, aim, &mut self.bounds);
+            let proposal = self.cavity.grow(mesh, t, aim, best, &mut self.bounds);
             self.weigh(proposal, &mut best, &mut way);
         }
         for e in 0..6 {
             // An edge's ring is a cavity of its own; it is needed where growing led nowhere.
             if best < 2.0 * own {
-                let proposal = (self.cavity).split(mesh, t, e, aim, &mut self.bounds);
+                let proposal = (self.cavity).split(mesh, t, e, aim, best, &mut self.bounds);
                 self.weigh(proposal, &mut best, &mut way);
             }
         }

@@ -111,6 +111,25 @@ impl Stage {
     }
 }
 
+impl Stage {
+    /// Whether one of badness `worst` is to be mended before this one, whose bound need not be found by search then.
+    pub(super) fn is_for_later<P: Pages>(&self, mesh: &mut Mesh<P>, tet: &Tet, worst: f64) -> bool {
+        if self.goal != Goal::WorstExcess {
+            return false;
+        }
+        let points = mesh.points(tet);
+        if !is_below(points, 1.0 / self.quality_max) {
+            return false;
+        }
+        let mut bound = 1.0f64;
+        for i in (0..4).filter(|&i| tet.is_required(i)) {
+            bound = bound.max(face_floor(tet.face(i).map(|v| mesh.point(v))));
+        }
+        let excess_most = quality(points) / bound;
+        excess_most > self.excess_max && excess_most < WORST_SHARE * worst
+    }
+}
+
 /// A tetrahedron in the eyes of a stage.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Judgment {
@@ -147,6 +166,9 @@ pub(super) fn judge<P: Pages>(
         if q <= stage.excess_max * face_floor(tet.face(i).map(|v| mesh.point(v))) {
             return Judgment::Forced(q);
         }
+    }
+    if stage.goal != Goal::WorstExcess && bounds.is_surely_above(tet, points, q, stage.excess_max) {
+        return Judgment::Bad(q);
     }
     // A face without area in doubles is no reason to do anything.
     let excess = q / bounds.of_tet(tet, points);

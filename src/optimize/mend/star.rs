@@ -2,9 +2,9 @@
 
 use std::collections::HashMap;
 
-use super::super::bound::{face_least, least};
+use super::super::bound::{face_least, face_most, least};
 use super::super::climb::Climb;
-use super::super::quality::{ALPHA, inverse_quality};
+use super::super::quality::{ALPHA, face_bound, inverse_quality};
 use super::kernel::{self, farthest_inside};
 use crate::geom::{Point, orient};
 use crate::mesh::anatomy::FACES;
@@ -25,6 +25,8 @@ pub(super) struct Side {
     doubt: f64,
     /// See [`Measure::weight`].
     pub(super) weight: f64,
+    /// The value is not above this, wherever the vertex is.
+    most: f64,
     /// The face beyond, or none.
     pub(super) across: FaceRef,
     pub(super) required: bool,
@@ -44,6 +46,11 @@ impl Side {
         let (u, v, w) = (b - a, c - a, c - b);
         let normal = u.cross(v);
         let required = record.is_required(i);
+        let weight = if required {
+            bounds.weight_of(vertices, points)
+        } else {
+            1.0
+        };
         Self {
             vertices,
             points,
@@ -51,11 +58,11 @@ impl Side {
             area: normal.length(),
             longest_squared: u.dot(u).max(v.dot(v)).max(w.dot(w)),
             doubt: 1e-28 * u.dot(u) * v.dot(v),
-            weight: if required {
-                let bound = bounds.of(vertices, points);
-                bounds.measure.weight(bound)
+            weight,
+            most: if weight < f64::MAX {
+                weight * face_bound(points) * (1.0 + ROUNDING)
             } else {
-                1.0
+                f64::INFINITY
             },
             across: record.neighbor[i],
             required,
@@ -86,11 +93,8 @@ impl Side {
     #[inline]
     pub(super) fn inverse_quality(&self, p: Point) -> f64 {
         let [a, b, c] = self.points;
-        let (u, v, w) = (a - p, b - p, c - p);
+        let u = a - p;
         let squared = |x: Point| x.dot(x);
-        let longest = (squared(u).max(squared(v)))
-            .max(squared(w))
-            .max(self.longest_squared);
         let mut det = self.normal.dot(u);
         if det * det <= self.doubt * squared(u) {
             det = orient(p, a, b, c);
@@ -98,10 +102,17 @@ impl Side {
         if det <= 0.0 {
             return det / (self.area * self.longest_squared.sqrt());
         }
+        let (v, w) = (b - p, c - p);
+        let longest = (squared(u).max(squared(v)))
+            .max(squared(w))
+            .max(self.longest_squared);
         let areas = u.cross(v).length() + v.cross(w).length() + w.cross(u).length() + self.area;
         det / (ALPHA * longest.sqrt() * areas)
     }
 }
+
+/// More than rounding makes of bounds.
+const ROUNDING: f64 = 1e-9;
 
 /// What tetrahedra are judged by.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -146,37 +157,109 @@ fn weight(bound: f64) -> f64 {
 /// Triangles of this bound and more are needles.
 const NEEDLE: f64 = 10.0;
 
-/// The bounds of required faces met so far: their corners never move.
+/// The bounds of required faces and of tetrahedra between several met so far: their corners never move.
+///
+/// A bound takes a search; where a number that it is not above decides, that is all that is asked for.
 #[derive(Default)]
 pub(super) struct FaceBounds {
     pub(super) measure: Measure,
-    known: HashMap<[u32; 3], f64>,
+    known: HashMap<[u32; 3], Known>,
+    /// By vertices in ascending order and their faces, as bits.
+    known_several: HashMap<([u32; 4], u8), f64>,
+}
+
+/// What is known of a face.
+#[derive(Clone, Copy)]
+struct Known {
+    /// The bound is not above this.
+    most: f64,
+    bound: Option<f64>,
 }
 
 impl FaceBounds {
     /// Forgets all when there are so many: about 2 MB.
     const KNOWN_MAX: usize = 1 << 16;
 
-    fn of(&mut self, mut vertices: [u32; 3], points: [Point; 3]) -> f64 {
+    fn known(&mut self, mut vertices: [u32; 3], points: [Point; 3]) -> &mut Known {
         if self.known.len() >= Self::KNOWN_MAX {
             self.known.clear();
         }
         vertices.sort_unstable();
-        *(self.known.entry(vertices)).or_insert_with(|| face_least(points))
+        (self.known.entry(vertices)).or_insert_with(|| Known {
+            most: face_most(points),
+            bound: None,
+        })
     }
-}
 
-impl FaceBounds {
+    fn of(&mut self, vertices: [u32; 3], points: [Point; 3]) -> f64 {
+        let known = self.known(vertices, points);
+        *known.bound.get_or_insert_with(|| face_least(points))
+    }
+
+    /// The weight of a required face.
+    fn weight_of(&mut self, vertices: [u32; 3], points: [Point; 3]) -> f64 {
+        let measure = self.measure;
+        if let Measure::Quality(q) = measure
+            && (q.is_infinite() || 2.0 * self.known(vertices, points).most <= q)
+        {
+            return 1.0;
+        }
+        measure.weight(self.of(vertices, points))
+    }
+
+    /// The required face of a tetrahedron that has one only, and whether there are several.
+    fn required(tet: &Tet) -> (Option<usize>, bool) {
+        let mut required = (0..4).filter(|&i| tet.is_required(i));
+        (required.next(), required.next().is_some())
+    }
+
     /// The bound of a tetrahedron.
     pub(super) fn of_tet(&mut self, tet: &Tet, points: [Point; 4]) -> f64 {
+        match Self::required(tet) {
+            (None, _) => 1.0,
+            (Some(i), false) => self.of(tet.face(i), FACES[i].map(|k| points[k])),
+            (Some(_), true) => self.of_several(tet, points),
+        }
+    }
+
+    /// The same where there are several required faces: then all corners are the surface's.
+    fn of_several(&mut self, tet: &Tet, points: [Point; 4]) -> f64 {
+        if self.known_several.len() >= Self::KNOWN_MAX {
+            self.known_several.clear();
+        }
+        let mut order = [0, 1, 2, 3];
+        order.sort_unstable_by_key(|&i| tet.vertex(i));
+        let bit = |k: usize| u8::from(tet.is_required(order[k])) << k;
+        let faces = (0..4).fold(0, |faces, k| faces | bit(k));
         let required = [0, 1, 2, 3].map(|i| tet.is_required(i));
-        match required.iter().filter(|&&r| r).count() {
-            0 => 1.0,
-            1 => {
-                let i = required.iter().position(|&r| r).unwrap_or(0);
-                self.of(tet.face(i), FACES[i].map(|k| points[k]))
+        *(self.known_several)
+            .entry((order.map(|i| tet.vertex(i)), faces))
+            .or_insert_with(|| least(points, required))
+    }
+
+    /// Whether q over the bound is above `excess` for certain; `false` where that takes a search.
+    pub(super) fn is_surely_above(
+        &mut self,
+        tet: &Tet,
+        points: [Point; 4],
+        q: f64,
+        excess: f64,
+    ) -> bool {
+        match Self::required(tet) {
+            (None, _) => q > excess,
+            (Some(i), false) => {
+                q > excess * self.known(tet.face(i), FACES[i].map(|k| points[k])).most
             }
-            _ => least(points, required),
+            (Some(_), true) => false,
+        }
+    }
+
+    /// The weight of a tetrahedron.
+    fn weight_of_tet(&mut self, tet: &Tet, points: [Point; 4]) -> f64 {
+        match (self.measure, Self::required(tet)) {
+            (Measure::Quality(q), _) if q.is_infinite() => 1.0,
+            (_, (Some(i), false)) => self.weight_of(tet.face(i), FACES[i].map(|k| points[k])),
+            (measure, _) => measure.weight(self.of_tet(tet, points)),
         }
     }
 }
@@ -189,10 +272,7 @@ pub(super) fn value_of<P: Pages>(
 ) -> [f64; 2] {
     let points = mesh.points(tet);
     let good = inverse_quality(points).max(0.0);
-    [
-        good,
-        good * bounds.measure.weight(bounds.of_tet(tet, points)),
-    ]
+    [good, good * bounds.weight_of_tet(tet, points)]
 }
 
 /// What a set of tetrahedra costs: the worst q, and the sum over the bad ones.
@@ -305,6 +385,18 @@ pub(super) struct Star {
 }
 
 impl Star {
+    /// What the least value of the sides is not above, wherever the vertex is.
+    pub(super) fn most(&self) -> f64 {
+        let sides = self.sides.iter().map(|side| side.most);
+        sides.fold(f64::INFINITY, f64::min)
+    }
+
+    /// The same with the required sides alone.
+    pub(super) fn most_required(&self) -> f64 {
+        let required = self.sides.iter().filter(|side| side.required);
+        (required.map(|side| side.most)).fold(f64::INFINITY, f64::min)
+    }
+
     /// The least value of the sides with the vertex at `p`, or any value of at most `floor` when it is not above `floor`.
     ///
     /// Effects: a side that decides early moves forward, to decide earlier next time.
@@ -348,12 +440,17 @@ impl Star {
         corners.dedup_by_key(|corner| corner.0);
         let mut best = None;
         let mut most = floor;
+        // What ruled the corner before out often rules out the next one.
+        let mut blocking = &self.sides[0];
         for (v, p) in corners {
-            let others = self.sides.iter().filter(|side| !side.vertices.contains(&v));
             let mut least = f64::INFINITY;
-            for side in others {
+            for side in std::iter::once(blocking).chain(&self.sides) {
+                if side.vertices.contains(&v) {
+                    continue;
+                }
                 least = least.min(side.value(p));
                 if least <= most || least.is_nan() {
+                    blocking = side;
                     break;
                 }
             }
@@ -388,15 +485,25 @@ impl Star {
     }
 
     /// The point that is farthest in front of all sides, in radii of their inscribed circles, up to one: what is nearer makes a flat
-    /// tetrahedron. Behind some, where no point is in front of all; `p` where rounding leaves no answer.
-    pub(super) fn moved_into_kernel(&mut self, p: Point) -> Point {
+    /// tetrahedron. Behind some, where no point is in front of all; `p` where rounding leaves no answer. And what the least value of the sides
+    /// is not above, wherever the vertex is.
+    pub(super) fn moved_into_kernel(&mut self, p: Point) -> (Point, f64) {
         let reach = 4.0 * self.radius(p);
+        let mut most = 0.0f64;
+        self.sides
+            .iter()
+            .for_each(|side| most = most.max(side.most));
         let sides = (self.sides.iter()).filter(|side| side.area > 0.0);
         let planes = sides.map(|side| {
             let n = side.normal / side.area;
             (n, n.dot(side.points[0] - p), side.radius())
         });
-        farthest_inside(p, reach, planes, &mut self.scratch).unwrap_or(p)
+        match farthest_inside(p, reach, planes, &mut self.scratch) {
+            // An inscribed sphere fits between a face and the apex over it.
+            Some((at, radii)) if radii < 1.0 => (at, 0.5 * radii * most + ROUNDING),
+            Some((at, _)) => (at, f64::INFINITY),
+            None => (p, f64::INFINITY),
+        }
     }
 
     /// The best of moves of `p` away from the nearest sides, in steps from the least of the heights to the size of the star, each twice the one
@@ -426,9 +533,14 @@ impl Star {
         best
     }
 
-    /// Moves from `start` to where the least value is largest; stops at `enough`. Returns where and what it is there.
-    pub(super) fn raise_least(&mut self, start: Point, steps: u32, enough: f64) -> (Point, f64) {
-        let value = self.least(start, f64::NEG_INFINITY);
+    /// Moves from `start`, where the least value is `value`, to where it is largest; stops at `enough`. Returns where and what it is there.
+    pub(super) fn raise_least(
+        &mut self,
+        start: Point,
+        value: f64,
+        steps: u32,
+        enough: f64,
+    ) -> (Point, f64) {
         // Between planes that are near each other, only short steps lead anywhere.
         for step in [0.2 * self.radius(start), self.height(start)] {
             let climb = Climb {
@@ -461,6 +573,53 @@ fn unit(x: f64, exponent: &mut f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::optimize::tests::{delaunay, live, random};
+    use crate::storage::FlatPages;
+
+    #[test]
+    fn no_place_is_worth_more_than_the_bounds_of_a_star() {
+        for flat in [1.0, 1e-3] {
+            let mut next = random(11);
+            let points: Vec<Point> = (0..30)
+                .map(|_| Point::new(next(), next(), flat * next()))
+                .collect();
+            let mut mesh = delaunay(Mesh::new(FlatPages::default()), &points, points.len(), 1.0);
+            let mut bounds = FaceBounds {
+                measure: Measure::Quality(20.0),
+                ..FaceBounds::default()
+            };
+            for (t, tet) in live(&mut mesh) {
+                let across = tet.neighbor.into_iter().find(|across| across.exists());
+                let mut star = Star::default();
+                for record in [tet, across.map_or(tet, |across| mesh.tet(across.tet()))] {
+                    (0..4).for_each(|i| {
+                        star.sides
+                            .push(Side::new(&mut mesh, &record, i, &mut bounds))
+                    });
+                }
+                let center = star.sides[0].points[0];
+                let (_, most) = star.moved_into_kernel(center);
+                for _ in 0..20 {
+                    let p = Point::new(next(), next(), flat * next());
+                    let least = star.least(p, f64::NEG_INFINITY);
+                    assert!(least <= star.most() && star.most() <= star.most_required());
+                    assert!(
+                        least <= most.max(0.0),
+                        "{t}: {least} at {p}, at most {most}"
+                    );
+                }
+                let points = mesh.points(&tet);
+                let own = 1.0 / inverse_quality(points);
+                let excess = own / bounds.of_tet(&tet, points);
+                if bounds.is_surely_above(&tet, points, own, 1.3) {
+                    assert!(excess > 1.3);
+                }
+                let several = bounds.of_several(&tet, points);
+                let required = [0, 1, 2, 3].map(|i| tet.is_required(i));
+                assert_eq!(several, least(points, required));
+            }
+        }
+    }
 
     #[test]
     fn products_of_any_size_are_ordered() {

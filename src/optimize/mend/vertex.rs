@@ -90,15 +90,20 @@ impl Mover {
     }
 
     /// Where the worst of the ball gathered is best, and its value there, where the ball gets better. For the worst excess, where that place costs the
-    /// worst q too much, a place on the way there.
+    /// worst q too much, a place on the way there. `None` where no place is above `floor`.
     pub(super) fn raise_least<P: Pages>(
         &mut self,
         mesh: &mut Mesh<P>,
         aim: Aim,
+        floor: f64,
         bounds: &mut FaceBounds,
     ) -> Option<(Point, f64)> {
+        if self.star.most() <= floor {
+            return None;
+        }
         let start = mesh.point(self.ball.v);
-        let (at, value) = self.star.raise_least(start, STEPS, aim.enough);
+        let value = self.star.least(start, f64::NEG_INFINITY);
+        let (at, value) = (self.star).raise_least(start, value, STEPS, aim.enough);
         let mut old = Cost::default();
         for record in &self.ball.records {
             let [good, value] = value_of(mesh, record, bounds);
