@@ -14,12 +14,12 @@ pub(super) struct HalfSpace {
 
 /// The center of the largest ball inside all half-spaces and the cube of half side `reach` around the origin.
 pub(super) fn center(half_spaces: &[HalfSpace], reach: f64) -> Option<Point> {
-    let mut rows: Vec<Vec<f64>> = half_spaces
+    let mut rows: Vec<Row> = half_spaces
         .iter()
         .filter(|h| h.normal.is_finite() && h.offset.is_finite())
         .map(|h| {
             let n = h.normal;
-            vec![n.x, n.y, n.z, 1.0, h.offset / reach]
+            [n.x, n.y, n.z, 1.0, h.offset / reach]
         })
         .collect();
     // A fixed shuffle: neighbors in the list are neighbors in space, the worst order.
@@ -28,7 +28,9 @@ pub(super) fn center(half_spaces: &[HalfSpace], reach: f64) -> Option<Point> {
         let h = (i as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 33;
         rows.swap(i, (h % (i as u64 + 1)) as usize);
     }
-    let x = solve(&rows, &[0.0, 0.0, 0.0, 1.0])?;
+    // Rows with three unknowns, two and one, filled again and again: new lists would take as long as the numbers in them.
+    let mut deeper: [Vec<Row>; 3] = Default::default();
+    let x = solve(&rows, &[0.0, 0.0, 0.0, 1.0], &mut deeper)?;
     Some(Point::new(x[0], x[1], x[2]) * reach)
 }
 
@@ -38,8 +40,12 @@ pub(super) fn room(half_spaces: &[HalfSpace], at: Point) -> f64 {
     rooms.fold(f64::INFINITY, f64::min)
 }
 
-/// Maximizes `goal · x` under `row · x <= last of row` and `-1 <= x <= 1`.
-fn solve(rows: &[Vec<f64>], goal: &[f64]) -> Option<Vec<f64>> {
+/// Factors of the unknowns, their bound behind them; what follows is not looked at.
+type Row = [f64; 5];
+
+/// Maximizes `goal · x` under `row · x <= bound` and `-1 <= x <= 1`. Of the answer as many numbers count as `goal` has; `deeper` is space for
+/// the rows of problems with fewer unknowns.
+fn solve(rows: &[Row], goal: &[f64], deeper: &mut [Vec<Row>]) -> Option<[f64; 4]> {
     let d = goal.len();
     if d == 1 {
         let (mut low, mut high) = (-1.0f64, 1.0f64);
@@ -52,12 +58,14 @@ fn solve(rows: &[Vec<f64>], goal: &[f64]) -> Option<Vec<f64>> {
                 return None;
             }
         }
-        return (low <= high + 1e-13).then(|| vec![if goal[0] >= 0.0 { high } else { low }]);
+        let best = if goal[0] >= 0.0 { high } else { low };
+        return (low <= high + 1e-13).then_some([best, 0.0, 0.0, 0.0]);
     }
-    let mut x: Vec<f64> = goal
-        .iter()
-        .map(|&g| if g >= 0.0 { 1.0 } else { -1.0 })
-        .collect();
+    let (below, deeper) = deeper.split_first_mut()?;
+    let mut x = [0.0; 4];
+    for (x, &g) in x.iter_mut().zip(goal) {
+        *x = if g >= 0.0 { 1.0 } else { -1.0 };
+    }
     for (m, row) in rows.iter().enumerate() {
         let value: f64 = (0..d).map(|i| row[i] * x[i]).sum();
         if value <= row[d] + 1e-13 {
@@ -68,34 +76,34 @@ fn solve(rows: &[Vec<f64>], goal: &[f64]) -> Option<Vec<f64>> {
         if row[k].abs() < 1e-14 {
             return None;
         }
-        let drop = |r: &[f64]| -> Vec<f64> {
+        let others = |n: usize| (0..n).filter(move |&i| i != k);
+        let drop = |r: &Row| -> Row {
             let share = r[k] / row[k];
-            (0..=d)
-                .filter(|&i| i != k)
-                .map(|i| r[i] - share * row[i])
-                .collect()
+            let mut dropped = [0.0; 5];
+            for (to, i) in dropped.iter_mut().zip(others(d + 1)) {
+                *to = r[i] - share * row[i];
+            }
+            dropped
         };
-        let mut below: Vec<Vec<f64>> = rows[..m].iter().map(|r| drop(r)).collect();
+        below.clear();
+        below.extend(rows[..m].iter().map(drop));
         for sign in [1.0, -1.0] {
-            let mut bound = vec![0.0; d + 1];
+            let mut bound = [0.0; 5];
             bound[k] = sign;
             bound[d] = 1.0;
             below.push(drop(&bound));
         }
         let share = goal[k] / row[k];
-        let goal_below: Vec<f64> = (0..d)
-            .filter(|&i| i != k)
-            .map(|i| goal[i] - share * row[i])
-            .collect();
-        let y = solve(&below, &goal_below)?;
-        let mut rest = y.into_iter();
-        for (i, x) in x.iter_mut().enumerate() {
-            if i != k {
-                *x = rest.next()?;
-            }
+        let mut goal_below = [0.0; 3];
+        for (to, i) in goal_below.iter_mut().zip(others(d)) {
+            *to = goal[i] - share * row[i];
         }
-        let others: f64 = (0..d).filter(|&i| i != k).map(|i| row[i] * x[i]).sum();
-        x[k] = (row[d] - others) / row[k];
+        let y = solve(below, &goal_below[..d - 1], deeper)?;
+        for (i, y) in others(d).zip(y) {
+            x[i] = y;
+        }
+        let known: f64 = others(d).map(|i| row[i] * x[i]).sum();
+        x[k] = (row[d] - known) / row[k];
     }
     Some(x)
 }

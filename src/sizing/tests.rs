@@ -600,3 +600,43 @@ fn time_reads(field: &SizeField) {
         );
     }
 }
+
+/// Walls of the unit cube as two triangles each, and small tetrahedra around some places.
+fn specks(size: f64, places: &[Point]) -> (Vec<Point>, Vec<[u32; 3]>) {
+    let (mut points, mut triangles) = cube(1, |i| i as f64);
+    for &place in places {
+        let first = points.len() as u32;
+        let corners = [
+            Point::ONE,
+            Point::new(1.0, -1.0, -1.0),
+            Point::new(-1.0, 1.0, -1.0),
+            Point::new(-1.0, -1.0, 1.0),
+        ];
+        points.extend(corners.map(|c| place + c * size));
+        let faces = [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]];
+        triangles.extend(faces.map(|f| f.map(|v| first + v)));
+    }
+    (points, triangles)
+}
+
+/// Such a cube once was small in a quarter of its width around the speck: 7e12 tetrahedra for a speck of 1e-5.
+#[test]
+fn sizes_grow_from_a_speck_far_from_all_others() {
+    let alone = vec![Point::new(0.322, 0.357, 0.65)];
+    let at = |i: usize| [0.21, 0.5, 0.77][i];
+    let many = (0..27)
+        .map(|i| Point::new(at(i % 3), at(i / 3 % 3), at(i / 9)))
+        .collect();
+    for places in [alone, many] {
+        for size in [1e-2, 1e-3, 1e-4, 1e-5] {
+            let field = build(&specks(size, &places), &SizeOptions::default());
+            let mut away = 32.0 * size;
+            while away < 0.1 {
+                let h = field.h(places[0] + Point::new(0.6, -0.64, 0.48) * away);
+                let grown = field.beta() * away;
+                assert!(h > 0.4 * grown, "{size}: {h} at {away}, {grown} is allowed");
+                away *= 1.5;
+            }
+        }
+    }
+}

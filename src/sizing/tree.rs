@@ -1,4 +1,5 @@
-//! The octree: where sizes differ, cells of about the local size; elsewhere, cells as large as may be.
+//! The octree: where sizes differ, and beside small bodies far from all others, cells of about the local size; elsewhere, cells as
+//! large as may be.
 //!
 //! Two leaves that share as much as a corner differ by one level at most. Cells are addressed on an
 //! integer lattice of 2^20 per axis; octants and corners are numbered x + 2y + 4z.
@@ -26,6 +27,10 @@ const SPREAD_MAX: f64 = 2.0;
 /// The means of its eight parts may differ this much, if each has at least `TREND_SEEDS`.
 const TREND_MAX: f64 = 1.2;
 const TREND_SEEDS: u32 = 4;
+/// A cell wider than this many of its smallest size, times the root of the number of seeds in and around the cell that it is part of, lies
+/// far from all but a small body. A surface of even edges that comes near it has fourteen times as many seeds, a straight rod enough for 48 sizes.
+/// With 8 a body alone in a cube takes up to twice as many tetrahedra; with 2 a tenth fewer, and rods count less.
+const SPARSE_FROM: f64 = 4.0;
 /// Interior sizes within this ratio of the surface's need no transition.
 const TARGET_MAX: f64 = 1.15;
 /// Lists at least this long are divided in parallel.
@@ -104,7 +109,7 @@ impl Tree {
         targets: &Targets,
         divide_further: impl FnOnce(&mut Self) -> Result<(), SizingError>,
     ) -> Result<Self, SizingError> {
-        let shape = shape_of(Leaf::ROOT, some, seeds, targets);
+        let shape = shape_of(Leaf::ROOT, some, some.len(), seeds, targets);
         let mut tree = Self::from_shape(&shape);
         drop(shape);
         divide_further(&mut tree)?;
@@ -301,15 +306,23 @@ impl Leaf {
     }
 }
 
-/// Which cells are divided, depth first, `near` being the seeds in the cell or half its side around it.
-fn shape_of(cell: Leaf, near: &[u32], seeds: &Seeds, targets: &Targets) -> Vec<bool> {
-    if !is_divided(cell, near, seeds, targets) {
+/// Which cells are divided, depth first, `near` being the seeds in the cell or half its side around it, `n_around` the number of those
+/// of the cell it is part of.
+fn shape_of(
+    cell: Leaf,
+    near: &[u32],
+    n_around: usize,
+    seeds: &Seeds,
+    targets: &Targets,
+) -> Vec<bool> {
+    if !is_divided(cell, near, n_around, seeds, targets) {
         return vec![false];
     }
     let part = |octant: usize| {
         let child = cell.child(octant);
+        let n_around = near.len();
         let near = near_child(child, near, seeds);
-        shape_of(child, &near, seeds, targets)
+        shape_of(child, &near, n_around, seeds, targets)
     };
     let parts: Vec<Vec<bool>> = if near.len() >= PARALLEL_SEEDS {
         parallel(|| (0..8).into_par_iter().map(part).collect())
@@ -336,7 +349,7 @@ fn near_child(cell: Leaf, near: &[u32], seeds: &Seeds) -> Vec<u32> {
 }
 
 /// Whether sizes in and around a cell ask for smaller cells.
-fn is_divided(cell: Leaf, near: &[u32], seeds: &Seeds, targets: &Targets) -> bool {
+fn is_divided(cell: Leaf, near: &[u32], n_around: usize, seeds: &Seeds, targets: &Targets) -> bool {
     if cell.level == DEPTH || near.is_empty() {
         return false;
     }
@@ -355,7 +368,8 @@ fn is_divided(cell: Leaf, near: &[u32], seeds: &Seeds, targets: &Targets) -> boo
     }
     let targets_differ = targets.any()
         && (targets.interior(low) > low * TARGET_MAX || targets.interior(high) * TARGET_MAX < high);
-    if targets_differ || high > low * SPREAD_MAX {
+    let is_sparse = cell.side() > SPARSE_FROM * (n_around as f64).sqrt() * low;
+    if targets_differ || high > low * SPREAD_MAX || is_sparse {
         return true;
     }
     let (mut low, mut high) = (f64::INFINITY, 0.0f64);
