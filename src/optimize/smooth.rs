@@ -197,8 +197,10 @@ mod tests {
         let mut next = random(5);
         for flat in [1.0, 0.1, 1e-3] {
             let mut point = || Point::new(next(), next(), flat * next());
-            let mut star = Star::default();
-            star.faces = (0..6).map(|_| [point(), point(), point()]).collect();
+            let mut star = Star {
+                faces: (0..6).map(|_| [point(), point(), point()]).collect(),
+                ..Star::default()
+            };
             let mut old = Deficit::default();
             old.add(0.0);
             for bar in [None, Some(old.bar())] {

@@ -26,8 +26,11 @@ use crate::storage::Pages;
 /// Steps of the search after each growth, and after the last.
 const STEPS_GROWING: u32 = 20;
 const STEPS: u32 = 80;
-/// Growth without any place that sees all faces from far enough ends after so many tetrahedra.
+/// Growth without any place that sees all faces from far enough ends after so many tetrahedra, but for flat ones: of those the one beside a polygon of
+/// nearly coplanar triangles needs 17.
 const HIDDEN_MAX: u32 = 12;
+/// Flat ones have a value below this.
+const FLAT: f64 = 1e-6;
 /// Growth past the best size so far ends after so many, but where the number of bad ones is to go down: there larger cavities do what others cannot
 /// (3 to 5 % of those of q ≥ 10 on four parts of 26).
 const IDLE_MAX: u32 = 8;
@@ -101,7 +104,10 @@ impl Cavity {
                     value,
                 });
             }
-            let corner = self.star.best_corner(best.map_or(aim.own, |b| b.value));
+            // Joined to a vertex that all of them have they would be the same ones again.
+            let records = &self.records;
+            let is_of_all = |v: u32| records.iter().all(|record| record.local(v).is_some());
+            let corner = (self.star).best_corner(best.map_or(aim.own, |b| b.value), is_of_all);
             if let Some((v, at, value)) = corner
                 && self.is_better(at, value, aim)
             {
@@ -116,7 +122,7 @@ impl Cavity {
             }
             if best.is_some_and(|b| b.value >= aim.enough)
                 || n >= aim.tets_max
-                || n_hidden > HIDDEN_MAX
+                || aim.own > FLAT && n_hidden > HIDDEN_MAX
                 || best.is_some() && n_idle > IDLE_MAX && aim.goal != Goal::Count
                 || !self.add_worst(mesh, at, bounds)
             {

@@ -39,6 +39,8 @@ use vertex::Mover;
 
 /// Searches stop at this value, and an operation that reaches it is done without trying others.
 const ENOUGH: f64 = 0.5;
+/// Below this value volumes are rounding: what takes the place of such a tetrahedron has to be above.
+const NO_VOLUME: f64 = 1e-15;
 /// Sweeps of moves for the product at most: where vertices hold each other, heights double in each.
 const SWEEPS_MAX: u32 = 60;
 
@@ -262,6 +264,7 @@ impl Mender {
         self.changed.clear();
         self.bounds.measure = stage.goal.measure(quality(mesh.points(tet)));
         let [_, own] = value_of(mesh, tet, &mut self.bounds);
+        let own = own.max(NO_VOLUME);
         let enough = ENOUGH.max(2.0 * own);
         let aim = Aim {
             own,

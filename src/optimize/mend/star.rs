@@ -431,8 +431,12 @@ impl Star {
         exponent + mantissa
     }
 
-    /// The corner, its place and the least value of the sides that do not have it, where that is largest and above `floor`.
-    pub(super) fn best_corner(&self, floor: f64) -> Option<(u32, Point, f64)> {
+    /// The corner, its place and the least value of the sides that do not have it, where that is largest and above `floor`; not one that `is_passed_over`.
+    pub(super) fn best_corner(
+        &self,
+        floor: f64,
+        is_passed_over: impl Fn(u32) -> bool,
+    ) -> Option<(u32, Point, f64)> {
         let mut corners: Vec<(u32, Point)> = (self.sides.iter())
             .flat_map(|side| side.vertices.into_iter().zip(side.points))
             .collect();
@@ -443,6 +447,9 @@ impl Star {
         // What ruled the corner before out often rules out the next one.
         let mut blocking = &self.sides[0];
         for (v, p) in corners {
+            if is_passed_over(v) {
+                continue;
+            }
             let mut least = f64::INFINITY;
             for side in std::iter::once(blocking).chain(&self.sides) {
                 if side.vertices.contains(&v) {
