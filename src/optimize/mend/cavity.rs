@@ -17,7 +17,8 @@
 //! is inside disappear.
 
 use super::super::smooth::is_free;
-use super::star::{Aim, Cost, FaceBounds, Goal, Side, Star, value_of};
+use super::face_bounds::{FaceBounds, value_of};
+use super::star::{Aim, Cost, Goal, Side, Star};
 use crate::geom::Point;
 use crate::mesh::{Mesh, Tet, VertexTag};
 use crate::reconnect::{Replacement, Shell};
@@ -144,7 +145,6 @@ impl Cavity {
     }
 
     /// The best vertex in the shell of edge `e` of `t`, an inner edge, if its value is to be above `floor`.
-    #[allow(clippy::too_many_arguments)]
     pub(super) fn split<P: Pages>(
         &mut self,
         mesh: &mut Mesh<P>,
@@ -351,5 +351,84 @@ impl Cavity {
         all.sort_unstable();
         all.dedup();
         all
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::NO_VOLUME;
+    use super::super::star::Goal;
+    use super::*;
+    use crate::optimize::quality::inverse_quality;
+    use crate::optimize::tests::{checked, delaunay, live, random};
+    use crate::storage::FlatPages;
+
+    /// Vertices of all tetrahedra, each in ascending order.
+    fn content(mesh: &mut Mesh<FlatPages>) -> Vec<[u32; 4]> {
+        let mut all: Vec<[u32; 4]> = (live(mesh).into_iter())
+            .map(|(_, tet)| {
+                let mut vertices = tet.vertices();
+                vertices.sort_unstable();
+                vertices
+            })
+            .collect();
+        all.sort_unstable();
+        all
+    }
+
+    /// Joined to a vertex that all tetrahedra of a cavity have, they are the same ones again, and other formulas give them other roundings of no volume.
+    #[test]
+    fn flat_tetrahedra_are_never_replaced_by_themselves() {
+        let (mut n_flat, mut n_mended) = (0, 0);
+        for seed in 0..60 {
+            let mut next = random(seed);
+            // A polygon whose corners are in one plane but for rounding, and points below it.
+            let u = Point::new(next() - 0.5, next() - 0.5, next() - 0.5).normalize();
+            let v = u.cross(Point::new(next(), next() - 0.5, 0.3)).normalize();
+            let w = u.cross(v);
+            let mut points: Vec<Point> = (0..12)
+                .map(|i| (f64::from(i) + 0.8 * next()) * std::f64::consts::TAU / 12.0)
+                .map(|angle| u * angle.cos() + v * angle.sin())
+                .collect();
+            points.extend((0..8).map(|_| {
+                let (x, y) = (next() - 0.5, next() - 0.5);
+                u * x + v * y - w * (0.3 + next())
+            }));
+            let mut mesh = delaunay(Mesh::new(FlatPages::default()), &points, points.len(), 1.0);
+            let (hull, volume) = checked(&mut mesh);
+            let flat = live(&mut mesh).into_iter().find(|(_, tet)| {
+                let points = mesh.points(tet);
+                inverse_quality(points) <= NO_VOLUME
+            });
+            let Some((t, _)) = flat else {
+                continue;
+            };
+            n_flat += 1;
+            let aim = Aim {
+                own: 0.0,
+                enough: 0.5,
+                goal: Goal::Quality,
+                more: 3,
+                tets_max: 40,
+            };
+            let mut bounds = FaceBounds::default();
+            bounds.measure = aim.goal.measure(f64::INFINITY);
+            let mut cavity = Cavity::default();
+            let before = content(&mut mesh);
+            let Some(proposal) = cavity.grow(&mut mesh, t, aim, 0.0, &mut bounds) else {
+                continue;
+            };
+            assert!(proposal.value > 0.0);
+            if cavity.apply(&mut mesh, proposal) {
+                assert_ne!(content(&mut mesh), before, "seed {seed}");
+                let after = checked(&mut mesh);
+                assert!(after.0 == hull && (after.1 - volume).abs() < 1e-12);
+                n_mended += 1;
+            }
+        }
+        assert!(
+            n_flat >= 20 && n_mended >= 15,
+            "{n_flat}, {n_mended} mended"
+        );
     }
 }

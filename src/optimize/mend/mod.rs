@@ -15,6 +15,7 @@
 //! Deterministic: order follows q or excess, then ids, and neither depends on paging.
 
 mod cavity;
+mod face_bounds;
 mod kernel;
 mod refill;
 mod stages;
@@ -32,9 +33,10 @@ use crate::geom::{Point, STEP, mix};
 use crate::mesh::{Mesh, Tet, tets_of_page};
 use crate::storage::{Pages, check_cancelled};
 use cavity::{Cavity, Proposal};
+use face_bounds::{FaceBounds, value_of};
 use refill::Refill;
 use stages::{Judgment, STAGES, Stage, WORST, judge};
-use star::{Aim, FaceBounds, Goal, value_of};
+use star::{Aim, Goal};
 use vertex::Mover;
 
 /// Searches stop at this value, and an operation that reaches it is done without trying others.

@@ -14,7 +14,8 @@
 use super::super::quality::inverse_quality;
 use super::super::smooth::is_free;
 use super::cavity::Cavity;
-use super::star::{Aim, Cost, FaceBounds};
+use super::face_bounds::FaceBounds;
+use super::star::{Aim, Cost};
 use crate::geom::{Point, orient};
 use crate::mesh::Mesh;
 use crate::storage::Pages;
@@ -352,7 +353,8 @@ fn sorted<const N: usize>(mut corners: [u8; N]) -> ([u8; N], bool) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::star::{Goal, value_of};
+    use super::super::face_bounds::value_of;
+    use super::super::star::Goal;
     use super::*;
     use crate::optimize::measure;
     use crate::optimize::tests::{checked, delaunay, live, random};

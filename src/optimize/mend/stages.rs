@@ -11,7 +11,8 @@
 
 use super::super::bound::face_floor;
 use super::super::quality::{is_below, quality};
-use super::star::{FaceBounds, Goal};
+use super::face_bounds::FaceBounds;
+use super::star::Goal;
 use crate::mesh::{Mesh, Tet};
 use crate::storage::Pages;
 

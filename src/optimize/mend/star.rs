@@ -1,13 +1,10 @@
 //! A vertex and the faces it is joined to: what its tetrahedra are worth, and where it should be.
 
-use std::collections::HashMap;
-
-use super::super::bound::{face_least, face_most, least};
 use super::super::climb::Climb;
-use super::super::quality::{ALPHA, face_bound, inverse_quality};
+use super::super::quality::{ALPHA, face_bound};
+use super::face_bounds::{FaceBounds, Measure};
 use super::kernel::{self, farthest_inside};
 use crate::geom::{Point, orient};
-use crate::mesh::anatomy::FACES;
 use crate::mesh::{FaceRef, Mesh, Tet};
 use crate::storage::Pages;
 
@@ -113,167 +110,6 @@ impl Side {
 
 /// More than rounding makes of bounds.
 const ROUNDING: f64 = 1e-9;
-
-/// What tetrahedra are judged by.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Measure {
-    /// q, while one of this q is mended: half of it counts as reached by what stands on a triangle that allows no less.
-    Quality(f64),
-    /// q over the bound.
-    Excess,
-}
-
-impl Default for Measure {
-    fn default() -> Self {
-        Self::Quality(1.0)
-    }
-}
-
-impl Measure {
-    /// What 1 / q is multiplied with on a face of this bound.
-    fn weight(self, bound: f64) -> f64 {
-        match self {
-            Self::Quality(q) => (2.0 * bound / q).clamp(1.0, f64::MAX),
-            Self::Excess => weight(bound),
-        }
-    }
-}
-
-/// What 1 / q is multiplied with on a face of this bound, to be compared with tetrahedra that nothing forces: the bound of a good
-/// triangle, 0.65 of that of a needle.
-///
-/// Twice a bound of 1 is an element to compute with, twice one of 1000 is a loss of 1000. A face without area in doubles is no
-/// reason to do anything.
-fn weight(bound: f64) -> f64 {
-    if bound < NEEDLE {
-        bound * (1.0 - 0.35 * (bound - 1.0) / (NEEDLE - 1.0))
-    } else if bound.is_finite() {
-        0.65 * bound
-    } else {
-        f64::MAX
-    }
-}
-
-/// Triangles of this bound and more are needles.
-const NEEDLE: f64 = 10.0;
-
-/// The bounds of required faces and of tetrahedra between several met so far: their corners never move.
-///
-/// A bound takes a search; where a number that it is not above decides, that is all that is asked for.
-#[derive(Default)]
-pub(super) struct FaceBounds {
-    pub(super) measure: Measure,
-    known: HashMap<[u32; 3], Known>,
-    /// By vertices in ascending order and their faces, as bits.
-    known_several: HashMap<([u32; 4], u8), f64>,
-}
-
-/// What is known of a face.
-#[derive(Clone, Copy)]
-struct Known {
-    /// The bound is not above this.
-    most: f64,
-    bound: Option<f64>,
-}
-
-impl FaceBounds {
-    /// Forgets all when there are so many: about 2 MB.
-    const KNOWN_MAX: usize = 1 << 16;
-
-    fn known(&mut self, mut vertices: [u32; 3], points: [Point; 3]) -> &mut Known {
-        if self.known.len() >= Self::KNOWN_MAX {
-            self.known.clear();
-        }
-        vertices.sort_unstable();
-        (self.known.entry(vertices)).or_insert_with(|| Known {
-            most: face_most(points),
-            bound: None,
-        })
-    }
-
-    fn of(&mut self, vertices: [u32; 3], points: [Point; 3]) -> f64 {
-        let known = self.known(vertices, points);
-        *known.bound.get_or_insert_with(|| face_least(points))
-    }
-
-    /// The weight of a required face.
-    fn weight_of(&mut self, vertices: [u32; 3], points: [Point; 3]) -> f64 {
-        let measure = self.measure;
-        if let Measure::Quality(q) = measure
-            && (q.is_infinite() || 2.0 * self.known(vertices, points).most <= q)
-        {
-            return 1.0;
-        }
-        measure.weight(self.of(vertices, points))
-    }
-
-    /// The required face of a tetrahedron that has one only, and whether there are several.
-    fn required(tet: &Tet) -> (Option<usize>, bool) {
-        let mut required = (0..4).filter(|&i| tet.is_required(i));
-        (required.next(), required.next().is_some())
-    }
-
-    /// The bound of a tetrahedron.
-    pub(super) fn of_tet(&mut self, tet: &Tet, points: [Point; 4]) -> f64 {
-        match Self::required(tet) {
-            (None, _) => 1.0,
-            (Some(i), false) => self.of(tet.face(i), FACES[i].map(|k| points[k])),
-            (Some(_), true) => self.of_several(tet, points),
-        }
-    }
-
-    /// The same where there are several required faces: then all corners are the surface's.
-    fn of_several(&mut self, tet: &Tet, points: [Point; 4]) -> f64 {
-        if self.known_several.len() >= Self::KNOWN_MAX {
-            self.known_several.clear();
-        }
-        let mut order = [0, 1, 2, 3];
-        order.sort_unstable_by_key(|&i| tet.vertex(i));
-        let bit = |k: usize| u8::from(tet.is_required(order[k])) << k;
-        let faces = (0..4).fold(0, |faces, k| faces | bit(k));
-        let required = [0, 1, 2, 3].map(|i| tet.is_required(i));
-        *(self.known_several)
-            .entry((order.map(|i| tet.vertex(i)), faces))
-            .or_insert_with(|| least(points, required))
-    }
-
-    /// Whether q over the bound is above `excess` for certain; `false` where that takes a search.
-    pub(super) fn is_surely_above(
-        &mut self,
-        tet: &Tet,
-        points: [Point; 4],
-        q: f64,
-        excess: f64,
-    ) -> bool {
-        match Self::required(tet) {
-            (None, _) => q > excess,
-            (Some(i), false) => {
-                q > excess * self.known(tet.face(i), FACES[i].map(|k| points[k])).most
-            }
-            (Some(_), true) => false,
-        }
-    }
-
-    /// The weight of a tetrahedron.
-    fn weight_of_tet(&mut self, tet: &Tet, points: [Point; 4]) -> f64 {
-        match (self.measure, Self::required(tet)) {
-            (Measure::Quality(q), _) if q.is_infinite() => 1.0,
-            (_, (Some(i), false)) => self.weight_of(tet.face(i), FACES[i].map(|k| points[k])),
-            (measure, _) => measure.weight(self.of_tet(tet, points)),
-        }
-    }
-}
-
-/// 1 / q of a tetrahedron of the mesh, and what it counts in the same units as the sides of a star.
-pub(super) fn value_of<P: Pages>(
-    mesh: &mut Mesh<P>,
-    tet: &Tet,
-    bounds: &mut FaceBounds,
-) -> [f64; 2] {
-    let points = mesh.points(tet);
-    let good = inverse_quality(points).max(0.0);
-    [good, good * bounds.weight_of_tet(tet, points)]
-}
 
 /// What a set of tetrahedra costs: the worst q, and the sum over the bad ones.
 #[derive(Clone, Copy, Debug)]
@@ -579,6 +415,8 @@ fn unit(x: f64, exponent: &mut f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::super::bound::least;
+    use super::super::super::quality::inverse_quality;
     use super::*;
     use crate::optimize::tests::{delaunay, live, random};
     use crate::storage::FlatPages;
@@ -591,10 +429,8 @@ mod tests {
                 .map(|_| Point::new(next(), next(), flat * next()))
                 .collect();
             let mut mesh = delaunay(Mesh::new(FlatPages::default()), &points, points.len(), 1.0);
-            let mut bounds = FaceBounds {
-                measure: Measure::Quality(20.0),
-                ..FaceBounds::default()
-            };
+            let mut bounds = FaceBounds::default();
+            bounds.measure = Measure::Quality(20.0);
             for (t, tet) in live(&mut mesh) {
                 let across = tet.neighbor.into_iter().find(|across| across.exists());
                 let mut star = Star::default();

@@ -2,7 +2,8 @@
 
 use super::super::climb::Climb;
 use super::super::smooth::is_free;
-use super::star::{Aim, Cost, FaceBounds, Goal, Side, Star, value_of};
+use super::face_bounds::{FaceBounds, value_of};
+use super::star::{Aim, Cost, Goal, Side, Star};
 use crate::geom::Point;
 use crate::mesh::Mesh;
 use crate::reconnect::Ball;
