@@ -64,8 +64,8 @@ const SORT_SHARE: f64 = 0.25;
 
 /// Bytes of frames for each tetrahedron: 100 to 105.
 const FRAMES_TET: f64 = 102.0;
-/// Bytes held beside the frames: by the program; by buffers that fill up soon; for each tetrahedron; for each triangle of the input.
-const PROGRAM: f64 = 12e6;
+/// Bytes held beside the frames: by the program and its code, 17 to 19 MB; by buffers that fill up soon; for each tetrahedron; for each triangle of the input.
+const PROGRAM: f64 = 18e6;
 const BUFFERS_MAX: f64 = 8e6;
 const BUFFERS_TET: f64 = 200.0;
 const BESIDE_TET: f64 = 45.0;
