@@ -107,23 +107,29 @@ pub fn resume(args: &ResumeArgs, console: &Console) -> Result<u8, Failure> {
     )
 }
 
+/// The number of threads that is asked for. Errors: none at all.
+pub(super) fn asked_threads(option: Option<usize>) -> Result<Option<usize>, Failure> {
+    if option == Some(0) {
+        let message = "--threads 0 is no thread to work with";
+        return Err(Failure::new("usage", message).help("give 1 or more"));
+    }
+    Ok(option)
+}
+
 /// Threads, signals, and the cap; nothing that is written may be one of `inputs`.
 pub(super) fn begin(
     args: &RunArgs,
     inputs: &[PathBuf],
     console: &Console,
 ) -> Result<Settings, Failure> {
-    if args.threads == Some(0) {
-        let message = "--threads 0 is no thread to work with";
-        return Err(Failure::new("usage", message).help("give 1 or more"));
-    }
+    let threads = asked_threads(args.threads)?;
     for out in &args.export {
         export::check_format(out)?;
         check_target(out, inputs)?;
     }
     let cap = memory::asked(args.memory.as_deref())?;
     #[cfg_attr(not(feature = "mpi"), allow(unused_mut))]
-    let mut settings = console.settings(cap, args.threads);
+    let mut settings = console.settings(cap, threads);
     #[cfg(feature = "mpi")]
     {
         settings.hands = super::ranks::hands();

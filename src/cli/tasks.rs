@@ -10,6 +10,7 @@ use super::args::{GatherArgs, PlanArgs, WorkArgs};
 use super::console::Console;
 use super::failure::Failure;
 use super::memory;
+use super::mesh::asked_threads;
 use super::task_scripts::{Script, kind};
 use crate::api::tasks::ranges;
 use crate::api::{Error, Tasks};
@@ -73,12 +74,8 @@ pub fn plan(args: &PlanArgs, console: &Console) -> Result<u8, Failure> {
 }
 
 pub fn work(args: &WorkArgs, console: &Console) -> Result<u8, Failure> {
-    if args.threads == Some(0) {
-        let message = "--threads 0 is no thread to work with";
-        return Err(Failure::new("usage", message).help("give 1 or more"));
-    }
     let cap = memory::asked(args.memory.as_deref())?;
-    let settings = console.settings(cap, args.threads);
+    let settings = console.settings(cap, asked_threads(args.threads)?);
     let mut tasks = Tasks::of(&args.store).wait(Duration::from_secs(args.wait));
     if let Some(dir) = args.scratch.clone().or_else(scratch_of_machine) {
         tasks = tasks.scratch(dir);

@@ -1,5 +1,6 @@
 //! The working mesh: cursors over one sub-domain's pages; balls, shells, checks.
 
+mod ahead;
 pub mod anatomy;
 mod cursor;
 mod faces;
@@ -9,6 +10,7 @@ mod snapshot;
 mod state;
 mod vertices;
 
+pub use ahead::{Draft, Foreseen, Trial, look_ahead};
 pub use anatomy::{FaceRef, Tet};
 pub use cursor::Mesh;
 pub use faces::{Facet, InterfaceFace, SHEET};

@@ -134,7 +134,7 @@ pub fn run_with<P: Pages>(
         mender.run(mesh, &mut bad, &mut |done| {
             tell("mend", (1000.0 * done) as u32, 1000);
         });
-        report.mended = mender.counts;
+        report.mended = mender.counts();
     }
     report
 }

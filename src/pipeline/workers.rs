@@ -114,7 +114,7 @@ fn work<J, D>(
                 let _ = tell.send(WorkerMessage::Progress(event));
             }
         };
-        let done = Box::new(run(job, &watch));
+        let done = Box::new(RunContext::busy(|| run(job, &watch)));
         if tell.send(WorkerMessage::Done(done)).is_err() {
             return;
         }

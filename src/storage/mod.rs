@@ -15,6 +15,7 @@ mod cancel;
 mod cancel_token;
 mod disk;
 mod disk_path;
+mod draft_pages;
 mod error;
 mod file;
 mod file_lock;
@@ -41,6 +42,7 @@ pub use cancel::{attempt, check_cancelled, raise};
 pub use cancel_token::CancelToken;
 pub use disk::{Disk, Entry, FileId};
 pub use disk_path::DiskPath;
+pub use draft_pages::DraftPages;
 pub use error::StorageError;
 pub use file::StoreFile;
 pub use file_lock::{FileLock, Refused, host_name, is_process_gone};
@@ -51,7 +53,9 @@ pub use pages::{Pages, SharedPages, kind};
 pub use parallel_sort::sort_unstable_by;
 pub use places::Backing;
 pub use reserve::{filled, push, reserve};
-pub use run_context::{CaughtPanic, RunContext, in_place_scope, n_threads, parallel};
+pub use run_context::{
+    CaughtPanic, RunContext, in_place_scope, n_threads, parallel, spare_threads,
+};
 pub use sort::{Sorted, Sorter};
 pub(crate) use sort_record::sort_record;
 pub use sort_record::{Keyed, Payload, SortBytes, SortField, SortRecord, total_order};

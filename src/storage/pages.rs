@@ -73,23 +73,41 @@ impl<'a> SharedPages<'a> {
             tables: tables.each_ref(),
         }
     }
-}
 
-impl Pages for SharedPages<'_> {
+    /// Record `id` of a kind.
     #[inline(always)]
-    fn read<const K: usize>(&mut self, id: u32) -> &Slot {
-        &self.frames[self.tables[K].to_read(id)]
+    pub(super) fn read_of(&self, kind: usize, id: u32) -> &'a Slot {
+        &self.frames[self.tables[kind].to_read(id)]
     }
 
+    /// Four records of a kind.
     #[inline(always)]
-    fn read_four<const K: usize>(&mut self, [a, b, c, d]: [u32; 4]) -> [&Slot; 4] {
-        let (frames, table) = (self.frames, self.tables[K]);
+    pub(super) fn read_four_of(&self, kind: usize, [a, b, c, d]: [u32; 4]) -> [&'a Slot; 4] {
+        let (frames, table) = (self.frames, self.tables[kind]);
         [
             &frames[table.to_read(a)],
             &frames[table.to_read(b)],
             &frames[table.to_read(c)],
             &frames[table.to_read(d)],
         ]
+    }
+
+    /// Number of pages of a kind.
+    #[inline(always)]
+    pub(super) fn n_pages_of(&self, kind: usize) -> u32 {
+        self.tables[kind].len() as u32
+    }
+}
+
+impl Pages for SharedPages<'_> {
+    #[inline(always)]
+    fn read<const K: usize>(&mut self, id: u32) -> &Slot {
+        self.read_of(K, id)
+    }
+
+    #[inline(always)]
+    fn read_four<const K: usize>(&mut self, ids: [u32; 4]) -> [&Slot; 4] {
+        self.read_four_of(K, ids)
     }
 
     fn write<const K: usize>(&mut self, id: u32) -> &mut Slot {

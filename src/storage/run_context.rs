@@ -5,6 +5,7 @@
 
 use std::cell::RefCell;
 use std::panic::PanicHookInfo;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, Once, OnceLock, PoisonError};
 
 use rayon::{Scope, ThreadPool, ThreadPoolBuilder};
@@ -26,6 +27,8 @@ pub struct RunContext {
 struct Run {
     cancel: CancelToken,
     panic: Mutex<Option<CaughtPanic>>,
+    /// Threads beside the pool that have work of their own.
+    busy: AtomicUsize,
 }
 
 /// A panic inside a run.
@@ -52,6 +55,7 @@ impl RunContext {
         let run = Arc::new(Run {
             cancel,
             panic: Mutex::new(None),
+            busy: AtomicUsize::new(0),
         });
         let pool = Pool {
             n_threads: n_threads.max(1),
@@ -79,6 +83,24 @@ impl RunContext {
             }
         }
         let _restore = Restore(CURRENT.replace(Some(self.clone())));
+        work()
+    }
+
+    /// Does `work`, while which others of this run know that this thread is busy.
+    pub fn busy<T>(work: impl FnOnce() -> T) -> T {
+        struct Busy(Option<RunContext>);
+        impl Drop for Busy {
+            fn drop(&mut self) {
+                if let Some(context) = &self.0 {
+                    context.run.busy.fetch_sub(1, Ordering::Relaxed);
+                }
+            }
+        }
+        let context = Self::current();
+        if let Some(context) = &context {
+            context.run.busy.fetch_add(1, Ordering::Relaxed);
+        }
+        let _busy = Busy(context);
         work()
     }
 
@@ -160,6 +182,12 @@ pub fn n_threads() -> usize {
     pool.map_or_else(rayon::current_num_threads, |pool| pool.n_threads)
 }
 
+/// Threads of this run that others who are busy leave to this one, itself among them. It changes from moment to moment: nothing that is made may depend on it.
+pub fn spare_threads() -> usize {
+    let busy = RunContext::current().map_or(0, |context| context.run.busy.load(Ordering::Relaxed));
+    n_threads().saturating_sub(busy.saturating_sub(1)).max(1)
+}
+
 /// From now on the message of a panic inside a run goes to the run; all others go where they went before.
 fn catch_messages() {
     static ONCE: Once = Once::new();
@@ -204,6 +232,25 @@ mod tests {
         assert!(look().is_ok(), "what is no run is not cancelled");
         tokens[0].reset();
         assert!(runs[0].enter(look).is_ok());
+    }
+
+    #[test]
+    fn threads_are_left_by_those_who_are_not_busy() {
+        let run = RunContext::new(3, CancelToken::new());
+        let spare = || run.enter(spare_threads);
+        assert_eq!(spare(), 3);
+        run.enter(|| {
+            RunContext::busy(|| {
+                assert_eq!(spare(), 3);
+                RunContext::busy(|| assert_eq!(spare(), 2));
+                let ended = std::panic::catch_unwind(|| RunContext::busy(|| panic!("midway")));
+                assert!(ended.is_err());
+                RunContext::busy(|| {
+                    RunContext::busy(|| RunContext::busy(|| assert_eq!(spare(), 1)))
+                });
+            });
+        });
+        assert_eq!(spare(), 3);
     }
 
     #[test]

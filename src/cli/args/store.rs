@@ -46,6 +46,9 @@ pub struct VerifyArgs {
     /// The surface whose triangles must all be there [default: what the store was meshed from]; may be repeated
     #[arg(long, value_name = "SURFACE")]
     pub against: Vec<String>,
+    /// Threads to use [default: all cores]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    pub threads: Option<usize>,
     #[command(flatten)]
     pub read: ReadArgs,
     /// What was embedded, where --against names the surface.

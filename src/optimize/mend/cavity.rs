@@ -178,33 +178,50 @@ impl Cavity {
         (value > 0.0 && self.is_better(at, value, aim)).then_some(proposal)
     }
 
-    /// Makes the proposal, the last one returned; `false`, with nothing changed, when a vertex that must stay would go.
-    pub(super) fn apply<P: Pages>(&mut self, mesh: &mut Mesh<P>, proposal: Proposal) -> bool {
-        assert_eq!(self.tets.len(), proposal.n, "the cavity of the proposal");
+    /// Its tetrahedra and outer faces, to make the proposal returned last with.
+    pub(super) fn outline(&self) -> (Vec<u32>, Vec<[u32; 3]>) {
+        let faces = self.star.sides.iter().map(|side| side.vertices);
+        (self.tets.clone(), faces.collect())
+    }
+
+    /// Makes a proposal in the cavity of this outline; `false`, with nothing changed, when a vertex that must stay would go.
+    pub(super) fn insert<P: Pages>(
+        &mut self,
+        mesh: &mut Mesh<P>,
+        tets: &[u32],
+        faces: &[[u32; 3]],
+        proposal: Proposal,
+    ) -> bool {
+        assert_eq!(tets.len(), proposal.n, "the cavity of the proposal");
         let v = proposal.corner.unwrap_or_else(|| {
-            let h = self.records[0].vertices().map(|v| mesh.size(v));
+            let h = mesh.tet(tets[0]).vertices().map(|v| mesh.size(v));
             let v = mesh.add_vertex(proposal.at, (h[0] + h[1] + h[2] + h[3]) * 0.25);
             mesh.set_vertex_attribute(v, VertexTag::Free, 0);
             v
         });
-        let sides = self.star.sides.iter().map(|side| side.vertices);
-        let new: Vec<[u32; 4]> = sides
+        let new: Vec<[u32; 4]> = (faces.iter())
             .filter(|face| !face.contains(&v))
-            .map(|[a, b, c]| [v, a, b, c])
+            .map(|&[a, b, c]| [v, a, b, c])
             .collect();
-        let done = self.exchange(mesh, &new);
+        let done = self.exchange(mesh, tets, &new);
         if !done && proposal.corner.is_none() {
             mesh.free_vertex(v);
         }
         done
     }
 
-    /// Replaces the cavity's tetrahedra by `new`, all exactly positive; `false`, with nothing changed, when a vertex that must stay would go.
-    pub(super) fn exchange<P: Pages>(&mut self, mesh: &mut Mesh<P>, new: &[[u32; 4]]) -> bool {
-        let mut gone = self.corners();
+    /// Replaces tetrahedra by `new`, all exactly positive; `false`, with nothing changed, when a vertex that must stay would go.
+    pub(super) fn exchange<P: Pages>(
+        &mut self,
+        mesh: &mut Mesh<P>,
+        tets: &[u32],
+        new: &[[u32; 4]],
+    ) -> bool {
+        let records: Vec<Tet> = tets.iter().map(|&t| mesh.tet(t)).collect();
+        let mut gone = corners_of(&records);
         gone.retain(|v| !new.iter().any(|tet| tet.contains(v)));
         let done = gone.iter().all(|&v| is_free(mesh, v))
-            && (self.replacement).apply(mesh, &self.tets, &self.records, new);
+            && (self.replacement).apply(mesh, tets, &records, new);
         if done {
             gone.into_iter().for_each(|v| mesh.free_vertex(v));
         }
@@ -330,12 +347,7 @@ impl Cavity {
     }
 
     /// Leaves the first `n` tetrahedra.
-    pub(super) fn shrink<P: Pages>(
-        &mut self,
-        mesh: &mut Mesh<P>,
-        n: usize,
-        bounds: &mut FaceBounds,
-    ) {
+    fn shrink<P: Pages>(&mut self, mesh: &mut Mesh<P>, n: usize, bounds: &mut FaceBounds) {
         if n < self.tets.len() {
             let tets = std::mem::take(&mut self.tets);
             self.clear();
@@ -347,11 +359,16 @@ impl Cavity {
 
     /// All vertices, in ascending order.
     pub(super) fn corners(&self) -> Vec<u32> {
-        let mut all: Vec<u32> = self.records.iter().flat_map(Tet::vertices).collect();
-        all.sort_unstable();
-        all.dedup();
-        all
+        corners_of(&self.records)
     }
+}
+
+/// Vertices of tetrahedra, in ascending order.
+fn corners_of(records: &[Tet]) -> Vec<u32> {
+    let mut all: Vec<u32> = records.iter().flat_map(Tet::vertices).collect();
+    all.sort_unstable();
+    all.dedup();
+    all
 }
 
 #[cfg(test)]
@@ -419,7 +436,8 @@ mod tests {
                 continue;
             };
             assert!(proposal.value > 0.0);
-            if cavity.apply(&mut mesh, proposal) {
+            let (tets, faces) = cavity.outline();
+            if cavity.insert(&mut mesh, &tets, &faces, proposal) {
                 assert_ne!(content(&mut mesh), before, "seed {seed}");
                 let after = checked(&mut mesh);
                 assert!(after.0 == hull && (after.1 - volume).abs() < 1e-12);

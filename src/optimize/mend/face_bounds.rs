@@ -55,9 +55,10 @@ const NEEDLE: f64 = 10.0;
 /// The bounds of required faces and of tetrahedra between several met so far: their corners never move.
 ///
 /// A bound takes a search; where a number that it is not above decides, that is all that is asked for.
-#[derive(Default)]
 pub(super) struct FaceBounds {
     pub(super) measure: Measure,
+    /// All are forgotten when there are so many.
+    known_max: usize,
     known: HashMap<[u32; 3], Known>,
     /// By vertices in ascending order and their faces, as bits.
     known_several: HashMap<([u32; 4], u8), f64>,
@@ -71,23 +72,46 @@ struct Known {
     bound: Option<f64>,
 }
 
-impl FaceBounds {
-    /// Forgets all when there are so many: about 2 MB.
-    const KNOWN_MAX: usize = 1 << 16;
+impl Default for FaceBounds {
+    /// Of about 2 MB.
+    fn default() -> Self {
+        Self::remembering(1 << 16)
+    }
+}
 
-    fn known(&mut self, mut vertices: [u32; 3], points: [Point; 3]) -> &mut Known {
-        if self.known.len() >= Self::KNOWN_MAX {
+impl FaceBounds {
+    /// Of so many faces at once.
+    pub(super) fn remembering(known_max: usize) -> Self {
+        Self {
+            measure: Measure::default(),
+            known_max,
+            known: HashMap::new(),
+            known_several: HashMap::new(),
+        }
+    }
+
+    /// What is known, and the corners in the order of the vertices: a search from another corner finds another number, by rounding and a bit, and
+    /// what is found must not depend on who asks first.
+    fn known(&mut self, vertices: [u32; 3], points: [Point; 3]) -> (&mut Known, [Point; 3]) {
+        if self.known.len() >= self.known_max {
             self.known.clear();
         }
-        vertices.sort_unstable();
-        (self.known.entry(vertices)).or_insert_with(|| Known {
+        let mut order = [0, 1, 2];
+        order.sort_unstable_by_key(|&i| vertices[i]);
+        let points = order.map(|i| points[i]);
+        let known = (self.known.entry(order.map(|i| vertices[i]))).or_insert_with(|| Known {
             most: face_most(points),
             bound: None,
-        })
+        });
+        (known, points)
+    }
+
+    fn most_of(&mut self, vertices: [u32; 3], points: [Point; 3]) -> f64 {
+        self.known(vertices, points).0.most
     }
 
     fn of(&mut self, vertices: [u32; 3], points: [Point; 3]) -> f64 {
-        let known = self.known(vertices, points);
+        let (known, points) = self.known(vertices, points);
         *known.bound.get_or_insert_with(|| face_least(points))
     }
 
@@ -95,7 +119,7 @@ impl FaceBounds {
     pub(super) fn weight_of(&mut self, vertices: [u32; 3], points: [Point; 3]) -> f64 {
         let measure = self.measure;
         if let Measure::Quality(q) = measure
-            && (q.is_infinite() || 2.0 * self.known(vertices, points).most <= q)
+            && (q.is_infinite() || 2.0 * self.most_of(vertices, points) <= q)
         {
             return 1.0;
         }
@@ -119,17 +143,21 @@ impl FaceBounds {
 
     /// The same where there are several required faces: then all corners are the surface's.
     pub(super) fn of_several(&mut self, tet: &Tet, points: [Point; 4]) -> f64 {
-        if self.known_several.len() >= Self::KNOWN_MAX {
+        if self.known_several.len() >= self.known_max {
             self.known_several.clear();
         }
         let mut order = [0, 1, 2, 3];
         order.sort_unstable_by_key(|&i| tet.vertex(i));
         let bit = |k: usize| u8::from(tet.is_required(order[k])) << k;
         let faces = (0..4).fold(0, |faces, k| faces | bit(k));
-        let required = [0, 1, 2, 3].map(|i| tet.is_required(i));
-        *(self.known_several)
-            .entry((order.map(|i| tet.vertex(i)), faces))
-            .or_insert_with(|| least(points, required))
+        let name = (order.map(|i| tet.vertex(i)), faces);
+        *(self.known_several).entry(name).or_insert_with(|| {
+            // The same order whoever asks, and positive.
+            if !is_even(order) {
+                order.swap(2, 3);
+            }
+            least(order.map(|i| points[i]), order.map(|i| tet.is_required(i)))
+        })
     }
 
     /// Whether q over the bound is above `excess` for certain; `false` where that takes a search.
@@ -142,9 +170,7 @@ impl FaceBounds {
     ) -> bool {
         match Self::required(tet) {
             (None, _) => q > excess,
-            (Some(i), false) => {
-                q > excess * self.known(tet.face(i), FACES[i].map(|k| points[k])).most
-            }
+            (Some(i), false) => q > excess * self.most_of(tet.face(i), FACES[i].map(|k| points[k])),
             (Some(_), true) => false,
         }
     }
@@ -157,6 +183,12 @@ impl FaceBounds {
             (measure, _) => measure.weight(self.of_tet(tet, points)),
         }
     }
+}
+
+/// Whether an even number of swaps leads to this order.
+fn is_even(order: [usize; 4]) -> bool {
+    let pairs = (0..4).flat_map(|i| (i + 1..4).map(move |j| (i, j)));
+    pairs.filter(|&(i, j)| order[i] > order[j]).count() % 2 == 0
 }
 
 /// 1 / q of a tetrahedron of the mesh, and what it counts in the same units as the sides of a star.

@@ -12,35 +12,31 @@
 //! The vertex in a cavity gains most. What is tried in vain is remembered until something changes it. All this in
 //! several stages, judged differently (`stages`).
 //!
-//! Deterministic: order follows q or excess, then ids, and neither depends on paging.
+//! What comes of a try is found out on all threads ahead of its turn (`window`), and brought about in order.
+//!
+//! Deterministic: order follows q or excess, then ids, and neither depends on paging or threads.
 
 mod cavity;
 mod face_bounds;
 mod kernel;
+mod operator;
 mod refill;
 mod stages;
 mod star;
 mod vertex;
+mod window;
 
 use std::collections::{BinaryHeap, HashSet};
 
-use super::collapse::Collapser;
-use super::objective::Worst;
 use super::pages::PageFlags;
-use super::quality::quality;
-use super::swap::Swapper;
 use crate::geom::{Point, STEP, mix};
 use crate::mesh::{Mesh, Tet, tets_of_page};
 use crate::storage::{Pages, check_cancelled};
-use cavity::{Cavity, Proposal};
-use face_bounds::{FaceBounds, value_of};
-use refill::Refill;
+use operator::{Attacks, Operator};
 use stages::{Judgment, STAGES, Stage, WORST, judge};
-use star::{Aim, Goal};
-use vertex::Mover;
+use star::Goal;
+use window::Window;
 
-/// Searches stop at this value, and an operation that reaches it is done without trying others.
-const ENOUGH: f64 = 0.5;
 /// Below this value volumes are rounding: what takes the place of such a tetrahedron has to be above.
 const NO_VOLUME: f64 = 1e-15;
 /// Sweeps of moves for the product at most: where vertices hold each other, heights double in each.
@@ -82,14 +78,10 @@ fn name(points: [Point; 4]) -> u64 {
 /// Scratch and queue of all passes.
 #[derive(Default)]
 pub(super) struct Mender {
-    mover: Mover,
-    cavity: Cavity,
-    /// The cavity of the best proposal so far.
-    best_cavity: Cavity,
-    refill: Refill,
-    bounds: FaceBounds,
-    swapper: Swapper<Worst>,
-    collapser: Collapser<Worst>,
+    operator: Operator,
+    window: Window,
+    /// Of the threads that look ahead.
+    operators: Vec<Operator>,
     /// Bits of the badness, which order like it, and the tetrahedron.
     queue: BinaryHeap<(u64, u32)>,
     /// Names of what was tried in vain.
@@ -98,11 +90,14 @@ pub(super) struct Mender {
     forced: f64,
     /// Vertices around which something changed in this pass, and in the one before.
     touched: [HashSet<u32>; 2],
-    changed: Vec<u32>,
-    pub(super) counts: MendCounts,
 }
 
 impl Mender {
+    /// What was done so far.
+    pub(super) fn counts(&self) -> MendCounts {
+        self.operator.counts
+    }
+
     /// Mends what is bad in the flagged pages. `progress` is told the share done of a pass.
     pub(super) fn run<P: Pages>(
         &mut self,
@@ -118,7 +113,7 @@ impl Mender {
             let mut flags = pages.clone();
             self.failed.clear();
             for _ in 0..stage.passes_max {
-                let before = self.counts.changes();
+                let before = self.operator.counts.changes();
                 if stage.goal == Goal::Quality {
                     let list = self.list(mesh, &mut flags.clone(), stage);
                     self.lift(mesh, &list);
@@ -128,7 +123,7 @@ impl Mender {
                     break;
                 };
                 self.pass(mesh, list, &mut flags, &stage, progress);
-                if self.counts.changes() == before {
+                if self.operator.counts.changes() == before {
                     break;
                 }
             }
@@ -144,7 +139,7 @@ impl Mender {
         stage: &Stage,
     ) -> Vec<(u64, u32)> {
         let most = stage.tried_max(mesh.n_tets());
-        let bounds = &mut self.bounds;
+        let bounds = &mut self.operator.bounds;
         let mut list = Vec::new();
         let (mut forced, mut worst) = (0.0f64, 0.0f64);
         let mut bad = PageFlags::default();
@@ -192,17 +187,18 @@ impl Mender {
         }
         for _ in 0..SWEEPS_MAX {
             check_cancelled();
-            let before = self.counts.vertices_moved;
+            let before = self.operator.counts.vertices_moved;
             vertices.retain(|&(v, t)| {
-                if !self.mover.gather(mesh, v, t, &mut self.bounds) {
+                let Operator { mover, bounds, .. } = &mut self.operator;
+                if !mover.gather(mesh, v, t, bounds) {
                     return false;
                 }
-                let is_moved = self.mover.raise_product(mesh);
-                self.counts.vertices_moved += u64::from(is_moved);
+                let is_moved = mover.raise_product(mesh);
+                self.operator.counts.vertices_moved += u64::from(is_moved);
                 // One that is stuck between others in a cluster may move after them.
-                is_moved || self.mover.is_flat()
+                is_moved || self.operator.mover.is_flat()
             });
-            if self.counts.vertices_moved == before {
+            if self.operator.counts.vertices_moved == before {
                 break;
             }
         }
@@ -222,31 +218,41 @@ impl Mender {
         let total = self.queue.len();
         // What operations leave bad is followed up, up to a bound.
         let mut left = stage.tried_max(mesh.n_tets());
-        while let Some((bits, t)) = self.queue.pop() {
+        self.window.clear();
+        loop {
+            self.look_ahead(mesh, stage);
+            let Some((bits, t)) = self.queue.pop() else {
+                break;
+            };
             check_cancelled();
+            let foreseen = self.window.take(t);
             progress(1.0 - (self.queue.len().min(total)) as f64 / total as f64);
             let tet = mesh.tet(t);
-            // Changed since it was listed: then it was listed anew.
-            let is_current = tet.is_live()
-                && (judge(mesh, &tet, stage, &mut self.bounds).bad())
-                    .is_some_and(|b| b.to_bits() == bits);
             if left == 0 {
                 self.queue.clear();
                 break;
             }
-            if !is_current || !self.is_worth_trying(mesh, &tet) {
+            if !self.is_current(mesh, &tet, bits, stage) || !self.is_worth_trying(mesh, &tet) {
                 continue;
             }
             left -= 1;
-            self.counts.tried += 1;
-            if !self.attack(mesh, t, &tet, stage) {
+            self.failed.remove(&name(mesh.points(&tet)));
+            self.operator.counts.tried += 1;
+            let operator = &mut self.operator;
+            let done = match foreseen {
+                Some(outcome) => operator.bring_about(mesh, t, &tet, outcome),
+                None => operator.attack(mesh, t, &tet, stage),
+            };
+            if !done {
                 self.failed.insert(name(mesh.points(&tet)));
                 continue;
             }
-            for &t in &self.changed {
+            self.window.tell(mesh, &self.operator.changed);
+            for k in 0..self.operator.changed.len() {
+                let t = self.operator.changed[k];
                 let tet = mesh.tet(t);
                 self.touched[0].extend(tet.vertices());
-                if let Some(badness) = judge(mesh, &tet, stage, &mut self.bounds).bad() {
+                if let Some(badness) = judge(mesh, &tet, stage, &mut self.operator.bounds).bad() {
                     pages.raise(t);
                     self.queue.push((badness.to_bits(), t));
                 }
@@ -254,130 +260,43 @@ impl Mender {
         }
     }
 
+    /// Whether a tetrahedron is as bad as when it was listed: if it has changed, it was listed anew.
+    fn is_current<P: Pages>(
+        &mut self,
+        mesh: &mut Mesh<P>,
+        tet: &Tet,
+        bits: u64,
+        stage: &Stage,
+    ) -> bool {
+        let bounds = &mut self.operator.bounds;
+        tet.is_live()
+            && (judge(mesh, tet, stage, bounds).bad()).is_some_and(|b| b.to_bits() == bits)
+    }
+
     /// Whether it was never tried, or something has changed near it in the pass before.
-    fn is_worth_trying<P: Pages>(&mut self, mesh: &mut Mesh<P>, tet: &Tet) -> bool {
-        let name = name(mesh.points(tet));
-        let changed = tet.vertices().iter().any(|v| self.touched[1].contains(v));
-        !self.failed.contains(&name) || changed && self.failed.remove(&name)
+    fn is_worth_trying<P: Pages>(&self, mesh: &mut Mesh<P>, tet: &Tet) -> bool {
+        !self.failed.contains(&name(mesh.points(tet)))
+            || tet.vertices().iter().any(|v| self.touched[1].contains(v))
     }
 
-    /// Tries everything on the bad tetrahedron `t`; after success `changed` lists the tetrahedra that are new or moved.
-    fn attack<P: Pages>(&mut self, mesh: &mut Mesh<P>, t: u32, tet: &Tet, stage: &Stage) -> bool {
-        self.changed.clear();
-        self.bounds.measure = stage.goal.measure(quality(mesh.points(tet)));
-        let [_, own] = value_of(mesh, tet, &mut self.bounds);
-        let own = own.max(NO_VOLUME);
-        let enough = ENOUGH.max(2.0 * own);
-        let aim = Aim {
-            own,
-            enough,
-            goal: stage.goal,
-            more: stage.more,
-            tets_max: stage.tets_max,
-        };
-        if self.reconnect(mesh, t, tet, enough) {
-            return true;
+    /// Tries the next ones in the queue on all threads.
+    fn look_ahead<P: Pages>(&mut self, mesh: &mut Mesh<P>, stage: &Stage) {
+        let room = self.window.room();
+        if room == 0 {
+            return;
         }
-        let mut best = stage.gain_min * own;
-        let mut way = Way::None;
-        for v in tet.vertices() {
-            if best < enough && self.mover.gather(mesh, v, t, &mut self.bounds) {
-                let found = (self.mover).raise_least(mesh, aim, best, &mut self.bounds);
-                if let Some((at, value)) = found.filter(|found| found.1 > best) {
-                    (best, way) = (value, Way::Move(v, at));
-                }
+        let mut next = Vec::new();
+        // What is not worth trying now is not in this pass: it goes.
+        while next.len() < room
+            && let Some((bits, t)) = self.queue.pop()
+        {
+            let tet = mesh.tet(t);
+            if self.is_current(mesh, &tet, bits, stage) && self.is_worth_trying(mesh, &tet) {
+                next.push((bits, t));
             }
         }
-        if best < enough {
-            let proposal = self.cavity.grow(mesh, t, aim, best, &mut self.bounds);
-            self.weigh(proposal, &mut best, &mut way);
-        }
-        for e in 0..6 {
-            // An edge's ring is a cavity of its own; it is needed where growing led nowhere.
-            if best < 2.0 * own {
-                let proposal = (self.cavity).split(mesh, t, e, aim, best, &mut self.bounds);
-                self.weigh(proposal, &mut best, &mut way);
-            }
-        }
-        // It takes a quarter of the time, and one success of twenty where the number of q ≥ 10 is to fall.
-        if best < 2.0 * own && stage.goal != Goal::Count {
-            let found = (self.refill).grow(mesh, t, aim, best, &mut self.bounds);
-            if let Some(value) = found {
-                (best, way) = (value, Way::Refill);
-            }
-        }
-        let floor = match stage.goal {
-            Goal::Worst | Goal::WorstExcess => best,
-            Goal::Quality | Goal::Count => own,
-        };
-        if best < 2.0 * own && self.reconnect(mesh, t, tet, floor) {
-            return true;
-        }
-        self.go(mesh, t, way)
+        let tets: Vec<u32> = next.iter().map(|&(_, t)| t).collect();
+        self.queue.extend(next);
+        (self.window).look(mesh, &tets, &mut self.operators, &Attacks { stage });
     }
-
-    /// Keeps a proposal that is better than the best so far.
-    fn weigh(&mut self, proposal: Option<Proposal>, best: &mut f64, way: &mut Way) {
-        if let Some(proposal) = proposal.filter(|p| p.value > *best) {
-            (*best, *way) = (proposal.value, Way::Insert(proposal));
-            std::mem::swap(&mut self.cavity, &mut self.best_cavity);
-        }
-    }
-
-    /// A flip, or an edge or a vertex removed, that leaves no new tetrahedron of 1 / q below `own` and a bit.
-    fn reconnect<P: Pages>(&mut self, mesh: &mut Mesh<P>, t: u32, tet: &Tet, own: f64) -> bool {
-        let done = self.swapper.remove_best_edge(mesh, t, tet, own, None)
-            || self.swapper.swap_best_face(mesh, t, tet, own);
-        if done {
-            self.counts.reconnected += 1;
-            self.changed.extend_from_slice(self.swapper.new_tets());
-        } else if self.collapser.collapse_best_edge(mesh, t, tet, own) {
-            self.counts.vertices_removed += 1;
-            self.changed.extend_from_slice(self.collapser.new_tets());
-            return true;
-        }
-        done
-    }
-
-    /// Does what was found best.
-    fn go<P: Pages>(&mut self, mesh: &mut Mesh<P>, t: u32, way: Way) -> bool {
-        match way {
-            Way::None => false,
-            Way::Move(v, at) => {
-                let found = self.mover.ball.gather(mesh, v, t, usize::MAX);
-                assert!(found, "tetrahedron {t} has vertex {v}");
-                mesh.set_point(v, at);
-                self.counts.vertices_moved += 1;
-                self.changed.extend_from_slice(&self.mover.ball.tets);
-                true
-            }
-            Way::Refill => {
-                let done = self.refill.apply(mesh, &mut self.bounds);
-                if done {
-                    self.counts.refilled += 1;
-                    self.changed.extend_from_slice(self.refill.new_tets());
-                }
-                done
-            }
-            Way::Insert(proposal) => {
-                let done = self.best_cavity.apply(mesh, proposal);
-                if done {
-                    self.counts.vertices_inserted += 1;
-                    self.changed.extend_from_slice(self.best_cavity.new_tets());
-                }
-                done
-            }
-        }
-    }
-}
-
-/// The best operation found.
-#[derive(Clone, Copy)]
-enum Way {
-    None,
-    Move(u32, Point),
-    /// The filling found last.
-    Refill,
-    /// A vertex in the best cavity.
-    Insert(Proposal),
 }

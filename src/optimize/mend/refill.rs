@@ -112,15 +112,10 @@ impl Refill {
         (self.n_best > 0).then_some(self.floor)
     }
 
-    /// Puts the filling returned last into the mesh; `false`, with nothing changed, when that is not possible.
-    pub(super) fn apply<P: Pages>(&mut self, mesh: &mut Mesh<P>, bounds: &mut FaceBounds) -> bool {
-        self.cavity.shrink(mesh, self.n_best, bounds);
-        self.cavity.exchange(mesh, &self.best)
-    }
-
-    /// Tetrahedra made by the last success.
-    pub(super) fn new_tets(&self) -> &[u32] {
-        self.cavity.new_tets()
+    /// The filling returned last: the tetrahedra that go, and those that come.
+    pub(super) fn found(&self) -> (Vec<u32>, Vec<[u32; 4]>) {
+        let (gone, _) = self.cavity.outline();
+        (gone[..self.n_best].to_vec(), self.best.clone())
     }
 
     /// Numbers the cavity's corners and opens its faces.
@@ -410,7 +405,8 @@ mod tests {
                 continue;
             };
             assert!(value > own);
-            assert!(refill.apply(&mut mesh, &mut bounds));
+            let (gone, new) = refill.found();
+            assert!(Cavity::default().exchange(&mut mesh, &gone, &new));
             let after = checked(&mut mesh);
             assert!(after.0 == hull && (after.1 - volume).abs() < 1e-12);
             // One that is there again has its vertices in another order.

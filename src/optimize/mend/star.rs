@@ -459,7 +459,8 @@ mod tests {
                 }
                 let several = bounds.of_several(&tet, points);
                 let required = [0, 1, 2, 3].map(|i| tet.is_required(i));
-                assert_eq!(several, least(points, required));
+                // Searched from other corners.
+                assert!((several / least(points, required) - 1.0).abs() < 2e-3);
             }
         }
     }
