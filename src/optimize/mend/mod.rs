@@ -32,6 +32,7 @@ use super::pages::PageFlags;
 use crate::geom::{Point, STEP, mix};
 use crate::mesh::{Mesh, Tet, tets_of_page};
 use crate::storage::{Pages, check_cancelled};
+use face_bounds::Measure;
 use operator::{Attacks, Operator};
 use stages::{Judgment, STAGES, Stage, WORST, judge};
 use star::Goal;
@@ -185,6 +186,8 @@ impl Mender {
             let new = tet.vertices().into_iter().filter(|&v| seen.insert(v));
             vertices.extend(new.map(|v| (v, t)));
         }
+        // Not what the tetrahedron tried last was judged by: which one that was depends on threads.
+        self.operator.bounds.measure = Measure::Quality(f64::INFINITY);
         for _ in 0..SWEEPS_MAX {
             check_cancelled();
             let before = self.operator.counts.vertices_moved;
