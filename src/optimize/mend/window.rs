@@ -6,7 +6,7 @@ use super::operator::{Attacks, Operator, Outcome};
 use crate::mesh::{Foreseen, Mesh, look_ahead};
 use crate::storage::{Pages, spare_threads};
 
-/// Tried ahead for each thread at once. One in seven has to be tried again, for something changed beside it.
+/// Tried ahead for each thread at once. One in twenty has to be tried again, for something changed beside it; with sixteen one in seven.
 const EACH: usize = 4;
 /// Fewer are not worth waking threads for.
 const LEAST: usize = 2;
