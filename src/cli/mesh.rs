@@ -8,7 +8,7 @@ use super::args::{MeshArgs, ResumeArgs, RunArgs};
 use super::console::Console;
 use super::failure::Failure;
 use super::input::{self, Space};
-use super::{config, export, info, memory};
+use super::{config, export, info, memory, threads};
 use crate::api::targets::{check_target, inputs_of};
 use crate::api::{Existing, Mesher, Settings, resume_reported};
 use crate::io::write::Selection;
@@ -107,22 +107,13 @@ pub fn resume(args: &ResumeArgs, console: &Console) -> Result<u8, Failure> {
     )
 }
 
-/// The number of threads that is asked for. Errors: none at all.
-pub(super) fn asked_threads(option: Option<usize>) -> Result<Option<usize>, Failure> {
-    if option == Some(0) {
-        let message = "--threads 0 is no thread to work with";
-        return Err(Failure::new("usage", message).help("give 1 or more"));
-    }
-    Ok(option)
-}
-
 /// Threads, signals, and the cap; nothing that is written may be one of `inputs`.
 pub(super) fn begin(
     args: &RunArgs,
     inputs: &[PathBuf],
     console: &Console,
 ) -> Result<Settings, Failure> {
-    let threads = asked_threads(args.threads)?;
+    let threads = threads::asked(args.threads)?;
     for out in &args.export {
         export::check_format(out)?;
         check_target(out, inputs)?;

@@ -31,6 +31,7 @@ mod signals;
 mod snapshot;
 mod task_scripts;
 mod tasks;
+mod threads;
 mod verify;
 mod words;
 

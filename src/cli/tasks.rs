@@ -9,9 +9,8 @@ use serde_json::{Value, json};
 use super::args::{GatherArgs, PlanArgs, WorkArgs};
 use super::console::Console;
 use super::failure::Failure;
-use super::memory;
-use super::mesh::asked_threads;
 use super::task_scripts::{Script, kind};
+use super::{memory, threads};
 use crate::api::tasks::ranges;
 use crate::api::{Error, Tasks};
 use crate::io::write::{Selection, check};
@@ -75,7 +74,7 @@ pub fn plan(args: &PlanArgs, console: &Console) -> Result<u8, Failure> {
 
 pub fn work(args: &WorkArgs, console: &Console) -> Result<u8, Failure> {
     let cap = memory::asked(args.memory.as_deref())?;
-    let settings = console.settings(cap, asked_threads(args.threads)?);
+    let settings = console.settings(cap, threads::asked(args.threads)?);
     let mut tasks = Tasks::of(&args.store).wait(Duration::from_secs(args.wait));
     if let Some(dir) = args.scratch.clone().or_else(scratch_of_machine) {
         tasks = tasks.scratch(dir);

@@ -6,8 +6,7 @@ use super::args::VerifyArgs;
 use super::console::Console;
 use super::failure::Failure;
 use super::input::{self, Space};
-use super::memory;
-use super::mesh::asked_threads;
+use super::{memory, threads};
 use crate::api::preflight::scratch_beside;
 use crate::api::store::open_finished;
 use crate::api::verify::{check, invalid, sentence};
@@ -71,7 +70,7 @@ pub fn run(args: &VerifyArgs, console: &Console) -> Result<u8, Failure> {
 pub(super) fn settings(args: &VerifyArgs, console: &Console) -> Result<Settings, Failure> {
     let cap = memory::cap(args.read.memory.as_deref())?;
     #[cfg_attr(not(feature = "mpi"), allow(unused_mut))]
-    let mut settings = console.settings(Some(cap), asked_threads(args.threads)?);
+    let mut settings = console.settings(Some(cap), threads::asked(args.threads)?);
     #[cfg(feature = "mpi")]
     {
         settings.hands = super::ranks::hands();

@@ -373,7 +373,7 @@ fn corners_of(records: &[Tet]) -> Vec<u32> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::NO_VOLUME;
+    use super::super::operator::NO_VOLUME;
     use super::super::star::Goal;
     use super::*;
     use crate::optimize::quality::inverse_quality;

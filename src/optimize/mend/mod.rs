@@ -33,42 +33,14 @@ use crate::geom::{Point, STEP, mix};
 use crate::mesh::{Mesh, Tet, tets_of_page};
 use crate::storage::{Pages, check_cancelled};
 use face_bounds::Measure;
+pub use operator::MendCounts;
 use operator::{Attacks, Operator};
 use stages::{Judgment, STAGES, Stage, WORST, judge};
 use star::Goal;
 use window::Window;
 
-/// Below this value volumes are rounding: what takes the place of such a tetrahedron has to be above.
-const NO_VOLUME: f64 = 1e-15;
 /// Sweeps of moves for the product at most: where vertices hold each other, heights double in each.
 const SWEEPS_MAX: u32 = 60;
-
-/// Accepted operations.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct MendCounts {
-    /// Bad tetrahedra tried, over all passes.
-    pub tried: u64,
-    /// Flips, and edges removed.
-    pub reconnected: u64,
-    /// Cavities filled anew with tetrahedra of their own vertices.
-    pub refilled: u64,
-    /// Moves of a vertex, each counted.
-    pub vertices_moved: u64,
-    /// Vertices put into cavities and on edges.
-    pub vertices_inserted: u64,
-    /// Vertices taken away with one of their edges.
-    pub vertices_removed: u64,
-}
-
-impl MendCounts {
-    fn changes(&self) -> u64 {
-        self.reconnected
-            + self.refilled
-            + self.vertices_moved
-            + self.vertices_inserted
-            + self.vertices_removed
-    }
-}
 
 /// A tetrahedron by its vertices' positions.
 fn name(points: [Point; 4]) -> u64 {

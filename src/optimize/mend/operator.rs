@@ -10,13 +10,42 @@ use super::refill::Refill;
 use super::stages::Stage;
 use super::star::{Aim, Goal};
 use super::vertex::Mover;
-use super::{MendCounts, NO_VOLUME};
 use crate::geom::Point;
 use crate::mesh::{Draft, Mesh, Tet, Trial};
 use crate::storage::Pages;
 
 /// Searches stop at this value, and an operation that reaches it is done without trying others.
 const ENOUGH: f64 = 0.5;
+
+/// Below this value volumes are rounding: what takes the place of such a tetrahedron has to be above.
+pub(super) const NO_VOLUME: f64 = 1e-15;
+
+/// Accepted operations.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct MendCounts {
+    /// Bad tetrahedra tried, over all passes.
+    pub tried: u64,
+    /// Flips, and edges removed.
+    pub reconnected: u64,
+    /// Cavities filled anew with tetrahedra of their own vertices.
+    pub refilled: u64,
+    /// Moves of a vertex, each counted.
+    pub vertices_moved: u64,
+    /// Vertices put into cavities and on edges.
+    pub vertices_inserted: u64,
+    /// Vertices taken away with one of their edges.
+    pub vertices_removed: u64,
+}
+
+impl MendCounts {
+    pub(super) fn changes(&self) -> u64 {
+        self.reconnected
+            + self.refilled
+            + self.vertices_moved
+            + self.vertices_inserted
+            + self.vertices_removed
+    }
+}
 
 /// Scratch of all operations. What comes of them does not depend on what was done before.
 #[derive(Default)]
@@ -230,7 +259,7 @@ pub(super) struct Attacks<'a> {
 impl Trial for Attacks<'_> {
     type Item = u32;
     type Scratch = Operator;
-    type Found = Outcome;
+    type Outcome = Outcome;
 
     fn attempt<P: Pages>(
         &self,

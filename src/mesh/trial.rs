@@ -18,7 +18,7 @@ pub trait Trial: Sync {
     /// What one thread uses again and again; must not have a say in what comes of it.
     type Scratch: Send;
     /// What comes of it.
-    type Found: Send;
+    type Outcome: Send;
 
     /// Tries it on a draft, which may be left changed where that is part of what is found.
     fn attempt<P: Pages>(
@@ -26,7 +26,7 @@ pub trait Trial: Sync {
         scratch: &mut Self::Scratch,
         mesh: &mut Mesh<P>,
         item: &Self::Item,
-    ) -> Option<(Self::Found, Draft)>;
+    ) -> Option<(Self::Outcome, Draft)>;
 }
 
 /// What is left of a draft.
@@ -52,7 +52,7 @@ pub fn look_ahead<P: Pages, T: Trial>(
     items: &[T::Item],
     scratch: &mut [T::Scratch],
     trial: &T,
-) -> Vec<Option<Foreseen<T::Found>>> {
+) -> Vec<Option<Foreseen<T::Outcome>>> {
     let mut all = Vec::new();
     all.resize_with(items.len(), || None);
     let Some(shared) = mesh.shared() else {
