@@ -9,7 +9,7 @@ use super::console::Console;
 use super::failure::{Failure, in_flags};
 use super::input::Space;
 use super::words::count;
-use super::{config, input, memory};
+use super::{config, input, memory, threads};
 use crate::api::job::take_seeds;
 use crate::api::preflight::free_at;
 use crate::api::{default_cap, divide, predict};
@@ -23,7 +23,7 @@ pub fn run(args: &EstimateArgs, console: &Console) -> Result<u8, Failure> {
         Some(cap) => (cap, "--memory".to_owned()),
         None => default_cap(),
     };
-    let threads = args.threads.unwrap_or_else(n_threads);
+    let threads = threads::asked(args.threads)?.unwrap_or_else(n_threads);
     let store = args.output.as_deref().unwrap_or(Path::new("."));
     // The cap is that of the run to come; what is said of it needs the surface, however large.
     let space = Space {

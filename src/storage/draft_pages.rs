@@ -1,48 +1,50 @@
 //! Changes of one's own over pages that several threads read.
 
-use tetdb_schema::page::{RECORDS, SLOT_BITS, Slot, u32_le};
+use std::collections::HashMap;
+
+use tetdb_schema::page::{NONE, SLOT_BITS, Slot, u32_le};
 
 use super::pages::{Pages, SharedPages, kind};
 
 /// Shared pages with changes that nobody else sees, and a list of the tetrahedra that were read.
 ///
-/// Is not: fast. Each access looks the record up among the changes first, when there are any.
+/// Is not: for many changes. Each access looks among them first, when there are any.
 pub struct DraftPages<'a> {
     base: SharedPages<'a>,
-    /// Where each changed record is among the slots, by kind and id.
-    places: Table,
-    slots: Vec<Slot>,
+    /// By kind and id.
+    changed: HashMap<(usize, u32), Slot>,
     /// Pages appended to each kind.
     appended: [u32; kind::ALL.len()],
-    is_met: Table,
     met: Vec<u32>,
+    /// Tetrahedra met last, each at a place its id says.
+    met_last: Vec<u32>,
 }
 
 const ZERO: Slot = [u32_le::from_native(0); 8];
+/// Places of those met last: most of what is read again is among them.
+const PLACES: usize = 1 << 10;
 
 impl<'a> DraftPages<'a> {
     /// Nothing changed, nothing read.
     pub fn new(base: SharedPages<'a>) -> Self {
         Self {
             base,
-            places: Table::default(),
-            slots: Vec::new(),
+            changed: HashMap::new(),
             appended: [0; kind::ALL.len()],
-            is_met: Table::default(),
             met: Vec::new(),
+            met_last: vec![NONE; PLACES],
         }
     }
 
     /// Forgets changes and what was read.
     pub fn restart(&mut self) {
-        self.places.clear();
-        self.slots.clear();
+        self.changed.clear();
         self.appended = [0; kind::ALL.len()];
-        self.is_met.clear();
         self.met.clear();
+        self.met_last.fill(NONE);
     }
 
-    /// Tetrahedra whose records were read, each once.
+    /// Tetrahedra whose records were read, some more than once.
     pub fn tets_met(&self) -> &[u32] {
         &self.met
     }
@@ -54,25 +56,17 @@ impl<'a> DraftPages<'a> {
 
     /// Whether all records are what they were.
     pub fn is_unchanged(&self) -> bool {
-        let is_same = |key: u64, slot: &Slot| {
-            let (base, kind, id) = (&self.base, (key >> 32) as usize, key as u32);
+        self.changed.iter().all(|(&(kind, id), slot)| {
+            let base = &self.base;
             id >> SLOT_BITS < base.n_pages_of(kind) && base.read_of(kind, id) == slot
-        };
-        (self.places.entries()).all(|(key, at)| is_same(key, &self.slots[at as usize]))
-    }
-
-    #[inline(always)]
-    fn changed<const K: usize>(&self, id: u32) -> Option<&Slot> {
-        if self.slots.is_empty() {
-            return None;
-        }
-        let at = self.places.find(key::<K>(id))?;
-        Some(&self.slots[at as usize])
+        })
     }
 
     #[inline(always)]
     fn current<const K: usize>(&self, id: u32) -> &Slot {
-        if let Some(slot) = self.changed::<K>(id) {
+        if !self.changed.is_empty()
+            && let Some(slot) = self.changed.get(&(K, id))
+        {
             return slot;
         }
         if self.appended[K] > 0 && id >> SLOT_BITS >= self.base.n_pages_of(K) {
@@ -82,26 +76,25 @@ impl<'a> DraftPages<'a> {
     }
 }
 
-#[inline(always)]
-fn key<const K: usize>(id: u32) -> u64 {
-    (K as u64) << 32 | u64::from(id)
-}
-
 impl Pages for DraftPages<'_> {
     #[inline(always)]
     fn read<const K: usize>(&mut self, id: u32) -> &Slot {
-        if K == kind::TETS && self.is_met.add(key::<K>(id), 0) {
-            self.met.push(id);
+        if K == kind::TETS {
+            let last = &mut self.met_last[id as usize % PLACES];
+            if *last != id {
+                *last = id;
+                self.met.push(id);
+            }
         }
         self.current::<K>(id)
     }
 
     #[inline(always)]
     fn read_four<const K: usize>(&mut self, ids: [u32; 4]) -> [&Slot; 4] {
-        let [a, b, c, d] = ids;
-        if self.slots.is_empty() && self.appended[K] == 0 {
+        if self.changed.is_empty() && self.appended[K] == 0 {
             return self.base.read_four_of(K, ids);
         }
+        let [a, b, c, d] = ids;
         [
             self.current::<K>(a),
             self.current::<K>(b),
@@ -111,13 +104,8 @@ impl Pages for DraftPages<'_> {
     }
 
     fn write<const K: usize>(&mut self, id: u32) -> &mut Slot {
-        let at = self.places.find(key::<K>(id)).unwrap_or_else(|| {
-            let (at, slot) = (self.slots.len() as u32, *self.current::<K>(id));
-            self.slots.push(slot);
-            self.places.add(key::<K>(id), at);
-            at
-        });
-        &mut self.slots[at as usize]
+        let slot = *self.current::<K>(id);
+        self.changed.entry((K, id)).or_insert(slot)
     }
 
     fn n_pages<const K: usize>(&self) -> u32 {
@@ -138,96 +126,10 @@ impl Pages for DraftPages<'_> {
     }
 }
 
-/// Numbers by key, all forgotten at once.
-struct Table {
-    /// Turn and key, and the number. A place of another turn is empty.
-    places: Vec<(u64, u32)>,
-    turn: u64,
-    n: usize,
-}
-
-/// Kinds and ids take fewer bits.
-const KEY_BITS: u32 = 36;
-const KEY_MASK: u64 = (1 << KEY_BITS) - 1;
-const PLACES_MIN: usize = 1 << 10;
-
-impl Default for Table {
-    fn default() -> Self {
-        Self {
-            places: vec![(0, 0); PLACES_MIN],
-            turn: 1,
-            n: 0,
-        }
-    }
-}
-
-impl Table {
-    fn clear(&mut self) {
-        (self.turn, self.n) = (self.turn + 1, 0);
-        if self.turn == 1 << (64 - KEY_BITS) {
-            self.places.fill((0, 0));
-            self.turn = 1;
-        }
-    }
-
-    /// Where the key is, or the empty place where it would be.
-    #[inline(always)]
-    fn at(&self, key: u64) -> (usize, bool) {
-        let mask = self.places.len() - 1;
-        let wanted = self.turn << KEY_BITS | key;
-        let mut at = (key.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 40) as usize & mask;
-        loop {
-            let found = self.places[at].0;
-            if found == wanted {
-                return (at, true);
-            }
-            if found >> KEY_BITS != self.turn {
-                return (at, false);
-            }
-            at = (at + 1) & mask;
-        }
-    }
-
-    #[inline(always)]
-    fn find(&self, key: u64) -> Option<u32> {
-        let (at, is_there) = self.at(key);
-        is_there.then(|| self.places[at].1)
-    }
-
-    /// Adds a key that is new; `false`, with nothing changed, when it is not.
-    #[inline(always)]
-    fn add(&mut self, key: u64, number: u32) -> bool {
-        let (at, is_there) = self.at(key);
-        if !is_there {
-            self.places[at] = (self.turn << KEY_BITS | key, number);
-            self.n += 1;
-            if 2 * self.n > self.places.len() {
-                self.grow();
-            }
-        }
-        !is_there
-    }
-
-    #[cold]
-    fn grow(&mut self) {
-        let entries: Vec<(u64, u32)> = self.entries().collect();
-        self.places = vec![(0, 0); 2 * self.places.len()];
-        self.n = 0;
-        for (key, number) in entries {
-            self.add(key, number);
-        }
-    }
-
-    fn entries(&self) -> impl Iterator<Item = (u64, u32)> + '_ {
-        let used = (self.places.iter()).filter(|place| place.0 >> KEY_BITS == self.turn);
-        used.map(|&(word, number)| (word & KEY_MASK, number))
-    }
-}
-
-const _: () = assert!(RECORDS < 1 << SLOT_BITS && kind::ALL.len() <= 1 << (KEY_BITS - 32));
-
 #[cfg(test)]
 mod tests {
+    use tetdb_schema::page::RECORDS;
+
     use super::*;
     use crate::storage::Pager;
 
@@ -243,8 +145,8 @@ mod tests {
         let word = |slot: &Slot| slot[0].to_native();
         let mut draft = DraftPages::new(pager.shared().expect("all in memory"));
         for turn in 0..3 {
-            // Twice the same, and enough for the tables to grow.
-            for id in (0..1500).chain(0..1500) {
+            // More than there are places, some at once again.
+            for id in (0..1500).flat_map(|id| [id, id]) {
                 assert_eq!(word(draft.read::<{ kind::TETS }>(id)), id + 7);
             }
             assert_eq!(draft.tets_met().len(), 1500);
@@ -264,7 +166,7 @@ mod tests {
             for id in 0..1200 {
                 draft.write::<{ kind::TETS }>(id)[0] = u32_le::from_native(id + 7);
             }
-            assert!(!draft.is_unchanged(), "a page more");
+            assert!(!draft.is_unchanged(), "a record more");
             draft.restart();
             assert!(draft.is_unchanged() && draft.tets_met().is_empty());
         }

@@ -17,7 +17,7 @@
 //! is inside disappear.
 
 use super::super::smooth::is_free;
-use super::face_bounds::{FaceBounds, value_of};
+use super::face_bounds::{Weights, value_of};
 use super::star::{Aim, Cost, Goal, Side, Star};
 use crate::geom::Point;
 use crate::mesh::{Mesh, Tet, VertexTag};
@@ -71,9 +71,9 @@ impl Cavity {
         t: u32,
         aim: Aim,
         floor: f64,
-        bounds: &mut FaceBounds,
+        weights: &mut Weights,
     ) -> Option<Proposal> {
-        self.begin(mesh, t, bounds);
+        self.begin(mesh, t, weights);
         let points = mesh.points(&self.records[0]);
         let mut at = (points[0] + points[1] + points[2] + points[3]) * 0.25;
         let mut best: Option<Proposal> = None;
@@ -125,13 +125,13 @@ impl Cavity {
                 || n >= aim.tets_max
                 || aim.own > FLAT && n_hidden > HIDDEN_MAX
                 || best.is_some() && n_idle > IDLE_MAX && aim.goal != Goal::Count
-                || !self.add_worst(mesh, at, bounds)
+                || !self.add_worst(mesh, at, weights)
             {
                 break;
             }
         }
         let best = best?;
-        self.shrink(mesh, best.n, bounds);
+        self.shrink(mesh, best.n, weights);
         if best.corner.is_some() {
             return Some(best);
         }
@@ -152,7 +152,7 @@ impl Cavity {
         e: usize,
         aim: Aim,
         floor: f64,
-        bounds: &mut FaceBounds,
+        weights: &mut Weights,
     ) -> Option<Proposal> {
         if !self.shell.gather(mesh, t, e, RING_MAX) || !self.shell.closed || self.shell.required {
             return None;
@@ -160,7 +160,7 @@ impl Cavity {
         self.clear();
         for k in 0..self.shell.tets.len() {
             let t = self.shell.tets[k];
-            self.add(mesh, t, bounds);
+            self.add(mesh, t, weights);
         }
         if self.star.most() <= floor {
             return None;
@@ -267,9 +267,9 @@ impl Cavity {
     }
 
     /// Begins with one tetrahedron.
-    pub(super) fn begin<P: Pages>(&mut self, mesh: &mut Mesh<P>, t: u32, bounds: &mut FaceBounds) {
+    pub(super) fn begin<P: Pages>(&mut self, mesh: &mut Mesh<P>, t: u32, weights: &mut Weights) {
         self.clear();
-        self.add(mesh, t, bounds);
+        self.add(mesh, t, weights);
     }
 
     /// Adds the worst tetrahedron beyond a face, and then all that have no vertex more; `false` when none may be added or there are too many.
@@ -278,15 +278,15 @@ impl Cavity {
         mesh: &mut Mesh<P>,
         tets_max: usize,
         corners_max: usize,
-        bounds: &mut FaceBounds,
+        weights: &mut Weights,
     ) -> bool {
         let mut order: Vec<(f64, u32)> = Vec::new();
         for t in self.beyond() {
             let record = mesh.tet(t);
-            order.push((value_of(mesh, &record, bounds)[1], t));
+            order.push((value_of(mesh, &record, weights)[1], t));
         }
         order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        if !order.into_iter().any(|(_, t)| self.add(mesh, t, bounds)) {
+        if !order.into_iter().any(|(_, t)| self.add(mesh, t, weights)) {
             return false;
         }
         let corners = self.corners();
@@ -295,7 +295,7 @@ impl Cavity {
             has_grown = false;
             for t in self.beyond() {
                 let has_all = mesh.tet(t).vertices().iter().all(|v| corners.contains(v));
-                has_grown |= has_all && self.add(mesh, t, bounds);
+                has_grown |= has_all && self.add(mesh, t, weights);
             }
         }
         self.tets.len() <= tets_max && corners.len() <= corners_max
@@ -311,7 +311,7 @@ impl Cavity {
     }
 
     /// Adds a tetrahedron; `false`, with nothing changed, when a required face would be inside.
-    fn add<P: Pages>(&mut self, mesh: &mut Mesh<P>, t: u32, bounds: &mut FaceBounds) -> bool {
+    fn add<P: Pages>(&mut self, mesh: &mut Mesh<P>, t: u32, weights: &mut Weights) -> bool {
         let is_shared = |side: &Side| side.across.exists() && side.across.tet() == t;
         let sides = &mut self.star.sides;
         if sides.iter().any(|side| is_shared(side) && side.required) {
@@ -322,10 +322,10 @@ impl Cavity {
         for i in 0..4 {
             let across = record.neighbor[i];
             if !across.exists() || !self.tets.contains(&across.tet()) {
-                self.star.sides.push(Side::new(mesh, &record, i, bounds));
+                self.star.sides.push(Side::new(mesh, &record, i, weights));
             }
         }
-        self.old.push(value_of(mesh, &record, bounds));
+        self.old.push(value_of(mesh, &record, weights));
         self.tets.push(t);
         self.records.push(record);
         true
@@ -336,23 +336,23 @@ impl Cavity {
         &mut self,
         mesh: &mut Mesh<P>,
         at: Point,
-        bounds: &mut FaceBounds,
+        weights: &mut Weights,
     ) -> bool {
         let mut order: Vec<(f64, u32)> = (self.star.sides.iter())
             .filter(|side| !side.required && side.across.exists())
             .map(|side| (side.value(at), side.across.tet()))
             .collect();
         order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        order.into_iter().any(|(_, t)| self.add(mesh, t, bounds))
+        order.into_iter().any(|(_, t)| self.add(mesh, t, weights))
     }
 
     /// Leaves the first `n` tetrahedra.
-    fn shrink<P: Pages>(&mut self, mesh: &mut Mesh<P>, n: usize, bounds: &mut FaceBounds) {
+    fn shrink<P: Pages>(&mut self, mesh: &mut Mesh<P>, n: usize, weights: &mut Weights) {
         if n < self.tets.len() {
             let tets = std::mem::take(&mut self.tets);
             self.clear();
             for &t in &tets[..n] {
-                self.add(mesh, t, bounds);
+                self.add(mesh, t, weights);
             }
         }
     }
@@ -373,6 +373,7 @@ fn corners_of(records: &[Tet]) -> Vec<u32> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::face_bounds::FaceBounds;
     use super::super::operator::NO_VOLUME;
     use super::super::star::Goal;
     use super::*;
@@ -429,10 +430,10 @@ mod tests {
                 tets_max: 40,
             };
             let mut bounds = FaceBounds::default();
-            bounds.measure = aim.goal.measure(f64::INFINITY);
+            let mut weights = bounds.by(aim.goal.measure(f64::INFINITY));
             let mut cavity = Cavity::default();
             let before = content(&mut mesh);
-            let Some(proposal) = cavity.grow(&mut mesh, t, aim, 0.0, &mut bounds) else {
+            let Some(proposal) = cavity.grow(&mut mesh, t, aim, 0.0, &mut weights) else {
                 continue;
             };
             assert!(proposal.value > 0.0);

@@ -18,12 +18,6 @@ pub(super) enum Measure {
     Excess,
 }
 
-impl Default for Measure {
-    fn default() -> Self {
-        Self::Quality(1.0)
-    }
-}
-
 impl Measure {
     /// What 1 / q is multiplied with on a face of this bound.
     fn weight(self, bound: f64) -> f64 {
@@ -56,7 +50,6 @@ const NEEDLE: f64 = 10.0;
 ///
 /// A bound takes a search; where a number that it is not above decides, that is all that is asked for.
 pub(super) struct FaceBounds {
-    pub(super) measure: Measure,
     /// All are forgotten when there are so many.
     known_max: usize,
     known: HashMap<[u32; 3], Known>,
@@ -83,7 +76,6 @@ impl FaceBounds {
     /// Of so many faces at once.
     pub(super) fn remembering(known_max: usize) -> Self {
         Self {
-            measure: Measure::default(),
             known_max,
             known: HashMap::new(),
             known_several: HashMap::new(),
@@ -115,15 +107,10 @@ impl FaceBounds {
         *known.bound.get_or_insert_with(|| face_least(points))
     }
 
-    /// The weight of a required face.
-    pub(super) fn weight_of(&mut self, vertices: [u32; 3], points: [Point; 3]) -> f64 {
-        let measure = self.measure;
-        if let Measure::Quality(q) = measure
-            && (q.is_infinite() || 2.0 * self.most_of(vertices, points) <= q)
-        {
-            return 1.0;
-        }
-        measure.weight(self.of(vertices, points))
+    /// What tetrahedra and faces weigh by a measure.
+    pub(super) fn by(&mut self, measure: Measure) -> Weights<'_> {
+        let bounds = self;
+        Weights { bounds, measure }
     }
 
     /// The required face of a tetrahedron that has one only, and whether there are several.
@@ -174,13 +161,32 @@ impl FaceBounds {
             (Some(_), true) => false,
         }
     }
+}
+
+/// What 1 / q is multiplied with, by one measure.
+pub(super) struct Weights<'a> {
+    bounds: &'a mut FaceBounds,
+    measure: Measure,
+}
+
+impl Weights<'_> {
+    /// The weight of a required face.
+    pub(super) fn of_face(&mut self, vertices: [u32; 3], points: [Point; 3]) -> f64 {
+        let (bounds, measure) = (&mut *self.bounds, self.measure);
+        if let Measure::Quality(q) = measure
+            && (q.is_infinite() || 2.0 * bounds.most_of(vertices, points) <= q)
+        {
+            return 1.0;
+        }
+        measure.weight(bounds.of(vertices, points))
+    }
 
     /// The weight of a tetrahedron.
-    fn weight_of_tet(&mut self, tet: &Tet, points: [Point; 4]) -> f64 {
-        match (self.measure, Self::required(tet)) {
+    fn of_tet(&mut self, tet: &Tet, points: [Point; 4]) -> f64 {
+        match (self.measure, FaceBounds::required(tet)) {
             (Measure::Quality(q), _) if q.is_infinite() => 1.0,
-            (_, (Some(i), false)) => self.weight_of(tet.face(i), FACES[i].map(|k| points[k])),
-            (measure, _) => measure.weight(self.of_tet(tet, points)),
+            (_, (Some(i), false)) => self.of_face(tet.face(i), FACES[i].map(|k| points[k])),
+            (measure, _) => measure.weight(self.bounds.of_tet(tet, points)),
         }
     }
 }
@@ -192,12 +198,8 @@ fn is_even(order: [usize; 4]) -> bool {
 }
 
 /// 1 / q of a tetrahedron of the mesh, and what it counts in the same units as the sides of a star.
-pub(super) fn value_of<P: Pages>(
-    mesh: &mut Mesh<P>,
-    tet: &Tet,
-    bounds: &mut FaceBounds,
-) -> [f64; 2] {
+pub(super) fn value_of<P: Pages>(mesh: &mut Mesh<P>, tet: &Tet, weights: &mut Weights) -> [f64; 2] {
     let points = mesh.points(tet);
     let good = inverse_quality(points).max(0.0);
-    [good, good * bounds.weight_of_tet(tet, points)]
+    [good, good * weights.of_tet(tet, points)]
 }

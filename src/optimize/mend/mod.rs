@@ -158,14 +158,14 @@ impl Mender {
             let new = tet.vertices().into_iter().filter(|&v| seen.insert(v));
             vertices.extend(new.map(|v| (v, t)));
         }
-        // Not what the tetrahedron tried last was judged by: which one that was depends on threads.
-        self.operator.bounds.measure = Measure::Quality(f64::INFINITY);
         for _ in 0..SWEEPS_MAX {
             check_cancelled();
             let before = self.operator.counts.vertices_moved;
             vertices.retain(|&(v, t)| {
                 let Operator { mover, bounds, .. } = &mut self.operator;
-                if !mover.gather(mesh, v, t, bounds) {
+                // No triangle's bound counts in a product.
+                let mut plain = bounds.by(Measure::Quality(f64::INFINITY));
+                if !mover.gather(mesh, v, t, &mut plain) {
                     return false;
                 }
                 let is_moved = mover.raise_product(mesh);

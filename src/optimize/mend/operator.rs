@@ -64,7 +64,6 @@ pub(super) struct Operator {
 }
 
 /// What comes of an attack, as anyone can bring it about as long as nothing has changed where it was found.
-#[derive(Clone)]
 pub(super) enum Outcome {
     Nothing,
     /// A flip, or an edge or a vertex removed, for values above this.
@@ -119,8 +118,8 @@ impl Operator {
         tet: &Tet,
         stage: &Stage,
     ) -> Outcome {
-        self.bounds.measure = stage.goal.measure(quality(mesh.points(tet)));
-        let [_, own] = value_of(mesh, tet, &mut self.bounds);
+        let measure = stage.goal.measure(quality(mesh.points(tet)));
+        let [_, own] = value_of(mesh, tet, &mut self.bounds.by(measure));
         let own = own.max(NO_VOLUME);
         let enough = ENOUGH.max(2.0 * own);
         let aim = Aim {
@@ -136,27 +135,30 @@ impl Operator {
         let mut best = stage.gain_min * own;
         let mut way = Way::None;
         for v in tet.vertices() {
-            if best < enough && self.mover.gather(mesh, v, t, &mut self.bounds) {
-                let found = (self.mover).raise_least(mesh, aim, best, &mut self.bounds);
+            if best < enough && self.mover.gather(mesh, v, t, &mut self.bounds.by(measure)) {
+                let found = (self.mover).raise_least(mesh, aim, best, &mut self.bounds.by(measure));
                 if let Some((at, value)) = found.filter(|found| found.1 > best) {
                     (best, way) = (value, Way::Move(v, at));
                 }
             }
         }
         if best < enough {
-            let proposal = self.cavity.grow(mesh, t, aim, best, &mut self.bounds);
+            let proposal = self
+                .cavity
+                .grow(mesh, t, aim, best, &mut self.bounds.by(measure));
             self.weigh(proposal, &mut best, &mut way);
         }
         for e in 0..6 {
             // An edge's ring is a cavity of its own; it is needed where growing led nowhere.
             if best < 2.0 * own {
-                let proposal = (self.cavity).split(mesh, t, e, aim, best, &mut self.bounds);
+                let proposal =
+                    (self.cavity).split(mesh, t, e, aim, best, &mut self.bounds.by(measure));
                 self.weigh(proposal, &mut best, &mut way);
             }
         }
         // It takes a quarter of the time, and one success of twenty where the number of q ≥ 10 is to fall.
         if best < 2.0 * own && stage.goal != Goal::Count {
-            let found = (self.refill).grow(mesh, t, aim, best, &mut self.bounds);
+            let found = (self.refill).grow(mesh, t, aim, best, &mut self.bounds.by(measure));
             if let Some(value) = found {
                 (best, way) = (value, Way::Refill);
             }

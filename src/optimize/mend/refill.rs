@@ -14,7 +14,7 @@
 use super::super::quality::inverse_quality;
 use super::super::smooth::is_free;
 use super::cavity::Cavity;
-use super::face_bounds::FaceBounds;
+use super::face_bounds::Weights;
 use super::star::{Aim, Cost};
 use crate::geom::{Point, orient};
 use crate::mesh::Mesh;
@@ -98,11 +98,11 @@ impl Refill {
         t: u32,
         aim: Aim,
         floor: f64,
-        bounds: &mut FaceBounds,
+        weights: &mut Weights,
     ) -> Option<f64> {
         (self.floor, self.n_best) = (floor, 0);
-        self.cavity.begin(mesh, t, bounds);
-        while (self.cavity).grow_by_vertex(mesh, aim.tets_max, CORNERS_MAX, bounds) {
+        self.cavity.begin(mesh, t, weights);
+        while (self.cavity).grow_by_vertex(mesh, aim.tets_max, CORNERS_MAX, weights) {
             let start = self.begin(mesh);
             self.search(aim, start);
             if self.n_best > 0 && self.floor >= aim.enough {
@@ -348,7 +348,7 @@ fn sorted<const N: usize>(mut corners: [u8; N]) -> ([u8; N], bool) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::face_bounds::value_of;
+    use super::super::face_bounds::{FaceBounds, Measure, value_of};
     use super::super::star::Goal;
     use super::*;
     use crate::optimize::measure;
@@ -386,8 +386,9 @@ mod tests {
             let (hull, volume) = checked(&mut mesh);
             let before = measure(&mut mesh).worst;
             let mut bounds = FaceBounds::default();
+            let plain = Measure::Quality(1.0);
             let values = live(&mut mesh).into_iter().map(|(t, tet)| {
-                let [_, value] = value_of(&mut mesh, &tet, &mut bounds);
+                let [_, value] = value_of(&mut mesh, &tet, &mut bounds.by(plain));
                 (value, t)
             });
             let (own, worst) = values
@@ -401,7 +402,7 @@ mod tests {
                 tets_max: 40,
             };
             let mut refill = Refill::default();
-            let Some(value) = refill.grow(&mut mesh, worst, aim, own, &mut bounds) else {
+            let Some(value) = refill.grow(&mut mesh, worst, aim, own, &mut bounds.by(plain)) else {
                 continue;
             };
             assert!(value > own);

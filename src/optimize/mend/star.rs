@@ -2,7 +2,7 @@
 
 use super::super::climb::Climb;
 use super::super::quality::{ALPHA, face_bound};
-use super::face_bounds::{FaceBounds, Measure};
+use super::face_bounds::{Measure, Weights};
 use super::kernel::{self, farthest_inside};
 use crate::geom::{Point, orient};
 use crate::mesh::{FaceRef, Mesh, Tet};
@@ -35,7 +35,7 @@ impl Side {
         mesh: &mut Mesh<P>,
         record: &Tet,
         i: usize,
-        bounds: &mut FaceBounds,
+        weights: &mut Weights,
     ) -> Self {
         let vertices = record.face(i);
         let points = vertices.map(|v| mesh.point(v));
@@ -44,7 +44,7 @@ impl Side {
         let normal = u.cross(v);
         let required = record.is_required(i);
         let weight = if required {
-            bounds.weight_of(vertices, points)
+            weights.of_face(vertices, points)
         } else {
             1.0
         };
@@ -417,6 +417,7 @@ fn unit(x: f64, exponent: &mut f64) -> f64 {
 mod tests {
     use super::super::super::bound::least;
     use super::super::super::quality::inverse_quality;
+    use super::super::face_bounds::FaceBounds;
     use super::*;
     use crate::optimize::tests::{delaunay, live, random};
     use crate::storage::FlatPages;
@@ -430,14 +431,14 @@ mod tests {
                 .collect();
             let mut mesh = delaunay(Mesh::new(FlatPages::default()), &points, points.len(), 1.0);
             let mut bounds = FaceBounds::default();
-            bounds.measure = Measure::Quality(20.0);
+            let measure = Measure::Quality(20.0);
             for (t, tet) in live(&mut mesh) {
                 let across = tet.neighbor.into_iter().find(|across| across.exists());
                 let mut star = Star::default();
                 for record in [tet, across.map_or(tet, |across| mesh.tet(across.tet()))] {
                     (0..4).for_each(|i| {
                         star.sides
-                            .push(Side::new(&mut mesh, &record, i, &mut bounds))
+                            .push(Side::new(&mut mesh, &record, i, &mut bounds.by(measure)))
                     });
                 }
                 let center = star.sides[0].points[0];

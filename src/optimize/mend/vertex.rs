@@ -2,7 +2,7 @@
 
 use super::super::climb::Climb;
 use super::super::smooth::is_free;
-use super::face_bounds::{FaceBounds, value_of};
+use super::face_bounds::{Weights, value_of};
 use super::star::{Aim, Cost, Goal, Side, Star};
 use crate::geom::Point;
 use crate::mesh::Mesh;
@@ -37,7 +37,7 @@ impl Mover {
         mesh: &mut Mesh<P>,
         v: u32,
         t: u32,
-        bounds: &mut FaceBounds,
+        weights: &mut Weights,
     ) -> bool {
         if !is_free(mesh, v)
             || !self.ball.gather(mesh, v, t, BALL_MAX)
@@ -48,7 +48,7 @@ impl Mover {
         }
         self.star.sides.clear();
         for (record, &local) in self.ball.records.iter().zip(&self.ball.locals) {
-            let side = Side::new(mesh, record, local.into(), bounds);
+            let side = Side::new(mesh, record, local.into(), weights);
             self.star.sides.push(side);
         }
         true
@@ -97,7 +97,7 @@ impl Mover {
         mesh: &mut Mesh<P>,
         aim: Aim,
         floor: f64,
-        bounds: &mut FaceBounds,
+        weights: &mut Weights,
     ) -> Option<(Point, f64)> {
         if self.star.most() <= floor {
             return None;
@@ -107,7 +107,7 @@ impl Mover {
         let (at, value) = (self.star).raise_least(start, value, STEPS, aim.enough);
         let mut old = Cost::default();
         for record in &self.ball.records {
-            let [good, value] = value_of(mesh, record, bounds);
+            let [good, value] = value_of(mesh, record, weights);
             old.add(good, value);
         }
         let is_better =

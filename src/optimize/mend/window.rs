@@ -16,17 +16,16 @@ const LEAST: usize = 2;
 /// It never decides what is done, only whether it is looked for once more: meshes do not depend on it, nor on the number of threads.
 #[derive(Default)]
 pub(super) struct Window {
-    foreseen: HashMap<u32, Foreseen<Outcome>>,
+    /// Of those whose turn has not come yet; nothing where it is not known.
+    foreseen: HashMap<u32, Option<Foreseen<Outcome>>>,
     changed: HashSet<u32>,
-    /// Tetrahedra tried ahead whose turn has not come yet.
-    left: HashSet<u32>,
 }
 
 impl Window {
     /// How many to try ahead now; none while the turn of some is still to come, or where there is one thread: what is tried ahead for nothing costs others theirs.
     pub(super) fn room(&self) -> usize {
         match spare_threads() {
-            n if n > 1 && self.left.is_empty() => EACH * n,
+            n if n > 1 && self.foreseen.is_empty() => EACH * n,
             _ => 0,
         }
     }
@@ -44,19 +43,15 @@ impl Window {
             return;
         }
         operators.resize_with(spare_threads(), Operator::ahead);
-        self.left.extend(tets);
         let foreseen = look_ahead(mesh, tets, operators, attacks);
-        let known = tets.iter().zip(foreseen);
-        (self.foreseen).extend(known.filter_map(|(&t, foreseen)| Some((t, foreseen?))));
+        (self.foreseen).extend(tets.iter().copied().zip(foreseen));
     }
 
     /// What comes of trying a tetrahedron whose turn it is, if that is known.
     pub(super) fn take(&mut self, t: u32) -> Option<Outcome> {
-        self.left.remove(&t);
-        let foreseen = self.foreseen.remove(&t)?;
-        let is_as_it_was =
-            self.changed.is_empty() || !foreseen.vertices.iter().any(|v| self.changed.contains(v));
-        is_as_it_was.then_some(foreseen.found)
+        let foreseen = self.foreseen.remove(&t)??;
+        let has_changed = foreseen.vertices.iter().any(|v| self.changed.contains(v));
+        (!has_changed).then_some(foreseen.found)
     }
 
     /// Tells that these tetrahedra are new or moved.
@@ -72,7 +67,6 @@ impl Window {
     pub(super) fn clear(&mut self) {
         self.foreseen.clear();
         self.changed.clear();
-        self.left.clear();
     }
 }
 
