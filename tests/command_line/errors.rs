@@ -111,6 +111,8 @@ const CASES: &[Case] = &[
         "mesh sample:box --threads 0 -o x.tetdb",
         "--threads 0",
     ),
+    case("usage", 2, "estimate sample:box --threads 0", "--threads 0"),
+    case("usage", 2, "verify a.tetdb --threads 0", "--threads 0"),
     case(
         "usage",
         2,
