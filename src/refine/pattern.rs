@@ -169,8 +169,12 @@ impl Tile {
 
     /// The nearest point of the repeated pattern: none is farther away than a cell is wide.
     fn nearest(&self, p: Point) -> Point {
-        let period = p.floor();
-        let local = p - period;
+        let mut period = p.floor();
+        let mut local = p - period;
+        // What is negative by less than rounding comes to 1, which is the next period's 0.
+        let beyond = local.cmpge(Point::ONE);
+        period += Point::select(beyond, Point::ONE, Point::ZERO);
+        local = Point::select(beyond, Point::ZERO, local);
         let middle = cell_of(local);
         let mut best = (f64::INFINITY, local);
         for dz in 0..3 {
@@ -246,6 +250,20 @@ mod tests {
             assert!((found.distance(p) - all_nearest(tile, p)).abs() < 1e-12);
             assert!(found.distance(p) < 1.0 / CELLS as f64);
             assert!(tile.nearest(found).distance(found) < 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_point_below_zero_by_less_than_rounding_is_at_the_end_of_a_period() {
+        let tile = Tile::get();
+        for tiny in [-1e-17, -1e-300] {
+            for p in [
+                Point::new(tiny, 0.4, 0.7),
+                Point::new(0.2, tiny, tiny),
+                Point::splat(tiny),
+            ] {
+                assert_eq!(tile.nearest(p), tile.nearest(p.max(Point::ZERO)));
+            }
         }
     }
 
