@@ -167,7 +167,17 @@ mod tests {
             broken: Some(1),
             ..Threads::default()
         };
-        assert_eq!(found(&path, Some(&surface), broken).0, Ok(one));
+        assert_eq!(found(&path, Some(&surface), broken).0, Ok(one.clone()));
+        // Threads of this process have room within a greater cap.
+        for n in [1, 2, 5] {
+            let settings = Settings::new().memory(Bytes(2 << 30)).threads(n);
+            let report = guarded(&settings, || {
+                let mut store = Catalog::open(&path)?;
+                let (surface, cap) = (Some(&surface), 2 << 30);
+                crate::api::verify::check(&mut store, &settings, surface, cap, Level::Delaunay)
+            });
+            assert_eq!(report.ok(), Some(one.clone()), "{n} threads");
+        }
         // What helpers would read is another surface: this process does it all.
         let mut moved = surface;
         moved.points[0].x += 0.5;

@@ -1,4 +1,4 @@
-//! One verification by several processes: each looks at sub-domains by itself, this one adds up what they found.
+//! One verification by several threads and processes: each looks at sub-domains by itself, one adds up what they found.
 //!
 //! What another process (`verify_server`) cannot do or fails at is done here: the report and the error are those of one process.
 
@@ -15,7 +15,7 @@ use crate::geom::Point;
 use crate::pipeline::{
     Hand, Helpers, Kind, PipelineError, Watcher, from_bytes, to_bytes, work_off,
 };
-use crate::storage::attempt;
+use crate::storage::{attempt, n_threads};
 use crate::store::{Catalog, StoreError};
 use crate::surface::Surface;
 
@@ -40,72 +40,98 @@ pub(super) fn options(cap: u64, surface: Option<&Surface>, level: Level) -> Veri
     }
 }
 
-/// Verifies, with the other processes of `settings` if there are any. Errors: as [`audit::verify`].
+/// Bytes for each thread that looks at sub-domains: with less, waiting for sorts on disk takes longer than a thread saves.
+const THREAD_BYTES: u64 = 64 << 20;
+
+/// Threads of this process that look at sub-domains side by side.
+fn threads(n_subdomains: usize, surface: Option<&Surface>, options: &VerifyOptions) -> usize {
+    let each = THREAD_BYTES + surface.map_or(0, audit::wire_bytes);
+    let room = options.memory_bytes as u64 / each;
+    n_threads().min(n_subdomains).min(room as usize).max(1)
+}
+
+/// Verifies, with several threads and with the other processes of `settings` if there are any. Errors: as [`audit::verify`].
 pub(super) fn verify(
     store: &mut Catalog,
     settings: &Settings,
     surface: Option<&Surface>,
     options: &VerifyOptions,
 ) -> Result<Report, StoreError> {
-    let Some(helpers) = settings.hands.0.clone() else {
-        return audit::verify(store, surface, options);
-    };
-    if store.subdomains()?.len() < 2 {
+    let n_subdomains = store.subdomains()?.len();
+    let n_threads = threads(n_subdomains, surface, options);
+    let helpers = settings.hands.0.clone();
+    if n_subdomains < 2 || helpers.is_none() && n_threads == 1 {
         return audit::verify(store, surface, options);
     }
     let dir = std::path::absolute(store.dir()).unwrap_or_else(|_| store.dir().to_owned());
     let sources = store.job()?.surfaces;
-    let own = Mutex::new(store.share());
+    let shares: Vec<_> = (0..n_threads).map(|_| Mutex::new(store.share())).collect();
+    let own_options = VerifyOptions {
+        memory_bytes: options.memory_bytes / n_threads,
+        ..options.clone()
+    };
     audit::verify_shared(store, surface, options, &mut |rows, apex, add| {
-        let job = Job {
+        let job = || Job {
             store: dir.to_string_lossy().into_owned(),
             level: options.level,
             apex: apex.map(|p| p.to_array()),
             surface: surface.map(|s| (sources.clone(), fingerprint(s))),
         };
-        let slots = match helpers.begin(&to_bytes(Kind::Verification, &job)) {
-            Ok(slots) => slots,
-            Err(failure) => {
+        let begun = helpers
+            .as_ref()
+            .map(|h| h.begin(&to_bytes(Kind::Verification, &job())));
+        let slots = match begun {
+            Some(Ok(slots)) => slots,
+            Some(Err(failure)) => {
                 settings.note(format!(
                     "note: verified by one process: {}",
                     failure.message
                 ));
                 0
             }
+            None => 0,
         };
-        let here = |row: &SubdomainRow| {
-            let own = own.lock().unwrap_or_else(PoisonError::into_inner);
+        let here = |thread: usize, row: &SubdomainRow| {
+            let share = &shares[thread];
+            let own = share.lock().unwrap_or_else(PoisonError::into_inner);
             let done = attempt(|| {
-                let mut part = own.open_row(row.clone(), options.memory_bytes / 4)?;
-                audit::verify_part(&mut part, apex, surface, options)
+                let mut part = own.open_row(row.clone(), own_options.memory_bytes / 4)?;
+                audit::verify_part(&mut part, apex, surface, &own_options)
             });
             done.map_err(StoreError::from).flatten()
         };
-        let each = |slot, row: &SubdomainRow| match ask(&*helpers, slot, row) {
-            Ok(part) => Ok(part),
-            Err(_) => here(row),
+        let each = |slot, row: &SubdomainRow| {
+            let asked = helpers.as_ref().map(|helpers| ask(&**helpers, slot, row));
+            match asked {
+                Some(Ok(part)) => Ok(part),
+                _ => here(slot % n_threads, row),
+            }
         };
-        share(rows, slots, &here, &each, add)
+        share(rows, [n_threads, slots], &here, &each, add)
     })
 }
 
 /// What is found of a sub-domain.
 type PartResult = Result<PartReport, StoreError>;
+/// Who looks at one, by number.
+type Look<'a> = &'a (dyn Fn(usize, &SubdomainRow) -> PartResult + Sync);
 
-/// Has each of `rows` looked at, here or by one of `slots` elsewhere; `add` takes what was found in their order.
+/// Has each of `rows` looked at, by so many here and so many elsewhere; `add` takes what was found in their order.
 fn share(
     rows: &[SubdomainRow],
-    slots: usize,
-    here: &(dyn Fn(&SubdomainRow) -> PartResult + Sync),
-    elsewhere: &(dyn Fn(usize, &SubdomainRow) -> PartResult + Sync),
+    [n_here, n_elsewhere]: [usize; 2],
+    here: Look,
+    elsewhere: Look,
     add: &mut dyn FnMut(PartReport) -> Result<(), StoreError>,
 ) -> Result<(), StoreError> {
-    let own = |at: usize, _: &Watcher| Ok((at, here(&rows[at])));
-    let others: Vec<_> = (0..slots)
-        .map(|slot| move |at: usize, _: &Watcher| Ok((at, elsewhere(slot, &rows[at]))))
+    let all = (0..n_here)
+        .map(|k| (here, k))
+        .chain((0..n_elsewhere).map(|k| (elsewhere, k)));
+    let all: Vec<_> = all
+        .map(|(look, k)| move |at: usize, _: &Watcher| Ok((at, look(k, &rows[at]))))
         .collect();
-    let mut hands: Vec<Hand<usize, (usize, PartResult)>> = vec![&own];
-    hands.extend(others.iter().map(|hand| hand as Hand<_, _>));
+    let hands: Vec<Hand<usize, (usize, PartResult)>> =
+        all.iter().map(|hand| hand as Hand<_, _>).collect();
     let mut waiting = BTreeMap::new();
     let mut next = 0;
     let mut commit = |(at, found): (usize, PartResult)| {

@@ -10,7 +10,7 @@ use super::{memory, threads};
 use crate::api::preflight::scratch_beside;
 use crate::api::store::open_finished;
 use crate::api::verify::{check, invalid, sentence};
-use crate::api::{Settings, Surface};
+use crate::api::{Settings, Surface, guarded};
 use crate::audit::Level;
 use crate::surface;
 
@@ -52,7 +52,10 @@ pub fn run(args: &VerifyArgs, console: &Console) -> Result<u8, Failure> {
     } else {
         Level::Geometry
     };
-    let report = check(&mut open, &settings, surface.as_ref(), cap, level)?;
+    // A run of its own, with the threads that were asked for.
+    let report = guarded(&settings, || {
+        check(&mut open, &settings, surface.as_ref(), cap, level)
+    })?;
     if console.is_json() {
         let mut answer = serde_json::to_value(&report).unwrap_or_default();
         answer["schema"] = json!(1);
