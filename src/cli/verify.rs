@@ -14,7 +14,13 @@ use crate::api::{Settings, Surface, guarded};
 use crate::audit::Level;
 use crate::surface;
 
+/// A run of its own, with the threads that are asked for.
 pub fn run(args: &VerifyArgs, console: &Console) -> Result<u8, Failure> {
+    let settings = settings(args, console)?;
+    guarded(&settings, || Ok(verify(args, &settings, console)))?
+}
+
+fn verify(args: &VerifyArgs, settings: &Settings, console: &Console) -> Result<u8, Failure> {
     let embeds = args.sheets.files().next().is_some() || args.sheets.allow_open;
     if embeds && args.against.is_empty() {
         let message =
@@ -22,7 +28,6 @@ pub fn run(args: &VerifyArgs, console: &Console) -> Result<u8, Failure> {
         return Err(Failure::new("usage", message)
             .help("name all files with --against and --embed…, or none: the store knows them"));
     }
-    let settings = settings(args, console)?;
     let cap = settings.cap()?;
     let mut open = open_finished(&args.store)?;
     // The store may be one that can only be read.
@@ -52,10 +57,7 @@ pub fn run(args: &VerifyArgs, console: &Console) -> Result<u8, Failure> {
     } else {
         Level::Geometry
     };
-    // A run of its own, with the threads that were asked for.
-    let report = guarded(&settings, || {
-        check(&mut open, &settings, surface.as_ref(), cap, level)
-    })?;
+    let report = check(&mut open, settings, surface.as_ref(), cap, level)?;
     if console.is_json() {
         let mut answer = serde_json::to_value(&report).unwrap_or_default();
         answer["schema"] = json!(1);

@@ -169,12 +169,9 @@ impl Tile {
 
     /// The nearest point of the repeated pattern: none is farther away than a cell is wide.
     fn nearest(&self, p: Point) -> Point {
-        let mut period = p.floor();
-        let mut local = p - period;
-        // What is negative by less than rounding comes to 1, which is the next period's 0.
-        let beyond = local.cmpge(Point::ONE);
-        period += Point::select(beyond, Point::ONE, Point::ZERO);
-        local = Point::select(beyond, Point::ZERO, local);
+        let period = p.floor();
+        // What is negative by less than rounding would come to 1, where the next period begins.
+        let local = (p - period).min(Point::splat(1.0 - f64::EPSILON / 2.0));
         let middle = cell_of(local);
         let mut best = (f64::INFINITY, local);
         for dz in 0..3 {
