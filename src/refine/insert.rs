@@ -97,7 +97,7 @@ impl Worker {
     }
 
     /// Whether the gathered cavity holds a tetrahedron frozen beside an interface: its face there is an outer one.
-    fn wants_frozen<P: Pages>(&mut self, mesh: &mut Mesh<P>) -> bool {
+    pub(super) fn wants_frozen<P: Pages>(&mut self, mesh: &mut Mesh<P>) -> bool {
         (self.kernel.faces().iter())
             .filter(|f| f.required)
             .any(|f| mesh.tet_attribute(f.inside.tet()).1 & FROZEN != 0)

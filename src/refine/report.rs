@@ -9,6 +9,8 @@ pub struct RefineReport {
     pub candidates: u64,
     /// Points inserted.
     pub inserted: u64,
+    /// Of those, inside of pieces of the pattern set in whole.
+    pub set_in: u64,
     /// Too near to a vertex or a required face.
     pub near: u64,
     /// No cavity that keeps the required faces, or a walk that left the mesh.

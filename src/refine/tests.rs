@@ -2,18 +2,19 @@ use super::*;
 use crate::delaunay::enclose;
 use crate::geom::orient;
 use crate::geom::{Aabb, Point};
-use crate::mesh::VertexTag;
+use crate::mesh::{FaceRef, Facet, VertexTag};
 use crate::storage::{Backing, Pager, kind};
 
 /// A cube of fixed corners, divided until edges have length `h`.
 fn cube(h: f64, pager: Pager) -> (Mesh<Pager>, RefineReport) {
-    graded(pager, Lengths::Field, &|_| h)
+    graded(pager, Lengths::Field, &|_| h, |_| ())
 }
 
 fn graded(
     pager: Pager,
     lengths: Lengths,
     h: &(dyn Fn(Point) -> f64 + Sync),
+    prepare: impl FnOnce(&mut Mesh<Pager>),
 ) -> (Mesh<Pager>, RefineReport) {
     let mut mesh = Mesh::new(pager);
     let bounds = Aabb::around([Point::ZERO, Point::ONE]);
@@ -23,6 +24,7 @@ fn graded(
         mesh.set_size(v, h(p) as f32);
         assert_eq!(mesh.vertex_attribute(v).0, VertexTag::EnclosingBox);
     }
+    prepare(&mut mesh);
     let field = Field {
         lengths,
         h,
@@ -41,7 +43,7 @@ fn graded(
 #[test]
 fn edges_end_near_the_wanted_length() {
     let (mut mesh, report) = cube(0.5, Pager::new(1 << 28, None));
-    assert!(report.inserted > 1000, "{report:?}");
+    assert!(report.inserted > 400, "{report:?}");
     let (mut n, mut sum, mut long) = (0u32, 0.0, 0u32);
     let mut from = 0;
     while let Some((t, tet)) = mesh.next_tet(from) {
@@ -55,7 +57,7 @@ fn edges_end_near_the_wanted_length() {
                 continue;
             }
             let l = p[i].distance(p[j]) / 0.5;
-            assert!(l > 0.7, "an edge of length {l}");
+            assert!(l > 0.6, "an edge of length {l}");
             n += 1;
             sum += l;
             long += u32::from(l > 1.5);
@@ -70,13 +72,72 @@ fn edges_end_near_the_wanted_length() {
     assert!(mesh.pages().n_pages::<{ kind::TETS }>() > 1);
 }
 
+/// Makes the faces of the enclosing box facets, as those of every domain are.
+pub(super) fn wall_in(mesh: &mut Mesh<Pager>) {
+    let mut from = 0;
+    while let Some((t, tet)) = mesh.next_tet(from) {
+        from = t + 1;
+        for i in 0..4 {
+            if !tet.neighbor[i].exists() {
+                mesh.set_required(FaceRef::new(t, i), true);
+                mesh.add_facet(Facet {
+                    vertices: tet.face(i),
+                    label: 0,
+                    input: 0,
+                    regions: [0, 1],
+                });
+            }
+        }
+    }
+}
+
+/// Every tetrahedron is positive, neighbors know each other, and together they fill the box.
+fn check_sound(mesh: &mut Mesh<Pager>, volume: f64) {
+    let (mut sum, mut from) = (0.0, 0);
+    while let Some((t, tet)) = mesh.next_tet(from) {
+        from = t + 1;
+        let [a, b, c, d] = mesh.points(&tet);
+        assert!(orient(a, b, c, d) > 0.0);
+        sum += (b - a).cross(c - a).dot(d - a) / 6.0;
+        for i in 0..4 {
+            let across = tet.neighbor[i];
+            if across.exists() {
+                let other = mesh.tet(across.tet());
+                assert_eq!(other.neighbor[across.face()], FaceRef::new(t, i));
+                let [mut here, mut there] = [tet.face(i), other.face(across.face())];
+                here.sort_unstable();
+                there.sort_unstable();
+                assert_eq!(here, there);
+            }
+        }
+    }
+    assert!((sum - volume).abs() < 1e-9 * volume, "{sum} of {volume}");
+}
+
+#[test]
+fn pieces_of_the_pattern_are_set_in_whole() {
+    let set_in = |h: &(dyn Fn(Point) -> f64 + Sync)| {
+        let pager = Pager::new(1 << 28, None);
+        let (mut mesh, report) = graded(pager, Lengths::Field, h, wall_in);
+        check_sound(&mut mesh, 216.0);
+        assert_eq!(u64::from(mesh.n_vertices()), 8 + report.inserted);
+        assert!(report.inserted > 400, "{report:?}");
+        (report.set_in, report.inserted)
+    };
+    let (inside, all) = set_in(&|_| 0.2);
+    assert!(4 * inside > all, "{inside} of {all}");
+    // Where sizes vary a piece of one size does not fit.
+    let (inside, _) = set_in(&|p| 0.2 + 0.3 * (p - Point::splat(0.5)).length());
+    assert_eq!(inside, 0);
+}
+
 #[test]
 fn between_vertices_only_the_field_knows() {
     // Fine in the middle, where no vertex of the coarse mesh is.
     let middle = |p: Point| 0.3 + 0.5 * (p - Point::splat(0.5)).length();
     let inserted = |lengths| {
         let pager = Pager::new(1 << 28, None);
-        graded(pager, lengths, &middle).1.inserted
+        graded(pager, lengths, &middle, |_| ()).1.inserted
     };
     let (field, ends) = (inserted(Lengths::Field), inserted(Lengths::Ends));
     assert!(ends > 0 && 3 * ends < field, "{ends} of {field}");

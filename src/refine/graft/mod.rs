@@ -1,0 +1,149 @@
+//! Pieces of the pattern set in whole, before edges are divided.
+//!
+//! Where a grain has room, the tetrahedra of its places are known beforehand: those of the pattern. Of such a piece only the places at its
+//! outer faces are inserted one by one. Then its outer faces are faces of the mesh, for a Delaunay tetrahedron stays one when points
+//! outside its sphere are left out; what the mesh has between them is replaced by the piece. That is checked, face by face; a piece that does not
+//! fit is left to the division of edges, and so is all that lies between pieces and around them.
+
+mod claims;
+mod piece;
+mod set_in;
+mod tets;
+
+use super::field::Field;
+use super::report::RefineReport;
+use super::worker::Worker;
+use crate::mesh::{Mesh, Workspace};
+use crate::storage::{Pages, StorageError};
+
+use claims::Claim;
+use piece::Piece;
+use set_in::Setter;
+
+/// A grain with more in its way is left alone: what concerns it would not fit small leases.
+const CLAIMS_MAX: usize = 1 << 17;
+
+/// Sets in all pieces there is room for, and inserts what other places there are in their grains.
+///
+/// Sizes must be set at all vertices. Effects: ids of tetrahedra are used again. Errors: the disk, while sorting.
+pub(super) fn set_in<P: Pages>(
+    worker: &mut Worker,
+    mesh: &mut Mesh<P>,
+    field: &Field,
+    space: &Workspace,
+    report: &mut RefineReport,
+    progress: &mut dyn FnMut(u64),
+) -> Result<(), StorageError> {
+    let Some(mut sorted) = claims::gather(mesh, field, space)? else {
+        return Ok(());
+    };
+    let mut setter = Setter::default();
+    let mut claims: Vec<Claim> = Vec::new();
+    let mut next = sorted.next().transpose()?;
+    while let Some(first) = next.take() {
+        claims.clear();
+        claims.push(first);
+        let mut n = 1;
+        for claim in sorted.by_ref() {
+            let claim = claim?;
+            if claim.grain != first.grain {
+                next = Some(claim);
+                break;
+            }
+            n += 1;
+            if n <= CLAIMS_MAX {
+                claims.push(claim);
+            }
+        }
+        if n > CLAIMS_MAX {
+            continue;
+        }
+        if let Some(mut piece) = Piece::of(&claims, field) {
+            setter.set_in(worker, mesh, &mut piece, &claims, report);
+            setter.insert_rest(worker, mesh, field, &piece, &claims, report);
+            progress(report.inserted);
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use tetdb_schema::page::NONE;
+
+    use super::*;
+    use crate::delaunay::{Kernel, enclose};
+    use crate::geom::{Aabb, HilbertFrame, Point};
+    use crate::refine::activity::Activity;
+    use crate::refine::candidate::Candidates;
+    use crate::refine::edge_cache::EdgeCache;
+    use crate::refine::recent::Recent;
+    use crate::refine::tests::wall_in;
+    use crate::refine::{Everywhere, Lengths};
+    use crate::storage::Pager;
+
+    /// Vertices inside of pieces set into a cube with one vertex in its middle, which is known to be in the way or not.
+    fn set_in_around_a_vertex(known: bool) -> u64 {
+        let mut mesh = Mesh::new(Pager::new(1 << 28, None));
+        let bounds = Aabb::around([Point::ZERO, Point::ONE]);
+        let start = enclose(&mut mesh, &bounds);
+        wall_in(&mut mesh);
+        let field = Field {
+            lengths: Lengths::Field,
+            h: &|_| 0.3,
+            place: &Everywhere,
+            bounds,
+        };
+        let mut worker = Worker {
+            kernel: Kernel::default(),
+            order: HilbertFrame::new(&bounds),
+            edges: Vec::new(),
+            candidates: Candidates::default(),
+            recent: Recent::new(),
+            active: Activity::all(&mesh),
+            settled: EdgeCache::new(8),
+            last: start,
+            placing: true,
+            examined_too: false,
+        };
+        let middle = Point::splat(0.5);
+        let v = mesh.add_vertex(middle, 0.3);
+        let inserted = worker.kernel.insert(&mut mesh, v, middle, start);
+        worker.last = inserted.expect("it is inside");
+        for v in mesh.vertex_ids() {
+            mesh.set_size(v, 0.3);
+        }
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let space = Workspace {
+            dir: &dir.path().into(),
+            memory: 1 << 20,
+        };
+        let gathered = claims::gather(&mut mesh, &field, &space).expect("room for runs");
+        let claims = gathered.expect("there is room in the cube");
+        let mut claims: Vec<Claim> = claims.map(|claim| claim.expect("in memory")).collect();
+        if !known {
+            claims.retain(|claim| claim.tet != NONE || claim.point() != middle);
+        }
+        let (mut setter, mut report) = (Setter::default(), RefineReport::default());
+        for claims in claims.chunk_by(|a, b| a.grain == b.grain) {
+            if let Some(mut piece) = Piece::of(claims, &field) {
+                setter.set_in(&mut worker, &mut mesh, &mut piece, claims, &mut report);
+            }
+        }
+        let mut from = 0;
+        let mut found = false;
+        while let Some((t, tet)) = mesh.next_tet(from) {
+            from = t + 1;
+            found |= tet.local(v).is_some();
+        }
+        assert!(found, "the vertex is still in the mesh");
+        report.set_in
+    }
+
+    #[test]
+    fn a_piece_with_something_inside_is_left_alone() {
+        let (known, unknown) = (set_in_around_a_vertex(true), set_in_around_a_vertex(false));
+        assert!(known > 100, "{known}");
+        assert!(unknown < known, "{unknown} of {known}");
+    }
+}

@@ -1,0 +1,469 @@
+//! The piece of the pattern that has room in one grain.
+
+use tetdb_schema::page::NONE;
+
+use super::super::field::Field;
+use super::super::grain::{Around, Grain, PERIOD, Site, octave, width};
+use super::super::pattern;
+use super::super::tile::{CELLS, Tile};
+use super::claims::{Claim, octave_and_corner};
+use super::tets::{Beside, PatternTet, PatternTets, wrapped};
+use crate::geom::Point;
+
+/// Nothing that was there before is nearer to a piece than this, in units of h.
+const CLEAR: f64 = 0.82;
+/// Places keep this distance, in units of h, from the limits of their grain, so that those of two grains are far enough apart.
+const MARGIN: f64 = 0.36;
+/// Greatest difference of a grain's size from the wanted one within a piece.
+const MISMATCH: f64 = 0.15;
+/// Cells from a grain's middle that are looked at.
+const RADIUS_MAX: f64 = 51.0;
+/// Cells between those of a piece and the limits of what is looked at: no tetrahedron of the pattern, nor one beside it, reaches farther.
+const BESIDE: i32 = 5;
+/// A piece with fewer vertices inside is not worth it.
+const INNER_MIN: usize = 256;
+/// Nor has one with fewer places so many inside.
+const PLACES_MIN: usize = 8 * INNER_MIN;
+
+/// In place of a part's number: it has none yet.
+const CHOSEN: u32 = NONE - 1;
+/// Why the corners of a tetrahedron of a piece are known.
+pub(super) const OPEN: &str = "all corners of a piece are in open cells";
+
+/// What a cell of the pattern is.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Cell {
+    Unknown,
+    /// Something is near.
+    Blocked,
+    /// Beyond the limits of the grain or of where points may go.
+    Beyond,
+    /// Blocked, beside an open one.
+    Rim,
+    Open,
+}
+
+/// What becomes of a place.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Use {
+    /// It stays empty.
+    None,
+    /// All its tetrahedra are those of the pattern.
+    Inner,
+    /// Some of its tetrahedra are.
+    Outer,
+}
+
+/// A place of the pattern.
+#[derive(Clone, Copy)]
+pub(super) struct Place {
+    pub point: Point,
+    pub h: f32,
+    pub used: Use,
+    /// Whether a vertex may be there.
+    pub fits: bool,
+    /// Whether it may be one of the piece.
+    pub allowed: bool,
+    /// Number of its cell here, and its number in the pattern.
+    cell: u32,
+    number: u32,
+    /// The number of its first tetrahedron.
+    first: u32,
+}
+
+/// A face of a piece.
+#[derive(Clone, Copy)]
+pub(super) struct OuterFace {
+    /// The tetrahedron of the piece, and which face of it.
+    pub tet: u32,
+    pub face: usize,
+}
+
+/// The places and tetrahedra that a grain has room for.
+pub(super) struct Piece {
+    tile: &'static Tile,
+    around: Around,
+    octave: u32,
+    width: f64,
+    corner: Point,
+    grain: Grain,
+    /// The pattern's cell that is the first here.
+    origin: [i32; 3],
+    /// Cells along an axis.
+    side: i32,
+    cells: Vec<Cell>,
+    /// Of each open cell its first place.
+    first: Vec<u32>,
+    pub places: Vec<Place>,
+    /// Of each tetrahedron of a place that may be used: which connected part it belongs to; [`NONE`] when not used.
+    parts: Vec<u32>,
+    /// The place it belongs to.
+    owners: Vec<u32>,
+}
+
+impl Piece {
+    /// The piece for which these claims leave room; all are of one grain. None where there is none.
+    pub fn of(claims: &[Claim], field: &Field) -> Option<Self> {
+        if claims[0].tet == NONE {
+            // Those with room come first.
+            return None;
+        }
+        let (octave, corner) = octave_and_corner(claims[0].grain);
+        let width = width(octave);
+        let mut site = Site::new(corner, octave);
+        let grain = *site.grain(field, width);
+        let cell = PERIOD / CELLS as f64 * grain.h;
+        if !(width / cell <= RADIUS_MAX) {
+            // The size in its middle is far from the others.
+            return None;
+        }
+        let radius = (width / cell).ceil() as i32 + BESIDE;
+        let side = 2 * radius + 1;
+        let middle = cell_at(grain.local(field.bounds.low + site.at * width));
+        let n_cells = (side * side * side) as usize;
+        let mut piece = Self {
+            tile: Tile::get(),
+            around: Around::new(),
+            octave,
+            width,
+            corner,
+            grain,
+            origin: middle.map(|c| c - radius),
+            side,
+            cells: vec![Cell::Unknown; n_cells],
+            first: Vec::new(),
+            places: Vec::new(),
+            parts: Vec::new(),
+            owners: Vec::new(),
+        };
+        piece.block(claims);
+        if piece.flood(claims, field) < INNER_MIN {
+            return None;
+        }
+        if piece.list_places(field) < PLACES_MIN {
+            return None;
+        }
+        piece.number_tets();
+        piece.choose();
+        piece
+            .parts
+            .iter()
+            .any(|&part| part != NONE)
+            .then_some(piece)
+    }
+
+    /// The cell here with the pattern's cell `c`, if it is well inside.
+    fn index(&self, c: [i32; 3], beside: i32) -> Option<usize> {
+        let at: [i32; 3] = std::array::from_fn(|k| c[k] - self.origin[k]);
+        let inside = at
+            .iter()
+            .all(|&x| (beside..self.side - beside).contains(&x));
+        inside.then(|| ((at[2] * self.side + at[1]) * self.side + at[0]) as usize)
+    }
+
+    /// The pattern's cell that is `cell` here.
+    fn coordinates(&self, cell: u32) -> [i32; 3] {
+        let (cell, side) = (cell as i32, self.side);
+        let at = [cell % side, cell / side % side, cell / (side * side)];
+        std::array::from_fn(|k| at[k] + self.origin[k])
+    }
+
+    /// Blocks the cells that are near to something.
+    fn block(&mut self, claims: &[Claim]) {
+        let reach = CLEAR * CELLS as f64 / PERIOD;
+        let steps = reach.ceil() as i32;
+        for claim in claims.iter().filter(|claim| claim.tet == NONE) {
+            let at = self.grain.local(claim.point()) * CELLS as f64;
+            let home = at.floor();
+            let [x, y, z] = home.to_array().map(|c| c as i32);
+            for dz in -steps..=steps {
+                for dy in -steps..=steps {
+                    for dx in -steps..=steps {
+                        let low = home + Point::new(dx.into(), dy.into(), dz.into());
+                        let nearest = at.clamp(low, low + Point::ONE);
+                        if (nearest - at).length_squared() < reach * reach
+                            && let Some(cell) = self.index([x + dx, y + dy, z + dz], 0)
+                        {
+                            self.cells[cell] = Cell::Blocked;
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Opens the cells that can be reached from where there is room.
+    fn flood(&mut self, claims: &[Claim], field: &Field) -> usize {
+        let mut stack: Vec<[i32; 3]> = Vec::new();
+        let mut n_open = 0;
+        for claim in claims.iter().filter(|claim| claim.tet != NONE) {
+            stack.push(cell_at(self.grain.local(claim.point())));
+            while let Some(c) = stack.pop() {
+                let Some(cell) = self.index(c, BESIDE) else {
+                    continue;
+                };
+                if self.cells[cell] != Cell::Unknown {
+                    continue;
+                }
+                let middle = Point::from_array(c.map(|c| (f64::from(c) + 0.5) / CELLS as f64));
+                let middle = self.grain.position(middle);
+                let h = (field.h)(middle);
+                let inside = (self.grain.h - h).abs() <= pattern::MISMATCH * h
+                    && self.depth(field, middle) > 0.0
+                    && field.place.admits(middle, h);
+                if !inside {
+                    self.cells[cell] = Cell::Beyond;
+                    continue;
+                }
+                self.cells[cell] = Cell::Open;
+                n_open += 1;
+                self.mark_rim(cell);
+                for k in 0..3 {
+                    for step in [-1, 1] {
+                        let mut next = c;
+                        next[k] += step;
+                        stack.push(next);
+                    }
+                }
+            }
+        }
+        n_open
+    }
+
+    /// Tells the blocked cells around an open one.
+    fn mark_rim(&mut self, cell: usize) {
+        for dz in -1..=1 {
+            for dy in -1..=1 {
+                for dx in -1..=1 {
+                    let near = cell as i32 + (dz * self.side + dy) * self.side + dx;
+                    let near = &mut self.cells[near as usize];
+                    if *near == Cell::Blocked {
+                        *near = Cell::Rim;
+                    }
+                }
+            }
+        }
+    }
+
+    /// How far a point is from the limits of the grain; negative outside.
+    fn depth(&mut self, field: &Field, p: Point) -> f64 {
+        let at = (p - field.bounds.low) / self.width;
+        let sites = self.around.sites(at, self.octave);
+        let Some(own) = sites.iter().find(|site| site.corner == self.corner) else {
+            return f64::NEG_INFINITY;
+        };
+        let (own, squared) = (own.at, (own.at - at).length_squared());
+        let depths = sites.iter().filter(|site| site.at != own).map(|site| {
+            ((site.at - at).length_squared() - squared) / (2.0 * (site.at - own).length())
+        });
+        depths.fold(f64::INFINITY, f64::min) * self.width
+    }
+
+    /// Lists the places of open cells and beside them; returns how many may be part of a piece.
+    fn list_places(&mut self, field: &Field) -> usize {
+        let mut n_allowed = 0;
+        self.first = vec![NONE; self.cells.len()];
+        for cell in 0..self.cells.len() {
+            let open = self.cells[cell] == Cell::Open;
+            if !open && self.cells[cell] != Cell::Rim {
+                continue;
+            }
+            self.first[cell] = self.places.len() as u32;
+            let c = self.coordinates(cell as u32);
+            let period = c.map(|c| f64::from(c.div_euclid(CELLS as i32)));
+            let at = c.map(|c| c.rem_euclid(CELLS as i32) as usize);
+            for &q in self.tile.points_of(at) {
+                let point = self.grain.position(Point::from_array(period) + q);
+                let depth = self.depth(field, point);
+                let h = (field.h)(point);
+                let mismatch = (self.grain.h - h).abs() / h;
+                let fits = depth > 0.0
+                    && octave(h) == self.octave
+                    && mismatch <= pattern::MISMATCH
+                    && field.place.admits(point, h)
+                    && !field.place.forbids(point, h);
+                let allowed =
+                    fits && open && mismatch <= MISMATCH && depth >= MARGIN * self.grain.h;
+                self.places.push(Place {
+                    point,
+                    h: h as f32,
+                    used: Use::None,
+                    fits,
+                    allowed,
+                    cell: cell as u32,
+                    number: 0,
+                    first: 0,
+                });
+                n_allowed += usize::from(allowed);
+            }
+        }
+        n_allowed
+    }
+
+    /// Numbers the tetrahedra of all places.
+    fn number_tets(&mut self) {
+        let tets = PatternTets::get();
+        let mut at = 0;
+        while at < self.places.len() {
+            let cell = self.places[at].cell;
+            let (number, n) = tets.points_of(wrapped(self.coordinates(cell)));
+            for number in number..number + n {
+                let place = &mut self.places[at];
+                (place.number, place.first) = (number, self.owners.len() as u32);
+                self.owners
+                    .extend(tets.owned(number).iter().map(|_| at as u32));
+                at += 1;
+            }
+        }
+    }
+
+    /// The place that is `beside` a place, if its cell is open.
+    fn beside(&self, place: &Place, beside: Beside) -> Option<u32> {
+        let [x, y, z] = beside.cell.map(i32::from);
+        let cell = place.cell as i32 + (z * self.side + y) * self.side + x;
+        let first = self.first[cell as usize];
+        (first != NONE).then_some(first + u32::from(beside.rank))
+    }
+
+    /// Tetrahedron `t` of the piece as the pattern has it, and the place it belongs to.
+    fn tet(&self, t: u32) -> (&'static PatternTet, &Place) {
+        let place = &self.places[self.owners[t as usize] as usize];
+        let number = (t - place.first) as usize;
+        (&PatternTets::get().owned(place.number)[number], place)
+    }
+
+    /// The places at the corners of tetrahedron `t`, if all are in open cells.
+    pub fn corners(&self, t: u32) -> Option<[u32; 4]> {
+        let (tet, place) = self.tet(t);
+        let [a, b, c, d] = tet.corners.map(|corner| self.beside(place, corner));
+        Some([a?, b?, c?, d?])
+    }
+
+    /// The tetrahedron beyond face `i` of `t`, and its face, if it is one of the piece.
+    pub fn across(&self, t: u32, i: usize) -> Option<OuterFace> {
+        let (tet, place) = self.tet(t);
+        let (owner, k, face) = tet.across[i];
+        let owner = self.beside(place, owner)?;
+        let tet = self.places[owner as usize].first + u32::from(k);
+        (self.parts[tet as usize] != NONE).then_some(OuterFace {
+            tet,
+            face: usize::from(face),
+        })
+    }
+
+    /// Chooses tetrahedra and what becomes of each place, from the places that are allowed.
+    pub fn choose(&mut self) {
+        let n_tets = self.owners.len() as u32;
+        self.parts.clear();
+        self.parts.resize(n_tets as usize, NONE);
+        let mut stars = vec![0u8; self.places.len()];
+        for t in 0..n_tets {
+            if !self.places[self.owners[t as usize] as usize].allowed {
+                continue;
+            }
+            if let Some(corners) = self.corners(t)
+                && corners.iter().all(|&p| self.places[p as usize].allowed)
+            {
+                corners.iter().for_each(|&p| stars[p as usize] += 1);
+                self.parts[t as usize] = CHOSEN;
+            }
+        }
+        let tets = PatternTets::get();
+        for (place, star) in self.places.iter_mut().zip(stars) {
+            let whole = place.allowed && star == tets.star(place.number);
+            place.used = if whole { Use::Inner } else { Use::None };
+        }
+        // Those around inner places are all of the piece; the others save nothing.
+        for t in 0..n_tets {
+            if self.parts[t as usize] == CHOSEN && !self.has(t, Use::Inner) {
+                self.parts[t as usize] = NONE;
+            }
+        }
+        self.split();
+        for t in 0..n_tets {
+            if self.parts[t as usize] != NONE {
+                for p in self.corners(t).expect(OPEN) {
+                    let used = &mut self.places[p as usize].used;
+                    if *used == Use::None {
+                        *used = Use::Outer;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Whether tetrahedron `t`, all of whose corners are in open cells, has one of this use.
+    fn has(&self, t: u32, used: Use) -> bool {
+        let corners = self.corners(t).expect(OPEN);
+        corners
+            .iter()
+            .any(|&p| self.places[p as usize].used == used)
+    }
+
+    /// Numbers connected parts, and gives up the small ones.
+    fn split(&mut self) {
+        let mut n_parts = 0;
+        let mut part = Vec::new();
+        for seed in 0..self.parts.len() as u32 {
+            if self.parts[seed as usize] != CHOSEN {
+                continue;
+            }
+            part.clear();
+            part.push(seed);
+            self.parts[seed as usize] = n_parts;
+            let mut next = 0;
+            while next < part.len() {
+                let t = part[next];
+                next += 1;
+                for i in 0..4 {
+                    if let Some(face) = self.across(t, i)
+                        && self.parts[face.tet as usize] == CHOSEN
+                    {
+                        self.parts[face.tet as usize] = n_parts;
+                        part.push(face.tet);
+                    }
+                }
+            }
+            // A place owns six tetrahedra in the mean.
+            let owner = |t: u32| &self.places[self.owners[t as usize] as usize];
+            let inner = part.iter().filter(|&&t| owner(t).used == Use::Inner);
+            if inner.count() >= 6 * INNER_MIN {
+                n_parts += 1;
+                continue;
+            }
+            for &t in &part {
+                self.parts[t as usize] = NONE;
+                for p in self.corners(t).expect(OPEN) {
+                    self.places[p as usize].used = Use::None;
+                }
+            }
+        }
+    }
+
+    /// The tetrahedra of each part.
+    pub fn tets_by_part(&self) -> Vec<Vec<u32>> {
+        let n_parts = self.parts.iter().filter(|&&part| part != NONE).max();
+        let mut tets = vec![Vec::new(); n_parts.map_or(0, |&last| last as usize + 1)];
+        for (t, &part) in (0..).zip(&self.parts) {
+            if part != NONE {
+                tets[part as usize].push(t);
+            }
+        }
+        tets
+    }
+
+    /// How many tetrahedra are numbered, those that are not used among them.
+    pub fn n_tets(&self) -> usize {
+        self.parts.len()
+    }
+
+    /// Edge length wanted in the grain.
+    pub fn h(&self) -> f64 {
+        self.grain.h
+    }
+}
+
+/// The pattern's cell at a position in units of its side.
+fn cell_at(local: Point) -> [i32; 3] {
+    (local * CELLS as f64).floor().to_array().map(|c| c as i32)
+}

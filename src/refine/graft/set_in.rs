@@ -1,0 +1,387 @@
+//! A piece set into the mesh: its outer places are inserted one after another, then what fills the space between them is replaced.
+
+use std::collections::HashMap;
+
+use tetdb_schema::page::NONE;
+
+use super::super::candidate::Candidate;
+use super::super::field::Field;
+use super::super::report::RefineReport;
+use super::super::worker::Worker;
+use super::claims::Claim;
+use super::piece::{OPEN, OuterFace, Piece, Place, Use};
+use crate::delaunay::{Located, insertion_key};
+use crate::geom::Point;
+use crate::mesh::anatomy::mark::{EXAMINED, IN_CAVITY};
+use crate::mesh::anatomy::{FACES, MARK};
+use crate::mesh::{FaceRef, Mesh, Tet, dense};
+use crate::storage::{Pages, check_cancelled};
+
+/// No vertex is nearer to an outer place than this, in units of h.
+const NEAR: f64 = 0.6;
+/// A piece that loses places is chosen anew so often.
+const TRIES: usize = 8;
+/// A walk begins where the last one ended when that is nearer than this, in units of h.
+const NEAR_START: f64 = 4.0;
+
+/// Sets one piece into a mesh after the other.
+#[derive(Default)]
+pub(super) struct Setter {
+    /// Of each place its vertex.
+    vertices: Vec<u32>,
+    /// Dense number of the first vertex inserted, and the place of each since.
+    first: u32,
+    placed: Vec<u32>,
+    /// Outer faces of a part by their places in ascending order, and what was found beyond each.
+    faces: HashMap<[u32; 3], (OuterFace, FaceRef)>,
+    visited: Vec<u32>,
+    /// Of each tetrahedron of the piece its id in the mesh.
+    ids: Vec<u32>,
+}
+
+impl Setter {
+    /// Inserts the outer places and puts in every part whose outer faces have come to be.
+    pub fn set_in<P: Pages>(
+        &mut self,
+        worker: &mut Worker,
+        mesh: &mut Mesh<P>,
+        piece: &mut Piece,
+        claims: &[Claim],
+        report: &mut RefineReport,
+    ) {
+        self.vertices.clear();
+        self.vertices.resize(piece.places.len(), NONE);
+        self.first = dense(mesh.vertex_ids_end());
+        self.placed.clear();
+        let mut whole = false;
+        for _ in 0..TRIES {
+            whole = self.insert_outer(worker, mesh, piece, claims);
+            if whole {
+                break;
+            }
+            piece.choose();
+        }
+        report.inserted += self.placed.len() as u64;
+        if !whole {
+            return;
+        }
+        for tets in piece.tets_by_part() {
+            check_cancelled();
+            self.list_faces(piece, &tets);
+            if self.flood(worker, mesh, piece, claims, &tets) {
+                let added = self.fill(worker, mesh, piece, &tets);
+                report.inserted += added;
+                report.set_in += added;
+            }
+        }
+    }
+
+    /// Inserts the other places where vertices may be, as points that divide edges are.
+    pub fn insert_rest<P: Pages>(
+        &mut self,
+        worker: &mut Worker,
+        mesh: &mut Mesh<P>,
+        field: &Field,
+        piece: &Piece,
+        claims: &[Claim],
+        report: &mut RefineReport,
+    ) {
+        let rest =
+            (0..piece.places.len()).filter(|&k| piece.places[k].fits && self.vertices[k] == NONE);
+        let key = |k: usize| worker.order.index(piece.places[k].point);
+        let mut order: Vec<(u64, usize)> = rest.map(|k| (key(k), k)).collect();
+        order.sort_unstable();
+        worker.recent.clear();
+        let mut before = Point::INFINITY;
+        for (_, k) in order {
+            let Place { point, h, .. } = piece.places[k];
+            let mut tet = worker.last;
+            if (point - before).length() > NEAR_START * f64::from(h) {
+                tet = nearest_room(point, claims).unwrap_or(tet);
+            }
+            before = point;
+            let candidate = Candidate { point, h, tet };
+            report.candidates += 1;
+            worker.try_insert(mesh, field, &candidate, report);
+        }
+    }
+
+    /// Inserts the outer places that are not in the mesh yet; whether all could be.
+    fn insert_outer<P: Pages>(
+        &mut self,
+        worker: &mut Worker,
+        mesh: &mut Mesh<P>,
+        piece: &mut Piece,
+        claims: &[Claim],
+    ) -> bool {
+        let wanted = (0..piece.places.len() as u32).filter(|&k| {
+            piece.places[k as usize].used == Use::Outer && self.vertices[k as usize] == NONE
+        });
+        let key = |k: u32| insertion_key(&worker.order, piece.places[k as usize].point);
+        let mut order: Vec<(u64, u32)> = wanted.map(|k| (key(k), k)).collect();
+        order.sort_unstable();
+        let mut whole = true;
+        let near = (NEAR * piece.h()).powi(2);
+        for (_, k) in order {
+            let place = piece.places[k as usize];
+            let Some(v) = insert(worker, mesh, place.point, place.h, near, claims) else {
+                piece.places[k as usize].allowed = false;
+                whole = false;
+                continue;
+            };
+            assert_eq!(
+                dense(v),
+                self.first + self.placed.len() as u32,
+                "no vertex was freed"
+            );
+            self.vertices[k as usize] = v;
+            self.placed.push(k);
+        }
+        whole
+    }
+
+    /// Lists the outer faces of a part.
+    fn list_faces(&mut self, piece: &Piece, tets: &[u32]) {
+        self.faces.clear();
+        for &t in tets {
+            for i in 0..4 {
+                if piece.across(t, i).is_none() {
+                    let corners = piece.corners(t).expect(OPEN);
+                    let mut key = FACES[i].map(|k| corners[k]);
+                    key.sort_unstable();
+                    let face = OuterFace { tet: t, face: i };
+                    self.faces.insert(key, (face, FaceRef::NONE));
+                }
+            }
+        }
+    }
+
+    /// Visits the tetrahedra of the mesh within a part; whether all its outer faces are there, and nothing else is between them.
+    fn flood<P: Pages>(
+        &mut self,
+        worker: &mut Worker,
+        mesh: &mut Mesh<P>,
+        piece: &Piece,
+        claims: &[Claim],
+        tets: &[u32],
+    ) -> bool {
+        self.visited.clear();
+        let mut n_found = 0;
+        let mut next = 0;
+        let good = loop {
+            if next == self.visited.len() {
+                if n_found == self.faces.len() {
+                    break true;
+                }
+                if next > 0 {
+                    break false;
+                }
+                let Some(start) = self.inside(worker, mesh, piece, claims, tets) else {
+                    break false;
+                };
+                self.visit(mesh, start);
+            }
+            let t = self.visited[next];
+            next += 1;
+            let tet = mesh.tet(t);
+            let Some(corners) = self.places_of(&tet) else {
+                break false;
+            };
+            let mut leaks = false;
+            for i in 0..4 {
+                let across = tet.neighbor[i];
+                let face = FACES[i].map(|k| corners[k]);
+                let mut key = face;
+                key.sort_unstable();
+                if let Some((outer, beyond)) = self.faces.get_mut(&key) {
+                    let seen = piece.corners(outer.tet).expect(OPEN);
+                    let seen = FACES[outer.face].map(|k| seen[k]);
+                    leaks |= tet.is_required(i) || *beyond != FaceRef::NONE || !turned(face, seen);
+                    *beyond = across;
+                    n_found += 1;
+                } else if !across.exists() || tet.is_required(i) {
+                    leaks = true;
+                } else if mesh.tet(across.tet()).node[IN_CAVITY] & MARK == 0 {
+                    self.visit(mesh, across.tet());
+                }
+            }
+            if leaks {
+                break false;
+            }
+        };
+        for &t in &self.visited {
+            mesh.set_mark(t, IN_CAVITY, false);
+        }
+        good
+    }
+
+    fn visit<P: Pages>(&mut self, mesh: &mut Mesh<P>, t: u32) {
+        mesh.set_mark(t, IN_CAVITY, true);
+        self.visited.push(t);
+    }
+
+    /// The places of a tetrahedron's vertices, if all are outer ones of the piece.
+    fn places_of(&self, tet: &Tet) -> Option<[u32; 4]> {
+        let place = |v: u32| {
+            let n = dense(v).checked_sub(self.first)?;
+            self.placed.get(n as usize).copied()
+        };
+        let [a, b, c, d] = tet.vertices().map(place);
+        Some([a?, b?, c?, d?])
+    }
+
+    /// A tetrahedron of the mesh within a part.
+    fn inside<P: Pages>(
+        &self,
+        worker: &mut Worker,
+        mesh: &mut Mesh<P>,
+        piece: &Piece,
+        claims: &[Claim],
+        tets: &[u32],
+    ) -> Option<u32> {
+        // One with a vertex in the mesh, where the walk begins.
+        let outer = |p: u32| self.vertices[p as usize] != NONE;
+        let t = tets.iter().find(|&&t| {
+            let corners = piece.corners(t).expect(OPEN);
+            corners.into_iter().any(outer)
+        });
+        let corners = piece.corners(*t?)?;
+        let middle = corners
+            .iter()
+            .map(|&p| piece.places[p as usize].point)
+            .sum::<Point>()
+            * 0.25;
+        find(worker, mesh, middle, claims).map(|located| located.tet)
+    }
+
+    /// Replaces the visited tetrahedra by those of the part; returns how many vertices that has added.
+    fn fill<P: Pages>(
+        &mut self,
+        worker: &mut Worker,
+        mesh: &mut Mesh<P>,
+        piece: &Piece,
+        tets: &[u32],
+    ) -> u64 {
+        let (region, _) = mesh.tet_attribute(self.visited[0]);
+        let recycled = self.visited.len();
+        self.ids.resize(piece.n_tets(), NONE);
+        for (k, &t) in tets.iter().enumerate() {
+            self.ids[t as usize] = match self.visited.get(k) {
+                Some(&id) => id,
+                None => mesh.take_tet(),
+            };
+        }
+        for &t in self.visited.iter().skip(tets.len()) {
+            mesh.free_tet(t);
+        }
+        let mut added = 0;
+        for (k, &t) in tets.iter().enumerate() {
+            let corners = piece.corners(t).expect(OPEN);
+            let node = corners.map(|p| {
+                if self.vertices[p as usize] == NONE {
+                    let place = &piece.places[p as usize];
+                    self.vertices[p as usize] = mesh.add_vertex(place.point, place.h);
+                    added += 1;
+                }
+                self.vertices[p as usize]
+            });
+            let id = self.ids[t as usize];
+            let neighbor = std::array::from_fn(|i| {
+                if let Some(face) = piece.across(t, i) {
+                    return FaceRef::new(self.ids[face.tet as usize], face.face);
+                }
+                let mut key = FACES[i].map(|k| corners[k]);
+                key.sort_unstable();
+                self.faces[&key].1
+            });
+            mesh.set_tet(id, Tet { node, neighbor });
+            // None of its edges is long.
+            mesh.set_mark(id, EXAMINED, true);
+            if k >= recycled {
+                mesh.set_tet_attribute(id, region, 0);
+            }
+        }
+        for (outer, beyond) in self.faces.values() {
+            let face = FaceRef::new(self.ids[outer.tet as usize], outer.face);
+            mesh.set_neighbor(*beyond, face);
+        }
+        worker.last = self.ids[tets[0] as usize];
+        added
+    }
+}
+
+/// Whether two faces with the same vertices are seen from the same side.
+fn turned(face: [u32; 3], other: [u32; 3]) -> bool {
+    let [a, b, c] = face;
+    other == [a, b, c] || other == [b, c, a] || other == [c, a, b]
+}
+
+/// Inserts a vertex, unless another one is near or a required face or a frozen tetrahedron would have to go.
+fn insert<P: Pages>(
+    worker: &mut Worker,
+    mesh: &mut Mesh<P>,
+    p: Point,
+    h: f32,
+    near: f64,
+    claims: &[Claim],
+) -> Option<u32> {
+    let Some(start) = find(worker, mesh, p, claims) else {
+        return None;
+    };
+    let is_near = |mesh: &mut Mesh<P>, v: u32| (mesh.point(v) - p).length_squared() < near;
+    if start
+        .record
+        .vertices()
+        .into_iter()
+        .any(|v| is_near(mesh, v))
+    {
+        return None;
+    }
+    let gathered = worker.kernel.gather_constrained(mesh, p, &start, is_near);
+    match gathered {
+        Ok(()) => {}
+        Err(crate::delaunay::Rejected::Refused) => {
+            return None;
+        }
+        Err(crate::delaunay::Rejected::Blocked) => {
+            return None;
+        }
+        Err(_) => {
+            return None;
+        }
+    }
+    if worker.wants_frozen(mesh) {
+        worker.kernel.discard(mesh);
+        return None;
+    }
+    let (region, _) = mesh.tet_attribute(start.tet);
+    let recycled = worker.kernel.cavity().len();
+    let v = mesh.add_vertex(p, h);
+    worker.last = worker.kernel.fill(mesh, v);
+    for &t in worker.kernel.new_tets().iter().skip(recycled) {
+        mesh.set_tet_attribute(t, region, 0);
+    }
+    Some(v)
+}
+
+/// The tetrahedron that holds `p`: from where the last one was, or from where there was room.
+fn find<P: Pages>(
+    worker: &mut Worker,
+    mesh: &mut Mesh<P>,
+    p: Point,
+    claims: &[Claim],
+) -> Option<Located> {
+    if let Ok(located) = worker.kernel.locate(mesh, p, worker.last) {
+        return Some(located);
+    }
+    let start = nearest_room(p, claims)?;
+    worker.kernel.locate(mesh, p, start).ok()
+}
+
+/// The nearest tetrahedron that had room.
+fn nearest_room(p: Point, claims: &[Claim]) -> Option<u32> {
+    let rooms = claims.iter().take_while(|claim| claim.tet != NONE);
+    let squared = |claim: &Claim| (claim.point() - p).length_squared();
+    let nearest = rooms.min_by(|a, b| squared(a).total_cmp(&squared(b)));
+    nearest.map(|claim| claim.tet)
+}
