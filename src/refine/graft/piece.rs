@@ -113,11 +113,12 @@ impl Piece {
         let mut site = Site::new(corner, octave);
         let grain = *site.grain(field, width);
         let cell = PERIOD / CELLS as f64 * grain.h;
-        if !(width / cell <= RADIUS_MAX) {
+        let radius = width / cell;
+        if radius.is_nan() || radius > RADIUS_MAX {
             // The size in its middle is far from the others.
             return None;
         }
-        let radius = (width / cell).ceil() as i32 + BESIDE;
+        let radius = radius.ceil() as i32 + BESIDE;
         let side = 2 * radius + 1;
         let middle = cell_at(grain.local(field.bounds.low + site.at * width));
         let n_cells = (side * side * side) as usize;

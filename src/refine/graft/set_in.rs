@@ -68,7 +68,8 @@ impl Setter {
         for tets in piece.tets_by_part() {
             check_cancelled();
             self.list_faces(piece, &tets);
-            if self.flood(worker, mesh, piece, claims, &tets) {
+            let start = self.inside(worker, mesh, piece, claims, &tets);
+            if start.is_some_and(|start| self.flood(mesh, piece, start)) {
                 let added = self.fill(worker, mesh, piece, &tets);
                 report.inserted += added;
                 report.set_in += added;
@@ -144,11 +145,10 @@ impl Setter {
     fn list_faces(&mut self, piece: &Piece, tets: &[u32]) {
         self.faces.clear();
         for &t in tets {
-            for i in 0..4 {
+            for (i, face) in FACES.into_iter().enumerate() {
                 if piece.across(t, i).is_none() {
                     let corners = piece.corners(t).expect(OPEN);
-                    let mut key = FACES[i].map(|k| corners[k]);
-                    key.sort_unstable();
+                    let key = ascending(face.map(|k| corners[k]));
                     let face = OuterFace { tet: t, face: i };
                     self.faces.insert(key, (face, FaceRef::NONE));
                 }
@@ -157,62 +157,37 @@ impl Setter {
     }
 
     /// Visits the tetrahedra of the mesh within a part; whether all its outer faces are there, and nothing else is between them.
-    fn flood<P: Pages>(
-        &mut self,
-        worker: &mut Worker,
-        mesh: &mut Mesh<P>,
-        piece: &Piece,
-        claims: &[Claim],
-        tets: &[u32],
-    ) -> bool {
+    fn flood<P: Pages>(&mut self, mesh: &mut Mesh<P>, piece: &Piece, start: u32) -> bool {
         self.visited.clear();
-        let mut n_found = 0;
-        let mut next = 0;
-        let good = loop {
-            if next == self.visited.len() {
-                if n_found == self.faces.len() {
-                    break true;
-                }
-                if next > 0 {
-                    break false;
-                }
-                let Some(start) = self.inside(worker, mesh, piece, claims, tets) else {
-                    break false;
-                };
-                self.visit(mesh, start);
-            }
-            let t = self.visited[next];
+        self.visit(mesh, start);
+        let (mut n_found, mut next, mut leaks) = (0, 0, false);
+        while next < self.visited.len() && !leaks {
+            let tet = mesh.tet(self.visited[next]);
             next += 1;
-            let tet = mesh.tet(t);
             let Some(corners) = self.places_of(&tet) else {
-                break false;
+                leaks = true;
+                break;
             };
-            let mut leaks = false;
-            for i in 0..4 {
+            for (i, face) in FACES.into_iter().enumerate() {
                 let across = tet.neighbor[i];
-                let face = FACES[i].map(|k| corners[k]);
-                let mut key = face;
-                key.sort_unstable();
-                if let Some((outer, beyond)) = self.faces.get_mut(&key) {
+                let face = face.map(|k| corners[k]);
+                if !across.exists() || tet.is_required(i) {
+                    leaks = true;
+                } else if let Some((outer, beyond)) = self.faces.get_mut(&ascending(face)) {
                     let seen = piece.corners(outer.tet).expect(OPEN);
                     let seen = FACES[outer.face].map(|k| seen[k]);
-                    leaks |= tet.is_required(i) || *beyond != FaceRef::NONE || !turned(face, seen);
+                    leaks |= beyond.exists() || !same_side(face, seen);
                     *beyond = across;
                     n_found += 1;
-                } else if !across.exists() || tet.is_required(i) {
-                    leaks = true;
                 } else if mesh.tet(across.tet()).node[IN_CAVITY] & MARK == 0 {
                     self.visit(mesh, across.tet());
                 }
             }
-            if leaks {
-                break false;
-            }
-        };
+        }
         for &t in &self.visited {
             mesh.set_mark(t, IN_CAVITY, false);
         }
-        good
+        !leaks && n_found == self.faces.len()
     }
 
     fn visit<P: Pages>(&mut self, mesh: &mut Mesh<P>, t: u32) {
@@ -290,9 +265,7 @@ impl Setter {
                 if let Some(face) = piece.across(t, i) {
                     return FaceRef::new(self.ids[face.tet as usize], face.face);
                 }
-                let mut key = FACES[i].map(|k| corners[k]);
-                key.sort_unstable();
-                self.faces[&key].1
+                self.faces[&ascending(FACES[i].map(|k| corners[k]))].1
             });
             mesh.set_tet(id, Tet { node, neighbor });
             // None of its edges is long.
@@ -310,8 +283,13 @@ impl Setter {
     }
 }
 
+fn ascending(mut face: [u32; 3]) -> [u32; 3] {
+    face.sort_unstable();
+    face
+}
+
 /// Whether two faces with the same vertices are seen from the same side.
-fn turned(face: [u32; 3], other: [u32; 3]) -> bool {
+fn same_side(face: [u32; 3], other: [u32; 3]) -> bool {
     let [a, b, c] = face;
     other == [a, b, c] || other == [b, c, a] || other == [c, a, b]
 }
@@ -325,31 +303,14 @@ fn insert<P: Pages>(
     near: f64,
     claims: &[Claim],
 ) -> Option<u32> {
-    let Some(start) = find(worker, mesh, p, claims) else {
-        return None;
-    };
+    let start = find(worker, mesh, p, claims)?;
     let is_near = |mesh: &mut Mesh<P>, v: u32| (mesh.point(v) - p).length_squared() < near;
-    if start
-        .record
-        .vertices()
-        .into_iter()
-        .any(|v| is_near(mesh, v))
-    {
+    let corners = start.record.vertices();
+    if corners.into_iter().any(|v| is_near(mesh, v)) {
         return None;
     }
     let gathered = worker.kernel.gather_constrained(mesh, p, &start, is_near);
-    match gathered {
-        Ok(()) => {}
-        Err(crate::delaunay::Rejected::Refused) => {
-            return None;
-        }
-        Err(crate::delaunay::Rejected::Blocked) => {
-            return None;
-        }
-        Err(_) => {
-            return None;
-        }
-    }
+    gathered.ok()?;
     if worker.wants_frozen(mesh) {
         worker.kernel.discard(mesh);
         return None;
