@@ -71,7 +71,7 @@ struct BinCounts {
     excess: Excess,
 }
 
-/// From here on a tetrahedron's excess may be above 2.
+/// Excess above this is counted.
 const EXCESS_FROM: f64 = 2.0;
 
 impl BinCounts {
@@ -95,7 +95,8 @@ impl BinCounts {
         let bin = ((quality - 1.0) * QUALITY_PER_UNIT) as usize;
         self.quality[bin.min(QUALITY_BINS - 1)] += 1;
         self.sum += (quality.min(1e6) * 2f64.powi(32)) as u128;
-        if quality > EXCESS_FROM {
+        // No excess is above the quality: most tetrahedra change neither number.
+        if quality > self.excess.worst.min(EXCESS_FROM) {
             let excess = excess(points, on_surface());
             self.excess.worst = self.excess.worst.max(excess);
             self.excess.above_two += u64::from(excess > EXCESS_FROM);
