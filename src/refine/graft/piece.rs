@@ -118,6 +118,13 @@ impl Piece {
             // The size in its middle is far from the others.
             return None;
         }
+        let mut rooms = claims.iter().take_while(|claim| claim.tet != NONE);
+        if !rooms.any(|room| {
+            let h = (field.h)(room.point());
+            (grain.h - h).abs() <= pattern::MISMATCH * h
+        }) {
+            return None;
+        }
         let radius = radius.ceil() as i32 + BESIDE;
         let side = 2 * radius + 1;
         let middle = cell_at(grain.local(field.bounds.low + site.at * width));
