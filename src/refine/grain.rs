@@ -115,15 +115,21 @@ impl Around {
     /// The nearest of them.
     pub fn nearest(&mut self, at: Point, octave: u32) -> &mut Site {
         let sites = self.sites(at, octave);
-        let mut best = (f64::INFINITY, 0);
-        for (k, site) in sites.iter().enumerate() {
-            let squared = (site.at - at).length_squared();
-            if squared < best.0 {
-                best = (squared, k);
-            }
-        }
-        &mut sites[best.1]
+        let nearest = nearest(sites, at);
+        &mut sites[nearest]
     }
+}
+
+/// Which site is the nearest to a point; of equals the first.
+pub(super) fn nearest(sites: &[Site; 8], at: Point) -> usize {
+    let mut best = (f64::INFINITY, 0);
+    for (k, site) in sites.iter().enumerate() {
+        let squared = (site.at - at).length_squared();
+        if squared < best.0 {
+            best = (squared, k);
+        }
+    }
+    best.1
 }
 
 /// Three numbers in [-1, 1).

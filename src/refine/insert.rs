@@ -70,7 +70,20 @@ impl Worker {
             report.frozen_hits += 1;
             return;
         }
-        let v = mesh.add_vertex(c.point, c.h);
+        self.put_in(mesh, c.point, c.h, region);
+        report.inserted += 1;
+        self.recent.push(c, self.last);
+    }
+
+    /// Replaces the gathered cavity, which lies in `region`, by the ball of a new vertex; returns that.
+    pub(super) fn put_in<P: Pages>(
+        &mut self,
+        mesh: &mut Mesh<P>,
+        point: Point,
+        h: f32,
+        region: u32,
+    ) -> u32 {
+        let v = mesh.add_vertex(point, h);
         let recycled = self.kernel.cavity().len();
         self.last = self.kernel.fill(mesh, v);
         for (k, &t) in self.kernel.new_tets().iter().enumerate() {
@@ -80,8 +93,7 @@ impl Worker {
                 mesh.set_tet_attribute(t, region, 0);
             }
         }
-        report.inserted += 1;
-        self.recent.push(c, self.last);
+        v
     }
 
     fn find<P: Pages>(

@@ -2,9 +2,10 @@
 //!
 //! Where there is room, pieces of a relaxed pattern are set in whole (`graft`). Then edges longer than √2 in the metric of the wanted
 //! size are divided equally; the points are inserted by the constrained kernel where no vertex is nearer than 1/√2. First they move to
-//! the nearest place of the pattern, as long as there are any (`pattern`); then they stay where they divide. What decides is order
-//! alone: grains in the order of their cells; blocks of tetrahedra in id order, long edges before short ones within a block, then the
-//! Hilbert curve. So the result does not depend on which pages are resident, nor on threads.
+//! the nearest place of the pattern, as long as there are any (`pattern`); then they stay where they divide. Places of a piece are at
+//! least 1/√2 apart in the size of its grain, which may be less by a seventh. What decides is order alone: grains in the order of
+//! their cells; blocks of tetrahedra in id order, long edges before short ones within a block, then the Hilbert curve. So the result
+//! does not depend on which pages are resident, nor on threads.
 //!
 //! Source: the paper, section 1.1; constants from F. Hecht's rule (BAMG) and measurement: a filter of 1/√2 with
 //! a threshold of √2 makes edges of mean length 1.0 and about 10.2 tetrahedra per unit of ∫ h⁻³.
@@ -53,8 +54,8 @@ const FEW: f64 = 0.02;
 /// jumps between layers created in different passes; above, sorting costs more than it saves.
 const GROWTH: f64 = 1.5;
 
-/// A mesh that has grown by less since then is left as it is in the end.
-const SETTLED: f64 = 1.03;
+/// A mesh that has grown by less than this since then is not numbered again in the end.
+const GROWTH_LAST: f64 = 1.03;
 
 /// Places for edges that are settled: three for each facet, which has one and a half edges, and 4 MB at most.
 const SETTLED_MAX: usize = 1 << 19;
@@ -129,7 +130,7 @@ pub fn saturate<P: Pages>(
         }
     }
     // Every sweep that follows goes in id order: this costs 0.8 s and saves them 2.2 s on 4 M tetrahedra.
-    if f64::from(mesh.n_tets()) > SETTLED * f64::from(numbered) {
+    if f64::from(mesh.n_tets()) > GROWTH_LAST * f64::from(numbered) {
         renumber(mesh, &worker.order, space)?;
     }
     if !field.place.is_partial() {

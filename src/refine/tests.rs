@@ -43,7 +43,7 @@ fn graded(
 #[test]
 fn edges_end_near_the_wanted_length() {
     let (mut mesh, report) = cube(0.5, Pager::new(1 << 28, None));
-    assert!(report.inserted > 400, "{report:?}");
+    assert!(report.inserted > 1000, "{report:?}");
     let (mut n, mut sum, mut long) = (0u32, 0.0, 0u32);
     let mut from = 0;
     while let Some((t, tet)) = mesh.next_tet(from) {
@@ -57,7 +57,7 @@ fn edges_end_near_the_wanted_length() {
                 continue;
             }
             let l = p[i].distance(p[j]) / 0.5;
-            assert!(l > 0.6, "an edge of length {l}");
+            assert!(l > 0.7, "an edge of length {l}");
             n += 1;
             sum += l;
             long += u32::from(l > 1.5);

@@ -87,11 +87,21 @@ fn cell_of(p: Point) -> usize {
 mod tests {
     use super::*;
     use crate::geom::mix;
-    use crate::refine::grain::random;
+    use crate::refine::grain::{PERIOD, random};
 
     fn all_nearest(tile: &Tile, p: Point) -> f64 {
         let q = tile.points.iter().map(|q| q.distance(p - p.floor()));
         q.fold(f64::INFINITY, f64::min)
+    }
+
+    #[test]
+    fn no_two_places_are_nearer_than_vertices_may_be() {
+        let tile = Tile::get();
+        for (k, p) in tile.points.iter().enumerate() {
+            let others = tile.points[k + 1..].iter();
+            let near = others.map(|q| q.distance(*p)).fold(1.0, f64::min);
+            assert!(near * PERIOD > std::f64::consts::FRAC_1_SQRT_2, "{p}");
+        }
     }
 
     #[test]

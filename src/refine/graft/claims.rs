@@ -5,7 +5,7 @@ use std::ops::Range;
 use tetdb_schema::page::NONE;
 
 use super::super::field::Field;
-use super::super::grain::{Around, Site, octave, width};
+use super::super::grain::{Around, Site, nearest, octave, width};
 use crate::geom::Point;
 use crate::mesh::anatomy::EDGES;
 use crate::mesh::{Mesh, Scan, Tet, Workspace, dense, scan_parts, sparse, tets_of_page};
@@ -181,9 +181,7 @@ impl Scan for Vertices<'_> {
         let mut claims = Vec::new();
         for n in numbers.clone() {
             let (p, h) = mesh.point_and_size(sparse(n));
-            for claim in lister.obstacle(p, f64::from(h)) {
-                claims.push(claim);
-            }
+            claims.extend(lister.obstacle(p, f64::from(h)));
         }
         claims
     }
@@ -270,13 +268,8 @@ impl<'a> Lister<'a> {
             let at = (p - self.field.bounds.low) / width;
             let sites = self.around[octave as usize & 1].sites(at, octave);
             let squared = |site: &Site| (site.at - at).length_squared();
-            let mut nearest = &sites[0];
-            for site in &sites[1..] {
-                if squared(site) < squared(nearest) {
-                    nearest = site;
-                }
-            }
-            let least = squared(nearest);
+            let nearest = sites[nearest(sites, at)];
+            let least = squared(&nearest);
             for site in &*sites {
                 let apart = 2.0 * (site.at - nearest.at).length();
                 if squared(site) - least <= apart * (REACH * h / width) {

@@ -383,7 +383,7 @@ impl Piece {
         }
         // Those around inner places are all of the piece; the others save nothing.
         for t in 0..n_tets {
-            if self.parts[t as usize] == CHOSEN && !self.has(t, Use::Inner) {
+            if self.parts[t as usize] == CHOSEN && !self.has_inner(t) {
                 self.parts[t as usize] = NONE;
             }
         }
@@ -400,12 +400,12 @@ impl Piece {
         }
     }
 
-    /// Whether tetrahedron `t`, all of whose corners are in open cells, has one of this use.
-    fn has(&self, t: u32, used: Use) -> bool {
+    /// Whether tetrahedron `t`, all of whose corners are in open cells, has an inner one.
+    fn has_inner(&self, t: u32) -> bool {
         let corners = self.corners(t).expect(OPEN);
         corners
             .iter()
-            .any(|&p| self.places[p as usize].used == used)
+            .any(|&p| self.places[p as usize].used == Use::Inner)
     }
 
     /// Numbers connected parts, and gives up the small ones.

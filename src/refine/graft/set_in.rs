@@ -14,11 +14,11 @@ use crate::delaunay::{Located, insertion_key};
 use crate::geom::Point;
 use crate::mesh::anatomy::mark::{EXAMINED, IN_CAVITY};
 use crate::mesh::anatomy::{FACES, MARK};
-use crate::mesh::{FaceRef, Mesh, Tet, dense};
+use crate::mesh::{FaceRef, Mesh, Tet};
 use crate::storage::{Pages, check_cancelled};
 
-/// No vertex is nearer to an outer place than this, in units of h.
-const NEAR: f64 = 0.6;
+/// No vertex is nearer to an outer place than this, in units of the grain's h: less than the pattern's own are.
+const NEAR: f64 = 0.7;
 /// A piece that loses places is chosen anew so often.
 const TRIES: usize = 8;
 /// A walk begins where the last one ended when that is nearer than this, in units of h.
@@ -29,9 +29,8 @@ const NEAR_START: f64 = 4.0;
 pub(super) struct Setter {
     /// Of each place its vertex.
     vertices: Vec<u32>,
-    /// Dense number of the first vertex inserted, and the place of each since.
-    first: u32,
-    placed: Vec<u32>,
+    /// The place of each vertex at an outer one.
+    placed: HashMap<u32, u32>,
     /// Outer faces of a part by their places in ascending order, and what was found beyond each.
     faces: HashMap<[u32; 3], (OuterFace, FaceRef)>,
     visited: Vec<u32>,
@@ -51,7 +50,6 @@ impl Setter {
     ) {
         self.vertices.clear();
         self.vertices.resize(piece.places.len(), NONE);
-        self.first = dense(mesh.vertex_ids_end());
         self.placed.clear();
         let mut whole = false;
         for _ in 0..TRIES {
@@ -130,13 +128,8 @@ impl Setter {
                 whole = false;
                 continue;
             };
-            assert_eq!(
-                dense(v),
-                self.first + self.placed.len() as u32,
-                "no vertex was freed"
-            );
             self.vertices[k as usize] = v;
-            self.placed.push(k);
+            self.placed.insert(v, k);
         }
         whole
     }
@@ -197,10 +190,7 @@ impl Setter {
 
     /// The places of a tetrahedron's vertices, if all are outer ones of the piece.
     fn places_of(&self, tet: &Tet) -> Option<[u32; 4]> {
-        let place = |v: u32| {
-            let n = dense(v).checked_sub(self.first)?;
-            self.placed.get(n as usize).copied()
-        };
+        let place = |v: u32| self.placed.get(&v).copied();
         let [a, b, c, d] = tet.vertices().map(place);
         Some([a?, b?, c?, d?])
     }
@@ -316,13 +306,7 @@ fn insert<P: Pages>(
         return None;
     }
     let (region, _) = mesh.tet_attribute(start.tet);
-    let recycled = worker.kernel.cavity().len();
-    let v = mesh.add_vertex(p, h);
-    worker.last = worker.kernel.fill(mesh, v);
-    for &t in worker.kernel.new_tets().iter().skip(recycled) {
-        mesh.set_tet_attribute(t, region, 0);
-    }
-    Some(v)
+    Some(worker.put_in(mesh, p, h, region))
 }
 
 /// The tetrahedron that holds `p`: from where the last one was, or from where there was room.
