@@ -21,9 +21,9 @@ const RADIUS_MAX: f64 = 51.0;
 /// Cells between those of a piece and the limits of what is looked at: no tetrahedron of the pattern, nor one beside it, reaches farther.
 const BESIDE: i32 = 5;
 /// A piece with fewer vertices inside is not worth it.
-const INNER_MIN: usize = 256;
+const INNER_MIN: usize = 1024;
 /// Nor has one with fewer places so many inside.
-const PLACES_MIN: usize = 8 * INNER_MIN;
+const PLACES_MIN: usize = 4 * INNER_MIN;
 
 /// In place of a part's number: it has none yet.
 const CHOSEN: u32 = NONE - 1;

@@ -20,7 +20,7 @@ use crate::storage::{Pages, check_cancelled};
 /// No vertex is nearer to an outer place than this, in units of the grain's h: less than the pattern's own are.
 const NEAR: f64 = 0.7;
 /// A piece that loses places is chosen anew so often.
-const TRIES: usize = 8;
+const TRIES: usize = 4;
 /// A walk begins where the last one ended when that is nearer than this, in units of h.
 const NEAR_START: f64 = 4.0;
 
