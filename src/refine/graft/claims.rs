@@ -31,8 +31,9 @@ impl Claim {
 
 /// A tetrahedron with an edge longer than this, in units of the least size of its ends, may have room for a piece of the pattern.
 const ROOMY: f64 = 4.0;
-/// Places on required faces no farther apart than this, in units of h, stand for all of them.
-const COVERED: f64 = 1.4;
+/// Places on required faces no farther apart than this, in units of h, stand for all of them: where the size of a grain is less by a sixth,
+/// nothing passes between them that keeps clear of each.
+const COVERED: f64 = 1.15;
 /// How far beyond its limits a grain minds what is in the way, in units of h.
 const REACH: f64 = 1.0;
 /// Sizes are known to this factor when the octave of a grain beside a vertex is guessed.

@@ -40,7 +40,7 @@ pub(super) fn set_in<P: Pages>(
     let mut setter = Setter::default();
     let mut claims: Vec<Claim> = Vec::new();
     let mut next = sorted.next().transpose()?;
-    while let Some(first) = next.take() {
+    while let Some(first) = next.take().filter(|_| !setter.gives_up()) {
         claims.clear();
         claims.push(first);
         let mut n = 1;

@@ -119,10 +119,7 @@ impl Piece {
             return None;
         }
         let mut rooms = claims.iter().take_while(|claim| claim.tet != NONE);
-        if !rooms.any(|room| {
-            let h = (field.h)(room.point());
-            (grain.h - h).abs() <= pattern::MISMATCH * h
-        }) {
+        if !rooms.any(|room| is_like(&grain, octave, (field.h)(room.point()))) {
             return None;
         }
         let radius = radius.ceil() as i32 + BESIDE;
@@ -216,7 +213,7 @@ impl Piece {
                 let middle = Point::from_array(c.map(|c| (f64::from(c) + 0.5) / CELLS as f64));
                 let middle = self.grain.position(middle);
                 let h = (field.h)(middle);
-                let inside = (self.grain.h - h).abs() <= pattern::MISMATCH * h
+                let inside = is_like(&self.grain, self.octave, h)
                     && self.depth(field, middle) > 0.0
                     && field.place.admits(middle, h);
                 if !inside {
@@ -284,14 +281,14 @@ impl Piece {
                 let point = self.grain.position(Point::from_array(period) + q);
                 let depth = self.depth(field, point);
                 let h = (field.h)(point);
-                let mismatch = (self.grain.h - h).abs() / h;
                 let fits = depth > 0.0
-                    && octave(h) == self.octave
-                    && mismatch <= pattern::MISMATCH
+                    && is_like(&self.grain, self.octave, h)
                     && field.place.admits(point, h)
                     && !field.place.forbids(point, h);
-                let allowed =
-                    fits && open && mismatch <= MISMATCH && depth >= MARGIN * self.grain.h;
+                let allowed = fits
+                    && open
+                    && (self.grain.h - h).abs() <= MISMATCH * h
+                    && depth >= MARGIN * self.grain.h;
                 self.places.push(Place {
                     point,
                     h: h as f32,
@@ -469,6 +466,11 @@ impl Piece {
     pub fn h(&self) -> f64 {
         self.grain.h
     }
+}
+
+/// Whether points where `h` is wanted may move to places of the grain: it is one of their octave, with a size like theirs.
+fn is_like(grain: &Grain, of: u32, h: f64) -> bool {
+    octave(h) == of && (grain.h - h).abs() <= pattern::MISMATCH * h
 }
 
 /// The pattern's cell at a position in units of its side.

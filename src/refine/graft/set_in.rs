@@ -21,6 +21,10 @@ use crate::storage::{Pages, check_cancelled};
 const NEAR: f64 = 0.7;
 /// A piece that loses places is chosen anew so often.
 const TRIES: usize = 4;
+/// A piece that loses a greater share of its outer places is given up.
+const LOST_MAX: f64 = 0.25;
+/// A mesh where so many more pieces did not fit than did is left alone: after recovery it may be far from Delaunay.
+const MISFITS_MAX: i32 = 2;
 /// A walk begins where the last one ended when that is nearer than this, in units of h.
 const NEAR_START: f64 = 4.0;
 
@@ -36,6 +40,8 @@ pub(super) struct Setter {
     visited: Vec<u32>,
     /// Of each tetrahedron of the piece its id in the mesh.
     ids: Vec<u32>,
+    /// How many more pieces did not fit than did.
+    misfits: i32,
 }
 
 impl Setter {
@@ -51,16 +57,17 @@ impl Setter {
         self.vertices.clear();
         self.vertices.resize(piece.places.len(), NONE);
         self.placed.clear();
-        let mut whole = false;
+        let mut lost = f64::INFINITY;
         for _ in 0..TRIES {
-            whole = self.insert_outer(worker, mesh, piece, claims);
-            if whole {
+            lost = self.insert_outer(worker, mesh, piece, claims);
+            if lost == 0.0 || lost > LOST_MAX {
                 break;
             }
             piece.choose();
         }
         report.inserted += self.placed.len() as u64;
-        if !whole {
+        if lost > 0.0 {
+            self.misfits += 1;
             return;
         }
         for tets in piece.tets_by_part() {
@@ -71,8 +78,16 @@ impl Setter {
                 let added = self.fill(worker, mesh, piece, &tets);
                 report.inserted += added;
                 report.set_in += added;
+                self.misfits -= 1;
+            } else {
+                self.misfits += 1;
             }
         }
+    }
+
+    /// Whether pieces do not fit this mesh.
+    pub fn gives_up(&self) -> bool {
+        self.misfits > MISFITS_MAX
     }
 
     /// Inserts the other places where vertices may be, as points that divide edges are.
@@ -105,33 +120,33 @@ impl Setter {
         }
     }
 
-    /// Inserts the outer places that are not in the mesh yet; whether all could be.
+    /// Inserts the outer places that are not in the mesh yet; returns the share that could not be.
     fn insert_outer<P: Pages>(
         &mut self,
         worker: &mut Worker,
         mesh: &mut Mesh<P>,
         piece: &mut Piece,
         claims: &[Claim],
-    ) -> bool {
+    ) -> f64 {
         let wanted = (0..piece.places.len() as u32).filter(|&k| {
             piece.places[k as usize].used == Use::Outer && self.vertices[k as usize] == NONE
         });
         let key = |k: u32| insertion_key(&worker.order, piece.places[k as usize].point);
         let mut order: Vec<(u64, u32)> = wanted.map(|k| (key(k), k)).collect();
         order.sort_unstable();
-        let mut whole = true;
+        let (mut lost, wanted) = (0, order.len().max(1));
         let near = (NEAR * piece.h()).powi(2);
         for (_, k) in order {
             let place = piece.places[k as usize];
             let Some(v) = insert(worker, mesh, place.point, place.h, near, claims) else {
                 piece.places[k as usize].allowed = false;
-                whole = false;
+                lost += 1;
                 continue;
             };
             self.vertices[k as usize] = v;
             self.placed.insert(v, k);
         }
-        whole
+        f64::from(lost) / wanted as f64
     }
 
     /// Lists the outer faces of a part.
