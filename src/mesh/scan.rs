@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use tetdb_schema::page::SLOT_BITS;
 
 use super::{Mesh, Tet};
-use crate::storage::{Pages, check_cancelled, n_threads, parallel};
+use crate::storage::{Pages, check_cancelled, parallel, spare_threads};
 
 /// A question to parts of a mesh, each answered for itself.
 pub trait Scan: Sync {
@@ -25,7 +25,7 @@ pub fn scan_parts<P: Pages, S: Scan>(
     scan: &S,
 ) -> Vec<S::Output> {
     if parts.len() > 1
-        && n_threads() > 1
+        && spare_threads() > 1
         && let Some(shared) = mesh.shared()
     {
         let found = |part| {

@@ -17,7 +17,7 @@ use super::form::{Cut, Cutter};
 use super::totals::{RegionTotals, Totals, array, count_open};
 use super::{FacePairs, Form, VertexCache};
 use crate::geom::{Aabb, Point};
-use crate::storage::{DiskPath, StoreFile, parallel};
+use crate::storage::{DiskPath, StoreFile, join};
 use tetdb_schema::catalog::SubdomainRow;
 
 /// One side of an interface as this sub-domain has it.
@@ -241,7 +241,7 @@ impl SealedWriter {
             }
             Ok(())
         };
-        let (packed, summed_up) = parallel(|| rayon::join(pack, sum_up));
+        let (packed, summed_up) = join(pack, sum_up);
         packed.and(summed_up)
     }
 

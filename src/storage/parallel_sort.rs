@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use super::{n_threads, parallel};
+use super::{parallel, spare_threads};
 
 /// Parts below this are sorted by one thread.
 const PART: usize = 1 << 14;
@@ -14,7 +14,7 @@ pub fn sort_unstable_by<T: Send>(
     items: &mut [T],
     order: impl Fn(&T, &T) -> Ordering + Copy + Sync + Send,
 ) {
-    let n_threads = n_threads();
+    let n_threads = spare_threads();
     if n_threads == 1 || items.len() <= PART {
         return items.sort_unstable_by(order);
     }

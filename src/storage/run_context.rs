@@ -167,6 +167,17 @@ pub fn parallel<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     }
 }
 
+/// Does both, side by side where a thread is to spare: handing work to threads that others keep busy takes longer than doing it.
+pub fn join<A: Send, B: Send>(
+    a: impl FnOnce() -> A + Send,
+    b: impl FnOnce() -> B + Send,
+) -> (A, B) {
+    match spare_threads() {
+        1 => (a(), b()),
+        _ => parallel(|| rayon::join(a, b)),
+    }
+}
+
 /// A scope whose tasks go to the pool of this run; `work` itself stays on this thread.
 pub fn in_place_scope<'scope, T>(work: impl FnOnce(&Scope<'scope>) -> T) -> T {
     let pool = RunContext::current().and_then(|context| context.pool);
