@@ -448,12 +448,29 @@ impl Pages for Pager {
     }
 
     fn shared(&mut self) -> Option<SharedPages<'_>> {
-        let all = self.tables.iter_mut().all(PageTable::make_readable);
+        let mut all = self.tables.iter_mut().all(PageTable::make_readable);
+        if !all && self.bring_in() {
+            all = self.tables.iter_mut().all(PageTable::make_readable);
+        }
         all.then(|| SharedPages::new(&self.frames, &self.tables))
     }
 }
 
 impl Pager {
+    /// Reads what is not in memory, such as what a mesh opened from its file has not asked for yet; `false` where there are not frames for all pages.
+    fn bring_in(&mut self) -> bool {
+        let pages: usize = self.tables.iter().map(PageTable::len).sum();
+        if pages > self.frames_max {
+            return false;
+        }
+        for kind in 0..self.tables.len() {
+            for page in 0..self.tables[kind].len() as u32 {
+                self.fault_in(kind, page);
+            }
+        }
+        true
+    }
+
     /// Leaves the places of the first `n` pages of a kind in the spill to others.
     fn forget(&mut self, kind: usize, n: u32) {
         assert!(!self.places.goes_to_output(kind), "written once, and kept");
