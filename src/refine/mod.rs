@@ -55,7 +55,7 @@ const FEW: f64 = 0.02;
 const GROWTH: f64 = 1.5;
 
 /// A mesh that has grown by less than this since then is not numbered again in the end.
-const GROWTH_LAST: f64 = 1.03;
+const GROWTH_LAST: f64 = 1.10;
 
 /// Places for edges that are settled: three for each facet, which has one and a half edges, and 4 MB at most.
 const SETTLED_MAX: usize = 1 << 19;
