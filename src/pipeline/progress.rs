@@ -1,3 +1,7 @@
+//! What a run says while it works.
+
+use crate::optimize;
+
 /// What a long run says while it works.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Event {
@@ -9,6 +13,17 @@ pub struct Event {
     pub total: Option<u64>,
     /// What `done` and `total` count.
     pub unit: &'static str,
+}
+
+impl From<optimize::Progress> for Event {
+    fn from(progress: optimize::Progress) -> Self {
+        Self {
+            stage: progress.stage,
+            done: progress.done.into(),
+            total: Some(progress.total.into()),
+            unit: "pages",
+        }
+    }
 }
 
 /// Receives [`Event`]s, often; it must be quick.

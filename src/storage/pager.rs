@@ -499,6 +499,7 @@ fn or_raise<T>(done: Result<T, StorageError>) -> T {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::storage::StoreFile;
 
     const PER_PAGE: u32 = 1 << SLOT_BITS;
 
@@ -510,6 +511,43 @@ mod tests {
             };
             pager.write::<{ kind::TETS }>(page * PER_PAGE)[0] = u32_le::from_native(page);
         }
+    }
+
+    /// Of a mesh opened from its file, threads may look at pages nobody has asked for yet, where all find room.
+    #[test]
+    fn pages_of_a_file_are_shared_where_they_fit() -> Result<(), Box<dyn std::error::Error>> {
+        const N: u32 = 24;
+        let dir = tempfile::tempdir()?;
+        let path: DiskPath = dir.path().join("pages").into();
+        let backing = |generation, base| Backing {
+            subdomain: 0,
+            generation,
+            spill: dir.path().into(),
+            made: None,
+            base,
+            cache_bytes: 1 << 20,
+        };
+        let frames = |n: u32| u64::from(n) * FRAME_BYTES as u64;
+        let mut pager = Pager::new(frames(N), Some(backing(1, None)));
+        fill(&mut pager, 0, N);
+        let extents = pager.extents();
+        pager.end_generation(path.clone(), 2);
+        for (n, fit) in [(N - 1, false), (N, true)] {
+            let base = StoreFile::open_repaired(&path, 1 << 20, false)?;
+            let mut pager = Pager::new(frames(n), Some(backing(2, Some(base))));
+            pager.adopt(extents);
+            pager.read::<{ kind::TETS }>(3 * PER_PAGE);
+            let Some(shared) = pager.shared() else {
+                assert!(!fit, "{n} frames");
+                continue;
+            };
+            assert!(fit, "{n} frames");
+            for page in 0..N {
+                let found = shared.read_of(kind::TETS, page * PER_PAGE)[0].to_native();
+                assert_eq!(found, page);
+            }
+        }
+        Ok(())
     }
 
     /// Pages written behind the old ones, which are then dropped, take their places: files never hold more than both.

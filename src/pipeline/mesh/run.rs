@@ -12,7 +12,6 @@ use crate::bisect::{CutReport, load_of};
 use crate::boundary::RegionSummary;
 use crate::geom::{Aabb, HilbertFrame};
 use crate::mesh::{Mesh, Workspace, renumber};
-use crate::optimize;
 use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::estimate::n_subdomains;
 use crate::pipeline::plan::leases::Leases;
@@ -266,10 +265,6 @@ impl<'a> Run<'a> {
             dir: &scratch,
             memory: self.plan.buffers / 2,
         };
-        if report.recovery.missing_segments + report.recovery.missing_facets > 0 {
-            // Recovery leaves it as it came; Delaunay wherever that can be, points find smaller cavities: an eighth less time for a scan's division.
-            optimize::run(&mut mesh, optimize::Mode::None, &|_| ());
-        }
         renumber(&mut mesh, &HilbertFrame::new(&self.bounds), &space)?;
         let load = self.load(&mut mesh);
         // Where vertices nearly touch, sizes at a point are next to nothing and the estimate knows no bound; the mesh's own load does.

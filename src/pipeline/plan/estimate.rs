@@ -513,14 +513,11 @@ mod tests {
 
     #[test]
     fn a_large_mesh_has_fewer_subdomains_for_its_size() -> Result<(), PipelineError> {
-        let n = |millions: f64| Ok(n_subdomains(millions * 1e6, &Options::default())?.0);
-        let each = TETS_PER_SUBDOMAIN / 1e6;
-        assert_eq!(n(0.1 * each)?, 1);
-        assert_eq!(n(10.0 * each)?, 10);
-        assert_eq!(n(MANY * each)?, 32);
-        // From there on they grow, and then there are more of them.
-        assert_eq!(n(1.5 * MANY * each)?, 32);
-        assert_eq!(n(500.0 * each)?, 250);
+        let options = Options::default();
+        // From 32 on they grow, and when they are twice as large there are more of them.
+        for (shares, n) in [(0.1, 1), (10.0, 10), (32.0, 32), (48.0, 32), (500.0, 250)] {
+            assert_eq!(n_subdomains(shares * TETS_PER_SUBDOMAIN, &options)?.0, n);
+        }
         Ok(())
     }
 

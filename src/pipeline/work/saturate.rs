@@ -66,14 +66,7 @@ pub(crate) fn saturate_and_optimize<P: Pages>(
         });
     })?;
     let refined = clock.elapsed().as_secs_f64();
-    let optimize = optimize::run(mesh, common.mode, &|p: optimize::Progress| {
-        watch(Event {
-            stage: p.stage,
-            done: u64::from(p.done),
-            total: Some(u64::from(p.total)),
-            unit: "pages",
-        });
-    });
+    let optimize = optimize::run(mesh, common.mode, &|p| watch(p.into()));
     Ok(FineReport {
         refine,
         optimize,
