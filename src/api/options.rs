@@ -41,7 +41,7 @@ pub enum Seal {
 /// Into how many sub-domains the mesh is divided.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Subdomains {
-    /// One for each two million predicted tetrahedra; for each four million where there are 32 of them and more.
+    /// One for each two million predicted tetrahedra; above 64 million there are 32, which grow to four million each.
     #[default]
     Auto,
     /// So many, from 1; fewer where they would have less than 25,000 tetrahedra.

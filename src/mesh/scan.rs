@@ -1,4 +1,4 @@
-//! Looking at many pages of a mesh that nobody changes meanwhile: on all threads of the run when it is in memory.
+//! Looking at many pages of a mesh that nobody changes meanwhile: on all threads of the run when it is in memory and any is to spare.
 
 use rayon::prelude::*;
 use tetdb_schema::page::SLOT_BITS;

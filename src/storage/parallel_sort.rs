@@ -1,4 +1,4 @@
-//! Sorting in memory, on all threads of the run.
+//! Sorting in memory, on all threads of the run that are to spare.
 
 use std::cmp::Ordering;
 

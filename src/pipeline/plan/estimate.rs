@@ -28,7 +28,8 @@ const PREPARE_LEAST: usize = 8 << 20;
 /// Tetrahedra of one sub-domain, unless a number of sub-domains is asked for. With twice as many, two at once do not fit 512 MiB: 20 million then
 /// take 1.28 times as long as with 4 GiB, not 1.04, and with 128 MiB 1.75 times, not 1.24.
 const TETS_PER_SUBDOMAIN: f64 = (2u64 << 20) as f64;
-/// The same of a mesh so large that it has [`MANY`] of them in any case: half the cuts take a tenth less time in all, and who makes it has more memory.
+/// The same of a mesh so large that it has [`MANY`] of them in any case: 20 million in half as many
+/// take a tenth fewer CPU seconds. Within 512 MiB it is slower; who makes such meshes is taken to have more.
 const TETS_PER_SUBDOMAIN_MAX: f64 = 2.0 * TETS_PER_SUBDOMAIN;
 /// Sub-domains that are enough to be shared out among threads and machines.
 const MANY: f64 = 32.0;
