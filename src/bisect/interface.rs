@@ -7,8 +7,6 @@
 //!
 //! Source: the paper, section 1.1, "Choosing the interface", which makes the moves alone.
 
-use rayon::prelude::*;
-
 use super::core::CoreBoundary;
 use super::flow::{Arc, Graph};
 use super::interface_faces::interface_points;
@@ -17,7 +15,7 @@ use super::moves::{Moves, Steps};
 use super::surface::CuttingSurface;
 use crate::geom::Point;
 use crate::mesh::{Mesh, dense};
-use crate::storage::{Pages, check_cancelled, parallel};
+use crate::storage::{Pages, check_cancelled, for_each_mut};
 use tetdb_schema::page::NONE;
 
 /// Nodes of a graph that is cut at once; wider interfaces are cut strip by strip. Of 593,000 tetrahedra, strips of 400,000 choose 46,024 faces in
@@ -117,10 +115,8 @@ fn minimum_cut<P: Pages>(
             tets.sort_unstable();
             read_strip(core, labels, surface, tets, graph);
         }
-        parallel(|| {
-            cuts[..strips.len()].par_iter_mut().for_each(|(_, graph)| {
-                graph.cut();
-            })
+        for_each_mut(&mut cuts[..strips.len()], |(_, graph)| {
+            graph.cut();
         });
         for (tets, graph) in &cuts[..strips.len()] {
             label_strip(labels, tets, graph);

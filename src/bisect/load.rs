@@ -4,12 +4,10 @@
 //! middle. It is divided along its longest edge until h varies little between the corners and the edge is a bounded number of
 //! wanted lengths long; the pieces then have a closed form.
 
-use rayon::prelude::*;
-
 use crate::geom::Point;
 use crate::mesh::Mesh;
 use crate::sizing::load_of_tet;
-use crate::storage::{Pages, check_cancelled, parallel};
+use crate::storage::{Pages, check_cancelled, for_each_mut};
 
 /// Longest edge of a piece in units of its smallest h: a narrow dip of a field graded by 1.3 per unit length is not stepped over, and the load is known where it lies.
 const EDGE_MAX: f64 = 5.0;
@@ -72,14 +70,12 @@ pub fn tally<P: Pages, T: Send>(
             return lanes.map(|(_, sum)| sum);
         }
         check_cancelled();
-        parallel(|| {
-            lanes.par_iter_mut().for_each(|(tets, sum)| {
-                let mut stack = Vec::new();
-                for tet in &*tets {
-                    divide(*tet, h, &mut stack, &mut |piece| add(sum, piece));
-                }
-                tets.clear();
-            })
+        for_each_mut(&mut lanes, |(tets, sum)| {
+            let mut stack = Vec::new();
+            for tet in &*tets {
+                divide(*tet, h, &mut stack, &mut |piece| add(sum, piece));
+            }
+            tets.clear();
         });
     }
 }

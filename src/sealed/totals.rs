@@ -2,14 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use rayon::prelude::*;
 use tetdb_schema::chunk::TetSummary;
 use tetdb_schema::digest::Digest;
 use tetdb_schema::record::{FACES, SealedTet};
 
 use super::{Corner, FacePairs, Paired, Shape, quality_bin, sorted_face};
 use crate::geom::Aabb;
-use crate::storage::{parallel, spare_threads};
+use crate::storage::map_into;
 use tetdb_schema::catalog::QUALITY_BINS;
 use tetdb_schema::catalog::QualityRow;
 
@@ -125,18 +124,7 @@ impl Totals {
                 corners.push(corners_of(tet)?);
             }
             // Shapes in parallel, sums in order: the same for any number of threads.
-            let shape_of = |c: &[Corner; 4]| Shape::of(c.map(|c| c.point));
-            match spare_threads() {
-                1 => {
-                    shapes.clear();
-                    shapes.extend(corners.iter().map(shape_of));
-                }
-                _ => parallel(|| {
-                    (corners.par_iter().with_min_len(1024))
-                        .map(shape_of)
-                        .collect_into_vec(shapes)
-                }),
-            }
+            map_into(corners, shapes, |c| Shape::of(c.map(|c| c.point)));
             let known = piece.iter().zip(&*corners).zip(&*shapes);
             for (place, ((tet, corners), shape)) in (first..).zip(known) {
                 self.digest

@@ -54,7 +54,8 @@ pub use parallel_sort::sort_unstable_by;
 pub use places::Backing;
 pub use reserve::{filled, push, reserve};
 pub use run_context::{
-    CaughtPanic, RunContext, in_place_scope, join, n_threads, parallel, spare_threads,
+    CaughtPanic, RunContext, for_each_mut, in_place_scope, join, map_into, n_threads, parallel,
+    spare_threads,
 };
 pub use sort::{Sorted, Sorter};
 pub(crate) use sort_record::sort_record;

@@ -8,9 +8,13 @@ use std::panic::PanicHookInfo;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, Once, OnceLock, PoisonError};
 
+use rayon::prelude::*;
 use rayon::{Scope, ThreadPool, ThreadPoolBuilder};
 
 use super::cancel_token::CancelToken;
+
+/// Small items that are worth handing to another thread.
+const ITEMS_MIN: usize = 1024;
 
 thread_local! {
     static CURRENT: RefCell<Option<RunContext>> = const { RefCell::new(None) };
@@ -178,6 +182,32 @@ pub fn join<A: Send, B: Send>(
     }
 }
 
+/// Does `work` on each item, side by side where a thread is to spare.
+pub fn for_each_mut<T: Send>(items: &mut [T], work: impl Fn(&mut T) + Sync + Send) {
+    match spare_threads() {
+        1 => items.iter_mut().for_each(work),
+        _ => parallel(|| items.par_iter_mut().for_each(work)),
+    }
+}
+
+/// What `found` makes of each item, in their order, in place of what `all` held: side by side where a thread is to spare.
+pub fn map_into<T: Sync, U: Send>(
+    items: &[T],
+    all: &mut Vec<U>,
+    found: impl Fn(&T) -> U + Sync + Send,
+) {
+    match spare_threads() {
+        1 => {
+            all.clear();
+            all.extend(items.iter().map(found));
+        }
+        _ => parallel(|| {
+            let items = items.par_iter().with_min_len(ITEMS_MIN);
+            items.map(found).collect_into_vec(all);
+        }),
+    }
+}
+
 /// A scope whose tasks go to the pool of this run; `work` itself stays on this thread.
 pub fn in_place_scope<'scope, T>(work: impl FnOnce(&Scope<'scope>) -> T) -> T {
     let pool = RunContext::current().and_then(|context| context.pool);
@@ -226,8 +256,6 @@ impl Run {
 
 #[cfg(test)]
 mod tests {
-    use rayon::prelude::*;
-
     use super::*;
     use crate::storage::{StorageError, attempt, check_cancelled};
 
