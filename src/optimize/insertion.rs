@@ -5,8 +5,8 @@
 //! tetrahedron, or the sum of what is missing.
 
 use super::deficit::{Deficit, GAIN};
-use super::quality::inverse_quality;
-use super::smooth::{Star, raised};
+use super::quality::{face_bound, inverse_quality};
+use super::smooth::{ROUNDING, Star, raised};
 use crate::delaunay::{Kernel, Located};
 use crate::geom::orient;
 use crate::mesh::anatomy::{EDGES, FACES};
@@ -47,6 +47,14 @@ impl Inserter {
         better: Better,
     ) -> bool {
         let points = mesh.points(tet);
+        // The cavity keeps the required faces of what is in it, and one that allows no less is in every ball.
+        let is_needle = |i: usize| {
+            tet.is_required(i)
+                && face_bound(FACES[i].map(|k| points[k])) * (1.0 + ROUNDING) <= GOOD_MIN
+        };
+        if (0..4).any(is_needle) {
+            return false;
+        }
         let middle = |e: usize| (points[EDGES[e][0]] + points[EDGES[e][1]]) * 0.5;
         let length = |e: usize| (points[EDGES[e][0]] - points[EDGES[e][1]]).length_squared();
         let longest = (1..6).fold(0, |best, e| if length(e) > length(best) { e } else { best });

@@ -83,6 +83,18 @@ impl PageFlags {
         self
     }
 
+    /// The first flagged pages from `from` on, at most so many, if there are any; their flags are taken down.
+    pub(super) fn take_some(&mut self, mut from: u32, most: usize) -> Option<Vec<u32>> {
+        let mut pages = Vec::new();
+        while pages.len() < most
+            && let Some(page) = self.take_next(from)
+        {
+            from = page + 1;
+            pages.push(page);
+        }
+        (!pages.is_empty()).then_some(pages)
+    }
+
     /// The first flagged page from `from` on; its flag is taken down.
     pub(super) fn take_next(&mut self, from: u32) -> Option<u32> {
         let skipped = self.flags.get(from as usize..)?.iter().position(|&f| f)?;

@@ -40,15 +40,19 @@ fn parts([a, b, c, d]: [Point; 4]) -> Parts {
 pub fn inverse_quality(points: [Point; 4]) -> f64 {
     let p = parts(points);
     // The rounding error of `det` is below 1e-14 of the cube of the longest edge.
-    if p.det * p.det <= 1e-24 * (p.longest_squared * p.longest_squared * p.longest_squared)
-        || p.det < 0.0
-    {
-        let [a, b, c, d] = points;
-        if orient(a, b, c, d) <= 0.0 {
-            return f64::NEG_INFINITY;
+    let is_sure =
+        p.det * p.det > 1e-24 * (p.longest_squared * p.longest_squared * p.longest_squared);
+    let is_positive = match is_sure {
+        true => p.det > 0.0,
+        false => {
+            let [a, b, c, d] = points;
+            orient(a, b, c, d) > 0.0
         }
+    };
+    match is_positive {
+        true => ratio(&p).max(0.0),
+        false => f64::NEG_INFINITY,
     }
-    ratio(&p).max(0.0)
 }
 
 /// det / (α · longest edge · 2 · sum of areas), without asking for the sign.

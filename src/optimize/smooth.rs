@@ -14,7 +14,7 @@ const FRACTIONS: [f64; 5] = [0.1, 0.25, 0.45, 0.7, 1.0];
 const GAIN_MIN: f64 = 1.03;
 const GAIN_LEAST: f64 = 0.003;
 /// More than rounding makes of sums and of bounds.
-const ROUNDING: f64 = 1e-9;
+pub(super) const ROUNDING: f64 = 1e-9;
 /// Steps of the search per vertex.
 const SEARCH_STEPS: usize = 12;
 /// A search without any gain so far ends after this many halvings of its step: what is nearer gains too little.
@@ -166,8 +166,11 @@ impl Star {
     /// Moves the vertex when that raises the worst goodness of its ball; the mesh is changed only then.
     pub(super) fn improve<P: Pages>(&mut self, mesh: &mut Mesh<P>, enough: f64) -> bool {
         let worst = self.value(self.at, f64::NEG_INFINITY);
+        if worst >= enough {
+            return false;
+        }
         let bound = self.bound();
-        if worst >= enough.min(bound / GAIN_MIN) {
+        if worst >= bound / GAIN_MIN {
             return false;
         }
         match self.search(raised(worst), enough.min(bound * CONTENT)) {

@@ -3,8 +3,8 @@
 use crate::mesh::{Mesh, Tet};
 use crate::storage::Pages;
 
-/// Up to this many tetrahedra are found again by looking through the list.
-const LISTED_MAX: usize = 48;
+/// Places of the table at first, most of which stay empty.
+const PLACES: usize = 256;
 
 /// The ball of a vertex, copied out of the mesh; its buffers are meant to be used again.
 #[derive(Clone, Debug, Default)]
@@ -21,8 +21,9 @@ pub struct Ball {
     pub closed: bool,
     /// Whether some face at `v` is required.
     pub required: bool,
-    /// Open addressing over tetrahedra, used by large balls; `u32::MAX` is an empty place.
-    table: Vec<u32>,
+    /// Open addressing over tetrahedra: the turn in the high half, the tetrahedron in the low one; places of other turns are empty.
+    table: Vec<u64>,
+    turn: u32,
 }
 
 impl Ball {
@@ -41,7 +42,7 @@ impl Ball {
         self.tets.clear();
         self.records.clear();
         self.locals.clear();
-        self.table.clear();
+        self.begin_turn();
         (self.closed, self.required) = (true, false);
         if start >= mesh.tet_ids_end() {
             return false;
@@ -84,36 +85,50 @@ impl Ball {
         self.gather(mesh, v, start, tets_max)
     }
 
+    /// Empties the table.
+    fn begin_turn(&mut self) {
+        match self.turn.checked_add(1) {
+            Some(turn) if !self.table.is_empty() => self.turn = turn,
+            _ => {
+                self.table.clear();
+                self.table.resize(PLACES, 0);
+                self.turn = 1;
+            }
+        }
+    }
+
     #[inline]
     fn push(&mut self, t: u32, record: Tet, local: usize) {
         self.tets.push(t);
         self.records.push(record);
         self.locals.push(local as u8);
-        let n = self.tets.len();
-        if n > LISTED_MAX {
-            if 2 * n > self.table.len() {
-                let size = (4 * n).next_power_of_two();
-                self.table.clear();
-                self.table.resize(size, u32::MAX);
-                for k in 0..n {
-                    self.enter(self.tets[k]);
-                }
-            } else {
-                self.enter(t);
+        if 2 * self.tets.len() <= self.table.len() {
+            self.enter(t);
+        } else {
+            let size = 2 * self.table.len();
+            self.table.clear();
+            self.table.resize(size, 0);
+            for k in 0..self.tets.len() {
+                self.enter(self.tets[k]);
             }
         }
     }
 
     fn enter(&mut self, t: u32) {
         let at = self.place(t);
-        self.table[at] = t;
+        self.table[at] = self.entry(t);
+    }
+
+    fn entry(&self, t: u32) -> u64 {
+        u64::from(self.turn) << 32 | u64::from(t)
     }
 
     /// Where `t` is in the table, or would be.
+    #[inline]
     fn place(&self, t: u32) -> usize {
-        let mask = self.table.len() - 1;
+        let (mask, entry) = (self.table.len() - 1, self.entry(t));
         let mut at = (t.wrapping_mul(0x9E37_79B1) >> 7) as usize & mask;
-        while self.table[at] != u32::MAX && self.table[at] != t {
+        while self.table[at] != entry && (self.table[at] >> 32) as u32 == self.turn {
             at = (at + 1) & mask;
         }
         at
@@ -121,10 +136,6 @@ impl Ball {
 
     #[inline]
     fn has(&self, t: u32) -> bool {
-        if self.tets.len() <= LISTED_MAX {
-            self.tets.contains(&t)
-        } else {
-            self.table[self.place(t)] == t
-        }
+        self.table[self.place(t)] == self.entry(t)
     }
 }

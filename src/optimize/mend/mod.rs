@@ -27,12 +27,13 @@ mod vertex;
 mod window;
 
 use std::collections::{BinaryHeap, HashSet};
+use std::sync::{Mutex, PoisonError};
 
 use super::pages::PageFlags;
 use crate::geom::{Point, STEP, mix};
-use crate::mesh::{Mesh, Tet, tets_of_page};
+use crate::mesh::{Mesh, Scan, Tet, scan_parts, tets_of_page};
 use crate::storage::{Pages, check_cancelled};
-use face_bounds::Measure;
+use face_bounds::{FaceBounds, Measure};
 pub use operator::MendCounts;
 use operator::{Attacks, Operator};
 use stages::{Judgment, STAGES, Stage, WORST, judge};
@@ -48,10 +49,68 @@ fn name(points: [Point; 4]) -> u64 {
     words.fold(0, |name, x| mix(name.wrapping_add(STEP) ^ x.to_bits()))
 }
 
+/// Pages judged at a time.
+const PAGES_LISTED: usize = 32;
+
+/// Judges the tetrahedra of a page.
+struct Listing<'a> {
+    stage: &'a Stage,
+    /// The worst found in earlier pages.
+    worst: f64,
+    judges: &'a Judges,
+}
+
+/// Bounds known to those who judge side by side; what they say does not depend on who has met which.
+#[derive(Default)]
+struct Judges(Mutex<Vec<FaceBounds>>);
+
+/// What was found in a page.
+#[derive(Default)]
+struct ListedPage {
+    /// Bits of the badness, and the tetrahedron.
+    bad: Vec<(u64, u32)>,
+    has_bad: bool,
+    /// The worst q that the surface forces.
+    forced: f64,
+}
+
+impl Scan for Listing<'_> {
+    type Part = u32;
+    type Output = ListedPage;
+
+    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &page: &u32) -> ListedPage {
+        let all = || self.judges.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let bounds = all().pop();
+        let mut bounds = bounds.unwrap_or_default();
+        let mut listed = ListedPage::default();
+        let mut worst = self.worst;
+        tets_of_page(mesh, page, |mesh, t, tet| {
+            if self.stage.is_for_later(mesh, &tet, worst) {
+                listed.has_bad = true;
+                return;
+            }
+            match judge(mesh, &tet, self.stage, &mut bounds) {
+                Judgment::Good => {}
+                // One without volume in doubles says nothing about others.
+                Judgment::Forced(q) if q.is_infinite() => {}
+                Judgment::Forced(q) => listed.forced = listed.forced.max(q),
+                Judgment::Bad(badness) => {
+                    listed.bad.push((badness.to_bits(), t));
+                    listed.has_bad = true;
+                    worst = worst.max(badness);
+                }
+            }
+        });
+        all().push(bounds);
+        listed
+    }
+}
+
 /// Scratch and queue of all passes.
 #[derive(Default)]
 pub(super) struct Mender {
     operator: Operator,
+    judges: Judges,
     window: Window,
     /// Of the threads that look ahead.
     operators: Vec<Operator>,
@@ -112,35 +171,30 @@ impl Mender {
         stage: &Stage,
     ) -> Vec<(u64, u32)> {
         let most = stage.tried_max(mesh.n_tets());
-        let bounds = &mut self.operator.bounds;
         let mut list = Vec::new();
         let (mut forced, mut worst) = (0.0f64, 0.0f64);
         let mut bad = PageFlags::default();
         let mut from = 0;
-        while let Some(page) = pages.take_next(from) {
-            check_cancelled();
-            from = page + 1;
-            tets_of_page(mesh, page, |mesh, t, tet| {
-                if stage.is_for_later(mesh, &tet, worst) {
-                    bad.raise(t);
-                    return;
+        while let Some(some) = pages.take_some(from, PAGES_LISTED) {
+            from = some[some.len() - 1] + 1;
+            let judges = &self.judges;
+            let listing = Listing {
+                stage,
+                worst,
+                judges,
+            };
+            for (&page, listed) in some.iter().zip(scan_parts(mesh, &some, &listing)) {
+                if listed.has_bad {
+                    bad.raise_page(page);
                 }
-                match judge(mesh, &tet, stage, bounds) {
-                    Judgment::Good => {}
-                    // One without volume in doubles says nothing about others.
-                    Judgment::Forced(q) if q.is_infinite() => {}
-                    Judgment::Forced(q) => forced = forced.max(q),
-                    Judgment::Bad(badness) => {
-                        list.push((badness.to_bits(), t));
-                        bad.raise(t);
-                        worst = worst.max(badness);
-                    }
-                }
-            });
+                forced = forced.max(listed.forced);
+                list.extend(listed.bad);
+            }
             if list.len() >= 2 * most {
                 list.sort_unstable_by(|a, b| b.cmp(a));
                 list.truncate(most);
             }
+            worst = (list.iter()).fold(worst, |worst, &(bits, _)| worst.max(f64::from_bits(bits)));
         }
         *pages = bad;
         self.forced = forced;
