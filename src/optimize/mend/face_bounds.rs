@@ -66,9 +66,9 @@ struct Known {
 }
 
 impl Default for FaceBounds {
-    /// Of about 2 MB.
+    /// Of some 8 MB at most.
     fn default() -> Self {
-        Self::remembering(1 << 16)
+        Self::remembering(1 << 17)
     }
 }
 
