@@ -34,7 +34,10 @@ pub fn scan_parts<P: Pages, S: Scan>(
         };
         return parallel(|| parts.par_iter().map(found).collect());
     }
-    let found = |part| scan.scan(mesh, part);
+    let found = |part| {
+        check_cancelled();
+        scan.scan(mesh, part)
+    };
     parts.iter().map(found).collect()
 }
 

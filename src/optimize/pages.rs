@@ -83,16 +83,13 @@ impl PageFlags {
         self
     }
 
-    /// The first flagged pages from `from` on, at most so many, if there are any; their flags are taken down.
-    pub(super) fn take_some(&mut self, mut from: u32, most: usize) -> Option<Vec<u32>> {
-        let mut pages = Vec::new();
-        while pages.len() < most
-            && let Some(page) = self.take_next(from)
-        {
-            from = page + 1;
-            pages.push(page);
-        }
-        (!pages.is_empty()).then_some(pages)
+    /// All flagged pages, in order; their flags are taken down.
+    pub(super) fn take_all(&mut self) -> Vec<u32> {
+        let flags = std::mem::take(&mut self.flags);
+        (0..)
+            .zip(flags)
+            .filter_map(|(page, f)| f.then_some(page))
+            .collect()
     }
 
     /// The first flagged page from `from` on; its flag is taken down.

@@ -42,16 +42,16 @@ pub fn inverse_quality(points: [Point; 4]) -> f64 {
     // The rounding error of `det` is below 1e-14 of the cube of the longest edge.
     let is_sure =
         p.det * p.det > 1e-24 * (p.longest_squared * p.longest_squared * p.longest_squared);
-    let is_positive = match is_sure {
-        true => p.det > 0.0,
-        false => {
-            let [a, b, c, d] = points;
-            orient(a, b, c, d) > 0.0
-        }
+    let is_positive = if is_sure {
+        p.det > 0.0
+    } else {
+        let [a, b, c, d] = points;
+        orient(a, b, c, d) > 0.0
     };
-    match is_positive {
-        true => ratio(&p).max(0.0),
-        false => f64::NEG_INFINITY,
+    if is_positive {
+        ratio(&p).max(0.0)
+    } else {
+        f64::NEG_INFINITY
     }
 }
 

@@ -139,3 +139,33 @@ impl Ball {
         self.table[self.place(t)] == self.entry(t)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::FaceRef;
+
+    #[test]
+    fn the_table_forgets_and_grows() {
+        let record = Tet {
+            node: [0; 4],
+            neighbor: [FaceRef::NONE; 4],
+        };
+        let mut ball = Ball::default();
+        for turn in [1, 2, u32::MAX, 1, 2] {
+            ball.begin_turn();
+            assert_eq!(ball.turn, turn);
+            ball.tets.clear();
+            // Ids that share places, and more of them than there are places at first.
+            for k in 0..3 * PLACES as u32 {
+                assert!(!ball.has(k << 20), "turn {turn}");
+                ball.push(k << 20, record, 0);
+                assert!(ball.has(k << 20) && ball.has(0) && !ball.has(k << 20 | 1));
+            }
+            assert!((0..3 * PLACES as u32).all(|k| ball.has(k << 20)));
+            if turn == 2 {
+                ball.turn = u32::MAX - 1;
+            }
+        }
+    }
+}

@@ -66,9 +66,9 @@ struct Known {
 }
 
 impl Default for FaceBounds {
-    /// Of some 8 MB at most.
+    /// Of the surface of a large part, in 5 MB; of tetrahedra between several faces as many in 4 MB.
     fn default() -> Self {
-        Self::remembering(1 << 17)
+        Self::remembering(7 << 14)
     }
 }
 

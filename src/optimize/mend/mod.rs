@@ -19,6 +19,7 @@
 mod cavity;
 mod face_bounds;
 mod kernel;
+mod list;
 mod operator;
 mod refill;
 mod stages;
@@ -27,16 +28,16 @@ mod vertex;
 mod window;
 
 use std::collections::{BinaryHeap, HashSet};
-use std::sync::{Mutex, PoisonError};
 
 use super::pages::PageFlags;
 use crate::geom::{Point, STEP, mix};
-use crate::mesh::{Mesh, Scan, Tet, scan_parts, tets_of_page};
+use crate::mesh::{Mesh, Tet};
 use crate::storage::{Pages, check_cancelled};
-use face_bounds::{FaceBounds, Measure};
+use face_bounds::Measure;
+use list::Judges;
 pub use operator::MendCounts;
 use operator::{Attacks, Operator};
-use stages::{Judgment, STAGES, Stage, WORST, judge};
+use stages::{STAGES, Stage, WORST, judge};
 use star::Goal;
 use window::Window;
 
@@ -47,63 +48,6 @@ const SWEEPS_MAX: u32 = 60;
 fn name(points: [Point; 4]) -> u64 {
     let words = points.into_iter().flat_map(|p| p.to_array());
     words.fold(0, |name, x| mix(name.wrapping_add(STEP) ^ x.to_bits()))
-}
-
-/// Pages judged at a time.
-const PAGES_LISTED: usize = 32;
-
-/// Judges the tetrahedra of a page.
-struct Listing<'a> {
-    stage: &'a Stage,
-    /// The worst found in earlier pages.
-    worst: f64,
-    judges: &'a Judges,
-}
-
-/// Bounds known to those who judge side by side; what they say does not depend on who has met which.
-#[derive(Default)]
-struct Judges(Mutex<Vec<FaceBounds>>);
-
-/// What was found in a page.
-#[derive(Default)]
-struct ListedPage {
-    /// Bits of the badness, and the tetrahedron.
-    bad: Vec<(u64, u32)>,
-    has_bad: bool,
-    /// The worst q that the surface forces.
-    forced: f64,
-}
-
-impl Scan for Listing<'_> {
-    type Part = u32;
-    type Output = ListedPage;
-
-    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &page: &u32) -> ListedPage {
-        let all = || self.judges.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let bounds = all().pop();
-        let mut bounds = bounds.unwrap_or_default();
-        let mut listed = ListedPage::default();
-        let mut worst = self.worst;
-        tets_of_page(mesh, page, |mesh, t, tet| {
-            if self.stage.is_for_later(mesh, &tet, worst) {
-                listed.has_bad = true;
-                return;
-            }
-            match judge(mesh, &tet, self.stage, &mut bounds) {
-                Judgment::Good => {}
-                // One without volume in doubles says nothing about others.
-                Judgment::Forced(q) if q.is_infinite() => {}
-                Judgment::Forced(q) => listed.forced = listed.forced.max(q),
-                Judgment::Bad(badness) => {
-                    listed.bad.push((badness.to_bits(), t));
-                    listed.has_bad = true;
-                    worst = worst.max(badness);
-                }
-            }
-        });
-        all().push(bounds);
-        listed
-    }
 }
 
 /// Scratch and queue of all passes.
@@ -170,37 +114,12 @@ impl Mender {
         pages: &mut PageFlags,
         stage: &Stage,
     ) -> Vec<(u64, u32)> {
-        let most = stage.tried_max(mesh.n_tets());
-        let mut list = Vec::new();
-        let (mut forced, mut worst) = (0.0f64, 0.0f64);
-        let mut bad = PageFlags::default();
-        let mut from = 0;
-        while let Some(some) = pages.take_some(from, PAGES_LISTED) {
-            from = some[some.len() - 1] + 1;
-            let judges = &self.judges;
-            let listing = Listing {
-                stage,
-                worst,
-                judges,
-            };
-            for (&page, listed) in some.iter().zip(scan_parts(mesh, &some, &listing)) {
-                if listed.has_bad {
-                    bad.raise_page(page);
-                }
-                forced = forced.max(listed.forced);
-                list.extend(listed.bad);
-            }
-            if list.len() >= 2 * most {
-                list.sort_unstable_by(|a, b| b.cmp(a));
-                list.truncate(most);
-            }
-            worst = (list.iter()).fold(worst, |worst, &(bits, _)| worst.max(f64::from_bits(bits)));
-        }
-        *pages = bad;
-        self.forced = forced;
-        list.sort_unstable_by(|a, b| b.cmp(a));
-        list.truncate(most);
-        list
+        // One of those who judge knows what the operator has met, who is told what that one has.
+        self.judges.lend(&mut self.operator.bounds);
+        let listed = list::list(mesh, pages, stage, &self.judges);
+        self.judges.take_back(&mut self.operator.bounds);
+        self.forced = listed.forced;
+        listed.bad
     }
 
     /// Moves the inner vertices of the listed tetrahedra, in sweeps.

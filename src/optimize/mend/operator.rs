@@ -90,7 +90,7 @@ impl Operator {
     /// One of those that try ahead, each thread has one: they remember less.
     pub(super) fn ahead() -> Self {
         Self {
-            bounds: FaceBounds::remembering(1 << 15),
+            bounds: FaceBounds::remembering(7 << 12),
             ..Self::default()
         }
     }
