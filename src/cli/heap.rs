@@ -3,13 +3,14 @@
 //! The ledger counts what is held. But the allocator of the GNU C library keeps what a thread gave back for that thread's next
 //! requests, and learns from each large block that is freed to keep blocks of its size, up to 32 MiB. Measured: a run in six sub-domains
 //! with two threads and a cap of 224 MiB held 199 MiB at most and had 339 MiB resident; with blocks from 256 KiB on mapped for themselves
-//! and few heaps, which are swept, 100 MiB less.
+//! and few heaps, which are swept, 258 MiB.
 
 /// Blocks of this many bytes go back to the system when they are freed.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 const MAPPED_FROM: i32 = 256 << 10;
 
-/// Heaps for all threads. With one they wait for each other: mending with two took as long as with one. With four 1 MiB more is resident.
+/// Heaps for all threads. With one they wait for each other: a surface whose mesh is mostly mended took two threads as long as one. With four, two
+/// threads have 1 MiB more resident at most.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 const HEAPS: i32 = 4;
 
@@ -28,7 +29,7 @@ pub fn keep_little() {
 /// Gives back, from now on and every so often, the pages of smaller blocks in which nothing lies any more.
 ///
 /// Blocks of all ages lie side by side in a heap, so that its end hardly ever falls free. Measured: 20 million tetrahedra with two threads
-/// and a cap of 128 MiB had 160 MiB resident at most, without this 170 MiB.
+/// and a cap of 128 MiB had 160 MiB resident at most, without this 170 MiB (one heap).
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 #[allow(unsafe_code)]
 pub fn keep_sweeping() {

@@ -57,3 +57,33 @@ pub fn tets_of_page<P: Pages>(
         each(mesh, t, tet);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::storage::{CancelToken, FlatPages, RunContext, StorageError, attempt};
+
+    struct Count;
+
+    impl Scan for Count {
+        type Part = u32;
+        type Output = u32;
+
+        fn scan<P: Pages>(&self, _: &mut Mesh<P>, &part: &u32) -> u32 {
+            part + 1
+        }
+    }
+
+    #[test]
+    fn a_scan_ends_with_its_run_whoever_does_it() {
+        for threads in [1, 2] {
+            let token = CancelToken::new();
+            let run = RunContext::new(threads, token.clone());
+            let mut mesh = Mesh::new(FlatPages::default());
+            let mut found = || run.enter(|| attempt(|| scan_parts(&mut mesh, &[0, 1], &Count)));
+            assert_eq!(found().expect("it goes on"), [1, 2]);
+            token.cancel();
+            assert!(matches!(found(), Err(StorageError::Cancelled)));
+        }
+    }
+}
