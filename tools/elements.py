@@ -135,17 +135,7 @@ def compare(surface, args):
     """One row: a cell for each mesher."""
     with tempfile.TemporaryDirectory() as directory:
         program = args.new if args.new != "-" else args.old
-        path = os.path.join(directory, "surface.ply")
-        command = None
-        if surface.startswith("sample:"):
-            command = ["sample", surface, "-o", path]
-        elif surface.endswith((".ply", ".stl", ".off", ".obj")):
-            path = surface
-        else:
-            # Formats the others do not read: the same triangles, none of them longer than asked for.
-            command = ["refine-surface", surface, path, "--hsiz", "1e30"]
-        if command:
-            subprocess.run([program, *command], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        path = peers.surface_file(program, surface, directory)
         points, triangles = peers.read_surface(path)
         points, number = np.unique(points, axis=0, return_inverse=True)
         triangles = number.reshape(-1)[triangles].astype(np.int64)

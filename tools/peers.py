@@ -279,17 +279,18 @@ def median(runs, key):
     return float(np.median([r[key] for r in runs]))
 
 
-def compare(surface, args, directory):
+def surface_file(program, surface, directory):
+    """A file of the surface, or of the sample, that all meshers read: its own, or the same triangles in another format."""
+    if os.path.exists(surface) and surface.endswith((".ply", ".stl", ".off", ".obj")):
+        return surface
     made = os.path.join(directory, "surface.ply")
-    if not os.path.exists(surface):
-        subprocess.run([args.tetdb, "sample", surface, "-o", made], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        path = made
-    elif not surface.endswith((".ply", ".stl", ".off", ".obj")):
-        # Formats the others do not read: the same triangles, none of them longer than asked for.
-        subprocess.run([args.tetdb, "refine-surface", surface, made, "--hsiz", "1e30"], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        path = made
-    else:
-        path = surface
+    command = ["check", surface, "--repair", "--write", made] if os.path.exists(surface) else ["sample", surface, "-o", made]
+    subprocess.run([program, *command], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    return made
+
+
+def compare(surface, args, directory):
+    path = surface_file(args.tetdb, surface, directory)
     arrays = os.path.join(directory, "surface.npz")
     points, triangles = read_surface(path)
     points, number = np.unique(points, axis=0, return_inverse=True)

@@ -75,9 +75,7 @@ def main():
     for surface in args.surface:
         cells = []
         with tempfile.TemporaryDirectory() as directory:
-            path = os.path.join(directory, "surface.ply")
-            command = ["sample", surface, "-o", path] if surface.startswith("sample:") else ["refine-surface", surface, path, "--hsiz", "1e30"]
-            subprocess.run([args.program, *command], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            path = peers.surface_file(args.program, surface, directory)
             points, triangles = peers.read_surface(path)
             points, number = np.unique(points, axis=0, return_inverse=True)
             arrays = os.path.join(directory, "surface.npz")

@@ -1,8 +1,11 @@
 //! What is bad in the eyes of a stage: pages are judged side by side.
 
+use std::cmp::Reverse;
+use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 
 use super::super::pages::PageFlags;
+use super::super::smooth::is_free;
 use super::face_bounds::FaceBounds;
 use super::stages::{Judgment, Stage, judge};
 use crate::mesh::{Mesh, Scan, scan_parts, tets_of_page};
@@ -63,12 +66,7 @@ pub(super) fn list<P: Pages>(
     let mut all = Listed::default();
     for some in pages.take_all().chunks(PAGES) {
         let worst = all.worst;
-        let listing = Listing {
-            stage,
-            worst,
-            judges,
-        };
-        for (&page, listed) in some.iter().zip(scan_parts(mesh, some, &listing)) {
+        for (&page, listed) in some.iter().zip(judged(mesh, some, stage, worst, judges)) {
             if listed.has_bad {
                 pages.raise_page(page);
             }
@@ -82,6 +80,48 @@ pub(super) fn list<P: Pages>(
     }
     keep_worst(&mut all.bad, most);
     all
+}
+
+/// The vertices that may move of all bad tetrahedra in the flagged pages, each with the worst it has, worst first and in the order of its corners.
+pub(super) fn list_movable<P: Pages>(
+    mesh: &mut Mesh<P>,
+    pages: &PageFlags,
+    stage: &Stage,
+    judges: &Judges,
+) -> Vec<(u32, u32)> {
+    let mut worst: HashMap<u32, (u64, u32, Reverse<usize>)> = HashMap::new();
+    for some in pages.clone().take_all().chunks(PAGES) {
+        for listed in judged(mesh, some, stage, 0.0, judges) {
+            for (bits, t) in listed.bad {
+                for (i, v) in mesh.tet(t).vertices().into_iter().enumerate() {
+                    if is_free(mesh, v) {
+                        let this = (bits, t, Reverse(i));
+                        let known = worst.entry(v).or_insert(this);
+                        *known = this.max(*known);
+                    }
+                }
+            }
+        }
+    }
+    let mut list: Vec<_> = worst.into_iter().collect();
+    list.sort_unstable_by_key(|&(_, worst)| Reverse(worst));
+    list.into_iter().map(|(v, (_, t, _))| (v, t)).collect()
+}
+
+/// What is bad in each of some pages.
+fn judged<P: Pages>(
+    mesh: &mut Mesh<P>,
+    pages: &[u32],
+    stage: &Stage,
+    worst: f64,
+    judges: &Judges,
+) -> Vec<Listed> {
+    let listing = Listing {
+        stage,
+        worst,
+        judges,
+    };
+    scan_parts(mesh, pages, &listing)
 }
 
 fn keep_worst(bad: &mut Vec<(u64, u32)>, most: usize) {

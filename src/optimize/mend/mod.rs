@@ -27,10 +27,9 @@ mod star;
 mod vertex;
 mod window;
 
-use std::collections::{BinaryHeap, HashSet};
+use std::collections::{BinaryHeap, HashMap, HashSet};
 
 use super::pages::PageFlags;
-use crate::geom::{Point, STEP, mix};
 use crate::mesh::{Mesh, Tet};
 use crate::storage::{Pages, check_cancelled};
 use face_bounds::Measure;
@@ -39,16 +38,11 @@ pub use operator::MendCounts;
 use operator::{Attacks, Operator};
 use stages::{STAGES, Stage, WORST, judge};
 use star::Goal;
+use vertex::{LIFTED_MAX, name};
 use window::Window;
 
 /// Sweeps of moves for the product at most: where vertices hold each other, heights double in each.
 const SWEEPS_MAX: u32 = 60;
-
-/// A tetrahedron by its vertices' positions.
-fn name(points: [Point; 4]) -> u64 {
-    let words = points.into_iter().flat_map(|p| p.to_array());
-    words.fold(0, |name, x| mix(name.wrapping_add(STEP) ^ x.to_bits()))
-}
 
 /// Scratch and queue of all passes.
 #[derive(Default)]
@@ -62,6 +56,8 @@ pub(super) struct Mender {
     queue: BinaryHeap<(u64, u32)>,
     /// Names of what was tried in vain.
     failed: HashSet<u64>,
+    /// Names of balls whose vertex does not move for the product, and whether they are flat.
+    at_rest: HashMap<u64, bool>,
     /// The worst q in the last list's pages that the surface forces.
     forced: f64,
     /// Vertices around which something changed in this pass, and in the one before.
@@ -88,11 +84,11 @@ impl Mender {
         for stage in &STAGES {
             let mut flags = pages.clone();
             self.failed.clear();
+            self.at_rest.clear();
             for _ in 0..stage.passes_max {
                 let before = self.operator.counts.changes();
                 if stage.goal == Goal::Quality {
-                    let list = self.list(mesh, &mut flags.clone(), stage);
-                    self.lift(mesh, &list);
+                    self.lift(mesh, &flags, stage);
                 }
                 let list = self.list(mesh, &mut flags, stage);
                 let Some(stage) = stage.at(&list, self.forced) else {
@@ -114,37 +110,61 @@ impl Mender {
         pages: &mut PageFlags,
         stage: &Stage,
     ) -> Vec<(u64, u32)> {
-        // One of those who judge knows what the operator has met, who is told what that one has.
-        self.judges.lend(&mut self.operator.bounds);
-        let listed = list::list(mesh, pages, stage, &self.judges);
-        self.judges.take_back(&mut self.operator.bounds);
+        let listed = self.judged(|judges| list::list(mesh, pages, stage, judges));
         self.forced = listed.forced;
         listed.bad
     }
 
-    /// Moves the inner vertices of the listed tetrahedra, in sweeps.
-    fn lift<P: Pages>(&mut self, mesh: &mut Mesh<P>, list: &[(u64, u32)]) {
-        let mut seen = HashSet::new();
-        let mut vertices = Vec::new();
-        for &(_, t) in list {
-            let tet = mesh.tet(t);
-            let new = tet.vertices().into_iter().filter(|&v| seen.insert(v));
+    /// Does what needs judges, one of whom knows what the operator has met, who is told what that one has.
+    fn judged<T>(&mut self, work: impl FnOnce(&Judges) -> T) -> T {
+        self.judges.lend(&mut self.operator.bounds);
+        let done = work(&self.judges);
+        self.judges.take_back(&mut self.operator.bounds);
+        done
+    }
+
+    /// Moves the inner vertices of the bad tetrahedra in the flagged pages, in sweeps: of the flat ones, however many there are, for each that stays
+    /// where it is holds others, and of those listed.
+    fn lift<P: Pages>(&mut self, mesh: &mut Mesh<P>, pages: &PageFlags, stage: &Stage) {
+        let flat = stage.of_flat();
+        let mut vertices = self.judged(|judges| list::list_movable(mesh, pages, &flat, judges));
+        let mut seen: HashSet<u32> = vertices.iter().map(|&(v, _)| v).collect();
+        for (_, t) in self.list(mesh, &mut pages.clone(), stage) {
+            let new = mesh
+                .tet(t)
+                .vertices()
+                .into_iter()
+                .filter(|&v| seen.insert(v));
             vertices.extend(new.map(|v| (v, t)));
         }
         for _ in 0..SWEEPS_MAX {
             check_cancelled();
             let before = self.operator.counts.vertices_moved;
             vertices.retain(|&(v, t)| {
-                let Operator { mover, bounds, .. } = &mut self.operator;
+                let Operator {
+                    mover,
+                    bounds,
+                    counts,
+                    ..
+                } = &mut self.operator;
                 // No triangle's bound counts in a product.
                 let mut plain = bounds.by(Measure::Quality(f64::INFINITY));
-                if !mover.gather(mesh, v, t, &mut plain) {
+                if !mover.gather(mesh, v, t, LIFTED_MAX, &mut plain) {
                     return false;
                 }
+                let around = mover.name(mesh);
+                if let Some(&is_flat) = self.at_rest.get(&around) {
+                    return is_flat;
+                }
                 let is_moved = mover.raise_product(mesh);
-                self.operator.counts.vertices_moved += u64::from(is_moved);
+                counts.vertices_moved += u64::from(is_moved);
+                if is_moved {
+                    return true;
+                }
                 // One that is stuck between others in a cluster may move after them.
-                is_moved || self.operator.mover.is_flat()
+                let is_flat = mover.is_flat();
+                self.at_rest.insert(around, is_flat);
+                is_flat
             });
             if self.operator.counts.vertices_moved == before {
                 break;

@@ -9,7 +9,7 @@ use super::face_bounds::{FaceBounds, value_of};
 use super::refill::Refill;
 use super::stages::Stage;
 use super::star::{Aim, Goal};
-use super::vertex::Mover;
+use super::vertex::{BALL_MAX, Mover};
 use crate::geom::Point;
 use crate::mesh::{Draft, Mesh, Tet, Trial};
 use crate::storage::Pages;
@@ -135,7 +135,9 @@ impl Operator {
         let mut best = stage.gain_min * own;
         let mut way = Way::None;
         for v in tet.vertices() {
-            if best < enough && self.mover.gather(mesh, v, t, &mut self.bounds.by(measure)) {
+            if best < enough
+                && (self.mover).gather(mesh, v, t, BALL_MAX, &mut self.bounds.by(measure))
+            {
                 let found = (self.mover).raise_least(mesh, aim, best, &mut self.bounds.by(measure));
                 if let Some((at, value)) = found.filter(|found| found.1 > best) {
                     (best, way) = (value, Way::Move(v, at));

@@ -13,6 +13,7 @@ use super::super::bound::face_floor;
 use super::super::quality::{is_below, quality};
 use super::face_bounds::FaceBounds;
 use super::star::Goal;
+use super::vertex::FLAT;
 use crate::mesh::{Mesh, Tet};
 use crate::storage::Pages;
 
@@ -89,6 +90,14 @@ pub(super) const STAGES: [Stage; 5] = [
 ];
 
 impl Stage {
+    /// The same where only those are bad that are flat.
+    pub(super) fn of_flat(&self) -> Self {
+        Self {
+            quality_max: 1.0 / FLAT,
+            ..*self
+        }
+    }
+
     /// Most tetrahedra of a pass, of a mesh of so many.
     pub(super) fn tried_max(&self, n_tets: u32) -> usize {
         TRIED_MIN + (n_tets / self.one_in) as usize

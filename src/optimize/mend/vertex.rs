@@ -4,13 +4,15 @@ use super::super::climb::Climb;
 use super::super::smooth::is_free;
 use super::face_bounds::{Weights, value_of};
 use super::star::{Aim, Cost, Goal, Side, Star};
-use crate::geom::Point;
+use crate::geom::{Point, STEP, mix};
 use crate::mesh::Mesh;
 use crate::reconnect::Ball;
 use crate::storage::Pages;
 
-/// Largest ball whose vertex moves.
-const BALL_MAX: usize = 1024;
+/// Largest ball whose vertex moves for the product: in a fan of needles one vertex sees thousands of them.
+pub(super) const LIFTED_MAX: usize = 1 << 14;
+/// Largest ball whose vertex moves for its worst, which many tetrahedra ask for.
+pub(super) const BALL_MAX: usize = 1024;
 /// Steps of a search.
 const STEPS: u32 = 60;
 /// Places tried on the way back to where a vertex is, each half as far.
@@ -19,7 +21,13 @@ const HALVINGS: u32 = 12;
 const GAIN_MIN: f64 = 0.1;
 
 /// A tetrahedron below this value is flat but for rounding.
-const FLAT: f64 = 1e-4;
+pub(super) const FLAT: f64 = 1e-4;
+
+/// A tetrahedron, or another set of points in order, by their positions.
+pub(super) fn name(points: impl IntoIterator<Item = Point>) -> u64 {
+    let words = points.into_iter().flat_map(|p| p.to_array());
+    words.fold(0, |name, x| mix(name.wrapping_add(STEP) ^ x.to_bits()))
+}
 
 /// Scratch of moves.
 #[derive(Default)]
@@ -37,10 +45,11 @@ impl Mover {
         mesh: &mut Mesh<P>,
         v: u32,
         t: u32,
+        tets_max: usize,
         weights: &mut Weights,
     ) -> bool {
         if !is_free(mesh, v)
-            || !self.ball.gather(mesh, v, t, BALL_MAX)
+            || !self.ball.gather(mesh, v, t, tets_max)
             || !self.ball.closed
             || self.ball.required
         {
@@ -52,6 +61,12 @@ impl Mover {
             self.star.sides.push(side);
         }
         true
+    }
+
+    /// Where vertex and ball gathered are.
+    pub(super) fn name(&self, mesh: &mut Mesh<impl Pages>) -> u64 {
+        let corners = self.star.sides.iter().flat_map(|side| side.points);
+        name(std::iter::once(mesh.point(self.ball.v)).chain(corners))
     }
 
     /// Moves the vertex gathered to where the product of its ball's values is largest.
