@@ -5,7 +5,7 @@
 //! crosses the facet; a point of the facet near the crossing, joined to the shell of that edge, takes it away and
 //! adds no edge with ends on both sides.
 
-use std::collections::HashSet;
+use crate::geom::IdSet;
 
 use super::chain::{TERMS, Trouble};
 use super::exact::ExactPoint;
@@ -39,11 +39,11 @@ impl<P: Pages> Patch<'_, P> {
         rim: &[(u32, u32)],
     ) -> Result<Vec<[u32; 3]>, Trouble> {
         let f = part.facets[0];
-        let on_rim: HashSet<(u32, u32)> = rim.iter().copied().collect();
-        let known: HashSet<u32> = part.facets.iter().flatten().copied().collect();
+        let on_rim: IdSet<(u32, u32)> = rim.iter().copied().collect();
+        let known: IdSet<u32> = part.facets.iter().flatten().copied().collect();
         let mut open: Vec<(u32, u32)> = on_rim.iter().copied().collect();
         open.sort_unstable();
-        let mut done: HashSet<(u32, u32)> = HashSet::new();
+        let mut done: IdSet<(u32, u32)> = IdSet::default();
         let mut faces = Vec::new();
         let mut points = 0;
         while let Some((p, q)) = open.pop() {

@@ -4,46 +4,66 @@
 //! two when `s` and `t` are. Signs of orientations of such points are found without rounding.
 //! They exist in memory only, while a patch is at work.
 
-use crate::geom::Dyadic;
+use crate::geom::{Dyadic, Pair};
 use crate::geom::{Point, orient};
 
 /// A point whose coordinates are exact values.
 #[derive(Clone, Debug)]
-pub(super) struct ExactPoint([Dyadic; 3]);
+pub(super) struct ExactPoint {
+    exact: [Dyadic; 3],
+    /// What the exact one rounds to, and what the rest rounds to.
+    rounded: Point,
+    rest: Point,
+}
 
 impl ExactPoint {
+    fn new(exact: [Dyadic; 3]) -> Self {
+        let rounded = Point::from_array([0, 1, 2].map(|i| exact[i].estimate()));
+        let known = rounded.to_array().map(Dyadic::from);
+        let rest = Point::from_array([0, 1, 2].map(|i| exact[i].minus(&known[i]).estimate()));
+        Self {
+            exact,
+            rounded,
+            rest,
+        }
+    }
+
     /// A point as it is.
     pub(super) fn explicit(p: Point) -> Self {
-        Self(p.to_array().map(Dyadic::from))
+        Self {
+            exact: p.to_array().map(Dyadic::from),
+            rounded: p,
+            rest: Point::ZERO,
+        }
     }
 
     /// `base + Σ share · (to - base)`.
     pub(super) fn combination(base: Point, shares: &[(Point, &Dyadic)]) -> Self {
-        let from = Self::explicit(base);
+        let from = base.to_array().map(Dyadic::from);
         let mut sum = from.clone();
         for (to, share) in shares {
-            let to = Self::explicit(*to);
+            let to = to.to_array().map(Dyadic::from);
             for i in 0..3 {
-                sum.0[i] = sum.0[i].plus(&to.0[i].minus(&from.0[i]).times(share));
+                sum[i] = sum[i].plus(&to[i].minus(&from[i]).times(share));
             }
         }
-        sum
+        Self::new(sum)
     }
 
     /// `self + by`, of few bits: each coordinate is off by less than `slack`.
     pub(super) fn moved(&self, by: Point, slack: &Dyadic) -> Self {
-        let by = Self::explicit(by);
-        Self([0, 1, 2].map(|i| self.0[i].plus(&by.0[i]).shortened(slack)))
+        let by = by.to_array().map(Dyadic::from);
+        Self::new([0, 1, 2].map(|i| self.exact[i].plus(&by[i]).shortened(slack)))
     }
 
     /// From `self` to `other`, rounded after the subtraction.
     pub(super) fn offset(&self, other: &Self) -> Point {
-        Point::from_array([0, 1, 2].map(|i| other.0[i].minus(&self.0[i]).estimate()))
+        Point::from_array([0, 1, 2].map(|i| other.exact[i].minus(&self.exact[i]).estimate()))
     }
 
     /// Rounded to the nearest doubles or nearly so.
     pub(super) fn rounded(&self) -> Point {
-        Point::from_array([0, 1, 2].map(|i| self.0[i].estimate()))
+        self.rounded
     }
 }
 
@@ -57,11 +77,16 @@ pub(super) struct Placed<'a> {
 /// Forward error of the determinant in doubles, as in `geom`.
 const ORIENT_BOUND: f64 = 5.2e-15;
 const EPSILON: f64 = f64::EPSILON;
+/// The same in pairs of doubles: nine products of 2^-102 and their sums of 2^-104, with room to spare.
+const PAIR_BOUND: f64 = EPSILON * EPSILON * 1024.0;
+/// How far a coordinate's difference is off in pairs, as a share of the coordinates: the rests are at most 2^-53 of them, and rounded a few times.
+const PAIR_OFF: f64 = EPSILON * EPSILON * 4.0;
 
 /// Six times the signed volume; the sign is exact.
 #[cfg(test)]
 pub(super) fn orient_placed(p: [Placed<'_>; 4]) -> f64 {
-    orient_filtered(p).unwrap_or_else(|| orient_exact(p).estimate())
+    (orient_filtered(p).or_else(|| orient_in_pairs(p)))
+        .unwrap_or_else(|| orient_exact(p).estimate())
 }
 
 /// Six times the signed volume, where doubles suffice for its sign.
@@ -86,6 +111,36 @@ pub(super) fn orient_filtered(p: [Placed<'_>; 4]) -> Option<f64> {
     is_sure.then_some(det)
 }
 
+/// Six times the signed volume, where twice the bits of doubles suffice for its sign.
+pub(super) fn orient_in_pairs(p: [Placed<'_>; 4]) -> Option<f64> {
+    let [a, b, c, d] = p.map(|p| match p.exact {
+        Some(exact) => (exact.rounded, exact.rest),
+        None => (p.point, Point::ZERO),
+    });
+    let [u, v, w] =
+        [b, c, d].map(|q| [0, 1, 2].map(|i| Pair::difference(q.0[i], a.0[i], q.1[i] - a.1[i])));
+    let mut det: Option<Pair> = None;
+    for (i, u) in u.iter().enumerate() {
+        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        let term = u.times(v[j].times(w[k]).minus(v[k].times(w[j])));
+        det = Some(det.map_or(term, |det| det.plus(term)));
+    }
+    let det = det?.value();
+    let largest = [a, b, c, d].map(|q| q.0.abs().max_element());
+    let off = PAIR_OFF * largest.into_iter().fold(0.0, f64::max);
+    let size = |i: usize| {
+        [u, v, w]
+            .map(|x| x[i].value().abs())
+            .into_iter()
+            .fold(2.0 * off, f64::max)
+    };
+    let m = [0, 1, 2].map(size);
+    let pairs = m[0] * m[1] + m[1] * m[2] + m[2] * m[0];
+    let is_sure = det.abs() > PAIR_BOUND * (m[0] * m[1] * m[2]) + 24.0 * off * pairs
+        && m.iter().all(|m| (1e-58..1e61).contains(m));
+    is_sure.then_some(det)
+}
+
 /// Six times the signed volume, without rounding.
 #[cold]
 pub(super) fn orient_exact(p: [Placed<'_>; 4]) -> Dyadic {
@@ -93,7 +148,7 @@ pub(super) fn orient_exact(p: [Placed<'_>; 4]) -> Dyadic {
         Some(exact) => exact.clone(),
         None => ExactPoint::explicit(p.point),
     });
-    let [u, v, w] = [b, c, d].map(|q| [0, 1, 2].map(|i| q.0[i].minus(&a.0[i])));
+    let [u, v, w] = [b, c, d].map(|q| [0, 1, 2].map(|i| q.exact[i].minus(&a.exact[i])));
     let mut det = Dyadic::default();
     for (i, u) in u.iter().enumerate() {
         let (j, k) = ((i + 1) % 3, (i + 2) % 3);

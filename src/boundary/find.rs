@@ -1,6 +1,6 @@
 //! Which segments and facets the mesh has, and recovery of one that is missing.
 
-use std::collections::HashSet;
+use crate::geom::IdSet;
 
 use super::flips::{CROSSINGS_MAX, Flipper};
 use super::space::Space;
@@ -59,10 +59,10 @@ pub(super) fn crossing_edges<S: Space>(
     t: u32,
     n_max: usize,
 ) -> Option<Vec<(u32, u32, u32)>> {
-    let mut seen: HashSet<u32> = HashSet::from([t]);
+    let mut seen: IdSet<u32> = IdSet::from_iter([t]);
     let mut cut = vec![t];
     let mut edges: Vec<(u32, u32, u32)> = Vec::new();
-    let mut known: HashSet<(u32, u32)> = HashSet::new();
+    let mut known: IdSet<(u32, u32)> = IdSet::default();
     let mut next = 0;
     while next < cut.len() {
         let at = cut[next];
@@ -164,7 +164,7 @@ impl<S: Space> Flipper<'_, S> {
                     _ => {}
                 }
             }
-            let mut tried: HashSet<(u32, u32)> = HashSet::new();
+            let mut tried: IdSet<(u32, u32)> = IdSet::default();
             for &(t, c, d) in &edges {
                 if flipped || self.work == 0 {
                     break;

@@ -1,6 +1,6 @@
 //! Taking away a vertex that is on no facet.
 
-use std::collections::HashSet;
+use crate::geom::IdSet;
 
 use super::space::Space;
 use super::walk::{ball, swapped};
@@ -11,7 +11,7 @@ use crate::mesh::anatomy::EDGES;
 /// No tetrahedron may become flatter than `least`, and none flat.
 pub(super) fn remove_free<S: Space>(s: &mut S, x: u32, least: f64) -> bool {
     let ball = ball(s, x);
-    let link: HashSet<u32> = ball
+    let link: IdSet<u32> = ball
         .iter()
         .flat_map(|&t| s.tet(t).vertices())
         .filter(|&v| v != x)
@@ -19,8 +19,9 @@ pub(super) fn remove_free<S: Space>(s: &mut S, x: u32, least: f64) -> bool {
     let mut link: Vec<u32> = link.into_iter().collect();
     link.sort_unstable();
     let mut best: Option<(f64, Vec<[u32; 4]>)> = None;
+    let mut blocking = 0;
     for u in link {
-        let Some(quads) = moved(s, x, u, &ball) else {
+        let Some(quads) = moved(s, x, u, &ball, &mut blocking) else {
             continue;
         };
         let worst = quads
@@ -41,17 +42,33 @@ pub(super) fn remove_free<S: Space>(s: &mut S, x: u32, least: f64) -> bool {
 }
 
 /// The ball with `x` moved to its neighbor `u`, if all volumes stay positive.
-pub(super) fn moved<S: Space>(s: &mut S, x: u32, u: u32, ball: &[u32]) -> Option<Vec<[u32; 4]>> {
-    let mut quads = Vec::new();
-    for &t in ball {
-        let tet = s.tet(t);
-        if tet.local(u).is_none() {
-            let q = swapped(&tet, tet.local(x)?, u);
-            if s.orient(q) <= 0.0 {
-                return None;
-            }
-            quads.push(q);
+///
+/// `blocking` is a place in the ball and is looked at first: what ruled one neighbor out often rules out the next.
+pub(super) fn moved<S: Space>(
+    s: &mut S,
+    x: u32,
+    u: u32,
+    ball: &[u32],
+    blocking: &mut usize,
+) -> Option<Vec<[u32; 4]>> {
+    let at = |s: &mut S, k: usize| {
+        let tet = s.tet(ball[k]);
+        if tet.local(u).is_some() {
+            return Some(None);
         }
+        let q = swapped(&tet, tet.local(x)?, u);
+        (s.orient(q) > 0.0).then_some(Some(q))
+    };
+    if !ball.is_empty() {
+        at(s, *blocking)?;
+    }
+    let mut quads = Vec::new();
+    for k in 0..ball.len() {
+        let Some(q) = at(s, k) else {
+            *blocking = k;
+            return None;
+        };
+        quads.extend(q);
     }
     Some(quads)
 }

@@ -4,7 +4,7 @@
 //! behind, the next tetrahedron joins the cavity, until everything is seen: the opposite of shrinking a cavity, and
 //! like it bounded by required faces.
 
-use std::collections::HashSet;
+use crate::geom::IdSet;
 
 use super::patch::Patch;
 use super::space::{Space, edge_key};
@@ -40,10 +40,10 @@ impl<P: Pages> Patch<'_, P> {
         x: u32,
         open: Option<u32>,
         walls: &[[u32; 3]],
-        taken: &HashSet<u32>,
+        taken: &IdSet<u32>,
     ) -> Result<Grown, Obstacle> {
         let mut cavity = seed.to_vec();
-        let mut inside: HashSet<u32> = seed.iter().copied().collect();
+        let mut inside: IdSet<u32> = seed.iter().copied().collect();
         let mut next = 0;
         while next < cavity.len() {
             let t = cavity[next];
@@ -73,8 +73,8 @@ impl<P: Pages> Patch<'_, P> {
             }
         }
         let mut quads = Vec::new();
-        let mut rim_edges: HashSet<u64> = HashSet::new();
-        let mut rim: HashSet<u32> = HashSet::new();
+        let mut rim_edges: IdSet<u64> = IdSet::default();
+        let mut rim: IdSet<u32> = IdSet::default();
         let mut note = |face: [u32; 3]| {
             rim.extend(face);
             for k in 0..3 {

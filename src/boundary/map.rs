@@ -1,6 +1,6 @@
 //! Which facets are faces already: those become required, the others are listed.
 
-use std::collections::HashSet;
+use crate::geom::IdSet;
 
 use super::find::{SearchResult, find_face};
 use super::space::{PagedSpace, Space, edge_key, sorted};
@@ -16,15 +16,15 @@ pub(super) struct MissingFacets {
     pub facets: Vec<u32>,
     pub segments: Vec<(u32, u32)>,
     /// Segments of missing facets that exist: no required face protects them yet.
-    pub protected: HashSet<u64>,
+    pub protected: IdSet<u64>,
 }
 
 /// Marks the facets that are faces as required, with the face in place of their first region ([`face_at`]), and lists the rest. One short
 /// walk per facet.
 pub(super) fn map<P: Pages>(mesh: &mut Mesh<P>) -> MissingFacets {
     let mut missing = MissingFacets::default();
-    let mut known: HashSet<u64> = HashSet::new();
-    let none = HashSet::new();
+    let mut known: IdSet<u64> = IdSet::default();
+    let none = IdSet::default();
     for n in 0..mesh.n_facets() {
         if n & 1023 == 0 {
             check_cancelled();

@@ -2,10 +2,10 @@
 //!
 //! The mesh is only read until [`Patch::commit`] writes the result as one step.
 
-use std::collections::{HashMap, HashSet};
+use crate::geom::{IdMap, IdSet};
 
 use super::effort::Effort;
-use super::exact::{ExactPoint, Placed, orient_exact, orient_filtered};
+use super::exact::{ExactPoint, Placed, orient_exact, orient_filtered, orient_in_pairs};
 use super::space::{Space, edge_key, sorted};
 use crate::geom::Dyadic;
 use crate::geom::{Point, orient};
@@ -40,20 +40,20 @@ struct Border {
 /// Tetrahedra copied from `mesh`, with ids and vertex ids of their own.
 pub(super) struct Patch<'m, P: Pages> {
     mesh: &'m mut Mesh<P>,
-    protected: &'m HashSet<u64>,
+    protected: &'m IdSet<u64>,
     tets: Vec<Tet>,
     free: Vec<u32>,
     vertices: Vec<PatchVertex>,
     /// Mesh vertex to patch vertex.
-    local: HashMap<u32, u32>,
+    local: IdMap<u32, u32>,
     borders: Vec<Border>,
     /// Face of a tetrahedron not brought in (as in the mesh) to its border.
-    border_of: HashMap<u32, u32>,
+    border_of: IdMap<u32, u32>,
     brought_in: Vec<u32>,
     /// Required faces brought in.
-    required: HashSet<[u32; 3]>,
+    required: IdSet<[u32; 3]>,
     /// Edges of the patch that must stay, besides those of `protected`.
-    pub kept: HashSet<u64>,
+    pub kept: IdSet<u64>,
     /// How hard and in which order to try.
     pub effort: Effort,
 }
@@ -65,19 +65,19 @@ const FREE: Tet = Tet {
 
 impl<'m, P: Pages> Patch<'m, P> {
     /// An empty patch.
-    pub(super) fn new(mesh: &'m mut Mesh<P>, protected: &'m HashSet<u64>, effort: Effort) -> Self {
+    pub(super) fn new(mesh: &'m mut Mesh<P>, protected: &'m IdSet<u64>, effort: Effort) -> Self {
         Self {
             mesh,
             protected,
             tets: Vec::new(),
             free: Vec::new(),
             vertices: Vec::new(),
-            local: HashMap::new(),
+            local: IdMap::default(),
             borders: Vec::new(),
-            border_of: HashMap::new(),
+            border_of: IdMap::default(),
             brought_in: Vec::new(),
-            required: HashSet::new(),
-            kept: HashSet::new(),
+            required: IdSet::default(),
+            kept: IdSet::default(),
             effort,
         }
     }
@@ -292,7 +292,7 @@ impl<'m, P: Pages> Patch<'m, P> {
 
     /// Whether every required face brought in is still there and required.
     pub(super) fn keeps_required(&self) -> bool {
-        let mut now: HashSet<[u32; 3]> = HashSet::new();
+        let mut now: IdSet<[u32; 3]> = IdSet::default();
         for t in self.live() {
             let tet = &self.tets[t as usize];
             let faces = (0..4).filter(|&i| tet.is_required(i));
@@ -382,7 +382,7 @@ impl<P: Pages> Space for Patch<'_, P> {
         let placed = v.map(|v| self.placed(v));
         orient_filtered(placed).unwrap_or_else(|| match self.in_one_plane(v) {
             true => 0.0,
-            false => orient_exact(placed).estimate(),
+            false => orient_in_pairs(placed).unwrap_or_else(|| orient_exact(placed).estimate()),
         })
     }
 

@@ -1,6 +1,6 @@
 //! The exact path: patches around facets that flips cannot recover.
 
-use std::collections::{HashMap, HashSet};
+use crate::geom::{IdMap, IdSet};
 
 use super::chain::Trouble;
 use super::effort::{EFFORTS, Effort};
@@ -19,6 +19,10 @@ use crate::storage::{Pages, check_cancelled};
 
 /// Times the facets left are tried again after others succeeded.
 const ROUNDS_MAX: usize = 4;
+
+/// See [`is_slow`].
+const FEW: usize = 8;
+const MANY: usize = 64;
 
 /// Recovers the missing facets, patch by patch; returns those left with their trouble.
 pub(super) fn recover_by_points<P: Pages>(
@@ -60,7 +64,7 @@ fn recover_group<P: Pages>(
     report: &mut RecoveryReport,
 ) -> Result<(), (Vec<u32>, Trouble)> {
     // A triangle given twice is one face.
-    let mut seen = HashSet::new();
+    let mut seen = IdSet::default();
     let corners: Vec<[u32; 3]> = group.iter().map(|&n| mesh.facet(n).vertices).collect();
     let mut once = corners.clone();
     once.retain(|&f| seen.insert(sorted(f)));
@@ -90,7 +94,7 @@ fn recover_group<P: Pages>(
 /// Marks facet `n` as required, if it is a face.
 fn require_facet<P: Pages>(mesh: &mut Mesh<P>, n: u32) -> bool {
     let f = mesh.facet(n).vertices;
-    let none = HashSet::new();
+    let none = IdSet::default();
     let mut s = PagedSpace(mesh, &none);
     match find_face(&mut s, f) {
         SearchResult::Face(face) => {
@@ -123,10 +127,10 @@ fn turn_inside<P: Pages>(
 fn groups<P: Pages>(
     mesh: &mut Mesh<P>,
     facets: &[u32],
-    protected: &mut HashSet<u64>,
+    protected: &mut IdSet<u64>,
 ) -> Vec<Vec<u32>> {
-    let none = HashSet::new();
-    let mut by_segment: HashMap<u64, usize> = HashMap::new();
+    let none = IdSet::default();
+    let mut by_segment: IdMap<u64, usize> = IdMap::default();
     let mut parent: Vec<usize> = (0..facets.len()).collect();
     fn root(parent: &mut [usize], mut i: usize) -> usize {
         while parent[i] != i {
@@ -176,7 +180,7 @@ fn attempt<P: Pages>(
 
 fn try_parts<P: Pages>(
     mesh: &mut Mesh<P>,
-    protected: &HashSet<u64>,
+    protected: &IdSet<u64>,
     parts: &[FlatPart],
     effort: Effort,
     report: &mut RecoveryReport,
@@ -206,7 +210,7 @@ fn try_parts<P: Pages>(
     let n_facets: usize = local.iter().map(|p| p.facets.len()).sum();
     let is_whole =
         |p: &FlatPart| p.facets.len() > 1 || skin.faces.contains_key(&sorted(p.facets[0]));
-    let own: HashSet<u32> = local
+    let own: IdSet<u32> = local
         .iter()
         .flat_map(|p| &p.facets)
         .flatten()
@@ -229,7 +233,7 @@ fn try_parts<P: Pages>(
         .collect();
     let added = patch.commit();
     report.steiner = report.steiner.saturating_add_signed(added as i32);
-    let none = HashSet::new();
+    let none = IdSet::default();
     let mut s = PagedSpace(mesh, &none);
     for face in free {
         match find_face(&mut s, face) {
@@ -240,13 +244,18 @@ fn try_parts<P: Pages>(
     Ok(())
 }
 
+/// Whether none of the vertices has left the surface or, of many, less than one in [`FEW`].
+fn is_slow(before: usize, after: usize) -> bool {
+    before == after || before > MANY && (before - after) * FEW < before
+}
+
 /// Chains, faces, suppression; returns how many vertices were on the surface for a while.
 fn build<P: Pages>(
     patch: &mut Patch<'_, P>,
     skin: &mut CavitySkin,
     parts: &[FlatPart],
 ) -> Result<u32, Trouble> {
-    let mut chains: HashMap<(u32, u32), Vec<u32>> = HashMap::new();
+    let mut chains: IdMap<(u32, u32), Vec<u32>> = IdMap::default();
     let mut on_segments: Vec<u32> = Vec::new();
     for &(a, b) in parts.iter().flat_map(|p| &p.rim) {
         if chains.contains_key(&(a, b)) {
@@ -272,7 +281,7 @@ fn build<P: Pages>(
             .flat_map(|side| chains[side].windows(2).map(|edge| (edge[0], edge[1])))
             .collect();
         let faces = patch.cover(part, &rim)?;
-        let on_rim: HashSet<u32> = rim.iter().map(|edge| edge.0).collect();
+        let on_rim: IdSet<u32> = rim.iter().map(|edge| edge.0).collect();
         let mut inside: Vec<u32> = faces
             .iter()
             .flatten()
@@ -323,8 +332,11 @@ fn build<P: Pages>(
         }
         late = left;
         match trouble {
-            // Mostly a few of thousands have no room: they alone go where no double is, all else is as good as it was.
-            Some(_) if late.len() == before && !patch.effort.exact => patch.effort.exact = true,
+            // Mostly a few of thousands have no room: they alone go where no double is, all else is as good as it was. Each try in vain takes
+            // milliseconds, and when one finds room now and then, hundreds of others are tried again.
+            Some(_) if is_slow(before, late.len()) && !patch.effort.exact => {
+                patch.effort.exact = true;
+            }
             Some(trouble) if late.len() == before => return Err(trouble),
             _ => {}
         }

@@ -101,7 +101,7 @@ pub fn fill_regions<P: Pages>(
 /// Notes on both sides of every facet which component lies there.
 fn survey<P: Pages>(mesh: &mut Mesh<P>, flood: &mut Flood) -> Result<Walls, BoundaryError> {
     let mut walls: Walls = BTreeMap::new();
-    let none = std::collections::HashSet::new();
+    let none = crate::geom::IdSet::default();
     for n in 0..mesh.n_facets() {
         if n & 1023 == 0 {
             check_cancelled();

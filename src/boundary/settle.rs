@@ -8,7 +8,7 @@
 //!          c--            Between facets nearer to each other than the last bits of their corners there is none.
 //! ```
 
-use std::collections::HashSet;
+use crate::geom::IdSet;
 
 use super::chain::Trouble;
 use super::exact::ExactPoint;
@@ -66,7 +66,7 @@ impl<P: Pages> Patch<'_, P> {
         let ball = ball(self, v);
         let mut reach = 0.0f64;
         let mut planes: Vec<HalfSpace> = Vec::new();
-        let mut neighbors: HashSet<u32> = HashSet::new();
+        let mut neighbors: IdSet<u32> = IdSet::default();
         for &t in &ball {
             let tet = self.tet(t);
             let Some(i) = tet.local(v) else { continue };

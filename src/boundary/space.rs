@@ -1,6 +1,6 @@
 //! One face for the two places where recovery works: the paged mesh, and a patch held in memory.
 
-use std::collections::HashSet;
+use crate::geom::IdSet;
 
 use crate::geom::{Point, orient};
 use crate::mesh::anatomy::{FACES, REQUIRED};
@@ -169,7 +169,7 @@ pub(super) fn edge_key(a: u32, b: u32) -> u64 {
 pub(super) struct PagedSpace<'m, P: Pages>(
     pub &'m mut Mesh<P>,
     /// Edges that must stay.
-    pub &'m HashSet<u64>,
+    pub &'m IdSet<u64>,
 );
 
 impl<P: Pages> PagedSpace<'_, P> {

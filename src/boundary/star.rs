@@ -1,6 +1,6 @@
 //! Puts an exact point into a small cavity that sees it whole.
 
-use std::collections::HashSet;
+use crate::geom::IdSet;
 
 use super::exact::ExactPoint;
 use super::patch::Patch;
@@ -55,7 +55,7 @@ impl<P: Pages> Patch<'_, P> {
         exact: ExactPoint,
     ) -> Option<u32> {
         let x = self.add_vertex_on(on, exact);
-        let Ok(grown) = self.grow(seed, x, None, &[], &HashSet::new()) else {
+        let Ok(grown) = self.grow(seed, x, None, &[], &IdSet::default()) else {
             self.drop_vertex(x);
             return None;
         };

@@ -13,7 +13,8 @@
 //! Source: P.-L. George, H. Borouchaki and E. Saltel, "'Ultimate' robustness in meshing an arbitrary polyhedron",
 //! International Journal for Numerical Methods in Engineering 58 (2003).
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+use crate::geom::{IdMap, IdSet};
+use std::collections::BTreeMap;
 
 use super::chain::Trouble;
 use super::flips::Flipper;
@@ -34,7 +35,7 @@ pub(super) struct CavitySkin {
     /// Three corners of each flat part: its plane.
     pub facets: Vec<[u32; 3]>,
     /// Sorted face to its part and itself in the part's direction.
-    pub faces: HashMap<[u32; 3], (usize, [u32; 3])>,
+    pub faces: IdMap<[u32; 3], (usize, [u32; 3])>,
 }
 
 /// The fan of one facet around the vertex.
@@ -124,7 +125,7 @@ impl<P: Pages> Patch<'_, P> {
         }
         let wedges = self.wedges(skin, x, &ball, &fans)?;
         let mut old = ball.clone();
-        let mut taken: HashSet<u32> = ball.iter().copied().collect();
+        let mut taken: IdSet<u32> = ball.iter().copied().collect();
         let mut new = Vec::new();
         let mut added = 0;
         for wedge in &wedges {
@@ -185,7 +186,7 @@ impl<P: Pages> Patch<'_, P> {
         }
         let mut fans = Vec::new();
         for (facet, next) in edges {
-            let ends: HashSet<u32> = next.values().copied().collect();
+            let ends: IdSet<u32> = next.values().copied().collect();
             let start = next.keys().copied().find(|p| !ends.contains(p));
             let closed = start.is_none();
             let first = start.unwrap_or_else(|| *next.keys().next().expect("not empty"));
@@ -225,8 +226,9 @@ impl<P: Pages> Patch<'_, P> {
                 *fans[0].polygon.last().expect("not empty"),
             ],
         };
+        let mut blocking = 0;
         for u in candidates {
-            let Some(quads) = moved(self, x, u, ball) else {
+            let Some(quads) = moved(self, x, u, ball, &mut blocking) else {
                 continue;
             };
             let faces: Vec<Vec<[u32; 3]>> = fans

@@ -1,6 +1,6 @@
 //! Steiner points at the end of recovery: those nobody needs go, the others move away from the planes they were put beside.
 
-use std::collections::HashSet;
+use crate::geom::IdSet;
 
 use super::free_vertex::{ball_flatness, remove_free};
 use super::kernel::{HalfSpace, center, room};
@@ -33,9 +33,9 @@ pub(super) fn tidy<P: Pages>(mesh: &mut Mesh<P>, report: &mut RecoveryReport) {
     let mut left: Vec<u32> = (0..mesh.n_vertices())
         .filter(|&v| steiner(mesh, v))
         .collect();
-    let none = HashSet::new();
+    let none = IdSet::default();
     // Beside what changed: for all others the answer is as it was.
-    let mut beside: HashSet<u32> = left.iter().copied().collect();
+    let mut beside: IdSet<u32> = left.iter().copied().collect();
     for _ in 0..ROUNDS_MAX {
         let due = std::mem::take(&mut beside);
         left.retain(|&v| {

@@ -1,6 +1,6 @@
 //! Exact walks: from a vertex towards another, around an edge, along a missing edge.
 
-use std::collections::HashSet;
+use crate::geom::IdSet;
 
 use super::space::Space;
 use crate::mesh::{FaceRef, Tet};
@@ -73,7 +73,7 @@ fn leaves_cone<S: Space>(s: &mut S, tet: &Tet, i: usize, b: u32, turn: u32) -> O
 pub(super) fn ball<S: Space>(s: &mut S, v: u32) -> Vec<u32> {
     check_cancelled();
     let first = s.tet_of(v);
-    let mut seen: HashSet<u32> = HashSet::from([first]);
+    let mut seen: IdSet<u32> = IdSet::from_iter([first]);
     let mut all = vec![first];
     let mut next = 0;
     while next < all.len() {

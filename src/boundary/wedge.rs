@@ -1,6 +1,7 @@
 //! The wedges of a ball between facets, and places in them for a vertex that sees all around.
 
-use std::collections::{BTreeSet, HashSet};
+use crate::geom::IdSet;
+use std::collections::BTreeSet;
 
 use super::chain::Trouble;
 use super::free_vertex::moved;
@@ -46,7 +47,7 @@ impl<P: Pages> Patch<'_, P> {
         ball: &[u32],
         fans: &[Fan],
     ) -> Result<Vec<Wedge>, Trouble> {
-        let mut seen: HashSet<u32> = HashSet::new();
+        let mut seen: IdSet<u32> = IdSet::default();
         let mut wedges = Vec::new();
         for &first in ball {
             if !seen.insert(first) {
@@ -98,7 +99,7 @@ impl<P: Pages> Patch<'_, P> {
         walls: &[[u32; 3]],
         fans: &[Fan],
     ) -> Option<Vec<[u32; 4]>> {
-        let on_wall: HashSet<u32> = fans
+        let on_wall: IdSet<u32> = fans
             .iter()
             .flat_map(|f| f.polygon.iter().copied())
             .collect();
@@ -135,7 +136,7 @@ impl<P: Pages> Patch<'_, P> {
         x: u32,
         wedge: &Wedge,
         walls: &[[u32; 3]],
-        taken: &HashSet<u32>,
+        taken: &IdSet<u32>,
     ) -> Option<Grown> {
         let origin = self.position(x);
         let mut reach = 0.0f64;
@@ -263,7 +264,7 @@ impl<P: Pages> Patch<'_, P> {
         x: u32,
         wedge: &Wedge,
         walls: &[[u32; 3]],
-        taken: &HashSet<u32>,
+        taken: &IdSet<u32>,
         place: Point,
         may_grow: bool,
     ) -> Result<Grown, Obstacle> {
@@ -288,7 +289,7 @@ impl<P: Pages> Patch<'_, P> {
 
     /// The wedge with `x` moved to `p`, if all volumes stay positive.
     pub(super) fn join_all(&mut self, x: u32, wedge: &Wedge, p: u32) -> Option<Grown> {
-        let quads = moved(self, x, p, &wedge.tets)?;
+        let quads = moved(self, x, p, &wedge.tets, &mut 0)?;
         Some(Grown {
             cavity: wedge.tets.clone(),
             quads,

@@ -1,5 +1,8 @@
 //! Numbers that look random, made of numbers: the same on every machine.
 
+use std::collections::{HashMap, HashSet};
+use std::hash::{BuildHasherDefault, Hasher};
+
 /// Mixes the bits of `v`: one step of SplitMix64 from the state `v`.
 ///
 /// Source: G. Steele, D. Lea, C. Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014.
@@ -13,3 +16,42 @@ pub fn mix(v: u64) -> u64 {
 
 /// What SplitMix64 adds to its state at each step.
 pub const STEP: u64 = 0x9E37_79B9_7F4A_7C15;
+
+/// Spreads numbers over the places of a table; they are the program's own, not an adversary's.
+#[derive(Default)]
+pub struct Spread(u64);
+
+impl Hasher for Spread {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        for chunk in bytes.chunks(8) {
+            let mut word = [0; 8];
+            word[..chunk.len()].copy_from_slice(chunk);
+            self.write_u64(u64::from_le_bytes(word));
+        }
+    }
+
+    #[inline]
+    fn write_u32(&mut self, n: u32) {
+        self.write_u64(n.into());
+    }
+
+    #[inline]
+    fn write_u64(&mut self, n: u64) {
+        let mixed = (self.0 ^ n).wrapping_mul(STEP);
+        self.0 = mixed ^ mixed >> 32;
+    }
+
+    #[inline]
+    fn write_usize(&mut self, n: usize) {
+        self.write_u64(n as u64);
+    }
+}
+
+/// A table by numbers of the program's own, such as ids.
+pub type IdMap<K, V> = HashMap<K, V, BuildHasherDefault<Spread>>;
+/// A set of them.
+pub type IdSet<K> = HashSet<K, BuildHasherDefault<Spread>>;

@@ -7,6 +7,7 @@ mod dyadic;
 mod hash;
 mod hilbert;
 mod number;
+mod pair;
 mod point;
 mod sign;
 mod wide;
@@ -17,9 +18,10 @@ pub(crate) mod oracle;
 pub(crate) mod tests;
 
 pub use dyadic::Dyadic;
-pub use hash::{STEP, mix};
+pub use hash::{IdMap, IdSet, STEP, mix};
 pub use hilbert::{HilbertFrame, hilbert_index};
 pub use number::short;
+pub use pair::Pair;
 pub use point::{Aabb, Point};
 pub use sign::{
     Seen, in_sphere_perturbed, insphere, insphere_filtered, lex_cmp, orient, orient_sign,

@@ -1,11 +1,8 @@
 //! A decoded chunk of tetrahedra with the vertices it needs, free of everything else.
 
-use std::collections::HashMap;
-use std::hash::{BuildHasherDefault, Hasher};
-
 use super::hit::Hit;
 use super::tree::BoxTree;
-use crate::geom::{Aabb, Point, STEP};
+use crate::geom::{Aabb, IdMap, Point};
 use crate::sealed::{Chunk, Corner, Subdomain};
 use crate::store::StoreError;
 use tetdb_schema::ids::{SubdomainId, TetId};
@@ -35,23 +32,6 @@ pub(super) struct Searched {
     pub tree: BoxTree,
 }
 
-/// Spreads the vertex numbers of a chunk; they come from a store, not from an adversary.
-#[derive(Default)]
-pub(crate) struct Spread(u64);
-
-impl Hasher for Spread {
-    fn finish(&self) -> u64 {
-        self.0
-    }
-    fn write(&mut self, bytes: &[u8]) {
-        bytes.iter().for_each(|&b| self.write_u32(u32::from(b)));
-    }
-    fn write_u32(&mut self, n: u32) {
-        let mixed = (self.0 ^ u64::from(n)).wrapping_mul(STEP);
-        self.0 = mixed ^ mixed >> 32;
-    }
-}
-
 impl DecodedChunk {
     /// The tetrahedra of a chunk that `keep` wants, with their vertices.
     ///
@@ -61,7 +41,7 @@ impl DecodedChunk {
         chunk: &Chunk<SealedTet>,
         mut keep: impl FnMut(&Subdomain, u32, &SealedTet) -> bool,
     ) -> Result<Self, StoreError> {
-        let mut places: HashMap<u32, u32, BuildHasherDefault<Spread>> = HashMap::default();
+        let mut places: IdMap<u32, u32> = IdMap::default();
         let mut frame = Self {
             part: part.id(),
             tets: Vec::new(),

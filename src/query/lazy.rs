@@ -6,19 +6,17 @@
 //! chunk of vertices that is read rules out more. What is left decides what is read next: the chunk that completes most,
 //! where the point is central in it.
 
-use std::collections::{BTreeMap, HashMap};
-use std::hash::BuildHasherDefault;
+use std::collections::BTreeMap;
 
 use tetdb_schema::ids::TetId;
 use tetdb_schema::record::SealedTet;
 
-use super::decoded::Spread;
 use super::hit::Hit;
 use super::locate::{Candidate, Search, holds, leaders};
 use super::near::{Near, nearness};
 use super::session::{checked_chunk, vertex_chunk};
 use super::{QueryError, QuerySession};
-use crate::geom::{Aabb, Point};
+use crate::geom::{Aabb, IdMap, Point};
 use crate::sealed::Subdomain;
 use crate::storage::check_cancelled;
 use crate::store::StoreError;
@@ -37,7 +35,7 @@ struct Lazy {
     reach: f64,
     waiting: Vec<Waiting>,
     /// Chunks of vertices looked at, by sub-domain and number: what they have near, and whether they are read.
-    chunks: HashMap<(u32, u32), (Near, bool), BuildHasherDefault<Spread>>,
+    chunks: IdMap<(u32, u32), (Near, bool)>,
 }
 
 impl Lazy {
@@ -106,7 +104,7 @@ impl QuerySession {
             point: search.point,
             reach: reaches.fold(0.0, f64::max),
             waiting: Vec::new(),
-            chunks: HashMap::default(),
+            chunks: IdMap::default(),
         };
         for candidate in candidates {
             self.gather(candidate, &mut lazy)?;

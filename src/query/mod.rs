@@ -31,7 +31,6 @@ mod surface_faces;
 mod tests;
 mod tree;
 
-pub(crate) use decoded::Spread;
 pub use error::QueryError;
 pub use hit::{Hit, VARIABLES};
 pub use locate::Located;

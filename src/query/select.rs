@@ -1,19 +1,16 @@
 //! The tetrahedra of a selection, one after the other in the order of their ids.
 
-use std::collections::HashMap;
-use std::hash::BuildHasherDefault;
 use std::vec::IntoIter;
 
 use tetdb_schema::ids::TetId;
 
-use super::decoded::Spread;
 use super::hit::Hit;
 use super::locate::leaders;
 use super::marks::Marks;
 use super::selection::Selection;
 use super::session::{bounds_of, reach, vertex_chunk};
 use super::{QueryError, QuerySession};
-use crate::geom::{Aabb, Point};
+use crate::geom::{Aabb, IdMap, Point};
 use crate::sealed::Subdomain;
 
 /// The answers to [`QuerySession::select`]; holds one chunk's at a time. Ends after the first error.
@@ -175,7 +172,7 @@ pub(super) fn hits_in(
 #[derive(Default)]
 struct Nearby {
     /// For a chunk of vertices a box around those of its cells that are near enough; empty where none are.
-    boxes: HashMap<usize, Aabb, BuildHasherDefault<Spread>>,
+    boxes: IdMap<usize, Aabb>,
     place: usize,
 }
 

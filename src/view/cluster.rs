@@ -8,13 +8,10 @@
 //! P. Lindstrom, "Out-of-core simplification of large polygonal models" (2000).
 
 use std::collections::hash_map::Entry;
-use std::collections::{HashMap, HashSet};
-use std::hash::BuildHasherDefault;
 
 use glam::{DMat3, DVec3};
 
-use crate::geom::{Aabb, Point};
-use crate::query::Spread;
+use crate::geom::{Aabb, IdMap, IdSet, Point};
 
 /// Cells along an axis at first, as a power of two: no two vertices that can be told apart on a screen share one.
 const BITS: u32 = 21;
@@ -27,8 +24,6 @@ const LEFT: f64 = 0.9;
 const TO_MEAN: f64 = 1e-3;
 /// Bytes a triangle takes while it is here, with its vertices.
 pub(super) const TRIANGLE_BYTES: u64 = 150;
-
-type Fast = BuildHasherDefault<Spread>;
 
 /// Vertices in one cell. Lengths are shares of the longest side of the box.
 #[derive(Clone, Copy)]
@@ -97,10 +92,10 @@ pub(super) struct Cluster<T> {
     most: usize,
     /// A cell's place is its number.
     cells: Vec<ClusterCell>,
-    numbers: HashMap<u64, u32, Fast>,
+    numbers: IdMap<u64, u32>,
     triangles: Vec<[u32; 3]>,
     tags: Vec<T>,
-    seen: HashSet<[u32; 3], Fast>,
+    seen: IdSet<[u32; 3]>,
     of: u64,
 }
 
@@ -115,10 +110,10 @@ impl<T: Copy> Cluster<T> {
             is_joined: false,
             most,
             cells: Vec::new(),
-            numbers: HashMap::default(),
+            numbers: IdMap::default(),
             triangles: Vec::new(),
             tags: Vec::new(),
-            seen: HashSet::default(),
+            seen: IdSet::default(),
             of: 0,
         }
     }

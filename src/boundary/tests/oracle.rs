@@ -5,7 +5,7 @@
 
 use std::cmp::Ordering;
 
-use crate::boundary::exact::{ExactPoint, Placed, orient_placed};
+use crate::boundary::exact::{ExactPoint, Placed, orient_filtered, orient_in_pairs, orient_placed};
 use crate::geom::Dyadic;
 use crate::geom::Point;
 use crate::geom::oracle::{Exact, combination, exact, orient_truth};
@@ -15,6 +15,7 @@ use crate::geom::tests::{Numbers, cases};
 fn orientations_of_exact_points_are_those_of_exact_numbers() {
     let mut numbers = Numbers(11);
     let mut seen = [0u32; 3];
+    let mut n_in_pairs = 0;
     for k in 0..cases() {
         let offset = numbers.point() * [0.0, 10.0, 1e5][k % 3];
         let corners = [0; 4].map(|_| {
@@ -60,10 +61,17 @@ fn orientations_of_exact_points_are_those_of_exact_numbers() {
             exact: shapes[i].1.as_ref(),
         });
         let truth = orient_truth(&[0, 1, 2, 3].map(|i| shapes[i].2.clone()));
+        let in_pairs = orient_in_pairs(placed);
+        n_in_pairs += u32::from(in_pairs.is_some() && orient_filtered(placed).is_none());
+        assert!(
+            in_pairs.is_none_or(|det| det.partial_cmp(&0.0) == Some(truth)),
+            "case {k}"
+        );
         let found = orient_placed(placed).partial_cmp(&0.0);
         assert_eq!(found, Some(truth), "case {k}");
         assert!(!planar || truth == Ordering::Equal, "case {k}");
         seen[(truth as i8 + 1) as usize] += 1;
     }
     assert!(seen.iter().all(|&n| n > cases() as u32 / 10), "{seen:?}");
+    assert!(n_in_pairs > 0);
 }
