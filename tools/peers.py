@@ -285,7 +285,7 @@ def surface_file(program, surface, directory):
         return surface
     made = os.path.join(directory, "surface.ply")
     command = ["check", surface, "--repair", "--write", made] if os.path.exists(surface) else ["sample", surface, "-o", made]
-    subprocess.run([program, *command], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    subprocess.run([program, *command, "-q"], check=True, stdout=subprocess.DEVNULL)
     return made
 
 

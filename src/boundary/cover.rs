@@ -5,8 +5,6 @@
 //! crosses the facet; a point of the facet near the crossing, joined to the shell of that edge, takes it away and
 //! adds no edge with ends on both sides.
 
-use crate::geom::IdSet;
-
 use super::chain::{TERMS, Trouble};
 use super::exact::ExactPoint;
 use super::flat::FlatPart;
@@ -15,7 +13,7 @@ use super::patch::Patch;
 use super::space::{Space, edge_key};
 use super::target::RecoveryTarget;
 use super::walk::{find_edge, shell};
-use crate::geom::Dyadic;
+use crate::geom::{Dyadic, IdSet};
 use crate::storage::Pages;
 
 /// Points in one facet.

@@ -4,8 +4,7 @@
 //! two when `s` and `t` are. Signs of orientations of such points are found without rounding.
 //! They exist in memory only, while a patch is at work.
 
-use crate::geom::{Dyadic, Pair};
-use crate::geom::{Point, orient};
+use crate::geom::{Dyadic, Pair, Point, orient};
 
 /// A point whose coordinates are exact values.
 #[derive(Clone, Debug)]
@@ -77,7 +76,7 @@ pub(super) struct Placed<'a> {
 /// Forward error of the determinant in doubles, as in `geom`.
 const ORIENT_BOUND: f64 = 5.2e-15;
 const EPSILON: f64 = f64::EPSILON;
-/// The same in pairs of doubles: nine products of 2^-102 and their sums of 2^-104, with room to spare.
+/// Forward error of the determinant in pairs of doubles: nine products of 2^-102 and their sums of 2^-104, with room to spare.
 const PAIR_BOUND: f64 = EPSILON * EPSILON * 1024.0;
 /// How far a coordinate's difference is off in pairs, as a share of the coordinates: the rests are at most 2^-53 of them, and rounded a few times.
 const PAIR_OFF: f64 = EPSILON * EPSILON * 4.0;
@@ -119,13 +118,9 @@ pub(super) fn orient_in_pairs(p: [Placed<'_>; 4]) -> Option<f64> {
     });
     let [u, v, w] =
         [b, c, d].map(|q| [0, 1, 2].map(|i| Pair::difference(q.0[i], a.0[i], q.1[i] - a.1[i])));
-    let mut det: Option<Pair> = None;
-    for (i, u) in u.iter().enumerate() {
-        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-        let term = u.times(v[j].times(w[k]).minus(v[k].times(w[j])));
-        det = Some(det.map_or(term, |det| det.plus(term)));
-    }
-    let det = det?.value();
+    let terms = [(0, 1, 2), (1, 2, 0), (2, 0, 1)];
+    let [x, y, z] = terms.map(|(i, j, k)| u[i].times(v[j].times(w[k]).minus(v[k].times(w[j]))));
+    let det = x.plus(y).plus(z).value();
     let largest = [a, b, c, d].map(|q| q.0.abs().max_element());
     let off = PAIR_OFF * largest.into_iter().fold(0.0, f64::max);
     let size = |i: usize| {

@@ -1,11 +1,10 @@
 //! Which segments and facets the mesh has, and recovery of one that is missing.
 
-use crate::geom::IdSet;
-
 use super::flips::{CROSSINGS_MAX, Flipper};
 use super::space::Space;
 use super::target::RecoveryTarget;
 use super::walk::{Exit, crossings, edge_at, find_edge, opposite, shell};
+use crate::geom::IdSet;
 use crate::mesh::FaceRef;
 
 /// Where facet `a b c` stands.

@@ -1,9 +1,8 @@
 //! Taking away a vertex that is on no facet.
 
-use crate::geom::IdSet;
-
 use super::space::Space;
 use super::walk::{ball, swapped};
+use crate::geom::IdSet;
 use crate::mesh::anatomy::EDGES;
 
 /// Takes free vertex `x` away if one of its neighbors can stand for it: the best one does.

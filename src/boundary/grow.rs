@@ -4,11 +4,10 @@
 //! behind, the next tetrahedron joins the cavity, until everything is seen: the opposite of shrinking a cavity, and
 //! like it bounded by required faces.
 
-use crate::geom::IdSet;
-
 use super::patch::Patch;
 use super::space::{Space, edge_key};
 use super::walk::swapped;
+use crate::geom::IdSet;
 use crate::mesh::anatomy::EDGES;
 use crate::storage::Pages;
 

@@ -1,10 +1,9 @@
 //! Which facets are faces already: those become required, the others are listed.
 
-use crate::geom::IdSet;
-
 use super::find::{SearchResult, find_face};
 use super::space::{PagedSpace, Space, edge_key, sorted};
 use super::walk::find_edge;
+use crate::geom::IdSet;
 use crate::mesh::{FaceRef, Facet, Mesh};
 use crate::storage::{Pages, check_cancelled};
 

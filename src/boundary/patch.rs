@@ -2,13 +2,10 @@
 //!
 //! The mesh is only read until [`Patch::commit`] writes the result as one step.
 
-use crate::geom::{IdMap, IdSet};
-
 use super::effort::Effort;
 use super::exact::{ExactPoint, Placed, orient_exact, orient_filtered, orient_in_pairs};
 use super::space::{Space, edge_key, sorted};
-use crate::geom::Dyadic;
-use crate::geom::{Point, orient};
+use crate::geom::{Dyadic, IdMap, IdSet, Point, orient};
 use crate::mesh::{FaceRef, Mesh, Tet, VertexTag};
 use crate::storage::Pages;
 use tetdb_schema::page::NONE;

@@ -1,7 +1,5 @@
 //! The exact path: patches around facets that flips cannot recover.
 
-use crate::geom::{IdMap, IdSet};
-
 use super::chain::Trouble;
 use super::effort::{EFFORTS, Effort};
 use super::find::{SearchResult, find_face};
@@ -14,6 +12,7 @@ use super::space::{PagedSpace, Space, edge_key, sorted};
 use super::suppress::CavitySkin;
 use super::turn::turn_segment;
 use super::walk::{find_edge, shell};
+use crate::geom::{IdMap, IdSet};
 use crate::mesh::{FaceRef, Mesh};
 use crate::storage::{Pages, check_cancelled};
 

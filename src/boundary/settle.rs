@@ -8,8 +8,6 @@
 //!          c--            Between facets nearer to each other than the last bits of their corners there is none.
 //! ```
 
-use crate::geom::IdSet;
-
 use super::chain::Trouble;
 use super::exact::ExactPoint;
 use super::free_vertex::remove_free;
@@ -18,8 +16,7 @@ use super::patch::Patch;
 use super::space::Space;
 use super::suppress::half_space;
 use super::walk::ball;
-use crate::geom::Dyadic;
-use crate::geom::Point;
+use crate::geom::{Dyadic, IdSet, Point};
 use crate::storage::Pages;
 
 /// Times all vertices are moved: room grows by a factor each time.

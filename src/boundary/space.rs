@@ -1,8 +1,6 @@
 //! One face for the two places where recovery works: the paged mesh, and a patch held in memory.
 
-use crate::geom::IdSet;
-
-use crate::geom::{Point, orient};
+use crate::geom::{IdSet, Point, orient};
 use crate::mesh::anatomy::{FACES, REQUIRED};
 use crate::mesh::{FaceRef, Mesh, Tet, VertexTag};
 use crate::storage::Pages;

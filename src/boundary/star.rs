@@ -1,11 +1,10 @@
 //! Puts an exact point into a small cavity that sees it whole.
 
-use crate::geom::IdSet;
-
 use super::exact::ExactPoint;
 use super::patch::Patch;
 use super::space::Space;
 use super::walk::swapped;
+use crate::geom::IdSet;
 use crate::mesh::Tet;
 use crate::storage::Pages;
 

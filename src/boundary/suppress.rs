@@ -13,7 +13,6 @@
 //! Source: P.-L. George, H. Borouchaki and E. Saltel, "'Ultimate' robustness in meshing an arbitrary polyhedron",
 //! International Journal for Numerical Methods in Engineering 58 (2003).
 
-use crate::geom::{IdMap, IdSet};
 use std::collections::BTreeMap;
 
 use super::chain::Trouble;
@@ -25,7 +24,7 @@ use super::polygon::triangulate;
 use super::space::{Space, sorted};
 use super::target::RecoveryTarget;
 use super::walk::{self, ball, edge_at};
-use crate::geom::Point;
+use crate::geom::{IdMap, IdSet, Point};
 use crate::mesh::FaceRef;
 use crate::storage::Pages;
 

@@ -1,14 +1,12 @@
 //! Steiner points at the end of recovery: those nobody needs go, the others move away from the planes they were put beside.
 
-use crate::geom::IdSet;
-
 use super::free_vertex::{ball_flatness, remove_free};
 use super::kernel::{HalfSpace, center, room};
 use super::report::RecoveryReport;
 use super::space::{PagedSpace, Space};
 use super::suppress::half_space;
 use super::walk::ball;
-use crate::geom::Point;
+use crate::geom::{IdSet, Point};
 use crate::mesh::{Mesh, VertexTag};
 use crate::storage::{Pages, check_cancelled};
 

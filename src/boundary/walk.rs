@@ -1,8 +1,7 @@
 //! Exact walks: from a vertex towards another, around an edge, along a missing edge.
 
-use crate::geom::IdSet;
-
 use super::space::Space;
+use crate::geom::IdSet;
 use crate::mesh::{FaceRef, Tet};
 use crate::storage::check_cancelled;
 

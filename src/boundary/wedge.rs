@@ -1,6 +1,5 @@
 //! The wedges of a ball between facets, and places in them for a vertex that sees all around.
 
-use crate::geom::IdSet;
 use std::collections::BTreeSet;
 
 use super::chain::Trouble;
@@ -11,7 +10,7 @@ use super::patch::Patch;
 use super::space::{Space, sorted};
 use super::suppress::{CavitySkin, Fan, half_space};
 use super::walk::swapped;
-use crate::geom::{Dyadic, Point};
+use crate::geom::{Dyadic, IdSet, Point};
 use crate::storage::Pages;
 
 /// A place nearer than this to the planes around it, in units of the wedge, is second choice.

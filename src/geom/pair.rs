@@ -82,17 +82,13 @@ impl Pair {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geom::tests::Numbers;
     use dashu::rational::RBig;
 
     #[test]
     fn sums_and_products_are_those_of_rationals_but_for_the_last_bits() {
-        let mut state = 1u64;
-        let mut next = |power: i32| {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            ((state >> 12) as f64 / (1u64 << 51) as f64 - 1.0) * 2f64.powi(power)
-        };
+        let mut numbers = Numbers(1);
+        let mut next = |power: i32| numbers.next() * 2f64.powi(power + 1);
         let rational = |x: f64| RBig::try_from(x).expect("finite");
         let of = |p: Pair| rational(p.0) + rational(p.1);
         let size = |x: RBig| x.to_f64().value().abs();

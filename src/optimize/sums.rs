@@ -1,10 +1,8 @@
 //! Four sums at each vertex of a part of the mesh, to be added to those of the other parts.
 
-use std::collections::HashMap;
-use std::hash::{BuildHasherDefault, Hasher};
-
 use tetdb_schema::page::{Slot, u32_le};
 
+use crate::geom::IdMap;
 use crate::mesh::Mesh;
 use crate::storage::{Pages, kind};
 
@@ -12,24 +10,6 @@ use crate::storage::{Pages, kind};
 const BLOCK: usize = 8;
 /// Blocks found without asking the map. A page of tetrahedra has about 50 blocks; with 64 a third more time goes by.
 const RECENT: usize = 256;
-
-/// Spreads numbers of blocks, which are consecutive more often than not.
-#[derive(Default)]
-struct Spread(u64);
-
-impl Hasher for Spread {
-    fn finish(&self) -> u64 {
-        self.0
-    }
-    fn write(&mut self, _: &[u8]) {
-        unreachable!("blocks are hashed as numbers")
-    }
-    fn write_u32(&mut self, block: u32) {
-        self.0 = u64::from(block)
-            .wrapping_mul(0x9E37_79B9_7F4A_7C15)
-            .rotate_left(29);
-    }
-}
 
 /// Four numbers beside a vertex: first the sum of weighted circumcenters times two and the sum of weights (both as
 /// six volumes), then the position before the move and what is left of its patience: 1 when moved, 0 when not.
@@ -54,7 +34,7 @@ pub(super) fn set_four(slot: &mut Slot, numbers: [f64; 4]) {
 /// Sums by vertex.
 pub(super) struct Sums {
     blocks: Vec<(u32, [[f64; 4]; BLOCK])>,
-    places: HashMap<u32, u32, BuildHasherDefault<Spread>>,
+    places: IdMap<u32, u32>,
     /// Blocks used lately and their places, by the last bits of their numbers.
     recent: Box<[(u32, u32); RECENT]>,
 }
@@ -63,7 +43,7 @@ impl Default for Sums {
     fn default() -> Self {
         Self {
             blocks: Vec::new(),
-            places: HashMap::default(),
+            places: IdMap::default(),
             recent: Box::new([(u32::MAX, 0); RECENT]),
         }
     }

@@ -9,10 +9,10 @@
 //! (1997).
 
 use std::cmp::Reverse;
-use std::collections::{BinaryHeap, HashMap};
+use std::collections::BinaryHeap;
 
 use super::{Surface, SurfaceError};
-use crate::geom::Point;
+use crate::geom::{IdMap, Point};
 
 /// Edges longer than this, in units of the wanted length, are divided: halves are then as much too short as it was too long.
 const LONG: f64 = std::f64::consts::SQRT_2;
@@ -109,9 +109,9 @@ struct Splitter {
     surface: Surface,
     /// Input triangle of each triangle.
     parent: Vec<u32>,
-    around: HashMap<Edge, Vec<u32>>,
+    around: IdMap<Edge, Vec<u32>>,
     /// Edges of wires, by their places among these. They are not swapped, and divided with the triangles they are edges of.
-    wires: HashMap<Edge, usize>,
+    wires: IdMap<Edge, usize>,
     report: SplitReport,
 }
 
@@ -121,7 +121,7 @@ type Ordered = (u64, Reverse<Edge>);
 impl Splitter {
     /// Knows the edges of those triangles whose parents `is_meant`.
     fn new(surface: Surface, parent: Vec<u32>, is_meant: impl Fn(u32) -> bool) -> Self {
-        let mut around: HashMap<Edge, Vec<u32>> = HashMap::new();
+        let mut around: IdMap<Edge, Vec<u32>> = IdMap::default();
         let triangles = (0u32..).zip(&surface.triangles);
         for (t, &[a, b, c]) in triangles.filter(|(t, _)| is_meant(parent[*t as usize])) {
             for e in [edge(a, b), edge(b, c), edge(c, a)] {
@@ -167,7 +167,7 @@ impl Splitter {
         self.swap(t, k)
     }
 
-    /// Divides every triangle at `e`, if it was not swapped.
+    /// Divides every triangle at `e`, if it is still there.
     fn divide(&mut self, e: Edge, h: &dyn Fn(Point) -> f64, heap: &mut BinaryHeap<Ordered>) {
         let Some(triangles) = self.around.remove(&e) else {
             return;
@@ -255,7 +255,7 @@ impl Splitter {
         }
     }
 
-    /// Swaps the edge at corner `k` of a triangle with the same conditions; returns the new one.
+    /// Swaps the edge from corner `k` of a triangle to the next, under the conditions of [`Splitter::swap_edge`]; returns the new one.
     fn swap(&mut self, t: u32, k: usize) -> Option<Edge> {
         let corners = self.surface.triangles[t as usize];
         let [a, b, c] = [corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]];

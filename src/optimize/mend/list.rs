@@ -1,13 +1,13 @@
 //! What is bad in the eyes of a stage: pages are judged side by side.
 
 use std::cmp::Reverse;
-use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 
 use super::super::pages::PageFlags;
 use super::super::smooth::is_free;
 use super::face_bounds::FaceBounds;
 use super::stages::{Judgment, Stage, judge};
+use crate::geom::IdMap;
 use crate::mesh::{Mesh, Scan, scan_parts, tets_of_page};
 use crate::storage::Pages;
 
@@ -89,7 +89,7 @@ pub(super) fn list_movable<P: Pages>(
     stage: &Stage,
     judges: &Judges,
 ) -> Vec<(u32, u32)> {
-    let mut worst: HashMap<u32, (u64, u32, Reverse<usize>)> = HashMap::new();
+    let mut worst: IdMap<u32, (u64, u32, Reverse<usize>)> = IdMap::default();
     for some in pages.clone().take_all().chunks(PAGES) {
         for listed in judged(mesh, some, stage, 0.0, judges) {
             for (bits, t) in listed.bad {
