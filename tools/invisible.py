@@ -5,12 +5,13 @@
     python3 tools/invisible.py --pair parts.vtu whole.vtu --pair ...
 
 Each cut is a pair of exports: of a mesh in two sub-domains, and of the same surface and options in one; with `--sample` both are
-made. In the mesh of one piece the interface of the other is a fake cut, which tells what chance and the surface do. Sizes must be
-uniform (such as in a box): they are taken as the median edge length.
+made. In the mesh of one piece the interface of the other is a fake cut, which tells what chance and the surface do. Sizes are taken as
+uniform (such as in a box), the median edge length; with `--graded` as the mean length of the edges of some hundred vertices around, in the
+mesh of one piece.
 
 Printed for the true and the fake cuts, all together, over tetrahedra away from the surface (farther than
 2 h) and near it:
-- Kolmogorov distances of quality and of metric edge length between tetrahedra nearer than 1 h to the interface (and at 3.5 to
+- Kolmogorov distances of quality, of metric edge length and of its mean in each tetrahedron between tetrahedra nearer than 1 h to the interface (and at 3.5 to
   6.5 h, where the refined zone ended) and those farther than 8 h;
 - densities of vertices in slices of 0.25 h out to 8 h from the plane of the cut: coefficient of variation, and what chance alone would make of it;
 - the area under the curve of a classifier that tries to tell near tetrahedra from far ones by their shape, size, valences and
@@ -52,6 +53,33 @@ def pair_faces(tets):
     return order[first] // 4, order[first + 1] // 4, ordered[first], faces[alone], n
 
 
+def unique_edges(tets):
+    return np.unique(np.sort(tets[:, EDGES].reshape(-1, 2), axis=1), axis=0)
+
+
+class Sizes:
+    """Lengths the mesh was to have, at any points: one for all, or what edges measure around them."""
+
+    def __init__(self, points, tets, graded):
+        edges = unique_edges(tets)
+        length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
+        self.median = float(np.median(length))
+        self.tree = None
+        if graded:
+            n = np.bincount(edges.ravel(), minlength=len(points))
+            sums = np.bincount(edges[:, 0], length, len(points)) + np.bincount(edges[:, 1], length, len(points))
+            mean = sums / np.maximum(n, 1)
+            # Some hundred neighbors: the noise of each goes, what a zone of a few lengths does stays in part and is the less seen.
+            self.tree = cKDTree(points)
+            self.values = np.concatenate([mean[self.tree.query(some, 200, workers=2)[1]].mean(1)
+                                          for some in np.array_split(points, 1 + len(points) // 100000)])
+
+    def at(self, places):
+        if self.tree is None:
+            return np.full(len(places), self.median)
+        return self.values[self.tree.query(places, workers=2)[1]]
+
+
 def features(points, tets, normal, size):
     p = points[tets]
     edges = p[:, EDGES[:, 1]] - p[:, EDGES[:, 0]]
@@ -59,10 +87,11 @@ def features(points, tets, normal, size):
     volume = np.einsum("ij,ij->i", edges[:, 0], np.cross(edges[:, 1], edges[:, 2])) / 6
     areas = [np.linalg.norm(np.cross(p[:, f[1]] - p[:, f[0]], p[:, f[2]] - p[:, f[0]]), axis=1) / 2 for f in FACES]
     quality = np.sqrt(6) / 12 * length.max(1) / (3 * volume / np.sum(areas, axis=0))
-    valence = np.bincount(np.unique(np.sort(tets[:, EDGES].reshape(-1, 2), axis=1), axis=0).ravel(), minlength=len(points))
-    slope = np.sort(np.abs(edges @ normal) / length, axis=1)
-    columns = [quality, np.sort(length, axis=1) / size, volume / size**3, np.sort(valence[tets], axis=1), slope]
-    return quality, length / size, np.column_stack([c if c.ndim == 2 else c[:, None] for c in columns])
+    valence = np.bincount(unique_edges(tets).ravel(), minlength=len(points))
+    length = length / size[:, None]
+    slope = np.sort(np.abs(edges @ normal) / (length * size[:, None]), axis=1)
+    columns = [quality, np.sort(length, axis=1), volume / size**3, np.sort(valence[tets], axis=1), slope]
+    return quality, length, np.column_stack([c if c.ndim == 2 else c[:, None] for c in columns])
 
 
 def kolmogorov(a, b):
@@ -77,16 +106,17 @@ NEAR = {"< 1 h": (0, 1), "3.5-6.5 h": (3.5, 6.5)}
 class Cut:
     """Features of all tetrahedra of one mesh, and where they are relative to an interface (true or fake)."""
 
-    def __init__(self, mesh, interface, normal, offset, size):
+    def __init__(self, mesh, interface, normal, offset, sizes):
         points, tets = mesh[:2]
         walls = points[pair_faces(tets)[3]]
         hull = cKDTree(walls.mean(1))
         middle = points[tets].mean(1)
+        size = sizes.at(middle)
         plane = np.abs(middle @ normal - offset) / size
         # Only what is near the plane needs its distance to the interface itself.
         self.distance = plane.copy()
         band = plane < 9
-        self.distance[band] = interface.query(middle[band], workers=2)[0] / size
+        self.distance[band] = interface.query(middle[band], workers=2)[0] / size[band]
         away, wall = hull.query(middle, workers=2)
         self.inner = away > 2 * size
         # Walls that face the cut are not met by it: near the surface only those it crosses are compared.
@@ -96,8 +126,9 @@ class Cut:
         self.quality, self.length, self.columns = features(points, tets, normal, size)
         across = np.linalg.svd(normal[None])[2][1]
         self.half = middle @ across > np.median(middle @ across)
+        size = sizes.at(points)
         away = hull.query(points, workers=2)[0] > 2 * size
-        d = (points[away] @ normal - offset) / size
+        d = (points[away] @ normal - offset) / size[away]
         self.slices = np.histogram(d, np.arange(-8, 8.01, 0.25))[0]
 
     def near(self, kind, inner):
@@ -140,28 +171,30 @@ def judge(name, cuts):
             near = [c.near(kind, inner) for c in cuts]
             far = [c.far(inner) for c in cuts]
             both = [np.concatenate([v(c)[m].ravel() for c, m in zip(cuts, masks)]) for v in
-                    (lambda c: c.quality, lambda c: c.length) for masks in (near, far)]
+                    (lambda c: c.quality, lambda c: c.length, lambda c: c.length.mean(1)) for masks in (near, far)]
             print(f"{name:10} {place:21} {kind:10} {sum(m.sum() for m in near):8} tets: KS quality {kolmogorov(*both[:2]):.4f}, "
-                  f"KS edge length {kolmogorov(*both[2:]):.4f}, AUC {auc(cuts, kind, inner):.3f}", flush=True)
+                  f"KS edge length {kolmogorov(*both[2:4]):.4f}, KS mean edge {kolmogorov(*both[4:]):.4f} "
+                  f"({both[4].mean() / both[5].mean() - 1:+.2%}), AUC {auc(cuts, kind, inner):.3f}", flush=True)
     # Slices of cuts with other sizes are compared as shares of their own mean.
     shares = np.mean([c.slices / c.slices.mean() for c in cuts], axis=0)
     chance = np.sqrt(np.sum([1 / c.slices.mean() for c in cuts])) / len(cuts)
     print(f"{name:10} density in 64 slices: cv {shares.std():.4f}, chance {chance:.4f}, extremes {shares.min() - 1:+.3f} {shares.max() - 1:+.3f}", flush=True)
 
 
-def make(sample, tetdb, folder):
-    """Exports of the sample in two sub-domains and in one."""
+def make(surface, tetdb, folder):
+    """Exports of the surface in two sub-domains and in one."""
     paths = []
+    surface = surface if pathlib.Path(surface).exists() else f"sample:{surface}"
     for n in (2, 1):
-        store, out = folder / "cut.tetdb", folder / f"{sample}_{n}.vtu"
-        for command in (["mesh", f"sample:{sample}", "-o", store, "--subdomains", n, "--no-verify", "--force"],
+        store, out = folder / "cut.tetdb", folder / f"{n}.vtu"
+        for command in (["mesh", surface, "-o", store, "--subdomains", n, "--no-verify", "--force"],
                         ["export", store, out]):
             subprocess.run([tetdb, *map(str, command)], check=True, stdout=subprocess.DEVNULL)
         paths.append(out)
     return paths
 
 
-def look(parts, whole):
+def look(name, parts, whole, graded):
     """The true cut and the fake one."""
     points, tets, part = read(parts)
     a, b, faces, _, _ = pair_faces(tets)
@@ -169,13 +202,14 @@ def look(parts, whole):
     at = points[np.unique(faces[cut])]
     center = at.mean(0)
     normal = np.linalg.svd(at - center, full_matrices=False)[2][2]
-    edge = points[faces[:, 0]] - points[faces[:, 1]]
-    size = float(np.median(np.linalg.norm(edge, axis=1)))
+    one = read(whole)[:2]
+    sizes = Sizes(*one, graded)
     offset = float(center @ normal)
     interface = cKDTree(np.concatenate([at, points[faces[cut]].mean(1)]))
-    print(f"{parts}: {cut.sum()} interface faces, plane {normal.round(4)} at {offset:.4f}, h {size:.5f}, "
-          f"spread {np.std((at - center) @ normal) / size:.2f} h", flush=True)
-    cuts = [Cut(mesh, interface, normal, offset, size) for mesh in ((points, tets), read(whole)[:2])]
+    size = sizes.at(at)
+    print(f"{name}: {cut.sum()} interface faces, plane {normal.round(4)} at {offset:.4f}, h {size.min():.5f} to {size.max():.5f}, "
+          f"spread {np.std((at - center) @ normal / size):.2f} h", flush=True)
+    cuts = [Cut(mesh, interface, normal, offset, sizes) for mesh in ((points, tets), one)]
     for inner in (True, False):
         lengths = [c.length[(c.inner == inner) & (c.distance < 4)].ravel() for c in cuts]
         mean, high = ([f(l) for l in lengths] for f in (np.mean, lambda l: np.quantile(l, 0.95)))
@@ -186,15 +220,16 @@ def look(parts, whole):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--pair", nargs=2, action="append", default=[], metavar=("PARTS", "WHOLE"))
-    parser.add_argument("--sample", action="append", default=[])
+    parser.add_argument("--sample", action="append", default=[], help="a sample's name, or a surface file")
+    parser.add_argument("--graded", action="store_true")
     parser.add_argument("--tetdb", default="target/release/tetdb")
     args = parser.parse_args()
     if not args.pair and not args.sample:
         parser.error("give --sample or --pair")
-    looked = [look(*pair) for pair in args.pair]
+    looked = [look(pair[0], *pair, args.graded) for pair in args.pair]
     for sample in args.sample:
         with tempfile.TemporaryDirectory() as folder:
-            looked.append(look(*make(sample, args.tetdb, pathlib.Path(folder))))
+            looked.append(look(sample, *make(sample, args.tetdb, pathlib.Path(folder)), args.graded))
     cut, fake = zip(*looked)
     judge("cuts", cut)
     judge("fakes", fake)

@@ -10,7 +10,7 @@ use super::patch::Patch;
 use super::report::{RecoveryReport, RecoveryWatcher};
 use super::space::{PagedSpace, Space, edge_key, sorted};
 use super::suppress::CavitySkin;
-use super::turn::turn_segment;
+use super::turn::{from_hubs, turn_segment};
 use super::walk::{find_edge, shell};
 use crate::geom::{IdMap, IdSet};
 use crate::mesh::{FaceRef, Mesh};
@@ -116,7 +116,7 @@ fn turn_inside<P: Pages>(
         missing.protected.extend(rim);
     }
     for part in parts {
-        for &(a, b) in &part.inner {
+        for (a, b) in from_hubs(&part.inner) {
             turn_segment(mesh, missing, report, a, b);
         }
     }

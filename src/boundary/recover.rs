@@ -13,16 +13,16 @@ use super::report::{RecoveryReport, RecoveryWatcher};
 use super::space::{PagedSpace, Space, edge_key};
 use super::target::RecoveryTarget;
 use super::tidy::tidy;
-use super::turn::turn_segment;
+use super::turn::{from_hubs, turn_segment};
 use crate::mesh::Mesh;
 use crate::storage::{Pages, check_cancelled};
 
 /// How deep edge removals may nest, pass after pass, and the ring searches a target may cost then.
 const LEVELS: [(u32, u32); 3] = [(0, 40), (1, 80), (2, 160)];
 
-/// Parts a segment may cross to be flipped for before edges are turned. Flips alone leave the better tetrahedra, and cost the square
-/// of this: where a fan of slats lies across a Delaunay mesh its segments cross hundreds.
-const CROSSINGS_FIRST: usize = 24;
+/// Parts a segment may cross to be flipped for before edges are turned. Flips cost the square of this: where a fan of slats lies across
+/// a Delaunay mesh its segments cross hundreds.
+const CROSSINGS_FIRST: usize = 8;
 
 /// Makes every facet of `mesh` a required face on both sides.
 ///
@@ -109,7 +109,7 @@ fn turn_segments<P: Pages>(
     watch: &RecoveryWatcher,
 ) {
     let mut left = Vec::new();
-    for (a, b) in std::mem::take(&mut missing.segments) {
+    for (a, b) in from_hubs(&std::mem::take(&mut missing.segments)) {
         check_cancelled();
         report.notify(watch);
         if turn_segment(mesh, missing, report, a, b) {

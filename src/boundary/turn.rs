@@ -7,7 +7,8 @@
 //!      \ | /             \   /      the crossing sees all their other faces, and both new triangles. A vertex of the ring may do
 //!        d                 d        as well; where none does, one is put there. The same below.
 //! ```
-//! A segment in the plane is reached by turning each edge it crosses, those that cannot turn yet after the others.
+//! A segment in the plane is reached by turning each edge it crosses, those that cannot turn yet after the others. New vertices crowd
+//! the plane: where that leaves no room, the tetrahedra above the edge grow to a cavity that swallows the ones before.
 //!
 //! Source: S. W. Sloan, "A fast algorithm for generating constrained Delaunay triangulations", Computers & Structures 47
 //! (1993), for the plane; the vertices above and below are our own.
@@ -15,14 +16,15 @@
 use std::collections::VecDeque;
 
 use super::free_vertex::remove_free;
+use super::grow::grow;
 use super::kernel::{HalfSpace, center, room};
 use super::map::MissingFacets;
 use super::report::RecoveryReport;
-use super::space::{PagedSpace, Space, edge_key};
+use super::space::{PagedSpace, Space, edge_key, sorted};
 use super::suppress::half_space;
 use super::tidy::rise;
 use super::walk::{EdgeRing, Exit, crossings, edge_at, shell};
-use crate::geom::{Point, orient};
+use crate::geom::{IdMap, IdSet, Point, orient};
 use crate::mesh::Mesh;
 use crate::storage::Pages;
 
@@ -35,8 +37,27 @@ const TURNS_MAX: usize = 20;
 /// Times a place half as far from the crossing is tried.
 const HALVES_MAX: i32 = 50;
 
+/// Times a place half as far from the crossing is tried for a cavity that grows.
+const GROWN_MAX: i32 = 24;
+
 /// A place with less room than this, in units of the tetrahedra around it, is second choice.
 const ROOM_MIN: f64 = 1e-4;
+
+/// The segments, each from the end where more of them meet.
+///
+/// Turned from there on, edges that cross one segment become edges of that end and are out of the way of all others: of a fan each is
+/// turned once or twice, from its rim a hundred times.
+pub(super) fn from_hubs(segments: &[(u32, u32)]) -> Vec<(u32, u32)> {
+    let mut meeting: IdMap<u32, u32> = IdMap::default();
+    for v in segments.iter().flat_map(|&(a, b)| [a, b]) {
+        *meeting.entry(v).or_default() += 1;
+    }
+    let from_hub = |&(a, b): &(u32, u32)| match meeting[&a] < meeting[&b] {
+        true => (b, a),
+        false => (a, b),
+    };
+    segments.iter().map(from_hub).collect()
+}
 
 /// Turns edges until the segment `a b` is there, and protects it; takes away again what was added and is not needed.
 ///
@@ -82,8 +103,34 @@ type Crossed = (u32, u32, u32);
 /// The edge after the turn, and whether the segment crosses it too.
 type Turned = (Crossed, bool);
 
-/// Tetrahedra, and the vertex added for them.
-type Half = (Vec<[u32; 4]>, Option<u32>);
+/// One side of the plane at an edge that turns.
+struct Side {
+    /// From one new corner to the other.
+    ring: Vec<u32>,
+    tets: Vec<u32>,
+    /// Tetrahedra of the other side, which are not to be taken.
+    others: IdSet<u32>,
+}
+
+/// What changes on one side of the plane.
+struct Half {
+    old: Vec<u32>,
+    new: Vec<[u32; 4]>,
+    /// The vertex added, and those no tetrahedron has any more.
+    added: Option<u32>,
+    lost: Vec<u32>,
+}
+
+/// How much a turn may do to find a place for a new vertex.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Reach {
+    /// Where there is room.
+    Roomy,
+    /// In a cavity that grows until it is seen, and swallows added vertices.
+    Grown,
+    /// As near to the plane as it takes.
+    Crowded,
+}
 
 /// An edge `c d` with its tetrahedra, as it turns to `x y`.
 struct Turn {
@@ -96,6 +143,27 @@ struct Turn {
     to_y: usize,
     /// Whether the segment crosses `x y` as well.
     crosses: bool,
+}
+
+impl Turn {
+    /// What lies above the plane, then below.
+    fn sides(&self) -> [Side; 2] {
+        let n = self.around.ring.len();
+        let from_to = [
+            (self.at_x, self.to_y),
+            (self.at_x + self.to_y, n - self.to_y),
+        ];
+        let tets = from_to.map(|(from, len)| -> Vec<u32> {
+            (0..len).map(|k| self.around.tets[(from + k) % n]).collect()
+        });
+        [0, 1].map(|i| Side {
+            ring: (0..=from_to[i].1)
+                .map(|k| self.around.ring[(from_to[i].0 + k) % n])
+                .collect(),
+            tets: tets[i].clone(),
+            others: tets[1 - i].iter().copied().collect(),
+        })
+    }
 }
 
 impl<P: Pages> Turner<'_, '_, P> {
@@ -147,11 +215,11 @@ impl<P: Pages> Turner<'_, '_, P> {
 
     /// Turns `c d`, which the segment `a b` crosses, if that makes a new edge in the plane.
     ///
-    /// Added vertices lie the nearer to the plane the more of them there are: where they leave little room, those around the edge
-    /// go or rise first.
+    /// Added vertices lie the nearer to the plane the more of them there are: where they leave little room, one new vertex replaces them,
+    /// or those around the edge go or rise first.
     fn turn(&mut self, edge: Crossed, a: u32, b: u32) -> Option<Turned> {
         let turn = self.plan(edge, a, b)?;
-        if let Some(turned) = self.carry_out(&turn, false) {
+        if let Some(turned) = self.carry_out(&turn, Reach::Roomy) {
             return Some(turned);
         }
         let mut free = turn.around.ring;
@@ -162,18 +230,24 @@ impl<P: Pages> Turner<'_, '_, P> {
             }
         }
         let turn = self.plan(edge, a, b)?;
-        self.carry_out(&turn, true)
+        self.carry_out(&turn, Reach::Grown)
+            .or_else(|| self.carry_out(&turn, Reach::Crowded))
     }
 
     /// Takes away a vertex that nothing needs.
     fn remove(&mut self, v: u32) -> bool {
         let removed = remove_free(self.s, v, 0.0);
         if removed {
-            self.s.drop_steiner(v);
-            self.balance -= 1;
-            self.added.retain(|&a| a != v);
+            self.forget(v);
         }
         removed
+    }
+
+    /// Gives back an added vertex that no tetrahedron has any more.
+    fn forget(&mut self, v: u32) {
+        self.s.drop_steiner(v);
+        self.balance -= 1;
+        self.added.retain(|&a| a != v);
     }
 
     /// Which edge `c d` becomes; `None` where it has to stay, or the four corners are not convex.
@@ -215,61 +289,65 @@ impl<P: Pages> Turner<'_, '_, P> {
     }
 
     /// Replaces the tetrahedra around the edge; `None`, and nothing changed, where there is no room.
-    fn carry_out(&mut self, turn: &Turn, may_crowd: bool) -> Option<Turned> {
-        let (mut new, over) = self.half(turn, true, may_crowd)?;
-        let Some((mut below, under)) = self.half(turn, false, may_crowd) else {
-            if let Some(p) = over {
+    fn carry_out(&mut self, turn: &Turn, reach: Reach) -> Option<Turned> {
+        let [above, mut below] = turn.sides();
+        let over = self.half(turn, &above, reach)?;
+        below.others.extend(&over.old);
+        let Some(under) = self.half(turn, &below, reach) else {
+            if let Some(p) = over.added {
                 self.s.drop_steiner(p);
             }
             return None;
         };
-        for p in over.into_iter().chain(under) {
+        let old = [over.old, under.old].concat();
+        let new = [over.new, under.new].concat();
+        let ids = self.s.replace(&old, &new);
+        self.turns += 1;
+        for p in over.added.into_iter().chain(under.added) {
             self.added.push(p);
             self.balance += 1;
         }
-        new.append(&mut below);
-        let ids = self.s.replace(&turn.around.tets, &new);
-        self.turns += 1;
-        let ring = &turn.around.ring;
-        let (x, y) = (ring[turn.at_x], ring[turn.at_x + turn.to_y]);
+        for v in over.lost.into_iter().chain(under.lost) {
+            self.forget(v);
+        }
+        let (x, y) = (above.ring[0], below.ring[0]);
         let at = new.iter().position(|q| q.contains(&x) && q.contains(&y))?;
         Some(((ids[at], x, y), turn.crosses))
     }
 
-    /// The tetrahedra on one side after the turn, and the vertex added for them.
-    fn half(&mut self, turn: &Turn, above: bool, may_crowd: bool) -> Option<Half> {
-        let n = turn.around.ring.len();
-        let (from, len) = match above {
-            true => (turn.at_x, turn.to_y),
-            false => (turn.at_x + turn.to_y, n - turn.to_y),
-        };
-        let ring: Vec<u32> = (0..=len)
-            .map(|k| turn.around.ring[(from + k) % n])
-            .collect();
+    /// What changes on one side.
+    fn half(&mut self, turn: &Turn, side: &Side, reach: Reach) -> Option<Half> {
+        let ring = &side.ring;
         let mut best: Option<(f64, Vec<[u32; 4]>)> = None;
-        for &p in &ring[1..len] {
-            let quads = joined(&ring, turn.c, turn.d, p);
+        for &p in &ring[1..ring.len() - 1] {
+            let quads = joined(ring, turn.c, turn.d, p);
             let least = self.least_volume(&quads);
             if least > best.as_ref().map_or(0.0, |b| b.0) {
                 best = Some((least, quads));
             }
         }
-        if let Some((_, quads)) = best {
-            return Some((quads, None));
-        }
-        self.join_to_new(&ring, turn.c, turn.d, may_crowd)
+        let Some((_, new)) = best else {
+            return self.join_to_new(turn, side, reach);
+        };
+        Some(Half {
+            old: side.tets.clone(),
+            new,
+            added: None,
+            lost: Vec::new(),
+        })
     }
 
     /// The ring and the new triangles joined to a new vertex near the crossing.
-    fn join_to_new(&mut self, ring: &[u32], c: u32, d: u32, may_crowd: bool) -> Option<Half> {
+    fn join_to_new(&mut self, turn: &Turn, side: &Side, reach: Reach) -> Option<Half> {
+        let (ring, c, d) = (&side.ring, turn.c, turn.d);
         let (x, y) = (ring[0], ring[ring.len() - 1]);
         let [pc, pd, px, py] = [c, d, x, y].map(|v| self.s.position(v));
         let origin = crossing([pc, pd], [px, py]);
-        let mut reach = 0.0f64;
+        let mut size = 0.0f64;
         let mut planes: Vec<HalfSpace> = Vec::new();
         let mut plane = |s: &mut PagedSpace<'_, P>, corners: [u32; 3]| {
             let corners = corners.map(|v| s.position(v) - origin);
-            reach = corners.iter().map(|c| c.length()).fold(reach, f64::max);
+            size = corners.iter().map(|c| c.length()).fold(size, f64::max);
             planes.extend(half_space(corners));
         };
         for pair in ring.windows(2) {
@@ -279,28 +357,87 @@ impl<P: Pages> Turner<'_, '_, P> {
         plane(self.s, [y, c, x]);
         plane(self.s, [d, y, x]);
         // Where all is seen best, or straight up from the crossing where that is too near for doubles to find.
-        let up = (py - px).cross(pd - pc).normalize_or_zero() * reach;
+        let up = (py - px).cross(pd - pc).normalize_or_zero() * size;
         let up = if orient(pc, py, px, origin + up) > 0.0 {
             up
         } else {
             -up
         };
-        let best = center(&planes, reach);
-        let is_roomy = best.is_some_and(|way| room(&planes, way) > ROOM_MIN * reach);
-        if !is_roomy && !may_crowd {
-            return None;
-        }
+        let best = center(&planes, size);
+        let is_roomy = best.is_some_and(|way| room(&planes, way) > ROOM_MIN * size);
         let p = self.s.add_steiner(origin);
-        let quads = joined(ring, c, d, p);
-        for way in best.into_iter().chain([up]) {
-            for k in 0..HALVES_MAX {
-                self.s.0.set_point(p, origin + way * 0.5f64.powi(k));
-                if self.least_volume(&quads) > 0.0 {
-                    return Some((quads, Some(p)));
-                }
-            }
+        let mut found = None;
+        if is_roomy || reach == Reach::Crowded {
+            let quads = joined(ring, c, d, p);
+            let mut places = (best.into_iter().chain([up]))
+                .flat_map(|way| (0..HALVES_MAX).map(move |k| origin + way * 0.5f64.powi(k)));
+            let is_seen = |place: Point| {
+                self.s.0.set_point(p, place);
+                self.least_volume(&quads) > 0.0
+            };
+            found = places.any(is_seen).then(|| Half {
+                old: side.tets.clone(),
+                new: quads,
+                added: Some(p),
+                lost: Vec::new(),
+            });
         }
-        self.s.drop_steiner(p);
+        if found.is_none() && reach == Reach::Grown {
+            let nearest = [pc, pd, px, py].map(|q| q.distance(origin));
+            let nearest = nearest.into_iter().fold(size, f64::min);
+            found = self.join_grown(turn, side, p, [origin, up * (nearest / size)]);
+        }
+        if found.is_none() {
+            self.s.drop_steiner(p);
+        }
+        found
+    }
+
+    /// A cavity around the edge joined to `p`, which comes from `origin + up` nearer and nearer to `origin` until it sees all; added
+    /// vertices inside it go.
+    fn join_grown(
+        &mut self,
+        turn: &Turn,
+        side: &Side,
+        p: u32,
+        [origin, up]: [Point; 2],
+    ) -> Option<Half> {
+        let (ring, c, d) = (&side.ring, turn.c, turn.d);
+        let (x, y) = (ring[0], ring[ring.len() - 1]);
+        let gone = [sorted([c, d, x]), sorted([c, d, y])];
+        for k in 0..GROWN_MAX {
+            self.s.0.set_point(p, origin + up * 0.5f64.powi(k));
+            let walls = [[c, y, x, p], [y, d, x, p]];
+            if walls.iter().any(|&q| self.s.orient(q) <= 0.0) {
+                continue;
+            }
+            let Ok(grown) = grow(self.s, &side.tets, p, None, &[], &side.others) else {
+                continue;
+            };
+            // Around the rim of a flat part it could come to its other side.
+            let is_beside = |&t: &u32| {
+                let corners = self.s.tet(t).vertices();
+                corners.iter().all(|&v| self.s.orient([c, y, x, v]) >= 0.0)
+            };
+            if !grown.cavity.iter().all(is_beside)
+                || !grown.lost.iter().all(|&v| self.s.is_steiner(v))
+            {
+                continue;
+            }
+            let mut new = grown.quads;
+            new.retain(|q| {
+                let mut f = q.iter().copied().filter(|&v| v != p);
+                let mut next = || f.next().unwrap_or(p);
+                !gone.contains(&sorted([next(), next(), next()]))
+            });
+            new.extend(walls);
+            return Some(Half {
+                old: grown.cavity,
+                new,
+                added: Some(p),
+                lost: grown.lost,
+            });
+        }
         None
     }
 

@@ -292,6 +292,7 @@ impl<P: Pages> Patch<'_, P> {
         Some(Grown {
             cavity: wedge.tets.clone(),
             quads,
+            lost: Vec::new(),
         })
     }
 
