@@ -4,12 +4,10 @@
 //! behind, the next tetrahedron joins the cavity, until everything is seen: the opposite of shrinking a cavity, and
 //! like it bounded by required faces.
 
-use super::patch::Patch;
 use super::space::{Space, edge_key};
 use super::walk::swapped;
 use crate::geom::IdSet;
 use crate::mesh::anatomy::EDGES;
-use crate::storage::Pages;
 
 /// Larger cavities are not tried.
 const CAVITY_MAX: usize = 300;
@@ -30,21 +28,12 @@ pub(super) enum Obstacle {
     Other,
 }
 
-impl<P: Pages> Patch<'_, P> {
-    /// As [`grow`]; no vertex may be lost.
-    pub(super) fn grow(
-        &mut self,
-        seed: &[u32],
-        x: u32,
-        open: Option<u32>,
-        walls: &[[u32; 3]],
-        taken: &IdSet<u32>,
-    ) -> Result<Grown, Obstacle> {
-        let grown = grow(self, seed, x, open, walls, taken)?;
-        if grown.lost.is_empty() {
-            Ok(grown)
-        } else {
-            Err(Obstacle::Other)
+impl Grown {
+    /// The same, where no vertex may be lost.
+    pub(super) fn losing_none(self) -> Result<Self, Obstacle> {
+        match self.lost.is_empty() {
+            true => Ok(self),
+            false => Err(Obstacle::Other),
         }
     }
 }

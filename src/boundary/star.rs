@@ -1,6 +1,7 @@
 //! Puts an exact point into a small cavity that sees it whole.
 
 use super::exact::ExactPoint;
+use super::grow::{Grown, grow};
 use super::patch::Patch;
 use super::space::Space;
 use super::walk::swapped;
@@ -54,7 +55,8 @@ impl<P: Pages> Patch<'_, P> {
         exact: ExactPoint,
     ) -> Option<u32> {
         let x = self.add_vertex_on(on, exact);
-        let Ok(grown) = self.grow(seed, x, None, &[], &IdSet::default()) else {
+        let grown = grow(self, seed, x, None, &[], &IdSet::default());
+        let Ok(grown) = grown.and_then(Grown::losing_none) else {
             self.drop_vertex(x);
             return None;
         };

@@ -20,7 +20,7 @@ use super::grow::grow;
 use super::kernel::{HalfSpace, center, room};
 use super::map::MissingFacets;
 use super::report::RecoveryReport;
-use super::space::{PagedSpace, Space, edge_key, sorted};
+use super::space::{PagedSpace, Space, edge_key};
 use super::suppress::half_space;
 use super::tidy::rise;
 use super::walk::{EdgeRing, Exit, crossings, edge_at, shell};
@@ -404,7 +404,6 @@ impl<P: Pages> Turner<'_, '_, P> {
     ) -> Option<Half> {
         let (ring, c, d) = (&side.ring, turn.c, turn.d);
         let (x, y) = (ring[0], ring[ring.len() - 1]);
-        let gone = [sorted([c, d, x]), sorted([c, d, y])];
         for k in 0..GROWN_MAX {
             self.s.0.set_point(p, origin + up * 0.5f64.powi(k));
             let walls = [[c, y, x, p], [y, d, x, p]];
@@ -425,11 +424,8 @@ impl<P: Pages> Turner<'_, '_, P> {
                 continue;
             }
             let mut new = grown.quads;
-            new.retain(|q| {
-                let mut f = q.iter().copied().filter(|&v| v != p);
-                let mut next = || f.next().unwrap_or(p);
-                !gone.contains(&sorted([next(), next(), next()]))
-            });
+            // The two triangles that turn: no other outer face has the edge.
+            new.retain(|q| !(q.contains(&c) && q.contains(&d)));
             new.extend(walls);
             return Some(Half {
                 old: grown.cavity,

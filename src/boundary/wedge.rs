@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::chain::Trouble;
 use super::free_vertex::moved;
-use super::grow::{Grown, Obstacle};
+use super::grow::{Grown, Obstacle, grow};
 use super::kernel::{center, room};
 use super::patch::Patch;
 use super::space::{Space, sorted};
@@ -274,7 +274,7 @@ impl<P: Pages> Patch<'_, P> {
             grown = if may_grow {
                 let mut others = taken.clone();
                 others.retain(|t| !wedge.tets.contains(t));
-                self.grow(&wedge.tets, p, Some(x), walls, &others)
+                grow(self, &wedge.tets, p, Some(x), walls, &others).and_then(Grown::losing_none)
             } else {
                 self.join_all(x, wedge, p).ok_or(Obstacle::Other)
             };
