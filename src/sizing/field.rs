@@ -117,6 +117,7 @@ impl SizeField {
             beside: 0.0,
         };
         let tree = Tree::build(&seeds, &scaled, |tree| constraints.refine(tree))?;
+        let _held = room.hold(seeds.bytes() + tree.bytes());
         let mut corners = Corners::of(&tree, room);
         let mut maker = Maker {
             tree: &tree,
@@ -282,10 +283,8 @@ impl SizeField {
     }
 
     /// What is held in any room.
-    fn octree_bytes(&self) -> usize {
-        size_of::<Self>()
-            + self.tree.blocks.capacity() * size_of::<[u32; 8]>()
-            + self.jump.cells.capacity() * size_of::<(u32, u32)>()
+    pub fn octree_bytes(&self) -> usize {
+        size_of::<Self>() + self.tree.bytes() + self.jump.cells.capacity() * size_of::<(u32, u32)>()
     }
 }
 

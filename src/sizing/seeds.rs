@@ -104,6 +104,11 @@ impl<'a> Seeds<'a> {
         !self.steeper.is_empty()
     }
 
+    /// Bytes of memory held for vertices; places along edges are in a room's arrays.
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(&self.h[..]) + size_of_val(&self.steeper[..])
+    }
+
     /// The vertices that triangles use, with sizes that are known, in a cube that is.
     pub(super) fn with_sizes(
         points: &'a [Point],

@@ -35,6 +35,8 @@ const SPARSE_FROM: f64 = 4.0;
 const TARGET_MAX: f64 = 1.15;
 /// Lists at least this long are divided in parallel.
 const PARALLEL_SEEDS: usize = 8192;
+/// Parts of longer ones are gone through one after the other, each in parallel within: what all parts together would hold is 14 times a list.
+const PARALLEL_SEEDS_MAX: usize = 1 << 18;
 
 /// Where a leaf is on the lattice; its side is `2^(DEPTH - level)`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -115,6 +117,11 @@ impl Tree {
         divide_further(&mut tree)?;
         tree.balance()?;
         Ok(tree.numbered())
+    }
+
+    /// Bytes of memory held.
+    pub(super) fn bytes(&self) -> usize {
+        self.blocks.capacity() * size_of::<[u32; 8]>()
     }
 
     /// From the depth-first list of "is divided".
@@ -320,11 +327,12 @@ fn shape_of(
     }
     let part = |octant: usize| {
         let child = cell.child(octant);
-        let n_around = near.len();
-        let near = near_child(child, near, seeds);
-        shape_of(child, &near, n_around, seeds, targets)
+        let list = near_child(child, near, seeds);
+        let inner = list.as_deref().unwrap_or(near);
+        shape_of(child, inner, near.len(), seeds, targets)
     };
-    let parts: Vec<Vec<bool>> = if near.len() >= PARALLEL_SEEDS {
+    // Long lists one after the other, or all parts would be held at once.
+    let parts: Vec<Vec<bool>> = if (PARALLEL_SEEDS..PARALLEL_SEEDS_MAX).contains(&near.len()) {
         parallel(|| (0..8).into_par_iter().map(part).collect())
     } else {
         (0..8).map(part).collect()
@@ -334,18 +342,20 @@ fn shape_of(
     shape
 }
 
-/// Seeds in a cell or half its side around it.
-fn near_child(cell: Leaf, near: &[u32], seeds: &Seeds) -> Vec<u32> {
+/// Seeds in a cell or half its side around it; none where all those of `near` are.
+fn near_child(cell: Leaf, near: &[u32], seeds: &Seeds) -> Option<Vec<u32>> {
     let side = cell.side();
     let low = cell.low() - Point::splat(0.5 * side);
     let high = low + Point::splat(2.0 * side);
-    near.iter()
-        .copied()
-        .filter(|&s| {
-            let p = seeds.at(s);
-            p.cmpge(low).all() && p.cmple(high).all()
-        })
-        .collect()
+    let is_near = |s: &u32| {
+        let p = seeds.at(*s);
+        p.cmpge(low).all() && p.cmple(high).all()
+    };
+    // Room for all is asked for and next to none of it touched: a list that grows takes up to three times its bytes.
+    let mut list = Vec::with_capacity(near.len());
+    list.extend(near.iter().copied().filter(is_near));
+    list.shrink_to_fit();
+    (list.len() < near.len()).then_some(list)
 }
 
 /// Whether sizes in and around a cell ask for smaller cells.

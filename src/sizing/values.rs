@@ -3,7 +3,7 @@
 use super::SizingError;
 use super::bits::Bits;
 use super::constraints::SizeConstraints;
-use super::corners::{Corners, PAIRS};
+use super::corners::Corners;
 use super::grading::{Grading, bound, close_finite};
 use super::options::Targets;
 use super::seeds::Seeds;
@@ -19,8 +19,17 @@ const FILL_ROUNDS: u32 = 18;
 const SLOWEST: f32 = 0.98;
 /// How far from the mean of its neighbors a value may be, as a factor.
 const REACH: f32 = 2.0;
-/// The twelve edges of a cell come first in `PAIRS`.
-const N_EDGES: usize = 12;
+/// Of each of a cell's corners the three that its edges lead to.
+const ALONG_EDGES: [[u8; 3]; 8] = [
+    [1, 2, 4],
+    [0, 3, 5],
+    [0, 3, 6],
+    [1, 2, 7],
+    [0, 5, 6],
+    [1, 4, 7],
+    [2, 4, 7],
+    [3, 5, 6],
+];
 
 sort_record! {
     /// A seed and the leaf that holds it.
@@ -187,7 +196,7 @@ impl Maker<'_> {
             for k in 0..open.len() {
                 let [leaf, weight] = open.get(k);
                 let ids = self.corners.of_leaf.get(leaf as usize);
-                average(&ids, f32::from_bits(weight), &mut h, &mut sums);
+                average(&ids, f32::from_bits(weight), &is_open, &mut h, &mut sums);
             }
             let mut complete = true;
             for i in 0..h.len() {
@@ -245,24 +254,31 @@ impl Maker<'_> {
     }
 }
 
-/// Adds to the sums at a leaf's corners what its twelve edges bring there.
+/// Adds to the sums at a leaf's open corners what its twelve edges bring there.
 #[inline(always)]
-fn average(ids: &[u32; 8], weight: f32, h: &mut SpillVec<f32>, sums: &mut SpillVec<[f32; 2]>) {
-    let (mut values, mut here) = ([0.0; 8], [[0.0; 2]; 8]);
-    for (k, &id) in ids.iter().enumerate() {
-        (values[k], here[k]) = (h.get(id as usize), sums.get(id as usize));
+fn average(
+    ids: &[u32; 8],
+    weight: f32,
+    is_open: &Bits,
+    h: &mut SpillVec<f32>,
+    sums: &mut SpillVec<[f32; 2]>,
+) {
+    let mut values = [0.0; 8];
+    for (value, &id) in values.iter_mut().zip(ids) {
+        *value = h.get(id as usize);
     }
-    for &(a, b, _) in &PAIRS[..N_EDGES] {
-        let (a, b) = (a as usize, b as usize);
-        for (to, from) in [(a, b), (b, a)] {
-            if values[from].is_finite() {
-                here[to][0] += weight * values[from];
-                here[to][1] += weight;
-            }
+    for (&id, along) in ids.iter().zip(ALONG_EDGES) {
+        if !is_open.get(id) {
+            continue;
         }
-    }
-    for (&id, sum) in ids.iter().zip(here) {
-        sums.set(id as usize, sum);
+        sums.change(id as usize, |sum| {
+            for corner in along {
+                let value = values[corner as usize];
+                if value.is_finite() {
+                    *sum = [sum[0] + weight * value, sum[1] + weight];
+                }
+            }
+        });
     }
 }
 

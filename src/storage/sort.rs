@@ -1,40 +1,43 @@
 //! Sort more records than memory holds: sorted runs on disk, merged while read.
+//!
+//! All runs are in one file, for a process may open some hundreds only; and where there are more runs than memory has buffers for, they are
+//! merged to fewer first.
 
 use std::cmp::Reverse;
-use std::collections::BinaryHeap;
-use std::io::{BufReader, BufWriter, Read, Write};
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::collections::{BinaryHeap, VecDeque};
+use std::sync::Arc;
 
+use super::scratch::ScratchFile;
 use super::sort_record::{SortBytes, SortRecord};
 use super::{DiskPath, StorageError, check_cancelled, reserve, sort_unstable_by};
 
-/// Numbers run files within the process.
-static RUNS: AtomicU64 = AtomicU64::new(0);
 /// A run is read through at least this much buffer.
 const READ_BYTES_MIN: usize = 16 << 10;
+/// Runs are read through no more, and written through as much.
+const READ_BYTES_MAX: usize = 1 << 20;
+const WRITE_BYTES: usize = 1 << 18;
+/// So many runs are merged at once however little memory there is.
+const MERGED_MIN: usize = 8;
 
 /// Collects records; [`Sorter::finish`] gives them back in ascending order.
 ///
-/// Memory: `memory_bytes`, whatever is pushed. Equal records stay as many as they
+/// Memory: `memory_bytes`, whatever is pushed, but 128 KiB at least. Equal records stay as many as they
 /// were. The result does not depend on the memory, nor on threads.
 pub struct Sorter<R: SortRecord> {
     records: Vec<R::Bytes>,
     records_max: usize,
     memory_bytes: usize,
     dir: DiskPath,
-    runs: Vec<Run>,
+    runs: VecDeque<Run>,
 }
 
-/// A sorted file that goes when it is dropped.
+/// Sorted records in a part of a file.
 struct Run {
-    path: DiskPath,
-}
-
-impl Drop for Run {
-    fn drop(&mut self) {
-        // The folder of runs is scratch: what stays here is removed when the store is next opened for writing.
-        let _ = self.path.remove_file();
-    }
+    file: Arc<ScratchFile>,
+    /// Bytes from here on.
+    at: u64,
+    /// Up to here.
+    end: u64,
 }
 
 /// Compares records by their bytes: the first sixteen, or eight, as one number, which is what nearly always decides.
@@ -66,7 +69,7 @@ impl<R: SortRecord> Sorter<R> {
             records_max: memory_bytes / size_of::<R::Bytes>(),
             memory_bytes,
             dir: dir.into(),
-            runs: Vec::new(),
+            runs: VecDeque::new(),
         }
     }
 
@@ -89,21 +92,11 @@ impl<R: SortRecord> Sorter<R> {
     fn spill(&mut self) -> Result<(), StorageError> {
         check_cancelled();
         sort_unstable_by(&mut self.records, order);
-        let number = RUNS.fetch_add(1, Ordering::Relaxed);
-        let path = self
-            .dir
-            .join(format!("run-{}-{number}", std::process::id()));
-        let run = Run { path };
-        let created = run.path.disk().create_stream(run.path.path());
-        let written = created.and_then(|file| {
-            let mut out = BufWriter::with_capacity(1 << 18, file);
-            for record in &self.records {
-                out.write_all(record.as_ref())?;
-            }
-            out.flush()
-        });
-        run.path.at_path(written)?;
-        self.runs.push(run);
+        let mut run = RunWriter::after(self.runs.back(), &self.dir)?;
+        for record in &self.records {
+            run.push(record)?;
+        }
+        self.runs.push_back(run.done()?);
         self.records.clear();
         Ok(())
     }
@@ -122,42 +115,102 @@ impl<R: SortRecord> Sorter<R> {
             self.spill()?;
         }
         self.records = Vec::new();
-        let buffer = (self.memory_bytes / self.runs.len()).clamp(READ_BYTES_MIN, 1 << 20);
-        let mut sorted = Sorted {
-            memory: Vec::new().into_iter(),
-            heap: BinaryHeap::with_capacity(self.runs.len()),
-            readers: Vec::with_capacity(self.runs.len()),
-        };
-        for (k, run) in self.runs.drain(..).enumerate() {
-            let file = run
-                .path
-                .at_path(run.path.disk().open_stream(run.path.path()))?;
-            let mut reader = RunReader {
-                bytes: BufReader::with_capacity(buffer, file),
-                run,
-            };
-            if let Some(record) = reader.next()? {
-                sorted.heap.push(Reverse((record, k)));
+        let at_once = (self.memory_bytes / READ_BYTES_MIN).max(MERGED_MIN);
+        self.merge_down_to(at_once)?;
+        Sorted::of(self.runs, self.memory_bytes)
+    }
+
+    /// Merges the oldest runs, which are the shortest, until so many are left.
+    fn merge_down_to(&mut self, at_once: usize) -> Result<(), StorageError> {
+        // The last run merged in this way round: a file's runs are all read before it goes.
+        let mut merged = None::<Arc<ScratchFile>>;
+        while self.runs.len() > at_once {
+            check_cancelled();
+            let n = at_once.min(self.runs.len() - at_once + 1);
+            let oldest: VecDeque<Run> = self.runs.drain(..n).collect();
+            merged = merged.filter(|file| oldest.iter().all(|run| !Arc::ptr_eq(&run.file, file)));
+            let last = self.runs.back();
+            let beside =
+                last.filter(|run| merged.as_ref().is_some_and(|f| Arc::ptr_eq(&run.file, f)));
+            let mut run = RunWriter::after(beside, &self.dir)?;
+            for record in Sorted::<R>::of(oldest, self.memory_bytes)? {
+                run.push(&record?.to_bytes())?;
             }
-            sorted.readers.push(reader);
+            let run = run.done()?;
+            merged = Some(Arc::clone(&run.file));
+            self.runs.push_back(run);
         }
-        Ok(sorted)
+        Ok(())
+    }
+}
+
+/// Writes a run.
+struct RunWriter {
+    run: Run,
+    buffer: Vec<u8>,
+}
+
+impl RunWriter {
+    /// Behind another run in its file, or in a file of its own. Errors: the disk.
+    fn after(last: Option<&Run>, dir: &DiskPath) -> Result<Self, StorageError> {
+        let (file, at) = match last {
+            Some(run) => (Arc::clone(&run.file), run.end),
+            None => (Arc::new(ScratchFile::create(dir)?), 0),
+        };
+        let run = Run { file, at, end: at };
+        let buffer = Vec::with_capacity(WRITE_BYTES);
+        Ok(Self { run, buffer })
+    }
+
+    fn push<B: SortBytes>(&mut self, record: &B) -> Result<(), StorageError> {
+        let bytes = record.as_ref();
+        if self.buffer.len() + bytes.len() > WRITE_BYTES {
+            self.flush()?;
+        }
+        self.buffer.extend_from_slice(bytes);
+        Ok(())
+    }
+
+    fn flush(&mut self) -> Result<(), StorageError> {
+        self.run.file.write(self.run.end, &self.buffer)?;
+        self.run.end += self.buffer.len() as u64;
+        self.buffer.clear();
+        Ok(())
+    }
+
+    fn done(mut self) -> Result<Run, StorageError> {
+        self.flush()?;
+        Ok(self.run)
     }
 }
 
 struct RunReader {
-    bytes: BufReader<Box<dyn Read + Send + Sync>>,
     run: Run,
+    buffer: Vec<u8>,
+    /// Bytes of the buffer already given.
+    given: usize,
+    /// Bytes read at a time: whole records.
+    at_once: usize,
 }
 
 impl RunReader {
     fn next<B: SortBytes>(&mut self) -> Result<Option<B>, StorageError> {
-        let mut record = B::ZERO;
-        match self.bytes.read_exact(record.as_mut()) {
-            Ok(()) => Ok(Some(record)),
-            Err(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => Ok(None),
-            Err(e) => self.run.path.at_path(Err(e)),
+        if self.given == self.buffer.len() {
+            let left = self.run.end - self.run.at;
+            if left == 0 {
+                return Ok(None);
+            }
+            self.buffer
+                .resize(left.min(self.at_once as u64) as usize, 0);
+            self.run.file.read(self.run.at, &mut self.buffer)?;
+            self.run.at += self.buffer.len() as u64;
+            self.given = 0;
         }
+        let mut record = B::ZERO;
+        let bytes = record.as_mut();
+        bytes.copy_from_slice(&self.buffer[self.given..][..bytes.len()]);
+        self.given += bytes.len();
+        Ok(Some(record))
     }
 }
 
@@ -166,6 +219,31 @@ pub struct Sorted<R: SortRecord> {
     memory: std::vec::IntoIter<R::Bytes>,
     heap: BinaryHeap<Reverse<(R::Bytes, usize)>>,
     readers: Vec<RunReader>,
+}
+
+impl<R: SortRecord> Sorted<R> {
+    /// Merges runs while they are read, each through its share of so much memory.
+    fn of(runs: VecDeque<Run>, memory_bytes: usize) -> Result<Self, StorageError> {
+        let share = (memory_bytes / runs.len()).clamp(READ_BYTES_MIN, READ_BYTES_MAX);
+        let mut sorted = Self {
+            memory: Vec::new().into_iter(),
+            heap: BinaryHeap::with_capacity(runs.len()),
+            readers: Vec::with_capacity(runs.len()),
+        };
+        for (k, run) in runs.into_iter().enumerate() {
+            let mut reader = RunReader {
+                run,
+                buffer: Vec::new(),
+                given: 0,
+                at_once: share / size_of::<R::Bytes>() * size_of::<R::Bytes>(),
+            };
+            if let Some(record) = reader.next()? {
+                sorted.heap.push(Reverse((record, k)));
+            }
+            sorted.readers.push(reader);
+        }
+        Ok(sorted)
+    }
 }
 
 impl<R: SortRecord> Iterator for Sorted<R> {
@@ -195,10 +273,11 @@ mod tests {
     #[test]
     fn records_come_back_sorted_whatever_the_memory() -> Result<(), Box<dyn std::error::Error>> {
         let dir = tempfile::tempdir()?;
-        let records: Vec<[u8; 12]> = (0..50_000u64)
+        // With the least memory 92 runs, which is more than are merged at once.
+        let records: Vec<[u8; 12]> = (0..500_000u64)
             .map(|i| {
                 let mut record = [0; 12];
-                let key = i.wrapping_mul(0x9E37_79B9_7F4A_7C15) % 30_000;
+                let key = i.wrapping_mul(0x9E37_79B9_7F4A_7C15) % 300_000;
                 record[..8].copy_from_slice(&key.to_be_bytes());
                 record
             })
@@ -210,6 +289,12 @@ mod tests {
             for &record in &records {
                 sorter.push(record)?;
             }
+            let files: Vec<_> = sorter
+                .runs
+                .iter()
+                .map(|run| Arc::as_ptr(&run.file))
+                .collect();
+            assert!(files.windows(2).all(|pair| pair[0] == pair[1]), "one file");
             let sorted: Result<Vec<_>, _> = sorter.finish()?.collect();
             assert_eq!(sorted?, expected, "memory {memory}");
         }

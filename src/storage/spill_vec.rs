@@ -50,6 +50,12 @@ impl ScratchSpace {
         self.budget.available()
     }
 
+    /// Counts what is held beside the arrays made here, as far as there is anything left: they take shares of the rest.
+    pub fn hold(&self, bytes: usize) -> Option<Lease> {
+        let bytes = (bytes as u64).min(self.available());
+        self.budget.lease(bytes, "what is held beside arrays").ok()
+    }
+
     /// `n` times `value`. A quarter of what is left is the most an array takes.
     pub fn column<T: Pod>(&self, n: usize, value: T) -> SpillVec<T> {
         let bytes = (n * size_of::<T>()) as u64;

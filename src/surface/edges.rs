@@ -301,6 +301,14 @@ impl Groups {
         let (a, b) = (self.root(a), self.root(b));
         self.parent[a.max(b) as usize] = a.min(b);
     }
+
+    /// The root of each, which is known when those below are.
+    pub fn into_roots(mut self) -> Vec<u32> {
+        for i in 0..self.parent.len() {
+            self.parent[i] = self.parent[self.parent[i] as usize];
+        }
+        self.parent
+    }
 }
 
 /// For each open edge the number of its connected group, counted in order of first appearance.

@@ -56,6 +56,6 @@ pub use seek::{Crossing, Seeker};
 pub use split::{SplitReport, split};
 pub use triangles::{Note, NoteKind, SourceFile, Surface, VolumePoints};
 pub use validate::{Validation, validate, validate_in};
-pub use volumes::{OUTSIDE, Volumes, Wall};
+pub use volumes::{OUTSIDE, VOLUMES_TRIANGLE, Volumes, Wall};
 pub use weld::SurfaceBuilder;
 pub use wire_set::{WireError, WireSet, Wires};

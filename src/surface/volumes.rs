@@ -16,6 +16,9 @@ use super::seek::Seeker;
 use crate::geom::{Point, orient_sign};
 use crate::storage::ScratchSpace;
 
+/// Bytes held for each triangle while volumes are identified: which sides see each other, which triangles hang together, which is left out.
+pub const VOLUMES_TRIANGLE: usize = 13;
+
 /// The number of the unbounded volume.
 pub const OUTSIDE: u32 = 0;
 
@@ -49,8 +52,8 @@ impl Volumes {
         Self::of_in(seeker, &ScratchSpace::boundless())
     }
 
-    /// Sides at open edges are joined, so an open surface encloses nothing. In the room 21 bytes a triangle are held at most; a scratch
-    /// file that fails unwinds.
+    /// Sides at open edges are joined, so an open surface encloses nothing. Beside the room's arrays [`VOLUMES_TRIANGLE`] bytes a triangle are held at
+    /// most, which the caller counts; a scratch file that fails unwinds.
     pub fn of_in(seeker: &Seeker, room: &ScratchSpace) -> Self {
         let surface = seeker.surface();
         let n = surface.n_triangles();
@@ -89,8 +92,7 @@ impl Volumes {
                 sides.join(2 * t, above.map_or(outside, |c| c.sides()[0]));
             }
         }
-        let mut volumes = numbered(surface, &mut sides);
-        drop(sides);
+        let mut volumes = numbered(surface, sides);
         facets.each_edge(|uses| volumes.add_angles(surface, uses));
         volumes
     }
@@ -262,20 +264,25 @@ fn lines(surface: &Surface, facets: &Facets, shells: &mut Groups) -> Vec<(Point,
     best.values().map(middle).collect()
 }
 
-fn numbered(surface: &Surface, sides: &mut Groups) -> Volumes {
-    let n = surface.n_triangles() as u32;
-    let mut numbers = BTreeMap::from([(sides.root(2 * n), OUTSIDE)]);
+/// The groups of sides with numbers, in the place of their roots: both at once would be the most that is held.
+fn numbered(surface: &Surface, sides: Groups) -> Volumes {
+    let mut of_side = sides.into_roots();
+    let outside = of_side.pop().unwrap_or(OUTSIDE);
+    let mut numbers = BTreeMap::from([(outside, OUTSIDE)]);
     // Of one triangle the volume in front comes first, as the mesh's regions do; sheets bound none.
-    for side in (0..2 * n).filter(|side| !surface.is_sheet(side / 2)) {
-        let next = numbers.len() as u32;
-        numbers.entry(sides.root(side)).or_insert(next);
+    for (side, &root) in (0u32..).zip(&of_side) {
+        if !surface.is_sheet(side / 2) {
+            let next = numbers.len() as u32;
+            numbers.entry(root).or_insert(next);
+        }
     }
-    let mut number = |side: u32| numbers.get(&sides.root(side)).copied().unwrap_or(OUTSIDE);
-    let of_side = (0..n).map(|t| [number(2 * t), number(2 * t + 1)]);
-    let of_side = of_side.collect();
+    for side in &mut of_side {
+        *side = numbers.get(side).copied().unwrap_or(OUTSIDE);
+    }
+    let of_side = bytemuck::allocation::cast_slice_box(of_side.into_boxed_slice());
     let n_volumes = numbers.len();
     Volumes {
-        of_side,
+        of_side: of_side.into_vec(),
         n_volumes: n_volumes as u32,
         angles: vec![0.0; n_volumes],
     }

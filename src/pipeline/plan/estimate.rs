@@ -14,17 +14,18 @@ use crate::sizing::{
     Background, Domain, Further, Region, SizeConstraint, SizeField, SizeSummary, TetCounts,
 };
 use crate::storage::{ScratchSpace, attempt};
-use crate::surface::{OUTSIDE, Seeker, Surface, Volumes};
+use crate::surface::{OUTSIDE, Seeker, Surface, VOLUMES_TRIANGLE, Volumes};
 
 /// A seed nearer to the surface than this share of the box diagonal lies on it: the side is found by sums of doubles, which are known to
 /// some 1e-16 of it, and a thousand times more where triangles are steep.
 const ON_SURFACE: f64 = 1e-12;
-/// Bytes held while volumes are identified, for each triangle: which volume each side has, which sides see each other, and which is left out.
-const PREPARE_TRIANGLE: usize = 17;
-/// Bytes held while sizes are computed, for each vertex: its size and slope, and lists of those and of the places along edges near a cell.
-const PREPARE_VERTEX: usize = 36;
-/// Bytes for frames of what is not held.
-const PREPARE_LEAST: usize = 8 << 20;
+/// Bytes held for each triangle once volumes are identified: which one each side has.
+const OF_SIDE: usize = size_of::<[u32; 2]>();
+/// Bytes held while sizes are computed, for each vertex: its size and slope, and lists of those and of as many places along edges near a cell,
+/// where each list is at most 0.42 of the one above.
+const SIZES_VERTEX: usize = 26;
+/// Bytes for frames of what is not held, and for lists of a quarter of a million places.
+const PREPARE_LEAST: usize = 16 << 20;
 /// Tetrahedra of one sub-domain, unless a number of sub-domains is asked for. With twice as many, two at once do not fit 512 MiB: 20 million then
 /// take 1.28 times as long as with 4 GiB, not 1.04, and with 128 MiB 1.75 times, not 1.24.
 const TETS_PER_SUBDOMAIN: f64 = (2u64 << 20) as f64;
@@ -174,8 +175,13 @@ fn prepare_in(
         true => Some(built(&[])?),
         false => None,
     };
+    let _early = (early.as_ref()).map(|(field, _)| scratch.hold(field.octree_bytes()));
+    // Counted before the tree takes its share of what is left.
+    let held = scratch.hold(VOLUMES_TRIANGLE * surface.n_triangles());
     let seeker = Seeker::of(surface, scratch, |_| true);
     let volumes = Volumes::of_in(&seeker, scratch);
+    drop(held);
+    let _volumes = scratch.hold(OF_SIDE * surface.n_triangles());
     let chosen = chosen(&seeker, &volumes, options)?;
     refuse_outer_sheets(surface, &volumes, &chosen)?;
     refuse_outer_points(surface, &seeker, &volumes, &chosen)?;
@@ -314,7 +320,7 @@ impl Estimate {
             subdomains,
             subdomains_asked,
             surface_bytes: surface.bytes() as u64,
-            least_to_prepare: least_to_prepare(surface),
+            least_to_prepare: least_to_prepare(surface, !options.sizes()?.regions.is_empty()),
             octree_bytes: field.bytes_in(0) - SizeField::share_of(0).min(sizes_bytes),
             sizes_bytes,
             form: options.form()?,
@@ -456,16 +462,21 @@ fn spilled(pages: f64, frames: f64) -> f64 {
 
 /// The smallest cap under which this surface may be meshed, as far as it alone tells: the size field needs a little more.
 pub fn least_for(surface: &Surface) -> u64 {
-    let mut cap = least_to_prepare(surface).max(MEMORY_MIN);
+    let mut cap = least_to_prepare(surface, false).max(MEMORY_MIN);
     while Plan::new(cap, surface.bytes() as u64).is_err() {
         cap += 1 << 20;
     }
     cap
 }
 
-/// The smallest cap under which volumes and sizes can be computed: what is held of each triangle and vertex beside the surface.
-fn least_to_prepare(surface: &Surface) -> u64 {
-    let beside = PREPARE_TRIANGLE * surface.n_triangles() + PREPARE_VERTEX * surface.n_vertices();
+/// The smallest cap under which volumes and sizes can be computed: one after the other, unless regions have sizes of their own.
+fn least_to_prepare(surface: &Surface, regions_have_sizes: bool) -> u64 {
+    let (triangles, vertices) = (surface.n_triangles(), surface.n_vertices());
+    let (volumes, sizes) = (VOLUMES_TRIANGLE * triangles, SIZES_VERTEX * vertices);
+    let beside = match regions_have_sizes {
+        false => volumes.max(sizes),
+        true => volumes.max(OF_SIDE * triangles + sizes),
+    };
     (surface.bytes() + beside + PREPARE_LEAST) as u64
 }
 
