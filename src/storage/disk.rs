@@ -28,7 +28,7 @@ pub trait Disk: Debug + Send + Sync {
         path: &Path,
         builder: &Builder,
     ) -> Option<Result<ReadOnlyDatabase, DatabaseError>>;
-    /// Creates a file to be written once from its beginning, such as a sorted run.
+    /// Creates a file to be written once from its beginning.
     fn create_stream(&self, path: &Path) -> io::Result<Box<dyn Write>>;
     /// Opens a file to be read once from its beginning.
     fn open_stream(&self, path: &Path) -> io::Result<Box<dyn Read + Send + Sync>>;

@@ -13,15 +13,16 @@ use super::{DiskPath, StorageError, check_cancelled, reserve, sort_unstable_by};
 
 /// A run is read through at least this much buffer.
 const READ_BYTES_MIN: usize = 16 << 10;
-/// Runs are read through no more, and written through as much.
+/// It is read through no more.
 const READ_BYTES_MAX: usize = 1 << 20;
+/// A run is written through this much.
 const WRITE_BYTES: usize = 1 << 18;
 /// So many runs are merged at once however little memory there is.
 const MERGED_MIN: usize = 8;
 
 /// Collects records; [`Sorter::finish`] gives them back in ascending order.
 ///
-/// Memory: `memory_bytes`, whatever is pushed, but 128 KiB at least. Equal records stay as many as they
+/// Memory: `memory_bytes`, whatever is pushed, but 128 KiB at least, and 256 KiB while a run is written. Equal records stay as many as they
 /// were. The result does not depend on the memory, nor on threads.
 pub struct Sorter<R: SortRecord> {
     records: Vec<R::Bytes>,
@@ -122,23 +123,18 @@ impl<R: SortRecord> Sorter<R> {
 
     /// Merges the oldest runs, which are the shortest, until so many are left.
     fn merge_down_to(&mut self, at_once: usize) -> Result<(), StorageError> {
-        // The last run merged in this way round: a file's runs are all read before it goes.
-        let mut merged = None::<Arc<ScratchFile>>;
         while self.runs.len() > at_once {
             check_cancelled();
             let n = at_once.min(self.runs.len() - at_once + 1);
             let oldest: VecDeque<Run> = self.runs.drain(..n).collect();
-            merged = merged.filter(|file| oldest.iter().all(|run| !Arc::ptr_eq(&run.file, file)));
-            let last = self.runs.back();
-            let beside =
-                last.filter(|run| merged.as_ref().is_some_and(|f| Arc::ptr_eq(&run.file, f)));
+            // Each round has a file of its own, so that the one before goes when all its runs are read.
+            let is_read = |file| oldest.iter().any(|run| Arc::ptr_eq(&run.file, file));
+            let beside = self.runs.back().filter(|last| !is_read(&last.file));
             let mut run = RunWriter::after(beside, &self.dir)?;
             for record in Sorted::<R>::of(oldest, self.memory_bytes)? {
                 run.push(&record?.to_bytes())?;
             }
-            let run = run.done()?;
-            merged = Some(Arc::clone(&run.file));
-            self.runs.push_back(run);
+            self.runs.push_back(run.done()?);
         }
         Ok(())
     }

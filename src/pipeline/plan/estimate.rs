@@ -22,7 +22,7 @@ const ON_SURFACE: f64 = 1e-12;
 /// Bytes held for each triangle once volumes are identified: which one each side has.
 const OF_SIDE: usize = size_of::<[u32; 2]>();
 /// Bytes held while sizes are computed, for each vertex: its size and slope, and lists of those and of as many places along edges near a cell,
-/// where each list is at most 0.42 of the one above.
+/// where each list is 0.42 of the one above, as it is where vertices are spread evenly.
 const SIZES_VERTEX: usize = 26;
 /// Bytes for frames of what is not held, and for lists of a quarter of a million places.
 const PREPARE_LEAST: usize = 16 << 20;
