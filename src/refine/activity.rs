@@ -3,25 +3,54 @@
 use crate::mesh::{Mesh, dense};
 use crate::storage::Pages;
 
-/// Which pages have had new tetrahedra since they were last examined: one byte a page.
+/// Which pages have had new tetrahedra since they were last examined: a byte a page.
 pub(super) struct Activity {
-    pages: Vec<bool>,
+    pages: Vec<State>,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum State {
+    /// Examined since.
+    Idle,
+    Active,
+    /// Points may go nowhere near any of its tetrahedra.
+    Far,
 }
 
 impl Activity {
     pub fn all<P: Pages>(mesh: &Mesh<P>) -> Self {
+        let mut all = Self { pages: Vec::new() };
+        all.again(mesh);
+        all
+    }
+
+    /// Makes all pages active but those far away.
+    pub fn again<P: Pages>(&mut self, mesh: &Mesh<P>) {
         let pages = dense(mesh.tet_ids_end()).div_ceil(2046) as usize;
-        Self {
-            pages: vec![true; pages],
+        self.pages.resize(pages, State::Active);
+        for page in &mut self.pages {
+            if *page == State::Idle {
+                *page = State::Active;
+            }
         }
+    }
+
+    /// Says that a page is far away, until one of its tetrahedra is replaced.
+    pub fn set_far(&mut self, page: u32) {
+        self.pages[page as usize] = State::Far;
+    }
+
+    /// Whether a page is still far away.
+    pub fn is_far(&self, page: u32) -> bool {
+        self.pages.get(page as usize) == Some(&State::Far)
     }
 
     pub fn touch(&mut self, tet: u32) {
         let page = (dense(tet) / 2046) as usize;
         if page >= self.pages.len() {
-            self.pages.resize(page + 1, false);
+            self.pages.resize(page + 1, State::Idle);
         }
-        self.pages[page] = true;
+        self.pages[page] = State::Active;
     }
 
     /// Whether any page of the dense range is active; clears them.
@@ -30,7 +59,10 @@ impl Activity {
         let end = end.min(self.pages.len());
         let mut any = false;
         for page in &mut self.pages[first.min(end)..end] {
-            any |= std::mem::take(page);
+            if *page == State::Active {
+                *page = State::Idle;
+                any = true;
+            }
         }
         any
     }

@@ -86,7 +86,8 @@ impl Worker {
 /// An edge as an ordered pair of vertices, and a tetrahedron that has it.
 type Edge = (u64, u32);
 
-/// Lists the edges of a page's unexamined tetrahedra that may be long; none when all are examined.
+/// Lists the edges of a page's unexamined tetrahedra that may be long; none when all are examined or out of reach, so that the page need not
+/// be changed.
 struct LongEdges<'a> {
     field: &'a Field<'a>,
     settled: &'a EdgeCache,
@@ -101,8 +102,11 @@ impl Scan for LongEdges<'_> {
         let mut found: Option<(Vec<Edge>, EdgeCache)> = None;
         tets_of_page(mesh, page, |mesh, t, tet| {
             if self.examined_too || tet.node[EXAMINED] & MARK == 0 {
-                let found = found.get_or_insert_with(|| (Vec::new(), EdgeCache::new(SEEN)));
-                self.list(mesh, t, &tet, found);
+                let ends = mesh.ends(&tet);
+                if self.reaches(&ends) {
+                    let found = found.get_or_insert_with(|| (Vec::new(), EdgeCache::new(SEEN)));
+                    self.list(t, &tet, &ends, found);
+                }
             }
         });
         found.map(|(edges, _)| edges)
@@ -111,22 +115,16 @@ impl Scan for LongEdges<'_> {
 
 impl LongEdges<'_> {
     #[inline(always)]
-    fn list<P: Pages>(
-        &self,
-        mesh: &mut Mesh<P>,
-        t: u32,
-        tet: &Tet,
-        (edges, seen): &mut (Vec<Edge>, EdgeCache),
-    ) {
-        let (v, ends) = (tet.vertices(), mesh.ends(tet));
-        if self.field.place.is_partial() {
-            // Spelled out, here and below: `map` on arrays is not always inlined.
-            let [a, b, c, d] = &ends;
-            let points = [a.point, b.point, c.point, d.point];
-            if !(self.field.place).reaches(&points, &[a.h, b.h, c.h, d.h]) {
-                return;
-            }
-        }
+    fn reaches(&self, [a, b, c, d]: &[End; 4]) -> bool {
+        // Spelled out, here and below: `map` on arrays is not always inlined.
+        let points = [a.point, b.point, c.point, d.point];
+        let place = self.field.place;
+        !place.is_partial() || place.reaches(&points, &[a.h, b.h, c.h, d.h])
+    }
+
+    #[inline(always)]
+    fn list(&self, t: u32, tet: &Tet, ends: &[End; 4], (edges, seen): &mut (Vec<Edge>, EdgeCache)) {
+        let v = tet.vertices();
         for [i, j] in EDGES {
             let fixed = ends[i].fixed && ends[j].fixed;
             if fixed || may_be_long(&ends[i], &ends[j]) {

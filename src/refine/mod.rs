@@ -90,8 +90,10 @@ pub fn saturate<P: Pages>(
             renumber(mesh, &worker.order, space)?;
             numbered = mesh.n_tets();
             worker.last = 0;
+            worker.active = Activity::all(mesh);
+        } else {
+            worker.active.again(mesh);
         }
-        worker.active = Activity::all(mesh);
     }
     for _ in 0..PASSES_MAX {
         let before = report.inserted;
@@ -106,7 +108,8 @@ pub fn saturate<P: Pages>(
             let to = end.min(from + BLOCK_TETS);
             if worker.active.take(from, to) {
                 let (first, last) = (sparse(from) >> SLOT_BITS, sparse(to - 1) >> SLOT_BITS);
-                let pages: Vec<u32> = (first..=last).collect();
+                let near = |&page: &u32| !worker.active.is_far(page);
+                let pages: Vec<u32> = (first..=last).filter(near).collect();
                 worker.block(mesh, field, &pages, &mut report);
                 progress(report.inserted);
             }
@@ -124,7 +127,7 @@ pub fn saturate<P: Pages>(
             // What is long still has no place of the pattern near enough: near the surface, and where sizes vary.
             worker.placing = false;
             worker.examined_too = true;
-            worker.active = Activity::all(mesh);
+            worker.active.again(mesh);
         } else if !worker.placing && inserted == 0 {
             break;
         }

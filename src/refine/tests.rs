@@ -2,6 +2,8 @@ use super::*;
 use crate::delaunay::enclose;
 use crate::geom::orient;
 use crate::geom::{Aabb, Point};
+use crate::mesh::anatomy::MARK;
+use crate::mesh::anatomy::mark::EXAMINED;
 use crate::mesh::{FaceRef, Facet, VertexTag};
 use crate::storage::{Backing, Pager, kind};
 
@@ -166,4 +168,73 @@ fn the_same_points_whatever_the_pool() {
         from = t + 1;
         assert_eq!(few.tet(t), tet);
     }
+}
+
+/// Points go where x is at most this.
+struct Below(f64);
+
+impl PlacementRule for Below {
+    fn is_partial(&self) -> bool {
+        true
+    }
+    fn reaches(&self, points: &[Point; 4], _: &[f32; 4]) -> bool {
+        points.iter().any(|p| p.x <= self.0)
+    }
+    fn stretch(&self, _: Point, _: Point, _: [f64; 2]) -> Option<[f64; 2]> {
+        Some([0.0, 1.0])
+    }
+    fn admits(&self, p: Point, _: f64) -> bool {
+        p.x <= self.0
+    }
+    fn forbids(&self, _: Point, _: f64) -> bool {
+        false
+    }
+}
+
+#[test]
+fn pages_far_from_a_zone_are_not_changed() {
+    let (mut mesh, _) = cube(0.3, Pager::new(1 << 28, None));
+    let bounds = Aabb::around(mesh.vertex_ids().map(|v| mesh.point(v)).collect::<Vec<_>>());
+    let place = Below(bounds.low.x + 0.2);
+    let tets: Vec<u32> = (0..dense(mesh.tet_ids_end())).map(sparse).collect();
+    for &t in &tets {
+        mesh.set_mark(t, EXAMINED, false);
+    }
+    for v in mesh.vertex_ids() {
+        mesh.set_size(v, 0.2);
+    }
+    let field = Field {
+        lengths: Lengths::Field,
+        h: &|_| 0.2,
+        place: &place,
+        bounds,
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let space = Workspace {
+        dir: &dir.path().into(),
+        memory: 1 << 20,
+    };
+    let reaches = |&t: &u32| {
+        let tet = mesh.tet(t);
+        tet.is_live() && place.reaches(&mesh.points(&tet), &[0.2; 4])
+    };
+    let near: Vec<u32> = tets.iter().copied().filter(reaches).collect();
+    let before = mesh.n_tets();
+    let report = saturate(&mut mesh, &field, &space, &mut |_| ()).expect("room for runs");
+    let grown = f64::from(mesh.n_tets()) / f64::from(before);
+    assert!(
+        report.inserted > 100 && grown < GROWTH_LAST,
+        "{report:?} {grown}"
+    );
+    let is_far = |page: &&[u32]| !page.iter().any(|t| near.binary_search(t).is_ok());
+    let (n, far) = (tets.chunks(2046).count(), tets.chunks(2046).filter(is_far));
+    let mut examined = |&t: &u32| mesh.tet(t).node[EXAMINED] & MARK != 0;
+    let changed: Vec<bool> = far.map(|page| page.iter().any(&mut examined)).collect();
+    assert!(
+        n > 20 && changed.len() > n / 4 && changed.len() < n,
+        "{n} {changed:?}"
+    );
+    // Few: those with tetrahedra of a cavity that reaches there.
+    let n_changed = changed.iter().filter(|changed| **changed).count();
+    assert!(n_changed < changed.len() / 4, "{changed:?}");
 }

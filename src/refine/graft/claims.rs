@@ -1,9 +1,11 @@
 //! What each grain has to know: where something stands in its way, and where there is room.
 
+use std::collections::HashSet;
 use std::ops::Range;
 
 use tetdb_schema::page::NONE;
 
+use super::super::activity::Activity;
 use super::super::field::Field;
 use super::super::grain::{Around, Site, nearest, octave, width};
 use crate::geom::Point;
@@ -69,33 +71,49 @@ pub(super) fn octave_and_corner(key: u64) -> (u32, Point) {
     )
 }
 
-/// All claims of a mesh in the order of grains; none when there is no room at all.
+/// All claims of a mesh on grains with room, in the order of grains; none when there is no room at all. `active` learns which pages are
+/// far from where points may go.
 ///
 /// Sizes must be set at all vertices. Errors: the disk, while sorting.
 pub(super) fn gather<P: Pages>(
     mesh: &mut Mesh<P>,
     field: &Field,
     space: &Workspace,
+    active: &mut Activity,
 ) -> Result<Option<Sorted<Claim>>, StorageError> {
     let mut sorter = Sorter::new(space.dir, space.memory);
-    let mut any = false;
+    // A zone has few of the grains that all the mesh's vertices and facets concern.
+    let mut roomy = HashSet::new();
     let pages: Vec<u32> = (0..mesh.pages().n_pages::<{ kind::TETS }>()).collect();
     for batch in pages.chunks(BATCH) {
         let found = scan_parts(mesh, batch, &Rooms { field });
-        for claim in found.into_iter().flatten() {
-            any = true;
-            sorter.push(claim)?;
+        for (&page, (claims, near)) in batch.iter().zip(found) {
+            if !near {
+                active.set_far(page);
+            }
+            for claim in claims {
+                roomy.insert(claim.grain);
+                sorter.push(claim)?;
+            }
         }
     }
-    if !any {
+    if roomy.is_empty() {
         return Ok(None);
     }
+    let vertices = Vertices {
+        field,
+        roomy: &roomy,
+    };
     for batch in parts(dense(mesh.vertex_ids_end())).chunks(BATCH) {
-        let found = scan_parts(mesh, batch, &Vertices { field });
+        let found = scan_parts(mesh, batch, &vertices);
         for claim in found.into_iter().flatten() {
             sorter.push(claim)?;
         }
     }
+    let mut push = |claim: Claim| match roomy.contains(&claim.grain) {
+        true => sorter.push(claim),
+        false => Ok(()),
+    };
     let mut lister = Lister::new(field);
     for of in [Faces::Facets, Faces::Interface] {
         let n = match of {
@@ -104,7 +122,7 @@ pub(super) fn gather<P: Pages>(
         };
         for batch in parts(n).chunks(BATCH) {
             for (corners, least) in scan_parts(mesh, batch, &of).into_iter().flatten() {
-                lister.cover(corners, least, &mut |claim| sorter.push(claim))?;
+                lister.cover(corners, least, &mut push)?;
             }
         }
     }
@@ -116,27 +134,33 @@ fn parts(n: u32) -> Vec<Range<u32>> {
     starts.map(|from| from..n.min(from + PART)).collect()
 }
 
-/// Lists positions in tetrahedra that are large beside the wanted length.
+/// Lists positions in tetrahedra that are large beside the wanted length, and tells whether points may go near any of a page.
 struct Rooms<'a> {
     field: &'a Field<'a>,
 }
 
 impl Scan for Rooms<'_> {
     type Part = u32;
-    type Output = Vec<Claim>;
+    type Output = (Vec<Claim>, bool);
 
-    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &page: &u32) -> Vec<Claim> {
+    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &page: &u32) -> (Vec<Claim>, bool) {
         let mut lister = Lister::new(self.field);
-        let mut claims = Vec::new();
+        let (mut claims, mut near) = (Vec::new(), false);
         tets_of_page(mesh, page, |mesh, t, tet| {
-            self.list(mesh, &tet, &mut |p, h| claims.extend(lister.room(t, p, h)));
+            near |= self.list(mesh, &tet, &mut |p, h| claims.extend(lister.room(t, p, h)));
         });
-        claims
+        (claims, near)
     }
 }
 
 impl Rooms<'_> {
-    fn list<P: Pages>(&self, mesh: &mut Mesh<P>, tet: &Tet, found: &mut impl FnMut(Point, f64)) {
+    /// Whether points may go near the tetrahedron.
+    fn list<P: Pages>(
+        &self,
+        mesh: &mut Mesh<P>,
+        tet: &Tet,
+        found: &mut impl FnMut(Point, f64),
+    ) -> bool {
         let place = self.field.place;
         let ends = mesh.ends(tet);
         let [a, b, c, d] = &ends;
@@ -145,10 +169,11 @@ impl Rooms<'_> {
         let squared = |e: [usize; 2]| (points[e[0]] - points[e[1]]).length_squared();
         let least = f64::from(sizes[0].min(sizes[1]).min(sizes[2].min(sizes[3])));
         let roomy = ROOMY * ROOMY * least * least;
-        if !EDGES.into_iter().any(|e| squared(e) > roomy)
-            || (place.is_partial() && !place.reaches(&points, &sizes))
-        {
-            return;
+        if place.is_partial() && !place.reaches(&points, &sizes) {
+            return false;
+        }
+        if !EDGES.into_iter().any(|e| squared(e) > roomy) {
+            return true;
         }
         let mut add = |p: Point| {
             let h = (self.field.h)(p);
@@ -165,12 +190,14 @@ impl Rooms<'_> {
         if let Some([from, to]) = place.stretch(points[i], points[j], sizes) {
             add(points[i] + (points[j] - points[i]) * (0.5 * (from + to)));
         }
+        true
     }
 }
 
-/// Lists vertices.
+/// Lists vertices for the grains with room.
 struct Vertices<'a> {
     field: &'a Field<'a>,
+    roomy: &'a HashSet<u64>,
 }
 
 impl Scan for Vertices<'_> {
@@ -182,7 +209,8 @@ impl Scan for Vertices<'_> {
         let mut claims = Vec::new();
         for n in numbers.clone() {
             let (p, h) = mesh.point_and_size(sparse(n));
-            claims.extend(lister.obstacle(p, f64::from(h)));
+            let known = lister.obstacle(p, f64::from(h));
+            claims.extend(known.filter(|claim| self.roomy.contains(&claim.grain)));
         }
         claims
     }

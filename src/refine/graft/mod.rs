@@ -34,7 +34,7 @@ pub(super) fn set_in<P: Pages>(
     report: &mut RefineReport,
     progress: &mut dyn FnMut(u64),
 ) -> Result<(), StorageError> {
-    let Some(mut sorted) = claims::gather(mesh, field, space)? else {
+    let Some(mut sorted) = claims::gather(mesh, field, space, &mut worker.active)? else {
         return Ok(());
     };
     let mut setter = Setter::default();
@@ -118,7 +118,8 @@ mod tests {
             dir: &dir.path().into(),
             memory: 1 << 20,
         };
-        let gathered = claims::gather(&mut mesh, &field, &space).expect("room for runs");
+        let gathered =
+            claims::gather(&mut mesh, &field, &space, &mut worker.active).expect("room for runs");
         let claims = gathered.expect("there is room in the cube");
         let mut claims: Vec<Claim> = claims.map(|claim| claim.expect("in memory")).collect();
         if !known {

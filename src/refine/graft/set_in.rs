@@ -275,6 +275,7 @@ impl Setter {
             mesh.set_tet(id, Tet { node, neighbor });
             // None of its edges is long.
             mesh.set_mark(id, EXAMINED, true);
+            worker.active.touch(id);
             if k >= recycled {
                 mesh.set_tet_attribute(id, region, 0);
             }
