@@ -2,6 +2,10 @@
 
 use crate::mesh::{Mesh, dense};
 use crate::storage::Pages;
+use tetdb_schema::page::RECORDS;
+
+/// Tetrahedra of a page.
+const PAGE: u32 = RECORDS as u32;
 
 /// Which pages have had new tetrahedra since they were last examined: a byte a page.
 pub(super) struct Activity {
@@ -26,7 +30,7 @@ impl Activity {
 
     /// Makes all pages active but those far away.
     pub fn again<P: Pages>(&mut self, mesh: &Mesh<P>) {
-        let pages = dense(mesh.tet_ids_end()).div_ceil(2046) as usize;
+        let pages = dense(mesh.tet_ids_end()).div_ceil(PAGE) as usize;
         self.pages.resize(pages, State::Active);
         for page in &mut self.pages {
             if *page == State::Idle {
@@ -37,7 +41,9 @@ impl Activity {
 
     /// Says that a page is far away, until one of its tetrahedra is replaced.
     pub fn set_far(&mut self, page: u32) {
-        self.pages[page as usize] = State::Far;
+        if let Some(state) = self.pages.get_mut(page as usize) {
+            *state = State::Far;
+        }
     }
 
     /// Whether a page is still far away.
@@ -46,7 +52,7 @@ impl Activity {
     }
 
     pub fn touch(&mut self, tet: u32) {
-        let page = (dense(tet) / 2046) as usize;
+        let page = (dense(tet) / PAGE) as usize;
         if page >= self.pages.len() {
             self.pages.resize(page + 1, State::Idle);
         }
@@ -55,7 +61,7 @@ impl Activity {
 
     /// Whether any page of the dense range is active; clears them.
     pub fn take(&mut self, from: u32, to: u32) -> bool {
-        let (first, end) = ((from / 2046) as usize, to.div_ceil(2046) as usize);
+        let (first, end) = ((from / PAGE) as usize, to.div_ceil(PAGE) as usize);
         let end = end.min(self.pages.len());
         let mut any = false;
         for page in &mut self.pages[first.min(end)..end] {

@@ -2,6 +2,7 @@
 
 use super::placement::PlacementRule;
 use crate::geom::{Aabb, Point};
+use crate::mesh::End;
 
 /// Where the wanted length at a point that divides an edge comes from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -28,4 +29,14 @@ pub struct Field<'a> {
     pub place: &'a dyn PlacementRule,
     /// Box of the mesh, which fixes the order along the curve.
     pub bounds: Aabb,
+}
+
+impl Field<'_> {
+    /// Whether points may go near a tetrahedron with these corners.
+    #[inline(always)]
+    pub(super) fn reaches(&self, [a, b, c, d]: &[End; 4]) -> bool {
+        // Spelled out: `map` on arrays is not always inlined.
+        let points = [a.point, b.point, c.point, d.point];
+        !self.place.is_partial() || self.place.reaches(&points, &[a.h, b.h, c.h, d.h])
+    }
 }

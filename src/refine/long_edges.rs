@@ -103,7 +103,7 @@ impl Scan for LongEdges<'_> {
         tets_of_page(mesh, page, |mesh, t, tet| {
             if self.examined_too || tet.node[EXAMINED] & MARK == 0 {
                 let ends = mesh.ends(&tet);
-                if self.reaches(&ends) {
+                if self.field.reaches(&ends) {
                     let found = found.get_or_insert_with(|| (Vec::new(), EdgeCache::new(SEEN)));
                     self.list(t, &tet, &ends, found);
                 }
@@ -114,14 +114,6 @@ impl Scan for LongEdges<'_> {
 }
 
 impl LongEdges<'_> {
-    #[inline(always)]
-    fn reaches(&self, [a, b, c, d]: &[End; 4]) -> bool {
-        // Spelled out, here and below: `map` on arrays is not always inlined.
-        let points = [a.point, b.point, c.point, d.point];
-        let place = self.field.place;
-        !place.is_partial() || place.reaches(&points, &[a.h, b.h, c.h, d.h])
-    }
-
     #[inline(always)]
     fn list(&self, t: u32, tet: &Tet, ends: &[End; 4], (edges, seen): &mut (Vec<Edge>, EdgeCache)) {
         let v = tet.vertices();

@@ -6,6 +6,7 @@ use crate::mesh::anatomy::MARK;
 use crate::mesh::anatomy::mark::EXAMINED;
 use crate::mesh::{FaceRef, Facet, VertexTag};
 use crate::storage::{Backing, Pager, kind};
+use tetdb_schema::page::RECORDS;
 
 /// A cube of fixed corners, divided until edges have length `h`.
 fn cube(h: f64, pager: Pager) -> (Mesh<Pager>, RefineReport) {
@@ -227,7 +228,10 @@ fn pages_far_from_a_zone_are_not_changed() {
         "{report:?} {grown}"
     );
     let is_far = |page: &&[u32]| !page.iter().any(|t| near.binary_search(t).is_ok());
-    let (n, far) = (tets.chunks(2046).count(), tets.chunks(2046).filter(is_far));
+    let (n, far) = (
+        tets.chunks(RECORDS).count(),
+        tets.chunks(RECORDS).filter(is_far),
+    );
     let mut examined = |&t: &u32| mesh.tet(t).node[EXAMINED] & MARK != 0;
     let changed: Vec<bool> = far.map(|page| page.iter().any(&mut examined)).collect();
     assert!(

@@ -169,7 +169,7 @@ impl Rooms<'_> {
         let squared = |e: [usize; 2]| (points[e[0]] - points[e[1]]).length_squared();
         let least = f64::from(sizes[0].min(sizes[1]).min(sizes[2].min(sizes[3])));
         let roomy = ROOMY * ROOMY * least * least;
-        if place.is_partial() && !place.reaches(&points, &sizes) {
+        if !self.field.reaches(&ends) {
             return false;
         }
         if !EDGES.into_iter().any(|e| squared(e) > roomy) {
