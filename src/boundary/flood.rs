@@ -1,10 +1,15 @@
-//! Components of tetrahedra between required faces, found by flooding through pages.
+//! Components of tetrahedra between required faces.
+//!
+//! A flood from tetrahedron to tetrahedron goes to and fro between pages. So pages are taken one after the other, three times: parts of
+//! components within each; which of them meet parts of other pages; what the tetrahedra of each component are together.
 
 use std::collections::BTreeSet;
 
+use tetdb_schema::page::{SLOT_BITS, SLOT_MASK, SLOTS};
+
 use crate::geom::orient;
-use crate::mesh::Mesh;
-use crate::storage::{Pages, check_cancelled};
+use crate::mesh::{Mesh, Scan, Tet, scan_parts, tets_of_page};
+use crate::storage::{Pages, kind};
 
 /// The component that has the enclosing box.
 pub(super) const OUTSIDE: u32 = 1;
@@ -27,63 +32,70 @@ pub(super) struct Flood {
     same: Vec<u32>,
 }
 
-impl Flood {
-    /// Numbers every tetrahedron's component in its region attribute.
-    pub(super) fn run<P: Pages>(mesh: &mut Mesh<P>) -> Self {
-        let mut from = 0;
-        while let Some((t, _)) = mesh.next_tet(from) {
-            from = t + 1;
-            let (_, flags) = mesh.tet_attribute(t);
-            mesh.set_tet_attribute(t, 0, flags);
-        }
-        mesh.clear_scratch();
-        let mut flood = Self {
-            components: vec![Component::default()],
-            same: Vec::new(),
-        };
-        let mut stack = Stack::default();
-        let outside = mesh.tet_of(0);
-        flood.fill(mesh, outside, &mut stack);
-        let mut from = 0;
-        while let Some((t, _)) = mesh.next_tet(from) {
-            from = t + 1;
-            if mesh.tet_attribute(t).0 == 0 {
-                flood.fill(mesh, t, &mut stack);
-            }
-        }
-        mesh.clear_scratch();
-        flood.same = (0..flood.components.len() as u32).collect();
-        flood
-    }
+/// Pages looked at before what was found in them is written: a megabyte.
+const BATCH: usize = 64;
 
-    fn fill<P: Pages>(&mut self, mesh: &mut Mesh<P>, first: u32, stack: &mut Stack) {
-        let component = self.components.len() as u32;
-        let mut found = Component {
-            side_first: u64::MAX,
-            ..Component::default()
-        };
-        let (_, flags) = mesh.tet_attribute(first);
-        mesh.set_tet_attribute(first, component, flags);
-        stack.push(mesh, first);
-        while let Some(t) = stack.pop(mesh) {
-            if found.tets & 4095 == 0 {
-                check_cancelled();
-            }
-            let tet = mesh.tet(t);
-            let [a, b, c, d] = mesh.points(&tet);
-            found.volume += orient(a, b, c, d) / 6.0;
-            found.tets += 1;
-            for (i, across) in tet.neighbor.into_iter().enumerate() {
-                if !across.exists() || tet.is_required(i) {
-                    continue;
+impl Flood {
+    /// Numbers every tetrahedron's component in its region attribute: the outside, then the others in the order of their first tetrahedra.
+    pub(super) fn run<P: Pages>(mesh: &mut Mesh<P>) -> Self {
+        mesh.clear_scratch();
+        let pages: Vec<u32> = (0..mesh.pages().n_pages::<{ kind::TETS }>()).collect();
+        let mut n_parts = 0;
+        for batch in pages.chunks(BATCH) {
+            for page in scan_parts(mesh, batch, &PartsOfPage) {
+                for &[t, part] in &page.tets {
+                    let (_, flags) = mesh.tet_attribute(t);
+                    mesh.set_tet_attribute(t, n_parts + part, flags);
                 }
-                if let (0, flags) = mesh.tet_attribute(across.tet()) {
-                    mesh.set_tet_attribute(across.tet(), component, flags);
-                    stack.push(mesh, across.tet());
+                // Each stands for itself so far.
+                for _ in 0..page.n_parts {
+                    mesh.set_scratch(n_parts, n_parts);
+                    n_parts += 1;
                 }
             }
         }
-        self.components.push(found);
+        for batch in pages.chunks(BATCH) {
+            for [a, b] in scan_parts(mesh, batch, &Meetings).into_iter().flatten() {
+                let (a, b) = (first_of(mesh, a), first_of(mesh, b));
+                mesh.set_scratch(a.max(b), a.min(b));
+            }
+        }
+        let t = mesh.tet_of(0);
+        let part = mesh.tet_attribute(t).0;
+        let mut components = vec![Component::default(); 2];
+        let outside = first_of(mesh, part);
+        for part in 0..n_parts {
+            // What it hangs on comes before it, and has its component's number already.
+            let on = mesh.scratch(part);
+            let component = if part == outside {
+                OUTSIDE
+            } else if part == on {
+                components.push(Component::default());
+                components.len() as u32 - 1
+            } else {
+                mesh.scratch(on)
+            };
+            mesh.set_scratch(part, component);
+        }
+        for component in &mut components {
+            component.side_first = u64::MAX;
+        }
+        for batch in pages.chunks(BATCH) {
+            for page in scan_parts(mesh, batch, &Sums) {
+                for (t, component) in page.tets {
+                    let (_, flags) = mesh.tet_attribute(t);
+                    mesh.set_tet_attribute(t, component, flags);
+                }
+                for (component, volume, tets) in page.sums {
+                    let sum = &mut components[component as usize];
+                    sum.volume += volume;
+                    sum.tets += tets;
+                }
+            }
+        }
+        mesh.clear_scratch();
+        let same = (0..components.len() as u32).collect();
+        Self { components, same }
     }
 
     /// Two components on the sides of a sheet are one volume.
@@ -126,37 +138,132 @@ impl Flood {
     }
 }
 
-/// Numbers that move between memory and scratch pages at a time.
-const BLOCK: usize = 1 << 14;
-
-/// A stack whose top is in memory and the rest in scratch pages: a flood's front can be as large as the mesh.
-#[derive(Default)]
-struct Stack {
-    top: Vec<u32>,
-    /// Numbers in scratch pages: a multiple of [`BLOCK`].
-    n_below: u32,
+/// The first of the parts that hang together with `part`, which from now on hangs on it more directly.
+fn first_of<P: Pages>(mesh: &mut Mesh<P>, mut part: u32) -> u32 {
+    loop {
+        let on = mesh.scratch(part);
+        if on == part {
+            return part;
+        }
+        let next = mesh.scratch(on);
+        mesh.set_scratch(part, next);
+        part = next;
+    }
 }
 
-impl Stack {
-    #[inline]
-    fn push<P: Pages>(&mut self, mesh: &mut Mesh<P>, value: u32) {
-        if self.top.len() == 2 * BLOCK {
-            for value in self.top.drain(..BLOCK) {
-                mesh.set_scratch(self.n_below, value);
-                self.n_below += 1;
-            }
-        }
-        self.top.push(value);
-    }
+/// Tetrahedra before `t` that lie in its component, for no required face is between.
+fn before(t: u32, tet: &Tet) -> impl Iterator<Item = u32> {
+    let open = (0..4).filter(|&i| tet.neighbor[i].exists() && !tet.is_required(i));
+    let across = open.map(|i| tet.neighbor[i].tet());
+    across.filter(move |&u| u < t)
+}
 
-    #[inline]
-    fn pop<P: Pages>(&mut self, mesh: &mut Mesh<P>) -> Option<u32> {
-        if self.top.is_empty() && self.n_below > 0 {
-            let first = self.n_below - BLOCK as u32;
-            self.top
-                .extend((first..self.n_below).map(|n| mesh.scratch(n)));
-            self.n_below = first;
+/// The tetrahedra of a page, and which part of a component within the page each is in.
+struct PartsOfPage;
+
+struct PageParts {
+    /// Tetrahedron, part.
+    tets: Vec<[u32; 2]>,
+    n_parts: u32,
+}
+
+impl Scan for PartsOfPage {
+    type Part = u32;
+    type Output = PageParts;
+
+    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &page: &u32) -> PageParts {
+        let first = page << SLOT_BITS;
+        // By slot, one before it in the same part, or itself.
+        let mut on: Vec<u16> = (0..SLOTS as u16).collect();
+        let root = |on: &mut [u16], mut slot: u16| {
+            while on[slot as usize] != slot {
+                let next = on[on[slot as usize] as usize];
+                on[slot as usize] = next;
+                slot = next;
+            }
+            slot
+        };
+        let mut tets = Vec::with_capacity(SLOTS);
+        tets_of_page(mesh, page, |_, t, tet| {
+            let mut own = (t & SLOT_MASK) as u16;
+            for u in before(t, &tet).filter(|&u| u >= first) {
+                let other = root(&mut on, (u & SLOT_MASK) as u16);
+                own = root(&mut on, own);
+                let (low, high) = (own.min(other), own.max(other));
+                on[high as usize] = low;
+            }
+            tets.push([t, 0]);
+        });
+        let mut number = vec![0; SLOTS];
+        let mut n_parts = 0;
+        for [t, part] in &mut tets {
+            let slot = (*t & SLOT_MASK) as u16;
+            let root = root(&mut on, slot);
+            if root == slot {
+                number[slot as usize] = n_parts;
+                n_parts += 1;
+            }
+            *part = number[root as usize];
         }
-        self.top.pop()
+        PageParts { tets, n_parts }
+    }
+}
+
+/// Pairs of parts with a face between them that is not required, from the page of the later tetrahedron, once each.
+struct Meetings;
+
+impl Scan for Meetings {
+    type Part = u32;
+    type Output = Vec<[u32; 2]>;
+
+    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &page: &u32) -> Vec<[u32; 2]> {
+        let first = page << SLOT_BITS;
+        let mut met = Vec::new();
+        tets_of_page(mesh, page, |mesh, t, tet| {
+            for u in before(t, &tet).filter(|&u| u < first) {
+                let pair = [t, u].map(|t| mesh.tet_attribute(t).0);
+                if met.last() != Some(&pair) {
+                    met.push(pair);
+                }
+            }
+        });
+        met.sort_unstable();
+        met.dedup();
+        met
+    }
+}
+
+/// Components of a page's tetrahedra, and what these are together.
+struct Sums;
+
+struct PageSums {
+    /// Tetrahedron, component.
+    tets: Vec<(u32, u32)>,
+    /// Component, volume, tetrahedra, for some that follow each other.
+    sums: Vec<(u32, f64, u32)>,
+}
+
+impl Scan for Sums {
+    type Part = u32;
+    type Output = PageSums;
+
+    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &page: &u32) -> PageSums {
+        let mut tets = Vec::with_capacity(SLOTS);
+        let mut sums: Vec<(u32, f64, u32)> = Vec::new();
+        tets_of_page(mesh, page, |mesh, t, tet| {
+            let part = mesh.tet_attribute(t).0;
+            let component = mesh.scratch(part);
+            let [a, b, c, d] = mesh.points(&tet);
+            let volume = orient(a, b, c, d) / 6.0;
+            tets.push((t, component));
+            match sums.last_mut() {
+                Some(sum) if sum.0 == component => {
+                    sum.1 += volume;
+                    sum.2 += 1;
+                }
+                _ => sums.push((component, volume, 1)),
+            }
+        });
+        PageSums { tets, sums }
     }
 }

@@ -132,7 +132,7 @@ fn twisted_prisms_get_points_inside_only() {
 }
 
 /// Joins solids into one surface, each scaled and moved.
-fn joined(parts: &[(Vec<Point>, Vec<[u32; 3]>)]) -> (Vec<Point>, Vec<[u32; 3]>) {
+pub fn joined(parts: &[(Vec<Point>, Vec<[u32; 3]>)]) -> (Vec<Point>, Vec<[u32; 3]>) {
     let (mut points, mut triangles) = (Vec::new(), Vec::new());
     for (p, t) in parts {
         let base = points.len() as u32;
@@ -142,7 +142,7 @@ fn joined(parts: &[(Vec<Point>, Vec<[u32; 3]>)]) -> (Vec<Point>, Vec<[u32; 3]>) 
     (points, triangles)
 }
 
-fn placed(
+pub fn placed(
     part: &(Vec<Point>, Vec<[u32; 3]>),
     scale: Point,
     by: Point,
