@@ -36,6 +36,7 @@ use activity::Activity;
 use candidate::Candidates;
 use edge_cache::EdgeCache;
 pub use field::{Field, Lengths};
+pub use graft::{PATTERN_BYTES, find_pattern};
 pub use placement::{Everywhere, PlacementRule};
 use recent::Recent;
 pub use report::RefineReport;

@@ -14,6 +14,7 @@ use crate::delaunay::KernelStats;
 use crate::mesh::Mesh;
 use crate::pipeline::plan::{Options, Plan};
 use crate::pipeline::progress::{Event, Watcher};
+use crate::refine::{PATTERN_BYTES, find_pattern};
 use crate::storage::{
     Backing, Pager, ScratchSpace, StorageError, attempt, in_place_scope, n_threads, raise,
 };
@@ -30,6 +31,8 @@ const BESIDE_VERTEX: u64 = 24;
 /// Bytes that validation and sizes hold for each triangle when all is in memory, and beside that: 140 and a little.
 const LOOK_TRIANGLE: u64 = 160;
 const LOOK_LEAST: u64 = 16 << 20;
+/// Vertices of surfaces whose inside may have room for pieces of the pattern, and whose run is longer than finding it takes (50 ms).
+const PATTERN_FROM: u64 = 1 << 12;
 
 /// The vertices and facets of a surface in a mesh, inserted before there was a store.
 pub struct HeadStart {
@@ -63,6 +66,8 @@ struct HeadStartShare {
     all: u64,
     /// Frames there may be once sizes are known, at most: memory that is not touched is not there.
     frames_later: u64,
+    /// Whether there is also room to find the pattern's tetrahedra.
+    finds_pattern: bool,
 }
 
 impl HeadStartShare {
@@ -78,11 +83,12 @@ impl HeadStartShare {
         let look = LOOK_TRIANGLE * triangles + LOOK_LEAST;
         // Once sizes are known the frames are part of the plan's.
         let plan = Plan::new(cap, held + LOOK_LEAST).ok()?;
-        let fits = held + all + look <= cap && frames <= plan.frames;
-        fits.then_some(Self {
+        let left = cap.checked_sub(held + all + look)?;
+        (frames <= plan.frames).then_some(Self {
             frames,
             all,
             frames_later: Plan::new(cap, held).ok()?.frames,
+            finds_pattern: points >= PATTERN_FROM && left >= PATTERN_BYTES,
         })
     }
 }
@@ -109,6 +115,10 @@ pub fn ahead<T, E>(
         let (made, is_vain, share) = (&made, &is_vain, &share);
         scope.spawn(move |_| {
             let start = begin(surface, share, is_vain, tell);
+            if start.is_some() && share.finds_pattern {
+                // Nobody waits for it but who needs it. What fails fails again there.
+                rayon::spawn(|| drop(attempt(find_pattern)));
+            }
             *made.lock().expect("nobody else has it yet") = start;
         });
         let vain = Vain(is_vain);
@@ -259,6 +269,7 @@ mod tests {
             frames: 0,
             all: 0,
             frames_later: CAP,
+            finds_pattern: false,
         };
         let (tell, _hear) = channel();
         assert!(begin(&surface, &share, &AtomicBool::new(false), tell.clone()).is_some());

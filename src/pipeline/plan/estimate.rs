@@ -13,7 +13,7 @@ use crate::sealed::Form;
 use crate::sizing::{
     Background, Domain, Further, Region, SizeConstraint, SizeField, SizeSummary, TetCounts,
 };
-use crate::storage::{ScratchSpace, attempt};
+use crate::storage::{ScratchSpace, attempt, join};
 use crate::surface::{OUTSIDE, Seeker, Surface, VOLUMES_TRIANGLE, Volumes};
 
 /// A seed nearer to the surface than this share of the box diagonal lies on it: the side is found by sums of doubles, which are known to
@@ -24,6 +24,9 @@ const OF_SIDE: usize = size_of::<[u32; 2]>();
 /// Bytes held while sizes are computed, for each vertex: its size and slope, and lists of those and of as many places along edges near a cell,
 /// where each list is 0.42 of the one above, as it is where vertices are spread evenly.
 const SIZES_VERTEX: usize = 26;
+/// Bytes left for each triangle with which sizes and volumes are found side by side: eight times what they hold, so that arrays, which take a
+/// quarter of what is left at most, stay in memory.
+const ROOM_FOR_BOTH: usize = 8 * 160;
 /// Bytes for frames of what is not held, and for lists of a quarter of a million places.
 const PREPARE_LEAST: usize = 16 << 20;
 /// Tetrahedra of one sub-domain, unless a number of sub-domains is asked for. With twice as many, two at once do not fit 512 MiB: 20 million then
@@ -170,17 +173,26 @@ fn prepare_in(
             scratch,
         )
     };
-    // What building takes is given back before the surface's tree is built, where regions have no sizes of their own.
-    let early = match asked.regions.is_empty() {
-        true => Some(built(&[])?),
-        false => None,
+    let enclosed = || {
+        // Counted before the tree takes its share of what is left.
+        let _held = scratch.hold(VOLUMES_TRIANGLE * surface.n_triangles());
+        let seeker = Seeker::of(surface, scratch, |_| true);
+        let volumes = Volumes::of_in(&seeker, scratch);
+        (seeker, volumes)
+    };
+    let has_room = scratch.available() >= (ROOM_FOR_BOTH * surface.n_triangles()) as u64;
+    let (early, (seeker, volumes)) = if !asked.regions.is_empty() {
+        (None, enclosed())
+    } else if has_room {
+        let (early, enclosed) = join(|| built(&[]), enclosed);
+        (Some(early?), enclosed)
+    } else {
+        // What building takes is given back before the surface's tree is built.
+        let early = built(&[])?;
+        let _early = scratch.hold(early.0.octree_bytes());
+        (Some(early), enclosed())
     };
     let _early = (early.as_ref()).map(|(field, _)| scratch.hold(field.octree_bytes()));
-    // Counted before the tree takes its share of what is left.
-    let held = scratch.hold(VOLUMES_TRIANGLE * surface.n_triangles());
-    let seeker = Seeker::of(surface, scratch, |_| true);
-    let volumes = Volumes::of_in(&seeker, scratch);
-    drop(held);
     let _volumes = scratch.hold(OF_SIDE * surface.n_triangles());
     let chosen = chosen(&seeker, &volumes, options)?;
     refuse_outer_sheets(surface, &volumes, &chosen)?;

@@ -20,6 +20,14 @@ use claims::Claim;
 use piece::Piece;
 use set_in::Setter;
 
+/// Bytes held while the tetrahedra of the pattern are found, and after.
+pub const PATTERN_BYTES: u64 = 8 << 20;
+
+/// Finds the tetrahedra of the pattern, once for the process: whoever sets in the first piece would wait for them.
+pub fn find_pattern() {
+    tets::PatternTets::get();
+}
+
 /// A grain with more in its way is left alone: what concerns it would not fit small leases.
 const CLAIMS_MAX: usize = 1 << 17;
 
