@@ -25,9 +25,9 @@ const PART: usize = 1024;
 const PARTS: usize = 32;
 
 /// The faces of some facets, where they are faces.
-struct Found;
+struct FacesOfFacets;
 
-impl Scan for Found {
+impl Scan for FacesOfFacets {
     type Part = Range<u32>;
     type Output = Vec<Option<FaceRef>>;
 
@@ -54,7 +54,9 @@ pub(super) fn map<P: Pages>(mesh: &mut Mesh<P>) -> MissingFacets {
     let part = |n: u32| n..end.min(n + PART as u32);
     let parts: Vec<Range<u32>> = (0..end).step_by(PART).map(part).collect();
     for parts in parts.chunks(PARTS) {
-        let found = scan_parts(mesh, parts, &Found).into_iter().flatten();
+        let found = scan_parts(mesh, parts, &FacesOfFacets)
+            .into_iter()
+            .flatten();
         for (n, face) in (parts[0].start..).zip(found) {
             let mut facet = mesh.facet(n);
             let f = facet.vertices;

@@ -4,7 +4,7 @@
 //! Unless another case is named, they are those of `balls,count=100` (394,000 tetrahedra on 62,000 triangles), `box,h=0.02` (1.03 million on
 //! 30,000), the armadillo (1.02 million on 52,000), `balls,count=1000` (4.04 million on 506,000).
 
-use super::regions::region_sizes;
+use super::regions::{refuse_outer_points, refuse_outer_sheets, region_sizes};
 use super::{MEMORY_MIN, Options, Plan};
 use crate::boundary::{BoundaryError, Filled, RegionPolicy};
 use crate::optimize::Mode;
@@ -238,60 +238,6 @@ fn chosen(seeker: &Seeker, volumes: &Volumes, options: &Options) -> Result<Fille
     let (end, walls) = (volumes.n_volumes, volumes.walls());
     let chosen = rule.policy.filled(OUTSIDE, end, &walls)?;
     Ok(rule.apply(chosen, OUTSIDE, end, |p| volumes.at(seeker, p))?)
-}
-
-/// Errors: a sheet, or an edge of a wire, where nothing is filled.
-fn refuse_outer_sheets(
-    surface: &Surface,
-    volumes: &Volumes,
-    chosen: &Filled,
-) -> Result<(), PipelineError> {
-    let is_outer =
-        |&t: &u32| surface.is_sheet(t) && !chosen.volumes.contains(&volumes.of_side[t as usize][0]);
-    let mut outer = (0..surface.n_triangles() as u32).filter(is_outer);
-    let Some(triangle) = outer.next() else {
-        return Ok(());
-    };
-    let [a, b, c] = surface.corners(triangle);
-    if surface.is_fin(triangle) {
-        return Err(PipelineError::WireOutside {
-            what: "edges",
-            label: surface.label_name(triangle).to_owned(),
-            at: a.midpoint(b),
-            n: 1 + outer.count() as u64,
-        });
-    }
-    Err(PipelineError::SheetOutside {
-        triangle,
-        label: surface.label_name(triangle).to_owned(),
-        at: (a + b + c) / 3.0,
-        n: 1 + outer.count() as u64,
-    })
-}
-
-/// Errors: a point where nothing is filled.
-fn refuse_outer_points(
-    surface: &Surface,
-    seeker: &Seeker,
-    volumes: &Volumes,
-    chosen: &Filled,
-) -> Result<(), PipelineError> {
-    let wires = &surface.wires;
-    let alone = (wires.points.iter().zip(&wires.sizes)).filter(|(_, size)| **size > 0.0);
-    let is_outer =
-        |&v: &u32| !(chosen.volumes).contains(&volumes.at(seeker, surface.points[v as usize]));
-    let mut outer = alone
-        .map(|(&[v, label], _)| (v, label))
-        .filter(|(v, _)| is_outer(v));
-    let Some((v, label)) = outer.next() else {
-        return Ok(());
-    };
-    Err(PipelineError::WireOutside {
-        what: "points",
-        label: surface.label_names[label as usize].clone(),
-        at: surface.points[v as usize],
-        n: 1 + outer.count() as u64,
-    })
 }
 
 /// What is worth knowing of seeds: where some regions have a name, how many have none; how many of the `n` volumes have no seed.

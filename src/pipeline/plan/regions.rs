@@ -1,11 +1,12 @@
-//! Sizes of regions, by their numbers, their names or by labels of the triangles around them.
+//! Sizes of regions, by their numbers, their names or by labels of the triangles around them; and what may not lie outside of all.
 
 use std::collections::BTreeMap;
 
+use crate::boundary::Filled;
 use crate::pipeline::error::PipelineError;
 use crate::sizing::{Domain, Region, RegionSize, SizeOptions, SizingError};
 use crate::storage::ScratchSpace;
-use crate::surface::Surface;
+use crate::surface::{Seeker, Surface, Volumes};
 
 /// What `sizes` asks of regions of `domain`, whose volumes have `names`.
 ///
@@ -83,4 +84,58 @@ fn unknown(which: &str, surface: &Surface, n_regions: usize) -> SizingError {
             "no filled region has this number or name, and no label of this name encloses one; there are regions 1 to {n_regions}, and labels {list}"
         ),
     }
+}
+
+/// Errors: a sheet, or an edge of a wire, where nothing is filled.
+pub(super) fn refuse_outer_sheets(
+    surface: &Surface,
+    volumes: &Volumes,
+    chosen: &Filled,
+) -> Result<(), PipelineError> {
+    let is_outer =
+        |&t: &u32| surface.is_sheet(t) && !chosen.volumes.contains(&volumes.of_side[t as usize][0]);
+    let mut outer = (0..surface.n_triangles() as u32).filter(is_outer);
+    let Some(triangle) = outer.next() else {
+        return Ok(());
+    };
+    let [a, b, c] = surface.corners(triangle);
+    if surface.is_fin(triangle) {
+        return Err(PipelineError::WireOutside {
+            what: "edges",
+            label: surface.label_name(triangle).to_owned(),
+            at: a.midpoint(b),
+            n: 1 + outer.count() as u64,
+        });
+    }
+    Err(PipelineError::SheetOutside {
+        triangle,
+        label: surface.label_name(triangle).to_owned(),
+        at: (a + b + c) / 3.0,
+        n: 1 + outer.count() as u64,
+    })
+}
+
+/// Errors: a point where nothing is filled.
+pub(super) fn refuse_outer_points(
+    surface: &Surface,
+    seeker: &Seeker,
+    volumes: &Volumes,
+    chosen: &Filled,
+) -> Result<(), PipelineError> {
+    let wires = &surface.wires;
+    let alone = (wires.points.iter().zip(&wires.sizes)).filter(|(_, size)| **size > 0.0);
+    let is_outer =
+        |&v: &u32| !(chosen.volumes).contains(&volumes.at(seeker, surface.points[v as usize]));
+    let mut outer = alone
+        .map(|(&[v, label], _)| (v, label))
+        .filter(|(v, _)| is_outer(v));
+    let Some((v, label)) = outer.next() else {
+        return Ok(());
+    };
+    Err(PipelineError::WireOutside {
+        what: "points",
+        label: surface.label_names[label as usize].clone(),
+        at: surface.points[v as usize],
+        n: 1 + outer.count() as u64,
+    })
 }
