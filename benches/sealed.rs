@@ -174,9 +174,8 @@ fn store(vertices: &[SealedVertex], tets: &[SealedTet]) {
     for &v in vertices {
         writer.push_vertex(v).expect("disk");
     }
-    for t in tets {
-        writer.push_tet(t.nodes, t.region).expect("disk");
-    }
+    let all = tets.iter().map(|t| (t.nodes, t.region));
+    writer.push_all_tets(all).expect("disk");
     for (triangle, (vertices, tet)) in (0..).zip(facets) {
         let facet = SealedFacet {
             vertices,

@@ -119,9 +119,7 @@ fn verified(draft: &Draft, level: Level) -> Result<Report, StoreError> {
             .number(),
         })?;
     }
-    for &(nodes, region) in &draft.tets {
-        writer.push_tet(nodes, region)?;
-    }
+    writer.push_all_tets(draft.tets.iter().copied())?;
     for &facet in &draft.facets {
         writer.push_facet(facet)?;
     }

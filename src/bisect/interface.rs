@@ -14,7 +14,7 @@ use super::labels::{InterfaceMeasures, Labels, face_cost, measure};
 use super::moves::{Moves, Steps};
 use super::surface::CuttingSurface;
 use crate::geom::Point;
-use crate::mesh::{Mesh, dense};
+use crate::mesh::{Mesh, Tet, dense};
 use crate::storage::{Pages, check_cancelled, for_each_mut};
 use tetdb_schema::page::NONE;
 
@@ -23,6 +23,12 @@ use tetdb_schema::page::NONE;
 const STRIP: usize = 100_000;
 /// Share of a strip on each side of a border that is cut again, because each was cut without the other.
 const BORDER: usize = 8;
+/// Cost of a tetrahedron of volume h³ on the other side than its middle, for each h that this lies beside the plane. Without, the least cut is as a whole anywhere
+/// between the limits: 0.15 to 0.4 h off, so that a box in 64 had parts of 0.85 to 1.18 of the mean, and not of 0.98 to 1.02; it had 1 % fewer faces, of walls between balls
+/// 6 %.
+const CENTERED: f64 = 1.0;
+/// Most that costs, as much as several faces: a tetrahedron on a long triangle of the input may be much larger than h³.
+const CENTERED_MOST: f64 = 4.0;
 /// Capacities are costs in this fraction.
 const SCALE: f64 = 256.0;
 
@@ -182,7 +188,7 @@ fn read_strip<P: Pages>(
         let tet = core.tet(t);
         let mut arcs = [Arc::NONE; 4];
         let mut capacity = [0; 4];
-        let mut terminal = [0; 2];
+        let mut terminal = pull(core, &tet, surface);
         for (i, across) in tet.neighbor.into_iter().enumerate() {
             if !across.exists() {
                 continue;
@@ -207,6 +213,18 @@ fn read_strip<P: Pages>(
     for &t in strip {
         core.set_scratch(dense(t), NONE);
     }
+}
+
+/// What it costs to have `tet` on the other side than its middle: where it is no source or sink, that much fits from the one it belongs to.
+fn pull<P: Pages>(core: &mut Mesh<P>, tet: &Tet, surface: &impl CuttingSurface) -> [u32; 2] {
+    let ends = core.ends(tet);
+    let [a, b, c, d] = ends.map(|end| end.point);
+    let h = 0.25 * ends.map(|end| f64::from(end.h)).iter().sum::<f64>();
+    let share = (b - a).cross(c - a).dot(d - a) / (6.0 * h * h * h);
+    let away = surface.distance((a + b + c + d) * 0.25) / h;
+    let cost = (CENTERED * share * away.abs()).min(CENTERED_MOST);
+    let cost = (SCALE * cost).round() as u32;
+    if away < 0.0 { [cost, 0] } else { [0, cost] }
 }
 
 /// Labels a strip as its graph was cut.

@@ -8,7 +8,6 @@ use tetdb_schema::chunk::{
 use tetdb_schema::digest::Digest;
 use tetdb_schema::ids::{SubdomainId, TetId};
 use tetdb_schema::leaf::TetPlace;
-use tetdb_schema::page::NONE;
 use tetdb_schema::record::{InterfaceFace, SealedFacet, SealedTet, SealedVertex};
 
 use super::SealedError;
@@ -64,8 +63,7 @@ pub struct SealedWriter {
     vertex_chunks: Vec<VertexSummary>,
     cache: Option<VertexCache>,
     tets: Cutter<SealedTet>,
-    /// To be packed; packed, to be summed up and stored.
-    incoming: Vec<(SealedTet, TetPlace)>,
+    /// To be summed up and stored.
     packed: Vec<Cut<SealedTet>>,
     tet_chunks: Vec<TetSummary>,
     facets: Cutter<SealedFacet>,
@@ -116,7 +114,6 @@ impl SealedWriter {
             vertex_chunks: Vec::new(),
             cache: None,
             tets: Cutter::new(form, rank, generation).map_err(io)?,
-            incoming: Vec::new(),
             packed: Vec::new(),
             tet_chunks: Vec::new(),
             facets: Cutter::new(form, rank, generation).map_err(io)?,
@@ -182,67 +179,71 @@ impl SealedWriter {
         Ok(())
     }
 
-    /// The next tetrahedron; its number is its place in the stream. Positive, and stored rotated.
+    /// All tetrahedra, by nodes and region: positive, in the order of their numbers.
     ///
-    /// Smallest when they come sorted by their rotated nodes ([`SealedTet::rotated`]).
-    /// Errors: the disk; a vertex that was not pushed.
-    pub fn push_tet(&mut self, nodes: [u32; 4], region: u32) -> Result<(), SealedError> {
+    /// Errors: as [`SealedWriter::push_tets`].
+    #[cfg(any(test, feature = "internals"))]
+    pub fn push_all_tets(
+        &mut self,
+        tets: impl Iterator<Item = ([u32; 4], u32)> + Send,
+    ) -> Result<(), SealedError> {
         let place = TetPlace {
-            neighbors: [NONE; 4],
+            neighbors: [tetdb_schema::page::NONE; 4],
             required: 0,
             flags: 0,
         };
-        let tet = SealedTet { nodes, region }.rotated();
-        self.push_placed_tet(tet, &place)
+        let placed = tets.map(|(nodes, region)| Ok((SealedTet { nodes, region }.rotated(), place)));
+        let mut placed = placed.peekable();
+        while placed.peek().is_some() {
+            self.push_tets::<SealedError>(&mut placed)?;
+        }
+        Ok(())
     }
 
-    /// The next tetrahedron, rotated, with what a working page tells of it; chunks do not. Errors: as [`SealedWriter::push_tet`].
-    pub fn push_placed_tet(&mut self, tet: SealedTet, place: &TetPlace) -> Result<(), SealedError> {
-        debug_assert_eq!(tet, tet.rotated());
+    /// Some thousands of the next tetrahedra, rotated ([`SealedTet::rotated`]), each with what a working page tells of it; chunks do not. The number of
+    /// each is its place in the stream.
+    ///
+    /// They are taken and packed while another thread sums up those before. Smallest when they come sorted by their nodes.
+    /// Errors: those of `tets`; the disk; a vertex that was not pushed.
+    pub fn push_tets<E: From<SealedError> + Send>(
+        &mut self,
+        tets: &mut (impl Iterator<Item = Result<(SealedTet, TetPlace), E>> + Send),
+    ) -> Result<(), E> {
         self.end_vertices()?;
+        let (io, rank) = (self.io(), self.subdomain.rank());
+        let before = std::mem::take(&mut self.packed);
+        let (cutter, packed, pairs) = (&mut self.tets, &mut self.packed, &mut self.pairs);
+        let pack = || {
+            let open = before.iter().map(|cut| count_open(pairs, &cut.records));
+            let open: Vec<u32> = open.collect();
+            for tet in tets.take(TETS_AT_ONCE) {
+                let (tet, place) = tet?;
+                debug_assert_eq!(tet, tet.rotated());
+                let cut = cutter.push(tet, |tet| tet.to_working(&place));
+                packed.extend(cut.map_err(&io)?);
+            }
+            Ok::<_, E>(open)
+        };
+        let cache = self.cache.as_mut().expect("vertices have ended");
+        let (file, totals) = (&mut self.file, &mut self.totals);
+        let sum_up = || {
+            let mut corners_of = |tet: &SealedTet| cache.corners(file, tet.nodes);
+            let add =
+                |cut: &Cut<SealedTet>| totals.add(cut.first, &cut.records, rank, &mut corners_of);
+            before.iter().map(add).collect::<Result<Vec<_>, _>>()
+        };
+        let (open, summaries) = join(pack, sum_up);
+        for ((cut, mut summary), open) in before.into_iter().zip(summaries?).zip(open?) {
+            (summary.open_faces, summary.bytes) = (open, cut.bytes());
+            self.tet_chunks.push(summary);
+            self.put(cut.values)?;
+        }
         assert!(
-            self.tets.count() + (self.incoming.len() as u64) < u64::from(TetId::LOCAL_MAX),
+            self.tets.count() <= u64::from(TetId::LOCAL_MAX),
             "sub-domain {} has more tetrahedra than ids",
             self.subdomain
         );
-        self.incoming.push((tet, *place));
-        if self.incoming.len() < TETS_AT_ONCE {
-            return Ok(());
-        }
-        self.pack_tets()
-    }
-
-    /// Packs the tetrahedra that came in, while another thread sums up and stores those packed before.
-    fn pack_tets(&mut self) -> Result<(), SealedError> {
-        let (io, rank) = (self.io(), self.subdomain.rank());
-        let mut before = std::mem::take(&mut self.packed);
-        let (tets, incoming, packed) = (&mut self.tets, &mut self.incoming, &mut self.packed);
-        let pack = || {
-            for (tet, place) in incoming.drain(..) {
-                let cut = tets.push(tet, |tet| tet.to_working(&place));
-                packed.extend(cut.map_err(&io)?);
-            }
-            Ok(())
-        };
-        let (cache, file) = (self.cache.as_mut(), &mut self.file);
-        let (totals, pairs) = (&mut self.totals, &mut self.pairs);
-        let (chunks, batch) = (&mut self.tet_chunks, &mut self.batch);
-        let sum_up = || {
-            let cache = cache.expect("vertices have ended");
-            for chunk in before.drain(..) {
-                let corners_of = |tet: &SealedTet| cache.corners(file, tet.nodes);
-                let mut summary = totals.add(chunk.first, &chunk.records, rank, corners_of)?;
-                summary.open_faces = count_open(pairs, &chunk.records);
-                summary.bytes = chunk.bytes();
-                chunks.push(summary);
-                for (key, value) in chunk.values {
-                    batch.push(file, key, value)?;
-                }
-            }
-            Ok(())
-        };
-        let (packed, summed_up) = join(pack, sum_up);
-        packed.and(summed_up)
+        Ok(())
     }
 
     fn put(&mut self, values: Vec<(u64, Vec<u8>)>) -> Result<(), SealedError> {
@@ -319,12 +320,13 @@ impl SealedWriter {
     /// Errors: the disk.
     pub fn finish(mut self) -> Result<Sealed, SealedError> {
         let io = self.io();
-        self.end_vertices()?;
-        self.pack_tets()?;
+        let mut none = std::iter::empty();
+        self.push_tets::<SealedError>(&mut none)?;
         while let Some(chunk) = self.tets.cut().map_err(&io)? {
             self.packed.push(chunk);
         }
-        self.pack_tets()?;
+        let mut none = std::iter::empty();
+        self.push_tets::<SealedError>(&mut none)?;
         while let Some(chunk) = self.facets.cut().map_err(&io)? {
             self.put_facets(chunk)?;
         }

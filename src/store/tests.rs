@@ -158,7 +158,7 @@ pub(crate) fn two_subdomains(path: &std::path::Path) -> Result<(), StoreError> {
                 .number(),
             })?;
         }
-        writer.push_tet(nodes, 1)?;
+        writer.push_all_tets(std::iter::once((nodes, 1)))?;
         let nodes = tetdb_schema::record::SealedTet { nodes, region: 1 }
             .rotated()
             .nodes;

@@ -45,7 +45,7 @@ fn any_number_of_parts_is_valid_and_of_the_same_size() {
         for part in info["subdomains"].as_array().expect("a list") {
             let share = number(&part["tets"]) * n as f64 / number(&info["tets"]);
             assert!(
-                (0.8..1.2).contains(&share),
+                (0.97..1.03).contains(&share),
                 "{n} parts: {share} of the mean"
             );
             assert!(number(&part["worst_q"]) < 3.5, "{part}");

@@ -123,7 +123,7 @@ pub struct ShapeArgs {
     /// How finished sub-domains are kept [default: packed]
     #[arg(long, value_enum, help_heading = "Store")]
     pub seal: Option<Seal>,
-    /// Number of sub-domains: auto, or a number [default: auto, one for each 2 million tetrahedra, of large meshes up to 4 million]
+    /// Number of sub-domains: auto, or a number [default: auto, one up to 2 million tetrahedra, above one for each 5 million, of large meshes 10 million]
     #[arg(long, value_name = "N", alias = "domains", help_heading = "Store")]
     pub subdomains: Option<String>,
     /// Keep the meshes before and after refinement for each cut, and its interface before and after faces are chosen, for `tetdb snapshot --stage`

@@ -251,9 +251,8 @@ fn cubes(path: &Path, n: u32) -> Outcome {
                 tets.push((path, 1 + u32::from(k * 2 >= n)));
             }
         }
-        for &(nodes, region) in &tets {
-            writer.push_tet(nodes.map(|g| local[&g]), region)?;
-        }
+        let numbered = |&(nodes, region): &([u32; 4], u32)| (nodes.map(|g| local[&g]), region);
+        writer.push_all_tets(tets.iter().map(numbered))?;
         push_hull(&mut writer, &tets, &local, rank, half, n, place)?;
         parts.push(writer.finish()?);
     }

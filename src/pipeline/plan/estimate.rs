@@ -29,12 +29,13 @@ const SIZES_VERTEX: usize = 26;
 const ROOM_FOR_BOTH: usize = 8 * 160;
 /// Bytes for frames of what is not held, and for lists of a quarter of a million places.
 const PREPARE_LEAST: usize = 16 << 20;
-/// Tetrahedra of one sub-domain, unless a number of sub-domains is asked for. With twice as many, two at once do not fit 512 MiB: 20 million then
-/// take 1.28 times as long as with 4 GiB, not 1.04, and with 128 MiB 1.75 times, not 1.24.
-const TETS_PER_SUBDOMAIN: f64 = (2u64 << 20) as f64;
-/// The same of a mesh so large that it has [`MANY`] of them in any case: 20 million in half as many
-/// take a tenth fewer CPU seconds. Within 512 MiB it is slower; who makes such meshes is taken to have more.
+/// Most tetrahedra of one sub-domain where two or more are made unasked. A cut is dear: 21 million in ten take a tenth to a fifth longer than in
+/// four, with caps from 128 MiB on, and the first of the cuts is made alone however many follow.
+const TETS_PER_SUBDOMAIN: f64 = (5u64 << 20) as f64;
+/// The same of a mesh so large that it has [`MANY`] of them in any case: 41 million in four take less time than in ten within 1 GiB too.
 const TETS_PER_SUBDOMAIN_MAX: f64 = 2.0 * TETS_PER_SUBDOMAIN;
+/// A mesh with more than this is made in two at least: two threads are faster side by side than within one sub-domain.
+const TETS_ALONE: f64 = (2u64 << 20) as f64;
 /// Sub-domains that are enough to be shared out among threads and machines.
 const MANY: f64 = 32.0;
 /// Inner tetrahedra without and with only part of the optimization, over those with all of it: 1.072 and 1.083, 1.023 and 1.026.
@@ -445,7 +446,11 @@ pub(crate) fn n_subdomains(
 ) -> Result<(u32, Option<u32>), PipelineError> {
     let asked = options.subdomain_count()?;
     let each = (tets / MANY).clamp(TETS_PER_SUBDOMAIN, TETS_PER_SUBDOMAIN_MAX);
-    let auto = (tets / each).ceil().max(1.0);
+    // An even number of them: three take longer on two threads than two or four.
+    let auto = match tets > TETS_ALONE {
+        true => 2.0 * (0.5 * tets / each).ceil(),
+        false => 1.0,
+    };
     let most = (tets / options.subdomain_tets_min()).floor().max(1.0);
     let wanted = asked.map_or(auto, f64::from);
     let n = wanted.min(most).min(f64::from(1u32 << 20)) as u32;
@@ -485,9 +490,19 @@ mod tests {
     fn a_large_mesh_has_fewer_subdomains_for_its_size() -> Result<(), PipelineError> {
         let options = Options::default();
         // From 32 on they grow, and when they are twice as large there are more of them.
-        for (shares, n) in [(0.1, 1), (10.0, 10), (32.0, 32), (48.0, 32), (500.0, 250)] {
+        let shares = [
+            (0.6, 2),
+            (2.0, 2),
+            (2.1, 4),
+            (10.0, 10),
+            (32.0, 32),
+            (48.0, 32),
+        ];
+        for (shares, n) in shares.into_iter().chain([(500.0, 250)]) {
             assert_eq!(n_subdomains(shares * TETS_PER_SUBDOMAIN, &options)?.0, n);
         }
+        assert_eq!(n_subdomains(TETS_ALONE, &options)?.0, 1);
+        assert_eq!(n_subdomains(1.01 * TETS_ALONE, &options)?.0, 2);
         Ok(())
     }
 

@@ -4,7 +4,7 @@ use crate::pipeline::tree::blob;
 use crate::store::{Catalog, Step, StoreError};
 
 /// Raised whenever a change alters the digest of any mesh: what one version began no other can go on with.
-pub const RECIPE: u32 = 14;
+pub const RECIPE: u32 = 15;
 
 /// Puts this version on record, with the job.
 pub fn record_recipe(step: &mut Step) {

@@ -55,15 +55,13 @@ pub(crate) fn seal<P: Pages>(
 }
 
 fn report_progress(watch: &Watcher, stage: &'static str, done: u64, total: u32) {
-    if done.is_multiple_of(65_536) {
-        check_cancelled();
-        watch(Event {
-            stage,
-            done,
-            total: Some(u64::from(total)),
-            unit: "records",
-        });
-    }
+    check_cancelled();
+    watch(Event {
+        stage,
+        done,
+        total: Some(u64::from(total)),
+        unit: "records",
+    });
 }
 
 fn vertices<P: Pages>(
@@ -110,7 +108,9 @@ fn vertices<P: Pages>(
             tag,
             id,
         })?;
-        report_progress(watch, "seal vertices", u64::from(local), mesh.n_vertices());
+        if local.is_multiple_of(65_536) {
+            report_progress(watch, "seal vertices", u64::from(local), mesh.n_vertices());
+        }
     }
     Ok(())
 }
@@ -174,30 +174,32 @@ fn tets(
     watch: &Watcher,
 ) -> Result<Sorted<RequiredFace>, PipelineError> {
     let mut faces = Sorter::new(target.scratch, target.memory / 4);
-    for (t, record) in order.enumerate() {
-        let TetRecord {
-            nodes,
-            region,
-            flags,
-            required,
-        } = record?;
-        match neighbors {
-            None => writer.push_tet(nodes, region)?,
-            Some(neighbors) => {
-                let place = TetPlace {
-                    neighbors: neighbors.next()?,
-                    required,
-                    flags,
-                };
-                writer.push_placed_tet(SealedTet { nodes, region }, &place)?;
+    let (mut order, mut done) = ((0..).zip(order).peekable(), 0);
+    while order.peek().is_some() {
+        let mut placed = (order.by_ref()).map(|(t, record): (u32, _)| {
+            let record: TetRecord = record?;
+            done = u64::from(t) + 1;
+            for i in (0..4).filter(|i| record.required >> i & 1 != 0) {
+                let (vertices, odd) = sorted_face(FACES[i].map(|k| record.nodes[k]));
+                faces.push(RequiredFace {
+                    vertices,
+                    tet: t,
+                    odd,
+                })?;
             }
-        }
-        for i in (0..4).filter(|i| required >> i & 1 != 0) {
-            let (vertices, odd) = sorted_face(FACES[i].map(|k| nodes[k]));
-            let tet = t as u32;
-            faces.push(RequiredFace { vertices, tet, odd })?;
-        }
-        report_progress(watch, "seal tetrahedra", t as u64, n_tets);
+            let place = TetPlace {
+                neighbors: match neighbors {
+                    Some(neighbors) => neighbors.next()?,
+                    None => [NONE; 4],
+                },
+                required: record.required,
+                flags: record.flags,
+            };
+            let (nodes, region) = (record.nodes, record.region);
+            Ok::<_, PipelineError>((SealedTet { nodes, region }, place))
+        });
+        writer.push_tets(&mut placed)?;
+        report_progress(watch, "seal tetrahedra", done, n_tets);
     }
     Ok(faces.finish()?)
 }

@@ -125,9 +125,7 @@ impl Grid {
             })
             .collect();
         tets.sort_by_key(|(_, tet)| tet.nodes);
-        for (_, tet) in &tets {
-            writer.push_tet(tet.nodes, tet.region)?;
-        }
+        writer.push_all_tets(tets.iter().map(|(_, tet)| (tet.nodes, tet.region)))?;
         let places: Vec<GridPlace> = numbers.keys().copied().collect();
         self.faces(&mut writer, rank, &places, &tets)?;
         Ok(writer.finish()?)
