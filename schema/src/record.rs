@@ -151,13 +151,10 @@ impl SealedTet {
         }
         let [a, b, c, d] = LEAD[lead];
         let [a, b, c, d] = [n[a], n[b], n[c], n[d]];
-        let nodes = if b < c && b < d {
-            [a, b, c, d]
-        } else if c < d {
-            [a, c, d, b]
-        } else {
-            [a, d, b, c]
-        };
+        // Which of three comes first is as good as random: looked up, not guessed.
+        let nodes = [[a, b, c, d], [a, c, d, b], [a, d, b, c]];
+        let later = usize::from(b >= c) | usize::from(b >= d);
+        let nodes = nodes[later * (1 + usize::from(c >= d))];
         Self { nodes, ..self }
     }
 }

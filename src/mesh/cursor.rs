@@ -59,13 +59,22 @@ impl<P: Pages> Mesh<P> {
         *self.pages.write::<K>(to) = record;
     }
 
-    /// Copies the attribute of id `from` to that of id `to` of an array that begins at page `first`.
-    pub(super) fn copy_attribute<const K: usize>(&mut self, from: u32, to: u32, first: u32) {
-        if attribute_place(from).0 >> SLOT_BITS >= first {
+    /// The attribute of an id in an array before page `first`.
+    pub(super) fn attribute_before<const K: usize>(&mut self, id: u32, first: u32) -> (u32, u32) {
+        match attribute_place(id).0 >> SLOT_BITS < first {
+            true => self.attribute::<K>(id),
             // Never set: what is there by now belongs to the new array.
-            return;
+            false => (0, 0),
         }
-        let (a, b) = self.attribute::<K>(from);
+    }
+
+    /// Sets the attribute of an id in an array that begins at page `first`, where it has none yet.
+    pub(super) fn place_attribute<const K: usize>(
+        &mut self,
+        to: u32,
+        first: u32,
+        (a, b): (u32, u32),
+    ) {
         if a | b == 0 {
             return;
         }

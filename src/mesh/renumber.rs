@@ -89,7 +89,8 @@ fn renumber_vertices<P: Pages>(
         let v = sorted?.id;
         let to = sparse(n_new);
         mesh.copy_record::<{ kind::VERTICES }>(v, (old_pages << SLOT_BITS) + to);
-        mesh.copy_attribute::<{ kind::VERTEX_ATTRIBUTES }>(v, to, old_attributes);
+        let attribute = mesh.attribute_before::<{ kind::VERTEX_ATTRIBUTES }>(v, old_attributes);
+        mesh.place_attribute::<{ kind::VERTEX_ATTRIBUTES }>(to, old_attributes, attribute);
         mesh.set_scratch(dense(v), to);
         n_new += 1;
     }
@@ -207,11 +208,16 @@ fn renumber_tets<P: Pages>(mesh: &mut Mesh<P>, n_vertices: u32) -> u32 {
     }
     let old_pages = mesh.pages().n_pages::<{ kind::TETS }>();
     let old_attributes = mesh.pages().n_pages::<{ kind::TET_ATTRIBUTES }>();
+    let moved = Moved {
+        numbers,
+        old,
+        old_attributes,
+    };
     for batch in parts(n_new).chunks(BATCH) {
-        let found = scan_parts(mesh, batch, &Moved { numbers, old });
-        for (n, (t, tet)) in (batch[0].start..).zip(found.into_iter().flatten()) {
+        let found = scan_parts(mesh, batch, &moved);
+        for (n, (tet, attribute)) in (batch[0].start..).zip(found.into_iter().flatten()) {
             mesh.place_tet((old_pages << SLOT_BITS) + sparse(n), tet);
-            mesh.copy_attribute::<{ kind::TET_ATTRIBUTES }>(t, sparse(n), old_attributes);
+            mesh.place_attribute::<{ kind::TET_ATTRIBUTES }>(sparse(n), old_attributes, attribute);
         }
     }
     mesh.pages_mut().drop_front::<{ kind::TETS }>(old_pages);
@@ -241,17 +247,18 @@ impl Scan for FirstVertices {
     }
 }
 
-/// Tetrahedra in their new order and under new numbers, each with its old one.
+/// Tetrahedra in their new order and under new numbers, each with its attribute.
 struct Moved {
     numbers: u32,
     old: u32,
+    old_attributes: u32,
 }
 
 impl Scan for Moved {
     type Part = Range<u32>;
-    type Output = Vec<(u32, Tet)>;
+    type Output = Vec<(Tet, (u32, u32))>;
 
-    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, part: &Range<u32>) -> Vec<(u32, Tet)> {
+    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, part: &Range<u32>) -> Self::Output {
         let moved = |n| {
             let t = mesh.scratch(self.old + n);
             let mut tet = mesh.tet(t);
@@ -265,7 +272,9 @@ impl Scan for Moved {
                     *face = FaceRef::new(to, face.face());
                 }
             }
-            (t, tet)
+            let old_attributes = self.old_attributes;
+            let attribute = mesh.attribute_before::<{ kind::TET_ATTRIBUTES }>(t, old_attributes);
+            (tet, attribute)
         };
         part.clone().map(moved).collect()
     }

@@ -39,32 +39,66 @@ impl Scan for Suspicious {
     type Output = Vec<u32>;
 
     fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &page: &u32) -> Vec<u32> {
-        let mut found = Vec::new();
+        let mut block = Block::default();
         tets_of_page(mesh, page, |mesh, t, tet| {
-            if is_suspicious(mesh, t, &tet) {
-                found.push(t);
+            block.add(mesh, t, &tet);
+            if block.tets.len() == BLOCK {
+                block.test(mesh);
             }
         });
-        found
+        block.test(mesh);
+        block.found
     }
 }
 
-#[inline(always)]
-fn is_suspicious<P: Pages>(mesh: &mut Mesh<P>, t: u32, tet: &Tet) -> bool {
-    let sphere = Sphere::new(mesh.points(tet));
-    // Which faces are tested is as good as random: listing them first takes the guess out of the branches.
-    let (mut faces, mut n) = ([0usize; 4], 0);
-    for i in 0..4 {
-        let across = tet.neighbor[i];
-        let tested = across.exists() && !tet.is_required(i) && across.tet() >= t;
-        faces[n & 3] = i;
-        n += usize::from(tested);
+/// Tetrahedra whose faces are listed before any is tested: what lies across is far apart in memory, and tests that follow each other
+/// without a branch between them wait for it together.
+const BLOCK: usize = 64;
+
+/// Some tetrahedra of a page, and their faces to be tested.
+struct Block {
+    tets: Vec<(u32, Sphere)>,
+    /// Places in `tets` and what lies across.
+    faces: [(u32, FaceRef); 4 * BLOCK + 1],
+    n_faces: usize,
+    found: Vec<u32>,
+}
+
+impl Default for Block {
+    fn default() -> Self {
+        Self {
+            tets: Vec::with_capacity(BLOCK),
+            faces: [(0, FaceRef::NONE); 4 * BLOCK + 1],
+            n_faces: 0,
+            found: Vec::new(),
+        }
     }
-    faces[..n].iter().any(|&i| {
-        let q = mesh.apex(tet.neighbor[i]);
-        let q = mesh.point(q);
-        sphere.has_inside(q)
-    })
+}
+
+impl Block {
+    #[inline(always)]
+    fn add<P: Pages>(&mut self, mesh: &mut Mesh<P>, t: u32, tet: &Tet) {
+        for i in 0..4 {
+            let across = tet.neighbor[i];
+            let tested = across.exists() && !tet.is_required(i) && across.tet() >= t;
+            self.faces[self.n_faces] = (self.tets.len() as u32, across);
+            self.n_faces += usize::from(tested);
+        }
+        self.tets.push((t, Sphere::new(mesh.points(tet))));
+    }
+
+    #[inline(always)]
+    fn test<P: Pages>(&mut self, mesh: &mut Mesh<P>) {
+        for &(at, across) in &self.faces[..self.n_faces] {
+            let (t, sphere) = &self.tets[at as usize];
+            let q = mesh.apex(across);
+            if sphere.has_inside(mesh.point(q)) && self.found.last() != Some(t) {
+                self.found.push(*t);
+            }
+        }
+        self.tets.clear();
+        self.n_faces = 0;
+    }
 }
 
 /// Scratch of the restoration.

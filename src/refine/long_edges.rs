@@ -116,16 +116,22 @@ impl Scan for LongEdges<'_> {
 impl LongEdges<'_> {
     #[inline(always)]
     fn list(&self, t: u32, tet: &Tet, ends: &[End; 4], (edges, seen): &mut (Vec<Edge>, EdgeCache)) {
+        // Which edges are long is as good as random: all are looked at before any is listed.
+        let mut listed = 0u32;
+        for (k, [i, j]) in EDGES.into_iter().enumerate() {
+            let fixed = ends[i].fixed & ends[j].fixed;
+            listed |= u32::from(fixed | may_be_long(&ends[i], &ends[j])) << k;
+        }
         let v = tet.vertices();
-        for [i, j] in EDGES {
+        while listed != 0 {
+            let [i, j] = EDGES[listed.trailing_zeros() as usize];
+            listed &= listed - 1;
             let fixed = ends[i].fixed && ends[j].fixed;
-            if fixed || may_be_long(&ends[i], &ends[j]) {
-                let (a, b) = (v[i].min(v[j]), v[i].max(v[j]));
-                let edge = u64::from(a) << 32 | u64::from(b);
-                // Of several tetrahedra with an edge the first counts.
-                if seen.add(edge) && !(fixed && self.settled.has(edge)) {
-                    edges.push((edge, t));
-                }
+            let (a, b) = (v[i].min(v[j]), v[i].max(v[j]));
+            let edge = u64::from(a) << 32 | u64::from(b);
+            // Of several tetrahedra with an edge the first counts.
+            if seen.add(edge) && !(fixed && self.settled.has(edge)) {
+                edges.push((edge, t));
             }
         }
     }

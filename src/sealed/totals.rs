@@ -7,7 +7,7 @@ use tetdb_schema::digest::Digest;
 use tetdb_schema::record::{FACES, SealedTet};
 
 use super::{Corner, FacePairs, Paired, Shape, quality_bin, sorted_face};
-use crate::geom::Aabb;
+use crate::geom::{Aabb, Point};
 use crate::storage::map_into;
 use tetdb_schema::catalog::QUALITY_BINS;
 use tetdb_schema::catalog::QualityRow;
@@ -34,8 +34,53 @@ pub(crate) struct Totals {
     /// By number.
     pub regions: BTreeMap<u32, RegionTotals>,
     /// Of the piece at hand; kept, for memory that is asked for anew is cleared by the system each time.
-    corners: Vec<[Corner; 4]>,
+    corners: Vec<[Spot; 4]>,
     shapes: Vec<Shape>,
+}
+
+/// What is summed of a vertex.
+#[derive(Clone, Copy)]
+struct Spot {
+    point: Point,
+    mix: u64,
+}
+
+impl Spot {
+    #[inline(always)]
+    fn of(corner: &Corner) -> Self {
+        Self {
+            point: corner.point,
+            mix: corner.mix,
+        }
+    }
+}
+
+/// Tetrahedra of one region that follow each other: the map of regions is asked once for all.
+struct RegionRun {
+    region: u32,
+    totals: RegionTotals,
+}
+
+impl RegionRun {
+    fn of(region: u32, regions: &BTreeMap<u32, RegionTotals>) -> Self {
+        let totals = regions.get(&region).copied().unwrap_or_default();
+        Self { region, totals }
+    }
+
+    fn end(self, regions: &mut BTreeMap<u32, RegionTotals>) {
+        regions.insert(self.region, self.totals);
+    }
+}
+
+/// Extends a box to a point: one instruction for each side, where a minimum that knows what is no number takes four. Coordinates that are
+/// none are left out here too.
+#[inline(always)]
+fn extend(bounds: &mut Aabb, p: Point) {
+    let less = |a: f64, b: f64| if a < b { a } else { b };
+    let more = |a: f64, b: f64| if a > b { a } else { b };
+    let (low, high) = (bounds.low, bounds.high);
+    bounds.low = Point::new(less(p.x, low.x), less(p.y, low.y), less(p.z, low.z));
+    bounds.high = Point::new(more(p.x, high.x), more(p.y, high.y), more(p.z, high.z));
 }
 
 /// Least and greatest coordinates.
@@ -103,7 +148,7 @@ impl Totals {
         let mut summary = TetSummary {
             bounds: [[0.0; 3]; 2],
             volume: 0.0,
-            quality: [f32::INFINITY, 0.0],
+            quality: [0.0; 2],
             regions: [u32::MAX, 0],
             vertices: [u32::MAX, 0],
             first,
@@ -117,27 +162,37 @@ impl Totals {
             std::mem::take(&mut self.shapes),
         );
         let (corners, shapes) = (&mut buffers.0, &mut buffers.1);
+        // Rounded once: what is rounded keeps its order.
+        let (mut quality, mut edge_max) = ([f64::INFINITY, 0.0f64], 0.0f64);
         // A piece at a time: the corners of a whole chunk would take ten times its bytes.
         for (piece, first) in tets.chunks(PIECE).zip((first..).step_by(PIECE)) {
             corners.clear();
             for tet in piece {
-                corners.push(corners_of(tet)?);
+                let [a, b, c, d] = &corners_of(tet)?;
+                corners.push([Spot::of(a), Spot::of(b), Spot::of(c), Spot::of(d)]);
             }
             // Shapes in parallel, sums in order: the same for any number of threads.
-            map_into(corners, shapes, |c| Shape::of(c.map(|c| c.point)));
+            let known = self.cosines;
+            map_into(corners, shapes, |[a, b, c, d]| {
+                Shape::beyond([a.point, b.point, c.point, d.point], known)
+            });
             let known = piece.iter().zip(&*corners).zip(&*shapes);
+            let mut run = RegionRun::of(piece[0].region, &self.regions);
             for (place, ((tet, corners), shape)) in (first..).zip(known) {
+                let [a, b, c, d] = corners;
                 self.digest
-                    .add_tet(corners.map(|c| c.mix), tet.region, rank);
-                bounds = corners.iter().fold(bounds, |b, c| b.with(c.point));
+                    .add_tet([a.mix, b.mix, c.mix, d.mix], tet.region, rank);
+                corners.iter().for_each(|c| extend(&mut bounds, c.point));
                 self.add_shape(place, shape);
-                let region = self.regions.entry(tet.region).or_default();
-                region.tets += 1;
-                region.volume += shape.volume;
+                if run.region != tet.region {
+                    run.end(&mut self.regions);
+                    run = RegionRun::of(tet.region, &self.regions);
+                }
+                run.totals.tets += 1;
+                run.totals.volume += shape.volume;
                 summary.volume += shape.volume;
-                summary.edge_max = summary.edge_max.max(rounded_up(shape.edge_max));
-                let q = shape.quality as f32;
-                summary.quality = [summary.quality[0].min(q), summary.quality[1].max(q)];
+                edge_max = edge_max.max(shape.edge_max);
+                quality = [quality[0].min(shape.quality), quality[1].max(shape.quality)];
                 let [least, most] = summary.regions;
                 summary.regions = [least.min(tet.region), most.max(tet.region)];
                 for v in tet.nodes {
@@ -145,9 +200,12 @@ impl Totals {
                     summary.vertices = [least.min(v), most.max(v)];
                 }
             }
+            run.end(&mut self.regions);
         }
         (self.corners, self.shapes) = buffers;
         summary.bounds = array(&bounds);
+        summary.quality = quality.map(|q| q as f32);
+        summary.edge_max = rounded_up(edge_max);
         Ok(summary)
     }
 

@@ -30,6 +30,26 @@ pub struct Corner {
     pub h: f32,
 }
 
+/// The vertices of a resident chunk.
+#[derive(Clone, Copy)]
+struct Window {
+    chunk: u32,
+    /// Vertices from this one on, below that.
+    first: u32,
+    end: u32,
+    /// Place in `resident`.
+    place: u32,
+}
+
+impl Window {
+    const EMPTY: Self = Self {
+        chunk: NOT_RESIDENT,
+        first: 0,
+        end: 0,
+        place: 0,
+    };
+}
+
 /// Decoded vertex chunks within a budget.
 ///
 /// A hit sets a reference bit; the `lru` crate orders the chunks when one is missed, and a chunk
@@ -47,7 +67,8 @@ pub struct VertexCache {
     order: LruCache<u32, ()>,
     loader: Loader<SealedVertex>,
     scratch: Vec<SealedVertex>,
-    last: usize,
+    /// Chunks asked last: corners of near tetrahedra lie in one or two.
+    last: [Window; 2],
     bytes: usize,
     bytes_max: usize,
     loads: u64,
@@ -76,7 +97,7 @@ impl VertexCache {
             order: LruCache::unbounded(),
             loader: Loader::of(form, (subdomain, generation))?,
             scratch: Vec::new(),
-            last: 0,
+            last: [Window::EMPTY; 2],
             bytes: 0,
             bytes_max,
             loads: 0,
@@ -96,33 +117,50 @@ impl VertexCache {
     /// Vertex `v`, read from `file` when its chunk is not resident.
     ///
     /// Errors: a damaged chunk; a number no vertex has.
-    #[inline]
+    #[inline(always)]
     pub fn corner(&mut self, file: &mut StoreFile, v: u32) -> Result<Corner, SealedError> {
-        let mut chunk = self.last;
-        let holds = |c: usize| {
-            self.firsts.get(c).is_some_and(|&f| f <= v)
-                && self.firsts.get(c + 1).copied().unwrap_or(self.n_vertices) > v
+        let [a, b] = &self.last;
+        let within = |w: &Window| w.first <= v && v < w.end;
+        let w = if within(a) {
+            *a
+        } else if within(b) {
+            *b
+        } else {
+            self.turn_to(file, v)?
         };
-        if !holds(chunk) {
-            if v >= self.n_vertices {
-                return Err(self.no_such_vertex(file, v));
-            }
-            chunk = self.chunk_of(v);
-            self.last = chunk;
-        }
-        if self.places[chunk] == NOT_RESIDENT {
-            self.load(file, chunk)?;
-        }
-        self.referenced[chunk] = true;
-        let corners = &self.resident[self.places[chunk] as usize];
-        match corners.get((v - self.firsts[chunk]) as usize) {
+        match self.resident[w.place as usize].get((v - w.first) as usize) {
             Some(&corner) => Ok(corner),
             None => Err(self.no_such_vertex(file, v)),
         }
     }
 
+    /// The chunk of `v`, resident, in place of the one of the last two that was asked first.
+    #[inline(never)]
+    fn turn_to(&mut self, file: &mut StoreFile, v: u32) -> Result<Window, SealedError> {
+        if v >= self.n_vertices {
+            return Err(self.no_such_vertex(file, v));
+        }
+        let chunk = self.chunk_of(v);
+        if self.places[chunk] == NOT_RESIDENT {
+            self.load(file, chunk)?;
+        }
+        self.referenced[chunk] = true;
+        let window = Window {
+            chunk: chunk as u32,
+            first: self.firsts[chunk],
+            end: self
+                .firsts
+                .get(chunk + 1)
+                .copied()
+                .unwrap_or(self.n_vertices),
+            place: self.places[chunk],
+        };
+        self.last = [window, self.last[0]];
+        Ok(window)
+    }
+
     /// The corners of a tetrahedron or face.
-    #[inline]
+    #[inline(always)]
     pub fn corners<const N: usize>(
         &mut self,
         file: &mut StoreFile,
@@ -200,6 +238,12 @@ impl VertexCache {
             if std::mem::take(&mut self.referenced[chunk as usize]) {
                 self.order.put(chunk, ());
                 continue;
+            }
+            // Whoever asks for it next has it read again.
+            for window in &mut self.last {
+                if window.chunk == chunk {
+                    *window = Window::EMPTY;
+                }
             }
             let place = std::mem::replace(&mut self.places[chunk as usize], NOT_RESIDENT);
             let corners = std::mem::take(&mut self.resident[place as usize]);

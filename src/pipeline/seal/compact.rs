@@ -7,7 +7,7 @@
 
 use tetdb_schema::ids::{Owner, VertexId};
 use tetdb_schema::leaf::TetPlace;
-use tetdb_schema::page::NONE;
+use tetdb_schema::page::{NONE, RECORDS};
 use tetdb_schema::record::{InterfaceFace, SealedFacet, SealedTet, SealedVertex, tag};
 
 use super::neighbors::Neighbors;
@@ -141,7 +141,7 @@ impl Scan for Records {
     type Output = Vec<TetRecord>;
 
     fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &page: &u32) -> Vec<TetRecord> {
-        let mut records = Vec::new();
+        let mut records = Vec::with_capacity(RECORDS);
         tets_of_page(mesh, page, |mesh, t, tet| {
             let mut nodes = [0; 4];
             for (i, node) in nodes.iter_mut().enumerate() {
@@ -150,9 +150,11 @@ impl Scan for Records {
             let (region, flags) = mesh.tet_attribute(t);
             let rotated = SealedTet { nodes, region }.rotated();
             let mut required = 0;
-            for (i, node) in rotated.nodes.into_iter().enumerate() {
-                let old = nodes.iter().position(|&n| n == node).unwrap_or(0);
-                required |= u8::from(tet.is_required(old)) << i;
+            if (0..4).any(|i| tet.is_required(i)) {
+                for (i, node) in rotated.nodes.into_iter().enumerate() {
+                    let old = nodes.iter().position(|&n| n == node).unwrap_or(0);
+                    required |= u8::from(tet.is_required(old)) << i;
+                }
             }
             records.push(TetRecord {
                 nodes: rotated.nodes,
