@@ -32,11 +32,11 @@ pub enum Paired {
 #[derive(Clone, Copy)]
 struct Entry {
     face: [u32; 3],
-    /// `reference << 1 | parity`, or the marker.
+    /// `reference << 1 | parity`, or one of the two markers.
     reference: u32,
 }
 
-/// Both sides of the face were there.
+const VACANT: u32 = u32::MAX;
 const CLOSED: u32 = u32::MAX - 1;
 /// Slots by which the faces of the next vertex begin later, a power of two: about three for each face that has a vertex as its smallest.
 const VERTEX_SLOTS: u32 = 32;
@@ -49,9 +49,6 @@ const NEAR: u32 = 16;
 /// Invariant: at most half full. Order: what it returns depends on the faces alone.
 pub struct FacePairs {
     entries: Vec<Entry>,
-    /// In which turn a slot was taken; it is vacant in all others. A table is 4 MB, and emptied for each chunk of some 24,000 tetrahedra.
-    turns: Vec<u8>,
-    turn: u8,
     used: usize,
 }
 
@@ -61,23 +58,17 @@ impl FacePairs {
         let slots = (tets * 8).next_power_of_two().max(16);
         let vacant = Entry {
             face: [0; 3],
-            reference: 0,
+            reference: VACANT,
         };
         Self {
             entries: vec![vacant; slots],
-            turns: vec![0; slots],
-            turn: 1,
             used: 0,
         }
     }
 
     /// Empties the table.
     pub fn clear(&mut self) {
-        if self.turn == u8::MAX {
-            self.turns.fill(0);
-            self.turn = 0;
-        }
-        self.turn += 1;
+        self.entries.iter_mut().for_each(|e| e.reference = VACANT);
         self.used = 0;
     }
 
@@ -91,8 +82,7 @@ impl FacePairs {
         let mut looked_at = 0;
         loop {
             let entry = &mut self.entries[at];
-            if self.turns[at] != self.turn {
-                self.turns[at] = self.turn;
+            if entry.reference == VACANT {
                 *entry = Entry {
                     face,
                     reference: reference << 1 | u32::from(odd),
@@ -121,10 +111,10 @@ impl FacePairs {
 
     /// The faces with one side only: vertices ascending, parity, reference.
     pub fn open(&self) -> impl Iterator<Item = ([u32; 3], bool, u32)> + '_ {
-        let entries = self.entries.iter().zip(&self.turns);
-        entries
-            .filter(|(e, turn)| **turn == self.turn && e.reference != CLOSED)
-            .map(|(e, _)| (e.face, e.reference & 1 == 1, e.reference >> 1))
+        self.entries
+            .iter()
+            .filter(|e| e.reference < CLOSED)
+            .map(|e| (e.face, e.reference & 1 == 1, e.reference >> 1))
     }
 }
 
@@ -146,19 +136,6 @@ mod tests {
         assert_eq!(pairs.open().count(), 0);
         for turn in [[1, 2, 3], [2, 3, 1], [3, 1, 2]] {
             assert_eq!(sorted_face(turn), ([1, 2, 3], false));
-        }
-    }
-
-    #[test]
-    fn an_emptied_table_knows_nothing() {
-        let mut pairs = FacePairs::new(4);
-        for k in 0..1000 {
-            assert_eq!(pairs.open().count(), 0);
-            let face = [k % 3, 7, 9];
-            assert_eq!(pairs.add(face, false, k), Paired::Open);
-            assert_eq!(pairs.add(face, false, 0), Paired::Same(k));
-            assert_eq!(pairs.open().next(), Some((face, false, k)));
-            pairs.clear();
         }
     }
 
