@@ -99,6 +99,8 @@ pub(super) struct Piece {
     parts: Vec<u32>,
     /// The place it belongs to.
     owners: Vec<u32>,
+    /// Of each part its outer faces.
+    outer: Vec<Vec<OuterFace>>,
 }
 
 impl Piece {
@@ -140,6 +142,7 @@ impl Piece {
             places: Vec::new(),
             parts: Vec::new(),
             owners: Vec::new(),
+            outer: Vec::new(),
         };
         piece.block(claims);
         if piece.flood(claims, field) < INNER_MIN {
@@ -331,7 +334,7 @@ impl Piece {
     }
 
     /// Tetrahedron `t` of the piece as the pattern has it, and the place it belongs to.
-    fn tet(&self, t: u32) -> (&'static PatternTet, &Place) {
+    pub fn tet(&self, t: u32) -> (&'static PatternTet, &Place) {
         let place = &self.places[self.owners[t as usize] as usize];
         let number = (t - place.first) as usize;
         (&PatternTets::get().owned(place.number)[number], place)
@@ -340,13 +343,25 @@ impl Piece {
     /// The places at the corners of tetrahedron `t`, if all are in open cells.
     pub fn corners(&self, t: u32) -> Option<[u32; 4]> {
         let (tet, place) = self.tet(t);
-        let [a, b, c, d] = tet.corners.map(|corner| self.beside(place, corner));
+        self.corners_of(tet, place)
+    }
+
+    /// The same of a tetrahedron at hand.
+    #[inline(always)]
+    pub fn corners_of(&self, tet: &PatternTet, place: &Place) -> Option<[u32; 4]> {
+        let [a, b, c, d] = &tet.corners;
+        let [a, b, c, d] = [
+            self.beside(place, *a),
+            self.beside(place, *b),
+            self.beside(place, *c),
+            self.beside(place, *d),
+        ];
         Some([a?, b?, c?, d?])
     }
 
-    /// The tetrahedron beyond face `i` of `t`, and its face, if it is one of the piece.
-    pub fn across(&self, t: u32, i: usize) -> Option<OuterFace> {
-        let (tet, place) = self.tet(t);
+    /// The tetrahedron beyond face `i` of the one at hand, and its face, if it is one of the piece.
+    #[inline(always)]
+    pub fn across_of(&self, tet: &PatternTet, place: &Place, i: usize) -> Option<OuterFace> {
         let (owner, k, face) = tet.across[i];
         let owner = self.beside(place, owner)?;
         let tet = self.places[owner as usize].first + u32::from(k);
@@ -358,48 +373,51 @@ impl Piece {
 
     /// Chooses tetrahedra and what becomes of each place, from the places that are allowed.
     pub fn choose(&mut self) {
-        let n_tets = self.owners.len() as u32;
         self.parts.clear();
-        self.parts.resize(n_tets as usize, NONE);
+        self.parts.resize(self.owners.len(), NONE);
+        let tets = PatternTets::get();
         let mut stars = vec![0u8; self.places.len()];
-        for t in 0..n_tets {
-            if !self.places[self.owners[t as usize] as usize].allowed {
-                continue;
-            }
-            if let Some(corners) = self.corners(t)
-                && corners.iter().all(|&p| self.places[p as usize].allowed)
-            {
-                corners.iter().for_each(|&p| stars[p as usize] += 1);
-                self.parts[t as usize] = CHOSEN;
+        for place in self.places.iter().filter(|place| place.allowed) {
+            for (t, tet) in (place.first as usize..).zip(tets.owned(place.number)) {
+                if let Some(corners) = self.corners_of(tet, place)
+                    && corners.iter().all(|&p| self.places[p as usize].allowed)
+                {
+                    corners.iter().for_each(|&p| stars[p as usize] += 1);
+                    self.parts[t] = CHOSEN;
+                }
             }
         }
-        let tets = PatternTets::get();
         for (place, star) in self.places.iter_mut().zip(stars) {
             let whole = place.allowed && star == tets.star(place.number);
             place.used = if whole { Use::Inner } else { Use::None };
         }
         // Those around inner places are all of the piece; the others save nothing.
-        for t in 0..n_tets {
-            if self.parts[t as usize] == CHOSEN && !self.has_inner(t) {
-                self.parts[t as usize] = NONE;
+        for place in &self.places {
+            for (t, tet) in (place.first as usize..).zip(tets.owned(place.number)) {
+                if self.parts[t] == CHOSEN && !self.has_inner(tet, place) {
+                    self.parts[t] = NONE;
+                }
             }
         }
         self.split();
-        for t in 0..n_tets {
-            if self.parts[t as usize] != NONE {
-                for p in self.corners(t).expect(OPEN) {
-                    let used = &mut self.places[p as usize].used;
-                    if *used == Use::None {
-                        *used = Use::Outer;
+        for at in 0..self.places.len() {
+            let place = self.places[at];
+            for (t, tet) in (place.first as usize..).zip(tets.owned(place.number)) {
+                if self.parts[t] != NONE {
+                    for p in self.corners_of(tet, &place).expect(OPEN) {
+                        let used = &mut self.places[p as usize].used;
+                        if *used == Use::None {
+                            *used = Use::Outer;
+                        }
                     }
                 }
             }
         }
     }
 
-    /// Whether tetrahedron `t`, all of whose corners are in open cells, has an inner one.
-    fn has_inner(&self, t: u32) -> bool {
-        let corners = self.corners(t).expect(OPEN);
+    /// Whether a tetrahedron, all of whose corners are in open cells, has an inner one.
+    fn has_inner(&self, tet: &PatternTet, place: &Place) -> bool {
+        let corners = self.corners_of(tet, place).expect(OPEN);
         corners
             .iter()
             .any(|&p| self.places[p as usize].used == Use::Inner)
@@ -407,23 +425,29 @@ impl Piece {
 
     /// Numbers connected parts, and gives up the small ones.
     fn split(&mut self) {
+        self.outer.clear();
         let mut n_parts = 0;
-        let mut part = Vec::new();
+        let (mut part, mut outer) = (Vec::new(), Vec::new());
         for seed in 0..self.parts.len() as u32 {
             if self.parts[seed as usize] != CHOSEN {
                 continue;
             }
             part.clear();
+            outer.clear();
             part.push(seed);
             self.parts[seed as usize] = n_parts;
             let mut next = 0;
             while next < part.len() {
                 let t = part[next];
                 next += 1;
-                for i in 0..4 {
-                    if let Some(face) = self.across(t, i)
-                        && self.parts[face.tet as usize] == CHOSEN
-                    {
+                let (tet, place) = self.tet(t);
+                let across: [_; 4] = std::array::from_fn(|i| self.across_of(tet, place, i));
+                for (i, beyond) in across.into_iter().enumerate() {
+                    let Some(face) = beyond else {
+                        outer.push(OuterFace { tet: t, face: i });
+                        continue;
+                    };
+                    if self.parts[face.tet as usize] == CHOSEN {
                         self.parts[face.tet as usize] = n_parts;
                         part.push(face.tet);
                     }
@@ -434,6 +458,7 @@ impl Piece {
             let inner = part.iter().filter(|&&t| owner(t).used == Use::Inner);
             if inner.count() >= 6 * INNER_MIN {
                 n_parts += 1;
+                self.outer.push(outer.clone());
                 continue;
             }
             for &t in &part {
@@ -455,6 +480,11 @@ impl Piece {
             }
         }
         tets
+    }
+
+    /// The outer faces of each part.
+    pub fn outer_by_part(&self) -> &[Vec<OuterFace>] {
+        &self.outer
     }
 
     /// How many tetrahedra are numbered, those that are not used among them.

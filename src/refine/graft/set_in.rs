@@ -1,7 +1,5 @@
 //! A piece set into the mesh: its outer places are inserted one after another, then what fills the space between them is replaced.
 
-use std::collections::HashMap;
-
 use tetdb_schema::page::NONE;
 
 use super::super::candidate::Candidate;
@@ -11,7 +9,7 @@ use super::super::worker::Worker;
 use super::claims::Claim;
 use super::piece::{OPEN, OuterFace, Piece, Place, Use};
 use crate::delaunay::{Located, insertion_key};
-use crate::geom::Point;
+use crate::geom::{IdMap, Point};
 use crate::mesh::anatomy::mark::{EXAMINED, IN_CAVITY};
 use crate::mesh::anatomy::{FACES, MARK};
 use crate::mesh::{FaceRef, Mesh, Tet};
@@ -34,9 +32,9 @@ pub(super) struct Setter {
     /// Of each place its vertex.
     vertices: Vec<u32>,
     /// The place of each vertex at an outer one.
-    placed: HashMap<u32, u32>,
+    placed: IdMap<u32, u32>,
     /// Outer faces of a part by their places in ascending order, and what was found beyond each.
-    faces: HashMap<[u32; 3], (OuterFace, FaceRef)>,
+    faces: IdMap<[u32; 3], (OuterFace, FaceRef)>,
     visited: Vec<u32>,
     /// Of each tetrahedron of the piece its id in the mesh.
     ids: Vec<u32>,
@@ -70,12 +68,12 @@ impl Setter {
             self.misfits += 1;
             return;
         }
-        for tets in piece.tets_by_part() {
+        for (tets, outer) in piece.tets_by_part().iter().zip(piece.outer_by_part()) {
             check_cancelled();
-            self.list_faces(piece, &tets);
-            let start = self.inside(worker, mesh, piece, claims, &tets);
+            self.list_faces(piece, outer);
+            let start = self.inside(worker, mesh, piece, claims, tets);
             if start.is_some_and(|start| self.flood(mesh, piece, start)) {
-                let added = self.fill(worker, mesh, piece, &tets);
+                let added = self.fill(worker, mesh, piece, tets);
                 report.inserted += added;
                 report.set_in += added;
                 self.misfits -= 1;
@@ -149,18 +147,13 @@ impl Setter {
         f64::from(lost) / wanted as f64
     }
 
-    /// Lists the outer faces of a part.
-    fn list_faces(&mut self, piece: &Piece, tets: &[u32]) {
+    /// Lists the outer faces of a part by their places.
+    fn list_faces(&mut self, piece: &Piece, outer: &[OuterFace]) {
         self.faces.clear();
-        for &t in tets {
-            for (i, face) in FACES.into_iter().enumerate() {
-                if piece.across(t, i).is_none() {
-                    let corners = piece.corners(t).expect(OPEN);
-                    let key = ascending(face.map(|k| corners[k]));
-                    let face = OuterFace { tet: t, face: i };
-                    self.faces.insert(key, (face, FaceRef::NONE));
-                }
-            }
+        for &face in outer {
+            let corners = piece.corners(face.tet).expect(OPEN);
+            let key = ascending(FACES[face.face].map(|k| corners[k]));
+            self.faces.insert(key, (face, FaceRef::NONE));
         }
     }
 
@@ -256,8 +249,9 @@ impl Setter {
         }
         let mut added = 0;
         for (k, &t) in tets.iter().enumerate() {
-            let corners = piece.corners(t).expect(OPEN);
-            let node = corners.map(|p| {
+            let (tet, place) = piece.tet(t);
+            let corners = piece.corners_of(tet, place).expect(OPEN);
+            let mut node = corners.map(|p| {
                 if self.vertices[p as usize] == NONE {
                     let place = &piece.places[p as usize];
                     self.vertices[p as usize] = mesh.add_vertex(place.point, place.h);
@@ -267,14 +261,14 @@ impl Setter {
             });
             let id = self.ids[t as usize];
             let neighbor = std::array::from_fn(|i| {
-                if let Some(face) = piece.across(t, i) {
+                if let Some(face) = piece.across_of(tet, place, i) {
                     return FaceRef::new(self.ids[face.tet as usize], face.face);
                 }
                 self.faces[&ascending(FACES[i].map(|k| corners[k]))].1
             });
-            mesh.set_tet(id, Tet { node, neighbor });
             // None of its edges is long.
-            mesh.set_mark(id, EXAMINED, true);
+            node[EXAMINED] |= MARK;
+            mesh.set_tet(id, Tet { node, neighbor });
             worker.active.touch(id);
             if k >= recycled {
                 mesh.set_tet_attribute(id, region, 0);
