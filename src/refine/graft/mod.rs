@@ -10,11 +10,13 @@ mod piece;
 mod set_in;
 mod tets;
 
+use std::iter::Peekable;
+
 use super::field::Field;
 use super::report::RefineReport;
 use super::worker::Worker;
 use crate::mesh::{Mesh, Workspace};
-use crate::storage::{Pages, StorageError};
+use crate::storage::{Pages, StorageError, in_place_scope, spare_threads};
 
 use claims::Claim;
 use piece::Piece;
@@ -42,37 +44,74 @@ pub(super) fn set_in<P: Pages>(
     report: &mut RefineReport,
     progress: &mut dyn FnMut(u64),
 ) -> Result<(), StorageError> {
-    let Some(mut sorted) = claims::gather(mesh, field, space, &mut worker.active)? else {
+    let Some(sorted) = claims::gather(mesh, field, space, &mut worker.active)? else {
         return Ok(());
     };
     let mut setter = Setter::default();
-    let mut claims: Vec<Claim> = Vec::new();
-    let mut next = sorted.next().transpose()?;
-    while let Some(first) = next.take().filter(|_| !setter.gives_up()) {
-        claims.clear();
-        claims.push(first);
-        let mut n = 1;
-        for claim in sorted.by_ref() {
-            let claim = claim?;
-            if claim.grain != first.grain {
-                next = Some(claim);
-                break;
+    let mut grains = Grains {
+        sorted: sorted.peekable(),
+    };
+    let with_piece = |claims: Vec<Claim>| (Piece::of(&claims, field), claims);
+    let mut at_hand = grains.next().transpose()?.map(with_piece);
+    while let Some((piece, claims)) = at_hand.take().filter(|_| !setter.gives_up()) {
+        let following = grains.next().transpose()?;
+        // The next piece needs nothing of the mesh. Two of them at once where memory holds the whole mesh.
+        let ahead = piece.is_some() && spare_threads() > 1 && mesh.shared().is_some();
+        let set_in = || {
+            if let Some(mut piece) = piece {
+                setter.set_in(worker, mesh, &mut piece, &claims, report);
+                setter.insert_rest(worker, mesh, field, &piece, &claims, report);
+                progress(report.inserted);
             }
-            n += 1;
-            if n <= CLAIMS_MAX {
-                claims.push(claim);
-            }
-        }
-        if n > CLAIMS_MAX {
-            continue;
-        }
-        if let Some(mut piece) = Piece::of(&claims, field) {
-            setter.set_in(worker, mesh, &mut piece, &claims, report);
-            setter.insert_rest(worker, mesh, field, &piece, &claims, report);
-            progress(report.inserted);
+        };
+        if ahead {
+            in_place_scope(|scope| {
+                scope.spawn(|_| at_hand = following.map(with_piece));
+                set_in();
+            });
+        } else {
+            set_in();
+            at_hand = following.map(with_piece);
         }
     }
     Ok(())
+}
+
+/// What concerns each grain, one after the other; grains that have too much are left out.
+struct Grains<I: Iterator<Item = Result<Claim, StorageError>>> {
+    sorted: Peekable<I>,
+}
+
+impl<I: Iterator<Item = Result<Claim, StorageError>>> Iterator for Grains<I> {
+    type Item = Result<Vec<Claim>, StorageError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            let first = match self.sorted.next()? {
+                Ok(claim) => claim,
+                Err(e) => return Some(Err(e)),
+            };
+            let (mut claims, mut n) = (vec![first], 1);
+            let is_same = |claim: &Result<Claim, _>| {
+                claim
+                    .as_ref()
+                    .map_or(true, |c: &Claim| c.grain == first.grain)
+            };
+            while let Some(claim) = self.sorted.next_if(is_same) {
+                let claim = match claim {
+                    Ok(claim) => claim,
+                    Err(e) => return Some(Err(e)),
+                };
+                n += 1;
+                if n <= CLAIMS_MAX {
+                    claims.push(claim);
+                }
+            }
+            if n <= CLAIMS_MAX {
+                return Some(Ok(claims));
+            }
+        }
+    }
 }
 
 #[cfg(test)]

@@ -59,16 +59,11 @@ pub(super) enum Use {
 pub(super) struct Place {
     pub point: Point,
     pub h: f32,
-    pub used: Use,
     /// Whether a vertex may be there.
     pub fits: bool,
-    /// Whether it may be one of the piece.
-    pub allowed: bool,
     /// Number of its cell here, and its number in the pattern.
     cell: u32,
     number: u32,
-    /// The number of its first tetrahedron.
-    first: u32,
 }
 
 /// A face of a piece.
@@ -95,6 +90,11 @@ pub(super) struct Piece {
     /// Of each open cell its first place.
     first: Vec<u32>,
     pub places: Vec<Place>,
+    /// What is asked of places out of order, in arrays of its own, which the caches hold: what becomes of each, whether it may be one of the
+    /// piece, and the number of its first tetrahedron.
+    pub used: Vec<Use>,
+    pub allowed: Vec<bool>,
+    tets: Vec<u32>,
     /// Of each tetrahedron of a place that may be used: which connected part it belongs to; [`NONE`] when not used.
     parts: Vec<u32>,
     /// The place it belongs to.
@@ -140,6 +140,9 @@ impl Piece {
             cells: vec![Cell::Unknown; n_cells],
             first: Vec::new(),
             places: Vec::new(),
+            used: Vec::new(),
+            allowed: Vec::new(),
+            tets: Vec::new(),
             parts: Vec::new(),
             owners: Vec::new(),
             outer: Vec::new(),
@@ -295,13 +298,11 @@ impl Piece {
                 self.places.push(Place {
                     point,
                     h: h as f32,
-                    used: Use::None,
                     fits,
-                    allowed,
                     cell: cell as u32,
                     number: 0,
-                    first: 0,
                 });
+                self.allowed.push(allowed);
                 n_allowed += usize::from(allowed);
             }
         }
@@ -316,8 +317,8 @@ impl Piece {
             let cell = self.places[at].cell;
             let (number, n) = tets.points_of(wrapped(self.coordinates(cell)));
             for number in number..number + n {
-                let place = &mut self.places[at];
-                (place.number, place.first) = (number, self.owners.len() as u32);
+                self.places[at].number = number;
+                self.tets.push(self.owners.len() as u32);
                 self.owners
                     .extend(tets.owned(number).iter().map(|_| at as u32));
                 at += 1;
@@ -335,8 +336,8 @@ impl Piece {
 
     /// Tetrahedron `t` of the piece as the pattern has it, and the place it belongs to.
     pub fn tet(&self, t: u32) -> (&'static PatternTet, &Place) {
-        let place = &self.places[self.owners[t as usize] as usize];
-        let number = (t - place.first) as usize;
+        let owner = self.owners[t as usize] as usize;
+        let (place, number) = (&self.places[owner], (t - self.tets[owner]) as usize);
         (&PatternTets::get().owned(place.number)[number], place)
     }
 
@@ -364,7 +365,7 @@ impl Piece {
     pub fn across_of(&self, tet: &PatternTet, place: &Place, i: usize) -> Option<OuterFace> {
         let (owner, k, face) = tet.across[i];
         let owner = self.beside(place, owner)?;
-        let tet = self.places[owner as usize].first + u32::from(k);
+        let tet = self.tets[owner as usize] + u32::from(k);
         (self.parts[tet as usize] != NONE).then_some(OuterFace {
             tet,
             face: usize::from(face),
@@ -377,35 +378,35 @@ impl Piece {
         self.parts.resize(self.owners.len(), NONE);
         let tets = PatternTets::get();
         let mut stars = vec![0u8; self.places.len()];
-        for place in self.places.iter().filter(|place| place.allowed) {
-            for (t, tet) in (place.first as usize..).zip(tets.owned(place.number)) {
-                if let Some(corners) = self.corners_of(tet, place)
-                    && corners.iter().all(|&p| self.places[p as usize].allowed)
+        for (place, _) in self.allowed.iter().enumerate().filter(|(_, a)| **a) {
+            for (t, tet) in self.tets_of(place) {
+                if let Some(corners) = self.corners_of(tet, &self.places[place])
+                    && corners.iter().all(|&p| self.allowed[p as usize])
                 {
                     corners.iter().for_each(|&p| stars[p as usize] += 1);
                     self.parts[t] = CHOSEN;
                 }
             }
         }
-        for (place, star) in self.places.iter_mut().zip(stars) {
-            let whole = place.allowed && star == tets.star(place.number);
-            place.used = if whole { Use::Inner } else { Use::None };
+        self.used.clear();
+        for ((place, &allowed), star) in self.places.iter().zip(&self.allowed).zip(stars) {
+            let whole = allowed && star == tets.star(place.number);
+            self.used.push(if whole { Use::Inner } else { Use::None });
         }
         // Those around inner places are all of the piece; the others save nothing.
-        for place in &self.places {
-            for (t, tet) in (place.first as usize..).zip(tets.owned(place.number)) {
-                if self.parts[t] == CHOSEN && !self.has_inner(tet, place) {
+        for place in 0..self.places.len() {
+            for (t, tet) in self.tets_of(place) {
+                if self.parts[t] == CHOSEN && !self.has_inner(tet, &self.places[place]) {
                     self.parts[t] = NONE;
                 }
             }
         }
         self.split();
-        for at in 0..self.places.len() {
-            let place = self.places[at];
-            for (t, tet) in (place.first as usize..).zip(tets.owned(place.number)) {
+        for place in 0..self.places.len() {
+            for (t, tet) in self.tets_of(place) {
                 if self.parts[t] != NONE {
-                    for p in self.corners_of(tet, &place).expect(OPEN) {
-                        let used = &mut self.places[p as usize].used;
+                    for p in self.corners_of(tet, &self.places[place]).expect(OPEN) {
+                        let used = &mut self.used[p as usize];
                         if *used == Use::None {
                             *used = Use::Outer;
                         }
@@ -415,12 +416,16 @@ impl Piece {
         }
     }
 
+    /// The tetrahedra of a place, each with its number.
+    fn tets_of(&self, place: usize) -> impl Iterator<Item = (usize, &'static PatternTet)> + use<> {
+        let owned = PatternTets::get().owned(self.places[place].number);
+        (self.tets[place] as usize..).zip(owned)
+    }
+
     /// Whether a tetrahedron, all of whose corners are in open cells, has an inner one.
     fn has_inner(&self, tet: &PatternTet, place: &Place) -> bool {
         let corners = self.corners_of(tet, place).expect(OPEN);
-        corners
-            .iter()
-            .any(|&p| self.places[p as usize].used == Use::Inner)
+        corners.iter().any(|&p| self.used[p as usize] == Use::Inner)
     }
 
     /// Numbers connected parts, and gives up the small ones.
@@ -454,8 +459,8 @@ impl Piece {
                 }
             }
             // A place owns six tetrahedra in the mean.
-            let owner = |t: u32| &self.places[self.owners[t as usize] as usize];
-            let inner = part.iter().filter(|&&t| owner(t).used == Use::Inner);
+            let owner = |t: u32| self.owners[t as usize] as usize;
+            let inner = part.iter().filter(|&&t| self.used[owner(t)] == Use::Inner);
             if inner.count() >= 6 * INNER_MIN {
                 n_parts += 1;
                 self.outer.push(outer.clone());
@@ -464,7 +469,7 @@ impl Piece {
             for &t in &part {
                 self.parts[t as usize] = NONE;
                 for p in self.corners(t).expect(OPEN) {
-                    self.places[p as usize].used = Use::None;
+                    self.used[p as usize] = Use::None;
                 }
             }
         }

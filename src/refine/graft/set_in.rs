@@ -126,9 +126,8 @@ impl Setter {
         piece: &mut Piece,
         claims: &[Claim],
     ) -> f64 {
-        let wanted = (0..piece.places.len() as u32).filter(|&k| {
-            piece.places[k as usize].used == Use::Outer && self.vertices[k as usize] == NONE
-        });
+        let wanted = (0..piece.places.len() as u32)
+            .filter(|&k| piece.used[k as usize] == Use::Outer && self.vertices[k as usize] == NONE);
         let key = |k: u32| insertion_key(&worker.order, piece.places[k as usize].point);
         let mut order: Vec<(u64, u32)> = wanted.map(|k| (key(k), k)).collect();
         order.sort_unstable();
@@ -137,7 +136,7 @@ impl Setter {
         for (_, k) in order {
             let place = piece.places[k as usize];
             let Some(v) = insert(worker, mesh, place.point, place.h, near, claims) else {
-                piece.places[k as usize].allowed = false;
+                piece.allowed[k as usize] = false;
                 lost += 1;
                 continue;
             };
