@@ -24,5 +24,5 @@ pub use number::short;
 pub use pair::Pair;
 pub use point::{Aabb, Point};
 pub use sign::{
-    Seen, in_sphere_perturbed, insphere, insphere_filtered, lex_cmp, orient, orient_sign,
+    Seen, in_sphere_perturbed, insphere, insphere_filtered, larger, lex_cmp, orient, orient_sign,
 };

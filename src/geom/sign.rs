@@ -99,7 +99,7 @@ fn orient_slow(a: Point, b: Point, c: Point, d: Point) -> f64 {
 
 /// The larger of two numbers that are not NaN: one instruction, where `f64::max` takes five.
 #[inline(always)]
-fn larger(a: f64, b: f64) -> f64 {
+pub fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 

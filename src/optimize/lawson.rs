@@ -92,7 +92,12 @@ impl Block {
         for &(at, across) in &self.faces[..self.n_faces] {
             let (t, sphere) = &self.tets[at as usize];
             let q = mesh.apex(across);
-            if sphere.has_inside(mesh.point(q)) && self.found.last() != Some(t) {
+            let q = mesh.point(q);
+            let corners = || {
+                let tet = mesh.tet(*t);
+                mesh.points(&tet)
+            };
+            if sphere.has_inside(q, corners) && self.found.last() != Some(t) {
                 self.found.push(*t);
             }
         }
@@ -141,7 +146,7 @@ impl Lawson {
             }
             let q = mesh.apex(tet.neighbor[i]);
             let q = mesh.point(q);
-            if sphere.has_inside(q) && self.flip(mesh, t, tet, p, i, q) {
+            if sphere.has_inside(q, || p) && self.flip(mesh, t, tet, p, i, q) {
                 return;
             }
         }

@@ -120,7 +120,7 @@ fn count_faces<P: Pages>(
         let apex = mesh.apex(across);
         let apex = mesh.point(apex);
         table.faces += 1;
-        table.faces_delaunay += u64::from(!sphere.has_inside(apex));
+        table.faces_delaunay += u64::from(!sphere.has_inside(apex, || p));
     }
 }
 

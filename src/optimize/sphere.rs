@@ -1,6 +1,6 @@
 //! The circumsphere of one tetrahedron, asked about several points.
 
-use crate::geom::{Point, insphere};
+use crate::geom::{Point, insphere, larger};
 
 /// Forward error of the filtered test: 54 monomials of degree 5 bounded by L⁴ E and 18 bounded by L³ E², each
 /// rounded at most 17 times, 2⁻⁵³ each; L and E are the largest differences among the corners and to the point asked about.
@@ -10,8 +10,10 @@ const BOUND_POINT: f64 = 3.6e-14;
 const DIFFERENCES: std::ops::Range<f64> = 1e-58..1e58;
 
 /// A positive tetrahedron's sphere: seen from its first corner, center = `normal / (2 det)`.
+///
+/// Small, so that many lie side by side: whoever asks has the corners again where they are needed.
 pub(super) struct Sphere {
-    corners: [Point; 4],
+    first: Point,
     normal: Point,
     det: f64,
     largest: f64,
@@ -24,27 +26,34 @@ impl Sphere {
         let (u, v, w) = (b - a, c - a, d - a);
         let (vw, wu, uv) = (v.cross(w), w.cross(u), u.cross(v));
         Self {
-            corners,
+            first: a,
             normal: vw * u.dot(u) + wu * v.dot(v) + uv * w.dot(w),
             det: u.dot(vw),
-            largest: u.abs().max(v.abs()).max(w.abs()).max_element(),
+            largest: larger(larger(greatest(u), greatest(v)), greatest(w)),
         }
     }
 
-    /// Whether `e` is strictly inside; exact.
+    /// Whether `e` is strictly inside; exact. `corners` are those of the tetrahedron.
     #[inline(always)]
-    pub(super) fn has_inside(&self, e: Point) -> bool {
-        let from = e - self.corners[0];
+    pub(super) fn has_inside(&self, e: Point, corners: impl FnOnce() -> [Point; 4]) -> bool {
+        let from = e - self.first;
         let (squares, along) = (from.dot(from) * self.det, from.dot(self.normal));
         let power = squares - along;
-        let (l, m) = (self.largest, from.abs().max_element());
+        let (l, m) = (self.largest, greatest(from));
         let bound = l * l * l * m * (BOUND_CORNERS * l + BOUND_POINT * m);
         if power.abs() > bound && DIFFERENCES.contains(&l) && DIFFERENCES.contains(&m) {
             return power < 0.0;
         }
-        let [a, b, c, d] = self.corners;
+        let [a, b, c, d] = corners();
         insphere(a, b, c, d, e) > 0.0
     }
+}
+
+/// The greatest of the coordinates without their signs.
+#[inline(always)]
+fn greatest(p: Point) -> f64 {
+    let p = p.abs();
+    larger(larger(p.x, p.y), p.z)
 }
 
 #[cfg(test)]
@@ -74,7 +83,8 @@ mod tests {
                 p.swap(0, 1);
             }
             let exact = insphere(p[0], p[1], p[2], p[3], p[4]);
-            let told = Sphere::new([p[0], p[1], p[2], p[3]]).has_inside(p[4]);
+            let corners = [p[0], p[1], p[2], p[3]];
+            let told = Sphere::new(corners).has_inside(p[4], || corners);
             assert_eq!(told, exact > 0.0, "{p:?}");
             inside += u32::from(told);
             on += u32::from(exact == 0.0);
