@@ -6,6 +6,7 @@
 //! fit is left to the division of edges, and so is all that lies between pieces and around them.
 
 mod claims;
+mod parts;
 mod piece;
 mod set_in;
 mod tets;
