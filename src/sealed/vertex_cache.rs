@@ -52,7 +52,7 @@ impl Window {
 
 /// Decoded vertex chunks within a budget.
 ///
-/// A hit sets a reference bit; the `lru` crate orders the chunks when one is missed, and a chunk
+/// Turning to a chunk other than the last two sets its reference bit; the `lru` crate orders the chunks when one is missed, and a chunk
 /// whose bit is set gets a second chance. Shape: `firsts[i]` = number of the first vertex of chunk `i`.
 pub struct VertexCache {
     subdomain: u32,
