@@ -1,6 +1,6 @@
 //! The working mesh of one sub-domain, read and changed record by record through its pages.
 
-use tetdb_schema::page::{NONE, RECORDS, SLOT_BITS, SLOT_MASK, SLOTS, u32_le};
+use tetdb_schema::page::{NONE, RECORDS, SLOT_BITS, SLOT_MASK, SLOTS, Slot, u32_le};
 
 use super::anatomy::mark::IN_CAVITY;
 use super::anatomy::{FaceRef, MARK, REQUIRED, Tet, VERTEX_MASK};
@@ -50,9 +50,15 @@ impl<P: Pages> Mesh<P> {
         self.state = state;
     }
 
-    /// Copies a record to an id that may lie in the next page not yet there.
-    pub(super) fn copy_record<const K: usize>(&mut self, from: u32, to: u32) {
-        let record = *self.pages.read::<K>(from);
+    /// A record as it is.
+    #[inline(always)]
+    pub(super) fn record<const K: usize>(&mut self, id: u32) -> Slot {
+        *self.pages.read::<K>(id)
+    }
+
+    /// Writes a record to an id that may lie in the next page not yet there.
+    #[inline(always)]
+    pub(super) fn place_record<const K: usize>(&mut self, to: u32, record: Slot) {
         if to >> SLOT_BITS == self.pages.n_pages::<K>() {
             self.pages.append_page::<K>();
         }

@@ -84,15 +84,31 @@ fn renumber_vertices<P: Pages>(
     for n in 0..end {
         mesh.set_scratch(n, NONE);
     }
-    let mut n_new = 0;
-    for sorted in sorter.finish()? {
-        let v = sorted?.id;
-        let to = sparse(n_new);
-        mesh.copy_record::<{ kind::VERTICES }>(v, (old_pages << SLOT_BITS) + to);
-        let attribute = mesh.attribute_before::<{ kind::VERTEX_ATTRIBUTES }>(v, old_attributes);
-        mesh.place_attribute::<{ kind::VERTEX_ATTRIBUTES }>(to, old_attributes, attribute);
-        mesh.set_scratch(dense(v), to);
-        n_new += 1;
+    let (mut n_new, mut sorted) = (0, sorter.finish()?);
+    let (mut run, mut found) = (Vec::with_capacity(RUN), Vec::with_capacity(RUN));
+    loop {
+        run.clear();
+        for keyed in sorted.by_ref().take(RUN) {
+            run.push(keyed?.id);
+        }
+        if run.is_empty() {
+            break;
+        }
+        found.clear();
+        found.extend(
+            run.iter()
+                .map(|&v| (mesh.record::<{ kind::VERTICES }>(v), (0, 0))),
+        );
+        for (&v, (_, attribute)) in run.iter().zip(&mut found) {
+            *attribute = mesh.attribute_before::<{ kind::VERTEX_ATTRIBUTES }>(v, old_attributes);
+        }
+        for (&v, &(record, attribute)) in run.iter().zip(&found) {
+            let to = sparse(n_new);
+            mesh.place_record::<{ kind::VERTICES }>((old_pages << SLOT_BITS) + to, record);
+            mesh.place_attribute::<{ kind::VERTEX_ATTRIBUTES }>(to, old_attributes, attribute);
+            mesh.set_scratch(dense(v), to);
+            n_new += 1;
+        }
     }
     mesh.pages_mut().drop_front::<{ kind::VERTICES }>(old_pages);
     mesh.pages_mut()
@@ -102,6 +118,8 @@ fn renumber_vertices<P: Pages>(
 
 /// Numbers looked at as one part: a page of records.
 const PART: usize = RECORDS;
+/// Records read one kind after the other: the processor waits for many of a kind at once, and for few where kinds take turns.
+const RUN: usize = 64;
 /// Parts looked at before what was found is written: 5 MB of tetrahedra.
 const BATCH: usize = 64;
 
@@ -259,24 +277,48 @@ impl Scan for Moved {
     type Output = Vec<(Tet, (u32, u32))>;
 
     fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, part: &Range<u32>) -> Self::Output {
-        let moved = |n| {
-            let t = mesh.scratch(self.old + n);
-            let mut tet = mesh.tet(t);
+        let mut moved = Vec::with_capacity(part.len());
+        for from in part.clone().step_by(RUN) {
+            let run = from..part.end.min(from + RUN as u32);
+            self.append(mesh, run, &mut moved);
+        }
+        moved
+    }
+}
+
+impl Moved {
+    /// Appends the tetrahedra of a run of new numbers.
+    fn append<P: Pages>(
+        &self,
+        mesh: &mut Mesh<P>,
+        run: Range<u32>,
+        moved: &mut Vec<(Tet, (u32, u32))>,
+    ) {
+        let mut old = [0; RUN];
+        let old = &mut old[..run.len()];
+        for (t, n) in old.iter_mut().zip(run) {
+            *t = mesh.scratch(self.old + n);
+        }
+        let from = moved.len();
+        moved.extend(old.iter().map(|&t| (mesh.tet(t), (0, 0))));
+        let moved = &mut moved[from..];
+        for (tet, _) in &mut *moved {
             for node in &mut tet.node {
                 let v = *node & VERTEX_MASK;
                 *node = *node - v + mesh.scratch(dense(v));
             }
+        }
+        for (tet, _) in &mut *moved {
             for face in &mut tet.neighbor {
                 if face.exists() {
                     let to = mesh.scratch(self.numbers + dense(face.tet()));
                     *face = FaceRef::new(to, face.face());
                 }
             }
-            let old_attributes = self.old_attributes;
-            let attribute = mesh.attribute_before::<{ kind::TET_ATTRIBUTES }>(t, old_attributes);
-            (tet, attribute)
-        };
-        part.clone().map(moved).collect()
+        }
+        for (&t, (_, attribute)) in old.iter().zip(moved) {
+            *attribute = mesh.attribute_before::<{ kind::TET_ATTRIBUTES }>(t, self.old_attributes);
+        }
     }
 }
 

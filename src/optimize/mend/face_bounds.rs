@@ -62,13 +62,14 @@ pub(super) struct FaceBounds {
 struct Known {
     /// The bound is not above this.
     most: f64,
-    bound: Option<f64>,
+    /// NaN until it is searched: a bound is a number.
+    bound: f64,
 }
 
 impl Default for FaceBounds {
-    /// Of the surface of a large part, in 5 MB; of tetrahedra between several faces as many in 4 MB.
+    /// Of 57,344 faces, in 2.2 MB; of tetrahedra between several of them as many, in 2.2 MB.
     fn default() -> Self {
-        Self::remembering(7 << 14)
+        Self::remembering(7 << 13)
     }
 }
 
@@ -93,7 +94,7 @@ impl FaceBounds {
         let points = order.map(|i| points[i]);
         let known = (self.known.entry(order.map(|i| vertices[i]))).or_insert_with(|| Known {
             most: face_most(points),
-            bound: None,
+            bound: f64::NAN,
         });
         (known, points)
     }
@@ -104,7 +105,10 @@ impl FaceBounds {
 
     fn of(&mut self, vertices: [u32; 3], points: [Point; 3]) -> f64 {
         let (known, points) = self.known(vertices, points);
-        *known.bound.get_or_insert_with(|| face_least(points))
+        if known.bound.is_nan() {
+            known.bound = face_least(points);
+        }
+        known.bound
     }
 
     /// What tetrahedra and faces weigh by a measure.
