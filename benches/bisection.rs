@@ -67,10 +67,7 @@ impl Bench {
 
     /// Cuts the coarse mesh in halves with `bytes` of frames.
     fn cut(&self, method: Method, bytes: u64) -> Cut {
-        let space = Workspace {
-            dir: &self.dir.path().into(),
-            memory: 64 << 20,
-        };
+        let space = Workspace { dir: &self.dir.path().into(), memory: 64 << 20 };
         let bounds = self.surface.bounds();
         let mut host = self.pool(None, bytes / 2);
         let options = Options::default();
@@ -99,18 +96,11 @@ impl Bench {
         for high in [false, true] {
             let name = format!("child-{high}.redb");
             let mut child = self.pool(Some(&name), bytes / 4);
-            bisect::write_child(
-                &mut host, &mut core, &mut child, &opened, high, &bounds, &space,
-            )
-            .expect("room");
+            bisect::write_child(&mut host, &mut core, &mut child, &opened, high, &bounds, &space)
+                .expect("room");
             digest = digest.wrapping_add(sum(&mut child, high));
             tets += u64::from(child.n_tets());
-            pages += child
-                .pages()
-                .extents()
-                .iter()
-                .map(|e| e[1] as usize)
-                .sum::<usize>();
+            pages += child.pages().extents().iter().map(|e| e[1] as usize).sum::<usize>();
             child.into_pages().finish();
             // A pool without a dirty page made no file.
             let _ = std::fs::remove_file(self.dir.path().join(name));
@@ -193,10 +183,7 @@ fn balance(least: f64, n: u32) {
             size_expr: Some(format!("min({coarse}, {least} + 0.26 * x)")),
             subdomains: Some(n.to_string()),
             optimize: Some("none".to_owned()),
-            method: Method {
-                plane,
-                ..Method::default()
-            },
+            method: Method { plane, ..Method::default() },
             ..Options::default()
         };
         let budget = Budget::new(4 << 30);
@@ -205,10 +192,7 @@ fn balance(least: f64, n: u32) {
         let tets: Vec<f64> = tets.map(|row| row.tets as f64).collect();
         let journal = catalog.journal().expect("rows");
         let told = journal.iter().flat_map(|row| &row.measures);
-        let told: Vec<f64> = told
-            .filter(|m| m.name == "predicted_tets")
-            .map(|m| m.value)
-            .collect();
+        let told: Vec<f64> = told.filter(|m| m.name == "predicted_tets").map(|m| m.value).collect();
         // The first is that of the whole.
         let predicted = &told[told.len() - tets.len()..];
         println!(
@@ -237,11 +221,7 @@ fn main() {
     println!("{sample}: {} triangles", bench.surface.n_triangles());
     tell("as it is", &whole);
     let steps = |minimum_cut, vertex_moves, tet_moves| Method {
-        steps: Steps {
-            minimum_cut,
-            vertex_moves,
-            tet_moves,
-        },
+        steps: Steps { minimum_cut, vertex_moves, tet_moves },
         ..Method::default()
     };
     if asked("method") {
@@ -293,11 +273,7 @@ fn main() {
             pool.pages_read,
             pool.pages_written,
             pool.seconds / whole.seconds,
-            if pool.digest == whole.digest {
-                "the same children"
-            } else {
-                "OTHER CHILDREN"
-            },
+            if pool.digest == whole.digest { "the same children" } else { "OTHER CHILDREN" },
         );
     }
 }

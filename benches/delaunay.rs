@@ -14,25 +14,15 @@ use tetdb::samples::SampleSpec;
 use tetdb::storage::{Backing, FlatPages, Pager, Pages, Sorter};
 
 fn main() {
-    let words: Vec<String> = std::env::args()
-        .skip(1)
-        .filter(|a| !a.starts_with("--"))
-        .collect();
+    let words: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
     let numbers: Vec<usize> = words.iter().filter_map(|a| a.parse().ok()).collect();
     let n = numbers.first().copied().unwrap_or(20_000);
     let runs = numbers.get(1).copied().unwrap_or(1);
-    let only = words
-        .iter()
-        .find(|w| w.parse::<usize>().is_err())
-        .map_or("all", String::as_str);
+    let only = words.iter().find(|w| w.parse::<usize>().is_err()).map_or("all", String::as_str);
     if only == "slab" {
         return slab(n);
     }
-    let points = if only == "balls" {
-        ball_points(n)
-    } else {
-        random_points(n)
-    };
+    let points = if only == "balls" { ball_points(n) } else { random_points(n) };
     println!("{} points ({only})", points.len());
     let mut cases: Vec<(String, Vec<f64>)> = Vec::new();
     let mut frames = 0;
@@ -88,12 +78,7 @@ fn main() {
         ("pool of 25 %", "resident cursors"),
         ("pool of 5 %", "resident cursors"),
     ] {
-        let find = |name: &str| {
-            cases
-                .iter()
-                .find(|(n, _)| n == name)
-                .map(|(_, r)| r[r.len() / 2])
-        };
+        let find = |name: &str| cases.iter().find(|(n, _)| n == name).map(|(_, r)| r[r.len() / 2]);
         if let (Some(a), Some(b)) = (find(pair.0), find(pair.1)) {
             println!("{} / {}: {:.3}", pair.0, pair.1, a / b);
         }
@@ -123,9 +108,8 @@ fn report(name: &str, rates: &mut [f64]) {
 fn random_points(n: usize) -> Vec<Point> {
     let mut state = 1u64;
     let mut next = || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 11) as f64 / (1u64 << 53) as f64
     };
     let points = (0..n).map(|_| Point::new(next(), next(), next()));
@@ -136,11 +120,8 @@ fn mesh_points<P: Pages>(mesh: Mesh<P>, points: &[Point]) -> (f64, Mesh<P>) {
     let started = cpu_seconds();
     let bounds = Aabb::around(points.iter().copied());
     let frame = HilbertFrame::new(&bounds);
-    let mut order: Vec<(u64, u32)> = points
-        .iter()
-        .enumerate()
-        .map(|(i, &p)| (insertion_key(&frame, p), i as u32))
-        .collect();
+    let mut order: Vec<(u64, u32)> =
+        points.iter().enumerate().map(|(i, &p)| (insertion_key(&frame, p), i as u32)).collect();
     order.sort_unstable();
     let ordered = order.into_iter().map(|(_, i)| points[i as usize]);
     insert_all(mesh, &bounds, ordered, started)
@@ -179,9 +160,7 @@ fn insert_all<P: Pages>(
     let mut hint = enclose(&mut mesh, bounds);
     for p in points {
         let v = mesh.add_vertex(p, 0.0);
-        hint = kernel
-            .insert(&mut mesh, v, p, hint)
-            .expect("the points are distinct");
+        hint = kernel.insert(&mut mesh, v, p, hint).expect("the points are distinct");
     }
     let seconds = cpu_seconds() - started;
     let s = kernel.stats;
@@ -211,10 +190,7 @@ fn slab(n: usize) {
 fn insert_into(name: &str, coarse: &[Point], mut points: Vec<Point>) -> f64 {
     let mut mesh = Mesh::new(FlatPages::default());
     let mut kernel = Kernel::default();
-    let mut hint = enclose(
-        &mut mesh,
-        &Aabb::around(coarse.iter().chain(&points).copied()),
-    );
+    let mut hint = enclose(&mut mesh, &Aabb::around(coarse.iter().chain(&points).copied()));
     let mut put = |p: &Point| {
         let v = mesh.add_vertex(*p, 0.0);
         let before = kernel.stats.walk_steps;
@@ -237,10 +213,7 @@ fn insert_into(name: &str, coarse: &[Point], mut points: Vec<Point>) -> f64 {
     while let Some((t, tet)) = mesh.next_tet(from) {
         from = t + 1;
         let [a, b, c, d] = tet.vertices().map(|v| mesh.point(v));
-        assert!(
-            orient_sign(a, b, c, d).is_gt(),
-            "tetrahedron {t} is inverted"
-        );
+        assert!(orient_sign(a, b, c, d).is_gt(), "tetrahedron {t} is inverted");
     }
     seconds
 }
@@ -250,10 +223,6 @@ fn cpu_seconds() -> f64 {
     use std::time::{SystemTime, UNIX_EPOCH};
     let told = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
     let nanos = told.and_then(|s| s.split_whitespace().next()?.parse::<f64>().ok());
-    let wall = || {
-        SystemTime::now()
-            .duration_since(UNIX_EPOCH)
-            .map_or(0.0, |d| d.as_secs_f64())
-    };
+    let wall = || SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |d| d.as_secs_f64());
     nanos.map_or_else(wall, |n| n * 1e-9)
 }

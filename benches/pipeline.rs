@@ -87,27 +87,18 @@ fn main() {
     };
     let options = Options {
         optimize,
-        method: Method {
-            lengths,
-            ..Method::default()
-        },
+        method: Method { lengths, ..Method::default() },
         subdomains: Some("1".to_owned()),
         ..Options::default()
     };
-    let surface: Surface = SampleSpec::parse(&word)
-        .and_then(|spec| spec.make())
-        .expect("a sample")
-        .into();
+    let surface: Surface =
+        SampleSpec::parse(&word).and_then(|spec| spec.make()).expect("a sample").into();
     let dir = tempfile::tempdir().expect("a temporary directory");
     let job = Job::default();
     let path = dir.path().join("bench.tetdb");
     let mut catalog = Catalog::create(&path, &job).expect("an empty place");
     let budget = Budget::new(8 << 30);
-    let stages = RefCell::new(Stages {
-        list: Vec::new(),
-        last: 0.0,
-        begun: Instant::now(),
-    });
+    let stages = RefCell::new(Stages { list: Vec::new(), last: 0.0, begun: Instant::now() });
     stages.borrow_mut().enter("sizes");
     let watch = |event: Event| stages.borrow_mut().enter(event.stage);
     let summary =

@@ -12,9 +12,8 @@ use tetdb::geom::{Point, insphere, orient};
 fn numbers() -> impl FnMut() -> f64 {
     let mut state = 9u64;
     move || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
     }
 }
@@ -24,11 +23,7 @@ fn sets(mut make: impl FnMut() -> Point) -> Vec<[Point; 5]> {
 }
 
 fn coordinates(p: Point) -> Coord3D<f64> {
-    Coord3D {
-        x: p.x,
-        y: p.y,
-        z: p.z,
-    }
+    Coord3D { x: p.x, y: p.y, z: p.z }
 }
 
 fn signs(c: &mut Criterion) {
@@ -39,16 +34,12 @@ fn signs(c: &mut Criterion) {
     let on_sphere = sets(|| center + Point::new(next(), next(), next()).normalize() * 0.05);
     let mut next = numbers();
     let on_grid = sets(|| (Point::new(next(), next(), next()) * 8.0).round());
-    for (name, points) in [
-        ("random", &random),
-        ("on one sphere", &on_sphere),
-        ("on a grid", &on_grid),
-    ] {
+    for (name, points) in
+        [("random", &random), ("on one sphere", &on_sphere), ("on a grid", &on_grid)]
+    {
         c.bench_function(&format!("1000 insphere, {name}"), |b| {
             b.iter(|| {
-                let signs = points
-                    .iter()
-                    .map(|&[a, b, c, d, e]| insphere(a, b, c, d, e));
+                let signs = points.iter().map(|&[a, b, c, d, e]| insphere(a, b, c, d, e));
                 black_box(signs.filter(|&x| x > 0.0).count())
             });
         });

@@ -39,13 +39,8 @@ fn main() {
 
 fn random_points(n: usize) -> Vec<Point> {
     let coordinate = |i: u64| (mix(1, i) >> 11) as f64 / (1u64 << 53) as f64;
-    let point = |i: u64| {
-        Point::new(
-            coordinate(3 * i),
-            coordinate(3 * i + 1),
-            coordinate(3 * i + 2),
-        )
-    };
+    let point =
+        |i: u64| Point::new(coordinate(3 * i), coordinate(3 * i + 1), coordinate(3 * i + 2));
     let mut points: Vec<Point> = (0..n as u64).map(point).collect();
     let frame = HilbertFrame::new(&Aabb::around(points.iter().copied()));
     points.sort_by_cached_key(|&p| frame.index(p));
@@ -100,11 +95,7 @@ fn sealed_vertices(points: &[Point], tets: &[SealedTet]) -> Vec<SealedVertex> {
             point: p.to_array(),
             h: 0.01 * (1.0 + p.x as f32 * p.y as f32),
             tag: if surface { tag::SURFACE } else { tag::FREE },
-            id: if surface {
-                u64::from(i)
-            } else {
-                SealedVertex::own_id(id, i)
-            },
+            id: if surface { u64::from(i) } else { SealedVertex::own_id(id, i) },
         })
         .collect()
 }
@@ -140,16 +131,12 @@ fn codec<R: ChunkRecord + PartialEq>(name: &str, records: &[R], n_tets: usize) {
     let mut back = Vec::new();
     let start = cpu_seconds();
     for chunk in &chunks {
-        decoder
-            .decode(&chunk.value, chunk.address, &mut back)
-            .expect("undamaged");
+        decoder.decode(&chunk.value, chunk.address, &mut back).expect("undamaged");
     }
     let decode = cpu_seconds() - start;
     let bytes: usize = chunks.iter().map(|c| c.value.len()).sum();
-    let rooms: usize = chunks
-        .iter()
-        .map(|c| (c.value.len() + 16).next_power_of_two().max(4096))
-        .sum();
+    let rooms: usize =
+        chunks.iter().map(|c| (c.value.len() + 16).next_power_of_two().max(4096)).sum();
     let n = records.len() as f64;
     println!(
         "{name}: {} chunks, {:.2} B a record, {:.2} B/tet, fill {:.3}; encode {:.1} M/s, decode {:.1} M/s",
@@ -177,13 +164,8 @@ fn store(vertices: &[SealedVertex], tets: &[SealedTet]) {
     let all = tets.iter().map(|t| (t.nodes, t.region));
     writer.push_all_tets(all).expect("disk");
     for (triangle, (vertices, tet)) in (0..).zip(facets) {
-        let facet = SealedFacet {
-            vertices,
-            label: 0,
-            triangle,
-            regions: [0, 1],
-            tets: [NO_TET, tet],
-        };
+        let facet =
+            SealedFacet { vertices, label: 0, triangle, regions: [0, 1], tets: [NO_TET, tet] };
         writer.push_facet(facet).expect("disk");
     }
     let sealed = writer.finish().expect("disk");
@@ -208,11 +190,8 @@ fn store(vertices: &[SealedVertex], tets: &[SealedTet]) {
         (Level::Delaunay, 64),
         (Level::Delaunay, 512),
     ] {
-        let options = VerifyOptions {
-            level,
-            memory_bytes: megabytes << 20,
-            temp_dir: dir.path().to_owned(),
-        };
+        let options =
+            VerifyOptions { level, memory_bytes: megabytes << 20, temp_dir: dir.path().to_owned() };
         let start = cpu_seconds();
         let report = Catalog::open(&path)
             .and_then(|mut s| verify(&mut s, None, &options))
@@ -237,10 +216,6 @@ fn cpu_seconds() -> f64 {
         let system: f64 = fields.next()?.parse().ok()?;
         Some(user + system)
     });
-    let wall = || {
-        SystemTime::now()
-            .duration_since(UNIX_EPOCH)
-            .map_or(0.0, |d| d.as_secs_f64())
-    };
+    let wall = || SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |d| d.as_secs_f64());
     ticks.map_or_else(wall, |t| t / 100.0)
 }

@@ -32,10 +32,7 @@ fn mesh_cut_by<T>(
     let path = dir.path().join("two.tetdb");
     let options = Options {
         subdomains: Some("2".to_owned()),
-        method: Method {
-            plane: PlaneChoice::Given(plane),
-            ..Method::default()
-        },
+        method: Method { plane: PlaneChoice::Given(plane), ..Method::default() },
         ..Options::default()
     };
     let budget = Budget::new(256 << 20);
@@ -48,11 +45,8 @@ fn mesh_cut_by<T>(
 
 fn verified(path: &Path, surface: &Surface) -> Report {
     let mut store = Catalog::open(path).expect("what was just written");
-    let verify = VerifyOptions {
-        level: Level::Delaunay,
-        memory_bytes: 64 << 20,
-        temp_dir: path.to_owned(),
-    };
+    let verify =
+        VerifyOptions { level: Level::Delaunay, memory_bytes: 64 << 20, temp_dir: path.to_owned() };
     audit::verify(&mut store, Some(surface), &verify).expect("a sound store")
 }
 
@@ -75,9 +69,7 @@ fn cube_with_hole(shape: &Surface, h: f64, size: Point) -> Surface {
     let mut surface = sample(&format!("box,h={h}"));
     let first = surface.points.len() as u32;
     let center = Point::splat(0.5);
-    surface
-        .points
-        .extend(shape.points.iter().map(|&p| center + p * size));
+    surface.points.extend(shape.points.iter().map(|&p| center + p * size));
     let corners = shape.triangles.iter().map(|t| t.map(|v| v + first));
     surface.triangles.extend(corners);
     surface.labels.extend(&shape.labels);
@@ -114,10 +106,7 @@ fn a_plane_that_leaves_nothing_on_one_side_is_refused() {
     let cube = sample("box,h=0.047");
     for offset in [0.0, 0.01, 2.0] {
         let error = mesh_cut_by(&cube, across_x(offset), |_| ()).expect_err("nothing below");
-        assert!(
-            matches!(error, PipelineError::EmptyPart { cut: 1 }),
-            "{error}"
-        );
+        assert!(matches!(error, PipelineError::EmptyPart { cut: 1 }), "{error}");
     }
 }
 
@@ -125,20 +114,10 @@ fn a_plane_that_leaves_nothing_on_one_side_is_refused() {
 fn a_plane_through_a_needle_thin_gap_loses_nothing() {
     // An octahedron pressed flat: nowhere thicker than a five-thousandth of an edge, and no short edge that would ask for small sizes.
     let corners = [(0, 1e-4), (1, 0.3), (2, 0.3)].into_iter();
-    let triangles = [
-        [0, 2, 4],
-        [1, 4, 2],
-        [0, 4, 3],
-        [1, 3, 4],
-        [0, 5, 2],
-        [1, 2, 5],
-        [0, 3, 5],
-        [1, 5, 3],
-    ];
+    let triangles =
+        [[0, 2, 4], [1, 4, 2], [0, 4, 3], [1, 3, 4], [0, 5, 2], [1, 2, 5], [0, 3, 5], [1, 5, 3]];
     let lens = Surface {
-        points: corners
-            .flat_map(|(axis, x)| [x, -x].map(|x| Point::AXES[axis] * x))
-            .collect(),
+        points: corners.flat_map(|(axis, x)| [x, -x].map(|x| Point::AXES[axis] * x)).collect(),
         labels: vec![0; triangles.len()],
         triangles: triangles.to_vec(),
         ..Surface::default()
@@ -209,10 +188,7 @@ fn the_papers_plane_is_across_the_axis_of_inertia_and_turns_with_the_mesh() {
         let angle = plane.normal.cross(spread(&mut mesh)).length();
         assert!(angle < 1e-6, "mesh {k}: {angle}");
         let mut other = surface.clone();
-        other
-            .points
-            .iter_mut()
-            .for_each(|p| *p = turned(*p, 0.5, -0.3));
+        other.points.iter_mut().for_each(|p| *p = turned(*p, 0.5, -0.3));
         let (_, again) = papers_plane(&other);
         let expected = turned(plane.normal, 0.5, -0.3);
         let angle = again.normal.cross(expected).length();

@@ -36,26 +36,11 @@ const FUNCTION_LINES_MAX: usize = 80;
 
 /// Files above [`FILE_LINES_MAX`], tests at their feet not counted.
 const LONG_FILES: &[(&str, &str)] = &[
-    (
-        "api/mesher.rs",
-        "a method with its documentation for each option of a mesh",
-    ),
-    (
-        "api/surface.rs",
-        "a method with its documentation for all that is done to a surface",
-    ),
-    (
-        "store/catalog.rs",
-        "one transaction type: a reader and a writer for each table",
-    ),
-    (
-        "audit/pass.rs",
-        "one walk over a sub-domain that all five levels of checks share",
-    ),
-    (
-        "io/read/feed.rs",
-        "the words, numbers and places that every text format reads by",
-    ),
+    ("api/mesher.rs", "a method with its documentation for each option of a mesh"),
+    ("api/surface.rs", "a method with its documentation for all that is done to a surface"),
+    ("store/catalog.rs", "one transaction type: a reader and a writer for each table"),
+    ("audit/pass.rs", "one walk over a sub-domain that all five levels of checks share"),
+    ("io/read/feed.rs", "the words, numbers and places that every text format reads by"),
     (
         "io/write/merged.rs",
         "one walk over all sub-domains as one mesh, which every format has its vertices, tetrahedra and faces from",
@@ -72,34 +57,19 @@ const LONG_FUNCTIONS: &[(&str, &str)] = &[
         "boundary/points.rs build",
         "chains, faces and suppression of one attempt, which hand on four lists",
     ),
-    (
-        "boundary/space.rs replace",
-        "pairs of sides are matched; each step uses the list before",
-    ),
-    (
-        "cli/estimate.rs run",
-        "an answer line by line, for people and for programs",
-    ),
+    ("boundary/space.rs replace", "pairs of sides are matched; each step uses the list before"),
+    ("cli/estimate.rs run", "an answer line by line, for people and for programs"),
     (
         "io/write/foam/faces.rs part",
         "one merge of four sorted streams; what a face is depends on all four",
     ),
-    (
-        "io/write/foam/processors.rs faces",
-        "three kinds of faces in the order of one file",
-    ),
-    (
-        "io/write/foam/processors.rs write",
-        "two passes that share their counts",
-    ),
+    ("io/write/foam/processors.rs faces", "three kinds of faces in the order of one file"),
+    ("io/write/foam/processors.rs write", "two passes that share their counts"),
     (
         "io/write/gmsh/nodes.rs claims",
         "faces, tetrahedra, vertices and ghosts claim in turn, into one sorter",
     ),
-    (
-        "io/write/midpoints.rs gather",
-        "five passes, each sorted for the next",
-    ),
+    ("io/write/midpoints.rs gather", "five passes, each sorted for the next"),
     (
         "io/write/vtu.rs write_partitions",
         "nine arrays named, opened, filled and closed in one order",
@@ -108,22 +78,13 @@ const LONG_FUNCTIONS: &[(&str, &str)] = &[
         "io/write/vtu_boundary.rs write",
         "fourteen arrays named, opened, filled and closed in one order",
     ),
-    (
-        "pipeline/mesh/run.rs coarse_step",
-        "one step of the recipe and its commit",
-    ),
-    (
-        "pipeline/remesh/run.rs commit",
-        "one commit: what it checks and all that it writes",
-    ),
+    ("pipeline/mesh/run.rs coarse_step", "one step of the recipe and its commit"),
+    ("pipeline/remesh/run.rs commit", "one commit: what it checks and all that it writes"),
     (
         "pipeline/tasks/serve.rs serve",
         "what orders need is set up once and lent to the threads that do them",
     ),
-    (
-        "refine/long_edges.rs divide",
-        "one edge from its length to its points",
-    ),
+    ("refine/long_edges.rs divide", "one edge from its length to its points"),
 ];
 
 fn floor(room: &str) -> Option<usize> {
@@ -154,10 +115,7 @@ fn rooms_import_only_from_lower_floors() {
         n_imports > 50,
         "only {n_imports} imports found: does the test still read the sources?"
     );
-    assert!(
-        wrong.is_empty(),
-        "imports that go up or sideways:\n{wrong:#?}"
-    );
+    assert!(wrong.is_empty(), "imports that go up or sideways:\n{wrong:#?}");
 }
 
 #[test]
@@ -169,10 +127,7 @@ fn files_of_a_room_form_no_circle() {
         n_edges > 200,
         "only {n_edges} imports between the files of a room found: does the test still read the sources?"
     );
-    let found: Vec<_> = circles(&graph)
-        .iter()
-        .map(|files| describe(files, &graph))
-        .collect();
+    let found: Vec<_> = circles(&graph).iter().map(|files| describe(files, &graph)).collect();
     assert!(
         found.is_empty(),
         "{} circles of files inside a room:\n{}",
@@ -184,10 +139,7 @@ fn files_of_a_room_form_no_circle() {
 #[test]
 fn circles_are_found_through_reexports() {
     let modules = Modules::from_texts([
-        (
-            "a",
-            "mod b;\nmod c;\nmod d;\npub use b::{B, other as renamed};\nuse c::Hidden;",
-        ),
+        ("a", "mod b;\nmod c;\nmod d;\npub use b::{B, other as renamed};\nuse c::Hidden;"),
         ("a::b", "use super::c::C;\nfn f() { crate::a::d::g() }"),
         ("a::c", "use crate::a::renamed;"),
         ("a::d", "use super::Hidden;\nuse super::super::e::E;"),
@@ -195,26 +147,17 @@ fn circles_are_found_through_reexports() {
     ]);
     let files = |names: &[&str]| names.iter().map(|n| n.to_string()).collect();
     let found = circles(&modules.graph());
-    assert_eq!(
-        found,
-        [files(&["a::b", "a::c", "a::d"])] as [BTreeSet<String>; 1]
-    );
+    assert_eq!(found, [files(&["a::b", "a::c", "a::d"])] as [BTreeSet<String>; 1]);
 }
 
 #[test]
 fn the_readme_names_every_room_and_no_file_that_is_not_there() {
     let text = fs::read_to_string(src().join("README.md")).expect("src/README.md is readable");
     for room in HOUSE.iter().copied().flatten() {
-        assert!(
-            text.contains(&format!("[`{room}`]")),
-            "src/README.md does not name {room}"
-        );
+        assert!(text.contains(&format!("[`{room}`]")), "src/README.md does not name {room}");
     }
     let spans: Vec<&str> = text.split('`').skip(1).step_by(2).collect();
-    for file in spans
-        .iter()
-        .filter(|s| s.ends_with(".rs") || s.ends_with(".md"))
-    {
+    for file in spans.iter().filter(|s| s.ends_with(".rs") || s.ends_with(".md")) {
         let found = src().join(file).exists() || src().join("..").join(file).exists();
         assert!(found, "src/README.md names {file}, which does not exist");
     }
@@ -249,9 +192,7 @@ fn long_files_and_functions_are_those_with_a_reason() {
 
 /// The text up to the tests at its foot.
 fn before_tests(text: &str) -> &str {
-    text.split("\n#[cfg(test)]\nmod tests {")
-        .next()
-        .unwrap_or(text)
+    text.split("\n#[cfg(test)]\nmod tests {").next().unwrap_or(text)
 }
 
 /// Functions with a body and the lines of each, as `cargo fmt` leaves them: from the name to the brace below it. Tests are left out.
@@ -311,12 +252,7 @@ fn imports_are_found_however_they_are_written() {
     let text = "use crate::storage::Page;\nuse crate::{geom::Point, mesh::{Tet, Face}};\nlet x = crate::sizing::f();\n\
         /// [`crate::io`] is only named\n#[cfg(test)]\nmod tests { use crate::cli; }\n";
     let found: BTreeSet<String> = imports(&without_tests(text)).into_iter().collect();
-    assert_eq!(
-        found,
-        ["geom", "mesh", "sizing", "storage"]
-            .map(String::from)
-            .into()
-    );
+    assert_eq!(found, ["geom", "mesh", "sizing", "storage"].map(String::from).into());
 }
 
 /// The folder (or file) directly below `src`.
@@ -365,9 +301,7 @@ fn names_in_braces(list: &str) -> Vec<String> {
 }
 
 fn name(text: &str) -> String {
-    text.chars()
-        .take_while(|c| c.is_alphanumeric() || *c == '_')
-        .collect()
+    text.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect()
 }
 
 /// A module by its path from the crate's root, `pipeline::mesh::run`, with what it imports and the other paths in it.
@@ -396,10 +330,7 @@ impl Modules {
             .filter(|path| room_of(path).is_some())
             .map(|path| {
                 let text = fs::read_to_string(path).expect("a source file is readable");
-                (
-                    module_of(path.strip_prefix(&root).expect("it is below src")),
-                    text,
-                )
+                (module_of(path.strip_prefix(&root).expect("it is below src")), text)
             })
             .collect();
         Self::from_texts(texts.iter().map(|(m, t)| (m.as_str(), t.as_str())))
@@ -423,10 +354,7 @@ impl Modules {
         for (name, module) in &self.0 {
             // What only passes on a name of its own children needs nothing from them: these paths count where
             // they are used.
-            let used = module
-                .uses
-                .values()
-                .filter(|path| !self.is_child(name, &path[0]));
+            let used = module.uses.values().filter(|path| !self.is_child(name, &path[0]));
             let inner = module.uses.iter().filter(|(alias, path)| {
                 self.is_child(name, &path[0]) && module.paths.iter().any(|p| p[0] == **alias)
             });
@@ -500,11 +428,7 @@ impl Modules {
 }
 
 fn join(module: &str, name: &str) -> String {
-    if module.is_empty() {
-        name.to_owned()
-    } else {
-        format!("{module}::{name}")
-    }
+    if module.is_empty() { name.to_owned() } else { format!("{module}::{name}") }
 }
 
 fn first(module: &str) -> &str {
@@ -513,11 +437,8 @@ fn first(module: &str) -> &str {
 
 /// `mesh/run.rs` -> `mesh::run`, `mesh/mod.rs` -> `mesh`.
 fn module_of(path: &Path) -> String {
-    let names: Vec<_> = path
-        .with_extension("")
-        .iter()
-        .map(|n| n.to_string_lossy().into_owned())
-        .collect();
+    let names: Vec<_> =
+        path.with_extension("").iter().map(|n| n.to_string_lossy().into_owned()).collect();
     let names = names.strip_suffix(&["mod".to_owned()]).unwrap_or(&names);
     names.join("::")
 }
@@ -592,10 +513,7 @@ fn split_list(list: &str) -> Vec<&str> {
 }
 
 fn path(text: &str) -> Vec<String> {
-    text.split("::")
-        .map(|n| n.trim().to_owned())
-        .filter(|n| !n.is_empty())
-        .collect()
+    text.split("::").map(|n| n.trim().to_owned()).filter(|n| !n.is_empty()).collect()
 }
 
 /// Every path and name in code.
@@ -612,11 +530,8 @@ fn circles(graph: &BTreeMap<String, BTreeSet<String>>) -> Vec<BTreeSet<String>> 
         graph.keys().map(|f| (f, reached(f, graph))).collect();
     let mut found: Vec<BTreeSet<String>> = Vec::new();
     for (file, others) in &reach {
-        let circle: BTreeSet<String> = others
-            .iter()
-            .filter(|o| reach[*o].contains(file))
-            .map(|o| (*o).clone())
-            .collect();
+        let circle: BTreeSet<String> =
+            others.iter().filter(|o| reach[*o].contains(file)).map(|o| (*o).clone()).collect();
         if !circle.is_empty() && !found.contains(&circle) {
             found.push(circle);
         }
@@ -641,15 +556,8 @@ fn reached<'a>(
 
 fn describe(files: &BTreeSet<String>, graph: &BTreeMap<String, BTreeSet<String>>) -> String {
     let lines = files.iter().map(|file| {
-        let to: Vec<&str> = graph[file]
-            .intersection(files)
-            .map(String::as_str)
-            .collect();
+        let to: Vec<&str> = graph[file].intersection(files).map(String::as_str).collect();
         format!("    {file} -> {}", to.join(", "))
     });
-    format!(
-        "  circle of {}:\n{}",
-        files.len(),
-        lines.collect::<Vec<_>>().join("\n")
-    )
+    format!("  circle of {}:\n{}", files.len(), lines.collect::<Vec<_>>().join("\n"))
 }

@@ -25,11 +25,7 @@ const PERMISSIVE: &[&str] = &[
 #[test]
 fn every_dependency_is_permissive() {
     let packages = packages();
-    assert!(
-        packages.len() > 10,
-        "only {} packages were listed",
-        packages.len()
-    );
+    assert!(packages.len() > 10, "only {} packages were listed", packages.len());
     for package in &packages {
         let (name, licence) = (&package["name"], package["license"].as_str());
         let licence =
@@ -61,15 +57,11 @@ fn expressions_are_read_as_they_are_meant() {
 }
 
 fn packages() -> Vec<serde_json::Value> {
-    let rustc = Command::new("rustc")
-        .arg("-vV")
-        .output()
-        .expect("rustc is there, it built this test");
+    let rustc =
+        Command::new("rustc").arg("-vV").output().expect("rustc is there, it built this test");
     let version = String::from_utf8(rustc.stdout).expect("rustc speaks UTF-8");
-    let host = version
-        .lines()
-        .find_map(|l| l.strip_prefix("host: "))
-        .expect("rustc names its host");
+    let host =
+        version.lines().find_map(|l| l.strip_prefix("host: ")).expect("rustc names its host");
     let cargo = Command::new(env!("CARGO"))
         .args([
             "metadata",
@@ -83,17 +75,10 @@ fn packages() -> Vec<serde_json::Value> {
         .current_dir(env!("CARGO_MANIFEST_DIR"))
         .output()
         .expect("cargo is there, it runs this test");
-    assert!(
-        cargo.status.success(),
-        "{}",
-        String::from_utf8_lossy(&cargo.stderr)
-    );
+    assert!(cargo.status.success(), "{}", String::from_utf8_lossy(&cargo.stderr));
     let metadata: serde_json::Value =
         serde_json::from_slice(&cargo.stdout).expect("cargo metadata is JSON");
-    metadata["packages"]
-        .as_array()
-        .expect("metadata lists packages")
-        .clone()
+    metadata["packages"].as_array().expect("metadata lists packages").clone()
 }
 
 /// Whether some choice of the expression is permissive: OR needs one side, AND needs both.

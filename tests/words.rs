@@ -22,9 +22,8 @@ const PARTS: &[&str] = &[
     "whole", "wish", "wishes",
 ];
 /// Files are not named so.
-const FILES: &[&str] = &[
-    "again", "ahead", "before", "crew", "fine", "held", "keep", "rims", "room", "whole", "wish",
-];
+const FILES: &[&str] =
+    &["again", "ahead", "before", "crew", "fine", "held", "keep", "rims", "room", "whole", "wish"];
 /// Words that are in no error message.
 const IN_NO_MESSAGE: &[&str] = &["crew", "made", "told"];
 
@@ -50,24 +49,16 @@ fn names_are_plain() {
             }
         }
     }
-    assert!(
-        n_names > 1000,
-        "only {n_names} names found: does the test still read the sources?"
-    );
+    assert!(n_names > 1000, "only {n_names} names found: does the test still read the sources?");
     assert!(wrong.is_empty(), "names that need explaining:\n{wrong:#?}");
 }
 
 #[test]
 fn only_the_command_line_names_flags() {
     let names_flag = |path: &PathBuf| literals(&read(path)).iter().any(|text| has_flag(text));
-    let all: BTreeSet<PathBuf> = below(&src(), &["cli", "api"])
-        .into_iter()
-        .filter(names_flag)
-        .collect();
-    assert!(
-        all.is_empty(),
-        "string literals with flags of the command line in {all:#?}"
-    );
+    let all: BTreeSet<PathBuf> =
+        below(&src(), &["cli", "api"]).into_iter().filter(names_flag).collect();
+    assert!(all.is_empty(), "string literals with flags of the command line in {all:#?}");
 }
 
 #[test]
@@ -85,10 +76,7 @@ fn error_messages_are_plain() {
 fn literals_and_names_are_found() {
     let text = "fn a() { let x = \"one // two\\\" --flag\"; } // \"none\"\nstruct OldTold<'a>(char);\n\
         const C: char = '\"'; const R: &str = r#\"a\"b\"#;\n#[error(\"was told\")]\n#[cfg(test)]\nmod tests { \"x\" }\n";
-    assert_eq!(
-        literals(text),
-        ["one // two\\\" --flag", "a\"b", "was told"]
-    );
+    assert_eq!(literals(text), ["one // two\\\" --flag", "a\"b", "was told"]);
     assert!(has_flag(&literals(text)[0]) && !has_flag("a -- b, --, c--d"));
     assert_eq!(messages(text), ["was told"]);
     let found: Vec<_> = names(text).collect();
@@ -132,10 +120,7 @@ fn parts(name: &str) -> Vec<String> {
             parts.push(String::new());
         }
         if c != '_' {
-            parts
-                .last_mut()
-                .expect("there is one")
-                .extend(c.to_lowercase());
+            parts.last_mut().expect("there is one").extend(c.to_lowercase());
         }
     }
     parts.retain(|part| !part.is_empty());
@@ -191,8 +176,7 @@ fn literals(text: &str) -> Vec<String> {
 
 /// Whether text ends with the word `r`.
 fn is_word_r(text: &str) -> bool {
-    text.strip_suffix('r')
-        .is_some_and(|t| !t.ends_with(|c: char| c.is_alphanumeric() || c == '_'))
+    text.strip_suffix('r').is_some_and(|t| !t.ends_with(|c: char| c.is_alphanumeric() || c == '_'))
 }
 
 /// Where a string's closing quote is.

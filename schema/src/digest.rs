@@ -81,9 +81,7 @@ mod tests {
 
     #[test]
     fn the_digest_does_not_depend_on_order_and_sees_every_part() {
-        let v: Vec<u64> = (0..5)
-            .map(|i| vertex_mix([f64::from(i), 0.5, -1.0]))
-            .collect();
+        let v: Vec<u64> = (0..5).map(|i| vertex_mix([f64::from(i), 0.5, -1.0])).collect();
         let mut a = Digest::default();
         a.add_tet([v[0], v[1], v[2], v[3]], 1, 0);
         a.add_tet([v[1], v[2], v[3], v[4]], 2, 0);

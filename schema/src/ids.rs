@@ -32,11 +32,7 @@ impl SubdomainId {
 
     /// The sub-domain of this rank, if there can be one.
     pub const fn new(rank: u32) -> Option<Self> {
-        if rank < Self::COUNT_MAX {
-            Some(Self(rank))
-        } else {
-            None
-        }
+        if rank < Self::COUNT_MAX { Some(Self(rank)) } else { None }
     }
 
     /// Its rank.
@@ -64,11 +60,7 @@ impl TetId {
 
     /// Tetrahedron `local` in the sealed order of `subdomain`, if there can be one.
     pub const fn new(subdomain: SubdomainId, local: u32) -> Option<Self> {
-        if local < Self::LOCAL_MAX {
-            Some(Self { subdomain, local })
-        } else {
-            None
-        }
+        if local < Self::LOCAL_MAX { Some(Self { subdomain, local }) } else { None }
     }
 
     /// Whose it is.
@@ -109,10 +101,7 @@ impl FromStr for TetId {
 
     fn from_str(text: &str) -> Result<Self, IdError> {
         let parsed = text.split_once(':').and_then(|(subdomain, local)| {
-            Self::new(
-                SubdomainId::new(subdomain.parse().ok()?)?,
-                local.parse().ok()?,
-            )
+            Self::new(SubdomainId::new(subdomain.parse().ok()?)?, local.parse().ok()?)
         });
         parsed.ok_or_else(|| IdError {
             text: text.to_owned(),
@@ -176,10 +165,7 @@ impl VertexId {
             return None;
         }
         match Owner::from_number((number >> 32) as u32) {
-            Some(owner) => Some(Self {
-                owner,
-                index: number as u32,
-            }),
+            Some(owner) => Some(Self { owner, index: number as u32 }),
             None => None,
         }
     }
@@ -206,10 +192,7 @@ impl FromStr for VertexId {
                 None if owner == "surface" => Owner::Surface,
                 None => Owner::Subdomain(SubdomainId::new(owner.parse().ok()?)?),
             };
-            Some(Self {
-                owner,
-                index: index.parse().ok()?,
-            })
+            Some(Self { owner, index: index.parse().ok()? })
         });
         parsed.ok_or_else(|| IdError {
             text: text.to_owned(),
@@ -225,45 +208,28 @@ mod tests {
     #[test]
     fn names_and_numbers_are_two_ways_to_write_one_id() {
         let last = SubdomainId::new(SubdomainId::COUNT_MAX - 1).expect("in range");
-        for (subdomain, local) in [
-            (SubdomainId(7), 1_048_211),
-            (SubdomainId(0), 0),
-            (last, TetId::LOCAL_MAX - 1),
-        ] {
+        for (subdomain, local) in
+            [(SubdomainId(7), 1_048_211), (SubdomainId(0), 0), (last, TetId::LOCAL_MAX - 1)]
+        {
             let id = TetId::new(subdomain, local).expect("in range");
             assert!(id.number() < 1 << 53);
             assert_eq!(TetId::from_number(id.number()), Some(id));
             assert_eq!(id.to_string().parse(), Ok(id));
         }
         assert_eq!(
-            TetId::new(SubdomainId(7), 1_048_211)
-                .map(|t| t.to_string())
-                .as_deref(),
+            TetId::new(SubdomainId(7), 1_048_211).map(|t| t.to_string()).as_deref(),
             Some("7:1048211")
         );
         for owner in [Owner::Surface, Owner::Cut(3), Owner::Subdomain(last)] {
-            let id = VertexId {
-                owner,
-                index: u32::MAX,
-            };
+            let id = VertexId { owner, index: u32::MAX };
             assert!(id.number() < 1 << 53);
             assert_eq!(VertexId::from_number(id.number()), Some(id));
             assert_eq!(id.to_string().parse(), Ok(id));
         }
-        for text in [
-            "7",
-            "cut0:1",
-            "cut1048576:1",
-            "surface:x",
-            "surface1:2",
-            ":3",
-        ] {
+        for text in ["7", "cut0:1", "cut1048576:1", "surface:x", "surface1:2", ":3"] {
             assert!(text.parse::<VertexId>().is_err(), "{text}");
         }
         assert!("7".parse::<TetId>().is_err() && "7:x".parse::<TetId>().is_err());
-        assert_eq!(
-            (TetId::from_number(1 << 53), VertexId::from_number(1 << 53)),
-            (None, None)
-        );
+        assert_eq!((TetId::from_number(1 << 53), VertexId::from_number(1 << 53)), (None, None));
     }
 }

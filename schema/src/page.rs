@@ -118,16 +118,7 @@ pub fn seal_page(frame: &mut [Slot], address: PageAddress, generation: u32) {
 /// The same for a page whose first `count` slots hold records, which its header says.
 pub fn seal_full_page(frame: &mut [Slot], address: PageAddress, generation: u32, count: u32) {
     let version_kind = u32::from(FORMAT_VERSION) | (address.kind as u32) << 16;
-    let words = [
-        0,
-        0,
-        MAGIC,
-        version_kind,
-        address.subdomain,
-        address.page,
-        generation,
-        count,
-    ];
+    let words = [0, 0, MAGIC, version_kind, address.subdomain, address.page, generation, count];
     frame[HEADER_SLOT] = words.map(u32_le::from_native);
     let sum = checksum(frame);
     frame[HEADER_SLOT][0] = u32_le::from_native(sum as u32);
@@ -166,11 +157,7 @@ pub fn check_page(frame: &[Slot], address: PageAddress) -> Result<u32, PageError
     let found = u64::from(header[0]) | u64::from(header[1]) << 32;
     let expected = checksum(frame);
     if found != expected {
-        return Err(PageError::Checksum {
-            address,
-            expected,
-            found,
-        });
+        return Err(PageError::Checksum { address, expected, found });
     }
     let version_kind = u32::from(FORMAT_VERSION) | (address.kind as u32) << 16;
     for (field, expected, found) in [
@@ -180,12 +167,7 @@ pub fn check_page(frame: &[Slot], address: PageAddress) -> Result<u32, PageError
         ("page", address.page, header[5]),
     ] {
         if expected != found {
-            return Err(PageError::Header {
-                address,
-                field,
-                expected,
-                found,
-            });
+            return Err(PageError::Header { address, field, expected, found });
         }
     }
     Ok(header[6])
@@ -209,11 +191,7 @@ mod tests {
 
     #[test]
     fn a_page_comes_back_and_any_flipped_bit_is_found() {
-        let address = PageAddress {
-            kind: PageKind::Vertices,
-            subdomain: 3,
-            page: 9,
-        };
+        let address = PageAddress { kind: PageKind::Vertices, subdomain: 3, page: 9 };
         let mut frame = vec![[u32_le::from_native(7); 8]; SLOTS];
         seal_page(&mut frame, address, 2);
         let mut bytes = stored_bytes(&frame).to_vec();

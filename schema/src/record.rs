@@ -49,10 +49,7 @@ impl Tet {
     /// The words of a slot.
     pub fn from_slot(slot: &Slot) -> Self {
         let [a, b, c, d, e, f, g, h] = slot.map(u32_le::to_native);
-        Self {
-            node: [a, b, c, d],
-            neighbor: [e, f, g, h],
-        }
+        Self { node: [a, b, c, d], neighbor: [e, f, g, h] }
     }
 
     /// The inverse of [`Tet::from_slot`].
@@ -65,10 +62,7 @@ impl Tet {
 impl TetAttribute {
     /// Attribute `place`, 0..4, of a slot.
     pub fn from_slot(slot: &Slot, place: usize) -> Self {
-        Self {
-            region: slot[2 * place].to_native(),
-            flags: slot[2 * place + 1].to_native(),
-        }
+        Self { region: slot[2 * place].to_native(), flags: slot[2 * place + 1].to_native() }
     }
 }
 
@@ -77,29 +71,13 @@ impl Vertex {
     pub fn from_slot(slot: &Slot) -> Self {
         let w = slot.map(u32_le::to_native);
         let axis = |i: usize| f64::from_bits(u64::from(w[i]) | u64::from(w[i + 1]) << 32);
-        Self {
-            point: [axis(0), axis(2), axis(4)],
-            h: f32::from_bits(w[6]),
-            v2t: w[7],
-        }
+        Self { point: [axis(0), axis(2), axis(4)], h: f32::from_bits(w[6]), v2t: w[7] }
     }
 
     /// The inverse of [`Vertex::from_slot`].
     pub fn to_slot(self) -> Slot {
-        let [x, y, z] = self
-            .point
-            .map(|c| [c.to_bits() as u32, (c.to_bits() >> 32) as u32]);
-        [
-            x[0],
-            x[1],
-            y[0],
-            y[1],
-            z[0],
-            z[1],
-            self.h.to_bits(),
-            self.v2t,
-        ]
-        .map(u32_le::from_native)
+        let [x, y, z] = self.point.map(|c| [c.to_bits() as u32, (c.to_bits() >> 32) as u32]);
+        [x[0], x[1], y[0], y[1], z[0], z[1], self.h.to_bits(), self.v2t].map(u32_le::from_native)
     }
 }
 
@@ -226,11 +204,7 @@ pub struct SealedVertex {
 impl SealedVertex {
     /// The id of a vertex of `subdomain`'s own at place `local`.
     pub fn own_id(subdomain: SubdomainId, local: u32) -> u64 {
-        VertexId {
-            owner: crate::ids::Owner::Subdomain(subdomain),
-            index: local,
-        }
-        .number()
+        VertexId { owner: crate::ids::Owner::Subdomain(subdomain), index: local }.number()
     }
 }
 
@@ -277,10 +251,7 @@ mod tests {
         assert_eq!(Tet::from_slot(&slot).to_slot(), slot);
         assert_eq!(Vertex::from_slot(&slot).to_slot(), slot);
         assert_eq!(Facet::from_slot(&slot).to_slot(), slot);
-        assert_eq!(
-            TetAttribute::from_slot(&slot, 1).region,
-            slot[2].to_native()
-        );
+        assert_eq!(TetAttribute::from_slot(&slot, 1).region, slot[2].to_native());
     }
 
     #[test]

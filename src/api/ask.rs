@@ -59,12 +59,7 @@ impl Store {
 
 impl<'s> Query<'s> {
     pub(super) fn new(store: &'s mut Store) -> Self {
-        Self {
-            store,
-            selection: Selection::default(),
-            order: None,
-            limit: None,
-        }
+        Self { store, selection: Selection::default(), order: None, limit: None }
     }
 
     /// They meet the box between two corners.
@@ -166,20 +161,11 @@ impl<'s> Query<'s> {
 
     /// The answers, found while they are taken. Errors: damage; too little memory.
     pub fn answers(self) -> Result<Answers<'s>, Error> {
-        let Self {
-            store,
-            selection,
-            order,
-            limit,
-        } = self;
+        let Self { store, selection, order, limit } = self;
         let (context, session) = store.context_and_session()?;
         let context = context.clone();
         let found = guarded_in(&context, || found(session, selection, order))?;
-        Ok(Answers {
-            context,
-            found: Some(found),
-            left: limit.unwrap_or(usize::MAX),
-        })
+        Ok(Answers { context, found: Some(found), left: limit.unwrap_or(usize::MAX) })
     }
 
     /// All answers at once. Errors: as [`Query::answers`].
@@ -198,13 +184,7 @@ fn found<'s>(
         None => Box::new(selected),
         Some((variable, order)) => {
             let falls = order == Order::Falling;
-            Box::new(Ordered::new(
-                selected,
-                variable,
-                falls,
-                &std::env::temp_dir(),
-                SORT_BYTES,
-            )?)
+            Box::new(Ordered::new(selected, variable, falls, &std::env::temp_dir(), SORT_BYTES)?)
         }
     })
 }
@@ -233,8 +213,5 @@ pub(super) fn condition_of(text: &str) -> Result<Expression, Error> {
     if condition.kind() == Kind::Truth {
         return Ok(condition);
     }
-    Err(wrong(ExprError {
-        at: 0,
-        message: "this is a number; a condition compares".to_owned(),
-    }))
+    Err(wrong(ExprError { at: 0, message: "this is a number; a condition compares".to_owned() }))
 }

@@ -31,13 +31,7 @@ pub(crate) enum Remedy {
 
 impl Error {
     pub(crate) fn new(code: &'static str, message: impl ToString) -> Self {
-        Self {
-            code,
-            message: message.to_string(),
-            place: None,
-            help: None,
-            remedy: Remedy::AsSaid,
-        }
+        Self { code, message: message.to_string(), place: None, help: None, remedy: Remedy::AsSaid }
     }
 
     pub(crate) fn at(mut self, place: impl ToString) -> Self {

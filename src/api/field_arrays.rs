@@ -70,11 +70,7 @@ impl FieldArrays {
         lengths: &[f64],
     ) -> Result<Self, Error> {
         check(points, tets, lengths)?;
-        Ok(Self {
-            points: points.to_vec(),
-            tets: tets.to_vec(),
-            lengths: lengths.to_vec(),
-        })
+        Ok(Self { points: points.to_vec(), tets: tets.to_vec(), lengths: lengths.to_vec() })
     }
 
     /// As the mesher asks it. Errors: `memory`, when it needs more than half of `cap`.
@@ -145,10 +141,7 @@ pub(crate) fn is_in_store(file: &str) -> bool {
 
 /// Sections of a binary MEDIT file: keyword, where the next begins, content.
 fn file_of(sections: &[(i32, Vec<u8>)]) -> Vec<u8> {
-    let mut bytes: Vec<u8> = [1, VERSION]
-        .into_iter()
-        .flat_map(i32::to_le_bytes)
-        .collect();
+    let mut bytes: Vec<u8> = [1, VERSION].into_iter().flat_map(i32::to_le_bytes).collect();
     let mut section = |keyword: i32, content: &[u8]| {
         bytes.extend(keyword.to_le_bytes());
         let next = bytes.len() + 8 + content.len();
@@ -171,14 +164,8 @@ mod tests {
         let corner = |c: u32| [0, 1, 2].map(|k| f64::from(c >> k & 1));
         let points: Vec<_> = (0..8).map(corner).collect();
         let lengths = points.iter().map(|p| 0.08 + 0.2 * p[0]).collect::<Vec<_>>();
-        let tets = [
-            [0, 1, 3, 7],
-            [0, 1, 5, 7],
-            [0, 2, 3, 7],
-            [0, 2, 6, 7],
-            [0, 4, 5, 7],
-            [0, 4, 6, 7],
-        ];
+        let tets =
+            [[0, 1, 3, 7], [0, 1, 5, 7], [0, 2, 3, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 4, 6, 7]];
         let sizes = Sizes::interior(Length::units(0.4));
         sizes.field_of_arrays(&points, &tets, &lengths).unwrap()
     }

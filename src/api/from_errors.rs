@@ -34,9 +34,7 @@ impl From<WriteError> for Error {
 
 impl From<SurfaceError> for Error {
     fn from(e: SurfaceError) -> Self {
-        let error = Self::new(e.code(), &e)
-            .with_help(e.help())
-            .with_remedy(Remedy::General);
+        let error = Self::new(e.code(), &e).with_help(e.help()).with_remedy(Remedy::General);
         match &e {
             SurfaceError::Invalid { defect, n_defects } => {
                 let more = match n_defects.saturating_sub(1) {
@@ -220,7 +218,5 @@ fn with_general_help(code: &'static str, e: &impl ToString) -> Error {
         "no-such-part" => "the store's summary lists its parts",
         _ => "check the path and its permissions",
     };
-    Error::new(code, e.to_string())
-        .with_help(help)
-        .with_remedy(Remedy::General)
+    Error::new(code, e.to_string()).with_help(help).with_remedy(Remedy::General)
 }

@@ -68,17 +68,10 @@ fn free() -> (u64, &'static str) {
             of_process("Max address space", "VmSize:"),
             "left of this process's limit of address space",
         ),
-        (
-            of_process("Max data size", "VmData:"),
-            "left of this process's limit of data",
-        ),
+        (of_process("Max data size", "VmData:"), "left of this process's limit of data"),
     ];
-    let known = all
-        .into_iter()
-        .filter_map(|(bytes, words)| Some((bytes?, words)));
-    known
-        .min_by_key(|(bytes, _)| *bytes)
-        .expect("the first is always known")
+    let known = all.into_iter().filter_map(|(bytes, words)| Some((bytes?, words)));
+    known.min_by_key(|(bytes, _)| *bytes).expect("the first is always known")
 }
 
 /// What a process holds beside its cap: code and stacks.
@@ -99,23 +92,14 @@ fn limit_of(name: &str) -> Option<u64> {
 }
 
 fn group_free() -> Option<u64> {
-    let number = |path: String| {
-        std::fs::read_to_string(path)
-            .ok()?
-            .trim()
-            .parse::<u64>()
-            .ok()
-    };
+    let number = |path: String| std::fs::read_to_string(path).ok()?.trim().parse::<u64>().ok();
     let groups = std::fs::read_to_string("/proc/self/cgroup").ok()?;
     for line in groups.lines() {
         let mut parts = line.splitn(3, ':');
         let (_, kinds, path) = (parts.next()?, parts.next()?, parts.next()?);
         let (limit, used) = if kinds.is_empty() {
             let base = format!("/sys/fs/cgroup{path}");
-            (
-                number(format!("{base}/memory.max")),
-                number(format!("{base}/memory.current")),
-            )
+            (number(format!("{base}/memory.max")), number(format!("{base}/memory.current")))
         } else if kinds.split(',').any(|k| k == "memory") {
             let base = format!("/sys/fs/cgroup/memory{path}");
             (

@@ -140,9 +140,7 @@ impl Mesher {
     pub fn region_seed(mut self, point: [f64; 3], name: Option<&str>) -> Self {
         let kind = SeedKind::Region(name.map(str::to_owned));
         let point = Point::from_array(point);
-        self.options
-            .region_seed
-            .push(Seed { point, kind }.to_string());
+        self.options.region_seed.push(Seed { point, kind }.to_string());
         self
     }
 
@@ -307,11 +305,7 @@ impl Mesher {
             self.divide_surface(path, cap, settings)?;
         }
         if self.is_there(path)? {
-            return Ok(Created {
-                path: path.to_owned(),
-                summary: None,
-                was_there: true,
-            });
+            return Ok(Created { path: path.to_owned(), summary: None, was_there: true });
         }
         if self.preflight {
             preflight::surface_fits(&self.surface.inner, cap)?;
@@ -320,11 +314,7 @@ impl Mesher {
         let (summary, lock) = match self.mesh(path, cap, prepared, settings) {
             // Another run was faster: what it left decides.
             Err(error) if error.code() == "store-exists" && self.is_there(path)? => {
-                return Ok(Created {
-                    path: path.to_owned(),
-                    summary: None,
-                    was_there: true,
-                });
+                return Ok(Created { path: path.to_owned(), summary: None, was_there: true });
             }
             other => other?,
         };
@@ -336,11 +326,7 @@ impl Mesher {
             };
             verify_new(path, surface, cap, settings, lock)?;
         }
-        Ok(Created {
-            path: path.to_owned(),
-            summary: Some(summary),
-            was_there: false,
-        })
+        Ok(Created { path: path.to_owned(), summary: Some(summary), was_there: false })
     }
 
     /// Refuses early what is no store or an unfinished one, before a surface is read for it.
@@ -560,12 +546,7 @@ fn predict_with(
         None => job::read_background(options, store, cap)?,
     };
     let scratch = scratch_beside(surface, cap, store)?;
-    Ok(pipeline::prepare(
-        surface,
-        options,
-        background.as_ref(),
-        &scratch,
-    )?)
+    Ok(pipeline::prepare(surface, options, background.as_ref(), &scratch)?)
 }
 
 /// The surface for the pipeline: given away when it is large against the cap, to be read again for verification.

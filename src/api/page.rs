@@ -56,21 +56,17 @@ pub(crate) fn write_page(path: &Path, out: &Path, settings: &Settings) -> Result
     let title = path.file_stem().unwrap_or_default().to_string_lossy();
     let mut data = of_catalog(path, &mut store, &title)?;
     // Text and tables of the page have the rest.
-    let (mut session, budget) = (
-        QuerySession::open(store, &Budget::new(cap / 2))?,
-        Budget::new(cap / 8 * 3),
-    );
+    let (mut session, budget) =
+        (QuerySession::open(store, &Budget::new(cap / 2))?, Budget::new(cap / 8 * 3));
     attempt(|| -> Result<Written, Error> {
         let statistics = session.statistics(&budget, &|done, total| {
             settings.count("measure", done, total, "tetrahedra");
         })?;
         let mut page = Page::new(out, &title, session.bounds())?;
-        data["scene"] = surfaces(
-            (&mut session, &budget),
-            &mut page,
-            &statistics,
-            &|done, total| settings.count("cut", done, total, "cuts"),
-        )?;
+        data["scene"] =
+            surfaces((&mut session, &budget), &mut page, &statistics, &|done, total| {
+                settings.count("cut", done, total, "cuts")
+            })?;
         data["statistics"] = json!(statistics);
         Ok(Written {
             bytes: page.finish(&data)?,
@@ -94,11 +90,8 @@ pub(crate) fn measure_excess(path: &Path, settings: &Settings) -> Result<Excess,
 /// What the catalog has on record.
 fn of_catalog(path: &Path, catalog: &mut Catalog, title: &str) -> Result<Value, Error> {
     let (state, job, labels) = (catalog.state()?, catalog.job()?, catalog.labels()?);
-    let (rows, journal, topology) = (
-        catalog.subdomains()?,
-        catalog.journal()?,
-        catalog.topology()?,
-    );
+    let (rows, journal, topology) =
+        (catalog.subdomains()?, catalog.journal()?, catalog.topology()?);
     let mut bins = [0u64; QUALITY_BINS];
     let mut dihedral = [f64::INFINITY, 0.0f64];
     for row in &rows {
@@ -131,9 +124,8 @@ fn of_catalog(path: &Path, catalog: &mut Catalog, title: &str) -> Result<Value, 
     });
     let regions: Vec<Value> = regions.collect();
     let interfaces = catalog.interfaces()?.into_iter();
-    let interfaces: Vec<Value> = interfaces
-        .map(|i| json!([i.cut, i.low, i.high, i.faces]))
-        .collect();
+    let interfaces: Vec<Value> =
+        interfaces.map(|i| json!([i.cut, i.low, i.high, i.faces])).collect();
     let sum = |part: &dyn Fn(&tetdb_schema::catalog::SubdomainRow) -> u64| {
         rows.iter().map(part).sum::<u64>()
     };
@@ -181,17 +173,10 @@ fn steps(journal: &[JournalRow]) -> Value {
         }
     }
     let kinds = kinds.into_iter().map(|(step, names)| {
-        let rows = journal
-            .iter()
-            .enumerate()
-            .filter(|(_, row)| row.step == step);
+        let rows = journal.iter().enumerate().filter(|(_, row)| row.step == step);
         let rows = rows.map(|(place, row)| {
-            let value = |name: &&str| {
-                row.measures
-                    .iter()
-                    .find(|m| m.name == **name)
-                    .map(|m| m.value)
-            };
+            let value =
+                |name: &&str| row.measures.iter().find(|m| m.name == **name).map(|m| m.value);
             let mut cells = vec![json!(place), json!(row.seconds), json!(row.subdomain)];
             cells.extend(names.iter().map(|name| json!(value(name))));
             Value::Array(cells)
@@ -221,10 +206,7 @@ fn surfaces(
     page.surface("boundary", &surface(&boundary, &channels))?;
     let boundary = shown(&boundary);
     let interfaces = scene.interfaces()?;
-    let channels = [
-        column(&interfaces, |ranks| ranks[0]),
-        column(&interfaces, |ranks| ranks[1]),
-    ];
+    let channels = [column(&interfaces, |ranks| ranks[0]), column(&interfaces, |ranks| ranks[1])];
     page.surface("interfaces", &surface(&interfaces, &channels))?;
     let interfaces = shown(&interfaces);
     let places = scene.places();
@@ -241,9 +223,7 @@ fn surfaces(
     let extent = bounds.high - bounds.low;
     let least = extent.to_array().into_iter().enumerate();
     // The cut seen first is across the shortest side, for it shows most; seen from the low side of y.
-    let axis = least
-        .min_by(|a, b| a.1.total_cmp(&b.1))
-        .map_or(1, |(axis, _)| axis);
+    let axis = least.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(1, |(axis, _)| axis);
     Ok(json!({
         "low": bounds.low.to_array(), "high": bounds.high.to_array(), "axis": axis, "quality": [1.0, QUALITY_MOST],
         "size": statistics.size, "boundary": boundary, "interfaces": interfaces, "cuts": cuts,
@@ -255,11 +235,7 @@ fn column<T>(patch: &Patch<T>, of: impl Fn(&T) -> u32) -> Vec<u32> {
 }
 
 fn surface<'a, T>(patch: &'a Patch<T>, channels: &'a [Vec<u32>]) -> Surface<'a> {
-    Surface {
-        points: &patch.points,
-        triangles: &patch.triangles,
-        channels,
-    }
+    Surface { points: &patch.points, triangles: &patch.triangles, channels }
 }
 
 fn shown<T>(patch: &Patch<T>) -> Value {

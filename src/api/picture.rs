@@ -179,11 +179,7 @@ impl Snapshot {
                 "a color by label: expected a picture in space, for tetrahedra have no label",
             );
         }
-        let vectors = self
-            .plane
-            .map(|[_, normal]| normal)
-            .into_iter()
-            .chain(self.from);
+        let vectors = self.plane.map(|[_, normal]| normal).into_iter().chain(self.from);
         if vectors.into_iter().any(|v| v == Point::ZERO) {
             return bad("a direction of zero length: expected three numbers that are not all zero");
         }
@@ -291,21 +287,14 @@ fn pieces(
         // Across the plane of the cut, as upright as can be.
         Some([on, normal]) => {
             let middle = middle - normal * normal.dot(middle - on);
-            let upright = if normal.z.abs() > 0.9 {
-                Point::Y
-            } else {
-                Point::Z
-            };
+            let upright = if normal.z.abs() > 0.9 { Point::Y } else { Point::Z };
             let across = normal.cross(upright);
             [middle, if across.y > 0.0 { -across } else { across }]
         }
         None => [middle, thinnest(&bounds)],
     });
     let view = View::new(point, normal);
-    let selection = Selection {
-        condition: snapshot.condition.clone(),
-        ..Selection::default()
-    };
+    let selection = Selection { condition: snapshot.condition.clone(), ..Selection::default() };
     let section = session.section(&view, snapshot.crinkle, selection, dir, memory)?;
     Ok((section, view))
 }
@@ -320,24 +309,17 @@ fn draw(
     match snapshot.color {
         ColorBy::Subdomain => picture.kind(piece.subdomain),
         ColorBy::Region => picture.kind(piece.region),
-        ColorBy::Label => piece
-            .label
-            .into_iter()
-            .for_each(|label| picture.kind(label)),
+        ColorBy::Label => piece.label.into_iter().for_each(|label| picture.kind(label)),
         ColorBy::Quality | ColorBy::Size => {}
     }
     let color = color(snapshot.color, extent, piece);
     // Faces seen from the side get less light; what is seen from behind is the inside.
-    let flat = matches!(
-        snapshot.subject,
-        Subject::Surface(ShellView::Natural(_) | ShellView::Chosen(_))
-    );
+    let flat =
+        matches!(snapshot.subject, Subject::Surface(ShellView::Natural(_) | ShellView::Chosen(_)));
     let color = if piece.facing >= 0.0 || flat {
         color.lit(0.5 + 0.5 * piece.facing.abs())
     } else {
-        color
-            .mixed(Rgb([232, 232, 236]), 0.45)
-            .lit(0.35 + 0.5 * piece.facing.abs())
+        color.mixed(Rgb([232, 232, 236]), 0.45).lit(0.35 + 0.5 * piece.facing.abs())
     };
     if in_space {
         let [a, b, c, _] = piece.corners;
@@ -367,11 +349,7 @@ fn are_many(by: ColorBy, subject: Subject, session: &QuerySession) -> bool {
 
 /// A direction near `normal`, from the half that is seen from in other pictures.
 fn slanted(normal: Point) -> Point {
-    let normal = if normal.dot(FROM) < 0.0 {
-        -normal
-    } else {
-        normal
-    };
+    let normal = if normal.dot(FROM) < 0.0 { -normal } else { normal };
     normal + FROM.normalize() * 0.7
 }
 
@@ -394,10 +372,7 @@ fn bar(by: ColorBy, extent: &Extent) -> Option<ColorBar> {
         ColorBy::Size => extent.size,
         ColorBy::Subdomain | ColorBy::Region | ColorBy::Label => return None,
     };
-    Some(ColorBar {
-        least: f64::from(least),
-        most: f64::from(most),
-    })
+    Some(ColorBar { least: f64::from(least), most: f64::from(most) })
 }
 
 fn color(by: ColorBy, extent: &Extent, piece: &Piece) -> Rgb {

@@ -20,10 +20,7 @@ pub(crate) fn scratch_beside(
 ) -> Result<ScratchSpace, Error> {
     let folder = folder_of(store)
         .ok_or_else(|| Error::new("io", "there is no folder above it").at(store.display()))?;
-    Ok(ScratchSpace::new(
-        cap.saturating_sub(surface.bytes() as u64),
-        &folder,
-    ))
+    Ok(ScratchSpace::new(cap.saturating_sub(surface.bytes() as u64), &folder))
 }
 
 /// Refuses a surface that leaves too little of the cap, before anything is done with it.
@@ -111,13 +108,8 @@ fn bytes_on_disk(dir: &Path) -> u64 {
 /// The nearest folder that exists.
 fn folder_of(store: &Path) -> Option<PathBuf> {
     let absolute = std::path::absolute(store).ok()?;
-    let above = absolute
-        .ancestors()
-        .skip(usize::from(store != Path::new(".")));
-    above
-        .into_iter()
-        .find(|folder| folder.is_dir())
-        .map(Path::to_owned)
+    let above = absolute.ancestors().skip(usize::from(store != Path::new(".")));
+    above.into_iter().find(|folder| folder.is_dir()).map(Path::to_owned)
 }
 
 /// Bytes free where a store would be.

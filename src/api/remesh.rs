@@ -195,11 +195,7 @@ impl Remesh {
             Some(sizes) => Some(sizes.clone()),
             None => self.new_sizes(&mut open, &options)?,
         };
-        let what = Resaturation {
-            ranks,
-            sizes,
-            repair: self.repair,
-        };
+        let what = Resaturation { ranks, sizes, repair: self.repair };
         let (budget, watch) = (self.settings.budget()?, self.settings.watcher());
         let summary = pipeline::resaturate(&mut open, &options, &what, &budget, &watch)?;
         open.close()?;
@@ -211,10 +207,8 @@ impl Remesh {
             return Ok(None);
         }
         if !(self.factor.is_normal() && self.factor > 0.0) {
-            let message = format!(
-                "a factor of {} scales nothing, expected one above zero",
-                self.factor
-            );
+            let message =
+                format!("a factor of {} scales nothing, expected one above zero", self.factor);
             return Err(Error::new("bad-size", message));
         }
         let given = self.sizes.clone();

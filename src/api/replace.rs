@@ -30,9 +30,7 @@ fn beside(path: &Path, extension: &str) -> PathBuf {
 
 /// How far the store at a path is; `None` where there is none that can be read.
 fn state(path: &Path) -> Option<StoreState> {
-    path.is_dir()
-        .then(|| Catalog::open(path).ok()?.state().ok())
-        .flatten()
+    path.is_dir().then(|| Catalog::open(path).ok()?.state().ok()).flatten()
 }
 
 /// Whether a replacement of the store at `path` was begun and not brought to its end.

@@ -60,10 +60,7 @@ fn run(path: &Path, settings: &Settings, verify: bool) -> Result<Created, Error>
     let scratch = scratch_beside(&surface::Surface::default(), cap, path)?;
     let mut surface = Surface::of_record(&job.surfaces, &place, &scratch)?;
     drop(scratch);
-    surface
-        .notes()
-        .into_iter()
-        .for_each(|note| settings.note(format!("note: {note}")));
+    surface.notes().into_iter().for_each(|note| settings.note(format!("note: {note}")));
     let summary = match state.is_finished() {
         true => {
             settings.note(format!("{} is already finished", path.display()));
@@ -83,11 +80,7 @@ fn run(path: &Path, settings: &Settings, verify: bool) -> Result<Created, Error>
         let at_hand = Some(&surface.inner).filter(|s| s.n_triangles() > 0);
         verify_new(path, at_hand, cap, settings, lock)?;
     }
-    Ok(Created {
-        path: path.to_owned(),
-        was_there: summary.is_none(),
-        summary,
-    })
+    Ok(Created { path: path.to_owned(), was_there: summary.is_none(), summary })
 }
 
 fn go_on(

@@ -109,10 +109,8 @@ impl Settings {
             None => Ok(default_cap().0),
             Some(Bytes(bytes)) if bytes < MEMORY_MIN => {
                 let least = MEMORY_MIN >> 20;
-                let message = format!(
-                    "{} are less than the {least} MiB any run needs",
-                    Bytes(bytes)
-                );
+                let message =
+                    format!("{} are less than the {least} MiB any run needs", Bytes(bytes));
                 Err(Error::new("memory", message).with_remedy(Remedy::Memory(MEMORY_MIN)))
             }
             Some(Bytes(bytes)) => Ok(bytes),
@@ -152,11 +150,6 @@ impl Settings {
     /// Progress of something counted.
     pub(crate) fn count(&self, stage: &'static str, done: u64, total: u64, unit: &'static str) {
         let total = Some(total);
-        self.say(&Event::Progress {
-            stage,
-            done,
-            total,
-            unit,
-        });
+        self.say(&Event::Progress { stage, done, total, unit });
     }
 }

@@ -116,12 +116,7 @@ impl Store {
     ) -> Result<Exported, Error> {
         guarded(self.settings(), || {
             check_target(out.as_ref(), &inputs_of(self.path()))?;
-            export(
-                self.path(),
-                out.as_ref(),
-                &options.selection,
-                self.settings(),
-            )
+            export(self.path(), out.as_ref(), &options.selection, self.settings())
         })
     }
 }

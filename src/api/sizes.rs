@@ -129,9 +129,7 @@ impl Sizes {
 
     /// `h` at most in a region, named by its number or by a label on it.
     pub fn in_region(mut self, region_or_label: &str, h: Length) -> Self {
-        self.options
-            .size_region
-            .push(format!("{region_or_label},{h}"));
+        self.options.size_region.push(format!("{region_or_label},{h}"));
         self
     }
 

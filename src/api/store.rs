@@ -86,14 +86,7 @@ impl Store {
             let summary = Summary::of(&mut catalog)?;
             Ok((catalog, summary))
         })?;
-        Ok(Self {
-            path,
-            settings,
-            context,
-            catalog,
-            summary,
-            session: None,
-        })
+        Ok(Self { path, settings, context, catalog, summary, session: None })
     }
 
     /// Where it is.
@@ -129,15 +122,9 @@ impl Store {
     /// Shape: the answer runs parallel to `points`. Errors: damage; too little memory.
     pub fn locate(&mut self, points: &[[f64; 3]]) -> Result<Vec<Option<crate::query::Hit>>, Error> {
         self.with_session(|session| {
-            let points: Vec<_> = points
-                .iter()
-                .map(|p| crate::geom::Point::from_array(*p))
-                .collect();
-            Ok(session
-                .locate(&points)?
-                .into_iter()
-                .map(|located| located.found)
-                .collect())
+            let points: Vec<_> =
+                points.iter().map(|p| crate::geom::Point::from_array(*p)).collect();
+            Ok(session.locate(&points)?.into_iter().map(|located| located.found).collect())
         })
     }
 
@@ -188,13 +175,7 @@ impl Store {
         &mut self,
         work: impl FnOnce(&mut QuerySession) -> Result<T, Error>,
     ) -> Result<T, Error> {
-        let Self {
-            catalog,
-            settings,
-            context,
-            session,
-            ..
-        } = self;
+        let Self { catalog, settings, context, session, .. } = self;
         guarded_in(context, || {
             if session.is_none() {
                 *session = Some(QuerySession::open(catalog.share(), &settings.budget()?)?);
@@ -207,10 +188,7 @@ impl Store {
         &mut self,
     ) -> Result<(&RunContext, &mut QuerySession), Error> {
         self.with_session(|_| Ok(()))?;
-        Ok((
-            &self.context,
-            self.session.as_mut().expect("it was opened above"),
-        ))
+        Ok((&self.context, self.session.as_mut().expect("it was opened above")))
     }
 }
 
@@ -259,9 +237,6 @@ pub(crate) fn say_how_locked(catalog: &Catalog, settings: &Settings) {
 fn if_finished(mut catalog: Catalog, path: &Path) -> Result<Catalog, Error> {
     match catalog.state()?.is_finished() {
         true => Ok(catalog),
-        false => Err(StoreError::Unfinished {
-            path: path.to_owned(),
-        }
-        .into()),
+        false => Err(StoreError::Unfinished { path: path.to_owned() }.into()),
     }
 }

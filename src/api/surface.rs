@@ -118,10 +118,9 @@ pub(super) fn mark_of(kind: WireKind) -> &'static str {
 fn refuse_sheets(surface: &surface::Surface, what: &str) -> Result<(), Error> {
     match surface.has_sheets() || surface.has_wires() {
         false => Ok(()),
-        true => Err(Error::new(
-            "usage",
-            format!("a surface is {what} before anything is embedded"),
-        )),
+        true => {
+            Err(Error::new("usage", format!("a surface is {what} before anything is embedded")))
+        }
     }
 }
 
@@ -267,15 +266,11 @@ impl Surface {
                 });
             }
             _ => {
-                let known = self
-                    .sources
-                    .iter()
-                    .find_map(|s| s.path.strip_prefix(SHEETS_FROM));
+                let known = self.sources.iter().find_map(|s| s.path.strip_prefix(SHEETS_FROM));
                 let first = known.map_or(first.to_string(), str::to_owned);
                 let is_open = self.sources.iter().any(|s| s.path == OPEN_PARTS);
                 self.sources = vec![given(&self.inner), mark(format!("{SHEETS_FROM}{first}"))];
-                self.sources
-                    .extend(is_open.then(|| mark(OPEN_PARTS.to_owned())));
+                self.sources.extend(is_open.then(|| mark(OPEN_PARTS.to_owned())));
             }
         }
         Ok(self)
@@ -284,9 +279,7 @@ impl Surface {
     /// The same with what of it is not closed as sheets, see [`Surface::embedded`]: triangles at an edge without a second triangle, then
     /// those that are at one without them, and so on.
     pub fn open_parts_as_sheets(self) -> Result<Self, Error> {
-        guarded(&Settings::new(), || {
-            Ok(self.open_parts_in(&ScratchSpace::boundless())?.0)
-        })
+        guarded(&Settings::new(), || Ok(self.open_parts_in(&ScratchSpace::boundless())?.0))
     }
 
     /// The same, and how many triangles that are.
@@ -300,21 +293,15 @@ impl Surface {
     fn refuse_wires(&self) -> Result<(), Error> {
         match self.inner.has_wires() {
             false => Ok(()),
-            true => Err(Error::new(
-                "usage",
-                "sheets are embedded before edges and points",
-            )),
+            true => Err(Error::new("usage", "sheets are embedded before edges and points")),
         }
     }
 
     /// What its first file is called, without folder and extension.
     fn name(&self) -> String {
         let file = self.inner.files.first().map(|file| Path::new(&file.name));
-        let stem = file
-            .and_then(Path::file_stem)
-            .map(|stem| stem.to_string_lossy());
-        stem.filter(|s| !s.is_empty())
-            .map_or("sheet".to_owned(), |s| s.into_owned())
+        let stem = file.and_then(Path::file_stem).map(|stem| stem.to_string_lossy());
+        stem.filter(|s| !s.is_empty()).map_or("sheet".to_owned(), |s| s.into_owned())
     }
 
     /// Writes it, without embedded edges and points, as `.stl`, `.off`, `.obj` or `.ply`. Errors: `unknown-format`, `lossy-format`; the disk.
@@ -334,11 +321,9 @@ impl Surface {
         match (samples, words) {
             (1, [word]) => Self::generated(word, cap),
             (0, _) => Self::read_in(&words.iter().map(PathBuf::from).collect::<Vec<_>>(), cap),
-            _ => Err(
-                Error::new("usage", "a sample cannot be joined with other surfaces")
-                    .with_help("write it to a file first")
-                    .with_remedy(Remedy::General),
-            ),
+            _ => Err(Error::new("usage", "a sample cannot be joined with other surfaces")
+                .with_help("write it to a file first")
+                .with_remedy(Remedy::General)),
         }
     }
 
@@ -354,10 +339,8 @@ impl Surface {
     pub(crate) fn notes(&self) -> Vec<String> {
         let mut notes: Vec<String> = self.inner.notes.iter().map(ToString::to_string).collect();
         if self.turned > 0 {
-            notes.push(format!(
-                "{} triangles were turned to run like their neighbors",
-                self.turned
-            ));
+            notes
+                .push(format!("{} triangles were turned to run like their neighbors", self.turned));
         }
         notes
     }
@@ -384,10 +367,7 @@ impl Surface {
                 .iter()
                 .any(|mark| s.path.starts_with(mark))
         };
-        let n = sources
-            .iter()
-            .position(is_of_sheets)
-            .unwrap_or(sources.len());
+        let n = sources.iter().position(is_of_sheets).unwrap_or(sources.len());
         let (own, of_sheets) = sources.split_at(n);
         let mut surface = match own {
             [only] if only.path == IN_STORE => {
@@ -426,20 +406,14 @@ impl Surface {
         scratch: &ScratchSpace,
     ) -> Result<Self, Error> {
         if let Some(first) = path.strip_prefix(SHEETS_FROM) {
-            let first = first
-                .parse::<usize>()
-                .ok()
-                .filter(|&n| n <= self.inner.n_triangles());
+            let first = first.parse::<usize>().ok().filter(|&n| n <= self.inner.n_triangles());
             let first = first
                 .ok_or_else(|| Error::new("damaged", "the record of sheets cannot be read"))?;
             self.inner.sheets_from(first);
             self.sources.push(mark(path.to_owned()));
             return Ok(self);
         }
-        if let Some((name, file)) = path
-            .strip_prefix(SHEET)
-            .and_then(|rest| rest.split_once('='))
-        {
+        if let Some((name, file)) = path.strip_prefix(SHEET).and_then(|rest| rest.split_once('=')) {
             let sheet = Self::load(&[file.to_owned()], scratch.cap())?.oriented(scratch)?;
             return self.embedded(sheet, Some(name));
         }
@@ -456,21 +430,12 @@ impl Surface {
     }
 
     fn of(inner: surface::Surface, sources: Vec<SurfaceSource>) -> Self {
-        Self {
-            inner,
-            sources,
-            turned: 0,
-            divides: false,
-        }
+        Self { inner, sources, turned: 0, divides: false }
     }
 
     fn generated(word: &str, cap: u64) -> Result<Self, Error> {
         let spec = SampleSpec::parse(word)?;
-        let source = SurfaceSource {
-            path: spec.canonical(),
-            bytes: 0,
-            hash: [0; 2],
-        };
+        let source = SurfaceSource { path: spec.canonical(), bytes: 0, hash: [0; 2] };
         let mut inner = surface::Surface::from(spec.make_within(cap)?);
         inner.hold_wires(&ScratchSpace::boundless())?;
         Ok(Self::of(inner, vec![source]))
@@ -496,10 +461,8 @@ impl Surface {
         builder.begin_file("arrays");
         for (i, point) in points.iter().enumerate() {
             if point.iter().any(|x| !x.is_finite()) {
-                return Err(
-                    Error::new("not-a-number", "a coordinate is not a finite number")
-                        .at(format!("point {i}")),
-                );
+                return Err(Error::new("not-a-number", "a coordinate is not a finite number")
+                    .at(format!("point {i}")));
             }
             builder.vertex(Point::from_array(*point))?;
         }
@@ -517,10 +480,7 @@ impl Surface {
 
 /// A line of the record that is no file.
 pub(super) fn mark(path: String) -> SurfaceSource {
-    SurfaceSource {
-        path,
-        ..SurfaceSource::default()
-    }
+    SurfaceSource { path, ..SurfaceSource::default() }
 }
 
 /// What identifies a surface that came from no file.
@@ -533,11 +493,7 @@ pub(super) fn given(surface: &surface::Surface) -> SurfaceSource {
         triangle.iter().for_each(|v| hash.update(&v.to_le_bytes()));
         hash.update(surface.label_name(t).as_bytes());
     }
-    SurfaceSource {
-        path: IN_STORE.to_owned(),
-        bytes: 0,
-        hash: halves(&hash),
-    }
+    SurfaceSource { path: IN_STORE.to_owned(), bytes: 0, hash: halves(&hash) }
 }
 
 /// Where a store keeps the copy of a surface that came from no file.
@@ -570,11 +526,7 @@ pub(crate) fn source(path: &Path) -> Result<SurfaceSource, Error> {
         bytes += n as u64;
         hash.update(&buffer[..n]);
     }
-    Ok(SurfaceSource {
-        path: absolute.to_string_lossy().into_owned(),
-        bytes,
-        hash: halves(&hash),
-    })
+    Ok(SurfaceSource { path: absolute.to_string_lossy().into_owned(), bytes, hash: halves(&hash) })
 }
 
 /// Low half first.

@@ -101,10 +101,8 @@ impl Surface {
         let set = read_wires(file, kind, scratch.cap())?;
         let stem = file.file_stem().unwrap_or_default().to_string_lossy();
         let name = name.unwrap_or(&stem);
-        let record = SurfaceSource {
-            path: format!("{}{name}={}", mark_of(kind), source.path),
-            ..source
-        };
+        let record =
+            SurfaceSource { path: format!("{}{name}={}", mark_of(kind), source.path), ..source };
         self.with_recorded(&set, name, Some(record), scratch)
     }
 
@@ -280,17 +278,9 @@ mod tests {
         };
         for (code, place, result) in [
             ("not-a-number", "point 1", edges(&points, &[[0, 1]], None)),
-            (
-                "index-out-of-range",
-                "edge 0",
-                edges(&points[..1], &[[0, 1]], None),
-            ),
+            ("index-out-of-range", "edge 0", edges(&points[..1], &[[0, 1]], None)),
             ("count-mismatch", "", edges(&points[..1], &[], Some(&["a"]))),
-            (
-                "wire-contact",
-                "",
-                surface().embedded_points_of(&[[0.3, 0.4, 1.0]], None, "p"),
-            ),
+            ("wire-contact", "", surface().embedded_points_of(&[[0.3, 0.4, 1.0]], None, "p")),
         ] {
             let error = result.expect_err(code);
             assert_eq!(error.code(), code);

@@ -29,10 +29,7 @@ pub(crate) fn check_target(out: &Path, inputs: &[PathBuf]) -> Result<(), Error> 
             true => "a store",
             false => "a folder",
         };
-        return refused(format!(
-            "{} is {what}, no file to be written",
-            out.display()
-        ));
+        return refused(format!("{} is {what}, no file to be written", out.display()));
     }
     let written = with_others(out, &WRITTEN);
     let read = inputs.iter().flat_map(|input| with_others(input, &READ));
@@ -51,9 +48,7 @@ pub(crate) fn check_target(out: &Path, inputs: &[PathBuf]) -> Result<(), Error> 
 /// A file, and those that `others` name by its ending.
 fn with_others(file: &Path, others: &[(&str, &[&str])]) -> Vec<PathBuf> {
     let ending = file.extension().unwrap_or_default().to_string_lossy();
-    let others = others
-        .iter()
-        .filter(|(of, _)| ending.eq_ignore_ascii_case(of));
+    let others = others.iter().filter(|(of, _)| ending.eq_ignore_ascii_case(of));
     let others = others.flat_map(|(_, endings)| endings.iter().map(|e| file.with_extension(e)));
     [file.to_owned()].into_iter().chain(others).collect()
 }

@@ -48,10 +48,7 @@ impl Tasks {
         Self {
             store: path.as_ref().to_owned(),
             settings: Settings::new(),
-            how: TaskSettings {
-                scratch: None,
-                wait: WAIT,
-            },
+            how: TaskSettings { scratch: None, wait: WAIT },
         }
     }
 
@@ -114,9 +111,7 @@ impl Tasks {
         let gathered = self.gather_reported()?;
         match gathered.is_finished {
             true => Ok(None),
-            false => Ok(Some(
-                gathered.left.into_iter().map(|(task, _)| task).collect(),
-            )),
+            false => Ok(Some(gathered.left.into_iter().map(|(task, _)| task).collect())),
         }
     }
 

@@ -63,8 +63,7 @@ pub(crate) fn check(
     if error.is_damage()
         && let Ok(Ok(list)) = attempt(|| audit::damage(store))
     {
-        list.iter()
-            .for_each(|damage| settings.note(damage.to_string()));
+        list.iter().for_each(|damage| settings.note(damage.to_string()));
     }
     Err(error.into())
 }
@@ -119,17 +118,11 @@ pub(crate) fn invalid(report: &Report, path: &Path) -> Error {
     let first = report.offenders.first();
     Error::new(
         "invalid-mesh",
-        format!(
-            "{} is not a valid mesh: {}",
-            path.display(),
-            findings.join(", ")
-        ),
+        format!("{} is not a valid mesh: {}", path.display(), findings.join(", ")),
     )
     .at(first.map_or_else(String::new, |o| {
         let tet = (o.tet.as_ref()).map_or(String::new(), |id| format!("tetrahedron {id}: "));
-        let corners: Vec<String> = (o.points.iter())
-            .map(|&p| show(Point::from_array(p)))
-            .collect();
+        let corners: Vec<String> = (o.points.iter()).map(|&p| show(Point::from_array(p))).collect();
         format!("{tet}{} {}", o.what, corners.join(" "))
     }))
     .with_help("a full verification lists examples of each kind")

@@ -47,11 +47,7 @@ impl Server {
                 Some(read)
             }
         };
-        Ok(Self {
-            options: options(cap, surface.as_ref(), job.level),
-            surface,
-            job,
-        })
+        Ok(Self { options: options(cap, surface.as_ref(), job.level), surface, job })
     }
 
     /// Looks at one sub-domain. Errors: damage; the disk; an order that cannot be read.
@@ -90,10 +86,7 @@ mod tests {
     }
 
     fn failure(error: Error) -> HelperFailure {
-        HelperFailure {
-            code: error.code().to_owned(),
-            message: error.message().to_owned(),
-        }
+        HelperFailure { code: error.code().to_owned(), message: error.message().to_owned() }
     }
 
     impl Helpers for Threads {
@@ -138,10 +131,7 @@ mod tests {
             let mut store = Catalog::open(path)?;
             crate::api::verify::check(&mut store, &settings, surface, 64 << 20, Level::Delaunay)
         });
-        (
-            report.map_err(|e| e.message().to_owned()),
-            threads.done.load(Ordering::Relaxed),
-        )
+        (report.map_err(|e| e.message().to_owned()), threads.done.load(Ordering::Relaxed))
     }
 
     #[test]
@@ -154,19 +144,12 @@ mod tests {
         assert!(one.valid && one.subdomains > 1, "{one:?}");
         assert!(one.edges_present > 0 && one.points_present > 0 && one.interface_faces > 0);
         for slots in [0, 1, 4] {
-            let threads = Threads {
-                slots,
-                ..Threads::default()
-            };
+            let threads = Threads { slots, ..Threads::default() };
             let (report, n) = found(&path, Some(&surface), threads);
             assert_eq!(report.as_ref(), Ok(&one), "{slots} helpers");
             assert_eq!(n > 0, slots > 0);
         }
-        let broken = Threads {
-            slots: 2,
-            broken: Some(1),
-            ..Threads::default()
-        };
+        let broken = Threads { slots: 2, broken: Some(1), ..Threads::default() };
         assert_eq!(found(&path, Some(&surface), broken).0, Ok(one.clone()));
         // Threads of this process have room within a greater cap.
         for n in [1, 2, 5] {
@@ -181,10 +164,7 @@ mod tests {
         // What helpers would read is another surface: this process does it all.
         let mut moved = surface;
         moved.points[0].x += 0.5;
-        let threads = Threads {
-            slots: 2,
-            ..Threads::default()
-        };
+        let threads = Threads { slots: 2, ..Threads::default() };
         let (report, n) = found(&path, Some(&moved), threads);
         assert!(!report.expect("an answer").valid);
         assert_eq!(n, 0);
@@ -203,10 +183,7 @@ mod tests {
         bytes[3 * n / 8..5 * n / 8].fill(0xa5);
         std::fs::write(file.path(), bytes).expect("its file");
         let of = |slots| {
-            let threads = Threads {
-                slots,
-                ..Threads::default()
-            };
+            let threads = Threads { slots, ..Threads::default() };
             found(&path, Some(&surface), threads).0
         };
         let one = of(0).expect_err("damage");

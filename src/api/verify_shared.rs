@@ -33,11 +33,7 @@ pub(super) struct Job {
 pub(super) fn options(cap: u64, surface: Option<&Surface>, level: Level) -> VerifyOptions {
     let held = surface.map_or(0, |s| s.bytes() as u64 + audit::wire_bytes(s));
     let memory = cap.saturating_sub(held).min(1 << 30) / 2;
-    VerifyOptions {
-        level,
-        memory_bytes: memory as usize,
-        temp_dir: std::env::temp_dir(),
-    }
+    VerifyOptions { level, memory_bytes: memory as usize, temp_dir: std::env::temp_dir() }
 }
 
 /// Bytes for each thread that looks at sub-domains: a second one took 24 to 66 MiB where there was room.
@@ -66,10 +62,8 @@ pub(super) fn verify(
     let dir = std::path::absolute(store.dir()).unwrap_or_else(|_| store.dir().to_owned());
     let sources = store.job()?.surfaces;
     let shares: Vec<_> = (0..n_threads).map(|_| Mutex::new(store.share())).collect();
-    let own_options = VerifyOptions {
-        memory_bytes: options.memory_bytes / n_threads,
-        ..options.clone()
-    };
+    let own_options =
+        VerifyOptions { memory_bytes: options.memory_bytes / n_threads, ..options.clone() };
     audit::verify_shared(store, surface, options, &mut |rows, apex, add| {
         let job = || Job {
             store: dir.to_string_lossy().into_owned(),
@@ -80,10 +74,7 @@ pub(super) fn verify(
         let slots = helpers.as_ref().map_or(0, |helpers| {
             let begun = helpers.begin(&to_bytes(Kind::Verification, &job()));
             begun.unwrap_or_else(|failure| {
-                settings.note(format!(
-                    "note: verified by one process: {}",
-                    failure.message
-                ));
+                settings.note(format!("note: verified by one process: {}", failure.message));
                 0
             })
         });
@@ -117,12 +108,9 @@ fn share(
     elsewhere: Look,
     add: &mut dyn FnMut(PartReport) -> Result<(), StoreError>,
 ) -> Result<(), StoreError> {
-    let all = (0..n_here)
-        .map(|k| (here, k))
-        .chain((0..n_elsewhere).map(|k| (elsewhere, k)));
-    let all: Vec<_> = all
-        .map(|(look, k)| move |at: usize, _: &Watcher| Ok((at, look(k, &rows[at]))))
-        .collect();
+    let all = (0..n_here).map(|k| (here, k)).chain((0..n_elsewhere).map(|k| (elsewhere, k)));
+    let all: Vec<_> =
+        all.map(|(look, k)| move |at: usize, _: &Watcher| Ok((at, look(k, &rows[at])))).collect();
     let hands: Vec<Hand<usize, (usize, PartResult)>> =
         all.iter().map(|hand| hand as Hand<_, _>).collect();
     let mut waiting = BTreeMap::new();

@@ -63,11 +63,7 @@ pub(super) fn check_owners(subdomain: u32, corners: &[Corner; 3], report: &mut R
 impl<'a> Input<'a> {
     pub(super) fn new(surface: &'a Surface) -> Self {
         let words = surface.triangles.len().div_ceil(64);
-        Self {
-            surface,
-            seen: [(); 3].map(|()| vec![0; words]),
-            doubled: Vec::new(),
-        }
+        Self { surface, seen: [(); 3].map(|()| vec![0; words]), doubled: Vec::new() }
     }
 
     /// What was seen, for [`add`](Self::add) elsewhere.

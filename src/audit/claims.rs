@@ -37,9 +37,7 @@ pub(super) struct SortedClaims {
 
 impl Claims {
     pub(super) fn new(dir: &Path, memory_bytes: usize) -> Self {
-        Self {
-            sorter: Sorter::new(dir, memory_bytes as u64),
-        }
+        Self { sorter: Sorter::new(dir, memory_bytes as u64) }
     }
 
     /// A face with these vertices, counter-clockwise seen from outside the tetrahedron, or from inside when `turned`.
@@ -52,18 +50,11 @@ impl Claims {
     ) -> Result<(), StorageError> {
         let (face, odd) = sorted_face(vertices);
         let odd = odd != turned;
-        self.sorter.push(Claim {
-            tet,
-            face,
-            odd,
-            kind,
-        })
+        self.sorter.push(Claim { tet, face, odd, kind })
     }
 
     pub(super) fn finish(self) -> Result<SortedClaims, StorageError> {
-        Ok(SortedClaims {
-            claims: self.sorter.finish()?.peekable(),
-        })
+        Ok(SortedClaims { claims: self.sorter.finish()?.peekable() })
     }
 }
 

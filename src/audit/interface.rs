@@ -75,19 +75,13 @@ impl CutPair {
 
 impl SharedFaces {
     fn of(row: &InterfaceRow) -> Self {
-        Self {
-            count: row.faces,
-            digest: Digest { lanes: row.digest },
-        }
+        Self { count: row.faces, digest: Digest { lanes: row.digest } }
     }
 }
 
 impl Interfaces {
     pub(super) fn new(dir: &Path, memory_bytes: usize) -> Self {
-        Self {
-            sorter: Sorter::new(dir, memory_bytes as u64),
-            sides: BTreeMap::new(),
-        }
+        Self { sorter: Sorter::new(dir, memory_bytes as u64), sides: BTreeMap::new() }
     }
 
     /// A face of `subdomain`; its vertices are counter-clockwise seen from outside it.
@@ -171,10 +165,8 @@ impl Interfaces {
         if !group.is_empty() {
             compare_sides(&group, report);
         }
-        let mut expected: BTreeMap<CutPair, SharedFaces> = rows
-            .iter()
-            .map(|row| (CutPair::of(row), SharedFaces::of(row)))
-            .collect();
+        let mut expected: BTreeMap<CutPair, SharedFaces> =
+            rows.iter().map(|row| (CutPair::of(row), SharedFaces::of(row))).collect();
         for (pair, sides) in self.sides {
             let row = expected.remove(&pair);
             if sides[0] != sides[1] || row != Some(sides[0]) {

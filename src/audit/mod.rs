@@ -93,9 +93,7 @@ pub fn verify_shared(
 /// The first corner of the boundary; `None` where there is none, or damage, which is found later.
 fn apex(store: &mut Catalog, rows: &[SubdomainRow], options: &VerifyOptions) -> Option<Point> {
     let first = rows.iter().find(|row| row.facets > 0)?;
-    let mut part = store
-        .open_row(first.clone(), options.memory_bytes / 4)
-        .ok()?;
+    let mut part = store.open_row(first.clone(), options.memory_bytes / 4).ok()?;
     let facet = *part.facet_chunk(0).ok()?.records.first()?;
     Some(part.corners(facet.vertices).ok()?[0].point)
 }

@@ -28,9 +28,7 @@ pub(super) struct OpenSides {
 
 impl OpenSides {
     pub(super) fn new(dir: &Path, memory_bytes: usize) -> Self {
-        Self {
-            sorter: Sorter::new(dir, memory_bytes as u64),
-        }
+        Self { sorter: Sorter::new(dir, memory_bytes as u64) }
     }
 
     pub(super) fn push(&mut self, side: &Side) -> Result<(), StorageError> {

@@ -335,10 +335,7 @@ impl<'a> Audit<'a> {
                 let reference = (t * 4 + i) as u32;
                 match self.pairs.add(key, odd, reference) {
                     Paired::Open => {}
-                    Paired::With(other) => inner.push(Pair {
-                        a: other,
-                        b: reference,
-                    }),
+                    Paired::With(other) => inner.push(Pair { a: other, b: reference }),
                     Paired::Same(_) | Paired::Third => {
                         let c = face.map(|k| corners[t][k]);
                         self.crowded(rank, first + t as u32, &c);
@@ -399,9 +396,7 @@ impl<'a> Audit<'a> {
         let finding = Finding::CrowdedFace;
         self.report.find(finding, || {
             let what = "more than one tetrahedron on one side of a face";
-            Offender::new(finding, Some(rank), what)
-                .with_tet(tet)
-                .with_corners(corners)
+            Offender::new(finding, Some(rank), what).with_tet(tet).with_corners(corners)
         });
     }
 
@@ -431,9 +426,7 @@ impl<'a> Audit<'a> {
             return;
         };
         self.report.find(finding, || {
-            Offender::new(finding, Some(rank), what)
-                .with_tet(tet)
-                .with_corners(corners)
+            Offender::new(finding, Some(rank), what).with_tet(tet).with_corners(corners)
         });
     }
 

@@ -139,19 +139,12 @@ pub(super) fn check_regions(rows: &[RegionRow], sums: &RegionSums, report: &mut 
 /// Errors: a damaged catalog.
 pub(super) fn check_catalog(store: &mut Catalog, report: &mut Report) -> Result<(), StoreError> {
     let mut expected = BTreeMap::<u32, BTreeMap<u32, u64>>::new();
-    for InterfaceRow {
-        low, high, faces, ..
-    } in store.interfaces()?
-    {
+    for InterfaceRow { low, high, faces, .. } in store.interfaces()? {
         for [a, b] in [[low, high], [high, low]] {
             *expected.entry(a).or_default().entry(b).or_default() += faces;
         }
     }
-    for TopologyRow {
-        subdomain,
-        neighbors,
-    } in store.topology()?
-    {
+    for TopologyRow { subdomain, neighbors } in store.topology()? {
         let of = expected.remove(&subdomain).unwrap_or_default().into_iter();
         let of = of.map(|(subdomain, faces)| NeighborRow { subdomain, faces });
         if !of.eq(neighbors) {
@@ -160,19 +153,14 @@ pub(super) fn check_catalog(store: &mut Catalog, report: &mut Report) -> Result<
         }
     }
     for rank in expected.into_keys() {
-        differs(
-            rank,
-            "it has interfaces and no row of neighbors".to_owned(),
-            report,
-        );
+        differs(rank, "it has interfaces and no row of neighbors".to_owned(), report);
     }
     let mut needed: Vec<[u32; 2]> = Vec::new();
     for row in store.subdomains()?.into_iter().chain(store.previous()?) {
         needed.push([row.rank, row.generation]);
     }
-    let listed: Vec<[u32; 2]> = (store.files()?.iter())
-        .map(|file| [file.subdomain, file.generation])
-        .collect();
+    let listed: Vec<[u32; 2]> =
+        (store.files()?.iter()).map(|file| [file.subdomain, file.generation]).collect();
     for missing in needed.iter().filter(|file| !listed.contains(file)) {
         differs(missing[0], "its file is not listed".to_owned(), report);
     }

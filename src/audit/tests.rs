@@ -31,14 +31,7 @@ fn draft(n: u32) -> Draft {
     }
     let mut tets = Vec::new();
     // Each cell along its diagonal, one tetrahedron for each order of the axes.
-    let orders = [
-        [0, 1, 2],
-        [1, 2, 0],
-        [2, 0, 1],
-        [0, 2, 1],
-        [2, 1, 0],
-        [1, 0, 2],
-    ];
+    let orders = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
     for cell in 0..n * n * n {
         let low = [cell / (n * n), cell / n % n, cell % n];
         for (k, order) in orders.iter().enumerate() {
@@ -57,12 +50,7 @@ fn draft(n: u32) -> Draft {
     }
     tets.sort_unstable();
     let (facets, surface) = boundary(&points, &tets);
-    Draft {
-        points,
-        tets,
-        facets,
-        surface,
-    }
+    Draft { points, tets, facets, surface }
 }
 
 /// Faces with one side, or between regions, become the input.
@@ -112,11 +100,7 @@ fn verified(draft: &Draft, level: Level) -> Result<Report, StoreError> {
             point,
             h: 1.0,
             tag: tag::SURFACE,
-            id: VertexId {
-                owner: Owner::Surface,
-                index,
-            }
-            .number(),
+            id: VertexId { owner: Owner::Surface, index }.number(),
         })?;
     }
     writer.push_all_tets(draft.tets.iter().copied())?;
@@ -134,11 +118,7 @@ fn verified(draft: &Draft, level: Level) -> Result<Report, StoreError> {
     let mut store = Catalog::open(&path)?;
     let [tets, faces] = digest(&mut store, 1 << 20)?;
     assert_eq!([tets, faces], store.digest()?);
-    let options = VerifyOptions {
-        level,
-        memory_bytes: 4 << 20,
-        temp_dir: dir.path().to_owned(),
-    };
+    let options = VerifyOptions { level, memory_bytes: 4 << 20, temp_dir: dir.path().to_owned() };
     let report = verify(&mut store, Some(&draft.surface), &options)?;
     assert_eq!(report.digest, tets.to_string());
     let surface = Some(&draft.surface);
@@ -157,33 +137,19 @@ fn verified(draft: &Draft, level: Level) -> Result<Report, StoreError> {
 #[test]
 fn a_valid_mesh_is_valid_on_every_level() -> Outcome {
     let draft = draft(12);
-    for level in [
-        Level::Element,
-        Level::Adjacency,
-        Level::Topology,
-        Level::Geometry,
-    ] {
+    for level in [Level::Element, Level::Adjacency, Level::Topology, Level::Geometry] {
         let report = verified(&draft, level)?;
         assert!(report.valid, "{report:?}");
     }
     let report = verified(&draft, Level::Delaunay)?;
     assert!(report.valid, "{report:?}");
     assert_eq!(report.tets, 12 * 12 * 12 * 6);
-    assert_eq!(
-        report.triangles_present,
-        draft.surface.triangles.len() as u64
-    );
+    assert_eq!(report.triangles_present, draft.surface.triangles.len() as u64);
     // Six sides of the box; the wall between the regions has two.
     assert_eq!(report.boundary_faces, 6 * 12 * 12 * 2);
-    assert_eq!(
-        report.inner_faces * 2 + report.boundary_faces,
-        report.tets * 4
-    );
+    assert_eq!(report.inner_faces * 2 + report.boundary_faces, report.tets * 4);
     assert!((report.volume - 1728.0).abs() < 1e-9);
-    assert!(
-        report.delaunay_share() == 1.0,
-        "cells of a grid are cospherical"
-    );
+    assert!(report.delaunay_share() == 1.0, "cells of a grid are cospherical");
     serde_json::to_string(&report)?;
     Ok(())
 }
@@ -193,10 +159,7 @@ fn a_mesh_of_many_chunks_pairs_its_faces() -> Outcome {
     let draft = draft(26);
     let report = verified(&draft, Level::Delaunay)?;
     assert!(report.tets > 3 * 32_768 && report.valid, "{report:?}");
-    assert_eq!(
-        report.inner_faces * 2 + report.boundary_faces,
-        report.tets * 4
-    );
+    assert_eq!(report.inner_faces * 2 + report.boundary_faces, report.tets * 4);
     Ok(())
 }
 
@@ -210,15 +173,11 @@ fn each_fault_is_found_by_its_name() -> Outcome {
         (Finding::NotPositive, |d| d.points[43] = d.points[42]),
         (Finding::RepeatedNode, |d| d.tets[7].0[2] = d.tets[7].0[3]),
         (Finding::UnusedVertex, |d| d.points.push([9.0; 3])),
-        (Finding::MissingTriangle, |d| {
-            d.facets.truncate(d.facets.len() - 1)
-        }),
+        (Finding::MissingTriangle, |d| d.facets.truncate(d.facets.len() - 1)),
         (Finding::StrayFacet, |d| d.facets[5].tets[1] ^= 1),
         (Finding::RegionLeak, |d| d.tets[3].1 = 9),
         (Finding::NotAnInputTriangle, |d| d.facets[9].triangle = 8),
-        (Finding::NotAnInputTriangle, |d| {
-            d.surface.points[0].x = -1e-300
-        }),
+        (Finding::NotAnInputTriangle, |d| d.surface.points[0].x = -1e-300),
         (Finding::OneSidedFacet, |d| {
             let wall = d.facets.iter_mut().find(|f| f.tets[0] != NO_TET);
             wall.expect("a wall between regions").tets[0] = NO_TET;

@@ -44,9 +44,7 @@ impl<'a> WireSearch<'a> {
         vertices.extend(points.map(|(i, &[v, _])| (v, (Some(i), false))));
         surface.has_wires().then(|| Self {
             surface,
-            edges: edges
-                .map(|(e, &[a, b, _])| ([a.min(b), a.max(b)], (e, false)))
-                .collect(),
+            edges: edges.map(|(e, &[a, b, _])| ([a.min(b), a.max(b)], (e, false))).collect(),
             vertices,
         })
     }
@@ -100,9 +98,7 @@ impl<'a> WireSearch<'a> {
     pub fn finish(self, report: &mut Report) {
         let wires = &self.surface.wires;
         let mut edges = vec![false; wires.edges.len()];
-        self.edges
-            .values()
-            .for_each(|&(e, is_seen)| edges[e] = is_seen);
+        self.edges.values().for_each(|&(e, is_seen)| edges[e] = is_seen);
         let mut points = vec![false; wires.points.len()];
         for &(point, is_seen) in self.vertices.values() {
             if let Some(i) = point {
@@ -123,17 +119,13 @@ impl<'a> WireSearch<'a> {
         };
         for (e, _) in edges.iter().enumerate().filter(|(_, is_seen)| !**is_seen) {
             let [a, b, _] = wires.edges[e];
-            let what = format!(
-                "embedded {} is no edge of a tetrahedron",
-                self.surface.edge_name(e)
-            );
+            let what =
+                format!("embedded {} is no edge of a tetrahedron", self.surface.edge_name(e));
             lose(Finding::MissingEdge, what, &[a, b]);
         }
         for (i, _) in points.iter().enumerate().filter(|(_, is_seen)| !**is_seen) {
-            let what = format!(
-                "embedded {} is no vertex of a tetrahedron",
-                self.surface.point_name(i)
-            );
+            let what =
+                format!("embedded {} is no vertex of a tetrahedron", self.surface.point_name(i));
             lose(Finding::MissingPoint, what, &wires.points[i][..1]);
         }
     }

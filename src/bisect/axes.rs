@@ -15,14 +15,7 @@ impl Moments {
     pub(super) fn add(&mut self, p: Point, weight: f64) {
         self.weight += weight;
         self.first += p * weight;
-        let products = [
-            p.x * p.x,
-            p.y * p.y,
-            p.z * p.z,
-            p.x * p.y,
-            p.x * p.z,
-            p.y * p.z,
-        ];
+        let products = [p.x * p.x, p.y * p.y, p.z * p.z, p.x * p.y, p.x * p.z, p.y * p.z];
         for (sum, product) in self.second.iter_mut().zip(products) {
             *sum += weight * product;
         }
@@ -33,11 +26,7 @@ impl Moments {
         let g = self.first / self.weight;
         let s = self.second.map(|s| s / self.weight);
         let (xy, xz, yz) = (s[3] - g.x * g.y, s[4] - g.x * g.z, s[5] - g.y * g.z);
-        [
-            [s[0] - g.x * g.x, xy, xz],
-            [xy, s[1] - g.y * g.y, yz],
-            [xz, yz, s[2] - g.z * g.z],
-        ]
+        [[s[0] - g.x * g.x, xy, xz], [xy, s[1] - g.y * g.y, yz], [xz, yz, s[2] - g.z * g.z]]
     }
 }
 
@@ -78,13 +67,10 @@ pub fn principal_axes(matrix: &[[f64; 3]; 3]) -> [Point; 3] {
     order.sort_by(|&i, &j| a[j][j].total_cmp(&a[i][i]));
     order.map(|k| {
         let axis = Point::new(v[0][k], v[1][k], v[2][k]).normalize();
-        let largest =
-            axis.to_array().into_iter().fold(
-                0.0,
-                |m: f64, x| {
-                    if x.abs() > m.abs() + 1e-9 { x } else { m }
-                },
-            );
+        let largest = axis
+            .to_array()
+            .into_iter()
+            .fold(0.0, |m: f64, x| if x.abs() > m.abs() + 1e-9 { x } else { m });
         if largest < 0.0 { -axis } else { axis }
     })
 }

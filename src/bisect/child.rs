@@ -48,11 +48,7 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
             let (v, met) = (sparse(n), self.core.scratch(n));
             if met != NONE && !is_held(self.core, v) {
                 let key = order.index(self.core.point(v));
-                sorter.push(ChildVertex {
-                    key,
-                    met,
-                    source: v,
-                })?;
+                sorter.push(ChildVertex { key, met, source: v })?;
             }
         }
         for n in 0..self.host_base {
@@ -105,8 +101,7 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
         for t in tet_ids(self.core) {
             let tet = self.core.tet(t);
             let ours = tet.is_live() && self.opened.labels.is_high(t) == self.high;
-            self.core
-                .set_scratch(self.core_base + dense(t), if ours { 0 } else { NONE });
+            self.core.set_scratch(self.core_base + dense(t), if ours { 0 } else { NONE });
             if !ours {
                 continue;
             }
@@ -314,12 +309,7 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
             if high {
                 vertices.swap(1, 2);
             }
-            child.add_interface_face(InterfaceFace {
-                vertices,
-                cut,
-                index,
-                side: u32::from(high),
-            });
+            child.add_interface_face(InterfaceFace { vertices, cut, index, side: u32::from(high) });
             index += 1;
         });
     }

@@ -53,10 +53,7 @@ pub(super) fn place<P: Pages>(
     tet: &Tet,
     surface: &impl CuttingSurface,
 ) -> (Sides, f64) {
-    let mut sides = Sides {
-        low: false,
-        high: false,
-    };
+    let mut sides = Sides { low: false, high: false };
     let mut least = f64::INFINITY;
     for end in mesh.ends(tet) {
         let s = surface.distance(end.point);
@@ -162,10 +159,7 @@ pub(super) fn extract<P: Pages, Q: Pages>(
                 }
             }
             vertices.sort_unstable();
-            rim.faces.push(BoundaryFace {
-                vertices,
-                host: across,
-            });
+            rim.faces.push(BoundaryFace { vertices, host: across });
         }
         core.set_tet(t, tet);
     }

@@ -35,13 +35,8 @@ struct FlowPlace {
     seen: u32,
 }
 
-const NOWHERE: FlowPlace = FlowPlace {
-    root: Root::Free,
-    parent: ORPHAN,
-    active: false,
-    distance: 0,
-    seen: 0,
-};
+const NOWHERE: FlowPlace =
+    FlowPlace { root: Root::Free, parent: ORPHAN, active: false, distance: 0, seen: 0 };
 
 /// An arc to a node, by which it is that node's arc too: the two of a pair are found from each other without a search.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -109,12 +104,7 @@ impl Graph {
 
     /// Adds a node: its arcs (the other of each pair has the same capacity) and what fits from source and to sink.
     pub(super) fn push(&mut self, arcs: [Arc; 4], capacity: [u32; 4], terminal: [u32; 2]) {
-        self.nodes.push(Node {
-            arcs,
-            residual: capacity,
-            terminal,
-            place: NOWHERE,
-        });
+        self.nodes.push(Node { arcs, residual: capacity, terminal, place: NOWHERE });
     }
 
     /// The capacity of arc `k` of a node, before [`Graph::cut`].
@@ -242,11 +232,7 @@ impl Graph {
                 }
                 let k = usize::from(node.place.parent);
                 let up = node.arcs[k];
-                pushed = pushed.min(if side == 0 {
-                    self.inward(up)
-                } else {
-                    node.residual[k]
-                });
+                pushed = pushed.min(if side == 0 { self.inward(up) } else { node.residual[k] });
                 at = up.node();
             }
         }
@@ -430,9 +416,8 @@ mod tests {
                     }
                 }
             }
-            let terminal: Vec<[u32; 2]> = (0..n)
-                .map(|_| [next(3) as u32 * 7, next(3) as u32 * 9])
-                .collect();
+            let terminal: Vec<[u32; 2]> =
+                (0..n).map(|_| [next(3) as u32 * 7, next(3) as u32 * 9]).collect();
             let mut graph = Graph::default();
             for k in 0..n {
                 let arcs = neighbor[k].map(|other| {

@@ -118,12 +118,7 @@ impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
             return Ok(());
         };
         vertices.sort_unstable();
-        claims.push(Claim {
-            vertices,
-            kind,
-            number,
-            in_core,
-        })
+        claims.push(Claim { vertices, kind, number, in_core })
     }
 
     /// Makes room behind the host's scratch map for the numbers of vertices without tetrahedra; returns where.

@@ -61,10 +61,7 @@ pub(super) fn choose<P: Pages>(
     if let Some(natural) = natural {
         *natural = interface_points(core, &labels);
     }
-    let mut report = InterfaceReport {
-        free_tets: free.len() as u64,
-        ..InterfaceReport::default()
-    };
+    let mut report = InterfaceReport { free_tets: free.len() as u64, ..InterfaceReport::default() };
     let mut moves = Moves::new(core, labels, surface, rim);
     report.natural = measure(core, &moves.labels, rim);
     report.natural.pinched = moves.count_pinched(core, &free);
@@ -129,9 +126,7 @@ fn minimum_cut<P: Pages>(
         }
     }
     core.clear_scratch();
-    let held = cuts
-        .iter()
-        .map(|(tets, graph)| 4 * tets.capacity() as u64 + graph.bytes());
+    let held = cuts.iter().map(|(tets, graph)| 4 * tets.capacity() as u64 + graph.bytes());
     size_of_val(&order[..]) as u64 + sorting.max(held.sum())
 }
 

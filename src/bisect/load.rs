@@ -111,11 +111,7 @@ fn divide(tet: Sized4, h: &SizeAt, stack: &mut Vec<Sized4>, visit: &mut impl FnM
         } else {
             load_of_tet(1.0, sizes)
         };
-        visit(&Piece {
-            points,
-            load: density * volume.max(0.0),
-            h: mean,
-        });
+        visit(&Piece { points, load: density * volume.max(0.0), h: mean });
     }
 }
 
@@ -133,12 +129,6 @@ fn longest(p: &[Point; 4]) -> (f64, [usize; 2]) {
 
 /// The load of the whole mesh.
 pub fn load_of<P: Pages>(mesh: &mut Mesh<P>, h: &SizeAt) -> f64 {
-    let sums = tally(
-        mesh,
-        h,
-        || 0.0,
-        &mut |_| (),
-        |sum, piece| *sum += piece.load,
-    );
+    let sums = tally(mesh, h, || 0.0, &mut |_| (), |sum, piece| *sum += piece.load);
     sums.into_iter().sum()
 }

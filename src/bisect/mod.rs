@@ -128,28 +128,16 @@ pub fn refine<P: Pages>(
     plane::set_sizes(host, plan.h);
     let plane = plane::choose(host, plan.h, plan.bounds.low, plan.low, plan.method.plane);
     seconds.plane = clock.elapsed().as_secs_f64();
-    let zone = Zone {
-        cut: plan.cut,
-        surface: plane.plane,
-    };
+    let zone = Zone { cut: plan.cut, surface: plane.plane };
     let field = Field {
         lengths: plan.method.lengths,
         h: plan.h,
-        place: &zone::InZone {
-            zone: &zone,
-            earlier: plan.earlier,
-            h: plan.h,
-        },
+        place: &zone::InZone { zone: &zone, earlier: plan.earlier, h: plan.h },
         bounds: plan.bounds,
     };
     let refine = saturate(host, &field, space, &mut |n| progress("refine the zone", n))?;
     seconds.zone = clock.elapsed().as_secs_f64() - seconds.plane;
-    Ok(Refined {
-        zone,
-        plane,
-        refine,
-        seconds,
-    })
+    Ok(Refined { zone, plane, refine, seconds })
 }
 
 /// The second part of [`open`]: the interface is chosen in `core`, which must be empty; `faces` learns what it was and is.
@@ -161,12 +149,7 @@ pub fn choose<P: Pages, Q: Pages>(
     mut faces: Option<&mut InterfaceFaces>,
     progress: &dyn Fn(&'static str, u64),
 ) -> Opened {
-    let Refined {
-        zone,
-        plane,
-        refine,
-        mut seconds,
-    } = refined;
+    let Refined { zone, plane, refine, mut seconds } = refined;
     let clock = Instant::now();
     progress("choose the interface", 0);
     let rim = core::extract(host, core, &zone.surface);

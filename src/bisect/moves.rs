@@ -403,10 +403,6 @@ pub struct Steps {
 
 impl Default for Steps {
     fn default() -> Self {
-        Self {
-            minimum_cut: true,
-            vertex_moves: true,
-            tet_moves: true,
-        }
+        Self { minimum_cut: true, vertex_moves: true, tet_moves: true }
     }
 }

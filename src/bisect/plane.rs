@@ -34,10 +34,7 @@ pub enum PlaneChoice {
     #[default]
     Load,
     /// As the paper says: centroids of the mesh, unweighted; the axis of the largest moment; placed by load.
-    #[cfg_attr(
-        not(feature = "internals"),
-        allow(dead_code, reason = "for comparison")
-    )]
+    #[cfg_attr(not(feature = "internals"), allow(dead_code, reason = "for comparison"))]
     Centroids,
     /// As `Load`, but shared by volume: what becomes of the balance when sizes do not count.
     Volume,
@@ -80,9 +77,7 @@ pub fn choose<P: Pages>(
                 let spread = grid.spread(axis);
                 spread.at(spread.quantile(low)).area
             });
-            let scores = (0..)
-                .zip(areas)
-                .map(|(k, a)| if k < 3 { 1.01 * a } else { a });
+            let scores = (0..).zip(areas).map(|(k, a)| if k < 3 { 1.01 * a } else { a });
             let best = scores.zip(0..).min_by(|a, b| a.0.total_cmp(&b.0));
             let best: usize = best.expect("there are axes").1;
             match best.checked_sub(3) {
@@ -166,11 +161,7 @@ impl Grid {
             }
             (along.iter_mut().zip(more_along)).for_each(|(ramps, more)| ramps.add_all(more));
         }
-        let grid = Self {
-            low: bounds.low,
-            width,
-            cells,
-        };
+        let grid = Self { low: bounds.low, width, cells };
         let along = along.into_iter().map(Ramps::sum_up).collect();
         ((grid, along), seen)
     }
@@ -195,12 +186,10 @@ impl Grid {
 
     fn spread(&self, axis: Point) -> Spread {
         let half = (self.width * 0.5).abs().dot(axis.abs());
-        let ends = self
-            .filled()
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], (p, _)| {
-                let s = axis.dot(p);
-                [l.min(s - half), h.max(s + half)]
-            });
+        let ends = self.filled().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], (p, _)| {
+            let s = axis.dot(p);
+            [l.min(s - half), h.max(s + half)]
+        });
         let mut ramps = Ramps::new(axis, ends);
         for (middle, [load, section]) in self.filled() {
             let s = axis.dot(middle);

@@ -49,12 +49,7 @@ pub(super) struct Ramps {
 
 impl Ramps {
     pub(super) fn new(axis: Point, [low, high]: [f64; 2]) -> Self {
-        Self {
-            axis,
-            low,
-            width: (high - low) / BINS as f64,
-            steps: vec![[0.0; 2]; BINS + 2],
-        }
+        Self { axis, low, width: (high - low) / BINS as f64, steps: vec![[0.0; 2]; BINS + 2] }
     }
 
     /// Spreads a body evenly over the bins between its ends.
@@ -95,13 +90,7 @@ impl Ramps {
             load.push(f64::max(sum[0], 0.0));
             section.push(f64::max(sum[1], 0.0));
         }
-        Spread {
-            axis: self.axis,
-            low: self.low,
-            width: self.width,
-            load,
-            section,
-        }
+        Spread { axis: self.axis, low: self.low, width: self.width, load, section }
     }
 }
 
@@ -145,11 +134,7 @@ impl Spread {
         let mut sum = 0.0;
         for (bin, &load) in self.load.iter().enumerate() {
             if sum + load >= wanted {
-                let part = if load > 0.0 {
-                    (wanted - sum) / load
-                } else {
-                    0.0
-                };
+                let part = if load > 0.0 { (wanted - sum) / load } else { 0.0 };
                 return self.low + (bin as f64 + part) * self.width;
             }
             sum += load;
@@ -167,10 +152,7 @@ impl Spread {
         let half = BINS / 100;
         let window = &self.section[bin.saturating_sub(half)..(bin + half).min(BINS)];
         ChosenPlane {
-            plane: Plane {
-                normal: self.axis,
-                offset,
-            },
+            plane: Plane { normal: self.axis, offset },
             load: [below, self.load.iter().sum()],
             area: window.iter().sum::<f64>() / (window.len() as f64 * self.width),
         }

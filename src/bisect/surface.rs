@@ -63,19 +63,13 @@ mod tests {
 
     #[test]
     fn the_band_of_an_edge_is_where_it_is_near() {
-        let plane = Plane {
-            normal: Point::Z,
-            offset: 1.0,
-        };
+        let plane = Plane { normal: Point::Z, offset: 1.0 };
         let (a, b) = (Point::ZERO, Point::new(3.0, 0.0, 4.0));
         let [from, to] = plane.band(a, b, 0.5).expect("it crosses the band");
         for (u, distance) in [(from, -0.5), (to, 0.5), (plane.nearest(a, b), 0.0)] {
             assert!((plane.distance(a + (b - a) * u) - distance).abs() < 1e-12);
         }
         assert_eq!(plane.band(a, Point::X, 0.5), None);
-        assert_eq!(
-            plane.band(Point::Z, Point::Z + Point::X, 0.5),
-            Some([0.0, 1.0])
-        );
+        assert_eq!(plane.band(Point::Z, Point::Z + Point::X, 0.5), Some([0.0, 1.0]));
     }
 }

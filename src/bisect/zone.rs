@@ -164,13 +164,7 @@ mod tests {
 
     #[test]
     fn the_limit_is_noisy_within_its_bounds_and_continuous() {
-        let zone = Zone {
-            cut: 3,
-            surface: Plane {
-                normal: Point::X,
-                offset: 0.5,
-            },
-        };
+        let zone = Zone { cut: 3, surface: Plane { normal: Point::X, offset: 0.5 } };
         let (mut least, mut most) = (f64::INFINITY, 0f64);
         let mut before = None::<f64>;
         for i in 0..40_000 {

@@ -121,16 +121,7 @@ impl<P: Pages> Patch<'_, P> {
                 }
             }
             let slack = width.times(&Dyadic::from(0.03125));
-            for share in [
-                self.effort.lean,
-                0.5,
-                0.375,
-                0.625,
-                0.25,
-                0.75,
-                0.125,
-                0.875,
-            ] {
+            for share in [self.effort.lean, 0.5, 0.375, 0.625, 0.25, 0.75, 0.125, 0.875] {
                 let t = low.plus(&width.times(&Dyadic::from(share)));
                 let exact = ExactPoint::combination(pa, &[(pb, &t.shortened(&slack))]);
                 if let Some(x) = self.star(cavity, &outer, [a, b, b], exact) {

@@ -91,19 +91,15 @@ impl<P: Pages> Patch<'_, P> {
             .and_then(|t| shell(self, t, p, q))
             .ok_or(Trouble::Broken("an edge of a facet is not there"))?;
         let n = around.ring.len();
-        let side: Vec<f64> = around
-            .ring
-            .iter()
-            .map(|&r| self.orient([f[0], f[1], f[2], r]))
-            .collect();
+        let side: Vec<f64> =
+            around.ring.iter().map(|&r| self.orient([f[0], f[1], f[2], r])).collect();
         for i in 0..n {
             let j = (i + 1) % n;
             let (x, y) = (around.ring[i], around.ring[j]);
             if side[i] == 0.0 {
                 // A reference off the plane tells left from right.
-                let k = (0..n)
-                    .find(|&k| side[k] != 0.0)
-                    .ok_or(Trouble::Broken("a shell is flat"))?;
+                let k =
+                    (0..n).find(|&k| side[k] != 0.0).ok_or(Trouble::Broken("a shell is flat"))?;
                 let turn = self.orient([p, q, x, around.ring[k]]);
                 if (turn > 0.0) == (side[k] > 0.0) && turn != 0.0 {
                     return Ok(Left::Face(x));
@@ -118,9 +114,7 @@ impl<P: Pages> Patch<'_, P> {
                 }
             }
         }
-        Err(Trouble::Broken(
-            "nothing lies on the left of a facet's edge",
-        ))
+        Err(Trouble::Broken("nothing lies on the left of a facet's edge"))
     }
 
     /// The facet of `part` that the edge passes through, and where: volumes of the edge with the sides opposite the corners, as
@@ -132,14 +126,9 @@ impl<P: Pages> Patch<'_, P> {
             let c = f.map(|v| self.position_of(v));
             let over = [(1, 2), (2, 0), (0, 1)].map(|(i, j)| (c[i] - p).cross(c[j] - p).dot(q - p));
             let sum: f64 = over.iter().sum();
-            over.map(|o| o / sum)
-                .into_iter()
-                .fold(f64::INFINITY, f64::min)
+            over.map(|o| o / sum).into_iter().fold(f64::INFINITY, f64::min)
         };
-        let guess = part
-            .facets
-            .iter()
-            .max_by(|f, g| depth(f).total_cmp(&depth(g)));
+        let guess = part.facets.iter().max_by(|f, g| depth(f).total_cmp(&depth(g)));
         guess.into_iter().chain(&part.facets).find_map(|&f| {
             let over = [(1, 2), (2, 0), (0, 1)]
                 .map(|(i, j)| self.orient_exact([above, below, f[i], f[j]]));
@@ -157,9 +146,8 @@ impl<P: Pages> Patch<'_, P> {
             return Err(Trouble::Crossed([above, below, below]));
         }
         let outer = self.outer_faces(&around.tets);
-        let (f, [over_a, over_b, over_c]) = self
-            .facet_at(part, above, below)
-            .ok_or(Trouble::Broken("an edge crosses no facet"))?;
+        let (f, [over_a, over_b, over_c]) =
+            self.facet_at(part, above, below).ok_or(Trouble::Broken("an edge crosses no facet"))?;
         let [a, b, c] = f.map(|v| self.position(v));
         let sum = over_a.plus(&over_b).plus(&over_c);
         let share = |terms| Some((over_b.over(&sum, terms)?, over_c.over(&sum, terms)?));
@@ -175,19 +163,12 @@ impl<P: Pages> Patch<'_, P> {
             / u.length().max(v.length());
         let near = |slack: f64, s: &Dyadic, t: &Dyadic| {
             let slack = Dyadic::from(slack);
-            let short = [s, t].map(|x| {
-                if slack.sign() > 0 {
-                    x.shortened(&slack)
-                } else {
-                    x.clone()
-                }
-            });
+            let short =
+                [s, t].map(|x| if slack.sign() > 0 { x.shortened(&slack) } else { x.clone() });
             let rest = Dyadic::from(1.0).minus(&short[0]).minus(&short[1]);
             // On a side of the facet only where the part goes on beyond it.
             let least = if part.facets.len() > 1 { 0 } else { 1 };
-            let inside = [&short[0], &short[1], &rest]
-                .iter()
-                .all(|s| s.sign() >= least);
+            let inside = [&short[0], &short[1], &rest].iter().all(|s| s.sign() >= least);
             inside.then(|| ExactPoint::combination(a, &[(b, &short[0]), (c, &short[1])]))
         };
         for slack in [0.02, 1e-4, 1e-7] {

@@ -30,52 +30,21 @@ pub(super) const EFFORTS: [Effort; 13] = {
         reversed: false,
         exact: false,
     };
-    let roomy = Effort {
-        piece_min: 1e-3,
-        ..first
-    };
-    let deep = Effort {
-        flip_level: 3,
-        flip_work: 1000,
-        ..first
-    };
+    let roomy = Effort { piece_min: 1e-3, ..first };
+    let deep = Effort { flip_level: 3, flip_work: 1000, ..first };
     [
         first,
-        Effort {
-            reversed: true,
-            ..first
-        },
+        Effort { reversed: true, ..first },
         roomy,
-        Effort {
-            reversed: true,
-            ..roomy
-        },
+        Effort { reversed: true, ..roomy },
         deep,
-        Effort {
-            reversed: true,
-            ..deep
-        },
+        Effort { reversed: true, ..deep },
         Effort { lean: 0.1, ..first },
         Effort { lean: 0.9, ..first },
-        Effort {
-            lean: 0.1,
-            reversed: true,
-            ..deep
-        },
+        Effort { lean: 0.1, reversed: true, ..deep },
         Effort { lean: 0.9, ..deep },
-        Effort {
-            exact: true,
-            ..first
-        },
-        Effort {
-            exact: true,
-            reversed: true,
-            ..deep
-        },
-        Effort {
-            exact: true,
-            lean: 0.1,
-            ..roomy
-        },
+        Effort { exact: true, ..first },
+        Effort { exact: true, reversed: true, ..deep },
+        Effort { exact: true, lean: 0.1, ..roomy },
     ]
 };

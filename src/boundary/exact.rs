@@ -20,20 +20,12 @@ impl ExactPoint {
         let rounded = Point::from_array([0, 1, 2].map(|i| exact[i].estimate()));
         let known = rounded.to_array().map(Dyadic::from);
         let rest = Point::from_array([0, 1, 2].map(|i| exact[i].minus(&known[i]).estimate()));
-        Self {
-            exact,
-            rounded,
-            rest,
-        }
+        Self { exact, rounded, rest }
     }
 
     /// A point as it is.
     pub(super) fn explicit(p: Point) -> Self {
-        Self {
-            exact: p.to_array().map(Dyadic::from),
-            rounded: p,
-            rest: Point::ZERO,
-        }
+        Self { exact: p.to_array().map(Dyadic::from), rounded: p, rest: Point::ZERO }
     }
 
     /// `base + Σ share · (to - base)`.
@@ -97,11 +89,7 @@ pub(super) fn orient_filtered(p: [Placed<'_>; 4]) -> Option<f64> {
     let (u, v, w) = (p[1].point - a, p[2].point - a, p[3].point - a);
     let det = u.dot(v.cross(w));
     // Rounding of positions moves each coordinate by less than this.
-    let off = 2.0
-        * EPSILON
-        * p.iter()
-            .map(|p| p.point.abs().max_element())
-            .fold(0.0, f64::max);
+    let off = 2.0 * EPSILON * p.iter().map(|p| p.point.abs().max_element()).fold(0.0, f64::max);
     let m = u.abs().max(v.abs()).max(w.abs()) + Point::splat(2.0 * off);
     let pairs = m.x * m.y + m.y * m.z + m.z * m.x;
     let is_sure = det.abs() > ORIENT_BOUND * (m.x * m.y * m.z) + 24.0 * off * pairs
@@ -123,12 +111,8 @@ pub(super) fn orient_in_pairs(p: [Placed<'_>; 4]) -> Option<f64> {
     let det = x.plus(y).plus(z).value();
     let largest = [a, b, c, d].map(|q| q.0.abs().max_element());
     let off = PAIR_OFF * largest.into_iter().fold(0.0, f64::max);
-    let size = |i: usize| {
-        [u, v, w]
-            .map(|x| x[i].value().abs())
-            .into_iter()
-            .fold(2.0 * off, f64::max)
-    };
+    let size =
+        |i: usize| [u, v, w].map(|x| x[i].value().abs()).into_iter().fold(2.0 * off, f64::max);
     let m = [0, 1, 2].map(size);
     let pairs = m[0] * m[1] + m[1] * m[2] + m[2] * m[0];
     let is_sure = det.abs() > PAIR_BOUND * (m[0] * m[1] * m[2]) + 24.0 * off * pairs
@@ -168,14 +152,8 @@ mod tests {
             let [s, t] = [97.3, 131.7].map(|n| Dyadic::from(f64::from(k) / n));
             let on_edge = ExactPoint::combination(a, &[(b, &s)]);
             let in_face = ExactPoint::combination(a, &[(b, &s), (c, &t)]);
-            let x = Placed {
-                point: on_edge.rounded(),
-                exact: Some(&on_edge),
-            };
-            let y = Placed {
-                point: in_face.rounded(),
-                exact: Some(&in_face),
-            };
+            let x = Placed { point: on_edge.rounded(), exact: Some(&on_edge) };
+            let y = Placed { point: in_face.rounded(), exact: Some(&in_face) };
             assert_eq!(orient_placed([place(a), place(b), x, place(d)]), 0.0);
             assert_eq!(orient_placed([place(a), place(b), place(c), y]), 0.0);
             assert_eq!(orient_placed([x, place(b), place(c), y]), 0.0);

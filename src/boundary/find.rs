@@ -68,13 +68,7 @@ pub(super) fn crossing_edges<S: Space>(
         next += 1;
         let tet = s.tet(at);
         let v = tet.vertices();
-        let side = v.map(|v| {
-            if f.contains(&v) {
-                0.0
-            } else {
-                s.orient([f[0], f[1], f[2], v])
-            }
-        });
+        let side = v.map(|v| if f.contains(&v) { 0.0 } else { s.orient([f[0], f[1], f[2], v]) });
         for i in 0..4 {
             for j in 0..4 {
                 if side[i] > 0.0 && side[j] < 0.0 && known.insert((v[i], v[j])) {

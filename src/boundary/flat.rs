@@ -21,11 +21,7 @@ pub(super) struct FlatPart {
 
 impl FlatPart {
     fn one(f: [u32; 3]) -> Self {
-        Self {
-            facets: vec![f],
-            rim: sides(f).to_vec(),
-            inner: Vec::new(),
-        }
+        Self { facets: vec![f], rim: sides(f).to_vec(), inner: Vec::new() }
     }
 
     /// Whether `v` is a corner of one of its facets.
@@ -37,11 +33,7 @@ impl FlatPart {
     pub(super) fn renamed(&self, mut name: impl FnMut(u32) -> u32) -> Self {
         let facets = self.facets.iter().map(|f| f.map(&mut name)).collect();
         let mut pairs = |all: &[(u32, u32)]| all.iter().map(|&(a, b)| (name(a), name(b))).collect();
-        Self {
-            facets,
-            rim: pairs(&self.rim),
-            inner: pairs(&self.inner),
-        }
+        Self { facets, rim: pairs(&self.rim), inner: pairs(&self.inner) }
     }
 }
 

@@ -45,14 +45,7 @@ pub(super) struct Flipper<'a, S: Space> {
 
 impl<'a, S: Space> Flipper<'a, S> {
     pub(super) fn new(s: &'a mut S, target: RecoveryTarget) -> Self {
-        Self {
-            s,
-            target,
-            log: Vec::new(),
-            work: 0,
-            crossings_max: CROSSINGS_MAX,
-            flips: 0,
-        }
+        Self { s, target, log: Vec::new(), work: 0, crossings_max: CROSSINGS_MAX, flips: 0 }
     }
 
     /// Makes everything done so far final.
@@ -96,9 +89,7 @@ impl<'a, S: Space> Flipper<'a, S> {
             return false;
         }
         let target = self.target;
-        let clear = [p, q, r]
-            .into_iter()
-            .all(|x| target.allows_edge(self.s, h, e, [x, x]));
+        let clear = [p, q, r].into_iter().all(|x| target.allows_edge(self.s, h, e, [x, x]));
         if clear {
             self.apply(vec![t, across.tet()], &new);
         }
@@ -163,11 +154,8 @@ impl<'a, S: Space> Flipper<'a, S> {
         let n = around.ring.len();
         let mut found = Vec::new();
         for i in 0..n {
-            let (x, r, y) = (
-                around.ring[(i + n - 1) % n],
-                around.ring[i],
-                around.ring[(i + 1) % n],
-            );
+            let (x, r, y) =
+                (around.ring[(i + n - 1) % n], around.ring[i], around.ring[(i + 1) % n]);
             if x == y {
                 continue;
             }

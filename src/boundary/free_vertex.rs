@@ -10,11 +10,8 @@ use crate::mesh::anatomy::EDGES;
 /// No tetrahedron may become flatter than `least`, and none flat.
 pub(super) fn remove_free<S: Space>(s: &mut S, x: u32, least: f64) -> bool {
     let ball = ball(s, x);
-    let link: IdSet<u32> = ball
-        .iter()
-        .flat_map(|&t| s.tet(t).vertices())
-        .filter(|&v| v != x)
-        .collect();
+    let link: IdSet<u32> =
+        ball.iter().flat_map(|&t| s.tet(t).vertices()).filter(|&v| v != x).collect();
     let mut link: Vec<u32> = link.into_iter().collect();
     link.sort_unstable();
     let mut best: Option<(f64, Vec<[u32; 4]>)> = None;
@@ -23,10 +20,7 @@ pub(super) fn remove_free<S: Space>(s: &mut S, x: u32, least: f64) -> bool {
         let Some(quads) = moved(s, x, u, &ball, &mut blocking) else {
             continue;
         };
-        let worst = quads
-            .iter()
-            .map(|&q| flatness(s, q))
-            .fold(f64::INFINITY, f64::min);
+        let worst = quads.iter().map(|&q| flatness(s, q)).fold(f64::INFINITY, f64::min);
         if best.as_ref().is_none_or(|b| worst > b.0) {
             best = Some((worst, quads));
         }
@@ -83,9 +77,6 @@ pub(super) fn ball_flatness<S: Space>(s: &mut S, x: u32) -> f64 {
 fn flatness<S: Space>(s: &mut S, q: [u32; 4]) -> f64 {
     let volume = s.orient(q);
     let p = q.map(|v| s.position(v));
-    let longest = EDGES
-        .iter()
-        .map(|&[i, j]| p[i].distance(p[j]))
-        .fold(0.0, f64::max);
+    let longest = EDGES.iter().map(|&[i, j]| p[i].distance(p[j])).fold(0.0, f64::max);
     volume / (longest * longest * longest)
 }

@@ -109,10 +109,7 @@ pub(super) fn grow<S: Space>(
     let mut lost: Vec<u32> = Vec::new();
     for &t in &cavity {
         let v = s.tet(t).vertices();
-        lost.extend(
-            v.into_iter()
-                .filter(|&v| !rim.contains(&v) && Some(v) != open),
-        );
+        lost.extend(v.into_iter().filter(|&v| !rim.contains(&v) && Some(v) != open));
         for [i, j] in EDGES {
             let (a, b) = (v[i], v[j]);
             let is_lost =
@@ -128,9 +125,5 @@ pub(super) fn grow<S: Space>(
     }
     lost.sort_unstable();
     lost.dedup();
-    Ok(Grown {
-        cavity,
-        quads,
-        lost,
-    })
+    Ok(Grown { cavity, quads, lost })
 }

@@ -114,21 +114,12 @@ mod tests {
 
     #[test]
     fn the_center_of_a_corner_is_as_far_as_the_cube_allows() {
-        let walls = [Point::X, Point::Y, Point::Z].map(|n| HalfSpace {
-            normal: -n,
-            offset: 0.0,
-        });
+        let walls = [Point::X, Point::Y, Point::Z].map(|n| HalfSpace { normal: -n, offset: 0.0 });
         let p = center(&walls, 2.0).expect("a corner has room");
         assert!(p.min_element() > 0.5, "{p}");
         let slab = [
-            HalfSpace {
-                normal: Point::X,
-                offset: 1e-6,
-            },
-            HalfSpace {
-                normal: -Point::X,
-                offset: 0.0,
-            },
+            HalfSpace { normal: Point::X, offset: 1e-6 },
+            HalfSpace { normal: -Point::X, offset: 0.0 },
         ];
         let p = center(&slab, 1.0).expect("a slab has room");
         assert!((p.x - 5e-7).abs() < 1e-12, "{p}");

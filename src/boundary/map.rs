@@ -54,9 +54,7 @@ pub(super) fn map<P: Pages>(mesh: &mut Mesh<P>) -> MissingFacets {
     let part = |n: u32| n..end.min(n + PART as u32);
     let parts: Vec<Range<u32>> = (0..end).step_by(PART).map(part).collect();
     for parts in parts.chunks(PARTS) {
-        let found = scan_parts(mesh, parts, &FacesOfFacets)
-            .into_iter()
-            .flatten();
+        let found = scan_parts(mesh, parts, &FacesOfFacets).into_iter().flatten();
         for (n, face) in (parts[0].start..).zip(found) {
             let mut facet = mesh.facet(n);
             let f = facet.vertices;

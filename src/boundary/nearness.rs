@@ -46,10 +46,9 @@ impl fmt::Display for Nearness {
                 f,
                 "triangles {t} and {u} are {value:.1e} of their size apart near {a:?} {b:?}"
             ),
-            NearnessKind::Height => write!(
-                f,
-                "triangle {t} is {value:.1e} of its length high at the edge {a:?} {b:?}"
-            ),
+            NearnessKind::Height => {
+                write!(f, "triangle {t} is {value:.1e} of its length high at the edge {a:?} {b:?}")
+            }
         }
     }
 }
@@ -87,9 +86,7 @@ pub(super) fn narrowest<P: Pages>(mesh: &mut Mesh<P>, facets: &[u32]) -> Option<
 }
 
 fn height((f, p): &(Facet, [Point; 3])) -> Nearness {
-    let k = (0..3)
-        .max_by(|&i, &j| length(p, i).total_cmp(&length(p, j)))
-        .unwrap_or(0);
+    let k = (0..3).max_by(|&i, &j| length(p, i).total_cmp(&length(p, j))).unwrap_or(0);
     let [a, b, c] = [0, 1, 2].map(|i| p[(k + i) % 3]);
     let along = b - a;
     Nearness {
@@ -120,9 +117,7 @@ fn between((f, p): &(Facet, [Point; 3]), (g, q): &(Facet, [Point; 3])) -> Option
             value: u.cross(v).length().atan2(u.dot(v)),
         });
     }
-    let size = (0..3)
-        .map(|i| length(p, i).max(length(q, i)))
-        .fold(0.0, f64::max);
+    let size = (0..3).map(|i| length(p, i).max(length(q, i))).fold(0.0, f64::max);
     let mut nearest: Option<[Point; 2]> = None;
     let mut note = |x: Point, y: Point| {
         if nearest.is_none_or(|[a, b]| x.distance(y) < a.distance(b)) {
@@ -145,20 +140,14 @@ fn between((f, p): &(Facet, [Point; 3]), (g, q): &(Facet, [Point; 3])) -> Option
         }
     }
     let at = nearest?;
-    Some(Nearness {
-        kind: NearnessKind::Gap,
-        inputs,
-        at,
-        value: at[0].distance(at[1]) / size,
-    })
+    Some(Nearness { kind: NearnessKind::Gap, inputs, at, value: at[0].distance(at[1]) / size })
 }
 
 /// The foot of `x` on the triangle, if it is inside.
 fn on_triangle(x: Point, [a, b, c]: &[Point; 3]) -> Option<Point> {
     let n = (*b - *a).cross(*c - *a);
-    let inside = [(a, b), (b, c), (c, a)]
-        .into_iter()
-        .all(|(p, q)| (*q - *p).cross(x - *p).dot(n) >= 0.0);
+    let inside =
+        [(a, b), (b, c), (c, a)].into_iter().all(|(p, q)| (*q - *p).cross(x - *p).dot(n) >= 0.0);
     (inside && n != Point::ZERO).then(|| x - n * ((x - *a).dot(n) / n.length_squared()))
 }
 
@@ -167,11 +156,7 @@ fn nearest_on([a, b]: [Point; 2], [c, d]: [Point; 2]) -> [Point; 2] {
     let (u, v, w) = (b - a, d - c, a - c);
     let (uu, uv, vv, uw, vw) = (u.dot(u), u.dot(v), v.dot(v), u.dot(w), v.dot(w));
     let det = uu * vv - uv * uv;
-    let s = if det > 0.0 {
-        ((uv * vw - vv * uw) / det).clamp(0.0, 1.0)
-    } else {
-        0.0
-    };
+    let s = if det > 0.0 { ((uv * vw - vv * uw) / det).clamp(0.0, 1.0) } else { 0.0 };
     let t = ((uv * s + vw) / vv).clamp(0.0, 1.0);
     // With one clamped, the other has to be found again.
     let s = ((uv * t - uw) / uu).clamp(0.0, 1.0);

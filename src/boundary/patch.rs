@@ -55,10 +55,7 @@ pub(super) struct Patch<'m, P: Pages> {
     pub effort: Effort,
 }
 
-const FREE: Tet = Tet {
-    node: [NONE; 4],
-    neighbor: [FaceRef::NONE; 4],
-};
+const FREE: Tet = Tet { node: [NONE; 4], neighbor: [FaceRef::NONE; 4] };
 
 impl<'m, P: Pages> Patch<'m, P> {
     /// An empty patch.
@@ -104,10 +101,7 @@ impl<'m, P: Pages> Patch<'m, P> {
                 self.tets[inside.tet() as usize].neighbor[inside.face()] = FaceRef::new(t, i);
             } else if outside.exists() {
                 let k = self.borders.len() as u32;
-                self.borders.push(Border {
-                    outside,
-                    inside: FaceRef::new(t, i),
-                });
+                self.borders.push(Border { outside, inside: FaceRef::new(t, i) });
                 self.border_of.insert(outside.0, k);
                 tet.neighbor[i] = FaceRef(BORDER | k);
             }
@@ -255,10 +249,7 @@ impl<'m, P: Pages> Patch<'m, P> {
 
     fn placed(&self, v: u32) -> Placed<'_> {
         let v = &self.vertices[v as usize];
-        Placed {
-            point: v.point,
-            exact: v.exact.as_ref(),
-        }
+        Placed { point: v.point, exact: v.exact.as_ref() }
     }
 
     /// Six times the signed volume, without rounding.
@@ -279,9 +270,7 @@ impl<'m, P: Pages> Patch<'m, P> {
     /// Whether the patch may be written: no exact point is in use, and all volumes are positive as rounded.
     pub(super) fn is_sound(&self) -> bool {
         self.live().all(|t| {
-            let v = self.tets[t as usize]
-                .vertices()
-                .map(|v| &self.vertices[v as usize]);
+            let v = self.tets[t as usize].vertices().map(|v| &self.vertices[v as usize]);
             v.iter().all(|v| v.exact.is_none())
                 && orient(v[0].point, v[1].point, v[2].point, v[3].point) > 0.0
         })

@@ -82,10 +82,7 @@ fn recover_group<P: Pages>(
         }
     }
     for n in left {
-        assert!(
-            require_facet(mesh, n),
-            "facet {n} was recovered and is not there"
-        );
+        assert!(require_facet(mesh, n), "facet {n} was recovered and is not there");
     }
     Ok(())
 }
@@ -185,17 +182,12 @@ fn try_parts<P: Pages>(
     report: &mut RecoveryReport,
 ) -> Result<(), Trouble> {
     let mut patch = Patch::new(mesh, protected, effort);
-    let mut local: Vec<FlatPart> = parts
-        .iter()
-        .map(|p| p.renamed(|v| patch.vertex(v)))
-        .collect();
+    let mut local: Vec<FlatPart> = parts.iter().map(|p| p.renamed(|v| patch.vertex(v))).collect();
     if effort.reversed {
         local.reverse();
     }
-    let mut skin = CavitySkin {
-        facets: local.iter().map(|p| p.facets[0]).collect(),
-        ..CavitySkin::default()
-    };
+    let mut skin =
+        CavitySkin { facets: local.iter().map(|p| p.facets[0]).collect(), ..CavitySkin::default() };
     let outcome = build(&mut patch, &mut skin, &local);
     let named = |trouble| match trouble {
         Trouble::Vertex(v) => Trouble::Vertex(patch.mesh_id(v)),
@@ -209,12 +201,7 @@ fn try_parts<P: Pages>(
     let n_facets: usize = local.iter().map(|p| p.facets.len()).sum();
     let is_whole =
         |p: &FlatPart| p.facets.len() > 1 || skin.faces.contains_key(&sorted(p.facets[0]));
-    let own: IdSet<u32> = local
-        .iter()
-        .flat_map(|p| &p.facets)
-        .flatten()
-        .copied()
-        .collect();
+    let own: IdSet<u32> = local.iter().flat_map(|p| &p.facets).flatten().copied().collect();
     let adds_none = skin.faces.keys().flatten().all(|v| own.contains(v));
     if !local.iter().all(is_whole)
         || skin.faces.len() != n_facets

@@ -52,10 +52,9 @@ impl RegionPolicy {
                 // A wall given once from each side, as two touching solids do, is crossed twice.
                 let step = |w: &Wall| i64::from(w.front != w.back);
                 match spread(outside, end, walls, step, 2) {
-                    Some(depth) => all
-                        .into_iter()
-                        .filter(|&v| depth[v as usize].rem_euclid(2) == 1)
-                        .collect(),
+                    Some(depth) => {
+                        all.into_iter().filter(|&v| depth[v as usize].rem_euclid(2) == 1).collect()
+                    }
                     None => {
                         all_instead_of_parity = true;
                         all
@@ -64,16 +63,10 @@ impl RegionPolicy {
             }
             Self::ByOrientation => {
                 let winding = winding(outside, end, walls)?;
-                all.into_iter()
-                    .filter(|&v| winding[v as usize] > 0)
-                    .collect()
+                all.into_iter().filter(|&v| winding[v as usize] > 0).collect()
             }
         };
-        Ok(Filled {
-            volumes,
-            names: BTreeMap::new(),
-            all_instead_of_parity,
-        })
+        Ok(Filled { volumes, names: BTreeMap::new(), all_instead_of_parity })
     }
 }
 

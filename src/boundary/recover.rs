@@ -95,10 +95,7 @@ fn explain<P: Pages>(
 /// Facet `n` for a message.
 pub(super) fn place<P: Pages>(mesh: &mut Mesh<P>, n: u32) -> FacetPlace {
     let facet = mesh.facet(n);
-    FacetPlace {
-        input: facet.input,
-        corners: facet.vertices.map(|v| mesh.point(v)),
-    }
+    FacetPlace { input: facet.input, corners: facet.vertices.map(|v| mesh.point(v)) }
 }
 
 /// Segments that run within flat parts of the surface.

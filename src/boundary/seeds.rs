@@ -21,11 +21,7 @@ pub struct RegionRule {
 impl From<RegionPolicy> for RegionRule {
     fn from(policy: RegionPolicy) -> Self {
         let (seeds, names) = (Vec::new(), Vec::new());
-        Self {
-            policy,
-            seeds,
-            names,
-        }
+        Self { policy, seeds, names }
     }
 }
 
@@ -71,10 +67,7 @@ impl RegionRule {
         }
         filled.volumes.retain(|v| !holes.contains_key(v));
         if let Some((_, seed)) = (regions.iter()).find(|(v, _)| !filled.volumes.contains(v)) {
-            return Err(wrong(
-                seed,
-                "lies in a region that stays empty under the chosen rule",
-            ));
+            return Err(wrong(seed, "lies in a region that stays empty under the chosen rule"));
         }
         filled.names = names(&regions);
         self.take_names(&mut filled, volume_of);
@@ -92,10 +85,7 @@ impl RegionRule {
         for (volume, all) in found {
             if let (1, true) = (all.len(), filled.volumes.contains(&volume)) {
                 let name = all.into_iter().next().unwrap_or_default();
-                filled
-                    .names
-                    .entry(volume)
-                    .or_insert_with(|| name.to_owned());
+                filled.names.entry(volume).or_insert_with(|| name.to_owned());
             }
         }
     }
@@ -114,8 +104,5 @@ fn wrong(seed: &Seed, what: &str) -> BoundaryError {
         SeedKind::Hole => "hole",
         SeedKind::Region(_) => "region seed",
     };
-    BoundaryError::Seed {
-        message: format!("the {seed_word} {seed} {what}"),
-        point: seed.point,
-    }
+    BoundaryError::Seed { message: format!("the {seed_word} {seed} {what}"), point: seed.point }
 }

@@ -53,9 +53,7 @@ impl<P: Pages> Patch<'_, P> {
                 break;
             }
         }
-        Err(Trouble::Precision(
-            "doubles leave no place beside its neighbors",
-        ))
+        Err(Trouble::Precision("doubles leave no place beside its neighbors"))
     }
 
     /// Moves free vertex `v` to the middle of what sees its ball, to a double if one sees it.
@@ -94,9 +92,7 @@ impl<P: Pages> Patch<'_, P> {
         }
         let mut share = 1.0;
         while share > 1e-3 {
-            let exact = self
-                .exact_place(v)
-                .moved(best * share, &Dyadic::from(then * share * FINE));
+            let exact = self.exact_place(v).moved(best * share, &Dyadic::from(then * share * FINE));
             if self.try_place(v, &ball, (exact.rounded(), Some(exact))) {
                 return true;
             }

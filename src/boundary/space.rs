@@ -72,13 +72,8 @@ pub(super) trait Space {
             }
         }
         sides.sort_unstable_by_key(|s| (s.key, s.shapes));
-        let mut records: Vec<Tet> = new
-            .iter()
-            .map(|&node| Tet {
-                node,
-                neighbor: [FaceRef::NONE; 4],
-            })
-            .collect();
+        let mut records: Vec<Tet> =
+            new.iter().map(|&node| Tet { node, neighbor: [FaceRef::NONE; 4] }).collect();
         let place = |shapes: u32| (shapes as usize / 4, shapes as usize % 4);
         let name = |shapes: u32| FaceRef::new(ids[shapes as usize / 4], shapes as usize % 4);
         for pair in sides.chunks(2) {

@@ -19,9 +19,7 @@ impl<P: Pages> Patch<'_, P> {
         for &t in cavity {
             let tet = self.tet(t);
             outer.extend(
-                (0..4)
-                    .filter(|&i| !cavity.contains(&tet.neighbor[i].tet()))
-                    .map(|i| (tet, i)),
+                (0..4).filter(|&i| !cavity.contains(&tet.neighbor[i].tet())).map(|i| (tet, i)),
             );
         }
         outer

@@ -48,10 +48,7 @@ pub(super) struct Fan {
 /// The half-space behind a triangle; `None` when doubles see no normal.
 pub(super) fn half_space([a, b, c]: [Point; 3]) -> Option<HalfSpace> {
     let normal = (b - a).cross(c - a).normalize_or_zero();
-    (normal != Point::ZERO).then(|| HalfSpace {
-        normal,
-        offset: normal.dot(a),
-    })
+    (normal != Point::ZERO).then(|| HalfSpace { normal, offset: normal.dot(a) })
 }
 
 impl<P: Pages> Patch<'_, P> {
@@ -61,12 +58,7 @@ impl<P: Pages> Patch<'_, P> {
             let ball = ball(self, x);
             let mut link: Vec<(u32, u32)> = Vec::new();
             for &t in &ball {
-                link.extend(
-                    self.tets_vertices(t)
-                        .into_iter()
-                        .filter(|&v| v != x)
-                        .map(|v| (v, t)),
-                );
+                link.extend(self.tets_vertices(t).into_iter().filter(|&v| v != x).map(|v| (v, t)));
             }
             link.sort_unstable();
             link.dedup_by_key(|l| l.0);
@@ -173,14 +165,8 @@ impl<P: Pages> Patch<'_, P> {
                 let Some(&(facet, face)) = skin.faces.get(&sorted(tet.face(i))) else {
                     return Err(Trouble::Broken("a facet of another patch at a new vertex"));
                 };
-                let k = face
-                    .iter()
-                    .position(|&v| v == x)
-                    .expect("a face of the ball");
-                edges
-                    .entry(facet)
-                    .or_default()
-                    .insert(face[(k + 1) % 3], face[(k + 2) % 3]);
+                let k = face.iter().position(|&v| v == x).expect("a face of the ball");
+                edges.entry(facet).or_default().insert(face[(k + 1) % 3], face[(k + 2) % 3]);
             }
         }
         let mut fans = Vec::new();
@@ -201,11 +187,7 @@ impl<P: Pages> Patch<'_, P> {
             if polygon.len() != next.len() + usize::from(!closed) {
                 return Err(Trouble::Broken("a facet meets a vertex twice"));
             }
-            fans.push(Fan {
-                facet,
-                polygon,
-                closed,
-            });
+            fans.push(Fan { facet, polygon, closed });
         }
         Ok(fans)
     }
@@ -220,10 +202,7 @@ impl<P: Pages> Patch<'_, P> {
     ) -> bool {
         let candidates: Vec<u32> = match fans {
             [fan] => fan.polygon.clone(),
-            _ => vec![
-                fans[0].polygon[0],
-                *fans[0].polygon.last().expect("not empty"),
-            ],
+            _ => vec![fans[0].polygon[0], *fans[0].polygon.last().expect("not empty")],
         };
         let mut blocking = 0;
         for u in candidates {
@@ -277,18 +256,13 @@ impl<P: Pages> Patch<'_, P> {
                     return 0.0;
                 }
                 let [p, q, r] = [a, b, c].map(|v| self.position(v));
-                let longest = p
-                    .distance_squared(q)
-                    .max(q.distance_squared(r))
-                    .max(r.distance_squared(p));
+                let longest =
+                    p.distance_squared(q).max(q.distance_squared(r)).max(r.distance_squared(p));
                 ((q - p).cross(r - p).length() / longest).max(f64::MIN_POSITIVE)
             },
         );
         let triangles = found.ok_or(Trouble::Broken("a fan without outline"))?;
-        Ok(triangles
-            .into_iter()
-            .map(|t| t.map(|i| polygon[i]))
-            .collect())
+        Ok(triangles.into_iter().map(|t| t.map(|i| polygon[i])).collect())
     }
 
     /// Forgets the faces at `x`, marks the new ones.

@@ -23,10 +23,7 @@ impl RecoveryTarget {
             Self::Free => true,
             Self::Face(f) => {
                 // An edge with an end in the plane, which is on the facet or beside it, stays on its side.
-                let (sx, sy) = (
-                    s.orient([f[0], f[1], f[2], x]),
-                    s.orient([f[0], f[1], f[2], y]),
-                );
+                let (sx, sy) = (s.orient([f[0], f[1], f[2], x]), s.orient([f[0], f[1], f[2], y]));
                 sx == 0.0 || sy == 0.0 || (sx > 0.0) == (sy > 0.0) || !edge_meets_face(s, x, y, f)
             }
             Self::Plane([p, q, r]) => {
@@ -56,10 +53,7 @@ pub(super) fn edge_meets_face<S: Space>(s: &mut S, a: u32, b: u32, f: [u32; 3]) 
     if has_a || has_b {
         return edge_runs_in_face(s, a, b, f);
     }
-    let (sa, sb) = (
-        s.orient([f[0], f[1], f[2], a]),
-        s.orient([f[0], f[1], f[2], b]),
-    );
+    let (sa, sb) = (s.orient([f[0], f[1], f[2], a]), s.orient([f[0], f[1], f[2], b]));
     if sa * sb > 0.0 || (sa > 0.0 && sb > 0.0) || (sa < 0.0 && sb < 0.0) {
         return false;
     }

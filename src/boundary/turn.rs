@@ -70,12 +70,7 @@ pub(super) fn turn_segment<P: Pages>(
     b: u32,
 ) -> bool {
     let mut s = PagedSpace(mesh, &missing.protected);
-    let mut turner = Turner {
-        s: &mut s,
-        added: Vec::new(),
-        balance: 0,
-        turns: 0,
-    };
+    let mut turner = Turner { s: &mut s, added: Vec::new(), balance: 0, turns: 0 };
     let recovered = turner.recover(a, b);
     turner.clear();
     report.flips += turner.turns;
@@ -149,17 +144,12 @@ impl Turn {
     /// What lies above the plane, then below.
     fn sides(&self) -> [Side; 2] {
         let n = self.around.ring.len();
-        let from_to = [
-            (self.at_x, self.to_y),
-            (self.at_x + self.to_y, n - self.to_y),
-        ];
+        let from_to = [(self.at_x, self.to_y), (self.at_x + self.to_y, n - self.to_y)];
         let tets = from_to.map(|(from, len)| -> Vec<u32> {
             (0..len).map(|k| self.around.tets[(from + k) % n]).collect()
         });
         [0, 1].map(|i| Side {
-            ring: (0..=from_to[i].1)
-                .map(|k| self.around.ring[(from_to[i].0 + k) % n])
-                .collect(),
+            ring: (0..=from_to[i].1).map(|k| self.around.ring[(from_to[i].0 + k) % n]).collect(),
             tets: tets[i].clone(),
             others: tets[1 - i].iter().copied().collect(),
         })
@@ -230,8 +220,7 @@ impl<P: Pages> Turner<'_, '_, P> {
             }
         }
         let turn = self.plan(edge, a, b)?;
-        self.carry_out(&turn, Reach::Grown)
-            .or_else(|| self.carry_out(&turn, Reach::Crowded))
+        self.carry_out(&turn, Reach::Grown).or_else(|| self.carry_out(&turn, Reach::Crowded))
     }
 
     /// Takes away a vertex that nothing needs.
@@ -261,9 +250,8 @@ impl<P: Pages> Turner<'_, '_, P> {
             return None;
         }
         let n = around.ring.len();
-        let in_plane: Vec<usize> = (0..n)
-            .filter(|&i| self.s.orient([a, b, c, around.ring[i]]) == 0.0)
-            .collect();
+        let in_plane: Vec<usize> =
+            (0..n).filter(|&i| self.s.orient([a, b, c, around.ring[i]]) == 0.0).collect();
         let &[at_x, at_y] = in_plane.as_slice() else {
             return None;
         };
@@ -278,14 +266,7 @@ impl<P: Pages> Turner<'_, '_, P> {
             return None;
         }
         let crosses = opposite(self.s, [a, b], [x, y]);
-        Some(Turn {
-            around,
-            c,
-            d,
-            at_x,
-            to_y: at_y - at_x,
-            crosses,
-        })
+        Some(Turn { around, c, d, at_x, to_y: at_y - at_x, crosses })
     }
 
     /// Replaces the tetrahedra around the edge; `None`, and nothing changed, where there is no room.
@@ -329,12 +310,7 @@ impl<P: Pages> Turner<'_, '_, P> {
         let Some((_, new)) = best else {
             return self.join_to_new(turn, side, reach);
         };
-        Some(Half {
-            old: side.tets.clone(),
-            new,
-            added: None,
-            lost: Vec::new(),
-        })
+        Some(Half { old: side.tets.clone(), new, added: None, lost: Vec::new() })
     }
 
     /// The ring and the new triangles joined to a new vertex near the crossing.
@@ -358,11 +334,7 @@ impl<P: Pages> Turner<'_, '_, P> {
         plane(self.s, [d, y, x]);
         // Where all is seen best, or straight up from the crossing where that is too near for doubles to find.
         let up = (py - px).cross(pd - pc).normalize_or_zero() * size;
-        let up = if orient(pc, py, px, origin + up) > 0.0 {
-            up
-        } else {
-            -up
-        };
+        let up = if orient(pc, py, px, origin + up) > 0.0 { up } else { -up };
         let best = center(&planes, size);
         let is_roomy = best.is_some_and(|way| room(&planes, way) > ROOM_MIN * size);
         let p = self.s.add_steiner(origin);
@@ -427,12 +399,7 @@ impl<P: Pages> Turner<'_, '_, P> {
             // The two triangles that turn: no other outer face has the edge.
             new.retain(|q| !(q.contains(&c) && q.contains(&d)));
             new.extend(walls);
-            return Some(Half {
-                old: grown.cavity,
-                new,
-                added: Some(p),
-                lost: grown.lost,
-            });
+            return Some(Half { old: grown.cavity, new, added: Some(p), lost: grown.lost });
         }
         None
     }

@@ -55,9 +55,7 @@ pub(super) fn cone<S: Space>(s: &mut S, h: u32, b: u32) -> Option<u32> {
     ball.into_iter().find(|&t| {
         let tet = s.tet(t);
         tet.local(b).is_some()
-            || tet
-                .local(h)
-                .is_some_and(|i| leaves_cone(s, &tet, i, b, 0).is_none())
+            || tet.local(h).is_some_and(|i| leaves_cone(s, &tet, i, b, 0).is_none())
     })
 }
 
@@ -121,10 +119,8 @@ pub(super) fn opposite(tet: &Tet, c: u32, d: u32) -> Option<(usize, usize)> {
     let mut rest = (0..4).filter(|&k| k != i && k != j);
     let (k, l) = (rest.next()?, rest.next()?);
     let p = [i, j, k, l];
-    let inversions = (0..4)
-        .flat_map(|x| (x + 1..4).map(move |y| (x, y)))
-        .filter(|&(x, y)| p[x] > p[y])
-        .count();
+    let inversions =
+        (0..4).flat_map(|x| (x + 1..4).map(move |y| (x, y))).filter(|&(x, y)| p[x] > p[y]).count();
     Some(if inversions % 2 == 0 { (k, l) } else { (l, k) })
 }
 
@@ -132,11 +128,7 @@ pub(super) fn opposite(tet: &Tet, c: u32, d: u32) -> Option<(usize, usize)> {
 pub(super) fn shell<S: Space>(s: &mut S, t: u32, c: u32, d: u32) -> Option<EdgeRing> {
     // Every flip and every search comes by here.
     check_cancelled();
-    let mut shell = EdgeRing {
-        tets: Vec::new(),
-        ring: Vec::new(),
-        required: false,
-    };
+    let mut shell = EdgeRing { tets: Vec::new(), ring: Vec::new(), required: false };
     let mut at = t;
     loop {
         let tet = s.tet(at);
@@ -174,11 +166,7 @@ pub(super) fn exit_vertex<S: Space>(s: &mut S, h: u32, b: u32) -> Exit {
             let j = flat.iter().position(|&f| f).expect("one is flat");
             let mut rest = others.iter().filter(|&&k| k != others[j]);
             let (&p, &q) = (rest.next().expect("two"), rest.next().expect("two"));
-            Exit::Edge {
-                tet: t,
-                c: tet.vertex(p),
-                d: tet.vertex(q),
-            }
+            Exit::Edge { tet: t, c: tet.vertex(p), d: tet.vertex(q) }
         }
         _ => {
             let j = flat.iter().position(|&f| !f).unwrap_or(0);
@@ -208,11 +196,7 @@ pub(super) fn exit_face<S: Space>(s: &mut S, a: u32, b: u32, face: FaceRef) -> E
             return Exit::Face(FaceRef::new(across.tet(), l));
         }
         if w[i] == 0.0 && w[j] > 0.0 {
-            return Exit::Edge {
-                tet: across.tet(),
-                c: p[i],
-                d: e,
-            };
+            return Exit::Edge { tet: across.tet(), c: p[i], d: e };
         }
     }
     Exit::Vertex(e)

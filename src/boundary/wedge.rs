@@ -52,10 +52,7 @@ impl<P: Pages> Patch<'_, P> {
             if !seen.insert(first) {
                 continue;
             }
-            let mut wedge = Wedge {
-                tets: vec![first],
-                walls: Vec::new(),
-            };
+            let mut wedge = Wedge { tets: vec![first], walls: Vec::new() };
             let mut next = 0;
             while next < wedge.tets.len() {
                 let t = wedge.tets[next];
@@ -98,10 +95,7 @@ impl<P: Pages> Patch<'_, P> {
         walls: &[[u32; 3]],
         fans: &[Fan],
     ) -> Option<Vec<[u32; 4]>> {
-        let on_wall: IdSet<u32> = fans
-            .iter()
-            .flat_map(|f| f.polygon.iter().copied())
-            .collect();
+        let on_wall: IdSet<u32> = fans.iter().flat_map(|f| f.polygon.iter().copied()).collect();
         let mut candidates: Vec<u32> = wedge
             .tets
             .iter()
@@ -194,16 +188,14 @@ impl<P: Pages> Patch<'_, P> {
         }
         proposals.extend(halves(heart, 45).map(|d| (d, false)));
         let found = proposals.into_iter().find_map(|(d, may_grow)| {
-            self.join_at(x, wedge, walls, taken, origin + d, may_grow)
-                .ok()
+            self.join_at(x, wedge, walls, taken, origin + d, may_grow).ok()
         });
         if found.is_some() || !self.effort.exact {
             return found;
         }
         let mut ways: Vec<Point> = best.into_iter().chain([heart]).collect();
         ways.extend(self.ways(x, wedge, walls));
-        ways.into_iter()
-            .find_map(|way| self.join_near(x, wedge, walls, way))
+        ways.into_iter().find_map(|way| self.join_near(x, wedge, walls, way))
     }
 
     /// Directions into the cone between the walls: to vertices of the wedge, to the middle between two, and away from it.
@@ -289,11 +281,7 @@ impl<P: Pages> Patch<'_, P> {
     /// The wedge with `x` moved to `p`, if all volumes stay positive.
     pub(super) fn join_all(&mut self, x: u32, wedge: &Wedge, p: u32) -> Option<Grown> {
         let quads = moved(self, x, p, &wedge.tets, &mut 0)?;
-        Some(Grown {
-            cavity: wedge.tets.clone(),
-            quads,
-            lost: Vec::new(),
-        })
+        Some(Grown { cavity: wedge.tets.clone(), quads, lost: Vec::new() })
     }
 
     /// From `x` to the mean of the wedge's other vertices: a direction to try when the planes give none.

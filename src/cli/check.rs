@@ -31,10 +31,8 @@ struct Mended {
 pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
     // Options are checked before anything is read.
     if args.repair && (args.sheets.allow_open || args.sheets.files().next().is_some()) {
-        return Err(
-            Failure::new("usage", "a surface is repaired before sheets are embedded")
-                .help("repair each file for itself"),
-        );
+        return Err(Failure::new("usage", "a surface is repaired before sheets are embedded")
+            .help("repair each file for itself"));
     }
     let weld_share = args.weld.as_deref().map(share).transpose()?;
     let inputs = args.surfaces.iter().chain(args.sheets.files());
@@ -97,9 +95,7 @@ fn mend(
             surface.n_triangles(),
             memory::show(least)
         );
-        return Err(Error::new("memory", message)
-            .with_remedy(Remedy::Memory(least))
-            .into());
+        return Err(Error::new("memory", message).with_remedy(Remedy::Memory(least)).into());
     }
     let scratch = space.scratch(surface)?;
     let n_defects = attempt(|| validate_in(surface, &scratch))?.n_defects;
@@ -109,12 +105,7 @@ fn mend(
     // Those turned while reading count too.
     done.turned += input.turned;
     input.turned = done.turned;
-    Ok(Mended {
-        weld_share,
-        weld_distance,
-        done,
-        before,
-    })
+    Ok(Mended { weld_share, weld_distance, done, before })
 }
 
 impl Mended {
@@ -178,16 +169,10 @@ fn write_files(
         let mut file = None;
         if defects.is_empty() {
             // A file without cells is one that some programs cannot read.
-            console.note(&format!(
-                "no triangle is defective: {} was not written",
-                out.display()
-            ));
+            console.note(&format!("no triangle is defective: {} was not written", out.display()));
         } else {
             n = write::defects(surface, defects, out)?;
-            console.note(&format!(
-                "wrote {n} defective triangles to {}",
-                out.display()
-            ));
+            console.note(&format!("wrote {n} defective triangles to {}", out.display()));
             file = Some(out.display().to_string());
         }
         fields.push(("bad_triangles", json!({ "file": file, "triangles": n })));

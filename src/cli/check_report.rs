@@ -70,9 +70,8 @@ impl<'a> Findings<'a> {
         };
         let prepared = is_estimated.then(|| expected(surface, space)).flatten();
         Ok(Self {
-            cures: (prepared.as_ref()).map_or_else(Vec::new, |prepared| {
-                cures(surface, &fitness, &prepared.field, space)
-            }),
+            cures: (prepared.as_ref())
+                .map_or_else(Vec::new, |prepared| cures(surface, &fitness, &prepared.field, space)),
             surface,
             turned,
             boundary_loops: boundary_loops(surface, &validation.closedness),
@@ -155,10 +154,7 @@ impl<'a> Findings<'a> {
         ));
         if self.surface.n_triangles() > 0 {
             console.line(&format!("box {}", words::bounds(self.bounds())));
-            console.line(&format!(
-                "labels: {}",
-                words::listed(&self.surface.label_names)
-            ));
+            console.line(&format!("labels: {}", words::listed(&self.surface.label_names)));
         }
         if !edges.two_sided.is_empty() {
             console.line(&format!(
@@ -199,9 +195,7 @@ impl<'a> Findings<'a> {
             };
             console.line(&format!("{code}: {n}"));
             for defect in kind.iter().take(LISTED) {
-                let at = defect
-                    .at()
-                    .map_or(String::new(), |p| format!(", near {}", show(p)));
+                let at = defect.at().map_or(String::new(), |p| format!(", near {}", show(p)));
                 console.line(&format!("  {defect}{at}"));
             }
             tell_rest(n, console);

@@ -47,12 +47,7 @@ fn print(a: &Qualities, b: &Qualities, console: &Console) {
         "", "first", "", "second", "", "change"
     ));
     let count = |name: &str, a: u64, b: u64| {
-        console.line(&format!(
-            "{name:<14} {a:>14} {:>9} {b:>14} {:>9} {}",
-            "",
-            "",
-            change(a, b)
-        ));
+        console.line(&format!("{name:<14} {a:>14} {:>9} {b:>14} {:>9} {}", "", "", change(a, b)));
     };
     count("sub-domains", a.subdomains, b.subdomains);
     count("interfaces", a.interface_faces, b.interface_faces);
@@ -93,10 +88,7 @@ fn population(name: &str, a: &Population, b: &Population, console: &Console) {
             100.0 * (b.share(bin) - a.share(bin))
         ));
     }
-    console.line(&format!(
-        "  {:<12} {:>14.3} {:>9} {:>14.3}",
-        "worst", a.worst, "", b.worst
-    ));
+    console.line(&format!("  {:<12} {:>14.3} {:>9} {:>14.3}", "worst", a.worst, "", b.worst));
 }
 
 /// The change from `a` to `b` in percent.

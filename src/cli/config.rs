@@ -79,10 +79,9 @@ pub fn take_sizes(args: &SizeArgs, options: &mut Options) {
 
 /// Seeds of the command line and of its file replace those of `options`. Errors: the file, with its line.
 fn take_seeds(args: &ShapeArgs, options: &mut Options) -> Result<(), Failure> {
-    for (given, option) in [
-        (&args.region_seed, &mut options.region_seed),
-        (&args.hole, &mut options.hole),
-    ] {
+    for (given, option) in
+        [(&args.region_seed, &mut options.region_seed), (&args.hole, &mut options.hole)]
+    {
         if !given.is_empty() {
             option.clone_from(given);
         }
@@ -163,10 +162,7 @@ fn bad(what: String) -> Failure {
 }
 
 fn word(value: impl ValueEnum) -> String {
-    value
-        .to_possible_value()
-        .map(|p| p.get_name().to_owned())
-        .unwrap_or_default()
+    value.to_possible_value().map(|p| p.get_name().to_owned()).unwrap_or_default()
 }
 
 #[cfg(test)]
@@ -185,24 +181,16 @@ mod tests {
         assert_eq!(options.hgrad.as_deref(), Some("1.5"));
         assert_eq!(options.subdomains.as_deref(), Some("4"));
         assert_eq!(options.size_sphere, ["0,-1,0.5,1,0.01", "0,0,0,1,0.1"]);
-        for text in [
-            "hsiz = 3 4",
-            "hsize = \"1\"",
-            "size_box = 3",
-            "hsiz = true",
-            "size_box = [[true]]",
-        ] {
+        for text in
+            ["hsiz = 3 4", "hsize = \"1\"", "size_box = 3", "hsiz = true", "size_box = [[true]]"]
+        {
             assert_eq!(read(text).err().map(|f| f.exit()), Some(2), "{text}");
         }
     }
 
     #[test]
     fn a_list_is_no_number() {
-        for text in [
-            "hsiz = [1]",
-            "hgrad = [1, 2]",
-            "size_box = [[[0, 0], 0, 1]]",
-        ] {
+        for text in ["hsiz = [1]", "hgrad = [1, 2]", "size_box = [[[0, 0], 0, 1]]"] {
             let failure = read(text).err().unwrap_or_else(|| panic!("{text}"));
             let message = failure.message;
             let key = text.split(' ').next().unwrap_or_default();

@@ -76,11 +76,7 @@ impl Console {
                 && std::env::var_os("TERM").is_none_or(|v| v != "dumb"),
             terminal,
             bar,
-            state: Arc::new(Mutex::new(State {
-                stage: String::new(),
-                since: now,
-                printed: now,
-            })),
+            state: Arc::new(Mutex::new(State { stage: String::new(), since: now, printed: now })),
             answer: Arc::default(),
             cancel: CancelToken::new(),
         }
@@ -106,12 +102,7 @@ impl Console {
 
     fn hear(&self, event: &Event) {
         match *event {
-            Event::Progress {
-                stage,
-                done,
-                total,
-                unit,
-            } => self.progress(stage, done, total, unit),
+            Event::Progress { stage, done, total, unit } => self.progress(stage, done, total, unit),
             Event::Note(ref text) => self.note(text),
             Event::Warning(ref text) => self.warn(&in_flags(text)),
             Event::StoreBegun(_) => super::signals::store_begins(),
@@ -314,10 +305,7 @@ fn style(known_total: bool) -> ProgressStyle {
     };
     let style = ProgressStyle::with_template(template);
     let style = style.unwrap_or_else(|_| ProgressStyle::default_bar());
-    style.with_key(
-        "rate",
-        |state: &ProgressState, out: &mut dyn std::fmt::Write| {
-            let _ = write!(out, "{}/s", short(state.per_sec()));
-        },
-    )
+    style.with_key("rate", |state: &ProgressState, out: &mut dyn std::fmt::Write| {
+        let _ = write!(out, "{}/s", short(state.per_sec()));
+    })
 }

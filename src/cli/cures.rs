@@ -88,17 +88,11 @@ pub fn cures(surface: &Surface, found: &Fitness, field: &SizeField, space: Space
         is_valid.then(|| (Some(share), measured(&tried)))
     });
     // The smallest change of the shape that does it.
-    let welded = welded
-        .filter(|(_, after)| after.is_gain_on(&before))
-        .take(1);
+    let welded = welded.filter(|(_, after)| after.is_gain_on(&before)).take(1);
     let tried = divided.into_iter().chain(welded);
     tried
         .filter(|(_, after)| after.is_gain_on(&before))
-        .map(|(weld, after)| Cure {
-            weld,
-            before,
-            after,
-        })
+        .map(|(weld, after)| Cure { weld, before, after })
         .collect()
 }
 

@@ -26,16 +26,9 @@ pub fn run(args: &EstimateArgs, console: &Console) -> Result<u8, Failure> {
     let threads = threads::asked(args.threads)?.unwrap_or_else(n_threads);
     let store = args.output.as_deref().unwrap_or(Path::new("."));
     // The cap is that of the run to come; what is said of it needs the surface, however large.
-    let space = Space {
-        cap: cap.max(default_cap().0),
-        beside: store,
-    };
-    let mut surface = input::load_valid(
-        &args.surfaces,
-        (&args.sheets, options.refine_surface),
-        space,
-        console,
-    )?;
+    let space = Space { cap: cap.max(default_cap().0), beside: store };
+    let mut surface =
+        input::load_valid(&args.surfaces, (&args.sheets, options.refine_surface), space, console)?;
     take_seeds(&mut options, &surface.inner.seeds);
     if options.refine_surface {
         let settings = console.settings(Some(cap), args.threads);
@@ -90,10 +83,7 @@ pub fn run(args: &EstimateArgs, console: &Console) -> Result<u8, Failure> {
             n => format!("{n} sub-domains"),
         }
     ));
-    let (least, full) = (
-        estimate.memory_least_bytes(),
-        estimate.memory_full_bytes(threads),
-    );
+    let (least, full) = (estimate.memory_least_bytes(), estimate.memory_full_bytes(threads));
     console.line(&format!(
         "memory: {} with a cap of {} ({whence}); the smallest cap is {}{}",
         memory::show(estimate.memory_bytes(cap, threads)),
@@ -104,9 +94,7 @@ pub fn run(args: &EstimateArgs, console: &Console) -> Result<u8, Failure> {
             false => String::new(),
         }
     ));
-    let free = disk_free.map_or(String::new(), |free| {
-        format!("; {} are free", memory::show(free))
-    });
+    let free = disk_free.map_or(String::new(), |free| format!("; {} are free", memory::show(free)));
     console.line(&format!(
         "disk: {} at most on the way, {} for the finished store{free}",
         memory::show(disk),

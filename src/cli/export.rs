@@ -70,9 +70,7 @@ fn write_share(
         Some(word) => Some(MeshFormat::of_word(word).ok_or_else(|| {
             Failure::new("unknown-format", "no format has this name")
                 .at(word)
-                .help(format!(
-                    "choose msh22, or an ending without its dot: {ENDINGS}"
-                ))
+                .help(format!("choose msh22, or an ending without its dot: {ENDINGS}"))
         })?),
         None => None,
     };
@@ -112,17 +110,12 @@ fn write_share(
     }
     let to_stdout = args.out.iter().any(|out| out == Path::new("-"));
     if to_stdout && (console.is_json() || args.out.len() > 1) {
-        return Err(Failure::new(
-            "usage",
-            "the standard output holds one mesh and nothing else",
-        )
-        .help("leave --json and other names out"));
+        return Err(Failure::new("usage", "the standard output holds one mesh and nothing else")
+            .help("leave --json and other names out"));
     }
     if !args.force {
         let inputs = inputs_of(&args.store);
-        args.out
-            .iter()
-            .try_for_each(|out| check_target(out, &inputs))?;
+        args.out.iter().try_for_each(|out| check_target(out, &inputs))?;
     }
     let mut reports = Vec::new();
     for (out, share, is_ours, writers) in &outs {
@@ -216,10 +209,6 @@ fn write_with(
 
 fn note(exported: &Exported, console: &Console) {
     for (file, bytes) in &exported.files {
-        console.note(&format!(
-            "wrote {} ({})",
-            file.display(),
-            memory::show(*bytes)
-        ));
+        console.note(&format!("wrote {} ({})", file.display(), memory::show(*bytes)));
     }
 }

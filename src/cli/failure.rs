@@ -28,12 +28,7 @@ pub struct Failure {
 
 impl Failure {
     pub fn new(code: &'static str, message: impl ToString) -> Self {
-        Self {
-            code,
-            message: message.to_string(),
-            place: None,
-            help: None,
-        }
+        Self { code, message: message.to_string(), place: None, help: None }
     }
 
     pub fn at(mut self, place: impl ToString) -> Self {
@@ -60,10 +55,9 @@ impl From<Error> for Failure {
     /// What helps, in the words of the command line.
     fn from(e: Error) -> Self {
         let help = match e.remedy {
-            Remedy::Memory(least) => Some(format!(
-                "give at least --memory {}MiB",
-                least.div_ceil(1 << 20)
-            )),
+            Remedy::Memory(least) => {
+                Some(format!("give at least --memory {}MiB", least.div_ceil(1 << 20)))
+            }
             Remedy::General => Some(help_of(e.code()).to_owned()),
             Remedy::AsSaid => e.help().map(str::to_owned),
         };

@@ -30,9 +30,8 @@ pub fn run(args: &InfoArgs, console: &Console) -> Result<u8, Failure> {
     // The rows of a catalog are far less than the least cap.
     let memory = memory::asked(args.of.memory.as_deref())?;
     let path = &args.of.store;
-    let excess = (args.excess)
-        .then(|| measure_excess(path, &console.settings(memory, None)))
-        .transpose()?;
+    let excess =
+        (args.excess).then(|| measure_excess(path, &console.settings(memory, None))).transpose()?;
     console.done();
     if console.is_json() {
         let mut all = object(path)?;
@@ -143,9 +142,7 @@ fn bounds(rows: &[SubdomainRow]) -> [[f64; 3]; 2] {
 }
 
 fn sum(digests: impl Iterator<Item = [u64; 2]>) -> [u64; 2] {
-    digests.fold([0; 2], |s, d| {
-        [s[0].wrapping_add(d[0]), s[1].wrapping_add(d[1])]
-    })
+    digests.fold([0; 2], |s, d| [s[0].wrapping_add(d[0]), s[1].wrapping_add(d[1])])
 }
 
 /// The digest of the whole mesh.
@@ -185,18 +182,13 @@ pub fn print(path: &Path, console: &Console) -> Result<(), Failure> {
         return Ok(());
     }
     if !state.is_finished() {
-        console.line(&format!(
-            "`tetdb resume {}` goes on with it",
-            path.display()
-        ));
+        console.line(&format!("`tetdb resume {}` goes on with it", path.display()));
         return Ok(());
     }
     let rows = catalog.subdomains()?;
     let tets: u64 = rows.iter().map(|r| r.tets).sum();
     let bytes = rows.iter().map(|r| r.bytes).sum::<u64>()
-        + (catalog.coarse_snapshots()?.iter())
-            .map(|c| c.bytes)
-            .sum::<u64>()
+        + (catalog.coarse_snapshots()?.iter()).map(|c| c.bytes).sum::<u64>()
         + catalog.previous()?.iter().map(|r| r.bytes).sum::<u64>()
         + catalog.file_bytes()?;
     console.line(&format!(
@@ -205,10 +197,8 @@ pub fn print(path: &Path, console: &Console) -> Result<(), Failure> {
         match catalog.n_input_triangles()? {
             Some(n) => count(n, "input triangle"),
             // Those between sub-domains are in both.
-            None => format!(
-                "at most {} input triangles",
-                rows.iter().map(|r| r.facets).sum::<u64>()
-            ),
+            None =>
+                format!("at most {} input triangles", rows.iter().map(|r| r.facets).sum::<u64>()),
         },
         count(rows.len() as u64, "sub-domain"),
         memory::show(bytes),
@@ -254,18 +244,12 @@ fn print_bytes(
     let coarse: u64 = catalog.coarse_snapshots()?.iter().map(|c| c.bytes).sum();
     for (what, bytes) in [
         ("sub-domains", rows.iter().map(|r| r.bytes).sum()),
-        (
-            "coarse snapshots, from which sub-domains can be meshed again",
-            coarse,
-        ),
+        ("coarse snapshots, from which sub-domains can be meshed again", coarse),
         ("catalog, with the wanted sizes", catalog.file_bytes()?),
     ] {
         // Of a small mesh the least a file takes says nothing of a tetrahedron.
         let each = match tets >= TETS_MEASURED {
-            true => format!(
-                ", {} bytes per tetrahedron",
-                short(bytes as f64 / tets as f64)
-            ),
+            true => format!(", {} bytes per tetrahedron", short(bytes as f64 / tets as f64)),
             false => String::new(),
         };
         console.line(&format!("{what}: {}{each}", memory::show(bytes)));
@@ -357,10 +341,7 @@ fn merged<'a>(rows: impl Iterator<Item = &'a QualityRow>) -> QualityRow {
             *sum += n;
         }
         all.worst = all.worst.max(row.worst);
-        all.dihedral = [
-            all.dihedral[0].min(row.dihedral[0]),
-            all.dihedral[1].max(row.dihedral[1]),
-        ];
+        all.dihedral = [all.dihedral[0].min(row.dihedral[0]), all.dihedral[1].max(row.dihedral[1])];
     }
     all
 }
@@ -375,16 +356,8 @@ fn quality_lines(q: &QualityRow) -> Vec<String> {
     let total: u64 = q.bins.iter().sum();
     let mut lines = vec!["quality q (1 is regular, larger is worse):".to_owned()];
     for (i, &n) in q.bins.iter().enumerate().filter(|(_, n)| **n > 0) {
-        let to = if i + 1 == q.bins.len() {
-            "inf".to_owned()
-        } else {
-            (i + 2).to_string()
-        };
-        lines.push(format!(
-            "  [{:>2}, {to:>3}[ {:>9} %  {n:>12}",
-            i + 1,
-            share(n, total)
-        ));
+        let to = if i + 1 == q.bins.len() { "inf".to_owned() } else { (i + 2).to_string() };
+        lines.push(format!("  [{:>2}, {to:>3}[ {:>9} %  {n:>12}", i + 1, share(n, total)));
     }
     lines.push(format!(
         "  worst {}; dihedral angles {} to {} degrees",
@@ -410,17 +383,12 @@ fn share(n: u64, total: u64) -> String {
 /// A quality in four digits, or as many as keep it in its row of the table.
 fn worst(q: f64) -> String {
     let text = short(q);
-    let is_in_its_row = text
-        .parse::<f64>()
-        .is_ok_and(|shown| shown.floor() == q.floor());
+    let is_in_its_row = text.parse::<f64>().is_ok_and(|shown| shown.floor() == q.floor());
     match is_in_its_row || q >= 10.0 {
         true => text,
         false => (4..16)
             .map(|digits| format!("{q:.digits$}"))
-            .find(|text| {
-                text.parse::<f64>()
-                    .is_ok_and(|shown| shown.floor() == q.floor())
-            })
+            .find(|text| text.parse::<f64>().is_ok_and(|shown| shown.floor() == q.floor()))
             .unwrap_or(text),
     }
 }

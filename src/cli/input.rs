@@ -67,10 +67,7 @@ pub fn load_with(
     if sheets.allow_open {
         let (with, n) = surface.open_parts_in(&space.scratch(&Default::default())?)?;
         surface = with;
-        console.note(&format!(
-            "note: sheets: {} of open parts",
-            count(n as u64, "triangle")
-        ));
+        console.note(&format!("note: sheets: {} of open parts", count(n as u64, "triangle")));
     }
     let name_of = |file: &String| {
         let name = names.iter().find(|(known, _)| known == file);
@@ -83,14 +80,8 @@ pub fn load_with(
     if divides {
         surface = surface.dividing();
     }
-    let edges = sheets
-        .embed_edges
-        .iter()
-        .map(|file| (file, WireKind::Edges));
-    let points = sheets
-        .embed_points
-        .iter()
-        .map(|file| (file, WireKind::Points));
+    let edges = sheets.embed_edges.iter().map(|file| (file, WireKind::Edges));
+    let points = sheets.embed_points.iter().map(|file| (file, WireKind::Points));
     for (file, kind) in edges.chain(points) {
         let scratch = space.scratch(&surface.inner)?;
         surface = surface.with_wires(Path::new(file), kind, name_of(file), &scratch)?;

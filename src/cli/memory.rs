@@ -27,19 +27,14 @@ pub fn asked(option: Option<&str>) -> Result<Option<u64>, Failure> {
 /// Reads `512MiB`, `8G`, `2GB`.
 pub fn parse(text: &str) -> Result<u64, Failure> {
     let bad = |why: &str| {
-        Failure::new(
-            "bad-memory",
-            format!("'{text}' is not a memory size: {why}"),
-        )
-        .help("write a number with its unit: 512MiB, 8GiB (or 8G), 2GB (10^9 bytes)")
+        Failure::new("bad-memory", format!("'{text}' is not a memory size: {why}"))
+            .help("write a number with its unit: 512MiB, 8GiB (or 8G), 2GB (10^9 bytes)")
     };
     let text = text.trim();
     let split = text
         .find(|c: char| !(c.is_ascii_digit() || c == '.'))
         .ok_or_else(|| bad("a unit is missing"))?;
-    let number: f64 = text[..split]
-        .parse()
-        .map_err(|_| bad("the number cannot be read"))?;
+    let number: f64 = text[..split].parse().map_err(|_| bad("the number cannot be read"))?;
     let unit: f64 = match text[split..].trim() {
         "K" | "KiB" => 1024.0,
         "M" | "MiB" => 1024.0 * 1024.0,
@@ -60,12 +55,9 @@ mod tests {
 
     #[test]
     fn units_mean_what_they_say() {
-        for (text, bytes) in [
-            ("64MiB", 64 << 20),
-            ("2G", 2 << 30),
-            ("1.5GiB", 3 << 29),
-            ("2GB", 2_000_000_000),
-        ] {
+        for (text, bytes) in
+            [("64MiB", 64 << 20), ("2G", 2 << 30), ("1.5GiB", 3 << 29), ("2GB", 2_000_000_000)]
+        {
             assert_eq!(parse(text).expect(text), bytes);
         }
         for text in ["512", "", "GiB", "5 parsecs", "1e9"] {

@@ -15,24 +15,16 @@ use crate::io::write::Selection;
 use crate::pipeline::Summary;
 
 pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
-    if let Some(file) = args
-        .output
-        .as_deref()
-        .filter(|out| export::check_format(out).is_ok())
-    {
-        let message = format!(
-            "-o {0} names a mesh file; -o names the store",
-            file.display()
-        );
+    if let Some(file) = args.output.as_deref().filter(|out| export::check_format(out).is_ok()) {
+        let message = format!("-o {0} names a mesh file; -o names the store", file.display());
         let help = format!("`--export {}` writes that file as well", file.display());
         return Err(Failure::new("usage", message).help(help));
     }
     let options = config::options(&args.shape)?;
     // Sizes are checked before anything is read.
     options.sizes()?;
-    let files = (args.surfaces.iter())
-        .chain(&args.shape.sizes.size_field)
-        .chain(args.sheets.files());
+    let files =
+        (args.surfaces.iter()).chain(&args.shape.sizes.size_field).chain(args.sheets.files());
     let inputs: Vec<PathBuf> = files.map(PathBuf::from).collect();
     let settings = begin(&args.run, if args.force { &[] } else { &inputs }, console)?;
     let path = output(args);
@@ -44,10 +36,7 @@ pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
     let surface = input::load_with(
         &args.surfaces,
         (&args.sheets, options.refine_surface),
-        Space {
-            cap: settings.cap()?,
-            beside: &path,
-        },
+        Space { cap: settings.cap()?, beside: &path },
         console,
     )?;
     let created = Mesher::of_options(surface, options)
@@ -68,13 +57,7 @@ pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
     if args.coarse_only {
         return begun(&path, &settings, console);
     }
-    finish(
-        &path,
-        &args.run,
-        &settings,
-        created.summary.as_ref(),
-        console,
-    )
+    finish(&path, &args.run, &settings, created.summary.as_ref(), console)
 }
 
 /// What can be done with a coarse mesh.
@@ -98,13 +81,7 @@ pub fn resume(args: &ResumeArgs, console: &Console) -> Result<u8, Failure> {
     let settings = begin(&args.run, &inputs_of(&args.store), console)?;
     let created = resume_reported(&args.store, &settings, !args.run.no_verify)?;
     console.done();
-    finish(
-        &args.store,
-        &args.run,
-        &settings,
-        created.summary.as_ref(),
-        console,
-    )
+    finish(&args.store, &args.run, &settings, created.summary.as_ref(), console)
 }
 
 /// Threads, signals, and the cap; nothing that is written may be one of `inputs`.
@@ -135,8 +112,7 @@ fn output(args: &MeshArgs) -> PathBuf {
             Some(sample) => sample.split(',').next().map(Into::into),
             None => Path::new(first).file_stem().map(PathBuf::from),
         };
-        stem.unwrap_or_else(|| PathBuf::from("mesh"))
-            .with_extension("tetdb")
+        stem.unwrap_or_else(|| PathBuf::from("mesh")).with_extension("tetdb")
     })
 }
 
@@ -163,11 +139,7 @@ fn finish(
     } else if !console.is_quiet() {
         info::print(path, console)?;
         if let Some(peak) = memory::peak().filter(|_| summary.is_some()) {
-            console.line(&format!(
-                "peak memory {} of {}",
-                memory::show(peak),
-                memory::show(cap)
-            ));
+            console.line(&format!("peak memory {} of {}", memory::show(peak), memory::show(cap)));
         }
         let page = path.with_extension("html");
         let (store, page) = (path.display(), page.display());

@@ -90,10 +90,7 @@ fn run_rank(ranks: &ranks::Ranks) -> ExitCode {
         Command::Mesh(args) => mesh::begin(&args.run, &[], &console),
         Command::Resume(args) => mesh::begin(&args.run, &[], &console),
         Command::Verify(args) => verify::settings(args, &console),
-        _ => Err(Failure::new(
-            "internal",
-            "a rank was asked for what it cannot do",
-        )),
+        _ => Err(Failure::new("internal", "a rank was asked for what it cannot do")),
     }))
 }
 
@@ -170,9 +167,8 @@ fn is_apart(error: &clap::Error) -> bool {
     let Some(ContextValue::String(found)) = error.get(ContextKind::InvalidArg) else {
         return false;
     };
-    let words: Vec<String> = std::env::args_os()
-        .map(|word| word.to_string_lossy().into_owned())
-        .collect();
+    let words: Vec<String> =
+        std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect();
     // Of one with a minus only the sign and the first digit are named.
     (words.windows(2))
         .any(|two| is_number(&two[0]) && is_number(&two[1]) && two[1].starts_with(found.as_str()))

@@ -29,9 +29,7 @@ const POINTS_MAX: u64 = 1 << 17;
 
 pub fn run(args: &QueryArgs, console: &Console) -> Result<u8, Failure> {
     if let Some(out) = &args.output {
-        let inputs = inputs_of(&args.store)
-            .into_iter()
-            .chain(args.points.clone());
+        let inputs = inputs_of(&args.store).into_iter().chain(args.points.clone());
         check_target(out, &inputs.collect::<Vec<_>>())?;
     }
     let cap = memory::cap(args.memory.as_deref())?;
@@ -135,22 +133,13 @@ fn columns(args: &QueryArgs) -> Result<Vec<QueryColumn>, Failure> {
     let names = args.select.as_deref().unwrap_or(default);
     let columns = names.split(',').map(|name| {
         let name = name.trim();
-        let known = || {
-            format!(
-                "columns among id, vertices, points, {}",
-                VARIABLES.join(", ")
-            )
-        };
+        let known = || format!("columns among id, vertices, points, {}", VARIABLES.join(", "));
         QueryColumn::named(name).ok_or_else(|| bad("--select", name, &known()))
     });
     let mut columns = columns.collect::<Result<Vec<_>, _>>()?;
     if of_points {
         if columns.contains(&QueryColumn::Variable(EXCESS)) {
-            return Err(bad(
-                "--select",
-                "excess",
-                "no excess where points are asked for",
-            ));
+            return Err(bad("--select", "excess", "no excess where points are asked for"));
         }
         columns.insert(0, QueryColumn::Point);
         columns.push(QueryColumn::Barycentric);
@@ -183,10 +172,7 @@ fn put(
     let limit = limit.map_or(usize::MAX, |n| usize::try_from(n).unwrap_or(usize::MAX));
     for found in found.take(limit) {
         n += 1;
-        let row = Row {
-            found: Some(found?),
-            located: None,
-        };
+        let row = Row { found: Some(found?), located: None };
         if !writer.put(&row)? {
             break;
         }
@@ -210,10 +196,7 @@ fn locate(
     let mut answer = |points: &mut Vec<Point>, writer: &mut Writer| -> Result<bool, Failure> {
         for located in inquiry.locate(points)? {
             n += u64::from(located.found.is_some());
-            let row = Row {
-                found: located.found,
-                located: Some(located),
-            };
+            let row = Row { found: located.found, located: Some(located) };
             if !writer.put(&row)? {
                 return Ok(false);
             }
@@ -257,12 +240,9 @@ fn line(from: &mut dyn BufRead) -> std::io::Result<Option<String>> {
 }
 
 fn unreadable(path: &Path, error: &std::io::Error) -> Failure {
-    Failure::new(
-        "unreadable-file",
-        format!("the points cannot be read: {error}"),
-    )
-    .at(path.display())
-    .help("check the path and its permissions")
+    Failure::new("unreadable-file", format!("the points cannot be read: {error}"))
+        .at(path.display())
+        .help("check the path and its permissions")
 }
 
 /// Three numbers with commas or spaces between; nothing in empty lines and behind `#`.

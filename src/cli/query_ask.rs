@@ -8,19 +8,13 @@ use crate::query::{QueryError, QuerySession, Selection, Solid, VARIABLES, region
 
 /// An option's value that makes no sense.
 pub fn bad(option: &str, found: &str, expected: &str) -> Failure {
-    Failure::new(
-        "bad-query",
-        format!("{option} {found}: expected {expected}"),
-    )
-    .help("`tetdb query --help` has examples")
+    Failure::new("bad-query", format!("{option} {found}: expected {expected}"))
+        .help("`tetdb query --help` has examples")
 }
 
 /// An expression that cannot be read, with a caret under the place.
 pub fn bad_expression(text: &str, error: &ExprError) -> Failure {
-    let line: String = text
-        .chars()
-        .map(|c| if c.is_control() { ' ' } else { c })
-        .collect();
+    let line: String = text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
     let before = text[..error.at].chars().count();
     // The place is told behind "  at: ".
     let caret = format!("{:1$}^", "", before + "  at: ".len());
@@ -39,9 +33,7 @@ pub fn numbers<const N: usize>(
         .split(',')
         .map(|word| word.trim().parse().ok().filter(|x: &f64| x.is_finite()))
         .collect();
-    parsed
-        .and_then(|list| list.try_into().ok())
-        .ok_or_else(|| bad(option, text, expected))
+    parsed.and_then(|list| list.try_into().ok()).ok_or_else(|| bad(option, text, expected))
 }
 
 /// A point as typed.
@@ -51,10 +43,7 @@ pub fn point(option: &str, text: &str) -> Result<Point, Failure> {
 
 /// Words separated by commas, each read by its kind.
 fn list<T: std::str::FromStr>(option: &str, text: &str, expected: &str) -> Result<Vec<T>, Failure> {
-    let parsed: Option<Vec<T>> = text
-        .split(',')
-        .map(|word| word.trim().parse().ok())
-        .collect();
+    let parsed: Option<Vec<T>> = text.split(',').map(|word| word.trim().parse().ok()).collect();
     parsed.ok_or_else(|| bad(option, text, expected))
 }
 
@@ -86,9 +75,8 @@ pub fn selection(args: &QueryArgs, inquiry: &mut QuerySession) -> Result<Selecti
     }
     if let Some(text) = &args.interface {
         let pair: Vec<u32> = list("--interface", text, "two sub-domains such as 0,1")?;
-        let pair: [u32; 2] = pair
-            .try_into()
-            .map_err(|_| bad("--interface", text, "two sub-domains such as 0,1"))?;
+        let pair: [u32; 2] =
+            pair.try_into().map_err(|_| bad("--interface", text, "two sub-domains such as 0,1"))?;
         selection.interface = Some(pair);
     }
     if let Some(text) = &args.tet {
@@ -181,11 +169,7 @@ fn label(inquiry: &QuerySession, name: &str) -> Result<u32, Failure> {
     let known = inquiry.labels();
     let by_name = known.iter().position(|label| label == name);
     let place = by_name.or_else(|| name.parse().ok().filter(|&n| n < known.len()));
-    place.map(|n| n as u32).ok_or_else(|| {
-        QueryError::NoLabel {
-            name: name.to_owned(),
-            known: known.to_vec(),
-        }
-        .into()
-    })
+    place
+        .map(|n| n as u32)
+        .ok_or_else(|| QueryError::NoLabel { name: name.to_owned(), known: known.to_vec() }.into())
 }

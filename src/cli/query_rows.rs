@@ -63,11 +63,7 @@ impl QueryColumn {
             _ if self.is_whole() => ("<i8", ""),
             Self::Variable(_) => ("<f8", ""),
         };
-        NpyField {
-            name: self.name(),
-            kind,
-            shape,
-        }
+        NpyField { name: self.name(), kind, shape }
     }
 
     /// How many values it has in a line of values.

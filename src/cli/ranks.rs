@@ -140,9 +140,7 @@ pub(super) fn gather<T: Serialize + DeserializeOwned>(
     }
     let helpers = RankHelpers::of(ranks);
     // All are heard, whatever one of them says, so that none sends to who is gone.
-    let others: Vec<_> = (1..ranks.size)
-        .map(|rank| helpers.answer(rank, CONTROL))
-        .collect();
+    let others: Vec<_> = (1..ranks.size).map(|rank| helpers.answer(rank, CONTROL)).collect();
     let mut all = mine?;
     for answer in others {
         let answer = answer.map_err(PipelineError::from)?;
@@ -162,10 +160,7 @@ pub(super) struct SharedFile {
 impl SharedFile {
     /// `None` where there are no other ranks.
     pub fn new() -> Option<Self> {
-        Some(Self {
-            ranks: RANKS.get()?.clone(),
-            is_announced: Cell::new(false),
-        })
+        Some(Self { ranks: RANKS.get()?.clone(), is_announced: Cell::new(false) })
     }
 
     fn announce_to_all(&self, letter: &[u8]) {
@@ -205,9 +200,7 @@ impl Writers for SharedFile {
     fn wait(&self) -> Result<(), HelperFailure> {
         let helpers = RankHelpers::of(&self.ranks);
         // All are heard: none writes any more when the file goes.
-        let others: Vec<_> = (1..self.ranks.size)
-            .map(|rank| helpers.answer(rank, FILE))
-            .collect();
+        let others: Vec<_> = (1..self.ranks.size).map(|rank| helpers.answer(rank, FILE)).collect();
         others.into_iter().try_for_each(|done| done.map(drop))
     }
 }
@@ -223,11 +216,7 @@ impl Drop for SharedFile {
 
 /// The other ranks, for a run of this process.
 pub(super) fn hands() -> Hands {
-    Hands(
-        HELPERS
-            .get()
-            .map(|helpers| helpers.clone() as Arc<dyn Helpers>),
-    )
+    Hands(HELPERS.get().map(|helpers| helpers.clone() as Arc<dyn Helpers>))
 }
 
 fn speak(ready: &Sender<[i32; 2]>, outgoing: &Receiver<Letter>, inbox: &Inbox) {
@@ -283,10 +272,7 @@ fn send(world: &SimpleCommunicator, letter: &Letter, inbox: &Inbox) {
 
 impl Ranks {
     fn share(&self) -> Share {
-        Share {
-            number: self.rank as u32 + 1,
-            of: self.size as u32,
-        }
+        Share { number: self.rank as u32 + 1, of: self.size as u32 }
     }
 
     fn send(&self, to: i32, tag: i32, bytes: Vec<u8>) {
@@ -307,10 +293,7 @@ impl Ranks {
             if stops && RunContext::is_current_cancelled() {
                 return None;
             }
-            let waited = self
-                .inbox
-                .arrived
-                .wait_timeout(boxes, Duration::from_millis(100));
+            let waited = self.inbox.arrived.wait_timeout(boxes, Duration::from_millis(100));
             boxes = waited.unwrap_or_else(PoisonError::into_inner).0;
         }
     }
@@ -337,9 +320,7 @@ impl Ranks {
             (1..self.size).for_each(|rank| self.send(rank, CONTROL, vec![END]));
         }
         *self.out.lock().unwrap_or_else(PoisonError::into_inner) = None;
-        let thread = (self.thread.lock())
-            .unwrap_or_else(PoisonError::into_inner)
-            .take();
+        let thread = (self.thread.lock()).unwrap_or_else(PoisonError::into_inner).take();
         if let Some(thread) = thread {
             let _ = thread.join();
         }
@@ -390,10 +371,7 @@ impl Ranks {
             }
             return Ok(end);
         }
-        let how = TaskSettings {
-            scratch: tasks::scratch_of_machine(),
-            wait: WAIT,
-        };
+        let how = TaskSettings { scratch: tasks::scratch_of_machine(), wait: WAIT };
         let answer = |slot, done: Result<_, PipelineError>| answer(slot, done.map_err(Error::from));
         let budget = Budget::new(settings.cap()?);
         pipeline::serve(job, &how, &budget, &|_| (), started, &mut next, &answer)?;
@@ -416,10 +394,7 @@ struct RankHelpers {
 
 impl RankHelpers {
     fn of(ranks: &Arc<Ranks>) -> Self {
-        Self {
-            ranks: ranks.clone(),
-            slots: Mutex::default(),
-        }
+        Self { ranks: ranks.clone(), slots: Mutex::default() }
     }
 
     fn slots(&self) -> MutexGuard<'_, Vec<(i32, i32)>> {
@@ -454,10 +429,7 @@ impl RankHelpers {
                 let error: Value =
                     serde_json::from_slice(bytes.get(1..).unwrap_or_default()).unwrap_or_default();
                 let text = |key| error[key].as_str().unwrap_or_default().to_owned();
-                Err(failure(
-                    &text("code"),
-                    &format!("rank {rank}: {}", text("message")),
-                ))
+                Err(failure(&text("code"), &format!("rank {rank}: {}", text("message"))))
             }
         }
     }
@@ -470,9 +442,7 @@ impl Helpers for RankHelpers {
             self.ask(rank, CONTROL, [&[DONE], job].concat())?;
         }
         // All are heard, whatever one of them says.
-        let answers: Vec<_> = others
-            .map(|rank| (rank, self.answer(rank, CONTROL)))
-            .collect();
+        let answers: Vec<_> = others.map(|rank| (rank, self.answer(rank, CONTROL))).collect();
         let mut slots = Vec::new();
         for (rank, answer) in answers {
             let answer = answer?;

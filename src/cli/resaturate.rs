@@ -59,11 +59,7 @@ pub fn run(args: &ResaturateArgs, console: &Console) -> Result<u8, Failure> {
         return Ok(0);
     }
     if args.dry_run {
-        let what = Resaturation {
-            ranks,
-            sizes,
-            repair: args.repair,
-        };
+        let what = Resaturation { ranks, sizes, repair: args.repair };
         let list = pipeline::forecast(&mut open, &options, &what, &budget)?;
         print_forecast(&list, console);
         return Ok(0);
@@ -90,18 +86,16 @@ fn check(args: &ResaturateArgs) -> Result<(), Failure> {
     let has_sizes = resaturate_sizes::are_given(args);
     if args.undo || args.forget || args.repair {
         return match has_sizes {
-            true => usage(
-                "--undo, --forget and --repair take no sizes",
-                "leave the size options away",
-            ),
+            true => {
+                usage("--undo, --forget and --repair take no sizes", "leave the size options away")
+            }
             false => Ok(()),
         };
     }
     match (args.changed, has_sizes, args.subdomain.is_empty()) {
-        (true, false, _) => usage(
-            "--changed has no sizes to compare with",
-            "give size options, such as --hsiz 1%",
-        ),
+        (true, false, _) => {
+            usage("--changed has no sizes to compare with", "give size options, such as --hsiz 1%")
+        }
         (false, _, true) => usage(
             "nothing says which sub-domains to make again",
             "name them, as in --subdomain 5,9, or give sizes and --changed; `tetdb info STORE` lists them",
@@ -131,10 +125,7 @@ fn forget(mut catalog: Catalog, console: &Console) -> Result<u8, Failure> {
     if console.is_json() {
         console.answer(&json!({ "schema": 1, "forgotten": n }));
     } else if !console.is_quiet() {
-        console.line(&format!(
-            "dropped the previous version of {}",
-            count(n as u64, "sub-domain")
-        ));
+        console.line(&format!("dropped the previous version of {}", count(n as u64, "sub-domain")));
     }
     Ok(0)
 }

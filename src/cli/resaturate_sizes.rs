@@ -91,9 +91,7 @@ fn limits(open: &mut Catalog, args: &ResaturateArgs) -> Result<[f64; 2], Failure
     };
     let diagonal = (0..3).map(|axis| side(axis).powi(2)).sum::<f64>().sqrt();
     let parse = |option, text: &Option<String>| match text {
-        Some(text) => Ok(Some(
-            crate::sizing::Length::parse(option, text)?.resolve(diagonal),
-        )),
+        Some(text) => Ok(Some(crate::sizing::Length::parse(option, text)?.resolve(diagonal))),
         None => Ok::<_, SizingError>(None),
     };
     let hmin = parse("--hmin", &args.sizes.hmin)?;

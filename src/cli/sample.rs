@@ -76,10 +76,9 @@ pub fn run(args: &SampleArgs, console: &Console) -> Result<u8, Failure> {
         let wires = beside(&args.output, "wires", Some("obj"));
         check_target(&wires, &[])?;
         write::wires(&surface.wire_set(), &wires)?;
-        for (option, n) in [
-            ("edges", surface.wires.edges.len()),
-            ("points", surface.wires.points.len()),
-        ] {
+        for (option, n) in
+            [("edges", surface.wires.edges.len()), ("points", surface.wires.points.len())]
+        {
             if n > 0 {
                 embed += &format!(" --embed-{option} {}", wires.display());
             }
@@ -91,9 +90,7 @@ pub fn run(args: &SampleArgs, console: &Console) -> Result<u8, Failure> {
     };
     if !embed.is_empty() {
         let shell = args.output.display();
-        console.note(&format!(
-            "what is inside has files of its own: `tetdb mesh {shell}{embed}`"
-        ));
+        console.note(&format!("what is inside has files of its own: `tetdb mesh {shell}{embed}`"));
     }
     let (triangles, vertices) = (surface.n_own_triangles(), surface.n_vertices());
     if console.is_json() {

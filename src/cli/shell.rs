@@ -28,11 +28,9 @@ pub fn man(args: &ManArgs, console: &Console) -> Result<u8, Failure> {
     }
     let command = match &args.command {
         None => &root,
-        Some(word) => pages(&root)
-            .find(|c| c.get_name() == word.as_str())
-            .ok_or_else(|| {
-                Failure::new("usage", format!("there is no command {word}")).help("`tetdb --help`")
-            })?,
+        Some(word) => pages(&root).find(|c| c.get_name() == word.as_str()).ok_or_else(|| {
+            Failure::new("usage", format!("there is no command {word}")).help("`tetdb --help`")
+        })?,
     };
     console.write(&page(command)?);
     Ok(0)
@@ -40,8 +38,7 @@ pub fn man(args: &ManArgs, console: &Console) -> Result<u8, Failure> {
 
 /// The commands that have a page of their own.
 fn pages(root: &Command) -> impl Iterator<Item = &Command> {
-    root.get_subcommands()
-        .filter(|c| c.get_name() != "help" && !c.is_hide_set())
+    root.get_subcommands().filter(|c| c.get_name() != "help" && !c.is_hide_set())
 }
 
 /// `tetdb` or `tetdb-mesh`.
@@ -86,7 +83,5 @@ fn examples(after: &str) -> (Vec<&str>, String) {
 }
 
 fn unwritable(path: &Path, error: &std::io::Error) -> Failure {
-    Failure::new("io", error)
-        .at(path.display())
-        .help("give a folder that exists with --dir")
+    Failure::new("io", error).at(path.display()).help("give a folder that exists with --dir")
 }

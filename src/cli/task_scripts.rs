@@ -101,11 +101,7 @@ impl Script<'_> {
             // Tasks that are cancelled because a stage failed count as ended: nothing is there to be gathered.
             and = ",afterok:$g";
         }
-        let resume = format!(
-            "{} --memory {}MiB",
-            self.command("resume"),
-            self.memory_bytes >> 20
-        );
+        let resume = format!("{} --memory {}MiB", self.command("resume"), self.memory_bytes >> 20);
         let _ = writeln!(
             text,
             "# Verified as one.\nv=$(submit{after} --job-name=tetdb-verify --mem={megabytes}M --cpus-per-task={} --wrap {})",

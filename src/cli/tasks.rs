@@ -24,10 +24,7 @@ const MEMORY_PER_TASK: u64 = 4 << 30;
 pub fn plan(args: &PlanArgs, console: &Console) -> Result<u8, Failure> {
     let memory_bytes = memory::asked(args.memory_per_task.as_deref())?.unwrap_or(MEMORY_PER_TASK);
     if let Some(out) = &args.export {
-        let pieces = Selection {
-            pieces: true,
-            ..Selection::default()
-        };
+        let pieces = Selection { pieces: true, ..Selection::default() };
         check(out, &pieces).map_err(Error::from)?;
     }
     let tasks = Tasks::of(&args.store).settings(console.settings(None, None));
@@ -114,10 +111,7 @@ pub fn gather(args: &GatherArgs, console: &Console) -> Result<u8, Failure> {
         }));
     } else if gathered.is_finished {
         console.line(&format!("{} is finished", args.store.display()));
-        console.note(&format!(
-            "next: `tetdb resume {}` verifies it",
-            args.store.display()
-        ));
+        console.note(&format!("next: `tetdb resume {}` verifies it", args.store.display()));
     } else {
         console.line(&format!(
             "stage {} of {}: tasks {} can begin",
@@ -132,9 +126,8 @@ pub fn gather(args: &GatherArgs, console: &Console) -> Result<u8, Failure> {
 /// The tasks of a store for `info`.
 pub(super) fn object(planned: &Planned) -> Value {
     let [done, running, failed, waiting] = planned.counts();
-    let states: Vec<Value> = (planned.states.iter())
-        .map(|(task, state)| state_object(*task, state))
-        .collect();
+    let states: Vec<Value> =
+        (planned.states.iter()).map(|(task, state)| state_object(*task, state)).collect();
     let stages: Vec<Value> = (planned.stages.iter())
         .map(|s| json!({ "does": kind(s.kind), "first_task": s.first, "tasks": s.tasks().len() }))
         .collect();
@@ -159,10 +152,7 @@ fn state_object(task: u32, state: &TaskState) -> Value {
 pub(super) fn print(planned: &Planned, console: &Console) {
     let [done, running, failed, waiting] = planned.counts();
     let range = planned.range();
-    let what = planned
-        .stages
-        .get(planned.stage)
-        .map_or("", |s| kind(s.kind));
+    let what = planned.stages.get(planned.stage).map_or("", |s| kind(s.kind));
     console.line(&format!(
         "tasks {}-{} of stage {} of {} ({what}): {done} done, {running} running, {failed} failed, {waiting} waiting",
         range.start,

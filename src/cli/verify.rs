@@ -32,10 +32,7 @@ fn verify(args: &VerifyArgs, settings: &Settings, console: &Console) -> Result<u
     let mut open = open_finished(&args.store)?;
     // The store may be one that can only be read.
     let scratch = std::env::temp_dir().join("verify");
-    let space = Space {
-        cap,
-        beside: &scratch,
-    };
+    let space = Space { cap, beside: &scratch };
     let surface = match args.against.is_empty() {
         true => {
             let sources = open.job()?.surfaces;
@@ -52,11 +49,7 @@ fn verify(args: &VerifyArgs, settings: &Settings, console: &Console) -> Result<u
         }
         Err(failure) => return Err(failure),
     };
-    let level = if args.full {
-        Level::Delaunay
-    } else {
-        Level::Geometry
-    };
+    let level = if args.full { Level::Delaunay } else { Level::Geometry };
     let report = check(&mut open, settings, surface.as_ref(), cap, level)?;
     if console.is_json() {
         let mut answer = serde_json::to_value(&report).unwrap_or_default();

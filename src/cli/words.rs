@@ -42,11 +42,7 @@ pub fn shortened(text: &str) -> Cow<'_, str> {
     }
     let begin = text.chars().take(TEXT_MAX / 2);
     let end = text.chars().skip(n - TEXT_MAX / 2);
-    begin
-        .chain(" … ".chars())
-        .chain(end)
-        .collect::<String>()
-        .into()
+    begin.chain(" … ".chars()).chain(end).collect::<String>().into()
 }
 
 #[cfg(test)]
@@ -59,9 +55,6 @@ mod tests {
         assert_eq!(count(0u32, "region"), "0 regions");
         let names: Vec<String> = (0..14).map(|n| n.to_string()).collect();
         assert!(listed(&names).ends_with("11 and 2 more"));
-        assert_eq!(
-            bounds([[0.0; 3], [1.0, 0.5, 1e-9]]),
-            "(0, 0, 0) to (1, 0.5, 1e-9)"
-        );
+        assert_eq!(bounds([[0.0; 3], [1.0, 0.5, 1e-9]]), "(0, 0, 0) to (1, 0.5, 1e-9)");
     }
 }

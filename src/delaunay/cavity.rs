@@ -90,12 +90,7 @@ impl Kernel {
             let tet = mesh.tet(t);
             let corners = mesh.points(&tet);
             let [a, b, c, d] = corners;
-            let seen = [
-                Seen::new(a, p),
-                Seen::new(b, p),
-                Seen::new(c, p),
-                Seen::new(d, p),
-            ];
+            let seen = [Seen::new(a, p), Seen::new(b, p), Seen::new(c, p), Seen::new(d, p)];
             // What lies across the face of entry is in the cavity; the first tetrahedron was entered from nowhere.
             let n = if next == 0 { 4 } else { 3 };
             next += 1;
@@ -193,11 +188,7 @@ impl Kernel {
         if self.faces.len() + 4 != 2 * self.n_outer() {
             return Err(Rejected::Blocked);
         }
-        if self.buries(start.record.vertices()) {
-            Err(Rejected::Buries)
-        } else {
-            Ok(())
-        }
+        if self.buries(start.record.vertices()) { Err(Rejected::Buries) } else { Ok(()) }
     }
 
     /// Whether a vertex of the cavity is on none of its outer faces.
@@ -205,11 +196,7 @@ impl Kernel {
         let numbered = self.numbered;
         let mut vertices = first.iter().chain(&self.apexes);
         vertices.any(|v| {
-            if numbered {
-                !self.links.knows(*v)
-            } else {
-                self.outer.binary_search(v).is_err()
-            }
+            if numbered { !self.links.knows(*v) } else { self.outer.binary_search(v).is_err() }
         })
     }
 
@@ -219,8 +206,7 @@ impl Kernel {
         self.numbered = self.number_faces();
         if !self.numbered {
             self.outer.clear();
-            self.outer
-                .extend(self.faces.iter().flat_map(|face| face.vertices));
+            self.outer.extend(self.faces.iter().flat_map(|face| face.vertices));
             self.outer.sort_unstable();
             self.outer.dedup();
         }
@@ -232,11 +218,9 @@ impl Kernel {
         self.locals.clear();
         for face in &self.faces {
             let [a, b, c] = face.vertices;
-            let (Some(a), Some(b), Some(c)) = (
-                self.links.local(a),
-                self.links.local(b),
-                self.links.local(c),
-            ) else {
+            let (Some(a), Some(b), Some(c)) =
+                (self.links.local(a), self.links.local(b), self.links.local(c))
+            else {
                 return false;
             };
             self.locals.push([a, b, c]);
@@ -246,11 +230,7 @@ impl Kernel {
 
     /// Vertices of the outer faces, once they are listed.
     fn n_outer(&self) -> usize {
-        if self.numbered {
-            self.links.n_local()
-        } else {
-            self.outer.len()
-        }
+        if self.numbered { self.links.n_local() } else { self.outer.len() }
     }
 
     /// Keeps what is still connected to `seed` through marked tetrahedra; lists the outer faces anew.
@@ -324,8 +304,7 @@ impl Kernel {
         self.stats.cavity_largest = self.stats.cavity_largest.max(self.cavity.len() as u64);
         let n_new = self.faces.len();
         self.new_tets.clear();
-        self.new_tets
-            .extend(self.cavity.iter().copied().take(n_new));
+        self.new_tets.extend(self.cavity.iter().copied().take(n_new));
         while self.new_tets.len() < n_new {
             self.new_tets.push(mesh.take_tet());
         }
@@ -355,11 +334,7 @@ impl Kernel {
             self.links.set(a, b, t | 3);
         }
         for ((face, &t), &[a, b, c]) in self.faces.iter().zip(&self.new_tets).zip(&self.locals) {
-            let inner = [
-                self.links.get(c, b),
-                self.links.get(a, c),
-                self.links.get(b, a),
-            ];
+            let inner = [self.links.get(c, b), self.links.get(a, c), self.links.get(b, a)];
             write_new(mesh, v, t, face, inner);
         }
     }
@@ -411,12 +386,7 @@ fn write_new<P: Pages>(mesh: &mut Mesh<P>, v: u32, t: u32, face: &CavityFace, in
     let required = if face.required { REQUIRED } else { 0 };
     let tet = Tet {
         node: [v | required, a, b, c],
-        neighbor: [
-            face.outside,
-            FaceRef(inner[0]),
-            FaceRef(inner[1]),
-            FaceRef(inner[2]),
-        ],
+        neighbor: [face.outside, FaceRef(inner[0]), FaceRef(inner[1]), FaceRef(inner[2])],
     };
     mesh.set_tet(t, tet);
     if face.outside.exists() {

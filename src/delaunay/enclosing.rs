@@ -16,13 +16,9 @@ const MARGIN: f64 = 3.0;
 pub fn enclose<P: Pages>(mesh: &mut Mesh<P>, bounds: &Aabb) -> u32 {
     assert_eq!(mesh.n_tets(), 0, "the enclosing box comes first");
     let center = (bounds.low + bounds.high) * 0.5;
-    let half = (bounds.high - bounds.low)
-        .max_element()
-        .max(f64::MIN_POSITIVE)
-        * MARGIN;
-    let corners: Vec<Point> = (0..8)
-        .map(|i| center + Point::new(side(i), side(i >> 1), side(i >> 2)) * half)
-        .collect();
+    let half = (bounds.high - bounds.low).max_element().max(f64::MIN_POSITIVE) * MARGIN;
+    let corners: Vec<Point> =
+        (0..8).map(|i| center + Point::new(side(i), side(i >> 1), side(i >> 2)) * half).collect();
     let ids: Vec<u32> = corners
         .iter()
         .enumerate()
@@ -70,11 +66,7 @@ fn delaunay_of_few(points: &[Point]) -> Vec<[usize; 4]> {
                     if volume == 0.0 {
                         continue;
                     }
-                    let cell = if volume > 0.0 {
-                        [a, b, c, d]
-                    } else {
-                        [b, a, c, d]
-                    };
+                    let cell = if volume > 0.0 { [a, b, c, d] } else { [b, a, c, d] };
                     let [p, q, r, s] = cell.map(|i| points[i]);
                     let empty = (0..n)
                         .all(|e| cell.contains(&e) || !in_sphere_perturbed(p, q, r, s, points[e]));

@@ -111,9 +111,7 @@ impl Links {
 
     /// The half-face of the edge a → b of a large surface.
     pub(super) fn find_sorted(&self, a: u32, b: u32) -> Option<u32> {
-        let at = self
-            .sorted
-            .binary_search_by_key(&(a, b), |&(a, b, _)| (a, b));
+        let at = self.sorted.binary_search_by_key(&(a, b), |&(a, b, _)| (a, b));
         at.ok().map(|i| self.sorted[i].2)
     }
 }

@@ -44,17 +44,9 @@ impl Kernel {
                     break;
                 }
             }
-            self.turn = self
-                .turn
-                .wrapping_mul(1_664_525)
-                .wrapping_add(1_013_904_223)
-                ^ (step >> 3);
+            self.turn = self.turn.wrapping_mul(1_664_525).wrapping_add(1_013_904_223) ^ (step >> 3);
             let Some(i) = exit else {
-                return Ok(Located {
-                    tet,
-                    record,
-                    points,
-                });
+                return Ok(Located { tet, record, points });
             };
             let across = record.neighbor[i];
             if !across.exists() {

@@ -21,7 +21,5 @@ pub fn insertion_key(frame: &HilbertFrame, p: Point) -> u64 {
 
 /// The coordinate bits, mixed.
 fn hash(p: Point) -> u64 {
-    p.to_array()
-        .into_iter()
-        .fold(STEP, |h, c| mix(h ^ c.to_bits()))
+    p.to_array().into_iter().fold(STEP, |h, c| mix(h ^ c.to_bits()))
 }

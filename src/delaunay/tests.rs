@@ -9,9 +9,8 @@ use crate::storage::{FlatPages, Pager, Pages};
 fn random(seed: u64) -> impl FnMut() -> f64 {
     let mut state = seed;
     move || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 11) as f64 / (1u64 << 53) as f64
     }
 }
@@ -21,9 +20,7 @@ fn build<P: Pages>(mut mesh: Mesh<P>, points: &[Point]) -> Mesh<P> {
     let mut hint = enclose(&mut mesh, &Aabb::around(points.iter().copied()));
     for &p in points {
         let v = mesh.add_vertex(p, 0.0);
-        hint = kernel
-            .insert(&mut mesh, v, p, hint)
-            .expect("inside the box and new");
+        hint = kernel.insert(&mut mesh, v, p, hint).expect("inside the box and new");
     }
     mesh
 }
@@ -35,10 +32,7 @@ fn checked<P: Pages>(mesh: &mut Mesh<P>) -> Vec<[[u64; 3]; 4]> {
     while let Some((t, tet)) = mesh.next_tet(from) {
         from = t + 1;
         let p = mesh.points(&tet);
-        assert!(
-            orient(p[0], p[1], p[2], p[3]) > 0.0,
-            "tetrahedron {t} is not positive"
-        );
+        assert!(orient(p[0], p[1], p[2], p[3]) > 0.0, "tetrahedron {t} is not positive");
         for i in 0..4 {
             let across = tet.neighbor[i];
             if !across.exists() {
@@ -80,21 +74,16 @@ fn grid(n: i32, scale: f64) -> Vec<Point> {
 #[test]
 fn the_mesh_is_a_function_of_the_point_set() {
     let mut next = random(7);
-    let cloud: Vec<Point> = (0..700)
-        .map(|_| Point::new(next(), next(), next()))
-        .collect();
+    let cloud: Vec<Point> = (0..700).map(|_| Point::new(next(), next(), next())).collect();
     let ring: Vec<Point> = (0..40)
         .map(|i| {
             let t = f64::from(i) / 40.0;
             Point::new(t, t * t, 0.0)
         })
         .collect();
-    for (name, mut points) in [
-        ("cloud", cloud),
-        ("grid", grid(7, 1.0)),
-        ("fine grid", grid(6, 1e-9)),
-        ("curve", ring),
-    ] {
+    for (name, mut points) in
+        [("cloud", cloud), ("grid", grid(7, 1.0)), ("fine grid", grid(6, 1e-9)), ("curve", ring)]
+    {
         let first = checked(&mut build(Mesh::new(FlatPages::default()), &points));
         points.reverse();
         let half = points.len() / 2;
@@ -111,9 +100,6 @@ fn a_point_given_twice_is_refused_and_changes_nothing() {
     let p = Point::new(1.0, 2.0, 0.0);
     let v = mesh.add_vertex(p, 0.0);
     let refused = Kernel::default().insert(&mut mesh, v, p, 0);
-    assert!(
-        matches!(refused, Err(Rejected::Duplicate(_))),
-        "{refused:?}"
-    );
+    assert!(matches!(refused, Err(Rejected::Duplicate(_))), "{refused:?}");
     assert_eq!(before, checked(&mut mesh));
 }

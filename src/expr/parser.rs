@@ -43,12 +43,7 @@ fn infix(word: Word) -> Option<Infix> {
         COMPARISON => (Kind::Number, Kind::Truth),
         _ => (Kind::Number, Kind::Number),
     };
-    Some(Infix {
-        binds,
-        takes,
-        gives,
-        op,
-    })
+    Some(Infix { binds, takes, gives, op })
 }
 
 /// What a name in front of a bracket does.
@@ -129,16 +124,9 @@ fn parse(text: &str, variables: &[&str]) -> Result<Expression, ExprError> {
     let kind = parser.expression(OR)?;
     if parser.word != Word::End {
         let what = parser.found();
-        return Err(fault(
-            parser.start,
-            format!("expected an operator or the end, found {what}"),
-        ));
+        return Err(fault(parser.start, format!("expected an operator or the end, found {what}")));
     }
-    Ok(Expression {
-        ops: parser.ops,
-        lists: parser.lists,
-        kind,
-    })
+    Ok(Expression { ops: parser.ops, lists: parser.lists, kind })
 }
 
 impl<'a> Parser<'a> {
@@ -158,10 +146,7 @@ impl<'a> Parser<'a> {
     fn expect(&mut self, sign: &'static str) -> Result<(), ExprError> {
         if self.word != Word::Sign(sign) {
             let found = self.found();
-            return Err(fault(
-                self.start,
-                format!("expected `{sign}`, found {found}"),
-            ));
+            return Err(fault(self.start, format!("expected `{sign}`, found {found}")));
         }
         self.advance()
     }
@@ -225,10 +210,7 @@ impl<'a> Parser<'a> {
 
     fn not_chained(&self, compared: bool) -> Result<(), ExprError> {
         match compared {
-            true => Err(fault(
-                self.start,
-                "comparisons are not chained; write `a < b and b < c`",
-            )),
+            true => Err(fault(self.start, "comparisons are not chained; write `a < b and b < c`")),
             false => Ok(()),
         }
     }
@@ -252,10 +234,7 @@ impl<'a> Parser<'a> {
             Word::Name(name) if !matches!(name, "and" | "or" | "in") => self.name(name),
             _ => {
                 let found = self.found();
-                Err(fault(
-                    start,
-                    format!("expected a number, a name or `(`, found {found}"),
-                ))
+                Err(fault(start, format!("expected a number, a name or `(`, found {found}")))
             }
         }
     }
@@ -359,10 +338,7 @@ impl<'a> Parser<'a> {
             }
             let Word::Number(value) = self.word else {
                 let found = self.found();
-                return Err(fault(
-                    self.start,
-                    format!("a list holds numbers, found {found}"),
-                ));
+                return Err(fault(self.start, format!("a list holds numbers, found {found}")));
             };
             list.push(if negative { -value } else { value });
             self.advance()?;

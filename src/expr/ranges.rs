@@ -13,11 +13,7 @@ struct Range {
     nan: bool,
 }
 
-const ANY: Range = Range {
-    low: f64::NEG_INFINITY,
-    high: f64::INFINITY,
-    nan: true,
-};
+const ANY: Range = Range { low: f64::NEG_INFINITY, high: f64::INFINITY, nan: true };
 
 impl Range {
     /// From values that are its ends; anything when one is not a number.
@@ -104,12 +100,7 @@ fn unary(f: Unary, x: Range) -> Range {
 fn binary(f: Binary, a: Range, b: Range) -> Range {
     let nan = a.nan || b.nan;
     let ends = |f: Binary| {
-        let pairs = [
-            (a.low, b.low),
-            (a.low, b.high),
-            (a.high, b.low),
-            (a.high, b.high),
-        ];
+        let pairs = [(a.low, b.low), (a.low, b.high), (a.high, b.low), (a.high, b.high)];
         pairs.map(|(a, b)| f.of(a, b))
     };
     // Infinite ends meet only where a range is unbounded: what is between them need not come near.

@@ -48,9 +48,9 @@ impl Tree {
                 let list: Vec<f64> = list.iter().map(|t| t.number(values)).collect();
                 let extreme = |better: fn(f64, f64) -> bool| match list.iter().any(|v| v.is_nan()) {
                     true => f64::NAN,
-                    false => list[1..]
-                        .iter()
-                        .fold(list[0], |m, &v| if better(v, m) { v } else { m }),
+                    false => {
+                        list[1..].iter().fold(list[0], |m, &v| if better(v, m) { v } else { m })
+                    }
                 };
                 match *name {
                     "abs" => list[0].abs(),
@@ -108,12 +108,7 @@ impl Tree {
 
 /// Small whole numbers and zero among others, so that equality and division by zero occur.
 fn value() -> impl Strategy<Value = f64> {
-    prop_oneof![
-        (-3i32..4).prop_map(f64::from),
-        -10.0..10.0,
-        Just(1e300),
-        Just(1e-300)
-    ]
+    prop_oneof![(-3i32..4).prop_map(f64::from), -10.0..10.0, Just(1e300), Just(1e-300)]
 }
 
 fn number() -> BoxedStrategy<Tree> {
@@ -125,20 +120,11 @@ fn number() -> BoxedStrategy<Tree> {
         let two = (inner.clone(), inner.clone());
         prop_oneof![
             inner.clone().prop_map(|a| Tree::Negate(a.into())),
-            (
-                prop::sample::select(vec!["abs", "sqrt", "floor", "exp", "sin"]),
-                inner.clone()
-            )
+            (prop::sample::select(vec!["abs", "sqrt", "floor", "exp", "sin"]), inner.clone())
                 .prop_map(|(name, a)| Tree::Call(name, vec![a])),
-            (
-                prop::sample::select(vec!["min", "max"]),
-                prop::collection::vec(inner.clone(), 2..4)
-            )
+            (prop::sample::select(vec!["min", "max"]), prop::collection::vec(inner.clone(), 2..4))
                 .prop_map(|(name, list)| Tree::Call(name, list)),
-            (
-                prop::sample::select(vec!["+", "-", "*", "/", "^"]),
-                two.clone()
-            )
+            (prop::sample::select(vec!["+", "-", "*", "/", "^"]), two.clone())
                 .prop_map(|(sign, (a, b))| Tree::Infix(sign, a.into(), b.into())),
             (comparison(inner), two).prop_map(|(c, (a, b))| Tree::If(c.into(), a.into(), b.into())),
         ]
@@ -161,11 +147,7 @@ fn truth() -> BoxedStrategy<Tree> {
     leaf.prop_recursive(3, 8, 2, |inner| {
         prop_oneof![
             inner.clone().prop_map(|a| Tree::Not(a.into())),
-            (
-                prop::sample::select(vec!["and", "or"]),
-                inner.clone(),
-                inner
-            )
+            (prop::sample::select(vec!["and", "or"]), inner.clone(), inner)
                 .prop_map(|(sign, a, b)| Tree::Infix(sign, a.into(), b.into())),
         ]
     })
@@ -322,9 +304,7 @@ fn nothing_is_too_deep_for_an_answer() {
 #[test]
 fn ranges_rule_out_what_cannot_be() {
     let may = |text: &str, ranges: [[f64; 2]; 3]| {
-        Expression::parse(text, &NAMES)
-            .expect(text)
-            .may_hold(&ranges)
+        Expression::parse(text, &NAMES).expect(text).may_hold(&ranges)
     };
     let ranges = [[0.0, 1.0], [5.0, 5.0], [1.0, 2.5]];
     for text in [
@@ -339,12 +319,7 @@ fn ranges_rule_out_what_cannot_be() {
     ] {
         assert!(!may(text, ranges), "{text}");
     }
-    for text in [
-        "x >= 1",
-        "quality > 2 and y = 5",
-        "exp(x) > 100",
-        "y in [5]",
-    ] {
+    for text in ["x >= 1", "quality > 2 and y = 5", "exp(x) > 100", "y in [5]"] {
         assert!(may(text, ranges), "{text}");
     }
 }

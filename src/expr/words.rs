@@ -13,9 +13,8 @@ pub(super) enum Word<'a> {
 }
 
 /// Signs, longer ones before those they begin with.
-const SIGNS: [&str; 17] = [
-    "==", "!=", "<=", ">=", "=", "<", ">", "+", "-", "*", "/", "^", "(", ")", "[", "]", ",",
-];
+const SIGNS: [&str; 17] =
+    ["==", "!=", "<=", ">=", "=", "<", ">", "+", "-", "*", "/", "^", "(", ")", "[", "]", ","];
 
 /// Signs of other languages, and what to write here.
 const FOREIGN: [(&str, &str); 7] = [
@@ -45,16 +44,11 @@ pub(super) fn next_word(text: &str, at: usize) -> Result<(Word<'_>, usize, usize
         let value = value.ok().filter(|v| v.is_finite());
         return match value {
             Some(value) => Ok((Word::Number(value), start, start + length)),
-            None => Err(fault(
-                start,
-                format!("{:?} is not a number", &rest[..length]),
-            )),
+            None => Err(fault(start, format!("{:?} is not a number", &rest[..length]))),
         };
     }
     if first.is_alphabetic() || first == '_' {
-        let length = rest
-            .find(|c: char| !(c.is_alphanumeric() || c == '_'))
-            .unwrap_or(rest.len());
+        let length = rest.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(rest.len());
         return Ok((Word::Name(&rest[..length]), start, start + length));
     }
     let foreign = FOREIGN.iter().find(|(sign, _)| rest.starts_with(sign));
@@ -89,8 +83,5 @@ fn number_length(text: &[u8]) -> usize {
 
 /// An error at a place.
 pub(super) fn fault(at: usize, message: impl Into<String>) -> ExprError {
-    ExprError {
-        at,
-        message: message.into(),
-    }
+    ExprError { at, message: message.into() }
 }

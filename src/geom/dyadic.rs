@@ -26,12 +26,7 @@ impl From<f64> for Dyadic {
             0 => (fraction, -1074),
             _ => (fraction | 1 << MANTISSA, biased - 1075),
         };
-        Self {
-            negative: x < 0.0,
-            magnitude: vec![whole],
-            exponent,
-        }
-        .trimmed()
+        Self { negative: x < 0.0, magnitude: vec![whole], exponent }.trimmed()
     }
 }
 
@@ -99,12 +94,7 @@ impl Dyadic {
         } else {
             (self.negative, subtracted(a, &b))
         };
-        Self {
-            negative,
-            magnitude,
-            exponent,
-        }
-        .trimmed()
+        Self { negative, magnitude, exponent }.trimmed()
     }
 
     /// `self + other`.
@@ -160,11 +150,7 @@ impl Dyadic {
         };
         let zeros = top.leading_zeros();
         let below = if n > 1 { self.magnitude[n - 2] } else { 0 };
-        let bits = if zeros == 0 {
-            top
-        } else {
-            top << zeros | below >> (64 - zeros)
-        };
+        let bits = if zeros == 0 { top } else { top << zeros | below >> (64 - zeros) };
         let sign = if self.negative { -1.0 } else { 1.0 };
         let exponent = self.exponent + 64 * (n as i64 - 1) - i64::from(zeros);
         (sign * bits as f64, exponent)
@@ -177,10 +163,7 @@ impl Dyadic {
             return 0.0;
         }
         let value = times_power(leading, exponent);
-        value
-            .abs()
-            .clamp(f64::MIN_POSITIVE, f64::MAX)
-            .copysign(leading)
+        value.abs().clamp(f64::MIN_POSITIVE, f64::MAX).copysign(leading)
     }
 
     /// `self / other` to about `50 * terms` bits; `None` for a division by zero.
@@ -219,12 +202,8 @@ impl Dyadic {
         }
         let mut magnitude = self.magnitude[words..].to_vec();
         magnitude[0] = magnitude[0] >> bits << bits;
-        Self {
-            negative: self.negative,
-            magnitude,
-            exponent: self.exponent + 64 * words as i64,
-        }
-        .trimmed()
+        Self { negative: self.negative, magnitude, exponent: self.exponent + 64 * words as i64 }
+            .trimmed()
     }
 }
 
@@ -236,9 +215,7 @@ fn times_power(x: f64, exponent: i64) -> f64 {
 }
 
 fn compared(a: &[u64], b: &[u64]) -> Ordering {
-    a.len()
-        .cmp(&b.len())
-        .then_with(|| a.iter().rev().cmp(b.iter().rev()))
+    a.len().cmp(&b.len()).then_with(|| a.iter().rev().cmp(b.iter().rev()))
 }
 
 fn added(mut a: Vec<u64>, b: &[u64]) -> Vec<u64> {
@@ -281,9 +258,7 @@ mod tests {
     fn sums_and_products_are_those_of_rationals() {
         let mut state = 1u64;
         let mut next = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
             let mantissa = (state >> 12) as f64 / (1u64 << 40) as f64 - 2048.0;
             mantissa * 2f64.powi((state >> 3) as i32 % 130 - 65)
         };
@@ -320,9 +295,6 @@ mod tests {
         assert_eq!(huge.times(&huge).estimate(), f64::MAX);
         assert_eq!(Dyadic::from(0.0).estimate(), 0.0);
         assert_eq!(Dyadic::from(1.5).estimate(), 1.5);
-        assert_eq!(
-            Dyadic::from(5e-324).plus(&Dyadic::from(1e308)).estimate(),
-            1e308
-        );
+        assert_eq!(Dyadic::from(5e-324).plus(&Dyadic::from(1e308)).estimate(), 1e308);
     }
 }

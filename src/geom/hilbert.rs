@@ -20,10 +20,7 @@ impl HilbertFrame {
         let extent = (bounds.high - bounds.low).max_element();
         let cells = f64::from(1u32 << BITS);
         let scale = if extent > 0.0 { cells / extent } else { 0.0 };
-        Self {
-            low: bounds.low,
-            scale: if scale.is_finite() { scale } else { 0.0 },
-        }
+        Self { low: bounds.low, scale: if scale.is_finite() { scale } else { 0.0 } }
     }
 
     /// Index of the curve cell of `p`, below 2^63.
@@ -70,14 +67,7 @@ struct Turn {
 
 /// Numbers of turns: six orders of axes, eight of directions, two of digits.
 const TURNS: usize = 96;
-const ORDERS: [[u8; 3]; 6] = [
-    [0, 1, 2],
-    [0, 2, 1],
-    [1, 0, 2],
-    [1, 2, 0],
-    [2, 0, 1],
-    [2, 1, 0],
-];
+const ORDERS: [[u8; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
 
 impl Turn {
     const fn from_number(n: usize) -> Self {
@@ -189,9 +179,7 @@ mod tests {
         }
         y ^= x;
         z ^= y;
-        let t = (1..BITS)
-            .rev()
-            .fold(0, |t, k| t ^ ((z >> k & 1) * ((1 << k) - 1)));
+        let t = (1..BITS).rev().fold(0, |t, k| t ^ ((z >> k & 1) * ((1 << k) - 1)));
         (0..BITS).rev().fold(0, |index, k| {
             [x ^ t, y ^ t, z ^ t]
                 .iter()
@@ -204,9 +192,7 @@ mod tests {
         let mut state = 1u64;
         for _ in 0..10_000 {
             let cell = [0; 3].map(|_| {
-                state = state
-                    .wrapping_mul(6_364_136_223_846_793_005)
-                    .wrapping_add(1);
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
                 (state >> 43) as u32
             });
             assert_eq!(hilbert_index(cell), by_bits(cell), "{cell:?}");

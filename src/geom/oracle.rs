@@ -26,10 +26,7 @@ impl From<f64> for Truth {
             _ => (fraction | 1 << 52, biased - 1075),
         };
         let mantissa = IBig::from(whole);
-        Self {
-            mantissa: if x < 0.0 { -mantissa } else { mantissa },
-            exponent,
-        }
+        Self { mantissa: if x < 0.0 { -mantissa } else { mantissa }, exponent }
     }
 }
 
@@ -47,10 +44,7 @@ impl Add for &Truth {
     type Output = Truth;
     fn add(self, other: Self) -> Truth {
         let exponent = self.exponent.min(other.exponent);
-        Truth {
-            mantissa: self.at_exponent(exponent) + other.at_exponent(exponent),
-            exponent,
-        }
+        Truth { mantissa: self.at_exponent(exponent) + other.at_exponent(exponent), exponent }
     }
 }
 
@@ -58,10 +52,7 @@ impl Sub for &Truth {
     type Output = Truth;
     fn sub(self, other: Self) -> Truth {
         let exponent = self.exponent.min(other.exponent);
-        Truth {
-            mantissa: self.at_exponent(exponent) - other.at_exponent(exponent),
-            exponent,
-        }
+        Truth { mantissa: self.at_exponent(exponent) - other.at_exponent(exponent), exponent }
     }
 }
 

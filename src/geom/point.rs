@@ -15,28 +15,19 @@ pub struct Aabb {
 
 impl Aabb {
     /// The box of no point: any point extends it to itself.
-    pub const EMPTY: Self = Self {
-        low: Point::INFINITY,
-        high: Point::NEG_INFINITY,
-    };
+    pub const EMPTY: Self = Self { low: Point::INFINITY, high: Point::NEG_INFINITY };
 
     /// The smallest box that also holds `p`.
     #[inline]
     #[must_use]
     pub fn with(self, p: Point) -> Self {
-        Self {
-            low: self.low.min(p),
-            high: self.high.max(p),
-        }
+        Self { low: self.low.min(p), high: self.high.max(p) }
     }
 
     /// The smallest box that holds both.
     #[must_use]
     pub fn union(self, other: Self) -> Self {
-        Self {
-            low: self.low.min(other.low),
-            high: self.high.max(other.high),
-        }
+        Self { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
 
     /// The smallest box around `points`.

@@ -38,18 +38,12 @@ const SLACK: f64 = 1.000_001;
 ///
 /// Also returns the inverse of that power.
 fn scaled<const N: usize>(points: [Point; N]) -> ([Coord3D<f64>; N], f64) {
-    let largest = points
-        .iter()
-        .fold(0.0f64, |m, p| m.max(p.abs().max_element()));
+    let largest = points.iter().fold(0.0f64, |m, p| m.max(p.abs().max_element()));
     let exponent = (largest.to_bits() >> 52) as i32 - 1023;
     let power = |e: i32| f64::from_bits(((1023 + e) as u64) << 52);
     let exponent = exponent.clamp(-1000, 1000);
     let factor = power(-exponent);
-    let points = points.map(|p| Coord3D {
-        x: p.x * factor,
-        y: p.y * factor,
-        z: p.z * factor,
-    });
+    let points = points.map(|p| Coord3D { x: p.x * factor, y: p.y * factor, z: p.z * factor });
     (points, power(exponent))
 }
 
@@ -91,10 +85,7 @@ fn orient_slow(a: Point, b: Point, c: Point, d: Point) -> f64 {
     }
     // Back in input units, for those who add volumes; a volume too small for a double keeps its sign.
     let volume = det * unit * unit * unit;
-    volume
-        .abs()
-        .clamp(f64::MIN_POSITIVE, f64::MAX)
-        .copysign(det)
+    volume.abs().clamp(f64::MIN_POSITIVE, f64::MAX).copysign(det)
 }
 
 /// The larger of two numbers that are not NaN: one instruction, where `f64::max` takes five.
@@ -106,9 +97,7 @@ pub fn larger(a: f64, b: f64) -> f64 {
 /// The sign of [`orient`] as an ordering against zero.
 #[inline]
 pub fn orient_sign(a: Point, b: Point, c: Point, d: Point) -> Ordering {
-    orient(a, b, c, d)
-        .partial_cmp(&0.0)
-        .expect("coordinates are finite")
+    orient(a, b, c, d).partial_cmp(&0.0).expect("coordinates are finite")
 }
 
 /// A point as seen from another: the difference and its square.
@@ -123,10 +112,7 @@ impl Seen {
     #[inline(always)]
     pub fn new(a: Point, e: Point) -> Self {
         let d = a - e;
-        Self {
-            d,
-            square: d.dot(d),
-        }
+        Self { d, square: d.dot(d) }
     }
 }
 
@@ -167,30 +153,16 @@ pub fn insphere_filtered(a: &Seen, b: &Seen, c: &Seen, d: &Seen) -> f64 {
 /// The sign is exact, the magnitude is not; zero means that the five points lie on one sphere.
 #[inline(always)]
 pub fn insphere(a: Point, b: Point, c: Point, d: Point, e: Point) -> f64 {
-    let [s, t, u, v] = [
-        Seen::new(a, e),
-        Seen::new(b, e),
-        Seen::new(c, e),
-        Seen::new(d, e),
-    ];
+    let [s, t, u, v] = [Seen::new(a, e), Seen::new(b, e), Seen::new(c, e), Seen::new(d, e)];
     let det = insphere_filtered(&s, &t, &u, &v);
-    if det != 0.0 {
-        det
-    } else {
-        insphere_slow(a, b, c, d, e)
-    }
+    if det != 0.0 { det } else { insphere_slow(a, b, c, d, e) }
 }
 
 /// The finer filter, for flat boxes of differences, and then the exact sign.
 #[cold]
 #[inline(never)]
 fn insphere_slow(a: Point, b: Point, c: Point, d: Point, e: Point) -> f64 {
-    let [s, t, u, v] = [
-        Seen::new(a, e),
-        Seen::new(b, e),
-        Seen::new(c, e),
-        Seen::new(d, e),
-    ];
+    let [s, t, u, v] = [Seen::new(a, e), Seen::new(b, e), Seen::new(c, e), Seen::new(d, e)];
     let det = seen_determinant(&s, &t, &u, &v);
     let m = s.d.abs().max(t.d.abs()).max(u.d.abs()).max(v.d.abs());
     let largest = m.max_element();
@@ -212,9 +184,7 @@ fn insphere_slow(a: Point, b: Point, c: Point, d: Point, e: Point) -> f64 {
 /// Lexicographic order of coordinates, the rank that decides all ties.
 #[inline]
 pub fn lex_cmp(a: Point, b: Point) -> Ordering {
-    (a.x, a.y, a.z)
-        .partial_cmp(&(b.x, b.y, b.z))
-        .expect("coordinates are finite")
+    (a.x, a.y, a.z).partial_cmp(&(b.x, b.y, b.z)).expect("coordinates are finite")
 }
 
 /// Whether `e` is strictly inside the perturbed sphere of the positive tetrahedron `a b c d`.
@@ -277,11 +247,7 @@ mod tests {
     fn volumes_the_filters_do_not_decide_are_in_input_units() {
         let flat = 2f64.powi(-48);
         for scale in [2f64.powi(-30), 1.0, 2f64.powi(30)] {
-            let [a, b, c] = [
-                Point::ONE,
-                Point::new(2.0, 1.0, 1.0),
-                Point::new(1.0, 2.0, 1.0),
-            ];
+            let [a, b, c] = [Point::ONE, Point::new(2.0, 1.0, 1.0), Point::new(1.0, 2.0, 1.0)];
             let [a, b, c] = [a, b, c].map(|p| p * scale);
             let d = Point::new(1.5, 1.5, 1.0 + flat) * scale;
             let volume = orient(a, b, c, d) / (flat * scale.powi(3));

@@ -60,13 +60,7 @@ fn rounded_differences(points: [Point; 4], e: Point) -> Option<[[i64; 3]; 4]> {
 fn integer_differences(points: [Point; 5]) -> Option<[[i64; 3]; 4]> {
     let parts_of = |p: Point| [parts(p.x), parts(p.y), parts(p.z)];
     let [a, b, c, d, e] = points;
-    let points = [
-        parts_of(a),
-        parts_of(b),
-        parts_of(c),
-        parts_of(d),
-        parts_of(e),
-    ];
+    let points = [parts_of(a), parts_of(b), parts_of(c), parts_of(d), parts_of(e)];
     let unit = points.iter().flatten().map(|p| p.1).min()?;
     let mut whole = [[0i128; 3]; 5];
     for (whole, point) in whole.iter_mut().zip(&points) {
@@ -153,19 +147,13 @@ impl Triple {
         let b = i128::from(b);
         let low = i128::from(a as u64) * b;
         let high = i128::from((a >> 64) as i64) * b;
-        Self {
-            low: low as u64,
-            high: high + (low >> 64),
-        }
+        Self { low: low as u64, high: high + (low >> 64) }
     }
 
     #[inline(always)]
     fn plus(self, other: Self) -> Self {
         let (low, carry) = self.low.overflowing_add(other.low);
-        Self {
-            low,
-            high: self.high + other.high + i128::from(carry),
-        }
+        Self { low, high: self.high + other.high + i128::from(carry) }
     }
 }
 

@@ -87,12 +87,7 @@ impl Tet {
     #[inline]
     pub fn vertices(&self) -> [u32; 4] {
         let [a, b, c, d] = self.node;
-        [
-            a & VERTEX_MASK,
-            b & VERTEX_MASK,
-            c & VERTEX_MASK,
-            d & VERTEX_MASK,
-        ]
+        [a & VERTEX_MASK, b & VERTEX_MASK, c & VERTEX_MASK, d & VERTEX_MASK]
     }
     /// Vertex id `i`.
     #[inline]

@@ -29,10 +29,7 @@ pub(super) const WORD_ZERO: u32_le = u32_le::from_native(0);
 impl<P: Pages> Mesh<P> {
     /// An empty mesh over `pages`, which must hold none.
     pub fn new(pages: P) -> Self {
-        Self {
-            pages,
-            state: MeshState::default(),
-        }
+        Self { pages, state: MeshState::default() }
     }
 
     /// Continues a mesh whose pages were stored with `state`.
@@ -97,10 +94,7 @@ impl<P: Pages> Mesh<P> {
     /// The mesh as several threads may read it, when all of it is in memory.
     pub fn shared(&mut self) -> Option<Mesh<SharedPages<'_>>> {
         let state = self.state;
-        Some(Mesh {
-            pages: self.pages.shared()?,
-            state,
-        })
+        Some(Mesh { pages: self.pages.shared()?, state })
     }
 
     /// The pages themselves.
@@ -212,11 +206,8 @@ impl<P: Pages> Mesh<P> {
             if f.exists() {
                 let word = &mut self.pages.write::<{ kind::TETS }>(f.tet())[f.face()];
                 let bits = word.to_native();
-                *word = u32_le::from_native(if required {
-                    bits | REQUIRED
-                } else {
-                    bits & !REQUIRED
-                });
+                *word =
+                    u32_le::from_native(if required { bits | REQUIRED } else { bits & !REQUIRED });
             }
         }
     }
@@ -238,11 +229,7 @@ impl<P: Pages> Mesh<P> {
     /// Takes the ids of `n` tetrahedra of a mesh that has none; each is then to be placed once, in any order.
     pub fn take_tets(&mut self, n: u32) {
         debug_assert_eq!(self.state.tets.fresh, 0);
-        self.state.tets = Arena {
-            fresh: sparse(n),
-            free_head: NONE,
-            n_live: n,
-        };
+        self.state.tets = Arena { fresh: sparse(n), free_head: NONE, n_live: n };
     }
 
     /// Writes a tetrahedron whose id was taken by [`Mesh::take_tets`], or is to lie behind all.

@@ -61,16 +61,7 @@ impl<P: Pages> Mesh<P> {
     pub fn set_facet(&mut self, n: u32, f: Facet) {
         let [a, b, c] = f.vertices;
         let input = f.input as u32;
-        let words = [
-            a,
-            b,
-            c,
-            f.label,
-            input,
-            (f.input >> 32) as u32,
-            f.regions[0],
-            f.regions[1],
-        ];
+        let words = [a, b, c, f.label, input, (f.input >> 32) as u32, f.regions[0], f.regions[1]];
         let slot = self.pages.write::<{ kind::FACETS }>(sparse(n));
         for (to, word) in slot.iter_mut().zip(words) {
             *to = u32_le::from_native(word);
@@ -94,16 +85,8 @@ impl<P: Pages> Mesh<P> {
 
     /// Interface face `n`, counted from 0.
     pub fn interface_face(&mut self, n: u32) -> InterfaceFace {
-        let w = self
-            .pages
-            .read::<{ kind::INTERFACE_FACES }>(sparse(n))
-            .map(u32_le::to_native);
-        InterfaceFace {
-            vertices: [w[0], w[1], w[2]],
-            cut: w[3],
-            index: w[4],
-            side: w[5],
-        }
+        let w = self.pages.read::<{ kind::INTERFACE_FACES }>(sparse(n)).map(u32_le::to_native);
+        InterfaceFace { vertices: [w[0], w[1], w[2]], cut: w[3], index: w[4], side: w[5] }
     }
 
     /// Replaces interface face `n`.

@@ -53,12 +53,7 @@ pub fn renumber<P: Pages>(
     }
     mesh.clear_scratch();
     let (facets, interface_faces) = (mesh.n_facets(), mesh.n_interface_faces());
-    mesh.set_state(MeshState::dense(
-        n_tets,
-        n_vertices,
-        facets,
-        interface_faces,
-    ));
+    mesh.set_state(MeshState::dense(n_tets, n_vertices, facets, interface_faces));
     Ok(())
 }
 
@@ -95,10 +90,7 @@ fn renumber_vertices<P: Pages>(
             break;
         }
         found.clear();
-        found.extend(
-            run.iter()
-                .map(|&v| (mesh.record::<{ kind::VERTICES }>(v), (0, 0))),
-        );
+        found.extend(run.iter().map(|&v| (mesh.record::<{ kind::VERTICES }>(v), (0, 0))));
         for (&v, (_, attribute)) in run.iter().zip(&mut found) {
             *attribute = mesh.attribute_before::<{ kind::VERTEX_ATTRIBUTES }>(v, old_attributes);
         }
@@ -111,8 +103,7 @@ fn renumber_vertices<P: Pages>(
         }
     }
     mesh.pages_mut().drop_front::<{ kind::VERTICES }>(old_pages);
-    mesh.pages_mut()
-        .drop_front::<{ kind::VERTEX_ATTRIBUTES }>(old_attributes);
+    mesh.pages_mut().drop_front::<{ kind::VERTEX_ATTRIBUTES }>(old_attributes);
     Ok(n_new)
 }
 
@@ -226,11 +217,7 @@ fn renumber_tets<P: Pages>(mesh: &mut Mesh<P>, n_vertices: u32) -> u32 {
     }
     let old_pages = mesh.pages().n_pages::<{ kind::TETS }>();
     let old_attributes = mesh.pages().n_pages::<{ kind::TET_ATTRIBUTES }>();
-    let moved = Moved {
-        numbers,
-        old,
-        old_attributes,
-    };
+    let moved = Moved { numbers, old, old_attributes };
     for batch in parts(n_new).chunks(BATCH) {
         let found = scan_parts(mesh, batch, &moved);
         for (n, (tet, attribute)) in (batch[0].start..).zip(found.into_iter().flatten()) {
@@ -239,8 +226,7 @@ fn renumber_tets<P: Pages>(mesh: &mut Mesh<P>, n_vertices: u32) -> u32 {
         }
     }
     mesh.pages_mut().drop_front::<{ kind::TETS }>(old_pages);
-    mesh.pages_mut()
-        .drop_front::<{ kind::TET_ATTRIBUTES }>(old_attributes);
+    mesh.pages_mut().drop_front::<{ kind::TET_ATTRIBUTES }>(old_attributes);
     n_new
 }
 
@@ -257,9 +243,7 @@ impl Scan for FirstVertices {
             if !tet.is_live() {
                 return NONE;
             }
-            (0..4).fold(NONE, |least, i| {
-                least.min(mesh.scratch(dense(tet.vertex(i))))
-            })
+            (0..4).fold(NONE, |least, i| least.min(mesh.scratch(dense(tet.vertex(i)))))
         };
         part.clone().map(least).collect()
     }
@@ -380,10 +364,7 @@ mod tests {
         mesh.set_required(FaceRef::new(hint, 2), true);
         let before = shape(&mut mesh);
         let dir = tempfile::tempdir().expect("a temporary directory");
-        let space = Workspace {
-            dir: &dir.path().into(),
-            memory: 1 << 20,
-        };
+        let space = Workspace { dir: &dir.path().into(), memory: 1 << 20 };
         for _ in 0..2 {
             renumber(&mut mesh, &HilbertFrame::new(&bounds), &space).expect("room for runs");
             assert_eq!(shape(&mut mesh), before);

@@ -53,22 +53,13 @@ impl<P: Pages> Mesh<P> {
         for (i, word) in tet.node.into_iter().enumerate() {
             bits |= u8::from(word & REQUIRED != 0) << i | u8::from(word & MARK != 0) << (4 + i);
         }
-        CoarseTet {
-            nodes: tet.vertices().map(dense),
-            bits,
-            region,
-            flags,
-        }
+        CoarseTet { nodes: tet.vertices().map(dense), bits, region, flags }
     }
 
     /// Vertex number `n` of a mesh without gaps.
     pub fn snapshot_vertex(&mut self, n: u32) -> CoarseVertex {
         let (point, (tag, owner)) = (self.point(sparse(n)), self.vertex_words(sparse(n)));
-        CoarseVertex {
-            point: point.to_array(),
-            tag,
-            owner,
-        }
+        CoarseVertex { point: point.to_array(), tag, owner }
     }
 
     /// Facet number `n`.

@@ -14,11 +14,7 @@ pub(super) struct Arena {
 
 impl Default for Arena {
     fn default() -> Self {
-        Self {
-            fresh: 0,
-            free_head: NONE,
-            n_live: 0,
-        }
+        Self { fresh: 0, free_head: NONE, n_live: 0 }
     }
 }
 
@@ -42,11 +38,7 @@ impl MeshState {
         n_facets: u32,
         n_interface_faces: u32,
     ) -> Self {
-        let arena = |n: u32| Arena {
-            fresh: sparse(n),
-            free_head: NONE,
-            n_live: n,
-        };
+        let arena = |n: u32| Arena { fresh: sparse(n), free_head: NONE, n_live: n };
         Self {
             tets: arena(n_tets),
             vertices: arena(n_vertices),
@@ -91,28 +83,15 @@ impl MeshState {
 
     /// The inverse of [`MeshState::to_words`].
     pub fn from_words(w: [u32; MESH_STATE_WORDS]) -> Self {
-        let arena = |i: usize| Arena {
-            fresh: w[i],
-            free_head: w[i + 1],
-            n_live: w[i + 2],
-        };
-        Self {
-            tets: arena(0),
-            vertices: arena(3),
-            facets: arena(6),
-            interface_faces: arena(9),
-        }
+        let arena = |i: usize| Arena { fresh: w[i], free_head: w[i + 1], n_live: w[i + 2] };
+        Self { tets: arena(0), vertices: arena(3), facets: arena(6), interface_faces: arena(9) }
     }
 }
 
 /// The id after `id` within pages whose last two slots hold no record.
 #[inline]
 pub fn next_id(id: u32) -> u32 {
-    if (id & SLOT_MASK) as usize == RECORDS - 1 {
-        id + 3
-    } else {
-        id + 1
-    }
+    if (id & SLOT_MASK) as usize == RECORDS - 1 { id + 3 } else { id + 1 }
 }
 
 /// Position of record `id` when the unused slots are left out.

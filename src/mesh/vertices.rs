@@ -44,11 +44,7 @@ const TAG_MASK: u32 = (1 << TAG_BITS) - 1;
 #[inline(always)]
 fn end(slot: &Slot) -> End {
     let size = slot[6].to_native();
-    End {
-        point: position(slot),
-        h: f32::from_bits(size & !FIXED),
-        fixed: size & FIXED != 0,
-    }
+    End { point: position(slot), h: f32::from_bits(size & !FIXED), fixed: size & FIXED != 0 }
 }
 
 /// The coordinates in a vertex record.

@@ -40,22 +40,14 @@ impl Base {
         let length = u.length();
         let (x, y) = (u.dot(v) / length, u.cross(v).length() / length);
         (y > 0.0 && x.is_finite()).then_some(Self {
-            corners: [
-                Point::ZERO,
-                Point::new(length, 0.0, 0.0),
-                Point::new(x, y, 0.0),
-            ],
+            corners: [Point::ZERO, Point::new(length, 0.0, 0.0), Point::new(x, y, 0.0)],
         })
     }
 
     /// 1 / q with the apex at `d`; not positive below the plane.
     fn inverse_quality(&self, d: Point) -> f64 {
         let [a, b, c] = self.corners;
-        if d.z > 0.0 {
-            1.0 / quality([a, b, c, d])
-        } else {
-            -1.0
-        }
+        if d.z > 0.0 { 1.0 / quality([a, b, c, d]) } else { -1.0 }
     }
 
     /// The middle of the inscribed circle.
@@ -76,10 +68,7 @@ impl Base {
         // Over the middle of the inscribed circle as high as the longest edge allows, and over the centroid as high as a regular one.
         let high = (1.0 - reach(middle)).max(0.01).sqrt();
         let centroid = (a + b + c) / 3.0;
-        [
-            middle + Point::Z * high,
-            centroid + Point::Z * (2.0f64 / 3.0).sqrt(),
-        ]
+        [middle + Point::Z * high, centroid + Point::Z * (2.0f64 / 3.0).sqrt()]
     }
 
     /// The best apex and its goodness.
@@ -92,21 +81,13 @@ impl Base {
     fn best_on(&self, out: Point) -> f64 {
         let [a, b, c] = self.corners;
         let start = Point::new((a.x + b.x + c.x) / 3.0, c.y.max(0.3), 0.0);
-        self.climb(start, |p| Point::new(p.x, 0.0, 0.0) + out * p.y)
-            .1
+        self.climb(start, |p| Point::new(p.x, 0.0, 0.0) + out * p.y).1
     }
 
     fn climb(&self, start: Point, place: impl Fn(Point) -> Point) -> (Point, f64) {
-        let climb = Climb {
-            start,
-            step: 0.2,
-            steps: STEPS,
-            enough: 1.0,
-        };
+        let climb = Climb { start, step: 0.2, steps: STEPS, enough: 1.0 };
         let floor = self.inverse_quality(place(start));
-        climb
-            .run(floor, |p, _| self.inverse_quality(place(p)))
-            .unwrap_or((start, floor))
+        climb.run(floor, |p, _| self.inverse_quality(place(p))).unwrap_or((start, floor))
     }
 }
 
@@ -197,11 +178,8 @@ mod tests {
             let around = center;
             for i in 0..27 * 27 * 27 {
                 let [i, j, k] = [i % 27, i / 27 % 27, i / 729].map(|i| f64::from(i - 13) / 13.0);
-                let at = [
-                    around[0] + half * i,
-                    around[1] + half * j,
-                    (around[2] + half * k).max(1e-3),
-                ];
+                let at =
+                    [around[0] + half * i, around[1] + half * j, (around[2] + half * k).max(1e-3)];
                 let d = a + (x * at[0] + y * at[1] + normal * at[2]) * longest;
                 let q = quality([a, b, c, d]);
                 if q < best {
@@ -296,9 +274,7 @@ mod tests {
     fn no_tetrahedron_is_below_its_bound() {
         let mut state = 3u64;
         let mut next = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
             (state >> 11) as f64 / (1u64 << 53) as f64
         };
         for k in 0..400 {

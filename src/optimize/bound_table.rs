@@ -75,10 +75,7 @@ mod tests {
         for _ in 0..3000 {
             let corners = [point(), point(), point()];
             let (near, exact) = (face_least_near(corners), face_least(corners));
-            assert!(
-                (near / exact - 1.0).abs() < 5e-3,
-                "{corners:?}: {near} {exact}"
-            );
+            assert!((near / exact - 1.0).abs() < 5e-3, "{corners:?}: {near} {exact}");
         }
     }
 }

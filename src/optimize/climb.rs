@@ -105,26 +105,14 @@ mod tests {
             (-10.0 * s.abs() - 0.5 * d.length()).min(-8.0 * t.abs() - 0.5 * d.length())
         };
         for scale in [1e-9, 1.0, 1e9] {
-            let climb = Climb {
-                start: Point::ZERO,
-                step: 0.3 * scale,
-                steps: 1000,
-                enough: f64::INFINITY,
-            };
+            let climb =
+                Climb { start: Point::ZERO, step: 0.3 * scale, steps: 1000, enough: f64::INFINITY };
             let scaled = |p: Point, best: f64| value(p / scale, best);
             let start = scaled(Point::ZERO, 0.0);
             let (at, best) = climb.run(start, scaled).expect("it goes up");
-            assert!(
-                (at / scale - top).length() < 0.05 * top.length(),
-                "{at} {best}"
-            );
+            assert!((at / scale - top).length() < 0.05 * top.length(), "{at} {best}");
         }
-        let flat = Climb {
-            start: Point::ZERO,
-            step: 1.0,
-            steps: 50,
-            enough: 1.0,
-        };
+        let flat = Climb { start: Point::ZERO, step: 1.0, steps: 50, enough: 1.0 };
         assert!(flat.run(0.0, |_, _| 0.0).is_none());
         assert!(flat.run(0.0, |_, _| f64::NAN).is_none());
     }

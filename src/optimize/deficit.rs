@@ -34,10 +34,7 @@ pub(super) struct AcceptanceFloor(f64);
 impl Default for Deficit {
     /// Of no tetrahedra.
     fn default() -> Self {
-        Self {
-            sum: 0.0,
-            worst: f64::INFINITY,
-        }
+        Self { sum: 0.0, worst: f64::INFINITY }
     }
 }
 
@@ -72,11 +69,7 @@ impl AcceptanceFloor {
     /// What a new tetrahedron adds to the sum: zero for a good one, `f64::NEG_INFINITY` for one that must not be made.
     #[inline]
     pub(super) fn worth(self, good: f64) -> f64 {
-        if good < self.0 {
-            f64::NEG_INFINITY
-        } else {
-            worth(good)
-        }
+        if good < self.0 { f64::NEG_INFINITY } else { worth(good) }
     }
 }
 

@@ -24,25 +24,16 @@ pub(super) enum Means {
 }
 
 /// The first aim: every tetrahedron of q ≥ 2, without changing the vertices' number.
-pub(super) const BAD: RoundGoal = RoundGoal {
-    below: GOODNESS_WANTED,
-    enough: GOODNESS_WANTED * 1.02,
-    means: Means::Connections,
-};
+pub(super) const BAD: RoundGoal =
+    RoundGoal { below: GOODNESS_WANTED, enough: GOODNESS_WANTED * 1.02, means: Means::Connections };
 
 /// The second aim: what is still at q ≥ 3 after the first.
-pub(super) const WORST: RoundGoal = RoundGoal {
-    below: 1.0 / 3.0,
-    enough: 0.5,
-    means: Means::Vertices,
-};
+pub(super) const WORST: RoundGoal =
+    RoundGoal { below: 1.0 / 3.0, enough: 0.5, means: Means::Vertices };
 
 /// The third aim: what is still at q >= 2 after the others.
-pub(super) const SHARE: RoundGoal = RoundGoal {
-    below: GOODNESS_WANTED,
-    enough: GOODNESS_WANTED,
-    means: Means::Sum,
-};
+pub(super) const SHARE: RoundGoal =
+    RoundGoal { below: GOODNESS_WANTED, enough: GOODNESS_WANTED, means: Means::Sum };
 
 /// Accepted operations.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

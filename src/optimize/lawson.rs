@@ -219,21 +219,13 @@ impl Lawson {
         let cone = |i: usize, j: usize, k: usize| {
             let above = orient(ring[i], ring[j], ring[k], b);
             let below = orient(a, ring[i], ring[j], ring[k]);
-            if above > 0.0 && below > 0.0 {
-                1.0
-            } else {
-                f64::NEG_INFINITY
-            }
+            if above > 0.0 && below > 0.0 { 1.0 } else { f64::NEG_INFINITY }
         };
         let forced = if n == 3 {
             Forced::Nothing
         } else {
             // `apex` is p, the vertex of `t` off the face; q is two steps from it in the ring.
-            if shell.ring[0] == apex {
-                Forced::Diagonal(0, 2)
-            } else {
-                Forced::Diagonal(1, 3)
-            }
+            if shell.ring[0] == apex { Forced::Diagonal(0, 2) } else { Forced::Diagonal(1, 3) }
         };
         if !self.triangulation.solve(n, 0.0, forced, cone) {
             return false;

@@ -28,11 +28,7 @@ impl Histogram {
     /// Share of `[1,2[` among all; 1 for none at all.
     pub fn share_below_2(&self) -> f64 {
         let total = self.total();
-        if total == 0 {
-            1.0
-        } else {
-            self.bins[0] as f64 / total as f64
-        }
+        if total == 0 { 1.0 } else { self.bins[0] as f64 / total as f64 }
     }
 }
 
@@ -58,11 +54,7 @@ pub struct QualityTable {
 impl QualityTable {
     /// Share of the inner, not required faces that are locally Delaunay.
     pub fn share_delaunay(&self) -> f64 {
-        if self.faces == 0 {
-            1.0
-        } else {
-            self.faces_delaunay as f64 / self.faces as f64
-        }
+        if self.faces == 0 { 1.0 } else { self.faces_delaunay as f64 / self.faces as f64 }
     }
 }
 

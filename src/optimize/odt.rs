@@ -94,11 +94,7 @@ fn add<P: Pages>(sums: &mut Sums, mesh: &mut Mesh<P>, tet: &Tet) {
     let p = [ends[0].point, ends[1].point, ends[2].point, ends[3].point];
     let size = |i: usize| f64::from(ends[i].h);
     let sizes = (size(0) + size(1)) + (size(2) + size(3));
-    let weight = if sizes > 0.0 {
-        64.0 / (sizes * sizes * sizes)
-    } else {
-        1.0
-    };
+    let weight = if sizes > 0.0 { 64.0 / (sizes * sizes * sizes) } else { 1.0 };
     let (u, v, w) = (p[1] - p[0], p[2] - p[0], p[3] - p[0]);
     let (vw, wu, uv) = (v.cross(w), w.cross(u), u.cross(v));
     let det = u.dot(vw) * weight;
@@ -143,10 +139,7 @@ fn displace<P: Pages>(mesh: &mut Mesh<P>, way: Way) -> Moves {
         let moving = volume > 0.0 && shift.is_finite() && is_free(mesh, v);
         let at = mesh.point(v);
         let flag = if moving { 1.0 } else { 0.0 };
-        set_four(
-            mesh.pages_mut().write::<{ kind::SCRATCH }>(v),
-            [at.x, at.y, at.z, flag],
-        );
+        set_four(mesh.pages_mut().write::<{ kind::SCRATCH }>(v), [at.x, at.y, at.z, flag]);
         if moving {
             let (h, length) = (f64::from(mesh.size(v)), shift.length());
             if h > 0.0 && length > MOVE_MAX * h {
@@ -224,14 +217,8 @@ fn take_back<P: Pages>(
                 old
             };
             mesh.set_point(v, p);
-            set_four(
-                mesh.pages_mut().write::<{ kind::SCRATCH }>(v),
-                [x, y, z, left],
-            );
-            assert!(
-                ball.gather(mesh, v, t, usize::MAX),
-                "tetrahedron {t} has vertex {v}"
-            );
+            set_four(mesh.pages_mut().write::<{ kind::SCRATCH }>(v), [x, y, z, left]);
+            assert!(ball.gather(mesh, v, t, usize::MAX), "tetrahedron {t} has vertex {v}");
             list.extend(ball.tets.iter().copied().zip(ball.records.iter().copied()));
         }
     }

@@ -52,9 +52,7 @@ impl PageFlags {
     /// All pages of the mesh flagged.
     pub(super) fn all<P: Pages>(mesh: &Mesh<P>) -> Self {
         let n = (mesh.tet_ids_end() as usize).div_ceil(SLOTS);
-        Self {
-            flags: vec![true; n],
-        }
+        Self { flags: vec![true; n] }
     }
 
     /// Flags the page of `t`.
@@ -74,10 +72,7 @@ impl PageFlags {
 
     /// Flags of pages that are flagged here or in `other`.
     pub(super) fn or(mut self, other: &Self) -> Self {
-        for page in (0..)
-            .zip(&other.flags)
-            .filter_map(|(page, &f)| f.then_some(page))
-        {
+        for page in (0..).zip(&other.flags).filter_map(|(page, &f)| f.then_some(page)) {
             self.raise_page(page);
         }
         self
@@ -86,10 +81,7 @@ impl PageFlags {
     /// All flagged pages, in order; their flags are taken down.
     pub(super) fn take_all(&mut self) -> Vec<u32> {
         let flags = std::mem::take(&mut self.flags);
-        (0..)
-            .zip(flags)
-            .filter_map(|(page, f)| f.then_some(page))
-            .collect()
+        (0..).zip(flags).filter_map(|(page, f)| f.then_some(page)).collect()
     }
 
     /// The first flagged page from `from` on; its flag is taken down.

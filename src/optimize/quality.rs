@@ -48,11 +48,7 @@ pub fn inverse_quality(points: [Point; 4]) -> f64 {
         let [a, b, c, d] = points;
         orient(a, b, c, d) > 0.0
     };
-    if is_positive {
-        ratio(&p).max(0.0)
-    } else {
-        f64::NEG_INFINITY
-    }
+    if is_positive { ratio(&p).max(0.0) } else { f64::NEG_INFINITY }
 }
 
 /// det / (α · longest edge · 2 · sum of areas), without asking for the sign.
@@ -101,11 +97,7 @@ pub(super) fn is_below(points: [Point; 4], wanted: f64) -> bool {
 /// Quality q of a tetrahedron: at least 1, infinite when it is not positive.
 pub fn quality(points: [Point; 4]) -> f64 {
     let good = inverse_quality(points);
-    if good > 0.0 {
-        1.0 / good
-    } else {
-        f64::INFINITY
-    }
+    if good > 0.0 { 1.0 / good } else { f64::INFINITY }
 }
 
 #[cfg(test)]
@@ -127,9 +119,7 @@ mod tests {
     fn the_cheap_test_agrees() {
         let mut state = 1u64;
         let mut next = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
             (state >> 11) as f64 / (1u64 << 53) as f64
         };
         for _ in 0..2000 {

@@ -213,14 +213,6 @@ impl Rounds {
             return false;
         }
         self.mark(mesh, t, RESCUED);
-        self.rescue.attack(
-            mesh,
-            t,
-            tet,
-            good,
-            target.enough,
-            &mut self.counts,
-            &mut self.changed,
-        )
+        self.rescue.attack(mesh, t, tet, good, target.enough, &mut self.counts, &mut self.changed)
     }
 }

@@ -120,14 +120,10 @@ pub fn run_with<P: Pages>(
         rounds.run(mesh, BAD, &mut |done, total| tell("quality", done, total));
         let bad = rounds.finish(mesh);
         rounds.flags.clone_from(&bad);
-        rounds.run(mesh, WORST, &mut |done, total| {
-            tell("improve the worst", done, total)
-        });
+        rounds.run(mesh, WORST, &mut |done, total| tell("improve the worst", done, total));
         rounds.finish(mesh);
         rounds.flags = bad;
-        rounds.run(mesh, SHARE, &mut |done, total| {
-            tell("improve low qualities", done, total)
-        });
+        rounds.run(mesh, SHARE, &mut |done, total| tell("improve low qualities", done, total));
         let mut bad = rounds.finish(mesh);
         report.operations = rounds.counts;
         let mut mender = Mender::default();
@@ -145,9 +141,7 @@ fn prepare<P: Pages>(mesh: &mut Mesh<P>) {
         let tet = mesh.tet(t);
         if tet.is_live() {
             clear_marks(mesh, t, &tet);
-            tet.vertices()
-                .into_iter()
-                .for_each(|v| mesh.set_tet_of(v, t));
+            tet.vertices().into_iter().for_each(|v| mesh.set_tet_of(v, t));
         }
     }
 }

@@ -65,9 +65,7 @@ mod tests {
     fn agrees_with_the_exact_sign() {
         let mut state = 1u64;
         let mut next = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
             // Few bits, so that many points lie on one sphere.
             f64::from((state >> 61) as u32)
         };

@@ -23,10 +23,7 @@ const NO_EDGE: (u64, f64) = (u64::MAX, 0.0);
 
 impl Default for Stuck {
     fn default() -> Self {
-        Self {
-            vertices: vec![NO_VERTEX; PLACES],
-            edges: vec![NO_EDGE; PLACES],
-        }
+        Self { vertices: vec![NO_VERTEX; PLACES], edges: vec![NO_EDGE; PLACES] }
     }
 }
 
@@ -102,9 +99,7 @@ mod tests {
     #[test]
     fn what_changed_is_tried_again_and_nothing_else_is() {
         let mut next = random(7);
-        let points: Vec<Point> = (0..40)
-            .map(|_| Point::new(next(), next(), next()))
-            .collect();
+        let points: Vec<Point> = (0..40).map(|_| Point::new(next(), next(), next())).collect();
         let mut mesh = delaunay(Mesh::new(FlatPages::default()), &points, points.len(), 1.0);
         let tets = live(&mut mesh);
         let mut stuck = Stuck::default();
@@ -114,26 +109,17 @@ mod tests {
         }
         let (t, changed) = tets[tets.len() / 2];
         let is_far = |tet: &Tet| tet.vertices().iter().all(|&v| changed.local(v).is_none());
-        let (_, far) = *tets
-            .iter()
-            .find(|(_, tet)| is_far(tet))
-            .expect("one far away");
+        let (_, far) = *tets.iter().find(|(_, tet)| is_far(tet)).expect("one far away");
         let known = |stuck: &Stuck, tet: &Tet| {
             let vertices = tet.vertices().into_iter().filter(|&v| stuck.has_vertex(v));
             let edges = (0..6).filter(|&e| stuck.has_edge(tet, e, 0.2));
             (vertices.count(), edges.count())
         };
-        assert_eq!(
-            (known(&stuck, &changed), known(&stuck, &far)),
-            ((4, 6), (4, 6))
-        );
+        assert_eq!((known(&stuck, &changed), known(&stuck, &far)), ((4, 6), (4, 6)));
         // What is not worth 0.2 may be worth 0.1.
         assert!(!stuck.has_edge(&changed, 0, 0.1) && stuck.has_edge(&changed, 0, 0.3));
         stuck.forget(&mut mesh, &[t]);
-        assert_eq!(
-            (known(&stuck, &changed), known(&stuck, &far)),
-            ((0, 0), (4, 6))
-        );
+        assert_eq!((known(&stuck, &changed), known(&stuck, &far)), ((0, 0), (4, 6)));
         stuck.clear();
         assert_eq!(known(&stuck, &far), (0, 0));
     }

@@ -82,9 +82,7 @@ impl Sums {
                 if sums == [0.0; 4] {
                     continue;
                 }
-                let slot = mesh
-                    .pages_mut()
-                    .write::<{ kind::SCRATCH }>(block * BLOCK as u32 + k);
+                let slot = mesh.pages_mut().write::<{ kind::SCRATCH }>(block * BLOCK as u32 + k);
                 let mut total = four(slot);
                 for (total, sum) in total.iter_mut().zip(sums) {
                     *total += sum;

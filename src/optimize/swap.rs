@@ -81,11 +81,7 @@ impl<J: Objective> Swapper<J> {
         let old = J::old(mesh, &shell.records);
         let floor = J::floor(old, best);
         let cone = |i: usize, j: usize, k: usize| {
-            let above = J::with(
-                old,
-                J::NOTHING,
-                inverse_quality([ring[i], ring[j], ring[k], b]),
-            );
+            let above = J::with(old, J::NOTHING, inverse_quality([ring[i], ring[j], ring[k], b]));
             if above <= floor {
                 return f64::NEG_INFINITY;
             }

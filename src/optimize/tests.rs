@@ -14,9 +14,8 @@ use crate::storage::{Backing, FlatPages, Pager, Pages};
 pub(super) fn random(seed: u64) -> impl FnMut() -> f64 {
     let mut state = seed;
     move || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 11) as f64 / (1u64 << 53) as f64
     }
 }
@@ -40,11 +39,7 @@ fn skin(n: i32) -> Vec<Point> {
         };
         for i in 1..n {
             for side in 0..4 {
-                points.push(place(
-                    f64::from(i) * h,
-                    (side & 1).into(),
-                    (side >> 1).into(),
-                ));
+                points.push(place(f64::from(i) * h, (side & 1).into(), (side >> 1).into()));
             }
         }
         let rows = (f64::from(n) / 0.866).round() as i32;
@@ -84,9 +79,7 @@ fn cube_points(n: i32, seed: u64) -> (Vec<Point>, usize) {
         for k in 0..27 {
             let d = [c[0] + k % 3 - 1, c[1] + k / 3 % 3 - 1, c[2] + k / 9 - 1];
             if d.iter().all(|&x| x >= 0 && x < cells) {
-                free &= grid[at(d)]
-                    .iter()
-                    .all(|&i| (points[i] - p).length() >= apart);
+                free &= grid[at(d)].iter().all(|&i| (points[i] - p).length() >= apart);
             }
         }
         if free {
@@ -120,9 +113,7 @@ pub(super) fn delaunay<P: Pages>(
         if i < n_skin {
             mesh.set_vertex_attribute(v, VertexTag::Surface, i as u32);
         }
-        hint = kernel
-            .insert(&mut mesh, v, points[i], hint)
-            .expect("inside the box and new");
+        hint = kernel.insert(&mut mesh, v, points[i], hint).expect("inside the box and new");
     }
     for (t, tet) in live(&mut mesh) {
         if tet.vertices().iter().any(|&v| v < 8) {
@@ -183,9 +174,7 @@ pub(super) fn checked<P: Pages>(mesh: &mut Mesh<P>) -> (Vec<[[u64; 3]; 3]>, f64)
                 b.sort_unstable();
                 assert_eq!(a, b);
             } else {
-                let mut face = tet
-                    .face(i)
-                    .map(|v| mesh.point(v).to_array().map(f64::to_bits));
+                let mut face = tet.face(i).map(|v| mesh.point(v).to_array().map(f64::to_bits));
                 face.sort_unstable();
                 hull.push(face);
             }
@@ -225,15 +214,9 @@ fn each_mode_keeps_the_skin_and_reaches_its_quality() {
         assert_eq!(before.0, after.0);
         assert!((after.1 - 1.0).abs() < 1e-9);
         let table = measure(&mut mesh);
-        assert!(
-            table.histogram.share_below_2() >= share,
-            "{mode:?} {table:?} {report:?}"
-        );
+        assert!(table.histogram.share_below_2() >= share, "{mode:?} {table:?} {report:?}");
         assert!(table.worst <= worst, "{mode:?} {table:?} {report:?}");
-        assert!(
-            table.share_delaunay() >= delaunay,
-            "{mode:?} {table:?} {report:?}"
-        );
+        assert!(table.share_delaunay() >= delaunay, "{mode:?} {table:?} {report:?}");
     }
 }
 
@@ -262,10 +245,7 @@ fn running_again_never_makes_the_worst_worse() {
     let mut mesh = cube(Mesh::new(FlatPages::default()), 8, 3);
     run(&mut mesh, Mode::Full, &|_| ());
     let first = measure(&mut mesh);
-    let again = Settings {
-        mode: Mode::Full,
-        odt_sweeps: 0,
-    };
+    let again = Settings { mode: Mode::Full, odt_sweeps: 0 };
     run_with(&mut mesh, again, &|_| ());
     checked(&mut mesh);
     let second = measure(&mut mesh);
@@ -284,11 +264,7 @@ fn the_last_rounds_make_fewer_bad_ones_and_none_of_the_worst_worse() {
     assert_eq!(checked(&mut mesh).0, hull);
     let after = measure(&mut mesh);
     let bad = |table: &QualityTable| table.histogram.total() - table.histogram.bins[0];
-    assert!(
-        4 * bad(&after) < bad(&before),
-        "{before:?} {after:?} {:?}",
-        rounds.counts
-    );
+    assert!(4 * bad(&after) < bad(&before), "{before:?} {after:?} {:?}", rounds.counts);
     assert!(after.worst <= before.worst.max(4.0));
 }
 
@@ -331,11 +307,7 @@ fn what_is_flat_but_for_rounding_is_mended_and_the_skin_stays() {
     let after = checked(&mut mesh);
     assert!(after.0 == hull && (after.1 - 1.0).abs() < 1e-9);
     let table = measure(&mut mesh);
-    assert!(
-        table.worst < before.worst.max(8.0),
-        "{table:?} {:?}",
-        mender.counts()
-    );
+    assert!(table.worst < before.worst.max(8.0), "{table:?} {:?}", mender.counts());
     assert!(mender.counts().vertices_moved + mender.counts().vertices_inserted > 0);
 }
 
@@ -393,16 +365,10 @@ fn a_good_mesh_is_left_as_it_is() {
 #[test]
 #[ignore = "prints a table for tuning"]
 fn table() {
-    let n = std::env::var("CUBE_N")
-        .ok()
-        .and_then(|n| n.parse().ok())
-        .unwrap_or(40);
+    let n = std::env::var("CUBE_N").ok().and_then(|n| n.parse().ok()).unwrap_or(40);
     let mut mesh = cube(Mesh::new(Pager::new(8 << 30, None)), n, 1);
     show("before", &mut mesh, 0.0);
-    let sweeps = std::env::var("SWEEPS")
-        .ok()
-        .and_then(|n| n.parse().ok())
-        .unwrap_or(3);
+    let sweeps = std::env::var("SWEEPS").ok().and_then(|n| n.parse().ok()).unwrap_or(3);
     for mode in [Mode::None, Mode::Delaunay, Mode::Full] {
         let sweeps = if mode == Mode::None { 0 } else { sweeps };
         let modes = std::env::var("MODE").unwrap_or_default();
@@ -414,19 +380,12 @@ fn table() {
         println!("built in {:.3}", cpu() - start);
         let start = cpu();
         let last = std::cell::Cell::new("");
-        let report = run_with(
-            &mut mesh,
-            Settings {
-                mode,
-                odt_sweeps: sweeps,
-            },
-            &|p| {
-                if p.stage != last.get() || p.stage == "delaunay" {
-                    println!("  {:?} {:.3}", p, (cpu() - start));
-                    last.set(p.stage);
-                }
-            },
-        );
+        let report = run_with(&mut mesh, Settings { mode, odt_sweeps: sweeps }, &|p| {
+            if p.stage != last.get() || p.stage == "delaunay" {
+                println!("  {:?} {:.3}", p, (cpu() - start));
+                last.set(p.stage);
+            }
+        });
         let time = cpu() - start;
         println!("{report:?}");
         show(&format!("{mode:?}"), &mut mesh, time);
@@ -443,10 +402,7 @@ fn cpu() -> f64 {
 fn show<P: Pages>(name: &str, mesh: &mut Mesh<P>, time: f64) {
     let table = measure(mesh);
     let total = table.histogram.total() as f64;
-    let bins = table
-        .histogram
-        .bins
-        .map(|b| (b as f64 / total * 1e6).round() / 1e4);
+    let bins = table.histogram.bins.map(|b| (b as f64 / total * 1e6).round() / 1e4);
     println!(
         "{name}: {total} tets, {:.3} s = {:.3} us/tet; {bins:?}; worst {:.2}; dihedral {:.1} {:.1}; Delaunay {:.3} %",
         time,

@@ -58,14 +58,8 @@ impl TreePart {
     pub(crate) fn children(self) -> [Self; 2] {
         let low = self.count / 2;
         [
-            Self {
-                first: self.first,
-                count: low,
-            },
-            Self {
-                first: self.first + low,
-                count: self.count - low,
-            },
+            Self { first: self.first, count: low },
+            Self { first: self.first + low, count: self.count - low },
         ]
     }
 
@@ -113,12 +107,7 @@ const PART_WORDS: usize = 4 + MESH_STATE_WORDS + 2 * kind::ALL.len();
 impl PartMesh {
     pub(crate) fn to_bytes(self) -> Vec<u8> {
         let load = self.load.to_bits();
-        let head = [
-            self.part.count,
-            self.generation,
-            load as u32,
-            (load >> 32) as u32,
-        ];
+        let head = [self.part.count, self.generation, load as u32, (load >> 32) as u32];
         let words = (head.into_iter())
             .chain(self.state.to_words())
             .chain(self.extents.into_iter().flatten());
@@ -126,19 +115,14 @@ impl PartMesh {
     }
 
     fn from_bytes(first: u32, bytes: &[u8]) -> Option<Self> {
-        let words: Vec<u32> = bytes
-            .chunks_exact(4)
-            .map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
-            .collect();
+        let words: Vec<u32> =
+            bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
         if words.len() != PART_WORDS {
             return None;
         }
         let (state, extents) = words[4..].split_at(MESH_STATE_WORDS);
         Some(Self {
-            part: TreePart {
-                first,
-                count: words[0],
-            },
+            part: TreePart { first, count: words[0] },
             generation: words[1],
             load: f64::from_bits(u64::from(words[2]) | u64::from(words[3]) << 32),
             state: MeshState::from_words(std::array::from_fn(|i| state[i])),
@@ -177,9 +161,8 @@ pub(crate) fn bounds_bytes(bounds: &Aabb) -> Vec<u8> {
 /// The box of the surface.
 pub(crate) fn bounds(catalog: &mut Catalog) -> Result<Aabb, StoreError> {
     let bytes = catalog.blob(blob::BOUNDS)?.unwrap_or_default();
-    let mut numbers = bytes
-        .chunks_exact(8)
-        .map(|b| f64::from_le_bytes(std::array::from_fn(|i| b[i])));
+    let mut numbers =
+        bytes.chunks_exact(8).map(|b| f64::from_le_bytes(std::array::from_fn(|i| b[i])));
     let mut corner = || {
         let [x, y, z] = [numbers.next()?, numbers.next()?, numbers.next()?];
         Some(Point::new(x, y, z))
@@ -210,10 +193,7 @@ impl From<Zone> for ZoneRow {
     fn from(zone: Zone) -> Self {
         let [x, y, z] = zone.surface.normal.to_array();
         let plane = [x, y, z, zone.surface.offset];
-        Self {
-            cut: zone.cut,
-            plane,
-        }
+        Self { cut: zone.cut, plane }
     }
 }
 
@@ -285,11 +265,7 @@ pub(crate) fn open_part(
     frames: u64,
 ) -> Result<Mesh, PipelineError> {
     check_extents(&part, &base)?;
-    backing.base = Some(StoreFile::open_repaired(
-        &base,
-        backing.cache_bytes / 2,
-        false,
-    )?);
+    backing.base = Some(StoreFile::open_repaired(&base, backing.cache_bytes / 2, false)?);
     let mut pager = Pager::new(frames, Some(backing));
     pager.adopt(part.extents);
     Ok(Mesh::with_state(pager, part.state))
@@ -366,13 +342,7 @@ mod tests {
     fn only_parts_of_the_tree_are_parts() {
         let part = |first, count| TreePart { first, count };
         assert!(part(0, 1).is_of(1) && part(2, 1).is_of(5) && part(2, 3).is_of(5));
-        for (first, count, n) in [
-            (0, 0x99_0001, 1),
-            (0, 0, 1),
-            (1, 1, 1),
-            (0, 3, 5),
-            (1, 2, 4),
-        ] {
+        for (first, count, n) in [(0, 0x99_0001, 1), (0, 0, 1), (1, 1, 1), (0, 3, 5), (1, 2, 4)] {
             assert!(!part(first, count).is_of(n), "{first} {count} of {n}");
         }
     }

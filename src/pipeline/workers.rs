@@ -105,9 +105,7 @@ fn work<J, D>(
     while let Some(job) = list.take() {
         let last = Cell::new(None::<Instant>);
         let watch = |event: Event| {
-            let due = last
-                .get()
-                .is_none_or(|t| t.elapsed().as_millis() > TELL_EVERY);
+            let due = last.get().is_none_or(|t| t.elapsed().as_millis() > TELL_EVERY);
             if due {
                 last.set(Some(Instant::now()));
                 // Nobody listens once a step has failed.
@@ -147,10 +145,7 @@ struct Jobs<J> {
 impl<J> JobQueue<J> {
     fn new(waiting: Vec<J>) -> Self {
         let open = waiting.len();
-        Self {
-            state: Mutex::new(Jobs { waiting, open }),
-            changed: Condvar::new(),
-        }
+        Self { state: Mutex::new(Jobs { waiting, open }), changed: Condvar::new() }
     }
 
     fn lock(&self) -> MutexGuard<'_, Jobs<J>> {
@@ -200,23 +195,16 @@ mod tests {
     fn halve(n: u32, workers: usize, fail_at: u32) -> Result<u32, PipelineError> {
         let mut leaves = 0;
         let run = &|n: u32, _: &Watcher| match n {
-            n if n == fail_at => Err(PipelineError::NothingFilled {
-                policy: String::new(),
-            }),
+            n if n == fail_at => Err(PipelineError::NothingFilled { policy: String::new() }),
             n => Ok(n),
         };
-        work_off(
-            vec![n],
-            &vec![run as Hand<u32, u32>; workers],
-            &silent,
-            &mut |n| {
-                if n == 1 {
-                    leaves += 1;
-                    return Ok(Vec::new());
-                }
-                Ok(vec![n / 2, n - n / 2])
-            },
-        )?;
+        work_off(vec![n], &vec![run as Hand<u32, u32>; workers], &silent, &mut |n| {
+            if n == 1 {
+                leaves += 1;
+                return Ok(Vec::new());
+            }
+            Ok(vec![n / 2, n - n / 2])
+        })?;
         Ok(leaves)
     }
 
@@ -242,12 +230,7 @@ mod tests {
     #[test]
     fn nobody_waits_when_the_listener_unwinds() {
         let run = &|n: u32, watch: &Watcher| {
-            watch(Event {
-                stage: "a step",
-                done: 1,
-                total: None,
-                unit: "jobs",
-            });
+            watch(Event { stage: "a step", done: 1, total: None, unit: "jobs" });
             Ok(n)
         };
         for (in_watch, in_commit) in [(true, false), (false, true)] {

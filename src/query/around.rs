@@ -14,10 +14,7 @@ use crate::storage::check_cancelled;
 impl QuerySession {
     /// One tetrahedron. Errors: the store has no such one.
     pub fn tet(&mut self, id: TetId) -> Result<Hit, QueryError> {
-        let selection = Selection {
-            tets: Some(vec![id]),
-            ..Selection::default()
-        };
+        let selection = Selection { tets: Some(vec![id]), ..Selection::default() };
         let found = self.select(selection)?.next();
         found.unwrap_or(Err(QueryError::NoTet { id }))
     }
@@ -30,11 +27,7 @@ impl QuerySession {
         for &id in vertices {
             placed.push((id.number(), self.vertex(id)?));
         }
-        Ok(Sharing {
-            at_least: placed.len(),
-            vertices: placed,
-            except: None,
-        })
+        Ok(Sharing { at_least: placed.len(), vertices: placed, except: None })
     }
 
     /// Tetrahedra that share a face with this one. Errors: the store has no such one.

@@ -42,12 +42,8 @@ impl DecodedChunk {
         mut keep: impl FnMut(&Subdomain, u32, &SealedTet) -> bool,
     ) -> Result<Self, StoreError> {
         let mut places: IdMap<u32, u32> = IdMap::default();
-        let mut frame = Self {
-            part: part.id(),
-            tets: Vec::new(),
-            points: Vec::new(),
-            ids: Vec::new(),
-        };
+        let mut frame =
+            Self { part: part.id(), tets: Vec::new(), points: Vec::new(), ids: Vec::new() };
         let mut locals = Vec::new();
         for (local, tet) in (chunk.first..).zip(&chunk.records) {
             if !keep(part, local, tet) {
@@ -59,11 +55,7 @@ impl DecodedChunk {
                     locals.len() as u32 - 1
                 })
             });
-            frame.tets.push(FrameTet {
-                local,
-                region: tet.region,
-                nodes,
-            });
+            frame.tets.push(FrameTet { local, region: tet.region, nodes });
         }
         // In order, so that each chunk of vertices is wanted once.
         let mut order: Vec<(u32, u32)> = locals.into_iter().zip(0..).collect();

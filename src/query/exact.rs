@@ -34,10 +34,7 @@ impl Near {
 
 impl Ring for Near {
     fn of(x: f64) -> Self {
-        Self {
-            value: x,
-            error: 0.0,
-        }
+        Self { value: x, error: 0.0 }
     }
 
     fn plus(&self, other: &Self) -> Self {
@@ -105,11 +102,8 @@ impl<R: Ring> Vector<R> {
     }
 
     pub fn cross(&self, other: &Self) -> Self {
-        let minor = |i: usize, j: usize| {
-            self.0[i]
-                .times(&other.0[j])
-                .minus(&self.0[j].times(&other.0[i]))
-        };
+        let minor =
+            |i: usize, j: usize| self.0[i].times(&other.0[j]).minus(&self.0[j].times(&other.0[i]));
         Self([minor(1, 2), minor(2, 0), minor(0, 1)])
     }
 }

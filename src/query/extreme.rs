@@ -65,11 +65,7 @@ impl QuerySession {
                         true => f64::from(most.next_up()),
                         false => -f64::from(least.next_down()),
                     };
-                    promises.push(Promise {
-                        quality,
-                        rank,
-                        chunk,
-                    });
+                    promises.push(Promise { quality, rank, chunk });
                 }
             }
         }

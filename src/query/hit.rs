@@ -48,14 +48,7 @@ pub struct Hit {
 impl Hit {
     /// With its shape measured.
     pub fn new(id: TetId, region: u32, vertices: [u64; 4], corners: [Point; 4]) -> Self {
-        Self {
-            id,
-            region,
-            vertices,
-            corners,
-            shape: Shape::of(corners),
-            on_surface: None,
-        }
+        Self { id, region, vertices, corners, shape: Shape::of(corners), on_surface: None }
     }
 
     /// The mean of its corners.
@@ -70,9 +63,7 @@ impl Hit {
         let lengths = [b - a, c - a, d - a, c - b, d - b, d - c].map(Point::length);
         lengths
             .into_iter()
-            .fold([f64::INFINITY, 0.0], |[least, most], l| {
-                [l.min(least), l.max(most)]
-            })
+            .fold([f64::INFINITY, 0.0], |[least, most], l| [l.min(least), l.max(most)])
     }
 
     /// Least and greatest dihedral angle in degrees.

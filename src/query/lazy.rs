@@ -59,9 +59,7 @@ impl Lazy {
     }
 
     fn nearness(&self, key: (u32, u32)) -> f64 {
-        self.chunks
-            .get(&key)
-            .map_or(f64::INFINITY, |c| c.0.nearness)
+        self.chunks.get(&key).map_or(f64::INFINITY, |c| c.0.nearness)
     }
 
     /// The chunk to read next: of the tetrahedra that lack fewest, the one that most of them lack, then the nearest.
@@ -82,12 +80,10 @@ impl Lazy {
                 *many += usize::from(lacking.len() == *fewest);
             }
         }
-        let best = wanted
-            .into_iter()
-            .min_by(|(a, (few, many)), (b, (fewer, more))| {
-                let by_lack = few.cmp(fewer).then(more.cmp(many));
-                by_lack.then(self.nearness(*a).total_cmp(&self.nearness(*b)))
-            });
+        let best = wanted.into_iter().min_by(|(a, (few, many)), (b, (fewer, more))| {
+            let by_lack = few.cmp(fewer).then(more.cmp(many));
+            by_lack.then(self.nearness(*a).total_cmp(&self.nearness(*b)))
+        });
         best.map(|(key, _)| key)
     }
 }
@@ -145,11 +141,7 @@ impl QuerySession {
             }
             if around.is_some_and(|around| holds(&around, lazy.point)) {
                 let id = TetId::new(part.id(), local);
-                lazy.waiting.push(Waiting {
-                    id: id.expect("the chunk was checked"),
-                    tet,
-                    chunks,
-                });
+                lazy.waiting.push(Waiting { id: id.expect("the chunk was checked"), tet, chunks });
             }
         }
         Ok(())

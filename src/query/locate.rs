@@ -86,19 +86,12 @@ impl QuerySession {
     /// Memory: some 300 bytes a point. Errors: damage.
     pub fn locate(&mut self, points: &[Point]) -> Result<Vec<Located>, QueryError> {
         let curve = HilbertFrame::new(&self.bounds());
-        let mut order: Vec<(u64, usize)> = points
-            .iter()
-            .enumerate()
-            .map(|(i, &p)| (curve.index(p), i))
-            .collect();
+        let mut order: Vec<(u64, usize)> =
+            points.iter().enumerate().map(|(i, &p)| (curve.index(p), i)).collect();
         order.sort_unstable();
         let mut answers: Vec<Located> = points
             .iter()
-            .map(|&point| Located {
-                point,
-                found: None,
-                barycentric: [0.0; 4],
-            })
+            .map(|&point| Located { point, found: None, barycentric: [0.0; 4] })
             .collect();
         let mut candidates = Vec::new();
         for (_, i) in order {
@@ -118,11 +111,7 @@ impl QuerySession {
         lazily: bool,
         candidates: &mut Vec<Candidate>,
     ) -> Result<Search, QueryError> {
-        let mut search = Search {
-            point,
-            best: None,
-            settled: false,
-        };
+        let mut search = Search { point, best: None, settled: false };
         self.candidates(point, candidates)?;
         let n_resident = candidates.partition_point(|c| c.resident);
         let n_whole = if lazily { n_resident } else { candidates.len() };

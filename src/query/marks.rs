@@ -91,10 +91,7 @@ impl QuerySession {
     fn blank(&mut self, rank: u32) -> Result<Marks, QueryError> {
         let words = self.part(rank)?.subdomain.row().tets.div_ceil(64);
         let lease = self.budget.lease(words * 8, "a bit for each tetrahedron")?;
-        Ok(Marks {
-            bits: vec![0; words as usize],
-            _lease: lease,
-        })
+        Ok(Marks { bits: vec![0; words as usize], _lease: lease })
     }
 
     fn on_facets(
@@ -126,11 +123,7 @@ impl QuerySession {
         labels: &[u32],
         marks: &mut Marks,
     ) -> Result<(), QueryError> {
-        let edges = self
-            .wires
-            .edges
-            .iter()
-            .filter(|edge| labels.contains(&edge[2]));
+        let edges = self.wires.edges.iter().filter(|edge| labels.contains(&edge[2]));
         let edges: HashSet<[u32; 2]> = edges.map(|&[a, b, _]| [a.min(b), a.max(b)]).collect();
         let points = self.wires.points.iter().filter(|p| labels.contains(&p[1]));
         let points: HashSet<u32> = points.map(|&[v, _]| v).collect();
@@ -145,10 +138,7 @@ impl QuerySession {
         let mut inputs = HashMap::new();
         for (local, vertex) in (0u32..).zip(part.vertices()) {
             let id = VertexId::from_number(vertex?.id);
-            if let Some(VertexId {
-                owner: Owner::Surface,
-                index,
-            }) = id
+            if let Some(VertexId { owner: Owner::Surface, index }) = id
                 && on_wires.contains(&index)
             {
                 inputs.insert(local, index);
@@ -193,10 +183,7 @@ fn set(marks: &mut Marks, tet: u32, part: &crate::sealed::Subdomain) -> Result<(
         return Err(StoreError::Sealed(SealedError::Content {
             path: part.path().to_owned(),
             subdomain: part.id().rank(),
-            what: format!(
-                "a face names tetrahedron {tet}, there are {}",
-                part.row().tets
-            ),
+            what: format!("a face names tetrahedron {tet}, there are {}", part.row().tets),
         }));
     }
     marks.bits[tet as usize / 64] |= 1 << (tet % 64);

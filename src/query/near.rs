@@ -14,19 +14,14 @@ pub(super) struct Near {
 
 impl Near {
     pub(super) fn of(part: &Subdomain, chunk: usize, p: Point, reach: f64) -> Self {
-        let mut near = Self {
-            nearness: f64::INFINITY,
-            bounds: Aabb::EMPTY,
-        };
+        let mut near = Self { nearness: f64::INFINITY, bounds: Aabb::EMPTY };
         for cell in part.vertex_summaries()[chunk].cells() {
             let [low, high] = cell.map(Point::from_array);
             let nearness = nearness(&Aabb { low, high }, p);
             near.nearness = near.nearness.min(nearness);
             if nearness <= reach {
-                near.bounds = near.bounds.union(Aabb {
-                    low: low.max(p - reach),
-                    high: high.min(p + reach),
-                });
+                near.bounds =
+                    near.bounds.union(Aabb { low: low.max(p - reach), high: high.min(p + reach) });
             }
         }
         near

@@ -46,9 +46,7 @@ impl Ordered {
             let tet = tet?;
             sorter.push(record(&tet, tet.values()[variable], descending))?;
         }
-        Ok(Self {
-            sorted: sorter.finish()?,
-        })
+        Ok(Self { sorted: sorter.finish()? })
     }
 }
 
@@ -69,9 +67,9 @@ fn record(tet: &Hit, value: f64, descending: bool) -> OrderedHit {
         vertices: tet.vertices,
         corners: tet.corners.map(|c| c.to_array()),
         region: tet.region,
-        on_surface: tet.on_surface.map_or(UNKNOWN, |faces| {
-            (0..4).map(|i| u32::from(faces[i]) << i).sum()
-        }),
+        on_surface: tet
+            .on_surface
+            .map_or(UNKNOWN, |faces| (0..4).map(|i| u32::from(faces[i]) << i).sum()),
     }
 }
 

@@ -88,9 +88,7 @@ impl Selected<'_> {
         let part = self.inquiry.part(rank)?;
         let mut chunks = Vec::new();
         for (chunk, summary) in (0u32..).zip(part.subdomain.tet_summaries()) {
-            let marked = marks
-                .as_ref()
-                .is_none_or(|m| m.any(summary.first, summary.count));
+            let marked = marks.as_ref().is_none_or(|m| m.any(summary.first, summary.count));
             if marked
                 && self.selection.may_be_among(rank, summary)
                 && (!self.selection.is_local()
@@ -161,10 +159,7 @@ pub(super) fn hits_in(
         keep
     })?;
     let found = frame.tets.iter().zip(on_surface);
-    let found = found.map(|(tet, on_surface)| Hit {
-        on_surface,
-        ..frame.hit(tet)
-    });
+    let found = found.map(|(tet, on_surface)| Hit { on_surface, ..frame.hit(tet) });
     Ok(found.filter(|found| selection.holds(found)).collect())
 }
 
@@ -183,10 +178,7 @@ impl Nearby {
             let mut near = Aabb::EMPTY;
             for cell in part.vertex_summaries()[c].cells() {
                 let [low, high] = cell.map(Point::from_array);
-                let widened = Aabb {
-                    low: low - reach,
-                    high: high + reach,
-                };
+                let widened = Aabb { low: low - reach, high: high + reach };
                 if selection.may_meet(&widened) {
                     near = near.with(low).with(high);
                 }
@@ -221,9 +213,7 @@ impl Nearby {
 fn is_led_near(part: &Subdomain, selection: &Selection, chunk: usize) -> bool {
     let leaders = leaders(part, chunk);
     let first = part.vertex_chunk_of(leaders.start);
-    let last = part
-        .vertex_chunk_of(leaders.end.saturating_sub(1))
-        .max(first);
+    let last = part.vertex_chunk_of(leaders.end.saturating_sub(1)).max(first);
     let (mut nearby, reach) = (Nearby::default(), reach(part, chunk));
     (first..=last).any(|c| {
         let near = nearby.of(part, selection, reach, c);

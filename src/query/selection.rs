@@ -67,10 +67,7 @@ impl Selection {
         let named = |list: &Option<Vec<u32>>| list.as_ref().is_none_or(|l| l.contains(&rank));
         named(&self.subdomains)
             && self.interface.is_none_or(|pair| pair.contains(&rank))
-            && self
-                .tets
-                .as_ref()
-                .is_none_or(|l| l.iter().any(|t| t.subdomain().rank() == rank))
+            && self.tets.as_ref().is_none_or(|l| l.iter().any(|t| t.subdomain().rank() == rank))
             && self.may_meet(bounds)
     }
 
@@ -85,10 +82,7 @@ impl Selection {
         self.regions.as_ref().is_none_or(|l| l.iter().any(within))
             && self.tets.as_ref().is_none_or(|l| l.iter().any(listed))
             && self.may_meet(&Aabb { low, high })
-            && self
-                .condition
-                .as_ref()
-                .is_none_or(|e| e.may_hold(&ranges(chunk, rank)))
+            && self.condition.as_ref().is_none_or(|e| e.may_hold(&ranges(chunk, rank)))
     }
 
     /// Whether tetrahedra within `bounds` may be where they are asked for.
@@ -123,13 +117,7 @@ impl Selection {
         let is_input = |v: &u64| v >> 32 == u64::from(surface);
         self.solids.iter().all(solid)
             && (!self.touching_surface || tet.vertices.iter().any(is_input))
-            && self
-                .sharing
-                .as_ref()
-                .is_none_or(|s| s.holds(tet.id, &tet.vertices))
-            && self
-                .condition
-                .as_ref()
-                .is_none_or(|e| e.truth(&tet.values()))
+            && self.sharing.as_ref().is_none_or(|s| s.holds(tet.id, &tet.vertices))
+            && self.condition.as_ref().is_none_or(|e| e.truth(&tet.values()))
     }
 }

@@ -233,14 +233,9 @@ impl QuerySession {
                 0 => None,
                 more => Some(self.budget.lease(more, "summaries of a sub-domain")?),
             };
-            let tree = BoxTree::new(subdomain.tet_summaries().len(), |i| {
-                chunk_bounds(&subdomain, i)
-            });
-            let part = OpenSubdomain {
-                subdomain,
-                tree,
-                _lease: lease,
-            };
+            let tree =
+                BoxTree::new(subdomain.tet_summaries().len(), |i| chunk_bounds(&subdomain, i));
+            let part = OpenSubdomain { subdomain, tree, _lease: lease };
             self.parts.put(rank, part);
         }
         Ok(self.parts.get_mut(&rank).expect("it was just put there"))

@@ -90,9 +90,9 @@ impl Solid {
     /// Whether the tetrahedron lies wholly in it; never in a plane.
     pub fn holds(&self, corners: &[Point; 4]) -> bool {
         match *self {
-            Self::Box(own) => corners
-                .iter()
-                .all(|c| own.low.cmple(*c).all() && c.cmple(own.high).all()),
+            Self::Box(own) => {
+                corners.iter().all(|c| own.low.cmple(*c).all() && c.cmple(own.high).all())
+            }
             Self::Sphere { center, radius } => {
                 corners.iter().all(|&c| is_within(center, radius, c))
             }
@@ -103,9 +103,7 @@ impl Solid {
 
 fn side(point: Point, normal: Point, c: Point) -> Ordering {
     fn sign<R: Ring>(point: Point, normal: Point, c: Point) -> Option<Ordering> {
-        Vector::<R>::between(point, c)
-            .dot(&Vector::of(normal))
-            .sign()
+        Vector::<R>::between(point, c).dot(&Vector::of(normal)).sign()
     }
     sign::<Near>(point, normal, c)
         .or_else(|| sign::<Dyadic>(point, normal, c))
@@ -167,10 +165,7 @@ fn edge_is_near<R: Ring>(a: Point, b: Point, to: &Vector<R>, square: &R) -> Opti
     let (along, length) = (edge.dot(to), edge.dot(&edge));
     let between = and(not_negative(&along), not_negative(&length.minus(&along)));
     let distance = to.dot(to).times(&length).minus(&along.times(&along));
-    and(
-        between,
-        not_negative(&square.times(&length).minus(&distance)),
-    )
+    and(between, not_negative(&square.times(&length).minus(&distance)))
 }
 
 /// The nearest point of the plane is in the triangle, and within the square of the radius.
@@ -199,18 +194,10 @@ fn and(a: Option<bool>, b: Option<bool>) -> Option<bool> {
 ///
 /// The box is first cut to that of the tetrahedron, which changes nothing and brings its numbers near.
 fn box_meets(own: &Aabb, around: &Aabb, corners: &[Point; 4]) -> bool {
-    let cut = Aabb {
-        low: own.low.max(around.low),
-        high: own.high.min(around.high),
-    };
+    let cut = Aabb { low: own.low.max(around.low), high: own.high.min(around.high) };
     let ends = [cut.low, cut.high];
-    let of_box = |bits: usize| {
-        Point::new(
-            ends[bits & 1].x,
-            ends[bits >> 1 & 1].y,
-            ends[bits >> 2 & 1].z,
-        )
-    };
+    let of_box =
+        |bits: usize| Point::new(ends[bits & 1].x, ends[bits >> 1 & 1].y, ends[bits >> 2 & 1].z);
     let apart = |f: &[usize; 3]| {
         let [a, b, c] = f.map(|i| corners[i]);
         (0..8).all(|bits| orient_sign(a, b, c, of_box(bits)).is_gt())
@@ -219,11 +206,7 @@ fn box_meets(own: &Aabb, around: &Aabb, corners: &[Point; 4]) -> bool {
         return false;
     }
     let height = (around.high - around.low).max_element();
-    (0..3).all(|axis| {
-        EDGES
-            .iter()
-            .all(|edge| !apart_along(axis, *edge, corners, &ends, height))
-    })
+    (0..3).all(|axis| EDGES.iter().all(|edge| !apart_along(axis, *edge, corners, &ends, height)))
 }
 
 /// Whether, seen along an axis, the line through an edge has the tetrahedron on one side and the box beyond.

@@ -31,11 +31,7 @@ impl SurfaceFaces {
             }
         }
         faces.sort_unstable();
-        Ok(Self {
-            rank: part.id().rank(),
-            faces,
-            _lease: lease,
-        })
+        Ok(Self { rank: part.id().rank(), faces, _lease: lease })
     }
 
     /// Whether each face of a tetrahedron, number `local`, is required.

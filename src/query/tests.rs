@@ -32,10 +32,7 @@ impl Fixture {
     }
 
     fn session(&self, cap: u64) -> Outcome<QuerySession> {
-        Ok(QuerySession::open(
-            Catalog::open(self.path())?,
-            &Budget::new(cap),
-        )?)
+        Ok(QuerySession::open(Catalog::open(self.path())?, &Budget::new(cap))?)
     }
 
     /// All tetrahedra, read without questions.
@@ -52,9 +49,7 @@ impl Fixture {
                 let beside = facets.iter().filter(|f| f.tets.contains(&id.local()));
                 let faces: Vec<[u32; 3]> = beside.map(|facet| facet.vertices).collect();
                 // A face is opposite the vertex it lacks.
-                let on_surface = tet
-                    .nodes
-                    .map(|v| faces.iter().any(|face| !face.contains(&v)));
+                let on_surface = tet.nodes.map(|v| faces.iter().any(|face| !face.contains(&v)));
                 all.push(Hit {
                     on_surface: Some(on_surface),
                     ..Hit::new(id, tet.region, ids, points)
@@ -66,9 +61,7 @@ impl Fixture {
 }
 
 fn grid(cells: usize, parts: usize) -> Outcome<Fixture> {
-    let made = Fixture {
-        dir: tempfile::tempdir()?,
-    };
+    let made = Fixture { dir: tempfile::tempdir()? };
     Grid { cells, parts }.write(&made.path())?;
     Ok(made)
 }
@@ -80,18 +73,11 @@ fn real() -> Outcome<Fixture> {
 
 /// A sample in two sub-domains.
 fn real_of(sample: &str) -> Outcome<Fixture> {
-    let made = Fixture {
-        dir: tempfile::tempdir()?,
-    };
+    let made = Fixture { dir: tempfile::tempdir()? };
     let surface = crate::samples::SampleSpec::parse(sample)?.make()?;
-    let options = crate::pipeline::Options {
-        subdomains: Some("2".to_owned()),
-        ..Default::default()
-    };
-    let job = Job {
-        options: serde_json::to_string(&options)?,
-        ..Job::default()
-    };
+    let options =
+        crate::pipeline::Options { subdomains: Some("2".to_owned()), ..Default::default() };
+    let job = Job { options: serde_json::to_string(&options)?, ..Job::default() };
     let mut catalog = Catalog::create(made.path(), &job)?;
     let budget = Budget::new(512 << 20);
     crate::pipeline::mesh(&mut catalog, &surface.into(), &options, &budget, &|_| {})?;

@@ -19,14 +19,11 @@ impl BoxTree {
         let around = |boxes: &mut dyn Iterator<Item = Aabb>| boxes.fold(Aabb::EMPTY, Aabb::union);
         let groups = n.div_ceil(FAN);
         let mut levels = Vec::new();
-        let mut level: Vec<Aabb> = (0..groups)
-            .map(|g| around(&mut (g * FAN..n.min((g + 1) * FAN)).map(&item)))
-            .collect();
+        let mut level: Vec<Aabb> =
+            (0..groups).map(|g| around(&mut (g * FAN..n.min((g + 1) * FAN)).map(&item))).collect();
         while level.len() > FAN {
-            let above = level
-                .chunks(FAN)
-                .map(|children| around(&mut children.iter().copied()))
-                .collect();
+            let above =
+                level.chunks(FAN).map(|children| around(&mut children.iter().copied())).collect();
             levels.push(std::mem::replace(&mut level, above));
         }
         levels.push(level);
@@ -57,11 +54,7 @@ impl BoxTree {
         if !meets(&self.levels[level][i]) {
             return;
         }
-        let below = if level == 0 {
-            self.n
-        } else {
-            self.levels[level - 1].len()
-        };
+        let below = if level == 0 { self.n } else { self.levels[level - 1].len() };
         for child in i * FAN..below.min((i + 1) * FAN) {
             match level {
                 0 => each(child),
@@ -81,10 +74,7 @@ mod tests {
         for n in [0usize, 1, 7, 8, 9, 64, 65, 1000] {
             let item = |i: usize| {
                 let low = Point::splat(i as f64);
-                Aabb {
-                    low,
-                    high: low + 1.5,
-                }
+                Aabb { low, high: low + 1.5 }
             };
             let tree = BoxTree::new(n, item);
             for at in [-1.0, 0.0, 3.25, 500.0, 1002.0] {

@@ -147,10 +147,7 @@ mod tests {
 
     #[test]
     fn the_table_forgets_and_grows() {
-        let record = Tet {
-            node: [0; 4],
-            neighbor: [FaceRef::NONE; 4],
-        };
+        let record = Tet { node: [0; 4], neighbor: [FaceRef::NONE; 4] };
         let mut ball = Ball::default();
         for turn in [1, 2, u32::MAX, 1, 2] {
             ball.begin_turn();

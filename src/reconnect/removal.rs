@@ -43,14 +43,8 @@ pub fn remove_edge<P: Pages>(
         let [ri, rj, rl] = [i, j, l].map(|p| shell.ring[p]);
         // Edges of the triangle: j l, l i, i j; the faces of the upper tetrahedron (i j l b) in that order.
         let edges = [(j, l), (l, i), (i, j)].map(|(x, y)| side(shell, triangles, x, y));
-        let mut upper = Tet {
-            node: [ri, rj, rl, shell.b],
-            neighbor: [FaceRef::NONE; 4],
-        };
-        let mut lower = Tet {
-            node: [ri, rl, rj, shell.a],
-            neighbor: [FaceRef::NONE; 4],
-        };
+        let mut upper = Tet { node: [ri, rj, rl, shell.b], neighbor: [FaceRef::NONE; 4] };
+        let mut lower = Tet { node: [ri, rl, rj, shell.a], neighbor: [FaceRef::NONE; 4] };
         upper.neighbor[3] = FaceRef::new(low, 3);
         lower.neighbor[3] = FaceRef::new(up, 3);
         for (face, edge) in edges.into_iter().enumerate() {

@@ -36,10 +36,8 @@ impl Replacement {
         if !self.match_faces(old, records, new) {
             return false;
         }
-        let inherited = Inherited::read(
-            mesh,
-            old.iter().copied().zip(records.iter().map(Tet::vertices)),
-        );
+        let inherited =
+            Inherited::read(mesh, old.iter().copied().zip(records.iter().map(Tet::vertices)));
         self.new_tets.clear();
         self.new_tets.extend(old.iter().copied().take(new.len()));
         while self.new_tets.len() < new.len() {
@@ -94,16 +92,12 @@ impl Replacement {
         }
         for (k, node) in new.iter().enumerate() {
             for (i, face) in FACES.iter().enumerate() {
-                self.faces
-                    .push((sorted(face.map(|f| node[f])), (4 * k + i) as u32));
+                self.faces.push((sorted(face.map(|f| node[f])), (4 * k + i) as u32));
             }
         }
         self.faces.sort_unstable();
         self.faces.len().is_multiple_of(2)
-            && self
-                .faces
-                .chunks_exact(2)
-                .all(|pair| pair[0].0 == pair[1].0 && pair[0].1 < OLD)
+            && self.faces.chunks_exact(2).all(|pair| pair[0].0 == pair[1].0 && pair[0].1 < OLD)
             && self
                 .faces
                 .chunks_exact(2)

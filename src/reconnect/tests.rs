@@ -12,9 +12,8 @@ type Flat = Mesh<FlatPages>;
 fn random(seed: u64) -> impl FnMut() -> f64 {
     let mut state = seed;
     move || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 11) as f64 / (1u64 << 53) as f64
     }
 }
@@ -25,9 +24,7 @@ fn build(points: &[Point]) -> Flat {
     let mut hint = enclose(&mut mesh, &Aabb::around(points.iter().copied()));
     for &p in points {
         let v = mesh.add_vertex(p, 0.0);
-        hint = kernel
-            .insert(&mut mesh, v, p, hint)
-            .expect("inside the box and new");
+        hint = kernel.insert(&mut mesh, v, p, hint).expect("inside the box and new");
     }
     mesh.refresh_tet_of();
     mesh
@@ -135,11 +132,7 @@ fn positive_cones(a: Point, b: Point, ring: &[Point]) -> impl Fn(usize, usize, u
     move |i, j, k| {
         let above = orient(ring[i], ring[j], ring[k], b);
         let below = orient(a, ring[i], ring[j], ring[k]);
-        if above > 0.0 && below > 0.0 {
-            above.min(below)
-        } else {
-            f64::NEG_INFINITY
-        }
+        if above > 0.0 && below > 0.0 { above.min(below) } else { f64::NEG_INFINITY }
     }
 }
 

@@ -9,9 +9,7 @@ pub(super) struct EdgeCache {
 impl EdgeCache {
     /// A table with at least so many places.
     pub fn new(places: usize) -> Self {
-        Self {
-            edges: vec![0; places.next_power_of_two()],
-        }
+        Self { edges: vec![0; places.next_power_of_two()] }
     }
 
     #[inline(always)]

@@ -12,10 +12,7 @@ pub enum Lengths {
     Field,
     /// Interpolated between the ends of the edge, hence from the vertices of the coarse mesh: the paper's way, section 1.1.
     /// Kept for comparison: what the vertices of the surface do not know is never seen.
-    #[cfg_attr(
-        not(feature = "internals"),
-        allow(dead_code, reason = "for comparison")
-    )]
+    #[cfg_attr(not(feature = "internals"), allow(dead_code, reason = "for comparison"))]
     Ends,
 }
 

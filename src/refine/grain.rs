@@ -63,12 +63,7 @@ impl Site {
         let cell = [corner.x as i64, corner.y as i64, corner.z as i64];
         let mix_in = |seed, &c: &i64| mix(seed ^ c as u64);
         let seed = cell.iter().fold(u64::from(octave), mix_in);
-        Self {
-            at: corner + Point::splat(0.5) + random(seed) * 0.4,
-            corner,
-            seed,
-            grain: None,
-        }
+        Self { at: corner + Point::splat(0.5) + random(seed) * 0.4, corner, seed, grain: None }
     }
 
     /// Its grain, whose cells are `width` wide.
@@ -92,11 +87,7 @@ pub(super) struct Around {
 
 impl Around {
     pub fn new() -> Self {
-        Self {
-            octave: u32::MAX,
-            base: Point::ZERO,
-            sites: [Site::default(); 8],
-        }
+        Self { octave: u32::MAX, base: Point::ZERO, sites: [Site::default(); 8] }
     }
 
     /// The eight displaced middles of cells around a point, which is in units of the grains' width.

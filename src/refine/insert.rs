@@ -41,9 +41,8 @@ impl Worker {
             return;
         }
         let (region, _) = mesh.tet_attribute(start.tet);
-        let gathered = self
-            .kernel
-            .gather_constrained(mesh, c.point, &start, |mesh, v| is_near(mesh, v, c));
+        let gathered =
+            self.kernel.gather_constrained(mesh, c.point, &start, |mesh, v| is_near(mesh, v, c));
         match gathered {
             Ok(()) => {}
             Err(Rejected::Refused) => {
@@ -118,11 +117,8 @@ impl Worker {
     /// Whether the gathered cavity has a required face too near.
     fn is_flat<P: Pages>(&mut self, mesh: &mut Mesh<P>, c: &Candidate) -> bool {
         self.kernel.faces().iter().filter(|f| f.required).any(|f| {
-            let [p, q, r] = [
-                mesh.point(f.vertices[0]),
-                mesh.point(f.vertices[1]),
-                mesh.point(f.vertices[2]),
-            ];
+            let [p, q, r] =
+                [mesh.point(f.vertices[0]), mesh.point(f.vertices[1]), mesh.point(f.vertices[2])];
             height(c.point, p, q, r) < HEIGHT * f64::from(c.h)
         })
     }

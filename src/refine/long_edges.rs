@@ -44,11 +44,7 @@ impl Worker {
         pages: &[u32],
     ) {
         self.edges.clear();
-        let edges = LongEdges {
-            field,
-            settled: &self.settled,
-            examined_too: self.examined_too,
-        };
+        let edges = LongEdges { field, settled: &self.settled, examined_too: self.examined_too };
         let found = scan_parts(mesh, pages, &edges);
         for (&page, edges) in pages.iter().zip(found) {
             if let Some(edges) = edges {
@@ -66,12 +62,8 @@ impl Worker {
         let n = self.edges.len();
         let starts = (0..n).step_by(EDGES_PART);
         let parts: Vec<Range<usize>> = starts.map(|i| i..n.min(i + EDGES_PART)).collect();
-        let division = Division {
-            edges: &self.edges,
-            field,
-            order: &self.order,
-            placing: self.placing,
-        };
+        let division =
+            Division { edges: &self.edges, field, order: &self.order, placing: self.placing };
         let found = scan_parts(mesh, &parts, &division);
         let candidates = found.into_iter().map(|(candidates, settled)| {
             for edge in settled {
@@ -220,11 +212,7 @@ impl Divider<'_> {
             metric = metric.max(length * (1.0 / ha + 4.0 / hm + 1.0 / hb) / 6.0);
         }
         if metric <= long || fixed && self.is_required(mesh, a, b, tet) {
-            return if fixed {
-                Verdict::Settled
-            } else {
-                Verdict::Open
-            };
+            return if fixed { Verdict::Settled } else { Verdict::Open };
         }
         let sizes = match field.lengths {
             Lengths::Field => [ha, hb],
@@ -313,8 +301,7 @@ impl Divider<'_> {
     #[inline]
     fn drop_near_to<P: Pages>(&mut self, mesh: &mut Mesh<P>, v: u32) {
         let (q, h) = mesh.point_and_size(v);
-        self.points
-            .retain(|c| !refuses((q - c.point).length_squared(), h, c));
+        self.points.retain(|c| !refuses((q - c.point).length_squared(), h, c));
     }
 
     /// Whether the edge a b of `tet` belongs to a required face: its points would lie in that face.
@@ -324,8 +311,7 @@ impl Divider<'_> {
             return false;
         };
         // A shell too large to be gathered is worth its candidate.
-        self.shell
-            .gather_from(mesh, tet, &record, EDGE_OF[i][j], SHELL_MAX)
+        self.shell.gather_from(mesh, tet, &record, EDGE_OF[i][j], SHELL_MAX)
             && (self.shell.required || !self.shell.closed)
     }
 }
@@ -349,10 +335,8 @@ fn division(f: f64, r: f64) -> f64 {
 
 /// Three numbers in [-1, 1) from the bits of a position.
 fn jitter(p: Point) -> Point {
-    let mut state = p
-        .to_array()
-        .into_iter()
-        .fold(0x6A69_7474_6572_u64, |s, c| mix(s ^ c.to_bits()));
+    let mut state =
+        p.to_array().into_iter().fold(0x6A69_7474_6572_u64, |s, c| mix(s ^ c.to_bits()));
     let mut next = || {
         state = mix(state);
         (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0

@@ -23,10 +23,7 @@ pub(super) struct Pattern {
 
 impl Pattern {
     pub fn new() -> Self {
-        Self {
-            tile: Tile::get(),
-            around: [Around::new(), Around::new()],
-        }
+        Self { tile: Tile::get(), around: [Around::new(), Around::new()] }
     }
 
     /// The place nearest to `p`, where `h` is wanted; none where the grain's size is another.

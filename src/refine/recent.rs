@@ -18,11 +18,7 @@ pub(super) struct Recent {
 
 impl Recent {
     pub fn new() -> Self {
-        Self {
-            points: [(Point::ZERO, 0.0); RECENT],
-            tets: [0; RECENT],
-            n: 0,
-        }
+        Self { points: [(Point::ZERO, 0.0); RECENT], tets: [0; RECENT], n: 0 }
     }
 
     pub fn clear(&mut self) {

@@ -28,17 +28,9 @@ fn graded(
         assert_eq!(mesh.vertex_attribute(v).0, VertexTag::EnclosingBox);
     }
     prepare(&mut mesh);
-    let field = Field {
-        lengths,
-        h,
-        place: &super::Everywhere,
-        bounds,
-    };
+    let field = Field { lengths, h, place: &super::Everywhere, bounds };
     let dir = tempfile::tempdir().expect("a temporary directory");
-    let space = Workspace {
-        dir: &dir.path().into(),
-        memory: 1 << 20,
-    };
+    let space = Workspace { dir: &dir.path().into(), memory: 1 << 20 };
     let report = saturate(&mut mesh, &field, &space, &mut |_| ()).expect("room for runs");
     (mesh, report)
 }
@@ -68,10 +60,7 @@ fn edges_end_near_the_wanted_length() {
     }
     let mean = sum / f64::from(n);
     assert!((0.95..1.1).contains(&mean), "mean {mean}");
-    assert!(
-        f64::from(long) < 0.02 * f64::from(n),
-        "{long} of {n} edges are long"
-    );
+    assert!(f64::from(long) < 0.02 * f64::from(n), "{long} of {n} edges are long");
     assert!(mesh.pages().n_pages::<{ kind::TETS }>() > 1);
 }
 
@@ -160,10 +149,7 @@ fn the_same_points_whatever_the_pool() {
     };
     let (mut few, same) = cube(0.45, Pager::new(16 << 16, Some(backing)));
     assert_eq!(same, report);
-    assert!(
-        few.pages().stats().pages_read > 0,
-        "the small pool must have missed"
-    );
+    assert!(few.pages().stats().pages_read > 0, "the small pool must have missed");
     let mut from = 0;
     while let Some((t, tet)) = all.next_tet(from) {
         from = t + 1;
@@ -204,17 +190,9 @@ fn pages_far_from_a_zone_are_not_changed() {
     for v in mesh.vertex_ids() {
         mesh.set_size(v, 0.2);
     }
-    let field = Field {
-        lengths: Lengths::Field,
-        h: &|_| 0.2,
-        place: &place,
-        bounds,
-    };
+    let field = Field { lengths: Lengths::Field, h: &|_| 0.2, place: &place, bounds };
     let dir = tempfile::tempdir().expect("a temporary directory");
-    let space = Workspace {
-        dir: &dir.path().into(),
-        memory: 1 << 20,
-    };
+    let space = Workspace { dir: &dir.path().into(), memory: 1 << 20 };
     let reaches = |&t: &u32| {
         let tet = mesh.tet(t);
         tet.is_live() && place.reaches(&mesh.points(&tet), &[0.2; 4])
@@ -223,21 +201,12 @@ fn pages_far_from_a_zone_are_not_changed() {
     let before = mesh.n_tets();
     let report = saturate(&mut mesh, &field, &space, &mut |_| ()).expect("room for runs");
     let grown = f64::from(mesh.n_tets()) / f64::from(before);
-    assert!(
-        report.inserted > 100 && grown < GROWTH_LAST,
-        "{report:?} {grown}"
-    );
+    assert!(report.inserted > 100 && grown < GROWTH_LAST, "{report:?} {grown}");
     let is_far = |page: &&[u32]| !page.iter().any(|t| near.binary_search(t).is_ok());
-    let (n, far) = (
-        tets.chunks(RECORDS).count(),
-        tets.chunks(RECORDS).filter(is_far),
-    );
+    let (n, far) = (tets.chunks(RECORDS).count(), tets.chunks(RECORDS).filter(is_far));
     let mut examined = |&t: &u32| mesh.tet(t).node[EXAMINED] & MARK != 0;
     let changed: Vec<bool> = far.map(|page| page.iter().any(&mut examined)).collect();
-    assert!(
-        n > 20 && changed.len() > n / 4 && changed.len() < n,
-        "{n} {changed:?}"
-    );
+    assert!(n > 20 && changed.len() > n / 4 && changed.len() < n, "{n} {changed:?}");
     // Few: those with tetrahedra of a cavity that reaches there.
     let n_changed = changed.iter().filter(|changed| **changed).count();
     assert!(n_changed < changed.len() / 4, "{changed:?}");

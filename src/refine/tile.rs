@@ -120,11 +120,7 @@ mod tests {
     fn a_point_below_zero_by_less_than_rounding_is_at_the_end_of_a_period() {
         let tile = Tile::get();
         for tiny in [-1e-17, -1e-300] {
-            for p in [
-                Point::new(tiny, 0.4, 0.7),
-                Point::new(0.2, tiny, tiny),
-                Point::splat(tiny),
-            ] {
+            for p in [Point::new(tiny, 0.4, 0.7), Point::new(0.2, tiny, tiny), Point::splat(tiny)] {
                 assert_eq!(tile.nearest(p), tile.nearest(p.max(Point::ZERO)));
             }
         }

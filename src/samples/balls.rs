@@ -52,15 +52,10 @@ impl Balls {
     pub(super) fn make(&self, bytes_max: u64) -> Result<Sample, SampleError> {
         let mut random = Random::new(self.seed);
         let placed = self.place(&mut random)?;
-        let bounds = Aabb {
-            low: Point::ZERO,
-            high: Point::ONE,
-        };
-        let n_triangles = placed
-            .iter()
-            .map(|(_, r)| sphere_triangles(sphere_pieces(*r, self.h)))
-            .sum::<f64>()
-            + box_triangles(&bounds, self.h);
+        let bounds = Aabb { low: Point::ZERO, high: Point::ONE };
+        let n_triangles =
+            placed.iter().map(|(_, r)| sphere_triangles(sphere_pieces(*r, self.h))).sum::<f64>()
+                + box_triangles(&bounds, self.h);
         triangles_checked("balls", n_triangles, bytes_max)?;
         let mut build = Builder::default();
         let walls = build.label("walls");

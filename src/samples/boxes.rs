@@ -16,10 +16,7 @@ use crate::geom::{Aabb, Point};
 
 /// A box `box,x=X,y=Y,z=Z,h=H` with a corner at the origin; one label per face.
 pub(super) fn make_box(sides: Point, h: f64, bytes_max: u64) -> Result<Sample, SampleError> {
-    let bounds = Aabb {
-        low: Point::ZERO,
-        high: sides,
-    };
+    let bounds = Aabb { low: Point::ZERO, high: sides };
     triangles_checked("box", box_triangles(&bounds, h), bytes_max)?;
     let mut build = Builder::default();
     let labels = ["x-low", "x-high", "y-low", "y-high", "z-low", "z-high"];
@@ -43,17 +40,10 @@ pub(super) fn box_triangles(bounds: &Aabb, h: f64) -> f64 {
 
 /// Adds the surface of a box with edges of about `h`; labels in the order x low, x high, y low, …
 pub(super) fn push_box(build: &mut Builder, bounds: &Aabb, h: f64, inward: bool, labels: [u32; 6]) {
-    let n = (bounds.high - bounds.low)
-        .to_array()
-        .map(|side| steps(side, h) as u32);
+    let n = (bounds.high - bounds.low).to_array().map(|side| steps(side, h) as u32);
     for axis in 0..3 {
         for high in [false, true] {
-            let face = Face {
-                bounds,
-                n,
-                axis,
-                high,
-            };
+            let face = Face { bounds, n, axis, high };
             let rows: Vec<Vec<Corner>> =
                 (0..=face.rows()).map(|row| face.row(build, row)).collect();
             let label = labels[2 * axis + usize::from(high)];
@@ -99,11 +89,7 @@ impl Face<'_> {
             };
             let p = self.place(at, f64::from(row));
             let on_seam = i == 0 || i > inner || row == 0 || row == self.rows();
-            let id = if on_seam {
-                build.seam_point(p)
-            } else {
-                build.point(p)
-            };
+            let id = if on_seam { build.seam_point(p) } else { build.point(p) };
             corners.push(Corner { at, id });
         }
         corners
@@ -113,19 +99,12 @@ impl Face<'_> {
     fn place(&self, along: f64, across: f64) -> Point {
         let mut p = Point::ZERO;
         let (low, high) = (self.bounds.low, self.bounds.high);
-        p[self.axis] = if self.high {
-            high[self.axis]
-        } else {
-            low[self.axis]
-        };
+        p[self.axis] = if self.high { high[self.axis] } else { low[self.axis] };
         for (axis, at) in [(self.axis + 1, along), (self.axis + 2, across)] {
             let axis = axis % 3;
             let n = f64::from(self.n[axis]);
-            p[axis] = if at == n {
-                high[axis]
-            } else {
-                low[axis] + (high[axis] - low[axis]) * (at / n)
-            };
+            p[axis] =
+                if at == n { high[axis] } else { low[axis] + (high[axis] - low[axis]) * (at / n) };
         }
         p
     }

@@ -104,11 +104,7 @@ pub(super) fn triangles_checked(
     bytes_max: u64,
 ) -> Result<(), SampleError> {
     if n_triangles.is_nan() || n_triangles > TRIANGLES_MAX as f64 {
-        return Err(SampleError::TooMany {
-            name,
-            found: n_triangles,
-            expected: TRIANGLES_MAX,
-        });
+        return Err(SampleError::TooMany { name, found: n_triangles, expected: TRIANGLES_MAX });
     }
     let needed = BYTES_TRIANGLE * n_triangles as u64;
     match needed <= bytes_max {

@@ -39,11 +39,7 @@ impl Caps {
         let lower = Flat { points, triangles };
         let mut build = Builder::default();
         let labels = ["low", "high", "around"].map(|name| build.label(name));
-        let prism = Prism {
-            at: &Point::new,
-            heights: [0.0, HEIGHT],
-            labels,
-        };
+        let prism = Prism { at: &Point::new, heights: [0.0, HEIGHT], labels };
         prism.push(&mut build, &lower, &upper);
         Ok(build.finish())
     }

@@ -9,10 +9,7 @@ use crate::geom::short;
 #[non_exhaustive]
 pub enum SampleError {
     /// There is no sample of this name.
-    #[error(
-        "there is no sample called `{found}`; the samples are {}",
-        Words(expected)
-    )]
+    #[error("there is no sample called `{found}`; the samples are {}", Words(expected))]
     UnknownName {
         /// The name found.
         found: String,
@@ -20,10 +17,7 @@ pub enum SampleError {
         expected: &'static [&'static str],
     },
     /// The sample has no such key.
-    #[error(
-        "sample `{name}` has no key `{found}`; its keys are {}",
-        Words(expected)
-    )]
+    #[error("sample `{name}` has no key `{found}`; its keys are {}", Words(expected))]
     UnknownKey {
         /// Name of the sample.
         name: &'static str,

@@ -34,16 +34,8 @@ pub(super) type CellSide = (usize, [u32; 3]);
 impl Faults {
     pub(super) fn make(&self, bytes_max: u64) -> Result<Sample, SampleError> {
         let squares = f64::from(self.cells) * f64::from(self.cells);
-        triangles_checked(
-            "faults",
-            2.0 * squares * (6.0 + self.count as f64),
-            bytes_max,
-        )?;
-        let grid = Grid {
-            cells: self.cells,
-            seed: self.seed,
-            shift: self.shift,
-        };
+        triangles_checked("faults", 2.0 * squares * (6.0 + self.count as f64), bytes_max)?;
+        let grid = Grid { cells: self.cells, seed: self.seed, shift: self.shift };
         let mut build = Builder::default();
         grid.shell(&mut build);
         let first = build.n_triangles();
@@ -130,9 +122,7 @@ impl Grid {
         if at.iter().any(|&i| i == 0 || i == n) {
             return whole / f64::from(n);
         }
-        let key = at
-            .iter()
-            .fold(self.seed ^ SHIFTS, |key, &i| mix(key ^ u64::from(i)));
+        let key = at.iter().fold(self.seed ^ SHIFTS, |key, &i| mix(key ^ u64::from(i)));
         let mut random = Random::new(key);
         let shift = (2.0 * random.in_cube() - Point::ONE) * self.shift;
         (whole + shift) / f64::from(n)

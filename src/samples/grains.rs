@@ -42,10 +42,7 @@ impl Grains {
 
     /// Makes the surface: labels `walls` and `grains`.
     pub(super) fn make(&self, bytes_max: u64) -> Result<Sample, SampleError> {
-        let bounds = Aabb {
-            low: Point::ZERO,
-            high: Point::ONE,
-        };
+        let bounds = Aabb { low: Point::ZERO, high: Point::ONE };
         let each = (POINTS_LEAST + POINTS_MOST - 4) as f64;
         let n_triangles = each * self.count as f64 + box_triangles(&bounds, self.h);
         triangles_checked("grains", n_triangles, bytes_max)?;
@@ -122,10 +119,7 @@ fn apart_on_sphere(n: usize, random: &mut Random) -> Vec<Point> {
             continue;
         }
         let p = p / square.sqrt();
-        if points
-            .iter()
-            .all(|q| q.distance_squared(p) >= APART * APART)
-        {
+        if points.iter().all(|q| q.distance_squared(p) >= APART * APART) {
             points.push(p);
         }
     }

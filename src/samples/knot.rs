@@ -24,10 +24,7 @@ pub(super) fn make_knot(tube: f64, h: f64, bytes_max: u64) -> Result<Sample, Sam
     let length = table[TABLE];
     let around = (TAU * tube / h + 0.5).floor().max(5.0);
     // Rows stand 0.87 h apart for near-equilateral triangles; even, since every second is shifted.
-    let rings = 2.0
-        * (length / (h * 0.75f64.sqrt()) / 2.0 + 0.5)
-            .floor()
-            .max(12.0);
+    let rings = 2.0 * (length / (h * 0.75f64.sqrt()) / 2.0 + 0.5).floor().max(12.0);
     triangles_checked("knot", 2.0 * around * rings, bytes_max)?;
     let (m, n) = (around as u32, rings as u32);
     let mut build = Builder::default();

@@ -37,11 +37,7 @@ impl Needles {
     pub(super) fn make(&self, bytes_max: u64) -> Result<Sample, SampleError> {
         let quarter = self.count.div_ceil(4).max(QUARTER_MIN);
         let circle = 4.0 * quarter as f64;
-        triangles_checked(
-            "needles",
-            circle * (8.0 + 4.0 * self.holes as f64),
-            bytes_max,
-        )?;
+        triangles_checked("needles", circle * (8.0 + 4.0 * self.holes as f64), bytes_max)?;
         let mut random = Random::new(self.seed);
         let mut build = Builder::default();
         let turn = random.unit();
@@ -52,11 +48,8 @@ impl Needles {
         ];
         for ((name, flat, height), x) in parts.into_iter().zip(PLACES) {
             let labels = ["low", "high", "around"].map(|end| build.label(format!("{name}-{end}")));
-            let prism = Prism {
-                at: &|u, v, w| Point::new(x + u, v, w),
-                heights: [0.0, height],
-                labels,
-            };
+            let prism =
+                Prism { at: &|u, v, w| Point::new(x + u, v, w), heights: [0.0, height], labels };
             prism.push(&mut build, &flat, &flat.triangles);
         }
         Ok(build.finish())
@@ -89,10 +82,7 @@ fn plate(holes: usize, quarter: usize, random: &mut Random) -> Flat {
         std::iter::once(0.0).chain(ends).collect()
     };
     let (xs, ys) = (lines(n_columns), lines(n_rows));
-    let mut flat = Flat {
-        points: Vec::new(),
-        triangles: Vec::new(),
-    };
+    let mut flat = Flat { points: Vec::new(), triangles: Vec::new() };
     for y in &ys {
         flat.points.extend(xs.iter().map(|x| [*x, *y]));
     }
@@ -119,8 +109,7 @@ fn cell(flat: &mut Flat, corners: [u32; 4], quarter: usize, share: f64) {
     let n = 4 * quarter;
     for i in 0..n {
         let (sin, cos) = sin_cos_turns(i as f64 / n as f64);
-        flat.points
-            .push([middle[0] + radius * cos, middle[1] + radius * sin]);
+        flat.points.push([middle[0] + radius * cos, middle[1] + radius * sin]);
     }
     let at = |i: usize| first + (i % n) as u32;
     for (k, &corner) in corners.iter().enumerate() {

@@ -35,11 +35,7 @@ impl From<Sample> for Surface {
             labels: sample.labels,
             label_names: sample.label_names,
             sheets: sample.sheets,
-            wires: Wires {
-                edges: sample.edges,
-                points: sample.marks,
-                ..Wires::default()
-            },
+            wires: Wires { edges: sample.edges, points: sample.marks, ..Wires::default() },
             ..Self::default()
         }
     }
@@ -50,11 +46,8 @@ impl Sample {
     #[cfg(test)]
     pub fn signed_volume(&self) -> f64 {
         let corner = |v: u32| self.points[v as usize];
-        let six: f64 = self
-            .triangles
-            .iter()
-            .map(|t| corner(t[0]).dot(corner(t[1]).cross(corner(t[2]))))
-            .sum();
+        let six: f64 =
+            self.triangles.iter().map(|t| corner(t[0]).dot(corner(t[1]).cross(corner(t[2])))).sum();
         six / 6.0
     }
 }

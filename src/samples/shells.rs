@@ -23,9 +23,7 @@ pub(super) fn make_shells(
     h: f64,
     bytes_max: u64,
 ) -> Result<Sample, SampleError> {
-    let radii: Vec<f64> = (0..count)
-        .map(|i| (count - i) as f64 / count as f64)
-        .collect();
+    let radii: Vec<f64> = (0..count).map(|i| (count - i) as f64 / count as f64).collect();
     let n_triangles = radii.iter().map(|&r| match kind {
         ShellKind::Spheres => sphere_triangles(sphere_pieces(r, h)),
         ShellKind::Boxes => box_triangles(&cube(r), h),
@@ -47,8 +45,5 @@ pub(super) fn make_shells(
 }
 
 fn cube(radius: f64) -> Aabb {
-    Aabb {
-        low: Point::splat(-radius),
-        high: Point::splat(radius),
-    }
+    Aabb { low: Point::splat(-radius), high: Point::splat(radius) }
 }

@@ -108,10 +108,7 @@ impl SampleSpec {
             "steps" => parse_steps(rest)?,
             "wells" => parse_wells(rest)?,
             _ => {
-                return Err(SampleError::UnknownName {
-                    found: name.to_owned(),
-                    expected: SAMPLES,
-                });
+                return Err(SampleError::UnknownName { found: name.to_owned(), expected: SAMPLES });
             }
         };
         Ok(Self { kind })
@@ -124,20 +121,12 @@ impl SampleSpec {
                 format!("{PREFIX}balls,count={count},seed={seed},h={h}")
             }
             SampleKind::Box { sides, h } => {
-                format!(
-                    "{PREFIX}box,x={},y={},z={},h={h}",
-                    sides.x, sides.y, sides.z
-                )
+                format!("{PREFIX}box,x={},y={},z={},h={h}", sides.x, sides.y, sides.z)
             }
             SampleKind::Caps(Caps { count, seed }) => {
                 format!("{PREFIX}caps,count={count},seed={seed}")
             }
-            SampleKind::Faults(Faults {
-                count,
-                seed,
-                cells,
-                shift,
-            }) => {
+            SampleKind::Faults(Faults { count, seed, cells, shift }) => {
                 format!("{PREFIX}faults,count={count},seed={seed},cells={cells},shift={shift}")
             }
             SampleKind::Grains(Grains { count, seed, h }) => {
@@ -158,14 +147,7 @@ impl SampleSpec {
             SampleKind::Steps(Steps { count, step, seed }) => {
                 format!("{PREFIX}steps,count={count},step={step},seed={seed}")
             }
-            SampleKind::Wells(Wells {
-                count,
-                seed,
-                cells,
-                layers,
-                points,
-                shift,
-            }) => {
+            SampleKind::Wells(Wells { count, seed, cells, layers, points, shift }) => {
                 format!(
                     "{PREFIX}wells,count={count},seed={seed},cells={cells},layers={layers},points={points},shift={shift}"
                 )
@@ -236,12 +218,7 @@ fn parse_faults(rest: &str) -> Result<SampleKind, SampleError> {
     let cells = keys.number("cells", 8, 2, 4000)?;
     // Beyond this triangles of two sides could meet.
     let shift = keys.number("shift", 0.1, 0.0, 0.15)?;
-    Ok(SampleKind::Faults(Faults {
-        count,
-        seed,
-        cells,
-        shift,
-    }))
+    Ok(SampleKind::Faults(Faults { count, seed, cells, shift }))
 }
 
 fn parse_needles(rest: &str) -> Result<SampleKind, SampleError> {
@@ -270,14 +247,7 @@ fn parse_wells(rest: &str) -> Result<SampleKind, SampleError> {
     let layers = keys.number("layers", 3, 0, cells - 1)?;
     let points = keys.number("points", count, 0, (cells as usize).pow(3))?;
     let shift = keys.number("shift", 0.1, 0.0, 0.15)?;
-    Ok(SampleKind::Wells(Wells {
-        count,
-        seed,
-        cells,
-        layers,
-        points,
-        shift,
-    }))
+    Ok(SampleKind::Wells(Wells { count, seed, cells, layers, points, shift }))
 }
 
 fn parse_grains(rest: &str) -> Result<SampleKind, SampleError> {
@@ -316,19 +286,11 @@ impl<'a> Keys<'a> {
         for word in rest.split(',').filter(|word| !word.is_empty()) {
             let found = word.to_owned();
             let Some((key, value)) = word.split_once('=') else {
-                return Err(SampleError::NotAPair {
-                    name,
-                    found,
-                    expected,
-                });
+                return Err(SampleError::NotAPair { name, found, expected });
             };
             if !expected.contains(&key) {
                 let found = key.to_owned();
-                return Err(SampleError::UnknownKey {
-                    name,
-                    found,
-                    expected,
-                });
+                return Err(SampleError::UnknownKey { name, found, expected });
             }
             if pairs.iter().any(|(other, _)| *other == key) {
                 let key = key.to_owned();

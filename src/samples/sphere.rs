@@ -54,21 +54,13 @@ pub(super) struct Ball {
 impl Ball {
     /// Around the origin, not turned.
     pub(super) fn unturned(radius: f64) -> Self {
-        Self {
-            center: Point::ZERO,
-            radius,
-            turn: [Point::X, Point::Y, Point::Z],
-        }
+        Self { center: Point::ZERO, radius, turn: [Point::X, Point::Y, Point::Z] }
     }
 
     /// Turned at random, so that many balls do not share directions.
     pub(super) fn turned(center: Point, radius: f64, random: &mut Random) -> Self {
         let turn = random.rotation();
-        Self {
-            center,
-            radius,
-            turn,
-        }
+        Self { center, radius, turn }
     }
 }
 
@@ -89,10 +81,7 @@ impl Spheres {
         label: u32,
     ) {
         let pieces = sphere_pieces(ball.radius, h) as u32;
-        let (points, triangles) = self
-            .made
-            .entry(pieces)
-            .or_insert_with(|| unit_sphere(pieces));
+        let (points, triangles) = self.made.entry(pieces).or_insert_with(|| unit_sphere(pieces));
         let [x, y, z] = ball.turn;
         let ids: Vec<u32> = points
             .iter()
@@ -142,11 +131,7 @@ fn face_rows(
 ) -> Vec<Vec<u32>> {
     let on_edge = |a: u32, b: u32, steps_from_a: u32| {
         let (low, high) = sorted(a, b);
-        let from_low = if a == low {
-            steps_from_a
-        } else {
-            n - steps_from_a
-        };
+        let from_low = if a == low { steps_from_a } else { n - steps_from_a };
         match from_low {
             0 => low,
             s if s == n => high,

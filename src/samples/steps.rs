@@ -50,11 +50,7 @@ impl Steps {
         let side = side(&widths, &heights);
         let mut build = Builder::default();
         let labels = ["back", "front", "around"].map(|name| build.label(name));
-        let prism = Prism {
-            at: &|x, z, y| Point::new(x, -y, z),
-            heights: [-DEPTH, 0.0],
-            labels,
-        };
+        let prism = Prism { at: &|x, z, y| Point::new(x, -y, z), heights: [-DEPTH, 0.0], labels };
         prism.push(&mut build, &side, &side.triangles);
         Ok(build.finish())
     }
@@ -62,10 +58,7 @@ impl Steps {
 
 /// The slab's side, column by column, without a point that the slab would not have.
 fn side(widths: &[f64], heights: &[f64]) -> Flat {
-    let mut flat = Flat {
-        points: Vec::new(),
-        triangles: Vec::new(),
-    };
+    let mut flat = Flat { points: Vec::new(), triangles: Vec::new() };
     let mut x = 0.0;
     let mut left = chain(&mut flat, x, &heights[..1]);
     for (i, &width) in widths.iter().enumerate() {

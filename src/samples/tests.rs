@@ -16,19 +16,13 @@ fn check_closed(sample: &Sample) -> i64 {
     for t in &sample.triangles {
         for i in 0..3 {
             used[t[i] as usize] = true;
-            assert!(
-                edges.insert((t[i], t[(i + 1) % 3])),
-                "edge twice in one direction: {t:?}"
-            );
+            assert!(edges.insert((t[i], t[(i + 1) % 3])), "edge twice in one direction: {t:?}");
         }
     }
     assert!(edges.iter().all(|&(a, b)| edges.contains(&(b, a))));
     assert!(used.iter().all(|&u| u), "a point is not used");
-    let distinct: HashSet<_> = sample
-        .points
-        .iter()
-        .map(|p| p.to_array().map(f64::to_bits))
-        .collect();
+    let distinct: HashSet<_> =
+        sample.points.iter().map(|p| p.to_array().map(f64::to_bits)).collect();
     assert_eq!(distinct.len(), sample.points.len());
     assert_eq!(sample.labels.len(), sample.triangles.len());
     let n_labels = sample.label_names.len() as u32;
@@ -62,18 +56,15 @@ fn hash(sample: &Sample) -> u64 {
         .map(f64::to_bits)
         .chain(sample.triangles.iter().flatten().map(|&v| u64::from(v)))
         .chain(sample.labels.iter().map(|&l| u64::from(l)));
-    words.fold(0xcbf2_9ce4_8422_2325, |hash, word| {
-        (hash ^ word).wrapping_mul(0x0000_0100_0000_01b3)
-    })
+    words
+        .fold(0xcbf2_9ce4_8422_2325, |hash, word| (hash ^ word).wrapping_mul(0x0000_0100_0000_01b3))
 }
 
 #[test]
 fn boxes_are_closed_and_have_their_volume() {
-    for (text, h) in [
-        ("box", 0.05),
-        ("box,h=0.1,x=2,z=0.5", 0.1),
-        ("box,h=1e-10,x=1e-9,y=1e-9,z=1e-9", 1e-10),
-    ] {
+    for (text, h) in
+        [("box", 0.05), ("box,h=0.1,x=2,z=0.5", 0.1), ("box,h=1e-10,x=1e-9,y=1e-9,z=1e-9", 1e-10)]
+    {
         let sample = made(text);
         assert_eq!(check_closed(&sample), 2, "{text}");
         check_edges(&sample, h, [0.5, 1.3]);
@@ -139,9 +130,7 @@ fn parts(sample: &Sample) -> Vec<u32> {
             parent[a.max(b) as usize] = a.min(b);
         }
     }
-    (0..parent.len() as u32)
-        .map(|v| root(&mut parent, v))
-        .collect()
+    (0..parent.len() as u32).map(|v| root(&mut parent, v)).collect()
 }
 
 #[test]
@@ -186,10 +175,7 @@ fn grains_are_disjoint_convex_polyhedra() {
     for grain in grains.values() {
         let ids: BTreeSet<u32> = grain.iter().flatten().copied().collect();
         let points: Vec<Point> = ids.iter().map(|&v| sample.points[v as usize]).collect();
-        let size = points
-            .iter()
-            .map(|p| points[0].distance(*p))
-            .fold(0.0, f64::max);
+        let size = points.iter().map(|p| points[0].distance(*p)).fold(0.0, f64::max);
         for t in grain {
             let [a, b, c] = t.map(|v| sample.points[v as usize]);
             // Inward triangles: all else lies in front.
@@ -198,9 +184,7 @@ fn grains_are_disjoint_convex_polyhedra() {
         }
         boxes.push(Aabb::around(points));
     }
-    let volumes = boxes
-        .iter()
-        .map(|b| (b.high - b.low).to_array().iter().product::<f64>());
+    let volumes = boxes.iter().map(|b| (b.high - b.low).to_array().iter().product::<f64>());
     let (low, high) = volumes.fold((1.0, 0.0), |(low, high), v| (v.min(low), v.max(high)));
     assert!(high > 8.0 * low, "sizes vary: {low} {high}");
     for (i, a) in boxes.iter().enumerate() {
@@ -229,11 +213,7 @@ fn the_knot_is_one_ring() {
     // Pappus: the section's area times the length of the center line.
     let length = 15.41;
     let exact = std::f64::consts::PI * 0.04 * length;
-    assert!(
-        (sample.signed_volume() / exact - 1.0).abs() < 0.05,
-        "{}",
-        sample.signed_volume()
-    );
+    assert!((sample.signed_volume() / exact - 1.0).abs() < 0.05, "{}", sample.signed_volume());
 }
 
 /// What meshing asks of a surface, and more: closed in exact signs, one volume or three.
@@ -242,11 +222,7 @@ fn check_solid(text: &str, n_parts: i64) -> Sample {
     let genus = if text.contains("needles") { 9 } else { 0 };
     assert_eq!(check_closed(&sample), 2 * (n_parts - genus), "{text}");
     let validation = crate::surface::validate(&sample.clone().into());
-    assert!(
-        validation.is_valid(),
-        "{text}: {:?}",
-        validation.defects.first()
-    );
+    assert!(validation.is_valid(), "{text}: {:?}", validation.defects.first());
     assert!(sample.signed_volume() > 0.0, "{text}");
     sample
 }
@@ -270,10 +246,7 @@ fn needles_are_three_valid_parts() {
     for seed in 0..20 {
         let sample = check_solid(&format!("needles,seed={seed}"), 3);
         // A disk, a rod, nine holes, the plate's two sides and outer walls.
-        assert_eq!(
-            sample.triangles.len(),
-            2 * (4 * 64 - 4) + 9 * (4 * 64 + 8) + 24
-        );
+        assert_eq!(sample.triangles.len(), 2 * (4 * 64 - 4) + 9 * (4 * 64 + 8) + 24);
     }
     check_solid("needles,count=2000,seed=3", 3);
 }
@@ -355,13 +328,7 @@ fn errors_name_the_word() {
             assert!(message.contains(part), "{text}: {message}");
         }
     }
-    for text in [
-        "box,h=1e-6",
-        "sphere,h=1e-90",
-        "balls,h=1e-7",
-        "shells,h=1e-7",
-        "knot,h=1e-7",
-    ] {
+    for text in ["box,h=1e-6", "sphere,h=1e-90", "balls,h=1e-7", "shells,h=1e-7", "knot,h=1e-7"] {
         let error = SampleSpec::parse(text).unwrap().make().unwrap_err();
         assert!(matches!(error, SampleError::TooMany { .. }), "{error}");
     }

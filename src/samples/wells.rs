@@ -42,11 +42,7 @@ impl Wells {
         let triangles =
             2.0 * squares * (6.0 + f64::from(self.layers)) + (self.count as f64) * f64::from(n);
         triangles_checked("wells", triangles, bytes_max)?;
-        let grid = Grid {
-            cells: n,
-            seed: self.seed,
-            shift: self.shift,
-        };
+        let grid = Grid { cells: n, seed: self.seed, shift: self.shift };
         let mut build = Builder::default();
         grid.shell(&mut build);
         let first = build.n_triangles();
@@ -58,9 +54,8 @@ impl Wells {
         }
         let mut random = Random::new(self.seed);
         let inner = n - 1;
-        for (well, column) in self
-            .chosen(self.count, u64::from(inner) * u64::from(inner))
-            .enumerate()
+        for (well, column) in
+            self.chosen(self.count, u64::from(inner) * u64::from(inner)).enumerate()
         {
             let label = build.label(format!("well-{}", well + 1));
             let (x, y) = (1 + column as u32 / inner, 1 + column as u32 % inner);

@@ -56,14 +56,8 @@ impl FacePairs {
     /// A table for the faces of `tets` tetrahedra.
     pub fn new(tets: usize) -> Self {
         let slots = (tets * 8).next_power_of_two().max(16);
-        let vacant = Entry {
-            face: [0; 3],
-            reference: VACANT,
-        };
-        Self {
-            entries: vec![vacant; slots],
-            used: 0,
-        }
+        let vacant = Entry { face: [0; 3], reference: VACANT };
+        Self { entries: vec![vacant; slots], used: 0 }
     }
 
     /// Empties the table.
@@ -83,10 +77,7 @@ impl FacePairs {
         loop {
             let entry = &mut self.entries[at];
             if entry.reference == VACANT {
-                *entry = Entry {
-                    face,
-                    reference: reference << 1 | u32::from(odd),
-                };
+                *entry = Entry { face, reference: reference << 1 | u32::from(odd) };
                 self.used += 1;
                 assert!(self.used * 2 <= mask + 1, "the table is for fewer faces");
                 return Paired::Open;

@@ -49,10 +49,7 @@ pub(super) struct Cut<R> {
 impl<R> Cut<R> {
     /// Bytes to store.
     pub fn bytes(&self) -> u32 {
-        self.values
-            .iter()
-            .map(|(_, value)| value.len() as u32)
-            .sum()
+        self.values.iter().map(|(_, value)| value.len() as u32).sum()
     }
 }
 
@@ -68,11 +65,7 @@ impl<R> From<Packed<R>> for Cut<R> {
 
 impl<R> From<PageSet<R>> for Cut<R> {
     fn from(page: PageSet<R>) -> Self {
-        Self {
-            first: page.first,
-            records: page.records,
-            values: page.values,
-        }
+        Self { first: page.first, records: page.records, values: page.values }
     }
 }
 
@@ -136,10 +129,7 @@ type ReadPage<R> =
 /// Reads what a [`Cutter`] cut.
 pub(super) enum Loader<R> {
     Chunks(Decoder<R>),
-    Pages {
-        frames: PageDecoder,
-        read: ReadPage<R>,
-    },
+    Pages { frames: PageDecoder, read: ReadPage<R> },
 }
 
 impl<R: ChunkRecord> Loader<R> {
@@ -159,15 +149,10 @@ impl<R: ChunkRecord> Loader<R> {
             Self::Chunks(decoder) => decoder,
             Self::Pages { frames, read } => return read(file, frames, address, records),
         };
-        let read = file.read(address.key(), |value| {
-            decoder.decode(value, address, records)
-        })?;
+        let read = file.read(address.key(), |value| decoder.decode(value, address, records))?;
         match read {
             Some(Ok(first)) => Ok(first),
-            Some(Err(source)) => Err(SealedError::Chunk {
-                path: file.path().to_owned(),
-                source,
-            }),
+            Some(Err(source)) => Err(SealedError::Chunk { path: file.path().to_owned(), source }),
             None => Err(missing(file, address, "chunk")),
         }
     }
@@ -202,10 +187,7 @@ fn read_page<R: PageRecord>(
 ) -> Result<u32, SealedError> {
     let page = address.chunk;
     let damaged = |file: &StoreFile, source: PageError| {
-        SealedError::Storage(StorageError::Page {
-            path: file.path().to_owned(),
-            source,
-        })
+        SealedError::Storage(StorageError::Page { path: file.path().to_owned(), source })
     };
     let (main, beside) = PageDecoder::keys::<R>(page);
     match file.read(main, |value| frames.open::<R>(page, value))? {

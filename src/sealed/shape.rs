@@ -37,11 +37,7 @@ impl Shape {
                     dot > (known[0] + ROUNDING) * unit && dot < (known[1] - ROUNDING) * unit;
                 beyond |= !within;
             }
-            if beyond {
-                cosines(normals, lengths)
-            } else {
-                known
-            }
+            if beyond { cosines(normals, lengths) } else { known }
         })
     }
 
@@ -58,9 +54,7 @@ impl Shape {
         let lengths = [e.length(), f.length(), g.length(), h.length()];
         let six_volumes = ab.dot(ac.cross(ad));
         let edges = [ab, ac, ad, bc, bd, d - c];
-        let longest = edges
-            .iter()
-            .fold(0.0, |m: f64, e| m.max(e.length_squared()));
+        let longest = edges.iter().fold(0.0, |m: f64, e| m.max(e.length_squared()));
         let inradius = six_volumes / lengths.iter().sum::<f64>();
         let quality = if six_volumes > 0.0 {
             6f64.sqrt() / 12.0 * longest.sqrt() / inradius
@@ -135,11 +129,7 @@ mod tests {
         for scale in [1e-9, 1.0, 1e9] {
             let [a, b, c, d] = p.map(|p| Point::from_array(p) * scale);
             let shape = Shape::of([a, c, b, d]);
-            let shape = if shape.volume > 0.0 {
-                shape
-            } else {
-                Shape::of([a, b, c, d])
-            };
+            let shape = if shape.volume > 0.0 { shape } else { Shape::of([a, b, c, d]) };
             assert!((shape.quality - 1.0).abs() < 1e-12, "{shape:?}");
             assert!((shape.volume / scale.powi(3) - 8.0 / 3.0).abs() < 1e-12);
             for cosine in shape.cosines {

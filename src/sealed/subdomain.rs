@@ -81,9 +81,7 @@ impl Subdomain {
         let (Some(tets), Some(vertices), Some(facets), Some(faces)) =
             (tets, vertices, facets, faces)
         else {
-            return Err(damaged(
-                "the summaries of its chunks do not follow each other".to_owned(),
-            ));
+            return Err(damaged("the summaries of its chunks do not follow each other".to_owned()));
         };
         if facets != row.facets || faces != row.interface_faces {
             return Err(damaged(format!(
@@ -272,12 +270,7 @@ impl Subdomain {
 }
 
 fn address<R: ChunkRecord>(row: &SubdomainRow) -> ChunkAddress {
-    ChunkAddress {
-        kind: R::KIND,
-        subdomain: row.rank,
-        generation: row.generation,
-        chunk: 0,
-    }
+    ChunkAddress { kind: R::KIND, subdomain: row.rank, generation: row.generation, chunk: 0 }
 }
 
 fn n_chunks<R: ChunkRecord>(row: &SubdomainRow) -> u32 {
@@ -287,9 +280,7 @@ fn n_chunks<R: ChunkRecord>(row: &SubdomainRow) -> u32 {
 
 /// Records in chunks that begin at and hold so many; `None` when one does not begin where the one before ends.
 fn n_records(mut chunks: impl Iterator<Item = [u32; 2]>) -> Option<u64> {
-    chunks.try_fold(0, |n, [first, count]| {
-        (u64::from(first) == n).then_some(n + u64::from(count))
-    })
+    chunks.try_fold(0, |n, [first, count]| (u64::from(first) == n).then_some(n + u64::from(count)))
 }
 
 /// All summaries of one kind: some ten bytes per thousand tetrahedra.
@@ -300,10 +291,7 @@ fn summaries<R: ChunkRecord>(
     let mut loader = Loader::chunks().map_err(|e| SealedError::io(file.path(), e))?;
     let (mut all, mut block) = (Vec::new(), Vec::new());
     for chunk in 0..n_chunks::<R>(row) {
-        let address = ChunkAddress {
-            chunk,
-            ..address::<R>(row)
-        };
+        let address = ChunkAddress { chunk, ..address::<R>(row) };
         loader.load(file, address, &mut block)?;
         all.append(&mut block);
     }

@@ -48,10 +48,7 @@ struct Spot {
 impl Spot {
     #[inline(always)]
     fn of(corner: &Corner) -> Self {
-        Self {
-            point: corner.point,
-            mix: corner.mix,
-        }
+        Self { point: corner.point, mix: corner.mix }
     }
 }
 
@@ -91,11 +88,7 @@ pub(super) fn array(bounds: &Aabb) -> [[f64; 3]; 2] {
 /// The least number not below `x` that 32 bits can hold.
 fn rounded_up(x: f64) -> f32 {
     let near = x as f32;
-    if f64::from(near) < x {
-        near.next_up()
-    } else {
-        near
-    }
+    if f64::from(near) < x { near.next_up() } else { near }
 }
 
 /// Faces of a chunk that have no partner in it.
@@ -157,10 +150,7 @@ impl Totals {
             bytes: 0,
             edge_max: 0.0,
         };
-        let mut buffers = (
-            std::mem::take(&mut self.corners),
-            std::mem::take(&mut self.shapes),
-        );
+        let mut buffers = (std::mem::take(&mut self.corners), std::mem::take(&mut self.shapes));
         let (corners, shapes) = (&mut buffers.0, &mut buffers.1);
         // Rounded once: what is rounded keeps its order.
         let (mut quality, mut edge_max) = ([f64::INFINITY, 0.0f64], 0.0f64);
@@ -180,8 +170,7 @@ impl Totals {
             let mut run = RegionRun::of(piece[0].region, &self.regions);
             for (place, ((tet, corners), shape)) in (first..).zip(known) {
                 let [a, b, c, d] = corners;
-                self.digest
-                    .add_tet([a.mix, b.mix, c.mix, d.mix], tet.region, rank);
+                self.digest.add_tet([a.mix, b.mix, c.mix, d.mix], tet.region, rank);
                 corners.iter().for_each(|c| extend(&mut bounds, c.point));
                 self.add_shape(place, shape);
                 if run.region != tet.region {

@@ -42,12 +42,7 @@ struct Window {
 }
 
 impl Window {
-    const EMPTY: Self = Self {
-        chunk: NOT_RESIDENT,
-        first: 0,
-        end: 0,
-        place: 0,
-    };
+    const EMPTY: Self = Self { chunk: NOT_RESIDENT, first: 0, end: 0, place: 0 };
 }
 
 /// Decoded vertex chunks within a budget.
@@ -148,11 +143,7 @@ impl VertexCache {
         let window = Window {
             chunk: chunk as u32,
             first: self.firsts[chunk],
-            end: self
-                .firsts
-                .get(chunk + 1)
-                .copied()
-                .unwrap_or(self.n_vertices),
+            end: self.firsts.get(chunk + 1).copied().unwrap_or(self.n_vertices),
             place: self.places[chunk],
         };
         self.last = [window, self.last[0]];
@@ -166,13 +157,7 @@ impl VertexCache {
         file: &mut StoreFile,
         vertices: [u32; N],
     ) -> Result<[Corner; N], SealedError> {
-        let mut corners = [Corner {
-            point: Point::ZERO,
-            mix: 0,
-            id: 0,
-            tag: 0,
-            h: 0.0,
-        }; N];
+        let mut corners = [Corner { point: Point::ZERO, mix: 0, id: 0, tag: 0, h: 0.0 }; N];
         for (corner, v) in corners.iter_mut().zip(vertices) {
             *corner = self.corner(file, v)?;
         }

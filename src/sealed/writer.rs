@@ -187,11 +187,7 @@ impl SealedWriter {
         &mut self,
         tets: impl Iterator<Item = ([u32; 4], u32)> + Send,
     ) -> Result<(), SealedError> {
-        let place = TetPlace {
-            neighbors: [tetdb_schema::page::NONE; 4],
-            required: 0,
-            flags: 0,
-        };
+        let place = TetPlace { neighbors: [tetdb_schema::page::NONE; 4], required: 0, flags: 0 };
         let placed = tets.map(|(nodes, region)| Ok((SealedTet { nodes, region }.rotated(), place)));
         let mut placed = placed.peekable();
         while placed.peek().is_some() {
@@ -265,10 +261,8 @@ impl SealedWriter {
     }
 
     fn put_facets(&mut self, chunk: Cut<SealedFacet>) -> Result<(), SealedError> {
-        self.facet_chunks.push(RangeSummary {
-            first: chunk.first,
-            count: chunk.records.len() as u32,
-        });
+        self.facet_chunks
+            .push(RangeSummary { first: chunk.first, count: chunk.records.len() as u32 });
         self.put(chunk.values)
     }
 
@@ -291,10 +285,8 @@ impl SealedWriter {
     }
 
     fn put_faces(&mut self, chunk: Cut<InterfaceFace>) -> Result<(), SealedError> {
-        self.face_chunks.push(RangeSummary {
-            first: chunk.first,
-            count: chunk.records.len() as u32,
-        });
+        self.face_chunks
+            .push(RangeSummary { first: chunk.first, count: chunk.records.len() as u32 });
         self.put(chunk.values)
     }
 
@@ -309,8 +301,7 @@ impl SealedWriter {
             blocks.push(block);
         }
         for block in blocks {
-            self.batch
-                .push(&mut self.file, block.address.key(), block.value)?;
+            self.batch.push(&mut self.file, block.address.key(), block.value)?;
         }
         Ok(packer.chunks())
     }
@@ -350,20 +341,11 @@ impl SealedWriter {
         let mut interfaces = Vec::with_capacity(self.interfaces.len());
         for ((cut, other), (faces, digest)) in self.interfaces {
             interface_digest.merge(&digest);
-            interfaces.push(InterfaceSide {
-                cut,
-                other,
-                faces,
-                digest,
-            });
+            interfaces.push(InterfaceSide { cut, other, faces, digest });
         }
         let totals = self.totals;
-        let chunks = [
-            self.tets.chunks(),
-            self.vertices.chunks(),
-            self.facets.chunks(),
-            self.faces.chunks(),
-        ];
+        let chunks =
+            [self.tets.chunks(), self.vertices.chunks(), self.facets.chunks(), self.faces.chunks()];
         let mut both = [0; 8];
         both[..4].copy_from_slice(&chunks);
         both[4..].copy_from_slice(&blocks);
@@ -383,11 +365,7 @@ impl SealedWriter {
             bounds: array(&totals.bounds),
             bytes,
         };
-        Ok(Sealed {
-            row,
-            regions: totals.regions,
-            interfaces,
-        })
+        Ok(Sealed { row, regions: totals.regions, interfaces })
     }
 }
 

@@ -57,14 +57,7 @@ impl BackgroundMesh {
             let level = (0..nodes.len()).map(range).collect();
             ranges.push(level);
         }
-        Self {
-            points,
-            tets,
-            h,
-            tree,
-            vertices,
-            ranges,
-        }
+        Self { points, tets, h, tree, vertices, ranges }
     }
 
     /// Memory held, in bytes, for so many vertices and tetrahedra.
@@ -78,9 +71,8 @@ impl BackgroundMesh {
         let mut add = |[a, b]: [f64; 2]| (low, high) = (low.min(a), high.max(b));
         let holds = |b: &Aabb| cell.low.cmple(b.low).all() && b.high.cmple(cell.high).all();
         let top = self.vertices.levels.len() - 1;
-        let mut stack: Vec<(usize, usize)> = (0..self.vertices.levels[top].len())
-            .map(|n| (top, n))
-            .collect();
+        let mut stack: Vec<(usize, usize)> =
+            (0..self.vertices.levels[top].len()).map(|n| (top, n)).collect();
         while let Some((level, node)) = stack.pop() {
             let bounds = &self.vertices.levels[level].get(node);
             if holds(bounds) {
@@ -121,12 +113,7 @@ const NONE: [f64; 2] = [f64::INFINITY, 0.0];
 fn shares([a, b, c, d]: [Point; 4], p: Point) -> Option<[f64; 4]> {
     let volume = |a: Point, b: Point, c: Point, d: Point| (b - a).cross(c - a).dot(d - a);
     let whole = volume(a, b, c, d);
-    let parts = [
-        volume(p, b, c, d),
-        volume(a, p, c, d),
-        volume(a, b, p, d),
-        volume(a, b, c, p),
-    ];
+    let parts = [volume(p, b, c, d), volume(a, p, c, d), volume(a, b, p, d), volume(a, b, c, p)];
     let shares = parts.map(|part| part / whole);
     let holds = shares.iter().all(|s| *s >= -OUTSIDE_MAX);
     holds.then(|| shares.map(|s| s.clamp(0.0, 1.0)))
@@ -140,10 +127,7 @@ impl SizeConstraint for BackgroundMesh {
     /// Linear pieces have their extremes at vertices: what is in the cell tells, besides its corners and middle.
     fn divides(&self, middle: Point, width: f64) -> Option<bool> {
         let half = Point::splat(0.5 * width);
-        let cell = Aabb {
-            low: middle - half,
-            high: middle + half,
-        };
+        let cell = Aabb { low: middle - half, high: middle + half };
         let corner = |c: usize| {
             let at = |axis: usize| if c >> axis & 1 == 1 { 0.5 } else { -0.5 };
             middle + Point::new(at(0), at(1), at(2)) * width
@@ -190,14 +174,7 @@ mod tests {
         for k in 0..n * n * n {
             let low = k % n + k / n % n * m + k / n / n * m * m;
             let steps = [1, m, m * m];
-            for [i, j, l] in [
-                [0, 1, 2],
-                [0, 2, 1],
-                [1, 0, 2],
-                [1, 2, 0],
-                [2, 0, 1],
-                [2, 1, 0],
-            ] {
+            for [i, j, l] in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
                 let a = low + steps[i];
                 let b = a + steps[j];
                 tets.push([low, a, b, b + steps[l]]);
@@ -223,13 +200,7 @@ mod tests {
 
     #[test]
     fn cells_are_divided_where_sizes_differ() {
-        let mesh = grid(40, |p| {
-            if p.distance(Point::splat(0.3)) < 0.02 {
-                0.001
-            } else {
-                0.2
-            }
-        });
+        let mesh = grid(40, |p| if p.distance(Point::splat(0.3)) < 0.02 { 0.001 } else { 0.2 });
         assert_eq!(mesh.divides(Point::splat(0.5), 1.0), Some(true));
         assert_eq!(mesh.divides(Point::splat(0.3), 0.01), Some(true));
         assert_eq!(mesh.divides(Point::splat(0.3), 0.0015), Some(false));

@@ -89,14 +89,8 @@ mod tests {
             return mean.powi(-3) * (1.0 + 6.0 * spread / (mean * mean));
         }
         let m = |i: usize, j: usize| 0.5 * (h[i] + h[j]);
-        let corners = (0..4).map(|i| {
-            [
-                h[i],
-                m(i, (i + 1) % 4),
-                m(i, (i + 2) % 4),
-                m(i, (i + 3) % 4),
-            ]
-        });
+        let corners =
+            (0..4).map(|i| [h[i], m(i, (i + 1) % 4), m(i, (i + 2) % 4), m(i, (i + 3) % 4)]);
         let inner = [
             [m(0, 1), m(0, 2), m(0, 3), m(1, 3)],
             [m(0, 1), m(0, 2), m(1, 2), m(1, 3)],
@@ -104,10 +98,7 @@ mod tests {
             [m(0, 2), m(1, 2), m(1, 3), m(2, 3)],
         ];
         let parts = corners.chain(inner);
-        parts
-            .map(|part| load_by_division(part, depth - 1))
-            .sum::<f64>()
-            / 8.0
+        parts.map(|part| load_by_division(part, depth - 1)).sum::<f64>() / 8.0
     }
 
     #[test]
@@ -123,26 +114,16 @@ mod tests {
         ] {
             let expected = load_by_division(h, 5);
             let found = load_of_tet(1.0, h);
-            assert!(
-                (found / expected - 1.0).abs() < 2e-6,
-                "{h:?} {found} {expected}"
-            );
+            assert!((found / expected - 1.0).abs() < 2e-6, "{h:?} {found} {expected}");
         }
     }
 
     #[test]
     fn loads_do_not_jump_where_the_series_begins() {
-        for shape in [
-            [0.0, 0.0, 0.0, 1.0],
-            [0.0, 0.3, 0.6, 1.0],
-            [0.0, 1.0, 1.0, 1.0],
-        ] {
+        for shape in [[0.0, 0.0, 0.0, 1.0], [0.0, 0.3, 0.6, 1.0], [0.0, 1.0, 1.0, 1.0]] {
             let at = |ratio: f64| load_of_tet(1.0, shape.map(|t| 1.0 + t * (ratio - 1.0)));
             let (below, above) = (at(SERIES_RATIO - 1e-9), at(SERIES_RATIO + 1e-9));
-            assert!(
-                (below / above - 1.0).abs() < 5e-9,
-                "{shape:?} {below} {above}"
-            );
+            assert!((below / above - 1.0).abs() < 5e-9, "{shape:?} {below} {above}");
             // The load scales with h^-3.
             let scaled = load_of_tet(1.0, shape.map(|t| 1e9 * (1.0 + t * 4.0)));
             let plain = load_of_tet(1.0, shape.map(|t| 1.0 + t * 4.0));

@@ -40,9 +40,7 @@ impl Memory {
     fn new() -> Self {
         // No corner of the lattice is there, and no size is zero.
         let nowhere = ([u32::MAX; 3], 0.0);
-        Self {
-            slots: vec![nowhere; REMEMBERED],
-        }
+        Self { slots: vec![nowhere; REMEMBERED] }
     }
 
     fn slot(&mut self, corner: [u32; 3]) -> &mut ([u32; 3], f32) {
@@ -135,11 +133,7 @@ impl SizeField {
         let low = Point::new(number(0), number(1), number(2));
         let (side, beta) = (number(3), number(4));
         if !low.is_finite() || !side.is_normal() || side < 0.0 {
-            return Err(damaged(
-                "cube",
-                format!("{low} {side}"),
-                "finite, side above zero",
-            ));
+            return Err(damaged("cube", format!("{low} {side}"), "finite, side above zero"));
         }
         if !(beta > 0.0 && beta.is_finite()) {
             return Err(damaged("slope", beta, "above zero"));
@@ -157,12 +151,7 @@ impl SizeField {
         let (news, values) = rest.split_at(n_leaves);
         let leaves = room.list_within(Self::share_of(room.cap()));
         let (tree, values) = read_tree(cells, news, values, leaves)?;
-        Ok(Self::from_parts(
-            OctreeFrame { low, side },
-            beta,
-            tree,
-            values,
-        ))
+        Ok(Self::from_parts(OctreeFrame { low, side }, beta, tree, values))
     }
 }
 
@@ -174,10 +163,8 @@ fn read_tree(
     mut leaves: SpillVecBuilder<[f32; 8]>,
 ) -> Result<(Tree, FrozenSpillVec<[f32; 8]>), SizingError> {
     let mut values = values.chunks_exact(4).map(|b| f32::from_le_bytes(array(b)));
-    let mut tree = Tree {
-        root: LEAF,
-        blocks: Vec::with_capacity(cells.len() - news.len().min(cells.len())),
-    };
+    let mut tree =
+        Tree { root: LEAF, blocks: Vec::with_capacity(cells.len() - news.len().min(cells.len())) };
     let mut memory = Memory::new();
     // A cell, and the block and octant whose entry it is.
     let mut stack = vec![(Leaf::ROOT, None)];
@@ -185,11 +172,8 @@ fn read_tree(
         let Some((cell, place)) = stack.pop() else {
             return Err(damaged("number of cells", cells.len(), "fewer"));
         };
-        let entry = if is_leaf == 0 {
-            tree.blocks.len() as u32
-        } else {
-            LEAF | leaves.len() as u32
-        };
+        let entry =
+            if is_leaf == 0 { tree.blocks.len() as u32 } else { LEAF | leaves.len() as u32 };
         match place {
             None => tree.root = entry,
             Some((block, octant)) => {
@@ -232,11 +216,7 @@ fn read_tree(
 }
 
 fn damaged(what: &'static str, found: impl Display, expected: impl Display) -> SizingError {
-    SizingError::Damaged {
-        what,
-        found: found.to_string(),
-        expected: expected.to_string(),
-    }
+    SizingError::Damaged { what, found: found.to_string(), expected: expected.to_string() }
 }
 
 /// The first bytes; the caller knows that they are there.

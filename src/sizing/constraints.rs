@@ -81,10 +81,7 @@ impl SizeConstraints<'_> {
             });
             all.extend(shapes?.into_iter().flatten());
             if all.len() > CELLS_MAX {
-                return Err(SizingError::TooLarge {
-                    found: all.len(),
-                    expected: CELLS_MAX,
-                });
+                return Err(SizingError::TooLarge { found: all.len(), expected: CELLS_MAX });
             }
         }
         *tree = Tree::from_shape(&all);

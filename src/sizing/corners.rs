@@ -31,21 +31,13 @@ impl Hanging {
 
     /// The two or four corners, once each.
     pub(super) fn distinct(&self) -> &[u32] {
-        if self.on_edge() {
-            &self.on[..2]
-        } else {
-            &self.on
-        }
+        if self.on_edge() { &self.on[..2] } else { &self.on }
     }
 
     /// Distance to the corners it hangs on, in units of the root's side.
     pub(super) fn distance(&self) -> f64 {
         let side = 1.0 / f64::from(1u32 << self.level);
-        if self.on_edge() {
-            side
-        } else {
-            side * 2f64.sqrt()
-        }
+        if self.on_edge() { side } else { side * 2f64.sqrt() }
     }
 }
 
@@ -64,11 +56,7 @@ impl Corners {
         let numbered = number_corners(tree, room);
         let (mut of_leaf, n_corners) = numbered.unwrap_or_else(|e| raise(e));
         let hanging = find_hanging(tree, &mut of_leaf, room).unwrap_or_else(|e| raise(e));
-        Self {
-            of_leaf,
-            n_corners,
-            hanging,
-        }
+        Self { of_leaf, n_corners, hanging }
     }
 }
 
@@ -82,10 +70,7 @@ fn number_corners(
     for (i, leaf) in tree.leaves().enumerate() {
         n_leaves += 1;
         for c in 0..8 {
-            keys.push(Keyed {
-                key: morton(leaf.corner(c)),
-                id: (8 * i + c) as u32,
-            })?;
+            keys.push(Keyed { key: morton(leaf.corner(c)), id: (8 * i + c) as u32 })?;
         }
     }
     let keys = keys.finish()?;
@@ -93,10 +78,7 @@ fn number_corners(
     let mut n_corners = 0u32;
     let mut last = None;
     for key in keys {
-        let Keyed {
-            key: corner,
-            id: slot,
-        } = key?;
+        let Keyed { key: corner, id: slot } = key?;
         if last != Some(corner) {
             n_corners += 1;
             last = Some(corner);
@@ -196,11 +178,7 @@ fn hangs(
         }
         *on = ids_large[octant];
     }
-    Some(Hanging {
-        level: leaf.level,
-        corner: id,
-        on,
-    })
+    Some(Hanging { level: leaf.level, corner: id, on })
 }
 
 /// Pairs of corners of a cell with the squared distance in sides: all 28 of them.

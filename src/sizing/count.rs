@@ -16,10 +16,7 @@ use crate::storage::parallel;
 /// little farther away take up the room as well. With 0.1 and 0.3 h from triangles thin plates of large triangles have a sixth more
 /// and a third fewer tetrahedra; with 0.5 and 0.6 h from vertices half of 42 surfaces are off by more than 3.4 and 4.5 %, and
 /// with 0.55 a thin knot of 1,700 tetrahedra by 16 %.
-const SKIN: SurfaceSkin = SurfaceSkin {
-    triangles: 0.2,
-    vertices: 0.57,
-};
+const SKIN: SurfaceSkin = SurfaceSkin { triangles: 0.2, vertices: 0.57 };
 /// Vertices per unit of load in the inside: 1.68 to 1.74 on balls, a box and three scans.
 const VERTICES_PER_LOAD: f64 = 1.69;
 /// Tetrahedra per wanted length of a needle's edges beyond [`NEEDLE_FROM`]. With none, surfaces of fans and needles (a wing, slats) have a
@@ -110,10 +107,7 @@ impl SizeField {
 fn summed(n: usize, of: impl Fn(usize) -> f64 + Sync) -> f64 {
     let starts: Vec<usize> = (0..n).step_by(CHUNK).collect();
     let sums: Vec<f64> = parallel(|| {
-        starts
-            .into_par_iter()
-            .map(|start| (start..(start + CHUNK).min(n)).map(&of).sum())
-            .collect()
+        starts.into_par_iter().map(|start| (start..(start + CHUNK).min(n)).map(&of).sum()).collect()
     });
     sums.iter().sum()
 }
@@ -122,10 +116,7 @@ impl Domain<'_> {
     /// On how many sides of a triangle there are tetrahedra.
     pub fn n_filled(&self, triangle: usize) -> u32 {
         let sides = self.volumes.of_side[triangle];
-        sides
-            .iter()
-            .map(|&v| u32::from(self.filled[v as usize]))
-            .sum()
+        sides.iter().map(|&v| u32::from(self.filled[v as usize])).sum()
     }
 
     /// What is filled, told from the triangles around it.
@@ -147,9 +138,7 @@ impl Domain<'_> {
         let n = self.volumes.of_side.len();
         let sides: u64 = (0..n).map(|t| u64::from(self.n_filled(t))).sum();
         let angles = self.volumes.angles.iter().zip(self.filled);
-        let angles = angles
-            .filter(|(_, filled)| **filled)
-            .map(|(angle, _)| angle);
+        let angles = angles.filter(|(_, filled)| **filled).map(|(angle, _)| angle);
         (sides as f64, angles.sum())
     }
 }

@@ -67,11 +67,7 @@ pub(super) fn edge_seeds(
     at_vertices: Option<&[f64]>,
     room: &ScratchSpace,
 ) -> Option<FrozenSpillVec<EdgeSeed>> {
-    let along = Along {
-        seeds,
-        slope: targets.beta * targets.steeper_max(),
-        at_vertices,
-    };
+    let along = Along { seeds, slope: targets.beta * targets.steeper_max(), at_vertices };
     let most = (triangles.len() / 2).max(SEEDS_MIN);
     let mut stretch = 1.0;
     while stretch < STRETCH_MAX && along.count(triangles, stretch) > most {
@@ -175,13 +171,7 @@ mod tests {
     use super::*;
 
     fn span(h: [f64; 2], length: f64) -> Span {
-        Span {
-            ends: [Point::ZERO, Point::X * length],
-            h,
-            steeper: [1.0; 2],
-            length,
-            slope: 0.7,
-        }
+        Span { ends: [Point::ZERO, Point::X * length], h, steeper: [1.0; 2], length, slope: 0.7 }
     }
 
     fn places(span: &Span) -> Vec<f64> {
@@ -214,9 +204,6 @@ mod tests {
 
     #[test]
     fn no_edge_has_more_seeds_than_its_steps() {
-        assert_eq!(
-            places(&span([1e-12, 1e-12], 1.0)).len(),
-            2 * STEPS_MAX as usize + 1
-        );
+        assert_eq!(places(&span([1e-12, 1e-12], 1.0)).len(), 2 * STEPS_MAX as usize + 1);
     }
 }

@@ -265,10 +265,7 @@ impl SizeField {
                 (low, high) = (low.min(h), high.max(h));
             }
         }
-        (
-            f64::from(low) * self.frame.side,
-            f64::from(high) * self.frame.side,
-        )
+        (f64::from(low) * self.frame.side, f64::from(high) * self.frame.side)
     }
 
     /// Memory held, in bytes.

@@ -18,18 +18,11 @@ impl Formula {
     /// # Errors
     /// The fault and its place in the text.
     pub fn parse(text: &str) -> Result<Self, SizingError> {
-        let bad = |at, message| SizingError::BadFormula {
-            text: text.to_owned(),
-            at,
-            message,
-        };
+        let bad = |at, message| SizingError::BadFormula { text: text.to_owned(), at, message };
         let expression =
             Expression::parse(text, &["x", "y", "z"]).map_err(|e| bad(e.at, e.message))?;
         match expression.kind() {
-            Kind::Number => Ok(Self {
-                text: text.to_owned(),
-                expression,
-            }),
+            Kind::Number => Ok(Self { text: text.to_owned(), expression }),
             Kind::Truth => Err(bad(0, "it is true or false, not a length".to_owned())),
         }
     }
@@ -48,10 +41,6 @@ impl SizeConstraint for Formula {
         if h.is_normal() && h > 0.0 {
             return Ok(h);
         }
-        Err(SizingError::NoSize {
-            text: self.text.clone(),
-            at: p.to_array(),
-            found: h,
-        })
+        Err(SizingError::NoSize { text: self.text.clone(), at: p.to_array(), found: h })
     }
 }

@@ -31,10 +31,7 @@ pub(super) fn seeds_of<'a>(
     if let Some(h) = at_vertices
         && h.len() != points.len()
     {
-        return Err(SizingError::SizeCount {
-            found: h.len(),
-            expected: points.len(),
-        });
+        return Err(SizingError::SizeCount { found: h.len(), expected: points.len() });
     }
     let at_once = usize::try_from(room.available() / 4 / 32).unwrap_or(usize::MAX);
     let at_once = at_once.clamp(1 << 16, points.len().max(1 << 16));

@@ -63,9 +63,7 @@ impl Grading<'_> {
             };
             match is_backward {
                 true => (self.tree.leaves_backward()).for_each(|(i, leaf)| sweep.relax(i, leaf)),
-                false => (0..)
-                    .zip(self.tree.leaves())
-                    .for_each(|(i, leaf)| sweep.relax(i, leaf)),
+                false => (0..).zip(self.tree.leaves()).for_each(|(i, leaf)| sweep.relax(i, leaf)),
             }
             if sweep.is_done {
                 break;
@@ -151,9 +149,8 @@ impl Sweep<'_> {
 /// Lowers each of a leaf's values to what the others allow; says whether one changed.
 #[inline]
 fn relax_once(h: &mut [f32; 8], steps: &[f64; 4]) -> bool {
-    let (low, high) = (h.iter()).fold((f32::INFINITY, f32::NEG_INFINITY), |(l, u), &x| {
-        (l.min(x), u.max(x))
-    });
+    let (low, high) =
+        (h.iter()).fold((f32::INFINITY, f32::NEG_INFINITY), |(l, u), &x| (l.min(x), u.max(x)));
     // The least step from the least value allows the greatest.
     if bound(low, steps[1]) >= high {
         return false;

@@ -218,12 +218,8 @@ impl Sum<'_> {
         }
         let points = (POINTS as f64 * self.share) as usize;
         let each = points.div_ceil(crossed.len().max(1)) as u64;
-        let drawn: Vec<[f64; 2]> = parallel(|| {
-            crossed
-                .into_par_iter()
-                .map(|cell| self.drawn(cell, each))
-                .collect()
-        });
+        let drawn: Vec<[f64; 2]> =
+            parallel(|| crossed.into_par_iter().map(|cell| self.drawn(cell, each)).collect());
         let [found, at_surface] = (drawn.iter()).fold([0.0; 2], |s, d| [s[0] + d[0], s[1] + d[1]]);
         let expected = self.domain.volume() - volume;
         let factor = match found > 0.0 {
@@ -236,11 +232,7 @@ impl Sum<'_> {
     /// Volume and load of a cell's filled part by the mean of some points in it.
     fn drawn(&self, cell: &IntegrationCell, points: u64) -> [f64; 2] {
         let (field, skin) = (self.field, self.skin);
-        let Domain {
-            seeker,
-            volumes,
-            filled,
-        } = *self.domain;
+        let Domain { seeker, volumes, filled } = *self.domain;
         let side = field.frame.side;
         let low = field.frame.low + cell.leaf.low() * side;
         let width = cell.leaf.side() * side;
@@ -276,11 +268,7 @@ impl Sum<'_> {
             }
             _ => cell.entry,
         };
-        IntegrationCell {
-            leaf,
-            entry,
-            ..*cell
-        }
+        IntegrationCell { leaf, entry, ..*cell }
     }
 
     /// Keeps a cell that was looked at. Returns the load that went into the heap.
@@ -329,15 +317,8 @@ impl Sum<'_> {
         cell.volume = volume;
         (cell.is_cut, cell.is_crossed) = (false, false);
         if !cell.is_deep {
-            let Domain {
-                seeker,
-                volumes,
-                filled,
-            } = *self.domain;
-            let SurfaceSkin {
-                triangles,
-                vertices,
-            } = self.skin;
+            let Domain { seeker, volumes, filled } = *self.domain;
+            let SurfaceSkin { triangles, vertices } = self.skin;
             let far = reach + triangles.max(vertices) * high;
             let away = seeker.distance(middle, far);
             let inside = cell.is_inside || filled[volumes.at(seeker, middle) as usize];

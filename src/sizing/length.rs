@@ -23,11 +23,9 @@ impl Length {
             None => (trimmed, false),
         };
         match digits.parse::<f64>() {
-            Ok(x) if x.is_normal() && x > 0.0 => Ok(if percent {
-                Self::Percent(x)
-            } else {
-                Self::Absolute(x)
-            }),
+            Ok(x) if x.is_normal() && x > 0.0 => {
+                Ok(if percent { Self::Percent(x) } else { Self::Absolute(x) })
+            }
             _ => Err(SizingError::BadValue {
                 option,
                 found: text.to_owned(),

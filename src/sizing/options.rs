@@ -21,18 +21,13 @@ impl RegionSize {
     /// # Errors
     /// Names the option and the value.
     pub fn parse(text: &str) -> Result<Self, SizingError> {
-        let parts = text
-            .rsplit_once(',')
-            .filter(|(which, _)| !which.trim().is_empty());
+        let parts = text.rsplit_once(',').filter(|(which, _)| !which.trim().is_empty());
         let (which, h) = parts.ok_or_else(|| SizingError::BadValue {
             option: "size_region",
             found: text.to_owned(),
             expected: "REGION,H or LABEL,H, such as 2,0.05",
         })?;
-        Ok(Self {
-            which: which.trim().to_owned(),
-            h: Length::parse("size_region", h)?,
-        })
+        Ok(Self { which: which.trim().to_owned(), h: Length::parse("size_region", h)? })
     }
 }
 
@@ -197,7 +192,6 @@ impl Targets {
     /// The size wanted in the interior where the surface alone would give `h`.
     pub(super) fn interior(&self, h: f64) -> f64 {
         let h = self.hsiz.unwrap_or(h);
-        h.max(self.hmin.unwrap_or(0.0))
-            .min(self.hmax.unwrap_or(f64::INFINITY))
+        h.max(self.hmin.unwrap_or(0.0)).min(self.hmax.unwrap_or(f64::INFINITY))
     }
 }

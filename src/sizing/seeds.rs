@@ -25,10 +25,7 @@ impl OctreeFrame {
     pub(super) fn around(bounds: &Aabb) -> Self {
         let extent = (bounds.high - bounds.low).max_element();
         let side = extent * (1.0 + 1.0 / 1024.0);
-        Self {
-            low: (bounds.low + bounds.high) * 0.5 - Point::splat(0.5 * side),
-            side,
-        }
+        Self { low: (bounds.low + bounds.high) * 0.5 - Point::splat(0.5 * side), side }
     }
 }
 
@@ -49,10 +46,7 @@ pub(super) struct Seeds<'a> {
 impl<'a> Seeds<'a> {
     /// The vertices that triangles use, in their order.
     pub(super) fn vertices(&self) -> impl Iterator<Item = u32> {
-        (0u32..)
-            .zip(&self.h)
-            .filter(|(_, h)| **h > 0.0)
-            .map(|(v, _)| v)
+        (0u32..).zip(&self.h).filter(|(_, h)| **h > 0.0).map(|(v, _)| v)
     }
 
     /// The vertices that triangles use, then the places along edges.
@@ -126,14 +120,7 @@ impl<'a> Seeds<'a> {
         if triangles.is_empty() {
             return Err(SizingError::NoEdges);
         }
-        Ok(Self {
-            points,
-            frame,
-            per_side: 1.0 / frame.side,
-            h,
-            steeper: Vec::new(),
-            along: None,
-        })
+        Ok(Self { points, frame, per_side: 1.0 / frame.side, h, steeper: Vec::new(), along: None })
     }
 }
 

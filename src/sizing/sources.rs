@@ -57,15 +57,8 @@ impl SizeSource {
         };
         let ([a, b, c, d, e, f], inside, outside) = form.read()?;
         let (p, q) = (Point::new(a, b, c), Point::new(d, e, f));
-        let shape = Shape::Box {
-            low: p.min(q),
-            high: p.max(q),
-        };
-        Ok(Self {
-            shape,
-            inside,
-            outside,
-        })
+        let shape = Shape::Box { low: p.min(q), high: p.max(q) };
+        Ok(Self { shape, inside, outside })
     }
 
     /// Reads `X,Y,Z,R,H[,OUTSIDE]`: center and radius.
@@ -83,11 +76,7 @@ impl SizeSource {
             return Err(form.bad());
         }
         let center = Point::new(x, y, z);
-        Ok(Self {
-            shape: Shape::Sphere { center, radius },
-            inside,
-            outside,
-        })
+        Ok(Self { shape: Shape::Sphere { center, radius }, inside, outside })
     }
 
     /// Reads `X0,Y0,Z0,X1,Y1,Z1,R,H[,OUTSIDE]`: the ends of the axis, which differ, and the radius.
@@ -105,11 +94,7 @@ impl SizeSource {
         if radius < 0.0 || ends[0] == ends[1] {
             return Err(form.bad());
         }
-        Ok(Self {
-            shape: Shape::Cylinder { ends, radius },
-            inside,
-            outside,
-        })
+        Ok(Self { shape: Shape::Cylinder { ends, radius }, inside, outside })
     }
 
     /// The source for a surface whose box has that diagonal; no size below `least`.
@@ -117,9 +102,7 @@ impl SizeSource {
         ResolvedSource {
             shape: self.shape,
             inside: self.inside.resolve(diagonal).max(least),
-            outside: self
-                .outside
-                .map_or(f64::INFINITY, |h| h.resolve(diagonal).max(least)),
+            outside: self.outside.map_or(f64::INFINITY, |h| h.resolve(diagonal).max(least)),
         }
     }
 }
@@ -191,27 +174,16 @@ impl Shape {
             Self::Box { low, high } => {
                 let walls = (p - low).min(high - p);
                 let beyond = (-walls).max(Point::ZERO);
-                if beyond == Point::ZERO {
-                    walls.min_element()
-                } else {
-                    -beyond.length()
-                }
+                if beyond == Point::ZERO { walls.min_element() } else { -beyond.length() }
             }
-            Self::Cylinder {
-                ends: [a, b],
-                radius,
-            } => {
+            Self::Cylinder { ends: [a, b], radius } => {
                 let axis = b - a;
                 let length = axis.length();
                 let along = (p - a).dot(axis) / length;
                 let radial = radius - (p - a - axis * (along / length)).length();
                 let axial = along.min(length - along);
                 let beyond = glam::DVec2::new((-radial).max(0.0), (-axial).max(0.0));
-                if beyond == glam::DVec2::ZERO {
-                    radial.min(axial)
-                } else {
-                    -beyond.length()
-                }
+                if beyond == glam::DVec2::ZERO { radial.min(axial) } else { -beyond.length() }
             }
         }
     }
@@ -257,14 +229,7 @@ mod tests {
 
     #[test]
     fn bad_texts_are_named() {
-        for text in [
-            "",
-            "1,2,3",
-            "1,2,3,4,x",
-            "1,2,3,-1,0.1",
-            "1,2,3,4,0",
-            "nan,2,3,4,1",
-        ] {
+        for text in ["", "1,2,3", "1,2,3,4,x", "1,2,3,-1,0.1", "1,2,3,4,0", "nan,2,3,4,1"] {
             let error = SizeSource::parse_sphere(text).expect_err(text).to_string();
             assert!(error.contains("size_sphere"), "{error}");
         }

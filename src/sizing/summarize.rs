@@ -40,11 +40,7 @@ impl SizeField {
             }
             // An upper bound that nothing comes near is no disappointment.
             let is_far_above = option == "hsiz" && wanted > FAR_ABOVE * high;
-            is_far_above.then_some(SizeWarning::NeverReached {
-                option,
-                wanted,
-                most: high,
-            })
+            is_far_above.then_some(SizeWarning::NeverReached { option, wanted, most: high })
         });
         SizeSummary {
             source: source_of(options, targets),
@@ -76,11 +72,7 @@ fn weighted_range(list: impl Iterator<Item = (f64, f64)>, room: &ScratchSpace) -
         pushed.unwrap_or_else(|e| raise(e));
     }
     let mut sum = 0.0;
-    let mut range = Range {
-        low: f64::INFINITY,
-        median: f64::NAN,
-        high: 0.0,
-    };
+    let mut range = Range { low: f64::INFINITY, median: f64::NAN, high: 0.0 };
     for next in sorter.finish().unwrap_or_else(|e| raise(e)) {
         let Weighted { x, weight } = next.unwrap_or_else(|e| raise(e));
         let is_below = sum < 0.5 * total;

@@ -63,12 +63,7 @@ pub enum SizeWarning {
 impl fmt::Display for SizeWarning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::FarBelowSurface {
-                option,
-                wanted,
-                surface_median,
-                away,
-            } => write!(
+            Self::FarBelowSurface { option, wanted, surface_median, away } => write!(
                 f,
                 "{option} {} is far below the surface's edges, which are kept: next to them edges of tetrahedra stay near the median of {}, and \
                  reach {} only {} or more away from them; refine the surface first",
@@ -77,11 +72,7 @@ impl fmt::Display for SizeWarning {
                 short(*wanted),
                 short(*away)
             ),
-            Self::NeverReached {
-                option,
-                wanted,
-                most,
-            } => write!(
+            Self::NeverReached { option, wanted, most } => write!(
                 f,
                 "{option} {} is never reached: from the surface's edges lengths grow to {} at most (hgrad says how fast); is it in the surface's unit?",
                 short(*wanted),

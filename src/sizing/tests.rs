@@ -11,10 +11,7 @@ struct Dice(u64);
 
 impl Dice {
     fn unit(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
 
@@ -62,10 +59,7 @@ fn options(hsiz: Option<&str>, hmin: Option<&str>, hmax: Option<&str>) -> SizeOp
 }
 
 fn formula(text: &str) -> SizeOptions {
-    SizeOptions {
-        formula: Some(Formula::parse(text).unwrap()),
-        ..SizeOptions::default()
-    }
+    SizeOptions { formula: Some(Formula::parse(text).unwrap()), ..SizeOptions::default() }
 }
 
 fn build(surface: &(Vec<Point>, Vec<[u32; 3]>), options: &SizeOptions) -> SizeField {
@@ -78,35 +72,14 @@ fn fields() -> Vec<(&'static str, SizeField)> {
     let steep = graded(50.0, 60);
     vec![
         ("even", build(&even, &SizeOptions::default())),
-        (
-            "even, small inside",
-            build(&even, &options(Some("0.02"), None, None)),
-        ),
-        (
-            "even, large inside",
-            build(&even, &options(Some("0.3"), None, None)),
-        ),
+        ("even, small inside", build(&even, &options(Some("0.02"), None, None))),
+        ("even, large inside", build(&even, &options(Some("0.3"), None, None))),
         ("steep", build(&steep, &SizeOptions::default())),
-        (
-            "steep, hmax",
-            build(&steep, &options(None, None, Some("0.02"))),
-        ),
-        (
-            "steep, hmin",
-            build(&steep, &options(None, Some("2%"), None)),
-        ),
-        (
-            "even, a valley",
-            build(&even, &formula("0.01+0.4*abs(x-y)")),
-        ),
-        (
-            "even, a step",
-            build(&even, &formula("if(x+2*z<1.1,0.01,1)")),
-        ),
-        (
-            "steep, hsiz",
-            build(&steep, &options(Some("0.04"), None, None)),
-        ),
+        ("steep, hmax", build(&steep, &options(None, None, Some("0.02")))),
+        ("steep, hmin", build(&steep, &options(None, Some("2%"), None))),
+        ("even, a valley", build(&even, &formula("0.01+0.4*abs(x-y)"))),
+        ("even, a step", build(&even, &formula("if(x+2*z<1.1,0.01,1)"))),
+        ("steep, hsiz", build(&steep, &options(Some("0.04"), None, None))),
     ]
 }
 
@@ -123,10 +96,7 @@ fn slopes_stay_within_the_gradation() {
             let slope = (field.h(a) - field.h(b)).abs() / a.distance(b).max(1e-300);
             worst = worst.max(slope / field.beta());
         }
-        println!(
-            "{name}: worst slope {worst:.3} of beta, {} leaves",
-            field.n_leaves()
-        );
+        println!("{name}: worst slope {worst:.3} of beta, {} leaves", field.n_leaves());
         assert!(worst < 3f64.sqrt(), "{name}: {worst}");
     }
 }
@@ -204,20 +174,13 @@ fn sample(text: &str) -> (Vec<Point>, Vec<[u32; 3]>) {
 
 /// Tetrahedra to expect of everything a surface bounds.
 fn expected(surface: &(Vec<Point>, Vec<[u32; 3]>), field: &SizeField) -> f64 {
-    let surface = Surface {
-        points: surface.0.clone(),
-        triangles: surface.1.clone(),
-        ..Surface::default()
-    };
+    let surface =
+        Surface { points: surface.0.clone(), triangles: surface.1.clone(), ..Surface::default() };
     let seeker = Seeker::of(&surface, &ScratchSpace::boundless(), |_| true);
     let volumes = Volumes::of(&seeker);
     let mut filled = vec![true; volumes.n_volumes as usize];
     filled[crate::surface::OUTSIDE as usize] = false;
-    let domain = Domain {
-        seeker: &seeker,
-        volumes: &volumes,
-        filled: &filled,
-    };
+    let domain = Domain { seeker: &seeker, volumes: &volumes, filled: &filled };
     field.counts(&domain).tets()
 }
 
@@ -257,10 +220,7 @@ fn a_gradation_that_is_asked_for_is_kept_next_to_needles() {
     let asked = SizeOptions::parse(None, None, None, Some("1.3")).unwrap();
     let (asked, free) = (steepest(&asked), steepest(&SizeOptions::default()));
     assert!(asked < 3f64.sqrt() * 1.3f64.ln(), "{asked}");
-    assert!(
-        free > 1.2 * asked && free < 3f64.sqrt() * 2f64.ln(),
-        "{free} {asked}"
-    );
+    assert!(free > 1.2 * asked && free < 3f64.sqrt() * 2f64.ln(), "{free} {asked}");
 }
 
 #[test]
@@ -277,25 +237,14 @@ fn steep_surfaces_are_followed() {
         ratio_high = ratio_high.max(ratio);
         near += usize::from((0.7..1.4).contains(&ratio));
     }
-    println!(
-        "ratio {ratio_low:.3} to {ratio_high:.3}, {near} of {}",
-        all.len()
-    );
+    println!("ratio {ratio_low:.3} to {ratio_high:.3}, {near} of {}", all.len());
     // Grid lines give long thin triangles, whose vertices differ in size more than any gradation allows, and whose long edges ask for more
     // than their ends.
     assert!(near * 4 > all.len() * 3, "{near} of {}", all.len());
-    assert!(
-        ratio_low > 0.08 && ratio_high < 4.0,
-        "{ratio_low} {ratio_high}"
-    );
+    assert!(ratio_low > 0.08 && ratio_high < 4.0, "{ratio_low} {ratio_high}");
     let (low, high) = field.range();
-    let smallest = all
-        .iter()
-        .fold(f64::INFINITY, |low, &v| low.min(seeds.h(v) * side));
-    assert!(
-        low > 0.95 * smallest && low < 1.5 * smallest && high > 0.03,
-        "{low} {high}"
-    );
+    let smallest = all.iter().fold(f64::INFINITY, |low, &v| low.min(seeds.h(v) * side));
+    assert!(low > 0.95 * smallest && low < 1.5 * smallest && high > 0.03, "{low} {high}");
 }
 
 #[test]
@@ -329,10 +278,7 @@ fn formulas_that_give_no_size_are_refused() {
     let even = cube(4, |i| i as f64 / 4.0);
     for text in ["x-0.5", "1/0", "0/0", "-1", "sqrt(x-0.9)", "0"] {
         let found = SizeField::build(&even.0, &even.1, &formula(text)).unwrap_err();
-        assert!(
-            matches!(found, SizingError::NoSize { .. }),
-            "{text} {found}"
-        );
+        assert!(matches!(found, SizingError::NoSize { .. }), "{text} {found}");
         assert!(found.to_string().contains(text), "{found}");
     }
     // Outside the surface's box nothing is asked.
@@ -356,20 +302,13 @@ fn equal_bits_in_a_room_too_small() {
         (&steep, options(Some("5%"), Some("0.5%"), Some("9%"))),
         (&even, formula("0.02 + 0.1*abs(x - 0.4)")),
     ] {
-        let [wide, narrow] = [
-            ScratchSpace::boundless(),
-            ScratchSpace::new(1 << 16, dir.path()),
-        ]
-        .map(|room| {
-            let (points, triangles) = surface;
-            let further = Further::default();
-            SizeField::build_with(points, triangles, &options, &further, &room).unwrap()
-        });
-        assert!(
-            narrow.0.bytes() > 0 && wide.1.n_leaves > 1000,
-            "{}",
-            wide.1.n_leaves
-        );
+        let [wide, narrow] = [ScratchSpace::boundless(), ScratchSpace::new(1 << 16, dir.path())]
+            .map(|room| {
+                let (points, triangles) = surface;
+                let further = Further::default();
+                SizeField::build_with(points, triangles, &options, &further, &room).unwrap()
+            });
+        assert!(narrow.0.bytes() > 0 && wide.1.n_leaves > 1000, "{}", wide.1.n_leaves);
         assert_eq!(wide.0.to_bytes(), narrow.0.to_bytes());
         assert_eq!(wide.1.to_string(), narrow.1.to_string());
         for _ in 0..1000 {
@@ -387,10 +326,7 @@ fn equal_bits_in_a_room_too_small() {
 fn equal_bits_for_any_number_of_threads() {
     let steep = graded(20.0, 120);
     let bytes = [1, 2, 3].map(|n| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(n)
-            .build()
-            .unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap();
         let mut asked = options(None, None, Some("0.05"));
         asked.formula = formula("0.02+x*y").formula;
         pool.install(|| build(&steep, &asked).to_bytes())
@@ -436,20 +372,12 @@ fn with_domain<T>(surface: &(Vec<Point>, Vec<[u32; 3]>), ask: impl FnOnce(&Domai
             })
         })
         .collect();
-    welded.triangles = surface
-        .1
-        .iter()
-        .map(|t| t.map(|v| ids[v as usize]))
-        .collect();
+    welded.triangles = surface.1.iter().map(|t| t.map(|v| ids[v as usize])).collect();
     let seeker = Seeker::new(&welded);
     let volumes = Volumes::of(&seeker);
     let filled: Vec<bool> = (0..volumes.n_volumes).map(|v| v > 0).collect();
     assert_eq!(filled, [false, true]);
-    ask(&Domain {
-        seeker: &seeker,
-        volumes: &volumes,
-        filled: &filled,
-    })
+    ask(&Domain { seeker: &seeker, volumes: &volumes, filled: &filled })
 }
 
 #[test]
@@ -474,16 +402,9 @@ fn loads_are_integrals() {
             .collect();
         for skin in [0.0, 0.5] {
             let inside = |p: &&Point| p.min(Point::ONE - **p).min_element() > skin * field.h(**p);
-            let sum: f64 = points
-                .iter()
-                .filter(inside)
-                .map(|&p| field.h(p).powi(-3))
-                .sum();
+            let sum: f64 = points.iter().filter(inside).map(|&p| field.h(p).powi(-3)).sum();
             let expected = sum / points.len() as f64;
-            let skin = SurfaceSkin {
-                triangles: skin,
-                vertices: 0.0,
-            };
+            let skin = SurfaceSkin { triangles: skin, vertices: 0.0 };
             let load = with_domain(surface, |domain| field.load(domain, skin));
             assert!((load / expected - 1.0).abs() < 0.03, "{load} {expected}");
         }
@@ -499,8 +420,7 @@ fn vertices_that_nearly_touch_have_a_bounded_load() {
     let [a, b, c] = twin.1[t];
     let [p, q, r] = [a, b, c].map(|v| twin.0[v as usize]);
     let d = twin.0.len() as u32;
-    twin.0
-        .push(p + ((q - p) * 2.0 + (r - p)) * (4.0 * f64::EPSILON));
+    twin.0.push(p + ((q - p) * 2.0 + (r - p)) * (4.0 * f64::EPSILON));
     assert_ne!(twin.0[d as usize], p);
     twin.1[t] = [a, b, d];
     twin.1.extend([[b, c, d], [c, a, d]]);
@@ -546,16 +466,10 @@ fn summaries_say_where_sizes_came_from() {
     )
     .unwrap();
     let text = summary.to_string();
-    assert!(
-        text.contains("hsiz 1% = 0.0173") && text.contains("hgrad 1.3"),
-        "{text}"
-    );
+    assert!(text.contains("hsiz 1% = 0.0173") && text.contains("hgrad 1.3"), "{text}");
     assert_eq!(summary.warnings.len(), 1);
     assert!(summary.warnings[0].to_string().contains("hsiz 0.0173"));
-    assert!(
-        (summary.surface.median / 0.0557 - 1.0).abs() < 0.05,
-        "{summary:?}"
-    );
+    assert!((summary.surface.median / 0.0557 - 1.0).abs() < 0.05, "{summary:?}");
 }
 
 /// `cargo test --release --lib sizing -- --ignored --nocapture`
@@ -594,10 +508,7 @@ fn time_reads(field: &SizeField) {
         let start = std::time::Instant::now();
         let sum: f64 = points.iter().map(|&p| field.h(p)).sum();
         let ns = start.elapsed().as_secs_f64() * 1e9 / points.len() as f64;
-        println!(
-            "    h(p), {name}: {ns:.1} ns (mean {:.4})",
-            sum / points.len() as f64
-        );
+        println!("    h(p), {name}: {ns:.1} ns (mean {:.4})", sum / points.len() as f64);
     }
 }
 
@@ -624,9 +535,7 @@ fn specks(size: f64, places: &[Point]) -> (Vec<Point>, Vec<[u32; 3]>) {
 fn sizes_grow_from_a_speck_far_from_all_others() {
     let alone = vec![Point::new(0.322, 0.357, 0.65)];
     let at = |i: usize| [0.21, 0.5, 0.77][i];
-    let many = (0..27)
-        .map(|i| Point::new(at(i % 3), at(i / 3 % 3), at(i / 9)))
-        .collect();
+    let many = (0..27).map(|i| Point::new(at(i % 3), at(i / 3 % 3), at(i / 9))).collect();
     for places in [alone, many] {
         for size in [1e-2, 1e-3, 1e-4, 1e-5] {
             let field = build(&specks(size, &places), &SizeOptions::default());

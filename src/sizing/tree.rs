@@ -46,10 +46,7 @@ pub(super) struct Leaf {
 }
 
 impl Leaf {
-    pub(super) const ROOT: Self = Self {
-        anchor: [0; 3],
-        level: 0,
-    };
+    pub(super) const ROOT: Self = Self { anchor: [0; 3], level: 0 };
 
     /// Side in lattice units.
     pub(super) fn width(&self) -> u32 {
@@ -68,10 +65,7 @@ impl Leaf {
 
     pub(super) fn child(&self, octant: usize) -> Self {
         let level = self.level + 1;
-        Self {
-            anchor: shift(self.anchor, octant, LATTICE >> level),
-            level,
-        }
+        Self { anchor: shift(self.anchor, octant, LATTICE >> level), level }
     }
 
     /// Lattice position of a corner.
@@ -166,25 +160,17 @@ impl Tree {
 
     /// All cells, depth first, each before its children; of a leaf its number.
     pub(super) fn cells(&self) -> Cells<'_> {
-        Cells {
-            tree: self,
-            stack: vec![(self.root, Leaf::ROOT)],
-            is_backward: false,
-        }
+        Cells { tree: self, stack: vec![(self.root, Leaf::ROOT)], is_backward: false }
     }
 
     /// All leaves, depth first: in the order of their numbers, once they are numbered.
     pub(super) fn leaves(&self) -> impl Iterator<Item = Leaf> {
-        self.cells()
-            .filter_map(|(number, leaf)| number.map(|_| leaf))
+        self.cells().filter_map(|(number, leaf)| number.map(|_| leaf))
     }
 
     /// All leaves with their numbers, from the last to the first.
     pub(super) fn leaves_backward(&self) -> impl Iterator<Item = (u32, Leaf)> {
-        let cells = Cells {
-            is_backward: true,
-            ..self.cells()
-        };
+        let cells = Cells { is_backward: true, ..self.cells() };
         cells.filter_map(|(number, leaf)| Some((number?, leaf)))
     }
 
@@ -224,10 +210,7 @@ impl Tree {
     fn divide(&mut self, block: usize, octant: usize) -> Result<(), SizingError> {
         let found = self.blocks.len() * 7;
         if found > LEAVES_MAX {
-            return Err(SizingError::TooLarge {
-                found,
-                expected: LEAVES_MAX,
-            });
+            return Err(SizingError::TooLarge { found, expected: LEAVES_MAX });
         }
         self.blocks[block][octant] = self.blocks.len() as u32;
         self.blocks.push([LEAF; 8]);
@@ -249,10 +232,7 @@ impl Tree {
             }
             block as u32
         }
-        let mut tree = Self {
-            root: LEAF,
-            blocks: Vec::with_capacity(self.blocks.len()),
-        };
+        let mut tree = Self { root: LEAF, blocks: Vec::with_capacity(self.blocks.len()) };
         tree.root = copy(self, self.root, &mut tree, &mut 0);
         tree
     }

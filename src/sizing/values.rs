@@ -20,16 +20,8 @@ const SLOWEST: f32 = 0.98;
 /// How far from the mean of its neighbors a value may be, as a factor.
 const REACH: f32 = 2.0;
 /// Of each of a cell's corners the three that its edges lead to.
-const ALONG_EDGES: [[u8; 3]; 8] = [
-    [1, 2, 4],
-    [0, 3, 5],
-    [0, 3, 6],
-    [1, 2, 7],
-    [0, 5, 6],
-    [1, 4, 7],
-    [2, 4, 7],
-    [3, 5, 6],
-];
+const ALONG_EDGES: [[u8; 3]; 8] =
+    [[1, 2, 4], [0, 3, 5], [0, 3, 6], [1, 2, 7], [0, 5, 6], [1, 4, 7], [2, 4, 7], [3, 5, 6]];
 
 sort_record! {
     /// A seed and the leaf that holds it.
@@ -85,9 +77,7 @@ impl Maker<'_> {
         let mut by_leaf = self.room.column(self.corners.of_leaf.len(), 1.0f32);
         for i in 0..by_leaf.len() {
             let ids = self.corners.of_leaf.get(i);
-            let sum: f64 = (ids.iter())
-                .map(|&id| f64::from(at_corners.get(id as usize)))
-                .sum();
+            let sum: f64 = (ids.iter()).map(|&id| f64::from(at_corners.get(id as usize))).sum();
             by_leaf.set(i, (sum / 8.0) as f32);
         }
         self.steeper = Some(by_leaf);
@@ -290,9 +280,7 @@ fn corner_place(corner: usize) -> Point {
 /// The lattice cell of a position in the unit cube.
 #[inline]
 pub(super) fn lattice_cell(at: Point) -> [u32; 3] {
-    (at * f64::from(LATTICE))
-        .to_array()
-        .map(|x| (x as u32).min(LATTICE - 1))
+    (at * f64::from(LATTICE)).to_array().map(|x| (x as u32).min(LATTICE - 1))
 }
 
 fn corner_weight(local: Point, corner: usize) -> f64 {

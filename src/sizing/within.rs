@@ -196,10 +196,7 @@ fn steeper(
 ) -> SpillVec<f32> {
     let mut steeper = room.column(corners.of_leaf.len(), 1.0f32);
     for (i, leaf) in tree.leaves().enumerate() {
-        let h = corners
-            .of_leaf
-            .get(i)
-            .map(|id| f64::from(had.get(id as usize)));
+        let h = corners.of_leaf.get(i).map(|id| f64::from(had.get(id as usize)));
         let slope = PAIRS.iter().fold(0.0f64, |most, &(a, b, distance2)| {
             let distance = f64::from(distance2).sqrt() * leaf.side();
             most.max((h[a as usize] - h[b as usize]).abs() / distance)
@@ -262,10 +259,7 @@ mod tests {
             let middle = field.h(Point::splat(0.5));
             let reach = 0.5 * beta;
             let expected = constraint.clamp(0.11 - reach, 0.11 + reach);
-            assert!(
-                (middle / expected - 1.0).abs() < 0.15,
-                "{constraint}: {middle}"
-            );
+            assert!((middle / expected - 1.0).abs() < 0.15, "{constraint}: {middle}");
             for y in [0.21, 0.5, 0.77] {
                 let at_skin = field.h(Point::new(0.0, y, 0.45));
                 assert!((0.08..0.14).contains(&at_skin), "{constraint}: {at_skin}");
@@ -290,10 +284,7 @@ mod tests {
         let field = field.expect("a good skin").expect("no size at all");
         let middle = field.h(Point::splat(0.5));
         assert!(middle > 0.1 && middle < 0.3, "{middle}");
-        assert!(
-            had.within(&points, &[], &Constant(1.0), 0.26, &room())
-                .is_err()
-        );
+        assert!(had.within(&points, &[], &Constant(1.0), 0.26, &room()).is_err());
     }
 
     /// A box of which one end is fine: the slope bounds sizes all along it.
@@ -351,20 +342,11 @@ mod tests {
         let (points, triangles, had) = graded();
         let mut before = had.clone();
         for share in [0.95, 0.8, 0.5] {
-            let field = had.within(
-                &points,
-                &triangles,
-                &Share(&had, share),
-                had.beta(),
-                &room(),
-            );
+            let field = had.within(&points, &triangles, &Share(&had, share), had.beta(), &room());
             let field = field.expect("a good skin").expect("other sizes");
             for p in places() {
                 let (old, new) = (had.h(p), field.h(p));
-                assert!(
-                    new < old * 1.01 && new > 0.9 * share * old,
-                    "{p} {old} {new}"
-                );
+                assert!(new < old * 1.01 && new > 0.9 * share * old, "{p} {old} {new}");
                 assert!(new < before.h(p) * 1.1, "{p} {share}");
             }
             before = field;

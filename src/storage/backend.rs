@@ -119,11 +119,7 @@ struct Changes {
 impl Private {
     pub(super) fn new(file: Box<dyn StorageBackend>) -> io::Result<Self> {
         let len = file.len()?;
-        let changes = Mutex::new(Changes {
-            len,
-            len_of_file: len,
-            blocks: BTreeMap::new(),
-        });
+        let changes = Mutex::new(Changes { len, len_of_file: len, blocks: BTreeMap::new() });
         Ok(Self { file, changes })
     }
 

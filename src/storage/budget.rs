@@ -56,26 +56,17 @@ impl Budget {
     /// Errors: [`StorageError::Budget`] when fewer are left.
     pub fn lease(&self, bytes: u64, what: &'static str) -> Result<Lease, StorageError> {
         let ledger = &self.ledger;
-        let taken = ledger
-            .used
-            .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |used| {
-                used.checked_add(bytes).filter(|&sum| sum <= ledger.cap)
-            });
+        let taken = ledger.used.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |used| {
+            used.checked_add(bytes).filter(|&sum| sum <= ledger.cap)
+        });
         match taken {
             Ok(before) => {
-                ledger
-                    .high_water
-                    .fetch_max(before + bytes, Ordering::Relaxed);
-                Ok(Lease {
-                    ledger: Arc::clone(ledger),
-                    bytes,
-                })
+                ledger.high_water.fetch_max(before + bytes, Ordering::Relaxed);
+                Ok(Lease { ledger: Arc::clone(ledger), bytes })
             }
-            Err(used) => Err(StorageError::Budget {
-                what,
-                needed: bytes,
-                available: ledger.cap - used,
-            }),
+            Err(used) => {
+                Err(StorageError::Budget { what, needed: bytes, available: ledger.cap - used })
+            }
         }
     }
 }
@@ -101,10 +92,7 @@ mod tests {
     fn leases_never_exceed_the_cap_and_come_back() {
         let budget = Budget::new(100);
         let a = budget.lease(60, "a").expect("60 of 100");
-        assert!(matches!(
-            budget.lease(41, "b"),
-            Err(StorageError::Budget { available: 40, .. })
-        ));
+        assert!(matches!(budget.lease(41, "b"), Err(StorageError::Budget { available: 40, .. })));
         let b = budget.lease(40, "b").expect("40 of 40");
         assert_eq!(budget.available(), 0);
         drop((a, b));

@@ -95,12 +95,7 @@ impl Pages for DraftPages<'_> {
             return self.base.read_four_of(K, ids);
         }
         let [a, b, c, d] = ids;
-        [
-            self.current::<K>(a),
-            self.current::<K>(b),
-            self.current::<K>(c),
-            self.current::<K>(d),
-        ]
+        [self.current::<K>(a), self.current::<K>(b), self.current::<K>(c), self.current::<K>(d)]
     }
 
     fn write<const K: usize>(&mut self, id: u32) -> &mut Slot {

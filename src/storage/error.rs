@@ -93,10 +93,7 @@ pub enum StorageError {
 impl StorageError {
     /// Whether what is on disk is not what was written.
     pub fn is_damage(&self) -> bool {
-        matches!(
-            self,
-            Self::Damaged { .. } | Self::Page { .. } | Self::Missing { .. }
-        )
+        matches!(self, Self::Damaged { .. } | Self::Page { .. } | Self::Missing { .. })
     }
 
     /// Wraps a failed operation on `path`.

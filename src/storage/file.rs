@@ -192,10 +192,9 @@ impl StoreFile {
     fn failed(&mut self, failure: Failure) -> StorageError {
         let path = self.path.path();
         match (failure, &self.damage) {
-            (Failure::Error(redb::Error::PreviousIo), Some(reason)) => StorageError::Damaged {
-                path: path.to_owned(),
-                reason: reason.clone(),
-            },
+            (Failure::Error(redb::Error::PreviousIo), Some(reason)) => {
+                StorageError::Damaged { path: path.to_owned(), reason: reason.clone() }
+            }
             (failure, _) => {
                 let error = failure.at(path);
                 if let StorageError::Damaged { reason, .. } = &error {
@@ -361,10 +360,7 @@ enum Access {
 
 /// Opens what is there; an empty file is none of redb's, which would begin a database in it.
 fn open_writable(path: &DiskPath, builder: &redb::Builder) -> Result<Database, DatabaseError> {
-    let file = path
-        .disk()
-        .open(path.path())
-        .map_err(redb::StorageError::Io)?;
+    let file = path.disk().open(path.path()).map_err(redb::StorageError::Io)?;
     refuse_empty(&*file)?;
     builder.create_with_backend(Synced(file))
 }
@@ -398,19 +394,13 @@ impl Failure {
             Self::Error(redb::Error::Corrupted(reason)) => StorageError::Damaged { path, reason },
             Self::Error(redb::Error::DatabaseAlreadyOpen) => StorageError::Busy { path },
             Self::Error(redb::Error::Io(e)) if e.kind() == ErrorKind::NotFound => {
-                StorageError::Missing {
-                    path,
-                    what: "the file".to_owned(),
-                }
+                StorageError::Missing { path, what: "the file".to_owned() }
             }
             // A foreign, cut or empty file: redb finds no header of its own, or not the pages it names.
             Self::Error(redb::Error::Io(e))
                 if matches!(e.kind(), ErrorKind::InvalidData | ErrorKind::UnexpectedEof) =>
             {
-                StorageError::Damaged {
-                    path,
-                    reason: e.to_string(),
-                }
+                StorageError::Damaged { path, reason: e.to_string() }
             }
             Self::Error(redb::Error::Io(e)) => StorageError::io(&path, e),
             // Every file has its one table from its first commit on.
@@ -421,14 +411,8 @@ impl Failure {
                 | redb::Error::TableIsNotMultimap(_)
                 | redb::Error::TypeDefinitionChanged { .. }
                 | redb::Error::UpgradeRequired(_)),
-            ) => StorageError::Damaged {
-                path,
-                reason: e.to_string(),
-            },
-            Self::Error(source) => StorageError::Database {
-                path,
-                source: Box::new(source),
-            },
+            ) => StorageError::Damaged { path, reason: e.to_string() },
+            Self::Error(source) => StorageError::Database { path, source: Box::new(source) },
         }
     }
 }
@@ -464,10 +448,7 @@ mod tests {
         let value = vec![5u8; 1000];
         file.write([(3, &value[..]), (9, &value[..10])].into_iter())?;
         assert_eq!(file.read(9, <[u8]>::len)?, Some(10));
-        assert!(matches!(
-            StoreFile::open(&path, 0, true),
-            Err(StorageError::Busy { .. })
-        ));
+        assert!(matches!(StoreFile::open(&path, 0, true), Err(StorageError::Busy { .. })));
         file.compact()?;
         let mut file = StoreFile::open(&path, 1 << 20, false)?;
         assert_eq!(file.read(3, <[u8]>::to_vec)?, Some(value));

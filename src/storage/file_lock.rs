@@ -78,10 +78,7 @@ impl Renewed {
                 let _ = file.set_modified(SystemTime::now());
             }
         };
-        Self {
-            thread: Some(std::thread::spawn(renew)),
-            stop: Some(stop),
-        }
+        Self { thread: Some(std::thread::spawn(renew)), stop: Some(stop) }
     }
 }
 
@@ -98,12 +95,7 @@ impl FileLock {
     /// One that nobody else asks for, such as on a disk in memory.
     #[cfg(feature = "internals")]
     pub fn unshared() -> Self {
-        Self {
-            held: None,
-            path: Mutex::default(),
-            text: String::new(),
-            is_by_name: false,
-        }
+        Self { held: None, path: Mutex::default(), text: String::new(), is_by_name: false }
     }
 
     /// Takes the right. Errors: another has it; the folder takes no files.

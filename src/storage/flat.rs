@@ -17,12 +17,7 @@ impl Pages for FlatPages {
     #[inline(always)]
     fn read_four<const K: usize>(&mut self, [a, b, c, d]: [u32; 4]) -> [&Slot; 4] {
         let array = &self.arrays[K];
-        [
-            &array[a as usize],
-            &array[b as usize],
-            &array[c as usize],
-            &array[d as usize],
-        ]
+        [&array[a as usize], &array[b as usize], &array[c as usize], &array[d as usize]]
     }
 
     #[inline(always)]

@@ -33,10 +33,7 @@ pub(super) struct PageTable {
 impl PageTable {
     /// `n` pages in the base file.
     pub(super) fn in_base(n: usize) -> Self {
-        Self {
-            entries: vec![IN_BASE; n],
-            quick: vec![BEYOND | CLEAN; n],
-        }
+        Self { entries: vec![IN_BASE; n], quick: vec![BEYOND | CLEAN; n] }
     }
 
     pub(super) fn len(&self) -> usize {
@@ -69,11 +66,7 @@ impl PageTable {
             READABLE => (entry & FRAME_MASK) << SLOT_BITS,
             _ => BEYOND,
         };
-        let clean = if first == BEYOND || entry & DIRTY == 0 {
-            CLEAN
-        } else {
-            0
-        };
+        let clean = if first == BEYOND || entry & DIRTY == 0 { CLEAN } else { 0 };
         self.entries[page as usize] = entry;
         self.quick[page as usize] = first | clean;
     }

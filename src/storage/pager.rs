@@ -72,9 +72,7 @@ impl Pager {
         let frames_max = frames_of(bytes);
         let frames =
             bytemuck::allocation::try_zeroed_vec(frames_max * SLOTS).unwrap_or_else(|()| {
-                raise(StorageError::NoMemory {
-                    bytes: (frames_max * FRAME_BYTES) as u64,
-                })
+                raise(StorageError::NoMemory { bytes: (frames_max * FRAME_BYTES) as u64 })
             });
         Self {
             frames,
@@ -219,11 +217,8 @@ impl Pager {
     fn open_slow<const K: usize>(&mut self, id: u32, flags: u32) -> usize {
         let page = id >> SLOT_BITS;
         let entry = self.tables[K].entry(page);
-        let opened = if entry & RESIDENT != 0 {
-            entry | flags
-        } else {
-            self.load(K, page, entry) | flags
-        };
+        let opened =
+            if entry & RESIDENT != 0 { entry | flags } else { self.load(K, page, entry) | flags };
         self.tables[K].set(page, opened);
         self.tables[K].to_read(id)
     }
@@ -432,11 +427,7 @@ impl Pages for Pager {
         let dropped = self.tables[K].drop_front(n as usize);
         self.release(dropped);
         self.first[K] += n;
-        for (_, page) in self
-            .owners
-            .iter_mut()
-            .filter(|(kind, _)| usize::from(*kind) == K)
-        {
+        for (_, page) in self.owners.iter_mut().filter(|(kind, _)| usize::from(*kind) == K) {
             *page -= n;
         }
     }

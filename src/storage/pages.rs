@@ -68,10 +68,7 @@ pub struct SharedPages<'a> {
 impl<'a> SharedPages<'a> {
     /// Every page of the tables must be readable at once.
     pub(super) fn new(frames: &'a [Slot], tables: &'a [PageTable; kind::ALL.len()]) -> Self {
-        Self {
-            frames,
-            tables: tables.each_ref(),
-        }
+        Self { frames, tables: tables.each_ref() }
     }
 
     /// Record `id` of a kind.

@@ -32,10 +32,7 @@ fn sort_parts<T: Send>(
         return items.sort_unstable_by(order);
     }
     let (low, _, high) = items.select_nth_unstable_by(items.len() / 2, order);
-    rayon::join(
-        || sort_parts(low, order, depth - 1),
-        || sort_parts(high, order, depth - 1),
-    );
+    rayon::join(|| sort_parts(low, order, depth - 1), || sort_parts(high, order, depth - 1));
 }
 
 #[cfg(test)]

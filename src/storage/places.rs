@@ -34,10 +34,7 @@ pub(super) struct Places {
 
 impl Places {
     pub fn new(backing: Option<Backing>) -> Self {
-        Self {
-            backing,
-            ..Self::default()
-        }
+        Self { backing, ..Self::default() }
     }
 
     /// Whether there are any.
@@ -65,10 +62,8 @@ impl Places {
         address: PageAddress,
         frame: &mut [Slot],
     ) -> Result<(), StorageError> {
-        let damaged = |path: &std::path::Path, source| StorageError::Page {
-            path: path.to_owned(),
-            source,
-        };
+        let damaged =
+            |path: &std::path::Path, source| StorageError::Page { path: path.to_owned(), source };
         if place >= IN_SPILL {
             let spill = self.spill.as_ref().expect("a page is in it");
             spill.read(place - IN_SPILL, frame)?;

@@ -108,10 +108,7 @@ impl Disk for RealDisk {
     #[cfg(not(unix))]
     fn id(&self, path: &Path) -> Option<FileId> {
         let metadata = fs::metadata(path).ok()?;
-        let since = metadata
-            .modified()
-            .ok()?
-            .duration_since(std::time::UNIX_EPOCH);
+        let since = metadata.modified().ok()?.duration_since(std::time::UNIX_EPOCH);
         Some((metadata.len(), since.ok()?.as_nanos() as u64))
     }
 }

@@ -56,21 +56,14 @@ impl RunContext {
     /// A run with `n_threads` threads of its own, which ends when `cancel` says so.
     pub fn new(n_threads: usize, cancel: CancelToken) -> Self {
         catch_messages();
-        let run = Arc::new(Run {
-            cancel,
-            panic: Mutex::new(None),
-            busy: AtomicUsize::new(0),
-        });
+        let run = Arc::new(Run { cancel, panic: Mutex::new(None), busy: AtomicUsize::new(0) });
         let pool = Pool {
             n_threads: n_threads.max(1),
             run: Arc::clone(&run),
             threads: OnceLock::new(),
             left: Arc::default(),
         };
-        Self {
-            run,
-            pool: Some(Arc::new(pool)),
-        }
+        Self { run, pool: Some(Arc::new(pool)) }
     }
 
     /// The context of this thread, for a thread it starts.
@@ -117,11 +110,7 @@ impl RunContext {
     /// Whether the run of this thread is to end.
     #[inline]
     pub fn is_current_cancelled() -> bool {
-        CURRENT.with_borrow(|current| {
-            current
-                .as_ref()
-                .is_some_and(|c| c.run.cancel.is_cancelled())
-        })
+        CURRENT.with_borrow(|current| current.as_ref().is_some_and(|c| c.run.cancel.is_cancelled()))
     }
 }
 

@@ -25,11 +25,7 @@ impl ScratchFile {
         let file = path.at_path(path.disk().create(path.path()))?;
         // Where a file without a name lives on while it is open, a run that is killed leaves nothing.
         let is_nameless = cfg!(unix) && path.remove_file().is_ok();
-        Ok(Self {
-            file,
-            path,
-            is_nameless,
-        })
+        Ok(Self { file, path, is_nameless })
     }
 
     /// Fills `out` from byte `at` on, all of which must have been written.

@@ -52,9 +52,9 @@ fn order<B: SortBytes>(a: &B, b: &B) -> std::cmp::Ordering {
         return first.then_with(|| a_rest.cmp(b_rest));
     }
     match (a.split_first_chunk::<8>(), b.split_first_chunk::<8>()) {
-        (Some((a, a_rest)), Some((b, b_rest))) => u64::from_be_bytes(*a)
-            .cmp(&u64::from_be_bytes(*b))
-            .then_with(|| a_rest.cmp(b_rest)),
+        (Some((a, a_rest)), Some((b, b_rest))) => {
+            u64::from_be_bytes(*a).cmp(&u64::from_be_bytes(*b)).then_with(|| a_rest.cmp(b_rest))
+        }
         _ => a.cmp(b),
     }
 }
@@ -62,9 +62,7 @@ fn order<B: SortBytes>(a: &B, b: &B) -> std::cmp::Ordering {
 impl<R: SortRecord> Sorter<R> {
     /// A sorter with runs in `dir`, which must exist.
     pub fn new(dir: impl Into<DiskPath>, memory_bytes: u64) -> Self {
-        let memory_bytes = usize::try_from(memory_bytes)
-            .unwrap_or(usize::MAX)
-            .max(1 << 16);
+        let memory_bytes = usize::try_from(memory_bytes).unwrap_or(usize::MAX).max(1 << 16);
         Self {
             records: Vec::new(),
             records_max: memory_bytes / size_of::<R::Bytes>(),
@@ -196,8 +194,7 @@ impl RunReader {
             if left == 0 {
                 return Ok(None);
             }
-            self.buffer
-                .resize(left.min(self.at_once as u64) as usize, 0);
+            self.buffer.resize(left.min(self.at_once as u64) as usize, 0);
             self.run.file.read(self.run.at, &mut self.buffer)?;
             self.run.at += self.buffer.len() as u64;
             self.given = 0;
@@ -285,20 +282,12 @@ mod tests {
             for &record in &records {
                 sorter.push(record)?;
             }
-            let files: Vec<_> = sorter
-                .runs
-                .iter()
-                .map(|run| Arc::as_ptr(&run.file))
-                .collect();
+            let files: Vec<_> = sorter.runs.iter().map(|run| Arc::as_ptr(&run.file)).collect();
             assert!(files.windows(2).all(|pair| pair[0] == pair[1]), "one file");
             let sorted: Result<Vec<_>, _> = sorter.finish()?.collect();
             assert_eq!(sorted?, expected, "memory {memory}");
         }
-        assert_eq!(
-            std::fs::read_dir(dir.path())?.count(),
-            0,
-            "runs are removed"
-        );
+        assert_eq!(std::fs::read_dir(dir.path())?.count(), 0, "runs are removed");
         Ok(())
     }
 }

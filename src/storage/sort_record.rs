@@ -92,11 +92,7 @@ impl SortField for f64 {
     #[inline(always)]
     fn get(bytes: &[u8]) -> Self {
         let ordered = u64::get(bytes);
-        let bits = if ordered >> 63 == 1 {
-            ordered ^ (1 << 63)
-        } else {
-            !ordered
-        };
+        let bits = if ordered >> 63 == 1 { ordered ^ (1 << 63) } else { !ordered };
         Self::from_bits(bits)
     }
 }
@@ -216,12 +212,7 @@ mod tests {
         for number in [false, true] {
             for x in numbers {
                 for words in [[0, 9], [1, 0], [256, 255]] {
-                    samples.extend([0, 255].map(|last| Sample {
-                        number,
-                        x,
-                        words,
-                        last,
-                    }));
+                    samples.extend([0, 255].map(|last| Sample { number, x, words, last }));
                 }
             }
         }

@@ -19,11 +19,7 @@ pub(super) struct Spill {
 impl Spill {
     /// An empty file in `dir`, which must exist. Errors: the disk.
     pub fn create(dir: &DiskPath) -> Result<Self, StorageError> {
-        Ok(Self {
-            file: ScratchFile::create(dir)?,
-            free: Vec::new(),
-            end: 0,
-        })
+        Ok(Self { file: ScratchFile::create(dir)?, free: Vec::new(), end: 0 })
     }
 
     /// A place that holds nothing.

@@ -26,18 +26,12 @@ impl fmt::Debug for ScratchSpace {
 impl ScratchSpace {
     /// All in memory, however much that is.
     pub fn boundless() -> Self {
-        Self {
-            budget: Budget::new(u64::MAX),
-            dir: None,
-        }
+        Self { budget: Budget::new(u64::MAX), dir: None }
     }
 
     /// At most `bytes` of memory; the rest goes to scratch files in `dir`, which must exist.
     pub fn new(bytes: u64, dir: impl Into<DiskPath>) -> Self {
-        Self {
-            budget: Budget::new(bytes),
-            dir: Some(dir.into()),
-        }
+        Self { budget: Budget::new(bytes), dir: Some(dir.into()) }
     }
 
     /// Bytes in all.
@@ -67,10 +61,7 @@ impl ScratchSpace {
                 let frames = ((bytes / PAGE_BYTES as u64) as usize).max(FRAMES_MIN);
                 let mut paged = PagedVec::new(dir, value, frames);
                 paged.resize(n);
-                SpillVec {
-                    place: Residence::Disk(Box::new(paged)),
-                    lease,
-                }
+                SpillVec { place: Residence::Disk(Box::new(paged)), lease }
             }
             _ => SpillVec {
                 place: Residence::Memory(filled(n, value)),
@@ -243,10 +234,7 @@ impl<T: Pod> SpillVecBuilder<T> {
                 Residence::Memory(self.memory)
             }
         };
-        SpillVec {
-            place,
-            lease: self.lease,
-        }
+        SpillVec { place, lease: self.lease }
     }
 }
 
@@ -316,10 +304,7 @@ mod tests {
         let dir = tempfile::tempdir().expect("a folder");
         let n = 300_000;
         let mut found = Vec::new();
-        for room in [
-            ScratchSpace::boundless(),
-            ScratchSpace::new(1 << 20, dir.path()),
-        ] {
+        for room in [ScratchSpace::boundless(), ScratchSpace::new(1 << 20, dir.path())] {
             let mut column = room.column(n, [7u32, 0]);
             let is_paged = matches!(column.place, Residence::Disk(_));
             assert_eq!(is_paged, room.dir.is_some());
@@ -352,9 +337,6 @@ mod tests {
         let dir = tempfile::tempdir().expect("a folder");
         let room = ScratchSpace::new(1 << 20, dir.path().join("missing"));
         let made = attempt(|| drop(room.column(1 << 20, 0u64)));
-        assert!(
-            matches!(made, Err(crate::storage::StorageError::Io { .. })),
-            "{made:?}"
-        );
+        assert!(matches!(made, Err(crate::storage::StorageError::Io { .. })), "{made:?}");
     }
 }

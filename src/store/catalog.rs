@@ -177,9 +177,7 @@ impl Catalog {
     fn find(dir: &DiskPath) -> Result<DiskPath, StoreError> {
         let path = dir.join(CATALOG);
         if !dir.exists() {
-            return Err(StoreError::NotFound {
-                path: dir.path().to_owned(),
-            });
+            return Err(StoreError::NotFound { path: dir.path().to_owned() });
         }
         if !path.is_file() {
             let reason = match dir.join(CATALOG_NEW).exists() {
@@ -188,10 +186,7 @@ impl Catalog {
                 }
                 false => "it has no catalog",
             };
-            return Err(StoreError::NotOurs {
-                path: dir.path().to_owned(),
-                reason,
-            });
+            return Err(StoreError::NotOurs { path: dir.path().to_owned(), reason });
         }
         Ok(path)
     }
@@ -206,14 +201,8 @@ impl Catalog {
                 break (file, id);
             }
         };
-        let mut catalog = Self {
-            dir: dir.clone(),
-            file,
-            id,
-            lock: None,
-            in_place,
-            journal_rows: 0,
-        };
+        let mut catalog =
+            Self { dir: dir.clone(), file, id, lock: None, in_place, journal_rows: 0 };
         catalog.check_format()?;
         if !in_place {
             // A file opened for writing has been checked.
@@ -268,19 +257,13 @@ impl Catalog {
 
     /// The name of a sub-domain's file in a generation.
     pub(crate) fn file_name(subdomain: u32, generation: u32) -> String {
-        let file = FileRow {
-            subdomain,
-            generation,
-        };
+        let file = FileRow { subdomain, generation };
         named(SUBDOMAIN, file)
     }
 
     /// The name of a coarse snapshot's file in a generation.
     pub(crate) fn coarse_name(subdomain: u32, generation: u32) -> String {
-        let file = FileRow {
-            subdomain,
-            generation,
-        };
+        let file = FileRow { subdomain, generation };
         named(COARSE, file)
     }
 
@@ -321,20 +304,14 @@ impl Catalog {
         &mut self,
         describe: impl FnOnce(&mut Step) -> Result<(), StoreError>,
     ) -> Result<(), StoreError> {
-        assert!(
-            self.lock.is_some(),
-            "{} is open for reading only",
-            self.dir().display()
-        );
+        assert!(self.lock.is_some(), "{} is open for reading only", self.dir().display());
         let mut step = Step::new(self.journal_rows);
         describe(&mut step)?;
         for file in &step.listed {
-            self.file_path(file.subdomain, file.generation)
-                .sync_file()?;
+            self.file_path(file.subdomain, file.generation).sync_file()?;
         }
         for file in &step.coarse_listed {
-            self.coarse_path(file.subdomain, file.generation)
-                .sync_file()?;
+            self.coarse_path(file.subdomain, file.generation).sync_file()?;
         }
         self.dir.sync_dir()?;
         match self.in_place {
@@ -343,8 +320,7 @@ impl Catalog {
         }
         self.journal_rows = step.journal_rows;
         for file in &step.unlisted {
-            self.file_path(file.subdomain, file.generation)
-                .remove_file()?;
+            self.file_path(file.subdomain, file.generation).remove_file()?;
         }
         Ok(())
     }
@@ -377,10 +353,7 @@ impl Catalog {
         let is_finished = self.state()?.is_finished();
         let listed = self.files()?;
         let coarse: Vec<FileRow> = (self.coarse_snapshots()?.iter())
-            .map(|row| FileRow {
-                subdomain: row.rank,
-                generation: row.generation,
-            })
+            .map(|row| FileRow { subdomain: row.rank, generation: row.generation })
             .collect();
         for name in self.dir.list()? {
             let path = self.dir.join(&name);
@@ -428,10 +401,7 @@ impl Catalog {
     /// Edges and points that are edges and vertices of the mesh.
     pub fn wires(&mut self) -> Result<WiresRow, StoreError> {
         let wires = self.row(RowKind::Wires.key(0, 0))?;
-        Ok(wires.unwrap_or(WiresRow {
-            fin_first: u64::MAX,
-            ..WiresRow::default()
-        }))
+        Ok(wires.unwrap_or(WiresRow { fin_first: u64::MAX, ..WiresRow::default() }))
     }
 
     /// Triangles of the input, which sub-domains have each for itself: one on a face between two counts in both. None in a store that does
@@ -535,9 +505,7 @@ impl Catalog {
             || Self::open(&self.dir).is_ok_and(|mut now| is_listed(&mut now).unwrap_or(false));
         match is_ours {
             true => Ok(opened?),
-            false => Err(StoreError::Changed {
-                path: self.dir().to_owned(),
-            }),
+            false => Err(StoreError::Changed { path: self.dir().to_owned() }),
         }
     }
 
@@ -572,9 +540,7 @@ impl Catalog {
                 }));
             }
             both[0].merge(&Digest { lanes: row.digest });
-            both[1].merge(&Digest {
-                lanes: row.interface_digest,
-            });
+            both[1].merge(&Digest { lanes: row.interface_digest });
         }
         Ok(both)
     }
@@ -619,9 +585,7 @@ impl Catalog {
     /// Meshes that were kept to be looked at, the coarse ones first, by cut.
     pub fn stages(&mut self) -> Result<Vec<StageRow>, StoreError> {
         let stages: Vec<StageRow> = self.rows(RowKind::Stage)?;
-        stages
-            .iter()
-            .try_for_each(|stage| self.check_row(&stage.row))?;
+        stages.iter().try_for_each(|stage| self.check_row(&stage.row))?;
         Ok(stages)
     }
 
@@ -658,17 +622,12 @@ impl Catalog {
     }
 
     fn damaged_row(&self, key: u64, reason: String) -> StoreError {
-        StoreError::Row {
-            path: self.file.path().to_owned(),
-            key,
-            reason,
-        }
+        StoreError::Row { path: self.file.path().to_owned(), key, reason }
     }
 
     fn bytes(&mut self, key: u64) -> Result<Option<Vec<u8>>, StoreError> {
-        let read = self.file.read(key, |value| {
-            rows::checked_bytes(key, value).map(<[u8]>::to_vec)
-        })?;
+        let read =
+            self.file.read(key, |value| rows::checked_bytes(key, value).map(<[u8]>::to_vec))?;
         read.transpose().map_err(|e| self.damaged_row(key, e))
     }
 
@@ -739,15 +698,9 @@ fn named(kind: &str, file: FileRow) -> String {
 }
 
 fn parsed(kind: &str, name: &str) -> Option<FileRow> {
-    let (subdomain, generation) = name
-        .strip_prefix(kind)?
-        .strip_prefix('-')?
-        .strip_suffix(".redb")?
-        .split_once("-g")?;
-    let file = FileRow {
-        subdomain: subdomain.parse().ok()?,
-        generation: generation.parse().ok()?,
-    };
+    let (subdomain, generation) =
+        name.strip_prefix(kind)?.strip_prefix('-')?.strip_suffix(".redb")?.split_once("-g")?;
+    let file = FileRow { subdomain: subdomain.parse().ok()?, generation: generation.parse().ok()? };
     (named(kind, file) == name).then_some(file)
 }
 

@@ -112,10 +112,9 @@ impl StoreError {
 impl From<StorageError> for StoreError {
     fn from(error: StorageError) -> Self {
         match error {
-            StorageError::Busy { path } => Self::Busy {
-                path,
-                writer: "another process".to_owned(),
-            },
+            StorageError::Busy { path } => {
+                Self::Busy { path, writer: "another process".to_owned() }
+            }
             other => Self::Storage(other),
         }
     }

@@ -38,8 +38,7 @@ impl Step {
     }
 
     pub(super) fn put_bytes(&mut self, key: u64, bytes: &[u8]) {
-        self.changes
-            .insert(key, Some(rows::guarded_bytes(key, bytes)));
+        self.changes.insert(key, Some(rows::guarded_bytes(key, bytes)));
     }
 
     fn put<T>(&mut self, key: u64, row: &T)
@@ -102,10 +101,7 @@ impl Step {
 
     /// A file counts from now on; it is synced before the commit.
     pub fn list_file(&mut self, subdomain: u32, generation: u32) {
-        let file = FileRow {
-            subdomain,
-            generation,
-        };
+        let file = FileRow { subdomain, generation };
         self.put(RowKind::File.key(subdomain, generation), &file);
         self.unlisted.remove(&file);
         self.listed.insert(file);
@@ -113,12 +109,8 @@ impl Step {
 
     /// A file no longer counts; it is removed after the commit.
     pub fn unlist_file(&mut self, subdomain: u32, generation: u32) {
-        let file = FileRow {
-            subdomain,
-            generation,
-        };
-        self.changes
-            .insert(RowKind::File.key(subdomain, generation), None);
+        let file = FileRow { subdomain, generation };
+        self.changes.insert(RowKind::File.key(subdomain, generation), None);
         self.listed.remove(&file);
         self.unlisted.insert(file);
     }
@@ -126,10 +118,7 @@ impl Step {
     /// A coarse snapshot counts from now on; its file is synced before the commit.
     pub fn list_coarse(&mut self, row: &CoarseRow) {
         self.put(RowKind::Coarse.key(0, row.rank), row);
-        self.coarse_listed.insert(FileRow {
-            subdomain: row.rank,
-            generation: row.generation,
-        });
+        self.coarse_listed.insert(FileRow { subdomain: row.rank, generation: row.generation });
     }
 
     /// All interfaces of one cut.

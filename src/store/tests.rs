@@ -9,11 +9,7 @@ use crate::sealed::{SealedWriter, Shape};
 type Outcome = Result<(), Box<dyn std::error::Error>>;
 
 fn job() -> Job {
-    Job {
-        options: "{}".to_owned(),
-        tool_version: "0".to_owned(),
-        ..Job::default()
-    }
+    Job { options: "{}".to_owned(), tool_version: "0".to_owned(), ..Job::default() }
 }
 
 fn no_error<T>(result: Result<T, StoreError>) -> StoreError {
@@ -28,14 +24,8 @@ fn what_is_in_the_way_of_a_new_store_is_named() -> Outcome {
     let dir = tempfile::tempdir()?;
     let path = dir.path().join("a.tetdb");
     let mut catalog = Catalog::create(&path, &job())?;
-    assert!(matches!(
-        no_error(Catalog::open(&path)),
-        StoreError::Busy { .. }
-    ));
-    assert!(matches!(
-        no_error(Catalog::create(&path, &job())),
-        StoreError::Busy { .. }
-    ));
+    assert!(matches!(no_error(Catalog::open(&path)), StoreError::Busy { .. }));
+    assert!(matches!(no_error(Catalog::create(&path, &job())), StoreError::Busy { .. }));
     assert_eq!(catalog.state()?, StoreState::New);
     catalog.close()?;
     let found = no_error(Catalog::create(&path, &job()));
@@ -49,10 +39,7 @@ fn what_is_in_the_way_of_a_new_store_is_named() -> Outcome {
     let found = no_error(Catalog::create(&path, &job()));
     assert!(matches!(found, StoreError::Finished { .. }), "{found}");
     let writer = Catalog::open_writable(&path)?;
-    assert!(matches!(
-        no_error(Catalog::open_writable(&path)),
-        StoreError::Busy { .. }
-    ));
+    assert!(matches!(no_error(Catalog::open_writable(&path)), StoreError::Busy { .. }));
     drop((Catalog::open(&path)?, Catalog::open(&path)?, writer));
     let found = no_error(Catalog::create(dir.path(), &job()));
     assert!(matches!(found, StoreError::NotOurs { .. }), "{found}");
@@ -105,13 +92,7 @@ fn a_step_flips_rows_and_forgets_files_together() -> Outcome {
     drop(catalog);
     let mut catalog = Catalog::open_writable(&path)?;
     assert!(!torn.exists() && new.exists() && path.join("notes.txt").exists());
-    assert_eq!(
-        catalog.files()?,
-        [FileRow {
-            subdomain: 3,
-            generation: 2
-        }]
-    );
+    assert_eq!(catalog.files()?, [FileRow { subdomain: 3, generation: 2 }]);
     assert_eq!(catalog.journal()?, [journal.clone(), journal]);
     assert_eq!(catalog.blob(1)?, Some(vec![7; 100_000]));
     assert_eq!(catalog.blob(2)?, None);
@@ -129,18 +110,10 @@ fn a_step_flips_rows_and_forgets_files_together() -> Outcome {
 /// Two tetrahedra in each of two sub-domains, joined by the face of vertices 1 2 3.
 pub(crate) fn two_subdomains(path: &std::path::Path) -> Result<(), StoreError> {
     let mut catalog = Catalog::create(path, &job())?;
-    let points = [
-        [0.0, 0.0, 0.0],
-        [1.0, 0.0, 0.0],
-        [0.0, 1.0, 0.0],
-        [0.0, 0.0, 1.0],
-        [1.0, 1.0, 1.0],
-    ];
+    let points =
+        [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 1.0]];
     // Of each sub-domain: vertices, the tetrahedron, the face shared with the other one.
-    let parts = [
-        ([0, 1, 2, 3], [0u32, 1, 2, 3], 0usize),
-        ([4, 1, 2, 3], [0, 1, 3, 2], 0),
-    ];
+    let parts = [([0, 1, 2, 3], [0u32, 1, 2, 3], 0usize), ([4, 1, 2, 3], [0, 1, 3, 2], 0)];
     let mut sealed = Vec::new();
     for (rank, (vertices, nodes, shared)) in (0u32..).zip(parts) {
         let id = SubdomainId::new(rank).expect("small");
@@ -151,17 +124,11 @@ pub(crate) fn two_subdomains(path: &std::path::Path) -> Result<(), StoreError> {
                 point: points[v],
                 h: 1.0,
                 tag: tag::SURFACE,
-                id: VertexId {
-                    owner: Owner::Surface,
-                    index: v as u32,
-                }
-                .number(),
+                id: VertexId { owner: Owner::Surface, index: v as u32 }.number(),
             })?;
         }
         writer.push_all_tets(std::iter::once((nodes, 1)))?;
-        let nodes = tetdb_schema::record::SealedTet { nodes, region: 1 }
-            .rotated()
-            .nodes;
+        let nodes = tetdb_schema::record::SealedTet { nodes, region: 1 }.rotated().nodes;
         for (i, corners) in FACES.iter().enumerate() {
             let face = corners.map(|c| nodes[c]);
             if i == shared {
@@ -191,14 +158,8 @@ pub(crate) fn two_subdomains(path: &std::path::Path) -> Result<(), StoreError> {
         for part in &sealed {
             step.list_file(part.row.rank, 1);
             step.set_subdomain(&part.row);
-            let neighbor = NeighborRow {
-                subdomain: 1 - part.row.rank,
-                faces: side.faces,
-            };
-            step.set_topology(&TopologyRow {
-                subdomain: part.row.rank,
-                neighbors: vec![neighbor],
-            });
+            let neighbor = NeighborRow { subdomain: 1 - part.row.rank, faces: side.faces };
+            step.set_topology(&TopologyRow { subdomain: part.row.rank, neighbors: vec![neighbor] });
         }
         step.set_interfaces(
             1,
@@ -224,10 +185,7 @@ fn a_store_of_two_subdomains_reads_back() -> Outcome {
     let mut store = Catalog::open(&path)?;
     let mut other = Catalog::open(&path)?;
     assert_eq!(store.digest()?, other.digest()?);
-    assert!(matches!(
-        no_error(store.subdomain(2)),
-        StoreError::NoSubdomain { .. }
-    ));
+    assert!(matches!(no_error(store.subdomain(2)), StoreError::NoSubdomain { .. }));
     let mut volume = 0.0;
     for rank in 0..2 {
         let mut part = store.open_subdomain(rank, 1 << 20)?;

@@ -84,23 +84,14 @@ pub fn t_junctions(
     let margin = Point::splat(distance_max);
     let on_open_edge = |&(triangle, edge): &(u32, [u32; 2])| {
         let [a, b] = edge.map(point);
-        let beside = Aabb {
-            low: a.min(b) - margin,
-            high: a.max(b) + margin,
-        };
+        let beside = Aabb { low: a.min(b) - margin, high: a.max(b) + margin };
         let mut found = Vec::new();
         tree.within(&beside, |vertex, at| {
             if edge.contains(&vertex) {
                 return;
             }
             if let Some(distance) = on_edge(at, [a, b], distance_max, gap) {
-                found.push(TJunction {
-                    vertex,
-                    at,
-                    triangle,
-                    edge,
-                    distance,
-                });
+                found.push(TJunction { vertex, at, triangle, edge, distance });
             }
         });
         found.sort_unstable_by_key(|junction| junction.vertex);
@@ -118,20 +109,12 @@ pub(super) fn has_near_junctions(
 ) -> Vec<bool> {
     let point = |v: u32| surface.points[v as usize];
     let farthest = distances.last().copied().unwrap_or(0.0);
-    let tree = PointTree::new(
-        ends(&closedness.open)
-            .into_iter()
-            .map(|v| (v, point(v)))
-            .collect(),
-    );
+    let tree = PointTree::new(ends(&closedness.open).into_iter().map(|v| (v, point(v))).collect());
     let gap = GAP_SHARE * surface.bounds().diagonal();
     let margin = Point::splat(farthest);
     let beside = |(_, edge): &(u32, [u32; 2])| {
         let [a, b] = edge.map(point);
-        let bounds = Aabb {
-            low: a.min(b) - margin,
-            high: a.max(b) + margin,
-        };
+        let bounds = Aabb { low: a.min(b) - margin, high: a.max(b) + margin };
         let mut found = vec![false; distances.len()];
         tree.within(&bounds, |vertex, p| {
             let to_end = p.distance(a).min(p.distance(b));
@@ -143,19 +126,14 @@ pub(super) fn has_near_junctions(
             };
             let mut near = distances.iter().map(|&max| distance <= max && max < to_end);
             if near.clone().any(|n| n) && !in_line(a, p, b) {
-                found
-                    .iter_mut()
-                    .for_each(|f| *f |= near.next() == Some(true));
+                found.iter_mut().for_each(|f| *f |= near.next() == Some(true));
             }
         });
         found
     };
     let either = |a: Vec<bool>, b: Vec<bool>| a.iter().zip(b).map(|(a, b)| *a || b).collect();
     let open = closedness.open.par_iter();
-    parallel(|| {
-        open.map(beside)
-            .reduce(|| vec![false; distances.len()], either)
-    })
+    parallel(|| open.map(beside).reduce(|| vec![false; distances.len()], either))
 }
 
 /// How far `p` is from the inside of the segment, unless it is farther than `distance_max`, or as near to an end.

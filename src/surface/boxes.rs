@@ -78,11 +78,7 @@ impl BoxTree {
         {
             levels.push(enclose(last, ARITY, room));
         }
-        Self {
-            order: order.done().fixed(),
-            boxes,
-            levels,
-        }
+        Self { order: order.done().fixed(), boxes, levels }
     }
 
     /// Calls `visit` with the things whose boxes hold `p`, in curve order, until it returns true.

@@ -23,13 +23,7 @@ pub(super) fn tree_of(
     keep: impl Fn(u32) -> bool + Sync,
 ) -> BoxTree {
     let box_of = |t: u32| Aabb::around(surface.corners(t));
-    BoxTree::new(
-        &surface.bounds(),
-        surface.n_triangles() as u32,
-        room,
-        keep,
-        box_of,
-    )
+    BoxTree::new(&surface.bounds(), surface.n_triangles() as u32, room, keep, box_of)
 }
 
 impl BoxTree {
@@ -112,10 +106,7 @@ impl BoxTree {
                 stack.extend(children.map(|child| (level - 1, child)));
                 continue;
             }
-            for i in own
-                .clone()
-                .filter(|&i| self.boxes.get(i).meets(&self.levels[0].get(node)))
-            {
+            for i in own.clone().filter(|&i| self.boxes.get(i).meets(&self.levels[0].get(node))) {
                 for j in self.members(node) {
                     self.try_pair(i, j, pair);
                 }

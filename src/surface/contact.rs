@@ -150,15 +150,9 @@ fn at_vertex(p: [Point; 3], q: [Point; 3]) -> Option<Contact> {
         if plane.are_corners_apart(&p, &q) {
             return None;
         }
-        let touch = worse(
-            segment_in_plane(q[1], q[2], &p),
-            segment_in_plane(p[1], p[2], &q),
-        )?;
+        let touch = worse(segment_in_plane(q[1], q[2], &p), segment_in_plane(p[1], p[2], &q))?;
         return Some(match plane.separation(&p, &q) {
-            Separation::None => Contact {
-                kind: ContactKind::CoplanarOverlap,
-                at: touch.at,
-            },
+            Separation::None => Contact { kind: ContactKind::CoplanarOverlap, at: touch.at },
             _ => touch,
         });
     }
@@ -166,10 +160,7 @@ fn at_vertex(p: [Point; 3], q: [Point; 3]) -> Option<Contact> {
     if a * b > 0 {
         return None;
     }
-    worse(
-        edge_meets(q[1], q[2], c, d, &p),
-        edge_meets(p[1], p[2], a, b, &q),
-    )
+    worse(edge_meets(q[1], q[2], c, d, &p), edge_meets(p[1], p[2], a, b, &q))
 }
 
 /// The other triangle has the first two vertices of `p` and the apex `y`.
@@ -180,10 +171,7 @@ fn at_edge(p: [Point; 3], y: Point) -> Option<Contact> {
     let plane = Projection::of(&p);
     let [u, v, x] = p;
     let overlap = plane.turn(u, v, x) * plane.turn(u, v, y) > 0;
-    overlap.then(|| Contact {
-        kind: ContactKind::CoplanarOverlap,
-        at: (u + v + y) / 3.0,
-    })
+    overlap.then(|| Contact { kind: ContactKind::CoplanarOverlap, at: (u + v + y) / 3.0 })
 }
 
 /// The closed edge `a b`, its ends on the given sides of the plane of `t`, against the closed `t`.
@@ -217,10 +205,7 @@ pub(super) fn edge_meets(
         (0, _) => a,
         (_, 0) => b,
         _ => {
-            let (x, y) = (
-                orient(t[0], t[1], t[2], a).abs(),
-                orient(t[0], t[1], t[2], b).abs(),
-            );
+            let (x, y) = (orient(t[0], t[1], t[2], a).abs(), orient(t[0], t[1], t[2], b).abs());
             a + (b - a) * (x / (x + y))
         }
     };
@@ -247,14 +232,9 @@ impl Projection {
     /// A projection for the plane of `t`, which must have area.
     pub(super) fn of(t: &[Point; 3]) -> Self {
         let normal = (t[1] - t[0]).cross(t[2] - t[0]).abs().to_array();
-        let best = (0..3)
-            .max_by(|&i, &j| normal[i].total_cmp(&normal[j]))
-            .unwrap_or(2);
-        let mut axes = [best, (best + 1) % 3, (best + 2) % 3]
-            .into_iter()
-            .map(|axis| Self { axis });
-        axes.find(|plane| plane.turn(t[0], t[1], t[2]) != 0)
-            .unwrap_or(Self { axis: best })
+        let best = (0..3).max_by(|&i, &j| normal[i].total_cmp(&normal[j])).unwrap_or(2);
+        let mut axes = [best, (best + 1) % 3, (best + 2) % 3].into_iter().map(|axis| Self { axis });
+        axes.find(|plane| plane.turn(t[0], t[1], t[2]) != 0).unwrap_or(Self { axis: best })
     }
 
     fn flat(self, p: Point) -> Coord<f64> {
@@ -346,23 +326,11 @@ pub(super) fn segment_in_plane(a: Point, b: Point, t: &[Point; 3]) -> Option<Con
     for k in 0..3 {
         let l = (k + 1) % 3;
         if turns[k] == 0 && a.min(b).cmple(t[k]).all() && t[k].cmple(a.max(b)).all() {
-            found = worse(
-                found,
-                Some(Contact {
-                    kind: ContactKind::VertexOnEdge,
-                    at: t[k],
-                }),
-            );
+            found = worse(found, Some(Contact { kind: ContactKind::VertexOnEdge, at: t[k] }));
         }
         if turns[k] * turns[l] < 0 && about_a[k] * about_b[k] < 0 {
             let at = plane.crossing(a, b, t[k], t[l]);
-            found = worse(
-                found,
-                Some(Contact {
-                    kind: ContactKind::EdgeOnEdge,
-                    at,
-                }),
-            );
+            found = worse(found, Some(Contact { kind: ContactKind::EdgeOnEdge, at }));
         }
     }
     found
@@ -393,10 +361,7 @@ mod tests {
             if !has_area(&p) || !has_area(&q) {
                 continue;
             }
-            let touch = worse(
-                segment_in_plane(q[1], q[2], &p),
-                segment_in_plane(p[1], p[2], &q),
-            );
+            let touch = worse(segment_in_plane(q[1], q[2], &p), segment_in_plane(p[1], p[2], &q));
             let apart = Projection::of(&p).are_corners_apart(&p, &q);
             assert_eq!(apart, touch.is_none(), "{p:?} {q:?}");
             n_apart += u32::from(apart);

@@ -83,10 +83,7 @@ impl SurfaceError {
     pub(super) fn check_size(what: &'static str, n: usize) -> Result<(), Self> {
         match n <= COUNT_MAX {
             true => Ok(()),
-            false => Err(Self::TooLarge {
-                what,
-                limit: COUNT_MAX,
-            }),
+            false => Err(Self::TooLarge { what, limit: COUNT_MAX }),
         }
     }
 
@@ -176,11 +173,7 @@ pub(crate) fn show(p: Point) -> String {
 
 /// A number, with a power of ten when it would be long without.
 fn show_number(x: f64) -> String {
-    if x == 0.0 || (1e-4..1e9).contains(&x.abs()) {
-        format!("{x}")
-    } else {
-        format!("{x:e}")
-    }
+    if x == 0.0 || (1e-4..1e9).contains(&x.abs()) { format!("{x}") } else { format!("{x:e}") }
 }
 
 impl Defect {
@@ -215,9 +208,9 @@ impl Defect {
             Self::Degenerate { corners, .. } | Self::Duplicate { corners, .. } => {
                 Some((corners[0] + corners[1] + corners[2]) / 3.0)
             }
-            Self::OpenEdge {
-                from, to, junction, ..
-            } => Some(junction.unwrap_or_else(|| from.midpoint(*to))),
+            Self::OpenEdge { from, to, junction, .. } => {
+                Some(junction.unwrap_or_else(|| from.midpoint(*to)))
+            }
             Self::SelfIntersection { at, .. } => Some(*at),
         }
     }
@@ -237,9 +230,9 @@ impl Defect {
         match self {
             Self::Empty => "choose a file that holds triangles",
             Self::Degenerate { .. } | Self::Duplicate { .. } => "a repair drops such triangles",
-            Self::OpenEdge {
-                junction: Some(_), ..
-            } => "a repair divides triangles where vertices lie exactly on their open edges",
+            Self::OpenEdge { junction: Some(_), .. } => {
+                "a repair divides triangles where vertices lie exactly on their open edges"
+            }
             Self::OpenEdge { .. } => {
                 "a repair may close them by joining near points; otherwise close them where the surface was made"
             }

@@ -84,10 +84,7 @@ struct Pieces {
 
 impl Pieces {
     fn of(triangles: &[[u32; 3]]) -> Self {
-        Self {
-            corners: triangles.to_vec(),
-            parts: HashMap::new(),
-        }
+        Self { corners: triangles.to_vec(), parts: HashMap::new() }
     }
 
     /// The undivided ones in `t` that `p`, which is no corner, lies on.
@@ -127,8 +124,7 @@ impl Pieces {
             Some([a, b, c]) => self.corners.extend([[a, v, c], [v, b, c]]),
             None => (self.corners).extend([0, 1, 2].map(|k| [corners[k], corners[(k + 1) % 3], v])),
         }
-        self.parts
-            .insert(t, (first, self.corners.len() as u32 - first));
+        self.parts.insert(t, (first, self.corners.len() as u32 - first));
     }
 }
 
@@ -159,9 +155,7 @@ mod tests {
         let set = surface.wire_set();
         let mut plain = surface.without_wires();
         plain.sheets_last();
-        plain
-            .embed_named(&set, &ScratchSpace::boundless())
-            .expect("as before");
+        plain.embed_named(&set, &ScratchSpace::boundless()).expect("as before");
         plain
     }
 
@@ -184,9 +178,7 @@ mod tests {
         let set = set(&points, &[]);
         let n = surface.divide_at(&set, &room).expect("few triangles");
         assert!(n > 200 && surface.n_vertices() == whole.n_vertices() + n);
-        surface
-            .embed_wires(&set, "in", &room)
-            .expect("each is a vertex");
+        surface.embed_wires(&set, "in", &room).expect("each is a vertex");
         assert!(surface.lone_points().is_empty());
         let found = validate(&surface);
         assert!(found.is_valid(), "{:?}", found.defects.first());
@@ -245,11 +237,8 @@ mod tests {
         let fine = in_order(&fine);
         assert!(validate(&fine).is_valid() && fine.n_own_triangles() > 400);
         assert_eq!(fine.wires.points.len(), 5);
-        let own = |e: &[u32; 3]| {
-            fine.triangles
-                .iter()
-                .any(|t| t.contains(&e[0]) && t.contains(&e[1]))
-        };
+        let own =
+            |e: &[u32; 3]| fine.triangles.iter().any(|t| t.contains(&e[0]) && t.contains(&e[1]));
         assert!(fine.wires.edges.len() == 4 && fine.wires.edges.iter().all(own));
     }
 }

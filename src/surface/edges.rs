@@ -129,10 +129,7 @@ impl Facets {
             }
             for k in 0..3 {
                 let (a, b) = (triangle[k as usize], triangle[(k as usize + 1) % 3]);
-                let edge_use = EdgeUse {
-                    edge: [a.min(b), a.max(b)],
-                    half: 4 * t + k,
-                };
+                let edge_use = EdgeUse { edge: [a.min(b), a.max(b)], half: 4 * t + k };
                 let pushed = sorter.push(edge_use);
                 pushed.unwrap_or_else(|e| raise(e));
             }
@@ -142,13 +139,7 @@ impl Facets {
             uses.push(edge_use.unwrap_or_else(|e| raise(e)));
         }
         let uses = uses.done();
-        Self {
-            degenerate,
-            duplicates,
-            two_sided,
-            uses,
-            is_left_out,
-        }
+        Self { degenerate, duplicates, two_sided, uses, is_left_out }
     }
 
     /// Calls `visit` with the uses of each edge together.
@@ -156,10 +147,7 @@ impl Facets {
         let mut together = Vec::new();
         for i in 0..self.uses.len() {
             let next = self.uses.get(i);
-            if together
-                .last()
-                .is_some_and(|u: &EdgeUse| u.edge != next.edge)
-            {
+            if together.last().is_some_and(|u: &EdgeUse| u.edge != next.edge) {
                 visit(&together);
                 together.clear();
             }
@@ -234,10 +222,7 @@ fn repetitions(
         if !is_left_out[t as usize] {
             let mut vertices = *triangle;
             vertices.sort_unstable();
-            let pushed = sorter.push(SortedTriangle {
-                vertices,
-                triangle: t,
-            });
+            let pushed = sorter.push(SortedTriangle { vertices, triangle: t });
             pushed.unwrap_or_else(|e| raise(e));
         }
     }
@@ -246,10 +231,7 @@ fn repetitions(
     // Of the set at hand: its vertices, the first triangle, the first one of the other orientation.
     let mut set = None::<([u32; 3], u32, Option<u32>)>;
     for key in sorter.finish().unwrap_or_else(|e| raise(e)) {
-        let SortedTriangle {
-            vertices,
-            triangle: t,
-        } = key.unwrap_or_else(|e| raise(e));
+        let SortedTriangle { vertices, triangle: t } = key.unwrap_or_else(|e| raise(e));
         let Some((_, first, opposite)) = set.as_mut().filter(|set| set.0 == vertices) else {
             set = Some((vertices, t, None));
             continue;
@@ -283,9 +265,7 @@ pub(super) struct Groups {
 
 impl Groups {
     pub fn new(n: usize) -> Self {
-        Self {
-            parent: (0..n as u32).collect(),
-        }
+        Self { parent: (0..n as u32).collect() }
     }
 
     pub fn root(&mut self, mut i: u32) -> u32 {

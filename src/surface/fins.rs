@@ -30,16 +30,7 @@ const CLEAR_SHARE: f64 = 0.35;
 /// Around an edge, as cosine and sine.
 const DIRECTIONS: [[f64; 2]; 8] = {
     const D: f64 = FRAC_1_SQRT_2;
-    [
-        [1.0, 0.0],
-        [0.0, 1.0],
-        [-1.0, 0.0],
-        [0.0, -1.0],
-        [D, D],
-        [-D, D],
-        [-D, -D],
-        [D, -D],
-    ]
+    [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0], [D, D], [-D, D], [-D, -D], [D, -D]]
 };
 
 impl Surface {
@@ -81,27 +72,17 @@ impl Surface {
     /// How high the fin of each edge may be, for the other edges and the points.
     fn heights(&self, is_free: &[bool], room: &ScratchSpace) -> Vec<f64> {
         let edges = self.wire_tree(room, |e| is_free[e as usize]);
-        let marks = self
-            .wires
-            .points
-            .iter()
-            .map(|&[v, _]| (v, self.points[v as usize]));
+        let marks = self.wires.points.iter().map(|&[v, _]| (v, self.points[v as usize]));
         let marks = PointTree::new(marks.collect());
         let mut heights = vec![0.0; is_free.len()];
-        for (e, height) in (0u32..)
-            .zip(&mut heights)
-            .filter(|(e, _)| is_free[*e as usize])
-        {
+        for (e, height) in (0u32..).zip(&mut heights).filter(|(e, _)| is_free[*e as usize]) {
             let edge = self.wire(e);
             let [a, b] = edge.ends;
             let length = a.distance(b);
             *height = EQUILATERAL * length;
             // What is farther leaves room enough.
             let reach = Point::splat(*height / DISTANCE_SHARE);
-            let around = Aabb {
-                low: a.min(b) - reach,
-                high: a.max(b) + reach,
-            };
+            let around = Aabb { low: a.min(b) - reach, high: a.max(b) + reach };
             edges.meeting(&around, |f| {
                 let other = self.wire(f);
                 let share = edge.ids.iter().position(|v| other.ids.contains(v));
@@ -178,12 +159,7 @@ fn to_edge(p: Point, [a, b]: [Point; 2]) -> f64 {
 
 /// Distance of two edges.
 fn between_edges([a, b]: [Point; 2], [c, d]: [Point; 2]) -> f64 {
-    let ends = [
-        to_edge(a, [c, d]),
-        to_edge(b, [c, d]),
-        to_edge(c, [a, b]),
-        to_edge(d, [a, b]),
-    ];
+    let ends = [to_edge(a, [c, d]), to_edge(b, [c, d]), to_edge(c, [a, b]), to_edge(d, [a, b])];
     let least = ends.into_iter().fold(f64::INFINITY, f64::min);
     // Or between insides, where the common perpendicular meets both.
     let (u, v, w) = (b - a, d - c, c - a);
@@ -205,18 +181,13 @@ mod tests {
     fn wells(word: &str) -> Surface {
         let spec = SampleSpec::parse(word).expect("a sample");
         let mut surface = Surface::from(spec.make().expect("small enough"));
-        surface
-            .hold_wires(&ScratchSpace::boundless())
-            .expect("room for fins");
+        surface.hold_wires(&ScratchSpace::boundless()).expect("room for fins");
         surface
     }
 
     #[test]
     fn fins_touch_nothing_and_are_well_shaped() {
-        for word in [
-            "wells,count=30,cells=9,shift=0",
-            "wells,count=40,cells=9,seed=5,shift=0.15",
-        ] {
+        for word in ["wells,count=30,cells=9,shift=0", "wells,count=40,cells=9,seed=5,shift=0.15"] {
             let surface = wells(word);
             let found = validate(&surface);
             assert!(found.is_valid(), "{:?}", found.defects.first());
@@ -224,16 +195,10 @@ mod tests {
                 surface.n_triangles() - surface.n_own_triangles(),
                 surface.wires.edges.len()
             );
-            assert_eq!(
-                fitness(&surface, &found.closedness).forcing_triangles,
-                0,
-                "{word}"
-            );
+            assert_eq!(fitness(&surface, &found.closedness).forcing_triangles, 0, "{word}");
             // Held once more they are the same, and without them it is the surface of before.
             let mut again = surface.clone();
-            again
-                .hold_wires(&ScratchSpace::boundless())
-                .expect("as before");
+            again.hold_wires(&ScratchSpace::boundless()).expect("as before");
             assert_eq!(again, surface);
             assert!(!surface.without_wires().has_wires());
         }
@@ -246,9 +211,7 @@ mod tests {
         surface.wires.edges.push([a, b, 0]);
         surface.wires.points.push([a, 0]);
         let n = surface.n_triangles();
-        surface
-            .hold_wires(&ScratchSpace::boundless())
-            .expect("room for fins");
+        surface.hold_wires(&ScratchSpace::boundless()).expect("room for fins");
         assert_eq!(surface.n_triangles(), n);
         assert_eq!(surface.wires.sizes[1], 0.0);
         assert!(surface.wires.sizes[0] > 0.0 && surface.lone_points().len() == 1);

@@ -73,17 +73,10 @@ pub fn fitness(surface: &Surface, closedness: &Closedness) -> Fitness {
         worst: (0.0, 0),
     };
     // Least and sum are free of the order of triangles, so the answer is the same for any number of threads.
-    let all = parallel(|| {
-        (0..n as u32)
-            .into_par_iter()
-            .map(|t| shape(surface, t))
-            .reduce(|| none, join)
-    });
+    let all =
+        parallel(|| (0..n as u32).into_par_iter().map(|t| shape(surface, t)).reduce(|| none, join));
     let mut lengths: Vec<f64> = parallel(|| {
-        (0..n as u32)
-            .into_par_iter()
-            .flat_map_iter(|t| edge_lengths(surface, t))
-            .collect()
+        (0..n as u32).into_par_iter().flat_map_iter(|t| edge_lengths(surface, t)).collect()
     });
     let middle = lengths.len() / 2;
     let (_, median, _) = lengths.select_nth_unstable_by(middle, f64::total_cmp);
@@ -149,14 +142,7 @@ fn shape(surface: &Surface, t: u32) -> Sums {
         high,
         n_forcing: is_worse(FORCED_QUALITY),
         n_hopeless: is_worse(10.0),
-        worst: (
-            if quality.is_nan() {
-                f64::INFINITY
-            } else {
-                quality
-            },
-            t,
-        ),
+        worst: (if quality.is_nan() { f64::INFINITY } else { quality }, t),
     }
 }
 

@@ -34,9 +34,7 @@ pub(super) fn n_near(surface: &Surface, distance: f64) -> usize {
 fn new_ids(surface: &Surface, distance: f64) -> Vec<u32> {
     let mut kept = Retained::new(surface.bounds().low, distance);
     let points = &surface.points;
-    (0..points.len() as u32)
-        .map(|v| kept.find_or_keep(v, points))
-        .collect()
+    (0..points.len() as u32).map(|v| kept.find_or_keep(v, points)).collect()
 }
 
 fn count_joined(new_ids: &[u32]) -> usize {
@@ -55,19 +53,12 @@ struct Retained {
 
 impl Retained {
     fn new(low: Point, distance: f64) -> Self {
-        Self {
-            low,
-            distance,
-            last: HashMap::new(),
-            before: Vec::new(),
-        }
+        Self { low, distance, last: HashMap::new(), before: Vec::new() }
     }
 
     /// The cube of a position.
     fn cube(&self, p: Point) -> [i64; 3] {
-        ((p - self.low) / (CUBE * self.distance))
-            .to_array()
-            .map(|x| x.floor() as i64)
+        ((p - self.low) / (CUBE * self.distance)).to_array().map(|x| x.floor() as i64)
     }
 
     fn find_or_keep(&mut self, v: u32, points: &[Point]) -> u32 {

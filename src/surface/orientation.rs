@@ -32,10 +32,7 @@ pub fn orient_alike(surface: &mut Surface) -> Orientation {
 pub fn orient_alike_in(surface: &mut Surface, room: &ScratchSpace) -> Orientation {
     let mut facets = Facets::of(surface, room);
     if let Some(n_patches) = patches_of_one_way(surface, &mut facets) {
-        return Orientation {
-            n_patches,
-            ..Orientation::default()
-        };
+        return Orientation { n_patches, ..Orientation::default() };
     }
     let links = links(surface, &mut facets);
     let n = surface.n_triangles();
@@ -73,9 +70,7 @@ pub fn orient_alike_in(surface: &mut Surface, room: &ScratchSpace) -> Orientatio
             turn[second as usize] = Some(true);
         }
     }
-    done.flipped = (0..n as u32)
-        .filter(|&t| turn[t as usize] == Some(true))
-        .collect();
+    done.flipped = (0..n as u32).filter(|&t| turn[t as usize] == Some(true)).collect();
     for &t in &done.flipped {
         surface.triangles[t as usize].swap(1, 2);
     }
@@ -99,10 +94,7 @@ fn patches_of_one_way(surface: &Surface, facets: &mut Facets) -> Option<usize> {
 
 /// Decides which triangles of a patch turn.
 fn settle(patch: &[u32], fits: bool, turn: &mut [Option<bool>], done: &mut Orientation) {
-    let n_turned = patch
-        .iter()
-        .filter(|&&t| turn[t as usize] == Some(true))
-        .count();
+    let n_turned = patch.iter().filter(|&&t| turn[t as usize] == Some(true)).count();
     let turn_others = 2 * n_turned > patch.len();
     done.n_unorientable += usize::from(!fits);
     for &t in patch {

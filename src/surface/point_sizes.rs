@@ -27,10 +27,7 @@ impl Surface {
             let mut reach = 0.5 * mean;
             loop {
                 let half = Point::splat(reach.min(to_triangles));
-                let around = Aabb {
-                    low: p - half,
-                    high: p + half,
-                };
+                let around = Aabb { low: p - half, high: p + half };
                 tree.within(&around, |other, q| {
                     if other != v {
                         best = best.min(p.distance(q));
@@ -46,14 +43,11 @@ impl Surface {
         drop((seeker, tree));
         let least = NEAR_SHARE * diagonal;
         let points = self.wires.points.iter();
-        self.wires.sizes = (points.map(|[v, _]| sizes.get(v).copied()))
-            .map(Option::unwrap_or_default)
-            .collect();
+        self.wires.sizes =
+            (points.map(|[v, _]| sizes.get(v).copied())).map(Option::unwrap_or_default).collect();
         let is_near = |[v, _]: &[u32; 2]| sizes.get(v).is_some_and(|&size| size < least);
         let points = self.wires.points.iter().enumerate();
-        let near: Vec<usize> = (points.filter(|(_, p)| is_near(p)))
-            .map(|(i, _)| i)
-            .collect();
+        let near: Vec<usize> = (points.filter(|(_, p)| is_near(p))).map(|(i, _)| i).collect();
         let Some(&first) = near.first() else {
             return Ok(());
         };

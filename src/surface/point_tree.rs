@@ -21,9 +21,8 @@ impl PointTree {
         let frame = HilbertFrame::new(&Aabb::around(points.iter().map(|p| p.1)));
         parallel(|| points.par_sort_by_cached_key(|&(id, p)| (frame.index(p), id)));
         let around = |group: &[(u32, Point)]| Aabb::around(group.iter().map(|p| p.1));
-        let mut levels = vec![parallel(|| {
-            points.par_chunks(ARITY).map(around).collect::<Vec<_>>()
-        })];
+        let mut levels =
+            vec![parallel(|| points.par_chunks(ARITY).map(around).collect::<Vec<_>>())];
         while let Some(last) = levels.last()
             && last.len() > 1
         {

@@ -140,9 +140,8 @@ fn may_close(found: &Closedness, junctions: &[TJunction]) -> bool {
     let mut on_edge: Vec<u32> = junctions.iter().map(|j| j.vertex).collect();
     on_edge.sort_unstable();
     found.open.iter().all(|&(triangle, edge)| {
-        let is_cut = junctions
-            .binary_search_by_key(&(triangle, edge), |j| (j.triangle, j.edge))
-            .is_ok();
+        let is_cut =
+            junctions.binary_search_by_key(&(triangle, edge), |j| (j.triangle, j.edge)).is_ok();
         is_cut || edge.iter().any(|v| on_edge.binary_search(v).is_ok())
     })
 }

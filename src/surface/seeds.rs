@@ -75,9 +75,8 @@ impl fmt::Display for Seed {
 
 /// Three finite numbers and nothing else.
 fn point_of<'a>(words: impl Iterator<Item = &'a str>) -> Option<Point> {
-    let numbers: Option<Vec<f64>> = words
-        .map(|word| word.trim().parse().ok().filter(|x: &f64| x.is_finite()))
-        .collect();
+    let numbers: Option<Vec<f64>> =
+        words.map(|word| word.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect();
     Some(Point::from_array(numbers?.try_into().ok()?))
 }
 
@@ -97,10 +96,7 @@ mod tests {
             let found = Seed::parse_line(line).map(|seed| seed.kind);
             assert_eq!(found, Some(SeedKind::Region(name)), "{line}");
         }
-        assert_eq!(
-            Seed::parse_line("1 2 3 hole").map(|s| s.kind),
-            Some(SeedKind::Hole)
-        );
+        assert_eq!(Seed::parse_line("1 2 3 hole").map(|s| s.kind), Some(SeedKind::Hole));
         for text in ["", "1,2", "1,2,x,rock", "1,nan,2"] {
             assert_eq!(Seed::parse_region(text), None, "{text}");
             assert_eq!(Seed::parse_line(text), None, "{text}");

@@ -70,9 +70,7 @@ impl<'a> Seeker<'a> {
 
     /// Distance from `p` to the surface; infinite when it is not below `within`.
     pub fn distance(&self, p: Point, within: f64) -> f64 {
-        self.nearest(p, within, |corners| {
-            (p - nearest_point(corners, p)).length_squared()
-        })
+        self.nearest(p, within, |corners| (p - nearest_point(corners, p)).length_squared())
     }
 
     /// Distance from `p` to the surface's vertices; infinite when it is not below `within`.
@@ -208,11 +206,7 @@ impl<'a> Seeker<'a> {
             true => a.z.max(b.z).max(c.z),
             false => (u.0 * a.z + v.0 * b.z + w.0 * c.z) / sum,
         };
-        Some(Crossing {
-            triangle,
-            z,
-            front_is_up,
-        })
+        Some(Crossing { triangle, z, front_is_up })
     }
 }
 
@@ -241,12 +235,7 @@ fn nearest_point([a, b, c]: [Point; 3], p: Point) -> Point {
     let on_edge = |from: Point, to: Point| {
         let along = to - from;
         let t = (p - from).dot(along) / along.length_squared();
-        from + along
-            * if t.is_finite() {
-                t.clamp(0.0, 1.0)
-            } else {
-                0.0
-            }
+        from + along * if t.is_finite() { t.clamp(0.0, 1.0) } else { 0.0 }
     };
     let ends = [on_edge(a, b), on_edge(b, c), on_edge(c, a)];
     let nearer = |x: Point, y: Point| if p.distance(y) < p.distance(x) { y } else { x };

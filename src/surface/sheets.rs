@@ -9,9 +9,7 @@ impl Surface {
     /// Whether triangle `t` is part of an embedded sheet.
     #[inline]
     pub fn is_sheet(&self, t: u32) -> bool {
-        self.sheets
-            .get(t as usize)
-            .is_some_and(|&is_sheet| is_sheet)
+        self.sheets.get(t as usize).is_some_and(|&is_sheet| is_sheet)
     }
 
     /// Whether it has embedded sheets.
@@ -96,10 +94,7 @@ impl Surface {
             };
             let taken = |name: &String| self.label_names.contains(name);
             let numbered = (2..).map(|n| format!("{wanted}~{n}"));
-            let free = [wanted.clone()]
-                .into_iter()
-                .chain(numbered)
-                .find(|n| !taken(n));
+            let free = [wanted.clone()].into_iter().chain(numbered).find(|n| !taken(n));
             self.label_names.extend(free);
         }
         first
@@ -209,9 +204,7 @@ mod tests {
         let whole = sample("faults,count=4,cells=20");
         let mut again = whole.part(false);
         assert!(again.points.len() > 1024 && validate(&again).is_valid());
-        again
-            .embed(&whole.part(true), "in it")
-            .expect("small enough");
+        again.embed(&whole.part(true), "in it").expect("small enough");
         assert_eq!(again.points, whole.points);
         assert_eq!(again.triangles, whole.triangles);
         assert_eq!(again.sheets, whole.sheets);
@@ -229,10 +222,7 @@ mod tests {
         open.sheets = Vec::new();
         assert!(!validate(&open).is_valid());
         let n = open.open_parts_to_sheets(&ScratchSpace::boundless());
-        assert_eq!(
-            (n, &open.sheets),
-            (whole.n_sheet_triangles(), &whole.sheets)
-        );
+        assert_eq!((n, &open.sheets), (whole.n_sheet_triangles(), &whole.sheets));
         let mut closed = whole.part(false);
         assert_eq!(closed.open_parts_to_sheets(&ScratchSpace::boundless()), 0);
     }

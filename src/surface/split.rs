@@ -76,10 +76,7 @@ pub fn split(
     // A heap by length and then by vertices: the order does not depend on that of a table.
     while let Some((_, Reverse(e))) = heap.pop() {
         if splitter.surface.triangles.len() > TRIANGLES_MAX {
-            return Err(SurfaceError::TooLarge {
-                what: "triangles",
-                limit: TRIANGLES_MAX,
-            });
+            return Err(SurfaceError::TooLarge { what: "triangles", limit: TRIANGLES_MAX });
         }
         fits(&splitter.surface)?;
         match splitter.swap_edge(e) {
@@ -186,8 +183,7 @@ impl Splitter {
         if let Some(i) = self.wires.remove(&e) {
             let wires = &mut self.surface.wires.edges;
             let [from, to, label] = wires[i];
-            self.wires
-                .extend([(edge(from, m), i), (edge(m, to), wires.len())]);
+            self.wires.extend([(edge(from, m), i), (edge(m, to), wires.len())]);
             wires[i] = [from, m, label];
             wires.push([m, to, label]);
         }
@@ -291,10 +287,7 @@ impl Splitter {
         self.around.remove(&edge(a, b));
         self.around.insert(edge(c, d), vec![t, other]);
         for (e, from, to) in [(edge(a, d), other, t), (edge(b, c), t, other)] {
-            let list = self
-                .around
-                .get_mut(&e)
-                .expect("a side of the quadrilateral");
+            let list = self.around.get_mut(&e).expect("a side of the quadrilateral");
             for side in list.iter_mut().filter(|s| **s == from) {
                 *side = to;
             }
@@ -311,10 +304,7 @@ impl Splitter {
     /// A measure of the least angle: twice the area over the square of the longest edge.
     fn least_sine(&self, t: [u32; 3]) -> f64 {
         let [a, b, c] = t.map(|v| self.point(v));
-        let longest = a
-            .distance_squared(b)
-            .max(b.distance_squared(c))
-            .max(c.distance_squared(a));
+        let longest = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a));
         self.normal(t).length() / longest
     }
 
@@ -340,11 +330,7 @@ mod tests {
     fn cube() -> Surface {
         let mut points = Vec::new();
         for i in 0..8u32 {
-            points.push(Point::new(
-                f64::from(i & 1),
-                f64::from(i >> 1 & 1),
-                f64::from(i >> 2),
-            ));
+            points.push(Point::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)));
         }
         let triangles = vec![
             [0, 2, 1],
@@ -391,10 +377,7 @@ mod tests {
             }
         }
         assert!(split(&cube(), &h, 1000 * BYTES_TRIANGLE).is_err());
-        assert_eq!(
-            split(&cube(), &h, u64::MAX).expect("the same").0.triangles,
-            fine.triangles
-        );
+        assert_eq!(split(&cube(), &h, u64::MAX).expect("the same").0.triangles, fine.triangles);
     }
 
     #[test]

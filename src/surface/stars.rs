@@ -84,9 +84,8 @@ pub(super) fn touching<T: Send>(
                 beside.extend(&other.members);
             }
         }
-        let is_hopeless = beside
-            .chunks(AT_ONCE)
-            .any(|some| add(star.with(surface, some, listed_max, &test)));
+        let is_hopeless =
+            beside.chunks(AT_ONCE).any(|some| add(star.with(surface, some, listed_max, &test)));
         if is_hopeless {
             break;
         }
@@ -114,10 +113,7 @@ fn stars(surface: &Surface, is_left_out: &mut [bool]) -> Vec<Star> {
     };
     let mut at_edges: HashMap<[u32; 2], u32> = HashMap::new();
     for t in (0..surface.n_triangles()).filter(counts) {
-        for edge in edges_of(t)
-            .into_iter()
-            .filter(|e| e.iter().all(|&v| is_middle(v)))
-        {
+        for edge in edges_of(t).into_iter().filter(|e| e.iter().all(|&v| is_middle(v))) {
             *at_edges.entry(edge).or_default() += 1;
         }
     }
@@ -130,11 +126,9 @@ fn stars(surface: &Surface, is_left_out: &mut [bool]) -> Vec<Star> {
         });
         let vertices = surface.triangles[t].map(|v| (degrees[v as usize], Center::Vertex(v)));
         // An edge first: seen from one of its ends its triangles have a direction in common.
-        let best = (edges
-            .filter(|(n, _)| *n >= STAR_MIN)
-            .max_by_key(|(n, _)| *n))
-        .or_else(|| vertices.into_iter().max_by_key(|(n, _)| *n))
-        .filter(|(n, _)| *n >= STAR_MIN);
+        let best = (edges.filter(|(n, _)| *n >= STAR_MIN).max_by_key(|(n, _)| *n))
+            .or_else(|| vertices.into_iter().max_by_key(|(n, _)| *n))
+            .filter(|(n, _)| *n >= STAR_MIN);
         if let Some((_, center)) = best {
             *is_out = true;
             let next = centers.len();
@@ -286,10 +280,7 @@ fn around_triangle([u, v, w]: [Point; 3]) -> Aabb {
 }
 
 /// Around all directions.
-const EVERYWHERE: Aabb = Aabb {
-    low: Point::splat(-4.0),
-    high: Point::splat(4.0),
-};
+const EVERYWHERE: Aabb = Aabb { low: Point::splat(-4.0), high: Point::splat(4.0) };
 
 fn tree_of_directions(n: u32, of: impl Fn(u32) -> Aabb + Sync) -> BoxTree {
     BoxTree::new(&EVERYWHERE, n, &ScratchSpace::boundless(), |_| true, of)
@@ -308,9 +299,7 @@ mod tests {
         builder.begin_file("made");
         let label = builder.label("made");
         for corners in triangles {
-            builder
-                .triangle_at(*corners, label)
-                .expect("finite corners");
+            builder.triangle_at(*corners, label).expect("finite corners");
         }
         builder.end_file().expect("triangles");
         builder.finish()
@@ -396,11 +385,7 @@ mod tests {
         let stray = |k: usize| {
             let at = |step: usize| (k * step % 17) as f64 / 8.0 - 1.0;
             let p = Point::new(at(3), at(5), at(7));
-            [
-                p,
-                p * 0.3 + Point::new(0.1, 0.0, 0.4),
-                Point::new(at(11), 0.0, at(2)),
-            ]
+            [p, p * 0.3 + Point::new(0.1, 0.0, 0.4), Point::new(at(11), 0.0, at(2))]
         };
         for make in [column, book, cones] {
             let mut triangles = make(300);
@@ -408,11 +393,7 @@ mod tests {
             // One page again, a little shorter, and a triangle through the middle of all.
             let [a, b, c] = triangles[40];
             triangles.push([a, b, c * 0.75]);
-            triangles.push([
-                Point::splat(-0.2),
-                Point::splat(0.3),
-                Point::new(0.2, -0.1, 0.0),
-            ]);
+            triangles.push([Point::splat(-0.2), Point::splat(0.3), Point::new(0.2, -0.1, 0.0)]);
             let surface = surface(&triangles);
             let (touching, _, _) = found(&surface);
             assert!(touching.len() > 100);

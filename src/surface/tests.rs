@@ -89,10 +89,7 @@ fn cubes_that_share_a_matching_side_are_valid() {
     let found = validate(&build(cube(|p| p).into_iter().chain(turned)));
     assert!(found.is_valid(), "{:?}", found.defects);
     assert_eq!(found.closedness.two_sided, [[10, 22], [11, 23]]);
-    assert_eq!(
-        (found.closedness.n_nonmanifold, found.closedness.n_odd),
-        (4, 4)
-    );
+    assert_eq!((found.closedness.n_nonmanifold, found.closedness.n_odd), (4, 4));
     let inside_out = build(cube(|p| p).into_iter().chain(mirrored));
     assert_eq!(codes(&inside_out), ["duplicate-triangle"]);
 }
@@ -110,10 +107,7 @@ fn touching_at_an_edge_or_a_vertex_is_valid() {
 fn an_open_cube_tells_its_rim() {
     let surface = build(cube(|p| p).into_iter().take(10));
     let found = validate(&surface);
-    assert_eq!(
-        (found.closedness.open.len(), found.closedness.n_open_loops),
-        (4, 1)
-    );
+    assert_eq!((found.closedness.open.len(), found.closedness.n_open_loops), (4, 1));
     assert_eq!(codes(&surface), ["open-surface"]);
     assert_eq!(found.accept().unwrap_err().code(), "open-surface");
     let two_holes = build(cube(|p| p).into_iter().skip(1).take(10));
@@ -128,16 +122,8 @@ fn bad_triangles_are_named() {
     assert_eq!(found.closedness.duplicates, [[3, 12]]);
     assert_eq!(codes(&repeated), ["duplicate-triangle"]);
     let [a, b, _] = whole[0];
-    let collapsed = build(
-        whole
-            .iter()
-            .copied()
-            .chain([[a, b, b], [a, a.midpoint(b), b]]),
-    );
-    assert_eq!(
-        validate(&collapsed).closedness.degenerate,
-        [(12, true), (13, false)]
-    );
+    let collapsed = build(whole.iter().copied().chain([[a, b, b], [a, a.midpoint(b), b]]));
+    assert_eq!(validate(&collapsed).closedness.degenerate, [(12, true), (13, false)]);
     assert_eq!(validate(&build([])).defects, [Defect::Empty]);
 }
 
@@ -148,10 +134,7 @@ fn a_wall_inside_is_valid_and_a_fin_is_open() {
     // The wall's corners use edges 0-3 and 4-7, which are diagonals of two sides.
     let found = validate(&surface);
     assert!(found.is_valid(), "{:?}", found.defects);
-    assert_eq!(
-        (found.closedness.n_nonmanifold, found.closedness.n_odd),
-        (4, 4)
-    );
+    assert_eq!((found.closedness.n_nonmanifold, found.closedness.n_odd), (4, 4));
     let fin = build(cube(|p| p).into_iter().chain([wall[0]]));
     assert_eq!(codes(&fin), ["open-surface"]);
 }
@@ -169,11 +152,7 @@ fn crossing_and_overlapping_cubes_are_refused_by_kind() {
     assert!(validate(&inside).is_valid());
     // A corner of one cube just reaches a side of the other.
     let tip = |p: Point| {
-        Point::new(
-            1.0 + p.x + p.y + p.z,
-            0.4 + 0.01 * (p.y - p.z),
-            0.6 + 0.01 * (p.x - p.y),
-        )
+        Point::new(1.0 + p.x + p.y + p.z, 0.4 + 0.01 * (p.y - p.z), 0.6 + 0.01 * (p.x - p.y))
     };
     assert_eq!(kinds(&two_cubes(tip)), [ContactKind::VertexOnFace]);
 }
@@ -214,12 +193,8 @@ fn inverted_triangles_turn_back() {
     let mut strip = Vec::new();
     for i in 0..3 {
         let (low, high) = if i == 2 { (1.0, 0.0) } else { (0.0, 1.0) };
-        let (a, b, c, d) = (
-            ring(i, 0.0),
-            ring((i + 1) % 3, low),
-            ring((i + 1) % 3, high),
-            ring(i, 1.0),
-        );
+        let (a, b, c, d) =
+            (ring(i, 0.0), ring((i + 1) % 3, low), ring((i + 1) % 3, high), ring(i, 1.0));
         strip.extend([[a, b, c], [a, c, d]]);
     }
     let mut strip = build(strip);
@@ -237,44 +212,17 @@ fn contact_by_number_of_shared_vertices() {
     let apart = [3, 4, 5];
     use ContactKind::*;
     for (q, expected) in [
-        (
-            [at(1., 1., -1.), at(1., 1., 1.), at(9., 9., 0.5)],
-            Some(Crossing),
-        ),
-        (
-            [at(1., 1., 0.), at(1., 1., 1.), at(1., 2., 1.)],
-            Some(VertexOnFace),
-        ),
-        (
-            [at(2., 0., 0.), at(1., 1., 1.), at(1., 2., 1.)],
-            Some(VertexOnEdge),
-        ),
-        (
-            [at(2., 0., -1.), at(2., 0., 1.), at(2., -1., 0.)],
-            Some(EdgeOnEdge),
-        ),
-        (
-            [at(0., 0., -1.), at(0., 0., 1.), at(-1., -1., 0.)],
-            Some(VertexOnEdge),
-        ),
+        ([at(1., 1., -1.), at(1., 1., 1.), at(9., 9., 0.5)], Some(Crossing)),
+        ([at(1., 1., 0.), at(1., 1., 1.), at(1., 2., 1.)], Some(VertexOnFace)),
+        ([at(2., 0., 0.), at(1., 1., 1.), at(1., 2., 1.)], Some(VertexOnEdge)),
+        ([at(2., 0., -1.), at(2., 0., 1.), at(2., -1., 0.)], Some(EdgeOnEdge)),
+        ([at(0., 0., -1.), at(0., 0., 1.), at(-1., -1., 0.)], Some(VertexOnEdge)),
         ([at(1., 1., 1e-300), at(1., 1., 1.), at(1., 2., 1.)], None),
-        (
-            [at(1., 1., 0.), at(2., 1., 0.), at(1., 2., 0.)],
-            Some(CoplanarOverlap),
-        ),
-        (
-            [at(-9., -9., 0.), at(90., -9., 0.), at(-9., 90., 0.)],
-            Some(CoplanarOverlap),
-        ),
-        (
-            [at(3., 3., 0.), at(2., 2., 0.), at(3., 2.5, 0.)],
-            Some(VertexOnEdge),
-        ),
+        ([at(1., 1., 0.), at(2., 1., 0.), at(1., 2., 0.)], Some(CoplanarOverlap)),
+        ([at(-9., -9., 0.), at(90., -9., 0.), at(-9., 90., 0.)], Some(CoplanarOverlap)),
+        ([at(3., 3., 0.), at(2., 2., 0.), at(3., 2.5, 0.)], Some(VertexOnEdge)),
         ([at(3., 3., 0.), at(2.5, 2., 0.), at(3., 2.5, 0.)], None),
-        (
-            [at(-1., 1., 0.), at(5., 2., 0.), at(2., 3., 9.)],
-            Some(EdgeOnEdge),
-        ),
+        ([at(-1., 1., 0.), at(5., 2., 0.), at(2., 3., 9.)], Some(EdgeOnEdge)),
     ] {
         assert_eq!(kind(q, apart), expected, "{q:?}");
         assert_eq!(contact(q, apart, p, ids).map(|c| c.kind), expected, "{q:?}");
@@ -287,10 +235,7 @@ fn contact_by_number_of_shared_vertices() {
         ([p[0], at(9., 9., 0.), at(-1., -1., 3.)], Some(EdgeOnEdge)),
         ([p[0], at(9., 0., 0.), at(0., -1., 3.)], Some(VertexOnEdge)),
         ([p[0], at(1., 1., 1.), at(1., 1., -1.)], Some(Crossing)),
-        (
-            [p[0], at(1., 1., 0.), at(-1., 1., 0.)],
-            Some(CoplanarOverlap),
-        ),
+        ([p[0], at(1., 1., 0.), at(-1., 1., 0.)], Some(CoplanarOverlap)),
         ([p[0], at(1., 0., 0.), at(1., -1., 0.)], Some(VertexOnEdge)),
         ([p[0], at(9., 0., 0.), at(1., -1., 0.)], Some(VertexOnEdge)),
         ([p[0], at(1., 2., 3.), at(2., 1., 3.)], None),
@@ -321,17 +266,8 @@ fn a_cracked_cube_closes_when_points_are_joined() {
     let surface = cracked(1e-7);
     let tried = closing(&surface);
     let last = tried.last().unwrap();
-    assert_eq!(
-        (last.closes, last.share, last.defects_left),
-        (true, 1e-6, Some(0))
-    );
-    assert!(
-        tried
-            .iter()
-            .rev()
-            .skip(1)
-            .all(|t| !t.closes && t.open_edges > 0)
-    );
+    assert_eq!((last.closes, last.share, last.defects_left), (true, 1e-6, Some(0)));
+    assert!(tried.iter().rev().skip(1).all(|t| !t.closes && t.open_edges > 0));
     let mut joined = surface;
     let done = repair(&mut joined, Some(last.distance));
     assert_eq!(done.points_joined, last.points_joined);
@@ -365,15 +301,7 @@ fn a_t_junction_is_divided() {
     let found = validate(&surface);
     assert_eq!(found.t_junctions.len(), 2);
     assert!(found.t_junctions.iter().all(|j| j.distance == 0.0));
-    assert!(
-        found
-            .accept()
-            .unwrap_err()
-            .to_string()
-            .contains("T-junction"),
-        "{:?}",
-        found.accept()
-    );
+    assert!(found.accept().unwrap_err().to_string().contains("T-junction"), "{:?}", found.accept());
     let done = repair(&mut surface, None);
     assert_eq!((done.divided, done.turned), (1, 0));
     assert!(validate(&surface).is_valid());
@@ -409,11 +337,7 @@ fn files_and_labels_follow_a_repair() {
     for (name, extra) in [("one", true), ("two", false)] {
         builder.begin_file(name);
         let label = builder.label(name);
-        let away = if extra {
-            Point::ZERO
-        } else {
-            Point::splat(3.0)
-        };
+        let away = if extra { Point::ZERO } else { Point::splat(3.0) };
         let triangles = cube(|p| p + away);
         let repeated = extra.then_some(triangles[4]);
         for triangle in repeated.into_iter().chain(triangles) {
@@ -423,17 +347,11 @@ fn files_and_labels_follow_a_repair() {
     }
     let mut surface = builder.finish();
     let done = repair(&mut surface, None);
-    let expected = Repair {
-        repeated_dropped: 1,
-        ..Repair::default()
-    };
+    let expected = Repair { repeated_dropped: 1, ..Repair::default() };
     assert_eq!(done, expected);
     assert_eq!(surface.source(12), Some(("two", 0)));
     assert_eq!(surface.source(11), Some(("one", 11)));
-    assert_eq!(
-        (surface.label_name(11), surface.label_name(12)),
-        ("one", "two")
-    );
+    assert_eq!((surface.label_name(11), surface.label_name(12)), ("one", "two"));
     assert!(validate(&surface).is_valid());
 }
 
@@ -444,16 +362,10 @@ fn holes_are_listed_the_longest_first() {
     triangles.drain(..2);
     let surface = build(triangles);
     let boundary_loops = boundary_loops(&surface, &closedness(&surface));
-    let lengths: Vec<(usize, f64)> = boundary_loops
-        .iter()
-        .map(|r| (r.n_edges, r.length))
-        .collect();
+    let lengths: Vec<(usize, f64)> = boundary_loops.iter().map(|r| (r.n_edges, r.length)).collect();
     // The hole of two triangles and that of one meet in a corner or not at all.
     let total: f64 = lengths.iter().map(|l| l.1).sum();
-    assert!(
-        (total - (4.0 + 2.0 + 2f64.sqrt())).abs() < 1e-12,
-        "{lengths:?}"
-    );
+    assert!((total - (4.0 + 2.0 + 2f64.sqrt())).abs() < 1e-12, "{lengths:?}");
     assert!(lengths.is_sorted_by(|a, b| a.1 >= b.1), "{lengths:?}");
 }
 

@@ -90,11 +90,8 @@ impl Surface {
 
     /// Bytes of memory held, for the budget.
     pub fn bytes(&self) -> usize {
-        let names: usize = self
-            .label_names
-            .iter()
-            .map(|n| n.capacity() + size_of::<String>())
-            .sum();
+        let names: usize =
+            self.label_names.iter().map(|n| n.capacity() + size_of::<String>()).sum();
         self.points.capacity() * size_of::<Point>()
             + self.triangles.capacity() * size_of::<[u32; 3]>()
             + self.labels.capacity() * size_of::<u32>()
@@ -173,22 +170,17 @@ impl fmt::Display for Note {
         write!(f, "{}: ", self.file)?;
         match &self.kind {
             NoteKind::MissingEndsolid { line } => {
-                write!(
-                    f,
-                    "the text ends at line {line} without `endsolid`; all facets were read"
-                )
+                write!(f, "the text ends at line {line} without `endsolid`; all facets were read")
             }
-            NoteKind::WeldedVertices { n } => write!(
-                f,
-                "{n} vertices repeat the coordinates of another and were joined to it"
-            ),
+            NoteKind::WeldedVertices { n } => {
+                write!(f, "{n} vertices repeat the coordinates of another and were joined to it")
+            }
             NoteKind::UnusedVertices { n } => {
                 write!(f, "{n} vertices belong to no triangle and were left out")
             }
-            NoteKind::FannedPolygons { n } => write!(
-                f,
-                "{n} polygons were cut into triangles from their first vertex"
-            ),
+            NoteKind::FannedPolygons { n } => {
+                write!(f, "{n} polygons were cut into triangles from their first vertex")
+            }
             NoteKind::SkippedElements { what, n } => {
                 write!(f, "{n} {what} were left out; only the surface is read")
             }

@@ -72,16 +72,10 @@ pub fn validate_in(surface: &Surface, room: &ScratchSpace) -> Validation {
     let closedness = facets.closedness(surface);
     let t_junctions = match closedness.is_closed() {
         true => Vec::new(),
-        false => t_junctions(
-            surface,
-            &closedness,
-            JUNCTION_SHARE * surface.bounds().diagonal(),
-        ),
+        false => t_junctions(surface, &closedness, JUNCTION_SHARE * surface.bounds().diagonal()),
     };
     let mut defects = edge_defects(surface, &closedness, &t_junctions);
-    let Facets {
-        mut is_left_out, ..
-    } = facets;
+    let Facets { mut is_left_out, .. } = facets;
     for &(t, _) in &closedness.degenerate {
         is_left_out[t as usize] = true;
     }
@@ -94,22 +88,12 @@ pub fn validate_in(surface: &Surface, room: &ScratchSpace) -> Validation {
         touching(surface, &mut is_left_out, room, LISTED_MAX, look);
     touching.sort_unstable_by_key(|(triangles, _)| *triangles);
     let n_defects = defects.len() as u64 + n_intersections;
-    defects.extend(
-        touching
-            .into_iter()
-            .map(|(triangles, found)| Defect::SelfIntersection {
-                triangles,
-                kind: found.kind,
-                at: found.at,
-            }),
-    );
-    Validation {
-        closedness,
-        t_junctions,
-        defects,
-        n_intersections,
-        n_defects,
-    }
+    defects.extend(touching.into_iter().map(|(triangles, found)| Defect::SelfIntersection {
+        triangles,
+        kind: found.kind,
+        at: found.at,
+    }));
+    Validation { closedness, t_junctions, defects, n_intersections, n_defects }
 }
 
 /// The defects that edges and vertices alone show.
@@ -129,13 +113,10 @@ fn edge_defects(
         corners: surface.corners(triangle),
     }));
     defects.extend(
-        closedness
-            .duplicates
-            .iter()
-            .map(|&triangles| Defect::Duplicate {
-                triangles,
-                corners: surface.corners(triangles[0]),
-            }),
+        closedness.duplicates.iter().map(|&triangles| Defect::Duplicate {
+            triangles,
+            corners: surface.corners(triangles[0]),
+        }),
     );
     let mut open: Vec<Defect> = closedness
         .open
@@ -148,25 +129,11 @@ fn edge_defects(
                 .first()
                 .filter(|j| (j.triangle, j.edge) == (triangle, vertices))
                 .map(|j| j.at);
-            Defect::OpenEdge {
-                triangle,
-                vertices,
-                from,
-                to,
-                junction,
-            }
+            Defect::OpenEdge { triangle, vertices, from, to, junction }
         })
         .collect();
     // Where the reason is known comes first.
-    open.sort_by_key(|d| {
-        !matches!(
-            d,
-            Defect::OpenEdge {
-                junction: Some(_),
-                ..
-            }
-        )
-    });
+    open.sort_by_key(|d| !matches!(d, Defect::OpenEdge { junction: Some(_), .. }));
     defects.extend(open);
     defects
 }

@@ -194,11 +194,7 @@ fn angle(x: f64, y: f64) -> f64 {
     let (low, high) = (x.abs().min(y.abs()), x.abs().max(y.abs()));
     let t = if high > 0.0 { low / high } else { 0.0 };
     let eighth = t * (FRAC_PI_4 + 0.273 * (1.0 - t));
-    let quarter = if y.abs() > x.abs() {
-        FRAC_PI_2 - eighth
-    } else {
-        eighth
-    };
+    let quarter = if y.abs() > x.abs() { FRAC_PI_2 - eighth } else { eighth };
     let half = if x < 0.0 { PI - quarter } else { quarter };
     if y < 0.0 { 2.0 * PI - half } else { half }
 }
@@ -311,14 +307,9 @@ mod tests {
                     }) as u32
                 })
                 .collect();
-            for wall in [
-                [0, 4, 6, 2],
-                [1, 3, 7, 5],
-                [0, 1, 5, 4],
-                [2, 6, 7, 3],
-                [0, 2, 3, 1],
-                [4, 5, 7, 6],
-            ] {
+            for wall in
+                [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]]
+            {
                 let [a, b, c, d] = wall.map(|k: usize| numbers[k]);
                 for mut t in [[a, b, c], [a, c, d]] {
                     if inward {
@@ -349,10 +340,7 @@ mod tests {
             // Edges with a right angle, diagonals with half a turn.
             let inside = 12.0 * 0.5 * PI + 6.0 * PI;
             let outside = 12.0 * 1.5 * PI + 6.0 * PI;
-            for (found, expected) in volumes
-                .angles
-                .iter()
-                .zip([outside, inside + outside, inside])
+            for (found, expected) in volumes.angles.iter().zip([outside, inside + outside, inside])
             {
                 assert!((found / expected - 1.0).abs() < 1e-12, "{found} {expected}");
             }
@@ -430,10 +418,7 @@ mod tests {
     fn angles_are_known_to_a_hundredth() {
         for k in 0..1000 {
             let a = f64::from(k) * 2.0 * PI / 1000.0;
-            assert!(
-                (angle(3.0 * a.cos(), 3.0 * a.sin()) - a).abs() < 0.005,
-                "{a}"
-            );
+            assert!((angle(3.0 * a.cos(), 3.0 * a.sin()) - a).abs() < 0.005, "{a}");
         }
     }
 }

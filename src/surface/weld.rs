@@ -38,10 +38,7 @@ impl SurfaceBuilder {
 
     /// A builder that refuses what it cannot hold in so many bytes.
     pub fn within(bytes_max: u64) -> Self {
-        Self {
-            bytes_max: Some(bytes_max),
-            ..Self::default()
-        }
+        Self { bytes_max: Some(bytes_max), ..Self::default() }
     }
 
     /// Bytes held: the surface, and what finds its vertices.
@@ -68,10 +65,9 @@ impl SurfaceBuilder {
         self.triangle_first = self.surface.triangles.len();
         self.file2vert.clear();
         (self.n_welded, self.n_fanned, self.by_position) = (0, 0, false);
-        self.surface.files.push(SourceFile {
-            name: name.to_owned(),
-            triangle_first: self.triangle_first as u32,
-        });
+        self.surface
+            .files
+            .push(SourceFile { name: name.to_owned(), triangle_first: self.triangle_first as u32 });
     }
 
     /// Number of vertices the current file has given so far.
@@ -189,9 +185,8 @@ impl SurfaceBuilder {
     pub fn end_file(&mut self) -> Result<(), SurfaceError> {
         if !self.by_position {
             let map = &self.file2vert;
-            for (i, triangle) in self.surface.triangles[self.triangle_first..]
-                .iter_mut()
-                .enumerate()
+            for (i, triangle) in
+                self.surface.triangles[self.triangle_first..].iter_mut().enumerate()
             {
                 for v in triangle {
                     *v = *map.get(*v as usize).ok_or(SurfaceError::NoSuchVertex {
@@ -218,14 +213,8 @@ impl SurfaceBuilder {
         drop(self.table);
         let n_unused = drop_unused_points(&mut surface);
         if n_unused > 0 {
-            let file = surface
-                .files
-                .first()
-                .map_or(String::new(), |f| f.name.clone());
-            surface.notes.push(Note {
-                file,
-                kind: NoteKind::UnusedVertices { n: n_unused },
-            });
+            let file = surface.files.first().map_or(String::new(), |f| f.name.clone());
+            surface.notes.push(Note { file, kind: NoteKind::UnusedVertices { n: n_unused } });
         }
         drop_unused_labels(&mut surface);
         surface
@@ -276,9 +265,7 @@ pub(super) fn drop_unused_labels(surface: &mut Surface) {
         })
         .collect();
     let mut keep = used.iter();
-    surface
-        .label_names
-        .retain(|_| *keep.next().expect("one flag per label"));
+    surface.label_names.retain(|_| *keep.next().expect("one flag per label"));
     for label in &mut surface.labels {
         *label = new_ids[*label as usize];
     }
@@ -296,9 +283,7 @@ impl PointTable {
     pub(super) fn of(points: &[Point]) -> Self {
         // Half of what it grows to.
         let len = (points.len() + 1).next_power_of_two();
-        let mut table = Self {
-            slots: filled(len, 0),
-        };
+        let mut table = Self { slots: filled(len, 0) };
         table.grow(points);
         table
     }

@@ -59,10 +59,8 @@ impl Edge {
                 let is_back = (x - from).cmpgt(Point::ZERO) == (y - from).cmpgt(Point::ZERO)
                     && (x - from).cmplt(Point::ZERO) == (y - from).cmplt(Point::ZERO);
                 let is_overlap = is_back && !has_area(&[from, x, y]);
-                return is_overlap.then_some(Contact {
-                    kind: ContactKind::EdgeOnEdge,
-                    at: from.midpoint(x),
-                });
+                return is_overlap
+                    .then_some(Contact { kind: ContactKind::EdgeOnEdge, at: from.midpoint(x) });
             }
             _ => return None,
         }
@@ -75,9 +73,7 @@ impl Edge {
             let is_on = |x: Point| low.cmple(x).all() && x.cmple(high).all();
             let covered = c.min(d).cmple(a).all() && a.cmple(c.max(d)).all();
             let at = [c, d].into_iter().find(|&x| is_on(x));
-            return at
-                .or(covered.then_some(a))
-                .and_then(|at| found(ContactKind::EdgeOnEdge, at));
+            return at.or(covered.then_some(a)).and_then(|at| found(ContactKind::EdgeOnEdge, at));
         };
         let plane = Projection::of(&[a, b, third]);
         let [of_c, of_d] = [c, d].map(|x| plane.turn(a, b, x));
@@ -106,10 +102,7 @@ fn leaves_into(x: Point, t: [Point; 3]) -> Option<Contact> {
         false => ContactKind::CoplanarOverlap,
     };
     let at = t[0].midpoint(x);
-    turns
-        .iter()
-        .all(|&turn| turn >= 0)
-        .then_some(Contact { kind, at })
+    turns.iter().all(|&turn| turn >= 0).then_some(Contact { kind, at })
 }
 
 /// How `p`, which is no corner of `t`, lies on `t`.
@@ -166,15 +159,10 @@ mod tests {
             let p = [0, 1, 2, 3].map(|i| whole(4 * k + i));
             // Equal points have equal numbers.
             let id = |i: usize| {
-                p.iter()
-                    .position(|q| *q == p[i])
-                    .map(|at| at as u32)
-                    .unwrap_or_default()
+                p.iter().position(|q| *q == p[i]).map(|at| at as u32).unwrap_or_default()
             };
-            let edge = |i: usize, j: usize| Edge {
-                ids: [id(i), id(j)],
-                ends: [point(p[i]), point(p[j])],
-            };
+            let edge =
+                |i: usize, j: usize| Edge { ids: [id(i), id(j)], ends: [point(p[i]), point(p[j])] };
             if p[0] == p[1] || p[2] == p[3] {
                 continue;
             }
@@ -197,11 +185,7 @@ mod tests {
 
     #[test]
     fn points_of_triangles_and_edges_are_found() {
-        let t = [
-            Point::ZERO,
-            Point::new(4.0, 0.0, 2.0),
-            Point::new(0.0, 4.0, 2.0),
-        ];
+        let t = [Point::ZERO, Point::new(4.0, 0.0, 2.0), Point::new(0.0, 4.0, 2.0)];
         assert!(
             point_at_triangle(Point::new(1.0, 1.0, 1.0), &t)
                 .is_some_and(|c| c.kind == ContactKind::VertexOnFace)
@@ -214,23 +198,14 @@ mod tests {
         assert!(point_at_triangle(Point::new(1.0, 1.0, 1.000_000_1), &t).is_none());
         assert!(is_on_edge(Point::new(2.0, 0.0, 1.0), [t[0], t[1]]));
         assert!(!is_on_edge(Point::new(6.0, 0.0, 3.0), [t[0], t[1]]));
-        let edge = |a, b| Edge {
-            ids: [0, 9],
-            ends: [a, b],
-        };
+        let edge = |a, b| Edge { ids: [0, 9], ends: [a, b] };
         let own = [0, 1, 2];
         let kind = |b: Point| match edge(t[0], b).at_triangle(t, own) {
             EdgeAtTriangle::Touching(c) => Some(c.kind),
             _ => None,
         };
-        assert_eq!(
-            kind(Point::new(1.0, 1.0, 1.0)),
-            Some(ContactKind::CoplanarOverlap)
-        );
-        assert_eq!(
-            kind(Point::new(2.0, 0.0, 1.0)),
-            Some(ContactKind::EdgeOnEdge)
-        );
+        assert_eq!(kind(Point::new(1.0, 1.0, 1.0)), Some(ContactKind::CoplanarOverlap));
+        assert_eq!(kind(Point::new(2.0, 0.0, 1.0)), Some(ContactKind::EdgeOnEdge));
         assert_eq!(kind(Point::new(-1.0, -1.0, -1.0)), None);
         assert_eq!(kind(Point::new(1.0, 1.0, 5.0)), None);
     }

@@ -97,9 +97,7 @@ fn more(n: usize) -> String {
 }
 
 fn far(distance: Option<f64>) -> String {
-    distance.map_or(String::new(), |distance| {
-        format!(": {distance:.1e} from it")
-    })
+    distance.map_or(String::new(), |distance| format!(": {distance:.1e} from it"))
 }
 
 impl WireError {

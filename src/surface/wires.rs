@@ -40,16 +40,12 @@ impl Surface {
 
     /// Number of triangles, without those that hold edges of wires.
     pub fn n_own_triangles(&self) -> usize {
-        self.wires
-            .fins
-            .map_or(self.n_triangles(), |[first, _]| first as usize)
+        self.wires.fins.map_or(self.n_triangles(), |[first, _]| first as usize)
     }
 
     /// Number of vertices, without those that only hold edges of wires.
     pub fn n_own_vertices(&self) -> usize {
-        self.wires
-            .fins
-            .map_or(self.n_vertices(), |[_, first]| first as usize)
+        self.wires.fins.map_or(self.n_vertices(), |[_, first]| first as usize)
     }
 
     /// Adds edges and points, and what holds them; vertices with the same coordinates become one.
@@ -193,10 +189,7 @@ impl Surface {
     pub(super) fn wire(&self, e: u32) -> Edge {
         let [a, b, _] = self.wires.edges[e as usize];
         let ids = [a, b];
-        Edge {
-            ids,
-            ends: ids.map(|v| self.points[v as usize]),
-        }
+        Edge { ids, ends: ids.map(|v| self.points[v as usize]) }
     }
 
     /// A tree over those edges of wires that `keep` accepts.
@@ -206,13 +199,7 @@ impl Surface {
         keep: impl Fn(u32) -> bool + Sync,
     ) -> BoxTree {
         let box_of = |e: u32| Aabb::around(self.wire(e).ends);
-        BoxTree::new(
-            &self.bounds(),
-            self.wires.edges.len() as u32,
-            room,
-            keep,
-            box_of,
-        )
+        BoxTree::new(&self.bounds(), self.wires.edges.len() as u32, room, keep, box_of)
     }
 
     /// What edge `e` is called in messages: its number among those of its label.
@@ -240,10 +227,7 @@ impl Surface {
         for (e, &[a, b, _]) in self.wires.edges.iter().enumerate() {
             let at = self.points[a as usize].midpoint(self.points[b as usize]);
             if a == b {
-                return Err(WireError::NoLength {
-                    edge: self.edge_name(e),
-                    at,
-                });
+                return Err(WireError::NoLength { edge: self.edge_name(e), at });
             }
             if let Some(other) = known.insert([a.min(b), a.max(b)], e) {
                 let [what, other] = [e, other].map(|e| self.edge_name(e));
@@ -254,11 +238,7 @@ impl Surface {
         for (p, &[v, _]) in self.wires.points.iter().enumerate() {
             if let Some(other) = known.insert(v, p) {
                 let [what, other] = [p, other].map(|p| self.point_name(p));
-                return Err(WireError::Repeated {
-                    what,
-                    other,
-                    at: self.points[v as usize],
-                });
+                return Err(WireError::Repeated { what, other, at: self.points[v as usize] });
             }
         }
         Ok(())
@@ -290,10 +270,7 @@ impl Surface {
                 }
             });
             edges.meeting(&bounds, |f| {
-                if let Some(c) = (f as usize > e)
-                    .then(|| edge.at_edge(&self.wire(f)))
-                    .flatten()
-                {
+                if let Some(c) = (f as usize > e).then(|| edge.at_edge(&self.wire(f))).flatten() {
                     touch(&what, &|| self.edge_name(f as usize), c.kind, c.at);
                 }
             });
@@ -312,24 +289,13 @@ impl Surface {
             edges.meeting(&bounds, |e| {
                 let edge = self.wire(e);
                 if !edge.ids.contains(&v) && is_on_edge(p, edge.ends) {
-                    touch(
-                        &what,
-                        &|| self.edge_name(e as usize),
-                        ContactKind::VertexOnEdge,
-                        p,
-                    );
+                    touch(&what, &|| self.edge_name(e as usize), ContactKind::VertexOnEdge, p);
                 }
             });
         }
         match first {
             None => Ok(is_free),
-            Some((what, other, kind, at)) => Err(WireError::Touching {
-                what,
-                other,
-                kind,
-                at,
-                n,
-            }),
+            Some((what, other, kind, at)) => Err(WireError::Touching { what, other, kind, at, n }),
         }
     }
 }

@@ -20,9 +20,7 @@ pub struct Owners {
 impl Owners {
     /// The faces of a new cut between two parts.
     pub fn new(faces: u32, low: u32, high: u32) -> Self {
-        Self {
-            faces: vec![[low, high]; faces as usize],
-        }
+        Self { faces: vec![[low, high]; faces as usize] }
     }
 
     /// Little-endian words, low before high.
@@ -38,9 +36,7 @@ impl Owners {
         }
         let word = |b: &[u8]| u32::from_le_bytes([b[0], b[1], b[2], b[3]]);
         let faces = bytes.chunks_exact(8);
-        Some(Self {
-            faces: faces.map(|b| [word(b), word(&b[4..])]).collect(),
-        })
+        Some(Self { faces: faces.map(|b| [word(b), word(&b[4..])]).collect() })
     }
 
     /// Who has the face on the other side; `None` when the cut has no such face.
@@ -57,9 +53,7 @@ impl Owners {
             [a, b] if b == part => Some([index, a]),
             _ => None,
         };
-        FacesAcross {
-            faces: faces.filter_map(other).collect(),
-        }
+        FacesAcross { faces: faces.filter_map(other).collect() }
     }
 }
 

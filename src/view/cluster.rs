@@ -129,12 +129,7 @@ impl<T: Copy> Cluster<T> {
         let offsets = (normal * normal.dot(a)).to_array().map(|x| x as f32);
         let nodes = corners.map(|sum| {
             let n = 1;
-            self.number(&ClusterCell {
-                sum,
-                n,
-                planes,
-                offsets,
-            })
+            self.number(&ClusterCell { sum, n, planes, offsets })
         });
         if self.is_new(nodes) {
             self.triangles.push(nodes);
@@ -156,9 +151,7 @@ impl<T: Copy> Cluster<T> {
     fn number(&mut self, vertices: &ClusterCell) -> u32 {
         let at = (vertices.mean() / self.cell).to_array();
         let last = f64::from((1u32 << BITS) - 1);
-        let key = at
-            .into_iter()
-            .fold(0, |key, x| key << BITS | x.clamp(0.0, last) as u64);
+        let key = at.into_iter().fold(0, |key, x| key << BITS | x.clamp(0.0, last) as u64);
         match self.numbers.entry(key) {
             Entry::Occupied(entry) => {
                 self.cells[*entry.get() as usize].add(vertices);
@@ -230,11 +223,7 @@ impl<T: Copy> Cluster<T> {
             points,
             triangles,
             tags: self.tags,
-            cell: if self.is_joined {
-                self.cell * self.side
-            } else {
-                0.0
-            },
+            cell: if self.is_joined { self.cell * self.side } else { 0.0 },
             of: self.of,
         }
     }
@@ -245,10 +234,7 @@ mod tests {
     use super::*;
 
     fn unit() -> Aabb {
-        Aabb {
-            low: Point::ZERO,
-            high: Point::ONE,
-        }
+        Aabb { low: Point::ZERO, high: Point::ONE }
     }
 
     /// The unit square of `n` by `n` squares, two triangles each.
@@ -307,12 +293,7 @@ mod tests {
         for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
             let [u, v] = [i, j].map(|k| f64::from(k) * step);
             let at = |u: f64, v: f64| [Point::new(u, v, 0.0), Point::new(0.0, v, u)];
-            let corners = [
-                at(u, v),
-                at(u + step, v),
-                at(u + step, v + step),
-                at(u, v + step),
-            ];
+            let corners = [at(u, v), at(u + step, v), at(u + step, v + step), at(u, v + step)];
             for wall in 0..2 {
                 let [a, b, c, d] = corners.map(|both| both[wall]);
                 cluster.push([a, b, c], 0);

@@ -51,10 +51,7 @@ pub(super) struct EdgeSample {
 
 impl EdgeSample {
     pub fn new() -> Self {
-        Self {
-            edges: Vec::with_capacity(4 * EDGES_LEAST),
-            most: u64::MAX,
-        }
+        Self { edges: Vec::with_capacity(4 * EDGES_LEAST), most: u64::MAX }
     }
 
     /// The six edges of a tetrahedron.
@@ -142,13 +139,7 @@ mod tests {
     use crate::geom::Point;
 
     fn corner(id: u64, x: f64) -> Corner {
-        Corner {
-            point: Point::new(x, 0.0, 0.0),
-            mix: 0,
-            id: 7 << 52 | id,
-            tag: 0,
-            h: 1.0,
-        }
+        Corner { point: Point::new(x, 0.0, 0.0), mix: 0, id: 7 << 52 | id, tag: 0, h: 1.0 }
     }
 
     #[test]

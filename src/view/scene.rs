@@ -62,10 +62,7 @@ pub struct Scene<'a> {
 impl QuerySession {
     /// The surfaces of the mesh, for pictures in space; one at a time takes up to 24 MB of `budget`.
     pub fn scene<'a>(&'a mut self, budget: &'a Budget) -> Scene<'a> {
-        Scene {
-            inquiry: self,
-            budget,
-        }
+        Scene { inquiry: self, budget }
     }
 }
 
@@ -171,9 +168,7 @@ impl Scene<'_> {
 
     fn cluster<T: Copy>(&self, most: usize) -> Result<(Cluster<T>, Lease), QueryError> {
         let bytes = most as u64 * TRIANGLE_BYTES;
-        let lease = self
-            .budget
-            .lease(bytes, "triangles of a picture in space")?;
+        let lease = self.budget.lease(bytes, "triangles of a picture in space")?;
         Ok((Cluster::new(&self.inquiry.bounds(), most), lease))
     }
 

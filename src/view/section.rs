@@ -27,18 +27,9 @@ impl View {
     pub fn new(origin: Point, normal: Point) -> Self {
         // Twice, since one division leaves very long and very short ones off by more than rounding.
         let normal = (normal / normal.abs().max_element()).normalize();
-        let upright = if normal.z.abs() > 0.999 {
-            Point::Y
-        } else {
-            Point::Z
-        };
+        let upright = if normal.z.abs() > 0.999 { Point::Y } else { Point::Z };
         let up = (upright - normal * upright.dot(normal)).normalize();
-        Self {
-            origin,
-            right: up.cross(normal),
-            up,
-            normal,
-        }
+        Self { origin, right: up.cross(normal), up, normal }
     }
 
     /// How much a face with this normal faces the viewer, -1 to 1.
@@ -153,10 +144,7 @@ impl QuerySession {
         dir: &Path,
         memory_bytes: u64,
     ) -> Result<Section, QueryError> {
-        selection.solids.push(Solid::Plane {
-            point: view.origin,
-            normal: view.normal,
-        });
+        selection.solids.push(Solid::Plane { point: view.origin, normal: view.normal });
         let mut all = Pieces::new(dir, memory_bytes);
         for tet in self.select(selection)? {
             let tet = tet?;
@@ -193,10 +181,7 @@ impl Pieces {
     }
 
     pub fn finish(self) -> Result<Section, QueryError> {
-        Ok(Section {
-            extent: self.extent,
-            sorted: self.sorter.finish()?,
-        })
+        Ok(Section { extent: self.extent, sorted: self.sorter.finish()? })
     }
 }
 
@@ -246,10 +231,7 @@ pub(super) fn pieces(view: &View, crinkle: bool, tet: &Hit) -> Vec<(f64, Piece)>
     if !crinkle {
         let polygon = polygon(view, tet);
         let seen = polygon.len() >= 3;
-        return seen
-            .then(|| (0.0, piece(&polygon, [0.0; 4], 1.0)))
-            .into_iter()
-            .collect();
+        return seen.then(|| (0.0, piece(&polygon, [0.0; 4], 1.0))).into_iter().collect();
     }
     let mut found = Vec::new();
     for face in FACES {

@@ -38,11 +38,7 @@ impl QuerySession {
         dir: &Path,
         memory_bytes: u64,
     ) -> Result<Section, QueryError> {
-        let mut all = Shown {
-            view,
-            clip,
-            pieces: Pieces::new(dir, memory_bytes),
-        };
+        let mut all = Shown { view, clip, pieces: Pieces::new(dir, memory_bytes) };
         match shell {
             ShellView::Boundary => {
                 for place in 0..self.rows.len() {

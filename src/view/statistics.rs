@@ -81,10 +81,7 @@ impl BinCounts {
             angles: vec![0; ANGLE_BINS],
             sum: 0,
             size: [f64::INFINITY, 0.0],
-            excess: Excess {
-                worst: 1.0,
-                above_two: 0,
-            },
+            excess: Excess { worst: 1.0, above_two: 0 },
         }
     }
 
@@ -121,10 +118,7 @@ impl BinCounts {
     }
 
     fn and(mut self, other: Self) -> Self {
-        let pairs = [
-            (&mut self.quality, &other.quality),
-            (&mut self.angles, &other.angles),
-        ];
+        let pairs = [(&mut self.quality, &other.quality), (&mut self.angles, &other.angles)];
         for (own, other) in pairs {
             own.iter_mut().zip(other).for_each(|(a, b)| *a += b);
         }
@@ -188,17 +182,9 @@ impl QuerySession {
         }
         Ok(Statistics {
             tets: total,
-            quality: Histogram {
-                least: 1.0,
-                width: 1.0 / QUALITY_PER_UNIT,
-                bins: counts.quality,
-            },
+            quality: Histogram { least: 1.0, width: 1.0 / QUALITY_PER_UNIT, bins: counts.quality },
             quality_mean: counts.sum as f64 / 2f64.powi(32) / total.max(1) as f64,
-            angles: Histogram {
-                least: 0.0,
-                width: 2.0,
-                bins: counts.angles,
-            },
+            angles: Histogram { least: 0.0, width: 2.0, bins: counts.angles },
             size: counts.size,
             excess: counts.excess,
             edges: sample.finish(),

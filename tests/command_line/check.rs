@@ -29,11 +29,7 @@ fn an_open_surface_tells_its_holes() {
     assert_eq!(done.exit(), Some(3));
     assert_eq!(answer["open_edges"], 4);
     let rim = &answer["open_loops"][0];
-    assert_eq!(
-        (&rim["edges"], rim["length"].as_f64()),
-        (&4.into(), Some(4.0)),
-        "{rim}"
-    );
+    assert_eq!((&rim["edges"], rim["length"].as_f64()), (&4.into(), Some(4.0)), "{rim}");
     assert!(rim["at"].is_array() && rim["triangle"].is_u64(), "{rim}");
     assert!(answer["closing"]["smallest"].is_null(), "{answer}");
     let text = place.run_line("check open.off").stdout();
@@ -52,21 +48,13 @@ fn a_t_junction_is_named_and_divided() {
     let place = Place::new();
     place.write("a.off", off(&triangles));
     let error = place.run_line("mesh a.off --json").error();
-    assert!(
-        error["message"]
-            .as_str()
-            .is_some_and(|m| m.contains("T-junction")),
-        "{error}"
-    );
+    assert!(error["message"].as_str().is_some_and(|m| m.contains("T-junction")), "{error}");
     let answer = place.run_line("check a.off --json").json();
     assert_eq!(answer["t_junctions"][0]["distance"], 0.0, "{answer}");
     assert_eq!(answer["closing"]["smallest"], 0.0, "{answer}");
     let text = place.run_line("check a.off").stdout();
     assert!(text.contains("1 T-junction"), "{text}");
-    let answer = place
-        .run_line("check a.off --repair --write b.off --json")
-        .succeeds()
-        .json();
+    let answer = place.run_line("check a.off --repair --write b.off --json").succeeds().json();
     assert_eq!(answer["repair"]["divided"], 1, "{answer}");
     place.run_line("mesh b.off").succeeds();
 }
@@ -83,19 +71,9 @@ fn a_crack_is_joined_only_when_told_to() {
     let done = place.run_line("check a.off --repair --write fixed.off");
     assert_eq!(done.exit(), Some(3));
     assert!(done.stderr().contains("still with"), "{}", done.stderr());
-    let done = place
-        .run_line(&command.replace("OUT", "fixed.off"))
-        .succeeds();
-    assert!(
-        done.stdout().contains(" points joined"),
-        "{}",
-        done.stdout()
-    );
-    assert!(
-        done.stderr().contains("free of defects"),
-        "{}",
-        done.stderr()
-    );
+    let done = place.run_line(&command.replace("OUT", "fixed.off")).succeeds();
+    assert!(done.stdout().contains(" points joined"), "{}", done.stdout());
+    assert!(done.stderr().contains("free of defects"), "{}", done.stderr());
     place.run_line("mesh fixed.off").succeeds();
 }
 
@@ -108,29 +86,14 @@ fn each_repair_is_counted() {
     triangles.push([a, b, b]);
     let place = Place::new();
     place.write("a.off", off(&triangles));
-    let done = place
-        .run_line("check a.off --repair --write b.stl --json")
-        .succeeds();
+    let done = place.run_line("check a.off --repair --write b.stl --json").succeeds();
     let answer = done.json();
     let repair = &answer["repair"];
-    let counts = [
-        "collapsed_dropped",
-        "repeated_dropped",
-        "turned",
-        "divided",
-        "points_joined",
-    ]
-    .map(|field| repair[field].as_u64());
-    assert_eq!(
-        counts,
-        [Some(1), Some(1), Some(1), Some(0), Some(0)],
-        "{answer}"
-    );
+    let counts = ["collapsed_dropped", "repeated_dropped", "turned", "divided", "points_joined"]
+        .map(|field| repair[field].as_u64());
+    assert_eq!(counts, [Some(1), Some(1), Some(1), Some(0), Some(0)], "{answer}");
     assert_eq!(repair["before"]["n_defects"], 2, "{answer}");
-    assert_eq!(
-        (&answer["triangles"], &answer["valid"]),
-        (&12.into(), &true.into())
-    );
+    assert_eq!((&answer["triangles"], &answer["valid"]), (&12.into(), &true.into()));
     assert_eq!(answer["written"]["file"], "b.stl");
     place.run_line("mesh b.stl").succeeds();
 }
@@ -145,9 +108,7 @@ fn bad_triangles_are_written_to_be_looked_at() {
     let done = place.run_line("check a.off --write-bad bad.vtu --json");
     let answer = done.json();
     assert_eq!(done.exit(), Some(3));
-    let n = answer["bad_triangles"]["triangles"]
-        .as_u64()
-        .expect("a count");
+    let n = answer["bad_triangles"]["triangles"].as_u64().expect("a count");
     let mut ids: Vec<u64> = answer["defects"]
         .as_array()
         .expect("a list")
@@ -165,9 +126,7 @@ fn bad_triangles_are_written_to_be_looked_at() {
     for array in ["defect", "defects", "input_id", "label", "defect_names"] {
         assert!(head.contains(&format!("Name=\"{array}\"")), "{head}");
     }
-    let error = place
-        .run_line("check a.off --write-bad bad.txt --json")
-        .error();
+    let error = place.run_line("check a.off --write-bad bad.txt --json").error();
     assert_eq!(error["code"], "unknown-format", "{error}");
 }
 
@@ -175,9 +134,7 @@ fn bad_triangles_are_written_to_be_looked_at() {
 fn without_bad_triangles_no_file_is_written() {
     let place = Place::new();
     place.write("a.off", off(&cube_at(0.0, 0.0, 0.0)));
-    let answer = place
-        .run_line("check a.off --write-bad bad.vtu --json")
-        .json();
+    let answer = place.run_line("check a.off --write-bad bad.vtu --json").json();
     assert_eq!(answer["bad_triangles"]["triangles"], 0, "{answer}");
     assert!(answer["bad_triangles"]["file"].is_null(), "{answer}");
     assert!(!place.path("bad.vtu").exists());
@@ -186,18 +143,11 @@ fn without_bad_triangles_no_file_is_written() {
 #[test]
 fn fitness_is_told_and_advice_given() {
     let place = Place::new();
-    let answer = place
-        .run_line("check sample:knot,h=0.2 --json")
-        .succeeds()
-        .json();
+    let answer = place.run_line("check sample:knot,h=0.2 --json").succeeds().json();
     let fitness = &answer["fitness"];
     assert_eq!(fitness["small_angles"], 0, "{answer}");
     assert!(fitness["tets_expected"].as_f64() > Some(100.0), "{answer}");
-    assert_eq!(
-        answer["advice"].as_array().map(Vec::len),
-        Some(0),
-        "{answer}"
-    );
+    assert_eq!(answer["advice"].as_array().map(Vec::len), Some(0), "{answer}");
     let mut flat = cube_at(0.0, 0.0, 0.0);
     for p in flat.iter_mut().flatten() {
         p[2] *= 0.01;
@@ -215,10 +165,7 @@ fn cures_of_needles_are_tried_and_keep_their_promise() {
     let answer = place.run_line("check needles.off --json").succeeds().json();
     assert!(answer["fitness"]["least_quality"].as_f64() > Some(1e4));
     let cure = &answer["cures"][0];
-    assert_eq!(
-        (&cure["way"], &cure["weld"]),
-        (&json!("weld"), &json!(1e-5))
-    );
+    assert_eq!((&cure["way"], &cure["weld"]), (&json!("weld"), &json!(1e-5)));
     let text = place.run_line("check needles.off").succeeds().stdout();
     let command = "`tetdb check needles.off --repair --weld 1e-5 --write OUT`";
     assert!(text.contains(&format!("cure: {command}")), "{text}");

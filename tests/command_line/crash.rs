@@ -14,9 +14,8 @@ const SAMPLE: &str = "sample:balls,count=12";
 
 /// Starts a run and waits until its catalog is there.
 fn started(place: &Place) -> Child {
-    let child = place
-        .command(&["mesh", SAMPLE, "-o", "a.tetdb", "--threads", "1", "--json"])
-        .spawn();
+    let child =
+        place.command(&["mesh", SAMPLE, "-o", "a.tetdb", "--threads", "1", "--json"]).spawn();
     let mut child = child.expect("the program starts");
     while !place.path("a.tetdb/catalog.redb").exists() {
         let ended = child.try_wait().expect("the child can be asked");
@@ -63,25 +62,15 @@ fn a_killed_run_is_resumed_to_the_same_mesh() {
 
 fn is_finished(place: &Place) -> bool {
     let info = place.run_line("info a.tetdb --json").succeeds().json();
-    let finished = info["finished"]
-        .as_bool()
-        .expect("info says whether it is finished");
+    let finished = info["finished"].as_bool().expect("info says whether it is finished");
     let text = place.run_line("info a.tetdb").succeeds().stdout();
-    assert_eq!(
-        text.contains("unfinished") && text.contains("tetdb resume"),
-        !finished,
-        "{text}"
-    );
+    assert_eq!(text.contains("unfinished") && text.contains("tetdb resume"), !finished, "{text}");
     finished
 }
 
 fn refuses_to_be_read(place: &Place) {
     let line = format!("mesh {SAMPLE} -o a.tetdb --json");
-    for line in [
-        "verify a.tetdb --json",
-        "digest a.tetdb --json",
-        line.as_str(),
-    ] {
+    for line in ["verify a.tetdb --json", "digest a.tetdb --json", line.as_str()] {
         let done = place.run_line(line);
         assert_eq!(
             (done.error()["code"].as_str(), done.exit()),
@@ -99,10 +88,7 @@ fn a_store_being_written_is_busy() {
         |child: &mut Child| child.try_wait().expect("the child can be asked").is_none();
     let done = place.run_line("info a.tetdb --json");
     if still_running(&mut child) {
-        assert_eq!(
-            (done.error()["code"].as_str(), done.exit()),
-            (Some("busy"), Some(5))
-        );
+        assert_eq!((done.error()["code"].as_str(), done.exit()), (Some("busy"), Some(5)));
     }
     child.kill().expect("the child can be killed");
     child.wait().expect("the child can be waited for");
@@ -117,10 +103,7 @@ fn a_stopped_run_says_so_and_can_be_resumed() {
         let mut child = started(&place);
         std::thread::sleep(Duration::from_millis(30));
         let id = child.id().to_string();
-        let sent = Command::new("kill")
-            .args([signal, &id])
-            .status()
-            .expect("kill is there");
+        let sent = Command::new("kill").args([signal, &id]).status().expect("kill is there");
         assert!(sent.success());
         let status = child.wait().expect("the child can be waited for");
         let mut stderr = String::new();
@@ -133,10 +116,7 @@ fn a_stopped_run_says_so_and_can_be_resumed() {
         // A run that ended on its own before the signal came is no failure of stopping.
         if status.code() != Some(0) {
             assert_eq!(status.code(), Some(exit), "{stderr}");
-            assert!(
-                stderr.contains("\"stopped\"") && stderr.contains("resume"),
-                "{stderr}"
-            );
+            assert!(stderr.contains("\"stopped\"") && stderr.contains("resume"), "{stderr}");
         }
         let resumed: Done = place.run_line("resume a.tetdb").succeeds();
         assert!(resumed.stdout().contains(&expected), "{}", resumed.stdout());
@@ -149,20 +129,15 @@ fn a_stopped_run_says_so_and_can_be_resumed() {
 fn a_killed_replacement_is_taken_up() {
     let place = Place::new();
     let expected = undisturbed(&place);
-    let (old, new) = (
-        "mesh sample:box,h=0.2 -o a.tetdb",
-        ["mesh", SAMPLE, "-o", "a.tetdb", "--force"],
-    );
+    let (old, new) =
+        ("mesh sample:box,h=0.2 -o a.tetdb", ["mesh", SAMPLE, "-o", "a.tetdb", "--force"]);
     let begun = |place: &Place| {
         let mut child = place
             .command(&[&new[..], &["--threads", "1"]].concat())
             .spawn()
             .expect("the program starts");
         // Until the coarse mesh is there, or the end.
-        while !place
-            .path("a.tetdb.being-made/subdomain-00000-g1.redb")
-            .exists()
-        {
+        while !place.path("a.tetdb.being-made/subdomain-00000-g1.redb").exists() {
             if child.try_wait().expect("the child can be asked").is_some() {
                 break;
             }
@@ -193,16 +168,12 @@ fn a_killed_replacement_is_taken_up() {
     whole(&place);
     place.run_line(old).succeeds();
     begun(&place);
-    place
-        .run_line(&format!("{old} --force --optimize none"))
-        .succeeds();
+    place.run_line(&format!("{old} --force --optimize none")).succeeds();
     assert_ne!(place.digest("a.tetdb"), expected);
     assert!(!place.path("a.tetdb.being-made").exists());
     // Killed between two renames, and before the old one was gone.
-    for (from, to) in [
-        ("whole.tetdb", "a.tetdb.being-made"),
-        ("a.tetdb", "a.tetdb.being-replaced"),
-    ] {
+    for (from, to) in [("whole.tetdb", "a.tetdb.being-made"), ("a.tetdb", "a.tetdb.being-replaced")]
+    {
         std::fs::rename(place.path(from), place.path(to)).expect("names can be changed");
     }
     place.run_line("resume a.tetdb").succeeds();
@@ -213,25 +184,18 @@ fn a_killed_replacement_is_taken_up() {
 #[test]
 fn a_replacement_removes_nothing_of_a_user() {
     let place = Place::new();
-    place
-        .run_line("mesh sample:box,h=0.2 -o a.tetdb")
-        .succeeds();
+    place.run_line("mesh sample:box,h=0.2 -o a.tetdb").succeeds();
     let first = place.digest("a.tetdb");
     let copies = ["a.tetdb-old", "a.tetdb-new"];
     for copy in copies {
-        place
-            .run_line(&format!("mesh sample:box,h=0.2 -o {copy}"))
-            .succeeds();
+        place.run_line(&format!("mesh sample:box,h=0.2 -o {copy}")).succeeds();
     }
     let own = place.path("a.tetdb.being-made");
     std::fs::create_dir(&own).expect("a folder");
     std::fs::write(own.join("notes.txt"), "mine").expect("a file");
     let again = "mesh sample:box,h=0.25 -o a.tetdb --force";
     let done = place.run_line(&format!("{again} --json"));
-    assert_eq!(
-        (done.error()["code"].as_str(), done.exit()),
-        (Some("not-a-store"), Some(8))
-    );
+    assert_eq!((done.error()["code"].as_str(), done.exit()), (Some("not-a-store"), Some(8)));
     assert!(own.join("notes.txt").exists());
     assert_eq!(place.digest("a.tetdb"), first);
     std::fs::remove_dir_all(&own).expect("the folder can be removed");

@@ -13,9 +13,7 @@ use super::place::Place;
 /// A finished store of a box, and the path of its one sub-domain.
 fn finished() -> (Place, std::path::PathBuf) {
     let place = Place::new();
-    place
-        .run_line("mesh sample:box,h=0.2 -o box.tetdb")
-        .succeeds();
+    place.run_line("mesh sample:box,h=0.2 -o box.tetdb").succeeds();
     let file = fs::read_dir(place.path("box.tetdb"))
         .expect("a store is a folder")
         .map(|entry| entry.expect("an entry is readable").path())
@@ -29,13 +27,9 @@ fn a_changed_byte_in_any_chunk_is_found() {
     let (place, file) = finished();
     let good = fs::read(&file).expect("the file is readable");
     // The magic of a sealed chunk stands behind its checksum.
-    let chunks: Vec<usize> = (0..good.len() - 64)
-        .filter(|&i| good[i..].starts_with(b"TETC"))
-        .collect();
-    assert!(
-        chunks.len() >= 3,
-        "tetrahedra, vertices and facets have chunks, found {chunks:?}"
-    );
+    let chunks: Vec<usize> =
+        (0..good.len() - 64).filter(|&i| good[i..].starts_with(b"TETC")).collect();
+    assert!(chunks.len() >= 3, "tetrahedra, vertices and facets have chunks, found {chunks:?}");
     for magic in chunks {
         let mut bad = good.clone();
         bad[magic + 60] ^= 0x10;
@@ -49,9 +43,7 @@ fn a_changed_byte_in_any_chunk_is_found() {
             magic + 60
         );
         assert!(
-            error["message"]
-                .as_str()
-                .is_some_and(|m| m.contains("subdomain-00000")),
+            error["message"].as_str().is_some_and(|m| m.contains("subdomain-00000")),
             "{error}"
         );
     }
@@ -65,12 +57,7 @@ fn a_damaged_or_missing_database_file_is_found() {
     let good = fs::read(&file).expect("the file is readable");
     let mut bad = good.clone();
     bad[..512].fill(0xff);
-    for content in [
-        Some(&bad[..]),
-        Some(&good[..good.len() / 2]),
-        Some(b""),
-        None,
-    ] {
+    for content in [Some(&bad[..]), Some(&good[..good.len() / 2]), Some(b""), None] {
         match content {
             Some(bytes) => fs::write(&file, bytes).expect("the file is writable"),
             None => fs::remove_file(&file).expect("the file can be removed"),
@@ -126,13 +113,7 @@ fn another_format_version_is_refused() {
 fn flip(place: &Place, begins: &str, generation: bool, n: usize) -> String {
     let mut names: Vec<String> = fs::read_dir(place.path("a.tetdb"))
         .expect("a store is a folder")
-        .map(|entry| {
-            entry
-                .expect("an entry")
-                .file_name()
-                .to_string_lossy()
-                .into_owned()
-        })
+        .map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned())
         .filter(|name| name.starts_with(begins))
         .collect();
     // Of two generations the shorter name, then the lesser one, is the older.
@@ -154,12 +135,8 @@ fn flip(place: &Place, begins: &str, generation: bool, n: usize) -> String {
 #[test]
 fn damage_in_what_is_only_kept_is_found_and_all_of_it_listed() {
     let place = Place::new();
-    place
-        .run_line("mesh sample:box,h=0.045 -o a.tetdb --subdomains 2")
-        .succeeds();
-    place
-        .run_line("resaturate a.tetdb --subdomain 1 --refine-by 0.9")
-        .succeeds();
+    place.run_line("mesh sample:box,h=0.045 -o a.tetdb --subdomains 2").succeeds();
+    place.run_line("resaturate a.tetdb --subdomain 1 --refine-by 0.9").succeeds();
     place.run_line("verify a.tetdb").succeeds();
     let digest = place.digest("a.tetdb");
     let before = flip(&place, "subdomain-00001", true, 1);
@@ -175,23 +152,14 @@ fn damage_in_what_is_only_kept_is_found_and_all_of_it_listed() {
     refused("verify a.tetdb --json", &[&before, &leaf]);
     // The mesh is not harmed, and what can be dropped can be.
     assert_eq!(place.digest("a.tetdb"), digest);
-    place
-        .run_line("query a.tetdb --point 0.1,0.2,0.3")
-        .succeeds();
+    place.run_line("query a.tetdb --point 0.1,0.2,0.3").succeeds();
     refused("resaturate a.tetdb --subdomain 0 --json", &[&leaf]);
     place.run_line("resaturate a.tetdb --forget").succeeds();
     let part = flip(&place, "subdomain-00001", false, 2);
     refused("verify a.tetdb --json", &[&part, &leaf]);
-    assert!(
-        !place
-            .run_line("verify a.tetdb --json")
-            .stderr()
-            .contains(&before)
-    );
+    assert!(!place.run_line("verify a.tetdb --json").stderr().contains(&before));
     // A coarse leaf that is sound makes its sub-domain again; the other one is past help.
-    place
-        .run_line("resaturate a.tetdb --repair --no-verify")
-        .succeeds();
+    place.run_line("resaturate a.tetdb --repair --no-verify").succeeds();
     assert_eq!(place.digest("a.tetdb"), digest);
     refused("verify a.tetdb --json", &[&leaf]);
 }
@@ -199,9 +167,7 @@ fn damage_in_what_is_only_kept_is_found_and_all_of_it_listed() {
 #[test]
 fn an_older_file_of_a_part_in_the_place_of_the_newer_is_found() {
     let (place, old) = finished();
-    place
-        .run_line("resaturate box.tetdb --subdomain 0 --refine-by 0.8")
-        .succeeds();
+    place.run_line("resaturate box.tetdb --subdomain 0 --refine-by 0.8").succeeds();
     let files = fs::read_dir(place.path("box.tetdb")).expect("a store is a folder");
     let new = files
         .map(|entry| entry.expect("an entry is readable").path())

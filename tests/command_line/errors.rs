@@ -39,14 +39,8 @@ const ELSEWHERE: &[(&str, &str)] = &[
 /// Words no test provokes, and why.
 const UNPROVOKED: &[(&str, &str)] = &[
     ("internal", "a case that provokes it is a bug to mend"),
-    (
-        "surface-too-large",
-        "takes more than four billion triangles",
-    ),
-    (
-        "unrecovered-triangles",
-        "every surface known to end so has been dealt with",
-    ),
+    ("surface-too-large", "takes more than four billion triangles"),
+    ("unrecovered-triangles", "every surface known to end so has been dealt with"),
     ("disk-full", "takes a disk to fill"),
     ("format-limit", "takes a mesh beyond 32-bit counts"),
 ];
@@ -65,26 +59,12 @@ struct Case {
 }
 
 const fn case(word: &'static str, exit: i32, line: &'static str, names: &'static str) -> Case {
-    Case {
-        word,
-        exit,
-        files: &[],
-        before: &[],
-        line,
-        names,
-    }
+    Case { word, exit, files: &[], before: &[], line, names }
 }
 
 /// A question to a store of one tetrahedron.
 const fn asked(word: &'static str, exit: i32, line: &'static str, names: &'static str) -> Case {
-    Case {
-        word,
-        exit,
-        files: &[("a.off", TETRA)],
-        before: &["mesh a.off"],
-        line,
-        names,
-    }
+    Case { word, exit, files: &[("a.off", TETRA)], before: &["mesh a.off"], line, names }
 }
 
 /// A surface file that `mesh` refuses.
@@ -94,55 +74,18 @@ const fn bad_file(
     line: &'static str,
     names: &'static str,
 ) -> Case {
-    Case {
-        word,
-        exit: 3,
-        files,
-        before: &[],
-        line,
-        names,
-    }
+    Case { word, exit: 3, files, before: &[], line, names }
 }
 
 const CASES: &[Case] = &[
-    case(
-        "usage",
-        2,
-        "mesh sample:box --threads 0 -o x.tetdb",
-        "--threads 0",
-    ),
+    case("usage", 2, "mesh sample:box --threads 0 -o x.tetdb", "--threads 0"),
     case("usage", 2, "estimate sample:box --threads 0", "--threads 0"),
     case("usage", 2, "verify a.tetdb --threads 0", "--threads 0"),
-    case(
-        "usage",
-        2,
-        "mesh sample:box --no-such-option",
-        "--no-such-option",
-    ),
-    case(
-        "usage",
-        2,
-        "mesh sample:box sample:knot -o x.tetdb",
-        "sample",
-    ),
-    case(
-        "bad-size",
-        2,
-        "mesh sample:box,h=0.5 --hsiz 0% -o x.tetdb",
-        "0%",
-    ),
-    case(
-        "bad-size",
-        2,
-        "mesh sample:box,h=0.5 --hmin 3 --hmax 1 -o x.tetdb",
-        "--hmin",
-    ),
-    case(
-        "bad-size",
-        2,
-        "mesh sample:box,h=0.5 --size-sphere 1,2,3 -o x.tetdb",
-        "--size-sphere",
-    ),
+    case("usage", 2, "mesh sample:box --no-such-option", "--no-such-option"),
+    case("usage", 2, "mesh sample:box sample:knot -o x.tetdb", "sample"),
+    case("bad-size", 2, "mesh sample:box,h=0.5 --hsiz 0% -o x.tetdb", "0%"),
+    case("bad-size", 2, "mesh sample:box,h=0.5 --hmin 3 --hmax 1 -o x.tetdb", "--hmin"),
+    case("bad-size", 2, "mesh sample:box,h=0.5 --size-sphere 1,2,3 -o x.tetdb", "--size-sphere"),
     Case {
         word: "bad-config",
         exit: 2,
@@ -151,82 +94,29 @@ const CASES: &[Case] = &[
         line: "mesh sample:box,h=0.5 --config bad.toml -o x.tetdb",
         names: "hsize",
     },
-    case(
-        "bad-memory",
-        2,
-        "mesh sample:box,h=0.5 --memory 512 -o x.tetdb",
-        "512",
-    ),
+    case("bad-memory", 2, "mesh sample:box,h=0.5 --memory 512 -o x.tetdb", "512"),
     asked("bad-query", 2, "query a.tetdb --box 1,1,1,0,0,0", "--box"),
     asked("bad-query", 2, "query a.tetdb --select id,shape", "shape"),
     asked("bad-query", 2, "query a.tetdb --tet 12", "12"),
-    asked(
-        "bad-expression",
-        2,
-        "query a.tetdb --where quality>",
-        "quality>",
-    ),
-    asked(
-        "bad-expression",
-        2,
-        "query a.tetdb --where quality+1",
-        "compares",
-    ),
+    asked("bad-expression", 2, "query a.tetdb --where quality>", "quality>"),
+    asked("bad-expression", 2, "query a.tetdb --where quality+1", "compares"),
     asked("no-such-part", 3, "query a.tetdb --tet 0:99", "0:99"),
     asked("no-such-part", 3, "query a.tetdb --ball cut1:7", "cut1:7"),
     asked("no-such-part", 3, "query a.tetdb --label hull", "hull"),
     asked("no-such-part", 3, "query a.tetdb --subdomain 4", "4"),
-    asked(
-        "unreadable-file",
-        3,
-        "query a.tetdb --points missing.txt",
-        "missing.txt",
-    ),
-    asked(
-        "unexpected-text",
-        3,
-        "query a.tetdb --points a.off",
-        "a.off, line 1",
-    ),
-    asked(
-        "unknown-format",
-        3,
-        "query a.tetdb --region 1 -o a.xyz",
-        "a.xyz",
-    ),
-    asked(
-        "bad-query",
-        2,
-        "snapshot a.tetdb a.svg --plane 9,9,9,0,0,1",
-        "--plane 9,9,9",
-    ),
-    asked(
-        "bad-query",
-        2,
-        "snapshot a.tetdb a.svg --size 10x10",
-        "10x10",
-    ),
+    asked("unreadable-file", 3, "query a.tetdb --points missing.txt", "missing.txt"),
+    asked("unexpected-text", 3, "query a.tetdb --points a.off", "a.off, line 1"),
+    asked("unknown-format", 3, "query a.tetdb --region 1 -o a.xyz", "a.xyz"),
+    asked("bad-query", 2, "snapshot a.tetdb a.svg --plane 9,9,9,0,0,1", "--plane 9,9,9"),
+    asked("bad-query", 2, "snapshot a.tetdb a.svg --size 10x10", "10x10"),
     asked("unknown-format", 3, "snapshot a.tetdb a.gif", "a.gif"),
     case("bad-sample", 2, "mesh sample:bix -o x.tetdb", "bix"),
     case("bad-sample", 2, "mesh sample:box,g=1 -o x.tetdb", "g"),
-    case(
-        "unreadable-file",
-        3,
-        "mesh missing.stl -o x.tetdb",
-        "missing.stl",
-    ),
-    bad_file(
-        "unknown-format",
-        &[("a.txt", "hello\n")],
-        "mesh a.txt -o x.tetdb",
-        "a.txt",
-    ),
+    case("unreadable-file", 3, "mesh missing.stl -o x.tetdb", "missing.stl"),
+    bad_file("unknown-format", &[("a.txt", "hello\n")], "mesh a.txt -o x.tetdb", "a.txt"),
     bad_file(
         "truncated-file",
-        &[(
-            "cut.stl",
-            "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n",
-        )],
+        &[("cut.stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n")],
         "mesh cut.stl -o x.tetdb",
         "cut.stl, line 6",
     ),
@@ -259,28 +149,17 @@ const CASES: &[Case] = &[
     ),
     bad_file(
         "coordinate-range",
-        &[(
-            "a.off",
-            "OFF\n4 1 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1e300\n3 0 2 3\n",
-        )],
+        &[("a.off", "OFF\n4 1 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1e300\n3 0 2 3\n")],
         "mesh a.off -o x.tetdb",
         "a.off, line 6",
     ),
     bad_file(
         "unsupported-content",
-        &[(
-            "a.mesh",
-            "MeshVersionFormatted 2\nDimension 2\nVertices\n1\n0 0 0\nEnd\n",
-        )],
+        &[("a.mesh", "MeshVersionFormatted 2\nDimension 2\nVertices\n1\n0 0 0\nEnd\n")],
         "mesh a.mesh -o x.tetdb",
         "a.mesh, line 2",
     ),
-    bad_file(
-        "empty-surface",
-        &[("a.stl", "")],
-        "mesh a.stl -o x.tetdb",
-        "a.stl",
-    ),
+    bad_file("empty-surface", &[("a.stl", "")], "mesh a.stl -o x.tetdb", "a.stl"),
     bad_file(
         "empty-surface",
         &[("a.off", "OFF\n3 0 0\n0 0 0\n1 0 0\n0 1 0\n")],
@@ -307,10 +186,7 @@ const CASES: &[Case] = &[
     ),
     bad_file(
         "open-surface",
-        &[(
-            "a.off",
-            "OFF\n4 3 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n",
-        )],
+        &[("a.off", "OFF\n4 3 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n")],
         "mesh a.off -o x.tetdb",
         "near (",
     ),
@@ -332,12 +208,7 @@ const CASES: &[Case] = &[
     ),
     case("lossy-format", 3, "sample knot,h=0.3 -o a.stlb", "a.stlb"),
     case("no-such-store", 3, "info missing.tetdb", "missing.tetdb"),
-    case(
-        "memory",
-        6,
-        "mesh sample:box,h=0.5 --memory 5MiB -o x.tetdb",
-        "5MiB",
-    ),
+    case("memory", 6, "mesh sample:box,h=0.5 --memory 5MiB -o x.tetdb", "5MiB"),
     case(
         "no-room",
         6,
@@ -391,10 +262,7 @@ fn each_case_ends_with_its_word() {
             "{said}"
         );
         assert_eq!(error["exit"].as_i64(), Some(i64::from(case.exit)), "{said}");
-        assert!(
-            error["help"].as_str().is_some_and(|h| !h.is_empty()),
-            "{said}"
-        );
+        assert!(error["help"].as_str().is_some_and(|h| !h.is_empty()), "{said}");
         let found = [&error["message"], &error["where"]]
             .iter()
             .any(|text| text.as_str().is_some_and(|t| t.contains(case.names)));
@@ -408,30 +276,17 @@ fn each_case_ends_with_its_word() {
             "{text}"
         );
         assert_eq!(done.exit(), Some(case.exit), "{text}");
-        assert_eq!(
-            place.names(),
-            names,
-            "`tetdb {}` left something behind",
-            case.line
-        );
+        assert_eq!(place.names(), names, "`tetdb {}` left something behind", case.line);
         helps_can_be_pasted(&place, error["help"].as_str().unwrap_or_default());
     }
 }
 
 /// Options named in the commands of a help text exist.
 fn helps_can_be_pasted(place: &Place, help: &str) {
-    for command in help
-        .split('`')
-        .skip(1)
-        .step_by(2)
-        .filter(|c| c.starts_with("tetdb "))
-    {
+    for command in help.split('`').skip(1).step_by(2).filter(|c| c.starts_with("tetdb ")) {
         let mut words = command.split_whitespace().skip(1);
         let name = words.next().filter(|w| !w.starts_with('-'));
-        let page = place
-            .run(&[name.unwrap_or("help"), "--help"])
-            .succeeds()
-            .stdout();
+        let page = place.run(&[name.unwrap_or("help"), "--help"]).succeeds().stdout();
         for option in words.filter(|w| w.starts_with("--") && *w != "--help") {
             assert!(
                 page.contains(option),
@@ -454,12 +309,7 @@ fn a_changed_surface_is_noticed() {
         (Some("surface-changed"), Some(8)),
         "{error}"
     );
-    assert!(
-        error["where"]
-            .as_str()
-            .is_some_and(|w| w.ends_with("a.off")),
-        "{error}"
-    );
+    assert!(error["where"].as_str().is_some_and(|w| w.ends_with("a.off")), "{error}");
 }
 
 #[test]
@@ -469,11 +319,7 @@ fn another_surfaces_mesh_is_invalid() {
     place.run_line("mesh a.off").succeeds();
     let done = place.run_line("verify a.tetdb --against sample:box,h=0.5");
     assert_eq!(done.exit(), Some(7), "{}", done.stderr());
-    assert!(
-        done.stderr().contains("error[invalid-mesh]: a.tetdb"),
-        "{}",
-        done.stderr()
-    );
+    assert!(done.stderr().contains("error[invalid-mesh]: a.tetdb"), "{}", done.stderr());
     // For programs this is an answer.
     let done = place.run_line("verify a.tetdb --against sample:box,h=0.5 --json");
     let report = done.json();
@@ -488,20 +334,11 @@ fn check_lists_defects_and_exits_3() {
     let done = place.run_line("check open.off --json");
     let answer = done.json();
     assert_eq!(
-        (
-            done.exit(),
-            answer["valid"].as_bool(),
-            answer["n_defects"].as_u64()
-        ),
+        (done.exit(), answer["valid"].as_bool(), answer["n_defects"].as_u64()),
         (Some(3), Some(false), Some(3)),
         "{answer}"
     );
-    assert!(
-        CODES
-            .iter()
-            .any(|row| answer["defects"][0]["code"] == row.code),
-        "{answer}"
-    );
+    assert!(CODES.iter().any(|row| answer["defects"][0]["code"] == row.code), "{answer}");
     place.write("closed.off", TETRA);
     assert_eq!(place.run_line("check closed.off").exit(), Some(0));
 }
@@ -522,11 +359,6 @@ fn every_word_of_the_table_has_a_case_or_a_reason() {
 fn the_table_agrees_with_the_cases() {
     for case in CASES {
         let row = CODES.iter().find(|row| row.code == case.word);
-        assert_eq!(
-            row.map(|row| i32::from(row.exit)),
-            Some(case.exit),
-            "{}",
-            case.word
-        );
+        assert_eq!(row.map(|row| i32::from(row.exit)), Some(case.exit), "{}", case.word);
     }
 }

@@ -9,18 +9,8 @@ use super::place::Place;
 
 /// What `info` says, without what a form may change.
 fn info(place: &Place, store: &str) -> Value {
-    let mut info = place
-        .run_line(&format!("info {store} --json"))
-        .succeeds()
-        .json();
-    for key in [
-        "store",
-        "bytes",
-        "catalog_bytes",
-        "previous_bytes",
-        "options",
-        "journal",
-    ] {
+    let mut info = place.run_line(&format!("info {store} --json")).succeeds().json();
+    for key in ["store", "bytes", "catalog_bytes", "previous_bytes", "options", "journal"] {
         info[key] = Value::Null;
     }
     for part in info["subdomains"].as_array_mut().expect("a list") {
@@ -54,13 +44,9 @@ fn same(place: &Place) {
         files.map(|file| std::fs::read(place.path(&file)).expect("just written"))
     });
     assert!(packed == pages, "exports differ");
-    place
-        .run_line("compare packed.tetdb pages.tetdb")
-        .succeeds();
+    place.run_line("compare packed.tetdb pages.tetdb").succeeds();
     let against = "sample:box,h=0.045";
-    place
-        .run_line(&format!("verify pages.tetdb --full --against {against}"))
-        .succeeds();
+    place.run_line(&format!("verify pages.tetdb --full --against {against}")).succeeds();
 }
 
 #[test]
@@ -72,10 +58,7 @@ fn pages_and_chunks_are_one_mesh() {
     }
     same(&place);
     let state = |store: &str| {
-        let info = place
-            .run_line(&format!("info {store} --json"))
-            .succeeds()
-            .json();
+        let info = place.run_line(&format!("info {store} --json")).succeeds().json();
         info["subdomains"][1]["state"].as_str().map(str::to_owned)
     };
     for store in ["packed.tetdb", "pages.tetdb"] {
@@ -94,9 +77,7 @@ fn pages_and_chunks_are_one_mesh() {
 #[test]
 fn damage_in_a_page_is_named() {
     let place = Place::new();
-    place
-        .run_line("mesh sample:box,h=0.1 -o a.tetdb --seal none")
-        .succeeds();
+    place.run_line("mesh sample:box,h=0.1 -o a.tetdb --seal none").succeeds();
     let file = std::fs::read_dir(place.path("a.tetdb"))
         .expect("a folder")
         .map(|entry| entry.expect("an entry").path())
@@ -105,10 +86,7 @@ fn damage_in_a_page_is_named() {
     let mut bytes = std::fs::read(&file).expect("a file");
     // Pages of 64 KiB: this is in the middle of one that holds tetrahedra.
     let magic = b"TETP\x01\x00\x01\x00";
-    let header = bytes
-        .windows(magic.len())
-        .position(|w| w == magic)
-        .expect("a page of tetrahedra");
+    let header = bytes.windows(magic.len()).position(|w| w == magic).expect("a page of tetrahedra");
     bytes[header - 30_000] ^= 4;
     std::fs::write(&file, bytes).expect("room");
     let done = place.run_line("verify a.tetdb --json");

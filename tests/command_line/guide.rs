@@ -18,10 +18,7 @@ const ERRORS: &str = include_str!("../../src/guide/errors.md");
 /// What stands before a command in a checkout.
 const CARGO_RUN: &str = "cargo run --release -- ";
 /// The command that runs this very test, and those that only build.
-const NOT_HERE: [&str; 2] = [
-    "cargo test --profile quick --workspace",
-    "cargo install --path .",
-];
+const NOT_HERE: [&str; 2] = ["cargo test --profile quick --workspace", "cargo install --path ."];
 /// The README's first sample is smaller here; `.ci/run` runs it in full.
 const SMALLER: (&str, &str) = ("count=100", "count=3");
 
@@ -52,11 +49,7 @@ fn steps(page: &str) -> Vec<Step> {
                     let command = command.to_owned();
                     goes_on = command.ends_with('\\');
                     let shown = Vec::new();
-                    steps.push(Step {
-                        command,
-                        exit: 0,
-                        shown,
-                    });
+                    steps.push(Step { command, exit: 0, shown });
                 }
                 None => {
                     let step = steps.last_mut().expect("a command stands before answers");
@@ -96,10 +89,7 @@ impl Step {
         assert_eq!(status.code(), Some(self.exit), "$ {command}\n{answer}");
         let finds_nothing =
             |line: &str| line.starts_with("0 found") || line.contains("\"found\":0}");
-        assert!(
-            !answer.lines().any(finds_nothing),
-            "$ {command}\nfinds nothing"
-        );
+        assert!(!answer.lines().any(finds_nothing), "$ {command}\nfinds nothing");
         let mut lines: VecDeque<&str> = answer.lines().collect();
         for shown in &self.shown {
             let found = lines.iter().position(|line| is_like(line, shown));
@@ -118,9 +108,9 @@ fn is_like(line: &str, shown: &str) -> bool {
     for (i, part) in parts.iter().enumerate() {
         let at = match (i, parts.len()) {
             (0, _) => rest.starts_with(part).then_some(0),
-            (i, n) if i + 1 == n => rest
-                .ends_with(part)
-                .then(|| rest.len().saturating_sub(part.len())),
+            (i, n) if i + 1 == n => {
+                rest.ends_with(part).then(|| rest.len().saturating_sub(part.len()))
+            }
             _ => rest.find(part),
         };
         match at {
@@ -184,11 +174,7 @@ chapters! {
 #[test]
 fn the_readme() {
     runs(README, 2);
-    assert_eq!(
-        steps(README)[1].command,
-        NOT_HERE[0],
-        "the second command runs the tests"
-    );
+    assert_eq!(steps(README)[1].command, NOT_HERE[0], "the second command runs the tests");
 }
 
 /// Two screens, at most.
@@ -218,11 +204,7 @@ fn every_chapter_is_a_module_and_in_the_list() {
     for file in files.expect("the guide is a folder") {
         let path = file.expect("an entry is readable").path();
         if path.extension().is_some_and(|ending| ending == "md") {
-            let name = path
-                .file_stem()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned();
+            let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
             assert!(CHAPTERS.iter().any(|(chapter, _)| *chapter == name));
             assert!(modules.contains(&format!("include_str!(\"{name}.md\")")));
         }
@@ -235,36 +217,21 @@ fn the_table_of_errors_is_the_programs() {
         .lines()
         .filter_map(|line| {
             let mut cells = line.strip_prefix("| `")?.strip_suffix(" |")?.split(" | ");
-            let (word, exit, meaning) = (
-                cells.next()?.strip_suffix('`')?,
-                cells.next()?,
-                cells.next()?,
-            );
-            Some((
-                word.to_owned(),
-                exit.split('/').next()?.parse().ok()?,
-                meaning.to_owned(),
-            ))
+            let (word, exit, meaning) =
+                (cells.next()?.strip_suffix('`')?, cells.next()?, cells.next()?);
+            Some((word.to_owned(), exit.split('/').next()?.parse().ok()?, meaning.to_owned()))
         })
         .collect();
-    let own: Vec<(String, u8, String)> = CODES
-        .iter()
-        .map(|row| (row.code.to_owned(), row.exit, row.meaning.to_owned()))
-        .collect();
+    let own: Vec<(String, u8, String)> =
+        CODES.iter().map(|row| (row.code.to_owned(), row.exit, row.meaning.to_owned())).collect();
     assert_eq!(rows, own);
 }
 
 #[test]
 fn the_readme_names_every_command() {
-    let help = super::place::Place::new()
-        .run(&["--help"])
-        .succeeds()
-        .stdout();
-    let commands = help
-        .lines()
-        .skip_while(|l| *l != "Commands:")
-        .skip(1)
-        .take_while(|l| !l.is_empty());
+    let help = super::place::Place::new().run(&["--help"]).succeeds().stdout();
+    let commands =
+        help.lines().skip_while(|l| *l != "Commands:").skip(1).take_while(|l| !l.is_empty());
     let mut n = 0;
     for line in commands {
         let name = line.split_whitespace().next().unwrap_or_default();

@@ -11,22 +11,11 @@ use super::place::Place;
 
 const PAGE: &str = include_str!("../../src/guide/scripting.md");
 /// Keys below these are of any name.
-const FREE: [&str; 4] = [
-    "options",
-    "subdomains[].sizes.options",
-    "findings",
-    "measures.chunks",
-];
+const FREE: [&str; 4] = ["options", "subdomains[].sizes.options", "findings", "measures.chunks"];
 
 /// The commands of each section, in order. The surfaces are written before.
 const RUNS: [(&str, &[&str]); 16] = [
-    (
-        "sample",
-        &[
-            "sample box,h=0.045 -o box.stl",
-            "sample sphere,h=0.2 -o sphere.stl",
-        ],
-    ),
+    ("sample", &["sample box,h=0.045 -o box.stl", "sample sphere,h=0.2 -o sphere.stl"]),
     (
         "check",
         &[
@@ -37,10 +26,7 @@ const RUNS: [(&str, &[&str]); 16] = [
             "check holes.off --repair --weld 1e-3 --write fixed.off",
         ],
     ),
-    (
-        "estimate",
-        &["estimate box.stl --subdomains 2 --memory 256MiB --workers 4"],
-    ),
+    ("estimate", &["estimate box.stl --subdomains 2 --memory 256MiB --workers 4"]),
     (
         "info",
         &[
@@ -54,22 +40,10 @@ const RUNS: [(&str, &[&str]); 16] = [
     ("work", &["work t.tetdb --task 1"]),
     ("gather", &["gather t.tetdb"]),
     ("digest", &["digest a.tetdb"]),
-    (
-        "verify",
-        &[
-            "verify a.tetdb --full",
-            "verify a.tetdb --against sphere.stl",
-        ],
-    ),
+    ("verify", &["verify a.tetdb --full", "verify a.tetdb --against sphere.stl"]),
     ("compare", &["compare a.tetdb a.tetdb"]),
-    (
-        "export",
-        &["export a.tetdb a.vtu a.npy", "export a.tetdb a.json"],
-    ),
-    (
-        "refine-surface",
-        &["refine-surface sphere.stl fine.stl --hsiz 0.1"],
-    ),
+    ("export", &["export a.tetdb a.vtu a.npy", "export a.tetdb a.json"]),
+    ("refine-surface", &["refine-surface sphere.stl fine.stl --hsiz 0.1"]),
     (
         "query",
         &[
@@ -171,11 +145,7 @@ fn every_key_is_documented_and_no_other() {
         let mut found = BTreeSet::new();
         for line in lines {
             let done = place.run_line(&format!("{line} --json"));
-            assert!(
-                matches!(done.exit(), Some(0 | 3 | 7)),
-                "{line}: {}",
-                done.stderr()
-            );
+            assert!(matches!(done.exit(), Some(0 | 3 | 7)), "{line}: {}", done.stderr());
             for answer in done.stdout().lines() {
                 let value: Value = serde_json::from_str(answer).expect("an object a line");
                 let into = match line.starts_with("info") || section == "info" {
@@ -202,13 +172,8 @@ fn every_key_is_documented_and_no_other() {
     // A line of progress comes only of what lasts; its keys are those of a test of their own.
     settle(&mut said, &talk);
     let unnamed: Vec<&String> = said.difference(&talk).collect();
-    assert!(
-        unnamed.is_empty(),
-        "keys on stderr that the chapter does not name: {unnamed:?}"
-    );
-    let unsaid = talk
-        .difference(&said)
-        .filter(|k| !k.starts_with("progress"));
+    assert!(unnamed.is_empty(), "keys on stderr that the chapter does not name: {unnamed:?}");
+    let unsaid = talk.difference(&said).filter(|k| !k.starts_with("progress"));
     assert_eq!(unsaid.collect::<Vec<_>>(), Vec::<&String>::new());
 }
 
@@ -233,9 +198,6 @@ fn every_command_has_a_section() {
         let is_silent = ["help", "completions", "man"].contains(&name);
         let is_named = PAGE.contains(&format!("## `tetdb {name}`"))
             || ["mesh", "resume"].contains(&name) && PAGE.contains(&format!("`{name}`"));
-        assert!(
-            is_silent || is_named,
-            "the chapter has no section on {name}"
-        );
+        assert!(is_silent || is_named, "the chapter has no section on {name}");
     }
 }

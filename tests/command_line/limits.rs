@@ -13,9 +13,7 @@ use {
 #[test]
 fn commands_that_read_a_surface_or_rows_take_a_cap_like_all_others() {
     let place = Place::new();
-    place
-        .run_line("sample box,h=0.5 -o b.off --memory 64MiB")
-        .succeeds();
+    place.run_line("sample box,h=0.5 -o b.off --memory 64MiB").succeeds();
     place.run_line("mesh b.off --memory 64MiB").succeeds();
     for line in [
         "check b.off",
@@ -49,10 +47,7 @@ fn a_surface_that_does_not_fit_the_cap_is_refused_with_the_cap_that_would_do() {
         let error = done.error();
         assert_eq!(error["code"], "memory", "{line}: {error}");
         let help = error["help"].as_str().unwrap_or_default();
-        assert!(
-            help.starts_with("give at least --memory "),
-            "{line}: {help}"
-        );
+        assert!(help.starts_with("give at least --memory "), "{line}: {help}");
         assert!(place.names().is_empty(), "{line}: {:?}", place.names());
     }
     // What would be generated has no end known ahead: it is refused on the way.

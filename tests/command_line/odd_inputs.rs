@@ -25,14 +25,8 @@ const CUBE: [[usize; 3]; 12] = [
     [1, 7, 5],
 ];
 /// The same sides as quadrilaterals.
-const SIDES: [[usize; 4]; 6] = [
-    [0, 2, 3, 1],
-    [4, 5, 7, 6],
-    [0, 1, 5, 4],
-    [2, 6, 7, 3],
-    [0, 4, 6, 2],
-    [1, 3, 7, 5],
-];
+const SIDES: [[usize; 4]; 6] =
+    [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
 
 fn corner(i: usize) -> Point {
     [i & 1, i >> 1 & 1, i >> 2].map(|bit| bit as f64)
@@ -93,9 +87,8 @@ fn stl_binary(header: &[u8], triangles: &[[Point; 3]]) -> Vec<u8> {
 
 /// Vertices, then faces that count back from the last vertex.
 fn obj_negative() -> String {
-    let mut text: String = (0..8)
-        .map(|i| format!("v {}\n", corner(i).map(|x| x.to_string()).join(" ")))
-        .collect();
+    let mut text: String =
+        (0..8).map(|i| format!("v {}\n", corner(i).map(|x| x.to_string()).join(" "))).collect();
     for t in CUBE {
         text += &format!("f {}\n", t.map(|i| (i as i64 - 8).to_string()).join(" "));
     }
@@ -149,28 +142,17 @@ struct Good {
 }
 
 fn good(name: &'static str, bytes: impl Into<Vec<u8>>) -> Good {
-    Good {
-        name,
-        bytes: bytes.into(),
-        volumes: vec![1.0],
-        note: "",
-    }
+    Good { name, bytes: bytes.into(), volumes: vec![1.0], note: "" }
 }
 
 /// A file that must be meshed, with something to tell.
 fn noted(name: &'static str, bytes: impl Into<Vec<u8>>, note: &'static str) -> Good {
-    Good {
-        note,
-        ..good(name, bytes)
-    }
+    Good { note, ..good(name, bytes) }
 }
 
 /// Two cubes of volume one.
 fn pair(name: &'static str, triangles: Triangles, note: &'static str) -> Good {
-    Good {
-        volumes: vec![1.0, 1.0],
-        ..noted(name, off(&triangles), note)
-    }
+    Good { volumes: vec![1.0, 1.0], ..noted(name, off(&triangles), note) }
 }
 
 /// One cube of this edge length.
@@ -178,25 +160,15 @@ fn sized(name: &'static str, edge: f64, away: f64) -> Good {
     let map = |p: Point| p.map(|x| x * edge + away);
     // What the rounded coordinates enclose.
     let edge = edge + away - away;
-    Good {
-        volumes: vec![edge * edge * edge],
-        ..good(name, off(&cube(map)))
-    }
+    Good { volumes: vec![edge * edge * edge], ..good(name, off(&cube(map))) }
 }
 
 fn meshed(case: &Good) {
     let place = Place::new();
     place.write(case.name, &case.bytes);
-    let done = place
-        .run(&["mesh", case.name, "-o", "x.tetdb", "--json"])
-        .succeeds();
+    let done = place.run(&["mesh", case.name, "-o", "x.tetdb", "--json"]).succeeds();
     let stderr = done.stderr();
-    assert!(
-        stderr.contains(case.note),
-        "{}: no note says {:?}: {stderr}",
-        case.name,
-        case.note
-    );
+    assert!(stderr.contains(case.note), "{}: no note says {:?}: {stderr}", case.name, case.note);
     let answer = done.json();
     assert_eq!(answer["state"], "verified", "{}: {answer}", case.name);
     let mut volumes: Vec<f64> = answer["regions"]
@@ -210,11 +182,7 @@ fn meshed(case: &Good) {
     assert_eq!(volumes.len(), case.volumes.len(), "{}: {answer}", case.name);
     for (found, expected) in volumes.iter().zip(&case.volumes) {
         let off = (found - expected).abs() / expected;
-        assert!(
-            off < 1e-9,
-            "{}: volume {found:e}, expected {expected:e}",
-            case.name
-        );
+        assert!(off < 1e-9, "{}: volume {found:e}, expected {expected:e}", case.name);
     }
 }
 
@@ -227,11 +195,7 @@ fn odd_files_are_meshed() {
     for case in [
         good("crlf.stl", whole.replace('\n', "\r\n")),
         good("crlf.obj", obj_negative().replace('\n', "\r\n")),
-        noted(
-            "noend.stl",
-            whole.replace("endsolid cube\n", ""),
-            "without `endsolid`",
-        ),
+        noted("noend.stl", whole.replace("endsolid cube\n", ""), "without `endsolid`"),
         good("solid.stl", stl_binary(b"solid facet normal", &shell)),
         good("zeros.stl", stl_binary(b"", &shell)),
         good("negative.obj", obj_negative()),
@@ -274,16 +238,9 @@ fn refused(name: &str, bytes: impl AsRef<[u8]>, word: &str, place_found: &str) {
     let names = place.names();
     let done = place.run(&["mesh", name, "-o", "x.tetdb", "--json"]);
     let error = done.error();
-    assert_eq!(
-        (done.exit(), error["code"].as_str()),
-        (Some(3), Some(word)),
-        "{name}: {error}"
-    );
+    assert_eq!((done.exit(), error["code"].as_str()), (Some(3), Some(word)), "{name}: {error}");
     let at = error["where"].as_str().unwrap_or_default();
-    assert!(
-        at.starts_with(place_found),
-        "{name}: at {at:?}, expected {place_found:?}"
-    );
+    assert!(at.starts_with(place_found), "{name}: at {at:?}, expected {place_found:?}");
     assert_eq!(place.names(), names, "{name} left something behind");
     // `check` finds the same.
     let done = place.run(&["check", name, "--json"]);
@@ -292,23 +249,14 @@ fn refused(name: &str, bytes: impl AsRef<[u8]>, word: &str, place_found: &str) {
     } else {
         done.json()["defects"][0]["code"].clone()
     };
-    assert_eq!(
-        (done.exit(), said.as_str()),
-        (Some(3), Some(word)),
-        "check {name}"
-    );
+    assert_eq!((done.exit(), said.as_str()), (Some(3), Some(word)), "check {name}");
 }
 
 #[test]
 fn broken_files_are_refused_with_their_place() {
     let shell = cube_at(0.0, 0.0, 0.0);
     let binary = stl_binary(b"solid", &shell);
-    refused(
-        "cut.stl",
-        &binary[..400],
-        "truncated-file",
-        "cut.stl, byte 400",
-    );
+    refused("cut.stl", &binary[..400], "truncated-file", "cut.stl, byte 400");
     let mut huge = binary.clone();
     huge[80..84].fill(0xff);
     refused("huge.stl", huge, "truncated-file", "huge.stl, byte 684");
@@ -331,19 +279,9 @@ fn broken_files_are_refused_with_their_place() {
     };
     bad("8 6 12", "-8 6 12", "count-mismatch", "a.off, line 2");
     bad("8 6 12", "8 -6 12", "count-mismatch", "a.off, line 2");
-    bad(
-        "8 6 12",
-        "2000000000 6 12",
-        "count-mismatch",
-        "a.off, line 2",
-    );
+    bad("8 6 12", "2000000000 6 12", "count-mismatch", "a.off, line 2");
     bad("8 6 12", "8 7 12", "count-mismatch", "a.off, line 1");
-    bad(
-        "4 1 3 7 5",
-        "4 1 3 7 8",
-        "index-out-of-range",
-        "a.off, line 16",
-    );
+    bad("4 1 3 7 5", "4 1 3 7 8", "index-out-of-range", "a.off, line 16");
     let ply = String::from_utf8_lossy(&ply_big_endian()).replace("vertex 8", "vertex -8");
     refused("a.ply", ply, "count-mismatch", "a.ply, line 4");
 }
@@ -352,12 +290,7 @@ fn broken_files_are_refused_with_their_place() {
 fn surfaces_that_bound_nothing_are_refused_with_their_place() {
     let first = || cube_at(0.0, 0.0, 0.0);
     let repeated = both(first(), vec![first()[7]]);
-    refused(
-        "twice.off",
-        off(&repeated),
-        "duplicate-triangle",
-        "triangles 7 and 12 near (",
-    );
+    refused("twice.off", off(&repeated), "duplicate-triangle", "triangles 7 and 12 near (");
     // One side's diagonal is divided on one side only.
     let mut junction = first();
     let [a, b, c] = junction[0];
@@ -371,21 +304,15 @@ fn surfaces_that_bound_nothing_are_refused_with_their_place() {
         // The same corners on the shared side, the other diagonal.
         ("unlike.off", cube(|p| [1.0 + p[0], 1.0 - p[1], p[2]])),
     ] {
-        refused(
-            name,
-            off(&both(first(), second)),
-            "self-intersection",
-            "triangles ",
-        );
+        refused(name, off(&both(first(), second)), "self-intersection", "triangles ");
     }
 }
 
 #[test]
 fn coordinates_beyond_the_exact_range_are_refused() {
-    for (name, edge, at) in [
-        ("tiny.off", 1e-30, "tiny.off"),
-        ("giant.off", 1e31, "giant.off, line "),
-    ] {
+    for (name, edge, at) in
+        [("tiny.off", 1e-30, "tiny.off"), ("giant.off", 1e31, "giant.off, line ")]
+    {
         let triangles = cube(|p| p.map(|x| x * edge));
         refused(name, off(&triangles), "coordinate-range", at);
     }

@@ -27,23 +27,9 @@ fn box_and_labels_are_named_by_check_and_info() {
 fn numbers_have_four_digits_and_ones_no_plural() {
     let place = Place::new();
     place.write("part.off", TETRA);
-    let said = said(
-        &place,
-        "mesh part.off --size-sphere 0,0,0,0.1,0.3 --hsiz 0.123456",
-    );
-    assert!(
-        said.contains("1 shape,") && said.contains("in 1 sub-domain;"),
-        "{said}"
-    );
-    for bad in [
-        "(s)",
-        "0.0000",
-        "100.0000",
-        "e0 ",
-        "e0,",
-        "bytes per tetrahedron",
-        "1 shapes",
-    ] {
+    let said = said(&place, "mesh part.off --size-sphere 0,0,0,0.1,0.3 --hsiz 0.123456");
+    assert!(said.contains("1 shape,") && said.contains("in 1 sub-domain;"), "{said}");
+    for bad in ["(s)", "0.0000", "100.0000", "e0 ", "e0,", "bytes per tetrahedron", "1 shapes"] {
         assert!(!said.contains(bad), "{bad:?} in {said}");
     }
 }
@@ -57,10 +43,7 @@ fn internals_are_for_those_who_ask_and_quiet_is_quiet() {
     assert!(usual.contains("`tetdb report a.tetdb a.html`"), "{usual}");
     assert!(usual.contains("`tetdb export a.tetdb"), "{usual}");
     let more = said(&place, "mesh part.off -o b.tetdb --verbose");
-    assert!(
-        more.contains("catalog,") && more.contains("coarse mesh"),
-        "{more}"
-    );
+    assert!(more.contains("catalog,") && more.contains("coarse mesh"), "{more}");
     for quiet in [
         "mesh part.off -o c.tetdb --quiet",
         "resaturate c.tetdb --subdomain 0 --refine-by 0.5 --quiet",
@@ -77,19 +60,14 @@ fn a_mesh_file_named_as_the_store_is_sent_to_export() {
     place.write("part.off", TETRA);
     let error = place.run_line("mesh part.off -o part.vtu --json").error();
     assert_eq!(error["code"], "usage");
-    assert!(
-        error["help"].to_string().contains("--export part.vtu"),
-        "{error}"
-    );
+    assert!(error["help"].to_string().contains("--export part.vtu"), "{error}");
     assert!(!place.path("part.vtu").exists());
 }
 
 #[test]
 fn rows_of_all_tetrahedra_are_exported_as_a_question_about_all_answers_them() {
     let place = Place::new();
-    place
-        .run_line("mesh sample:box,h=0.5 -o b.tetdb --no-verify")
-        .succeeds();
+    place.run_line("mesh sample:box,h=0.5 -o b.tetdb --no-verify").succeeds();
     for (format, option) in [("csv", "--csv"), ("jsonl", "--json")] {
         let rows = |line: &str| place.run_line(line).succeeds().stdout();
         let exported = rows(&format!("export b.tetdb - --format {format}"));
@@ -126,19 +104,11 @@ fn negative_numbers_reach_the_option_before_them() {
     let error = place.run_line("mesh part.off --hsiz -1 --json").error();
     assert_eq!(error["code"], "bad-size");
     let message = error["message"].to_string();
-    assert!(
-        message.contains("--hsiz -1") && message.contains("above zero"),
-        "{message}"
-    );
+    assert!(message.contains("--hsiz -1") && message.contains("above zero"), "{message}");
     let error = place.run_line("check part.off -1 --json").error();
-    assert!(
-        error["message"].to_string().contains("negative number"),
-        "{error}"
-    );
+    assert!(error["message"].to_string().contains("negative number"), "{error}");
     for apart in ["0.1 0.2 0.3", "-0.1 -0.2 -0.3"] {
-        let error = place
-            .run_line(&format!("query part.tetdb --point {apart} --json"))
-            .error();
+        let error = place.run_line(&format!("query part.tetdb --point {apart} --json")).error();
         assert!(error["help"].to_string().contains("with commas"), "{error}");
     }
 }
@@ -147,14 +117,8 @@ fn negative_numbers_reach_the_option_before_them() {
 fn numbers_of_a_configuration_are_numbers() {
     let place = Place::new();
     place.write("part.off", TETRA);
-    place.write(
-        "a.toml",
-        "hsiz = 0.25\nsize_sphere = [[0, 0, 0, 0.1, 0.05]]\n",
-    );
-    place.write(
-        "b.toml",
-        "hsiz = \"0.25\"\nsize_sphere = [\"0,0,0,0.1,0.05\"]\n",
-    );
+    place.write("a.toml", "hsiz = 0.25\nsize_sphere = [[0, 0, 0, 0.1, 0.05]]\n");
+    place.write("b.toml", "hsiz = \"0.25\"\nsize_sphere = [\"0,0,0,0.1,0.05\"]\n");
     for name in ["a", "b"] {
         let line = format!("mesh part.off --config {name}.toml -o {name}.tetdb");
         place.run_line(&line).succeeds();
@@ -166,11 +130,7 @@ fn numbers_of_a_configuration_are_numbers() {
 fn sizes_that_edges_of_the_surface_forbid_are_said_to_stay_out_of_reach() {
     let place = Place::new();
     let said = said(&place, "estimate sample:box,h=0.3 --hsiz 0.03");
-    for words in [
-        "--hsiz 0.03 is far below",
-        "away from them",
-        "tetdb refine-surface",
-    ] {
+    for words in ["--hsiz 0.03 is far below", "away from them", "tetdb refine-surface"] {
         assert!(said.contains(words), "{words}: {said}");
     }
 }
@@ -180,13 +140,9 @@ fn check_and_estimate_expect_the_same() {
     let place = Place::new();
     let check = place.run_line("check sample:knot,h=0.1 --json").json();
     let estimate = place.run_line("estimate sample:knot,h=0.1 --json").json();
-    let expected = check["fitness"]["tets_expected"]
-        .as_f64()
-        .expect("a number");
+    let expected = check["fitness"]["tets_expected"].as_f64().expect("a number");
     assert_eq!(Some(expected.round() as u64), estimate["tets"].as_u64());
-    place
-        .run_line("mesh sample:knot,h=0.1 -o k.tetdb")
-        .succeeds();
+    place.run_line("mesh sample:knot,h=0.1 -o k.tetdb").succeeds();
     let actual = place.run_line("info k.tetdb --json").json()["tets"].as_f64();
     let ratio = expected / actual.expect("a number");
     assert!((0.9..1.1).contains(&ratio), "{ratio}");
@@ -195,16 +151,10 @@ fn check_and_estimate_expect_the_same() {
 #[test]
 fn an_open_surface_is_not_sent_to_the_command_it_comes_from() {
     let place = Place::new();
-    place.write(
-        "open.off",
-        TETRA.replace("4 4 0", "4 3 0").replace("3 0 3 2\n", ""),
-    );
+    place.write("open.off", TETRA.replace("4 4 0", "4 3 0").replace("3 0 3 2\n", ""));
     let said = place.run_line("check open.off").stdout();
     let help = said.lines().find(|line| line.starts_with("help:"));
-    assert!(
-        help.is_none_or(|help| !help.contains("tetdb check SURFACE")),
-        "{said}"
-    );
+    assert!(help.is_none_or(|help| !help.contains("tetdb check SURFACE")), "{said}");
 }
 
 #[test]
@@ -212,9 +162,7 @@ fn a_ply_of_one_label_is_corners_alone() {
     let place = Place::new();
     place.run_line("sample box,h=0.5 -o one.ply").succeeds();
     place.write("part.off", TETRA);
-    place
-        .run_line("refine-surface part.off one.ply --hsiz 0.5")
-        .succeeds();
+    place.run_line("refine-surface part.off one.ply --hsiz 0.5").succeeds();
     let bytes = std::fs::read(place.path("one.ply")).expect("it was written");
     let head = String::from_utf8_lossy(&bytes[..300.min(bytes.len())]).into_owned();
     assert!(!head.contains("property int label"), "{head}");
@@ -247,16 +195,9 @@ fn help_wraps_at_the_width_of_the_terminal() {
         let text = done.expect("it starts").stdout;
         // Examples are lines to be copied.
         let options = String::from_utf8_lossy(&text).into_owned();
-        let options = options
-            .split("Examples:")
-            .next()
-            .unwrap_or_default()
-            .to_owned();
+        let options = options.split("Examples:").next().unwrap_or_default().to_owned();
         let widest = options.lines().map(|line| line.chars().count()).max();
-        assert!(
-            widest.is_some_and(|w| w <= width && w > width - 20),
-            "{widest:?} of {width}"
-        );
+        assert!(widest.is_some_and(|w| w <= width && w > width - 20), "{widest:?} of {width}");
     }
 }
 
@@ -274,8 +215,7 @@ fn errors_have_colors_on_a_terminal_that_may_have_them() {
             .stdin(std::process::Stdio::null())
             .current_dir(place.path("."))
             .output();
-        run.ok()
-            .map(|run| String::from_utf8_lossy(&run.stdout).into_owned())
+        run.ok().map(|run| String::from_utf8_lossy(&run.stdout).into_owned())
     };
     let (Some(with), Some(without)) = (said(""), said("1")) else {
         return;

@@ -27,17 +27,10 @@ impl Piece {
         };
         let vertices = section("Vertices").into_iter().map(str::to_owned).collect();
         let triangles = section("Triangles").into_iter().map(|line| {
-            let words: Vec<usize> = line
-                .split(' ')
-                .map(|w| w.parse().expect("a number"))
-                .collect();
+            let words: Vec<usize> = line.split(' ').map(|w| w.parse().expect("a number")).collect();
             ([words[0] - 1, words[1] - 1, words[2] - 1], words[3] as u32)
         });
-        Self {
-            vertices,
-            triangles: triangles.collect(),
-            tets: section("Tetrahedra").len(),
-        }
+        Self { vertices, triangles: triangles.collect(), tets: section("Tetrahedra").len() }
     }
 
     /// Triangles with a reference, each as the texts of its corners in ascending order.
@@ -54,27 +47,20 @@ impl Piece {
 
 fn list(value: &Value) -> Vec<usize> {
     let items = value.as_array().expect("a list").iter();
-    items
-        .map(|v| v.as_u64().expect("a number") as usize)
-        .collect()
+    items.map(|v| v.as_u64().expect("a number") as usize).collect()
 }
 
 #[test]
 fn what_two_parts_share_is_the_same_in_both_files() {
     let place = Place::new();
-    place
-        .run_line("mesh sample:box,h=0.038 -o four.tetdb --subdomains 4")
-        .succeeds();
-    place
-        .run_line("export four.tetdb part.mesh --pieces")
-        .succeeds();
+    place.run_line("mesh sample:box,h=0.038 -o four.tetdb --subdomains 4").succeeds();
+    place.run_line("export four.tetdb part.mesh --pieces").succeeds();
     place.run_line("export four.tetdb topology.json").succeeds();
     let info = place.run_line("info four.tetdb --json").succeeds().json();
     let parts = info["subdomains"].as_array().expect("a list");
     let n_labels = info["labels"].as_array().expect("a list").len() as u32;
-    let pieces: Vec<Piece> = (0..parts.len())
-        .map(|rank| Piece::read(&place, &format!("part_{rank:05}.mesh")))
-        .collect();
+    let pieces: Vec<Piece> =
+        (0..parts.len()).map(|rank| Piece::read(&place, &format!("part_{rank:05}.mesh"))).collect();
     assert_eq!(pieces.len(), 4);
     for (piece, part) in pieces.iter().zip(parts) {
         assert_eq!(piece.tets as u64, part["tets"]);
@@ -98,16 +84,8 @@ fn what_two_parts_share_is_the_same_in_both_files() {
         }
         // Points are text made from exact coordinates: equal text is the same vertex.
         let here: HashSet<&String> = pieces[low].vertices.iter().collect();
-        let both = pieces[high]
-            .vertices
-            .iter()
-            .filter(|v| here.contains(v))
-            .count();
-        assert_eq!(
-            both,
-            numbers.len(),
-            "{low} and {high} share vertices that are not listed"
-        );
+        let both = pieces[high].vertices.iter().filter(|v| here.contains(v)).count();
+        assert_eq!(both, numbers.len(), "{low} and {high} share vertices that are not listed");
         let reference = |other: usize| n_labels + other as u32 + 1;
         let faces = pieces[low].faces(reference(high));
         assert_eq!(faces, pieces[high].faces(reference(low)));
@@ -130,12 +108,8 @@ fn what_two_parts_share_is_the_same_in_both_files() {
 #[test]
 fn some_parts_are_a_mesh_with_a_closed_boundary() {
     let place = Place::new();
-    place
-        .run_line("mesh sample:box,h=0.045 -o three.tetdb --subdomains 3")
-        .succeeds();
-    place
-        .run_line("export three.tetdb two.mesh --subdomain 0,1")
-        .succeeds();
+    place.run_line("mesh sample:box,h=0.045 -o three.tetdb --subdomains 3").succeeds();
+    place.run_line("export three.tetdb two.mesh --subdomain 0,1").succeeds();
     let two = Piece::read(&place, "two.mesh");
     let mut edges = BTreeMap::new();
     for (corners, _) in &two.triangles {
@@ -144,10 +118,7 @@ fn some_parts_are_a_mesh_with_a_closed_boundary() {
             *edges.entry([a.min(b), a.max(b)]).or_insert(0) += 1;
         }
     }
-    assert!(
-        !edges.is_empty() && edges.values().all(|n| n % 2 == 0),
-        "the boundary has a rim"
-    );
+    assert!(!edges.is_empty() && edges.values().all(|n| n % 2 == 0), "the boundary has a rim");
     // It is a surface as good as any: its mesh is made like one.
     place.run_line("check two.mesh").succeeds();
     let nine = place.run_line("export three.tetdb nine.mesh --subdomain 9");
@@ -155,9 +126,7 @@ fn some_parts_are_a_mesh_with_a_closed_boundary() {
     let faces = place.run_line("export three.tetdb faces.msh --interfaces");
     assert_eq!(faces.exit(), Some(2));
     assert!(!place.path("nine.mesh").exists() && !place.path("faces.msh").exists());
-    place
-        .run_line("export three.tetdb faces.vtu --interfaces")
-        .succeeds();
+    place.run_line("export three.tetdb faces.vtu --interfaces").succeeds();
 }
 
 #[test]
@@ -206,9 +175,7 @@ fn regions_apart_are_closed_and_together_the_whole() {
 #[test]
 fn shares_of_an_export_in_pieces_are_together_that_of_one_process() {
     let place = Place::new();
-    place
-        .run_line("mesh sample:box,h=0.038 -o four.tetdb --subdomains 4")
-        .succeeds();
+    place.run_line("mesh sample:box,h=0.038 -o four.tetdb --subdomains 4").succeeds();
     std::fs::create_dir(place.path("one")).expect("a folder");
     for out in ["a.pvtu", "a.vtu --region 1", "a.msh", "a.mfem", "a.foam"] {
         let export = |folder: &str, more: &str| {
@@ -227,11 +194,7 @@ fn shares_of_an_export_in_pieces_are_together_that_of_one_process() {
     for of in ["of-2", "of-5"] {
         assert!(contents(&place.path(of)) == expected, "{of}");
     }
-    for refused in [
-        "a.vtu --share 1/2",
-        "a.pvtu --share 3/2",
-        "a.pvtu --share 0/0",
-    ] {
+    for refused in ["a.vtu --share 1/2", "a.pvtu --share 3/2", "a.pvtu --share 0/0"] {
         let line = format!("export four.tetdb {refused}");
         assert_eq!(place.run_line(&line).exit(), Some(2), "{refused}");
     }
@@ -260,9 +223,7 @@ fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 #[test]
 fn pieces_are_the_same_whoever_writes_them() {
     let place = Place::new();
-    place
-        .run_line("mesh sample:box,h=0.038 -o four.tetdb --subdomains 4")
-        .succeeds();
+    place.run_line("mesh sample:box,h=0.038 -o four.tetdb --subdomains 4").succeeds();
     let outs = [
         "part.mesh",
         "part.vtu --order 2",

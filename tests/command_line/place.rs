@@ -28,9 +28,7 @@ pub struct Place {
 
 impl Place {
     pub fn new() -> Self {
-        Self {
-            dir: tempfile::tempdir().expect("a temporary folder"),
-        }
+        Self { dir: tempfile::tempdir().expect("a temporary folder") }
     }
 
     pub fn path(&self, name: &str) -> PathBuf {
@@ -59,20 +57,14 @@ impl Place {
     /// The program with these words, to be run in the folder.
     pub fn command(&self, words: &[&str]) -> Command {
         let mut command = Command::new(program());
-        command
-            .args(words)
-            .current_dir(self.dir.path())
-            .stdin(Stdio::null());
+        command.args(words).current_dir(self.dir.path()).stdin(Stdio::null());
         command.stdout(Stdio::piped()).stderr(Stdio::piped());
         command
     }
 
     pub fn run(&self, words: &[&str]) -> Done {
         let output = self.command(words).output().expect("the program starts");
-        Done {
-            words: words.join(" "),
-            output,
-        }
+        Done { words: words.join(" "), output }
     }
 
     /// Runs a line as a shell without special characters would.
@@ -86,18 +78,13 @@ impl Place {
             format!("mesh {sample} -o again.tetdb --subdomains 4 --threads 1 --memory 128MiB");
         self.run_line(&again).succeeds();
         assert_eq!(self.digest("four.tetdb"), self.digest("again.tetdb"));
-        self.run_line("resaturate four.tetdb --subdomain 1 --hgrad 1.2")
-            .succeeds();
+        self.run_line("resaturate four.tetdb --subdomain 1 --hgrad 1.2").succeeds();
         self.run_line("verify four.tetdb --full").succeeds();
     }
 
     /// The digest of a store in the folder.
     pub fn digest(&self, store: &str) -> String {
-        self.run(&["digest", store])
-            .succeeds()
-            .stdout()
-            .trim()
-            .to_owned()
+        self.run(&["digest", store]).succeeds().stdout().trim().to_owned()
     }
 }
 
@@ -126,39 +113,24 @@ impl Done {
 
     /// Panics with all that was said unless the exit code is 0.
     pub fn succeeds(self) -> Self {
-        assert_eq!(
-            self.exit(),
-            Some(0),
-            "tetdb {}\n{}",
-            self.words,
-            self.stderr()
-        );
+        assert_eq!(self.exit(), Some(0), "tetdb {}\n{}", self.words, self.stderr());
         self
     }
 
     /// stdout as one JSON object.
     pub fn json(&self) -> Value {
         serde_json::from_str(&self.stdout()).unwrap_or_else(|e| {
-            panic!(
-                "tetdb {}: {e} in {}\n{}",
-                self.words,
-                self.stdout(),
-                self.stderr()
-            )
+            panic!("tetdb {}: {e} in {}\n{}", self.words, self.stdout(), self.stderr())
         })
     }
 
     /// The error object of a run with `--json`.
     pub fn error(&self) -> Value {
         let stderr = self.stderr();
-        let mut objects = stderr
-            .lines()
-            .rev()
-            .filter_map(|line| serde_json::from_str::<Value>(line).ok());
+        let mut objects =
+            stderr.lines().rev().filter_map(|line| serde_json::from_str::<Value>(line).ok());
         // Only the last line of a failed run is an error.
-        let error = objects
-            .next()
-            .and_then(|mut object| object.get_mut("error").map(Value::take));
+        let error = objects.next().and_then(|mut object| object.get_mut("error").map(Value::take));
         error.unwrap_or_else(|| panic!("tetdb {}: no error object in {stderr:?}", self.words))
     }
 }

@@ -25,9 +25,7 @@ fn objects(done: &Done) -> Vec<Value> {
 }
 
 fn number(value: &Value) -> f64 {
-    value
-        .as_f64()
-        .unwrap_or_else(|| panic!("{value} is no number"))
+    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
 }
 
 /// Equal up to the last bit, which the reader of objects used here may lose.
@@ -40,10 +38,7 @@ fn corners(tet: &Value) -> [[f64; 3]; 4] {
 }
 
 fn ids(objects: &[Value]) -> Vec<&str> {
-    objects
-        .iter()
-        .map(|o| o["id"].as_str().unwrap_or("-"))
-        .collect()
+    objects.iter().map(|o| o["id"].as_str().unwrap_or("-")).collect()
 }
 
 #[test]
@@ -79,10 +74,7 @@ fn all_tetrahedra_add_up_to_the_mesh() {
 #[test]
 fn points_are_answered_in_their_order_from_anywhere() {
     let place = small();
-    place.write(
-        "probes.txt",
-        "# three\n0.51, 0.52, 0.53\n\n7 7 7\t# outside\n0.1 0.2,0.3\n",
-    );
+    place.write("probes.txt", "# three\n0.51, 0.52, 0.53\n\n7 7 7\t# outside\n0.1 0.2,0.3\n");
     let line = "query a.tetdb --points probes.txt --json";
     let from_file = objects(&place.run_line(line).succeeds());
     assert_eq!(from_file.len(), 3);
@@ -126,10 +118,7 @@ fn files_hold_what_is_printed() {
     let printed = place.run_line(&format!("{question} {columns}")).stdout();
     assert_eq!(csv, printed);
     let rows: Vec<Vec<&str>> = csv.lines().map(|l| l.split(',').collect()).collect();
-    assert_eq!(
-        rows[0][5..10].join(" "),
-        "vertices0 vertices1 vertices2 vertices3 x0"
-    );
+    assert_eq!(rows[0][5..10].join(" "), "vertices0 vertices1 vertices2 vertices3 x0");
     for (row, object) in rows[1..].iter().zip(&objects) {
         assert_eq!(row[0], object["id"].as_str().unwrap_or_default());
         let parsed = |i: usize| row[i].parse().unwrap_or(f64::NAN);
@@ -141,10 +130,7 @@ fn files_hold_what_is_printed() {
     assert_eq!(&npy[..8], b"\x93NUMPY\x01\x00");
     let start = 10 + usize::from(u16::from_le_bytes([npy[8], npy[9]]));
     let head = String::from_utf8_lossy(&npy[10..start]).into_owned();
-    assert!(
-        head.contains(&format!("'shape': ({},)", objects.len())),
-        "{head}"
-    );
+    assert!(head.contains(&format!("'shape': ({},)", objects.len())), "{head}");
     let width = 3 * 8 + 2 * 8 + 4 * 8 + 12 * 8;
     assert_eq!(npy.len() - start, width * objects.len());
     for (row, object) in npy[start..].chunks(width).zip(&objects) {
@@ -154,22 +140,14 @@ fn files_hold_what_is_printed() {
 
     let vtu = read("out.vtu");
     let head = String::from_utf8_lossy(&vtu[..600]).into_owned();
-    assert!(
-        head.contains(&format!("NumberOfCells=\"{}\"", objects.len())),
-        "{head}"
-    );
+    assert!(head.contains(&format!("NumberOfCells=\"{}\"", objects.len())), "{head}");
 }
 
 #[test]
 fn questions_are_answered_as_asked() {
     let place = small();
-    let ask = |line: &str| {
-        objects(
-            &place
-                .run_line(&format!("query a.tetdb {line} --json"))
-                .succeeds(),
-        )
-    };
+    let ask =
+        |line: &str| objects(&place.run_line(&format!("query a.tetdb {line} --json")).succeeds());
     let bad = ask("--where quality>1.8");
     assert!(!bad.is_empty() && bad.iter().all(|t| number(&t["quality"]) > 1.8));
     let sorted = ask("--order-by -volume --limit 5");

@@ -17,12 +17,7 @@ fn seventy_thousand_regions_stay_apart() {
     let mut text = format!("OFF\n{} {} 0\n", 4 * REGIONS, 4 * REGIONS);
     for n in 0..REGIONS {
         let corner = [n % SIDE, n / SIDE % SIDE, n / SIDE / SIDE];
-        for offset in [
-            [0.0, 0.0, 0.0],
-            [0.5, 0.0, 0.0],
-            [0.0, 0.5, 0.0],
-            [0.0, 0.0, 0.5],
-        ] {
+        for offset in [[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, 0.5]] {
             let [x, y, z] = [0, 1, 2].map(|i| corner[i] as f64 + offset[i]);
             writeln!(text, "{x} {y} {z}").expect("text grows");
         }
@@ -34,9 +29,7 @@ fn seventy_thousand_regions_stay_apart() {
         }
     }
     place.write("many.off", &text);
-    place
-        .run_line("mesh many.off -o many.tetdb --optimize none")
-        .succeeds();
+    place.run_line("mesh many.off -o many.tetdb --optimize none").succeeds();
     let info = place.run_line("info many.tetdb --json").succeeds().json();
     let regions = info["regions"].as_array().expect("a list");
     let filled: Vec<u64> = regions

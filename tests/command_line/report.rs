@@ -25,9 +25,7 @@ fn page(place: &Place, line: &str, name: &str) -> (Value, String, Value) {
 #[test]
 fn a_page_tells_what_info_tells() {
     let place = Place::new();
-    place
-        .run_line("mesh sample:box,h=0.05 -o a.tetdb --subdomains 2 --no-verify")
-        .succeeds();
+    place.run_line("mesh sample:box,h=0.05 -o a.tetdb --subdomains 2 --no-verify").succeeds();
     let info = place.run_line("info a.tetdb --json").succeeds().json();
     let (answer, text, data) = page(&place, "report a.tetdb a.html --json", "a.html");
     for key in ["tets", "vertices", "bytes"] {
@@ -48,10 +46,7 @@ fn a_page_tells_what_info_tells() {
     let worst = place.run_line(line).succeeds().stdout();
     let worst: Value = serde_json::from_str(worst.lines().next().expect("one")).expect("JSON");
     assert_eq!(statistics["excess"]["worst"], worst["excess"]);
-    let info = place
-        .run_line("info a.tetdb --excess --json")
-        .succeeds()
-        .json();
+    let info = place.run_line("info a.tetdb --excess --json").succeeds().json();
     assert_eq!(info["excess"], statistics["excess"]);
     let line = "query a.tetdb --where excess>2 --select id --json";
     let above = place.run_line(line).succeeds().stdout().lines().count() as u64;
@@ -79,24 +74,12 @@ fn a_page_tells_what_info_tells() {
     assert!(data["subdomains"][1]["predicted"].as_f64() > Some(0.0));
     assert_eq!(data["interfaces"][0][3], info["interfaces"][0]["faces"]);
     let steps = data["steps"].as_array().expect("a list");
-    let rows: usize = steps
-        .iter()
-        .filter_map(|s| Some(s["rows"].as_array()?.len()))
-        .sum();
+    let rows: usize = steps.iter().filter_map(|s| Some(s["rows"].as_array()?.len())).sum();
     assert_eq!(Some(rows), info["journal"].as_array().map(Vec::len));
-    let names: Vec<&Value> = steps
-        .iter()
-        .filter_map(|s| s["names"].as_array())
-        .flatten()
-        .collect();
-    for name in [
-        "natural_faces",
-        "zone_rejects",
-        "frozen_hits",
-        "pages_read",
-        "frames_used",
-        "optimize_s",
-    ] {
+    let names: Vec<&Value> = steps.iter().filter_map(|s| s["names"].as_array()).flatten().collect();
+    for name in
+        ["natural_faces", "zone_rejects", "frozen_hits", "pages_read", "frames_used", "optimize_s"]
+    {
         assert!(names.iter().any(|n| *n == name), "{name}");
     }
     assert_eq!(answer["boundary"]["of"], facets);
@@ -112,9 +95,7 @@ fn a_page_tells_what_info_tells() {
 #[test]
 fn a_page_is_the_same_whatever_the_memory_and_replaces_another() {
     let place = Place::new();
-    place
-        .run_line("mesh sample:balls,count=5 -o a.tetdb --no-verify")
-        .succeeds();
+    place.run_line("mesh sample:balls,count=5 -o a.tetdb --no-verify").succeeds();
     let (_, first, _) = page(&place, "report a.tetdb a.html --json", "a.html");
     place.write("a.html", "something else");
     let line = "report a.tetdb a.html --json --memory 64MiB";

@@ -38,28 +38,16 @@ fn verifies(place: &Place) {
 
 fn refuses(done: &Done, code: &str, exit: i32) {
     let error = done.error();
-    assert_eq!(
-        (error["code"].as_str(), done.exit()),
-        (Some(code), Some(exit)),
-        "{error}"
-    );
+    assert_eq!((error["code"].as_str(), done.exit()), (Some(code), Some(exit)), "{error}");
     assert!(error["help"].as_str().is_some_and(|help| !help.is_empty()));
 }
 
 /// Ranks whose digests differ.
 fn changed(before: &Value, after: &Value) -> BTreeSet<usize> {
-    assert_eq!(
-        each(before, "interface_digest"),
-        each(after, "interface_digest")
-    );
+    assert_eq!(each(before, "interface_digest"), each(after, "interface_digest"));
     assert_eq!(before["interfaces"], after["interfaces"]);
-    let pairs = each(before, "digest")
-        .into_iter()
-        .zip(each(after, "digest"));
-    (pairs.enumerate())
-        .filter(|(_, (a, b))| a != b)
-        .map(|(rank, _)| rank)
-        .collect()
+    let pairs = each(before, "digest").into_iter().zip(each(after, "digest"));
+    (pairs.enumerate()).filter(|(_, (a, b))| a != b).map(|(rank, _)| rank).collect()
 }
 
 #[test]
@@ -76,10 +64,7 @@ fn without_options_the_mesh_is_the_same_whatever_the_machine() {
     }
     let line = "resaturate a.tetdb --subdomain 2 --refine-by 0.7 --json --threads";
     let digest = |options: &str| {
-        let answer = place
-            .run_line(&format!("{line} {options}"))
-            .succeeds()
-            .json();
+        let answer = place.run_line(&format!("{line} {options}")).succeeds().json();
         place.run_line("resaturate a.tetdb --undo").succeeds();
         answer["digest"].clone()
     };
@@ -92,9 +77,7 @@ fn half_the_size_changes_one_part_only_and_can_be_undone() {
     let place = made();
     let before = info(&place);
     let line = "resaturate a.tetdb --subdomain 1 --refine-by 0.5";
-    let list = place
-        .run_line(&format!("{line} --dry-run --json"))
-        .succeeds();
+    let list = place.run_line(&format!("{line} --dry-run --json")).succeeds();
     let predicted = list.json()["subdomains"][0]["predicted_tets"].as_f64();
     place.run_line(line).succeeds();
     verifies(&place);
@@ -114,32 +97,18 @@ fn half_the_size_changes_one_part_only_and_can_be_undone() {
     let median = metric_median(&place, 1);
     assert!((0.9..1.1).contains(&median), "{median}");
     let good = |info: &Value| {
-        let bins = info["subdomains"][1]["quality"]["bins"]
-            .as_array()
-            .expect("a list")
-            .clone();
+        let bins = info["subdomains"][1]["quality"]["bins"].as_array().expect("a list").clone();
         let bins: Vec<f64> = bins.iter().filter_map(Value::as_f64).collect();
         100.0 * bins[0] / bins.iter().sum::<f64>()
     };
-    assert!(
-        (good(&after) - good(&before)).abs() < 0.5,
-        "{} {}",
-        good(&before),
-        good(&after)
-    );
+    assert!((good(&after) - good(&before)).abs() < 0.5, "{} {}", good(&before), good(&after));
     // Made again as it is now, with nothing said of sizes.
-    place
-        .run_line("resaturate a.tetdb --subdomain 1")
-        .succeeds();
+    place.run_line("resaturate a.tetdb --subdomain 1").succeeds();
     assert!(changed(&after, &info(&place)).is_empty());
     // That was no change: the one before it is undone.
     place.run_line("resaturate a.tetdb --undo").succeeds();
     assert_eq!(info(&place)["digest"], before["digest"]);
-    refuses(
-        &place.run_line("resaturate a.tetdb --undo --json"),
-        "nothing-to-undo",
-        8,
-    );
+    refuses(&place.run_line("resaturate a.tetdb --undo --json"), "nothing-to-undo", 8);
     place.run_line(line).succeeds();
     assert_eq!(info(&place)["digest"], after["digest"]);
     place.run_line(line).succeeds();
@@ -147,29 +116,17 @@ fn half_the_size_changes_one_part_only_and_can_be_undone() {
     assert_eq!(info(&place)["digest"], after["digest"]);
     verifies(&place);
     place.run_line(line).succeeds();
-    let files = || {
-        place
-            .names()
-            .iter()
-            .filter(|n| n.contains("/subdomain-"))
-            .count()
-    };
+    let files = || place.names().iter().filter(|n| n.contains("/subdomain-")).count();
     assert_eq!(files(), 4);
     place.run_line("resaturate a.tetdb --forget").succeeds();
     assert_eq!(files(), 3);
-    refuses(
-        &place.run_line("resaturate a.tetdb --undo --json"),
-        "nothing-to-undo",
-        8,
-    );
+    refuses(&place.run_line("resaturate a.tetdb --undo --json"), "nothing-to-undo", 8);
 }
 
 /// The median length of edges in units of the lengths wanted at their ends, of those farther than twice that from all faces that stay.
 fn metric_median(place: &Place, rank: u32) -> f64 {
     let mut store = Catalog::open(place.path("a.tetdb")).expect("a finished store");
-    let mut part = store
-        .open_subdomain(rank, 16 << 20)
-        .expect("a sealed sub-domain");
+    let mut part = store.open_subdomain(rank, 16 << 20).expect("a sealed sub-domain");
     let vertices: Vec<_> = part.vertices().map(|v| v.expect("no damage")).collect();
     let skin: Vec<[f64; 3]> = (vertices.iter())
         .filter(|v| v.tag == tag::SURFACE || v.tag == tag::INTERFACE)
@@ -216,23 +173,14 @@ fn only_what_a_size_reaches_is_changed() {
         .map(|id| id as usize)
         .collect();
     assert!(!ids.is_empty() && ids.len() < 3, "{list}");
-    assert_eq!(
-        info(&place)["digest"],
-        before["digest"],
-        "a dry run writes nothing"
-    );
-    place
-        .run_line(&format!("resaturate a.tetdb --changed {corner}"))
-        .succeeds();
+    assert_eq!(info(&place)["digest"], before["digest"], "a dry run writes nothing");
+    place.run_line(&format!("resaturate a.tetdb --changed {corner}")).succeeds();
     let after = info(&place);
     assert_eq!(changed(&before, &after), ids.iter().copied().collect());
     assert!(after["tets"].as_u64() > before["tets"].as_u64());
     // The same again: nothing would be another.
     let again = place.run_line(&format!("resaturate a.tetdb --changed {corner} --json"));
-    assert_eq!(
-        again.succeeds().json()["subdomains"],
-        Value::Array(Vec::new())
-    );
+    assert_eq!(again.succeeds().json()["subdomains"], Value::Array(Vec::new()));
 }
 
 #[test]
@@ -283,10 +231,7 @@ fn a_damaged_part_is_made_again_from_its_coarse_leaf() {
     for damage in 0..3 {
         let file = sealed(&place, 2);
         let mut bytes = std::fs::read(&file).expect("the file is readable");
-        let chunk = bytes
-            .windows(4)
-            .position(|w| w == b"TETC")
-            .expect("a chunk");
+        let chunk = bytes.windows(4).position(|w| w == b"TETC").expect("a chunk");
         match damage {
             0 => bytes[chunk + 100] ^= 1,
             1 => bytes[..4096].fill(0xff),
@@ -299,32 +244,18 @@ fn a_damaged_part_is_made_again_from_its_coarse_leaf() {
         let done = place.run_line("verify a.tetdb --json");
         refuses(&done, "damaged", 4);
         let error = done.error();
-        assert!(
-            error["message"]
-                .as_str()
-                .is_some_and(|m| m.contains("00002")),
-            "{error}"
-        );
-        assert!(
-            error["help"]
-                .as_str()
-                .is_some_and(|h| h.contains("--repair")),
-            "{error}"
-        );
+        assert!(error["message"].as_str().is_some_and(|m| m.contains("00002")), "{error}");
+        assert!(error["help"].as_str().is_some_and(|h| h.contains("--repair")), "{error}");
         place.run_line("resaturate a.tetdb --repair").succeeds();
         verifies(&place);
         assert_eq!(info(&place)["digest"], before["digest"]);
     }
     // Of a sub-domain with sizes of its own, too.
-    place
-        .run_line("resaturate a.tetdb --subdomain 2 --refine-by 0.8")
-        .succeeds();
+    place.run_line("resaturate a.tetdb --subdomain 2 --refine-by 0.8").succeeds();
     place.run_line("resaturate a.tetdb --forget").succeeds();
     let finer = info(&place);
     std::fs::remove_file(sealed(&place, 2)).expect("the file can be removed");
-    place
-        .run_line("resaturate a.tetdb --repair --subdomain 2")
-        .succeeds();
+    place.run_line("resaturate a.tetdb --repair --subdomain 2").succeeds();
     assert_eq!(info(&place)["digest"], finer["digest"]);
 }
 
@@ -335,9 +266,7 @@ fn a_killed_change_leaves_old_or_new() {
     let line = "resaturate a.tetdb --subdomain 0,2 --refine-by 0.7 --no-verify";
     place.run_line(line).succeeds();
     let after = info(&place)["digest"].clone();
-    place
-        .run_line("resaturate a.tetdb --undo --no-verify")
-        .succeeds();
+    place.run_line("resaturate a.tetdb --undo --no-verify").succeeds();
     assert_eq!(info(&place)["digest"], before);
     let words: Vec<&str> = line.split_whitespace().collect();
     let mut n_old = 0;
@@ -348,19 +277,14 @@ fn a_killed_change_leaves_old_or_new() {
         child.wait().expect("the child can be waited for");
         // A killed writer's lock goes with it.
         let found = info(&place)["digest"].clone();
-        assert!(
-            found == before || found == after,
-            "{found} after {millis} ms"
-        );
+        assert!(found == before || found == after, "{found} after {millis} ms");
         verifies(&place);
         if found == before {
             n_old += 1;
             place.run_line(line).succeeds();
             assert_eq!(info(&place)["digest"], after);
         }
-        place
-            .run_line("resaturate a.tetdb --undo --no-verify")
-            .succeeds();
+        place.run_line("resaturate a.tetdb --undo --no-verify").succeeds();
         assert_eq!(info(&place)["digest"], before);
     }
     assert!(n_old > 0, "every run was done before it was killed");
@@ -378,11 +302,7 @@ fn what_cannot_be_made_again_is_told() {
     refuses(&line("--subdomain 1 --refine-by 0"), "bad-size", 2);
     refuses(&line("--subdomain 1 --hsiz -1"), "bad-size", 2);
     refuses(&line("--subdomain 1 --hmin 2 --hmax 1"), "bad-size", 2);
-    refuses(
-        &line("--subdomain 1 --size-field none.npy"),
-        "unreadable-file",
-        3,
-    );
+    refuses(&line("--subdomain 1 --size-field none.npy"), "unreadable-file", 3);
     let npy = |shape: &str, values: &[f64]| {
         let head = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}\n");
         let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
@@ -401,31 +321,18 @@ fn what_cannot_be_made_again_is_told() {
     refuses(&line(file), "unexpected-text", 3);
     // Without coarse leaves the mesh is the same, and final.
     let digest = place.digest("a.tetdb");
-    place
-        .run_line(&format!("{MESH} --drop-coarse --force"))
-        .succeeds();
+    place.run_line(&format!("{MESH} --drop-coarse --force")).succeeds();
     assert_eq!(place.digest("a.tetdb"), digest);
     assert_eq!(info(&place)["coarse_bytes"], 0);
     refuses(&line("--subdomain 1"), "no-coarse-leaf", 8);
     assert!(!place.names().iter().any(|name| name.contains("coarse-")));
     // What is not finished is not made again.
-    let words = [
-        "mesh",
-        "sample:balls,count=12",
-        "-o",
-        "b.tetdb",
-        "--threads",
-        "1",
-    ];
+    let words = ["mesh", "sample:balls,count=12", "-o", "b.tetdb", "--threads", "1"];
     let mut child = place.command(&words).spawn().expect("the program starts");
     while !Path::new(&place.path("b.tetdb/catalog.redb")).exists() {
         std::thread::sleep(Duration::from_millis(1));
     }
     child.kill().expect("the child can be killed");
     child.wait().expect("the child can be waited for");
-    refuses(
-        &place.run_line("resaturate b.tetdb --subdomain 0 --json"),
-        "store-unfinished",
-        8,
-    );
+    refuses(&place.run_line("resaturate b.tetdb --subdomain 0 --json"), "store-unfinished", 8);
 }

@@ -40,12 +40,8 @@ fn threads_do_not_change_what_is_mended() {
 #[test]
 fn options_that_shape_the_mesh_do_change_it() {
     let place = Place::new();
-    place
-        .run_line("mesh sample:box,h=0.3 -o a.tetdb")
-        .succeeds();
-    place
-        .run_line("mesh sample:box,h=0.3 -o b.tetdb --hsiz 0.15")
-        .succeeds();
+    place.run_line("mesh sample:box,h=0.3 -o a.tetdb").succeeds();
+    place.run_line("mesh sample:box,h=0.3 -o b.tetdb --hsiz 0.15").succeeds();
     assert_ne!(place.digest("a.tetdb"), place.digest("b.tetdb"));
 }
 
@@ -56,33 +52,19 @@ fn a_finished_store_is_left_as_it_is() {
     place.run_line(line).succeeds();
     let digest = place.digest("a.tetdb");
     let again = place.run_line(line).succeeds();
-    assert!(
-        again.stderr().contains("already holds"),
-        "{}",
-        again.stderr()
-    );
+    assert!(again.stderr().contains("already holds"), "{}", again.stderr());
     assert_eq!(place.digest("a.tetdb"), digest);
 
-    place
-        .run_line("mesh sample:box,h=0.3 -o a.tetdb --hsiz 0.15 --force")
-        .succeeds();
+    place.run_line("mesh sample:box,h=0.3 -o a.tetdb --hsiz 0.15 --force").succeeds();
     assert_ne!(place.digest("a.tetdb"), digest);
     let names = place.names();
-    assert!(
-        names
-            .iter()
-            .all(|n| n == "a.tetdb" || n.starts_with("a.tetdb/")),
-        "{names:?}"
-    );
+    assert!(names.iter().all(|n| n == "a.tetdb" || n.starts_with("a.tetdb/")), "{names:?}");
 }
 
 #[test]
 fn answers_for_programs_have_their_fields() {
     let place = Place::new();
-    let made = place
-        .run_line("mesh sample:box,h=0.3 -o a.tetdb --json")
-        .succeeds()
-        .json();
+    let made = place.run_line("mesh sample:box,h=0.3 -o a.tetdb --json").succeeds().json();
     let info = place.run_line("info a.tetdb --json").succeeds().json();
     for (field, value) in info.as_object().expect("info answers an object") {
         assert_eq!(&made[field], value, "mesh and info agree on {field}");
@@ -91,31 +73,15 @@ fn answers_for_programs_have_their_fields() {
         assert!(made[field].is_u64(), "{field} of {made}");
     }
     let whole = &info["subdomains"][0];
-    assert_eq!(
-        (&info["schema"], &info["state"]),
-        (&1.into(), &"verified".into())
-    );
+    assert_eq!((&info["schema"], &info["state"]), (&1.into(), &"verified".into()));
     assert_eq!(whole["tets"], info["tets"]);
-    let bins = whole["quality"]["bins"]
-        .as_array()
-        .expect("bins are a list");
+    let bins = whole["quality"]["bins"].as_array().expect("bins are a list");
     assert_eq!(
-        bins.iter()
-            .filter_map(serde_json::Value::as_u64)
-            .sum::<u64>(),
+        bins.iter().filter_map(serde_json::Value::as_u64).sum::<u64>(),
         info["tets"].as_u64().unwrap_or(0)
     );
 
-    let proof = place
-        .run_line("verify a.tetdb --full --json")
-        .succeeds()
-        .json();
-    assert_eq!(
-        (&proof["valid"], &proof["digest"]),
-        (&true.into(), &info["digest"])
-    );
-    assert_eq!(
-        place.run_line("digest a.tetdb --json").json()["digest"],
-        info["digest"]
-    );
+    let proof = place.run_line("verify a.tetdb --full --json").succeeds().json();
+    assert_eq!((&proof["valid"], &proof["digest"]), (&true.into(), &info["digest"]));
+    assert_eq!(place.run_line("digest a.tetdb --json").json()["digest"], info["digest"]);
 }

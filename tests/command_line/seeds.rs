@@ -30,16 +30,11 @@ fn regions(place: &Place, store: &str) -> Vec<(Option<String>, bool)> {
 #[test]
 fn seeds_fill_and_name_regions_and_names_are_good_wherever_regions_are() {
     let place = Place::new();
-    place.write(
-        "seeds.txt",
-        "# three of them\n0 0 0 core\n0.5, 0, 0, the shell\n0.9 0 0 hole\n",
-    );
+    place.write("seeds.txt", "# three of them\n0 0 0 core\n0.5, 0, 0, the shell\n0.9 0 0 hole\n");
     let two_names =
         format!("mesh {SHELLS} -o s.tetdb --seeds seeds.txt --region-seed 0,0.01,0,kernel");
     refused(&place, &two_names, "bad-seed");
-    place
-        .run_line(&format!("mesh {SHELLS} -o s.tetdb --seeds seeds.txt"))
-        .succeeds();
+    place.run_line(&format!("mesh {SHELLS} -o s.tetdb --seeds seeds.txt")).succeeds();
     let named = |name: &str| (Some(name.to_owned()), true);
     let expected = vec![(None, false), named("the shell"), named("core")];
     assert_eq!(regions(&place, "s.tetdb"), expected);
@@ -51,9 +46,7 @@ fn seeds_fill_and_name_regions_and_names_are_good_wherever_regions_are() {
     assert_eq!(of("core"), of("2"));
     refused(&place, "query s.tetdb --region rock", "no-such-part");
     let all = format!("mesh {SHELLS} -o all.tetdb --regions all --region-seed 0,0,0,core");
-    place
-        .run_line(&format!("{all} --size-region core,0.1"))
-        .succeeds();
+    place.run_line(&format!("{all} --size-region core,0.1")).succeeds();
     let expected = vec![(None, true), (None, true), named("core")];
     assert_eq!(regions(&place, "all.tetdb"), expected);
 }
@@ -62,9 +55,7 @@ fn seeds_fill_and_name_regions_and_names_are_good_wherever_regions_are() {
 fn names_go_into_every_export_that_has_names_and_come_back_from_there() {
     let place = Place::new();
     let seeds = "--region-seed 0,0,0,core --region-seed 0.5,0,0,mantle";
-    place
-        .run_line(&format!("mesh {SHELLS} -o s.tetdb {seeds}"))
-        .succeeds();
+    place.run_line(&format!("mesh {SHELLS} -o s.tetdb {seeds}")).succeeds();
     for (file, text) in [
         ("s.msh", "3 1 \"mantle\"\n3 2 \"core\""),
         ("s22.msh", "3 1 \"mantle\"\n3 2 \"core\""),
@@ -72,31 +63,20 @@ fn names_go_into_every_export_that_has_names_and_come_back_from_there() {
         ("s.vtu", "Name=\"region_names\""),
         ("s.vtkhdf", "region_names"),
     ] {
-        let format = if file == "s22.msh" {
-            "--format msh22"
-        } else {
-            ""
-        };
-        place
-            .run_line(&format!("export s.tetdb {file} {format}"))
-            .succeeds();
+        let format = if file == "s22.msh" { "--format msh22" } else { "" };
+        place.run_line(&format!("export s.tetdb {file} {format}")).succeeds();
         let bytes = std::fs::read(place.path(file)).expect("it was written");
         let found = bytes.windows(text.len()).any(|w| w == text.as_bytes());
         assert!(found, "{file} has no {text}");
     }
     place.run_line("export s.tetdb case.foam").succeeds();
-    let zones = place
-        .path("case.foam")
-        .with_file_name("constant/polyMesh/cellZones");
+    let zones = place.path("case.foam").with_file_name("constant/polyMesh/cellZones");
     let zones = std::fs::read(zones).expect("it was written");
     assert!(zones.windows(6).any(|w| w == b"mantle"));
     for file in ["s.msh", "s22.msh"] {
         let line = format!("mesh {file} -o again.tetdb --regions seeds --force");
         place.run_line(&line).succeeds();
-        let names: Vec<_> = regions(&place, "again.tetdb")
-            .into_iter()
-            .map(|r| r.0)
-            .collect();
+        let names: Vec<_> = regions(&place, "again.tetdb").into_iter().map(|r| r.0).collect();
         let expected = ["mantle", "core"].map(|name| Some(name.to_owned()));
         assert_eq!(names, expected, "{file}");
     }
@@ -104,10 +84,7 @@ fn names_go_into_every_export_that_has_names_and_come_back_from_there() {
         place.run_line(&format!("export s.tetdb {file}")).succeeds();
         let line = format!("mesh {file} -o again.tetdb --regions seeds --force");
         place.run_line(&line).succeeds();
-        let names: Vec<_> = regions(&place, "again.tetdb")
-            .into_iter()
-            .map(|r| r.0)
-            .collect();
+        let names: Vec<_> = regions(&place, "again.tetdb").into_iter().map(|r| r.0).collect();
         let expected = ["ref_1", "ref_2"].map(|name| Some(name.to_owned()));
         assert_eq!(names, expected, "{file}");
     }
@@ -119,50 +96,22 @@ fn holes_and_attributes_of_a_poly_choose_regions_where_seeds_do() {
     let cube = |from: usize, low: f64, high: f64| {
         let at = |bit: usize| if bit == 1 { high } else { low };
         let points: Vec<String> = (0..8)
-            .map(|c| {
-                format!(
-                    "{} {} {} {}",
-                    from + c,
-                    at(c & 1),
-                    at(c >> 1 & 1),
-                    at(c >> 2)
-                )
-            })
+            .map(|c| format!("{} {} {} {}", from + c, at(c & 1), at(c >> 1 & 1), at(c >> 2)))
             .collect();
-        let sides = [
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-        ];
+        let sides =
+            [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
         let sides: Vec<String> = sides
             .iter()
-            .map(|s| {
-                format!(
-                    "1\n4 {}",
-                    s.map(|c: usize| (from + c).to_string()).join(" ")
-                )
-            })
+            .map(|s| format!("1\n4 {}", s.map(|c: usize| (from + c).to_string()).join(" ")))
             .collect();
         (points.join("\n"), sides.join("\n"))
     };
     let (a, b) = (cube(0, 0.0, 3.0), cube(8, 1.0, 2.0));
     let text = |holes: &str, regions: &str| {
-        format!(
-            "16 3\n{}\n{}\n12\n{}\n{}\n{holes}\n{regions}\n",
-            a.0, b.0, a.1, b.1
-        )
+        format!("16 3\n{}\n{}\n12\n{}\n{}\n{holes}\n{regions}\n", a.0, b.0, a.1, b.1)
     };
-    place.write(
-        "hole.poly",
-        text("1\n1 1.5 1.5 1.5", "1\n1 0.5 0.5 0.5 7 0.1"),
-    );
-    place.write(
-        "full.poly",
-        text("0", "2\n1 0.5 0.5 0.5 7 0.1\n2 1.5 1.5 1.4 8"),
-    );
+    place.write("hole.poly", text("1\n1 1.5 1.5 1.5", "1\n1 0.5 0.5 0.5 7 0.1"));
+    place.write("full.poly", text("0", "2\n1 0.5 0.5 0.5 7 0.1\n2 1.5 1.5 1.4 8"));
     place.write("bad.poly", text("1\n1 0.4 0.5 0.5", "1\n1 0.5 0.5 0.5 7"));
     place.run_line("mesh hole.poly --regions seeds").succeeds();
     let named = |name: &str| (Some(name.to_owned()), true);

@@ -16,10 +16,7 @@ fn shell(skipped: usize) -> String {
         "1 3 4", "1 4 2", "5 6 8", "5 8 7", "1 2 6", "1 6 5", "3 7 8", "3 8 4", "1 5 7", "1 7 3",
         "2 4 8", "2 8 6",
     ];
-    let faces: Vec<String> = faces[skipped..]
-        .iter()
-        .map(|f| format!("f {f}\n"))
-        .collect();
+    let faces: Vec<String> = faces[skipped..].iter().map(|f| format!("f {f}\n")).collect();
     points.to_owned() + &faces.concat()
 }
 
@@ -36,14 +33,9 @@ fn faults_are_faces_with_tetrahedra_on_both_sides_in_one_piece_and_in_several() 
     for (store, n) in [("one", 1), ("four", 4)] {
         let line = format!("mesh {MANY} -o {store}.tetdb --subdomains {n}");
         place.run_line(&line).succeeds();
-        let verified = place
-            .run_line(&format!("verify {store}.tetdb --full --json"))
-            .succeeds();
+        let verified = place.run_line(&format!("verify {store}.tetdb --full --json")).succeeds();
         assert_eq!(verified.json()["triangles_missing"], 0, "{store}");
-        let info = place
-            .run_line(&format!("info {store}.tetdb --json"))
-            .succeeds()
-            .json();
+        let info = place.run_line(&format!("info {store}.tetdb --json")).succeeds().json();
         assert_eq!(info["subdomains"].as_array().map(Vec::len), Some(n));
         // No fault parts a region.
         assert_eq!(info["regions"].as_array().map(Vec::len), Some(1));
@@ -51,15 +43,7 @@ fn faults_are_faces_with_tetrahedra_on_both_sides_in_one_piece_and_in_several() 
         let found = place.run_line(&line).succeeds().stdout();
         counts.push(found.lines().count());
         let of_label = format!("query {store}.tetdb --json --select id --label fault-1");
-        assert!(
-            place
-                .run_line(&of_label)
-                .succeeds()
-                .stdout()
-                .lines()
-                .count()
-                >= 2
-        );
+        assert!(place.run_line(&of_label).succeeds().stdout().lines().count() >= 2);
     }
     assert!(counts.iter().all(|&n| n > 100), "{counts:?}");
     place.check_four(MANY);
@@ -69,36 +53,19 @@ fn faults_are_faces_with_tetrahedra_on_both_sides_in_one_piece_and_in_several() 
 fn sheets_of_files_keep_their_names_and_give_the_mesh_of_the_sample() {
     let place = Place::new();
     let sample = FAULTS.trim_start_matches("sample:");
-    place
-        .run_line(&format!("sample {sample} -o box.obj"))
-        .succeeds();
+    place.run_line(&format!("sample {sample} -o box.obj")).succeeds();
     place
         .run_line("mesh box.obj --embed box_sheets.obj --name box_sheets.obj=faults -o files.tetdb")
         .succeeds();
-    place
-        .run_line(&format!("mesh {FAULTS} -o sample.tetdb"))
-        .succeeds();
+    place.run_line(&format!("mesh {FAULTS} -o sample.tetdb")).succeeds();
     assert_eq!(place.digest("files.tetdb"), place.digest("sample.tetdb"));
     let labels = place.run_line("info files.tetdb --json").succeeds().json()["labels"].clone();
-    let labels: Vec<&str> = labels
-        .as_array()
-        .expect("a list")
-        .iter()
-        .filter_map(|l| l.as_str())
-        .collect();
-    assert!(
-        labels[0] == "box" && labels.contains(&"faults:fault-1"),
-        "{labels:?}"
-    );
+    let labels: Vec<&str> =
+        labels.as_array().expect("a list").iter().filter_map(|l| l.as_str()).collect();
+    assert!(labels[0] == "box" && labels.contains(&"faults:fault-1"), "{labels:?}");
     // The finished mesh of this job is known again; the surface of the record is read with its sheets.
     let same = "mesh box.obj --embed box_sheets.obj --name box_sheets.obj=faults -o files.tetdb";
-    assert!(
-        place
-            .run_line(same)
-            .succeeds()
-            .stderr()
-            .contains("already holds")
-    );
+    assert!(place.run_line(same).succeeds().stderr().contains("already holds"));
     place.run_line("verify files.tetdb --full").succeeds();
     place.run_line("export files.tetdb files.msh").succeeds();
     let text = std::fs::read(place.path("files.msh")).expect("it was written");
@@ -109,12 +76,7 @@ fn sheets_of_files_keep_their_names_and_give_the_mesh_of_the_sample() {
 fn open_parts_of_a_surface_are_sheets_when_they_are_allowed() {
     let place = Place::new();
     let sheet = obj(
-        &[
-            [0.2, 0.2, 0.5],
-            [0.8, 0.3, 0.5],
-            [0.5, 0.8, 0.6],
-            [0.9, 0.9, 0.4],
-        ],
+        &[[0.2, 0.2, 0.5], [0.8, 0.3, 0.5], [0.5, 0.8, 0.6], [0.9, 0.9, 0.4]],
         &[[9, 10, 11], [10, 12, 11]],
     );
     place.write("all.obj", shell(0) + &sheet);
@@ -141,68 +103,22 @@ fn sheets_in_wrong_places_are_refused_with_the_place() {
         place.write(name, obj(points, faces));
     };
     place_of("good.obj", &good, one);
-    place_of(
-        "outside.obj",
-        &[[2.0, 0.0, 0.0], [3.0, 0.0, 0.0], [2.0, 1.0, 0.0]],
-        one,
-    );
-    place_of(
-        "through.obj",
-        &[[0.5, 0.5, 0.5], [1.5, 0.5, 0.5], [0.5, 0.6, 0.9]],
-        one,
-    );
-    place_of(
-        "touching.obj",
-        &[[0.5, 0.5, 0.5], [1.0, 0.5, 0.6], [0.5, 0.6, 0.9]],
-        one,
-    );
-    place_of(
-        "on_edge.obj",
-        &[[0.5, 0.5, 0.5], [1.0, 0.0, 0.5], [0.5, 0.6, 0.9]],
-        one,
-    );
-    place_of(
-        "in_face.obj",
-        &[[0.2, 0.2, 0.0], [0.8, 0.3, 0.0], [0.5, 0.8, 0.0]],
-        one,
-    );
-    place_of(
-        "of_shell.obj",
-        &[[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]],
-        one,
-    );
-    place_of(
-        "of_shell_back.obj",
-        &[[0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [1.0, 1.0, 0.0]],
-        one,
-    );
-    place_of(
-        "line.obj",
-        &[[0.2, 0.2, 0.2], [0.4, 0.4, 0.4], [0.6, 0.6, 0.6]],
-        one,
-    );
+    place_of("outside.obj", &[[2.0, 0.0, 0.0], [3.0, 0.0, 0.0], [2.0, 1.0, 0.0]], one);
+    place_of("through.obj", &[[0.5, 0.5, 0.5], [1.5, 0.5, 0.5], [0.5, 0.6, 0.9]], one);
+    place_of("touching.obj", &[[0.5, 0.5, 0.5], [1.0, 0.5, 0.6], [0.5, 0.6, 0.9]], one);
+    place_of("on_edge.obj", &[[0.5, 0.5, 0.5], [1.0, 0.0, 0.5], [0.5, 0.6, 0.9]], one);
+    place_of("in_face.obj", &[[0.2, 0.2, 0.0], [0.8, 0.3, 0.0], [0.5, 0.8, 0.0]], one);
+    place_of("of_shell.obj", &[[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]], one);
+    place_of("of_shell_back.obj", &[[0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [1.0, 1.0, 0.0]], one);
+    place_of("line.obj", &[[0.2, 0.2, 0.2], [0.4, 0.4, 0.4], [0.6, 0.6, 0.6]], one);
     place_of("twice.obj", &good, &[[1, 2, 3], [2, 3, 1]]);
     place_of("twice_back.obj", &good, &[[1, 2, 3], [2, 1, 3]]);
     let more = |p: [[f64; 3]; 3]| [good.to_vec(), p.to_vec()].concat();
     let two: &[[usize; 3]] = &[[1, 2, 3], [4, 5, 6]];
-    place_of(
-        "cross.obj",
-        &more([[0.5, 0.4, 0.2], [0.5, 0.5, 0.9], [0.4, 0.4, 0.9]]),
-        two,
-    );
-    place_of(
-        "corner.obj",
-        &more([[0.375, 0.5, 0.5625], [0.3, 0.9, 0.9], [0.2, 0.9, 0.9]]),
-        two,
-    );
-    place.write(
-        "nan.obj",
-        "v 0.1 0.1 nan\nv 0.2 0.1 0.1\nv 0.1 0.3 0.1\nf 1 2 3\n",
-    );
-    place.write(
-        "index.obj",
-        "v 0.1 0.1 0.2\nv 0.2 0.1 0.1\nv 0.1 0.3 0.1\nf 1 2 4\n",
-    );
+    place_of("cross.obj", &more([[0.5, 0.4, 0.2], [0.5, 0.5, 0.9], [0.4, 0.4, 0.9]]), two);
+    place_of("corner.obj", &more([[0.375, 0.5, 0.5625], [0.3, 0.9, 0.9], [0.2, 0.9, 0.9]]), two);
+    place.write("nan.obj", "v 0.1 0.1 nan\nv 0.2 0.1 0.1\nv 0.1 0.3 0.1\nf 1 2 3\n");
+    place.write("index.obj", "v 0.1 0.1 0.2\nv 0.2 0.1 0.1\nv 0.1 0.3 0.1\nf 1 2 4\n");
     place.write("empty.obj", "");
     place.write("points.obj", "v 0.1 0.1 0.2\nv 0.2 0.1 0.1\n");
     place.write("text.stl", "no stl at all");
@@ -233,10 +149,7 @@ fn sheets_in_wrong_places_are_refused_with_the_place() {
         assert_eq!(run.exit(), Some(3), "{sheet}");
         let error = run.error();
         assert_eq!(error["code"], code, "{sheet}: {error}");
-        assert!(
-            !error["where"].is_null() || code == "unreadable-file",
-            "{sheet}: {error}"
-        );
+        assert!(!error["where"].is_null() || code == "unreadable-file", "{sheet}: {error}");
         assert!(!place.path("s.tetdb").exists(), "{sheet}");
     }
     let run = place.run_line("mesh box.obj --embed good.obj --name other.obj=x --json");

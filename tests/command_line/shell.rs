@@ -7,11 +7,8 @@ use super::place::Place;
 
 fn commands(place: &Place) -> Vec<String> {
     let help = place.run(&["--help"]).succeeds().stdout();
-    let lines = help
-        .lines()
-        .skip_while(|l| *l != "Commands:")
-        .skip(1)
-        .take_while(|l| !l.is_empty());
+    let lines =
+        help.lines().skip_while(|l| *l != "Commands:").skip(1).take_while(|l| !l.is_empty());
     let names = lines.filter_map(|l| l.strip_prefix("  ")?.split_whitespace().next());
     let names: Vec<String> = names.map(str::to_owned).filter(|n| n != "help").collect();
     assert!(names.len() >= 12, "{help}");
@@ -36,10 +33,7 @@ fn shells_complete_every_command() {
         for name in commands(&place) {
             assert!(script.contains(&name), "{shell} does not know {name}");
         }
-        assert!(
-            script.contains("touching-surface"),
-            "{shell} knows no options of query"
-        );
+        assert!(script.contains("touching-surface"), "{shell} knows no options of query");
     }
     assert_eq!(place.run(&["completions", "dash"]).exit(), Some(2));
 }
@@ -64,9 +58,7 @@ fn quiet_commands_tell_of_warnings_and_errors_alone() {
     let place = Place::new();
     let balls = "sample:balls,count=2,h=0.2";
     let told = place.run(&["mesh", balls, "-o", "a.tetdb"]).succeeds();
-    let quiet = place
-        .run(&["mesh", balls, "-o", "b.tetdb", "--quiet"])
-        .succeeds();
+    let quiet = place.run(&["mesh", balls, "-o", "b.tetdb", "--quiet"]).succeeds();
     assert!(!told.stderr().is_empty());
     assert_eq!(quiet.stderr(), "");
     assert_eq!(quiet.stdout(), "", "a summary nobody asked for");
@@ -75,14 +67,7 @@ fn quiet_commands_tell_of_warnings_and_errors_alone() {
     assert!(asked.stdout().contains("finished and verified"));
     let warned = place.run(&["-q", "mesh", balls, "-o", "c.tetdb", "--hmax", "0.05"]);
     let text = warned.succeeds().stderr();
-    assert!(
-        !text.is_empty() && text.lines().all(|l| l.starts_with("warning: ")),
-        "{text}"
-    );
+    assert!(!text.is_empty() && text.lines().all(|l| l.starts_with("warning: ")), "{text}");
     let refused = place.run(&["info", "nothing.tetdb", "-q"]);
-    assert!(
-        refused.stderr().starts_with("error["),
-        "{}",
-        refused.stderr()
-    );
+    assert!(refused.stderr().starts_with("error["), "{}", refused.stderr());
 }

@@ -44,18 +44,14 @@ fn what_a_run_reads_is_never_what_it_writes() {
             assert_eq!(found, content, "{line}");
         }
     }
-    place
-        .run_line("refine-surface s.off s.off --hsiz 0.5 --force")
-        .succeeds();
+    place.run_line("refine-surface s.off s.off --hsiz 0.5 --force").succeeds();
     place.run_line("export k.tetdb k.mesh --force").succeeds();
 }
 
 #[test]
 fn a_folder_is_no_file_to_be_written() {
     let place = Place::new();
-    place
-        .run_line("mesh sample:box,h=0.5 -o k.tetdb --no-verify")
-        .succeeds();
+    place.run_line("mesh sample:box,h=0.5 -o k.tetdb --no-verify").succeeds();
     for (name, command) in [
         ("d.vtu", "export k.tetdb"),
         ("d.csv", "query k.tetdb -o"),
@@ -79,9 +75,7 @@ fn a_folder_is_no_file_to_be_written() {
 #[test]
 fn files_that_were_embedded_are_not_overwritten() {
     let place = Place::new();
-    place
-        .run_line("sample wells,count=2,cells=6 -o w.obj")
-        .succeeds();
+    place.run_line("sample wells,count=2,cells=6 -o w.obj").succeeds();
     place
         .run_line("mesh w.obj --embed w_sheets.obj --embed-edges w_wires.obj --embed-points w_wires.obj --no-verify")
         .succeeds();
@@ -240,18 +234,15 @@ fn an_export_that_is_stopped_leaves_no_file_behind() {
     let words = ["mesh", "sample:box,h=0.05", "-o", "b.tetdb", "--no-verify"];
     place.run(&words).succeeds();
     for millis in [5, 20, 60] {
-        let mut child = place
-            .command(&["export", "b.tetdb", "b.mesh"])
-            .spawn()
-            .expect("the program starts");
+        let mut child =
+            place.command(&["export", "b.tetdb", "b.mesh"]).spawn().expect("the program starts");
         std::thread::sleep(Duration::from_millis(millis));
         let id = child.id().to_string();
         let sent = Command::new("kill").args(["-TERM", &id]).status();
         assert!(sent.is_ok());
         child.wait().expect("it ends");
-        let left: Vec<String> = (place.names().into_iter())
-            .filter(|name| name.contains(".tmp"))
-            .collect();
+        let left: Vec<String> =
+            (place.names().into_iter()).filter(|name| name.contains(".tmp")).collect();
         assert!(left.is_empty(), "{left:?}");
     }
 }

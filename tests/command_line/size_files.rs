@@ -66,41 +66,21 @@ fn a_background_mesh_tells_sizes() {
 fn sizes_at_the_surfaces_own_vertices() {
     let place = Place::new();
     place.run_line("sample box,h=0.4 -o a.off").succeeds();
-    let plain = place
-        .run_line("mesh a.off -o plain.tetdb --json")
-        .succeeds();
+    let plain = place.run_line("mesh a.off -o plain.tetdb --json").succeeds();
     let plain = plain.json();
     let text = std::fs::read_to_string(place.path("a.off")).expect("a text");
-    let n: usize = text
-        .split_whitespace()
-        .nth(1)
-        .and_then(|w| w.parse().ok())
-        .expect("a count");
+    let n: usize = text.split_whitespace().nth(1).and_then(|w| w.parse().ok()).expect("a count");
     let head = format!("MeshVersionFormatted 2\nDimension 3\nSolAtVertices\n{n}\n1 1\n");
     place.write("own.sol", head.clone() + &"0.15\n".repeat(n));
     let line = "mesh a.off --size-field own.sol -o fine.tetdb --json";
     let fine = place.run_line(line).succeeds().json();
-    assert!(
-        tets(&fine) > 3.0 * tets(&plain),
-        "{} {}",
-        fine["tets"],
-        plain["tets"]
-    );
-    place.write(
-        "own.sol",
-        head.replace(&format!("\n{n}\n"), "\n3\n") + &"0.15\n".repeat(3),
-    );
+    assert!(tets(&fine) > 3.0 * tets(&plain), "{} {}", fine["tets"], plain["tets"]);
+    place.write("own.sol", head.replace(&format!("\n{n}\n"), "\n3\n") + &"0.15\n".repeat(3));
     let done = place.run_line("mesh a.off --size-field own.sol -o bad.tetdb --json");
     let error = done.error();
-    assert_eq!(
-        (error["code"].as_str(), done.exit()),
-        (Some("bad-size"), Some(2))
-    );
+    assert_eq!((error["code"].as_str(), done.exit()), (Some("bad-size"), Some(2)));
     let message = error["message"].as_str().unwrap_or_default();
-    assert!(
-        message.contains(&format!("3 sizes for the {n} vertices")),
-        "{message}"
-    );
+    assert!(message.contains(&format!("3 sizes for the {n} vertices")), "{message}");
 }
 
 #[test]
@@ -111,11 +91,7 @@ fn faults_are_named_with_their_place() {
         let line = "mesh sample:box,h=0.5 --size-field back.sol -o x.tetdb --json";
         let done = place.run_line(line);
         let error = done.error();
-        assert_eq!(
-            (error["code"].as_str(), done.exit()),
-            (Some(code), Some(exit)),
-            "{error}"
-        );
+        assert_eq!((error["code"].as_str(), done.exit()), (Some(code), Some(exit)), "{error}");
         let said = format!("{} {}", error["message"], error["where"]);
         assert!(said.contains(names), "{said} does not name {names}");
         assert!(!place.path("x.tetdb").exists());
@@ -133,10 +109,7 @@ fn faults_are_named_with_their_place() {
     sizes(&place, "much", "0.1");
     run("not-a-number", 3, "back.sol, line 6");
     let head = "MeshVersionFormatted 2\nDimension 3\n";
-    place.write(
-        "back.sol",
-        format!("{head}SolAtVertices\n8\n1 2\n{}", "1 1 1\n".repeat(8)),
-    );
+    place.write("back.sol", format!("{head}SolAtVertices\n8\n1 2\n{}", "1 1 1\n".repeat(8)));
     run("unsupported-content", 3, "back.sol, line");
     place.write("back.sol", format!("{head}SolAtVertices\n3\n1 1\n1\n1\n"));
     run("count-mismatch", 3, "back.sol");

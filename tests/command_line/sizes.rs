@@ -28,9 +28,7 @@ fn beside_tiny_notches_lengths_stay_those_of_the_surface() {
     // Lengths filled in between theirs once ran away below zero here, and 1e16 tetrahedra were expected.
     let expected = place.run_line("estimate notches.off --json");
     let expected = number(&expected.succeeds().json(), "tets");
-    place
-        .run_line("mesh notches.off -o n.tetdb --quiet")
-        .succeeds();
+    place.run_line("mesh notches.off -o n.tetdb --quiet").succeeds();
     let found = place.run_line("info n.tetdb --json").succeeds().json();
     let ratio = expected / number(&found, "tets");
     assert!((0.5..2.0).contains(&ratio), "{expected} expected, {ratio}");
@@ -58,10 +56,7 @@ fn estimates_come_true() {
         let made = made.succeeds().json();
         for (name, off_max) in [("tets", 0.15), ("vertices", 0.15), ("peak_bytes", 0.35)] {
             let ratio = number(&told, name) / number(&made, name);
-            assert!(
-                (ratio - 1.0).abs() < off_max,
-                "{line}: {name} is {ratio} of what came"
-            );
+            assert!((ratio - 1.0).abs() < off_max, "{line}: {name} is {ratio} of what came");
         }
         let subdomains = made["subdomains"].as_array().map(Vec::len);
         assert_eq!(told["subdomains"].as_u64(), subdomains.map(|n| n as u64));
@@ -113,17 +108,9 @@ fn regions_have_sizes_of_their_own() {
         found.push(tets_of_regions(&place, &format!("{store}.tetdb")));
     }
     // The region asked for has its tetrahedra, others only those of the transition.
-    let [plain, first, second, named, both] = &found[..] else {
-        panic!("{found:?}")
-    };
-    assert!(
-        first[0] > 4.0 * plain[0] && first[2] < 3.0 * plain[2],
-        "{found:?}"
-    );
-    assert!(
-        second[1] > 8.0 * plain[1] && second[1] > second[0],
-        "{found:?}"
-    );
+    let [plain, first, second, named, both] = &found[..] else { panic!("{found:?}") };
+    assert!(first[0] > 4.0 * plain[0] && first[2] < 3.0 * plain[2], "{found:?}");
+    assert!(second[1] > 8.0 * plain[1] && second[1] > second[0], "{found:?}");
     assert_eq!(second, named);
     assert!(both[2] > 3.0 * second[2], "{found:?}");
     for (option, named) in [
@@ -140,10 +127,7 @@ fn regions_have_sizes_of_their_own() {
         words.push(option);
         let done = place.run(&words);
         let error = done.error();
-        assert_eq!(
-            (error["code"].as_str(), done.exit()),
-            (Some("bad-size"), Some(2))
-        );
+        assert_eq!((error["code"].as_str(), done.exit()), (Some("bad-size"), Some(2)));
         let message = error["message"].as_str().unwrap_or_default();
         assert!(message.contains(named), "{option}: {message}");
         assert!(!place.path("bad.tetdb").exists());
@@ -155,10 +139,7 @@ fn sizes_by_position_give_one_mesh() {
     let place = Place::new();
     let expression = "0.06+0.3*abs(x-0.5)";
     let mut digests = Vec::new();
-    place.write(
-        "job.toml",
-        format!("size_expr = \"{expression}\"\nsize_region = [\"1,0.15\"]\n"),
-    );
+    place.write("job.toml", format!("size_expr = \"{expression}\"\nsize_region = [\"1,0.15\"]\n"));
     let typed = format!("--size-expr {expression} --size-region 1,0.15");
     for (store, options) in [
         ("a", format!("{typed} --threads 1 --memory 64MiB")),
@@ -196,19 +177,9 @@ fn expressions_that_are_no_sizes_are_named() {
         ("w", "w"),
     ] {
         let option = format!("--size-expr={expression}");
-        let done = place.run(&[
-            "mesh",
-            "sample:box,h=0.5",
-            "-o",
-            "a.tetdb",
-            "--json",
-            &option,
-        ]);
+        let done = place.run(&["mesh", "sample:box,h=0.5", "-o", "a.tetdb", "--json", &option]);
         let error = done.error();
-        assert_eq!(
-            (error["code"].as_str(), done.exit()),
-            (Some("bad-size"), Some(2))
-        );
+        assert_eq!((error["code"].as_str(), done.exit()), (Some("bad-size"), Some(2)));
         let message = error["message"].as_str().unwrap_or_default();
         assert!(message.contains(named), "{expression}: {message}");
         assert!(place.names().is_empty());

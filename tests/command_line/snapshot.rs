@@ -59,11 +59,7 @@ fn a_cut_is_drawn_whole_and_in_its_colors() {
     let svg = std::fs::read_to_string(place.path("whole.svg")).expect("it was written");
     let pieces = polygons(&svg);
     assert!(pieces.iter().all(|(corners, _)| corners.len() == 3));
-    let widest = pieces
-        .iter()
-        .flat_map(|(c, _)| c)
-        .map(|c| c[0])
-        .fold(0.0, f64::max);
+    let widest = pieces.iter().flat_map(|(c, _)| c).map(|c| c[0]).fold(0.0, f64::max);
     assert!(widest < 420.0, "the bar of colors has its place: {widest}");
 }
 
@@ -71,9 +67,7 @@ fn a_cut_is_drawn_whole_and_in_its_colors() {
 #[cfg(feature = "pictures")]
 fn a_png_has_the_size_asked_for() {
     let place = Place::new();
-    place
-        .run_line("mesh sample:box,h=0.2 -o a.tetdb")
-        .succeeds();
+    place.run_line("mesh sample:box,h=0.2 -o a.tetdb").succeeds();
     for (name, options) in [("a.png", ""), ("b.png", ""), ("c.png", "--color quality")] {
         let line = format!("snapshot a.tetdb {name} --size 320x240 {options}");
         place.run_line(&line).succeeds();
@@ -119,11 +113,7 @@ fn stages_are_drawn_where_they_were_kept_and_change_nothing() {
         "snapshot b.tetdb c.svg --stage 1:natural --json",
         "snapshot a.tetdb c.svg --stage 2:refined --json",
     ] {
-        assert_eq!(
-            place.run_line(line).error()["code"],
-            "no-such-part",
-            "{line}"
-        );
+        assert_eq!(place.run_line(line).error()["code"], "no-such-part", "{line}");
     }
     for line in [
         "snapshot a.tetdb c.svg --stage 1 --json",
@@ -148,10 +138,7 @@ fn surfaces_are_drawn_with_what_bounds_them() {
         answer["pieces"].as_u64().expect("a number")
     };
     let number = |key: &str| part[key].as_u64().expect("a number");
-    assert_eq!(
-        pieces("--shell 1"),
-        number("facets") + number("interface_faces")
-    );
+    assert_eq!(pieces("--shell 1"), number("facets") + number("interface_faces"));
     let all = number("facets") + info["subdomains"][0]["facets"].as_u64().expect("a number");
     assert_eq!(pieces("--surface"), all);
     // Half of the surface, and of the tetrahedra in the plane the faces that look to the viewer: one to three of each.
@@ -171,9 +158,7 @@ fn surfaces_are_drawn_with_what_bounds_them() {
 #[test]
 fn a_surface_that_is_cut_open_shows_tetrahedra_and_labels_have_colors() {
     let place = Place::new();
-    place
-        .run_line("mesh sample:box,h=0.5 -o box.tetdb")
-        .succeeds();
+    place.run_line("mesh sample:box,h=0.5 -o box.tetdb").succeeds();
     let pieces = |options: &str| {
         let line = format!("snapshot box.tetdb a.png --surface --size 200x200 --json {options}");
         let answer = place.run_line(&line).succeeds().json();
@@ -182,10 +167,7 @@ fn a_surface_that_is_cut_open_shows_tetrahedra_and_labels_have_colors() {
     let (whole, cut) = (pieces(""), pieces("--plane 0.5,0.5,0.5,1,0,0"));
     let tets = place.run_line("query box.tetdb --plane 0.5,0.5,0.5,1,0,0 --json");
     let n_cut = tets.succeeds().stdout().lines().count() as u64;
-    assert!(
-        n_cut > 0 && cut > n_cut && cut <= whole + 3 * n_cut,
-        "{whole} {cut} {n_cut}"
-    );
+    assert!(n_cut > 0 && cut > n_cut && cut <= whole + 3 * n_cut, "{whole} {cut} {n_cut}");
     assert_eq!(pieces("--color label"), whole);
     // What was cut has no label, and no color among those explained.
     let line = "snapshot box.tetdb a.svg --surface --plane 0.5,0.5,0.5,1,0,0 --color label";

@@ -11,9 +11,7 @@ use super::place::{Place, TETRA, program};
 /// CRC-32 and a stored block: gzip without compression.
 fn gzip(bytes: &[u8]) -> Vec<u8> {
     let crc = !bytes.iter().fold(!0u32, |crc, &byte| {
-        (0..8).fold(crc ^ u32::from(byte), |c, _| {
-            c >> 1 ^ (0xedb8_8320 & (c & 1).wrapping_neg())
-        })
+        (0..8).fold(crc ^ u32::from(byte), |c, _| c >> 1 ^ (0xedb8_8320 & (c & 1).wrapping_neg()))
     });
     let length = bytes.len() as u16;
     let mut out = vec![0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 255, 1];
@@ -30,17 +28,9 @@ fn packed_surfaces_are_the_surfaces_they_hold() {
     let place = Place::new();
     place.write("part.off", TETRA);
     place.write("part.off.gz", gzip(TETRA.as_bytes()));
-    place.write(
-        "part.off.zst",
-        zstd::bulk::compress(TETRA.as_bytes(), 3).expect("room"),
-    );
-    for (k, name) in ["part.off", "part.off.gz", "part.off.zst"]
-        .iter()
-        .enumerate()
-    {
-        place
-            .run_line(&format!("mesh {name} -o {k}.tetdb"))
-            .succeeds();
+    place.write("part.off.zst", zstd::bulk::compress(TETRA.as_bytes(), 3).expect("room"));
+    for (k, name) in ["part.off", "part.off.gz", "part.off.zst"].iter().enumerate() {
+        place.run_line(&format!("mesh {name} -o {k}.tetdb")).succeeds();
         place.run_line(&format!("verify {k}.tetdb")).succeeds();
         assert_eq!(place.digest("0.tetdb"), place.digest(&format!("{k}.tetdb")));
         let labels = place.run_line(&format!("info {k}.tetdb --json")).json()["labels"].clone();
@@ -53,9 +43,7 @@ fn what_unpacks_to_more_than_its_share_of_memory_is_refused() {
     let place = Place::new();
     let zeros = zstd::bulk::compress(&vec![b' '; 40 << 20], 3).expect("room");
     place.write("bomb.off.zst", zeros);
-    let error = place
-        .run_line("mesh bomb.off.zst --memory 64MiB --json")
-        .error();
+    let error = place.run_line("mesh bomb.off.zst --memory 64MiB --json").error();
     assert_eq!(error["code"], "memory", "{error}");
     place.write("cut.off.gz", &gzip(TETRA.as_bytes())[..40]);
     let error = place.run_line("check cut.off.gz --json").error();
@@ -78,10 +66,7 @@ fn a_surface_may_come_by_the_standard_input() {
         drop(input);
         let output = child.wait_with_output().expect("it ends");
         let said = String::from_utf8_lossy(&output.stdout).into_owned();
-        assert!(
-            output.status.success() && said.contains("it can be meshed"),
-            "{said}"
-        );
+        assert!(output.status.success() && said.contains("it can be meshed"), "{said}");
     }
 }
 
@@ -92,9 +77,7 @@ fn endless_and_enormous_inputs_are_refused_at_once() {
     place.run_line("mesh part.off").succeeds();
     let long = "# a comment\n".repeat(20 << 16);
     place.write("long.toml", long);
-    let made = std::process::Command::new("mkfifo")
-        .arg(place.path("pipe.sol"))
-        .status();
+    let made = std::process::Command::new("mkfifo").arg(place.path("pipe.sol")).status();
     assert!(made.is_ok_and(|made| made.success()), "mkfifo works here");
     for (line, code) in [
         ("check /dev/zero", "unreadable-file"),
@@ -103,10 +86,7 @@ fn endless_and_enormous_inputs_are_refused_at_once() {
         ("mesh part.off --config long.toml", "unreadable-file"),
         ("mesh part.off --size-field pipe.sol", "unreadable-file"),
         ("query part.tetdb --points /dev/zero", "unreadable-file"),
-        (
-            "verify part.tetdb --against /dev/urandom",
-            "unreadable-file",
-        ),
+        ("verify part.tetdb --against /dev/urandom", "unreadable-file"),
     ] {
         let words: Vec<&str> = line.split(' ').chain(["--json"]).collect();
         let mut command = std::process::Command::new("timeout");
@@ -121,9 +101,7 @@ fn endless_and_enormous_inputs_are_refused_at_once() {
 #[test]
 fn lengths_that_no_mesh_can_have_are_refused_before_work_begins() {
     let place = Place::new();
-    place
-        .run_line("mesh sample:box,h=0.5 -o b.tetdb --no-verify")
-        .succeeds();
+    place.run_line("mesh sample:box,h=0.5 -o b.tetdb --no-verify").succeeds();
     let info = place.run_line("info b.tetdb --json").succeeds().json();
     let n = info["subdomains"][0]["vertices"].as_u64().expect("a count");
     let head = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({n},), }}");
@@ -132,10 +110,7 @@ fn lengths_that_no_mesh_can_have_are_refused_before_work_begins() {
     (0..n).for_each(|_| bytes.extend_from_slice(&1e-300_f64.to_le_bytes()));
     place.write("h.npy", bytes);
     let mut command = std::process::Command::new("timeout");
-    command
-        .arg("20")
-        .arg(program())
-        .current_dir(place.path("."));
+    command.arg("20").arg(program()).current_dir(place.path("."));
     let words = "resaturate b.tetdb --subdomain 0 --size-field h.npy --json";
     let output = command.args(words.split(' ')).output();
     let output = output.expect("it starts");

@@ -17,9 +17,7 @@ fn info(place: &Place, store: &str) -> Value {
 }
 
 fn number(value: &Value) -> f64 {
-    value
-        .as_f64()
-        .unwrap_or_else(|| panic!("{value} is no number"))
+    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
 }
 
 #[test]
@@ -38,16 +36,10 @@ fn any_number_of_parts_is_valid_and_of_the_same_size() {
         assert_eq!(proof["triangles_missing"], 0);
         let info = info(&place, &store);
         let ratio = number(&info["tets"]) / number(&whole["tets"]);
-        assert!(
-            (ratio - 1.0).abs() < 0.02,
-            "{n} parts: {ratio} times as many"
-        );
+        assert!((ratio - 1.0).abs() < 0.02, "{n} parts: {ratio} times as many");
         for part in info["subdomains"].as_array().expect("a list") {
             let share = number(&part["tets"]) * n as f64 / number(&info["tets"]);
-            assert!(
-                (0.97..1.03).contains(&share),
-                "{n} parts: {share} of the mean"
-            );
+            assert!((0.97..1.03).contains(&share), "{n} parts: {share} of the mean");
             assert!(number(&part["worst_q"]) < 3.5, "{part}");
         }
         topology_is_symmetric(&info);
@@ -72,10 +64,7 @@ fn topology_is_symmetric(info: &Value) {
                 (i["low"] == a["id"] && i["high"] == b["id"])
                     || (i["low"] == b["id"] && i["high"] == a["id"])
             });
-            assert_eq!(
-                between.map(|i| number(&i["faces"])).sum::<f64>(),
-                shared(a, b)
-            );
+            assert_eq!(between.map(|i| number(&i["faces"])).sum::<f64>(), shared(a, b));
             sum += shared(a, b);
         }
     }
@@ -103,10 +92,7 @@ fn cuts_are_good(info: &Value) {
         assert_eq!(measure("frozen_hits"), 0.0);
         assert_eq!(measure("z_enclosed"), measure("z_tets"));
     }
-    assert_eq!(
-        n_cuts + 1,
-        info["subdomains"].as_array().map_or(0, Vec::len)
-    );
+    assert_eq!(n_cuts + 1, info["subdomains"].as_array().map_or(0, Vec::len));
 }
 
 #[test]
@@ -148,14 +134,8 @@ fn threads_memory_and_interruptions_do_not_change_the_parts() {
 #[test]
 fn more_parts_than_the_mesh_allows_are_not_made() {
     let place = Place::new();
-    let made = place
-        .run_line("mesh sample:box,h=0.1 -o a.tetdb --subdomains 50")
-        .succeeds();
-    assert!(
-        made.stderr().contains("50 sub-domains were asked for"),
-        "{}",
-        made.stderr()
-    );
+    let made = place.run_line("mesh sample:box,h=0.1 -o a.tetdb --subdomains 50").succeeds();
+    assert!(made.stderr().contains("50 sub-domains were asked for"), "{}", made.stderr());
     let info = info(&place, "a.tetdb");
     assert_eq!(info["subdomains"].as_array().map(Vec::len), Some(1));
     for bad in ["0", "-1", "many", "1.5"] {
@@ -170,10 +150,7 @@ fn more_parts_than_the_mesh_allows_are_not_made() {
 fn a_surface_made_finer_is_the_same_surface() {
     let place = Place::new();
     place.run_line("sample box,h=0.5 -o a.off").succeeds();
-    let made = place
-        .run_line("refine-surface a.off b.off --hsiz 0.1 --json")
-        .succeeds()
-        .json();
+    let made = place.run_line("refine-surface a.off b.off --hsiz 0.1 --json").succeeds().json();
     assert_eq!(number(&made["report"]["deviation_max"]), 0.0);
     assert!(number(&made["triangles"]) > 10.0 * number(&made["triangles_before"]));
     place.run_line("mesh b.off -o b.tetdb").succeeds();
@@ -199,10 +176,7 @@ fn two_meshes_are_compared_by_kind_of_tetrahedron() {
         let line = format!("mesh {SAMPLE} -o {store}.tetdb {options}");
         place.run_line(&line).succeeds();
     }
-    let same = place
-        .run_line("compare a.tetdb a.tetdb --json")
-        .succeeds()
-        .json();
+    let same = place.run_line("compare a.tetdb a.tetdb --json").succeeds().json();
     assert_eq!(same["same"], true);
     let done = place.run_line("compare a.tetdb b.tetdb --json");
     assert_eq!(done.exit(), Some(7));
@@ -214,8 +188,5 @@ fn two_meshes_are_compared_by_kind_of_tetrahedron() {
     }
     assert!(number(&found["second"]["at_interface"]["tets"]) > 1000.0);
     let text = place.run_line("compare a.tetdb b.tetdb").stdout();
-    assert!(
-        text.contains("at interfaces") && text.contains("the meshes differ"),
-        "{text}"
-    );
+    assert!(text.contains("at interfaces") && text.contains("the meshes differ"), "{text}");
 }

@@ -27,10 +27,8 @@ impl Random {
     }
 
     fn below(&mut self, n: usize) -> usize {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        self.0 =
+            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 33) as usize % n
     }
 
@@ -49,9 +47,7 @@ fn planned(place: &Place, tasks: u32) -> String {
     };
     mesh("one.tetdb", "--no-verify");
     mesh("a.tetdb", "--coarse-only");
-    place
-        .run_line(&format!("plan a.tetdb --tasks {tasks} --json"))
-        .succeeds();
+    place.run_line(&format!("plan a.tetdb --tasks {tasks} --json")).succeeds();
     place.digest("one.tetdb")
 }
 
@@ -64,9 +60,7 @@ fn next(place: &Place) -> Vec<u32> {
     let info = place.run_line("info a.tetdb --json").succeeds().json();
     let states = info["tasks"]["states"].as_array().cloned();
     let tasks = states.unwrap_or_default().into_iter();
-    tasks
-        .map(|t| t["task"].as_u64().expect("a number") as u32)
-        .collect()
+    tasks.map(|t| t["task"].as_u64().expect("a number") as u32).collect()
 }
 
 fn started(place: &Place, task: u32, more: &str) -> Child {
@@ -101,12 +95,7 @@ fn is_as_of_one_process(place: &Place, digest: &str) {
     let files = |store: &str| {
         let names = fs::read_dir(place.path(store)).expect("a store");
         let mut names: Vec<String> = names
-            .map(|e| {
-                e.expect("an entry")
-                    .file_name()
-                    .to_string_lossy()
-                    .into_owned()
-            })
+            .map(|e| e.expect("an entry").file_name().to_string_lossy().into_owned())
             .collect();
         names.sort();
         names
@@ -117,9 +106,7 @@ fn is_as_of_one_process(place: &Place, digest: &str) {
 fn receipts(place: &Place) -> Vec<PathBuf> {
     let dir = fs::read_dir(place.path("a.tetdb/work")).expect("the folder of tasks");
     let paths = dir.map(|e| e.expect("an entry").path());
-    paths
-        .filter(|p| p.extension().is_some_and(|e| e == "receipts"))
-        .collect()
+    paths.filter(|p| p.extension().is_some_and(|e| e == "receipts")).collect()
 }
 
 #[test]
@@ -134,10 +121,8 @@ fn tasks_in_any_order_and_each_twice_at_once_give_the_mesh_of_one_process() {
             random.shuffle(&mut twice);
             for two in twice.chunks(2) {
                 // With a folder of the machine and without.
-                let both = [
-                    two.first().map(|t| (t, "--scratch local")),
-                    two.get(1).map(|t| (t, "")),
-                ];
+                let both =
+                    [two.first().map(|t| (t, "--scratch local")), two.get(1).map(|t| (t, ""))];
                 let running = both.into_iter().flatten();
                 let running: Vec<Child> =
                     running.map(|(t, more)| started(&place, *t, more)).collect();
@@ -189,10 +174,7 @@ fn tasks_and_gathers_that_are_killed_anywhere_lose_nothing() {
             break;
         }
     }
-    assert!(
-        n_killed > 4 && n_gathers_killed > 2,
-        "{n_killed} and {n_gathers_killed} killed"
-    );
+    assert!(n_killed > 4 && n_gathers_killed > 2, "{n_killed} and {n_gathers_killed} killed");
     is_as_of_one_process(&place, &expected);
 }
 
@@ -203,9 +185,7 @@ fn a_damaged_or_missing_receipt_is_a_task_to_do_again_and_is_named() {
     work(&place, 1);
     gather(&place).succeeds();
     let tasks = next(&place);
-    let [first, ..] = tasks[..] else {
-        panic!("a second stage")
-    };
+    let [first, ..] = tasks[..] else { panic!("a second stage") };
     let refused = |why: &str| {
         let error = gather(&place).error();
         assert_eq!(error["code"], "tasks-left");
@@ -238,20 +218,12 @@ fn a_damaged_or_missing_receipt_is_a_task_to_do_again_and_is_named() {
         }
     }
     let error = gather(&place).error();
-    assert!(
-        error["message"]
-            .as_str()
-            .is_some_and(|m| m.contains("missing")),
-        "{error}"
-    );
+    assert!(error["message"].as_str().is_some_and(|m| m.contains("missing")), "{error}");
     // Orders that are damaged are refused by the task, and written anew.
     let orders = place.path(&format!("a.tetdb/work/task-{first:05}.orders"));
     fs::write(&orders, b"nothing").expect("it can be damaged");
     let refused = place.run_line(&format!("work a.tetdb --task {first} --wait 0 --json"));
-    assert_eq!(
-        (refused.error()["code"].as_str(), refused.exit()),
-        (Some("task-file"), Some(4))
-    );
+    assert_eq!((refused.error()["code"].as_str(), refused.exit()), (Some("task-file"), Some(4)));
     assert_eq!(gather(&place).exit(), Some(8));
     work_off(&place);
     is_as_of_one_process(&place, &expected);
@@ -311,18 +283,12 @@ fn one_process_can_go_on_with_what_tasks_began_but_not_while_they_are_at_it() {
     let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
     let now = now.expect("a clock").as_secs();
     let id = std::process::id();
-    let text = format!(
-        r#"{{"host":"{}","process":{id},"renewed":{now},"error":null}}"#,
-        host.trim()
-    );
+    let text =
+        format!(r#"{{"host":"{}","process":{id},"renewed":{now},"error":null}}"#, host.trim());
     fs::write(&mark, text).expect("the folder takes files");
     for line in ["resume a.tetdb --json", "plan a.tetdb --tasks 5 --json"] {
         let done = place.run_line(line);
-        assert_eq!(
-            (done.error()["code"].as_str(), done.exit()),
-            (Some("busy"), Some(5)),
-            "{line}"
-        );
+        assert_eq!((done.error()["code"].as_str(), done.exit()), (Some("busy"), Some(5)), "{line}");
     }
     fs::remove_file(&mark).expect("it is there");
     place.run_line("plan a.tetdb --tasks 5").succeeds();
@@ -363,9 +329,7 @@ fn the_printed_scripts_run() {
     ] {
         fs::remove_dir_all(place.path("a.tetdb")).expect("a store");
         place
-            .run_line(&format!(
-                "mesh {SAMPLE} -o a.tetdb --subdomains {SUBDOMAINS} --coarse-only"
-            ))
+            .run_line(&format!("mesh {SAMPLE} -o a.tetdb --subdomains {SUBDOMAINS} --coarse-only"))
             .succeeds();
         place.write("run.sh", script(engine));
         let is_there = Command::new(program).arg("--version").output().is_ok();
@@ -386,9 +350,5 @@ fn shell(place: &Place, line: &str) {
         .current_dir(Path::new(&place.path(".")))
         .output()
         .expect("bash is there");
-    assert!(
-        done.status.success(),
-        "{line}\n{}",
-        String::from_utf8_lossy(&done.stderr)
-    );
+    assert!(done.status.success(), "{line}\n{}", String::from_utf8_lossy(&done.stderr));
 }

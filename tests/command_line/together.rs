@@ -50,9 +50,7 @@ fn a_question_during_a_change_is_answered_from_before_or_after_it() {
     let mut writer = place.command(&words).spawn().expect("it starts");
     let (mut answers, mut n) = (Vec::new(), 0);
     while writer.try_wait().expect("it is ours").is_none() {
-        place
-            .run_line("query a.tetdb --point 0.5,0.5,0.5")
-            .succeeds();
+        place.run_line("query a.tetdb --point 0.5,0.5,0.5").succeeds();
         answers.push(place.digest("a.tetdb"));
         n += 1;
     }
@@ -78,9 +76,7 @@ fn a_reader_keeps_to_the_state_it_began_with_and_hinders_no_writer() {
     assert_eq!(found(&mut reader).expect("its files are there"), before);
     assert!(!reader.is_current());
     let mut second = Catalog::open(&path).expect("a finished store");
-    place
-        .run_line("resaturate a.tetdb --subdomain 0 --refine-by 0.9 --no-verify")
-        .succeeds();
+    place.run_line("resaturate a.tetdb --subdomain 0 --refine-by 0.9 --no-verify").succeeds();
     // Now the first version of sub-domain 1 is gone.
     let gone = found(&mut reader).expect_err("a file is gone");
     assert!(matches!(gone, StoreError::Changed { .. }) && !gone.is_damage());
@@ -119,10 +115,7 @@ fn a_second_writer_is_busy_and_says_who_is_first() {
         let done = place.run_line(line);
         assert_eq!(done.exit(), Some(5), "{line}: {}", done.stderr());
         let message = done.error()["message"].to_string();
-        assert!(
-            message.contains(&std::process::id().to_string()),
-            "{message}"
-        );
+        assert!(message.contains(&std::process::id().to_string()), "{message}");
     }
     place.run_line("verify a.tetdb").succeeds();
     drop(held);
@@ -144,38 +137,22 @@ fn what_a_killed_writer_left_is_read_as_it_is_and_cleaned_up_by_the_next() {
     for (name, bytes) in [
         ("catalog.redb", &torn[..]),
         ("catalog.redb-next", b"half of it"),
-        (
-            "writer.lock",
-            b"{\"host\":\"x\",\"process\":1,\"time\":1,\"run\":\"1\"}",
-        ),
+        ("writer.lock", b"{\"host\":\"x\",\"process\":1,\"time\":1,\"run\":\"1\"}"),
         ("subdomain-00000-g77.redb", b"half of it"),
     ] {
         fs::write(path.join(name), bytes).expect("room");
     }
     let before = content(&path);
     assert_eq!(place.digest("a.tetdb"), digest);
-    for line in [
-        "query a.tetdb --point 0.5,0.5,0.5",
-        "info a.tetdb",
-        "verify a.tetdb",
-    ] {
+    for line in ["query a.tetdb --point 0.5,0.5,0.5", "info a.tetdb", "verify a.tetdb"] {
         place.run_line(line).succeeds();
     }
     assert!(content(&path) == before, "reading changes nothing");
-    place
-        .run_line("resaturate a.tetdb --subdomain 0 --no-verify")
-        .succeeds();
+    place.run_line("resaturate a.tetdb --subdomain 0 --no-verify").succeeds();
     assert_eq!(place.digest("a.tetdb"), digest);
     let names: Vec<String> = content(&path).into_iter().map(|(name, _)| name).collect();
-    for gone in [
-        "catalog.redb-next",
-        "writer.lock",
-        "subdomain-00000-g77.redb",
-    ] {
-        assert!(
-            !names.iter().any(|name| name == gone),
-            "{gone} in {names:?}"
-        );
+    for gone in ["catalog.redb-next", "writer.lock", "subdomain-00000-g77.redb"] {
+        assert!(!names.iter().any(|name| name == gone), "{gone} in {names:?}");
     }
 }
 
@@ -192,16 +169,10 @@ fn of_two_runs_of_one_job_none_fails_but_while_the_other_writes() {
         let mut two = start();
         let exits = [&mut one, &mut two].map(|child| child.wait().expect("it ends").code());
         let fine = |code| matches!(code, Some(0 | 5));
-        assert!(
-            exits.into_iter().all(fine) && exits.contains(&Some(0)),
-            "{delay} ms: {exits:?}"
-        );
+        assert!(exits.into_iter().all(fine) && exits.contains(&Some(0)), "{delay} ms: {exits:?}");
         place.run_line("verify x.tetdb").succeeds();
         let left = content(&place.path("x.tetdb"));
-        assert!(
-            left.iter().all(|(name, _)| !name.contains("lock")),
-            "{delay} ms"
-        );
+        assert!(left.iter().all(|(name, _)| !name.contains("lock")), "{delay} ms");
         fs::remove_dir_all(place.path("x.tetdb")).expect("it is ours");
     }
 }

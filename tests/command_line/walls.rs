@@ -8,14 +8,8 @@ use std::fmt::Write;
 use super::place::Place;
 
 /// Sides as corners (bits x, y, z), seen from outside: the one at low x first, the one at high x next.
-const SIDES: [[usize; 4]; 6] = [
-    [0, 4, 6, 2],
-    [1, 3, 7, 5],
-    [0, 1, 5, 4],
-    [2, 6, 7, 3],
-    [0, 2, 3, 1],
-    [4, 5, 7, 6],
-];
+const SIDES: [[usize; 4]; 6] =
+    [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
 
 /// A unit cube from `x` on as OBJ, without the first `skipped` sides.
 fn cube(x: f64, skipped: usize) -> String {
@@ -36,9 +30,7 @@ fn a_wall_in_two_files_keeps_both_labels() {
     let place = Place::new();
     place.write("left.obj", cube(0.0, 0));
     place.write("right.obj", cube(1.0, 0));
-    place
-        .run_line("mesh left.obj right.obj -o two.tetdb --hsiz 0.5")
-        .succeeds();
+    place.run_line("mesh left.obj right.obj -o two.tetdb --hsiz 0.5").succeeds();
     // All six sides of each cube are there under its own name, and nothing else is.
     for (label, x) in [("left", [0.0, 1.0]), ("right", [1.0, 2.0])] {
         let line = format!("query two.tetdb --label {label} --json");
@@ -57,9 +49,7 @@ fn a_wall_in_two_files_keeps_both_labels() {
     let triangles = mesh.split("Triangles\n").nth(1).expect("there are some");
     let triangles: Vec<&str> = triangles.lines().skip(1).take(24).collect();
     for label in ["1", "2"] {
-        let own = triangles
-            .iter()
-            .filter(|t| t.split(' ').nth(3) == Some(label));
+        let own = triangles.iter().filter(|t| t.split(' ').nth(3) == Some(label));
         assert_eq!(own.count(), 12, "{triangles:?}");
     }
     place.run_line("verify two.tetdb --full").succeeds();
@@ -75,13 +65,8 @@ fn walls_that_contradict_filling_by_orientation_are_named_as_the_reason() {
     assert_eq!(run.exit(), Some(3));
     let error = run.error();
     assert_eq!(error["code"], "contradicting-orientation");
-    assert!(
-        error["help"].to_string().contains("--regions all"),
-        "{error}"
-    );
-    place
-        .run_line("mesh left.obj right.obj -o two.tetdb --regions all")
-        .succeeds();
+    assert!(error["help"].to_string().contains("--regions all"), "{error}");
+    place.run_line("mesh left.obj right.obj -o two.tetdb --regions all").succeeds();
 }
 
 #[test]
@@ -91,10 +76,7 @@ fn points_of_a_poly_that_mark_holes_and_regions_are_noted() {
         1\n1 0.1 0.1 0.1\n2\n1 0.2 0.2 0.2 7 0.1\n2 0.3 0.2 0.2 8\n";
     place.write("part.poly", text);
     let said = place.run_line("check part.poly").succeeds().stderr();
-    for words in [
-        "hole points (1) count where",
-        "regions with an attribute or reference (2) are",
-    ] {
+    for words in ["hole points (1) count where", "regions with an attribute or reference (2) are"] {
         assert!(said.contains(words), "{said}");
     }
 }

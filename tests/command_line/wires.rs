@@ -18,10 +18,8 @@ fn wells_and_sensors_are_edges_and_vertices_in_one_piece_and_in_several() {
     for (store, n) in [("one", 1), ("four", 4)] {
         let line = format!("mesh {MANY} -o {store}.tetdb --subdomains {n}");
         place.run_line(&line).succeeds();
-        let verified = place
-            .run_line(&format!("verify {store}.tetdb --full --json"))
-            .succeeds()
-            .json();
+        let verified =
+            place.run_line(&format!("verify {store}.tetdb --full --json")).succeeds().json();
         for (what, count) in [("edges", 0), ("points", 0), ("triangles", 0)] {
             assert_eq!(verified[format!("{what}_missing")], count, "{store}");
         }
@@ -53,37 +51,22 @@ fn wells_and_sensors_are_edges_and_vertices_in_one_piece_and_in_several() {
 #[test]
 fn wires_of_files_keep_their_names_and_give_the_mesh_of_the_sample() {
     let place = Place::new();
-    place
-        .run_line("sample wells,count=5,points=4 -o box.obj")
-        .succeeds();
+    place.run_line("sample wells,count=5,points=4 -o box.obj").succeeds();
     let from_files = "mesh box.obj --embed box_sheets.obj --embed-edges box_wires.obj --embed-points box_wires.obj \
          --name box_wires.obj=inside -o files.tetdb";
     place.run_line(from_files).succeeds();
-    place
-        .run_line("mesh sample:wells,count=5,points=4 -o sample.tetdb")
-        .succeeds();
+    place.run_line("mesh sample:wells,count=5,points=4 -o sample.tetdb").succeeds();
     assert_eq!(place.digest("files.tetdb"), place.digest("sample.tetdb"));
     let known = place.run_line(from_files).succeeds().stderr();
     assert!(known.contains("already holds"), "{known}");
     place.run_line("verify files.tetdb --full").succeeds();
     for (file, words) in [
-        (
-            "out.msh",
-            &["0 ", "\"inside\"", "1 ", "\"inside:well-3\""][..],
-        ),
+        ("out.msh", &["0 ", "\"inside\"", "1 ", "\"inside:well-3\""][..]),
         ("out.mesh", &["\nEdges\n", "\nRequiredVertices\n4\n"]),
-        (
-            "out.inp",
-            &[
-                "TYPE=T3D2, ELSET=edges_inside_well-3",
-                "*NSET, NSET=points_inside",
-            ],
-        ),
+        ("out.inp", &["TYPE=T3D2, ELSET=edges_inside_well-3", "*NSET, NSET=points_inside"]),
         ("out.vtu", &[]),
     ] {
-        place
-            .run_line(&format!("export files.tetdb {file}"))
-            .succeeds();
+        place.run_line(&format!("export files.tetdb {file}")).succeeds();
         let text = std::fs::read(place.path(file)).expect("it was written");
         let text = String::from_utf8_lossy(&text);
         assert!(words.iter().all(|word| text.contains(word)), "{file}");
@@ -103,10 +86,7 @@ fn wires_of_files_keep_their_names_and_give_the_mesh_of_the_sample() {
 fn every_kind_of_file_gives_the_same_mesh() {
     let place = Place::new();
     place.write("box.obj", BOX);
-    place.write(
-        "e.obj",
-        "v .25 .25 .25\nv .25 .25 .75\nv .5 .75 .5\nl 1 2 3\n",
-    );
+    place.write("e.obj", "v .25 .25 .25\nv .25 .25 .75\nv .5 .75 .5\nl 1 2 3\n");
     place.write(
         "e.vtk",
         "# vtk DataFile Version 3.0\nt\nASCII\nDATASET POLYDATA\nPOINTS 3 double\n.25 .25 .25 .25 .25 .75 .5 .75 .5\nLINES 1 4\n3 0 1 2\n",
@@ -122,13 +102,9 @@ fn every_kind_of_file_gives_the_same_mesh() {
         binary.extend(x.to_be_bytes());
     }
     binary.extend(b"\nMETADATA\nINFORMATION 0\n\nLINES 2 3\nOFFSETS vtktypeint64\n");
-    [0, 3i64]
-        .iter()
-        .for_each(|n| binary.extend(n.to_be_bytes()));
+    [0, 3i64].iter().for_each(|n| binary.extend(n.to_be_bytes()));
     binary.extend(b"\nCONNECTIVITY vtktypeint64\n");
-    [0, 1, 2i64]
-        .iter()
-        .for_each(|n| binary.extend(n.to_be_bytes()));
+    [0, 1, 2i64].iter().for_each(|n| binary.extend(n.to_be_bytes()));
     place.write("eb.vtk", binary);
     place.write(
         "e.poly",
@@ -137,10 +113,7 @@ fn every_kind_of_file_gives_the_same_mesh() {
     place.write("p.csv", "x,y,z,name\n0.7,0.25,0.5,north\n0.75, 0.7, 0.2\n");
     place.write("p.node", "2 3 0 1\n0 0.7 0.25 0.5 4\n1 0.75 0.7 0.2 0\n");
     // What a head says of attributes may be anything: lines end where they end.
-    place.write(
-        "mad.node",
-        "2 3 999999999991 1\n0 0.7 0.25 0.5 4\n1 0.75 0.7 0.2 0\n",
-    );
+    place.write("mad.node", "2 3 999999999991 1\n0 0.7 0.25 0.5 4\n1 0.75 0.7 0.2 0\n");
     place.write("p.txt", "# two\n0.7 0.25 0.5 north\n0.75\t0.7 0.2\n");
     let mut digests = Vec::new();
     for edges in ["e.obj", "e.vtk", "e5.vtk", "eb.vtk", "e.poly"] {
@@ -155,15 +128,9 @@ fn every_kind_of_file_gives_the_same_mesh() {
     assert!(digests.windows(2).all(|d| d[0] == d[1]), "{digests:?}");
     let verified = place.run_line("verify s.tetdb --full --json").succeeds();
     let verified = verified.json();
-    assert_eq!(
-        (&verified["edges_present"], &verified["points_present"]),
-        (&2.into(), &2.into())
-    );
+    assert_eq!((&verified["edges_present"], &verified["points_present"]), (&2.into(), &2.into()));
     // On an edge of the surface, on its corner and inside: nothing is added where a triangle has it.
-    place.write(
-        "on.obj",
-        "v 0 0 0\nv 1 0 0\nv .5 .5 .5\nl 1 2\nl 2 3\np 1\n",
-    );
+    place.write("on.obj", "v 0 0 0\nv 1 0 0\nv .5 .5 .5\nl 1 2\nl 2 3\np 1\n");
     place
         .run_line("mesh box.obj --embed-edges on.obj --embed-points on.obj -o on.tetdb")
         .succeeds();
@@ -183,10 +150,7 @@ fn points_and_ends_on_triangles_are_put_into_a_surface_that_may_be_divided() {
         "on.csv",
         "0.5,0.25,0,a\n0.5,0,0,a\n0.75,0.125,0,b\n0.5,0.5,0.625,b\n.125,.125,.125,b\n",
     );
-    place.write(
-        "rod.obj",
-        "v .5 .5 .875\nv .5 .25 1\nv 0 0 1\nv 0 .5 1\nl 1 2\nl 3 4\n",
-    );
+    place.write("rod.obj", "v .5 .5 .875\nv .5 .25 1\nv 0 0 1\nv 0 .5 1\nl 1 2\nl 3 4\n");
     let inside = "--embed sheet.obj --embed-edges rod.obj --embed-points on.csv";
     let refused = place.run_line(&format!("mesh box.obj {inside} --json"));
     assert_eq!(refused.error()["code"], "wire-contact");
@@ -194,18 +158,10 @@ fn points_and_ends_on_triangles_are_put_into_a_surface_that_may_be_divided() {
     place.run_line(&line).succeeds();
     let again = place.run_line(&line).succeeds().stderr();
     assert!(again.contains("already holds"), "{again}");
-    place
-        .run_line("resaturate s.tetdb --subdomain 0 --hgrad 1.2")
-        .succeeds();
-    let verified = place
-        .run_line("verify s.tetdb --full --json")
-        .succeeds()
-        .json();
+    place.run_line("resaturate s.tetdb --subdomain 0 --hgrad 1.2").succeeds();
+    let verified = place.run_line("verify s.tetdb --full --json").succeeds().json();
     // An edge of the box is divided with it.
-    assert_eq!(
-        (&verified["edges_present"], &verified["points_present"]),
-        (&3.into(), &5.into())
-    );
+    assert_eq!((&verified["edges_present"], &verified["points_present"]), (&3.into(), &5.into()));
     let info = place.run_line("info s.tetdb --json").succeeds().json();
     assert_eq!(info["input_triangles"], verified["triangles_present"]);
     assert_eq!(info["wires"].as_array().map(Vec::len), Some(3));
@@ -224,9 +180,7 @@ fn points_and_ends_on_triangles_are_put_into_a_surface_that_may_be_divided() {
         let error = place.run_line(&line).error();
         assert_eq!(error["code"], "wire-too-near", "{file}: {error}");
         assert!(
-            error["message"]
-                .as_str()
-                .is_some_and(|m| m.contains("1.0e-17 from it")),
+            error["message"].as_str().is_some_and(|m| m.contains("1.0e-17 from it")),
             "{error}"
         );
     }
@@ -238,42 +192,12 @@ fn edges_and_points_in_wrong_places_are_refused_with_the_place() {
     place.write("box.obj", BOX);
     let inside = "v .25 .25 .25\nv .25 .25 .75\nv .5 .75 .5\nv .25 .25 .5\n";
     for (file, option, text, code) in [
-        (
-            "out.obj",
-            "edges",
-            "v 2 0 0\nv 3 0 0\nl 1 2\n",
-            "wire-outside",
-        ),
-        (
-            "leave.obj",
-            "edges",
-            "v .5 .5 .5\nv .5 .4 1.5\nl 1 2\n",
-            "wire-contact",
-        ),
-        (
-            "end.obj",
-            "edges",
-            "v .5 .5 .5\nv .5 .4 1\nl 1 2\n",
-            "wire-contact",
-        ),
-        (
-            "side.obj",
-            "edges",
-            "v .5 .5 .5\nv .5 0 0\nl 1 2\n",
-            "wire-contact",
-        ),
-        (
-            "in_face.obj",
-            "edges",
-            "v 1 0 0\nv 0 1 0\nl 1 2\n",
-            "wire-contact",
-        ),
-        (
-            "along.obj",
-            "edges",
-            "v 0 0 0\nv .5 0 0\nl 1 2\n",
-            "wire-contact",
-        ),
+        ("out.obj", "edges", "v 2 0 0\nv 3 0 0\nl 1 2\n", "wire-outside"),
+        ("leave.obj", "edges", "v .5 .5 .5\nv .5 .4 1.5\nl 1 2\n", "wire-contact"),
+        ("end.obj", "edges", "v .5 .5 .5\nv .5 .4 1\nl 1 2\n", "wire-contact"),
+        ("side.obj", "edges", "v .5 .5 .5\nv .5 0 0\nl 1 2\n", "wire-contact"),
+        ("in_face.obj", "edges", "v 1 0 0\nv 0 1 0\nl 1 2\n", "wire-contact"),
+        ("along.obj", "edges", "v 0 0 0\nv .5 0 0\nl 1 2\n", "wire-contact"),
         (
             "cross.obj",
             "edges",
@@ -286,54 +210,19 @@ fn edges_and_points_in_wrong_places_are_refused_with_the_place() {
             "v .4 .4 .4\nv .6 .6 .6\nv .5 .5 .5\nv .5 .5 .1\nl 1 2\nl 3 4\n",
             "wire-contact",
         ),
-        (
-            "fold.obj",
-            "edges",
-            "v .4 .4 .4\nv .6 .6 .6\nv .5 .5 .5\nl 1 2\nl 1 3\n",
-            "wire-contact",
-        ),
-        (
-            "point.obj",
-            "edges",
-            "v .5 .5 .5\nl 1 1\n",
-            "degenerate-edge",
-        ),
-        (
-            "equal.obj",
-            "edges",
-            "v .5 .5 .5\nv .5 .5 .5\nl 1 2\n",
-            "degenerate-edge",
-        ),
-        (
-            "twice.obj",
-            "edges",
-            "v .4 .4 .4\nv .6 .6 .6\nl 1 2\nl 2 1\n",
-            "duplicate-wire",
-        ),
+        ("fold.obj", "edges", "v .4 .4 .4\nv .6 .6 .6\nv .5 .5 .5\nl 1 2\nl 1 3\n", "wire-contact"),
+        ("point.obj", "edges", "v .5 .5 .5\nl 1 1\n", "degenerate-edge"),
+        ("equal.obj", "edges", "v .5 .5 .5\nv .5 .5 .5\nl 1 2\n", "degenerate-edge"),
+        ("twice.obj", "edges", "v .4 .4 .4\nv .6 .6 .6\nl 1 2\nl 2 1\n", "duplicate-wire"),
         (
             "near.obj",
             "edges",
             "v .4 .4 .4\nv .6 .6 .4\nv .4 .6 .40000000000001\nv .6 .4 .40000000000001\nl 1 2\nl 3 4\n",
             "wire-too-near",
         ),
-        (
-            "nan.obj",
-            "edges",
-            "v .4 .4 nan\nv .6 .6 .6\nl 1 2\n",
-            "not-a-number",
-        ),
-        (
-            "index.obj",
-            "edges",
-            "v .4 .4 .4\nv .6 .6 .6\nl 1 3\n",
-            "index-out-of-range",
-        ),
-        (
-            "none.obj",
-            "edges",
-            "v .4 .4 .4\nv .6 .6 .6\np 1\n",
-            "unexpected-text",
-        ),
+        ("nan.obj", "edges", "v .4 .4 nan\nv .6 .6 .6\nl 1 2\n", "not-a-number"),
+        ("index.obj", "edges", "v .4 .4 .4\nv .6 .6 .6\nl 1 3\n", "index-out-of-range"),
+        ("none.obj", "edges", "v .4 .4 .4\nv .6 .6 .6\np 1\n", "unexpected-text"),
         ("edges.stl", "edges", "solid\nendsolid\n", "unknown-format"),
         (
             "short.vtk",
@@ -351,45 +240,20 @@ fn edges_and_points_in_wrong_places_are_refused_with_the_place() {
         ("far.csv", "points", "1,1,7\n", "wire-outside"),
         ("face.csv", "points", "0.5,0.25,0\n", "wire-contact"),
         ("edge.csv", "points", "0.5,0,0\n", "wire-contact"),
-        (
-            "same.csv",
-            "points",
-            "0.5,0.5,0.5,a\n0.5,0.5,0.5,b\n",
-            "duplicate-wire",
-        ),
-        (
-            "close.csv",
-            "points",
-            "0.5,0.5,0.5,a\n0.5,0.5,0.50000000000001,b\n",
-            "wire-too-near",
-        ),
-        (
-            "word.csv",
-            "points",
-            "0.5,0.5,0.5\n0.1,x,0.1\n",
-            "not-a-number",
-        ),
+        ("same.csv", "points", "0.5,0.5,0.5,a\n0.5,0.5,0.5,b\n", "duplicate-wire"),
+        ("close.csv", "points", "0.5,0.5,0.5,a\n0.5,0.5,0.50000000000001,b\n", "wire-too-near"),
+        ("word.csv", "points", "0.5,0.5,0.5\n0.1,x,0.1\n", "not-a-number"),
         ("inf.csv", "points", "0.5,0.5,inf\n", "not-a-number"),
         ("huge.csv", "points", "0.5,0.5,1e200\n", "coordinate-range"),
         ("two.csv", "points", "0.5,0.5\n", "not-a-number"),
-        (
-            "flat.node",
-            "points",
-            "1 2 0 0\n1 0.5 0.5\n",
-            "unsupported-content",
-        ),
+        ("flat.node", "points", "1 2 0 0\n1 0.5 0.5\n", "unsupported-content"),
         ("empty.csv", "points", "", "unexpected-text"),
     ] {
         place.write(file, text);
-        let run = place.run_line(&format!(
-            "mesh box.obj --embed-{option} {file} -o s.tetdb --json"
-        ));
+        let run =
+            place.run_line(&format!("mesh box.obj --embed-{option} {file} -o s.tetdb --json"));
         let error = run.error();
-        assert_eq!(
-            (run.exit(), &error["code"]),
-            (Some(3), &code.into()),
-            "{file}: {error}"
-        );
+        assert_eq!((run.exit(), &error["code"]), (Some(3), &code.into()), "{file}: {error}");
         assert!(!error["where"].is_null(), "{file}: {error}");
         assert!(!place.path("s.tetdb").exists(), "{file}");
     }
@@ -400,7 +264,5 @@ fn edges_and_points_in_wrong_places_are_refused_with_the_place() {
     assert_eq!(run.error()["code"], "wire-contact");
     let run = place.run_line("check box.obj --embed-edges edge.obj --repair --write r.obj --json");
     assert_eq!(run.error()["code"], "usage");
-    place
-        .run_line("mesh box.obj --embed-edges edge.obj")
-        .succeeds();
+    place.run_line("mesh box.obj --embed-edges edge.obj").succeeds();
 }

@@ -49,38 +49,29 @@ fn frozen(place: &Place, rank: u32) -> (BTreeSet<Tet>, BTreeSet<Face>) {
 
 fn part(place: &Place, rank: u32) -> Subdomain {
     let mut store = Catalog::open(place.path("a.tetdb")).expect("a store");
-    store
-        .open_subdomain(rank, 16 << 20)
-        .expect("it is finished")
+    store.open_subdomain(rank, 16 << 20).expect("it is finished")
 }
 
 /// All tetrahedra of a sub-domain, and those with a face on an interface.
 fn tets(place: &Place, rank: u32) -> (BTreeSet<Tet>, BTreeSet<Tet>) {
     let mut part = part(place, rank);
-    let vertices: Vec<Position> = (part.vertices())
-        .map(|v| bits(v.expect("sound").point))
-        .collect();
+    let vertices: Vec<Position> =
+        (part.vertices()).map(|v| bits(v.expect("sound").point)).collect();
     let corner = |v: u32| vertices[v as usize];
-    let list: Vec<Tet> = (part.tets())
-        .map(|tet| sorted(tet.expect("sound").1.nodes.map(corner)))
-        .collect();
-    let at_interface = (part.interfaces())
-        .map(|face| list[face.expect("sound").tet as usize])
-        .collect();
+    let list: Vec<Tet> =
+        (part.tets()).map(|tet| sorted(tet.expect("sound").1.nodes.map(corner))).collect();
+    let at_interface =
+        (part.interfaces()).map(|face| list[face.expect("sound").tet as usize]).collect();
     (list.into_iter().collect(), at_interface)
 }
 
 /// The interface faces of a sub-domain.
 fn faces(place: &Place, rank: u32) -> BTreeSet<Face> {
     let mut part = part(place, rank);
-    let faces: Vec<[u32; 3]> = (part.interfaces())
-        .map(|face| face.expect("sound").vertices)
-        .collect();
+    let faces: Vec<[u32; 3]> =
+        (part.interfaces()).map(|face| face.expect("sound").vertices).collect();
     let mut corners = |v: u32| bits(part.corner(v).expect("sound").point.to_array());
-    faces
-        .into_iter()
-        .map(|face| sorted(face.map(&mut corners)))
-        .collect()
+    faces.into_iter().map(|face| sorted(face.map(&mut corners))).collect()
 }
 
 #[test]
@@ -96,9 +87,7 @@ fn what_is_frozen_stays_whatever_the_sizes() {
         assert!(coarse_faces.len() > 500, "{}", coarse_faces.len());
         assert_eq!(faces(&place, 1), coarse_faces);
         let (before, at_interface) = tets(&place, 1);
-        place
-            .run_line("resaturate a.tetdb --subdomain 1 --refine-by 0.5 --no-verify")
-            .succeeds();
+        place.run_line("resaturate a.tetdb --subdomain 1 --refine-by 0.5 --no-verify").succeeds();
         let (after, at_interface_after) = tets(&place, 1);
         assert_eq!(faces(&place, 1), coarse_faces, "{optimize}");
         assert!(after.len() > 2 * before.len());
@@ -112,14 +101,8 @@ fn what_is_frozen_stays_whatever_the_sizes() {
             kept(&at_interface_after, &at_interface)
         );
         if optimize == "none" {
-            assert!(
-                frozen.is_subset(&before),
-                "the first run touched frozen tetrahedra"
-            );
-            assert!(
-                frozen.is_subset(&after),
-                "the change touched frozen tetrahedra"
-            );
+            assert!(frozen.is_subset(&before), "the first run touched frozen tetrahedra");
+            assert!(frozen.is_subset(&after), "the change touched frozen tetrahedra");
             // Each face has its own: they are those frozen.
             assert!(at_interface.is_subset(&frozen));
             assert_eq!(at_interface, at_interface_after);

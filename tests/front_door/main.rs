@@ -16,10 +16,7 @@ use tetdb::{
 type Outcome = Result<(), Box<dyn std::error::Error>>;
 
 fn program(dir: &Path, words: &[&str]) -> std::io::Result<Output> {
-    Command::new(env!("CARGO_BIN_EXE_tetdb"))
-        .args(words)
-        .current_dir(dir)
-        .output()
+    Command::new(env!("CARGO_BIN_EXE_tetdb")).args(words).current_dir(dir).output()
 }
 
 /// What the program prints; it must succeed.
@@ -33,17 +30,9 @@ fn answer(dir: &Path, words: &[&str]) -> std::io::Result<String> {
 /// A cube of side 1 in 12 triangles.
 fn cube() -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
     let points = (0..8).map(|i| [i & 1, i >> 1 & 1, i >> 2 & 1].map(f64::from));
-    let quads = [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ];
-    let triangles = quads
-        .iter()
-        .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]);
+    let quads =
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]);
     (points.collect(), triangles.collect())
 }
 
@@ -68,14 +57,7 @@ fn what_the_library_makes_from_arrays_the_program_goes_on_with() -> Outcome {
     run(&["verify", "cube.tetdb", "--full"])?;
     run(&["info", "cube.tetdb", "--json"])?;
     run(&["resume", "cube.tetdb"])?;
-    run(&[
-        "resaturate",
-        "cube.tetdb",
-        "--subdomain",
-        "0",
-        "--refine-by",
-        "0.7",
-    ])?;
+    run(&["resaturate", "cube.tetdb", "--subdomain", "0", "--refine-by", "0.7"])?;
     assert_ne!(run(&["digest", "cube.tetdb"])?, digest);
     let store = Store::open(&path)?.undo()?;
     assert_eq!(store.summary().digest, digest);
@@ -85,14 +67,7 @@ fn what_the_library_makes_from_arrays_the_program_goes_on_with() -> Outcome {
 #[test]
 fn what_the_program_makes_the_library_goes_on_with() -> Outcome {
     let dir = tempfile::tempdir()?;
-    let words = [
-        "mesh",
-        "sample:box,h=0.2",
-        "-o",
-        "box.tetdb",
-        "--hsiz",
-        "10%",
-    ];
+    let words = ["mesh", "sample:box,h=0.2", "-o", "box.tetdb", "--hsiz", "10%"];
     answer(dir.path(), &words)?;
     let theirs = Store::open(dir.path().join("box.tetdb"))?;
     let ours = Mesher::new(Surface::sample("box,h=0.2")?)
@@ -170,10 +145,7 @@ fn of_three_runs_at_once_each_ends_in_its_own_way() -> Outcome {
         });
         let finished = scope.spawn(|| mesher()?.create(dir.path().join("finished.tetdb")));
         let cancelled = cancelled.join().expect("no call unwinds into its caller");
-        was_cancelled.store(
-            cancelled.is_err_and(|e| e.is_cancelled()),
-            Ordering::Relaxed,
-        );
+        was_cancelled.store(cancelled.is_err_and(|e| e.is_cancelled()), Ordering::Relaxed);
         let refused = refused.join().expect("no call unwinds into its caller");
         assert_eq!(refused.err().map(|e| e.code()), Some("open-surface"));
         let finished = finished.join().expect("no call unwinds into its caller");
@@ -224,9 +196,7 @@ fn a_store_of_another_recipe_is_not_gone_on_with() -> Outcome {
         Ok(())
     })?;
     catalog.close()?;
-    let error = Store::resume(&path, Settings::new())
-        .err()
-        .ok_or("refused")?;
+    let error = Store::resume(&path, Settings::new()).err().ok_or("refused")?;
     assert_eq!((error.code(), error.exit_code()), ("store-recipe", 8));
     assert!(error.message().contains("99"), "{error}");
     let output = program(dir.path(), &["resume", "old.tetdb"])?;
@@ -241,33 +211,21 @@ fn what_makes_no_sense_is_an_error_with_a_word() -> Outcome {
     let code = |result: Result<Surface, tetdb::Error>| result.err().map(|e| e.code());
     let mut wild = triangles.clone();
     wild[3][1] = 77;
-    assert_eq!(
-        code(Surface::from_arrays(&points, &wild, None)),
-        Some("index-out-of-range")
-    );
+    assert_eq!(code(Surface::from_arrays(&points, &wild, None)), Some("index-out-of-range"));
     let mut nan = points.clone();
     nan[2][0] = f64::NAN;
-    assert_eq!(
-        code(Surface::from_arrays(&nan, &triangles, None)),
-        Some("not-a-number")
-    );
+    assert_eq!(code(Surface::from_arrays(&nan, &triangles, None)), Some("not-a-number"));
     assert_eq!(
         code(Surface::from_arrays(&points, &triangles, Some(&["a"]))),
         Some("count-mismatch")
     );
     assert_eq!(code(Surface::sample("teapot")), Some("bad-sample"));
-    assert_eq!(
-        code(Surface::read(["nowhere.stl"])),
-        Some("unreadable-file")
-    );
+    assert_eq!(code(Surface::read(["nowhere.stl"])), Some("unreadable-file"));
     let path = dir.path().join("x.tetdb");
     let word = |mesher: Mesher| mesher.create(&path).err().map(|e| e.code());
     let sizes = Sizes::interior(Length::units(-1.0));
     assert_eq!(word(mesher()?.sizes(sizes)), Some("bad-size"));
-    assert_eq!(
-        word(mesher()?.subdomains(Subdomains::Exactly(0))),
-        Some("usage")
-    );
+    assert_eq!(word(mesher()?.subdomains(Subdomains::Exactly(0))), Some("usage"));
     assert_eq!(word(mesher()?.threads(0)), Some("usage"));
     assert_eq!(word(mesher()?.memory(tetdb::Bytes::mib(3))), Some("memory"));
     assert!(!path.exists(), "a refused run leaves nothing");
@@ -278,13 +236,9 @@ fn what_makes_no_sense_is_an_error_with_a_word() -> Outcome {
 fn on_steps_needles_and_caps_what_the_surface_does_not_force_is_mended() -> Outcome {
     let dir = tempfile::tempdir()?;
     let at = |name: String| dir.path().join(name);
-    for (spec, seed) in [
-        ("steps", 1),
-        ("needles,count=16,holes=2", 2),
-        ("caps,count=24", 3),
-    ]
-    .into_iter()
-    .flat_map(|(spec, first)| (first..first + 2).map(move |seed| (spec, seed)))
+    for (spec, seed) in [("steps", 1), ("needles,count=16,holes=2", 2), ("caps,count=24", 3)]
+        .into_iter()
+        .flat_map(|(spec, first)| (first..first + 2).map(move |seed| (spec, seed)))
     {
         let mesher = |threads| {
             let surface = Surface::sample(&format!("{spec},seed={seed}"))?;
@@ -297,25 +251,15 @@ fn on_steps_needles_and_caps_what_the_surface_does_not_force_is_mended() -> Outc
         assert!(store.summary().n_tets < 20_000, "{spec} {seed}");
         // No volume that cannot be told from zero, unless a triangle forces it.
         let flat = "volume < 1e-12*edge_max^3 and excess > 2";
-        assert!(
-            store.query().where_(flat)?.collect()?.is_empty(),
-            "{spec} {seed}"
-        );
+        assert!(store.query().where_(flat)?.collect()?.is_empty(), "{spec} {seed}");
         let worst = store.query().order_by("excess", Order::Falling)?.limit(1);
         let worst = worst.collect()?.remove(0);
         assert!(
             worst.excess() >= 1.0 - 1e-9 && worst.excess() <= worst.shape.quality * (1.0 + 1e-9)
         );
         // As good as allowed: the bound of what stands on the surface is met by its own quality.
-        let forced = store
-            .query()
-            .where_("quality > 3 and excess < 1.5")?
-            .collect()?;
-        assert!(
-            forced
-                .iter()
-                .all(|hit| hit.on_surface.is_some_and(|faces| faces.contains(&true)))
-        );
+        let forced = store.query().where_("quality > 3 and excess < 1.5")?.collect()?;
+        assert!(forced.iter().all(|hit| hit.on_surface.is_some_and(|faces| faces.contains(&true))));
     }
     Ok(())
 }
@@ -332,11 +276,7 @@ fn pages_that_are_no_mesh_are_damage() -> Outcome {
     let (path, token) = (dir.path().join("a.tetdb"), CancelToken::new());
     let inner = token.clone();
     let begun = mesher()?.cancel(&token).progress(move |event| {
-        if let Event::Progress {
-            stage: "divide edges",
-            ..
-        } = event
-        {
+        if let Event::Progress { stage: "divide edges", .. } = event {
             inner.cancel();
         }
     });
@@ -362,11 +302,7 @@ fn pages_that_are_no_mesh_are_damage() -> Outcome {
                     Some(row) => row.map(|(key, page)| (key.value(), page.value().to_vec()))?,
                     None => return Err(format!("no page of {kind:?}").into()),
                 };
-                let address = PageAddress {
-                    kind,
-                    subdomain: 0,
-                    page: key as u32,
-                };
+                let address = PageAddress { kind, subdomain: 0, page: key as u32 };
                 let mut frame: Vec<Slot> = bytemuck::zeroed_vec(FRAME_BYTES / size_of::<Slot>());
                 let generation = open_page(&stored, address, &mut frame)?;
                 frame[20][word] = u32_le::from_native(number);

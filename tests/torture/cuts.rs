@@ -50,15 +50,8 @@ fn base(random: &mut Random) -> Shape {
             let height = 10f64.powf(random.between(-2.0, 2.0));
             twisted(n, layers, sign * limit * random.between(0.0, 0.97), height)
         }
-        5 => nested(
-            &base(random),
-            2 + random.below(3) as u32,
-            random.between(0.3, 0.95),
-        ),
-        6 => chazelle(
-            1 + random.below(2) as u32,
-            10f64.powf(random.between(-4.0, 0.0)),
-        ),
+        5 => nested(&base(random), 2 + random.below(3) as u32, random.between(0.3, 0.95)),
+        6 => chazelle(1 + random.below(2) as u32, 10f64.powf(random.between(-4.0, 0.0))),
         7 => {
             let (rings, around) = (1 + random.below(5) as u32, 3 + random.below(8) as u32);
             globe(rings, around, random)
@@ -85,11 +78,7 @@ fn step(s: Shape, random: &mut Random) -> Shape {
     match random.below(7) {
         // Triangles get a point inside, in their plane or nearly.
         0 => {
-            let bulge = if random.one_in(2) {
-                0.0
-            } else {
-                random.between(-1e-3, 1e-3)
-            };
+            let bulge = if random.one_in(2) { 0.0 } else { random.between(-1e-3, 1e-3) };
             divided_inside(s, bulge, random)
         }
         // Edges are divided, both triangles with them.

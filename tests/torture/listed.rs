@@ -44,11 +44,7 @@ fn torture(solids: Vec<Shape>) {
     for (k, solid) in solids.iter().enumerate() {
         let mut run = |shape: &Shape, may_refuse: bool, on_disk: bool| {
             let clock = Instant::now();
-            let outcome = if on_disk {
-                whole(shape, "none")
-            } else {
-                recovery(shape)
-            };
+            let outcome = if on_disk { whole(shape, "none") } else { recovery(shape) };
             refused[0] += 1;
             refused[1] += usize::from(matches!(outcome, Outcome::Refused(_) | Outcome::TooNear(_)));
             failures.extend(judge(shape, &outcome, clock.elapsed(), may_refuse).err());
@@ -60,28 +56,14 @@ fn torture(solids: Vec<Shape>) {
             run(&shuffled, false, false);
             run(&shuffled.clone().turned(&mut random), true, false);
             let by = 10f64.powf(random.between(-9.0, 9.0));
-            run(
-                &shuffled.clone().turned(&mut random).scaled(by),
-                true,
-                round == 0,
-            );
+            run(&shuffled.clone().turned(&mut random).scaled(by), true, round == 0);
             let far = Point::new(6e5, -7e5, 4e5);
             run(&shuffled.turned(&mut random).moved(far), true, false);
         }
     }
-    assert!(
-        failures.is_empty(),
-        "{} failures:\n{}",
-        failures.len(),
-        failures.join("\n")
-    );
+    assert!(failures.is_empty(), "{} failures:\n{}", failures.len(), failures.join("\n"));
     // Most variants are meshed, or the test would say little.
-    assert!(
-        refused[1] * 2 < refused[0],
-        "{} of {} refused",
-        refused[1],
-        refused[0]
-    );
+    assert!(refused[1] * 2 < refused[0], "{} of {} refused", refused[1], refused[0]);
 }
 
 #[test]
@@ -136,10 +118,7 @@ fn cospherical_points() {
     for (rings, around) in [(1, 3), (3, 5), (8, 16)] {
         solids.push(globe(rings, around, &mut random));
         let s = globe(rings, around, &mut random);
-        solids.push(
-            s.mapped(|p| Point::new(p.x, p.y, p.z * 0.02))
-                .named(", flat"),
-        );
+        solids.push(s.mapped(|p| Point::new(p.x, p.y, p.z * 0.02)).named(", flat"));
         solids.push(cylinder(around, rings, 2.0, &mut random));
         solids.push(cylinder(around, rings, 1e-3, &mut random));
     }
@@ -156,9 +135,7 @@ fn needles_and_thin_plates() {
         solids.push(twisted(3, 1, -0.5, length));
     }
     for thickness in [1e-2, 1e-4, 1e-6, 1e-8] {
-        let s = grid([4, 4, 1], |x, y, face| {
-            (3 * x + y + face as u32).is_multiple_of(2)
-        });
+        let s = grid([4, 4, 1], |x, y, face| (3 * x + y + face as u32).is_multiple_of(2));
         let s = s.mapped(|p| Point::new(p.x, p.y, p.z * thickness));
         solids.push(s.named(&format!(" thick {thickness:e}")));
     }

@@ -132,10 +132,7 @@ fn judge(counts: &Counts) {
 }
 
 fn number(name: &str, default: u64) -> u64 {
-    std::env::var(name)
-        .ok()
-        .and_then(|word| word.parse().ok())
-        .unwrap_or(default)
+    std::env::var(name).ok().and_then(|word| word.parse().ok()).unwrap_or(default)
 }
 
 #[test]
@@ -165,16 +162,10 @@ fn a_few_random_cuts_are_meshed_and_verified_in_a_store() {
 #[ignore = "a hundred thousand cases"]
 fn random_cuts_by_the_hundred_thousand() {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let (seed, first) = (
-        number("TETDB_TORTURE_SEED", 1),
-        number("TETDB_TORTURE_FIRST", 0),
-    );
+    let (seed, first) = (number("TETDB_TORTURE_SEED", 1), number("TETDB_TORTURE_FIRST", 0));
     let clock = Instant::now();
     let counts = run(seed, first, number("TETDB_TORTURE_CASES", 100_000), threads);
-    println!(
-        "{:.0} s on {threads} threads",
-        clock.elapsed().as_secs_f64()
-    );
+    println!("{:.0} s on {threads} threads", clock.elapsed().as_secs_f64());
     judge(&counts);
 }
 

@@ -61,10 +61,9 @@ const NEAR: f64 = 1e-13;
 
 fn given_up(error: &BoundaryError) -> Outcome {
     match error {
-        BoundaryError::NotRecovered {
-            nearness: Some(nearness),
-            ..
-        } if nearness.value < NEAR => Outcome::TooNear(error.to_string()),
+        BoundaryError::NotRecovered { nearness: Some(nearness), .. } if nearness.value < NEAR => {
+            Outcome::TooNear(error.to_string())
+        }
         _ => Outcome::GaveUp(error.to_string()),
     }
 }
@@ -87,11 +86,7 @@ pub fn whole(shape: &Shape, optimize: &str) -> Outcome {
     };
     let dir = tempfile::tempdir().expect("a temporary folder");
     let path = dir.path().join("case.tetdb");
-    let job = Job {
-        options: String::new(),
-        surfaces: Vec::new(),
-        tool_version: String::new(),
-    };
+    let job = Job { options: String::new(), surfaces: Vec::new(), tool_version: String::new() };
     let mut catalog = Catalog::create(&path, &job).expect("an empty folder");
     // Few tetrahedra: what is tested is the surface.
     let options = Options {
@@ -128,10 +123,7 @@ pub fn whole(shape: &Shape, optimize: &str) -> Outcome {
         ));
     }
     let recovery = summary.coarse.map(|c| Recovery::from(&c.recovery));
-    Outcome::Meshed {
-        tets: report.tets,
-        recovery: recovery.unwrap_or_default(),
-    }
+    Outcome::Meshed { tets: report.tets, recovery: recovery.unwrap_or_default() }
 }
 
 /// The coarse mesh in memory, checked by [`wrong`].
@@ -155,10 +147,9 @@ pub fn recovery(shape: &Shape) -> Outcome {
         return Outcome::Wrong(error.to_string());
     }
     match wrong(&mut mesh, Some(&surface)) {
-        None => Outcome::Meshed {
-            tets: u64::from(mesh.n_tets()),
-            recovery: Recovery::from(&report),
-        },
+        None => {
+            Outcome::Meshed { tets: u64::from(mesh.n_tets()), recovery: Recovery::from(&report) }
+        }
         Some(what) => Outcome::Wrong(what),
     }
 }
@@ -177,9 +168,7 @@ pub fn delaunay(surface: &Surface) -> Mesh<FlatPages> {
         let p = surface.points[i as usize];
         let v = mesh.add_vertex(p, 0.0);
         mesh.set_vertex_attribute(v, VertexTag::Surface, i);
-        hint = kernel
-            .insert(&mut mesh, v, p, hint)
-            .expect("inside the box and new");
+        hint = kernel.insert(&mut mesh, v, p, hint).expect("inside the box and new");
         id[i as usize] = v;
     }
     for (n, t) in surface.triangles.iter().enumerate() {

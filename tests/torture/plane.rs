@@ -8,9 +8,7 @@ fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
 /// Triangles of a simple polygon, in its direction. Coordinates must be round enough for doubles to tell turns.
 pub fn triangulated(polygon: &[[f64; 2]]) -> Vec<[usize; 3]> {
     let n = polygon.len();
-    let area: f64 = (1..n - 1)
-        .map(|i| turn(polygon[0], polygon[i], polygon[i + 1]))
-        .sum();
+    let area: f64 = (1..n - 1).map(|i| turn(polygon[0], polygon[i], polygon[i + 1])).sum();
     let mut left: Vec<usize> = (0..n).collect();
     if area < 0.0 {
         left.reverse();

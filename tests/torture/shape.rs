@@ -15,10 +15,7 @@ pub struct Shape {
 
 impl Shape {
     pub fn new(name: impl Into<String>) -> Self {
-        Self {
-            name: name.into(),
-            ..Self::default()
-        }
+        Self { name: name.into(), ..Self::default() }
     }
 
     /// Adds a point and returns its number.
@@ -51,8 +48,7 @@ impl Shape {
     pub fn with(mut self, other: &Self) -> Self {
         let base = self.points.len() as u32;
         self.points.extend(&other.points);
-        self.triangles
-            .extend(other.triangles.iter().map(|t| t.map(|v| v + base)));
+        self.triangles.extend(other.triangles.iter().map(|t| t.map(|v| v + base)));
         self
     }
 
@@ -72,8 +68,7 @@ impl Shape {
     }
 
     pub fn moved(self, by: Point) -> Self {
-        self.mapped(|p| p + by)
-            .named(&format!(", moved by {}", by.length()))
+        self.mapped(|p| p + by).named(&format!(", moved by {}", by.length()))
     }
 
     /// The same surface with vertices, triangles and corners in another order.

@@ -38,10 +38,7 @@ pub fn twisted(n: u32, layers: u32, twist: f64, height: f64) -> Shape {
 /// `shells` copies of a shape inside each other, each `ratio` the size of the one around it.
 pub fn nested(shape: &Shape, shells: u32, ratio: f64) -> Shape {
     let low = shape.points.iter().fold(Point::INFINITY, |m, &p| m.min(p));
-    let high = shape
-        .points
-        .iter()
-        .fold(Point::NEG_INFINITY, |m, &p| m.max(p));
+    let high = shape.points.iter().fold(Point::NEG_INFINITY, |m, &p| m.max(p));
     let center = (low + high) * 0.5;
     let mut all = Shape::new(format!("{shells} nested: {}", shape.name));
     for k in 0..shells {
@@ -85,26 +82,10 @@ pub fn chazelle(n: u32, gap: f64) -> Shape {
     // The four walls are polygons in the planes x = 0, x = w, y = 0, y = w.
     for end in 0..2 {
         let mut wall: Vec<u32> = below.iter().map(|r| r[end]).collect();
-        wall.extend(
-            if end == 0 {
-                above[0]
-            } else {
-                above[2 * n as usize]
-            }
-            .iter()
-            .rev(),
-        );
+        wall.extend(if end == 0 { above[0] } else { above[2 * n as usize] }.iter().rev());
         wall_of(&mut s, &wall, [1, 2]);
         let mut wall: Vec<u32> = above.iter().map(|r| r[end]).collect();
-        wall.extend(
-            if end == 0 {
-                below[0]
-            } else {
-                below[2 * n as usize]
-            }
-            .iter()
-            .rev(),
-        );
+        wall.extend(if end == 0 { below[0] } else { below[2 * n as usize] }.iter().rev());
         wall_of(&mut s, &wall, [0, 2]);
     }
     s
@@ -112,10 +93,8 @@ pub fn chazelle(n: u32, gap: f64) -> Shape {
 
 /// Fills a polygon that lies in a plane of two axes.
 fn wall_of(s: &mut Shape, polygon: &[u32], axes: [usize; 2]) {
-    let flat: Vec<[f64; 2]> = polygon
-        .iter()
-        .map(|&v| axes.map(|axis| s.points[v as usize].to_array()[axis]))
-        .collect();
+    let flat: Vec<[f64; 2]> =
+        polygon.iter().map(|&v| axes.map(|axis| s.points[v as usize].to_array()[axis])).collect();
     for t in triangulated(&flat) {
         s.triangles.push(t.map(|i| polygon[i]));
     }
@@ -165,8 +144,7 @@ pub fn globe(rings: u32, around: u32, random: &mut Random) -> Shape {
     let id = |r: u32, k: u32| 2 + r * around + k % around;
     for k in 0..around {
         s.triangles.push([south, id(0, k + 1), id(0, k)]);
-        s.triangles
-            .push([north, id(rings - 1, k), id(rings - 1, k + 1)]);
+        s.triangles.push([north, id(rings - 1, k), id(rings - 1, k + 1)]);
         for r in 0..rings - 1 {
             let corner = [id(r, k), id(r, k + 1), id(r + 1, k + 1), id(r + 1, k)];
             s.quad(corner, random.one_in(2));
@@ -248,8 +226,7 @@ pub fn book(n: u32, angle: f64, gap: f64) -> Shape {
         let at = f64::from(k) * (angle + gap);
         let c = s.point(at.cos(), at.sin(), 0.3);
         let d = s.point((at + angle).cos(), (at + angle).sin(), 0.7);
-        s.triangles
-            .extend([[a, c, b], [a, b, d], [a, d, c], [b, c, d]]);
+        s.triangles.extend([[a, c, b], [a, b, d], [a, d, c], [b, c, d]]);
     }
     s
 }
@@ -258,9 +235,7 @@ pub fn book(n: u32, angle: f64, gap: f64) -> Shape {
 pub fn wedge(n: u32, angle: f64, random: &mut Random) -> Shape {
     let mut s = Shape::new(format!("wedge of {angle:e} rad in {n} pieces"));
     let row = |s: &mut Shape, x: f64, z: f64| -> Vec<u32> {
-        (0..=n)
-            .map(|k| s.point(x, f64::from(k) / f64::from(n), z))
-            .collect()
+        (0..=n).map(|k| s.point(x, f64::from(k) / f64::from(n), z)).collect()
     };
     let edge = row(&mut s, 0.0, 0.0);
     let low = row(&mut s, 1.0, 0.0);
@@ -271,8 +246,7 @@ pub fn wedge(n: u32, angle: f64, random: &mut Random) -> Shape {
         }
     }
     let n = n as usize;
-    s.triangles
-        .extend([[edge[0], low[0], high[0]], [edge[n], high[n], low[n]]]);
+    s.triangles.extend([[edge[0], low[0], high[0]], [edge[n], high[n], low[n]]]);
     s
 }
 
@@ -298,10 +272,7 @@ pub fn extruded(rows: &[&str], depth: f64, random: &mut Random) -> Shape {
             }
             let corner = [(x, y + 1), (x + 1, y + 1), (x + 1, y), (x, y)];
             let [bottom, top] = [false, true].map(|up| corner.map(|(x, y)| id(&mut s, (x, y, up))));
-            s.quad(
-                [bottom[3], bottom[2], bottom[1], bottom[0]],
-                random.one_in(2),
-            );
+            s.quad([bottom[3], bottom[2], bottom[1], bottom[0]], random.one_in(2));
             s.quad(top, random.one_in(2));
             let outside = [(x, y + 1), (x + 1, y), (x, y - 1), (x - 1, y)];
             for (k, (x, y)) in outside.into_iter().enumerate() {
@@ -324,10 +295,7 @@ pub fn pulled(name: &str, outline: &[[f64; 2]], depth: f64) -> Shape {
             s.point(x, y, z);
         }
     }
-    for [a, b, c] in triangulated(outline)
-        .into_iter()
-        .map(|t| t.map(|i| i as u32))
-    {
+    for [a, b, c] in triangulated(outline).into_iter().map(|t| t.map(|i| i as u32)) {
         s.triangles.extend([[a, c, b], [a + n, b + n, c + n]]);
     }
     for i in 0..n {

@@ -25,12 +25,7 @@ fn element([a, b, c, d]: [DVec3; 4]) -> [[f64; 4]; 4] {
 fn assemble(part: &mut Subdomain) -> Result<(Vec<DVec3>, Matrix), data::SealedError> {
     let mut points = Vec::with_capacity(part.row().vertices as usize);
     for chunk in part.vertex_chunks() {
-        points.extend(
-            chunk?
-                .records
-                .iter()
-                .map(|vertex| DVec3::from_array(vertex.point)),
-        );
+        points.extend(chunk?.records.iter().map(|vertex| DVec3::from_array(vertex.point)));
     }
     let mut matrix = Matrix::new();
     for chunk in part.tet_chunks() {

@@ -31,10 +31,8 @@ const SIDES: [([u32; 4], &str); 6] = [
 fn main() -> Result<(), Box<dyn Error>> {
     let path = std::env::args().nth(1).ok_or("usage: mesh_arrays STORE")?;
 
-    let triangles: Vec<[u32; 3]> = SIDES
-        .iter()
-        .flat_map(|([a, b, c, d], _)| [[*a, *b, *c], [*a, *c, *d]])
-        .collect();
+    let triangles: Vec<[u32; 3]> =
+        SIDES.iter().flat_map(|([a, b, c, d], _)| [[*a, *b, *c], [*a, *c, *d]]).collect();
     let labels: Vec<&str> = SIDES.iter().flat_map(|(_, label)| [*label; 2]).collect();
 
     // Twelve triangles with edges of 1 are divided first: the mesh keeps the surface's triangles as they are.

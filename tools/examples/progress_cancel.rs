@@ -9,9 +9,7 @@ use std::sync::Mutex;
 use tetdb::{CancelToken, Event, Mesher, Settings, Store, Surface};
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let path = std::env::args()
-        .nth(1)
-        .ok_or("usage: progress_cancel STORE")?;
+    let path = std::env::args().nth(1).ok_or("usage: progress_cancel STORE")?;
 
     let token = CancelToken::new();
     let in_listener = token.clone();
@@ -31,19 +29,17 @@ fn main() -> Result<(), Box<dyn Error>> {
     // The same token serves again; other runs in this process never noticed.
     token.reset();
     let stage = Mutex::new("");
-    let settings = Settings::new()
-        .cancel(&token)
-        .progress(move |event| match event {
-            // `done` of `total` comes with it, many times a second.
-            Event::Progress { stage: now, .. } => {
-                let mut last = stage.lock().expect("no listener panics");
-                if std::mem::replace(&mut *last, *now) != *now {
-                    println!("working: {now}");
-                }
+    let settings = Settings::new().cancel(&token).progress(move |event| match event {
+        // `done` of `total` comes with it, many times a second.
+        Event::Progress { stage: now, .. } => {
+            let mut last = stage.lock().expect("no listener panics");
+            if std::mem::replace(&mut *last, *now) != *now {
+                println!("working: {now}");
             }
-            Event::Note(text) | Event::Warning(text) => println!("{text}"),
-            _ => {}
-        });
+        }
+        Event::Note(text) | Event::Warning(text) => println!("{text}"),
+        _ => {}
+    });
     let store = Store::resume(&path, settings)?;
 
     let folder = tempfile::tempdir()?;

@@ -82,12 +82,7 @@ fn records<R: PageRecord>(
     let (mut all, mut chunk) = (Vec::new(), Vec::new());
     for number in 0.. {
         let kind: ChunkKind = R::KIND;
-        let address = ChunkAddress {
-            kind,
-            subdomain,
-            generation,
-            chunk: number,
-        };
+        let address = ChunkAddress { kind, subdomain, generation, chunk: number };
         let Some(value) = table.get(address.key())? else {
             break;
         };
@@ -112,11 +107,7 @@ fn records<R: PageRecord>(
 
 fn volume(a: [f64; 3], b: [f64; 3], c: [f64; 3], d: [f64; 3]) -> f64 {
     let [u, v, w] = [b, c, d].map(|p| [p[0] - a[0], p[1] - a[1], p[2] - a[2]]);
-    let cross = [
-        v[1] * w[2] - v[2] * w[1],
-        v[2] * w[0] - v[0] * w[2],
-        v[0] * w[1] - v[1] * w[0],
-    ];
+    let cross = [v[1] * w[2] - v[2] * w[1], v[2] * w[0] - v[0] * w[2], v[0] * w[1] - v[1] * w[0]];
     (u[0] * cross[0] + u[1] * cross[1] + u[2] * cross[2]) / 6.0
 }
 

@@ -8,23 +8,14 @@ use std::error::Error;
 use tetdb::{Order, Store};
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let path = std::env::args()
-        .nth(1)
-        .ok_or("usage: read_subdomain STORE")?;
+    let path = std::env::args().nth(1).ok_or("usage: read_subdomain STORE")?;
     let mut store = Store::open(&path)?;
 
     // The three worst tetrahedra, and the one in the middle of the first sub-domain's box.
-    let worst = store
-        .query()
-        .order_by("quality", Order::Falling)?
-        .limit(3)
-        .collect()?;
+    let worst = store.query().order_by("quality", Order::Falling)?.limit(3).collect()?;
     for hit in &worst {
         let [x, y, z] = hit.centroid().to_array();
-        println!(
-            "{}: quality {:.3} at {x:.3} {y:.3} {z:.3}",
-            hit.id, hit.shape.quality
-        );
+        println!("{}: quality {:.3} at {x:.3} {y:.3} {z:.3}", hit.id, hit.shape.quality);
     }
     let [low, high] = store.summary().subdomains[0].bounds;
     let middle: [f64; 3] = std::array::from_fn(|i| (low[i] + high[i]) / 2.0);
@@ -51,10 +42,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             n_boundary += chunk?.records.len() as u64;
         }
         assert_eq!((n_tets, n_boundary), (row.tets, row.facets));
-        println!(
-            "sub-domain {}: {n_tets} tetrahedra, {n_boundary} boundary triangles",
-            row.rank
-        );
+        println!("sub-domain {}: {n_tets} tetrahedra, {n_boundary} boundary triangles", row.rank);
     }
     let recorded: f64 = store.summary().subdomains.iter().map(|r| r.volume).sum();
     assert!((volume - recorded).abs() < 1e-9 * recorded);

@@ -37,10 +37,7 @@ fn a_change_killed_at_any_boundary_is_done_or_not() {
     let (.., changed) = case();
     assert!(changed.boundaries > 10, "{}", changed.boundaries);
     troubled((0..changed.boundaries).map(|boundary| {
-        let trouble = Trouble {
-            die_at_boundary: Some(boundary),
-            ..Trouble::default()
-        };
+        let trouble = Trouble { die_at_boundary: Some(boundary), ..Trouble::default() };
         (format!("killed at boundary {boundary}"), trouble)
     }));
 }
@@ -53,11 +50,7 @@ fn a_call_that_fails_leaves_the_old_mesh_or_the_new() {
     let calls = (0..changed.calls).step_by(step);
     let last = changed.calls.saturating_sub(6)..changed.calls;
     troubled(calls.chain(last).enumerate().map(|(i, call)| {
-        let trouble = Trouble {
-            fail_at: Some(call),
-            fails_on: i % 3 == 2,
-            ..Trouble::default()
-        };
+        let trouble = Trouble { fail_at: Some(call), fails_on: i % 3 == 2, ..Trouble::default() };
         (format!("call {call} fails"), trouble)
     }));
 }
@@ -68,45 +61,29 @@ fn a_full_disk_refuses_a_change_and_keeps_the_mesh() {
     let used = changed.whole.used_bytes();
     let room = [0, 32, 64, 96, 128, 160, 192, 224, 2048];
     let ends = room.map(|kibibytes| {
-        let trouble = Trouble {
-            space: Some(used + (kibibytes << 10)),
-            ..Trouble::default()
-        };
+        let trouble = Trouble { space: Some(used + (kibibytes << 10)), ..Trouble::default() };
         match case.change_troubled(trouble, reference, changed) {
             Ok(is_new) => is_new,
             Err(wrong) => panic!("{kibibytes} KiB of room: {wrong}"),
         }
     });
-    assert_eq!(
-        (ends[0], ends[1], ends[8]),
-        (false, false, true),
-        "{ends:?}"
-    );
+    assert_eq!((ends[0], ends[1], ends[8]), (false, false, true), "{ends:?}");
 }
 
 #[test]
 fn a_loss_of_power_during_a_change_leaves_the_old_mesh_or_the_new() {
     let (case, reference, changed) = case();
     let mut rng = Rng(9);
-    let mut crash_at: Vec<(u64, u64)> = (0..60)
-        .map(|_| (rng.below(changed.calls), rng.word()))
-        .collect();
+    let mut crash_at: Vec<(u64, u64)> =
+        (0..60).map(|_| (rng.below(changed.calls), rng.word())).collect();
     crash_at.sort_unstable_by(|a, b| b.cmp(a));
     let disk = changed.whole.copy();
-    disk.set_trouble(Trouble {
-        crash_at,
-        ..Trouble::default()
-    });
-    case.change(&disk)
-        .expect("nobody sees a loss of power coming");
+    disk.set_trouble(Trouble { crash_at, ..Trouble::default() });
+    case.change(&disk).expect("nobody sees a loss of power coming");
     let mut n = 0;
     for wreck in disk.take_wrecks() {
         let is_changed = case.is_changed(&wreck.disk, reference, changed);
-        assert!(
-            is_changed.is_ok(),
-            "power lost before call {}: {is_changed:?}",
-            wreck.call
-        );
+        assert!(is_changed.is_ok(), "power lost before call {}: {is_changed:?}", wreck.call);
         n += 1;
     }
     assert!(n > 40, "{n}");

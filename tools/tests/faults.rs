@@ -24,15 +24,10 @@ fn case() -> &'static (Case, Reference) {
 fn wrecks(n: u64, seed: u64, lies: Option<Call>) -> Vec<Wreck> {
     let (case, reference) = case();
     let mut rng = Rng(seed);
-    let mut crash_at: Vec<(u64, u64)> = (0..n)
-        .map(|_| (rng.below(reference.calls), rng.word()))
-        .collect();
+    let mut crash_at: Vec<(u64, u64)> =
+        (0..n).map(|_| (rng.below(reference.calls), rng.word())).collect();
     crash_at.sort_unstable_by(|a, b| b.cmp(a));
-    let (disk, end) = case.troubled(Trouble {
-        crash_at,
-        lies,
-        ..Trouble::default()
-    });
+    let (disk, end) = case.troubled(Trouble { crash_at, lies, ..Trouble::default() });
     assert_eq!(end, End::Done, "nobody sees a loss of power coming");
     disk.take_wrecks()
 }
@@ -73,10 +68,8 @@ fn a_run_killed_between_two_changes_goes_on() {
     let (case, reference) = case();
     let step = reference.boundaries as usize / 23;
     for boundary in (0..reference.boundaries).step_by(step) {
-        let (disk, end) = case.troubled(Trouble {
-            die_at_boundary: Some(boundary),
-            ..Trouble::default()
-        });
+        let (disk, end) =
+            case.troubled(Trouble { die_at_boundary: Some(boundary), ..Trouble::default() });
         assert_eq!(unclean(&end), None, "killed at {boundary}");
         if let Err(wrong) = case.resumed(&disk, reference) {
             panic!("killed at boundary {boundary}, then {wrong}");
@@ -89,10 +82,7 @@ fn a_full_disk_is_told_and_the_run_goes_on_when_there_is_room() {
     let (case, reference) = case();
     for share in 0..8 {
         let space = reference.bytes_peak * share / 8;
-        let (disk, end) = case.troubled(Trouble {
-            space: Some(space),
-            ..Trouble::default()
-        });
+        let (disk, end) = case.troubled(Trouble { space: Some(space), ..Trouble::default() });
         match end {
             End::Failed(6, text) => assert!(text.contains("no space left"), "{text}"),
             other => panic!("{space} bytes of room: {other:?}"),
@@ -128,9 +118,7 @@ fn a_disk_whose_syncs_do_nothing_is_found_out() {
     let (case, reference) = case();
     for lies in [Call::Sync, Call::SyncFile, Call::SyncDir] {
         let wrecks = wrecks(40, 6, Some(lies));
-        let broken = wrecks
-            .iter()
-            .filter(|w| case.survives(w, reference).is_err());
+        let broken = wrecks.iter().filter(|w| case.survives(w, reference).is_err());
         let n = broken.count();
         assert!(n > 4, "{lies:?}: only {n} of {} are broken", wrecks.len());
     }
@@ -165,10 +153,7 @@ fn a_bit_that_was_turned_is_found_or_changes_nothing() {
             }
         }
     }
-    assert!(
-        found > 8 && harmless > 8,
-        "{found} found, {harmless} harmless"
-    );
+    assert!(found > 8 && harmless > 8, "{found} found, {harmless} harmless");
 }
 
 fn verified(case: &Case, disk: &std::sync::Arc<SimDisk>) -> Result<bool, tetdb::store::StoreError> {

@@ -30,18 +30,9 @@ fn check(seal: &str) -> Result<String, Box<dyn std::error::Error>> {
         seal: Some(seal.to_owned()),
         ..Options::default()
     };
-    let job = Job {
-        options: serde_json::to_string(&options)?,
-        ..Job::default()
-    };
+    let job = Job { options: serde_json::to_string(&options)?, ..Job::default() };
     let mut catalog = Catalog::create(&path, &job)?;
-    pipeline::mesh(
-        &mut catalog,
-        &surface,
-        &options,
-        &Budget::new(256 << 20),
-        &|_| {},
-    )?;
+    pipeline::mesh(&mut catalog, &surface, &options, &Budget::new(256 << 20), &|_| {})?;
     catalog.close()?;
 
     let found = example::read(&path)?;
@@ -54,9 +45,6 @@ fn check(seal: &str) -> Result<String, Box<dyn std::error::Error>> {
     assert!((found.volume - rows.iter().map(|r| r.volume).sum::<f64>()).abs() < 1e-9);
     assert_eq!(found.digest, store.digest()?[0].to_string());
     let text = include_str!("../examples/read_store.rs");
-    assert!(
-        !text.contains("tetdb::"),
-        "the example may use the schema only"
-    );
+    assert!(!text.contains("tetdb::"), "the example may use the schema only");
     Ok(found.digest)
 }

@@ -41,11 +41,7 @@ const NO_TURN: u8 = u8::MAX;
 impl CoarseTet {
     /// The nodes turned as those of a sealed tetrahedron, and which of [`TURNS`] turns them back.
     fn turned(&self) -> (SealedTet, u8) {
-        let turned = SealedTet {
-            nodes: self.nodes,
-            region: self.region,
-        }
-        .rotated();
+        let turned = SealedTet { nodes: self.nodes, region: self.region }.rotated();
         let [a, b, c, _] = turned.nodes;
         let place = |node: u32| match node {
             _ if node == a => 0,
@@ -83,13 +79,8 @@ impl ChunkRecord for CoarseTet {
         decode_nodes(columns, &mut turned)?;
         let start = records.len();
         for (tet, &turn) in turned.iter().zip(columns.raw(count)?) {
-            let turn = TURNS
-                .get(usize::from(turn))
-                .ok_or(Malformed("an unknown turn"))?;
-            records.push(Self {
-                nodes: turn.map(|i| tet.nodes[i]),
-                ..Self::default()
-            });
+            let turn = TURNS.get(usize::from(turn)).ok_or(Malformed("an unknown turn"))?;
+            records.push(Self { nodes: turn.map(|i| tet.nodes[i]), ..Self::default() });
         }
         let records = &mut records[start..];
         columns.dictionary(count, |i, bits| records[i].bits = bits as u8)?;
@@ -188,10 +179,7 @@ impl ChunkRecord for CoarseFace {
     ) -> Result<(), Malformed> {
         let start = records.len();
         let faces = decode_vertices(columns, count)?;
-        records.extend(faces.into_iter().map(|vertices| Self {
-            vertices,
-            ..Self::default()
-        }));
+        records.extend(faces.into_iter().map(|vertices| Self { vertices, ..Self::default() }));
         let records = &mut records[start..];
         columns.dictionary(count, |i, cut| records[i].cut = cut as u32)?;
         columns.dictionary(count, |i, side| records[i].side = side as u32)?;

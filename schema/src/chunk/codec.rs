@@ -49,11 +49,8 @@ impl<R: ChunkRecord> Encoder<R> {
         self.columns.bytes.clear();
         R::encode(records, first, &mut self.columns);
         let raw = &self.columns.bytes;
-        self.value
-            .resize(HEAD_BYTES + zstd::zstd_safe::compress_bound(raw.len()), 0);
-        let packed = self
-            .zstd
-            .compress_to_buffer(raw, &mut self.value[HEAD_BYTES..])?;
+        self.value.resize(HEAD_BYTES + zstd::zstd_safe::compress_bound(raw.len()), 0);
+        let packed = self.zstd.compress_to_buffer(raw, &mut self.value[HEAD_BYTES..])?;
         self.value.truncate(HEAD_BYTES + packed);
         write_head(
             &mut self.value,
@@ -103,11 +100,7 @@ impl<R: ChunkRecord> Decoder<R> {
     ///
     /// Errors: zstd cannot allocate its context.
     pub fn new() -> std::io::Result<Self> {
-        Ok(Self {
-            raw: Vec::new(),
-            zstd: Decompressor::new()?,
-            record: PhantomData,
-        })
+        Ok(Self { raw: Vec::new(), zstd: Decompressor::new()?, record: PhantomData })
     }
 
     /// Replaces `records` by those of a stored value; returns the number of the first.
@@ -121,8 +114,7 @@ impl<R: ChunkRecord> Decoder<R> {
         records: &mut Vec<R>,
     ) -> Result<u32, ChunkError> {
         records.clear();
-        self.decode_inner(value, address, records)
-            .map_err(|reason| ChunkError { address, reason })
+        self.decode_inner(value, address, records).map_err(|reason| ChunkError { address, reason })
     }
 
     fn decode_inner(
@@ -134,9 +126,7 @@ impl<R: ChunkRecord> Decoder<R> {
         let [first, count, raw] = read_head::<R>(value, address)?;
         let count = count as usize;
         self.raw.resize(raw as usize, 0);
-        let unpacked = self
-            .zstd
-            .decompress_to_buffer(&value[HEAD_BYTES..], &mut self.raw[..]);
+        let unpacked = self.zstd.decompress_to_buffer(&value[HEAD_BYTES..], &mut self.raw[..]);
         if unpacked.ok() != Some(raw as usize) {
             return Err(ChunkDamage::Compression);
         }
@@ -173,11 +163,7 @@ fn read_head<R: ChunkRecord>(value: &[u8], address: ChunkAddress) -> Result<[u32
         ("reserved bytes", 0, word(9)),
     ] {
         if expected != found {
-            return Err(ChunkDamage::Head {
-                field,
-                expected,
-                found,
-            });
+            return Err(ChunkDamage::Head { field, expected, found });
         }
     }
     let [first, count, raw] = [word(5), word(6), word(8)];
@@ -188,11 +174,7 @@ fn read_head<R: ChunkRecord>(value: &[u8], address: ChunkAddress) -> Result<[u32
         ("a first record of", u32::MAX - R::COUNT_MAX as u32, first),
     ] {
         if found > most {
-            return Err(ChunkDamage::Head {
-                field,
-                expected: most,
-                found,
-            });
+            return Err(ChunkDamage::Head { field, expected: most, found });
         }
     }
     Ok([first, count, raw])

@@ -163,10 +163,7 @@ impl<'a> Reader<'a> {
     fn long_varint(&mut self) -> Result<u64, Malformed> {
         let mut v = 0;
         for shift in (0..64).step_by(7) {
-            let &byte = self
-                .bytes
-                .get(self.at)
-                .ok_or(Malformed("a number ends early"))?;
+            let &byte = self.bytes.get(self.at).ok_or(Malformed("a number ends early"))?;
             self.at += 1;
             v |= u64::from(byte & 0x7f) << shift;
             if byte < 0x80 {
@@ -232,9 +229,7 @@ impl<'a> Reader<'a> {
                 if n > WORDS_MAX as u64 || (n == 0 && count > 0) {
                     return Err(Malformed("a dictionary of a wrong length"));
                 }
-                let words = (0..n)
-                    .map(|_| self.varint())
-                    .collect::<Result<Vec<_>, _>>()?;
+                let words = (0..n).map(|_| self.varint()).collect::<Result<Vec<_>, _>>()?;
                 if n == 1 {
                     (0..count).for_each(|i| set(i, words[0]));
                 } else if n > 1 {

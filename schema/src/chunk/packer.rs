@@ -43,12 +43,7 @@ impl<R: ChunkRecord> Packer<R> {
     /// Errors: zstd cannot allocate its context.
     pub fn new(subdomain: u32, generation: u32) -> std::io::Result<Self> {
         Ok(Self {
-            address: ChunkAddress {
-                kind: R::KIND,
-                subdomain,
-                generation,
-                chunk: 0,
-            },
+            address: ChunkAddress { kind: R::KIND, subdomain, generation, chunk: 0 },
             first: 0,
             guess: (CHUNK_BYTES_MAX / RECORD_BYTES_GUESS).min(R::COUNT_MAX),
             pending: Vec::new(),
@@ -92,20 +87,14 @@ impl<R: ChunkRecord> Packer<R> {
         if most == 0 {
             return Ok(None);
         }
-        let mut n = if most <= self.guess + self.guess / 16 {
-            most
-        } else {
-            self.guess.clamp(1, most)
-        };
+        let mut n =
+            if most <= self.guess + self.guess / 16 { most } else { self.guess.clamp(1, most) };
         // `fits` is known to fit, `bursts` not to.
         let (mut fits, mut bursts) = (0, most + 1);
         let mut growths = 0;
         loop {
             let records = &self.pending[..n];
-            let length = self
-                .encoder
-                .encode(self.address, self.first, records)?
-                .len();
+            let length = self.encoder.encode(self.address, self.first, records)?.len();
             let aim = (n as f64 * FILL_AIM * CHUNK_BYTES_MAX as f64 / length as f64) as usize;
             if length > CHUNK_BYTES_MAX {
                 bursts = n;
@@ -135,12 +124,7 @@ impl<R: ChunkRecord> Packer<R> {
     fn take(&mut self, n: usize) -> Packed<R> {
         let records: Vec<R> = self.pending.drain(..n).collect();
         let value = self.encoder.last_value().to_vec();
-        let packed = Packed {
-            address: self.address,
-            first: self.first,
-            value,
-            records,
-        };
+        let packed = Packed { address: self.address, first: self.first, value, records };
         self.first += n as u32;
         self.address.chunk += 1;
         packed

@@ -89,8 +89,7 @@ impl Fields<'_> {
 /// Whether a box has finite corners, the low one first.
 pub fn is_box([low, high]: &[[f64; 3]; 2]) -> bool {
     let ends = low.iter().zip(high);
-    ends.into_iter()
-        .all(|(low, high)| low.is_finite() && high.is_finite() && low <= high)
+    ends.into_iter().all(|(low, high)| low.is_finite() && high.is_finite() && low <= high)
 }
 
 fn pad(columns: &mut Columns, start: usize, width: usize) {
@@ -252,11 +251,8 @@ impl<const INTERFACE: bool> RangeSummary<INTERFACE> {
 }
 
 impl<const INTERFACE: bool> ChunkRecord for RangeSummary<INTERFACE> {
-    const KIND: ChunkKind = if INTERFACE {
-        ChunkKind::InterfaceSummaries
-    } else {
-        ChunkKind::FacetSummaries
-    };
+    const KIND: ChunkKind =
+        if INTERFACE { ChunkKind::InterfaceSummaries } else { ChunkKind::FacetSummaries };
     const COUNT_MAX: usize = 16_384;
     const RAW_BYTES_MAX: usize = Self::BYTES;
 
@@ -277,10 +273,7 @@ impl<const INTERFACE: bool> ChunkRecord for RangeSummary<INTERFACE> {
     ) -> Result<(), Malformed> {
         for _ in 0..count {
             let mut f = Fields(columns.raw(Self::BYTES)?);
-            records.push(Self {
-                first: f.u32(),
-                count: f.u32(),
-            });
+            records.push(Self { first: f.u32(), count: f.u32() });
             f.finish()?;
         }
         Ok(())

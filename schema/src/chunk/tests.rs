@@ -78,13 +78,7 @@ fn coarse_tets(n: u32) -> Vec<CoarseTet> {
             // Nodes of a tetrahedron differ.
             let nodes = [a, b, c + 50, d + 100];
             let [a, b, c, d] = nodes;
-            let turned = [
-                nodes,
-                [b, a, d, c],
-                [c, d, a, b],
-                [b, c, a, d],
-                [d, a, c, b],
-            ];
+            let turned = [nodes, [b, a, d, c], [c, d, a, b], [b, c, a, d], [d, a, c, b]];
             CoarseTet {
                 nodes: turned[(next() % 5) as usize],
                 bits: next() as u8 & 0x93,
@@ -97,11 +91,7 @@ fn coarse_tets(n: u32) -> Vec<CoarseTet> {
 
 fn coarse_vertices(n: u32) -> Vec<CoarseVertex> {
     (vertices(n).into_iter())
-        .map(|v| CoarseVertex {
-            point: v.point,
-            tag: v.tag | v.tag << 7,
-            owner: v.id as u32,
-        })
+        .map(|v| CoarseVertex { point: v.point, tag: v.tag | v.tag << 7, owner: v.id as u32 })
         .collect()
 }
 
@@ -118,12 +108,7 @@ fn coarse_facets(n: u32) -> Vec<Facet> {
 
 fn coarse_faces(n: u32) -> Vec<CoarseFace> {
     (faces(n).into_iter())
-        .map(|f| CoarseFace {
-            vertices: f.vertices,
-            cut: f.cut,
-            index: f.index,
-            side: f.cut & 1,
-        })
+        .map(|f| CoarseFace { vertices: f.vertices, cut: f.cut, index: f.index, side: f.cut & 1 })
         .collect()
 }
 
@@ -178,29 +163,15 @@ fn every_kind_comes_back() {
     };
     come_back(&vec![summary; 3000]);
     let bounds = [[0.5; 3]; 2];
-    come_back(&vec![
-        VertexSummary {
-            bounds,
-            first: 0,
-            count: 9,
-            cells: 5 << 40,
-        };
-        5000
-    ]);
+    come_back(&vec![VertexSummary { bounds, first: 0, count: 9, cells: 5 << 40 }; 5000]);
     come_back(&vec![RangeSummary::<true> { first: 0, count: 9 }; 50]);
 }
 
 #[test]
 fn chunks_are_well_filled() {
     for chunks in [
-        pack(&tets(400_000))
-            .iter()
-            .map(|c| c.value.len())
-            .collect::<Vec<_>>(),
-        pack(&vertices(60_000))
-            .iter()
-            .map(|c| c.value.len())
-            .collect(),
+        pack(&tets(400_000)).iter().map(|c| c.value.len()).collect::<Vec<_>>(),
+        pack(&vertices(60_000)).iter().map(|c| c.value.len()).collect(),
     ] {
         let full = &chunks[..chunks.len() - 1];
         let mean = full.iter().sum::<usize>() as f64 / full.len() as f64;
@@ -232,11 +203,7 @@ fn damage<R: ChunkRecord>(records: &[R]) {
         let _ = decoder.decode(&value, chunk.address, &mut some);
         assert!(some.capacity() <= 2 * R::COUNT_MAX);
         let short = next() as usize % value.len();
-        assert!(
-            decoder
-                .decode(&value[..short], chunk.address, &mut some)
-                .is_err()
-        );
+        assert!(decoder.decode(&value[..short], chunk.address, &mut some).is_err());
     }
     // Random columns behind an honest head.
     for round in 0..400 {
@@ -249,10 +216,7 @@ fn damage<R: ChunkRecord>(records: &[R]) {
         let count = next() as usize % 500;
         let _ = R::decode(&mut columns, u32::MAX - 400, count, &mut some);
     }
-    let other = ChunkAddress {
-        generation: 9,
-        ..chunk.address
-    };
+    let other = ChunkAddress { generation: 9, ..chunk.address };
     let found = decoder.decode(&chunk.value, other, &mut some);
     assert!(found.is_err_and(|e| e.to_string().contains("sub-domain 5")));
 }
@@ -264,14 +228,7 @@ fn damage_is_an_error() {
     damage(&facets(500));
     damage(&faces(500));
     let bounds = [[0.5; 3]; 2];
-    damage(
-        &[VertexSummary {
-            bounds,
-            first: 0,
-            count: 9,
-            cells: 5 << 40,
-        }; 40],
-    );
+    damage(&[VertexSummary { bounds, first: 0, count: 9, cells: 5 << 40 }; 40]);
 }
 
 #[test]
@@ -307,28 +264,17 @@ fn a_summary_that_no_chunk_can_have_is_refused() {
         assert!(read.is_err(), "change {i}");
     }
     let bounds = [[1.0; 3], [0.0; 3]];
-    let summary = VertexSummary {
-        bounds,
-        first: 0,
-        count: 9,
-        cells: 0,
-    };
+    let summary = VertexSummary { bounds, first: 0, count: 9, cells: 0 };
     let chunk = &pack(&[summary])[0];
     let mut decoder = Decoder::<VertexSummary>::new().expect("a zstd context");
-    assert!(
-        decoder
-            .decode(&chunk.value, chunk.address, &mut Vec::new())
-            .is_err()
-    );
+    assert!(decoder.decode(&chunk.value, chunk.address, &mut Vec::new()).is_err());
 }
 
 #[test]
 fn the_cells_of_a_box_hold_its_vertices() {
     let mut state = 7u64;
     let mut random = || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1);
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
         (state >> 11) as f64 / (1u64 << 53) as f64
     };
     for scale in [1e-200, 1e-9, 1.0, 1e9] {
@@ -336,11 +282,7 @@ fn the_cells_of_a_box_hold_its_vertices() {
             let points: Vec<[f64; 3]> = (0..40)
                 .map(|i| {
                     let on_border = |x: f64| {
-                        if i % 3 == 0 {
-                            (x * 4.0).floor() / 4.0
-                        } else {
-                            x
-                        }
+                        if i % 3 == 0 { (x * 4.0).floor() / 4.0 } else { x }
                     };
                     let z = if flat { 0.3 } else { on_border(random()) };
                     [on_border(random()), on_border(random()), z].map(|x| (x - 0.4) * scale)
@@ -348,20 +290,11 @@ fn the_cells_of_a_box_hold_its_vertices() {
                 .collect();
             let bounds = [f64::min as fn(f64, f64) -> f64, f64::max].map(|of| {
                 std::array::from_fn(|axis| {
-                    points
-                        .iter()
-                        .map(|p| p[axis])
-                        .reduce(of)
-                        .expect("forty points")
+                    points.iter().map(|p| p[axis]).reduce(of).expect("forty points")
                 })
             });
             let cells = VertexSummary::cells_of(&bounds, points.iter().copied());
-            let told = VertexSummary {
-                bounds,
-                first: 0,
-                count: 40,
-                cells,
-            };
+            let told = VertexSummary { bounds, first: 0, count: 40, cells };
             for p in &points {
                 let is_in = |[low, high]: [[f64; 3]; 2]| {
                     (0..3).all(|axis| low[axis] <= p[axis] && p[axis] <= high[axis])

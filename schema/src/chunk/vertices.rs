@@ -26,9 +26,8 @@ impl ChunkRecord for SealedVertex {
 
     fn encode(records: &[Self], first: u32, columns: &mut Columns) {
         put_points(records.iter().map(|v| v.point), columns);
-        let sizes: Vec<u64> = steps32(records.iter().map(|v| v.h.to_bits()))
-            .map(u64::from)
-            .collect();
+        let sizes: Vec<u64> =
+            steps32(records.iter().map(|v| v.h.to_bits())).map(u64::from).collect();
         columns.planes(&sizes, 4);
         columns.dictionary(records.iter().map(|v| u64::from(v.tag)));
         columns.dictionary(records.iter().map(|v| v.id >> 32));
@@ -48,12 +47,7 @@ impl ChunkRecord for SealedVertex {
         records: &mut Vec<Self>,
     ) -> Result<(), Malformed> {
         let start = records.len();
-        let empty = Self {
-            point: [0.0; 3],
-            h: 0.0,
-            tag: 0,
-            id: 0,
-        };
+        let empty = Self { point: [0.0; 3], h: 0.0, tag: 0, id: 0 };
         records.resize(start + count, empty);
         let records = &mut records[start..];
         take_points(columns, count, |i, axis, x| records[i].point[axis] = x)?;

@@ -93,22 +93,13 @@ impl<R: PageRecord> PagePacker<R> {
         let records = std::mem::take(&mut self.pending);
         let first = self.first;
         self.first += records.len() as u32;
-        PageSet {
-            page,
-            first,
-            records,
-            values,
-        }
+        PageSet { page, first, records, values }
     }
 
     fn sealed(&self, kind: PageKind, page: u32, slots: &[Slot], empty: Slot) -> (u64, Vec<u8>) {
         let mut frame = vec![empty; SLOTS];
         frame[..slots.len()].copy_from_slice(slots);
-        let address = PageAddress {
-            kind,
-            subdomain: self.subdomain,
-            page,
-        };
+        let address = PageAddress { kind, subdomain: self.subdomain, page };
         seal_full_page(&mut frame, address, self.generation, slots.len() as u32);
         (page_key(kind, page), stored_bytes(&frame).to_vec())
     }

@@ -46,21 +46,14 @@ impl SealedTet {
     /// As a working tetrahedron.
     pub fn to_working(self, place: &TetPlace) -> Working {
         let required = |i: usize| {
-            if place.required >> i & 1 == 1 {
-                REQUIRED
-            } else {
-                0
-            }
+            if place.required >> i & 1 == 1 { REQUIRED } else { 0 }
         };
         let neighbor = place.neighbors.map(|face| match face {
             NONE => NONE,
             face => sparse(face >> 2) << 2 | face & 3,
         });
         let node = std::array::from_fn(|i| sparse(self.nodes[i]) | required(i));
-        Working {
-            slot: Tet { node, neighbor }.to_slot(),
-            beside: [self.region, place.flags],
-        }
+        Working { slot: Tet { node, neighbor }.to_slot(), beside: [self.region, place.flags] }
     }
 }
 
@@ -94,15 +87,9 @@ impl SealedVertex {
             tag::FREE | tag::STEINER => 0,
             _ => FIXED,
         };
-        let vertex = Vertex {
-            point: self.point,
-            h: f32::from_bits(self.h.to_bits() | fixed),
-            v2t: NONE,
-        };
-        Working {
-            slot: vertex.to_slot(),
-            beside: [self.tag | cut << TAG_BITS, index],
-        }
+        let vertex =
+            Vertex { point: self.point, h: f32::from_bits(self.h.to_bits() | fixed), v2t: NONE };
+        Working { slot: vertex.to_slot(), beside: [self.tag | cut << TAG_BITS, index] }
     }
 }
 
@@ -150,10 +137,7 @@ impl SealedFacet {
             triangle: self.triangle,
             regions: self.regions,
         };
-        Working {
-            slot: facet.to_slot(),
-            beside: self.tets.map(tet_id),
-        }
+        Working { slot: facet.to_slot(), beside: self.tets.map(tet_id) }
     }
 }
 
@@ -178,20 +162,8 @@ impl InterfaceFace {
     pub fn to_working(self, rank: u32) -> Working {
         let [a, b, c] = self.vertices.map(sparse);
         let side = u32::from(rank > self.other);
-        let words = [
-            a,
-            b,
-            c,
-            self.cut,
-            self.index,
-            side,
-            self.other,
-            tet_id(self.tet),
-        ];
-        Working {
-            slot: words.map(u32_le::from_native),
-            beside: [0; 2],
-        }
+        let words = [a, b, c, self.cut, self.index, side, self.other, tet_id(self.tet)];
+        Working { slot: words.map(u32_le::from_native), beside: [0; 2] }
     }
 }
 
@@ -201,12 +173,6 @@ impl PageRecord for InterfaceFace {
 
     fn from_working(working: &Working, _rank: u32, _n: u32) -> Option<Self> {
         let [a, b, c, cut, index, _side, other, tet] = working.slot.map(u32_le::to_native);
-        Some(Self {
-            vertices: [a, b, c].map(dense),
-            cut,
-            index,
-            other,
-            tet: tet_number(tet),
-        })
+        Some(Self { vertices: [a, b, c].map(dense), cut, index, other, tet: tet_number(tet) })
     }
 }

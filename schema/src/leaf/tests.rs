@@ -27,25 +27,13 @@ fn through<R: PageRecord>(records: &[R], working: impl Fn(R) -> Working) -> Vec<
     let (mut all, mut page_records) = (Vec::new(), Vec::new());
     for page in 0..packer.pages() {
         let (main, beside) = PageDecoder::keys::<R>(page);
-        decoder
-            .open::<R>(page, &values[&main])
-            .expect("as it was written");
-        assert!(matches!(
-            elsewhere.open::<R>(page, &values[&main]),
-            Err(PageError::Header { .. })
-        ));
-        assert!(matches!(
-            later.open::<R>(page, &values[&main]),
-            Err(PageError::Header { .. })
-        ));
+        decoder.open::<R>(page, &values[&main]).expect("as it was written");
+        assert!(matches!(elsewhere.open::<R>(page, &values[&main]), Err(PageError::Header { .. })));
+        assert!(matches!(later.open::<R>(page, &values[&main]), Err(PageError::Header { .. })));
         if let Some(beside) = beside {
-            decoder
-                .open_beside::<R>(page, &values[&beside])
-                .expect("as it was written");
+            decoder.open_beside::<R>(page, &values[&beside]).expect("as it was written");
         }
-        let first = decoder
-            .records(page, &mut page_records)
-            .expect("all are records");
+        let first = decoder.records(page, &mut page_records).expect("all are records");
         assert_eq!(first as usize, all.len());
         all.append(&mut page_records);
     }
@@ -55,16 +43,9 @@ fn through<R: PageRecord>(records: &[R], working: impl Fn(R) -> Working) -> Vec<
 #[test]
 fn records_come_back_from_their_pages() {
     let tets: Vec<SealedTet> = (0..10_000u32)
-        .map(|i| SealedTet {
-            nodes: [i, i + 1, 7 * i, 100_000 - i],
-            region: i % 3,
-        })
+        .map(|i| SealedTet { nodes: [i, i + 1, 7 * i, 100_000 - i], region: i % 3 })
         .collect();
-    let place = TetPlace {
-        neighbors: [NONE, 17, 4 * 5000 + 3, 8],
-        required: 0b1001,
-        flags: 1,
-    };
+    let place = TetPlace { neighbors: [NONE, 17, 4 * 5000 + 3, 8], required: 0b1001, flags: 1 };
     assert_eq!(through(&tets, |t| t.to_working(&place)), tets);
 
     let own = SubdomainId::new(RANK).expect("a small rank");
@@ -112,15 +93,8 @@ fn records_come_back_from_their_pages() {
 
 #[test]
 fn a_slot_without_a_tetrahedron_is_damage() {
-    let tet = SealedTet {
-        nodes: [0, 1, 2, 3],
-        region: 1,
-    };
-    let place = TetPlace {
-        neighbors: [NONE; 4],
-        required: 0,
-        flags: 0,
-    };
+    let tet = SealedTet { nodes: [0, 1, 2, 3], region: 1 };
+    let place = TetPlace { neighbors: [NONE; 4], required: 0, flags: 0 };
     let mut packer = PagePacker::new(RANK, GENERATION);
     packer.push(tet, tet.to_working(&place));
     let set = packer.cut().expect("one record");
@@ -132,11 +106,7 @@ fn a_slot_without_a_tetrahedron_is_damage() {
     assert_eq!(decoder.records(0, &mut records), Ok(0));
     assert_eq!(records, [tet]);
     let mut frame = vec![[u32_le::from_native(0); 8]; SLOTS];
-    let address = PageAddress {
-        kind: PageKind::Tets,
-        subdomain: RANK,
-        page: 0,
-    };
+    let address = PageAddress { kind: PageKind::Tets, subdomain: RANK, page: 0 };
     open_page(&set.values[0].1, address, &mut frame).expect("as it was written");
     for count in [0, 2, 2047] {
         seal_full_page(&mut frame, address, GENERATION, count);

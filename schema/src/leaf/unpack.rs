@@ -17,12 +17,7 @@ impl PageDecoder {
     /// A decoder with frames of its own.
     pub fn new(subdomain: u32, generation: u32) -> Self {
         let empty = [u32_le::from_native(0); 8];
-        Self {
-            subdomain,
-            generation,
-            main: vec![empty; SLOTS],
-            beside: vec![empty; SLOTS],
-        }
+        Self { subdomain, generation, main: vec![empty; SLOTS], beside: vec![empty; SLOTS] }
     }
 
     /// Keys of the values that hold page `page` of records `R`.
@@ -69,10 +64,8 @@ impl PageDecoder {
         let shift = page as usize % BESIDE * RECORDS;
         for at in 0..count as usize {
             let word = |i: usize| self.beside[(shift + at) / BESIDE][(shift + at) % BESIDE * 2 + i];
-            let working = Working {
-                slot: self.main[at],
-                beside: [word(0).to_native(), word(1).to_native()],
-            };
+            let working =
+                Working { slot: self.main[at], beside: [word(0).to_native(), word(1).to_native()] };
             let n = first + at as u32;
             let record = R::from_working(&working, self.subdomain, n);
             records.push(record.ok_or_else(|| wrong(count, at as u32))?);
@@ -81,22 +74,13 @@ impl PageDecoder {
     }
 
     fn address(&self, kind: PageKind, page: u32) -> PageAddress {
-        PageAddress {
-            kind,
-            subdomain: self.subdomain,
-            page,
-        }
+        PageAddress { kind, subdomain: self.subdomain, page }
     }
 
     fn check(&self, address: PageAddress, found: u32) -> Result<(), PageError> {
         if found == self.generation {
             return Ok(());
         }
-        Err(PageError::Header {
-            address,
-            field: "generation",
-            expected: self.generation,
-            found,
-        })
+        Err(PageError::Header { address, field: "generation", expected: self.generation, found })
     }
 }

@@ -21,9 +21,7 @@ pub fn delaunay(points: &[Point], triangles: &[[u32; 3]]) -> Mesh<FlatPages> {
         let p = points[i as usize];
         let v = mesh.add_vertex(p, 0.0);
         mesh.set_vertex_attribute(v, VertexTag::Surface, i);
-        hint = kernel
-            .insert(&mut mesh, v, p, hint)
-            .expect("inside the box and new");
+        hint = kernel.insert(&mut mesh, v, p, hint).expect("inside the box and new");
         id[i as usize] = v;
     }
     for (n, t) in triangles.iter().enumerate() {

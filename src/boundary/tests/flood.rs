@@ -76,10 +76,7 @@ fn components_across_pages_are_those_that_a_walk_finds() {
     }
     let bounds = Aabb::around(points.iter().copied());
     let inside = bounds.high - bounds.low;
-    let inner: f64 = flood
-        .volumes()
-        .map(|c| flood.components[c as usize].volume)
-        .sum();
+    let inner: f64 = flood.volumes().map(|c| flood.components[c as usize].volume).sum();
     assert!((inner - inside.x * inside.y * inside.z).abs() < 1e-9 * inner);
     assert!(flood.components[OUTSIDE as usize].volume > 0.0);
 }

@@ -29,11 +29,7 @@ fn orientations_of_exact_points_are_those_of_exact_numbers() {
                 let turn = if planar { 3 } else { 4 };
                 let pick = |j: usize| corners[(i + j) % turn];
                 let share = |x: f64| {
-                    if k % 7 == 0 {
-                        (x * 64.0).round() / 64.0
-                    } else {
-                        x
-                    }
+                    if k % 7 == 0 { (x * 64.0).round() / 64.0 } else { x }
                 };
                 let shares = [
                     (pick(1), share(numbers.next() + 0.5)),
@@ -56,17 +52,12 @@ fn orientations_of_exact_points_are_those_of_exact_numbers() {
                 }
             })
             .collect();
-        let placed = [0, 1, 2, 3].map(|i| Placed {
-            point: shapes[i].0,
-            exact: shapes[i].1.as_ref(),
-        });
+        let placed =
+            [0, 1, 2, 3].map(|i| Placed { point: shapes[i].0, exact: shapes[i].1.as_ref() });
         let truth = orient_truth(&[0, 1, 2, 3].map(|i| shapes[i].2.clone()));
         let in_pairs = orient_in_pairs(placed);
         n_in_pairs += u32::from(in_pairs.is_some() && orient_filtered(placed).is_none());
-        assert!(
-            in_pairs.is_none_or(|det| det.partial_cmp(&0.0) == Some(truth)),
-            "case {k}"
-        );
+        assert!(in_pairs.is_none_or(|det| det.partial_cmp(&0.0) == Some(truth)), "case {k}");
         let found = orient_placed(placed).partial_cmp(&0.0);
         assert_eq!(found, Some(truth), "case {k}");
         assert!(!planar || truth == Ordering::Equal, "case {k}");

@@ -8,9 +8,8 @@ use crate::geom::Point;
 pub fn random(seed: u64) -> impl FnMut() -> f64 {
     let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
     move || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 11) as f64 / (1u64 << 53) as f64
     }
 }
@@ -122,11 +121,7 @@ fn twisted_prisms_get_points_inside_only() {
             let twist = -0.1 - 0.15 * f64::from(k) * 3.0 / f64::from(n);
             let (points, triangles) = twisted(n, twist, 1.0);
             recovered(&format!("prism {n} by {twist}"), &points, &triangles);
-            recovered(
-                &format!("turned prism {n} by {twist}"),
-                &turned(&points),
-                &triangles,
-            );
+            recovered(&format!("turned prism {n} by {twist}"), &turned(&points), &triangles);
         }
     }
 }
@@ -147,23 +142,14 @@ pub fn placed(
     scale: Point,
     by: Point,
 ) -> (Vec<Point>, Vec<[u32; 3]>) {
-    (
-        part.0.iter().map(|&p| p * scale + by).collect(),
-        part.1.clone(),
-    )
+    (part.0.iter().map(|&p| p * scale + by).collect(), part.1.clone())
 }
 
 #[test]
 fn a_stack_of_twisted_prisms_close_together_is_recovered() {
     let prism = twisted(3, -0.5, 1.0);
     let parts: Vec<_> = (0..6)
-        .map(|i| {
-            placed(
-                &prism,
-                Point::ONE,
-                Point::new(0.0, 0.0, 1.01 * f64::from(i)),
-            )
-        })
+        .map(|i| placed(&prism, Point::ONE, Point::new(0.0, 0.0, 1.01 * f64::from(i))))
         .collect();
     let (points, triangles) = joined(&parts);
     recovered("stack", &points, &triangles);
@@ -174,17 +160,9 @@ fn a_stack_of_twisted_prisms_close_together_is_recovered() {
 fn thin_plates_with_different_cuts_are_recovered() {
     for thickness in [0.1, 1e-2, 1e-4, 1e-6] {
         let (points, triangles) = cube(5, |x, y, face| (x * 3 + y + face as u32).is_multiple_of(2));
-        let plate = placed(
-            &(points, triangles),
-            Point::new(1.0, 1.0, thickness),
-            Point::ZERO,
-        );
+        let plate = placed(&(points, triangles), Point::new(1.0, 1.0, thickness), Point::ZERO);
         recovered(&format!("plate {thickness}"), &plate.0, &plate.1);
-        recovered(
-            &format!("turned plate {thickness}"),
-            &turned(&plate.0),
-            &plate.1,
-        );
+        recovered(&format!("turned plate {thickness}"), &turned(&plate.0), &plate.1);
     }
 }
 
@@ -201,11 +179,7 @@ fn nested_shells_are_told_apart() {
             .map(|i| {
                 let side = 10.0 - 3.0 * f64::from(i);
                 let solid = cube(3, |x, y, _| (x + y).is_multiple_of(2));
-                placed(
-                    &solid,
-                    Point::splat(side / 3.0),
-                    Point::splat(1.5 * f64::from(i)),
-                )
+                placed(&solid, Point::splat(side / 3.0), Point::splat(1.5 * f64::from(i)))
             })
             .collect();
         let (points, triangles) = joined(&parts);
@@ -227,26 +201,13 @@ fn nested_shells_are_told_apart() {
         let regions = fill_regions(&mut mesh, &rule).expect("closed");
         let numbers: Vec<u32> = regions.list.iter().map(|r| r.region).collect();
         assert_eq!(numbers, filled, "{policy:?}");
-        let sum: f64 = regions
-            .list
-            .iter()
-            .filter(|r| r.region > 0)
-            .map(|r| r.volume)
-            .sum();
+        let sum: f64 = regions.list.iter().filter(|r| r.region > 0).map(|r| r.volume).sum();
         assert!((sum - volume).abs() < 1e-9, "{policy:?} {sum}");
         check(&mut mesh);
-        let n: u32 = regions
-            .list
-            .iter()
-            .filter(|r| r.region > 0)
-            .map(|r| r.tets)
-            .sum();
+        let n: u32 = regions.list.iter().filter(|r| r.region > 0).map(|r| r.tets).sum();
         assert_eq!(n, mesh.n_tets());
     }
-    for seeds in [
-        vec![seed(-5.0, "out")],
-        vec![seed(5.0, "a"), seed(5.1, "b")],
-    ] {
+    for seeds in [vec![seed(-5.0, "out")], vec![seed(5.0, "a"), seed(5.1, "b")]] {
         let mut rule = RegionRule::from(RegionPolicy::Seeds);
         rule.seeds = seeds;
         assert!(fill_regions(&mut make(), &rule).is_err());
@@ -271,19 +232,12 @@ fn two_cubes_that_share_a_wall_are_both_filled() {
         }) as u32;
     }
     let mut both = triangles.clone();
-    both.extend(
-        triangles
-            .iter()
-            .map(|&[a, b, c]| [a, c, b].map(|v| twin[v as usize])),
-    );
+    both.extend(triangles.iter().map(|&[a, b, c]| [a, c, b].map(|v| twin[v as usize])));
     let mut mesh = delaunay(&all, &both);
     recover(&mut mesh).expect("two cubes");
     let regions = fill_regions(&mut mesh, &RegionPolicy::Parity.into()).expect("closed");
     assert!(!regions.all_instead_of_parity);
-    assert_eq!(
-        regions.list.iter().map(|r| r.region).collect::<Vec<_>>(),
-        [1, 2]
-    );
+    assert_eq!(regions.list.iter().map(|r| r.region).collect::<Vec<_>>(), [1, 2]);
     // Given once, the wall makes parity contradictory.
     both.truncate(triangles.len());
     both.extend(
@@ -311,11 +265,7 @@ fn random_cuts_of_cospherical_and_random_hulls_are_recovered() {
                 let t = std::f64::consts::PI * (f64::from(r) / f64::from(n_rings + 1) - 0.5);
                 for k in 0..n_around {
                     let u = std::f64::consts::TAU * f64::from(k) / f64::from(n_around);
-                    points.push(Point::new(
-                        t.cos() * u.cos(),
-                        t.cos() * u.sin(),
-                        t.sin() * squash,
-                    ));
+                    points.push(Point::new(t.cos() * u.cos(), t.cos() * u.sin(), t.sin() * squash));
                 }
             }
             let id = |r: u32, k: u32| 2 + r * n_around + k % n_around;
@@ -332,11 +282,7 @@ fn random_cuts_of_cospherical_and_random_hulls_are_recovered() {
                     }
                 }
             }
-            recovered(
-                &format!("rings {n_rings} {n_around} {round}"),
-                &points,
-                &triangles,
-            );
+            recovered(&format!("rings {n_rings} {n_around} {round}"), &points, &triangles);
             recovered(
                 &format!("turned rings {n_rings} {n_around} {round}"),
                 &turned(&points),

@@ -54,12 +54,7 @@ pub struct EstimateArgs {
     #[arg(long, value_name = "SIZE", help_heading = "Run")]
     pub memory: Option<String>,
     /// Threads the run would use [default: all cores]
-    #[arg(
-        long,
-        value_name = "N",
-        allow_negative_numbers = true,
-        help_heading = "Run"
-    )]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = "Run")]
     pub threads: Option<usize>,
     /// Also say how long so many ranks or tasks at once would take, with a thread each
     #[arg(long, value_name = "N", help_heading = "Run", value_parser = clap::value_parser!(u32).range(1..))]

@@ -38,13 +38,7 @@ pub struct Args {
     #[arg(long, short, global = true, display_order = 990)]
     pub quiet: bool,
     /// Say more: steps and their seconds, bytes of each part of a store
-    #[arg(
-        long,
-        short,
-        global = true,
-        conflicts_with = "quiet",
-        display_order = 991
-    )]
+    #[arg(long, short, global = true, conflicts_with = "quiet", display_order = 991)]
     pub verbose: bool,
     #[command(subcommand)]
     pub command: Command,

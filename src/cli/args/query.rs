@@ -23,11 +23,7 @@ pub struct QueryArgs {
     #[arg(long, value_name = "FILE", conflicts_with_all = PLACES)]
     pub points: Option<PathBuf>,
     /// Tetrahedra that meet a box
-    #[arg(
-        long = "box",
-        value_name = "X0,Y0,Z0,X1,Y1,Z1",
-        allow_hyphen_values = true
-    )]
+    #[arg(long = "box", value_name = "X0,Y0,Z0,X1,Y1,Z1", allow_hyphen_values = true)]
     pub boxes: Vec<String>,
     /// Tetrahedra that meet a ball
     #[arg(long, value_name = "X,Y,Z,R", allow_hyphen_values = true)]

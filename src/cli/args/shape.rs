@@ -53,21 +53,13 @@ pub struct SizeArgs {
     #[arg(long, value_name = "RATIO", allow_hyphen_values = true)]
     pub hgrad: Option<String>,
     /// Edge length in a box, and at most OUTSIDE away from it; may be repeated
-    #[arg(
-        long,
-        value_name = "X0,Y0,Z0,X1,Y1,Z1,H[,OUTSIDE]",
-        allow_hyphen_values = true
-    )]
+    #[arg(long, value_name = "X0,Y0,Z0,X1,Y1,Z1,H[,OUTSIDE]", allow_hyphen_values = true)]
     pub size_box: Vec<String>,
     /// Edge length in a sphere, and at most OUTSIDE away from it; may be repeated
     #[arg(long, value_name = "X,Y,Z,R,H[,OUTSIDE]", allow_hyphen_values = true)]
     pub size_sphere: Vec<String>,
     /// Edge length in a cylinder around the axis between two points; may be repeated
-    #[arg(
-        long,
-        value_name = "X0,Y0,Z0,X1,Y1,Z1,R,H[,OUTSIDE]",
-        allow_hyphen_values = true
-    )]
+    #[arg(long, value_name = "X0,Y0,Z0,X1,Y1,Z1,R,H[,OUTSIDE]", allow_hyphen_values = true)]
     pub size_cylinder: Vec<String>,
     /// Edge length in a region, by its number in `tetdb info` or a label of triangles around it; may be repeated
     #[arg(long, value_name = "REGION_OR_LABEL,H", allow_hyphen_values = true)]
@@ -96,20 +88,10 @@ pub struct ShapeArgs {
     #[arg(long, value_enum, help_heading = "Regions")]
     pub regions: Option<Regions>,
     /// A point inside a region, and what it is called; may be repeated
-    #[arg(
-        long,
-        value_name = "X,Y,Z[,NAME]",
-        allow_hyphen_values = true,
-        help_heading = "Regions"
-    )]
+    #[arg(long, value_name = "X,Y,Z[,NAME]", allow_hyphen_values = true, help_heading = "Regions")]
     pub region_seed: Vec<String>,
     /// A point inside a region that stays empty; may be repeated
-    #[arg(
-        long,
-        value_name = "X,Y,Z",
-        allow_hyphen_values = true,
-        help_heading = "Regions"
-    )]
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, help_heading = "Regions")]
     pub hole: Vec<String>,
     /// Seeds and holes from a file: a line `x y z name` or `x y z hole` for each
     #[arg(long, value_name = "FILE", help_heading = "Regions")]

@@ -74,9 +74,7 @@ pub struct CompareArgs {
 
 /// `3/64`.
 fn share(text: &str) -> Result<Share, String> {
-    let numbers = text
-        .split_once('/')
-        .and_then(|(k, n)| Some((k.parse().ok()?, n.parse().ok()?)));
+    let numbers = text.split_once('/').and_then(|(k, n)| Some((k.parse().ok()?, n.parse().ok()?)));
     match numbers {
         Some((number, of)) if (1..=of).contains(&number) => Ok(Share { number, of }),
         _ => Err("give which share and of how many, such as 3/64".to_owned()),

@@ -26,9 +26,7 @@ pub struct SheetArgs {
 impl SheetArgs {
     /// All files to embed.
     pub fn files(&self) -> impl Iterator<Item = &String> {
-        (self.embed.iter())
-            .chain(&self.embed_edges)
-            .chain(&self.embed_points)
+        (self.embed.iter()).chain(&self.embed_edges).chain(&self.embed_points)
     }
 }
 
@@ -52,12 +50,7 @@ pub struct CheckArgs {
     #[arg(long, requires = "write")]
     pub repair: bool,
     /// With --repair: first join points not farther apart than this share of the box diagonal
-    #[arg(
-        long,
-        value_name = "R",
-        requires = "repair",
-        allow_hyphen_values = true
-    )]
+    #[arg(long, value_name = "R", requires = "repair", allow_hyphen_values = true)]
     pub weld: Option<String>,
     /// With --repair: where to write the repaired surface (.stl, .ply, .obj, .off)
     #[arg(long, value_name = "OUT", requires = "repair")]

@@ -21,16 +21,10 @@ fn fitting(defect: &str) -> &'static [&'static str] {
         // Repeated with opposite orientation they are two-sided, and what is wrong is the open rim.
         ("duplicate", &["duplicate-triangle", "open-surface"]),
         ("self-intersection", &["self-intersection"]),
-        (
-            "odd non-manifold",
-            &["duplicate-triangle", "self-intersection", "open-surface"],
-        ),
+        ("odd non-manifold", &["duplicate-triangle", "self-intersection", "open-surface"]),
         ("open", &["open-surface"]),
     ];
-    table
-        .iter()
-        .find(|(start, _)| defect.starts_with(start))
-        .map_or(&[], |(_, codes)| codes)
+    table.iter().find(|(start, _)| defect.starts_with(start)).map_or(&[], |(_, codes)| codes)
 }
 
 #[test]
@@ -64,19 +58,11 @@ fn the_collection_reads_and_validates_as_its_index_says() {
                 continue;
             }
         };
-        let turned = if class == "invalid" {
-            None
-        } else {
-            Some(orient_alike(&mut surface))
-        };
+        let turned = if class == "invalid" { None } else { Some(orient_alike(&mut surface)) };
         let start = Instant::now();
         let found = validate(&surface);
         let valid_ms = start.elapsed().as_secs_f64() * 1e3;
-        let (v, t, c) = (
-            surface.n_vertices(),
-            surface.n_triangles(),
-            &found.closedness,
-        );
+        let (v, t, c) = (surface.n_vertices(), surface.n_triangles(), &found.closedness);
         let genus = c.n_components as i64 - (v as i64 - c.n_edges as i64 + t as i64) / 2;
         let us = valid_ms * 1e3 / t as f64;
         let mut codes: Vec<(&str, usize)> = Vec::new();
@@ -109,11 +95,10 @@ fn the_collection_reads_and_validates_as_its_index_says() {
         }
         if class == "invalid" {
             println!("    index: {}", column[9]);
-            if !column[9].split("; ").any(|d| {
-                fitting(d)
-                    .iter()
-                    .any(|code| codes.iter().any(|(c, _)| c == code))
-            }) {
+            if !column[9]
+                .split("; ")
+                .any(|d| fitting(d).iter().any(|code| codes.iter().any(|(c, _)| c == code)))
+            {
                 raise(format!("found {codes:?}"));
             }
         } else if !found.is_valid() || c.n_inconsistent > 0 || !same(column[7], genus) {

@@ -27,10 +27,7 @@ pub enum Spot {
 impl FilePlace {
     /// A file as a whole.
     pub(super) fn of_file(path: &std::path::Path) -> Self {
-        Self {
-            file: path.to_string_lossy().into_owned(),
-            spot: Spot::Totals,
-        }
+        Self { file: path.to_string_lossy().into_owned(), spot: Spot::Totals }
     }
 }
 

@@ -96,36 +96,24 @@ impl<R: BufRead> Feed<R> {
     }
 
     pub fn unsupported(&self, what: impl Into<String>) -> ReadError {
-        ReadError::Unsupported {
-            place: self.place(),
-            what: what.into(),
-        }
+        ReadError::Unsupported { place: self.place(), what: what.into() }
     }
 
     pub fn out_of_range(&self, index: i64, low: i64, high: i64) -> ReadError {
-        ReadError::IndexOutOfRange {
-            place: self.place(),
-            index,
-            low,
-            high,
-        }
+        ReadError::IndexOutOfRange { place: self.place(), index, low, high }
     }
 
     /// Gives a builder's refusal this place.
     pub fn placed<T>(&self, result: std::result::Result<T, SurfaceError>) -> Result<T> {
-        result.map_err(|source| ReadError::Surface {
-            place: self.place(),
-            source,
-        })
+        result.map_err(|source| ReadError::Surface { place: self.place(), source })
     }
 
     /// Refuses a declared count that the rest of the file cannot hold at `bytes_min` each.
     pub fn check_count(&self, what: &'static str, declared: i64, bytes_min: u64) -> Result<u64> {
         let left = self.len.saturating_sub(self.offset);
         // The last text record may lack its line end.
-        let fits = u64::try_from(declared)
-            .ok()
-            .filter(|&n| n.saturating_mul(bytes_min) <= left + 1);
+        let fits =
+            u64::try_from(declared).ok().filter(|&n| n.saturating_mul(bytes_min) <= left + 1);
         fits.ok_or_else(|| ReadError::CountMismatch {
             place: self.place(),
             what,
@@ -234,9 +222,7 @@ impl<R: BufRead> Feed<R> {
                 .fill_buf()
                 .map_err(|e| broken(place(&self.file, self.binary, self.offset, self.line), &e))?;
             let comment = self.comment;
-            let end = buffer
-                .iter()
-                .position(|&b| b.is_ascii_whitespace() || Some(b) == comment);
+            let end = buffer.iter().position(|&b| b.is_ascii_whitespace() || Some(b) == comment);
             let n = end.unwrap_or(buffer.len());
             let done = end.is_some() || buffer.is_empty();
             self.word.extend_from_slice(&buffer[..n]);
@@ -253,11 +239,7 @@ impl<R: BufRead> Feed<R> {
 
     /// Takes a word that must be there.
     pub fn need_word(&mut self, expected: &'static str) -> Result<()> {
-        if self.next_word()? {
-            Ok(())
-        } else {
-            Err(self.truncated(expected))
-        }
+        if self.next_word()? { Ok(()) } else { Err(self.truncated(expected)) }
     }
 
     /// Takes the word `expected` (any case).
@@ -308,21 +290,10 @@ impl<R: BufRead> Feed<R> {
         if x.abs() < COORDINATE_MAX {
             Ok(x)
         } else if x.is_finite() {
-            Err(ReadError::CoordinateRange {
-                place: self.place(),
-                found: x,
-            })
+            Err(ReadError::CoordinateRange { place: self.place(), found: x })
         } else {
-            let found = if self.binary {
-                x.to_string()
-            } else {
-                quote(&self.word)
-            };
-            Err(ReadError::NotANumber {
-                place: self.place(),
-                what: "a coordinate",
-                found,
-            })
+            let found = if self.binary { x.to_string() } else { quote(&self.word) };
+            Err(ReadError::NotANumber { place: self.place(), what: "a coordinate", found })
         }
     }
 
@@ -334,19 +305,13 @@ impl<R: BufRead> Feed<R> {
             what: "a coordinate",
             found: quote(word),
         })?;
-        self.checked(value).map_err(|_| ReadError::CoordinateRange {
-            place: place.clone(),
-            found: value,
-        })
+        self.checked(value)
+            .map_err(|_| ReadError::CoordinateRange { place: place.clone(), found: value })
     }
 
     /// Takes three coordinates.
     pub fn point(&mut self) -> Result<Point> {
-        Ok(Point::new(
-            self.coordinate()?,
-            self.coordinate()?,
-            self.coordinate()?,
-        ))
+        Ok(Point::new(self.coordinate()?, self.coordinate()?, self.coordinate()?))
     }
 
     /// Takes an index of 1 ..= n and returns it 0-based.
@@ -398,11 +363,8 @@ impl<R: BufRead> Feed<R> {
             while n < buffer.len() && matched < pattern.len() {
                 let b = buffer[n];
                 self.line += u64::from(b == b'\n');
-                matched = if b == pattern[matched] {
-                    matched + 1
-                } else {
-                    usize::from(b == pattern[0])
-                };
+                matched =
+                    if b == pattern[matched] { matched + 1 } else { usize::from(b == pattern[0]) };
                 n += 1;
             }
             self.take(n);
@@ -441,10 +403,7 @@ impl<R: BufRead> Feed<R> {
     pub fn finish(&self, builder: &mut SurfaceBuilder) -> Result<()> {
         if builder.n_file_triangles() == 0 {
             return Err(ReadError::Empty {
-                place: FilePlace {
-                    file: self.file.clone(),
-                    spot: Spot::Totals,
-                },
+                place: FilePlace { file: self.file.clone(), spot: Spot::Totals },
             });
         }
         self.placed(builder.end_file())
@@ -488,22 +447,12 @@ impl<R: BufRead> Feed<R> {
 }
 
 fn place(file: &str, binary: bool, offset: u64, line: u64) -> FilePlace {
-    let spot = if binary {
-        Spot::Byte(offset)
-    } else {
-        Spot::Line(line)
-    };
-    FilePlace {
-        file: file.to_owned(),
-        spot,
-    }
+    let spot = if binary { Spot::Byte(offset) } else { Spot::Line(line) };
+    FilePlace { file: file.to_owned(), spot }
 }
 
 fn broken(place: FilePlace, error: &std::io::Error) -> ReadError {
-    ReadError::Unreadable {
-        place,
-        reason: error.to_string(),
-    }
+    ReadError::Unreadable { place, reason: error.to_string() }
 }
 
 /// `bytes` as a number in plain decimal text.
@@ -514,19 +463,12 @@ pub(super) fn parse<T: std::str::FromStr>(bytes: &[u8]) -> Option<T> {
 /// A short printable form of bytes from a file.
 pub(super) fn quote(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(&bytes[..bytes.len().min(40)]);
-    let clean: String = text
-        .chars()
-        .map(|c| if c.is_control() { '?' } else { c })
-        .collect();
+    let clean: String = text.chars().map(|c| if c.is_control() { '?' } else { c }).collect();
     format!("`{clean}`")
 }
 
 /// A name from a file: trimmed, printable.
 pub(super) fn name(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(bytes);
-    text.trim()
-        .chars()
-        .filter(|c| !c.is_control())
-        .take(200)
-        .collect()
+    text.trim().chars().filter(|c| !c.is_control()).take(200).collect()
 }

@@ -83,10 +83,7 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
     mesh.read_sections(version)?;
     if mesh.n_solids > 0 {
         let n = mesh.n_solids;
-        mesh.target.builder.note(NoteKind::SkippedElements {
-            what: "solid elements",
-            n,
-        });
+        mesh.target.builder.note(NoteKind::SkippedElements { what: "solid elements", n });
         let first = std::mem::take(&mut mesh.first_tets);
         mesh.target.regions_of_mesh(&first);
     }
@@ -98,10 +95,7 @@ impl<R: BufRead> Mesh<'_, '_, R> {
         while self.numbers.feed.next_word()? {
             let section = self.numbers.feed.word().to_vec();
             if section.first() != Some(&b'$') {
-                return Err(self
-                    .numbers
-                    .feed
-                    .unexpected("a section beginning with `$`", &section));
+                return Err(self.numbers.feed.unexpected("a section beginning with `$`", &section));
             }
             self.numbers.feed.skip_line()?;
             match (section.as_slice(), version) {
@@ -199,11 +193,7 @@ impl<R: BufRead> Mesh<'_, '_, R> {
     }
 
     fn point(&mut self) -> Result<Point> {
-        Ok(Point::new(
-            self.numbers.double()?,
-            self.numbers.double()?,
-            self.numbers.double()?,
-        ))
+        Ok(Point::new(self.numbers.double()?, self.numbers.double()?, self.numbers.double()?))
     }
 
     fn face(&mut self, tags: &[i64], group: i64) -> Result<()> {
@@ -212,9 +202,7 @@ impl<R: BufRead> Mesh<'_, '_, R> {
             *corner = self.nodes.find(*tag, &self.numbers.feed)?;
         }
         let label = self.label(group);
-        self.numbers
-            .feed
-            .placed(self.target.builder.polygon(&corners[..tags.len()], label))
+        self.numbers.feed.placed(self.target.builder.polygon(&corners[..tags.len()], label))
     }
 
     // --- 2.2 ----------------------------------------------------------------------------------
@@ -363,11 +351,8 @@ impl<R: BufRead> Mesh<'_, '_, R> {
 
     /// The numbers before one block: entity dimension, entity, a third and the number of entries.
     fn block(&mut self, what: &'static str, words: u64) -> Result<(i64, i64, i64, u64)> {
-        let (dimension, entity, third) = (
-            self.numbers.int()?,
-            self.numbers.int()?,
-            self.numbers.int()?,
-        );
+        let (dimension, entity, third) =
+            (self.numbers.int()?, self.numbers.int()?, self.numbers.int()?);
         let n = self.numbers.size()?;
         let n = self.numbers.check_count(what, n, words, 8)?;
         Ok((dimension, entity, third, n))
@@ -392,11 +377,7 @@ impl<R: BufRead> Mesh<'_, '_, R> {
         for i in 0..n_blocks {
             self.numbers.need_record("blocks", n_blocks, i)?;
             let (dimension, _, parametric, n) = self.block("nodes", 4)?;
-            let n_parameters = if parametric != 0 {
-                dimension.clamp(0, 3)
-            } else {
-                0
-            };
+            let n_parameters = if parametric != 0 { dimension.clamp(0, 3) } else { 0 };
             tags.clear();
             for k in 0..n {
                 self.numbers.need_record("nodes", n, k)?;

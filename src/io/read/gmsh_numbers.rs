@@ -20,11 +20,7 @@ impl<R: BufRead> Numbers<R> {
             return self.feed.integer("a whole number");
         }
         let bytes = self.feed.bytes::<4>()?;
-        Ok(i64::from(if self.big {
-            i32::from_be_bytes(bytes)
-        } else {
-            i32::from_le_bytes(bytes)
-        }))
+        Ok(i64::from(if self.big { i32::from_be_bytes(bytes) } else { i32::from_le_bytes(bytes) }))
     }
 
     /// A `size_t` of the format, of 8 bytes.
@@ -33,11 +29,7 @@ impl<R: BufRead> Numbers<R> {
             return self.feed.integer("a whole number");
         }
         let bytes = self.feed.bytes::<8>()?;
-        Ok(if self.big {
-            i64::from_be_bytes(bytes)
-        } else {
-            i64::from_le_bytes(bytes)
-        })
+        Ok(if self.big { i64::from_be_bytes(bytes) } else { i64::from_le_bytes(bytes) })
     }
 
     /// A coordinate.
@@ -61,11 +53,7 @@ impl<R: BufRead> Numbers<R> {
         words: u64,
         bytes: u64,
     ) -> Result<u64> {
-        let bytes_min = if self.binary {
-            words * bytes
-        } else {
-            words * 2
-        };
+        let bytes_min = if self.binary { words * bytes } else { words * 2 };
         self.feed.check_count(what, declared, bytes_min)
     }
 

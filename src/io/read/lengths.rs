@@ -22,11 +22,7 @@ const HEAD_MAX: usize = 1 << 16;
 /// What is no such file, not one-dimensional, not of 4 or 8 byte floating point numbers; the place of what is no length.
 pub fn read_lengths(path: &Path, limit: u64) -> Result<Vec<f64>> {
     let (from, length_of_file) = open_plain(path)?;
-    let mut file = ArrayFile {
-        from,
-        name: path.display().to_string(),
-        at: 0,
-    };
+    let mut file = ArrayFile { from, name: path.display().to_string(), at: 0 };
     let (n, kind) = file.head()?;
     let needed = n.saturating_mul(8);
     if needed > limit {
@@ -65,18 +61,11 @@ struct ArrayFile {
 
 impl ArrayFile {
     fn place(&self, spot: Spot) -> FilePlace {
-        FilePlace {
-            file: self.name.clone(),
-            spot,
-        }
+        FilePlace { file: self.name.clone(), spot }
     }
 
     fn unexpected(&self, spot: Spot, expected: &str, found: String) -> ReadError {
-        ReadError::Unexpected {
-            place: self.place(spot),
-            expected: expected.to_owned(),
-            found,
-        }
+        ReadError::Unexpected { place: self.place(spot), expected: expected.to_owned(), found }
     }
 
     fn take(&mut self, n: usize) -> Result<Vec<u8>> {
@@ -187,12 +176,7 @@ mod tests {
             ("<i8", "(2,)", &two[..], "unexpected-text"),
             ("<f8", "(2, 1)", &two[..], "unexpected-text"),
             ("<f8", "(1,)", &[0; 8][..], "unexpected-text"),
-            (
-                "<f8",
-                "(1,)",
-                &1e-300f64.to_le_bytes()[..],
-                "unexpected-text",
-            ),
+            ("<f8", "(1,)", &1e-300f64.to_le_bytes()[..], "unexpected-text"),
             ("<f8", "(9000000000,)", &two[..], "memory"),
             ("<f8", "()", &two[..], "unexpected-text"),
         ] {

@@ -167,10 +167,7 @@ fn skip_section<R: BufRead>(
         if let (true, Some(what)) = (first, solid) {
             let n: u64 = feed.parse("the number of elements")?;
             if n > 0 {
-                target.builder.note(NoteKind::SkippedElements {
-                    what: lower(what),
-                    n,
-                });
+                target.builder.note(NoteKind::SkippedElements { what: lower(what), n });
             }
         }
         first = false;

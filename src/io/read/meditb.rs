@@ -38,38 +38,22 @@ pub(super) struct Numbers<R> {
 impl<R: BufRead> Numbers<R> {
     pub(super) fn i32(&mut self) -> Result<i32> {
         let bytes = self.feed.bytes::<4>()?;
-        Ok(if self.big {
-            i32::from_be_bytes(bytes)
-        } else {
-            i32::from_le_bytes(bytes)
-        })
+        Ok(if self.big { i32::from_be_bytes(bytes) } else { i32::from_le_bytes(bytes) })
     }
 
     fn i64(&mut self) -> Result<i64> {
         let bytes = self.feed.bytes::<8>()?;
-        Ok(if self.big {
-            i64::from_be_bytes(bytes)
-        } else {
-            i64::from_le_bytes(bytes)
-        })
+        Ok(if self.big { i64::from_be_bytes(bytes) } else { i64::from_le_bytes(bytes) })
     }
 
     /// A count, vertex number or reference.
     pub(super) fn integer(&mut self) -> Result<i64> {
-        if self.version >= 4 {
-            self.i64()
-        } else {
-            Ok(i64::from(self.i32()?))
-        }
+        if self.version >= 4 { self.i64() } else { Ok(i64::from(self.i32()?)) }
     }
 
     /// A position in the file.
     fn position(&mut self) -> Result<i64> {
-        if self.version >= 3 {
-            self.i64()
-        } else {
-            Ok(i64::from(self.i32()?))
-        }
+        if self.version >= 3 { self.i64() } else { Ok(i64::from(self.i32()?)) }
     }
 
     pub(super) fn coordinate(&mut self) -> Result<f64> {
@@ -101,17 +85,11 @@ impl<R: BufRead> Numbers<R> {
             0x0100_0000 => true,
             _ => return Err(feed.unexpected("1 as the first number of a .meshb file", &magic)),
         };
-        let mut numbers = Self {
-            feed,
-            big,
-            version: 0,
-        };
+        let mut numbers = Self { feed, big, version: 0 };
         numbers.version = numbers.i32()?;
         if !(1..=4).contains(&numbers.version) {
             let version = numbers.version;
-            return Err(numbers
-                .feed
-                .unsupported(format!("version {version} of .meshb")));
+            return Err(numbers.feed.unsupported(format!("version {version} of .meshb")));
         }
         Ok(numbers)
     }
@@ -149,10 +127,7 @@ fn skip_to<R: BufRead>(feed: &mut Feed<R>, next: i64) -> Result<()> {
         Ok(next) if (feed.offset..=feed.len).contains(&next) => feed.skip_bytes(next - feed.offset),
         _ => Err(ReadError::Unexpected {
             place: feed.place(),
-            expected: format!(
-                "the next section between byte {} and {}",
-                feed.offset, feed.len
-            ),
+            expected: format!("the next section between byte {} and {}", feed.offset, feed.len),
             found: format!("byte {next}"),
         }),
     }
@@ -169,20 +144,15 @@ fn read_section<R: BufRead>(
         DIMENSION => {
             let dimension = numbers.i32()?;
             if dimension != 3 {
-                return Err(numbers
-                    .feed
-                    .unsupported(format!("a mesh of dimension {dimension}")));
+                return Err(numbers.feed.unsupported(format!("a mesh of dimension {dimension}")));
             }
         }
         VERTICES => {
             let coordinate = if numbers.version == 1 { 4 } else { 8 };
             let n = numbers.count("vertices", 3 * coordinate + int)?;
             for _ in 0..n {
-                let p = Point::new(
-                    numbers.coordinate()?,
-                    numbers.coordinate()?,
-                    numbers.coordinate()?,
-                );
+                let p =
+                    Point::new(numbers.coordinate()?, numbers.coordinate()?, numbers.coordinate()?);
                 numbers.integer()?;
                 numbers.feed.placed(target.builder.vertex(p))?;
             }
@@ -237,9 +207,7 @@ fn read_faces<R: BufRead>(
             *corner = numbers.feed.check_index(index, 1, n_vertices)?;
         }
         let label = labels.of(numbers.integer()?, target);
-        numbers
-            .feed
-            .placed(target.builder.polygon(&corners[..n_corners], label))?;
+        numbers.feed.placed(target.builder.polygon(&corners[..n_corners], label))?;
     }
     Ok(())
 }

@@ -91,8 +91,7 @@ impl Format {
     /// The format the first bytes of a file tell, for names that do not.
     fn of_head(head: &[u8], length: u64) -> Option<Self> {
         let starts = |word: &str| {
-            head.get(..word.len())
-                .is_some_and(|h| h.eq_ignore_ascii_case(word.as_bytes()))
+            head.get(..word.len()).is_some_and(|h| h.eq_ignore_ascii_case(word.as_bytes()))
         };
         if starts("ply\n") || starts("ply\r") {
             Some(Self::Ply)
@@ -149,11 +148,7 @@ pub fn read_surface(paths: &[PathBuf], cap: u64) -> Result<Surface> {
         let stem = stem(path);
         let prefix = (paths.len() > 1).then(|| unique(&stem, &prefixes));
         prefixes.extend(prefix.clone());
-        let mut target = SurfaceSink {
-            builder: &mut builder,
-            stem,
-            prefix,
-        };
+        let mut target = SurfaceSink { builder: &mut builder, stem, prefix };
         read_file(path, cap / 4, &mut target)?;
     }
     let surface = builder.finish();
@@ -163,10 +158,7 @@ pub fn read_surface(paths: &[PathBuf], cap: u64) -> Result<Surface> {
     if extent > 0.0 && extent < EXTENT_MIN {
         let file = paths.first().map(|p| p.display().to_string());
         return Err(ReadError::Surface {
-            place: FilePlace {
-                file: file.unwrap_or_default(),
-                spot: Spot::Totals,
-            },
+            place: FilePlace { file: file.unwrap_or_default(), spot: Spot::Totals },
             source: SurfaceError::TooSmall { extent },
         });
     }
@@ -182,11 +174,8 @@ pub fn read_surface(paths: &[PathBuf], cap: u64) -> Result<Surface> {
 #[cfg(any(test, feature = "internals"))]
 pub fn read_memory(format: Format, file: &str, bytes: &[u8]) -> Result<Surface> {
     let mut builder = SurfaceBuilder::new();
-    let mut target = SurfaceSink {
-        builder: &mut builder,
-        stem: stem(Path::new(file)),
-        prefix: None,
-    };
+    let mut target =
+        SurfaceSink { builder: &mut builder, stem: stem(Path::new(file)), prefix: None };
     target.builder.begin_file(file);
     let feed = Feed::new(file, bytes, bytes.len() as u64);
     read_feed(format, feed, None, 0, &mut target)?;
@@ -205,10 +194,7 @@ fn unique(stem: &str, taken: &[String]) -> String {
 
 fn read_file(path: &Path, limit: u64, target: &mut SurfaceSink) -> Result<()> {
     if let Some(kind) = solid_model(path, b"") {
-        return Err(ReadError::SolidModel {
-            place: FilePlace::of_file(path),
-            kind,
-        });
+        return Err(ReadError::SolidModel { place: FilePlace::of_file(path), kind });
     }
     let mut feed = open(path, limit)?;
     let format = match Format::of_extension(path) {
@@ -244,10 +230,7 @@ fn read_feed<R: BufRead>(
 ) -> Result<()> {
     if feed.len == 0 {
         return Err(ReadError::Empty {
-            place: FilePlace {
-                file: feed.file().to_owned(),
-                spot: Spot::Totals,
-            },
+            place: FilePlace { file: feed.file().to_owned(), spot: Spot::Totals },
         });
     }
     match format {

@@ -37,9 +37,7 @@ impl Names {
 
     fn best(&self) -> &str {
         let all = [&self.group, &self.object, &self.material];
-        all.into_iter()
-            .find(|n| !n.is_empty())
-            .map_or("", |n| n.as_str())
+        all.into_iter().find(|n| !n.is_empty()).map_or("", |n| n.as_str())
     }
 }
 
@@ -93,18 +91,12 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
     let known = target.builder.n_file_vertices() as u32;
     if let Some((index, place)) = ahead.into_iter().find(|(index, _)| *index >= known) {
         let (index, high) = (i64::from(index) + 1, i64::from(known));
-        return Err(ReadError::IndexOutOfRange {
-            place,
-            index,
-            low: 1,
-            high,
-        });
+        return Err(ReadError::IndexOutOfRange { place, index, low: 1, high });
     }
     if n_lines_points > 0 {
-        target.builder.note(NoteKind::SkippedElements {
-            what: "lines and points",
-            n: n_lines_points,
-        });
+        target
+            .builder
+            .note(NoteKind::SkippedElements { what: "lines and points", n: n_lines_points });
     }
     feed.finish(target.builder)
 }
@@ -122,9 +114,7 @@ fn vertex<'a, R: BufRead>(
 ) -> Result<Point> {
     let mut p = [0.0; 3];
     for x in &mut p {
-        let word = words
-            .next()
-            .ok_or_else(|| unexpected(place, "three coordinates", b"fewer"))?;
+        let word = words.next().ok_or_else(|| unexpected(place, "three coordinates", b"fewer"))?;
         *x = feed.coordinate_of(word, place)?;
     }
     Ok(Point::from_array(p))
@@ -201,11 +191,7 @@ fn read_logical_line<R: BufRead>(feed: &mut Feed<R>, line: &mut Vec<u8>) -> Resu
 fn corner(word: &[u8], known: u32, place: &super::FilePlace) -> Result<u32> {
     let number = word.split(|&b| b == b'/').next().unwrap_or_default();
     let index: i64 = parse(number).ok_or_else(|| not_a_number(place, "a vertex number", word))?;
-    let zero_based = if index > 0 {
-        index - 1
-    } else {
-        i64::from(known).saturating_add(index)
-    };
+    let zero_based = if index > 0 { index - 1 } else { i64::from(known).saturating_add(index) };
     match u32::try_from(zero_based) {
         Ok(i) if index != 0 && i < u32::MAX => Ok(i),
         _ => Err(ReadError::IndexOutOfRange {
@@ -226,9 +212,5 @@ fn unexpected(place: &super::FilePlace, expected: &str, found: &[u8]) -> ReadErr
 }
 
 fn not_a_number(place: &super::FilePlace, what: &'static str, found: &[u8]) -> ReadError {
-    ReadError::NotANumber {
-        place: place.clone(),
-        what,
-        found: quote(found),
-    }
+    ReadError::NotANumber { place: place.clone(), what, found: quote(found) }
 }

@@ -34,11 +34,7 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
         if !feed.next_word()? {
             return Err(feed.too_few("vertices", n_vertices, i));
         }
-        let p = Point::new(
-            feed.word_coordinate()?,
-            feed.coordinate()?,
-            feed.coordinate()?,
-        );
+        let p = Point::new(feed.word_coordinate()?, feed.coordinate()?, feed.coordinate()?);
         feed.skip_line()?;
         feed.placed(target.builder.vertex(p))?;
     }

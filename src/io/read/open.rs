@@ -43,11 +43,7 @@ pub(super) fn stem(path: &Path) -> String {
     let name = unpacked_name(path);
     let text = name.file_stem().unwrap_or_default().to_string_lossy();
     let name = feed::name(text.as_bytes());
-    if name.is_empty() {
-        "surface".to_owned()
-    } else {
-        name
-    }
+    if name.is_empty() { "surface".to_owned() } else { name }
 }
 
 /// Whether what stands here can be read but once: a pipe, or `-`, the standard input.
@@ -80,9 +76,7 @@ pub(super) fn open(path: &Path, limit: u64) -> Result<Feed<Reader>> {
                 d.window_log_max(WINDOW_LOG_MAX)?;
                 Ok(d)
             });
-            Box::new(BufReader::new(
-                decoder.map_err(|e| unreadable(path, e.to_string()))?,
-            ))
+            Box::new(BufReader::new(decoder.map_err(|e| unreadable(path, e.to_string()))?))
         }
         None if path == Path::new("-") => Box::new(BufReader::new(std::io::stdin())),
         None if is_stream(path) => {
@@ -130,8 +124,5 @@ pub(super) fn open_plain(path: &Path) -> Result<(BufReader<File>, u64)> {
 }
 
 fn unreadable(path: &Path, reason: String) -> ReadError {
-    ReadError::Unreadable {
-        place: FilePlace::of_file(path),
-        reason,
-    }
+    ReadError::Unreadable { place: FilePlace::of_file(path), reason }
 }

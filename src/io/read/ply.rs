@@ -74,11 +74,7 @@ struct Header {
 pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
     let header = read_header(&mut feed)?;
     feed.binary = header.encoding != Encoding::Text;
-    let n_vertices = header
-        .elements
-        .iter()
-        .find(|e| e.name == "vertex")
-        .map_or(0, |e| e.n);
+    let n_vertices = header.elements.iter().find(|e| e.name == "vertex").map_or(0, |e| e.n);
     for element in &header.elements {
         let n = check_count(&feed, &header, element)?;
         match element.name.as_str() {
@@ -101,35 +97,20 @@ pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> R
 fn check_count<R: BufRead>(feed: &Feed<R>, header: &Header, element: &Element) -> Result<u64> {
     let bytes: u64 = match header.encoding {
         Encoding::Text => 2 * element.properties.len() as u64,
-        _ => element
-            .properties
-            .iter()
-            .map(|p| p.count.unwrap_or(p.value).bytes())
-            .sum(),
+        _ => element.properties.iter().map(|p| p.count.unwrap_or(p.value).bytes()).sum(),
     };
     let name = match element.name.as_str() {
         "vertex" => "vertices",
         "face" => "faces",
         _ => "elements",
     };
-    feed.check_count(name, element.n, bytes.max(1))
-        .map_err(|e| match e {
-            ReadError::CountMismatch {
-                mut place,
-                what,
-                declared,
-                found,
-            } => {
-                place.spot = super::Spot::Line(element.line);
-                ReadError::CountMismatch {
-                    place,
-                    what,
-                    declared,
-                    found,
-                }
-            }
-            e => e,
-        })
+    feed.check_count(name, element.n, bytes.max(1)).map_err(|e| match e {
+        ReadError::CountMismatch { mut place, what, declared, found } => {
+            place.spot = super::Spot::Line(element.line);
+            ReadError::CountMismatch { place, what, declared, found }
+        }
+        e => e,
+    })
 }
 
 fn read_header<R: BufRead>(feed: &mut Feed<R>) -> Result<Header> {
@@ -174,22 +155,17 @@ fn read_header<R: BufRead>(feed: &mut Feed<R>) -> Result<Header> {
                 None => return wrong(feed, "a number of elements"),
             },
             ["property", types @ .., name] => {
-                let scalars: Option<Vec<Scalar>> = types
-                    .iter()
-                    .filter(|t| **t != "list")
-                    .map(|t| Scalar::named(t))
-                    .collect();
+                let scalars: Option<Vec<Scalar>> =
+                    types.iter().filter(|t| **t != "list").map(|t| Scalar::named(t)).collect();
                 let (count, value) = match (types, scalars.as_deref()) {
                     (["list", _, _], Some([count, value])) => (Some(*count), *value),
                     ([_], Some([value])) => (None, *value),
                     _ => return wrong(feed, "a property of known type"),
                 };
                 match elements.last_mut() {
-                    Some(e) => e.properties.push(Property {
-                        name: (*name).to_owned(),
-                        count,
-                        value,
-                    }),
+                    Some(e) => {
+                        e.properties.push(Property { name: (*name).to_owned(), count, value })
+                    }
                     None => return wrong(feed, "an element before its properties"),
                 }
             }
@@ -249,11 +225,7 @@ fn list_len<R: BufRead>(
     value: Scalar,
 ) -> Result<u64> {
     let n = integer(feed, encoding, count)?;
-    let bytes = if encoding == Encoding::Text {
-        2
-    } else {
-        value.bytes()
-    };
+    let bytes = if encoding == Encoding::Text { 2 } else { value.bytes() };
     feed.check_count("list items", n, bytes)
 }
 
@@ -278,11 +250,8 @@ fn read_vertices<R: BufRead>(
     n: u64,
     target: &mut SurfaceSink,
 ) -> Result<()> {
-    let axis = |p: &Property| {
-        ["x", "y", "z"]
-            .iter()
-            .position(|a| p.count.is_none() && *a == p.name)
-    };
+    let axis =
+        |p: &Property| ["x", "y", "z"].iter().position(|a| p.count.is_none() && *a == p.name);
     let axes: Vec<Option<usize>> = element.properties.iter().map(axis).collect();
     if (0..3).any(|a| axes.iter().filter(|x| **x == Some(a)).count() != 1) {
         return Err(feed.unexpected("vertex properties x, y and z", b"others"));

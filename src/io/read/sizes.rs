@@ -31,10 +31,7 @@ pub fn size_files(path: &Path) -> Result<(PathBuf, Option<PathBuf>)> {
         let all = endings.map(|e| path.with_extension(e));
         all.into_iter().find(|p| p.is_file())
     };
-    let place = || FilePlace {
-        file: path.display().to_string(),
-        spot: Spot::Totals,
-    };
+    let place = || FilePlace { file: path.display().to_string(), spot: Spot::Totals };
     let extension = path.extension().unwrap_or_default().to_string_lossy();
     match extension.to_ascii_lowercase().as_str() {
         "sol" => Ok((path.to_owned(), beside(["mesh", "meshb"]))),
@@ -66,10 +63,7 @@ pub fn read_sizes(path: &Path, limit: u64) -> Result<Background> {
     let Some(mesh) = mesh else {
         return Ok(Background::AtVertices(h));
     };
-    let mut solid = Solid {
-        limit,
-        ..Solid::default()
-    };
+    let mut solid = Solid { limit, ..Solid::default() };
     match is_binary(&mesh) {
         true => binary_solid(feed(&mesh)?, &mut solid)?,
         false => text_solid(feed(&mesh)?, &mut solid)?,
@@ -79,20 +73,13 @@ pub fn read_sizes(path: &Path, limit: u64) -> Result<Background> {
     }
     if h.len() != solid.points.len() {
         return Err(ReadError::CountMismatch {
-            place: FilePlace {
-                file: sizes.display().to_string(),
-                spot: Spot::Totals,
-            },
+            place: FilePlace { file: sizes.display().to_string(), spot: Spot::Totals },
             what: "sizes",
             declared: h.len().to_string(),
             found: format!("{} vertices in {}", solid.points.len(), mesh.display()),
         });
     }
-    Ok(Background::Mesh(Box::new(BackgroundMesh::new(
-        solid.points,
-        solid.tets,
-        h,
-    ))))
+    Ok(Background::Mesh(Box::new(BackgroundMesh::new(solid.points, solid.tets, h))))
 }
 
 fn feed(path: &Path) -> Result<Feed<BufReader<File>>> {
@@ -116,12 +103,7 @@ struct Solid {
 impl Solid {
     fn check<R: BufRead>(&self, feed: &Feed<R>, n_more: u64, bytes: u64) -> Result<()> {
         let held = VERTEX_BYTES * self.points.len() as u64;
-        check(
-            feed,
-            "the background mesh",
-            held + n_more * bytes,
-            self.limit,
-        )
+        check(feed, "the background mesh", held + n_more * bytes, self.limit)
     }
 
     fn add_tet<R: BufRead>(&mut self, feed: &Feed<R>, tet: [u32; 4]) -> Result<()> {
@@ -137,12 +119,7 @@ impl Solid {
 
 fn check<R: BufRead>(feed: &Feed<R>, what: &'static str, needed: u64, limit: u64) -> Result<()> {
     if needed > limit {
-        return Err(ReadError::TooLarge {
-            place: feed.place(),
-            what,
-            needed,
-            limit,
-        });
+        return Err(ReadError::TooLarge { place: feed.place(), what, needed, limit });
     }
     Ok(())
 }
@@ -294,11 +271,8 @@ fn binary_solid<R: BufRead>(feed: Feed<R>, solid: &mut Solid) -> Result<()> {
                 let n = numbers.count("vertices", 3 * coordinate + int)?;
                 solid.check(&numbers.feed, n, VERTEX_BYTES)?;
                 for _ in 0..n {
-                    let [x, y, z] = [
-                        numbers.coordinate()?,
-                        numbers.coordinate()?,
-                        numbers.coordinate()?,
-                    ];
+                    let [x, y, z] =
+                        [numbers.coordinate()?, numbers.coordinate()?, numbers.coordinate()?];
                     numbers.integer()?;
                     solid.points.push(Point::new(x, y, z));
                 }

@@ -22,9 +22,7 @@ pub(super) fn read<R: BufRead>(feed: Feed<R>, target: &mut SurfaceSink) -> Resul
         return read_binary(feed, n, target);
     }
     let text = head[..n_head].trim_ascii_start();
-    let solid = text
-        .get(..5)
-        .is_some_and(|w| w.eq_ignore_ascii_case(b"solid"));
+    let solid = text.get(..5).is_some_and(|w| w.eq_ignore_ascii_case(b"solid"));
     // A text has no zero bytes; a header that says "solid" is often padded with them.
     if solid && !head[..n_head].contains(&0) {
         return read_text(feed, target);
@@ -37,20 +35,12 @@ fn wrong_length<R: BufRead>(mut feed: Feed<R>, n_head: usize, n: u32, expected: 
     let found = format!("{} bytes", feed.len);
     if n_head < HEADER {
         let expected = format!("`solid`, or {HEADER} bytes of binary header");
-        return ReadError::Truncated {
-            place: feed.place(),
-            expected,
-            found,
-        };
+        return ReadError::Truncated { place: feed.place(), expected, found };
     }
     if feed.len < expected {
         feed.offset = feed.len;
         let expected = format!("{expected} bytes for the {n} triangles declared at byte 80");
-        return ReadError::Truncated {
-            place: feed.place(),
-            expected,
-            found,
-        };
+        return ReadError::Truncated { place: feed.place(), expected, found };
     }
     feed.offset = 80;
     ReadError::CountMismatch {
@@ -106,18 +96,14 @@ fn read_text<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> Result<
             if is(feed.word(), "facet") {
                 read_facet(&mut feed, label, target)?;
                 if !feed.next_word()? {
-                    target
-                        .builder
-                        .note(NoteKind::MissingEndsolid { line: feed.line });
+                    target.builder.note(NoteKind::MissingEndsolid { line: feed.line });
                     break;
                 }
             } else if is(feed.word(), "endsolid") {
                 feed.skip_line()?;
                 break;
             } else if is(feed.word(), "solid") {
-                target
-                    .builder
-                    .note(NoteKind::MissingEndsolid { line: feed.line });
+                target.builder.note(NoteKind::MissingEndsolid { line: feed.line });
                 pending = true;
                 break;
             } else {

@@ -16,12 +16,7 @@ use medit::{MEDIT, meshb};
 use ply::ply;
 use stl::{stl_binary, stl_text};
 
-const POINTS: [[f64; 3]; 4] = [
-    [0.0, 0.0, 0.0],
-    [1.0, 0.0, 0.0],
-    [0.0, 1.0, 0.0],
-    [0.0, 0.0, 1.0],
-];
+const POINTS: [[f64; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 
 fn read(format: Format, bytes: impl AsRef<[u8]>) -> Result<Surface> {
@@ -33,10 +28,7 @@ fn read_tetrahedron(format: Format, bytes: impl AsRef<[u8]>) -> Surface {
     let surface = read(format, bytes).unwrap_or_else(|e| panic!("{format:?}: {}: {e}", e.place()));
     assert_eq!((surface.n_vertices(), surface.n_triangles()), (4, 4));
     for (t, face) in FACES.iter().enumerate() {
-        assert_eq!(
-            surface.corners(t as u32),
-            face.map(|v| Point::from_array(POINTS[v]))
-        );
+        assert_eq!(surface.corners(t as u32), face.map(|v| Point::from_array(POINTS[v])));
     }
     surface
 }
@@ -63,14 +55,8 @@ fn files_on_disk() {
     let surface = read_surface(&[path("a.stl"), path("b.OBJ")], 1 << 22).unwrap();
     assert_eq!(surface.label_names, ["a", "b:top"]);
     assert_eq!((surface.n_triangles(), surface.n_vertices()), (8, 8));
-    assert_eq!(
-        surface.source(5).map(|(f, t)| (f.ends_with("b.OBJ"), t)),
-        Some((true, 1))
-    );
-    assert_eq!(
-        read_surface(&[path("c")], 1 << 22).unwrap().n_triangles(),
-        4
-    );
+    assert_eq!(surface.source(5).map(|(f, t)| (f.ends_with("b.OBJ"), t)), Some((true, 1)));
+    assert_eq!(read_surface(&[path("c")], 1 << 22).unwrap().n_triangles(), 4);
     let twice = read_surface(&[path("a.stl"), path("a.stl")], 1 << 22).unwrap();
     assert_eq!(twice.label_names, ["a", "a~2"]);
     let code = |name: &str| read_surface(&[path(name)], 1 << 22).unwrap_err().code();

@@ -84,10 +84,7 @@ fn read_volume_points<R: BufRead>(
         let _: i64 = feed.integer("the number of a point in the volume")?;
         let point = feed.point()?;
         match points {
-            VolumePoints::Holes => target.builder.seed(Seed {
-                point,
-                kind: SeedKind::Hole,
-            }),
+            VolumePoints::Holes => target.builder.seed(Seed { point, kind: SeedKind::Hole }),
             VolumePoints::Regions => {
                 let attribute = match feed.next_word_in_line()? {
                     true => name(feed.word()),
@@ -255,9 +252,7 @@ fn read_polygon<R: BufRead>(feed: &mut Feed<R>, numbering: Numbering) -> Result<
     if n < 3 {
         return Err(feed.unsupported(format!("a polygon of {n} corners")));
     }
-    (0..n)
-        .map(|_| feed.index(numbering.first, numbering.n))
-        .collect()
+    (0..n).map(|_| feed.index(numbering.first, numbering.n)).collect()
 }
 
 /// The whole numbers left on this line.
@@ -290,10 +285,7 @@ fn read_facet<R: BufRead>(
 ) -> Result<bool> {
     let n_polygons = feed.count("polygons", 4)?;
     let rest = rest_of_line(feed)?;
-    let (n_holes, marker) = (
-        rest.first().copied().unwrap_or(0),
-        rest.get(1).copied().unwrap_or(0),
-    );
+    let (n_holes, marker) = (rest.first().copied().unwrap_or(0), rest.get(1).copied().unwrap_or(0));
     let n_holes = feed.check_count("holes of a facet", n_holes, 6)?;
     for i in 0..n_polygons {
         if feed.at_end()? {

@@ -28,11 +28,7 @@ struct Vtk<R> {
 
 /// Reads the lines or the vertices among the cells.
 pub(super) fn read<R: BufRead>(feed: Feed<R>, kind: WireKind, sink: &mut WireSink) -> Result<()> {
-    let mut vtk = Vtk {
-        feed,
-        is_binary: false,
-        n_points: 0,
-    };
+    let mut vtk = Vtk { feed, is_binary: false, n_points: 0 };
     let mut line = Vec::new();
     vtk.feed.read_line(&mut line)?;
     if !line.starts_with(b"# vtk DataFile Version") {
@@ -48,9 +44,7 @@ pub(super) fn read<R: BufRead>(feed: Feed<R>, kind: WireKind, sink: &mut WireSin
     vtk.feed.need_keyword("DATASET")?;
     vtk.feed.need_word("POLYDATA or UNSTRUCTURED_GRID")?;
     if ![&b"POLYDATA"[..], b"UNSTRUCTURED_GRID"].contains(&vtk.feed.word()) {
-        return Err(vtk
-            .feed
-            .unexpected("POLYDATA or UNSTRUCTURED_GRID", vtk.feed.word()));
+        return Err(vtk.feed.unexpected("POLYDATA or UNSTRUCTURED_GRID", vtk.feed.word()));
     }
     let (mut lines, mut vertices, mut mixed) = (Cells::new(), Cells::new(), Cells::new());
     while vtk.feed.next_word()? {
@@ -76,9 +70,7 @@ pub(super) fn read<R: BufRead>(feed: Feed<R>, kind: WireKind, sink: &mut WireSin
             // What follows are values at points and cells.
             b"POINT_DATA" | b"CELL_DATA" | b"FIELD" => break,
             word => {
-                return Err(vtk
-                    .feed
-                    .unexpected("POINTS, LINES, VERTICES or CELLS", word));
+                return Err(vtk.feed.unexpected("POINTS, LINES, VERTICES or CELLS", word));
             }
         }
     }
@@ -163,16 +155,12 @@ impl<R: BufRead> Vtk<R> {
         self.feed.need_word("the type of offsets")?;
         let kind = self.feed.word().to_vec();
         self.begin_data()?;
-        let offsets = (0..n)
-            .map(|_| self.integer(&kind))
-            .collect::<Result<Vec<_>>>()?;
+        let offsets = (0..n).map(|_| self.integer(&kind)).collect::<Result<Vec<_>>>()?;
         self.feed.need_keyword("CONNECTIVITY")?;
         self.feed.need_word("the type of vertex numbers")?;
         let kind = self.feed.word().to_vec();
         self.begin_data()?;
-        let vertices = (0..size)
-            .map(|_| self.vertex(&kind))
-            .collect::<Result<Vec<u32>>>()?;
+        let vertices = (0..size).map(|_| self.vertex(&kind)).collect::<Result<Vec<u32>>>()?;
         let cell = |ends: &[i64]| {
             let [from, to] = [ends[0], ends[1]].map(|k| usize::try_from(k).unwrap_or(usize::MAX));
             vertices.get(from..to).map(<[u32]>::to_vec)

@@ -27,11 +27,7 @@ pub(super) struct WireSink {
 impl WireSink {
     /// For a file of this name, and at most so many bytes.
     pub fn called(stem: String, bytes_max: u64) -> Self {
-        Self {
-            stem,
-            bytes_max,
-            ..Self::default()
-        }
+        Self { stem, bytes_max, ..Self::default() }
     }
 
     /// Refuses `more` bytes that do not fit beside what it holds.

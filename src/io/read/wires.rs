@@ -43,10 +43,7 @@ pub fn read_wires(path: &Path, kind: WireKind, cap: u64) -> Result<WireSet> {
     };
     match is_empty {
         true => Err(ReadError::Unexpected {
-            place: FilePlace {
-                file,
-                spot: Spot::Totals,
-            },
+            place: FilePlace { file, spot: Spot::Totals },
             expected: match kind {
                 WireKind::Edges => "edges".to_owned(),
                 WireKind::Points => "points".to_owned(),
@@ -73,16 +70,9 @@ fn read_table(feed: &mut Feed<Reader>, sink: &mut WireSink) -> Result<()> {
         }
         let is_break = |b: &u8| matches!(b, b',' | b';' | b'\t' | b' ');
         let has_commas = text.iter().any(|b| matches!(b, b',' | b';'));
-        let parts = text.split(|b| {
-            if has_commas {
-                matches!(b, b',' | b';')
-            } else {
-                is_break(b)
-            }
-        });
-        let words: Vec<&[u8]> = (parts.map(<[u8]>::trim_ascii))
-            .filter(|w| has_commas || !w.is_empty())
-            .collect();
+        let parts = text.split(|b| if has_commas { matches!(b, b',' | b';') } else { is_break(b) });
+        let words: Vec<&[u8]> =
+            (parts.map(<[u8]>::trim_ascii)).filter(|w| has_commas || !w.is_empty()).collect();
         let is_heading = is_first && words.iter().all(|w| parse::<f64>(w).is_none());
         is_first = false;
         if is_heading {

@@ -150,10 +150,7 @@ fn wires(mesh: &Merged, stream: &mut Stream) {
     let mut last = None;
     for (number, ([a, b], label)) in (mesh.n_tets() + 1..).zip(&wires.edges) {
         if last.replace(label) != Some(label) {
-            stream.text(&format!(
-                "*ELEMENT, TYPE=T3D2, ELSET=edges_{}\n",
-                names[label]
-            ));
+            stream.text(&format!("*ELEMENT, TYPE=T3D2, ELSET=edges_{}\n", names[label]));
         }
         stream.text(&format!("{number},{},{}\n", a + 1, b + 1));
     }
@@ -170,11 +167,7 @@ fn wires(mesh: &Merged, stream: &mut Stream) {
 fn faces_by_tet(mesh: &Merged, dir: &Path) -> Result<Sorted<TetFace>> {
     let mut sorter = Sorter::new(dir, mesh.sorter_bytes());
     mesh.faces().each(|face| {
-        Ok(sorter.push(TetFace {
-            tet: face.tet,
-            label: face.label,
-            vertices: face.vertices,
-        })?)
+        Ok(sorter.push(TetFace { tet: face.tet, label: face.label, vertices: face.vertices })?)
     })?;
     Ok(sorter.finish()?)
 }

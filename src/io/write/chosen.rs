@@ -87,10 +87,7 @@ impl Chosen {
             words.push(u64::from_le_bytes(word));
         }
         let vertices = words.split_off(n.div_ceil(64) as usize);
-        Ok(Self {
-            tets: RankedSet::new(words),
-            vertices: RankedSet::new(vertices),
-        })
+        Ok(Self { tets: RankedSet::new(words), vertices: RankedSet::new(vertices) })
     }
 }
 

@@ -15,26 +15,16 @@ use crate::surface::{Defect, Surface};
 /// VTK's number of a triangle.
 const TRIANGLE: u8 = 5;
 /// Words of defects by their number in the file; no triangle has number 0.
-const KINDS: [&str; 5] = [
-    "none",
-    "degenerate-triangle",
-    "duplicate-triangle",
-    "open-surface",
-    "self-intersection",
-];
+const KINDS: [&str; 5] =
+    ["none", "degenerate-triangle", "duplicate-triangle", "open-surface", "self-intersection"];
 
 /// Writes the triangles that `defects` are about to the `.vtu` file `out` and returns how many there are.
 ///
 /// Errors: [`WriteError`]; `out` is not touched then.
 pub fn defects(surface: &Surface, defects: &[Defect], out: &Path) -> Result<u64> {
-    let is_vtu = out
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("vtu"));
+    let is_vtu = out.extension().is_some_and(|e| e.eq_ignore_ascii_case("vtu"));
     if !is_vtu {
-        return Err(WriteError::UnknownFormat {
-            path: out.to_owned(),
-            known: ".vtu",
-        });
+        return Err(WriteError::UnknownFormat { path: out.to_owned(), known: ".vtu" });
     }
     let bad = numbered(defects);
     let n = bad.len() as u64;
@@ -49,24 +39,13 @@ pub fn defects(surface: &Surface, defects: &[Defect], out: &Path) -> Result<u64>
         Array::new(Group::Cells, "offsets", index.kind()),
         Array::new(Group::Cells, "types", "UInt8"),
     ];
-    let texts: Vec<u8> = KINDS
-        .iter()
-        .flat_map(|word| word.bytes().chain([0]))
-        .collect();
+    let texts: Vec<u8> = KINDS.iter().flat_map(|word| word.bytes().chain([0])).collect();
     let texts = ("defect_names", texts.as_slice());
     let layout = Layout::new(&Container::Xml, &arrays, [3 * n, n, 3], texts);
     let mut draft = Draft::new(out)?;
     let path = draft.create(out, layout.file_bytes())?;
-    let [
-        mut kinds,
-        mut counts,
-        mut ids,
-        mut labels,
-        mut points,
-        mut nodes,
-        mut ends,
-        mut types,
-    ] = layout.open(&path)?;
+    let [mut kinds, mut counts, mut ids, mut labels, mut points, mut nodes, mut ends, mut types] =
+        layout.open(&path)?;
     for (place, (&t, &(kind, count))) in (0u64..).zip(&bad) {
         kinds.put(&kind.to_le_bytes())?;
         counts.put(&count.to_le_bytes())?;

@@ -83,11 +83,6 @@ impl Changes {
 impl Double {
     /// What it says as a vertex: all but its number is that of the one it is of.
     pub fn sealed(&self) -> SealedVertex {
-        SealedVertex {
-            point: self.point.0,
-            h: self.h as f32,
-            tag: self.tag,
-            id: self.id,
-        }
+        SealedVertex { point: self.point.0, h: self.h as f32, tag: self.tag, id: self.id }
     }
 }

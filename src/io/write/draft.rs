@@ -58,11 +58,7 @@ impl Draft {
             return Ok(out.to_owned());
         }
         if let Some(available) = available_bytes(&self.dir).filter(|&free| free < bytes) {
-            return Err(WriteError::NoSpace {
-                path: out.to_owned(),
-                needed: bytes,
-                available,
-            });
+            return Err(WriteError::NoSpace { path: out.to_owned(), needed: bytes, available });
         }
         let path = self.dir.join(format!("out-{}", self.files.len()));
         File::create_new(&path).map_err(|e| WriteError::io(&path, e))?;
@@ -153,10 +149,8 @@ mod tests {
         let dir = tempfile::tempdir()?;
         let (host, here) = (host_name(), std::process::id());
         // No process has a number this high.
-        let gone = [
-            format!(".a.vtu.{host}.4294967295-0.tmp"),
-            format!(".a.vtu.{host}.{here}-77.tmp"),
-        ];
+        let gone =
+            [format!(".a.vtu.{host}.4294967295-0.tmp"), format!(".a.vtu.{host}.{here}-77.tmp")];
         let stay = [
             format!(".a.vtu.{host}.{here}-78.tmp"),
             format!(".b.vtu.{host}.4294967295-0.tmp"),

@@ -67,10 +67,7 @@ pub(super) struct FaceSorter {
 impl FaceSorter {
     /// A sorter of `memory` bytes with scratch in `dir`.
     pub fn new(dir: &Path, memory: u64) -> Self {
-        Self {
-            sorter: Sorter::new(dir, memory),
-            path: dir.join("faces"),
-        }
+        Self { sorter: Sorter::new(dir, memory), path: dir.join("faces") }
     }
 
     /// Adds a facet of a sub-domain.

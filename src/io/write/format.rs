@@ -67,11 +67,7 @@ const FORMATS: &[(&str, MeshFormat, u16)] = {
         ("msh22", Gmsh22, PARTS | STREAM.0 | SLITS.0),
         ("mesh", Medit, TEXT.0 | PARTS | STREAM.0 | SLITS.0),
         ("meshb", MeditBinary, PARTS | STREAM.0 | SLITS.0),
-        (
-            "mfem",
-            Mfem,
-            TEXT.0 | SUBDOMAINS.0 | REGIONS.0 | STREAM.0 | SLITS.0,
-        ),
+        ("mfem", Mfem, TEXT.0 | SUBDOMAINS.0 | REGIONS.0 | STREAM.0 | SLITS.0),
         ("ele", TetGen, TEXT.0 | PARTS | SLITS.0),
         ("inp", Abaqus, TEXT.0 | ORDER_2 | PARTS | STREAM.0 | SLITS.0),
         ("npy", Numpy, PARTS | SLITS.0),

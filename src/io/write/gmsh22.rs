@@ -25,11 +25,7 @@ pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
     mesh.expect_passes(1, 1);
     let elements_bytes = 24 * mesh.n_faces() + 28 * mesh.n_tets();
     let partition_bytes = 8 * (mesh.n_faces() + mesh.n_tets());
-    let partitioned = if mesh.n_parts() > 1 {
-        partition_bytes
-    } else {
-        0
-    };
+    let partitioned = if mesh.n_parts() > 1 { partition_bytes } else { 0 };
     let bytes = 200 + 28 * mesh.n_vertices() + elements_bytes + partitioned;
     let names = physical_names(mesh)?;
     let path = draft.create(out, bytes + names.len() as u64)?;
@@ -65,11 +61,7 @@ fn put(stream: &mut Stream, words: &[u32]) {
 fn elements(mesh: &mut Merged, stream: &mut Stream) -> Result<()> {
     let mut number = 0;
     let partitioned = mesh.n_parts() > 1;
-    let n_tags = if partitioned {
-        N_TAGS_PARTITIONED
-    } else {
-        N_TAGS
-    };
+    let n_tags = if partitioned { N_TAGS_PARTITIONED } else { N_TAGS };
     let put_head = |stream: &mut Stream, number: u32, tag: u32, subdomain: u32| {
         put(stream, &[number, tag, tag]);
         if partitioned {

@@ -65,21 +65,13 @@ enum Content {
 impl Object {
     pub fn group(name: &'static str, children: Vec<Object>) -> Self {
         let (attributes, content) = (Vec::new(), Content::Group(children));
-        Self {
-            name,
-            attributes,
-            content,
-        }
+        Self { name, attributes, content }
     }
 
     /// An array of this shape, the last index running fastest.
     pub fn array(name: &'static str, number: Number, shape: &[u64]) -> Self {
         let (attributes, content) = (Vec::new(), Content::Array(number, shape.to_vec()));
-        Self {
-            name,
-            attributes,
-            content,
-        }
+        Self { name, attributes, content }
     }
 
     /// The same with a list of integers attached.
@@ -133,11 +125,7 @@ pub(super) fn plan(root: &Object) -> Plan {
 }
 
 fn round(root: &Object, data: u64) -> Plan {
-    let mut plan = Plan {
-        head: vec![0; SUPERBLOCK_BYTES],
-        arrays: Vec::new(),
-        file_bytes: data,
-    };
+    let mut plan = Plan { head: vec![0; SUPERBLOCK_BYTES], arrays: Vec::new(), file_bytes: data };
     let root = put_object(root, &mut plan);
     let mut superblock = b"\x89HDF\r\n\x1a\n\x02\x08\x08\x00".to_vec();
     for address in [0, UNDEFINED, plan.file_bytes, root] {
@@ -273,10 +261,7 @@ mod tests {
         let plan = plan(&root);
         let head = plan.head.len() as u64;
         let first = head.next_multiple_of(8);
-        assert_eq!(
-            plan.arrays,
-            [[first, 3], [first + 8, 120], [first + 128, 0]]
-        );
+        assert_eq!(plan.arrays, [[first, 3], [first + 8, 120], [first + 128, 0]]);
         assert_eq!(plan.file_bytes, first + 128);
         assert!(plan.head.starts_with(b"\x89HDF\r\n\x1a\n"));
     }

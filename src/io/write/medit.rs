@@ -129,8 +129,7 @@ fn sections(mesh: &mut Merged, file: &mut impl Medit) -> Result<()> {
     vertices(mesh, file)?;
     wires(mesh, file)?;
     file.section(TRIANGLES, mesh.n_faces(), 32);
-    mesh.faces()
-        .each(|face| file.element(&face.vertices, u64::from(face.label) + 1))?;
+    mesh.faces().each(|face| file.element(&face.vertices, u64::from(face.label) + 1))?;
     file.section(TETRAHEDRA, mesh.n_tets(), 40);
     mesh.tets(|tet| file.element(&tet.nodes, u64::from(tet.region)))
 }

@@ -33,11 +33,7 @@ pub(super) struct Progress<'a> {
 impl<'a> Progress<'a> {
     pub fn new(report: &'a dyn Fn(u64, u64)) -> Self {
         let (done, total) = (Cell::new(0), Cell::new(0));
-        Self {
-            report,
-            done,
-            total,
-        }
+        Self { report, done, total }
     }
 
     /// Counts `n` more records; the place where a request to stop is heard.
@@ -135,17 +131,8 @@ impl<'a> Merged<'a> {
             let numbers = numbering.part(store, &parts, p)?;
             let rank = source.row.rank;
             let mut from = store.open_subdomain(rank, memory / 4)?;
-            let part = FaceSource {
-                rank,
-                numbers: &numbers,
-                scope,
-            };
-            collect_faces(
-                &mut from,
-                &part,
-                [first_label.into(), row.fin_first],
-                &mut sorter,
-            )?;
+            let part = FaceSource { rank, numbers: &numbers, scope };
+            collect_faces(&mut from, &part, [first_label.into(), row.fin_first], &mut sorter)?;
         }
         let faces = sorter.finish()?;
         let is_whole = scope.regions.is_empty() && scope.ranks.is_empty();
@@ -358,12 +345,7 @@ impl<'a> Merged<'a> {
         for (what, found) in [("vertices", self.n_vertices()), ("elements", elements)] {
             if found > limit {
                 let path = out.to_owned();
-                return Err(WriteError::TooLarge {
-                    path,
-                    what,
-                    limit,
-                    found,
-                });
+                return Err(WriteError::TooLarge { path, what, limit, found });
             }
         }
         Ok(())
@@ -520,15 +502,9 @@ fn damaged(part: &Subdomain, found: u32, expected: u32) -> StoreError {
 
 fn too_many_vertices(catalog: &Catalog, row: &SubdomainRow, end: u64) -> StoreError {
     StoreError::Sealed(SealedError::Content {
-        path: catalog
-            .file_path(row.rank, row.generation)
-            .path()
-            .to_owned(),
+        path: catalog.file_path(row.rank, row.generation).path().to_owned(),
         subdomain: row.rank,
-        what: format!(
-            "a chunk ends at vertex {end}, the catalog counts {}",
-            row.vertices
-        ),
+        what: format!("a chunk ends at vertex {end}, the catalog counts {}", row.vertices),
     })
 }
 

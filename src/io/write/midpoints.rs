@@ -149,13 +149,7 @@ impl Midpoints {
             stream.end()?;
         }
         stream.finish()?;
-        Ok(Self {
-            counts,
-            n_tets: mesh.n_tets(),
-            n_faces: mesh.n_faces(),
-            elements,
-            points,
-        })
+        Ok(Self { counts, n_tets: mesh.n_tets(), n_faces: mesh.n_faces(), elements, points })
     }
 
     /// How many there are.

@@ -171,9 +171,7 @@ pub fn export_with(
 /// Refuses regions that the store does not have, or that are empty.
 fn check_regions(store: &mut Catalog, selection: &Selection) -> Result<()> {
     let rows = store.regions()?;
-    let filled: Vec<u32> = (rows.iter().filter(|row| row.filled))
-        .map(|row| row.region)
-        .collect();
+    let filled: Vec<u32> = (rows.iter().filter(|row| row.filled)).map(|row| row.region).collect();
     match (selection.regions.iter()).find(|region| !filled.contains(region)) {
         Some(&region) => Err(WriteError::NoRegion { region, filled }),
         None => Ok(()),
@@ -185,10 +183,7 @@ pub fn check(out: &Path, selection: &Selection) -> Result<MeshFormat> {
     let path = || out.to_owned();
     let known = ENDINGS;
     let named = selection.format.or_else(|| MeshFormat::of_extension(out));
-    let format = named.ok_or_else(|| WriteError::UnknownFormat {
-        path: path(),
-        known,
-    })?;
+    let format = named.ok_or_else(|| WriteError::UnknownFormat { path: path(), known })?;
     let stdout = out == Path::new(STDOUT);
     let (pieces, regions) = (selection.pieces, !selection.regions.is_empty());
     let subdomains = !selection.subdomains.is_empty();
@@ -214,10 +209,6 @@ pub fn check(out: &Path, selection: &Selection) -> Result<MeshFormat> {
     let several = one_stream.or(slits).or(share);
     match refused.filter_map(lacks).next().or(several) {
         None => Ok(format),
-        Some(what) => Err(WriteError::Unsupported {
-            path: path(),
-            format: format.word(),
-            what,
-        }),
+        Some(what) => Err(WriteError::Unsupported { path: path(), format: format.word(), what }),
     }
 }

@@ -13,10 +13,7 @@ pub(super) fn set_names(labels: &BTreeMap<u32, String>) -> BTreeMap<u32, String>
     let mut names = BTreeMap::new();
     for (&label, name) in labels {
         let letter = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-        let mut clean: String = name
-            .chars()
-            .map(|c| if letter(c) { c } else { '_' })
-            .collect();
+        let mut clean: String = name.chars().map(|c| if letter(c) { c } else { '_' }).collect();
         if !clean.starts_with(|c: char| c.is_ascii_alphabetic()) {
             clean.insert_str(0, "label_");
         }

@@ -64,13 +64,7 @@ impl NpyTable {
         let kind = format!("[{}]", fields.join(", "));
         let mut stream = Stream::open(&path)?;
         stream.bytes(&head(&kind, 0, ""));
-        Ok(Self {
-            draft,
-            path,
-            kind,
-            out: stream,
-            rows: 0,
-        })
+        Ok(Self { draft, path, kind, out: stream, rows: 0 })
     }
 
     /// Adds a row, its fields one after the other. Errors: the disk.

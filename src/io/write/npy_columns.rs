@@ -45,20 +45,13 @@ pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
     mesh.expect_passes(1, 1);
     let (n_vertices, n_tets, n_faces) = (mesh.n_vertices(), mesh.n_tets(), mesh.n_faces());
     let index = Index::new(n_vertices, 0);
-    let number = if index.kind() == "Int32" {
-        "<i4"
-    } else {
-        "<i8"
-    };
+    let number = if index.kind() == "Int32" { "<i4" } else { "<i8" };
     let mut columns = Columns { draft, out };
     let mut points = columns.open("points", "<f8", n_vertices, 3)?;
     let mut vertex_ids = columns.open("vertex_id", "<i8", n_vertices, 0)?;
     mesh.vertices(|_, vertex| {
         vertex_ids.put(&vertex.id.to_le_bytes())?;
-        vertex
-            .point
-            .iter()
-            .try_for_each(|x| points.put(&x.to_le_bytes()))
+        vertex.point.iter().try_for_each(|x| points.put(&x.to_le_bytes()))
     })?;
     points.finish()?;
     vertex_ids.finish()?;
@@ -69,9 +62,7 @@ pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
     let mut qualities = columns.open("quality", "<f8", n_tets, 0)?;
     let mut ids = columns.open("global_id", "<i8", n_tets, 0)?;
     mesh.measured_tets(Measured::Quality, |tet| {
-        tet.nodes
-            .iter()
-            .try_for_each(|&v| index.put(&mut nodes, v))?;
+        tet.nodes.iter().try_for_each(|&v| index.put(&mut nodes, v))?;
         regions.put(&tet.region.to_le_bytes())?;
         ranks.put(&tet.subdomain.to_le_bytes())?;
         qualities.put(&tet.quality.to_le_bytes())?;
@@ -82,9 +73,7 @@ pub(super) fn write(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
     let mut labels = columns.open("label", "<u4", n_faces, 0)?;
     let mut inputs = columns.open("input_id", "<i8", n_faces, 0)?;
     mesh.faces().each(|face| {
-        face.vertices
-            .iter()
-            .try_for_each(|&v| index.put(&mut faces, v))?;
+        face.vertices.iter().try_for_each(|&v| index.put(&mut faces, v))?;
         labels.put(&face.label.to_le_bytes())?;
         let input = face.triangle().map_or(-1, |t| t as i64);
         inputs.put(&input.to_le_bytes())

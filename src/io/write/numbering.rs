@@ -84,12 +84,7 @@ impl Source {
 
 impl From<SubdomainRow> for Source {
     fn from(row: SubdomainRow) -> Self {
-        Self {
-            n_tets: row.tets,
-            n_vertices: row.vertices,
-            row,
-            chosen: None,
-        }
+        Self { n_tets: row.tets, n_vertices: row.vertices, row, chosen: None }
     }
 }
 
@@ -364,11 +359,7 @@ pub(super) fn sharers(by_id: Sorted<Candidate>, dir: &Path, bytes: u64) -> Resul
         }
         for other in &group {
             for [a, b] in [[&candidate, other], [other, &candidate]] {
-                sorter.push(Sharer {
-                    part: a.part,
-                    local: a.local,
-                    other: b.part,
-                })?;
+                sorter.push(Sharer { part: a.part, local: a.local, other: b.part })?;
             }
         }
         group.push(candidate);
@@ -378,12 +369,7 @@ pub(super) fn sharers(by_id: Sorted<Candidate>, dir: &Path, bytes: u64) -> Resul
 
 impl Candidate {
     fn shared(&self, group: u64, is_elsewhere: bool) -> SharedVertex {
-        SharedVertex {
-            part: self.part,
-            local: self.local,
-            group,
-            is_elsewhere,
-        }
+        SharedVertex { part: self.part, local: self.local, group, is_elsewhere }
     }
 }
 
@@ -397,11 +383,7 @@ fn carry(groups: Sorted<GroupMember>, dir: &Path, memory: usize, table: &Path) -
             number = member.number;
             continue;
         }
-        sorter.push(TableEntry {
-            part: member.part,
-            local: member.local,
-            number,
-        })?;
+        sorter.push(TableEntry { part: member.part, local: member.local, number })?;
     }
     let mut stream = scratch(table)?;
     for entry in sorter.finish()? {
@@ -439,9 +421,6 @@ mod tests {
         let error = numbers.of([0, 4, 2]).unwrap_err();
         assert_eq!(error.code(), "damaged");
         let text = error.to_string();
-        assert!(
-            text.contains("a.redb") && text.contains("[0, 4, 2]"),
-            "{text}"
-        );
+        assert!(text.contains("a.redb") && text.contains("[0, 4, 2]"), "{text}");
     }
 }

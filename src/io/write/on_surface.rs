@@ -31,10 +31,7 @@ impl OnSurface {
             check_cancelled();
             let facet = facet?;
             for tet in facet.tets.into_iter().filter(|&t| t != NO_TET) {
-                let face = TetFace {
-                    tet,
-                    vertices: facet.vertices,
-                };
+                let face = TetFace { tet, vertices: facet.vertices };
                 sorter.push(face)?;
             }
         }
@@ -45,10 +42,7 @@ impl OnSurface {
     /// Whether each face of tetrahedron `local` of these vertices, opposite the vertex of its place, is required. Errors: the disk.
     pub fn faces(&mut self, local: u32, nodes: [u32; 4]) -> Result<[bool; 4]> {
         let mut on_surface = [false; 4];
-        while let Some(face) = self
-            .faces
-            .next_if(|face| here(face, |face| face.tet <= local))
-        {
+        while let Some(face) = self.faces.next_if(|face| here(face, |face| face.tet <= local)) {
             let face = face?;
             if face.tet == local {
                 let own = face_of(face.vertices, nodes);

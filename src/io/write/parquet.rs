@@ -189,10 +189,7 @@ impl Tets {
             Ok(())
         })?;
         let done = self.done;
-        *self = Self {
-            done,
-            ..Self::default()
-        };
+        *self = Self { done, ..Self::default() };
         Ok(())
     }
 }

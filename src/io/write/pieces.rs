@@ -23,10 +23,7 @@ pub(super) fn write(
 ) -> Result<FileCounts> {
     let (parallel, extension) = match format {
         MeshFormat::Pvtu => (true, "vtu"),
-        _ => (
-            false,
-            out.extension().and_then(|e| e.to_str()).unwrap_or_default(),
-        ),
+        _ => (false, out.extension().and_then(|e| e.to_str()).unwrap_or_default()),
     };
     let mut rows = store.subdomains()?;
     if !selection.subdomains.is_empty() {
@@ -106,19 +103,14 @@ fn head(draft: &mut Draft, out: &Path, pieces: &[PathBuf]) -> Result<()> {
     for (group, arrays) in groups {
         stream.text(&format!("    <{group}>\n"));
         for (name, kind) in arrays {
-            stream.text(&format!(
-                "      <PDataArray type=\"{kind}\" Name=\"{name}\"/>\n"
-            ));
+            stream.text(&format!("      <PDataArray type=\"{kind}\" Name=\"{name}\"/>\n"));
         }
         stream.text(&format!("    </{group}>\n"));
     }
     stream.text("    <PPoints>\n      <PDataArray type=\"Float64\" Name=\"Points\" NumberOfComponents=\"3\"/>\n    </PPoints>\n");
     for piece in pieces {
         let name = piece.file_name().unwrap_or_default().to_string_lossy();
-        let name = name
-            .replace('&', "&amp;")
-            .replace('"', "&quot;")
-            .replace('<', "&lt;");
+        let name = name.replace('&', "&amp;").replace('"', "&quot;").replace('<', "&lt;");
         stream.text(&format!("    <Piece Source=\"{name}\"/>\n"));
         stream.end()?;
     }

@@ -121,17 +121,7 @@ impl SelectedVtu {
         let layout = Layout::new(&Container::Xml, &arrays, counts, ("", &[]));
         let path = self.draft.create(&self.out, layout.file_bytes())?;
         let mut strips = layout.open::<9>(&path)?;
-        let [
-            vertex_ids,
-            ranks,
-            regions,
-            qualities,
-            ids,
-            places,
-            nodes,
-            ends,
-            types,
-        ] = &mut strips;
+        let [vertex_ids, ranks, regions, qualities, ids, places, nodes, ends, types] = &mut strips;
         let mut points = Records::<32>::open(&points_path, 0)?;
         while let Some(record) = points.next()? {
             vertex_ids.put(&record[..8])?;
@@ -151,9 +141,7 @@ impl SelectedVtu {
         for corner in numbers.finish()? {
             index.put(nodes, corner?.number)?;
         }
-        strips
-            .into_iter()
-            .try_for_each(super::stream::Strip::finish)?;
+        strips.into_iter().try_for_each(super::stream::Strip::finish)?;
         length(self.draft)
     }
 }
@@ -167,11 +155,7 @@ fn number(
     let mut last = None;
     let mut n = 0u64;
     for corner in corners {
-        let Corner {
-            vertex,
-            place,
-            point,
-        } = corner?;
+        let Corner { vertex, place, point } = corner?;
         if last != Some(vertex) {
             last = Some(vertex);
             n += 1;

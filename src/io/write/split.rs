@@ -76,26 +76,15 @@ pub(super) fn split(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
         }
         let numbers = numbers_at(vertex, &tets, &faces, n_vertices + n);
         let doubles = numbers.iter().filter(|&&number| number != vertex);
-        let end = doubles
-            .copied()
-            .max()
-            .map_or(n, |last| last + 1 - n_vertices);
+        let end = doubles.copied().max().map_or(n, |last| last + 1 - n_vertices);
         for _ in n..end {
             stream.bytes(&vertex.to_le_bytes());
             stream.end()?;
         }
         n = end;
-        for (tet, &double) in tets
-            .iter()
-            .zip(&numbers)
-            .filter(|(_, double)| **double != vertex)
-        {
+        for (tet, &double) in tets.iter().zip(&numbers).filter(|(_, double)| **double != vertex) {
             let tet = tet.tet;
-            changes.push(Change {
-                tet,
-                vertex,
-                double,
-            })?;
+            changes.push(Change { tet, vertex, double })?;
         }
         for face in &faces {
             if let Some(change) = face_change(face, &tets, &numbers) {
@@ -104,11 +93,7 @@ pub(super) fn split(mesh: &mut Merged, draft: &mut Draft, out: &Path) -> Result<
         }
     }
     stream.finish()?;
-    let doubles = Doubles {
-        n,
-        changes: dir.join("changes"),
-        vertices: dir.join("doubles"),
-    };
+    let doubles = Doubles { n, changes: dir.join("changes"), vertices: dir.join("doubles") };
     save(changes.finish()?, &doubles.changes)?;
     positions(mesh, &originals, &doubles.vertices)?;
     pairs(&doubles, draft, out, n_vertices)?;
@@ -223,20 +208,14 @@ fn numbers_at(vertex: u64, tets: &[Corner], faces: &[FaceCorner], first: u64) ->
 fn join(classes: &mut [usize], i: usize, j: usize) {
     let (low, high) = (classes[i].min(classes[j]), classes[i].max(classes[j]));
     if low != high {
-        classes
-            .iter_mut()
-            .filter(|c| **c == high)
-            .for_each(|c| *c = low);
+        classes.iter_mut().filter(|c| **c == high).for_each(|c| *c = low);
     }
 }
 
 fn face_change(face: &FaceCorner, tets: &[Corner], numbers: &[u64]) -> Option<FaceChange> {
     let front = tets.binary_search_by_key(&face.tet, |tet| tet.tet).ok()?;
     let has = |tet: &Corner| face.vertices.iter().all(|v| tet.nodes.contains(v));
-    let mut others = tets
-        .iter()
-        .enumerate()
-        .filter(|(i, tet)| *i != front && has(tet));
+    let mut others = tets.iter().enumerate().filter(|(i, tet)| *i != front && has(tet));
     let back = others.next().filter(|_| face.is_sheet);
     Some(FaceChange {
         face: face.face,

@@ -90,10 +90,7 @@ impl Stream {
                 self.file = Box::new(std::io::sink());
                 Ok(())
             }
-            Err(source) => Err(WriteError::StandardOutput {
-                written: self.written,
-                source,
-            }),
+            Err(source) => Err(WriteError::StandardOutput { written: self.written, source }),
         }
     }
 

@@ -55,15 +55,9 @@ pub fn surface(surface: &Surface, out: &Path) -> Result<SurfaceReport> {
 
 fn refuse_rounding(surface: &Surface, out: &Path) -> Result<()> {
     let rounds = |x: f64| f64::from(x as f32) != x;
-    let vertex = surface
-        .points
-        .iter()
-        .position(|p| p.to_array().into_iter().any(rounds));
+    let vertex = surface.points.iter().position(|p| p.to_array().into_iter().any(rounds));
     vertex.map_or(Ok(()), |vertex| {
-        Err(WriteError::Lossy {
-            path: out.to_owned(),
-            vertex: vertex as u32,
-        })
+        Err(WriteError::Lossy { path: out.to_owned(), vertex: vertex as u32 })
     })
 }
 
@@ -122,9 +116,7 @@ fn stl_binary(surface: &Surface, stream: &mut Stream) -> Result<()> {
     stream.bytes(&(surface.n_triangles() as u32).to_le_bytes());
     for t in 0..surface.n_triangles() {
         let corners = surface.corners(t as u32).map(|p| p.to_array());
-        let numbers = normal(surface, t)
-            .into_iter()
-            .chain(corners.into_iter().flatten());
+        let numbers = normal(surface, t).into_iter().chain(corners.into_iter().flatten());
         for x in numbers {
             stream.bytes(&(x as f32).to_le_bytes());
         }
@@ -216,11 +208,7 @@ fn ply(surface: &Surface, stream: &mut Stream) -> Result<()> {
          element face {}\nproperty list uchar int vertex_indices\n{}end_header\n",
         surface.n_vertices(),
         surface.n_triangles(),
-        if has_labels {
-            "property int label\n"
-        } else {
-            ""
-        }
+        if has_labels { "property int label\n" } else { "" }
     ));
     for p in &surface.points {
         for x in p.to_array() {

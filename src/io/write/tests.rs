@@ -106,10 +106,7 @@ impl Vtu {
         let nodes = self.numbers("Cells.connectivity", i32::from_le_bytes);
         let seen = Seen {
             points: self.points(),
-            tets: nodes
-                .chunks(4)
-                .map(|t| [0, 1, 2, 3].map(|i| t[i] as usize))
-                .collect(),
+            tets: nodes.chunks(4).map(|t| [0, 1, 2, 3].map(|i| t[i] as usize)).collect(),
             regions: self.numbers("CellData.region", u32::from_le_bytes),
         };
         let ends = self.numbers("Cells.offsets", i32::from_le_bytes);
@@ -126,10 +123,7 @@ fn npy(path: &Path, kind: &str, inner: &str) -> Outcome<Vec<u8>> {
     let head = std::str::from_utf8(&bytes[10..start])?.to_owned();
     assert!(bytes.starts_with(b"\x93NUMPY\x01\x00") && start % 64 == 0 && head.ends_with('\n'));
     assert!(head.contains(&format!("'descr': {kind},")), "{head}");
-    let rows = head
-        .split("'shape': (")
-        .nth(1)
-        .and_then(|s| s.split(',').next());
+    let rows = head.split("'shape': (").nth(1).and_then(|s| s.split(',').next());
     let rows: usize = rows.ok_or("a shape")?.parse()?;
     assert!(head.contains(&format!("({rows},{inner})")), "{head}");
     let width: usize = kind[3..4].parse()?;
@@ -146,15 +140,11 @@ fn seen_in_npy(stem: &Path) -> Outcome<Seen> {
     };
     let numbers = |bytes: Vec<u8>| -> Vec<u32> {
         let words = bytes.chunks(4);
-        words
-            .map(|c| u32::from_le_bytes(c.try_into().expect("four")))
-            .collect()
+        words.map(|c| u32::from_le_bytes(c.try_into().expect("four"))).collect()
     };
     let points = load("points", "'<f8'", " 3")?;
     let doubles = points.chunks(8);
-    let x: Vec<f64> = doubles
-        .map(|c| f64::from_le_bytes(c.try_into().expect("eight")))
-        .collect();
+    let x: Vec<f64> = doubles.map(|c| f64::from_le_bytes(c.try_into().expect("eight"))).collect();
     Ok(Seen {
         points: x.chunks(3).map(|p| [p[0], p[1], p[2]]).collect(),
         tets: numbers(load("tets", "'<i4'", " 4")?)
@@ -230,14 +220,7 @@ fn cubes(path: &Path, n: u32) -> Outcome {
             if i == n || j == n || k == n || !mine {
                 continue;
             }
-            for order in [
-                [0, 1, 2],
-                [1, 2, 0],
-                [2, 0, 1],
-                [0, 2, 1],
-                [2, 1, 0],
-                [1, 0, 2],
-            ] {
+            for order in [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]] {
                 let mut at = [i, j, k];
                 let mut path = [corner(i, j, k); 4];
                 for (step, axis) in (1..).zip(order) {
@@ -332,11 +315,7 @@ fn two_subdomains_become_one_mesh_in_every_format() -> Outcome {
             assert_eq!(std::fs::metadata(file)?.len(), bytes);
         }
     }
-    assert_eq!(
-        std::fs::read_dir(dir.path())?.count(),
-        7,
-        "five files, the boundary and the store"
-    );
+    assert_eq!(std::fs::read_dir(dir.path())?.count(), 7, "five files, the boundary and the store");
     let seen = Vtu::read(&dir.path().join("a.vtu"))?.seen();
     assert_eq!((seen.points.len(), seen.volume()), (5, 0.5));
     assert_eq!(seen, seen_in_medit(&dir.path().join("a.mesh"))?);
@@ -346,10 +325,7 @@ fn two_subdomains_become_one_mesh_in_every_format() -> Outcome {
     let fronts = boundary.numbers("CellData.region_front", u32::from_le_bytes);
     assert_eq!(fronts, [0; 6]);
     let inp = std::fs::read_to_string(dir.path().join("a.inp"))?;
-    assert!(
-        inp.contains("*SURFACE, TYPE=ELEMENT, NAME=label_0\n1,S1\n1,S2\n1,S4\n2,S"),
-        "{inp}"
-    );
+    assert!(inp.contains("*SURFACE, TYPE=ELEMENT, NAME=label_0\n1,S1\n1,S2\n1,S4\n2,S"), "{inp}");
     assert!(inp.contains("*NSET, NSET=label_0\n1,2,3,4,5\n"), "{inp}");
     Ok(())
 }
@@ -385,13 +361,8 @@ fn shared_vertices_are_one_and_the_boundary_is_whole() -> Outcome {
     assert_eq!(ids[ids.len() / 2], 1 << 29);
     let ranks = vtu.numbers("CellData.subdomain", u32::from_le_bytes);
     assert_eq!(ranks.iter().sum::<u32>() as usize * 2, ranks.len());
-    let report = export(
-        &mut store,
-        &dir.path().join("c.npy"),
-        &Selection::default(),
-        1 << 20,
-        &quiet,
-    )?;
+    let report =
+        export(&mut store, &dir.path().join("c.npy"), &Selection::default(), 1 << 20, &quiet)?;
     assert_eq!(report.files.len(), 10);
     let arrays = seen_in_npy(&dir.path().join("c"))?;
     assert_eq!(arrays, seen);
@@ -416,13 +387,7 @@ fn boundaries_read_back_as_the_surface() -> Outcome {
         (0..s.n_triangles() as u32).map(corners).collect::<Vec<_>>()
     };
     let boundary = dir.path().join("b.vtu");
-    export(
-        &mut store,
-        &boundary,
-        &Selection::default(),
-        1 << 20,
-        &quiet,
-    )?;
+    export(&mut store, &boundary, &Selection::default(), 1 << 20, &quiet)?;
     let vtu = Vtu::read(&dir.path().join("b_boundary.vtu"))?;
     let points = vtu.points();
     let nodes = vtu.numbers("Cells.connectivity", i32::from_le_bytes);
@@ -434,22 +399,11 @@ fn boundaries_read_back_as_the_surface() -> Outcome {
     assert!(vtu.head.contains("111 116 104 101 114 0 "), "other");
     let whole = Vtu::read(&boundary)?.points();
     let place = vtu.numbers("PointData.mesh_vertex", i64::from_le_bytes);
-    assert!(
-        place
-            .iter()
-            .zip(&points)
-            .all(|(&v, p)| whole[v as usize] == *p)
-    );
-    for (name, format) in [
-        ("b.mesh", None),
-        ("b.meshb", None),
-        ("b.msh", Some(MeshFormat::Gmsh22)),
-    ] {
+    assert!(place.iter().zip(&points).all(|(&v, p)| whole[v as usize] == *p));
+    for (name, format) in [("b.mesh", None), ("b.meshb", None), ("b.msh", Some(MeshFormat::Gmsh22))]
+    {
         let out = dir.path().join(name);
-        let selection = Selection {
-            format,
-            ..Selection::default()
-        };
+        let selection = Selection { format, ..Selection::default() };
         export(&mut store, &out, &selection, 1 << 20, &quiet)?;
         let surface = read_surface(&[out], 1 << 30)?;
         assert_eq!(triangles(&surface), expected, "{name}");
@@ -470,23 +424,12 @@ fn files_do_not_depend_on_the_memory() -> Outcome {
     let path = dir.path().join("cubes.tetdb");
     cubes(&path, 20)?;
     let mut store = Catalog::open(&path)?;
-    let names = [
-        "m.vtu", "m.meshb", "m.inp", "m.vtkhdf", "m.msh", "m.foam", "m.mfem",
-    ];
+    let names = ["m.vtu", "m.meshb", "m.inp", "m.vtkhdf", "m.msh", "m.foam", "m.mfem"];
     for (name, pieces) in names.iter().flat_map(|n| [(n, false), (n, true)]) {
-        let selection = Selection {
-            pieces,
-            ..Selection::default()
-        };
+        let selection = Selection { pieces, ..Selection::default() };
         let mut files = Vec::new();
         for memory in [1 << 16, 64 << 20] {
-            let report = export(
-                &mut store,
-                &dir.path().join(name),
-                &selection,
-                memory,
-                &quiet,
-            )?;
+            let report = export(&mut store, &dir.path().join(name), &selection, memory, &quiet)?;
             let read = report.files.iter().map(|(file, _)| std::fs::read(file));
             files.push(read.collect::<std::io::Result<Vec<_>>>()?);
         }
@@ -502,11 +445,9 @@ fn a_surface_read_from_partitions_has_all_triangles_and_labels() -> Outcome {
     cubes(&path, 4)?;
     let mut store = Catalog::open(&path)?;
     let mut seen = Vec::new();
-    for (format, ascii) in [
-        (MeshFormat::Gmsh22, false),
-        (MeshFormat::Gmsh, false),
-        (MeshFormat::Gmsh, true),
-    ] {
+    for (format, ascii) in
+        [(MeshFormat::Gmsh22, false), (MeshFormat::Gmsh, false), (MeshFormat::Gmsh, true)]
+    {
         let selection = Selection {
             format: Some(format),
             ascii,
@@ -565,10 +506,7 @@ struct OneOfTwo {
 
 impl Writers for OneOfTwo {
     fn share(&self) -> Share {
-        Share {
-            number: self.number,
-            of: 2,
-        }
+        Share { number: self.number, of: 2 }
     }
     fn announce(&self, file: &Path) {
         self.file.0.send(file.to_owned()).expect("a receiver");
@@ -628,24 +566,14 @@ fn what_a_format_cannot_hold_is_refused() -> Outcome {
         let refused = check(&dir.path().join(name), &selection);
         refused.err().map(|error| error.code())
     };
-    let text = || Selection {
-        ascii: true,
-        ..Selection::default()
-    };
-    let ghosts = |pieces| Selection {
-        ghosts: true,
-        pieces,
-        ..Selection::default()
-    };
+    let text = || Selection { ascii: true, ..Selection::default() };
+    let ghosts = |pieces| Selection { ghosts: true, pieces, ..Selection::default() };
     assert_eq!(of("a.vtu", text()), Some("usage"));
     assert_eq!(of("a.msh", text()), None);
     assert_eq!(of("a.foam", ghosts(false)), Some("usage"));
     assert_eq!(of("a.msh", ghosts(true)), None);
     assert_eq!(of("a.mfem", ghosts(false)), Some("usage"));
-    let vtu = Selection {
-        format: Some(MeshFormat::Vtu),
-        ..Selection::default()
-    };
+    let vtu = Selection { format: Some(MeshFormat::Vtu), ..Selection::default() };
     let to_stdout = check(Path::new("-"), &vtu);
     assert_eq!(to_stdout.err().ok_or("an error")?.code(), "usage");
     Ok(())
@@ -680,13 +608,8 @@ fn what_cannot_be_written_leaves_nothing() -> Outcome {
     two_subdomains(&path)?;
     let mut store = Catalog::open(&path)?;
     let mut code = |name: &str| {
-        let error = export(
-            &mut store,
-            &dir.path().join(name),
-            &Selection::default(),
-            1 << 20,
-            &quiet,
-        );
+        let error =
+            export(&mut store, &dir.path().join(name), &Selection::default(), 1 << 20, &quiet);
         error.map(|_| "written").unwrap_or_else(|e| {
             assert!(!e.help().is_empty() && e.to_string().contains(name));
             e.code()
@@ -697,20 +620,11 @@ fn what_cannot_be_written_leaves_nothing() -> Outcome {
     std::fs::create_dir(dir.path().join("folder.vtu"))?;
     assert_eq!(code("folder.vtu"), "io");
     std::fs::remove_file(path.join("subdomain-00001-g1.redb"))?;
-    let error = export(
-        &mut store,
-        &dir.path().join("a.vtu"),
-        &Selection::default(),
-        1 << 20,
-        &quiet,
-    );
+    let error =
+        export(&mut store, &dir.path().join("a.vtu"), &Selection::default(), 1 << 20, &quiet);
     let error = error.err().ok_or("an error")?;
     assert_eq!(error.code(), "damaged");
-    assert_eq!(
-        std::fs::read_dir(dir.path())?.count(),
-        2,
-        "store and folder"
-    );
+    assert_eq!(std::fs::read_dir(dir.path())?.count(), 2, "store and folder");
     let mut draft = draft::Draft::new(&dir.path().join("huge.vtu"))?;
     if cfg!(unix) {
         let error = draft.create(&dir.path().join("huge.vtu"), 1 << 60);
@@ -723,18 +637,10 @@ fn tetrahedron() -> Outcome<Surface> {
     let mut builder = SurfaceBuilder::new();
     builder.begin_file("a");
     let labels = [builder.label("first one"), builder.label("second")];
-    for p in [
-        [0.1, 0., 0.],
-        [1. / 3., 1e-7, 0.],
-        [0., 1e20, 2.],
-        [0.7, 0.2, -1e-30],
-    ] {
+    for p in [[0.1, 0., 0.], [1. / 3., 1e-7, 0.], [0., 1e20, 2.], [0.7, 0.2, -1e-30]] {
         builder.vertex(Point::from_array(p))?;
     }
-    for (i, t) in [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]
-        .into_iter()
-        .enumerate()
-    {
+    for (i, t) in [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]].into_iter().enumerate() {
         builder.triangle(t, labels[usize::from(i >= 2)])?;
     }
     builder.end_file()?;

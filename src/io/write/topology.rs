@@ -50,9 +50,8 @@ pub(super) fn write(
     let dir = draft.dir().to_owned();
     let vertices = shared_vertices(store, &sources, &dir, memory)?;
     let faces = shared_faces(store, &rows, &dir, memory)?;
-    let neighbors: BTreeMap<u32, Vec<NeighborRow>> = (store.topology()?.into_iter())
-        .map(|row| (row.subdomain, row.neighbors))
-        .collect();
+    let neighbors: BTreeMap<u32, Vec<NeighborRow>> =
+        (store.topology()?.into_iter()).map(|row| (row.subdomain, row.neighbors)).collect();
     let path = draft.create(out, 0)?;
     let mut stream = Stream::open(&path)?;
     stream.text("{\"schema\": 1, \"subdomains\": [");
@@ -105,9 +104,7 @@ fn pairs(
         if tets[0].len() != tets[1].len() {
             return Err(unequal(store, low, high));
         }
-        stream.text(&format!(
-            "{before}\n{{\"low\": {low}, \"high\": {high}, \"vertices\": "
-        ));
+        stream.text(&format!("{before}\n{{\"low\": {low}, \"high\": {high}, \"vertices\": "));
         lists(stream, &shared)?;
         stream.text(", \"faces\": ");
         lists(stream, &tets)?;

@@ -102,12 +102,7 @@ fn layout(mesh: &Merged, partitions: &[Partition], is_hdf: bool, is_quadratic: b
     ];
     let n_points = partitions.iter().map(Partition::n_points).sum();
     let counts = [n_points, mesh.n_tets(), corners];
-    Layout::new(
-        &container,
-        &arrays,
-        counts,
-        ("region_names", &mesh.region_names()),
-    )
+    Layout::new(&container, &arrays, counts, ("region_names", &mesh.region_names()))
 }
 
 fn corners(is_quadratic: bool) -> u64 {
@@ -193,15 +188,10 @@ fn write_partitions(
             }
         }
         index.put(&mut ends, end)?;
-        types.put(&[if corners == 10 {
-            QUADRATIC_TETRA
-        } else {
-            TETRA
-        }])
+        types.put(&[if corners == 10 { QUADRATIC_TETRA } else { TETRA }])
     })?;
-    for strip in [
-        vertex_ids, ranks, regions, qualities, excesses, ids, points, nodes, ends, types,
-    ] {
+    for strip in [vertex_ids, ranks, regions, qualities, excesses, ids, points, nodes, ends, types]
+    {
         strip.finish()?;
     }
     Ok(())

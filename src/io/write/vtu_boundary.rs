@@ -129,12 +129,7 @@ pub(super) fn write(
         Array::new(Group::Cells, "types", "UInt8"),
     ];
     let counts = [corners.n_vertices, n_faces, n_corners];
-    let layout = Layout::new(
-        &container,
-        &arrays,
-        counts,
-        ("label_names", &label_names(mesh)),
-    );
+    let layout = Layout::new(&container, &arrays, counts, ("label_names", &label_names(mesh)));
     let path = draft.create(out, layout.file_bytes())?;
     let [
         mut numbers,
@@ -165,11 +160,7 @@ pub(super) fn write(
         }
         next = used.next()?;
         let p = partitions.partition_point(|p| p.first_vertex <= number) - 1;
-        put(
-            number + partitions[p].first_middle,
-            vertex.id as i64,
-            vertex.point,
-        )
+        put(number + partitions[p].first_middle, vertex.id as i64, vertex.point)
     })?;
     let mut edge = 0;
     while let (Some(points), Some(wanted)) = (&mut middle_points, next) {
@@ -254,11 +245,7 @@ fn corners(mesh: &Merged, dir: &Path, middles: Option<&Midpoints>) -> Result<Cor
         by_place.push(CornerNumber { place, number })?;
     }
     stream.finish()?;
-    Ok(Corners {
-        n_vertices,
-        used,
-        dense: by_place.finish()?,
-    })
+    Ok(Corners { n_vertices, used, dense: by_place.finish()? })
 }
 
 /// Names of labels 0, 1, .., up to the last one a face has, a zero after each.

@@ -33,13 +33,7 @@ impl Array {
             "Int32" | "UInt32" => 4,
             _ => 8,
         };
-        Self {
-            group,
-            name,
-            kind,
-            components: 1,
-            width,
-        }
+        Self { group, name, kind, components: 1, width }
     }
 
     fn number(&self) -> Number {
@@ -66,10 +60,7 @@ impl Array {
 
     /// The same with three components.
     pub fn vectors(self) -> Self {
-        Self {
-            components: 3,
-            ..self
-        }
+        Self { components: 3, ..self }
     }
 }
 
@@ -157,12 +148,7 @@ impl Layout {
             at += 8 + bytes;
         }
         fixed.push((at, TAIL.as_bytes().to_vec()));
-        Self {
-            fixed,
-            places,
-            bytes_per,
-            bytes: at + TAIL.len() as u64,
-        }
+        Self { fixed, places, bytes_per, bytes: at + TAIL.len() as u64 }
     }
 
     /// Source: the VTKHDF file format in the VTK documentation, version 2, unstructured grids.
@@ -199,11 +185,7 @@ impl Layout {
         let of_partitions = ["NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds"];
         top.extend(of_partitions.map(|name| Object::array(name, Number::I64, &[n_partitions])));
         let field = Object::array(texts.0, Number::U8, &[texts.1.len() as u64]);
-        let fields = if texts.1.is_empty() {
-            vec![]
-        } else {
-            vec![field]
-        };
+        let fields = if texts.1.is_empty() { vec![] } else { vec![field] };
         top.push(Object::group("FieldData", fields));
         let grid = Object::group("VTKHDF", top)
             .with_integers("Version", &[2, 0])
@@ -298,17 +280,10 @@ fn xml_head(arrays: &[Array], counts: Counts, texts: Texts) -> String {
             texts.1.len()
         );
     }
-    text += &format!(
-        "    <Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n",
-        counts[0], counts[1]
-    );
+    text +=
+        &format!("    <Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n", counts[0], counts[1]);
     let mut offset = 0;
-    for group in [
-        Group::PointData,
-        Group::CellData,
-        Group::Points,
-        Group::Cells,
-    ] {
+    for group in [Group::PointData, Group::CellData, Group::Points, Group::Cells] {
         text += &format!("      <{group:?}>\n");
         for array in arrays.iter().filter(|a| a.group == group) {
             text += &format!(

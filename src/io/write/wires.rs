@@ -64,10 +64,8 @@ impl WrittenWires {
             let mut part = store.open_subdomain(source.row.rank, memory / 4)?;
             for (local, vertex) in (0u32..).zip(part.vertices()) {
                 let vertex = vertex?;
-                let Some(VertexId {
-                    owner: Owner::Surface,
-                    index,
-                }) = VertexId::from_number(vertex.id)
+                let Some(VertexId { owner: Owner::Surface, index }) =
+                    VertexId::from_number(vertex.id)
                 else {
                     continue;
                 };
@@ -84,11 +82,7 @@ impl WrittenWires {
         let mut points: Vec<_> = (row.points.iter())
             .filter_map(|&[v, label]| {
                 let &(vertex, point) = known.get(&v)?;
-                Some(WirePoint {
-                    vertex,
-                    label,
-                    point,
-                })
+                Some(WirePoint { vertex, label, point })
             })
             .collect();
         points.sort_by_key(|point| point.label);
@@ -102,11 +96,8 @@ impl WrittenWires {
     /// Keeps the edges that are edges of tetrahedra of `mesh`: where not all is written, both ends may be and the edge not. Errors: damage.
     pub fn keep_those_of(&mut self, mesh: &mut Merged) -> Result<()> {
         let ascending = |[a, b]: [u64; 2]| [a.min(b), a.max(b)];
-        let mut seen: HashMap<[u64; 2], bool> = self
-            .edges
-            .iter()
-            .map(|(ends, _)| (ascending(*ends), false))
-            .collect();
+        let mut seen: HashMap<[u64; 2], bool> =
+            self.edges.iter().map(|(ends, _)| (ascending(*ends), false)).collect();
         mesh.tets(|tet| {
             for (i, &a) in tet.nodes.iter().enumerate() {
                 for &b in &tet.nodes[i + 1..] {
@@ -150,21 +141,13 @@ pub(super) fn write_list(mesh: &Merged, draft: &mut Draft, out: &Path) -> Result
     let path = draft.create(&out.with_file_name(format!("{stem}_wires.csv")), 0)?;
     let mut stream = Stream::open(&path)?;
     stream.text("kind,name,vertex,to\n");
-    let name = |label| {
-        mesh.label_name(label)
-            .replace('"', "\"\"")
-            .replace(['\n', '\r'], " ")
-    };
+    let name = |label| mesh.label_name(label).replace('"', "\"\"").replace(['\n', '\r'], " ");
     for ([a, b], label) in &wires.edges {
         stream.text(&format!("edge,\"{}\",{a},{b}\n", name(*label)));
         stream.end()?;
     }
     for point in &wires.points {
-        stream.text(&format!(
-            "point,\"{}\",{},\n",
-            name(point.label),
-            point.vertex
-        ));
+        stream.text(&format!("point,\"{}\",{},\n", name(point.label), point.vertex));
         stream.end()?;
     }
     stream.finish()

@@ -98,12 +98,7 @@ impl Cavity {
             let n = self.tets.len();
             if value > best.map_or(0.0, |b| b.value) && self.is_better(at, value, aim) {
                 n_idle = 0;
-                best = Some(Proposal {
-                    n,
-                    at,
-                    corner: None,
-                    value,
-                });
+                best = Some(Proposal { n, at, corner: None, value });
             }
             // Joined to a vertex that all of them have they would be the same ones again.
             let records = &self.records;
@@ -114,12 +109,7 @@ impl Cavity {
             {
                 let corner = Some(v);
                 n_idle = 0;
-                best = Some(Proposal {
-                    n,
-                    at,
-                    corner,
-                    value,
-                });
+                best = Some(Proposal { n, at, corner, value });
             }
             if best.is_some_and(|b| b.value >= aim.enough)
                 || n >= aim.tets_max
@@ -137,11 +127,7 @@ impl Cavity {
         }
         let value = self.star.least(best.at, f64::NEG_INFINITY);
         let (at, value) = (self.star).raise_least(best.at, value, STEPS, aim.enough);
-        Some(if self.is_better(at, value, aim) {
-            Proposal { at, value, ..best }
-        } else {
-            best
-        })
+        Some(if self.is_better(at, value, aim) { Proposal { at, value, ..best } } else { best })
     }
 
     /// The best vertex in the shell of edge `e` of `t`, an inner edge, if its value is to be above `floor`.
@@ -169,12 +155,7 @@ impl Cavity {
         let value = self.star.least(middle, f64::NEG_INFINITY);
         let (at, value) = (self.star).raise_least(middle, value, STEPS, aim.enough);
         let n = self.tets.len();
-        let proposal = Proposal {
-            n,
-            at,
-            corner: None,
-            value,
-        };
+        let proposal = Proposal { n, at, corner: None, value };
         (value > 0.0 && self.is_better(at, value, aim)).then_some(proposal)
     }
 
@@ -422,13 +403,7 @@ mod tests {
                 continue;
             };
             n_flat += 1;
-            let aim = Aim {
-                own: 0.0,
-                enough: 0.5,
-                goal: Goal::Quality,
-                more: 3,
-                tets_max: 40,
-            };
+            let aim = Aim { own: 0.0, enough: 0.5, goal: Goal::Quality, more: 3, tets_max: 40 };
             let mut bounds = FaceBounds::default();
             let mut weights = bounds.by(aim.goal.measure(f64::INFINITY));
             let mut cavity = Cavity::default();
@@ -445,9 +420,6 @@ mod tests {
                 n_mended += 1;
             }
         }
-        assert!(
-            n_flat >= 20 && n_mended >= 15,
-            "{n_flat}, {n_mended} mended"
-        );
+        assert!(n_flat >= 20 && n_mended >= 15, "{n_flat}, {n_mended} mended");
     }
 }

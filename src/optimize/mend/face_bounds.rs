@@ -76,11 +76,7 @@ impl Default for FaceBounds {
 impl FaceBounds {
     /// Of so many faces at once.
     pub(super) fn remembering(known_max: usize) -> Self {
-        Self {
-            known_max,
-            known: HashMap::new(),
-            known_several: HashMap::new(),
-        }
+        Self { known_max, known: HashMap::new(), known_several: HashMap::new() }
     }
 
     /// What is known, and the corners in the order of the vertices: a search from another corner finds another number, by rounding and a bit, and
@@ -92,10 +88,8 @@ impl FaceBounds {
         let mut order = [0, 1, 2];
         order.sort_unstable_by_key(|&i| vertices[i]);
         let points = order.map(|i| points[i]);
-        let known = (self.known.entry(order.map(|i| vertices[i]))).or_insert_with(|| Known {
-            most: face_most(points),
-            bound: f64::NAN,
-        });
+        let known = (self.known.entry(order.map(|i| vertices[i])))
+            .or_insert_with(|| Known { most: face_most(points), bound: f64::NAN });
         (known, points)
     }
 

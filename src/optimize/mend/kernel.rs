@@ -84,10 +84,7 @@ fn solve<const D: usize>(
             _ => solve_line(fewer, c, low, high)?,
         };
         x[k] = q - (0..D - 1).map(|j| r[j] * found[j]).sum::<f64>();
-        (0..D)
-            .filter(|&j| j != k)
-            .enumerate()
-            .for_each(|(from, j)| x[j] = found[from]);
+        (0..D).filter(|&j| j != k).enumerate().for_each(|(from, j)| x[j] = found[from]);
     }
     Some(x)
 }
@@ -109,10 +106,7 @@ fn solve_line(rows: &[Row], c: [f64; 4], low: [f64; 4], high: [f64; 4]) -> Optio
 /// The first `D` numbers but that at `k`.
 fn without<const D: usize>(x: [f64; 4], k: usize) -> [f64; 4] {
     let mut rest = [0.0; 4];
-    (0..D)
-        .filter(|&j| j != k)
-        .enumerate()
-        .for_each(|(to, j)| rest[to] = x[j]);
+    (0..D).filter(|&j| j != k).enumerate().for_each(|(to, j)| rest[to] = x[j]);
     rest
 }
 
@@ -130,10 +124,7 @@ mod tests {
     #[test]
     fn the_middle_of_a_box_is_farthest_from_its_sides_however_thin_it_is() {
         for thickness in [1.0, 1e-4, 1e-9] {
-            let (low, high) = (
-                Point::new(0.1, 0.2, 0.3),
-                Point::new(0.9, 0.6, 0.3 + thickness),
-            );
+            let (low, high) = (Point::new(0.1, 0.2, 0.3), Point::new(0.9, 0.6, 0.3 + thickness));
             let found = farthest_inside(
                 Point::ZERO,
                 2.0,
@@ -151,16 +142,9 @@ mod tests {
     fn where_nothing_is_inside_the_least_behind_is_found() {
         // Two planes that face away from each other, 0.2 apart.
         let planes = [(Point::X, -0.1, 0.5), (-Point::X, -0.1, 0.5)];
-        let (p, least) = farthest_inside(
-            Point::ZERO,
-            1.0,
-            planes.into_iter(),
-            &mut Scratch::default(),
-        )
-        .expect("an answer");
-        assert!(
-            p.x.abs() < 1e-9 && (least + 0.2).abs() < 1e-9,
-            "{p} {least}"
-        );
+        let (p, least) =
+            farthest_inside(Point::ZERO, 1.0, planes.into_iter(), &mut Scratch::default())
+                .expect("an answer");
+        assert!(p.x.abs() < 1e-9 && (least + 0.2).abs() < 1e-9, "{p} {least}");
     }
 }

@@ -116,11 +116,7 @@ fn judged<P: Pages>(
     worst: f64,
     judges: &Judges,
 ) -> Vec<Listed> {
-    let listing = Listing {
-        stage,
-        worst,
-        judges,
-    };
+    let listing = Listing { stage, worst, judges };
     scan_parts(mesh, pages, &listing)
 }
 
@@ -142,10 +138,7 @@ impl Scan for Listing<'_> {
     type Output = Listed;
 
     fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &page: &u32) -> Listed {
-        let mut listed = Listed {
-            worst: self.worst,
-            ..Listed::default()
-        };
+        let mut listed = Listed { worst: self.worst, ..Listed::default() };
         self.judges.with(|bounds| {
             tets_of_page(mesh, page, |mesh, t, tet| {
                 if self.stage.is_for_later(mesh, &tet, listed.worst) {

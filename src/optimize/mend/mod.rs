@@ -130,23 +130,14 @@ impl Mender {
         let mut vertices = self.judged(|judges| list::list_movable(mesh, pages, &flat, judges));
         let mut seen: HashSet<u32> = vertices.iter().map(|&(v, _)| v).collect();
         for (_, t) in self.list(mesh, &mut pages.clone(), stage) {
-            let new = mesh
-                .tet(t)
-                .vertices()
-                .into_iter()
-                .filter(|&v| seen.insert(v));
+            let new = mesh.tet(t).vertices().into_iter().filter(|&v| seen.insert(v));
             vertices.extend(new.map(|v| (v, t)));
         }
         for _ in 0..SWEEPS_MAX {
             check_cancelled();
             let before = self.operator.counts.vertices_moved;
             vertices.retain(|&(v, t)| {
-                let Operator {
-                    mover,
-                    bounds,
-                    counts,
-                    ..
-                } = &mut self.operator;
+                let Operator { mover, bounds, counts, .. } = &mut self.operator;
                 // No triangle's bound counts in a product.
                 let mut plain = bounds.by(Measure::Quality(f64::INFINITY));
                 if !mover.gather(mesh, v, t, LIFTED_MAX, &mut plain) {

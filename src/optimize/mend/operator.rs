@@ -89,10 +89,7 @@ enum Way {
 impl Operator {
     /// One of those that try ahead, each thread has one: they remember less.
     pub(super) fn ahead() -> Self {
-        Self {
-            bounds: FaceBounds::remembering(7 << 12),
-            ..Self::default()
-        }
+        Self { bounds: FaceBounds::remembering(7 << 12), ..Self::default() }
     }
 
     /// Tries everything on the bad tetrahedron `t`; after success `changed` lists the tetrahedra that are new or moved.
@@ -122,13 +119,7 @@ impl Operator {
         let [_, own] = value_of(mesh, tet, &mut self.bounds.by(measure));
         let own = own.max(NO_VOLUME);
         let enough = ENOUGH.max(2.0 * own);
-        let aim = Aim {
-            own,
-            enough,
-            goal: stage.goal,
-            more: stage.more,
-            tets_max: stage.tets_max,
-        };
+        let aim = Aim { own, enough, goal: stage.goal, more: stage.more, tets_max: stage.tets_max };
         if self.reconnect(mesh, t, tet, enough) {
             return Outcome::Reconnection(enough);
         }
@@ -145,9 +136,7 @@ impl Operator {
             }
         }
         if best < enough {
-            let proposal = self
-                .cavity
-                .grow(mesh, t, aim, best, &mut self.bounds.by(measure));
+            let proposal = self.cavity.grow(mesh, t, aim, best, &mut self.bounds.by(measure));
             self.weigh(proposal, &mut best, &mut way);
         }
         for e in 0..6 {

@@ -297,9 +297,7 @@ impl Refill {
 
     /// Keeps a filling that is better than what there is.
     fn end(&mut self, aim: Aim, progress: Progress) -> bool {
-        let Progress {
-            cost, least, used, ..
-        } = progress;
+        let Progress { cost, least, used, .. } = progress;
         let left_out = self.inside & !used;
         if left_out & !self.optional != 0 || !cost.is_better(&self.old, least, aim) {
             return false;
@@ -391,16 +389,8 @@ mod tests {
                 let [_, value] = value_of(&mut mesh, &tet, &mut bounds.by(plain));
                 (value, t)
             });
-            let (own, worst) = values
-                .min_by(|a, b| a.0.total_cmp(&b.0))
-                .expect("not empty");
-            let aim = Aim {
-                own,
-                enough: 1.0,
-                goal: Goal::Quality,
-                more: 0,
-                tets_max: 40,
-            };
+            let (own, worst) = values.min_by(|a, b| a.0.total_cmp(&b.0)).expect("not empty");
+            let aim = Aim { own, enough: 1.0, goal: Goal::Quality, more: 0, tets_max: 40 };
             let mut refill = Refill::default();
             let Some(value) = refill.grow(&mut mesh, worst, aim, own, &mut bounds.by(plain)) else {
                 continue;

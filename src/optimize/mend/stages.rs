@@ -71,11 +71,7 @@ pub(super) const STAGES: [Stage; 5] = [
         one_in: 100,
     },
     WORST,
-    Stage {
-        goal: Goal::WorstExcess,
-        excess_max: 4.0,
-        ..WORST
-    },
+    Stage { goal: Goal::WorstExcess, excess_max: 4.0, ..WORST },
     Stage {
         goal: Goal::Count,
         quality_max: 10.0,
@@ -92,10 +88,7 @@ pub(super) const STAGES: [Stage; 5] = [
 impl Stage {
     /// The same where only those are bad that are flat.
     pub(super) fn of_flat(&self) -> Self {
-        Self {
-            quality_max: 1.0 / FLAT,
-            ..*self
-        }
+        Self { quality_max: 1.0 / FLAT, ..*self }
     }
 
     /// Most tetrahedra of a pass, of a mesh of so many.

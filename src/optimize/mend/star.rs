@@ -43,11 +43,7 @@ impl Side {
         let (u, v, w) = (b - a, c - a, c - b);
         let normal = u.cross(v);
         let required = record.is_required(i);
-        let weight = if required {
-            weights.of_face(vertices, points)
-        } else {
-            1.0
-        };
+        let weight = if required { weights.of_face(vertices, points) } else { 1.0 };
         Self {
             vertices,
             points,
@@ -100,9 +96,7 @@ impl Side {
             return det / (self.area * self.longest_squared.sqrt());
         }
         let (v, w) = (b - p, c - p);
-        let longest = (squared(u).max(squared(v)))
-            .max(squared(w))
-            .max(self.longest_squared);
+        let longest = (squared(u).max(squared(v))).max(squared(w)).max(self.longest_squared);
         let areas = u.cross(v).length() + v.cross(w).length() + w.cross(u).length() + self.area;
         det / (ALPHA * longest.sqrt() * areas)
     }
@@ -124,11 +118,7 @@ pub(super) struct Cost {
 
 impl Default for Cost {
     fn default() -> Self {
-        Self {
-            worst_goodness: f64::INFINITY,
-            sum: 0.0,
-            n_poor: 0,
-        }
+        Self { worst_goodness: f64::INFINITY, sum: 0.0, n_poor: 0 }
     }
 }
 
@@ -151,11 +141,7 @@ impl Cost {
     pub(super) fn is_better(&self, old: &Self, value: f64, aim: Aim) -> bool {
         let is_much = aim.own < VERY_BAD && value > MUCH * aim.own;
         let gain = (value / aim.own).max(1.0);
-        let more = if is_much {
-            aim.more * exponent(gain)
-        } else {
-            0
-        };
+        let more = if is_much { aim.more * exponent(gain) } else { 0 };
         let is_wanted = match aim.goal {
             Goal::Quality => (is_much || self.sum < old.sum) && self.n_poor <= old.n_poor + more,
             Goal::Count => (self.n_poor, self.sum) < (old.n_poor, old.sum),
@@ -333,9 +319,7 @@ impl Star {
     pub(super) fn moved_into_kernel(&mut self, p: Point) -> (Point, f64) {
         let reach = 4.0 * self.radius(p);
         let mut most = 0.0f64;
-        self.sides
-            .iter()
-            .for_each(|side| most = most.max(side.most));
+        self.sides.iter().for_each(|side| most = most.max(side.most));
         let sides = (self.sides.iter()).filter(|side| side.area > 0.0);
         let planes = sides.map(|side| {
             let n = side.normal / side.area;
@@ -386,12 +370,7 @@ impl Star {
     ) -> (Point, f64) {
         // Between planes that are near each other, only short steps lead anywhere.
         for step in [0.2 * self.radius(start), self.height(start)] {
-            let climb = Climb {
-                start,
-                step,
-                steps,
-                enough,
-            };
+            let climb = Climb { start, step, steps, enough };
             let found = climb.run(value, |p, floor| self.least(p, floor));
             if let Some(found) = found {
                 return found;
@@ -426,9 +405,8 @@ mod tests {
     fn no_place_is_worth_more_than_the_bounds_of_a_star() {
         for flat in [1.0, 1e-3] {
             let mut next = random(11);
-            let points: Vec<Point> = (0..30)
-                .map(|_| Point::new(next(), next(), flat * next()))
-                .collect();
+            let points: Vec<Point> =
+                (0..30).map(|_| Point::new(next(), next(), flat * next())).collect();
             let mut mesh = delaunay(Mesh::new(FlatPages::default()), &points, points.len(), 1.0);
             let mut bounds = FaceBounds::default();
             let measure = Measure::Quality(20.0);
@@ -437,8 +415,7 @@ mod tests {
                 let mut star = Star::default();
                 for record in [tet, across.map_or(tet, |across| mesh.tet(across.tet()))] {
                     (0..4).for_each(|i| {
-                        star.sides
-                            .push(Side::new(&mut mesh, &record, i, &mut bounds.by(measure)))
+                        star.sides.push(Side::new(&mut mesh, &record, i, &mut bounds.by(measure)))
                     });
                 }
                 let center = star.sides[0].points[0];
@@ -447,10 +424,7 @@ mod tests {
                     let p = Point::new(next(), next(), flat * next());
                     let least = star.least(p, f64::NEG_INFINITY);
                     assert!(least <= star.most() && star.most() <= star.most_required());
-                    assert!(
-                        least <= most.max(0.0),
-                        "{t}: {least} at {p}, at most {most}"
-                    );
+                    assert!(least <= most.max(0.0), "{t}: {least} at {p}, at most {most}");
                 }
                 let points = mesh.points(&tet);
                 let own = 1.0 / inverse_quality(points);

@@ -78,11 +78,7 @@ impl Mover {
         // A mere needle must not become worse; in a cluster some have to, for a while.
         let least = self.star.least(start, f64::NEG_INFINITY);
         self.was_flat = least < FLAT;
-        let floor = if self.was_flat {
-            f64::MIN_POSITIVE
-        } else {
-            least
-        };
+        let floor = if self.was_flat { f64::MIN_POSITIVE } else { least };
         let before = self.star.product(start, f64::MIN_POSITIVE);
         let (lifted, value) = (self.star.lift(start, floor)).unwrap_or((start, before));
         let climb = Climb {

@@ -81,9 +81,8 @@ mod tests {
     /// A flat cloud, of whose tetrahedra many are slivers, mended by so many threads: what was done, and all that came of it.
     fn mended(seed: u64, threads: usize) -> (MendCounts, Vec<u64>) {
         let mut next = random(seed);
-        let points: Vec<Point> = (0..500)
-            .map(|_| Point::new(next(), next(), 0.02 * next()))
-            .collect();
+        let points: Vec<Point> =
+            (0..500).map(|_| Point::new(next(), next(), 0.02 * next())).collect();
         let pager = Pager::new(1 << 24, None);
         let mut mesh = delaunay(Mesh::new(pager), &points, 250, 0.1);
         let context = RunContext::new(threads, CancelToken::new());
@@ -114,9 +113,6 @@ mod tests {
             n_tried += counts.tried;
             n_changed += counts.changes();
         }
-        assert!(
-            n_tried > 500 && n_changed > 100,
-            "{n_tried}, {n_changed} changes"
-        );
+        assert!(n_tried > 500 && n_changed > 100, "{n_tried}, {n_changed} changes");
     }
 }

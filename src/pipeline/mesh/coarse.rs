@@ -75,30 +75,18 @@ pub(crate) fn recovered<P: Pages>(
     let regions = fill_regions(mesh, &options.region_rule()?)?;
     if mesh.n_tets() == 0 {
         return Err(PipelineError::NothingFilled {
-            policy: options
-                .regions
-                .clone()
-                .unwrap_or_else(|| "parity".to_owned()),
+            policy: options.regions.clone().unwrap_or_else(|| "parity".to_owned()),
         });
     }
     if recovery.missing_segments + recovery.missing_facets > 0 {
         // Recovery leaves it as it came. Where it is Delaunay, points find smaller cavities: an eighth less time for the division of a scan.
         optimize::run(mesh, optimize::Mode::None, &|p| watch(p.into()));
     }
-    Ok(CoarseReport {
-        kernel,
-        recovery,
-        regions,
-    })
+    Ok(CoarseReport { kernel, recovery, regions })
 }
 
 fn stage(stage: &'static str) -> Event {
-    Event {
-        stage,
-        done: 0,
-        total: None,
-        unit: "",
-    }
+    Event { stage, done: 0, total: None, unit: "" }
 }
 
 /// Inserts the surface's vertices and lists its facets.

@@ -33,11 +33,7 @@ pub(crate) fn subdomain_order(
         owners.insert(cut, table.across(part.part.first));
     }
     let zones = tree::zones_above(catalog, part.part, n)?;
-    Ok(SubdomainOrder {
-        part,
-        zones,
-        owners,
-    })
+    Ok(SubdomainOrder { part, zones, owners })
 }
 
 /// Commits bisections, each after those above it, in one step: of the files between them only the last children's are there.
@@ -45,13 +41,8 @@ pub(crate) fn commit_cuts(catalog: &mut Catalog, cuts: &[CutReceipt]) -> Result<
     let mut topology = TopologyChange::none(catalog)?;
     for cut in cuts {
         let [low, high] = cut.children.map(|child| child.part.first);
-        let new = NewCut {
-            cut: cut.zone.cut,
-            faces: cut.faces,
-            low,
-            high,
-            inherited: &cut.inherited,
-        };
+        let new =
+            NewCut { cut: cut.zone.cut, faces: cut.faces, low, high, inherited: &cut.inherited };
         topology.add(catalog, &new)?;
     }
     catalog.commit(|step| {
@@ -97,10 +88,7 @@ pub(crate) fn commit_subdomain(
 
 /// Everything is sealed: regions and interfaces of the whole.
 pub(crate) fn close(catalog: &mut Catalog, n: u32) -> Result<(), PipelineError> {
-    let Totals {
-        regions,
-        interfaces,
-    } = sum_totals(catalog, n, &BTreeMap::new())?;
+    let Totals { regions, interfaces } = sum_totals(catalog, n, &BTreeMap::new())?;
     let scratch = catalog.scratch_dir()?;
     catalog.commit(|step| {
         step.set_regions(&regions);

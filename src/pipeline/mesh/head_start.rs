@@ -167,11 +167,7 @@ fn begin(
     });
     // What failed here fails again, or finds memory, where it is reported.
     let (mesh, kernel) = inserted.ok()??;
-    Some(HeadStart {
-        mesh,
-        kernel,
-        seconds: clock.elapsed().as_secs_f64(),
-    })
+    Some(HeadStart { mesh, kernel, seconds: clock.elapsed().as_secs_f64() })
 }
 
 #[cfg(test)]
@@ -204,11 +200,7 @@ mod tests {
             all.push(tet.to_slot().map(u32::from));
         }
         for v in mesh.vertex_ids() {
-            all.push(
-                mesh.pages_mut()
-                    .read::<{ kind::VERTICES }>(v)
-                    .map(u32::from),
-            );
+            all.push(mesh.pages_mut().read::<{ kind::VERTICES }>(v).map(u32::from));
         }
         for n in 0..mesh.n_facets() {
             let facet = mesh.facet(n);
@@ -224,9 +216,8 @@ mod tests {
         let mut flat = Mesh::new(FlatPages::default());
         let kernel = inserted(&mut flat, &surface, &ScratchSpace::boundless(), &silent);
         let expected = records(&mut flat);
-        let begun = with_threads(2, || {
-            ahead(&surface, &options, CAP, &silent, Ok::<_, StorageError>)
-        });
+        let begun =
+            with_threads(2, || ahead(&surface, &options, CAP, &silent, Ok::<_, StorageError>));
         let (taken, begun) = begun.expect("nothing to object to");
         let begun = begun.expect("two threads and room for all");
         assert!(taken > begun.bytes());
@@ -255,9 +246,8 @@ mod tests {
     #[test]
     fn a_refused_surface_and_too_little_room_leave_nothing() {
         let (surface, options) = (surface(), Options::default());
-        let refused = with_threads(2, || {
-            ahead(&surface, &options, CAP, &silent, |_| Err::<(), _>("bad"))
-        });
+        let refused =
+            with_threads(2, || ahead(&surface, &options, CAP, &silent, |_| Err::<(), _>("bad")));
         assert_eq!(refused.err(), Some("bad"));
         for (threads, cap) in [(1, CAP), (2, 16 << 20)] {
             let looked = with_threads(threads, || {
@@ -265,12 +255,7 @@ mod tests {
             });
             assert!(matches!(looked, Ok((0, None))));
         }
-        let share = HeadStartShare {
-            frames: 0,
-            all: 0,
-            frames_later: CAP,
-            finds_pattern: false,
-        };
+        let share = HeadStartShare { frames: 0, all: 0, frames_later: CAP, finds_pattern: false };
         let (tell, _hear) = channel();
         assert!(begin(&surface, &share, &AtomicBool::new(false), tell.clone()).is_some());
         assert!(begin(&surface, &share, &AtomicBool::new(true), tell).is_none());

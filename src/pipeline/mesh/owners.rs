@@ -43,13 +43,7 @@ impl TopologyChange {
 
     /// One more cut. Errors: a damaged catalog.
     pub fn add(&mut self, catalog: &mut Catalog, new: &NewCut) -> Result<(), StoreError> {
-        let &NewCut {
-            cut,
-            faces,
-            low,
-            high,
-            ..
-        } = new;
+        let &NewCut { cut, faces, low, high, .. } = new;
         let (owners, neighbors) = (&mut self.owners, &mut self.neighbors);
         owners.insert(cut, Owners::new(faces, low, high));
         neighbors.set(low, high, u64::from(faces));
@@ -112,8 +106,6 @@ fn topology_row(neighbors: &Neighbors, name: u32) -> TopologyRow {
     let of = neighbors.of(name).into_iter();
     TopologyRow {
         subdomain: name,
-        neighbors: of
-            .map(|(subdomain, faces)| NeighborRow { subdomain, faces })
-            .collect(),
+        neighbors: of.map(|(subdomain, faces)| NeighborRow { subdomain, faces }).collect(),
     }
 }

@@ -103,11 +103,7 @@ pub fn mesh_prepared(
     budget: &Budget,
     watch: &Watcher,
 ) -> Result<Summary, PipelineError> {
-    let new = New {
-        sizes: prepared.sizes,
-        estimate: prepared.estimate,
-        begun,
-    };
+    let new = New { sizes: prepared.sizes, estimate: prepared.estimate, begun };
     let field = &prepared.field;
     go_on(catalog, surface, options, field, Some(new), budget, watch)
 }
@@ -261,10 +257,7 @@ impl<'a> Run<'a> {
         // All that is needed from here on is in the mesh.
         drop(surface);
         let report = recovered(&mut mesh, kernel, self.options, self.watch)?;
-        let space = Workspace {
-            dir: &scratch,
-            memory: self.plan.buffers / 2,
-        };
+        let space = Workspace { dir: &scratch, memory: self.plan.buffers / 2 };
         renumber(&mut mesh, &HilbertFrame::new(&self.bounds), &space)?;
         let load = self.load(&mut mesh);
         // Where vertices nearly touch, sizes at a point are next to nothing and the estimate knows no bound; the mesh's own load does.
@@ -302,10 +295,7 @@ impl<'a> Run<'a> {
                 "coarse mesh",
                 clock,
                 &[
-                    (
-                        "missing_segments",
-                        f64::from(report.recovery.missing_segments),
-                    ),
+                    ("missing_segments", f64::from(report.recovery.missing_segments)),
                     ("missing_facets", f64::from(report.recovery.missing_facets)),
                     (INPUT_TRIANGLES, n_triangles as f64),
                     ("predicted_tets", predicted),
@@ -336,10 +326,7 @@ impl<'a> Run<'a> {
         open: Option<Mesh>,
         summary: &mut Summary,
     ) -> Result<(), PipelineError> {
-        let worker = Worker {
-            place: Workplace::in_store(self.catalog)?,
-            common: self.common()?,
-        };
+        let worker = Worker { place: Workplace::in_store(self.catalog)?, common: self.common()? };
         if let (Some(mesh), [part]) = (open, &left[..]) {
             let job =
                 worker.subdomain_job(subdomain_order(self.catalog, self.n, *part)?, self.plan)?;

@@ -161,18 +161,8 @@ fn prepare_in(
             Some(Background::AtVertices(h)) => at_vertices = Some(&h[..]),
             None => {}
         }
-        let further = Further {
-            constraints: &constraints,
-            at_vertices,
-            at_points: &lone_points,
-        };
-        SizeField::build_with(
-            &surface.points,
-            &surface.triangles,
-            &asked,
-            &further,
-            scratch,
-        )
+        let further = Further { constraints: &constraints, at_vertices, at_points: &lone_points };
+        SizeField::build_with(&surface.points, &surface.triangles, &asked, &further, scratch)
     };
     let enclosed = || {
         // Counted before the tree takes its share of what is left.
@@ -198,14 +188,8 @@ fn prepare_in(
     let chosen = chosen(&seeker, &volumes, options)?;
     refuse_outer_sheets(surface, &volumes, &chosen)?;
     refuse_outer_points(surface, &seeker, &volumes, &chosen)?;
-    let filled: Vec<bool> = (0..volumes.n_volumes)
-        .map(|v| chosen.volumes.contains(&v))
-        .collect();
-    let domain = Domain {
-        seeker: &seeker,
-        volumes: &volumes,
-        filled: &filled,
-    };
+    let filled: Vec<bool> = (0..volumes.n_volumes).map(|v| chosen.volumes.contains(&v)).collect();
+    let domain = Domain { seeker: &seeker, volumes: &volumes, filled: &filled };
     let (field, mut sizes) = match early {
         Some(built) => built,
         None => built(&region_sizes(&domain, &chosen.names, &asked, scratch)?)?,
@@ -214,12 +198,7 @@ fn prepare_in(
         sizes.source = format!("a size field, {}", sizes.source);
     }
     let estimate = Estimate::of(&domain, options, &field)?;
-    Ok(Prepared {
-        field,
-        sizes,
-        estimate,
-        notes: notes(&chosen, options, volumes.n_volumes - 1),
-    })
+    Ok(Prepared { field, sizes, estimate, notes: notes(&chosen, options, volumes.n_volumes - 1) })
 }
 
 /// The volumes that are filled. Errors: seeds that say what cannot be.
@@ -250,9 +229,7 @@ fn notes(chosen: &Filled, options: &Options, n: u32) -> Vec<String> {
         notes.push(format!("{unnamed} of {filled} filled regions have no name"));
     }
     if options.region_policy() == Some(RegionPolicy::Seeds) && empty > 0 {
-        notes.push(format!(
-            "{empty} of {n} regions stay empty: no seed is inside, or a hole"
-        ));
+        notes.push(format!("{empty} of {n} regions stay empty: no seed is inside, or a hole"));
     }
     notes
 }
@@ -468,10 +445,7 @@ mod tests {
         let dir = tempfile::tempdir()?;
         let mut surface: Surface = SampleSpec::parse("grains,count=400")?.make()?.into();
         surface.shrink();
-        let options = Options {
-            regions: Some("all".to_owned()),
-            ..Options::default()
-        };
+        let options = Options { regions: Some("all".to_owned()), ..Options::default() };
         let wide = prepare(&surface, &options, None, &ScratchSpace::boundless())?;
         let narrow = ScratchSpace::new(surface.bytes() as u64 / 4, dir.path());
         orient_alike_in(&mut surface, &narrow);
@@ -490,14 +464,7 @@ mod tests {
     fn a_large_mesh_has_fewer_subdomains_for_its_size() -> Result<(), PipelineError> {
         let options = Options::default();
         // From 32 on they grow, and when they are twice as large there are more of them.
-        let shares = [
-            (0.6, 2),
-            (2.0, 2),
-            (2.1, 4),
-            (10.0, 10),
-            (32.0, 32),
-            (48.0, 32),
-        ];
+        let shares = [(0.6, 2), (2.0, 2), (2.1, 4), (10.0, 10), (32.0, 32), (48.0, 32)];
         for (shares, n) in shares.into_iter().chain([(500.0, 250)]) {
             assert_eq!(n_subdomains(shares * TETS_PER_SUBDOMAIN, &options)?.0, n);
         }
@@ -508,19 +475,13 @@ mod tests {
 
     #[test]
     fn the_least_cap_leaves_room_for_the_surface_and_little_more() {
-        let surface = |n: usize| Surface {
-            triangles: vec![[0; 3]; n],
-            ..Surface::default()
-        };
+        let surface = |n: usize| Surface { triangles: vec![[0; 3]; n], ..Surface::default() };
         assert_eq!(least_for(&surface(0)), MEMORY_MIN);
         for n in [1 << 20, 1 << 22] {
             let surface = surface(n);
             let (held, least) = (surface.bytes() as u64, least_for(&surface));
             assert!(Plan::new(least, held).is_ok());
-            assert!(
-                least > held && least < 3 * held + MEMORY_MIN,
-                "{held} {least}"
-            );
+            assert!(least > held && least < 3 * held + MEMORY_MIN, "{held} {least}");
         }
     }
 }

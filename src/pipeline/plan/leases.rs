@@ -31,13 +31,7 @@ impl Leases {
         let surface = budget.lease(surface_bytes as u64, "the surface")?;
         let field = budget.lease(field.bytes() as u64, "the size field")?;
         let (plan, working) = Self::working(surface.bytes() + field.bytes(), options, budget)?;
-        Ok(Self {
-            plan,
-            surface_bytes,
-            surface,
-            field,
-            working,
-        })
+        Ok(Self { plan, surface_bytes, surface, field, working })
     }
 
     fn working(
@@ -63,11 +57,6 @@ impl Leases {
         let left = (self.surface_bytes / LEFT_BEHIND) as u64;
         let surface = budget.lease(left, "what the surface leaves behind")?;
         let (plan, working) = Self::working(left + self.field.bytes(), options, budget)?;
-        Ok(Self {
-            plan,
-            surface,
-            working,
-            ..self
-        })
+        Ok(Self { plan, surface, working, ..self })
     }
 }

@@ -52,11 +52,7 @@ impl Plan {
                 available: rest,
             });
         }
-        Ok(Self {
-            frames: rest - held,
-            redb,
-            buffers,
-        })
+        Ok(Self { frames: rest - held, redb, buffers })
     }
 
     /// An equal share for each of `workers`.
@@ -70,10 +66,7 @@ impl Plan {
 
     /// For a step that makes no file of pages: what redb would hold of it goes to frames.
     pub fn without_file(self) -> Self {
-        Self {
-            frames: self.frames + self.redb,
-            ..self
-        }
+        Self { frames: self.frames + self.redb, ..self }
     }
 
     /// How many sub-domains can be meshed at once: a worker needs frames of its own.
@@ -93,10 +86,7 @@ mod tests {
             let plan = Plan::new(cap, 1 << 20).expect("room for a small surface");
             let sum = plan.frames + plan.redb + plan.redb / 2 + plan.buffers + CATALOG + (1 << 20);
             assert!(sum <= cap, "{plan:?} of {cap}");
-            assert!(
-                plan.redb + plan.redb / 2 + CATALOG <= cap / 4,
-                "{plan:?} of {cap}"
-            );
+            assert!(plan.redb + plan.redb / 2 + CATALOG <= cap / 4, "{plan:?} of {cap}");
         }
         assert!(Plan::new(MEMORY_MIN, MEMORY_MIN).is_err());
     }

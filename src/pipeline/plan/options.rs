@@ -118,14 +118,8 @@ impl Options {
         )?;
         let boxes = self.size_box.iter().map(|t| SizeSource::parse_box(t));
         let spheres = self.size_sphere.iter().map(|t| SizeSource::parse_sphere(t));
-        let cylinders = self
-            .size_cylinder
-            .iter()
-            .map(|t| SizeSource::parse_cylinder(t));
-        sizes.sources = boxes
-            .chain(spheres)
-            .chain(cylinders)
-            .collect::<Result<_, _>>()?;
+        let cylinders = self.size_cylinder.iter().map(|t| SizeSource::parse_cylinder(t));
+        sizes.sources = boxes.chain(spheres).chain(cylinders).collect::<Result<_, _>>()?;
         sizes.formula = self.size_expr.as_deref().map(Formula::parse).transpose()?;
         let regions = self.size_region.iter().map(|t| RegionSize::parse(t));
         sizes.regions = regions.collect::<Result<_, _>>()?;
@@ -167,10 +161,7 @@ impl Options {
             None | Some("auto") => Ok(None),
             Some(text) => match text.parse() {
                 Ok(n) if n > 0 => Ok(Some(n)),
-                _ => Err(PipelineError::Option {
-                    option: "subdomains",
-                    value: text.to_owned(),
-                }),
+                _ => Err(PipelineError::Option { option: "subdomains", value: text.to_owned() }),
             },
         }
     }
@@ -221,33 +212,24 @@ impl Options {
     /// Errors: the word or the seed that has no meaning.
     pub fn region_rule(&self) -> Result<RegionRule, PipelineError> {
         let policy = self.region_policy();
-        let bad = |option, text: &str| PipelineError::BadSeed {
-            option,
-            found: text.to_owned(),
-        };
+        let bad = |option, text: &str| PipelineError::BadSeed { option, found: text.to_owned() };
         let region =
             |text: &String| Seed::parse_region(text).ok_or_else(|| bad("region_seed", text));
         let hole = |text: &String| Seed::parse_hole(text).ok_or_else(|| bad("hole", text));
         let regions = self.region_seed.iter().map(region);
         Ok(RegionRule {
             policy: policy.ok_or_else(|| unknown("regions", &self.regions))?,
-            seeds: regions
-                .chain(self.hole.iter().map(hole))
-                .collect::<Result<_, _>>()?,
+            seeds: regions.chain(self.hole.iter().map(hole)).collect::<Result<_, _>>()?,
             names: (self.region_name.iter().map(region)).collect::<Result<_, _>>()?,
         })
     }
 
     /// [`Options::optimize_mode`], or an error that names the word.
     pub(crate) fn mode(&self) -> Result<Mode, PipelineError> {
-        self.optimize_mode()
-            .ok_or_else(|| unknown("optimize", &self.optimize))
+        self.optimize_mode().ok_or_else(|| unknown("optimize", &self.optimize))
     }
 }
 
 fn unknown(option: &'static str, value: &Option<String>) -> PipelineError {
-    PipelineError::Option {
-        option,
-        value: value.clone().unwrap_or_default(),
-    }
+    PipelineError::Option { option, value: value.clone().unwrap_or_default() }
 }

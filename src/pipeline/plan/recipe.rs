@@ -16,7 +16,5 @@ pub fn record_recipe(step: &mut Step) {
 /// Errors: a damaged catalog.
 pub fn recipe_of(catalog: &mut Catalog) -> Result<u32, StoreError> {
     let bytes = catalog.blob(blob::RECIPE)?;
-    Ok(bytes
-        .and_then(|bytes| bytes.try_into().ok())
-        .map_or(1, u32::from_le_bytes))
+    Ok(bytes.and_then(|bytes| bytes.try_into().ok()).map_or(1, u32::from_le_bytes))
 }

@@ -21,17 +21,8 @@ pub(crate) fn region_sizes<'a>(
     let one = |size: &RegionSize| {
         let is_here = find(domain, names, &size.which)?;
         let h = size.h.resolve(diagonal);
-        let Domain {
-            seeker, volumes, ..
-        } = *domain;
-        Ok(Region::new(
-            seeker,
-            volumes,
-            is_here,
-            h,
-            sizes.beta(),
-            scratch,
-        ))
+        let Domain { seeker, volumes, .. } = *domain;
+        Ok(Region::new(seeker, volumes, is_here, h, sizes.beta(), scratch))
     };
     sizes.regions.iter().map(one).collect()
 }
@@ -126,9 +117,7 @@ pub(super) fn refuse_outer_points(
     let alone = (wires.points.iter().zip(&wires.sizes)).filter(|(_, size)| **size > 0.0);
     let is_outer =
         |&v: &u32| !(chosen.volumes).contains(&volumes.at(seeker, surface.points[v as usize]));
-    let mut outer = alone
-        .map(|(&[v, label], _)| (v, label))
-        .filter(|(v, _)| is_outer(v));
+    let mut outer = alone.map(|(&[v, label], _)| (v, label)).filter(|(v, _)| is_outer(v));
     let Some((v, label)) = outer.next() else {
         return Ok(());
     };

@@ -18,9 +18,7 @@ pub fn undo(catalog: &mut Catalog) -> Result<ResaturateSummary, PipelineError> {
     let clock = Instant::now();
     let before = catalog.previous()?;
     if before.is_empty() {
-        return Err(PipelineError::NothingToUndo {
-            path: catalog.dir().to_owned(),
-        });
+        return Err(PipelineError::NothingToUndo { path: catalog.dir().to_owned() });
     }
     let n = tree::n_subdomains(catalog)?;
     let (mut parts, mut totals, mut blobs) = (Vec::new(), BTreeMap::new(), Vec::new());
@@ -32,11 +30,7 @@ pub fn undo(catalog: &mut Catalog) -> Result<ResaturateSummary, PipelineError> {
             let new = catalog.blob(now + rank)?;
             blobs.push(([now + rank, then + rank], old, new));
         }
-        parts.push(Remade {
-            before: catalog.subdomain(rank)?,
-            after: row,
-            fine: None,
-        });
+        parts.push(Remade { before: catalog.subdomain(rank)?, after: row, fine: None });
     }
     let regions = sum_totals(catalog, n, &totals)?.regions;
     catalog.commit(|step| {
@@ -58,11 +52,7 @@ pub fn undo(catalog: &mut Catalog) -> Result<ResaturateSummary, PipelineError> {
         step.append_journal(&journal(StoreState::Sealed, "undo", clock, &[]));
         Ok(())
     })?;
-    Ok(ResaturateSummary {
-        parts,
-        pages: PagerStats::default(),
-        frames_used: 0,
-    })
+    Ok(ResaturateSummary { parts, pages: PagerStats::default(), frames_used: 0 })
 }
 
 /// Drops the previous version; returns of how many sub-domains there was one. Errors: the disk.

@@ -59,10 +59,7 @@ pub fn forecast(
         let memory = budget.available() / 4;
         let mut list = Vec::new();
         for (rank, new) in again.fields(budget)? {
-            let recorded = Recorded {
-                whole: &again.field,
-                room: &room(again.catalog, budget)?,
-            };
+            let recorded = Recorded { whole: &again.field, room: &room(again.catalog, budget)? };
             let old = recorded.own(again.catalog, rank)?;
             let old = old.as_ref().unwrap_or(&again.field);
             let tets = again.catalog.subdomain(rank)?.tets;
@@ -70,11 +67,7 @@ pub fn forecast(
                 Some(new) => predicted(again.catalog, rank, [old, new], memory)?,
                 None => tets as f64,
             };
-            list.push(Forecast {
-                rank,
-                tets,
-                predicted,
-            });
+            list.push(Forecast { rank, tets, predicted });
         }
         Ok(list)
     })?
@@ -90,10 +83,7 @@ pub fn changed(
 ) -> Result<BTreeSet<u32>, PipelineError> {
     let room = room(catalog, budget)?;
     let field = recorded_field(catalog, options, &room)?;
-    let recorded = Recorded {
-        whole: &field,
-        room: &room,
-    };
+    let recorded = Recorded { whole: &field, room: &room };
     let mut ranks = BTreeSet::new();
     for row in catalog.subdomains()? {
         let memory = budget.available() / 4;

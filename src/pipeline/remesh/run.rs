@@ -55,11 +55,7 @@ struct Job {
 
 impl Job {
     fn run(self, common: Common, watch: &Watcher) -> Result<FinishedSubdomain, PipelineError> {
-        let Self {
-            subdomain,
-            kept,
-            path,
-        } = self;
+        let Self { subdomain, kept, path } = self;
         let (share, generation) = (subdomain.share, subdomain.generation);
         let (rank, scratch) = (kept.rank, subdomain.scratch.clone());
         let open = || {
@@ -71,10 +67,7 @@ impl Job {
                 base: None,
                 cache_bytes: share.redb as usize,
             };
-            let space = Workspace {
-                dir: &scratch,
-                memory: share.buffers / 2,
-            };
+            let space = Workspace { dir: &scratch, memory: share.buffers / 2 };
             let mut kept = CoarseSnapshot::open(&path, kept, (share.redb / 2) as usize)?;
             reopen(&mut kept, backing, share.frames, &space)
         };
@@ -140,10 +133,7 @@ impl<'a> RemeshRun<'a> {
             None => None,
         };
         let room = room(self.catalog, budget)?;
-        let recorded = Recorded {
-            whole: &self.field,
-            room: &room,
-        };
+        let recorded = Recorded { whole: &self.field, room: &room };
         let mut from = 0;
         for (row, _) in &self.rows {
             let field = match &self.what.sizes {
@@ -192,11 +182,7 @@ impl<'a> RemeshRun<'a> {
         };
         match found == expected {
             true => Ok(()),
-            false => Err(PipelineError::SizeCount {
-                found,
-                tets,
-                vertices,
-            }),
+            false => Err(PipelineError::SizeCount { found, tets, vertices }),
         }
     }
 
@@ -280,11 +266,7 @@ impl<'a> RemeshRun<'a> {
             owners,
             share,
         };
-        Ok(Job {
-            subdomain,
-            kept,
-            path: self.catalog.coarse_path(rank, kept.generation),
-        })
+        Ok(Job { subdomain, kept, path: self.catalog.coarse_path(rank, kept.generation) })
     }
 
     fn commit(
@@ -356,11 +338,7 @@ impl<'a> RemeshRun<'a> {
                     ("pages_read", subdomain.pages.pages_read as f64),
                     ("pages_written", subdomain.pages.pages_written as f64),
                 ];
-                let since = if finished.len() == 1 {
-                    clock
-                } else {
-                    subdomain.clock
-                };
+                let since = if finished.len() == 1 { clock } else { subdomain.clock };
                 let mut journal = journal(StoreState::Sealed, step_name, since, &measures);
                 journal.subdomain = Some(rank);
                 step.append_journal(&journal);
@@ -379,9 +357,7 @@ impl<'a> RemeshRun<'a> {
     ) -> Result<ResaturateSummary, PipelineError> {
         for (row, _) in &self.rows {
             let subdomain = finished.get_mut(&row.rank).expect("made for each");
-            let path = self
-                .catalog
-                .file_path(row.rank, subdomain.sealed.row.generation);
+            let path = self.catalog.file_path(row.rank, subdomain.sealed.row.generation);
             // It is not listed: what stays is removed by the next writer.
             let _ = path.remove_file();
             subdomain.sealed.row = row.clone();
@@ -394,11 +370,8 @@ impl<'a> RemeshRun<'a> {
             // Nothing in it counts.
             let _ = scratch.remove_dir_all();
         }
-        let mut summary = ResaturateSummary {
-            parts: Vec::new(),
-            pages: PagerStats::default(),
-            frames_used: 0,
-        };
+        let mut summary =
+            ResaturateSummary { parts: Vec::new(), pages: PagerStats::default(), frames_used: 0 };
         for ((before, _), subdomain) in self.rows.iter().zip(finished.into_values()) {
             summary.pages.add(subdomain.pages);
             summary.frames_used = summary.frames_used.max(subdomain.frames_used);

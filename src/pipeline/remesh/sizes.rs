@@ -236,10 +236,7 @@ fn on_mesh(
         tets.extend(chunk?.records.iter().map(|t| t.nodes));
     }
     let h = match values {
-        Values::Vertices(h) => h[from..from + n_vertices]
-            .iter()
-            .map(|&h| length(h))
-            .collect(),
+        Values::Vertices(h) => h[from..from + n_vertices].iter().map(|&h| length(h)).collect(),
         Values::Tets(h) => {
             let mut sums = vec![(0.0, 0u32); n_vertices];
             for (tet, &h) in tets.iter().zip(&h[from..from + n_tets]) {

@@ -41,14 +41,7 @@ pub(crate) fn seal<P: Pages>(
         Form::Pages => Some(Neighbors::of(sort_tets(mesh, target)?, target)?),
     };
     let order = sort_tets(mesh, target)?;
-    let faces = tets(
-        order,
-        mesh.n_tets(),
-        &mut neighbors,
-        target,
-        &mut writer,
-        watch,
-    )?;
+    let faces = tets(order, mesh.n_tets(), &mut neighbors, target, &mut writer, watch)?;
     facets(mesh, faces, target, &mut writer)?;
     mesh.clear_scratch();
     Ok(writer.finish()?)
@@ -56,12 +49,7 @@ pub(crate) fn seal<P: Pages>(
 
 fn report_progress(watch: &Watcher, stage: &'static str, done: u64, total: u32) {
     check_cancelled();
-    watch(Event {
-        stage,
-        done,
-        total: Some(u64::from(total)),
-        unit: "records",
-    });
+    watch(Event { stage, done, total: Some(u64::from(total)), unit: "records" });
 }
 
 fn vertices<P: Pages>(
@@ -88,10 +76,7 @@ fn vertices<P: Pages>(
         let (vertex_tag, owner_index) = mesh.vertex_attribute(v);
         let (tag, id) = match vertex_tag {
             VertexTag::Surface => {
-                let id = VertexId {
-                    owner: Owner::Surface,
-                    index: owner_index,
-                };
+                let id = VertexId { owner: Owner::Surface, index: owner_index };
                 (tag::SURFACE, id.number())
             }
             VertexTag::Interface => {
@@ -102,12 +87,7 @@ fn vertices<P: Pages>(
             VertexTag::Steiner => (tag::STEINER, SealedVertex::own_id(target.subdomain, local)),
             _ => (tag::FREE, SealedVertex::own_id(target.subdomain, local)),
         };
-        writer.push_vertex(SealedVertex {
-            point: point.to_array(),
-            h,
-            tag,
-            id,
-        })?;
+        writer.push_vertex(SealedVertex { point: point.to_array(), h, tag, id })?;
         if local.is_multiple_of(65_536) {
             report_progress(watch, "seal vertices", u64::from(local), mesh.n_vertices());
         }
@@ -156,12 +136,7 @@ impl Scan for Records {
                     required |= u8::from(tet.is_required(old)) << i;
                 }
             }
-            records.push(TetRecord {
-                nodes: rotated.nodes,
-                region,
-                flags,
-                required,
-            });
+            records.push(TetRecord { nodes: rotated.nodes, region, flags, required });
         });
         records
     }
@@ -183,11 +158,7 @@ fn tets(
             done = u64::from(t) + 1;
             for i in (0..4).filter(|i| record.required >> i & 1 != 0) {
                 let (vertices, odd) = sorted_face(FACES[i].map(|k| record.nodes[k]));
-                faces.push(RequiredFace {
-                    vertices,
-                    tet: t,
-                    odd,
-                })?;
+                faces.push(RequiredFace { vertices, tet: t, odd })?;
             }
             let place = TetPlace {
                 neighbors: match neighbors {
@@ -248,10 +219,7 @@ fn facets<P: Pages>(
         // A tetrahedron sees its face from inside turn as the facet does when it lies behind it.
         let odd = usize::from(claim.odd);
         let next = all.peek().and_then(|next| next.as_ref().ok());
-        let has_twin = [last.as_ref(), next]
-            .into_iter()
-            .flatten()
-            .any(|c| is_pair(c, &claim));
+        let has_twin = [last.as_ref(), next].into_iter().flatten().any(|c| is_pair(c, &claim));
         let front = if has_twin { NONE } else { sides[1 - odd] };
         let tets = [front, sides[odd]];
         if claim.at_interface {
@@ -266,12 +234,7 @@ fn facets<P: Pages>(
 
 fn claim(vertices: [u32; 3], number: u32, at_interface: bool) -> Claim {
     let (vertices, odd) = sorted_face(vertices);
-    Claim {
-        vertices,
-        number,
-        odd,
-        at_interface,
-    }
+    Claim { vertices, number, odd, at_interface }
 }
 
 fn push_facet<P: Pages>(

@@ -45,10 +45,7 @@ impl Neighbors {
                 _ => open = Some(face),
             }
         }
-        Ok(Self {
-            links: links.finish()?.peekable(),
-            tet: 0,
-        })
+        Ok(Self { links: links.finish()?.peekable(), tet: 0 })
     }
 
     /// Those of the next tetrahedron. Errors: the disk.
@@ -88,10 +85,7 @@ mod tests {
         let options = Options {
             subdomains: Some("2".to_owned()),
             seal: Some("none".to_owned()),
-            trial: Trial {
-                subdomains_small: true,
-                plan: None,
-            },
+            trial: Trial { subdomains_small: true, plan: None },
             ..Options::default()
         };
         let mut catalog = Catalog::create(dir.path().join("a.tetdb"), &Job::default())?;
@@ -111,20 +105,11 @@ mod tests {
             let mut pager = Pager::new(1 << 24, Some(backing));
             let [tets, vertices, facets, faces, ..] = row.chunks;
             let beside = |pages: u32| pages.div_ceil(4);
-            let extents = [
-                tets,
-                beside(tets),
-                vertices,
-                beside(vertices),
-                facets,
-                faces,
-                0,
-            ];
+            let extents = [tets, beside(tets), vertices, beside(vertices), facets, faces, 0];
             pager.adopt(extents.map(|n| [0, n]));
             let counts = [row.tets, row.vertices, row.facets, row.interface_faces];
-            let words: Vec<u32> = (counts.iter())
-                .flat_map(|&n| [sparse(n as u32), NONE, n as u32])
-                .collect();
+            let words: Vec<u32> =
+                (counts.iter()).flat_map(|&n| [sparse(n as u32), NONE, n as u32]).collect();
             let state = MeshState::from_words(words.try_into().expect("four arenas"));
             let mut mesh = Mesh::with_state(pager, state);
 

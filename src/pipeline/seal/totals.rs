@@ -21,10 +21,7 @@ pub(crate) struct SealedTotals {
 
 impl SealedTotals {
     pub(crate) fn of(sealed: &Sealed) -> Self {
-        Self {
-            regions: sealed.regions.clone(),
-            interfaces: sealed.interfaces.clone(),
-        }
+        Self { regions: sealed.regions.clone(), interfaces: sealed.interfaces.clone() }
     }
 
     /// Number of regions, three words of each, then five of each interface.
@@ -50,10 +47,7 @@ impl SealedTotals {
         let regions = rest.get(..(n as usize).checked_mul(3)?)?;
         let mut totals = Self::default();
         for r in regions.chunks_exact(3) {
-            let region = RegionTotals {
-                tets: r[1],
-                volume: f64::from_bits(r[2]),
-            };
+            let region = RegionTotals { tets: r[1], volume: f64::from_bits(r[2]) };
             totals.regions.insert(r[0] as u32, region);
         }
         for s in rest[regions.len()..].chunks_exact(5) {
@@ -61,9 +55,7 @@ impl SealedTotals {
                 cut: s[0] as u32,
                 other: s[1] as u32,
                 faces: s[2],
-                digest: Digest {
-                    lanes: [s[3], s[4]],
-                },
+                digest: Digest { lanes: [s[3], s[4]] },
             });
         }
         Some(totals)
@@ -114,10 +106,7 @@ pub(crate) fn sum_totals(
             });
         }
     }
-    Ok(Totals {
-        regions,
-        interfaces,
-    })
+    Ok(Totals { regions, interfaces })
 }
 
 /// The totals of a sub-domain, kept in the blobs that begin with `first`.
@@ -150,10 +139,7 @@ pub(crate) fn journal(
         seconds: clock.elapsed().as_secs_f64(),
         measures: measures
             .iter()
-            .map(|&(name, value)| Measure {
-                name: name.to_owned(),
-                value,
-            })
+            .map(|&(name, value)| Measure { name: name.to_owned(), value })
             .collect(),
     }
 }
@@ -165,10 +151,7 @@ mod tests {
     #[test]
     fn totals_come_back_from_their_bytes() {
         let mut totals = SealedTotals::default();
-        let region = RegionTotals {
-            tets: 17,
-            volume: 0.1,
-        };
+        let region = RegionTotals { tets: 17, volume: 0.1 };
         totals.regions.insert(4, region);
         totals.interfaces.push(InterfaceSide {
             cut: 3,

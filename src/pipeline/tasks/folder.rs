@@ -34,9 +34,7 @@ impl Patience {
     /// Waits a little; `false` when the time is over.
     fn goes_on(self) -> bool {
         check_cancelled();
-        let left = self
-            .0
-            .and_then(|end| end.checked_duration_since(Instant::now()));
+        let left = self.0.and_then(|end| end.checked_duration_since(Instant::now()));
         left.is_some_and(|left| {
             std::thread::sleep(left.min(LOOK_AGAIN));
             true
@@ -59,10 +57,8 @@ impl Patience {
 
 /// A name that no other process gives, here or elsewhere.
 pub(super) fn attempt_name() -> String {
-    let host: String = host_name()
-        .chars()
-        .map(|c| if c.is_ascii_alphanumeric() { c } else { '_' })
-        .collect();
+    let host: String =
+        host_name().chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
     let now = SystemTime::now().duration_since(UNIX_EPOCH);
     let nanos = now.unwrap_or_default().as_nanos();
     format!("{host}-{}-{nanos}", std::process::id())
@@ -150,9 +146,7 @@ impl TaskFolder {
         let path = self.field_path();
         let mut bytes =
             (patience.until(|| read(&path))?).ok_or_else(|| damaged(&path, "it is missing"))?;
-        let length = body(Kind::SizeField, &bytes)
-            .map_err(|e| damaged(&path, &e))?
-            .len();
+        let length = body(Kind::SizeField, &bytes).map_err(|e| damaged(&path, &e))?.len();
         bytes.drain(..bytes.len() - length);
         Ok(bytes)
     }
@@ -164,10 +158,7 @@ impl TaskFolder {
 
 /// A file of the folder that cannot be used.
 pub(super) fn damaged(path: &DiskPath, what: &str) -> PipelineError {
-    PipelineError::TaskFile {
-        path: path.path().to_owned(),
-        what: what.to_owned(),
-    }
+    PipelineError::TaskFile { path: path.path().to_owned(), what: what.to_owned() }
 }
 
 /// All of a file; `None` where there is none.
@@ -235,11 +226,7 @@ pub(super) fn copy(from: &DiskPath, to: &DiskPath) -> Result<(), StorageError> {
 }
 
 fn draft_of(path: &DiskPath) -> DiskPath {
-    let name = path
-        .path()
-        .file_name()
-        .unwrap_or_default()
-        .to_string_lossy();
+    let name = path.path().file_name().unwrap_or_default().to_string_lossy();
     path.folder().join(format!("{name}.{}", attempt_name()))
 }
 

@@ -59,9 +59,7 @@ pub fn plan(catalog: &mut Catalog, tasks: u32, options: &str) -> Result<(), Pipe
             return Err(no_plan("it is finished"));
         }
         if state < StoreState::Coarse {
-            return Err(no_plan(
-                "it has no coarse mesh yet, which one process makes",
-            ));
+            return Err(no_plan("it has no coarse mesh yet, which one process makes"));
         }
         let bounds = tree::bounds(catalog)?;
         let mut plan = PlanRecord {
@@ -105,18 +103,10 @@ pub fn gather(catalog: &mut Catalog, wait: Duration) -> Result<Gathered, Pipelin
         let folder = TaskFolder::of(catalog.work_dir());
         let patience = Patience::of(wait);
         if catalog.state()?.is_finished() {
-            return Ok(Gathered {
-                is_finished: true,
-                ..Gathered::default()
-            });
+            return Ok(Gathered { is_finished: true, ..Gathered::default() });
         }
         let plan = folder.plan(patience)?;
-        let run = GatherRun {
-            catalog,
-            folder: &folder,
-            plan: &plan,
-            patience,
-        };
+        let run = GatherRun { catalog, folder: &folder, plan: &plan, patience };
         run.all()
     })?
 }
@@ -174,10 +164,7 @@ impl GatherRun<'_> {
             }
         };
         let tasks = stage.tasks().zip(&stage.parts);
-        Ok(tasks
-            .filter(|(_, part)| is_open(**part))
-            .map(|(task, _)| task)
-            .collect())
+        Ok(tasks.filter(|(_, part)| is_open(**part)).map(|(task, _)| task).collect())
     }
 
     /// What a task has done, its files at hand; else why nothing can be committed.
@@ -203,12 +190,7 @@ impl GatherRun<'_> {
         let dir = self.folder.files_dir(&receipts.attempt);
         for (name, bytes) in &receipts.files {
             let file = dir.join(name);
-            let is_there = || {
-                Ok(file
-                    .bytes()
-                    .is_ok_and(|found| found == *bytes)
-                    .then_some(()))
-            };
+            let is_there = || Ok(file.bytes().is_ok_and(|found| found == *bytes).then_some(()));
             if patience.until(is_there)?.is_none() {
                 return Ok(Err(format!("its file {name} is missing or not complete")));
             }
@@ -221,13 +203,9 @@ impl GatherRun<'_> {
         let from = self.folder.files_dir(&done.attempt);
         let store = self.folder.dir.folder();
         let files = self.catalog.files()?;
-        let files = files
-            .iter()
-            .map(|f| Catalog::file_name(f.subdomain, f.generation));
+        let files = files.iter().map(|f| Catalog::file_name(f.subdomain, f.generation));
         let coarse = self.catalog.coarse_snapshots()?;
-        let coarse = coarse
-            .iter()
-            .map(|c| Catalog::coarse_name(c.rank, c.generation));
+        let coarse = coarse.iter().map(|c| Catalog::coarse_name(c.rank, c.generation));
         let listed: BTreeSet<String> = files.chain(coarse).collect();
         for (name, _) in &done.files {
             // One that counts already is not touched: this part of the task was committed before.
@@ -244,10 +222,7 @@ impl GatherRun<'_> {
         }
         self.commit_new_cuts(cuts, done.task)?;
         let sealed: BTreeSet<u32> = self.catalog.subdomains()?.iter().map(|r| r.rank).collect();
-        for sub in subdomains
-            .iter()
-            .filter(|sub| !sealed.contains(&sub.row.rank))
-        {
+        for sub in subdomains.iter().filter(|sub| !sealed.contains(&sub.row.rank)) {
             commit_subdomain(self.catalog, sub)?;
         }
         // What remains in it are other names of files that count now.
@@ -296,11 +271,7 @@ impl GatherRun<'_> {
             orders,
             below: stage.kind == StageKind::Subtrees,
         };
-        Ok(write_record(
-            &self.folder.orders_path(task),
-            Kind::Orders,
-            &record,
-        )?)
+        Ok(write_record(&self.folder.orders_path(task), Kind::Orders, &record)?)
     }
 }
 

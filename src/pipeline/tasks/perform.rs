@@ -61,21 +61,14 @@ pub fn perform(
         let plan = folder.plan(patience)?;
         let stages = stages(plan.n, plan.tasks);
         let Some(stage) = stages.iter().position(|s| s.tasks().contains(&task)) else {
-            return Err(PipelineError::Option {
-                option: "task",
-                value: task.to_string(),
-            });
+            return Err(PipelineError::Option { option: "task", value: task.to_string() });
         };
         if folder.stage()? > stage || is_done(&folder, &plan, task)? {
             return Ok(Performed::Already);
         }
         let orders = orders_of(&folder, &plan, task, patience)?;
-        let is_alive = Mark {
-            host: host_name(),
-            process: std::process::id(),
-            renewed: 0,
-            error: None,
-        };
+        let is_alive =
+            Mark { host: host_name(), process: std::process::id(), renewed: 0, error: None };
         let done = marked(&folder, task, &is_alive, || {
             Attempt::new(&folder, &plan, orders, settings).run(patience, budget, watch)
         });
@@ -136,13 +129,7 @@ fn marked<T>(folder: &TaskFolder, task: u32, mark: &Mark, work: impl FnOnce() ->
                 let now = SystemTime::now().duration_since(UNIX_EPOCH);
                 let renewed = now.unwrap_or_default().as_secs();
                 // For others to look at: the work goes on without it.
-                let _ = folder.set_mark(
-                    task,
-                    &Mark {
-                        renewed,
-                        ..mark.clone()
-                    },
-                );
+                let _ = folder.set_mark(task, &Mark { renewed, ..mark.clone() });
                 if stopped.recv_timeout(RENEWED_EVERY) != Err(RecvTimeoutError::Timeout) {
                     return;
                 }
@@ -211,11 +198,7 @@ impl<'a> Attempt<'a> {
                 receipts,
                 seconds: clock.elapsed().as_secs_f64(),
             };
-            write_record(
-                &self.folder.receipts_path(record.task),
-                Kind::Receipts,
-                &record,
-            )?;
+            write_record(&self.folder.receipts_path(record.task), Kind::Receipts, &record)?;
             Ok(n)
         })();
         if let Some(local) = &self.local {
@@ -299,10 +282,7 @@ impl<'a> Attempt<'a> {
             let path = store.join(order.input());
             let found = patience.until(|| Ok(path.is_file().then_some(())))?;
             found.ok_or_else(|| {
-                damaged(
-                    &path,
-                    "it is missing, unless the task has been done meanwhile",
-                )
+                damaged(&path, "it is missing, unless the task has been done meanwhile")
             })?;
         }
         Ok(())
@@ -317,10 +297,7 @@ impl<'a> Attempt<'a> {
         let mut names: BTreeSet<String> = receipts.iter().flat_map(Receipt::files).collect();
         for receipt in receipts {
             if let Receipt::Cut(cut) = receipt {
-                names.remove(&Catalog::file_name(
-                    cut.parent.part.first,
-                    cut.parent.generation,
-                ));
+                names.remove(&Catalog::file_name(cut.parent.part.first, cut.parent.generation));
             }
         }
         let mut files = Vec::with_capacity(names.len());

@@ -66,10 +66,7 @@ pub(crate) fn stages(n: u32, tasks: u32) -> Vec<Stage> {
     }
     let batches = tasks.min(n);
     let at = |k: u32| (u64::from(n) * u64::from(k) / u64::from(batches)) as u32;
-    let batch = |k| TreePart {
-        first: at(k),
-        count: at(k + 1) - at(k),
-    };
+    let batch = |k| TreePart { first: at(k), count: at(k + 1) - at(k) };
     add(StageKind::Subdomains, (0..batches).map(batch).collect());
     stages
 }

@@ -110,10 +110,7 @@ pub fn serve(
         serde_json::from_str(&job.options).map_err(|e| damaged(&store, &e.to_string()))?;
     let bounds = Aabb::around(job.bounds.map(Point::from_array));
     let name = attempt_name();
-    let local = settings
-        .scratch
-        .as_deref()
-        .map(|dir| scratch_in(dir, &name));
+    let local = settings.scratch.as_deref().map(|dir| scratch_in(dir, &name));
     let folder = TaskFolder::of(Catalog::work_dir_at(&store));
     let scratch = match &local {
         Some(local) => local.join("scratch"),

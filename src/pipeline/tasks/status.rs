@@ -39,10 +39,7 @@ pub enum TaskState {
 
 /// The plan of a store and how far its tasks are.
 #[derive(Clone, Debug)]
-#[cfg_attr(
-    not(feature = "cli"),
-    allow(dead_code, reason = "for the program alone")
-)]
+#[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "for the program alone"))]
 pub struct Planned {
     /// Sub-domains.
     pub subdomains: u32,
@@ -56,10 +53,7 @@ pub struct Planned {
     pub states: Vec<(u32, TaskState)>,
 }
 
-#[cfg_attr(
-    not(feature = "cli"),
-    allow(dead_code, reason = "for the program alone")
-)]
+#[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "for the program alone"))]
 impl Planned {
     /// Tasks of the stage that is being done.
     pub fn range(&self) -> Range<u32> {
@@ -118,26 +112,19 @@ fn state(folder: &TaskFolder, run: u64, task: u32) -> Result<TaskState, StorageE
     let found = read_record::<TaskReceipts>(&folder.receipts_path(task), Kind::Receipts)?;
     let mark = folder.mark(task);
     Ok(match (found, mark) {
-        (Some(Ok(receipts)), _) if receipts.run == run => TaskState::Done {
-            seconds: receipts.seconds,
-        },
-        (Some(Err(why)), _) => TaskState::Failed {
-            why: format!("its receipt cannot be used: {why}"),
-        },
-        (
-            _,
-            Some(Mark {
-                host,
-                error: Some(error),
-                ..
-            }),
-        ) => TaskState::Failed {
-            why: format!("on {host}: {error}"),
-        },
+        (Some(Ok(receipts)), _) if receipts.run == run => {
+            TaskState::Done { seconds: receipts.seconds }
+        }
+        (Some(Err(why)), _) => {
+            TaskState::Failed { why: format!("its receipt cannot be used: {why}") }
+        }
+        (_, Some(Mark { host, error: Some(error), .. })) => {
+            TaskState::Failed { why: format!("on {host}: {error}") }
+        }
         (_, Some(mark)) if is_alive(&mark) => TaskState::Running { host: mark.host },
-        (_, Some(mark)) => TaskState::Failed {
-            why: format!("on {}: it ended without a word", mark.host),
-        },
+        (_, Some(mark)) => {
+            TaskState::Failed { why: format!("on {}: it ended without a word", mark.host) }
+        }
         (_, None) => TaskState::Waiting,
     })
 }

@@ -74,9 +74,7 @@ pub(crate) fn body(kind: Kind, bytes: &[u8]) -> Result<&[u8], String> {
     let number = |at: usize| u16::from_le_bytes([front[at], front[at + 1]]);
     if number(8) != VERSION {
         let found = number(8);
-        return Err(format!(
-            "it has version {found}, this program reads {VERSION}"
-        ));
+        return Err(format!("it has version {found}, this program reads {VERSION}"));
     }
     if xxh3_64_with_seed(body, xxh3_64(front)).to_le_bytes() != sum {
         return Err("it does not match its checksum".to_owned());

@@ -143,12 +143,7 @@ mod tests {
                 input: u64::from(i) << 30,
                 regions: [1, 0],
             });
-            mesh.add_interface_face(InterfaceFace {
-                vertices,
-                cut: 2,
-                index: 3 * i,
-                side: i & 1,
-            });
+            mesh.add_interface_face(InterfaceFace { vertices, cut: 2, index: 3 * i, side: i & 1 });
         }
         renumber(&mut mesh, &HilbertFrame::new(&bounds), space).expect("room for runs");
         mesh
@@ -158,10 +153,7 @@ mod tests {
     fn a_kept_mesh_comes_back_with_its_ids() {
         let dir = tempfile::tempdir().expect("a temporary folder");
         let scratch = DiskPath::from(dir.path());
-        let space = Workspace {
-            dir: &scratch,
-            memory: 1 << 20,
-        };
+        let space = Workspace { dir: &scratch, memory: 1 << 20 };
         let mut mesh = made(&space);
         let path = scratch.join("coarse.redb");
         let row = save(&mut mesh, &path, 3, 7, 1 << 20).expect("space for the snapshot");
@@ -202,10 +194,7 @@ mod tests {
     fn tetrahedra_that_are_no_mesh_are_damage() {
         let dir = tempfile::tempdir().expect("a temporary folder");
         let scratch = DiskPath::from(dir.path());
-        let space = Workspace {
-            dir: &scratch,
-            memory: 1 << 20,
-        };
+        let space = Workspace { dir: &scratch, memory: 1 << 20 };
         let opened = |name: &str, points: [[f64; 3]; 5], tets: &[[u32; 4]]| {
             let path = scratch.join(name);
             let writer = CoarseWriter::create(&path, 0, 1, 1 << 20);
@@ -216,12 +205,7 @@ mod tests {
                 writer.push_vertex(vertex).expect("space for the snapshot");
             }
             for &nodes in tets {
-                let tet = CoarseTet {
-                    nodes,
-                    bits: 0,
-                    region: 1,
-                    flags: 0,
-                };
+                let tet = CoarseTet { nodes, bits: 0, region: 1, flags: 0 };
                 writer.push_tet(tet).expect("space for the snapshot");
             }
             let row = writer.finish().expect("space for the snapshot");
@@ -237,13 +221,7 @@ mod tests {
             reopen(&mut snapshot, backing, 1 << 20, &space).map(|mesh| mesh.n_tets())
         };
         // One on either side of the triangle 0 1 2.
-        let points = [
-            [0., 0., 0.],
-            [1., 0., 0.],
-            [0., 1., 0.],
-            [0., 0., 1.],
-            [0.2, 0.2, -1.],
-        ];
+        let points = [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [0., 0., 1.], [0.2, 0.2, -1.]];
         let (above, below) = ([0, 1, 2, 3], [0, 2, 1, 4]);
         let sound = opened("sound", points, &[above, below]);
         assert_eq!(sound.expect("a mesh"), 2);

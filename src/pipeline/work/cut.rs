@@ -56,15 +56,10 @@ impl CutJob<'_> {
         let clock = Instant::now();
         let (parent, common) = (self.order.parent, self.common);
         let part = parent.part;
-        let space = Workspace {
-            dir: &self.scratch,
-            memory: self.share.buffers / 2,
-        };
+        let space = Workspace { dir: &self.scratch, memory: self.share.buffers / 2 };
         let mut host = self.open()?;
-        let mut core = Mesh::new(Pager::new(
-            self.share.frames / 4,
-            Some(self.backing(part.first, None, 4)),
-        ));
+        let mut core =
+            Mesh::new(Pager::new(self.share.frames / 4, Some(self.backing(part.first, None, 4))));
         let plan = CutPlan {
             cut: part.cut(),
             low: part.low_share(),
@@ -75,12 +70,7 @@ impl CutJob<'_> {
             optimize: Settings::of(common.mode),
         };
         let progress = |stage, done| {
-            watch(Event {
-                stage,
-                done,
-                total: None,
-                unit: "vertices",
-            });
+            watch(Event { stage, done, total: None, unit: "vertices" });
         };
         let kept = common.keeps_stages.then(|| StageFiles {
             cut: part.cut(),
@@ -154,11 +144,7 @@ impl CutJob<'_> {
         for n in 0..mesh.n_interface_faces() {
             let face = mesh.interface_face(n);
             if face.cut != opened.zone.cut {
-                inherited.push(InheritedFace {
-                    cut: face.cut,
-                    index: face.index,
-                    side: face.side,
-                });
+                inherited.push(InheritedFace { cut: face.cut, index: face.index, side: face.side });
             }
         }
         inherited.sort_unstable();
@@ -176,10 +162,7 @@ impl CutJob<'_> {
             load,
         };
         let stats = mesh.into_pages().finish();
-        let child = Child {
-            mesh: part_mesh,
-            inherited,
-        };
+        let child = Child { mesh: part_mesh, inherited };
         Ok((child, stats))
     }
 

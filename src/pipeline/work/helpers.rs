@@ -26,11 +26,7 @@ pub struct Hands(pub Option<Arc<dyn Helpers>>);
 
 impl fmt::Debug for Hands {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(if self.0.is_some() {
-            "Hands"
-        } else {
-            "no hands"
-        })
+        f.write_str(if self.0.is_some() { "Hands" } else { "no hands" })
     }
 }
 

@@ -92,10 +92,7 @@ impl CutReceipt {
     pub fn below(&self, zones: &[ZoneRow]) -> impl Iterator<Item = CutOrder> {
         let zones = [zones, &[self.zone]].concat();
         let wide = self.children.into_iter().filter(|c| c.part.count > 1);
-        wide.map(move |parent| CutOrder {
-            parent,
-            zones: zones.clone(),
-        })
+        wide.map(move |parent| CutOrder { parent, zones: zones.clone() })
     }
 }
 

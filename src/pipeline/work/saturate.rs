@@ -33,12 +33,7 @@ pub(crate) fn saturate_and_optimize<P: Pages>(
     space: &Workspace,
     watch: &Watcher,
 ) -> Result<FineReport, PipelineError> {
-    watch(Event {
-        stage: "divide edges",
-        done: 0,
-        total: None,
-        unit: "vertices",
-    });
+    watch(Event { stage: "divide edges", done: 0, total: None, unit: "vertices" });
     let clock = Instant::now();
     for v in mesh.vertex_ids() {
         let p = mesh.point(v);
@@ -46,30 +41,13 @@ pub(crate) fn saturate_and_optimize<P: Pages>(
     }
     let h = |p| field.h(p);
     let outside = OutsideZones { zones, h: &h };
-    let place: &dyn PlacementRule = if zones.is_empty() {
-        &Everywhere
-    } else {
-        &outside
-    };
-    let wanted = Field {
-        h: &|p| field.h(p),
-        place,
-        lengths: common.method.lengths,
-        bounds: common.bounds,
-    };
+    let place: &dyn PlacementRule = if zones.is_empty() { &Everywhere } else { &outside };
+    let wanted =
+        Field { h: &|p| field.h(p), place, lengths: common.method.lengths, bounds: common.bounds };
     let refine = saturate(mesh, &wanted, space, &mut |inserted| {
-        watch(Event {
-            stage: "divide edges",
-            done: inserted,
-            total: None,
-            unit: "vertices",
-        });
+        watch(Event { stage: "divide edges", done: inserted, total: None, unit: "vertices" });
     })?;
     let refined = clock.elapsed().as_secs_f64();
     let optimize = optimize::run(mesh, common.mode, &|p| watch(p.into()));
-    Ok(FineReport {
-        refine,
-        optimize,
-        seconds: [refined, clock.elapsed().as_secs_f64() - refined],
-    })
+    Ok(FineReport { refine, optimize, seconds: [refined, clock.elapsed().as_secs_f64() - refined] })
 }

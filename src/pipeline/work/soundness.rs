@@ -28,10 +28,7 @@ pub(crate) fn panic_is_damage_of<T>(
     }
     match attempt(|| open().map(|mut mesh| is_sound(&mut mesh)))?? {
         true => resume_unwind(panic),
-        false => Err(damaged(
-            (base, part),
-            "tetrahedra of its working mesh do not fit together",
-        )),
+        false => Err(damaged((base, part), "tetrahedra of its working mesh do not fit together")),
     }
 }
 
@@ -53,10 +50,7 @@ pub(crate) fn check_owners<P: Pages>(
     let mut beyond = all.map(|face| owners.get(&face.cut)?.other(face.index));
     match beyond.all(|other| other.is_some()) {
         true => Ok(()),
-        false => Err(damaged(
-            place,
-            "a face between sub-domains that none has beyond",
-        )),
+        false => Err(damaged(place, "a face between sub-domains that none has beyond")),
     }
 }
 
@@ -118,12 +112,7 @@ mod tests {
     use crate::storage::FlatPages;
 
     fn face(vertices: [u32; 3]) -> InterfaceFace {
-        InterfaceFace {
-            vertices,
-            cut: 2,
-            index: 43,
-            side: 0,
-        }
+        InterfaceFace { vertices, cut: 2, index: 43, side: 0 }
     }
 
     #[test]

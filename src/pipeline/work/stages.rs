@@ -121,10 +121,7 @@ fn from_bytes(bytes: &[u8]) -> Option<InterfaceFaces> {
         return None;
     }
     let chosen = faces.split_off(natural);
-    Some(InterfaceFaces {
-        natural: faces,
-        chosen,
-    })
+    Some(InterfaceFaces { natural: faces, chosen })
 }
 
 /// The faces of a cut's interface before and after the choice, where they were kept.
@@ -151,10 +148,8 @@ mod tests {
     #[test]
     fn faces_come_back_from_their_bytes() {
         let face = |x: f64| [Point::splat(x), Point::X, Point::new(0.1, x, 3.0)];
-        let faces = InterfaceFaces {
-            natural: vec![face(1.0), face(-2.5)],
-            chosen: vec![face(1e9)],
-        };
+        let faces =
+            InterfaceFaces { natural: vec![face(1.0), face(-2.5)], chosen: vec![face(1e9)] };
         let bytes = to_bytes(&faces);
         assert_eq!(from_bytes(&bytes), Some(faces));
         assert_eq!(from_bytes(&bytes[..bytes.len() - 8]), None);

@@ -94,10 +94,7 @@ impl SubdomainJob {
         watch: &Watcher,
     ) -> Result<FinishedSubdomain, PipelineError> {
         let clock = Instant::now();
-        let space = Workspace {
-            dir: &self.scratch,
-            memory: self.share.buffers / 2,
-        };
+        let space = Workspace { dir: &self.scratch, memory: self.share.buffers / 2 };
         let (rank, coarse) = (self.part.part.first, self.part.generation);
         let kept = match &self.kept {
             Some(path) => Some(save(&mut mesh, path, rank, coarse, self.share.buffers)?),

@@ -36,11 +36,7 @@ impl Workplace {
     /// In the store itself: for who has its lock.
     pub fn in_store(catalog: &Catalog) -> Result<Self, StoreError> {
         let store = catalog.disk_path().clone();
-        Ok(Self {
-            output: store.clone(),
-            store,
-            scratch: catalog.scratch_dir()?,
-        })
+        Ok(Self { output: store.clone(), store, scratch: catalog.scratch_dir()? })
     }
 
     fn input(&self, name: String) -> DiskPath {
@@ -109,11 +105,7 @@ impl Worker<'_> {
         order: SubdomainOrder,
         share: Plan,
     ) -> Result<SubdomainJob, PipelineError> {
-        let SubdomainOrder {
-            part,
-            zones,
-            owners,
-        } = order;
+        let SubdomainOrder { part, zones, owners } = order;
         let (rank, coarse) = (part.part.first, part.generation);
         let output = |name: String| self.place.output.join(name);
         let kept = Catalog::coarse_name(rank, coarse);

@@ -13,14 +13,7 @@ use crate::store::{Catalog, StoreError};
 use tetdb_schema::catalog::{InterfaceRow, Job, StoreState};
 
 /// Axes in all orders, even ones first.
-const ORDERS: [[usize; 3]; 6] = [
-    [0, 1, 2],
-    [1, 2, 0],
-    [2, 0, 1],
-    [0, 2, 1],
-    [2, 1, 0],
-    [1, 0, 2],
-];
+const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
 
 type GridPlace = [usize; 3];
 
@@ -58,11 +51,7 @@ impl Grid {
             for row in &interfaces {
                 step.set_interfaces(row.cut, &vec![*row]);
             }
-            step.set_labels(
-                &["x0", "y0", "z0", "x1", "y1", "z1"]
-                    .map(str::to_owned)
-                    .to_vec(),
-            );
+            step.set_labels(&["x0", "y0", "z0", "x1", "y1", "z1"].map(str::to_owned).to_vec());
             step.set_state(StoreState::Sealed);
             Ok(())
         })?;
@@ -110,12 +99,7 @@ impl Grid {
         }
         let mut tets: Vec<([GridPlace; 4], SealedTet)> = self
             .cells_of(x0)
-            .flat_map(|cell| {
-                ORDERS
-                    .iter()
-                    .enumerate()
-                    .map(move |(i, o)| corners(cell, *o, i > 2))
-            })
+            .flat_map(|cell| ORDERS.iter().enumerate().map(move |(i, o)| corners(cell, *o, i > 2)))
             .map(|places| {
                 let tet = SealedTet {
                     nodes: places.map(|p| numbers[&p]),
@@ -172,13 +156,7 @@ impl Grid {
         }
         interface.sort_unstable();
         for (index, (_, vertices, cut, other, tet)) in (0u32..).zip(interface) {
-            writer.push_interface_face(InterfaceFace {
-                vertices,
-                cut,
-                index,
-                other,
-                tet,
-            })?;
+            writer.push_interface_face(InterfaceFace { vertices, cut, index, other, tet })?;
         }
         Ok(())
     }

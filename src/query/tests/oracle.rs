@@ -105,10 +105,7 @@ pub(super) fn meets(solid: &Solid, corners: &[Point; 4]) -> bool {
         }
         Solid::Sphere { center, radius } => {
             let (c, r) = (exact(center), RBig::try_from(radius).expect("finite"));
-            let nearest = triangles
-                .iter()
-                .map(|f| from_triangle(&c, f.map(|i| &t[i])))
-                .min();
+            let nearest = triangles.iter().map(|f| from_triangle(&c, f.map(|i| &t[i]))).min();
             holds(corners, center) || nearest.is_some_and(|d| d <= &r * &r)
         }
         Solid::Plane { point, normal } => {
@@ -124,10 +121,8 @@ pub(super) fn within(solid: &Solid, corners: &[Point; 4]) -> bool {
     corners.iter().all(|&c| match *solid {
         Solid::Box(b) => (0..3).all(|i| b.low[i] <= c[i] && c[i] <= b.high[i]),
         Solid::Sphere { center, radius } => {
-            let (d, r) = (
-                minus(&exact(c), &exact(center)),
-                RBig::try_from(radius).expect("finite"),
-            );
+            let (d, r) =
+                (minus(&exact(c), &exact(center)), RBig::try_from(radius).expect("finite"));
             dot(&d, &d) <= &r * &r
         }
         Solid::Plane { .. } => false,

@@ -4,9 +4,7 @@ use super::*;
 
 /// The least id of those that hold the point, by exact signs of volumes in rational numbers.
 fn holder(all: &[(Aabb, Hit)], p: Point) -> Option<TetId> {
-    let near = all
-        .iter()
-        .filter(|(b, _)| b.low.cmple(p).all() && p.cmple(b.high).all());
+    let near = all.iter().filter(|(b, _)| b.low.cmple(p).all() && p.cmple(b.high).all());
     let mut holding = near.filter(|(_, t)| oracle::holds(&t.corners, p));
     holding.next().map(|(_, t)| t.id)
 }
@@ -26,10 +24,7 @@ fn points_are_found_in_the_lowest_tetrahedron_that_holds_them() -> Outcome {
             }
             points.push(random.point(&Aabb::around(all[0].corners.into_iter().chain(tet.corners))));
         }
-        let all: Vec<_> = all
-            .into_iter()
-            .map(|t| (Aabb::around(t.corners), t))
-            .collect();
+        let all: Vec<_> = all.into_iter().map(|t| (Aabb::around(t.corners), t)).collect();
         let mut session = made.session(64 << 20)?;
         let located = session.locate(&points)?;
         for (located, &p) in located.iter().zip(&points) {
@@ -63,10 +58,7 @@ fn solids(random: &mut Random, lattice: Option<usize>, bounds: &Aabb) -> Vec<Sol
     for i in 0..9 {
         let (a, b) = (point(random), point(random));
         let b = if i % 3 == 0 { a } else { b };
-        solids.push(Solid::Box(Aabb {
-            low: a.min(b),
-            high: a.max(b),
-        }));
+        solids.push(Solid::Box(Aabb { low: a.min(b), high: a.max(b) }));
         let radius = match (lattice, i % 3) {
             (_, 0) => 0.0,
             (Some(_), 1) => random.below(5) as f64 / 2.0,
@@ -90,18 +82,12 @@ fn solids_select_what_meets_them_and_what_lies_in_them() -> Outcome {
         let mut touching = 0;
         for solid in solids(&mut random, lattice, &bounds) {
             for inside in [false, true] {
-                let selection = Selection {
-                    solids: vec![solid],
-                    inside,
-                    ..Selection::default()
-                };
+                let selection = Selection { solids: vec![solid], inside, ..Selection::default() };
                 let found = ids(session.select(selection)?)?;
                 let found: BTreeSet<TetId> = found.into_iter().collect();
                 for (i, tet) in all.iter().enumerate() {
                     // Rational numbers are slow: of the many far away only some are looked at.
-                    let far = solid
-                        .bounds()
-                        .is_some_and(|b| !b.meets(&Aabb::around(tet.corners)));
+                    let far = solid.bounds().is_some_and(|b| !b.meets(&Aabb::around(tet.corners)));
                     if lattice.is_none() && i % if far { 997 } else { 41 } != 0 {
                         continue;
                     }
@@ -109,11 +95,7 @@ fn solids_select_what_meets_them_and_what_lies_in_them() -> Outcome {
                         true => oracle::within(&solid, &tet.corners),
                         false => oracle::meets(&solid, &tet.corners),
                     };
-                    assert_eq!(
-                        found.contains(&tet.id),
-                        expected,
-                        "{solid:?} {inside} {tet:?}"
-                    );
+                    assert_eq!(found.contains(&tet.id), expected, "{solid:?} {inside} {tet:?}");
                 }
                 touching += found.len();
             }
@@ -131,24 +113,17 @@ fn solids_of_any_scale_are_met_exactly() {
         let own = corners.map(|c| c * scale);
         for _ in 0..20 {
             let shift = random.lattice(2);
-            let bounds = Aabb {
-                low: Point::splat(-1.0),
-                high: Point::splat(2.0),
-            };
+            let bounds = Aabb { low: Point::splat(-1.0), high: Point::splat(2.0) };
             for solid in solids(&mut random, Some(1), &bounds) {
                 let solid = match solid {
                     Solid::Box(b) => Solid::Box(Aabb {
                         low: (b.low - shift.abs() * 1e-17) * scale,
                         high: b.high * scale,
                     }),
-                    Solid::Sphere { center, radius } => Solid::Sphere {
-                        center: center * scale,
-                        radius: radius * scale,
-                    },
-                    Solid::Plane { point, normal } => Solid::Plane {
-                        point: point * scale,
-                        normal,
-                    },
+                    Solid::Sphere { center, radius } => {
+                        Solid::Sphere { center: center * scale, radius: radius * scale }
+                    }
+                    Solid::Plane { point, normal } => Solid::Plane { point: point * scale, normal },
                 };
                 assert_eq!(solid.meets(&own), oracle::meets(&solid, &own), "{solid:?}");
                 assert_eq!(solid.holds(&own), oracle::within(&solid, &own), "{solid:?}");

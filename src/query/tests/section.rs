@@ -20,32 +20,19 @@ fn sections_cover_what_the_plane_cuts_once() -> Outcome {
         (Point::new(0.0, 0.0, 1.3), Point::Z, 16.0),
         (Point::new(0.0, 0.0, 2.0), Point::Z, 16.0),
         (Point::new(2.0, 0.0, 0.0), Point::NEG_X * 1e-200, 16.0),
-        (
-            Point::new(2.0, 2.0, 0.0),
-            Point::new(1.0, 1.0, 0.0),
-            diagonal,
-        ),
+        (Point::new(2.0, 2.0, 0.0), Point::new(1.0, 1.0, 0.0), diagonal),
         (Point::new(4.0, 4.0, 4.0), Point::ONE, 0.0),
     ] {
         let view = View::new(origin, normal);
         let section = |session: &mut QuerySession, crinkle| {
-            session.section(
-                &view,
-                crinkle,
-                Selection::default(),
-                made.dir.path(),
-                1 << 16,
-            )
+            session.section(&view, crinkle, Selection::default(), made.dir.path(), 1 << 16)
         };
         let cut = section(&mut session, false)?;
         let extent = cut.extent;
         let pieces: Vec<Piece> = cut.collect::<Result<_, _>>()?;
         assert_eq!(pieces.len() as u64, extent.n);
         let sum: f64 = pieces.iter().map(|p| area(p).abs()).sum();
-        assert!(
-            (sum / 2.0 - expected).abs() < 1e-9,
-            "{origin} {normal}: {sum}"
-        );
+        assert!((sum / 2.0 - expected).abs() < 1e-9, "{origin} {normal}: {sum}");
         assert!(pieces.iter().all(|p| p.quality >= 1.0 && p.facing == 1.0));
         if expected == 0.0 {
             continue;
@@ -53,11 +40,7 @@ fn sections_cover_what_the_plane_cuts_once() -> Outcome {
         // Faces of whole tetrahedra, seen from the front, hide no less.
         let whole = section(&mut session, true)?;
         let pieces: Vec<Piece> = whole.collect::<Result<_, _>>()?;
-        assert!(
-            pieces
-                .iter()
-                .all(|p| p.n == 3 && p.facing > 0.0 && area(p) > 0.0)
-        );
+        assert!(pieces.iter().all(|p| p.n == 3 && p.facing > 0.0 && area(p) > 0.0));
         let sum: f64 = pieces.iter().map(area).sum();
         assert!(sum / 2.0 >= expected - 1e-9, "{sum}");
     }

@@ -4,10 +4,7 @@ use super::*;
 
 /// Without what is read only where somebody asks for it.
 fn bare(hits: &[Hit]) -> Vec<Hit> {
-    let without = |hit: &Hit| Hit {
-        on_surface: None,
-        ..*hit
-    };
+    let without = |hit: &Hit| Hit { on_surface: None, ..*hit };
     hits.iter().map(without).collect()
 }
 
@@ -18,18 +15,10 @@ fn numbers_and_conditions_select_what_they_say() -> Outcome {
         let mut session = made.session(64 << 20)?;
         let none = Selection::default;
         expect(&mut session, &all, none(), |_| true)?;
-        let selection = Selection {
-            subdomains: Some(vec![1]),
-            ..none()
-        };
-        let n = expect(&mut session, &all, selection, |t| {
-            t.id.subdomain().rank() == 1
-        })?;
+        let selection = Selection { subdomains: Some(vec![1]), ..none() };
+        let n = expect(&mut session, &all, selection, |t| t.id.subdomain().rank() == 1)?;
         assert!(n > 0);
-        let selection = Selection {
-            regions: Some(vec![2, 7]),
-            ..none()
-        };
+        let selection = Selection { regions: Some(vec![2, 7]), ..none() };
         expect(&mut session, &all, selection, |t| t.region == 2)?;
         for text in [
             "quality > 1.5 and region = 1",
@@ -40,19 +29,11 @@ fn numbers_and_conditions_select_what_they_say() -> Outcome {
             "excess > 1.2 and quality < 3",
         ] {
             let condition = Expression::parse(text, &VARIABLES)?;
-            let selection = Selection {
-                condition: Some(condition.clone()),
-                ..none()
-            };
-            expect(&mut session, &all, selection, |t| {
-                condition.truth(&t.values())
-            })?;
+            let selection = Selection { condition: Some(condition.clone()), ..none() };
+            expect(&mut session, &all, selection, |t| condition.truth(&t.values()))?;
         }
         let three = [all[0].id, all[all.len() / 2].id, all[all.len() - 1].id];
-        let selection = Selection {
-            tets: Some(three.to_vec()),
-            ..none()
-        };
+        let selection = Selection { tets: Some(three.to_vec()), ..none() };
         expect(&mut session, &all, selection, |t| three.contains(&t.id))?;
         assert_eq!(session.tet(three[1])?, bare(&all)[all.len() / 2]);
     }
@@ -78,11 +59,7 @@ fn answers_are_sorted_by_any_variable() -> Outcome {
         all.sort_by(|a, b| {
             let (x, y) = (a.values()[variable], b.values()[variable]);
             let by_value = x.total_cmp(&y);
-            let by_value = if descending {
-                by_value.reverse()
-            } else {
-                by_value
-            };
+            let by_value = if descending { by_value.reverse() } else { by_value };
             by_value.then(a.id.cmp(&b.id))
         });
         assert_eq!(bare(&found), bare(&all));
@@ -104,33 +81,20 @@ fn the_worst_and_the_best_are_found_without_a_look_at_all() -> Outcome {
             ("y > 0.5", false, 1_000_000),
         ] {
             let condition = Expression::parse(text, &VARIABLES)?;
-            let mut expected: Vec<Hit> = all
-                .iter()
-                .copied()
-                .filter(|t| condition.truth(&t.values()))
-                .collect();
+            let mut expected: Vec<Hit> =
+                all.iter().copied().filter(|t| condition.truth(&t.values())).collect();
             let key = |t: &Hit| {
-                if greatest {
-                    -t.shape.quality
-                } else {
-                    t.shape.quality
-                }
+                if greatest { -t.shape.quality } else { t.shape.quality }
             };
             expected.sort_by(|a, b| key(a).total_cmp(&key(b)).then(a.id.cmp(&b.id)));
             expected.truncate(limit);
-            let selection = Selection {
-                condition: Some(condition),
-                ..Selection::default()
-            };
+            let selection = Selection { condition: Some(condition), ..Selection::default() };
             let mut session = made.session(64 << 20)?;
             let found = session.extreme(&selection, greatest, limit)?;
             assert_eq!(bare(&found), bare(&expected), "{text}");
             // A single one is found in the chunk that promises most, but for a promise hardly kept.
             let measures = session.measures();
-            assert!(
-                limit > 1 || measures.tet_chunks_read <= 2,
-                "{text}: {measures:?}"
-            );
+            assert!(limit > 1 || measures.tet_chunks_read <= 2, "{text}: {measures:?}");
         }
     }
     Ok(())
@@ -144,10 +108,7 @@ fn only_chunks_that_matter_are_read() -> Outcome {
     let chunks = session.measures();
     assert!(chunks.tet_chunks >= 4, "{chunks:?}");
     let nowhere = Selection {
-        solids: vec![Solid::Sphere {
-            center: Point::splat(-9.0),
-            radius: 1.0,
-        }],
+        solids: vec![Solid::Sphere { center: Point::splat(-9.0), radius: 1.0 }],
         ..Selection::default()
     };
     assert_eq!(session.select(nowhere)?.count(), 0);
@@ -162,9 +123,6 @@ fn only_chunks_that_matter_are_read() -> Outcome {
     session.locate(&[center])?;
     let read = session.measures();
     assert!(read.tet_chunks_read <= 2, "{read:?}");
-    assert!(
-        read.vertex_chunks_read < chunks.vertex_chunks / 2,
-        "{read:?}"
-    );
+    assert!(read.vertex_chunks_read < chunks.vertex_chunks / 2, "{read:?}");
     Ok(())
 }

@@ -50,25 +50,17 @@ const CELL_BITS: u32 = 17;
 /// An octave and a cell as one number; none for cells too far away from the mesh's corner.
 pub(super) fn key(octave: u32, corner: Point) -> Option<u64> {
     let half = i64::from(1 << (CELL_BITS - 1));
-    corner
-        .to_array()
-        .into_iter()
-        .try_fold(u64::from(octave), |key, c| {
-            let cell = c as i64 + half;
-            (0..2 * half)
-                .contains(&cell)
-                .then_some(key << CELL_BITS | cell as u64)
-        })
+    corner.to_array().into_iter().try_fold(u64::from(octave), |key, c| {
+        let cell = c as i64 + half;
+        (0..2 * half).contains(&cell).then_some(key << CELL_BITS | cell as u64)
+    })
 }
 
 /// The inverse of [`key`].
 pub(super) fn octave_and_corner(key: u64) -> (u32, Point) {
     let half = f64::from(1 << (CELL_BITS - 1));
     let cell = |k: u32| (key >> (k * CELL_BITS) & ((1 << CELL_BITS) - 1)) as f64 - half;
-    (
-        (key >> (3 * CELL_BITS)) as u32,
-        Point::new(cell(2), cell(1), cell(0)),
-    )
+    ((key >> (3 * CELL_BITS)) as u32, Point::new(cell(2), cell(1), cell(0)))
 }
 
 /// All claims of a mesh on grains with room, in the order of grains; none when there is no room at all. `active` learns which pages are
@@ -100,10 +92,7 @@ pub(super) fn gather<P: Pages>(
     if roomy.is_empty() {
         return Ok(None);
     }
-    let vertices = Vertices {
-        field,
-        roomy: &roomy,
-    };
+    let vertices = Vertices { field, roomy: &roomy };
     for batch in parts(dense(mesh.vertex_ids_end())).chunks(BATCH) {
         let found = scan_parts(mesh, batch, &vertices);
         for claim in found.into_iter().flatten() {
@@ -182,9 +171,7 @@ impl Rooms<'_> {
             }
         };
         add((points[0] + points[1] + points[2] + points[3]) * 0.25);
-        let longest = EDGES
-            .into_iter()
-            .max_by(|&e, &f| squared(e).total_cmp(&squared(f)));
+        let longest = EDGES.into_iter().max_by(|&e, &f| squared(e).total_cmp(&squared(f)));
         let [i, j] = longest.expect("a tetrahedron has edges");
         let sizes = [i, j].map(|k| f64::from(sizes[k]));
         if let Some([from, to]) = place.stretch(points[i], points[j], sizes) {
@@ -249,9 +236,7 @@ impl Scan for Faces {
 fn longest_side([a, b, c]: [Point; 3]) -> (Point, Point, Point) {
     let sides = [(b, c, a), (c, a, b), (a, b, c)];
     let squared = |side: &(Point, Point, Point)| (side.0 - side.1).length_squared();
-    let longest = sides
-        .into_iter()
-        .max_by(|s, t| squared(s).total_cmp(&squared(t)));
+    let longest = sides.into_iter().max_by(|s, t| squared(s).total_cmp(&squared(t)));
     longest.expect("a triangle has sides")
 }
 
@@ -264,10 +249,7 @@ struct Lister<'a> {
 
 impl<'a> Lister<'a> {
     fn new(field: &'a Field<'a>) -> Self {
-        Self {
-            field,
-            around: [Around::new(), Around::new()],
-        }
+        Self { field, around: [Around::new(), Around::new()] }
     }
 
     /// What the grain of `p`, where `h` is wanted, learns of a tetrahedron that holds it.
@@ -275,11 +257,7 @@ impl<'a> Lister<'a> {
         let octave = octave(h);
         let at = (p - self.field.bounds.low) / width(octave);
         let corner = self.around[octave as usize & 1].nearest(at, octave).corner;
-        Some(Claim {
-            grain: key(octave, corner)?,
-            tet,
-            at: Payload(p.to_array()),
-        })
+        Some(Claim { grain: key(octave, corner)?, tet, at: Payload(p.to_array()) })
     }
 
     /// What the grains near `p`, where about `h` is wanted, learn: that something is there.
@@ -308,11 +286,7 @@ impl<'a> Lister<'a> {
             }
         }
         let at = Payload(p.to_array());
-        let claim = move |grain| Claim {
-            grain,
-            tet: NONE,
-            at,
-        };
+        let claim = move |grain| Claim { grain, tet: NONE, at };
         grains.into_iter().flatten().map(claim)
     }
 

@@ -49,9 +49,7 @@ pub(super) fn set_in<P: Pages>(
         return Ok(());
     };
     let mut setter = Setter::default();
-    let mut grains = Grains {
-        sorted: sorted.peekable(),
-    };
+    let mut grains = Grains { sorted: sorted.peekable() };
     let with_piece = |claims: Vec<Claim>| (Piece::of(&claims, field), claims);
     let mut at_hand = grains.next().transpose()?.map(with_piece);
     while let Some((piece, claims)) = at_hand.take().filter(|_| !setter.gives_up()) {
@@ -94,9 +92,7 @@ impl<I: Iterator<Item = Result<Claim, StorageError>>> Iterator for Grains<I> {
             };
             let (mut claims, mut n) = (vec![first], 1);
             let is_same = |claim: &Result<Claim, _>| {
-                claim
-                    .as_ref()
-                    .map_or(true, |c: &Claim| c.grain == first.grain)
+                claim.as_ref().map_or(true, |c: &Claim| c.grain == first.grain)
             };
             while let Some(claim) = self.sorted.next_if(is_same) {
                 let claim = match claim {
@@ -136,12 +132,7 @@ mod tests {
         let bounds = Aabb::around([Point::ZERO, Point::ONE]);
         let start = enclose(&mut mesh, &bounds);
         wall_in(&mut mesh);
-        let field = Field {
-            lengths: Lengths::Field,
-            h: &|_| 0.3,
-            place: &Everywhere,
-            bounds,
-        };
+        let field = Field { lengths: Lengths::Field, h: &|_| 0.3, place: &Everywhere, bounds };
         let mut worker = Worker {
             kernel: Kernel::default(),
             order: HilbertFrame::new(&bounds),
@@ -162,10 +153,7 @@ mod tests {
             mesh.set_size(v, 0.3);
         }
         let dir = tempfile::tempdir().expect("a temporary directory");
-        let space = Workspace {
-            dir: &dir.path().into(),
-            memory: 1 << 20,
-        };
+        let space = Workspace { dir: &dir.path().into(), memory: 1 << 20 };
         let gathered =
             claims::gather(&mut mesh, &field, &space, &mut worker.active).expect("room for runs");
         let claims = gathered.expect("there is room in the cube");

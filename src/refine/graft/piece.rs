@@ -154,19 +154,13 @@ impl Piece {
         }
         piece.number_tets();
         piece.choose();
-        piece
-            .parts
-            .iter()
-            .any(|&part| part != NONE)
-            .then_some(piece)
+        piece.parts.iter().any(|&part| part != NONE).then_some(piece)
     }
 
     /// The cell here with the pattern's cell `c`, if it is well inside.
     fn index(&self, c: [i32; 3], beside: i32) -> Option<usize> {
         let at: [i32; 3] = std::array::from_fn(|k| c[k] - self.origin[k]);
-        let inside = at
-            .iter()
-            .all(|&x| (beside..self.side - beside).contains(&x));
+        let inside = at.iter().all(|&x| (beside..self.side - beside).contains(&x));
         inside.then(|| ((at[2] * self.side + at[1]) * self.side + at[0]) as usize)
     }
 
@@ -293,13 +287,7 @@ impl Piece {
                     && open
                     && (self.grain.h - h).abs() <= MISMATCH * h
                     && depth >= MARGIN * self.grain.h;
-                self.places.push(Place {
-                    point,
-                    h: h as f32,
-                    fits,
-                    cell: cell as u32,
-                    number: 0,
-                });
+                self.places.push(Place { point, h: h as f32, fits, cell: cell as u32, number: 0 });
                 self.allowed.push(allowed);
                 n_allowed += usize::from(allowed);
             }
@@ -317,8 +305,7 @@ impl Piece {
             for number in number..number + n {
                 self.places[at].number = number;
                 self.tets.push(self.owners.len() as u32);
-                self.owners
-                    .extend(tets.owned(number).iter().map(|_| at as u32));
+                self.owners.extend(tets.owned(number).iter().map(|_| at as u32));
                 at += 1;
             }
         }
@@ -364,10 +351,7 @@ impl Piece {
         let (owner, k, face) = tet.across[i];
         let owner = self.beside(place, owner)?;
         let tet = self.tets[owner as usize] + u32::from(k);
-        (self.parts[tet as usize] != NONE).then_some(OuterFace {
-            tet,
-            face: usize::from(face),
-        })
+        (self.parts[tet as usize] != NONE).then_some(OuterFace { tet, face: usize::from(face) })
     }
 
     /// How many tetrahedra are numbered, those that are not used among them.

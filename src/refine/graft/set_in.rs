@@ -218,11 +218,7 @@ impl Setter {
             corners.into_iter().any(outer)
         });
         let corners = piece.corners(*t?)?;
-        let middle = corners
-            .iter()
-            .map(|&p| piece.places[p as usize].point)
-            .sum::<Point>()
-            * 0.25;
+        let middle = corners.iter().map(|&p| piece.places[p as usize].point).sum::<Point>() * 0.25;
         find(worker, mesh, middle, claims).map(|located| located.tet)
     }
 

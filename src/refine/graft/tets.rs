@@ -96,10 +96,7 @@ impl PatternTets {
         let starts = (0..=n_points).map(|n| found.partition_point(|f| f.0 < n) as u32);
         let starts: Vec<u32> = starts.collect();
         let tets = found.iter().map(|&(_, t, corners)| {
-            let here = owner(
-                &mesh.tet(t).vertices().map(|v| *vertex(v).expect(NEAR)),
-                &number,
-            );
+            let here = owner(&mesh.tet(t).vertices().map(|v| *vertex(v).expect(NEAR)), &number);
             let across = mesh.tet(t).neighbor.map(|face| {
                 let beyond = mesh.tet(face.tet()).vertices();
                 let beyond = beyond.map(|v| *vertex(v).expect(NEAR));
@@ -118,12 +115,7 @@ impl PatternTets {
             });
             PatternTet { corners, across }
         });
-        Self {
-            tets: tets.collect(),
-            points,
-            starts,
-            stars,
-        }
+        Self { tets: tets.collect(), points, starts, stars }
     }
 }
 
@@ -240,11 +232,7 @@ mod tests {
                             .collect();
                         let mut beyond: Vec<[u64; 3]> = (0..4)
                             .filter(|&j| j != usize::from(face))
-                            .map(|j| {
-                                position(other.corners[j], there)
-                                    .to_array()
-                                    .map(f64::to_bits)
-                            })
+                            .map(|j| position(other.corners[j], there).to_array().map(f64::to_bits))
                             .collect();
                         here.sort_unstable();
                         beyond.sort_unstable();

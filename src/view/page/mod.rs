@@ -44,10 +44,7 @@ impl Page {
     /// Begins the page `out`; surfaces lie within `bounds`. Errors: another ending; a folder that cannot be written.
     pub fn new(out: &Path, title: &str, bounds: Aabb) -> Result<Self> {
         if !is_page(out) {
-            return Err(WriteError::UnknownFormat {
-                path: out.to_owned(),
-                known: ENDINGS,
-            });
+            return Err(WriteError::UnknownFormat { path: out.to_owned(), known: ENDINGS });
         }
         let mut file = TextFile::new(out)?;
         file.line("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">")?;
@@ -64,15 +61,13 @@ impl Page {
     /// Adds a surface under a name. Errors: the disk.
     pub fn surface(&mut self, name: &str, surface: &Surface) -> Result<()> {
         let text = pack::pack(surface, &self.bounds);
-        self.file.line(&format!(
-            "<script type=\"text/plain\" id=\"surface-{name}\">{text}</script>"
-        ))
+        self.file
+            .line(&format!("<script type=\"text/plain\" id=\"surface-{name}\">{text}</script>"))
     }
 
     /// Adds the data about the mesh, and the program; returns the file's length. Errors: the disk.
     pub fn finish(mut self, data: &serde_json::Value) -> Result<u64> {
-        self.file
-            .line("<script type=\"application/json\" id=\"data\">")?;
+        self.file.line("<script type=\"application/json\" id=\"data\">")?;
         self.file.line(&inert(&data.to_string()))?;
         self.file.line("</script>")?;
         for part in PROGRAM {
@@ -89,9 +84,7 @@ fn inert(json: &str) -> String {
 }
 
 fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 #[cfg(test)]
@@ -103,10 +96,7 @@ mod tests {
     fn a_name_cannot_break_out_of_the_page() {
         let dir = tempfile::tempdir().expect("a temporary folder");
         let out = dir.path().join("a.html");
-        let bounds = Aabb {
-            low: Point::ZERO,
-            high: Point::ONE,
-        };
+        let bounds = Aabb { low: Point::ZERO, high: Point::ONE };
         let name = "</script><script>alert(1)</script><!--";
         let page = Page::new(&out, name, bounds).expect("the folder is there");
         let data = serde_json::json!({ "title": name });
@@ -116,10 +106,7 @@ mod tests {
         assert!(!text.contains("alert(1)</script>") && !text.contains("<!--"));
         let json = text.split("id=\"data\">").nth(1).expect("the data");
         let json = json.split("</script>").next().expect("its end");
-        assert_eq!(
-            serde_json::from_str::<serde_json::Value>(json).ok(),
-            Some(data)
-        );
+        assert_eq!(serde_json::from_str::<serde_json::Value>(json).ok(), Some(data));
         for other in ["a.txt", "html"] {
             assert!(Page::new(&dir.path().join(other), "", bounds).is_err());
         }

@@ -44,9 +44,7 @@ pub(super) fn pack(surface: &Surface, bounds: &Aabb) -> String {
     let mut last = [0; 3];
     for &p in surface.points {
         let share = (p - bounds.low) / side;
-        let at = share
-            .to_array()
-            .map(|x| (x * STEPS).round().clamp(0.0, STEPS) as i32);
+        let at = share.to_array().map(|x| (x * STEPS).round().clamp(0.0, STEPS) as i32);
         for (now, before) in at.into_iter().zip(last) {
             out.difference(now - before);
         }
@@ -77,11 +75,7 @@ fn base64(bytes: &[u8]) -> String {
             three.iter().fold(0, |word, &b| word << 8 | u32::from(b)) << (8 * (3 - three.len()));
         for k in 0..4 {
             let letter = LETTERS[(word >> (18 - 6 * k) & 63) as usize];
-            text.push(if k <= three.len() {
-                letter as char
-            } else {
-                '='
-            });
+            text.push(if k <= three.len() { letter as char } else { '=' });
         }
     }
     text
@@ -93,13 +87,9 @@ mod tests {
 
     #[test]
     fn base_64_is_that_of_the_standard() {
-        for (bytes, text) in [
-            ("", ""),
-            ("f", "Zg=="),
-            ("fo", "Zm8="),
-            ("foo", "Zm9v"),
-            ("foobar", "Zm9vYmFy"),
-        ] {
+        for (bytes, text) in
+            [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foobar", "Zm9vYmFy")]
+        {
             assert_eq!(base64(bytes.as_bytes()), text);
         }
     }
@@ -112,10 +102,7 @@ mod tests {
             triangles: &[[0, 1, 2], [2, 1, 3]],
             channels: &[vec![7, 7], vec![0, 300]],
         };
-        let bounds = Aabb {
-            low: Point::ZERO,
-            high: Point::ONE,
-        };
+        let bounds = Aabb { low: Point::ZERO, high: Point::ONE };
         let up = [254, 255, 7];
         let down = [253, 255, 7];
         let bytes = [

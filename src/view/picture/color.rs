@@ -43,11 +43,7 @@ pub fn scale(share: f64) -> Rgb {
 pub fn category(n: u32) -> Rgb {
     let hue = (f64::from(n) * 0.618_033_988_749_895 + 0.58).fract() * 6.0;
     // Every other round of hues is darker.
-    let (light, gray) = if (n / 7).is_multiple_of(2) {
-        (225.0, 0.42)
-    } else {
-        (175.0, 0.35)
-    };
+    let (light, gray) = if (n / 7).is_multiple_of(2) { (225.0, 0.42) } else { (175.0, 0.35) };
     Rgb([5.0, 3.0, 1.0].map(|shift| {
         let k = (shift + hue) % 6.0;
         let dip = f64::min(k, 4.0 - k).clamp(0.0, 1.0);

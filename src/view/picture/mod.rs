@@ -18,11 +18,7 @@ use crate::io::write::WriteError;
 type Result<T> = std::result::Result<T, WriteError>;
 
 /// Endings of the formats.
-pub const ENDINGS: &str = if cfg!(feature = "pictures") {
-    ".png or .svg"
-} else {
-    ".svg"
-};
+pub const ENDINGS: &str = if cfg!(feature = "pictures") { ".png or .svg" } else { ".svg" };
 
 /// Share of the picture left free on each side.
 const MARGIN: f64 = 0.04;
@@ -86,10 +82,7 @@ impl Picture {
             "png" => Canvas::Png(png::Png::new(out, frame.pixels)?),
             "svg" => Canvas::Svg(svg::Svg::new(out, frame.pixels)?),
             _ => {
-                return Err(WriteError::UnknownFormat {
-                    path: out.to_owned(),
-                    known: ENDINGS,
-                });
+                return Err(WriteError::UnknownFormat { path: out.to_owned(), known: ENDINGS });
             }
         };
         let [width, height] = frame.pixels.map(f64::from);
@@ -183,12 +176,7 @@ impl Picture {
         let corner =
             |t: f64, side: f64| [0, 1].map(|k| point[k] + direction[k] * t + across[k] * side);
         let (from, to) = (from - more, to + more);
-        let corners = [
-            corner(from, -1.0),
-            corner(to, -1.0),
-            corner(to, 1.0),
-            corner(from, 1.0),
-        ];
+        let corners = [corner(from, -1.0), corner(to, -1.0), corner(to, 1.0), corner(from, 1.0)];
         let line = self.line.take();
         let drawn = self.polygon(&corners, Rgb([10; 3]));
         self.line = line;

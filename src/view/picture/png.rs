@@ -30,11 +30,7 @@ impl Png {
             found: u64::from(width) * u64::from(height),
         })?;
         pixels.fill(Color::WHITE);
-        Ok(Self {
-            out: out.to_owned(),
-            pixels,
-            heights: Vec::new(),
-        })
+        Ok(Self { out: out.to_owned(), pixels, heights: Vec::new() })
     }
 
     pub fn polygon(&mut self, corners: &[[f32; 2]], color: Rgb, line: Option<f32>) {
@@ -47,18 +43,12 @@ impl Png {
         // Smooth edges would let the background through between neighbors.
         paint.anti_alias = false;
         let whole = Transform::identity();
-        self.pixels
-            .fill_path(&outline, &paint, FillRule::EvenOdd, whole, None);
+        self.pixels.fill_path(&outline, &paint, FillRule::EvenOdd, whole, None);
         if let Some(width) = line {
             let mut paint = Paint::default();
             paint.set_color_rgba8(30, 30, 30, 220);
-            let stroke = Stroke {
-                width,
-                line_join: LineJoin::Round,
-                ..Stroke::default()
-            };
-            self.pixels
-                .stroke_path(&outline, &paint, &stroke, whole, None);
+            let stroke = Stroke { width, line_join: LineJoin::Round, ..Stroke::default() };
+            self.pixels.stroke_path(&outline, &paint, &stroke, whole, None);
         }
     }
 
@@ -89,10 +79,7 @@ impl Png {
         let range = |axis: usize, end: usize| {
             let [x, y, z] = corners.map(|p| p[axis]);
             let (from, to) = (x.min(y).min(z) - 0.5, x.max(y).max(z) - 0.5);
-            (
-                from.ceil().max(0.0) as usize,
-                ((to.floor() + 1.0).max(0.0) as usize).min(end),
-            )
+            (from.ceil().max(0.0) as usize, ((to.floor() + 1.0).max(0.0) as usize).min(end))
         };
         let ((left, right), (top, foot)) = (range(0, width), range(1, height));
         let half = line.map(|w| 0.5 * f64::from(w.max(0.8)));
@@ -111,9 +98,7 @@ impl Png {
                     continue;
                 }
                 self.heights[at] = z;
-                let from_side = (0..3)
-                    .map(|k| shares[k] * over[k])
-                    .fold(f64::INFINITY, f64::min);
+                let from_side = (0..3).map(|k| shares[k] * over[k]).fold(f64::INFINITY, f64::min);
                 let edge = half.map_or(0.0, |half| (half + 0.5 - from_side).clamp(0.0, 1.0));
                 let (ink, most) = EDGE;
                 let share = edge * most;
@@ -151,17 +136,9 @@ mod tests {
 
     #[test]
     fn what_is_nearer_hides_what_is_farther_in_any_order() {
-        let near = (
-            [[2.0, 2.0], [30.0, 4.0], [6.0, 28.0]],
-            [3.0, 3.0, 3.0],
-            Rgb([200, 0, 0]),
-        );
+        let near = ([[2.0, 2.0], [30.0, 4.0], [6.0, 28.0]], [3.0, 3.0, 3.0], Rgb([200, 0, 0]));
         // Comes out of the near one on the left.
-        let far = (
-            [[0.0, 0.0], [31.0, 0.0], [0.0, 31.0]],
-            [9.0, -9.0, 2.0],
-            Rgb([0, 200, 0]),
-        );
+        let far = ([[0.0, 0.0], [31.0, 0.0], [0.0, 31.0]], [9.0, -9.0, 2.0], Rgb([0, 200, 0]));
         let draw = |order: [_; 2]| {
             let mut png = Png::new(Path::new("a.png"), [32, 32]).expect("a small picture");
             for (corners, heights, color) in order {
@@ -190,12 +167,7 @@ mod tests {
             })
             .collect();
         for k in 0..12 {
-            png.solid(
-                [middle, rim[k], rim[(k + 1) % 12]],
-                [0.0; 3],
-                Rgb([0; 3]),
-                None,
-            );
+            png.solid([middle, rim[k], rim[(k + 1) % 12]], [0.0; 3], Rgb([0; 3]), None);
         }
         for (x, y) in (0..64).flat_map(|x| (0..64).map(move |y| (x, y))) {
             let from = (f64::from(x) + 0.5 - middle[0]).hypot(f64::from(y) + 0.5 - middle[1]);

@@ -26,10 +26,7 @@ impl Svg {
         color: Rgb,
         line: Option<f32>,
     ) -> Result<(), WriteError> {
-        let points: Vec<String> = corners
-            .iter()
-            .map(|[x, y]| format!("{x:.2},{y:.2}"))
-            .collect();
+        let points: Vec<String> = corners.iter().map(|[x, y]| format!("{x:.2},{y:.2}")).collect();
         let Rgb([r, g, b]) = color;
         // Without edges of their own, edges of the same color close the seams.
         let stroke = match line {

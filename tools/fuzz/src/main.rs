@@ -33,10 +33,7 @@ const INPUT_FILE: &str = "TETDB_FUZZ_INPUT";
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let number = |i: usize, default: u64| {
-        arguments
-            .get(i)
-            .and_then(|word| word.parse().ok())
-            .unwrap_or(default)
+        arguments.get(i).and_then(|word| word.parse().ok()).unwrap_or(default)
     };
     let wanted = arguments.first().map_or("all", String::as_str);
     if let Some(file) = arguments.get(1).filter(|word| Path::new(word).is_file()) {
@@ -48,10 +45,7 @@ fn main() -> ExitCode {
         PathBuf::from,
     );
     let mut found = 0;
-    for target in TARGETS
-        .iter()
-        .filter(|t| wanted == "all" || t.name == wanted)
-    {
+    for target in TARGETS.iter().filter(|t| wanted == "all" || t.name == wanted) {
         let folder = corpus.join(target.name);
         let time = Duration::from_secs(seconds);
         let is_apart = APART.contains(&target.name) && std::env::var_os(INPUT_FILE).is_none();
@@ -72,14 +66,10 @@ fn main() -> ExitCode {
 
 /// Feeds one input.
 fn again(wanted: &str, file: &Path) -> ExitCode {
-    let (Some(target), Ok(input)) = (
-        TARGETS.iter().find(|t| t.name == wanted),
-        std::fs::read(file),
-    ) else {
-        eprintln!(
-            "{wanted}: no such target, or {} cannot be read",
-            file.display()
-        );
+    let (Some(target), Ok(input)) =
+        (TARGETS.iter().find(|t| t.name == wanted), std::fs::read(file))
+    else {
+        eprintln!("{wanted}: no such target, or {} cannot be read", file.display());
         return ExitCode::from(2);
     };
     let (ended, took) = timed(target, &input);

@@ -166,14 +166,8 @@ impl Mutator {
             7 | 8 => {
                 // A word of text in place of the one here.
                 let is_text = |b: &u8| !b.is_ascii_whitespace();
-                let start = input[..at]
-                    .iter()
-                    .rposition(|b| !is_text(b))
-                    .map_or(0, |i| i + 1);
-                let end = input[at..]
-                    .iter()
-                    .position(|b| !is_text(b))
-                    .map_or(n, |i| at + i);
+                let start = input[..at].iter().rposition(|b| !is_text(b)).map_or(0, |i| i + 1);
+                let end = input[at..].iter().position(|b| !is_text(b)).map_or(n, |i| at + i);
                 let word = WORDS[self.below(WORDS.len())];
                 if end - start < 40 {
                     input.splice(start..end, word.bytes());

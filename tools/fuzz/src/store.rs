@@ -44,12 +44,8 @@ enum Made {
     Begun,
 }
 
-const MADE: [Made; 4] = [
-    Made::Whole(Seal::Packed),
-    Made::Whole(Seal::None),
-    Made::Divided,
-    Made::Begun,
-];
+const MADE: [Made; 4] =
+    [Made::Whole(Seal::Packed), Made::Whole(Seal::None), Made::Divided, Made::Begun];
 
 fn settings() -> Settings {
     Settings::default().threads(1).memory(Bytes(MEMORY))
@@ -95,11 +91,7 @@ fn sound(made: Made) -> Sound {
             let token = CancelToken::new();
             let cancelled = token.clone();
             let ending = settings().cancel(&token).progress(move |event| {
-                if let Event::Progress {
-                    stage: "divide edges",
-                    ..
-                } = event
-                {
+                if let Event::Progress { stage: "divide edges", .. } = event {
                     cancelled.cancel();
                 }
             });
@@ -111,11 +103,7 @@ fn sound(made: Made) -> Sound {
     let mut files = entries(&path);
     files.retain(|path| path.extension().is_some_and(|e| e == "redb"));
     let read = |path: PathBuf| (path.clone(), std::fs::read(path).expect("readable"));
-    Sound {
-        path,
-        files: files.into_iter().map(read).collect(),
-        dir,
-    }
+    Sound { path, files: files.into_iter().map(read).collect(), dir }
 }
 
 /// Meshes a box into sub-domains far smaller than those of the front door.
@@ -123,16 +111,10 @@ fn divided(path: &Path) {
     let surface = tetdb::samples::SampleSpec::parse("box,h=0.2").and_then(|spec| spec.make());
     let options = Options {
         subdomains: Some("4".to_owned()),
-        trial: Trial {
-            subdomains_small: true,
-            ..Trial::default()
-        },
+        trial: Trial { subdomains_small: true, ..Trial::default() },
         ..Options::default()
     };
-    let job = Job {
-        options: "{}".to_owned(),
-        ..Job::default()
-    };
+    let job = Job { options: "{}".to_owned(), ..Job::default() };
     let mut catalog = Catalog::create(path, &job).expect("a new store");
     let surface = surface.expect("a box").into();
     let budget = Budget::new(MEMORY);
@@ -214,10 +196,7 @@ fn put(content: &mut Vec<u8>, at: usize, change: &[u8]) {
     match change[7] % 8 {
         0..=2 => content[at] ^= 1 << (change[6] % 8),
         3..=5 => content[at] = change[6],
-        6 => content[at..]
-            .iter_mut()
-            .take(8)
-            .for_each(|b| *b = change[6]),
+        6 => content[at..].iter_mut().take(8).for_each(|b| *b = change[6]),
         _ => content.truncate(at),
     }
 }

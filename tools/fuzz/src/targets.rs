@@ -35,19 +35,11 @@ pub struct Target {
 }
 
 const fn reader(name: &'static str, format: Format, run: fn(&[u8])) -> Target {
-    Target {
-        name,
-        format: Some(format),
-        run,
-    }
+    Target { name, format: Some(format), run }
 }
 
 const fn text(name: &'static str, run: fn(&[u8])) -> Target {
-    Target {
-        name,
-        format: None,
-        run,
-    }
+    Target { name, format: None, run }
 }
 
 pub const TARGETS: &[Target] = &[
@@ -56,44 +48,18 @@ pub const TARGETS: &[Target] = &[
     reader("obj", Format::Obj, |bytes| read(Format::Obj, bytes)),
     reader("ply", Format::Ply, |bytes| read(Format::Ply, bytes)),
     reader("medit", Format::Medit, |bytes| read(Format::Medit, bytes)),
-    reader("meditb", Format::MeditBinary, |bytes| {
-        read(Format::MeditBinary, bytes)
-    }),
+    reader("meditb", Format::MeditBinary, |bytes| read(Format::MeditBinary, bytes)),
     reader("gmsh", Format::Gmsh, |bytes| read(Format::Gmsh, bytes)),
-    reader("smesh", Format::TetgenSmesh, |bytes| {
-        read(Format::TetgenSmesh, bytes)
-    }),
-    reader("poly", Format::TetgenPoly, |bytes| {
-        read(Format::TetgenPoly, bytes)
-    }),
+    reader("smesh", Format::TetgenSmesh, |bytes| read(Format::TetgenSmesh, bytes)),
+    reader("poly", Format::TetgenPoly, |bytes| read(Format::TetgenPoly, bytes)),
     text("expr", expression),
     text("config", config),
     text("option", option),
-    Target {
-        name: "page",
-        format: None,
-        run: page,
-    },
-    Target {
-        name: "leaf",
-        format: None,
-        run: leaf,
-    },
-    Target {
-        name: "chunk",
-        format: None,
-        run: chunk,
-    },
-    Target {
-        name: "file",
-        format: None,
-        run: crate::file::changed,
-    },
-    Target {
-        name: "store",
-        format: None,
-        run: crate::store::changed,
-    },
+    Target { name: "page", format: None, run: page },
+    Target { name: "leaf", format: None, run: leaf },
+    Target { name: "chunk", format: None, run: chunk },
+    Target { name: "file", format: None, run: crate::file::changed },
+    Target { name: "store", format: None, run: crate::store::changed },
 ];
 
 /// An expression of sizes or of a query: parsed, and its value at some points.
@@ -131,10 +97,7 @@ fn config(bytes: &[u8]) {
     let _ = (options.region_policy(), options.optimize_mode());
     // What a store has on record comes back as it was.
     let recorded = serde_json::to_string(&options).expect("options are text");
-    assert_eq!(
-        serde_json::from_str::<Options>(&recorded).ok(),
-        Some(options)
-    );
+    assert_eq!(serde_json::from_str::<Options>(&recorded).ok(), Some(options));
 }
 
 /// One option as typed; the first byte says which.
@@ -177,14 +140,8 @@ fn read(format: Format, bytes: &[u8]) {
 }
 
 fn page(bytes: &[u8]) {
-    let kind = kind::ALL[bytes
-        .first()
-        .map_or(0, |&b| usize::from(b) % kind::ALL.len())];
-    let address = PageAddress {
-        kind,
-        subdomain: 3,
-        page: 7,
-    };
+    let kind = kind::ALL[bytes.first().map_or(0, |&b| usize::from(b) % kind::ALL.len())];
+    let address = PageAddress { kind, subdomain: 3, page: 7 };
     let mut frame: Box<Frame> = Box::new([Default::default(); SLOTS]);
     // As it is: wrong in length or checksum.
     assert!(open_page(bytes, address, &mut frame[..]).is_err());
@@ -230,11 +187,7 @@ fn leaf_records<R: PageRecord>(bytes: &[u8]) {
     let sealed = |kind: PageKind, page: u32, content: &[u8]| {
         let mut frame: Box<Frame> = Box::new([Default::default(); SLOTS]);
         bytemuck::cast_slice_mut(&mut frame[..SLOTS - 1]).copy_from_slice(content);
-        let address = PageAddress {
-            kind,
-            subdomain: 5,
-            page,
-        };
+        let address = PageAddress { kind, subdomain: 5, page };
         seal_full_page(&mut frame[..], address, 2, count);
         bytemuck::cast_slice::<_, u8>(&frame[..SLOTS - 1]).to_vec()
     };
@@ -247,10 +200,7 @@ fn leaf_records<R: PageRecord>(bytes: &[u8]) {
     let mut records: Vec<R> = Vec::new();
     let first = decoder.records(PAGE, &mut records);
     assert!(records.len() <= count as usize);
-    assert_eq!(
-        first.is_ok(),
-        records.len() == count as usize && (1..=2046).contains(&count)
-    );
+    assert_eq!(first.is_ok(), records.len() == count as usize && (1..=2046).contains(&count));
 }
 
 fn chunk(bytes: &[u8]) {
@@ -276,12 +226,7 @@ fn chunk(bytes: &[u8]) {
 /// Four bytes of count, four of the first number, then columns.
 fn records<R: ChunkRecord>(bytes: &[u8]) {
     let mut decoder = Decoder::<R>::new().expect("a zstd context");
-    let address = ChunkAddress {
-        kind: R::KIND,
-        subdomain: 5,
-        generation: 2,
-        chunk: 0,
-    };
+    let address = ChunkAddress { kind: R::KIND, subdomain: 5, generation: 2, chunk: 0 };
     let mut found: Vec<R> = Vec::new();
     let mut decode = |value: &[u8]| {
         let first = decoder.decode(value, address, &mut found);
@@ -298,11 +243,7 @@ fn records<R: ChunkRecord>(bytes: &[u8]) {
     // Compressed and headed as an encoder does it; then the same with the bytes themselves for a payload.
     let packed = zstd::bulk::compress(raw, 1).expect("zstd has room");
     for payload in [&packed[..], raw] {
-        decode(&headed(
-            R::KIND,
-            [first, count, payload.len() as u32, raw.len() as u32],
-            payload,
-        ));
+        decode(&headed(R::KIND, [first, count, payload.len() as u32, raw.len() as u32], payload));
     }
 }
 

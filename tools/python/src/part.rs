@@ -89,18 +89,14 @@ impl Part {
     fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         self.rows(py, (self.n_vertices, 3), |part, out, token| {
             let chunks = part.vertex_chunks();
-            decode(chunks, (out, 3), token, |v, row| {
-                row.copy_from_slice(&v.point)
-            })
+            decode(chunks, (out, 3), token, |v, row| row.copy_from_slice(&v.point))
         })
     }
 
     fn vertex_ids<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<i64>>> {
         self.rows(py, (self.n_vertices, 1), |part, out, token| {
             let chunks = part.vertex_chunks();
-            decode(chunks, (out, 1), token, |v, row| {
-                row[0] = v.id.cast_signed()
-            })
+            decode(chunks, (out, 1), token, |v, row| row[0] = v.id.cast_signed())
         })
     }
 
@@ -114,18 +110,14 @@ impl Part {
     fn tets<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<i32>>> {
         self.rows(py, (self.n_tets, 4), |part, out, token| {
             let chunks = part.tet_chunks();
-            decode(chunks, (out, 4), token, |tet, row| {
-                row.copy_from_slice(&signed(tet.nodes))
-            })
+            decode(chunks, (out, 4), token, |tet, row| row.copy_from_slice(&signed(tet.nodes)))
         })
     }
 
     fn regions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<i32>>> {
         self.rows(py, (self.n_tets, 1), |part, out, token| {
             let chunks = part.tet_chunks();
-            decode(chunks, (out, 1), token, |tet, row| {
-                row[0] = tet.region.cast_signed()
-            })
+            decode(chunks, (out, 1), token, |tet, row| row[0] = tet.region.cast_signed())
         })
     }
 

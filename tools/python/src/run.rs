@@ -107,10 +107,7 @@ pub fn mesh(
         .existing(existing)
         .verify(verify)
         .coarse_only(coarse_only);
-    let listener = Listener {
-        board: &board,
-        callable: callable.as_ref(),
-    };
+    let listener = Listener { board: &board, callable: callable.as_ref() };
     let work = || mesher.create_unfinished(path).map_err(Failure::from);
     watched(py, &token, Some(&listener), work)
 }
@@ -125,15 +122,8 @@ pub fn resume(
 ) -> PyResult<()> {
     let (token, board) = (CancelToken::new(), Arc::new(Board::default()));
     let settings = settings.settings(&token, Some(&board));
-    let listener = Listener {
-        board: &board,
-        callable: callable.as_ref(),
-    };
-    let work = || {
-        Store::resume(path, settings)
-            .map(drop)
-            .map_err(Failure::from)
-    };
+    let listener = Listener { board: &board, callable: callable.as_ref() };
+    let work = || Store::resume(path, settings).map(drop).map_err(Failure::from);
     watched(py, &token, Some(&listener), work)
 }
 

@@ -20,11 +20,8 @@ pub fn length((value, is_percent): LengthWords) -> Length {
 type ShapeWords = (String, Vec<f64>, LengthWords, Option<LengthWords>);
 
 /// Points, tetrahedra and a length at each point.
-type FieldWords<'py> = (
-    PyReadonlyArray2<'py, f64>,
-    PyReadonlyArray2<'py, u32>,
-    PyReadonlyArray1<'py, f64>,
-);
+type FieldWords<'py> =
+    (PyReadonlyArray2<'py, f64>, PyReadonlyArray2<'py, u32>, PyReadonlyArray1<'py, f64>);
 
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]

@@ -119,10 +119,7 @@ impl Store {
         work: impl FnOnce(tetdb::Store) -> Result<(), Failure> + Send,
     ) -> PyResult<()> {
         let (token, board) = (CancelToken::new(), Arc::new(Board::default()));
-        let listener = Listener {
-            board: &board,
-            callable,
-        };
+        let listener = Listener { board: &board, callable };
         watched(py, &token, Some(&listener), || {
             let mut session = self.session.lock().unwrap_or_else(PoisonError::into_inner);
             *session = None;
@@ -247,15 +244,11 @@ impl Store {
         let points: Vec<[f64; 3]> = bytemuck::cast_slice(points.as_slice()?).to_vec();
         let located = self.in_session(py, |store| Ok(store.locate_barycentric(&points)?))?;
         let id = |found: &Option<(Hit, _)>| {
-            found
-                .as_ref()
-                .map_or(-1, |(hit, _)| hit.id.number().cast_signed())
+            found.as_ref().map_or(-1, |(hit, _)| hit.id.number().cast_signed())
         };
         let ids = PyArray1::from_vec(py, located.iter().map(id).collect());
         let none = [f64::NAN; 4];
-        let shares = located
-            .iter()
-            .flat_map(|found| found.map_or(none, |(_, shares)| shares));
+        let shares = located.iter().flat_map(|found| found.map_or(none, |(_, shares)| shares));
         let shares = PyArray1::from_vec(py, shares.collect());
         Ok((ids, shares.reshape([located.len(), 4])?))
     }
@@ -268,9 +261,8 @@ impl Store {
         words: ExportWords,
     ) -> PyResult<Vec<(PathBuf, u64)>> {
         self.alone(py, |store| {
-            let mut options = ExportOptions::new()
-                .subdomains(&words.subdomains)
-                .regions(&words.regions);
+            let mut options =
+                ExportOptions::new().subdomains(&words.subdomains).regions(&words.regions);
             if words.is_second_order {
                 options = options.second_order();
             }
@@ -368,9 +360,7 @@ impl Store {
     }
 
     fn forget_previous(&self, py: Python<'_>) -> PyResult<()> {
-        self.changed(py, None, |mut store| {
-            Ok(store.forget_previous().map(drop)?)
-        })
+        self.changed(py, None, |mut store| Ok(store.forget_previous().map(drop)?))
     }
 }
 

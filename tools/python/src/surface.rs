@@ -92,12 +92,8 @@ impl Surface {
     fn check<'py>(
         &self,
         py: Python<'py>,
-    ) -> PyResult<(
-        String,
-        Vec<&'static str>,
-        Bound<'py, PyArray2<i64>>,
-        Bound<'py, PyArray2<f64>>,
-    )> {
+    ) -> PyResult<(String, Vec<&'static str>, Bound<'py, PyArray2<i64>>, Bound<'py, PyArray2<f64>>)>
+    {
         let work = || Ok(self.inner.check()?);
         let report = watched(py, &CancelToken::new(), None, work)?;
         let words = json!({
@@ -124,9 +120,7 @@ impl Surface {
     }
 
     fn refined(&self, py: Python<'_>, hsiz: (f64, bool)) -> PyResult<Self> {
-        made(py, || {
-            tetdb::Surface::clone(&self.inner).refined(length(hsiz))
-        })
+        made(py, || tetdb::Surface::clone(&self.inner).refined(length(hsiz)))
     }
 
     fn embedded(&self, py: Python<'_>, sheet: &Surface, name: String) -> PyResult<Self> {
@@ -174,10 +168,9 @@ impl Surface {
     ) -> PyResult<Self> {
         let given = match points {
             PointsGiven::File(file) => Err(file),
-            PointsGiven::Arrays(points, labels) => Ok((
-                bytemuck::cast_slice::<_, [f64; 3]>(points.as_slice()?).to_vec(),
-                labels,
-            )),
+            PointsGiven::Arrays(points, labels) => {
+                Ok((bytemuck::cast_slice::<_, [f64; 3]>(points.as_slice()?).to_vec(), labels))
+            }
         };
         made(py, || {
             let surface = self.to_embed_in(divides);
@@ -211,11 +204,7 @@ impl Surface {
 #[derive(FromPyObject)]
 pub enum EdgesGiven<'py> {
     File(PathBuf),
-    Arrays(
-        PyReadonlyArray2<'py, f64>,
-        PyReadonlyArray2<'py, u32>,
-        Option<Vec<String>>,
-    ),
+    Arrays(PyReadonlyArray2<'py, f64>, PyReadonlyArray2<'py, u32>, Option<Vec<String>>),
 }
 
 /// A file, or points and a label for each.

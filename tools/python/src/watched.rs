@@ -54,12 +54,9 @@ impl Listener<'_> {
         };
         for event in events {
             match event {
-                Event::Progress {
-                    stage,
-                    done,
-                    total,
-                    unit,
-                } => callable.call1(py, ("progress", stage, done, total, unit))?,
+                Event::Progress { stage, done, total, unit } => {
+                    callable.call1(py, ("progress", stage, done, total, unit))?
+                }
                 Event::Note(text) => say(py, callable, "note", &text)?,
                 Event::Warning(text) => say(py, callable, "warning", &text)?,
                 Event::StoreBegun(path) => say(py, callable, "store", &path.to_string_lossy())?,

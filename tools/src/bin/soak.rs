@@ -53,14 +53,10 @@ fn args() -> Option<Args> {
 /// The first item that has no line yet.
 fn first_item(args: &Args) -> u64 {
     let text = std::fs::read_to_string(&args.results).unwrap_or_default();
-    let lines = text
-        .lines()
-        .filter_map(|l| serde_json::from_str::<Value>(l).ok());
+    let lines = text.lines().filter_map(|l| serde_json::from_str::<Value>(l).ok());
     let ours = lines
         .filter(|l| l["mode"] == args.mode && l["seed"] == args.seed && l["model"] == args.model);
-    ours.filter_map(|l| l["item"].as_u64())
-        .max()
-        .map_or(0, |last| last + 1)
+    ours.filter_map(|l| l["item"].as_u64()).max().map_or(0, |last| last + 1)
 }
 
 fn main() -> ExitCode {
@@ -94,10 +90,7 @@ fn main() -> ExitCode {
             "mode": args.mode, "model": args.model, "seed": args.seed, "item": item, "counts": counts, "wrong": wrong,
             "seconds": clock.elapsed().as_secs_f64(),
         });
-        let file = OpenOptions::new()
-            .create(true)
-            .append(true)
-            .open(&args.results);
+        let file = OpenOptions::new().create(true).append(true).open(&args.results);
         if let Err(e) = file.and_then(|mut f| writeln!(f, "{line}")) {
             eprintln!("{}: {e}", args.results.display());
             return ExitCode::from(2);

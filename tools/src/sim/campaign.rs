@@ -96,12 +96,7 @@ impl Case {
         let digests = self.digests(&disk).expect("a sound disk");
         assert_ne!(digests[0], reference.digests[0], "the change changes");
         assert_eq!(digests[1], reference.digests[1], "interfaces stay");
-        Changed {
-            whole,
-            digests,
-            calls,
-            boundaries,
-        }
+        Changed { whole, digests, calls, boundaries }
     }
 
     /// Changes the finished store with `trouble`, then again on the sound disk. Errors: what was wrong: a store in between, or another mesh.

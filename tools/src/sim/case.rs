@@ -39,19 +39,11 @@ impl Case {
             subdomains: Some(subdomains.to_string()),
             trial: Trial {
                 subdomains_small: true,
-                plan: Some(Plan {
-                    frames: 1 << 20,
-                    redb: 512 << 10,
-                    buffers: 128 << 10,
-                }),
+                plan: Some(Plan { frames: 1 << 20, redb: 512 << 10, buffers: 128 << 10 }),
             },
             ..Options::default()
         };
-        Self {
-            surface: surface.expect("a sample").into(),
-            options,
-            budget: 128 << 20,
-        }
+        Self { surface: surface.expect("a sample").into(), options, budget: 128 << 20 }
     }
 
     /// The one all campaigns use.
@@ -103,11 +95,7 @@ impl Case {
             beta: self.options.sizes().expect("no options, no errors").beta(),
             asked: "{}".to_owned(),
         };
-        let what = Resaturation {
-            ranks: [2, 5].into(),
-            sizes: Some(sizes),
-            repair: false,
-        };
+        let what = Resaturation { ranks: [2, 5].into(), sizes: Some(sizes), repair: false };
         let mut catalog = Catalog::open_writable(self.store(disk))?;
         let budget = Budget::new(self.budget);
         pipeline::resaturate(&mut catalog, &self.options, &what, &budget, &silent)?;
@@ -168,27 +156,17 @@ impl Case {
         let mut told = [Digest::default(); 2];
         for row in rows {
             told[0].merge(&Digest { lanes: row.digest });
-            told[1].merge(&Digest {
-                lanes: row.interface_digest,
-            });
+            told[1].merge(&Digest { lanes: row.interface_digest });
         }
         if found.map(|d| d.to_string()) != told.map(|d| d.to_string()) {
-            return Err(content(
-                &path,
-                0,
-                "a sealed sub-domain has another digest".into(),
-            ));
+            return Err(content(&path, 0, "a sealed sub-domain has another digest".into()));
         }
         Ok(state)
     }
 }
 
 fn content(path: &DiskPath, subdomain: u32, what: String) -> StoreError {
-    StoreError::Sealed(SealedError::Content {
-        path: path.path().to_owned(),
-        subdomain,
-        what,
-    })
+    StoreError::Sealed(SealedError::Content { path: path.path().to_owned(), subdomain, what })
 }
 
 /// Whether a page or chunk matches its checksum.

@@ -34,9 +34,7 @@ impl Content {
 
     /// Reads what is within the file; returns how many bytes that is.
     pub fn read(&self, offset: u64, out: &mut [u8]) -> usize {
-        let n = out
-            .len()
-            .min(self.len.saturating_sub(offset).try_into().unwrap_or(0));
+        let n = out.len().min(self.len.saturating_sub(offset).try_into().unwrap_or(0));
         let mut done = 0;
         while done < n {
             let at = offset as usize + done;

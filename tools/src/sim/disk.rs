@@ -22,17 +22,11 @@ impl SimDisk {
     /// An empty disk: only the folder `/`.
     pub fn new() -> Arc<Self> {
         let names = BTreeMap::from([(PathBuf::from("/"), Node::Folder)]);
-        Self::with(State {
-            names_synced: names.clone(),
-            names,
-            ..State::default()
-        })
+        Self::with(State { names_synced: names.clone(), names, ..State::default() })
     }
 
     pub(super) fn with(state: State) -> Arc<Self> {
-        Arc::new(Self {
-            state: Mutex::new(state),
-        })
+        Arc::new(Self { state: Mutex::new(state) })
     }
 
     pub(super) fn lock(&self) -> MutexGuard<'_, State> {

@@ -183,10 +183,8 @@ impl Disk for Door {
         let mut state = self.0.lock();
         state.begin(Call::Unlink)?;
         state.node(dir)?;
-        let below: Vec<PathBuf> = (state.names.keys().rev())
-            .filter(|path| path.starts_with(dir))
-            .cloned()
-            .collect();
+        let below: Vec<PathBuf> =
+            (state.names.keys().rev()).filter(|path| path.starts_with(dir)).cloned().collect();
         for path in below {
             if let Some(&Node::File(f)) = state.names.get(&path) {
                 state.unlink(f);

@@ -179,10 +179,7 @@ impl State {
         if self.node(folder)? != Node::Folder {
             return Err(ErrorKind::NotADirectory.into());
         }
-        self.files.push(FileState {
-            is_linked: true,
-            ..FileState::default()
-        });
+        self.files.push(FileState { is_linked: true, ..FileState::default() });
         let f = self.files.len() - 1;
         self.change(None, Some((path, Node::File(f))));
         Ok(f)

@@ -74,11 +74,7 @@ impl Flips {
             let path = entry.expect("a readable folder").path();
             let bytes = std::fs::read(&path).expect("a readable file");
             let values = values(&path, &bytes);
-            flips.files.push(File {
-                path,
-                bytes,
-                values,
-            });
+            flips.files.push(File { path, bytes, values });
         }
         flips.files.sort_by(|a, b| a.path.cmp(&b.path));
         flips.answers = flips.questions.iter().map(|q| flips.ask(q).1).collect();
@@ -124,12 +120,7 @@ impl Flips {
     }
 
     fn look(&self, file: &File, offset: usize, bit: u8, done: &mut Item) {
-        let name = file
-            .path
-            .file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned();
+        let name = file.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let value = file.value_at(offset);
         let (mut found, mut named, mut silent) = (false, true, false);
         for (question, answer) in self.questions.iter().zip(&self.answers) {
@@ -144,8 +135,7 @@ impl Flips {
                     named &= text.contains(&name);
                     let place = place_of(&name, value);
                     if place.iter().any(|p| !text.contains(p.as_str())) {
-                        done.wrong
-                            .push(format!("{context}: not told where: {text}"));
+                        done.wrong.push(format!("{context}: not told where: {text}"));
                     }
                 }
                 Some(0) => {
@@ -169,8 +159,7 @@ impl Flips {
             done.count("file not named");
         }
         if value.is_some() && !found {
-            done.wrong
-                .push(format!("{name} byte {offset} bit {bit}: not found"));
+            done.wrong.push(format!("{name} byte {offset} bit {bit}: not found"));
         }
     }
 }
@@ -178,10 +167,7 @@ impl Flips {
 impl File {
     /// Key of the value at a place in the file.
     fn value_at(&self, offset: usize) -> Option<u64> {
-        let found = self
-            .values
-            .iter()
-            .find(|(range, _)| range.contains(&offset));
+        let found = self.values.iter().find(|(range, _)| range.contains(&offset));
         found.map(|&(_, key)| key)
     }
 }

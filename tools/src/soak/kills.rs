@@ -26,23 +26,12 @@ impl Kills {
         let mut kills = Self {
             program,
             dir,
-            mesh: [
-                "mesh",
-                model.large,
-                "-o",
-                "a.tetdb",
-                "--subdomains",
-                "2",
-                "--memory",
-                "64MiB",
-            ],
+            mesh: ["mesh", model.large, "-o", "a.tetdb", "--subdomains", "2", "--memory", "64MiB"],
             digest: String::new(),
             duration: Duration::ZERO,
         };
         kills.measure().expect("an undisturbed run");
-        kills.digest = kills
-            .succeed(&["digest", "a.tetdb"])
-            .expect("a finished store");
+        kills.digest = kills.succeed(&["digest", "a.tetdb"]).expect("a finished store");
         kills
     }
 

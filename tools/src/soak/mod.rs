@@ -35,11 +35,7 @@ impl Model {
             ),
             _ => return None,
         };
-        Some(Self {
-            large,
-            small,
-            question,
-        })
+        Some(Self { large, small, question })
     }
 }
 
@@ -104,21 +100,16 @@ impl Sim {
             End::Done => "harmless",
             _ => "failed",
         });
-        item.wrong
-            .extend(unclean(end).map(|e| format!("{context}: {e}")));
+        item.wrong.extend(unclean(end).map(|e| format!("{context}: {e}")));
     }
 
     fn images(&self, seed: u64, item: u64) -> Item {
         let mut rng = Rng(seed ^ item.wrapping_mul(0xD6E8_FEB8_6659_FD93));
         let mut done = Item::default();
-        let mut crash_at: Vec<(u64, u64)> = (0..IMAGES)
-            .map(|_| (rng.below(self.reference.calls), rng.word()))
-            .collect();
+        let mut crash_at: Vec<(u64, u64)> =
+            (0..IMAGES).map(|_| (rng.below(self.reference.calls), rng.word())).collect();
         crash_at.sort_unstable_by(|a, b| b.cmp(a));
-        let (disk, _) = self.case.troubled(Trouble {
-            crash_at,
-            ..Trouble::default()
-        });
+        let (disk, _) = self.case.troubled(Trouble { crash_at, ..Trouble::default() });
         for (i, wreck) in disk.take_wrecks().into_iter().enumerate() {
             let context = format!("power lost before call {}", wreck.call);
             done.count("images");
@@ -151,10 +142,8 @@ impl Sim {
     fn death(&self, boundary: u64) -> Item {
         let mut done = Item::default();
         let context = format!("killed at boundary {boundary}");
-        let (disk, end) = self.case.troubled(Trouble {
-            die_at_boundary: Some(boundary),
-            ..Trouble::default()
-        });
+        let (disk, end) =
+            self.case.troubled(Trouble { die_at_boundary: Some(boundary), ..Trouble::default() });
         self.end(&mut done, &context, &end);
         done.count("resumed");
         done.note(&context, self.case.resumed(&disk, &self.reference));
@@ -165,10 +154,7 @@ impl Sim {
         let mut done = Item::default();
         let space = self.reference.bytes_peak * item / SPACES;
         let context = format!("{space} bytes of room");
-        let (disk, end) = self.case.troubled(Trouble {
-            space: Some(space),
-            ..Trouble::default()
-        });
+        let (disk, end) = self.case.troubled(Trouble { space: Some(space), ..Trouble::default() });
         self.end(&mut done, &context, &end);
         if let End::Failed(_, text) = &end
             && !text.contains("no space left")

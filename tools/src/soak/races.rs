@@ -60,10 +60,7 @@ impl Races {
             let done = command.args(words).current_dir(self.dir.path()).output();
             let done = done.map_err(|e| e.to_string())?;
             if !done.status.success() {
-                return Err(format!(
-                    "{words:?}: {}",
-                    String::from_utf8_lossy(&done.stderr)
-                ));
+                return Err(format!("{words:?}: {}", String::from_utf8_lossy(&done.stderr)));
             }
             if words[0] == "digest" {
                 return Ok(String::from_utf8_lossy(&done.stdout).into_owned());

@@ -35,10 +35,7 @@ struct Seen {
 impl Readers {
     pub fn new(program: &Path) -> Self {
         let program = program.canonicalize().expect("the program that changes");
-        let readers = Self {
-            program,
-            dir: tempfile::tempdir().expect("a folder for a store"),
-        };
+        let readers = Self { program, dir: tempfile::tempdir().expect("a folder for a store") };
         let mesh = "mesh sample:box,h=0.05 -o a.tetdb --subdomains 2";
         readers.run(mesh).expect("an undisturbed run");
         readers
@@ -46,10 +43,7 @@ impl Readers {
 
     fn run(&self, line: &str) -> Result<(), String> {
         let mut command = Command::new(&self.program);
-        let done = command
-            .args(line.split_whitespace())
-            .current_dir(self.dir.path())
-            .output();
+        let done = command.args(line.split_whitespace()).current_dir(self.dir.path()).output();
         let done = done.map_err(|e| e.to_string())?;
         match done.status.success() {
             true => Ok(()),
@@ -102,8 +96,7 @@ impl Readers {
             for digest in seen.digests {
                 done.count("answers");
                 if digest != before && digest != after {
-                    done.wrong
-                        .push(format!("an answer of neither mesh: {digest}"));
+                    done.wrong.push(format!("an answer of neither mesh: {digest}"));
                 }
             }
         }

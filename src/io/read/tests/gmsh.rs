@@ -16,18 +16,9 @@ fn gmsh_text() {
     let surface = read_tetrahedron(Format::Gmsh, MSH2);
     assert_eq!(
         (surface.label_names, surface.labels),
-        (
-            vec!["outer wall".into(), "4".into(), "part".into()],
-            vec![0, 0, 1, 2]
-        )
+        (vec!["outer wall".into(), "4".into(), "part".into()], vec![0, 0, 1, 2])
     );
-    assert_eq!(
-        surface.notes[0].kind,
-        NoteKind::SkippedElements {
-            what: "solid elements",
-            n: 1
-        }
-    );
+    assert_eq!(surface.notes[0].kind, NoteKind::SkippedElements { what: "solid elements", n: 1 });
     let surface = read_tetrahedron(Format::Gmsh, MSH4);
     assert_eq!(
         (surface.label_names, surface.labels),
@@ -40,18 +31,9 @@ fn gmsh_text() {
         assert_eq!(bad("$EndElements\n", ""), "truncated-file");
     }
     let bad = |from: &str, to: &str| refuse(Format::Gmsh, MSH2.replacen(from, to, 1));
-    assert_eq!(
-        bad("12 13 24\n", "12 13 25\n"),
-        ("index-out-of-range", Spot::Line(22))
-    );
-    assert_eq!(
-        bad("$Nodes\n4", "$Nodes\n2000000000"),
-        ("count-mismatch", Spot::Line(10))
-    );
-    assert_eq!(
-        bad("$Elements\n6", "$Elements\n7"),
-        ("count-mismatch", Spot::Line(27))
-    );
+    assert_eq!(bad("12 13 24\n", "12 13 25\n"), ("index-out-of-range", Spot::Line(22)));
+    assert_eq!(bad("$Nodes\n4", "$Nodes\n2000000000"), ("count-mismatch", Spot::Line(10)));
+    assert_eq!(bad("$Elements\n6", "$Elements\n7"), ("count-mismatch", Spot::Line(27)));
     assert_eq!(bad("12 1 0 0", "11 1 0 0").0, "unexpected-text");
     assert_eq!(bad("2.2 0", "4.0 0").0, "unsupported-content");
     assert_eq!(bad("2 2 2 3 1", "2 9 2 3 1").0, "unsupported-content");
@@ -88,21 +70,14 @@ fn gmsh_binary() {
                     );
                 }
             } else {
-                put!(
-                    1u64, 4u64, 1u64, 4u64, 2i32, 1i32, 0i32, 4u64, 1u64, 2u64, 3u64, 4u64
-                );
+                put!(1u64, 4u64, 1u64, 4u64, 2i32, 1i32, 0i32, 4u64, 1u64, 2u64, 3u64, 4u64);
                 for [x, y, z] in POINTS {
                     put!(x, y, z);
                 }
                 out.extend(b"\n$EndNodes\n$Elements\n");
                 put!(1u64, 4u64, 1u64, 4u64, 2i32, 1i32, 2i32, 4u64);
                 for face in FACES {
-                    put!(
-                        7u64,
-                        face[0] as u64 + 1,
-                        face[1] as u64 + 1,
-                        face[2] as u64 + 1
-                    );
+                    put!(7u64, face[0] as u64 + 1, face[1] as u64 + 1, face[2] as u64 + 1);
                 }
             }
             out.extend(b"\n$EndElements\n");

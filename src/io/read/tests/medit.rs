@@ -12,30 +12,12 @@ fn medit_text() {
         (surface.label_names, surface.labels),
         (vec!["7".into(), "9".into()], vec![0, 0, 1, 1])
     );
-    assert_eq!(
-        surface.notes[0].kind,
-        NoteKind::SkippedElements {
-            what: "tetrahedra",
-            n: 1
-        }
-    );
+    assert_eq!(surface.notes[0].kind, NoteKind::SkippedElements { what: "tetrahedra", n: 1 });
     let bad = |from: &str, to: &str| refuse(Format::Medit, MEDIT.replacen(from, to, 1));
-    assert_eq!(
-        bad("2 3 4 7", "2 3 5 7"),
-        ("index-out-of-range", Spot::Line(13))
-    );
-    assert_eq!(
-        bad("2 3 4 7", "2 3 0 7"),
-        ("index-out-of-range", Spot::Line(13))
-    );
-    assert_eq!(
-        bad("Vertices 4", "Vertices 2000000000"),
-        ("count-mismatch", Spot::Line(4))
-    );
-    assert_eq!(
-        bad("Vertices 4", "Vertices -4"),
-        ("count-mismatch", Spot::Line(4))
-    );
+    assert_eq!(bad("2 3 4 7", "2 3 5 7"), ("index-out-of-range", Spot::Line(13)));
+    assert_eq!(bad("2 3 4 7", "2 3 0 7"), ("index-out-of-range", Spot::Line(13)));
+    assert_eq!(bad("Vertices 4", "Vertices 2000000000"), ("count-mismatch", Spot::Line(4)));
+    assert_eq!(bad("Vertices 4", "Vertices -4"), ("count-mismatch", Spot::Line(4)));
     assert_eq!(bad("Dimension\n3", "Dimension\n2").0, "unsupported-content");
     assert_eq!(bad("0 1 0 0", "0 nan 0 0"), ("not-a-number", Spot::Line(7)));
 }
@@ -44,20 +26,12 @@ pub(super) fn meshb(version: i32, big: bool) -> Vec<u8> {
     let mut out = Vec::new();
     macro_rules! put {
         ($value:expr) => {
-            if big {
-                out.extend($value.to_be_bytes())
-            } else {
-                out.extend($value.to_le_bytes())
-            }
+            if big { out.extend($value.to_be_bytes()) } else { out.extend($value.to_le_bytes()) }
         };
     }
     macro_rules! sized {
         ($long:expr, $value:expr) => {
-            if $long {
-                put!($value as i64)
-            } else {
-                put!($value as i32)
-            }
+            if $long { put!($value as i64) } else { put!($value as i32) }
         };
     }
     let (long_position, long_int) = (version >= 3, version >= 4);
@@ -69,16 +43,8 @@ pub(super) fn meshb(version: i32, big: bool) -> Vec<u8> {
     let mut at = 8;
     let mut section = |out: &mut Vec<u8>, keyword: i32, bytes: usize| {
         at += 4 + position + bytes;
-        let next = if big {
-            (at as i64).to_be_bytes()
-        } else {
-            (at as i64).to_le_bytes()
-        };
-        out.extend(if big {
-            keyword.to_be_bytes()
-        } else {
-            keyword.to_le_bytes()
-        });
+        let next = if big { (at as i64).to_be_bytes() } else { (at as i64).to_le_bytes() };
+        out.extend(if big { keyword.to_be_bytes() } else { keyword.to_le_bytes() });
         match (long_position, big) {
             (true, _) => out.extend(next),
             (false, true) => out.extend(&next[4..]),
@@ -93,11 +59,7 @@ pub(super) fn meshb(version: i32, big: bool) -> Vec<u8> {
     sized!(long_int, 4);
     for p in POINTS {
         for x in p {
-            if version == 1 {
-                put!(x as f32)
-            } else {
-                put!(x)
-            }
+            if version == 1 { put!(x as f32) } else { put!(x) }
         }
         sized!(long_int, 0);
     }
@@ -118,23 +80,11 @@ fn medit_binary() {
     for version in 1..=4 {
         for big in [false, true] {
             let whole = meshb(version, big);
-            assert_eq!(
-                read_tetrahedron(Format::MeditBinary, &whole).label_names,
-                ["5"]
-            );
+            assert_eq!(read_tetrahedron(Format::MeditBinary, &whole).label_names, ["5"]);
             let code = refuse(Format::MeditBinary, &whole[..whole.len() - 40]).0;
-            assert!(
-                ["truncated-file", "count-mismatch"].contains(&code),
-                "{code}"
-            );
+            assert!(["truncated-file", "count-mismatch"].contains(&code), "{code}");
         }
     }
-    assert_eq!(
-        refuse(Format::MeditBinary, "hello world").0,
-        "unexpected-text"
-    );
-    assert_eq!(
-        refuse(Format::MeditBinary, [1, 0, 0, 0, 9, 0, 0, 0]).0,
-        "unsupported-content"
-    );
+    assert_eq!(refuse(Format::MeditBinary, "hello world").0, "unexpected-text");
+    assert_eq!(refuse(Format::MeditBinary, [1, 0, 0, 0, 9, 0, 0, 0]).0, "unsupported-content");
 }

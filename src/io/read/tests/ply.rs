@@ -12,20 +12,13 @@ pub(super) fn ply(format: &str) -> Vec<u8> {
     let big = format.ends_with("big_endian");
     macro_rules! put {
         ($value:expr) => {
-            if big {
-                out.extend($value.to_be_bytes())
-            } else {
-                out.extend($value.to_le_bytes())
-            }
+            if big { out.extend($value.to_be_bytes()) } else { out.extend($value.to_le_bytes()) }
         };
     }
     if format == "ascii" {
         let body = indexed(|v| v.to_string(), "", "3 ", " 1 0.5").replace("0 0 0 1", "0 9 0 0 1");
         let vertices = POINTS.iter().map(|[x, y, z]| format!("{x} 9 {y} {z}\n"));
-        let faces = body
-            .lines()
-            .filter(|l| l.starts_with("3 "))
-            .map(|l| format!("{l}\n"));
+        let faces = body.lines().filter(|l| l.starts_with("3 ")).map(|l| format!("{l}\n"));
         out.extend(vertices.chain(faces).collect::<String>().bytes());
         return out;
     }
@@ -53,20 +46,14 @@ fn ply_good_and_bad() {
         read_tetrahedron(Format::Ply, &whole);
         let short = &whole[..whole.len() - 9];
         let code = refuse(Format::Ply, short).0;
-        assert!(
-            ["truncated-file", "count-mismatch"].contains(&code),
-            "{format} {code}"
-        );
+        assert!(["truncated-file", "count-mismatch"].contains(&code), "{format} {code}");
         let text = String::from_utf8_lossy(&whole).into_owned();
         if format == "ascii" {
             read_tetrahedron(Format::Ply, text.replace('\n', "\r\n"));
             let many = text.replace("vertex 4", "vertex 2000000000");
             assert_eq!(refuse(Format::Ply, many), ("count-mismatch", Spot::Line(4)));
             let negative = text.replace("face 4", "face -4");
-            assert_eq!(
-                refuse(Format::Ply, negative),
-                ("count-mismatch", Spot::Line(9))
-            );
+            assert_eq!(refuse(Format::Ply, negative), ("count-mismatch", Spot::Line(9)));
             assert_eq!(
                 refuse(Format::Ply, text.replace("face 4", "face 5")),
                 ("count-mismatch", Spot::Line(21))
@@ -75,10 +62,7 @@ fn ply_good_and_bad() {
                 refuse(Format::Ply, text.replace("3 1 2 3", "3 1 2 4")),
                 ("index-out-of-range", Spot::Line(17))
             );
-            assert_eq!(
-                refuse(Format::Ply, text.replace("1 9 0 0", "1 9 nan 0")).0,
-                "not-a-number"
-            );
+            assert_eq!(refuse(Format::Ply, text.replace("1 9 0 0", "1 9 nan 0")).0, "not-a-number");
             assert_eq!(
                 refuse(Format::Ply, text.replace("double y", "double w")).0,
                 "unexpected-text"

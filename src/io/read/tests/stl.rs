@@ -39,10 +39,7 @@ fn stl_of_both_kinds() {
     assert_eq!(surface.label_names, ["first part"]);
     assert!(surface.notes.is_empty());
     let surface = read_tetrahedron(Format::Stl, stl_text(""));
-    assert!(matches!(
-        surface.notes[0].kind,
-        NoteKind::MissingEndsolid { .. }
-    ));
+    assert!(matches!(surface.notes[0].kind, NoteKind::MissingEndsolid { .. }));
     for header in [&b""[..], b"solid cube", b"solid cube facet normal"] {
         let surface = read_tetrahedron(Format::Stl, stl_binary(header));
         assert_eq!(surface.label_names, ["part"]);
@@ -61,23 +58,14 @@ fn several_solids_are_several_labels() {
 #[test]
 fn bad_stl() {
     let whole = stl_binary(b"solid");
-    assert_eq!(
-        refuse(Format::Stl, &whole[..200]),
-        ("truncated-file", Spot::Byte(200))
-    );
-    assert_eq!(
-        refuse(Format::Stl, &whole[..60]),
-        ("truncated-file", Spot::Byte(0))
-    );
+    assert_eq!(refuse(Format::Stl, &whole[..200]), ("truncated-file", Spot::Byte(200)));
+    assert_eq!(refuse(Format::Stl, &whole[..60]), ("truncated-file", Spot::Byte(0)));
     let mut huge = whole.clone();
     huge[80..84].copy_from_slice(&u32::MAX.to_le_bytes());
     assert_eq!(refuse(Format::Stl, &huge).0, "truncated-file");
     let mut few = whole.clone();
     few[80] = 3;
-    assert_eq!(
-        refuse(Format::Stl, &few),
-        ("count-mismatch", Spot::Byte(80))
-    );
+    assert_eq!(refuse(Format::Stl, &few), ("count-mismatch", Spot::Byte(80)));
     let mut nan = whole.clone();
     nan[96..100].copy_from_slice(&f32::NAN.to_le_bytes());
     assert_eq!(refuse(Format::Stl, &nan).0, "not-a-number");
@@ -87,10 +75,7 @@ fn bad_stl() {
     assert_eq!(refuse(Format::Stl, &none), ("empty-surface", Spot::Totals));
     assert_eq!(refuse(Format::Stl, ""), ("empty-surface", Spot::Totals));
     let text = stl_text("endsolid");
-    assert_eq!(
-        refuse(Format::Stl, &text[..text.len() - 40]).0,
-        "truncated-file"
-    );
+    assert_eq!(refuse(Format::Stl, &text[..text.len() - 40]).0, "truncated-file");
     let nan = text.replacen("vertex 1e0", "vertex nan", 1);
     assert_eq!(refuse(Format::Stl, nan), ("not-a-number", Spot::Line(4)));
     assert_eq!(

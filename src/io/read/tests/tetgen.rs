@@ -25,10 +25,7 @@ fn tetgen_layouts() {
         refuse(Format::TetgenSmesh, smesh.replace("4 1\n", "9 1\n")),
         ("unsupported-content", Spot::Line(12))
     );
-    assert_eq!(
-        refuse(Format::TetgenSmesh, "0 3\n4 1\n").0,
-        "unsupported-content"
-    );
+    assert_eq!(refuse(Format::TetgenSmesh, "0 3\n4 1\n").0, "unsupported-content");
     assert_eq!(
         refuse(Format::TetgenSmesh, smesh.replace("2 0 1 0\n", "5 0 1 0\n")),
         ("unexpected-text", Spot::Line(5))

@@ -160,9 +160,8 @@ impl FaceWalk {
     pub fn new(mesh: &mut Merged) -> Result<Self> {
         let parts = mesh.parts();
         let first_interface = mesh.n_labels();
-        let places: BTreeMap<u32, usize> = (parts.iter().enumerate())
-            .map(|(p, part)| (part.rank, p))
-            .collect();
+        let places: BTreeMap<u32, usize> =
+            (parts.iter().enumerate()).map(|(p, part)| (part.rank, p)).collect();
         let mut census = Census::default();
         let (dir, bytes) = (mesh.dir().to_owned(), mesh.sorter_bytes());
         let mut sides = Sorter::new(&dir, bytes);
@@ -230,11 +229,7 @@ impl FaceWalk {
                 }
             }
         }
-        Ok(Self {
-            behind: behind.finish()?.peekable(),
-            census,
-            first_interface,
-        })
+        Ok(Self { behind: behind.finish()?.peekable(), census, first_interface })
     }
 
     /// The faces of the next sub-domain, number `p`. Errors: damage, the disk.
@@ -295,17 +290,10 @@ impl FaceWalk {
                 if owner == neighbor || u64::from(neighbor) >= n_tets {
                     return Err(broken(&part, owner, "has a face twice"));
                 }
-                inner.push(Inner {
-                    owner,
-                    neighbor,
-                    vertices,
-                    zone,
-                })?;
+                inner.push(Inner { owner, neighbor, vertices, zone })?;
                 continue;
             }
-            let behind = at(&mut self.behind, |b| {
-                (b.rank, b.vertices).cmp(&(rank, sorted))
-            })?;
+            let behind = at(&mut self.behind, |b| (b.rank, b.vertices).cmp(&(rank, sorted)))?;
             match (behind, facet) {
                 (Some(b), _) if b.cell != NO_TET => {
                     between.push(Between {
@@ -328,16 +316,10 @@ impl FaceWalk {
                         })?;
                     }
                 }
-                (Some(b), _) => outer.push(Outer {
-                    patch: self.first_interface + b.other,
-                    owner,
-                    vertices,
-                })?,
-                (None, Some(facet)) => outer.push(Outer {
-                    patch: facet.label,
-                    owner,
-                    vertices,
-                })?,
+                (Some(b), _) => {
+                    outer.push(Outer { patch: self.first_interface + b.other, owner, vertices })?
+                }
+                (None, Some(facet)) => outer.push(Outer { patch: facet.label, owner, vertices })?,
                 (None, None) => {
                     let what = "has a face with nothing behind it that is not of the surface";
                     return Err(broken(&part, owner, what));

@@ -73,13 +73,7 @@ impl FaceFiles {
         faces.begin_list(if ascii { size.faces } else { 3 * size.faces });
         owner.begin_list(size.faces);
         neighbour.begin_list(size.inner);
-        Ok(Self {
-            faces,
-            owner,
-            neighbour,
-            size,
-            written: 0,
-        })
+        Ok(Self { faces, owner, neighbour, size, written: 0 })
     }
 
     /// A face with cells on both sides.
@@ -190,11 +184,7 @@ impl Zones {
     }
 
     pub fn push(&mut self, zone: u32, item: u32, is_flipped: bool) -> Result<()> {
-        let member = Member {
-            zone,
-            item,
-            is_flipped,
-        };
+        let member = Member { zone, item, is_flipped };
         *self.counts.entry(zone).or_default() += 1;
         self.items.push(member)?;
         if let Some(flips) = &mut self.flips {
@@ -223,23 +213,17 @@ impl Zones {
         file.text(&format!("{}\n(\n", names.len()));
         for (zone, name) in names {
             let n = self.counts.get(zone).copied().unwrap_or_default();
-            file.text(&format!(
-                "{name}\n{{\n    type {kind};\n    {list} List<label> "
-            ));
+            file.text(&format!("{name}\n{{\n    type {kind};\n    {list} List<label> "));
             file.list(n, |file| {
                 let members = items.by_ref().take(n as usize);
-                members
-                    .into_iter()
-                    .try_for_each(|m| file.label(m?.item as i32))
+                members.into_iter().try_for_each(|m| file.label(m?.item as i32))
             })?;
             file.text(";\n");
             if let Some(flips) = &mut flips {
                 file.text("    flipMap List<bool> ");
                 file.list(n, |file| {
                     let members = flips.by_ref().take(n as usize);
-                    members
-                        .into_iter()
-                        .try_for_each(|m| file.bool(m?.is_flipped))
+                    members.into_iter().try_for_each(|m| file.bool(m?.is_flipped))
                 })?;
                 file.text(";\n");
             }

@@ -57,13 +57,7 @@ pub(super) fn write(
         |(p, part): (usize, &super::super::merged::Part)| walk.census.n_inner(p, part.n_tets);
     let n_inner = parts.iter().enumerate().map(inner).sum::<u64>() + n_between / 2;
     let mut start = n_inner;
-    let mut job = Job {
-        case,
-        names,
-        ascii,
-        n_inner,
-        patch_starts: BTreeMap::new(),
-    };
+    let mut job = Job { case, names, ascii, n_inner, patch_starts: BTreeMap::new() };
     for &label in names.patches.keys() {
         job.patch_starts.insert(label, start);
         start += (walk.census.patches.iter().filter_map(|p| p.get(&label))).sum::<u64>();
@@ -74,14 +68,7 @@ pub(super) fn write(
         let is_written = selection.writes_piece(part.rank);
         let faces = walk.part(mesh, p)?;
         let sizes = sizes(walk, p, part.n_vertices, part.n_tets);
-        job.faces(
-            mesh,
-            draft,
-            walk,
-            (p, faces, sizes),
-            is_written,
-            (&mut next, &mut addresses),
-        )?;
+        job.faces(mesh, draft, walk, (p, faces, sizes), is_written, (&mut next, &mut addresses))?;
         if is_written {
             job.points_and_cells(mesh, draft, p, sizes)?;
             counts.vertices += sizes.points;
@@ -102,29 +89,17 @@ pub(super) fn write(
         }
         let sizes = sizes(walk, p, part.n_vertices, part.n_tets);
         let dir = job.dir(part.rank);
-        write_labels(
-            draft,
-            (&dir, "faceProcAddressing"),
-            sizes.faces,
-            ascii,
-            |file| {
-                let mut known = Records::<4>::open(&scratch_path(mesh.dir(), part.rank), 0)?;
-                while let Some(label) = known.next()? {
-                    file.label(i32::from_le_bytes(label))?;
-                }
-                of_part.into_iter().try_for_each(|address| {
-                    let Address {
-                        rank, other, face, ..
-                    } = address?;
-                    // The whole has the face as the lower one sees it.
-                    file.label(if rank < other {
-                        face as i32
-                    } else {
-                        -(face as i32)
-                    })
-                })
-            },
-        )?;
+        write_labels(draft, (&dir, "faceProcAddressing"), sizes.faces, ascii, |file| {
+            let mut known = Records::<4>::open(&scratch_path(mesh.dir(), part.rank), 0)?;
+            while let Some(label) = known.next()? {
+                file.label(i32::from_le_bytes(label))?;
+            }
+            of_part.into_iter().try_for_each(|address| {
+                let Address { rank, other, face, .. } = address?;
+                // The whole has the face as the lower one sees it.
+                file.label(if rank < other { face as i32 } else { -(face as i32) })
+            })
+        })?;
     }
     Ok(counts)
 }
@@ -248,13 +223,11 @@ impl Job<'_> {
             between: None,
             n_faces: counts.get(label).copied().unwrap_or_default(),
         });
-        let shared = walk.census.between[p]
-            .iter()
-            .map(|(&there, &n_faces)| Patch {
-                name: format!("procBoundary{here}to{there}"),
-                between: Some([here as usize, there as usize]),
-                n_faces,
-            });
+        let shared = walk.census.between[p].iter().map(|(&there, &n_faces)| Patch {
+            name: format!("procBoundary{here}to{there}"),
+            between: Some([here as usize, there as usize]),
+            n_faces,
+        });
         let patches: Vec<_> = plain.chain(shared).collect();
         write_boundary(draft, &dir, size.inner, &patches)?;
         let what = (dir.as_path(), "boundaryProcAddressing");
@@ -286,22 +259,12 @@ impl Job<'_> {
             Ok(())
         })?;
         points.finish()?;
-        write_labels(
-            draft,
-            (&dir, "pointProcAddressing"),
-            size.points,
-            ascii,
-            |file| (0..size.points as u32).try_for_each(|v| file.label(numbers.of([v])?[0] as i32)),
-        )?;
-        write_labels(
-            draft,
-            (&dir, "cellProcAddressing"),
-            size.cells,
-            ascii,
-            |file| {
-                (0..size.cells as u32).try_for_each(|cell| file.label((first_tet + cell) as i32))
-            },
-        )?;
+        write_labels(draft, (&dir, "pointProcAddressing"), size.points, ascii, |file| {
+            (0..size.points as u32).try_for_each(|v| file.label(numbers.of([v])?[0] as i32))
+        })?;
+        write_labels(draft, (&dir, "cellProcAddressing"), size.cells, ascii, |file| {
+            (0..size.cells as u32).try_for_each(|cell| file.label((first_tet + cell) as i32))
+        })?;
         let mut zones = Zones::new(&scratch, false, bytes);
         for tet in part.tets() {
             let (id, tet) = tet?;

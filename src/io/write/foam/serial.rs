@@ -58,18 +58,13 @@ pub(super) fn write(
     let dir = mesh_dir(case);
     let parts = mesh.parts();
     let census = &walk.census;
-    let n_inner: u64 = (parts.iter().enumerate())
-        .map(|(p, part)| census.n_inner(p, part.n_tets))
-        .sum();
+    let n_inner: u64 =
+        (parts.iter().enumerate()).map(|(p, part)| census.n_inner(p, part.n_tets)).sum();
     let n_between: u64 = (census.between.iter().flat_map(|b| b.values())).sum();
     let n_outer: u64 = (census.patches.iter().flat_map(|b| b.values())).sum();
     let inner = n_inner + n_between / 2;
-    let size = Size {
-        points: mesh.n_vertices(),
-        cells: mesh.n_tets(),
-        inner,
-        faces: inner + n_outer,
-    };
+    let size =
+        Size { points: mesh.n_vertices(), cells: mesh.n_tets(), inner, faces: inner + n_outer };
     write_points(mesh, draft, &dir, size, ascii)?;
     let patches = names.patches.iter().map(|(label, name)| Patch {
         name: name.clone(),
@@ -85,11 +80,7 @@ pub(super) fn write(
         zones.push(tet.region, cell - 1, false)
     })?;
     zones.write(draft, &dir, &names.cell_zones, ascii)?;
-    Ok(FileCounts {
-        vertices: size.points,
-        tets: size.cells,
-        triangles: n_outer,
-    })
+    Ok(FileCounts { vertices: size.points, tets: size.cells, triangles: n_outer })
 }
 
 fn write_points(

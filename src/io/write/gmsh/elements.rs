@@ -118,9 +118,7 @@ pub(super) fn write(
             out.int(word);
         }
         number += 1;
-        [1, number, point.vertex + 1]
-            .into_iter()
-            .for_each(|n| out.size(n));
+        [1, number, point.vertex + 1].into_iter().for_each(|n| out.size(n));
         out.end()?;
     }
     Ok(())
@@ -172,9 +170,7 @@ impl Elements<'_> {
         nodes.iter().for_each(|v| self.out.size(v + 1));
         if let Some(edges) = &mut self.edges {
             let edges = edges.of(number)?;
-            MIDDLES
-                .iter()
-                .for_each(|&i| self.out.size(self.n_vertices + edges[i] + 1));
+            MIDDLES.iter().for_each(|&i| self.out.size(self.n_vertices + edges[i] + 1));
         }
         self.out.end()
     }
@@ -190,11 +186,7 @@ fn triangles(
     let mut number = 0;
     mesh.faces().each(|face| {
         if let Some(entity) = entities.surface(face) {
-            sorter.push(Triangle {
-                entity,
-                number,
-                vertices: face.vertices,
-            })?;
+            sorter.push(Triangle { entity, number, vertices: face.vertices })?;
         }
         number += 1;
         Ok(())

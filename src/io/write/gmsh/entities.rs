@@ -142,9 +142,7 @@ impl Entities {
     /// Those with a physical group.
     fn labels(&self) -> BTreeSet<u32> {
         let labels = self.surfaces.iter().map(|(key, _)| key.0);
-        labels
-            .filter(|&label| self.neighbor(label).is_none())
-            .collect()
+        labels.filter(|&label| self.neighbor(label).is_none()).collect()
     }
 
     fn regions(&self) -> BTreeSet<u32> {
@@ -163,11 +161,7 @@ impl Entities {
             text += &format!("{dim} {} \"{}\"\n", label + 1, quotable(&name));
         }
         for label in labels {
-            text += &format!(
-                "2 {} \"{}\"\n",
-                label + 1,
-                quotable(&mesh.label_name(label))
-            );
+            text += &format!("2 {} \"{}\"\n", label + 1, quotable(&mesh.label_name(label)));
         }
         for region in regions {
             text += &format!("3 {region} \"{}\"\n", quotable(&mesh.region_name(region)));
@@ -196,10 +190,7 @@ impl Entities {
             out.end()?;
         }
         let curves = curves.into_keys().map(|label| label + 1);
-        for tag in curves
-            .chain(labels.iter().map(|label| label + 1))
-            .chain(regions)
-        {
+        for tag in curves.chain(labels.iter().map(|label| label + 1)).chain(regions) {
             out.int(tag);
             self.put_bounds(out);
             out.size(1);

@@ -41,22 +41,14 @@ pub(super) fn write(
     let foreign = ghosts.filter(|_| selection.pieces);
     if !selection.pieces {
         let all: Vec<usize> = (0..mesh.n_parts()).collect();
-        let piece = Piece {
-            which: &all,
-            middles,
-            foreign,
-        };
+        let piece = Piece { which: &all, middles, foreign };
         return write_file(mesh, draft, out, &piece, (selection.ascii, ghosts));
     }
     let mut counts = FileCounts::default();
     for (p, part) in mesh.parts().into_iter().enumerate() {
         if selection.writes_piece(part.rank) {
             let path = piece_path(out, part.rank);
-            let piece = Piece {
-                which: &[p],
-                middles,
-                foreign,
-            };
+            let piece = Piece { which: &[p], middles, foreign };
             counts += write_file(mesh, draft, &path, &piece, (selection.ascii, ghosts))?;
         }
     }
@@ -105,16 +97,10 @@ fn write_file(
         })?;
     }
     out.section("Nodes", |out| nodes.write(out, &entities))?;
-    out.section("Elements", |out| {
-        elements::write(mesh, out, piece, &entities)
-    })?;
+    out.section("Elements", |out| elements::write(mesh, out, piece, &entities))?;
     if let Some(ghosts) = ghosts {
         out.section("GhostElements", |out| ghosts.write(out, piece.which, mesh))?;
     }
     out.finish()?;
-    Ok(FileCounts {
-        vertices: nodes.n,
-        tets: n_tets,
-        triangles: entities.n_faces(),
-    })
+    Ok(FileCounts { vertices: nodes.n, tets: n_tets, triangles: entities.n_faces() })
 }

@@ -78,12 +78,7 @@ pub(super) fn gather(
     let (dir, bytes) = (mesh.dir().to_owned(), mesh.sorter_bytes());
     let claims = claims(mesh, piece, entities)?;
     let mut points = piece.middles.map(Midpoints::points).transpose()?;
-    let nodes = granted(
-        claims,
-        mesh.n_vertices(),
-        &mut points,
-        Sorter::new(&dir, bytes),
-    )?;
+    let nodes = granted(claims, mesh.n_vertices(), &mut points, Sorter::new(&dir, bytes))?;
     let file = name.file_name().unwrap_or_default().to_string_lossy();
     stored(nodes, entities, dir.join(format!("nodes-{file}")))
 }
@@ -93,13 +88,8 @@ fn claims(mesh: &mut Merged, piece: &Piece, entities: &Entities) -> Result<Sorte
     let parts = mesh.parts();
     let n_vertices = mesh.n_vertices();
     let mut claims = Sorter::new(mesh.dir(), mesh.sorter_bytes());
-    let mut claim = |vertex, entity, point| {
-        claims.push(Claim {
-            vertex,
-            entity,
-            point: Payload(point),
-        })
-    };
+    let mut claim =
+        |vertex, entity, point| claims.push(Claim { vertex, entity, point: Payload(point) });
     let mut edges = piece.middles.map(Midpoints::faces).transpose()?;
     let mut number = 0;
     mesh.faces().each(|face| {
@@ -123,9 +113,7 @@ fn claims(mesh: &mut Merged, piece: &Piece, entities: &Entities) -> Result<Sorte
         let only = entities.only_volume(rank);
         // Inside, all tetrahedra around a vertex are of one region, so that the first one tells it.
         let mut vertices = Seen::new(parts[p].first_vertex, parts[p].n_vertices);
-        let of_edges = piece
-            .middles
-            .map_or((0, 0), |m| (m.first_of(p), m.counts[p]));
+        let of_edges = piece.middles.map_or((0, 0), |m| (m.first_of(p), m.counts[p]));
         let mut middles = Seen::new(n_vertices + of_edges.0, of_edges.1);
         let needs_tets = only.is_none() || edges.is_some();
         for tet in part.tets().take_while(|_| needs_tets) {
@@ -161,12 +149,7 @@ fn claims(mesh: &mut Merged, piece: &Piece, entities: &Entities) -> Result<Sorte
     }
     piece.each_ghost(|ghost| {
         let entity = entities.volume(ghost.region, ghost.from);
-        for (v, point) in ghost
-            .nodes
-            .0
-            .into_iter()
-            .zip(ghost.points.0.as_chunks::<3>().0)
-        {
+        for (v, point) in ghost.nodes.0.into_iter().zip(ghost.points.0.as_chunks::<3>().0) {
             claim(v, entity, [0.0; 3])?;
             claim(v, POSITION, *point)?;
         }
@@ -193,11 +176,7 @@ fn granted(
         match last {
             Some((vertex, entity)) if vertex == claim.vertex => {
                 if claim.entity == POSITION && entity != POSITION {
-                    sorter.push(Node {
-                        entity,
-                        vertex,
-                        point: claim.point,
-                    })?;
+                    sorter.push(Node { entity, vertex, point: claim.point })?;
                     last = Some((vertex, POSITION));
                 }
             }
@@ -220,12 +199,8 @@ fn granted(
 
 /// Counts them and puts them into a file at `path`.
 fn stored(sorted: Sorted<Node>, entities: &Entities, path: PathBuf) -> Result<Nodes> {
-    let mut nodes = Nodes {
-        n: 0,
-        counts: vec![0; entities.tags().len()],
-        span: [u64::MAX, 0],
-        path,
-    };
+    let mut nodes =
+        Nodes { n: 0, counts: vec![0; entities.tags().len()], span: [u64::MAX, 0], path };
     let mut stream = scratch(&nodes.path)?;
     for node in sorted {
         let node = node?;

@@ -60,22 +60,14 @@ fn write_serial(
     out: &Path,
     sets: &[String; 2],
 ) -> Result<FileCounts> {
-    let counts = FileCounts {
-        vertices: mesh.n_vertices(),
-        tets: mesh.n_tets(),
-        triangles: mesh.n_faces(),
-    };
+    let counts =
+        FileCounts { vertices: mesh.n_vertices(), tets: mesh.n_tets(), triangles: mesh.n_faces() };
     let mut stream = begin(draft, out, counts)?;
     mesh.tets(|tet| element(&mut stream, tet.region.into(), TETRAHEDRON, &tet.nodes))?;
     boundary(&mut stream, counts.triangles, sets);
     mesh.faces().each(|face| {
         let label = u64::from(face.label) + 1;
-        element(
-            &mut stream,
-            label,
-            TRIANGLE,
-            &outward(face.vertices, face.regions),
-        )
+        element(&mut stream, label, TRIANGLE, &outward(face.vertices, face.regions))
     })?;
     vertices(&mut stream, counts.vertices, sets);
     mesh.vertices(|_, vertex| point(&mut stream, vertex.point))?;
@@ -140,11 +132,7 @@ fn each_facet(
 
 /// The vertices counter-clockwise seen from outside the tetrahedron that the face is of: the one in front, where there is one.
 fn outward([a, b, c]: [u64; 3], regions: [u32; 2]) -> [u64; 3] {
-    if regions[0] == 0 {
-        [a, b, c]
-    } else {
-        [a, c, b]
-    }
+    if regions[0] == 0 { [a, b, c] } else { [a, c, b] }
 }
 
 fn begin(draft: &mut Draft, out: &Path, counts: FileCounts) -> Result<Stream> {
@@ -153,9 +141,7 @@ fn begin(draft: &mut Draft, out: &Path, counts: FileCounts) -> Result<Stream> {
     let path = draft.create(out, 48 * counts.vertices + elements)?;
     let mut stream = Stream::open(&path)?;
     let n = counts.tets;
-    stream.text(&format!(
-        "MFEM mesh v1.3\n\ndimension\n3\n\nelements\n{n}\n"
-    ));
+    stream.text(&format!("MFEM mesh v1.3\n\ndimension\n3\n\nelements\n{n}\n"));
     Ok(stream)
 }
 
@@ -164,9 +150,7 @@ fn boundary(stream: &mut Stream, n: u64, [regions, _]: &[String; 2]) {
 }
 
 fn vertices(stream: &mut Stream, n: u64, [_, labels]: &[String; 2]) {
-    stream.text(&format!(
-        "\nbdr_attribute_sets\n{labels}\nvertices\n{n}\n3\n"
-    ));
+    stream.text(&format!("\nbdr_attribute_sets\n{labels}\nvertices\n{n}\n3\n"));
 }
 
 fn region_sets(mesh: &mut Merged) -> Result<String> {
@@ -189,9 +173,5 @@ fn sets(named: impl Iterator<Item = (u32, String)>) -> String {
     let set = |(name, members): (&String, &Vec<String>)| {
         format!("\"{name}\"\n{}\n{}\n", members.len(), members.join(" "))
     };
-    format!(
-        "{}\n{}",
-        by_name.len(),
-        by_name.iter().map(set).collect::<String>()
-    )
+    format!("{}\n{}", by_name.len(), by_name.iter().map(set).collect::<String>())
 }

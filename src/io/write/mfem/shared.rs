@@ -41,23 +41,13 @@ sort_record! {
 fn entities(mesh: &mut Merged) -> Result<Sorted<Entity>> {
     let mut entities = Sorter::new(mesh.dir(), mesh.sorter_bytes());
     for p in 0..mesh.n_parts() {
-        let Opened {
-            mut part, numbers, ..
-        } = mesh.open_part(p)?;
+        let Opened { mut part, numbers, .. } = mesh.open_part(p)?;
         let mut push = |face: [u32; 3]| -> Result<()> {
             let [i, j, k] = numbers.of(face)?;
             let mut ends = [(i, face[0]), (j, face[1]), (k, face[2])];
             ends.sort_unstable();
             let [a, b, c] = ends;
-            for ends in [
-                [a; 3],
-                [b; 3],
-                [c; 3],
-                [a, b, b],
-                [a, c, c],
-                [b, c, c],
-                ends,
-            ] {
+            for ends in [[a; 3], [b; 3], [c; 3], [a, b, b], [a, c, c], [b, c, c], ends] {
                 entities.push(Entity {
                     key: ends.map(|end| end.0),
                     part: p as u32,
@@ -116,13 +106,7 @@ impl Shared {
             let dimension = u32::from(a != b) + u32::from(b != c);
             for Entity { key, part, locals } in all {
                 counts.entry((part, group)).or_default()[dimension as usize] += 1;
-                members.push(Member {
-                    part,
-                    group,
-                    dimension,
-                    key,
-                    locals,
-                })?;
+                members.push(Member { part, group, dimension, key, locals })?;
             }
         }
         let mut groups = vec![Vec::new(); group_of.len()];
@@ -130,11 +114,7 @@ impl Shared {
             groups[group as usize] = ranks;
         }
         let members = members.finish()?.peekable();
-        Ok(Self {
-            members,
-            groups,
-            counts,
-        })
+        Ok(Self { members, groups, counts })
     }
 
     /// Writes what the sub-domain at place `p` shares; later calls are for later ones. Errors: the disk.
@@ -148,10 +128,7 @@ impl Shared {
         for ((_, group), _) in &groups {
             let ranks = &self.groups[*group as usize];
             stream.integer(ranks.len() as u64, b' ');
-            list(
-                stream,
-                &ranks.iter().map(|&rank| rank.into()).collect::<Vec<_>>(),
-            )?;
+            list(stream, &ranks.iter().map(|&rank| rank.into()).collect::<Vec<_>>())?;
         }
         stream.text("\n");
         for (dimension, what) in ["vertices", "edges", "faces"].iter().enumerate() {
@@ -163,9 +140,8 @@ impl Shared {
                 stream.text(&format!("\nshared_{what} {}\n", counts[dimension as usize]));
                 let here = (p, group, dimension);
                 let order = |m: &Member| (m.part, m.group, m.dimension);
-                while let Some(member) = self
-                    .members
-                    .next_if(|m| m.as_ref().map_or(true, |m| order(m) <= here))
+                while let Some(member) =
+                    self.members.next_if(|m| m.as_ref().map_or(true, |m| order(m) <= here))
                 {
                     let member = member?;
                     if order(&member) < here {
