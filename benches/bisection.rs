@@ -7,17 +7,17 @@
 
 use std::time::Instant;
 
-use tetdb::bisect::{self, CutPlan, CutReport, Method, PlaneChoice, Steps, load_of};
-use tetdb::geom::{Point, mix};
-use tetdb::mesh::{Mesh, Workspace, renumber};
-use tetdb::optimize::{Mode, Settings};
-use tetdb::pipeline::{self, Options, silent};
-use tetdb::samples::SampleSpec;
-use tetdb::sizing::{SizeField, SizeOptions, TETS_PER_LOAD};
-use tetdb::storage::{Backing, Budget, Pager, ScratchSpace, attempt};
-use tetdb::store::Catalog;
-use tetdb::surface::Surface;
+use tetdb_base::geom::{Point, mix};
+use tetdb_base::storage::{Backing, Budget, Pager, ScratchSpace, attempt};
+use tetdb_base::surface::Surface;
+use tetdb_engine::pipeline::{self, Options, silent};
+use tetdb_kernel::bisect::{self, CutPlan, CutReport, Method, PlaneChoice, Steps, load_of};
+use tetdb_kernel::mesh::{Mesh, Workspace, renumber};
+use tetdb_kernel::optimize::{Mode, Settings};
+use tetdb_kernel::samples::SampleSpec;
+use tetdb_kernel::sizing::{SizeField, SizeOptions, TETS_PER_LOAD};
 use tetdb_schema::catalog::Job;
+use tetdb_store::store::Catalog;
 
 /// Bytes of pages per tetrahedron of a finished mesh, its vertices included.
 const BYTES_PER_TET: f64 = 42.0;
@@ -79,7 +79,7 @@ impl Bench {
             &silent,
         )
         .expect("a mesh");
-        renumber(&mut host, &tetdb::geom::HilbertFrame::new(&bounds), &space).expect("room");
+        renumber(&mut host, &tetdb_base::geom::HilbertFrame::new(&bounds), &space).expect("room");
         let clock = Instant::now();
         let mut core = self.pool(None, bytes / 4);
         let plan = CutPlan {

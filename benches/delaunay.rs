@@ -7,11 +7,11 @@
 
 use std::path::Path;
 
-use tetdb::delaunay::{Kernel, enclose, insertion_key};
-use tetdb::geom::{Aabb, HilbertFrame, Point, orient_sign};
-use tetdb::mesh::Mesh;
-use tetdb::samples::SampleSpec;
-use tetdb::storage::{Backing, FlatPages, Pager, Pages, Sorter};
+use tetdb_base::geom::{Aabb, HilbertFrame, Point, orient_sign};
+use tetdb_base::storage::{Backing, FlatPages, Pager, Pages, Sorter};
+use tetdb_kernel::delaunay::{Kernel, enclose, insertion_key};
+use tetdb_kernel::mesh::Mesh;
+use tetdb_kernel::samples::SampleSpec;
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();

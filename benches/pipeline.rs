@@ -9,16 +9,16 @@ use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 use std::path::Path;
 use std::time::Instant;
 
-use tetdb::bisect::Method;
-use tetdb::geom::Point;
-use tetdb::pipeline::{self, Event, Options};
-use tetdb::refine::Lengths;
-use tetdb::samples::SampleSpec;
-use tetdb::storage::Budget;
-use tetdb::store::Catalog;
-use tetdb::surface::Surface;
+use tetdb_base::geom::Point;
+use tetdb_base::storage::Budget;
+use tetdb_base::surface::Surface;
+use tetdb_engine::pipeline::{self, Event, Options};
+use tetdb_kernel::bisect::Method;
+use tetdb_kernel::refine::Lengths;
+use tetdb_kernel::samples::SampleSpec;
 use tetdb_schema::catalog::Job;
 use tetdb_schema::record::{SealedVertex, tag};
+use tetdb_store::store::Catalog;
 
 /// Seconds per stage; what passes between two words of the watcher belongs to the stage of the first.
 struct Stages {

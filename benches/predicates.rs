@@ -6,7 +6,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use robust::Coord3D;
-use tetdb::geom::{Point, insphere, orient};
+use tetdb_base::geom::{Point, insphere, orient};
 
 /// Seeded, uniform in [-0.5, 0.5).
 fn numbers() -> impl FnMut() -> f64 {

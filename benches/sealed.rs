@@ -3,18 +3,18 @@
 //! `cargo bench --bench sealed -- [points]`; without an argument a smoke size. Rates are per
 //! CPU second of all threads.
 
-use tetdb::audit::{Level, VerifyOptions, verify};
-use tetdb::delaunay::{Kernel, enclose};
-use tetdb::geom::{Aabb, HilbertFrame, Point};
-use tetdb::mesh::Mesh;
-use tetdb::sealed::{FacePairs, Paired, SealedWriter, sorted_face};
-use tetdb::storage::FlatPages;
-use tetdb::store::Catalog;
+use tetdb_base::geom::{Aabb, HilbertFrame, Point};
+use tetdb_base::storage::FlatPages;
+use tetdb_kernel::delaunay::{Kernel, enclose};
+use tetdb_kernel::mesh::Mesh;
 use tetdb_schema::catalog::{Job, StoreState};
 use tetdb_schema::chunk::{ChunkRecord, Decoder, Packer};
 use tetdb_schema::digest::mix;
 use tetdb_schema::ids::SubdomainId;
 use tetdb_schema::record::{FACES, NO_TET, SealedFacet, SealedTet, SealedVertex, tag};
+use tetdb_store::audit::{Level, VerifyOptions, verify};
+use tetdb_store::sealed::{FacePairs, Paired, SealedWriter, sorted_face};
+use tetdb_store::store::Catalog;
 
 fn main() {
     let n = std::env::args().find_map(|a| a.parse().ok());

@@ -1,6 +1,6 @@
-//! The command line program; see [`tetdb::cli`].
+//! The command line program; see the crate `tetdb-cli`.
 #![forbid(unsafe_code)]
 
 fn main() -> std::process::ExitCode {
-    tetdb::cli::run()
+    tetdb_cli::run()
 }

@@ -6,16 +6,16 @@
 
 use std::path::Path;
 
-use tetdb::audit::{self, Level, Report, VerifyOptions};
-use tetdb::bisect::{CutReport, Method, Plane, PlaneChoice, choose_plane};
-use tetdb::geom::{Point, mix};
-use tetdb::mesh::Mesh;
-use tetdb::pipeline::{self, Options, PipelineError, silent};
-use tetdb::samples::SampleSpec;
-use tetdb::storage::{Budget, FlatPages, ScratchSpace};
-use tetdb::store::Catalog;
-use tetdb::surface::Surface;
+use tetdb_base::geom::{Point, mix};
+use tetdb_base::storage::{Budget, FlatPages, ScratchSpace};
+use tetdb_base::surface::Surface;
+use tetdb_engine::pipeline::{self, Options, PipelineError, silent};
+use tetdb_kernel::bisect::{CutReport, Method, Plane, PlaneChoice, choose_plane};
+use tetdb_kernel::mesh::Mesh;
+use tetdb_kernel::samples::SampleSpec;
 use tetdb_schema::catalog::Job;
+use tetdb_store::audit::{self, Level, Report, VerifyOptions};
+use tetdb_store::store::Catalog;
 
 fn sample(words: &str) -> Surface {
     let made = SampleSpec::parse(words).and_then(|spec| spec.make());

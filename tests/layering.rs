@@ -1,8 +1,7 @@
-//! A room imports only from lower floors, never from its own; inside a room, files form no circle.
+//! A module imports only from lower floors of its crate, and the files of a module form no circle.
 //!
-//! Why: the topology kernel must not come to know formats, nor the store geometry, one convenient import at a time.
-//! How: every `crate::ROOM` in the sources, tests left out, is looked up in the house below. Inside a room, every path is followed through
-//! the re-exports to the file that defines its end.
+//! Why: cargo keeps the floors between crates, but inside one a convenient import would tie modules together unseen.
+//! How: `syn` reads every file, tests left out. Each path is followed through re-exports to the file that defines its end.
 
 mod sources;
 
@@ -10,25 +9,28 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
-use sources::{sources, src, without_tests};
+use proc_macro2::{TokenStream, TokenTree};
+use sources::{sources, src};
+use syn::spanned::Spanned;
+use syn::visit::{self, Visit};
 
-/// Rooms from the lowest floor up.
-const HOUSE: &[&[&str]] = &[
-    &["geom", "expr"],
-    &["storage"],
-    &["mesh", "surface", "sealed"],
-    &["delaunay", "reconnect", "sizing", "samples", "store"],
-    &["boundary", "refine", "optimize"],
-    &["bisect", "topology"],
-    &["pipeline", "audit", "query"],
-    &["io"],
-    &["view"],
-    &["api"],
-    &["cli"],
+/// The crates below `src` with the floors of their modules, from the lowest up.
+const HOUSE: &[(&str, &[&[&str]])] = &[
+    ("base", &[&["geom", "expr"], &["shape", "storage"], &["surface"]]),
+    (
+        "kernel",
+        &[
+            &["mesh", "topology"],
+            &["delaunay", "reconnect", "sizing", "samples"],
+            &["boundary", "refine", "optimize"],
+            &["bisect"],
+        ],
+    ),
+    ("store", &[&["sealed"], &["store"], &["query", "audit"]]),
+    ("io", &[&["read", "write"]]),
+    ("engine", &[&["pipeline"], &["view"], &["api"]]),
+    ("cli", &[]),
 ];
-
-/// Files and modules at the top of the crate that are no rooms.
-const NOT_ROOMS: &[&str] = &["lib", "main", "guide"];
 
 /// Longer files and functions are looked at a second time: those left are below, each with its reason.
 const FILE_LINES_MAX: usize = 500;
@@ -36,10 +38,10 @@ const FUNCTION_LINES_MAX: usize = 80;
 
 /// Files above [`FILE_LINES_MAX`], tests at their feet not counted.
 const LONG_FILES: &[(&str, &str)] = &[
-    ("api/mesher.rs", "a method with its documentation for each option of a mesh"),
-    ("api/surface.rs", "a method with its documentation for all that is done to a surface"),
-    ("store/catalog.rs", "one transaction type: a reader and a writer for each table"),
-    ("audit/pass.rs", "one walk over a sub-domain that all five levels of checks share"),
+    ("engine/api/mesher.rs", "a method with its documentation for each option of a mesh"),
+    ("engine/api/surface.rs", "a method with its documentation for all that is done to a surface"),
+    ("store/store/catalog.rs", "one transaction type: a reader and a writer for each table"),
+    ("store/audit/pass.rs", "one walk over a sub-domain that all five levels of checks share"),
     ("io/read/feed.rs", "the words, numbers and places that every text format reads by"),
     (
         "io/write/merged.rs",
@@ -50,14 +52,17 @@ const LONG_FILES: &[(&str, &str)] = &[
 /// Functions above [`FUNCTION_LINES_MAX`].
 const LONG_FUNCTIONS: &[(&str, &str)] = &[
     (
-        "boundary/grow.rs grow",
+        "kernel/boundary/grow.rs grow",
         "a cavity is grown, then refused for any of five reasons that need what was grown",
     ),
     (
-        "boundary/points.rs build",
+        "kernel/boundary/points.rs build",
         "chains, faces and suppression of one attempt, which hand on four lists",
     ),
-    ("boundary/space.rs replace", "pairs of sides are matched; each step uses the list before"),
+    (
+        "kernel/boundary/space.rs replace",
+        "pairs of sides are matched; each step uses the list before",
+    ),
     ("cli/estimate.rs run", "an answer line by line, for people and for programs"),
     (
         "io/write/foam/faces.rs part",
@@ -78,83 +83,87 @@ const LONG_FUNCTIONS: &[(&str, &str)] = &[
         "io/write/vtu_boundary.rs write",
         "fourteen arrays named, opened, filled and closed in one order",
     ),
-    ("pipeline/mesh/run.rs coarse_step", "one step of the recipe and its commit"),
-    ("pipeline/remesh/run.rs commit", "one commit: what it checks and all that it writes"),
+    ("engine/pipeline/mesh/run.rs coarse_step", "one step of the recipe and its commit"),
+    ("engine/pipeline/remesh/run.rs commit", "one commit: what it checks and all that it writes"),
     (
-        "pipeline/tasks/serve.rs serve",
+        "engine/pipeline/tasks/serve.rs serve",
         "what orders need is set up once and lent to the threads that do them",
     ),
-    ("refine/long_edges.rs divide", "one edge from its length to its points"),
+    ("kernel/refine/long_edges.rs divide", "one edge from its length to its points"),
 ];
 
-fn floor(room: &str) -> Option<usize> {
-    HOUSE.iter().position(|rooms| rooms.contains(&room))
-}
-
 #[test]
-fn rooms_import_only_from_lower_floors() {
-    let mut wrong = BTreeSet::new();
+fn modules_import_from_lower_floors_alone() {
+    let mut wrong = Vec::new();
     let mut n_imports = 0;
-    for path in sources(&src()) {
-        let Some(room) = room_of(&path) else { continue };
-        let here =
-            floor(&room).unwrap_or_else(|| panic!("{room} has no floor in this test's house"));
-        let text = fs::read_to_string(&path).expect("a source file is readable");
-        for other in imports(&without_tests(&text)) {
-            if other == room || NOT_ROOMS.contains(&other.as_str()) {
+    for (name, floors) in HOUSE {
+        let floor_of = |m: &str| floors.iter().position(|floor| floor.contains(&m));
+        for (file, module) in &Crate::read(name).files {
+            let Some(from) = floor_of(first(file)) else {
                 continue;
-            }
-            n_imports += 1;
-            match floor(&other) {
-                Some(there) if there < here => {}
-                _ => _ = wrong.insert(format!("{}: {room} imports {other}", path.display())),
+            };
+            for path in module.all_paths().filter(|p| p.len() > 1 && p[0] == "crate") {
+                n_imports += 1;
+                let to = floor_of(&path[1]);
+                if path[1] != first(file) && to.is_some_and(|to| to >= from) {
+                    wrong.push(format!("{name}/{file}: {}", path.join("::")));
+                }
             }
         }
     }
-    assert!(
-        n_imports > 50,
-        "only {n_imports} imports found: does the test still read the sources?"
-    );
-    assert!(wrong.is_empty(), "imports that go up or sideways:\n{wrong:#?}");
+    assert!(n_imports > 200, "only {n_imports} imports found: does the test read the sources?");
+    assert!(wrong.is_empty(), "imports that do not lead down: {wrong:#?}");
 }
 
 #[test]
-fn files_of_a_room_form_no_circle() {
-    let modules = Modules::read();
-    let graph = modules.graph();
-    let n_edges: usize = graph.values().map(BTreeSet::len).sum();
-    assert!(
-        n_edges > 200,
-        "only {n_edges} imports between the files of a room found: does the test still read the sources?"
-    );
-    let found: Vec<_> = circles(&graph).iter().map(|files| describe(files, &graph)).collect();
-    assert!(
-        found.is_empty(),
-        "{} circles of files inside a room:\n{}",
-        found.len(),
-        found.join("\n")
-    );
+fn every_module_has_a_floor() {
+    for (name, floors) in HOUSE.iter().filter(|(_, floors)| !floors.is_empty()) {
+        let files = Crate::read(name).files;
+        let found: BTreeSet<&str> =
+            files.keys().map(|file| first(file)).filter(|m| !m.is_empty()).collect();
+        let listed: BTreeSet<&str> = floors.iter().copied().flatten().copied().collect();
+        assert_eq!(found, listed, "of src/{name}");
+    }
 }
 
 #[test]
-fn circles_are_found_through_reexports() {
-    let modules = Modules::from_texts([
-        ("a", "mod b;\nmod c;\nmod d;\npub use b::{B, other as renamed};\nuse c::Hidden;"),
-        ("a::b", "use super::c::C;\nfn f() { crate::a::d::g() }"),
+fn files_of_a_module_form_no_circle() {
+    let (mut found, mut n_edges) = (Vec::new(), 0);
+    for (name, _) in HOUSE {
+        let graph = Crate::read(name).graph();
+        n_edges += graph.values().map(BTreeSet::len).sum::<usize>();
+        found.extend(circles(&graph).iter().map(|files| describe(name, files, &graph)));
+    }
+    assert!(n_edges > 200, "only {n_edges} imports found: does the test read the sources?");
+    assert!(found.is_empty(), "{} circles of files:\n{}", found.len(), found.join("\n"));
+}
+
+#[test]
+fn circles_are_found_through_reexports_and_beside_functions_of_the_same_name() {
+    let files = [
+        ("a", "mod b; mod c; mod d; pub use b::{B, other as renamed}; use c::Hidden;"),
+        ("a::b", "use super::c::C; fn f() { crate::a::d::g() }"),
         ("a::c", "use crate::a::renamed;"),
-        ("a::d", "use super::Hidden;\nuse super::super::e::E;"),
+        ("a::d", "use super::Hidden; use super::super::e::E;"),
         ("e", "pub struct E;"),
-    ]);
-    let files = |names: &[&str]| names.iter().map(|n| n.to_string()).collect();
-    let found = circles(&modules.graph());
-    assert_eq!(found, [files(&["a::b", "a::c", "a::d"])] as [BTreeSet<String>; 1]);
+        // A function and a module of one name: the path through it is the module's.
+        ("f", "mod g; mod h; mod i; pub use i::g;"),
+        ("f::g", "use super::h::H;"),
+        ("f::h", "use super::g::G; sort_record! { struct R { x: super::i::I } }"),
+        ("f::i", "pub fn g() {}"),
+    ];
+    let found = circles(&Crate::from_texts(files).graph());
+    let files = |names: &[&str]| names.iter().map(|n| n.to_string()).collect::<BTreeSet<_>>();
+    assert_eq!(found, [files(&["a::b", "a::c", "a::d"]), files(&["f::g", "f::h"])]);
 }
 
 #[test]
-fn the_readme_names_every_room_and_no_file_that_is_not_there() {
+fn the_readme_names_every_module_and_no_file_that_is_not_there() {
     let text = fs::read_to_string(src().join("README.md")).expect("src/README.md is readable");
-    for room in HOUSE.iter().copied().flatten() {
-        assert!(text.contains(&format!("[`{room}`]")), "src/README.md does not name {room}");
+    for (name, floors) in HOUSE {
+        for module in floors.iter().copied().flatten().chain([name]) {
+            assert!(text.contains(&format!("`{module}`")), "src/README.md does not name {module}");
+        }
     }
     let spans: Vec<&str> = text.split('`').skip(1).step_by(2).collect();
     for file in spans.iter().filter(|s| s.ends_with(".rs") || s.ends_with(".md")) {
@@ -171,196 +180,202 @@ fn long_files_and_functions_are_those_with_a_reason() {
         let text = fs::read_to_string(&path).expect("a source file is readable");
         let name = path.strip_prefix(src()).expect("it is below src");
         let name = name.to_string_lossy().replace('\\', "/");
-        if before_tests(&text).lines().count() > FILE_LINES_MAX {
+        let mut measured = Measured::default();
+        measured.visit_file(&syn::parse_file(&text).expect("a source file parses"));
+        let lines = text.lines().count() - measured.test_lines;
+        if lines > FILE_LINES_MAX {
             files.insert(name.clone());
         }
-        for (function, lines) in functions_of(&text) {
-            n_functions += 1;
-            if lines > FUNCTION_LINES_MAX {
-                functions.insert(format!("{name} {function}"));
-            }
-        }
+        n_functions += measured.functions.len();
+        let long = measured.functions.iter().filter(|(_, lines)| *lines > FUNCTION_LINES_MAX);
+        functions.extend(long.map(|(function, _)| format!("{name} {function}")));
     }
     assert!(
         n_functions > 3000,
-        "only {n_functions} functions found: does the test still read the sources?"
+        "only {n_functions} functions found: does the test read the sources?"
     );
     let listed = |list: &[(&str, &str)]| list.iter().map(|row| row.0.to_owned()).collect();
     assert_eq!(files, listed(LONG_FILES));
     assert_eq!(functions, listed(LONG_FUNCTIONS));
 }
 
-/// The text up to the tests at its foot.
-fn before_tests(text: &str) -> &str {
-    text.split("\n#[cfg(test)]\nmod tests {").next().unwrap_or(text)
+/// Lines of functions and of tests in a file.
+#[derive(Default)]
+struct Measured {
+    functions: Vec<(String, usize)>,
+    test_lines: usize,
 }
 
-/// Functions with a body and the lines of each, as `cargo fmt` leaves them: from the name to the brace below it. Tests are left out.
-fn functions_of(text: &str) -> Vec<(String, usize)> {
-    let lines: Vec<&str> = before_tests(text).lines().collect();
-    let mut found = Vec::new();
-    for (i, line) in lines.iter().enumerate() {
-        let code = line.trim_start();
-        let Some(at) = code.find("fn ").filter(|&at| {
-            let words = code[..at].split_whitespace();
-            words
-                .map(|w| w.split('(').next().unwrap_or(w))
-                .all(|w| ["pub", "const", "unsafe"].contains(&w))
-        }) else {
-            continue;
-        };
-        let attributes = lines[..i].iter().rev().map(|l| l.trim());
-        let mut attributes = attributes.take_while(|l| l.starts_with("#["));
-        let head = lines[i..].iter().find(|l| l.ends_with(['{', '}', ';']));
-        if attributes.any(|l| l == "#[test]") || head.is_none_or(|l| l.ends_with(';')) {
-            continue;
-        }
-        let end = format!("{}}}", &line[..line.len() - code.len()]);
-        let ended = |l: &&str| {
-            **l == end
-                || l.len() > end.len() && l.starts_with(&end) && l.as_bytes()[end.len()] == b';'
-        };
-        if let Some(length) = lines[i..].iter().position(ended) {
-            found.push((name(&code[at + "fn ".len()..]), length + 1));
+impl Measured {
+    fn add(&mut self, signature: &syn::Signature, span: proc_macro2::Span) {
+        let first = signature.span().start().line;
+        self.functions.push((signature.ident.to_string(), span.end().line + 1 - first));
+    }
+}
+
+impl<'ast> Visit<'ast> for Measured {
+    fn visit_item_mod(&mut self, item: &'ast syn::ItemMod) {
+        match is_test(&item.attrs) {
+            true => self.test_lines += item.span().end().line + 1 - item.span().start().line,
+            false => visit::visit_item_mod(self, item),
         }
     }
-    found
-}
 
-#[test]
-fn functions_are_measured_to_their_last_brace() {
-    let text = "trait T {\n    fn only_named(\n        &self,\n    );\n}\n\nfn a() {\n    1\n}\n\nimpl B {\n    pub(super) fn b(\n        c: u32,\n    ) -> u32 {\n        c\n    }\n}\n\
-        #[test]\n#[ignore]\nfn left_out() {\n}\n";
-    let found = functions_of(text);
-    assert_eq!(found, [("a".to_owned(), 3), ("b".to_owned(), 5)]);
-}
-
-#[test]
-fn every_room_is_a_module_of_the_crate() {
-    let lib = fs::read_to_string(src().join("lib.rs")).expect("src/lib.rs is readable");
-    let declared: BTreeSet<&str> = lib
-        .lines()
-        .filter_map(|l| l.trim_start().strip_prefix("pub mod ")?.strip_suffix(';'))
-        .filter(|name| !NOT_ROOMS.contains(name))
-        .collect();
-    let found: BTreeSet<String> = sources(&src()).iter().filter_map(|p| room_of(p)).collect();
-    assert_eq!(declared, found.iter().map(String::as_str).collect());
-}
-
-#[test]
-fn imports_are_found_however_they_are_written() {
-    let text = "use crate::storage::Page;\nuse crate::{geom::Point, mesh::{Tet, Face}};\nlet x = crate::sizing::f();\n\
-        /// [`crate::io`] is only named\n#[cfg(test)]\nmod tests { use crate::cli; }\n";
-    let found: BTreeSet<String> = imports(&without_tests(text)).into_iter().collect();
-    assert_eq!(found, ["geom", "mesh", "sizing", "storage"].map(String::from).into());
-}
-
-/// The folder (or file) directly below `src`.
-fn room_of(path: &Path) -> Option<String> {
-    let first = path.strip_prefix(src()).ok()?.iter().next()?;
-    let room = Path::new(first).file_stem()?.to_string_lossy().into_owned();
-    (!NOT_ROOMS.contains(&room.as_str())).then_some(room)
-}
-
-/// First names after `crate::`, also inside braces.
-fn imports(text: &str) -> Vec<String> {
-    let mut found = Vec::new();
-    for (at, _) in text.match_indices("crate::") {
-        // `crate_name::` and `$crate::` are other things.
-        if text[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_') {
-            continue;
-        }
-        let rest = &text[at + "crate::".len()..];
-        match rest.strip_prefix('{') {
-            Some(list) => found.extend(names_in_braces(list)),
-            None => found.push(name(rest)),
-        }
+    fn visit_item_fn(&mut self, item: &'ast syn::ItemFn) {
+        self.add(&item.sig, item.span());
+        visit::visit_item_fn(self, item);
     }
-    // Types and functions of the crate's root are in lower floors' reach.
-    found.retain(|n| n.starts_with(|c: char| c.is_ascii_lowercase()));
-    found
-}
 
-fn names_in_braces(list: &str) -> Vec<String> {
-    let (mut depth, mut start, mut found) = (0, true, Vec::new());
-    for (i, c) in list.char_indices() {
-        match c {
-            '{' => depth += 1,
-            '}' if depth == 0 => break,
-            '}' => depth -= 1,
-            ',' if depth == 0 => start = true,
-            c if c.is_whitespace() => {}
-            _ if start => {
-                found.push(name(&list[i..]));
-                start = false;
-            }
-            _ => {}
-        }
+    fn visit_impl_item_fn(&mut self, item: &'ast syn::ImplItemFn) {
+        self.add(&item.sig, item.span());
+        visit::visit_impl_item_fn(self, item);
     }
-    found
 }
 
-fn name(text: &str) -> String {
-    text.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect()
+/// Whether an item is built for tests alone.
+fn is_test(attributes: &[syn::Attribute]) -> bool {
+    attributes.iter().any(|a| match &a.meta {
+        syn::Meta::List(list) if a.path().is_ident("cfg") => list.tokens.to_string() == "test",
+        meta => meta.path().is_ident("test"),
+    })
 }
 
-/// A module by its path from the crate's root, `pipeline::mesh::run`, with what it imports and the other paths in it.
+/// A file as a module: what it imports, and the other paths in it.
 #[derive(Default)]
 struct Module {
-    /// Name here -> path as it is written, of every `use`.
+    /// Name here and path, of every `use`.
     uses: BTreeMap<String, Vec<String>>,
     paths: Vec<Vec<String>>,
 }
 
-/// What a path leads to.
-enum Target {
-    Module(String),
-    /// Something defined in the file of this module.
-    ItemOf(String),
+impl Module {
+    fn parse(text: &str) -> Self {
+        let mut module = Self::default();
+        module.visit_file(&syn::parse_file(text).expect("a source file parses"));
+        module
+    }
+
+    fn all_paths(&self) -> impl Iterator<Item = &Vec<String>> {
+        self.uses.values().chain(&self.paths)
+    }
+
+    fn add_tree(&mut self, tree: &syn::UseTree, mut path: Vec<String>) {
+        match tree {
+            syn::UseTree::Path(p) => {
+                path.push(p.ident.to_string());
+                self.add_tree(&p.tree, path);
+            }
+            syn::UseTree::Name(n) if n.ident == "self" => {
+                self.uses.insert(path.last().cloned().unwrap_or_default(), path);
+            }
+            syn::UseTree::Name(n) => {
+                path.push(n.ident.to_string());
+                self.uses.insert(n.ident.to_string(), path);
+            }
+            syn::UseTree::Rename(r) => {
+                path.push(r.ident.to_string());
+                self.uses.insert(r.rename.to_string(), path);
+            }
+            syn::UseTree::Glob(_) => self.paths.push(path),
+            syn::UseTree::Group(group) => {
+                group.items.iter().for_each(|tree| self.add_tree(tree, path.clone()));
+            }
+        }
+    }
+
+    /// Paths among the tokens of a macro.
+    fn add_tokens(&mut self, tokens: TokenStream) {
+        let mut path: Vec<String> = Vec::new();
+        let mut colons = 0;
+        for token in tokens {
+            match token {
+                TokenTree::Ident(name) => {
+                    if colons != 2 {
+                        self.paths.extend((!path.is_empty()).then(|| std::mem::take(&mut path)));
+                    }
+                    path.push(name.to_string());
+                    colons = 0;
+                }
+                TokenTree::Punct(p) if p.as_char() == ':' => colons += 1,
+                other => {
+                    colons = 0;
+                    self.paths.extend((!path.is_empty()).then(|| std::mem::take(&mut path)));
+                    if let TokenTree::Group(group) = other {
+                        self.add_tokens(group.stream());
+                    }
+                }
+            }
+        }
+        self.paths.extend((!path.is_empty()).then_some(path));
+    }
 }
 
-/// Every module of the crate that is a file.
-struct Modules(BTreeMap<String, Module>);
+impl<'ast> Visit<'ast> for Module {
+    fn visit_item(&mut self, item: &'ast syn::Item) {
+        let attributes = match item {
+            syn::Item::Mod(i) => &i.attrs,
+            syn::Item::Fn(i) => &i.attrs,
+            syn::Item::Use(i) => &i.attrs,
+            syn::Item::Impl(i) => &i.attrs,
+            _ => &Vec::new(),
+        };
+        if !is_test(attributes) {
+            visit::visit_item(self, item);
+        }
+    }
 
-impl Modules {
-    fn read() -> Self {
-        let root = src();
-        let texts: Vec<(String, String)> = sources(&root)
-            .iter()
-            .filter(|path| room_of(path).is_some())
-            .map(|path| {
-                let text = fs::read_to_string(path).expect("a source file is readable");
-                (module_of(path.strip_prefix(&root).expect("it is below src")), text)
-            })
-            .collect();
-        Self::from_texts(texts.iter().map(|(m, t)| (m.as_str(), t.as_str())))
+    fn visit_item_use(&mut self, item: &'ast syn::ItemUse) {
+        self.add_tree(&item.tree, Vec::new());
+    }
+
+    fn visit_path(&mut self, path: &'ast syn::Path) {
+        self.paths.push(path.segments.iter().map(|s| s.ident.to_string()).collect());
+        visit::visit_path(self, path);
+    }
+
+    fn visit_macro(&mut self, item: &'ast syn::Macro) {
+        self.add_tokens(item.tokens.clone());
+    }
+
+    fn visit_item_macro(&mut self, item: &'ast syn::ItemMacro) {
+        // What a macro defines is resolved where it is used.
+        if !item.mac.path.is_ident("macro_rules") {
+            self.visit_macro(&item.mac);
+        }
+    }
+}
+
+/// Every file of a crate by the path of its module, `pipeline::mesh::run`.
+struct Crate {
+    files: BTreeMap<String, Module>,
+}
+
+impl Crate {
+    fn read(name: &str) -> Self {
+        let root = src().join(name);
+        let files = sources(&root).into_iter().map(|path| {
+            let text = fs::read_to_string(&path).expect("a source file is readable");
+            (module_of(path.strip_prefix(&root).expect("it is below")), Module::parse(&text))
+        });
+        Self { files: files.collect() }
     }
 
     fn from_texts<'a>(texts: impl IntoIterator<Item = (&'a str, &'a str)>) -> Self {
-        let modules = texts.into_iter().map(|(name, text)| {
-            let (uses, rest) = split_uses(&without_tests(text));
-            let module = Module {
-                uses: uses.iter().flat_map(|u| use_tree(u)).collect(),
-                paths: paths(&rest),
-            };
-            (name.to_owned(), module)
-        });
-        Self(modules.collect())
+        let files = texts.into_iter().map(|(name, text)| (name.to_owned(), Module::parse(text)));
+        Self { files: files.collect() }
     }
 
-    /// File -> files of the same room it takes something from, by the paths of their modules.
+    /// File -> files of the same module that it takes something from.
     fn graph(&self) -> BTreeMap<String, BTreeSet<String>> {
         let mut graph = BTreeMap::new();
-        for (name, module) in &self.0 {
-            // What only passes on a name of its own children needs nothing from them: these paths count where
-            // they are used.
-            let used = module.uses.values().filter(|path| !self.is_child(name, &path[0]));
-            let inner = module.uses.iter().filter(|(alias, path)| {
-                self.is_child(name, &path[0]) && module.paths.iter().any(|p| p[0] == **alias)
+        for (name, module) in &self.files {
+            // A name of its own children that a file only passes on counts where it is used.
+            let used = module.uses.iter().filter(|(alias, path)| {
+                !self.is_child(name, &path[0]) || module.paths.iter().any(|p| p[0] == **alias)
             });
-            let all = used.chain(inner.map(|(_, path)| path)).chain(&module.paths);
+            let all = used.map(|(_, path)| path).chain(&module.paths);
             let to: BTreeSet<String> = all
-                .filter_map(|path| self.file_of(name, path))
+                .filter_map(|path| self.file_of(name, path, 0))
                 .filter(|to| to != name && first(to) == first(name))
                 .collect();
             graph.insert(name.clone(), to);
@@ -369,61 +384,40 @@ impl Modules {
     }
 
     fn is_child(&self, module: &str, name: &str) -> bool {
-        self.0.contains_key(&join(module, name))
+        self.files.contains_key(&join(module, name))
     }
 
-    fn file_of(&self, from: &str, path: &[String]) -> Option<String> {
-        match self.resolve(from, path)? {
-            Target::ItemOf(module) => Some(module),
-            // A folder's own name stands for nothing yet: what is taken from it is another path.
-            Target::Module(m) if self.0.keys().any(|k| k.starts_with(&format!("{m}::"))) => None,
-            Target::Module(module) => Some(module),
-        }
-    }
-
-    fn resolve(&self, from: &str, path: &[String]) -> Option<Target> {
-        let rest = &path[1..];
-        match path[0].as_str() {
-            "crate" => self.walk("", rest),
-            "self" => self.walk(from, rest),
-            "super" => {
-                let parent = from.rsplit_once("::").map_or("", |(parent, _)| parent);
-                match rest.first().map(String::as_str) {
-                    Some("super") => self.resolve(parent, rest),
-                    _ => self.walk(parent, rest),
-                }
-            }
-            name if self.is_child(from, name) => self.walk(&join(from, name), rest),
-            name => {
-                let used = self.0.get(from)?.uses.get(name)?;
-                self.continue_from(from, used, rest)
-            }
-        }
-    }
-
-    fn walk(&self, module: &str, path: &[String]) -> Option<Target> {
-        let Some(name) = path.first() else {
-            return Some(Target::Module(module.to_owned()));
+    /// The file that defines the end of a path; none for a folder's own name and for other crates.
+    fn file_of(&self, from: &str, path: &[String], depth: u32) -> Option<String> {
+        let (mut at, mut rest) = match path[0].as_str() {
+            "crate" => (String::new(), &path[1..]),
+            "self" => (from.to_owned(), &path[1..]),
+            "super" => (parent(from).to_owned(), &path[1..]),
+            name if path.len() > 1 && self.is_child(from, name) => (from.to_owned(), path),
+            name if self.files.get(from)?.uses.contains_key(name) => (from.to_owned(), path),
+            _ => return None,
         };
-        let used = self.0.get(module).and_then(|m| m.uses.get(name));
-        match used {
-            Some(used) => self.continue_from(module, used, &path[1..]),
-            None if self.is_child(module, name) => self.walk(&join(module, name), &path[1..]),
-            None if self.0.contains_key(module) => Some(Target::ItemOf(module.to_owned())),
-            None => None,
+        while let Some(name) = rest.first() {
+            let used = self.files.get(&at).and_then(|m| m.uses.get(name));
+            if name == "super" {
+                at = parent(&at).to_owned();
+            } else if rest.len() > 1 && self.is_child(&at, name) {
+                at = join(&at, name);
+            } else if let Some(used) = used.filter(|_| depth < 16) {
+                let whole = [used, &rest[1..]].concat();
+                return match whole == path && at == from {
+                    true => None,
+                    false => self.file_of(&at, &whole, depth + 1),
+                };
+            } else if self.is_child(&at, name) {
+                at = join(&at, name);
+            } else {
+                return Some(at);
+            }
+            rest = &rest[1..];
         }
-    }
-
-    fn continue_from(&self, module: &str, used: &[String], rest: &[String]) -> Option<Target> {
-        // `use name;` and an outer crate's name lead nowhere in this crate.
-        let known = ["crate", "self", "super"].contains(&used[0].as_str());
-        if !known && !self.is_child(module, &used[0]) {
-            return None;
-        }
-        match self.resolve(module, used)? {
-            Target::Module(m) => self.walk(&m, rest),
-            item => Some(item),
-        }
+        let is_folder = self.files.keys().any(|k| k.starts_with(&format!("{at}::")));
+        (!at.is_empty() && !is_folder).then_some(at)
     }
 }
 
@@ -431,97 +425,22 @@ fn join(module: &str, name: &str) -> String {
     if module.is_empty() { name.to_owned() } else { format!("{module}::{name}") }
 }
 
+fn parent(module: &str) -> &str {
+    module.rsplit_once("::").map_or("", |(parent, _)| parent)
+}
+
 fn first(module: &str) -> &str {
     module.split("::").next().unwrap_or(module)
 }
 
-/// `mesh/run.rs` -> `mesh::run`, `mesh/mod.rs` -> `mesh`.
+/// `mesh/run.rs` -> `mesh::run`, `mesh/mod.rs` -> `mesh`, `lib.rs` -> the empty path.
 fn module_of(path: &Path) -> String {
     let names: Vec<_> =
         path.with_extension("").iter().map(|n| n.to_string_lossy().into_owned()).collect();
-    let names = names.strip_suffix(&["mod".to_owned()]).unwrap_or(&names);
-    names.join("::")
-}
-
-/// The trees of all `use`, and the text without them.
-fn split_uses(text: &str) -> (Vec<String>, String) {
-    let (mut uses, mut rest) = (Vec::new(), String::new());
-    let mut inside: Option<String> = None;
-    for line in text.lines() {
-        let line = line.trim();
-        let start = line
-            .find("use ")
-            .filter(|&at| at == 0 || line.starts_with("pub") && line[..at].ends_with([' ', ')']));
-        match (&mut inside, start) {
-            (Some(tree), _) => tree.push_str(line),
-            (None, Some(at)) => inside = Some(line[at + "use ".len()..].to_owned()),
-            (None, None) => {
-                rest.push_str(line);
-                rest.push('\n');
-            }
-        }
-        if let Some(tree) = inside.take_if(|tree| tree.ends_with(';')) {
-            uses.push(tree.trim_end_matches(';').to_owned());
-        }
+    match names.split_last() {
+        Some((last, folders)) if last == "mod" || last == "lib" => folders.join("::"),
+        _ => names.join("::"),
     }
-    (uses, rest)
-}
-
-/// Name -> path for every leaf of `a::{b, c::{d, e as f}}`.
-fn use_tree(tree: &str) -> Vec<(String, Vec<String>)> {
-    let tree = tree.trim();
-    if let Some((prefix, list)) = tree.split_once('{') {
-        let list = list.strip_suffix('}').expect("a list ends with its brace");
-        let prefix = path(prefix);
-        return split_list(list)
-            .into_iter()
-            .flat_map(use_tree)
-            .map(|(name, rest)| match rest.as_slice() {
-                [own] if own == "self" => {
-                    (prefix.last().cloned().unwrap_or_default(), prefix.clone())
-                }
-                _ => (name, [prefix.clone(), rest].concat()),
-            })
-            .collect();
-    }
-    let (tree, alias) = tree.split_once(" as ").unwrap_or((tree, ""));
-    let path = path(tree);
-    let Some(last) = path.last() else {
-        return Vec::new();
-    };
-    let name = if alias.is_empty() { last } else { alias.trim() };
-    vec![(name.to_owned(), path.clone())]
-}
-
-/// The parts between the commas that are in no inner braces.
-fn split_list(list: &str) -> Vec<&str> {
-    let (mut depth, mut start, mut parts) = (0, 0, Vec::new());
-    for (i, c) in list.char_indices() {
-        match c {
-            '{' => depth += 1,
-            '}' => depth -= 1,
-            ',' if depth == 0 => {
-                parts.push(&list[start..i]);
-                start = i + 1;
-            }
-            _ => {}
-        }
-    }
-    parts.push(&list[start..]);
-    parts.retain(|part| !part.trim().is_empty());
-    parts
-}
-
-fn path(text: &str) -> Vec<String> {
-    text.split("::").map(|n| n.trim().to_owned()).filter(|n| !n.is_empty()).collect()
-}
-
-/// Every path and name in code.
-fn paths(text: &str) -> Vec<Vec<String>> {
-    text.split(|c: char| !(c.is_alphanumeric() || c == '_' || c == ':'))
-        .map(path)
-        .filter(|p| !p.is_empty())
-        .collect()
 }
 
 /// The largest groups of files that all lead to each other.
@@ -554,10 +473,14 @@ fn reached<'a>(
     reached
 }
 
-fn describe(files: &BTreeSet<String>, graph: &BTreeMap<String, BTreeSet<String>>) -> String {
+fn describe(
+    name: &str,
+    files: &BTreeSet<String>,
+    graph: &BTreeMap<String, BTreeSet<String>>,
+) -> String {
     let lines = files.iter().map(|file| {
         let to: Vec<&str> = graph[file].intersection(files).map(String::as_str).collect();
-        format!("    {file} -> {}", to.join(", "))
+        format!("    {name}/{file} -> {}", to.join(", "))
     });
     format!("  circle of {}:\n{}", files.len(), lines.collect::<Vec<_>>().join("\n"))
 }

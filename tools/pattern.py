@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Computes `src/refine/pattern.bin`: points of a cube that repeats in all directions, without a bad tetrahedron between them.
+"""Computes `src/kernel/refine/pattern.bin`: points of a cube that repeats in all directions, without a bad tetrahedron between them.
 
-    python3 tools/pattern.py src/refine/pattern.bin [--points 4096] [--seed 7] [--start FILE]
+    python3 tools/pattern.py src/kernel/refine/pattern.bin [--points 4096] [--seed 7] [--start FILE]
 
 Random points are smoothed towards an optimal Delaunay triangulation (L. Chen and M. Holst, 2011): 1.3 % of the tetrahedra are left with
 q >= 2. Then, as long as there are any, one vertex each of a dozen of them is displaced at random and everything is smoothed for a few

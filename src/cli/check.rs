@@ -10,14 +10,14 @@ use super::console::Console;
 use super::failure::Failure;
 use super::input::{self, Space};
 use super::memory;
-use crate::api;
-use crate::api::error::{Error, Remedy};
-use crate::api::surface::WELD_SHARE_MAX;
-use crate::api::targets::check_target;
-use crate::geom::short;
-use crate::io::write;
-use crate::storage::attempt;
-use crate::surface::{Repair, Surface, repair, repair_bytes, validate_in};
+use tetdb_base::geom::short;
+use tetdb_base::storage::attempt;
+use tetdb_base::surface::{Repair, Surface, repair, repair_bytes, validate_in};
+use tetdb_engine::api;
+use tetdb_engine::api::error::{Error, Remedy};
+use tetdb_engine::api::surface::WELD_SHARE_MAX;
+use tetdb_engine::api::targets::check_target;
+use tetdb_io::write;
 
 /// A repair that was made.
 struct Mended {

@@ -8,16 +8,16 @@ use super::failure::Failure;
 use super::input::Space;
 use super::memory;
 use super::words::{self, count};
-use crate::api::predict;
-use crate::geom::Point;
-use crate::geom::short;
-use crate::optimize::face_least;
-use crate::pipeline::{Options, Prepared, least_for};
-use crate::storage::attempt;
-use crate::surface::{
+use tetdb_base::geom::Point;
+use tetdb_base::geom::short;
+use tetdb_base::shape::face_least;
+use tetdb_base::storage::attempt;
+use tetdb_base::surface::{
     BoundaryLoop, Closing, Defect, Fitness, Surface, Validation, boundary_loops, closing, fitness,
     repair_bytes, show, validate_in,
 };
+use tetdb_engine::api::predict;
+use tetdb_engine::pipeline::{Options, Prepared, least_for};
 
 /// Defects of one kind, holes and junctions listed for people.
 const LISTED: usize = 8;

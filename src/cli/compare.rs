@@ -6,8 +6,8 @@ use super::args::CompareArgs;
 use super::console::Console;
 use super::failure::Failure;
 use super::memory;
-use crate::api::store::open_finished;
-use crate::audit::{Population, Qualities, qualities};
+use tetdb_engine::api::store::open_finished;
+use tetdb_store::audit::{Population, Qualities, qualities};
 
 /// Exit code when the meshes differ.
 const DIFFERENT: u8 = 7;

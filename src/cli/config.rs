@@ -6,9 +6,9 @@ use clap::ValueEnum;
 
 use super::args::{Optimize, Regions, ShapeArgs, SizeArgs};
 use super::failure::Failure;
-use crate::api::job::identify_sizes;
-use crate::pipeline::Options;
-use crate::surface::{Seed, SeedKind};
+use tetdb_base::surface::{Seed, SeedKind};
+use tetdb_engine::api::job::identify_sizes;
+use tetdb_engine::pipeline::Options;
 
 /// No configuration is longer.
 const BYTES_MAX: u64 = 1 << 20;

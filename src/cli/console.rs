@@ -9,9 +9,9 @@ use serde::Serialize;
 
 use super::failure::{Failure, in_flags};
 use super::words;
-use crate::api::{Bytes, Event, Settings};
-use crate::geom::short;
-use crate::storage::CancelToken;
+use tetdb_base::geom::short;
+use tetdb_base::storage::CancelToken;
+use tetdb_engine::api::{Bytes, Event, Settings};
 
 /// Without a terminal, progress is one line in so much time.
 const PLAIN_EVERY: Duration = Duration::from_secs(10);
@@ -106,6 +106,7 @@ impl Console {
             Event::Note(ref text) => self.note(text),
             Event::Warning(ref text) => self.warn(&in_flags(text)),
             Event::StoreBegun(_) => super::signals::store_begins(),
+            _ => {}
         }
     }
 

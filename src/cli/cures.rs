@@ -3,13 +3,13 @@
 use serde_json::{Value, json};
 
 use super::input::Space;
-use crate::geom::short;
-use crate::optimize::face_least;
-use crate::sizing::SizeField;
-use crate::storage::attempt;
-use crate::surface::{
+use tetdb_base::geom::short;
+use tetdb_base::shape::face_least;
+use tetdb_base::storage::attempt;
+use tetdb_base::surface::{
     Fitness, Surface, closedness, fitness, repair, repair_bytes, split, validate_in,
 };
+use tetdb_kernel::sizing::SizeField;
 
 /// Shares of the box diagonal within which points are joined on trial.
 const WELDS: [f64; 4] = [1e-6, 1e-5, 1e-4, 1e-3];

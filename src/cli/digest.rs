@@ -6,7 +6,7 @@ use super::args::StoreArgs;
 use super::console::Console;
 use super::failure::Failure;
 use super::memory;
-use crate::api::store::open_finished;
+use tetdb_engine::api::store::open_finished;
 
 pub fn run(args: &StoreArgs, console: &Console) -> Result<u8, Failure> {
     // One row of the catalog is read.

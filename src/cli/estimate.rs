@@ -10,11 +10,11 @@ use super::failure::{Failure, in_flags};
 use super::input::Space;
 use super::words::count;
 use super::{config, input, memory, threads};
-use crate::api::job::take_seeds;
-use crate::api::preflight::free_at;
-use crate::api::{default_cap, divide, predict};
-use crate::geom::short;
-use crate::storage::n_threads;
+use tetdb_base::geom::short;
+use tetdb_base::storage::n_threads;
+use tetdb_engine::api::job::take_seeds;
+use tetdb_engine::api::preflight::free_at;
+use tetdb_engine::api::{default_cap, divide, predict};
 
 pub fn run(args: &EstimateArgs, console: &Console) -> Result<u8, Failure> {
     let mut options = config::options(&args.shape)?;

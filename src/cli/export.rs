@@ -10,9 +10,9 @@ use super::failure::Failure;
 use super::memory;
 use super::query;
 use super::query_ask::regions;
-use crate::api::targets::{check_target, inputs_of};
-use crate::api::{Error, Exported, Settings, show};
-use crate::io::write::{Content, ENDINGS, MeshFormat, Order, Selection, Share, Writers, check};
+use tetdb_engine::api::targets::{check_target, inputs_of};
+use tetdb_engine::api::{Error, Exported, Settings, show};
+use tetdb_io::write::{Content, ENDINGS, MeshFormat, Order, Selection, Share, Writers, check};
 
 pub fn run(args: &ExportArgs, console: &Console) -> Result<u8, Failure> {
     let is_first = share_of_ranks().is_none_or(|share| share.number == 1);

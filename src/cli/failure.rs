@@ -3,19 +3,19 @@
 use clap::CommandFactory;
 
 use super::args::Args;
-use crate::api::error::{Error, Remedy};
-use crate::boundary::BoundaryError;
-use crate::io::read::ReadError;
-use crate::io::write::WriteError;
-use crate::pipeline::PipelineError;
-use crate::query::QueryError;
-use crate::sealed::SealedError;
-use crate::sizing::SizingError;
-use crate::storage::StorageError;
-use crate::store::StoreError;
-use crate::surface::SurfaceError;
+use tetdb_base::storage::StorageError;
+use tetdb_base::surface::SurfaceError;
+use tetdb_engine::api::error::{Error, Remedy};
+use tetdb_engine::pipeline::PipelineError;
+use tetdb_io::read::ReadError;
+use tetdb_io::write::WriteError;
+use tetdb_kernel::boundary::BoundaryError;
+use tetdb_kernel::sizing::SizingError;
+use tetdb_store::query::QueryError;
+use tetdb_store::sealed::SealedError;
+use tetdb_store::store::StoreError;
 
-pub use crate::api::{CODES, CodeRow};
+pub use tetdb_engine::api::{CODES, CodeRow};
 
 /// An error on its way to the user.
 #[derive(Debug)]

@@ -11,13 +11,13 @@ use super::failure::Failure;
 use super::memory;
 use super::tasks;
 use super::words::{self, count};
-use crate::api::Tasks;
-use crate::api::page::measure_excess;
-use crate::geom::{Aabb, Point, short};
-use crate::pipeline;
-use crate::store::Catalog;
-use crate::view::Excess;
+use tetdb_base::geom::{Aabb, Point, short};
+use tetdb_engine::api::Tasks;
+use tetdb_engine::api::page::measure_excess;
+use tetdb_engine::pipeline;
+use tetdb_engine::view::Excess;
 use tetdb_schema::catalog::{QualityRow, RegionRow, StoreState, SubdomainRow};
+use tetdb_store::store::Catalog;
 
 /// Regions listed for people.
 const REGIONS_LISTED: usize = 12;

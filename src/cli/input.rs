@@ -7,11 +7,11 @@ use super::console::Console;
 use super::failure::Failure;
 use super::memory;
 use super::words::count;
-use crate::api::Surface;
-use crate::api::preflight::scratch_beside;
-use crate::io::read::WireKind;
-use crate::storage::{ScratchSpace, attempt};
-use crate::surface;
+use tetdb_base::storage::{ScratchSpace, attempt};
+use tetdb_base::surface;
+use tetdb_engine::api::Surface;
+use tetdb_engine::api::preflight::scratch_beside;
+use tetdb_io::read::WireKind;
 
 /// The memory a command may hold, and where its scratch files go.
 #[derive(Clone, Copy)]

@@ -1,10 +1,10 @@
 //! Sizes of memory as typed.
 
 use super::failure::Failure;
-use crate::api::default_cap;
-pub use crate::api::peak_bytes as peak;
-pub(super) use crate::api::show_bytes as show;
-use crate::pipeline::MEMORY_MIN;
+use tetdb_engine::api::default_cap;
+pub use tetdb_engine::api::peak_bytes as peak;
+pub(super) use tetdb_engine::api::show_bytes as show;
+use tetdb_engine::pipeline::MEMORY_MIN;
 
 /// The cap in bytes: what is asked for, or a share of what is free. Errors: as [`asked`].
 pub fn cap(option: Option<&str>) -> Result<u64, Failure> {

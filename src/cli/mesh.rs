@@ -9,10 +9,10 @@ use super::console::Console;
 use super::failure::Failure;
 use super::input::{self, Space};
 use super::{config, export, info, memory, threads};
-use crate::api::targets::{check_target, inputs_of};
-use crate::api::{Existing, Mesher, Settings, resume_reported};
-use crate::io::write::Selection;
-use crate::pipeline::Summary;
+use tetdb_engine::api::targets::{check_target, inputs_of};
+use tetdb_engine::api::{Existing, Mesher, Settings, resume_reported};
+use tetdb_engine::pipeline::Summary;
+use tetdb_io::write::Selection;
 
 pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
     if let Some(file) = args.output.as_deref().filter(|out| export::check_format(out).is_ok()) {
@@ -108,7 +108,7 @@ pub(super) fn begin(
 fn output(args: &MeshArgs) -> PathBuf {
     args.output.clone().unwrap_or_else(|| {
         let first = args.surfaces.first().map_or("mesh", String::as_str);
-        let stem = match first.strip_prefix(crate::samples::PREFIX) {
+        let stem = match first.strip_prefix(tetdb_kernel::samples::PREFIX) {
             Some(sample) => sample.split(',').next().map(Into::into),
             None => Path::new(first).file_stem().map(PathBuf::from),
         };

@@ -10,11 +10,11 @@ use super::failure::Failure;
 use super::memory;
 use super::query_ask::{bad, point, selection};
 use super::query_rows::{FileSink, QueryColumn, Row, Sink, Writer};
-use crate::api::store::open_finished;
-use crate::api::targets::{check_target, inputs_of};
-use crate::geom::Point;
-use crate::query::{Hit, Ordered, QueryError, QuerySession, VARIABLES};
-use crate::storage::{Budget, attempt};
+use tetdb_base::geom::Point;
+use tetdb_base::storage::{Budget, attempt};
+use tetdb_engine::api::store::open_finished;
+use tetdb_engine::api::targets::{check_target, inputs_of};
+use tetdb_store::query::{Hit, Ordered, QueryError, QuerySession, VARIABLES};
 
 /// Memory of a point on its way to its answer.
 const POINT_BYTES: u64 = 512;

@@ -2,9 +2,9 @@
 
 use super::args::QueryArgs;
 use super::failure::Failure;
-use crate::expr::{ExprError, Expression, Kind};
-use crate::geom::{Aabb, Point};
-use crate::query::{QueryError, QuerySession, Selection, Solid, VARIABLES, regions_called};
+use tetdb_base::expr::{ExprError, Expression, Kind};
+use tetdb_base::geom::{Aabb, Point};
+use tetdb_store::query::{QueryError, QuerySession, Selection, Solid, VARIABLES, regions_called};
 
 /// An option's value that makes no sense.
 pub fn bad(option: &str, found: &str, expected: &str) -> Failure {

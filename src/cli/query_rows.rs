@@ -7,8 +7,8 @@ use tetdb_schema::ids::VertexId;
 
 use super::console::Console;
 use super::failure::Failure;
-use crate::io::write::{NpyField, NpyTable, SelectedTet, SelectedVtu, TextFile};
-use crate::query::{Hit, Located, VARIABLES};
+use tetdb_io::write::{NpyField, NpyTable, SelectedTet, SelectedVtu, TextFile};
+use tetdb_store::query::{Hit, Located, VARIABLES};
 
 /// A column of the answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -23,11 +23,11 @@ use serde_json::{Value, json};
 
 use super::failure::Failure;
 use super::tasks;
-use crate::api::verify_server::Server;
-use crate::api::{Error, Settings, guarded};
-use crate::io::write::{Share, Writers};
-use crate::pipeline::{self, Hands, HelperFailure, Helpers, PipelineError, TaskSettings};
-use crate::storage::{Budget, RunContext, host_name};
+use tetdb_base::storage::{Budget, RunContext, host_name};
+use tetdb_engine::api::verify_server::Server;
+use tetdb_engine::api::{Error, Settings, guarded};
+use tetdb_engine::pipeline::{self, Hands, Helpers, PipelineError, RemoteFailure, TaskSettings};
+use tetdb_io::write::{Share, Writers};
 
 /// Tag of what is no order: jobs, their answers, the end.
 const CONTROL: i32 = 0;
@@ -189,7 +189,7 @@ impl Writers for SharedFile {
         Some(path)
     }
 
-    fn say(&self, done: Result<(), HelperFailure>) {
+    fn say(&self, done: Result<(), RemoteFailure>) {
         let letter = match done {
             Ok(()) => vec![DONE],
             Err(failure) => failed(&failure.code, &failure.message),
@@ -197,7 +197,7 @@ impl Writers for SharedFile {
         self.ranks.send(0, FILE, letter);
     }
 
-    fn wait(&self) -> Result<(), HelperFailure> {
+    fn wait(&self) -> Result<(), RemoteFailure> {
         let helpers = RankHelpers::of(&self.ranks);
         // All are heard: none writes any more when the file goes.
         let others: Vec<_> = (1..self.ranks.size).map(|rank| helpers.answer(rank, FILE)).collect();
@@ -401,9 +401,9 @@ impl RankHelpers {
         self.slots.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn ask(&self, rank: i32, tag: i32, message: Vec<u8>) -> Result<(), HelperFailure> {
+    fn ask(&self, rank: i32, tag: i32, message: Vec<u8>) -> Result<(), RemoteFailure> {
         if i32::try_from(message.len()).is_err() {
-            return Err(HelperFailure {
+            return Err(RemoteFailure {
                 code: "memory".to_owned(),
                 message: format!(
                     "an order of {} bytes is more than a message can hold",
@@ -415,8 +415,8 @@ impl RankHelpers {
         Ok(())
     }
 
-    fn answer(&self, rank: i32, tag: i32) -> Result<Vec<u8>, HelperFailure> {
-        let failure = |code: &str, message: &str| HelperFailure {
+    fn answer(&self, rank: i32, tag: i32) -> Result<Vec<u8>, RemoteFailure> {
+        let failure = |code: &str, message: &str| RemoteFailure {
             code: code.to_owned(),
             message: message.to_owned(),
         };
@@ -436,7 +436,7 @@ impl RankHelpers {
 }
 
 impl Helpers for RankHelpers {
-    fn begin(&self, job: &[u8]) -> Result<usize, HelperFailure> {
+    fn begin(&self, job: &[u8]) -> Result<usize, RemoteFailure> {
         let others = 1..self.ranks.size;
         for rank in others.clone() {
             self.ask(rank, CONTROL, [&[DONE], job].concat())?;
@@ -456,9 +456,9 @@ impl Helpers for RankHelpers {
         Ok(n)
     }
 
-    fn perform(&self, slot: usize, order: Vec<u8>) -> Result<Vec<u8>, HelperFailure> {
+    fn perform(&self, slot: usize, order: Vec<u8>) -> Result<Vec<u8>, RemoteFailure> {
         let found = self.slots().get(slot).copied();
-        let (rank, of_rank) = found.ok_or_else(|| HelperFailure {
+        let (rank, of_rank) = found.ok_or_else(|| RemoteFailure {
             code: "internal".to_owned(),
             message: "an order for a rank that has not begun".to_owned(),
         })?;

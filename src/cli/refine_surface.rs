@@ -8,11 +8,11 @@ use super::args::{RefineSurfaceArgs, SheetArgs};
 use super::console::Console;
 use super::failure::Failure;
 use super::input::{self, Space};
-use crate::api::surface::refine;
-use crate::api::targets::check_target;
-use crate::geom::short;
-use crate::io::write;
-use crate::sizing::SizeOptions;
+use tetdb_base::geom::short;
+use tetdb_engine::api::surface::refine;
+use tetdb_engine::api::targets::check_target;
+use tetdb_io::write;
+use tetdb_kernel::sizing::SizeOptions;
 
 pub fn run(args: &RefineSurfaceArgs, console: &Console) -> Result<u8, Failure> {
     let options = SizeOptions::parse(Some(&args.hsiz), None, None, args.hgrad.as_deref())?;

@@ -6,8 +6,8 @@ use super::args::ReportArgs;
 use super::console::Console;
 use super::failure::Failure;
 use super::memory;
-use crate::api::page::write_page;
-use crate::api::targets::{check_target, inputs_of};
+use tetdb_engine::api::page::write_page;
+use tetdb_engine::api::targets::{check_target, inputs_of};
 
 pub fn run(args: &ReportArgs, console: &Console) -> Result<u8, Failure> {
     check_target(&args.output, &inputs_of(&args.store))?;

@@ -12,15 +12,17 @@ use super::info::{hex, share_below_two};
 use super::resaturate_sizes::{self, new_sizes};
 use super::words::count;
 use super::{memory, mesh};
-use crate::api::job::options_of;
-use crate::api::remesh::{damaged, verify_changed};
-use crate::api::store::{open_finished, open_to_change};
-use crate::api::targets::inputs_of;
-use crate::api::{Remesh, Settings};
-use crate::geom::short;
-use crate::pipeline::{self, Forecast, NewSizes, Options, Remade, ResaturateSummary, Resaturation};
-use crate::storage::Budget;
-use crate::store::Catalog;
+use tetdb_base::geom::short;
+use tetdb_base::storage::Budget;
+use tetdb_engine::api::job::options_of;
+use tetdb_engine::api::remesh::{damaged, verify_changed};
+use tetdb_engine::api::store::{open_finished, open_to_change};
+use tetdb_engine::api::targets::inputs_of;
+use tetdb_engine::api::{Remesh, Settings};
+use tetdb_engine::pipeline::{
+    self, Forecast, NewSizes, Options, Remade, ResaturateSummary, Resaturation,
+};
+use tetdb_store::store::Catalog;
 
 pub fn run(args: &ResaturateArgs, console: &Console) -> Result<u8, Failure> {
     check(args)?;

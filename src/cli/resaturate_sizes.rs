@@ -8,12 +8,12 @@ use super::args::ResaturateArgs;
 use super::args::SizeArgs;
 use super::config;
 use super::failure::Failure;
-use crate::api::Settings;
-use crate::api::remesh::AskedSizes;
-use crate::io::read::read_lengths;
-use crate::pipeline::{NewSizes, Options, Values};
-use crate::sizing::SizingError;
-use crate::store::Catalog;
+use tetdb_engine::api::Settings;
+use tetdb_engine::api::remesh::AskedSizes;
+use tetdb_engine::pipeline::{NewSizes, Options, Values};
+use tetdb_io::read::read_lengths;
+use tetdb_kernel::sizing::SizingError;
+use tetdb_store::store::Catalog;
 
 /// Whether any sizes are asked for.
 pub fn are_given(args: &ResaturateArgs) -> bool {
@@ -91,7 +91,9 @@ fn limits(open: &mut Catalog, args: &ResaturateArgs) -> Result<[f64; 2], Failure
     };
     let diagonal = (0..3).map(|axis| side(axis).powi(2)).sum::<f64>().sqrt();
     let parse = |option, text: &Option<String>| match text {
-        Some(text) => Ok(Some(crate::sizing::Length::parse(option, text)?.resolve(diagonal))),
+        Some(text) => {
+            Ok(Some(tetdb_kernel::sizing::Length::parse(option, text)?.resolve(diagonal)))
+        }
         None => Ok::<_, SizingError>(None),
     };
     let hmin = parse("--hmin", &args.sizes.hmin)?;

@@ -10,9 +10,9 @@ use super::args::SampleArgs;
 use super::console::Console;
 use super::failure::Failure;
 use super::input::{self, Space};
-use crate::api::targets::check_target;
-use crate::io::write;
-use crate::samples::PREFIX;
+use tetdb_engine::api::targets::check_target;
+use tetdb_io::write;
+use tetdb_kernel::samples::PREFIX;
 
 /// Writes to the standard output.
 fn to_stdout(word: &str, format: &str, space: Space, console: &Console) -> Result<u8, Failure> {

@@ -8,7 +8,7 @@ use signal_hook::consts::{SIGABRT, SIGHUP, SIGINT, SIGTERM};
 use signal_hook::flag::register_conditional_shutdown;
 use signal_hook::iterator::Signals;
 
-use crate::storage::CancelToken;
+use tetdb_base::storage::CancelToken;
 
 static RECEIVED: AtomicI32 = AtomicI32::new(0);
 /// Whether there is a store that can be resumed.

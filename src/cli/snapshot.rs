@@ -5,9 +5,9 @@ use super::console::Console;
 use super::failure::Failure;
 use super::memory;
 use super::query_ask::{bad, condition, numbers};
-use crate::api::picture::take;
-use crate::api::targets::{check_target, inputs_of};
-use crate::api::{self, Snapped, Snapshot};
+use tetdb_engine::api::picture::take;
+use tetdb_engine::api::targets::{check_target, inputs_of};
+use tetdb_engine::api::{self, Snapped, Snapshot};
 
 /// Least and greatest side of a picture in pixels.
 const SIDE: std::ops::RangeInclusive<u32> = 64..=16_384;

@@ -5,7 +5,7 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use crate::pipeline::{Planned, Stage, StageKind};
+use tetdb_engine::pipeline::{Planned, Stage, StageKind};
 
 /// Beside the cap: code and stacks.
 const MEMORY_BESIDE: u64 = 64 << 20;

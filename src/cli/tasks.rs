@@ -11,10 +11,10 @@ use super::console::Console;
 use super::failure::Failure;
 use super::task_scripts::{Script, kind};
 use super::{memory, threads};
-use crate::api::tasks::ranges;
-use crate::api::{Error, Tasks};
-use crate::io::write::{Selection, check};
-use crate::pipeline::{Planned, TaskState};
+use tetdb_engine::api::tasks::ranges;
+use tetdb_engine::api::{Error, Tasks};
+use tetdb_engine::pipeline::{Planned, TaskState};
+use tetdb_io::write::{Selection, check};
 
 /// Sub-domains a task of the last stage should have, so that tasks end at about the same time.
 const SUBDOMAINS_PER_TASK: u32 = 4;

@@ -7,12 +7,12 @@ use super::console::Console;
 use super::failure::Failure;
 use super::input::{self, Space};
 use super::{memory, threads};
-use crate::api::preflight::scratch_beside;
-use crate::api::store::open_finished;
-use crate::api::verify::{check, invalid, sentence};
-use crate::api::{Settings, Surface, guarded};
-use crate::audit::Level;
-use crate::surface;
+use tetdb_base::surface;
+use tetdb_engine::api::preflight::scratch_beside;
+use tetdb_engine::api::store::open_finished;
+use tetdb_engine::api::verify::{check, invalid, sentence};
+use tetdb_engine::api::{Settings, Surface, guarded};
+use tetdb_store::audit::Level;
 
 /// A run of its own, with the threads that are asked for.
 pub fn run(args: &VerifyArgs, console: &Console) -> Result<u8, Failure> {

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use crate::geom::short;
+use tetdb_base::geom::short;
 
 /// Names listed for people.
 const LISTED: usize = 12;

@@ -5,7 +5,7 @@
 
 use std::collections::BTreeSet;
 
-use tetdb::cli::CODES;
+use tetdb_cli::CODES;
 
 use super::place::{Place, TETRA, TETRA_INWARD};
 

@@ -2,7 +2,7 @@
 //!
 //! Why: a mesh nobody can ask for a place or a bad tetrahedron is only half kept; scripts read the answers.
 //! How: all tetrahedra of a small mesh as objects, recomputed here; then the same questions in other forms. That the right
-//! tetrahedra are found is proved against all of them in `src/report/tests.rs`.
+//! tetrahedra are found is proved against all of them in `tests/questions`.
 
 use std::io::Write;
 use std::process::Stdio;

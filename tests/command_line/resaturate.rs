@@ -9,8 +9,8 @@ use std::path::Path;
 use std::time::Duration;
 
 use serde_json::Value;
-use tetdb::store::Catalog;
 use tetdb_schema::record::tag;
+use tetdb_store::store::Catalog;
 
 use super::place::{Done, Place};
 

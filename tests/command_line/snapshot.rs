@@ -2,7 +2,7 @@
 //!
 //! Why: a picture is believed at a glance; it must show the mesh that is there.
 //! How: the PNG's head and some of its pixels by way of a second picture; the SVG's polygons, counted and measured. That a section
-//! covers what the plane cuts, once, is shown in `src/report/tests.rs`.
+//! covers what the plane cuts, once, is shown in `tests/questions`.
 
 use super::place::Place;
 

@@ -7,9 +7,9 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
-use tetdb::audit;
-use tetdb::storage::StoreFile;
-use tetdb::store::{Catalog, StoreError, WriterLock};
+use tetdb_base::storage::StoreFile;
+use tetdb_store::audit;
+use tetdb_store::store::{Catalog, StoreError, WriterLock};
 
 use super::place::Place;
 

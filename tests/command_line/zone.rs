@@ -7,8 +7,8 @@
 
 use std::collections::BTreeSet;
 
-use tetdb::sealed::Subdomain;
-use tetdb::store::Catalog;
+use tetdb_store::sealed::Subdomain;
+use tetdb_store::store::Catalog;
 
 use super::place::Place;
 

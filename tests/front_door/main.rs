@@ -7,11 +7,11 @@ use std::path::Path;
 use std::process::{Command, Output};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use tetdb::store::Catalog;
 use tetdb::{
     CancelToken, Event, Length, Mesher, Order, Settings, Sizes, Store, Subdomains, Surface,
     VerifyLevel,
 };
+use tetdb_store::store::Catalog;
 
 type Outcome = Result<(), Box<dyn std::error::Error>>;
 

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 
 use mutate::Mutator;
 use targets::{TARGETS, Target};
-use tetdb::io::read::read_memory;
+use tetdb_io::read::read_memory;
 
 /// Mutated inputs for each target.
 const SMOKE: usize = 500;

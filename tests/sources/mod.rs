@@ -24,23 +24,3 @@ pub fn sources(dir: &Path) -> Vec<PathBuf> {
     found.sort();
     found
 }
-
-/// The text without comments, up to the tests at its foot, and without what is declared for tests alone.
-pub fn without_tests(text: &str) -> String {
-    let mut lines = Vec::new();
-    let mut rest = text.lines().peekable();
-    while let Some(line) = rest.next() {
-        let code = line.split("//").next().unwrap_or_default();
-        if code.trim() == "#[cfg(test)]" {
-            match rest.peek() {
-                // A module with a body; `mod tests;` only names a file.
-                Some(next) if next.starts_with("mod ") && next.contains('{') => break,
-                Some(next) if next.ends_with(';') => _ = rest.next(),
-                _ => {}
-            }
-            continue;
-        }
-        lines.push(code);
-    }
-    lines.join("\n")
-}

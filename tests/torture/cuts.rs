@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use tetdb::geom::Point;
+use tetdb_base::geom::Point;
 
 use super::random::Random;
 use super::shape::Shape;

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use tetdb::geom::Point;
+use tetdb_base::geom::Point;
 
 use super::mesher::{Outcome, recovery, whole};
 use super::random::Random;

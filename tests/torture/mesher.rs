@@ -7,16 +7,16 @@
 use std::collections::HashMap;
 use std::time::Duration;
 
-use tetdb::audit::{self, Level, VerifyOptions};
-use tetdb::boundary::{BoundaryError, RecoveryReport, RegionPolicy, fill_regions, recover};
-use tetdb::delaunay::{Kernel, enclose, insertion_key};
-use tetdb::geom::{HilbertFrame, orient};
-use tetdb::mesh::{FaceRef, Facet, Mesh, VertexTag};
-use tetdb::pipeline::{self, Options, PipelineError};
-use tetdb::storage::{Budget, FlatPages};
-use tetdb::store::Catalog;
-use tetdb::surface::{Surface, orient_alike, validate};
+use tetdb_base::geom::{HilbertFrame, orient};
+use tetdb_base::storage::{Budget, FlatPages};
+use tetdb_base::surface::{Surface, orient_alike, validate};
+use tetdb_engine::pipeline::{self, Options, PipelineError};
+use tetdb_kernel::boundary::{BoundaryError, RecoveryReport, RegionPolicy, fill_regions, recover};
+use tetdb_kernel::delaunay::{Kernel, enclose, insertion_key};
+use tetdb_kernel::mesh::{FaceRef, Facet, Mesh, VertexTag};
 use tetdb_schema::catalog::Job;
+use tetdb_store::audit::{self, Level, VerifyOptions};
+use tetdb_store::store::Catalog;
 
 use super::shape::Shape;
 

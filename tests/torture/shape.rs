@@ -1,7 +1,7 @@
 //! A triangle soup with a name, and what can be done to it without changing what it is.
 
-use tetdb::geom::Point;
-use tetdb::surface::{Surface, SurfaceBuilder};
+use tetdb_base::geom::Point;
+use tetdb_base::surface::{Surface, SurfaceBuilder};
 
 use super::random::Random;
 

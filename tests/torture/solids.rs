@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
 
-use tetdb::geom::Point;
+use tetdb_base::geom::Point;
 
 use super::plane::triangulated;
 use super::random::Random;

@@ -6,8 +6,8 @@
 
 use std::sync::OnceLock;
 
-use tetdb::audit::{self, Level, VerifyOptions};
-use tetdb::store::Catalog;
+use tetdb_store::audit::{self, Level, VerifyOptions};
+use tetdb_store::store::Catalog;
 use tetdb_tools::sim::{Call, Case, End, Reference, Rng, SimDisk, Trouble, Wreck, unclean};
 
 /// The case and its undisturbed run.
@@ -156,7 +156,10 @@ fn a_bit_that_was_turned_is_found_or_changes_nothing() {
     assert!(found > 8 && harmless > 8, "{found} found, {harmless} harmless");
 }
 
-fn verified(case: &Case, disk: &std::sync::Arc<SimDisk>) -> Result<bool, tetdb::store::StoreError> {
+fn verified(
+    case: &Case,
+    disk: &std::sync::Arc<SimDisk>,
+) -> Result<bool, tetdb_store::store::StoreError> {
     let scratch = tempfile::tempdir().expect("a temporary directory");
     let options = VerifyOptions {
         level: Level::Delaunay,

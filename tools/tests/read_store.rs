@@ -3,11 +3,11 @@
 //! Why: a store must be readable by programs that do not have the mesher.
 //! How: a small mesh in two sub-domains, read by the example and by the library; the example's text names no `tetdb::`.
 
-use tetdb::pipeline::{self, Options};
-use tetdb::samples::SampleSpec;
-use tetdb::storage::Budget;
-use tetdb::store::Catalog;
+use tetdb_base::storage::Budget;
+use tetdb_engine::pipeline::{self, Options};
+use tetdb_kernel::samples::SampleSpec;
 use tetdb_schema::catalog::Job;
+use tetdb_store::store::Catalog;
 
 #[path = "../examples/read_store.rs"]
 mod example;

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use super::read_surface;
-use crate::surface::{orient_alike, validate};
+use tetdb_base::surface::{orient_alike, validate};
 
 /// Codes that fit what the index says is wrong.
 fn fitting(defect: &str) -> &'static [&'static str] {

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::surface::SurfaceError;
+use tetdb_base::surface::SurfaceError;
 
 /// A place in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -43,7 +43,6 @@ impl fmt::Display for FilePlace {
 
 /// Why a surface file was refused. Each value carries its place.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
 pub enum ReadError {
     /// The file cannot be opened or read.
     #[error("the file cannot be read: {reason}")]

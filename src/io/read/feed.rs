@@ -3,8 +3,8 @@
 use std::io::{BufRead, Cursor, Read};
 
 use super::error::{FilePlace, ReadError, Spot};
-use crate::geom::Point;
-use crate::surface::{SurfaceBuilder, SurfaceError};
+use tetdb_base::geom::Point;
+use tetdb_base::surface::{SurfaceBuilder, SurfaceError};
 
 /// Longest word accepted in text: numbers and keywords are far shorter.
 const WORD_MAX: usize = 4096;

@@ -9,8 +9,8 @@ use std::io::BufRead;
 use super::feed::{Feed, name};
 use super::gmsh_numbers::{NodeTags, Numbers, Role, need_element_type};
 use super::{ReadError, Result, SurfaceSink};
-use crate::geom::Point;
-use crate::surface::NoteKind;
+use tetdb_base::geom::Point;
+use tetdb_base::surface::NoteKind;
 
 /// What the sections of one file build up together.
 struct Mesh<'a, 'b, R> {

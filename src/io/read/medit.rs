@@ -5,8 +5,8 @@ use std::io::BufRead;
 
 use super::feed::Feed;
 use super::{ReadError, Result, SurfaceSink};
-use crate::geom::Point;
-use crate::surface::NoteKind;
+use tetdb_base::geom::Point;
+use tetdb_base::surface::NoteKind;
 
 /// Solid elements, left out with a note.
 const SOLIDS: [&str; 4] = ["Hexahedra", "Prisms", "Pyramids", "TetrahedraP2"];

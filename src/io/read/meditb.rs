@@ -15,8 +15,8 @@ use std::io::BufRead;
 use super::feed::Feed;
 use super::medit::{RefLabels, note_reference, note_tets};
 use super::{ReadError, Result, SurfaceSink};
-use crate::geom::Point;
-use crate::surface::NoteKind;
+use tetdb_base::geom::Point;
+use tetdb_base::surface::NoteKind;
 
 pub(super) const DIMENSION: i64 = 3;
 pub(super) const VERTICES: i64 = 4;

@@ -8,7 +8,6 @@ mod error;
 mod feed;
 mod gmsh;
 mod gmsh_numbers;
-#[cfg(any(test, feature = "cli", feature = "internals"))]
 mod lengths;
 mod medit;
 mod meditb;
@@ -34,20 +33,18 @@ use std::path::{Path, PathBuf};
 
 pub use error::{FilePlace, ReadError, Spot};
 use feed::{Feed, Result};
-#[cfg(any(test, feature = "cli", feature = "internals"))]
 pub use lengths::read_lengths;
 pub use open::is_stream;
 use open::{open, stem, unpacked_name};
 use sink::SurfaceSink;
-pub use sizes::{read_sizes, size_files};
+pub use sizes::{FileSizes, read_sizes, size_files};
 pub use wire_sink::WireKind;
 pub use wires::read_wires;
 
-use crate::surface::{Surface, SurfaceBuilder, SurfaceError};
+use tetdb_base::surface::{Surface, SurfaceBuilder, SurfaceError};
 
 /// A kind of surface file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
 pub enum Format {
     /// STL, text or binary.
     Stl,
@@ -171,7 +168,6 @@ pub fn read_surface(paths: &[PathBuf], cap: u64) -> Result<Surface> {
 ///
 /// # Errors
 /// As [`read_surface`].
-#[cfg(any(test, feature = "internals"))]
 pub fn read_memory(format: Format, file: &str, bytes: &[u8]) -> Result<Surface> {
     let mut builder = SurfaceBuilder::new();
     let mut target =

@@ -8,8 +8,8 @@ use std::io::BufRead;
 use super::feed::{Feed, parse, quote};
 use super::wire_sink::{WireKind, WireSink};
 use super::{ReadError, Result, SurfaceSink};
-use crate::geom::Point;
-use crate::surface::NoteKind;
+use tetdb_base::geom::Point;
+use tetdb_base::surface::NoteKind;
 
 /// Names in force; the most telling one is the label of a face.
 #[derive(Default)]

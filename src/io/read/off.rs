@@ -7,7 +7,7 @@ use std::io::BufRead;
 
 use super::feed::Feed;
 use super::{Result, SurfaceSink};
-use crate::geom::Point;
+use tetdb_base::geom::Point;
 
 pub(super) fn read<R: BufRead>(mut feed: Feed<R>, target: &mut SurfaceSink) -> Result<()> {
     feed.comment = Some(b'#');

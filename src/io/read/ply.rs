@@ -4,7 +4,7 @@ use std::io::BufRead;
 
 use super::feed::{Feed, parse};
 use super::{ReadError, Result, SurfaceSink};
-use crate::geom::Point;
+use tetdb_base::geom::Point;
 
 #[derive(Clone, Copy, PartialEq)]
 enum Encoding {

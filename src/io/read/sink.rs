@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use crate::geom::Point;
-use crate::surface::{NoteKind, Seed, SeedKind, SurfaceBuilder, VolumePoints};
+use tetdb_base::geom::Point;
+use tetdb_base::surface::{NoteKind, Seed, SeedKind, SurfaceBuilder, VolumePoints};
 
 /// What the readers share: the surface being built and how this file's labels are called.
-pub(crate) struct SurfaceSink<'a> {
+pub struct SurfaceSink<'a> {
     pub(super) builder: &'a mut SurfaceBuilder,
     /// The file's name without folder and extension: the label of triangles that have none.
     pub(super) stem: String,

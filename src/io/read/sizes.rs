@@ -11,8 +11,7 @@ use super::error::{FilePlace, ReadError, Spot};
 use super::feed::{Feed, Result};
 use super::meditb::{DIMENSION, Numbers, TETRAHEDRA, VERTICES};
 use super::open::open_plain;
-use crate::geom::Point;
-use crate::sizing::{Background, BackgroundMesh};
+use tetdb_base::geom::Point;
 
 /// Keyword of sizes in binary files.
 const SOL_AT_VERTICES: i64 = 62;
@@ -50,18 +49,34 @@ pub fn size_files(path: &Path) -> Result<(PathBuf, Option<PathBuf>)> {
     }
 }
 
+/// Wanted edge lengths as a file has them.
+#[derive(Clone, Debug)]
+pub enum FileSizes {
+    /// At the vertices of a tetrahedral mesh. Shape: `h` runs parallel to `points`, which `tets` index.
+    Mesh {
+        /// The vertices.
+        points: Vec<Point>,
+        /// The tetrahedra.
+        tets: Vec<[u32; 4]>,
+        /// The wanted edge lengths, above zero.
+        h: Vec<f64>,
+    },
+    /// At the vertices of the surface itself, in their order.
+    AtVertices(Vec<f64>),
+}
+
 /// Reads the sizes that `path` names, holding at most `limit` bytes.
 ///
 /// # Errors
 /// The place of what is no size, no scalar, or does not fit the mesh.
-pub fn read_sizes(path: &Path, limit: u64) -> Result<Background> {
+pub fn read_sizes(path: &Path, limit: u64) -> Result<FileSizes> {
     let (sizes, mesh) = size_files(path)?;
     let h = match is_binary(&sizes) {
         true => binary_sizes(feed(&sizes)?, limit)?,
         false => text_sizes(feed(&sizes)?, limit)?,
     };
     let Some(mesh) = mesh else {
-        return Ok(Background::AtVertices(h));
+        return Ok(FileSizes::AtVertices(h));
     };
     let mut solid = Solid { limit, ..Solid::default() };
     match is_binary(&mesh) {
@@ -69,7 +84,7 @@ pub fn read_sizes(path: &Path, limit: u64) -> Result<Background> {
         false => text_solid(feed(&mesh)?, &mut solid)?,
     }
     if solid.tets.is_empty() {
-        return Ok(Background::AtVertices(h));
+        return Ok(FileSizes::AtVertices(h));
     }
     if h.len() != solid.points.len() {
         return Err(ReadError::CountMismatch {
@@ -79,7 +94,7 @@ pub fn read_sizes(path: &Path, limit: u64) -> Result<Background> {
             found: format!("{} vertices in {}", solid.points.len(), mesh.display()),
         });
     }
-    Ok(Background::Mesh(Box::new(BackgroundMesh::new(solid.points, solid.tets, h))))
+    Ok(FileSizes::Mesh { points: solid.points, tets: solid.tets, h })
 }
 
 fn feed(path: &Path) -> Result<Feed<BufReader<File>>> {
@@ -300,7 +315,6 @@ fn binary_solid<R: BufRead>(feed: Feed<R>, solid: &mut Solid) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sizing::SizeConstraint;
 
     const POINTS: [[f64; 3]; 4] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     const SIZES: [f64; 4] = [0.25, 0.5, 0.125, 1.0];
@@ -351,14 +365,11 @@ mod tests {
             let path = dir.path().join("a.solb");
             std::fs::write(dir.path().join("a.meshb"), binary(version, &mesh)).unwrap();
             std::fs::write(&path, binary(version, &[(3, dimension), (62, sizes)])).unwrap();
-            let Ok(Background::Mesh(found)) = read_sizes(&path, 1 << 20) else {
+            let Ok(FileSizes::Mesh { points, tets, h }) = read_sizes(&path, 1 << 20) else {
                 panic!("version {version} is not read");
             };
-            for (p, h) in POINTS.into_iter().zip(SIZES) {
-                assert_eq!(found.h(Point::from_array(p)), Ok(h));
-            }
-            let middle = found.h(Point::splat(0.25)).unwrap();
-            assert!((middle - 0.46875).abs() < 1e-12, "{middle}");
+            assert_eq!(points, POINTS.map(Point::from_array));
+            assert_eq!((tets, h), (vec![[0, 1, 2, 3]], SIZES.to_vec()));
             // More than there may be is refused from the count alone.
             let refused = read_sizes(&path, 100).unwrap_err();
             assert_eq!(refused.code(), "memory");

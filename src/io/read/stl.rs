@@ -8,8 +8,8 @@ use std::io::BufRead;
 
 use super::feed::{self, Feed};
 use super::{ReadError, Result, SurfaceSink};
-use crate::geom::Point;
-use crate::surface::NoteKind;
+use tetdb_base::geom::Point;
+use tetdb_base::surface::NoteKind;
 
 const HEADER: usize = 84;
 const RECORD: u64 = 50;

@@ -8,13 +8,13 @@ mod stl;
 mod tetgen;
 
 use super::*;
-use crate::geom::Point;
-use crate::surface::NoteKind;
 use gmsh::{MSH2, MSH4};
 use indexed::{indexed, off_body};
 use medit::{MEDIT, meshb};
 use ply::ply;
 use stl::{stl_binary, stl_text};
+use tetdb_base::geom::Point;
+use tetdb_base::surface::NoteKind;
 
 const POINTS: [[f64; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];

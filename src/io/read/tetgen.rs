@@ -10,8 +10,8 @@ use std::path::Path;
 use super::feed::{Feed, name, parse};
 use super::wire_sink::WireSink;
 use super::{ReadError, Result, SurfaceSink, open};
-use crate::geom::Point;
-use crate::surface::{NoteKind, Seed, SeedKind, SurfaceError, VolumePoints};
+use tetdb_base::geom::Point;
+use tetdb_base::surface::{NoteKind, Seed, SeedKind, SurfaceError, VolumePoints};
 
 /// The two layouts of the facet part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

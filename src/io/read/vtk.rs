@@ -7,7 +7,7 @@ use std::io::BufRead;
 use super::ReadError;
 use super::feed::{Feed, Result};
 use super::wire_sink::{WireKind, WireSink};
-use crate::geom::Point;
+use tetdb_base::geom::Point;
 
 /// Kinds of cells with one vertex or several, and lines of two or more.
 const VERTEX: i64 = 1;

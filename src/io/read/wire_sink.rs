@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
-use crate::geom::Point;
-use crate::surface::{SurfaceError, WireSet};
+use tetdb_base::geom::Point;
+use tetdb_base::surface::{SurfaceError, WireSet};
 
 /// What is wanted of a file that may have both.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

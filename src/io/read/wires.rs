@@ -7,8 +7,8 @@ use super::feed::{Feed, Result, name, parse};
 use super::open::{Reader, open, stem, unpacked_name};
 use super::wire_sink::{WireKind, WireSink};
 use super::{obj, tetgen, vtk};
-use crate::geom::Point;
-use crate::surface::WireSet;
+use tetdb_base::geom::Point;
+use tetdb_base::surface::WireSet;
 
 /// Reads the edges or the points of a file, labels after its groups or markers, else after the file. `cap`: bytes of memory it may take.
 ///

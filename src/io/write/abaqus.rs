@@ -11,7 +11,7 @@ use super::merged::{Merged, Tet};
 use super::midpoints::Midpoints;
 use super::names::set_names;
 use super::stream::Stream;
-use crate::storage::{Sorted, Sorter, sort_record};
+use tetdb_base::storage::{Sorted, Sorter, sort_record};
 
 /// The element's face opposite each of its nodes.
 const SIDE_OPPOSITE: [u8; 4] = [3, 4, 2, 1];

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::error::Result;
 use super::stream::{Records, scratch};
-use crate::sealed::Subdomain;
+use tetdb_store::sealed::Subdomain;
 
 /// A set of numbers that knows how many of them are below each number.
 ///

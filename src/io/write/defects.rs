@@ -10,7 +10,7 @@ use std::path::Path;
 use super::draft::Draft;
 use super::error::{Result, WriteError};
 use super::vtu_layout::{Array, Container, Group, Index, Layout};
-use crate::surface::{Defect, Surface};
+use tetdb_base::surface::{Defect, Surface};
 
 /// VTK's number of a triangle.
 const TRIANGLE: u8 = 5;

@@ -9,7 +9,7 @@ use super::merged::Merged;
 use super::midpoints::Midpoints;
 use super::report::FileCounts;
 use super::selection::{Content, Order, Selection};
-use super::wires::write_list;
+use super::wires_list::write_list;
 use super::writers::{Writers, is_first};
 use super::{abaqus, foam, gmsh, gmsh22, medit, mfem, npy_columns, tetgen, vtu, vtu_boundary};
 

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::error::Result;
 use super::stream::Records;
-use crate::storage::{Payload, SortRecord, sort_record};
+use tetdb_base::storage::{Payload, SortRecord, sort_record};
 use tetdb_schema::record::SealedVertex;
 
 sort_record! {

@@ -1,11 +1,11 @@
 //! Files in the making: a folder beside the output, removed whatever happens; rename when all are whole.
 
-use crate::storage::{available_bytes, host_name, is_process_gone};
 use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
+use tetdb_base::storage::{available_bytes, host_name, is_process_gone};
 
 use super::error::{Result, WriteError};
 

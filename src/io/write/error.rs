@@ -4,14 +4,13 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-use crate::pipeline::HelperFailure;
-use crate::sealed::SealedError;
-use crate::storage::StorageError;
-use crate::store::StoreError;
+use tetdb_base::storage::RemoteFailure;
+use tetdb_base::storage::StorageError;
+use tetdb_store::sealed::SealedError;
+use tetdb_store::store::StoreError;
 
 /// Errors of writing meshes and surfaces.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum WriteError {
     /// The name does not end as a format does.
     #[error("{path}: its ending names no known format, expected {known}")]
@@ -100,7 +99,7 @@ pub enum WriteError {
     Store(StoreError),
     /// Another process could not write its part.
     #[error("{}", .0.message)]
-    Elsewhere(HelperFailure),
+    Elsewhere(RemoteFailure),
 }
 
 impl WriteError {

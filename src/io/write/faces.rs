@@ -9,7 +9,7 @@ use super::error::Result;
 use super::numbering::PartNumbers;
 use super::scope::Scope;
 use super::stream::{Records, Stream, scratch};
-use crate::storage::{SortRecord, Sorter, sort_record};
+use tetdb_base::storage::{SortRecord, Sorter, sort_record};
 
 /// Marks the key of an interface face, and sorts it behind the input triangles; below it the number of the cut, then of the face.
 const INTERFACE: u64 = 1 << 63;

@@ -16,12 +16,12 @@ use super::numbering::{Numbering, PartNumbers, Sharer, Source, candidates, share
 use super::on_surface::OnSurface;
 use super::scope::{FaceSet, Scope};
 use super::wires::{WrittenWires, beside};
-use crate::optimize;
-use crate::sealed::SealedError;
-use crate::sealed::{Shape, Subdomain};
-use crate::storage::{Sorted, check_cancelled};
-use crate::store::{Catalog, StoreError};
+use tetdb_base::shape::excess_near;
+use tetdb_base::storage::{Sorted, check_cancelled};
 use tetdb_schema::catalog::SubdomainRow;
+use tetdb_store::sealed::SealedError;
+use tetdb_store::sealed::{Shape, Subdomain};
+use tetdb_store::store::{Catalog, StoreError};
 
 /// Counts records and tells.
 pub(super) struct Progress<'a> {
@@ -153,7 +153,12 @@ impl<'a> Merged<'a> {
             progress,
         };
         if !wires.edges.is_empty() && !is_whole {
-            wires.keep_those_of(&mut mesh)?;
+            let mut edges = wires.edges_to_find();
+            mesh.tets(|tet| {
+                edges.find(tet.nodes);
+                Ok(())
+            })?;
+            wires.keep_found(&edges);
         }
         mesh.wires = wires;
         Ok(mesh)
@@ -422,7 +427,7 @@ impl<'a> Merged<'a> {
                         if let Some(on_surface) = &mut on_surface {
                             let faces = on_surface.faces(local, tet.nodes)?;
                             excess = match faces.contains(&true) {
-                                true => optimize::excess_near(points, faces),
+                                true => excess_near(points, faces),
                                 false => quality,
                             };
                         }

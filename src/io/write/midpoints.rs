@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use super::error::Result;
 use super::merged::Merged;
 use super::stream::{Records, scratch};
-use crate::storage::{Payload, Sorter, StorageError, sort_record};
+use tetdb_base::storage::{Payload, Sorter, StorageError, sort_record};
 
 /// The edges of a tetrahedron in the order in which VTK and Abaqus have their middles, behind its corners.
 pub(super) const TET_EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]];

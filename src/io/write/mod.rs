@@ -12,7 +12,6 @@
 
 mod abaqus;
 mod chosen;
-#[cfg(any(test, feature = "cli", feature = "internals"))]
 mod defects;
 mod dispatch;
 mod doubles;
@@ -38,7 +37,6 @@ mod parquet;
 mod pieces;
 mod report;
 mod scope;
-#[cfg(any(test, feature = "cli", feature = "internals"))]
 mod selected;
 mod selection;
 mod split;
@@ -52,12 +50,12 @@ mod vtu;
 mod vtu_boundary;
 mod vtu_layout;
 mod wires;
+mod wires_list;
 mod writers;
 
 use std::collections::BTreeSet;
 use std::path::Path;
 
-#[cfg(any(test, feature = "cli", feature = "internals"))]
 pub use defects::defects;
 use error::Result;
 pub use error::WriteError;
@@ -66,27 +64,23 @@ use format::{
     FACES_ALONE, GHOSTS, REGIONS, REGIONS_APART, SECOND_ORDER, SLITS, STREAM, SUBDOMAINS, TEXT,
 };
 pub use npy::TextFile;
-#[cfg(any(feature = "pictures", feature = "internals"))]
 pub use npy::bytes;
-#[cfg(any(test, feature = "cli", feature = "internals"))]
 pub use npy::{NpyField, NpyTable};
 pub use report::ExportReport;
 use report::FileCounts;
-#[cfg(any(test, feature = "cli", feature = "internals"))]
 pub use selected::{SelectedTet, SelectedVtu};
 pub use selection::{Content, Order, Selection, Share};
 pub use surface::{SurfaceReport, surface, wires};
 
-use crate::storage::attempt;
-use crate::store::{Catalog, StoreError};
 use draft::{Draft, STDOUT};
 use merged::{Merged, Progress};
 use scope::{FaceSet, Scope};
+use tetdb_base::storage::attempt;
+use tetdb_store::store::{Catalog, StoreError};
 pub use writers::Writers;
 use writers::is_first;
 
 /// [`export_with`] by one process.
-#[cfg(any(test, feature = "internals"))]
 pub fn export(
     store: &mut Catalog,
     out: &Path,

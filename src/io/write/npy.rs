@@ -27,7 +27,6 @@ pub(super) fn head(kind: &str, rows: u64, inner: &str) -> Vec<u8> {
 }
 
 /// A field of a structured array: name, type of a number such as `<f8`, and numbers in a row (`4, 3`) where there are several.
-#[cfg(any(test, feature = "cli", feature = "internals"))]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NpyField {
     /// Name of the field.
@@ -39,7 +38,6 @@ pub struct NpyField {
 }
 
 /// Rows of fields being written to one file; nothing has its name until [`NpyTable::finish`].
-#[cfg(any(test, feature = "cli", feature = "internals"))]
 pub struct NpyTable {
     draft: Draft,
     path: PathBuf,
@@ -48,7 +46,6 @@ pub struct NpyTable {
     rows: u64,
 }
 
-#[cfg(any(test, feature = "cli", feature = "internals"))]
 impl NpyTable {
     /// Begins `out`. Errors: its folder cannot be written.
     pub fn new(out: &Path, fields: &[NpyField]) -> Result<Self> {
@@ -114,7 +111,6 @@ impl TextFile {
 }
 
 /// Writes a whole file at once; returns its length. Errors: the disk.
-#[cfg(any(feature = "pictures", feature = "internals"))]
 pub fn bytes(out: &Path, content: &[u8]) -> Result<u64> {
     let mut draft = Draft::new(out)?;
     let path = draft.create(out, content.len() as u64)?;

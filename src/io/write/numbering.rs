@@ -12,9 +12,9 @@ use tetdb_schema::ids::{Owner, SubdomainId, VertexId};
 use super::chosen::Chosen;
 use super::error::Result;
 use super::stream::{Records, scratch};
-use crate::sealed::SealedError;
-use crate::storage::{SortRecord, Sorted, Sorter, sort_record};
-use crate::store::{Catalog, StoreError};
+use tetdb_base::storage::{SortRecord, Sorted, Sorter, sort_record};
+use tetdb_store::sealed::SealedError;
+use tetdb_store::store::{Catalog, StoreError};
 
 sort_record! {
     /// A vertex that another sub-domain may also have.

@@ -7,8 +7,8 @@ use tetdb_schema::record::NO_TET;
 
 use super::error::Result;
 use super::stream::here;
-use crate::sealed::{Subdomain, face_of};
-use crate::storage::{Sorted, Sorter, check_cancelled, sort_record};
+use tetdb_base::storage::{Sorted, Sorter, check_cancelled, sort_record};
+use tetdb_store::sealed::{Subdomain, face_of};
 
 sort_record! {
     /// A face of a tetrahedron.

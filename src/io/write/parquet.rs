@@ -20,10 +20,10 @@ use tetdb_schema::ids::TetId;
 use super::draft::Draft;
 use super::pieces::piece_path;
 use super::{FileCounts, Result, Selection, WriteError};
-use crate::geom::Point;
-use crate::sealed::{Shape, Subdomain};
-use crate::storage::check_cancelled;
-use crate::store::Catalog;
+use tetdb_base::geom::Point;
+use tetdb_base::storage::check_cancelled;
+use tetdb_store::sealed::{Shape, Subdomain};
+use tetdb_store::store::Catalog;
 
 /// Rows of a group: small enough that a place is in few of them, large enough for columns to pack well.
 const GROUP_ROWS: usize = 65_536;

@@ -11,7 +11,7 @@ use super::merged::{Merged, Progress};
 use super::scope::{FaceSet, Scope};
 use super::stream::Stream;
 use super::{FileCounts, MeshFormat, Result, Selection, WriteError};
-use crate::store::Catalog;
+use tetdb_store::store::Catalog;
 
 pub(super) fn write(
     store: &mut Catalog,

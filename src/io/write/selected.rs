@@ -11,7 +11,7 @@ use super::npy::length;
 use super::stream::{Records, Stream, scratch};
 use super::vtu::TETRA;
 use super::vtu_layout::{Array, Container, Group, Index, Layout};
-use crate::storage::{Payload, Sorted, Sorter, sort_record};
+use tetdb_base::storage::{Payload, Sorted, Sorter, sort_record};
 
 /// Region, sub-domain, quality, number.
 const CELL: usize = 4 + 4 + 8 + 8;

@@ -55,7 +55,6 @@ impl Selection {
     }
 
     /// Whether several processes can write the one file together: the tetrahedra of `.vtkhdf`, a partition for each sub-domain.
-    #[cfg_attr(not(feature = "mpi"), allow(dead_code, reason = "for ranks"))]
     pub fn is_shared_file(&self, format: MeshFormat) -> bool {
         let is_plain = self.content == Content::Mesh && self.order == Order::First;
         format == MeshFormat::VtkHdf && is_plain && !self.pieces && !self.split_sheets

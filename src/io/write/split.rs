@@ -12,7 +12,7 @@ use super::error::Result;
 use super::faces::Face;
 use super::merged::Merged;
 use super::stream::{Records, Stream, here, scratch};
-use crate::storage::{Payload, SortRecord, Sorted, Sorter, sort_record};
+use tetdb_base::storage::{Payload, SortRecord, Sorted, Sorter, sort_record};
 use tetdb_schema::record::FACES;
 
 sort_record! {

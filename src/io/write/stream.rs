@@ -182,7 +182,7 @@ pub(super) fn scratch(path: &Path) -> Result<Stream> {
 
 /// Whether a record that was read is one that is looked for; errors are, to be seen.
 pub(super) fn here<R>(
-    record: &std::result::Result<R, crate::storage::StorageError>,
+    record: &std::result::Result<R, tetdb_base::storage::StorageError>,
     is: impl Fn(&R) -> bool,
 ) -> bool {
     record.as_ref().map_or(true, is)

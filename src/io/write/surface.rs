@@ -5,7 +5,7 @@ use std::path::Path;
 use super::draft::Draft;
 use super::error::{Result, WriteError};
 use super::stream::Stream;
-use crate::surface::{Surface, WireSet};
+use tetdb_base::surface::{Surface, WireSet};
 
 /// A writer of one format.
 type Write = fn(&Surface, &mut Stream) -> Result<()>;

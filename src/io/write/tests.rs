@@ -10,13 +10,13 @@ use tetdb_schema::record::{
 };
 
 use super::*;
-use crate::geom::Point;
-use crate::io::read::read_surface;
-use crate::pipeline::HelperFailure;
-use crate::sealed::SealedWriter;
-use crate::store::{Catalog, two_subdomains};
-use crate::surface::{Surface, SurfaceBuilder};
+use crate::read::read_surface;
+use tetdb_base::geom::Point;
+use tetdb_base::storage::RemoteFailure;
+use tetdb_base::surface::{Surface, SurfaceBuilder};
 use tetdb_schema::catalog::{Job, StoreState};
+use tetdb_store::sealed::SealedWriter;
+use tetdb_store::store::{Catalog, two_subdomains};
 
 type Outcome<T = ()> = std::result::Result<T, Box<dyn std::error::Error>>;
 
@@ -514,10 +514,10 @@ impl Writers for OneOfTwo {
     fn hear(&self) -> Option<PathBuf> {
         self.file.1.recv().ok()
     }
-    fn say(&self, done: std::result::Result<(), HelperFailure>) {
+    fn say(&self, done: std::result::Result<(), RemoteFailure>) {
         self.done.0.send(done.is_ok()).expect("a receiver");
     }
-    fn wait(&self) -> std::result::Result<(), HelperFailure> {
+    fn wait(&self) -> std::result::Result<(), RemoteFailure> {
         assert!(self.done.1.recv().expect("a sender"));
         Ok(())
     }

@@ -11,10 +11,10 @@ use super::draft::Draft;
 use super::numbering::{Candidate, Source, candidates};
 use super::stream::Stream;
 use super::{FileCounts, Result};
-use crate::sealed::SealedError;
-use crate::storage::{Sorted, Sorter, sort_record};
-use crate::store::{Catalog, StoreError};
+use tetdb_base::storage::{Sorted, Sorter, sort_record};
 use tetdb_schema::catalog::{NeighborRow, SubdomainRow};
+use tetdb_store::sealed::SealedError;
+use tetdb_store::store::{Catalog, StoreError};
 
 sort_record! {
     /// A vertex of a pair of sub-domains, the lower rank first.

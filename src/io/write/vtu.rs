@@ -14,7 +14,7 @@ use super::selection::Share;
 use super::vtu_boundary::{self, Partition, partitions};
 use super::vtu_layout::{Array, Container, Group, Index, Layout};
 use super::writers::Writers;
-use crate::pipeline::HelperFailure;
+use tetdb_base::storage::RemoteFailure;
 
 /// VTK's number of a tetrahedron.
 pub(super) const TETRA: u8 = 10;
@@ -65,7 +65,7 @@ pub(super) fn write(
         return Ok(());
     };
     let done = write_own(mesh, &path);
-    writers.say(done.as_ref().copied().map_err(|error| HelperFailure {
+    writers.say(done.as_ref().copied().map_err(|error| RemoteFailure {
         code: error.code().to_owned(),
         message: error.to_string(),
     }));

@@ -12,7 +12,7 @@ use super::merged::Merged;
 use super::midpoints::Midpoints;
 use super::stream::{Records, scratch};
 use super::vtu_layout::{Array, Container, Group, Index, Layout};
-use crate::storage::{Sorted, Sorter, sort_record};
+use tetdb_base::storage::{Sorted, Sorter, sort_record};
 
 /// VTK's numbers of a triangle, alone and with the middles of its edges.
 const TRIANGLE: u8 = 5;

@@ -1,18 +1,14 @@
 //! Embedded edges and points in the merged mesh.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
-use std::path::Path;
 
 use tetdb_schema::catalog::WiresRow;
 use tetdb_schema::ids::{Owner, VertexId};
 
-use super::draft::Draft;
 use super::error::Result;
-use super::merged::Merged;
 use super::numbering::{Numbering, Source};
-use super::stream::Stream;
-use crate::storage::StorageError;
-use crate::store::Catalog;
+use tetdb_base::storage::StorageError;
+use tetdb_store::store::Catalog;
 
 /// A point of the merged mesh.
 #[derive(Clone, Copy)]
@@ -93,23 +89,14 @@ impl WrittenWires {
         self.edges.is_empty() && self.points.is_empty()
     }
 
-    /// Keeps the edges that are edges of tetrahedra of `mesh`: where not all is written, both ends may be and the edge not. Errors: damage.
-    pub fn keep_those_of(&mut self, mesh: &mut Merged) -> Result<()> {
-        let ascending = |[a, b]: [u64; 2]| [a.min(b), a.max(b)];
-        let mut seen: HashMap<[u64; 2], bool> =
-            self.edges.iter().map(|(ends, _)| (ascending(*ends), false)).collect();
-        mesh.tets(|tet| {
-            for (i, &a) in tet.nodes.iter().enumerate() {
-                for &b in &tet.nodes[i + 1..] {
-                    if let Some(is_seen) = seen.get_mut(&ascending([a, b])) {
-                        *is_seen = true;
-                    }
-                }
-            }
-            Ok(())
-        })?;
-        self.edges.retain(|(ends, _)| seen[&ascending(*ends)]);
-        Ok(())
+    /// Every edge, none found in a tetrahedron yet.
+    pub fn edges_to_find(&self) -> EdgesToFind {
+        EdgesToFind(self.edges.iter().map(|(ends, _)| (ascending(*ends), false)).collect())
+    }
+
+    /// Keeps the edges that were found: where not all is written, both ends may be and the edge not.
+    pub fn keep_found(&mut self, edges: &EdgesToFind) {
+        self.edges.retain(|(ends, _)| edges.0[&ascending(*ends)]);
     }
 
     /// How many edges each label has.
@@ -131,24 +118,22 @@ impl WrittenWires {
     }
 }
 
-/// For formats without lines: `NAME_wires.csv` with the name of each edge and point and the numbers of its vertices, from 0. Errors: the disk.
-pub(super) fn write_list(mesh: &Merged, draft: &mut Draft, out: &Path) -> Result<()> {
-    let wires = mesh.wires();
-    if wires.is_empty() {
-        return Ok(());
+/// Whether each edge is one of a tetrahedron, by its vertices in ascending order.
+pub(super) struct EdgesToFind(HashMap<[u64; 2], bool>);
+
+impl EdgesToFind {
+    /// Marks the edges of a tetrahedron as found.
+    pub fn find(&mut self, nodes: [u64; 4]) {
+        for (i, &a) in nodes.iter().enumerate() {
+            for &b in &nodes[i + 1..] {
+                if let Some(is_found) = self.0.get_mut(&ascending([a, b])) {
+                    *is_found = true;
+                }
+            }
+        }
     }
-    let stem = out.file_stem().unwrap_or_default().to_string_lossy();
-    let path = draft.create(&out.with_file_name(format!("{stem}_wires.csv")), 0)?;
-    let mut stream = Stream::open(&path)?;
-    stream.text("kind,name,vertex,to\n");
-    let name = |label| mesh.label_name(label).replace('"', "\"\"").replace(['\n', '\r'], " ");
-    for ([a, b], label) in &wires.edges {
-        stream.text(&format!("edge,\"{}\",{a},{b}\n", name(*label)));
-        stream.end()?;
-    }
-    for point in &wires.points {
-        stream.text(&format!("point,\"{}\",{},\n", name(point.label), point.vertex));
-        stream.end()?;
-    }
-    stream.finish()
+}
+
+fn ascending([a, b]: [u64; 2]) -> [u64; 2] {
+    [a.min(b), a.max(b)]
 }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::selection::Share;
-use crate::pipeline::HelperFailure;
+use tetdb_base::storage::RemoteFailure;
 
 /// The processes. The first makes the file, announces where it is, and renames it when all have done their parts.
 pub trait Writers {
@@ -14,9 +14,9 @@ pub trait Writers {
     /// What the first has said; `None` when there will be no file.
     fn hear(&self) -> Option<PathBuf>;
     /// The others say how their part went.
-    fn say(&self, done: Result<(), HelperFailure>);
+    fn say(&self, done: Result<(), RemoteFailure>);
     /// The first waits until all others have. Errors: of any of them.
-    fn wait(&self) -> Result<(), HelperFailure>;
+    fn wait(&self) -> Result<(), RemoteFailure>;
 }
 
 /// Whether what is written once is for this process to write.

@@ -5,7 +5,7 @@
 use std::path::Path;
 use std::sync::OnceLock;
 
-use tetdb::storage::StoreFile;
+use tetdb_base::storage::StoreFile;
 
 const CACHE_BYTES: usize = 1 << 16;
 /// As many values as give the tree two levels.

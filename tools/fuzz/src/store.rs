@@ -9,14 +9,14 @@ use std::sync::{Mutex, OnceLock};
 use std::time::{Duration, Instant};
 
 use redb::{Database, ReadableDatabase, ReadableTable, TableDefinition};
-use tetdb::pipeline::{self, Options, Trial};
-use tetdb::storage::Budget;
-use tetdb::store::Catalog;
 use tetdb::{
     Bytes, CancelToken, ColorBy, Event, ExportOptions, MeshFormat, Mesher, Seal, Settings,
     Snapshot, Store, Surface, VerifyLevel,
 };
+use tetdb_base::storage::Budget;
+use tetdb_engine::pipeline::{self, Options, Trial};
 use tetdb_schema::catalog::{Job, StoreState};
+use tetdb_store::store::Catalog;
 use xxhash_rust::xxh3::xxh3_64_with_seed;
 
 /// Of every file of a store: values by key.
@@ -108,7 +108,8 @@ fn sound(made: Made) -> Sound {
 
 /// Meshes a box into sub-domains far smaller than those of the front door.
 fn divided(path: &Path) {
-    let surface = tetdb::samples::SampleSpec::parse("box,h=0.2").and_then(|spec| spec.make());
+    let surface =
+        tetdb_kernel::samples::SampleSpec::parse("box,h=0.2").and_then(|spec| spec.make());
     let options = Options {
         subdomains: Some("4".to_owned()),
         trial: Trial { subdomains_small: true, ..Trial::default() },

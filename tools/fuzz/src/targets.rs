@@ -3,13 +3,13 @@
 //! A target may answer with any error. It may not panic, hang, or hold more than its input justifies.
 //! Bytes that cannot have been written are also given a valid head and checksum, or only the checksum would be tested.
 
-use tetdb::expr::{Expression, Kind};
-use tetdb::io::read::{Format, read_memory};
-use tetdb::pipeline::Options;
-use tetdb::samples::SampleSpec;
-use tetdb::sizing::{RegionSize, SizeOptions, SizeSource};
-use tetdb::storage::kind;
-use tetdb::surface::{orient_alike, validate};
+use tetdb_base::expr::{Expression, Kind};
+use tetdb_base::storage::kind;
+use tetdb_base::surface::{orient_alike, validate};
+use tetdb_engine::pipeline::Options;
+use tetdb_io::read::{Format, read_memory};
+use tetdb_kernel::samples::SampleSpec;
+use tetdb_kernel::sizing::{RegionSize, SizeOptions, SizeSource};
 use tetdb_schema::chunk::{
     ChunkAddress, ChunkKind, ChunkRecord, Decoder, HEAD_BYTES, RangeSummary, TetSummary,
     VertexSummary,

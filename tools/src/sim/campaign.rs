@@ -3,8 +3,8 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
-use tetdb::pipeline::PipelineError;
-use tetdb::store::Catalog;
+use tetdb_engine::pipeline::PipelineError;
+use tetdb_store::store::Catalog;
 
 use super::{Case, Digests, SimDisk, Trouble, Wreck};
 

@@ -2,16 +2,18 @@
 
 use std::sync::Arc;
 
-use tetdb::audit;
-use tetdb::pipeline::{self, NewSizes, Options, PipelineError, Plan, Resaturation, Trial, silent};
-use tetdb::samples::SampleSpec;
-use tetdb::sealed::SealedError;
-use tetdb::storage::{Budget, DiskPath, StoreFile};
-use tetdb::store::{Catalog, StoreError};
-use tetdb::surface::Surface;
+use tetdb_base::storage::{Budget, DiskPath, StoreFile};
+use tetdb_base::surface::Surface;
+use tetdb_engine::pipeline::{
+    self, NewSizes, Options, PipelineError, Plan, Resaturation, Trial, silent,
+};
+use tetdb_kernel::samples::SampleSpec;
 use tetdb_schema::catalog::{Job, StoreState};
 use tetdb_schema::digest::Digest;
 use tetdb_schema::page::STORED_BYTES;
+use tetdb_store::audit;
+use tetdb_store::sealed::SealedError;
+use tetdb_store::store::{Catalog, StoreError};
 use xxhash_rust::xxh3::{Xxh3, xxh3_64};
 
 use super::SimDisk;

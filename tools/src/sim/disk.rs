@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use tetdb::storage::DiskPath;
+use tetdb_base::storage::DiskPath;
 
 use super::Trouble;
 use super::content::BLOCK;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use redb::{Builder, DatabaseError, ReadOnlyDatabase, StorageBackend};
-use tetdb::storage::{Disk, Entry, FileId, FileLock, Refused};
+use tetdb_base::storage::{Disk, Entry, FileId, FileLock, Refused};
 
 use super::SimDisk;
 use super::state::{Call, Node, Pending, Told};

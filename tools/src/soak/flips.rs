@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use serde_json::Value;
-use tetdb::storage::StoreFile;
+use tetdb_base::storage::StoreFile;
 
 use super::{Item, Model};
 use crate::sim::Rng;

@@ -5,8 +5,8 @@ use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use tetdb::audit;
-use tetdb::store::{Catalog, StoreError};
+use tetdb_store::audit;
+use tetdb_store::store::{Catalog, StoreError};
 
 use super::Item;
 use crate::sim::Rng;

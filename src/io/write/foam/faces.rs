@@ -10,10 +10,10 @@ use std::iter::Peekable;
 use super::super::WriteError;
 use super::super::error::Result;
 use super::super::merged::{Merged, Opened};
-use crate::sealed::{SealedError, Subdomain, sorted_face};
-use crate::storage::{Sorted, Sorter, StorageError, sort_record};
-use crate::store::StoreError;
+use tetdb_base::storage::{Sorted, Sorter, StorageError, sort_record};
 use tetdb_schema::record::{FACES, NO_TET, SealedFacet};
+use tetdb_store::sealed::{SealedError, Subdomain, sorted_face};
+use tetdb_store::store::StoreError;
 
 sort_record! {
     /// A face of a tetrahedron.
@@ -347,7 +347,7 @@ fn is_inner(mesh: &Merged, facet: &SealedFacet) -> bool {
 }
 
 /// The record at this place of a sorted list, whose earlier records are passed over.
-fn at<R: crate::storage::SortRecord>(
+fn at<R: tetdb_base::storage::SortRecord>(
     list: &mut Peekable<Sorted<R>>,
     order: impl Fn(&R) -> std::cmp::Ordering,
 ) -> Result<Option<R>> {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::super::draft::Draft;
 use super::super::error::Result;
 use super::file::FoamFile;
-use crate::storage::{Sorter, sort_record};
+use tetdb_base::storage::{Sorter, sort_record};
 
 /// `constant/polyMesh` below `root`.
 pub(super) fn mesh_dir(root: &Path) -> PathBuf {

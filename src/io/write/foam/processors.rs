@@ -15,7 +15,7 @@ use super::polymesh::{
     FaceFiles, Names, Patch, Size, Zones, mesh_dir, write_boundary, write_labels,
 };
 use super::serial::{WithTwoCells, in_order};
-use crate::storage::{Sorter, sort_record};
+use tetdb_base::storage::{Sorter, sort_record};
 
 sort_record! {
     /// Where a face between two sub-domains is in the whole.

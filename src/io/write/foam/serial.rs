@@ -9,7 +9,7 @@ use super::super::report::FileCounts;
 use super::faces::{FaceWalk, Inner, Upper, zone_of};
 use super::file::FoamFile;
 use super::polymesh::{FaceFiles, Names, Patch, Size, Zones, mesh_dir, write_boundary};
-use crate::storage::{Sorted, Sorter, sort_record};
+use tetdb_base::storage::{Sorted, Sorter, sort_record};
 
 sort_record! {
     /// A face on the boundary of the whole.

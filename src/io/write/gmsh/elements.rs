@@ -7,7 +7,7 @@ use super::super::wires::WrittenWires;
 use super::entities::Entities;
 use super::out::Out;
 use super::piece::Piece;
-use crate::storage::{Sorter, sort_record};
+use tetdb_base::storage::{Sorter, sort_record};
 
 /// Gmsh's numbers of the types of elements, of first and of second order.
 const POINT: u32 = 15;

@@ -6,7 +6,7 @@ use super::super::error::Result;
 use super::super::merged::{Merged, Opened};
 use super::super::stream::{Records, scratch};
 use super::out::Out;
-use crate::storage::{Payload, SortRecord, Sorter, sort_record};
+use tetdb_base::storage::{Payload, SortRecord, Sorter, sort_record};
 
 sort_record! {
     /// A tetrahedron as another partition sees it.

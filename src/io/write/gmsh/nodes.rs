@@ -9,7 +9,7 @@ use super::super::stream::{Records, scratch};
 use super::entities::Entities;
 use super::out::Out;
 use super::piece::Piece;
-use crate::storage::{Payload, SortRecord, Sorted, Sorter, sort_record};
+use tetdb_base::storage::{Payload, SortRecord, Sorted, Sorter, sort_record};
 
 sort_record! {
     /// An entity that a vertex is on, or, behind all of these, where it is.

@@ -17,10 +17,10 @@ use super::names::quotable;
 use super::report::FileCounts;
 use super::selection::Selection;
 use super::stream::Stream;
-use crate::sealed::Subdomain;
 use lines::{TETRAHEDRON, TRIANGLE, element, point};
 use shared::Shared;
 use tetdb_schema::record::{NO_TET, SealedFacet};
+use tetdb_store::sealed::Subdomain;
 
 /// Writes one file of all, or one of each sub-domain.
 pub(super) fn write(

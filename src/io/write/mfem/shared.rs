@@ -11,7 +11,7 @@ use super::super::error::Result;
 use super::super::merged::{Merged, Opened};
 use super::super::stream::Stream;
 use super::lines::{TRIANGLE, list};
-use crate::storage::{Sorted, Sorter, sort_record};
+use tetdb_base::storage::{Sorted, Sorter, sort_record};
 use tetdb_schema::record::NO_TET;
 
 sort_record! {

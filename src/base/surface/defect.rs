@@ -1,0 +1,242 @@
+//! What can be wrong with a surface, in words, with the place and the way out.
+
+use super::contact::ContactKind;
+use super::wire_set::WireError;
+use crate::geom::Point;
+
+/// A surface that cannot be built or meshed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SurfaceError {
+    /// There are too many vertices, triangles or labels to number.
+    #[error("the surface has more than {limit} {what}")]
+    TooLarge {
+        /// What there is too much of.
+        what: &'static str,
+        /// The most allowed.
+        limit: usize,
+    },
+    /// It does not fit the memory allowed.
+    #[error(
+        "{triangles} triangles and {vertices} vertices, and there are more, take more than the {bytes_max} bytes of memory allowed"
+    )]
+    Memory {
+        /// Bytes allowed.
+        bytes_max: u64,
+        /// Triangles read so far.
+        triangles: usize,
+        /// Vertices read so far.
+        vertices: usize,
+    },
+    /// Edges or points to embed do not fit the memory allowed.
+    #[error(
+        "edges and points of {vertices} vertices, or more, take more than the {bytes_max} bytes of memory allowed"
+    )]
+    WireMemory {
+        /// Bytes allowed.
+        bytes_max: u64,
+        /// Vertices known so far.
+        vertices: usize,
+    },
+    /// A triangle names a vertex that is not there.
+    #[error("triangle {triangle} names vertex {vertex}, but there are {n_vertices}")]
+    NoSuchVertex {
+        /// The triangle.
+        triangle: u32,
+        /// The vertex it names.
+        vertex: u32,
+        /// Number of vertices.
+        n_vertices: usize,
+    },
+    /// The surface is too small to compute with exactly.
+    #[error(
+        "the surface is too small to compute with exactly: its longest extent is {extent:e}, expected above 1e-24"
+    )]
+    TooSmall {
+        /// Its longest extent.
+        extent: f64,
+    },
+    /// Validation found defects; the first of the worst kind is told.
+    #[error("{defect}")]
+    Invalid {
+        /// The first defect of the worst kind.
+        defect: Box<Defect>,
+        /// Defects in all.
+        n_defects: u64,
+    },
+    /// An embedded edge or point cannot be there.
+    #[error(transparent)]
+    Wire(Box<WireError>),
+}
+
+impl From<WireError> for SurfaceError {
+    fn from(error: WireError) -> Self {
+        Self::Wire(Box::new(error))
+    }
+}
+
+/// Vertices and triangles of a surface at most: ids keep two bits free in the mesh.
+const COUNT_MAX: usize = 1 << 30;
+
+impl SurfaceError {
+    /// Refuses more of `what` than can be numbered.
+    pub(super) fn check_size(what: &'static str, n: usize) -> Result<(), Self> {
+        match n <= COUNT_MAX {
+            true => Ok(()),
+            false => Err(Self::TooLarge { what, limit: COUNT_MAX }),
+        }
+    }
+
+    /// The word for this error.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::TooLarge { .. } => "surface-too-large",
+            Self::Memory { .. } | Self::WireMemory { .. } => "memory",
+            Self::NoSuchVertex { .. } => "index-out-of-range",
+            Self::TooSmall { .. } => "coordinate-range",
+            Self::Invalid { defect, .. } => defect.code(),
+            Self::Wire(wire) => wire.code(),
+        }
+    }
+
+    /// What to do about it.
+    pub fn help(&self) -> &'static str {
+        match self {
+            Self::TooLarge { .. } => "split the surface into parts and mesh them one by one",
+            Self::Memory { .. } => "allow more memory, or take a coarser surface",
+            Self::WireMemory { .. } => "allow more memory, or take fewer edges and points",
+            Self::NoSuchVertex { .. } => "write the file again from the program that made it",
+            Self::TooSmall { .. } => "scale the surface to ordinary units, for example metres",
+            Self::Invalid { defect, .. } => defect.help(),
+            Self::Wire(wire) => wire.help(),
+        }
+    }
+}
+
+/// One thing that makes a surface unfit to bound volumes, with the triangles (input ids) it is about.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Defect {
+    /// The surface has no triangle.
+    #[error("the surface has no triangles")]
+    Empty,
+    /// Two corners are one vertex, or the corners lie exactly on a line.
+    #[error("triangle {triangle} has no area: {}", if *repeated { "a corner is repeated" } else { "its corners are exactly in line" })]
+    Degenerate {
+        /// The triangle.
+        triangle: u32,
+        /// Whether two corners are one vertex.
+        repeated: bool,
+        /// Its corners.
+        corners: [Point; 3],
+    },
+    /// The same three vertices twice in the same cyclic order.
+    #[error("triangle {} repeats triangle {}", triangles[1], triangles[0])]
+    Duplicate {
+        /// The two triangles.
+        triangles: [u32; 2],
+        /// Their corners.
+        corners: [Point; 3],
+    },
+    /// An edge with one triangle only: the surface has a hole there.
+    #[error("the surface is open: the edge of triangle {triangle} from {} to {} has no second triangle{}", show(*from), show(*to),
+        junction.map(|p| format!("; a vertex lies on it at {} (T-junction)", show(p))).unwrap_or_default())]
+    OpenEdge {
+        /// The triangle at the edge.
+        triangle: u32,
+        /// Vertices of the edge.
+        vertices: [u32; 2],
+        /// Where the edge begins.
+        from: Point,
+        /// Where the edge ends.
+        to: Point,
+        /// A vertex that lies on the edge, or as good as: a T-junction.
+        junction: Option<Point>,
+    },
+    /// Two triangles touch elsewhere than in the vertices and edges they share.
+    #[error("triangles {} and {} meet where they should not: {kind}", triangles[0], triangles[1])]
+    SelfIntersection {
+        /// The two triangles.
+        triangles: [u32; 2],
+        /// How they touch.
+        kind: ContactKind,
+        /// A point where they touch.
+        at: Point,
+    },
+}
+
+/// A position, for messages: the numbers as they are, very large and very small ones with a power of ten.
+pub fn show(p: Point) -> String {
+    let [x, y, z] = p.to_array().map(show_number);
+    format!("({x}, {y}, {z})")
+}
+
+/// A number, with a power of ten when it would be long without.
+fn show_number(x: f64) -> String {
+    if x == 0.0 || (1e-4..1e9).contains(&x.abs()) { format!("{x}") } else { format!("{x:e}") }
+}
+
+impl Defect {
+    /// The word for this kind of defect.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::Empty => "empty-surface",
+            Self::Degenerate { .. } => "degenerate-triangle",
+            Self::Duplicate { .. } => "duplicate-triangle",
+            Self::OpenEdge { .. } => "open-surface",
+            Self::SelfIntersection { .. } => "self-intersection",
+        }
+    }
+
+    /// The triangles concerned, as input ids.
+    pub fn triangles(&self) -> &[u32] {
+        match self {
+            Self::Empty => &[],
+            Self::Degenerate { triangle, .. } | Self::OpenEdge { triangle, .. } => {
+                std::slice::from_ref(triangle)
+            }
+            Self::Duplicate { triangles, .. } | Self::SelfIntersection { triangles, .. } => {
+                triangles
+            }
+        }
+    }
+
+    /// A position where it can be seen.
+    pub fn at(&self) -> Option<Point> {
+        match self {
+            Self::Empty => None,
+            Self::Degenerate { corners, .. } | Self::Duplicate { corners, .. } => {
+                Some((corners[0] + corners[1] + corners[2]) / 3.0)
+            }
+            Self::OpenEdge { from, to, junction, .. } => {
+                Some(junction.unwrap_or_else(|| from.midpoint(*to)))
+            }
+            Self::SelfIntersection { at, .. } => Some(*at),
+        }
+    }
+
+    /// Ids and coordinates on one line.
+    pub fn place(&self) -> String {
+        let ids: Vec<String> = self.triangles().iter().map(u32::to_string).collect();
+        match (self.at(), ids.len()) {
+            (None, _) => "nowhere: there is nothing to show".to_owned(),
+            (Some(p), 1) => format!("triangle {} near {}", ids[0], show(p)),
+            (Some(p), _) => format!("triangles {} near {}", ids.join(" and "), show(p)),
+        }
+    }
+
+    /// What to do about it.
+    pub fn help(&self) -> &'static str {
+        match self {
+            Self::Empty => "choose a file that holds triangles",
+            Self::Degenerate { .. } | Self::Duplicate { .. } => "a repair drops such triangles",
+            Self::OpenEdge { junction: Some(_), .. } => {
+                "a repair divides triangles where vertices lie exactly on their open edges"
+            }
+            Self::OpenEdge { .. } => {
+                "a repair may close them by joining near points; otherwise close them where the surface was made"
+            }
+            Self::SelfIntersection { .. } => {
+                "unite or separate the parts where the surface was made"
+            }
+        }
+    }
+}

@@ -1,0 +1,204 @@
+//! An indexed triangle surface in memory.
+
+use std::fmt;
+use std::mem::size_of;
+
+use super::Seed;
+use super::wire_set::Wires;
+use crate::geom::{Aabb, Point};
+
+/// An indexed triangle surface with a label on each triangle.
+///
+/// Shape: `labels` runs parallel to `triangles` and indexes `label_names`; a triangle's position is
+/// its input id: file order, polygons fanned from their first vertex, files one after the other.
+/// Invariant (when made by [`SurfaceBuilder`](super::SurfaceBuilder)): points are finite, pairwise
+/// different, free of −0.0, each used by a triangle or a wire, in order of first appearance in the files.
+/// Is not: validated. A triangle may be degenerate, the surface open; see [`validate`](super::validate).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Surface {
+    /// Positions of the vertices.
+    pub points: Vec<Point>,
+    /// Vertices of each triangle.
+    pub triangles: Vec<[u32; 3]>,
+    /// Label of each triangle, as an index into `label_names`.
+    pub labels: Vec<u32>,
+    /// Names of the labels.
+    pub label_names: Vec<String>,
+    /// The files read, in order.
+    pub files: Vec<SourceFile>,
+    /// Whether each triangle is part of an embedded sheet; empty where none is.
+    pub sheets: Vec<bool>,
+    /// Embedded edges and points, and what holds them.
+    pub wires: Wires,
+    /// What a reader found worth telling, in order.
+    pub notes: Vec<Note>,
+    /// What the files say of volumes, in order.
+    pub seeds: Vec<Seed>,
+}
+
+/// One file of a surface and the triangles that came from it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SourceFile {
+    /// The path as it was given.
+    pub name: String,
+    /// Its triangles are `triangle_first ..` up to the next file's first.
+    pub triangle_first: u32,
+}
+
+impl Surface {
+    /// Number of triangles.
+    pub fn n_triangles(&self) -> usize {
+        self.triangles.len()
+    }
+
+    /// Number of vertices.
+    pub fn n_vertices(&self) -> usize {
+        self.points.len()
+    }
+
+    /// Positions of the three vertices of triangle `t`.
+    #[inline]
+    pub fn corners(&self, t: u32) -> [Point; 3] {
+        self.triangles[t as usize].map(|v| self.points[v as usize])
+    }
+
+    /// Name of the label of triangle `t`.
+    pub fn label_name(&self, t: u32) -> &str {
+        &self.label_names[self.labels[t as usize] as usize]
+    }
+
+    /// The file triangle `t` came from and its number in that file, counted from 0.
+    pub fn source(&self, t: u32) -> Option<(&str, u32)> {
+        let next = self.files.partition_point(|f| f.triangle_first <= t);
+        let file = self.files.get(next.checked_sub(1)?)?;
+        Some((&file.name, t - file.triangle_first))
+    }
+
+    /// The smallest box around all vertices.
+    pub fn bounds(&self) -> Aabb {
+        Aabb::around(self.points.iter().copied())
+    }
+
+    /// Gives back memory kept for more triangles to come.
+    pub fn shrink(&mut self) {
+        self.points.shrink_to_fit();
+        self.triangles.shrink_to_fit();
+        self.labels.shrink_to_fit();
+        self.sheets.shrink_to_fit();
+    }
+
+    /// Bytes of memory held, for the budget.
+    pub fn bytes(&self) -> usize {
+        let names: usize =
+            self.label_names.iter().map(|n| n.capacity() + size_of::<String>()).sum();
+        self.points.capacity() * size_of::<Point>()
+            + self.triangles.capacity() * size_of::<[u32; 3]>()
+            + self.labels.capacity() * size_of::<u32>()
+            + self.sheets.capacity()
+            + self.wires.edges.capacity() * size_of::<[u32; 3]>()
+            + self.wires.points.capacity() * size_of::<[u32; 4]>()
+            + names
+    }
+}
+
+/// Something the reader did or left out that the user may want to know; not an error.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Note {
+    /// The file it is about.
+    pub file: String,
+    /// What was done or left out.
+    pub kind: NoteKind,
+}
+
+/// The things a [`Note`] can tell.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum NoteKind {
+    /// A text STL ended without `endsolid`.
+    MissingEndsolid {
+        /// The line where the file ended.
+        line: u64,
+    },
+    /// An indexed file held vertices with identical coordinates, now one each.
+    WeldedVertices {
+        /// Vertices that were joined to others.
+        n: u64,
+    },
+    /// Vertices that no triangle uses were left out.
+    UnusedVertices {
+        /// How many.
+        n: u64,
+    },
+    /// Polygons with more than three corners were cut into fans.
+    FannedPolygons {
+        /// How many.
+        n: u64,
+    },
+    /// Elements that are no part of a surface (tetrahedra, lines, …) were left out.
+    SkippedElements {
+        /// The kind of element.
+        what: &'static str,
+        /// How many.
+        n: u64,
+    },
+    /// Points that mark holes or regions of the volume.
+    VolumePoints {
+        /// What they mark.
+        points: VolumePoints,
+        /// How many.
+        n: u64,
+    },
+    /// A planar facet of several polygons or with holes was taken polygon by polygon.
+    SplitFacets {
+        /// How many.
+        n: u64,
+    },
+}
+
+/// What points inside the volume mark.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum VolumePoints {
+    /// Volumes to leave empty.
+    Holes,
+    /// Volumes with an attribute or a size of their own.
+    Regions,
+}
+
+impl fmt::Display for Note {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: ", self.file)?;
+        match &self.kind {
+            NoteKind::MissingEndsolid { line } => {
+                write!(f, "the text ends at line {line} without `endsolid`; all facets were read")
+            }
+            NoteKind::WeldedVertices { n } => {
+                write!(f, "{n} vertices repeat the coordinates of another and were joined to it")
+            }
+            NoteKind::UnusedVertices { n } => {
+                write!(f, "{n} vertices belong to no triangle and were left out")
+            }
+            NoteKind::FannedPolygons { n } => {
+                write!(f, "{n} polygons were cut into triangles from their first vertex")
+            }
+            NoteKind::SkippedElements { what, n } => {
+                write!(f, "{n} {what} were left out; only the surface is read")
+            }
+            NoteKind::VolumePoints { points, n } => {
+                let (what, use_of) = match points {
+                    VolumePoints::Holes => (
+                        "hole points",
+                        "count where regions are filled by seeds, and are ignored else",
+                    ),
+                    VolumePoints::Regions => (
+                        "regions with an attribute or reference",
+                        "are named by it, and are what is filled where regions are filled by seeds",
+                    ),
+                };
+                write!(f, "{what} ({n}) {use_of}")
+            }
+            NoteKind::SplitFacets { n } => write!(
+                f,
+                "{n} facets have several polygons or holes; each polygon was taken for itself"
+            ),
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! Wires: edges and points inside a volume that the mesh has as its edges and vertices.
+
+use super::contact::ContactKind;
+use crate::geom::Point;
+
+/// Edges and points of a surface that are no parts of its triangles, or are to be known by a name of their own.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Wires {
+    /// The vertices of each edge, and its label.
+    pub edges: Vec<[u32; 3]>,
+    /// The vertex of each point, and its label.
+    pub points: Vec<[u32; 2]>,
+    /// How long edges at each point should be, at most; 0 where the point is a vertex of triangles, which say it.
+    pub sizes: Vec<f64>,
+    /// The first triangle that is a fin, and the first vertex that belongs to fins alone.
+    pub fins: Option<[u32; 2]>,
+}
+
+/// What a file says of edges and points.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct WireSet {
+    /// Positions of the vertices, equal ones among them.
+    pub points: Vec<Point>,
+    /// The vertices of each edge, and its label.
+    pub edges: Vec<[u32; 3]>,
+    /// The vertices that are points, and their labels.
+    pub marks: Vec<[u32; 2]>,
+    /// Names of the labels.
+    pub label_names: Vec<String>,
+}
+
+impl WireSet {
+    /// Bytes of memory held, for the budget.
+    pub fn bytes(&self) -> u64 {
+        let names = self.label_names.len() * 2 * size_of::<String>();
+        let points = self.points.capacity() * size_of::<Point>();
+        let edges = self.edges.capacity() * size_of::<[u32; 3]>();
+        (names + points + edges + self.marks.capacity() * size_of::<[u32; 2]>()) as u64
+    }
+}
+
+/// Why edges and points cannot be embedded.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum WireError {
+    /// Both ends of an edge are one vertex.
+    #[error("{edge} has no length")]
+    NoLength {
+        /// The edge.
+        edge: String,
+        /// Where.
+        at: Point,
+    },
+    /// An edge or a point is given twice.
+    #[error("{what} is there twice: it is {other} too")]
+    Repeated {
+        /// The later one.
+        what: String,
+        /// The earlier one.
+        other: String,
+        /// Where.
+        at: Point,
+    },
+    /// It touches something elsewhere than in common vertices.
+    #[error("{what} and {other} meet where they should not: {kind}{}", more(*n))]
+    Touching {
+        /// The edge or the point.
+        what: String,
+        /// The triangle or the edge.
+        other: String,
+        /// How they touch.
+        kind: ContactKind,
+        /// Where.
+        at: Point,
+        /// How many such pairs there are.
+        n: usize,
+    },
+    /// There is no room for a tetrahedron of computable size.
+    #[error("{what} is nearer to something else than can be meshed{}{}", far(*distance), more(*n))]
+    TooNear {
+        /// The first of them, and at most nine others.
+        what: String,
+        /// Where.
+        at: Point,
+        /// How far the first one is from it, if that is known.
+        distance: Option<f64>,
+        /// How many there are.
+        n: usize,
+    },
+}
+
+fn more(n: usize) -> String {
+    match n {
+        0 | 1 => String::new(),
+        n => format!(" (and {} more)", n - 1),
+    }
+}
+
+fn far(distance: Option<f64>) -> String {
+    distance.map_or(String::new(), |distance| format!(": {distance:.1e} from it"))
+}
+
+impl WireError {
+    /// The word for this error.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::NoLength { .. } => "degenerate-edge",
+            Self::Repeated { .. } => "duplicate-wire",
+            Self::Touching { .. } => "wire-contact",
+            Self::TooNear { .. } => "wire-too-near",
+        }
+    }
+
+    /// Where it is.
+    pub fn at(&self) -> Point {
+        match self {
+            Self::NoLength { at, .. }
+            | Self::Repeated { at, .. }
+            | Self::Touching { at, .. }
+            | Self::TooNear { at, .. } => *at,
+        }
+    }
+
+    /// What to do about it.
+    pub fn help(&self) -> &'static str {
+        match self {
+            Self::NoLength { .. } | Self::Repeated { .. } => {
+                "give each edge and each point once, of different vertices"
+            }
+            Self::Touching { .. } => {
+                "edges and points meet triangles, and edges each other, in common vertices alone: divide the triangle or the edge there"
+            }
+            Self::TooNear { .. } => {
+                "join what is meant to meet, or move it apart: what is not exactly on a triangle is beside it, however near, \
+                 so give the triangle a vertex there"
+            }
+        }
+    }
+}

@@ -1,0 +1,221 @@
+//! What the user typed, what it means, one file per command.
+
+#![warn(missing_docs)]
+
+mod args;
+mod check;
+mod check_report;
+mod compare;
+mod config;
+mod console;
+mod cures;
+mod digest;
+mod estimate;
+mod export;
+mod failure;
+mod heap;
+mod info;
+mod input;
+mod memory;
+mod mesh;
+mod query;
+mod query_ask;
+mod query_rows;
+#[cfg(feature = "mpi")]
+mod ranks;
+mod refine_surface;
+mod report;
+mod resaturate;
+mod resaturate_sizes;
+mod sample;
+mod shell;
+mod signals;
+mod snapshot;
+mod task_scripts;
+mod tasks;
+mod threads;
+mod verify;
+mod words;
+
+use std::io::Write;
+use std::process::ExitCode;
+
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{CommandFactory, Parser};
+
+use args::{Args, Command};
+use console::Console;
+use failure::Failure;
+
+use tetdb_base::storage::StorageError;
+use tetdb_engine::api::guarded;
+
+pub use failure::{CODES, CodeRow};
+
+/// Runs the command line of this process and returns its exit code.
+pub fn run() -> ExitCode {
+    heap::keep_little();
+    heap::keep_sweeping();
+    signals::end_without_memory();
+    #[cfg(feature = "mpi")]
+    let ranks = match ranks::begin() {
+        Ok(ranks) => ranks,
+        Err(failure) => return ExitCode::from(Console::new(false).fail(&failure)),
+    };
+    #[cfg(feature = "mpi")]
+    if let Some(ranks) = ranks {
+        let exit = run_rank(&ranks);
+        ranks.end();
+        return exit;
+    }
+    run_alone()
+}
+
+/// Rank 0 is the program as ever; of the others only that one says what is wrong with the command line.
+#[cfg(feature = "mpi")]
+fn run_rank(ranks: &ranks::Ranks) -> ExitCode {
+    if ranks.rank == 0 {
+        return run_alone();
+    }
+    let Ok(args) = Args::try_parse() else {
+        return ExitCode::SUCCESS;
+    };
+    let console = Console::with(false, true, false);
+    listen(&console);
+    if let Command::Export(export) = &args.command {
+        return match export::run(export, &console) {
+            Ok(exit) => ExitCode::from(exit),
+            Err(failure) => ExitCode::from(failure.exit()),
+        };
+    }
+    ExitCode::from(ranks.serve(|| match &args.command {
+        Command::Mesh(args) => mesh::begin(&args.run, &[], &console),
+        Command::Resume(args) => mesh::begin(&args.run, &[], &console),
+        Command::Verify(args) => verify::settings(args, &console),
+        _ => Err(Failure::new("internal", "a rank was asked for what it cannot do")),
+    }))
+}
+
+/// Signals end the run from now on.
+fn listen(console: &Console) {
+    let is_json = console.is_json();
+    signals::listen(console.cancel(), move || {
+        Console::new(is_json).fail(&StorageError::Cancelled.into())
+    });
+}
+
+fn run_alone() -> ExitCode {
+    let args = match Args::try_parse() {
+        Ok(args) => args,
+        Err(error) => return unparsed(&error),
+    };
+    let console = Console::with(args.command.is_json(), args.quiet, args.verbose);
+    let settings = console.settings(None, None);
+    listen(&console);
+    let done = guarded(&settings, || Ok(dispatch(&args.command, &console)));
+    let done = done.map(|done| console.end_answer().and(done));
+    let exit = match done {
+        Ok(Ok(exit)) => exit,
+        Ok(Err(failure)) => console.fail(&failure),
+        Err(error) => console.fail(&error.into()),
+    };
+    ExitCode::from(exit)
+}
+
+/// Says what is wrong with the command line; help and version are no errors and go to stdout.
+fn unparsed(error: &clap::Error) -> ExitCode {
+    let is_help = error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand;
+    if is_help || !error.use_stderr() {
+        let printed = error.print().and_then(|()| std::io::stdout().flush());
+        return ExitCode::from(match printed.or_else(|e| console::unwritten(&e, "")) {
+            Ok(()) if error.use_stderr() => 2,
+            Ok(()) => 0,
+            Err(failure) => Console::new(false).fail(&failure),
+        });
+    }
+    let is_json = std::env::args_os().any(|word| word == "--json");
+    let text = error.render().to_string();
+    let text = text.split("\n\nUsage:").next().unwrap_or(&text);
+    let message = text.strip_prefix("error: ").unwrap_or(text).trim_end();
+    let command = std::env::args().nth(1).filter(|c| is_command(c));
+    if !is_apart(error)
+        && let Some(ContextValue::String(word)) = error.get(ContextKind::InvalidArg)
+        && error.kind() == ErrorKind::UnknownArgument
+        && word.starts_with('-')
+        && word[1..].starts_with(|c: char| c.is_ascii_digit() || c == '.')
+    {
+        let help = format!(
+            "the option before it takes no value of this kind; write values that begin with a minus behind a sign of equality, as in --option={word}"
+        );
+        let message = format!("{word} looks like a negative number, and no option here takes one");
+        return ExitCode::from(
+            Console::new(is_json).fail(&Failure::new("usage", message).help(help)),
+        );
+    }
+    if is_apart(error) {
+        let message = "numbers of one option stand apart";
+        let help = "write them as one word with commas, as in --point 0.1,0.2,0.3";
+        return ExitCode::from(
+            Console::new(is_json).fail(&Failure::new("usage", message).help(help)),
+        );
+    }
+    let help = format!("`tetdb {} --help`", command.unwrap_or_default()).replace("  ", " ");
+    ExitCode::from(Console::new(is_json).fail(&Failure::new("usage", message).help(help)))
+}
+
+/// Whether what was not expected is a number behind another one.
+fn is_apart(error: &clap::Error) -> bool {
+    let is_number = |word: &str| word.trim_end_matches(',').parse::<f64>().is_ok();
+    let Some(ContextValue::String(found)) = error.get(ContextKind::InvalidArg) else {
+        return false;
+    };
+    let words: Vec<String> =
+        std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect();
+    // Of one with a minus only the sign and the first digit are named.
+    (words.windows(2))
+        .any(|two| is_number(&two[0]) && is_number(&two[1]) && two[1].starts_with(found.as_str()))
+}
+
+fn is_command(word: &str) -> bool {
+    Args::command().find_subcommand(word).is_some()
+}
+
+fn dispatch(command: &Command, console: &Console) -> Result<u8, Failure> {
+    if writes_files(command) {
+        signals::end_in_order();
+    }
+    match command {
+        Command::Mesh(args) => mesh::run(args, console),
+        Command::Estimate(args) => estimate::run(args, console),
+        Command::Resume(args) => mesh::resume(args, console),
+        Command::Plan(args) => tasks::plan(args, console),
+        Command::Work(args) => tasks::work(args, console),
+        Command::Gather(args) => tasks::gather(args, console),
+        Command::Resaturate(args) => resaturate::run(args, console),
+        Command::Check(args) => check::run(args, console),
+        Command::Info(args) => info::run(args, console),
+        Command::Query(args) => query::run(args, console),
+        Command::Verify(args) => verify::run(args, console),
+        Command::Compare(args) => compare::run(args, console),
+        Command::Digest(args) => digest::run(args, console),
+        Command::Export(args) => export::run(args, console),
+        Command::RefineSurface(args) => refine_surface::run(args, console),
+        Command::Snapshot(args) => snapshot::run(args, console),
+        Command::Report(args) => report::run(args, console),
+        Command::Sample(args) => sample::run(args, console),
+        Command::Completions(args) => shell::completions(args, console),
+        Command::Man(args) => shell::man(args, console),
+    }
+}
+
+/// Whether a command that ended at once would leave something half done from the start.
+fn writes_files(command: &Command) -> bool {
+    matches!(
+        command,
+        Command::Resaturate(_)
+            | Command::Export(_)
+            | Command::Snapshot(_)
+            | Command::Report(_)
+            | Command::Query(_)
+    )
+}

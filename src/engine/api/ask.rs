@@ -1,0 +1,217 @@
+//! Questions about tetrahedra.
+
+use super::guard::guarded_in;
+use super::{Error, Store};
+use tetdb_base::expr::{ExprError, Expression, Kind};
+use tetdb_base::geom::{Aabb, Point};
+use tetdb_base::storage::RunContext;
+use tetdb_store::query::{
+    Hit, Ordered, QueryError, QuerySession, Selection, Solid, VARIABLES, regions_called,
+};
+
+/// Memory of answers while they are sorted.
+const SORT_BYTES: u64 = 32 << 20;
+
+/// Which answers come first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Order {
+    /// The least value first.
+    Rising,
+    /// The greatest value first.
+    Falling,
+}
+
+/// A question: the tetrahedra that all of it holds of; without a condition, all there are.
+///
+/// ```
+/// # let dir = tempfile::tempdir()?;
+/// # let path = dir.path().join("box.tetdb");
+/// # let mut store = tetdb::Mesher::new(tetdb::Surface::sample("box,h=0.2")?).create(&path)?;
+/// let near = store.query().in_box([0.0; 3], [0.3; 3]).where_("quality < 2 and x > 0.1")?;
+/// for hit in near.answers()? {
+///     let hit = hit?;
+///     assert!(hit.shape.quality < 2.0);
+/// }
+/// let worst = store.query().order_by("quality", tetdb::Order::Falling)?.limit(3).collect()?;
+/// assert_eq!(worst.len(), 3);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Query<'s> {
+    store: &'s mut Store,
+    selection: Selection,
+    order: Option<(usize, Order)>,
+    limit: Option<usize>,
+}
+
+/// Answers as they are found. After an error there are no more.
+pub struct Answers<'s> {
+    context: RunContext,
+    found: Option<Box<dyn Iterator<Item = Result<Hit, QueryError>> + 's>>,
+    left: usize,
+}
+
+impl Store {
+    /// Begins a question about tetrahedra.
+    pub fn query(&mut self) -> Query<'_> {
+        Query::new(self)
+    }
+}
+
+impl<'s> Query<'s> {
+    pub(super) fn new(store: &'s mut Store) -> Self {
+        Self { store, selection: Selection::default(), order: None, limit: None }
+    }
+
+    /// They meet the box between two corners.
+    pub fn in_box(mut self, low: [f64; 3], high: [f64; 3]) -> Self {
+        let [low, high] = [low, high].map(Point::from_array);
+        self.selection.solids.push(Solid::Box(Aabb { low, high }));
+        self
+    }
+
+    /// They meet the ball.
+    pub fn in_sphere(mut self, center: [f64; 3], radius: f64) -> Self {
+        let center = Point::from_array(center);
+        self.selection.solids.push(Solid::Sphere { center, radius });
+        self
+    }
+
+    /// They meet the plane through `point`.
+    pub fn at_plane(mut self, point: [f64; 3], normal: [f64; 3]) -> Self {
+        let [point, normal] = [point, normal].map(Point::from_array);
+        self.selection.solids.push(Solid::Plane { point, normal });
+        self
+    }
+
+    /// They lie wholly in each box and ball, instead of only meeting them.
+    pub fn inside(mut self) -> Self {
+        self.selection.inside = true;
+        self
+    }
+
+    /// They are in one of these sub-domains.
+    pub fn in_subdomains(mut self, ranks: &[u32]) -> Self {
+        self.selection.subdomains = Some(ranks.to_vec());
+        self
+    }
+
+    /// They are in one of these regions.
+    pub fn in_regions(mut self, regions: &[u32]) -> Self {
+        self.selection.regions = Some(regions.to_vec());
+        self
+    }
+
+    /// They are in a region of this name. Errors: `no-such-part`.
+    pub fn in_region_called(mut self, name: &str) -> Result<Self, Error> {
+        let found = regions_called(&self.store.summary().region_names, name)?;
+        self.selection.regions.get_or_insert_default().extend(found);
+        Ok(self)
+    }
+
+    /// They stand on an input triangle with one of these labels, positions in [`Summary::labels`](super::Summary::labels).
+    pub fn on_labels(mut self, labels: &[u32]) -> Self {
+        self.selection.labels = Some(labels.to_vec());
+        self
+    }
+
+    /// They have a face on the interface of these two sub-domains.
+    pub fn on_interface(mut self, low: u32, high: u32) -> Self {
+        self.selection.interface = Some([low, high]);
+        self
+    }
+
+    /// They have a vertex of the surface.
+    pub fn touching_surface(mut self) -> Self {
+        self.selection.touching_surface = true;
+        self
+    }
+
+    /// They have a face on an embedded sheet.
+    pub fn touching_sheet(mut self) -> Self {
+        self.selection.touching_sheet = true;
+        self
+    }
+
+    /// A condition on quality, region, subdomain, volume, x, y, z (of the centroid), edge_min, edge_max, angle_min, angle_max (degrees)
+    /// and excess (quality over the least that the faces on the surface allow),
+    /// such as `quality > 6 and region in [1, 2]`.
+    ///
+    /// Errors: `bad-expression`, with the place.
+    pub fn where_(mut self, condition: &str) -> Result<Self, Error> {
+        self.selection.condition = Some(condition_of(condition)?);
+        Ok(self)
+    }
+
+    /// Sorts the answers by one of the numbers a condition may name. Errors: `bad-query`.
+    pub fn order_by(mut self, variable: &str, order: Order) -> Result<Self, Error> {
+        let Some(place) = VARIABLES.iter().position(|v| *v == variable) else {
+            let message = format!("{variable}: expected one of {}", VARIABLES.join(", "));
+            return Err(Error::new("bad-query", message));
+        };
+        self.selection.excess |= variable == "excess";
+        self.order = Some((place, order));
+        Ok(self)
+    }
+
+    /// No more answers than `n`.
+    pub fn limit(mut self, n: usize) -> Self {
+        self.limit = Some(n);
+        self
+    }
+
+    /// The answers, found while they are taken. Errors: damage; too little memory.
+    pub fn answers(self) -> Result<Answers<'s>, Error> {
+        let Self { store, selection, order, limit } = self;
+        let (context, session) = store.context_and_session()?;
+        let context = context.clone();
+        let found = guarded_in(&context, || found(session, selection, order))?;
+        Ok(Answers { context, found: Some(found), left: limit.unwrap_or(usize::MAX) })
+    }
+
+    /// All answers at once. Errors: as [`Query::answers`].
+    pub fn collect(self) -> Result<Vec<Hit>, Error> {
+        self.answers()?.collect()
+    }
+}
+
+fn found<'s>(
+    session: &'s mut QuerySession,
+    selection: Selection,
+    order: Option<(usize, Order)>,
+) -> Result<Box<dyn Iterator<Item = Result<Hit, QueryError>> + 's>, Error> {
+    let selected = session.select(selection)?;
+    Ok(match order {
+        None => Box::new(selected),
+        Some((variable, order)) => {
+            let falls = order == Order::Falling;
+            Box::new(Ordered::new(selected, variable, falls, &std::env::temp_dir(), SORT_BYTES)?)
+        }
+    })
+}
+
+impl Iterator for Answers<'_> {
+    type Item = Result<Hit, Error>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let found = self.found.as_mut().filter(|_| self.left > 0)?;
+        self.left -= 1;
+        let next = guarded_in(&self.context, || Ok(found.next().transpose()?)).transpose();
+        if !matches!(next, Some(Ok(_))) {
+            self.found = None;
+        }
+        next
+    }
+}
+
+pub(super) fn condition_of(text: &str) -> Result<Expression, Error> {
+    let wrong = |error: ExprError| {
+        Error::new("bad-expression", &error)
+            .at(format!("character {} of {text}", error.at + 1))
+            .with_help("such as quality > 6 and region in [1, 2]")
+    };
+    let condition = Expression::parse(text, &VARIABLES).map_err(wrong)?;
+    if condition.kind() == Kind::Truth {
+        return Ok(condition);
+    }
+    Err(wrong(ExprError { at: 0, message: "this is a number; a condition compares".to_owned() }))
+}

@@ -1,0 +1,222 @@
+//! Errors of the modules below as [`Error`]s.
+
+use super::error::{Error, Remedy};
+use crate::pipeline::PipelineError;
+use tetdb_base::storage::StorageError;
+use tetdb_base::surface::{SurfaceError, show};
+use tetdb_io::read::ReadError;
+use tetdb_io::write::WriteError;
+use tetdb_kernel::boundary::BoundaryError;
+use tetdb_kernel::samples::SampleError;
+use tetdb_kernel::sizing::SizingError;
+use tetdb_store::query::QueryError;
+use tetdb_store::sealed::SealedError;
+use tetdb_store::store::StoreError;
+
+impl From<ReadError> for Error {
+    fn from(e: ReadError) -> Self {
+        Self::new(e.code(), &e).at(e.place()).with_help(e.help())
+    }
+}
+
+impl From<WriteError> for Error {
+    fn from(e: WriteError) -> Self {
+        if let WriteError::Elsewhere(failure) = e {
+            return PipelineError::from(failure).into();
+        }
+        let error = Self::new(e.code(), &e).with_help(e.help());
+        match e.place() {
+            Some(path) => error.at(path.display()),
+            None => error,
+        }
+    }
+}
+
+impl From<SurfaceError> for Error {
+    fn from(e: SurfaceError) -> Self {
+        let error = Self::new(e.code(), &e).with_help(e.help()).with_remedy(Remedy::General);
+        match &e {
+            SurfaceError::Invalid { defect, n_defects } => {
+                let more = match n_defects.saturating_sub(1) {
+                    0 => String::new(),
+                    n => format!(" (and {n} more defects)"),
+                };
+                error.at(defect.place() + &more)
+            }
+            SurfaceError::Wire(wire) => error.at(show(wire.at())),
+            _ => error,
+        }
+    }
+}
+
+impl From<SampleError> for Error {
+    fn from(e: SampleError) -> Self {
+        if let SampleError::Memory { needed, .. } = e {
+            return Self::new("memory", &e).with_remedy(Remedy::Memory(needed));
+        }
+        Self::new("bad-sample", e)
+            .with_help("for example balls,count=100 or box,h=0.1")
+            .with_remedy(Remedy::General)
+    }
+}
+
+impl From<StorageError> for Error {
+    fn from(e: StorageError) -> Self {
+        let code = match &e {
+            StorageError::Busy { .. } => "busy",
+            StorageError::Full { .. } => "disk-full",
+            StorageError::Damaged { .. }
+            | StorageError::Page { .. }
+            | StorageError::Missing { .. } => "damaged",
+            StorageError::Budget { .. }
+            | StorageError::NoMemory { .. }
+            | StorageError::TooMany { .. } => "memory",
+            StorageError::Cancelled => "stopped",
+            _ => "io",
+        };
+        match e {
+            StorageError::NoMemory { .. } => Self::new(code, &e).with_help(
+                "end other programs, or raise the limit of this process; with a smaller memory cap more goes to the disk",
+            ),
+            _ => with_general_help(code, &e),
+        }
+    }
+}
+
+impl From<SealedError> for Error {
+    fn from(e: SealedError) -> Self {
+        StoreError::from(e).into()
+    }
+}
+
+impl From<StoreError> for Error {
+    fn from(e: StoreError) -> Self {
+        let code = match e {
+            StoreError::Storage(inner) => return inner.into(),
+            StoreError::Sealed(SealedError::Storage(inner)) => return inner.into(),
+            StoreError::Busy { .. } => "busy",
+            StoreError::Changed { .. } => "store-changed",
+            StoreError::NotFound { .. } => "no-such-store",
+            StoreError::NoSubdomain { .. } => "no-such-part",
+            StoreError::NotOurs { .. } => "not-a-store",
+            StoreError::Finished { .. } => "store-exists",
+            StoreError::Unfinished { .. } => "store-unfinished",
+            StoreError::NoCoarseSnapshot { .. } => "no-coarse-leaf",
+            StoreError::Format { .. } => "store-format",
+            StoreError::Sealed(SealedError::NotSealed { .. }) => "store-unfinished",
+            StoreError::Row { .. } | StoreError::Sealed(_) => "damaged",
+        };
+        with_general_help(code, &e)
+    }
+}
+
+impl From<QueryError> for Error {
+    fn from(e: QueryError) -> Self {
+        match e {
+            QueryError::Store(e) => e.into(),
+            other => with_general_help("no-such-part", &other),
+        }
+    }
+}
+
+impl From<SizingError> for Error {
+    fn from(e: SizingError) -> Self {
+        let help = match &e {
+            SizingError::BadValue { expected, .. } if !expected.contains("length") => {
+                "write a plain number, with a point and without a unit"
+            }
+            _ => {
+                "a length is a number in the surface's own unit, such as 0.5, or a share of its box diagonal, such as 1%"
+            }
+        };
+        Self::new("bad-size", e).with_help(help)
+    }
+}
+
+impl From<BoundaryError> for Error {
+    fn from(e: BoundaryError) -> Self {
+        if matches!(e, BoundaryError::Orientation { .. }) {
+            return Self::new("contradicting-orientation", &e)
+                .with_help("fill all regions, which needs no orientation, or give each shared wall from both sides")
+                .with_remedy(Remedy::General);
+        }
+        if let BoundaryError::Seed { point, .. } = &e {
+            return Self::new("bad-seed", &e)
+                .at(show(*point))
+                .with_help("a seed lies inside the region that it fills or names, off its triangles; one for each region");
+        }
+        if let BoundaryError::NoSeed = &e {
+            return Self::new("bad-seed", &e)
+                .with_help("give a point inside each region to fill, or inside each hole");
+        }
+        Self::new("unrecovered-triangles", &e)
+            .with_help("look at these triangles; a finer or better shaped surface there helps")
+            .with_remedy(Remedy::General)
+    }
+}
+
+impl From<PipelineError> for Error {
+    fn from(e: PipelineError) -> Self {
+        match e {
+            PipelineError::Surface(e) => e.into(),
+            PipelineError::Boundary(e) => e.into(),
+            PipelineError::Sizing(e) => e.into(),
+            PipelineError::Store(e) => e.into(),
+            PipelineError::Storage(e) => e.into(),
+            PipelineError::NothingFilled { .. } => Self::new("nothing-filled", &e)
+                .with_help("fill all regions, and look at the surface")
+                .with_remedy(Remedy::General),
+            PipelineError::NothingToUndo { .. } => Self::new("nothing-to-undo", &e)
+                .with_help("only the last change can be undone, once, and not after its old version was dropped")
+                .with_remedy(Remedy::General),
+            PipelineError::SheetOutside { ref at, .. } => Self::new("sheet-outside", &e)
+                .at(show(*at))
+                .with_help("cut sheets off where they leave the filled regions, or fill the region they lie in")
+                .with_remedy(Remedy::General),
+            PipelineError::WireOutside { ref at, .. } => Self::new("wire-outside", &e)
+                .at(show(*at))
+                .with_help("leave out what is outside the filled regions, or fill the region it lies in")
+                .with_remedy(Remedy::General),
+            PipelineError::BadSeed { option, .. } => Self::new("bad-seed", &e).with_help(match option {
+                "hole" => "such as 0.5,0.5,0.2",
+                _ => "such as 0.5,0.5,0.2,rock",
+            }),
+            PipelineError::SizeCount { .. } => Self::new("count-mismatch", &e)
+                .with_help("give one length for each, in the order of the exported arrays")
+                .with_remedy(Remedy::General),
+            PipelineError::Helper(failure) => {
+                let row = super::CODES.iter().find(|row| row.code == failure.code);
+                with_general_help(row.map_or("internal", |row| row.code), &failure.message)
+            }
+            PipelineError::NoPlan { .. } => Self::new("no-tasks", &e)
+                .with_help("the store's summary says how far it is; the stage before a task has to be gathered first")
+                .with_remedy(Remedy::General),
+            PipelineError::TaskFile { .. } => Self::new("task-file", &e)
+                .with_help("gather again, which writes orders anew, then do the task again")
+                .with_remedy(Remedy::General),
+            other => Self::new("usage", other),
+        }
+    }
+}
+
+fn with_general_help(code: &'static str, e: &impl ToString) -> Error {
+    let help = match code {
+        "busy" => "wait for the other process, or stop it",
+        "store-changed" => "ask again: the answer is then of the store as it is now",
+        "disk-full" => "free some space, then resume",
+        "damaged" => {
+            "verify the store to see what is damaged; damaged sub-domains can be meshed again"
+        }
+        "memory" => "allow more memory, or mesh a coarser surface",
+        "stopped" => "resume goes on from the last finished step",
+        "no-such-store" => "check the path",
+        "not-a-store" => "choose another path; what is there was not written by tetdb",
+        "store-exists" => "choose another path, or allow it to be replaced",
+        "no-coarse-leaf" => "mesh the surface again and keep the coarse snapshots",
+        "store-unfinished" => "resume goes on with it",
+        "store-format" => "use the version of tetdb that wrote the store, or mesh again",
+        "no-such-part" => "the store's summary lists its parts",
+        _ => "check the path and its permissions",
+    };
+    Error::new(code, e.to_string()).with_help(help).with_remedy(Remedy::General)
+}

@@ -1,0 +1,54 @@
+//! Nothing unwinds into the caller: failures, requests to stop and panics become errors.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use super::{Error, Settings};
+use tetdb_base::storage::{RunContext, StorageError};
+
+// Failed page accesses travel by unwinding, which such a build turns into the end of the process.
+#[cfg(panic = "abort")]
+compile_error!(
+    "tetdb needs `panic = \"unwind\"`: failures of the disk and requests to stop travel by unwinding, which never leaves a call"
+);
+
+/// Does `work` as a run of its own, with the threads and the token of `settings`.
+#[doc(hidden)]
+pub fn guarded<T>(
+    settings: &Settings,
+    work: impl FnOnce() -> Result<T, Error>,
+) -> Result<T, Error> {
+    let context = RunContext::new(settings.n_threads(), settings.cancel.clone());
+    guarded_in(&context, work)
+}
+
+/// Does `work` as part of a run that goes on.
+#[doc(hidden)]
+pub fn guarded_in<T>(
+    context: &RunContext,
+    work: impl FnOnce() -> Result<T, Error>,
+) -> Result<T, Error> {
+    match catch_unwind(AssertUnwindSafe(|| context.enter(work))) {
+        Ok(done) => done,
+        Err(payload) => Err(match payload.downcast::<StorageError>() {
+            Ok(error) => (*error).into(),
+            Err(_) => of_panic(context),
+        }),
+    }
+}
+
+/// Damage when it came from redb, which asserts what it reads; otherwise a bug of ours.
+#[doc(hidden)]
+pub fn of_panic(context: &RunContext) -> Error {
+    match context.take_panic() {
+        Some(panic) if panic.is_in_redb => Error::new(
+            "damaged",
+            "a database file of the store cannot be followed",
+        )
+        .at(panic.message.replace('\n', " "))
+        .with_help(
+            "verify the store to see what is damaged; damaged sub-domains can be meshed again",
+        ),
+        Some(panic) => Error::internal(panic.message),
+        None => Error::internal("a panic without a message".to_owned()),
+    }
+}

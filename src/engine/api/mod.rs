@@ -1,0 +1,84 @@
+//! The front door: whoever calls it gets validation, refusal before anything is written, the job on record, verification and resume.
+//!
+//! Reading order: `surface`, `sizes` and `options` (what is asked for), `settings` (memory, threads, cancelling, progress), `mesher`
+//! (a new store), `store` (a finished one), `ask` (questions), `remesh` (sub-domains again), `tasks` (many
+//! machines), `show` (files, pictures, the page),
+//! `error`. Private: `job` (what is put on record), `preflight` (what is refused before it begins), `replace` (one store in the place of
+//! another), `guard` (nothing unwinds into the caller).
+
+mod ask;
+mod codes;
+mod defects;
+#[doc(hidden)]
+pub mod error;
+#[doc(hidden)]
+pub mod field_arrays;
+mod from_errors;
+#[doc(hidden)]
+pub mod guard;
+#[doc(hidden)]
+pub mod job;
+mod located;
+mod memory;
+mod mesher;
+mod options;
+#[doc(hidden)]
+pub mod page;
+#[doc(hidden)]
+pub mod picture;
+#[doc(hidden)]
+pub mod preflight;
+#[doc(hidden)]
+pub mod remesh;
+#[doc(hidden)]
+pub mod replace;
+mod resume;
+mod settings;
+#[doc(hidden)]
+pub mod show;
+mod sizes;
+#[doc(hidden)]
+pub mod store;
+#[doc(hidden)]
+pub mod surface;
+mod surface_arrays;
+mod surface_wires;
+#[doc(hidden)]
+pub mod targets;
+#[doc(hidden)]
+pub mod tasks;
+#[doc(hidden)]
+pub mod verify;
+#[doc(hidden)]
+pub mod verify_server;
+mod verify_shared;
+
+pub use ask::{Answers, Order, Query};
+pub use codes::{CODES, CodeRow};
+pub use defects::DefectPlace;
+pub use error::Error;
+#[doc(hidden)]
+pub use guard::guarded;
+pub use memory::Bytes;
+#[doc(hidden)]
+pub use memory::default_cap;
+pub use memory::peak_bytes;
+#[doc(hidden)]
+pub use memory::show_bytes;
+pub use mesher::{Existing, Mesher, Prediction};
+#[doc(hidden)]
+pub use mesher::{divide, predict};
+pub use options::{Optimize, Regions, Seal, Subdomains};
+pub use picture::{ColorBy, Snapped, Snapshot};
+pub use remesh::{Remesh, Remeshed};
+#[doc(hidden)]
+pub use resume::resume_reported;
+pub use settings::{Event, Settings};
+pub use show::{ExportOptions, Exported};
+pub use sizes::{Length, Sizes};
+pub use store::{Store, Summary};
+pub use surface::{CheckReport, Surface};
+pub use tasks::Tasks;
+pub use tetdb_base::storage::CancelToken;
+pub use tetdb_io::write::MeshFormat;
+pub use verify::{Verification, VerifyLevel};

@@ -1,0 +1,119 @@
+//! What is refused before anything is written: too little memory, too little disk.
+
+use std::path::{Path, PathBuf};
+
+use super::error::{Error, Remedy};
+use super::{Settings, show_bytes};
+use crate::pipeline::{self, Estimate};
+use tetdb_base::geom::short;
+use tetdb_base::storage::{ScratchSpace, available_bytes, n_threads};
+use tetdb_base::surface::Surface;
+
+/// A mesh is refused when less than this share of the disk it is expected to take is free: predictions may be that far off.
+const REFUSED_BELOW: f64 = 0.7;
+
+/// What a cap leaves beside a surface, with scratch files where the store is or will be.
+#[doc(hidden)]
+pub fn scratch_beside(surface: &Surface, cap: u64, store: &Path) -> Result<ScratchSpace, Error> {
+    let folder = folder_of(store)
+        .ok_or_else(|| Error::new("io", "there is no folder above it").at(store.display()))?;
+    Ok(ScratchSpace::new(cap.saturating_sub(surface.bytes() as u64), &folder))
+}
+
+/// Refuses a surface that leaves too little of the cap, before anything is done with it.
+#[doc(hidden)]
+pub fn surface_fits(surface: &Surface, cap: u64) -> Result<(), Error> {
+    let least = pipeline::least_for(surface);
+    if cap >= least {
+        return Ok(());
+    }
+    let message = format!(
+        "the surface alone takes {}: with a cap of {} too little is left for the mesh",
+        show_bytes(surface.bytes() as u64),
+        show_bytes(cap)
+    );
+    Err(Error::new("memory", message).with_remedy(Remedy::Memory(least)))
+}
+
+/// Refuses a mesh that memory or disk cannot hold.
+#[doc(hidden)]
+pub fn preflight(
+    estimate: &Estimate,
+    cap: u64,
+    store: &Path,
+    settings: &Settings,
+) -> Result<(), Error> {
+    let least = estimate.memory_least_bytes();
+    if cap < least {
+        let message = format!(
+            "the surface and its size field take {}: with a cap of {} too little is left for the mesh",
+            show_bytes(estimate.resident_bytes(cap)),
+            show_bytes(cap)
+        );
+        return Err(Error::new("memory", message).with_remedy(Remedy::Memory(least)));
+    }
+    let Some(free) = free_at(store) else {
+        return Ok(());
+    };
+    let needed = estimate.disk_peak_bytes(cap, n_threads());
+    if (free as f64) < REFUSED_BELOW * needed as f64 {
+        let message = format!(
+            "about {} tetrahedra are expected, which need {} of disk on the way; {} are free",
+            short(estimate.tets().round()),
+            show_bytes(needed),
+            show_bytes(free)
+        );
+        return Err(Error::new("no-room", message)
+            .at(store.display())
+            .with_help("ask for longer edges, allow more memory, or put the store on another disk")
+            .with_remedy(Remedy::General));
+    }
+    if free < needed {
+        settings.warn(format!(
+            "the mesh may need {} of disk on the way; {} are free",
+            show_bytes(needed),
+            show_bytes(free)
+        ));
+    }
+    Ok(())
+}
+
+/// Says of a full disk what is missing: what is free, and what a run that is expected to need `needed` bytes in all still lacks.
+#[doc(hidden)]
+pub fn with_free_space(mut error: Error, store: &Path, needed: Option<u64>) -> Error {
+    if let ("disk-full", Some(free)) = (error.code(), free_at(store)) {
+        error.add(&format!("; {} are free", show_bytes(free)));
+        let missing = needed.map_or(0, |n| n.saturating_sub(bytes_on_disk(store) + free));
+        if missing > 0 {
+            error.add(&format!(", about {} more are needed", show_bytes(missing)));
+        }
+    }
+    error
+}
+
+/// Bytes that files in a folder take up, where the system says; else their lengths.
+fn bytes_on_disk(dir: &Path) -> u64 {
+    let entries = std::fs::read_dir(dir).into_iter().flatten().flatten();
+    let bytes = entries.map(|entry| match entry.metadata() {
+        Ok(metadata) if metadata.is_dir() => bytes_on_disk(&entry.path()),
+        #[cfg(unix)]
+        Ok(metadata) => std::os::unix::fs::MetadataExt::blocks(&metadata) * 512,
+        #[cfg(not(unix))]
+        Ok(metadata) => metadata.len(),
+        Err(_) => 0,
+    });
+    bytes.sum()
+}
+
+/// The nearest folder that exists.
+fn folder_of(store: &Path) -> Option<PathBuf> {
+    let absolute = std::path::absolute(store).ok()?;
+    let above = absolute.ancestors().skip(usize::from(store != Path::new(".")));
+    above.into_iter().find(|folder| folder.is_dir()).map(Path::to_owned)
+}
+
+/// Bytes free where a store would be.
+#[doc(hidden)]
+pub fn free_at(store: &Path) -> Option<u64> {
+    available_bytes(&folder_of(store)?)
+}

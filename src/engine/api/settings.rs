@@ -1,0 +1,166 @@
+//! How a run works, which never changes what it makes: memory, threads, cancelling, progress.
+
+use std::fmt;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::memory::{Bytes, default_cap};
+use super::{Error, error::Remedy};
+use crate::pipeline::{self, Hands, MEMORY_MIN, Watcher};
+use tetdb_base::storage::{Budget, CancelToken};
+
+/// What a run says while it works.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Event {
+    /// Work on the way; comes often.
+    Progress {
+        /// One or two words, always the same for the same work.
+        stage: &'static str,
+        /// Work done so far, in `unit`.
+        done: u64,
+        /// Work in all, where that is known.
+        total: Option<u64>,
+        /// What `done` and `total` count.
+        unit: &'static str,
+    },
+    /// Something worth knowing.
+    Note(String),
+    /// Something that may not be as wanted.
+    Warning(String),
+    /// From now on there is a store at this path, which can be resumed.
+    StoreBegun(PathBuf),
+}
+
+type Listener = Arc<dyn Fn(&Event) + Send + Sync>;
+
+/// How a run works: none of it changes the mesh. Clones share the token and the listener.
+#[derive(Clone, Default)]
+pub struct Settings {
+    memory: Option<Bytes>,
+    threads: Option<usize>,
+    #[doc(hidden)]
+    pub cancel: CancelToken,
+    progress: Option<Listener>,
+    /// Other processes that share the work.
+    #[doc(hidden)]
+    pub hands: Hands,
+}
+
+impl fmt::Debug for Settings {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Settings({:?}, {:?} threads)", self.memory, self.threads)
+    }
+}
+
+impl Settings {
+    /// 60 % of the memory that is free when a run begins, one thread per core, no listener.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Caps what the run holds. At least 64 MiB.
+    pub fn memory(mut self, cap: Bytes) -> Self {
+        self.memory = Some(cap);
+        self
+    }
+
+    /// Threads of the run; they end with it.
+    pub fn threads(mut self, n: usize) -> Self {
+        self.threads = Some(n);
+        self
+    }
+
+    /// The run ends soon after this token is cancelled.
+    pub fn cancel(mut self, token: &CancelToken) -> Self {
+        self.cancel = token.clone();
+        self
+    }
+
+    /// Is called with each [`Event`], on whatever thread; it must be quick.
+    pub fn progress(mut self, listener: impl Fn(&Event) + Send + Sync + 'static) -> Self {
+        self.progress = Some(Arc::new(listener));
+        self
+    }
+
+    #[doc(hidden)]
+    pub fn n_threads(&self) -> usize {
+        self.threads.unwrap_or_else(|| {
+            std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
+        })
+    }
+
+    /// The cap in words, and where it comes from.
+    #[doc(hidden)]
+    pub fn cap_in_words(&self) -> String {
+        match self.memory {
+            Some(cap) => format!("{cap} (as asked for)"),
+            None => {
+                let (bytes, whence) = default_cap();
+                format!("{} ({whence})", Bytes(bytes))
+            }
+        }
+    }
+
+    /// The cap in bytes. Errors: `memory`, when it is less than any run needs; `usage`, when there is no thread.
+    #[doc(hidden)]
+    pub fn cap(&self) -> Result<u64, Error> {
+        if self.threads == Some(0) {
+            return Err(
+                Error::new("usage", "no thread is left to work").with_help("allow one or more")
+            );
+        }
+        match self.memory {
+            None => Ok(default_cap().0),
+            Some(Bytes(bytes)) if bytes < MEMORY_MIN => {
+                let least = MEMORY_MIN >> 20;
+                let message =
+                    format!("{} are less than the {least} MiB any run needs", Bytes(bytes));
+                Err(Error::new("memory", message).with_remedy(Remedy::Memory(MEMORY_MIN)))
+            }
+            Some(Bytes(bytes)) => Ok(bytes),
+        }
+    }
+
+    #[doc(hidden)]
+    pub fn budget(&self) -> Result<Budget, Error> {
+        Ok(Budget::new(self.cap()?))
+    }
+
+    #[doc(hidden)]
+    pub fn say(&self, event: &Event) {
+        if let Some(listener) = &self.progress {
+            listener(event);
+        }
+    }
+
+    #[doc(hidden)]
+    pub fn note(&self, text: impl Into<String>) {
+        self.say(&Event::Note(text.into()));
+    }
+
+    #[doc(hidden)]
+    pub fn warn(&self, text: impl Into<String>) {
+        self.say(&Event::Warning(text.into()));
+    }
+
+    /// The pipeline's events as ours.
+    #[doc(hidden)]
+    pub fn watcher(&self) -> Box<Watcher<'_>> {
+        Box::new(|event: pipeline::Event| {
+            self.say(&Event::Progress {
+                stage: event.stage,
+                done: event.done,
+                total: event.total,
+                unit: event.unit,
+            });
+        })
+    }
+
+    /// Progress of something counted.
+    #[doc(hidden)]
+    pub fn count(&self, stage: &'static str, done: u64, total: u64, unit: &'static str) {
+        let total = Some(total);
+        self.say(&Event::Progress { stage, done, total, unit });
+    }
+}

@@ -1,0 +1,248 @@
+//! A finished store.
+
+use std::path::{Path, PathBuf};
+
+use super::guard::guarded_in;
+use super::preflight::scratch_beside;
+use super::{Error, Settings, Surface, Verification, VerifyLevel, verify};
+use tetdb_base::storage::RunContext;
+use tetdb_schema::catalog::{InterfaceRow, RegionRow, StoreState, SubdomainRow};
+use tetdb_store::audit::Level;
+use tetdb_store::query::QuerySession;
+use tetdb_store::sealed::Subdomain;
+use tetdb_store::store::{Catalog, StoreError};
+
+/// Memory of one open sub-domain: half for the database, half for decoded vertices.
+const SUBDOMAIN_BYTES: usize = 16 << 20;
+
+/// A finished store, open for reading. Others may read and change it at the same time: this goes on to answer from the state it was
+/// opened in, or with the error `store-changed` where files of that state are gone.
+///
+/// ```
+/// # let dir = tempfile::tempdir()?;
+/// # let path = dir.path().join("box.tetdb");
+/// # tetdb::Mesher::new(tetdb::Surface::sample("box,h=0.5")?).create(&path)?;
+/// let mut store = tetdb::Store::open(&path)?;
+/// println!("{} tetrahedra, digest {}", store.summary().n_tets, store.summary().digest);
+///
+/// let mut part = store.subdomain(0)?;
+/// for chunk in part.tet_chunks() {
+///     for tet in chunk?.records {
+///         assert_eq!(tet.nodes.len(), 4);
+///     }
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Store {
+    path: PathBuf,
+    settings: Settings,
+    context: RunContext,
+    /// What all answers come from, whatever others do to the store meanwhile.
+    catalog: Catalog,
+    summary: Summary,
+    session: Option<QuerySession>,
+}
+
+/// What a store holds, in numbers.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Summary {
+    /// Tetrahedra.
+    pub n_tets: u64,
+    /// Vertices; one shared by several sub-domains counts in each.
+    pub n_vertices: u64,
+    /// Bytes of the sub-domains' files.
+    pub bytes: u64,
+    /// One number for the mesh, the same for equal meshes: 32 hexadecimal digits.
+    pub digest: String,
+    /// Whether a verification is on record.
+    pub is_verified: bool,
+    /// The greatest q = √6/12 · longest edge / inradius; 1 is regular.
+    pub worst_quality: f64,
+    /// Names of the labels; a label is a position here.
+    pub labels: Vec<String>,
+    /// Regions by number, empty ones among them.
+    pub regions: Vec<RegionRow>,
+    /// What regions 1, 2, … are called, empty for one without a name; none at all where no region has one.
+    pub region_names: Vec<String>,
+    /// Sub-domains by rank.
+    pub subdomains: Vec<SubdomainRow>,
+    /// Which sub-domains share how many faces, by cut.
+    pub interfaces: Vec<InterfaceRow>,
+}
+
+impl Store {
+    /// Opens a finished store. Errors: `no-such-store`, `not-a-store`, `store-unfinished`, `damaged`, `busy`.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, Error> {
+        Self::open_with(path, Settings::new())
+    }
+
+    /// The same, with settings for all that follows.
+    pub fn open_with(path: impl AsRef<Path>, settings: Settings) -> Result<Self, Error> {
+        let path = path.as_ref().to_owned();
+        let context = RunContext::new(settings.n_threads(), settings.cancel.clone());
+        let (catalog, summary) = guarded_in(&context, || {
+            let mut catalog = open_finished(&path)?;
+            let summary = Summary::of(&mut catalog)?;
+            Ok((catalog, summary))
+        })?;
+        Ok(Self { path, settings, context, catalog, summary, session: None })
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Takes it apart: its path and its settings.
+    pub(super) fn into_parts(self) -> (PathBuf, Settings) {
+        (self.path, self.settings)
+    }
+
+    pub(super) fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// What it holds, in numbers.
+    pub fn summary(&self) -> &Summary {
+        &self.summary
+    }
+
+    /// A sub-domain for reading chunk by chunk, without copies beyond the chunk.
+    ///
+    /// Errors: `no-such-part`; damage.
+    pub fn subdomain(&self, rank: u32) -> Result<Subdomain, Error> {
+        guarded_in(&self.context, || {
+            Ok(self.catalog.share().open_subdomain(rank, SUBDOMAIN_BYTES)?)
+        })
+    }
+
+    /// The tetrahedron that holds each point, the first by id where several do; `None` outside of the mesh.
+    ///
+    /// Shape: the answer runs parallel to `points`. Errors: damage; too little memory.
+    pub fn locate(
+        &mut self,
+        points: &[[f64; 3]],
+    ) -> Result<Vec<Option<tetdb_store::query::Hit>>, Error> {
+        self.with_session(|session| {
+            let points: Vec<_> =
+                points.iter().map(|p| tetdb_base::geom::Point::from_array(*p)).collect();
+            Ok(session.locate(&points)?.into_iter().map(|located| located.found).collect())
+        })
+    }
+
+    /// Verifies the mesh with exact signs, against its surface where that is still at hand.
+    ///
+    /// Errors: damage; an invalid mesh is an answer.
+    pub fn verify(&self, level: VerifyLevel) -> Result<Verification, Error> {
+        guarded_in(&self.context, || {
+            let cap = self.settings.cap()?;
+            let mut catalog = self.catalog.share();
+            let sources = catalog.job()?.surfaces;
+            let scratch = scratch_beside(
+                &tetdb_base::surface::Surface::default(),
+                cap,
+                &std::env::temp_dir().join("verify"),
+            )?;
+            let surface = match Surface::of_record(&sources, &self.path, &scratch) {
+                Ok(surface) => Some(surface.inner),
+                Err(error) if error.code() == "unreadable-file" => {
+                    self.settings.note(
+                        "note: the surface is not where it was; the mesh is verified without it",
+                    );
+                    None
+                }
+                Err(error) => return Err(error),
+            };
+            let level = match level {
+                VerifyLevel::Geometry => Level::Geometry,
+                VerifyLevel::Delaunay => Level::Delaunay,
+            };
+            let report = verify::check(&mut catalog, &self.settings, surface.as_ref(), cap, level)?;
+            Ok(Verification { report })
+        })
+    }
+
+    /// Whether another store holds the same mesh, bit for bit, in the same sub-domains.
+    pub fn is_same_mesh(&self, other: &Self) -> bool {
+        self.summary.digest == other.summary.digest
+    }
+
+    /// Closes the session that answers questions; it is opened again when the next is asked.
+    pub(super) fn close_session(&mut self) {
+        self.session = None;
+    }
+
+    /// Does `work` with the session that answers questions, which stays open.
+    pub(super) fn with_session<T>(
+        &mut self,
+        work: impl FnOnce(&mut QuerySession) -> Result<T, Error>,
+    ) -> Result<T, Error> {
+        let Self { catalog, settings, context, session, .. } = self;
+        guarded_in(context, || {
+            if session.is_none() {
+                *session = Some(QuerySession::open(catalog.share(), &settings.budget()?)?);
+            }
+            work(session.as_mut().expect("it was opened above"))
+        })
+    }
+
+    pub(super) fn context_and_session(
+        &mut self,
+    ) -> Result<(&RunContext, &mut QuerySession), Error> {
+        self.with_session(|_| Ok(()))?;
+        Ok((&self.context, self.session.as_mut().expect("it was opened above")))
+    }
+}
+
+impl Summary {
+    fn of(catalog: &mut Catalog) -> Result<Self, Error> {
+        let subdomains = catalog.subdomains()?;
+        let worst = subdomains.iter().map(|r| r.quality.worst);
+        Ok(Self {
+            n_tets: subdomains.iter().map(|r| r.tets).sum(),
+            n_vertices: subdomains.iter().map(|r| r.vertices).sum(),
+            bytes: subdomains.iter().map(|r| r.bytes).sum(),
+            digest: catalog.digest()?[0].to_string(),
+            is_verified: catalog.state()? == StoreState::Verified,
+            worst_quality: worst.fold(0.0, f64::max),
+            labels: catalog.labels()?,
+            regions: catalog.regions()?,
+            region_names: catalog.region_names()?,
+            interfaces: catalog.interfaces()?,
+            subdomains,
+        })
+    }
+}
+
+/// Opens a store that is finished. Errors: `store-unfinished`.
+#[doc(hidden)]
+pub fn open_finished(path: &Path) -> Result<Catalog, Error> {
+    if_finished(Catalog::open(path)?, path)
+}
+
+/// Opens a store that is finished, to change it. Errors: `store-unfinished`; `busy` while another does.
+#[doc(hidden)]
+pub fn open_to_change(path: &Path, settings: &Settings) -> Result<Catalog, Error> {
+    let catalog = Catalog::open_writable(path)?;
+    say_how_locked(&catalog, settings);
+    if_finished(catalog, path)
+}
+
+/// Says so when nothing but a file keeps others from writing.
+#[doc(hidden)]
+pub fn say_how_locked(catalog: &Catalog, settings: &Settings) {
+    if catalog.lock().is_some_and(|lock| lock.is_by_name()) {
+        settings.note(format!(
+            "note: the file system of {} knows no locks; writer.lock in it keeps other writers of this host away, and has to be removed by hand when a writer of another host has died",
+            catalog.dir().display()
+        ));
+    }
+}
+
+fn if_finished(mut catalog: Catalog, path: &Path) -> Result<Catalog, Error> {
+    match catalog.state()?.is_finished() {
+        true => Ok(catalog),
+        false => Err(StoreError::Unfinished { path: path.to_owned() }.into()),
+    }
+}

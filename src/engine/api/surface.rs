@@ -1,0 +1,551 @@
+//! The surface that is meshed.
+
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use tetdb_schema::catalog::SurfaceSource;
+use xxhash_rust::xxh3::Xxh3;
+
+use super::error::{Error, Remedy};
+use super::{DefectPlace, Length, Settings, guarded};
+use tetdb_base::geom::Point;
+use tetdb_base::storage::{ScratchSpace, attempt};
+use tetdb_base::surface::{self, SplitReport, SurfaceBuilder, orient_alike_in, split};
+use tetdb_io::read::{WireKind, is_stream, read_surface};
+use tetdb_io::write;
+use tetdb_kernel::samples::{PREFIX, SampleSpec};
+use tetdb_kernel::sizing::{Further, SizeField, SizeOptions};
+
+/// A triangle surface with labels, read or given, all triangles turned like their neighbors.
+///
+/// Is not: validated; that happens before a mesh is begun.
+#[derive(Clone, Debug)]
+pub struct Surface {
+    #[doc(hidden)]
+    pub inner: surface::Surface,
+    #[doc(hidden)]
+    pub sources: Vec<SurfaceSource>,
+    /// Triangles that were turned round.
+    #[doc(hidden)]
+    pub turned: usize,
+    /// Whether triangles are divided where edges and points to come lie on them.
+    pub(super) divides: bool,
+}
+
+/// What is wrong with a surface, and what its triangles allow.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct CheckReport {
+    /// Each defect as the error it would be, some hundred at most.
+    pub defects: Vec<Error>,
+    /// Where each of `defects` is, in the same order.
+    pub places: Vec<DefectPlace>,
+    /// All defects.
+    pub n_defects: u64,
+    /// Edges with one triangle.
+    pub n_open_edges: usize,
+    /// Triangles with an angle of less than five degrees.
+    pub n_small_angles: usize,
+    /// Triangles on which no tetrahedron can have q < 2.
+    pub n_forcing_triangles: usize,
+    /// Least, median and greatest edge length.
+    pub edges: [f64; 3],
+    /// Enclosed volume, of a closed surface.
+    pub volume: Option<f64>,
+}
+
+impl CheckReport {
+    /// Whether it can be meshed.
+    pub fn is_valid(&self) -> bool {
+        self.n_defects == 0
+    }
+
+    fn of(validation: &surface::Validation, fitness: &surface::Fitness) -> Self {
+        let defects = validation.defects.iter();
+        let defects = defects.map(|d| Error::new(d.code(), d).at(d.place()).with_help(d.help()));
+        Self {
+            defects: defects.collect(),
+            places: DefectPlace::all_of(validation),
+            n_defects: validation.n_defects,
+            n_open_edges: validation.closedness.open.len(),
+            n_small_angles: fitness.small_angles as usize,
+            n_forcing_triangles: fitness.forcing_triangles as usize,
+            edges: [fitness.edge_min, fitness.edge_median, fitness.edge_max],
+            volume: fitness.volume,
+        }
+    }
+}
+
+/// Points are joined up to this share of the box diagonal at most: beyond it a surface loses its shape.
+#[doc(hidden)]
+pub const WELD_SHARE_MAX: f64 = 0.01;
+
+/// Divides triangles until their edges are as short as `options` want them; where the surface is finer, sizes grow from its edges.
+///
+/// Errors: more triangles than `scratch` has memory for.
+#[doc(hidden)]
+pub fn refine(
+    surface: &surface::Surface,
+    options: &SizeOptions,
+    scratch: &ScratchSpace,
+) -> Result<(surface::Surface, SplitReport), Error> {
+    refuse_sheets(surface, "refined")?;
+    let wanted = (options.hsiz).map_or(f64::INFINITY, |l| l.resolve(surface.bounds().diagonal()));
+    let (points, triangles) = (&surface.points, &surface.triangles);
+    let built = || SizeField::build_with(points, triangles, options, &Further::default(), scratch);
+    let (field, _) = attempt(built)??;
+    let left = scratch.available().saturating_sub(field.bytes() as u64);
+    Ok(split(surface, &|p| field.h(p).min(wanted), left)?)
+}
+
+/// What stands for the path of a surface that was given as arrays: a file in the store.
+#[doc(hidden)]
+pub const IN_STORE: &str = "store:surface.obj";
+
+/// Lines of the record that say what of the surface before them are sheets: a file and its name; triangles from a number on; all that is
+/// not closed.
+pub(super) const SHEET: &str = "sheet:";
+pub(super) const SHEETS_FROM: &str = "sheets-from:";
+pub(super) const OPEN_PARTS: &str = "open-parts:";
+/// Lines that name a file of edges, or of points, as that of a sheet; and how many edges and points the store has in a file of its own.
+pub(super) const EDGES: &str = "edges:";
+pub(super) const POINTS: &str = "points:";
+pub(super) const WIRES: &str = "wires:";
+
+/// What begins the line of a file.
+pub(super) fn mark_of(kind: WireKind) -> &'static str {
+    match kind {
+        WireKind::Edges => EDGES,
+        WireKind::Points => POINTS,
+    }
+}
+
+/// What cannot be done any more once there are sheets.
+fn refuse_sheets(surface: &surface::Surface, what: &str) -> Result<(), Error> {
+    match surface.has_sheets() || surface.has_wires() {
+        false => Ok(()),
+        true => {
+            Err(Error::new("usage", format!("a surface is {what} before anything is embedded")))
+        }
+    }
+}
+
+impl Surface {
+    /// Reads files as one surface, each file a label unless it has labels of its own.
+    ///
+    /// STL, PLY, OBJ, OFF, MEDIT, Gmsh and TetGen files, also packed as `.gz` or `.zst`, and pipes. Errors: what cannot be read, with its line or byte.
+    pub fn read<P: AsRef<Path>>(files: impl IntoIterator<Item = P>) -> Result<Self, Error> {
+        let paths: Vec<PathBuf> = files.into_iter().map(|p| p.as_ref().to_owned()).collect();
+        guarded(&Settings::new(), || {
+            let cap = Settings::new().cap()?;
+            Self::read_in(&paths, cap)?.oriented(&ScratchSpace::boundless())
+        })
+    }
+
+    /// A surface of `points` and `triangles`, each three positions in `points`, counter-clockwise seen from outside or all the other way.
+    ///
+    /// Shape: `labels`, if given, runs parallel to `triangles`; a name each. The store keeps a copy of such a surface.
+    /// Errors: `index-out-of-range`, `not-a-number`, `count-mismatch` name the triangle or the point.
+    pub fn from_arrays(
+        points: &[[f64; 3]],
+        triangles: &[[u32; 3]],
+        labels: Option<&[&str]>,
+    ) -> Result<Self, Error> {
+        if let Some(labels) = labels.filter(|labels| labels.len() != triangles.len()) {
+            let message = format!("{} labels for {} triangles", labels.len(), triangles.len());
+            return Err(
+                Error::new("count-mismatch", message).with_help("give one label for each triangle")
+            );
+        }
+        guarded(&Settings::new(), || {
+            Self::built(points, triangles, labels)?.oriented(&ScratchSpace::boundless())
+        })
+    }
+
+    /// A generated surface such as `balls,count=100,seed=1` or `box,h=0.1`.
+    ///
+    /// Errors: `bad-sample` names what is wrong.
+    pub fn sample(spec: &str) -> Result<Self, Error> {
+        guarded(&Settings::new(), || {
+            let word = format!("{PREFIX}{}", spec.trim_start_matches(PREFIX));
+            Self::generated(&word, Settings::new().cap()?)?.oriented(&ScratchSpace::boundless())
+        })
+    }
+
+    /// Number of triangles.
+    pub fn n_triangles(&self) -> usize {
+        self.inner.n_own_triangles()
+    }
+
+    /// Number of vertices, those with the same coordinates counted once.
+    pub fn n_vertices(&self) -> usize {
+        self.inner.n_own_vertices()
+    }
+
+    /// Low and high corner of the smallest box around it.
+    pub fn bounds(&self) -> [[f64; 3]; 2] {
+        let bounds = self.inner.bounds();
+        [bounds.low, bounds.high].map(|p| p.to_array())
+    }
+
+    /// Names of the labels.
+    pub fn labels(&self) -> &[String] {
+        &self.inner.label_names
+    }
+
+    /// Whether it can be meshed. Errors: the first of the worst defects, with its place and the number of all.
+    pub fn validate(&self) -> Result<(), Error> {
+        guarded(&Settings::new(), || {
+            surface::validate(&self.inner).accept()?;
+            Ok(())
+        })
+    }
+
+    /// All that is wrong with it, and what its triangles allow. Is not: an error, however much is wrong.
+    pub fn check(&self) -> Result<CheckReport, Error> {
+        guarded(&Settings::new(), || {
+            let validation = surface::validate(&self.inner);
+            let fitness = surface::fitness(&self.inner, &validation.closedness);
+            Ok(CheckReport::of(&validation, &fitness))
+        })
+    }
+
+    /// Without triangles of no area and repeated ones, divided where vertices lie exactly on open edges, turned alike; and points nearer
+    /// than `weld`, a share of the box diagonal up to 0.01, joined.
+    pub fn repaired(mut self, weld: Option<f64>) -> Result<Self, Error> {
+        if let Some(share) = weld.filter(|share| !(*share > 0.0 && *share <= WELD_SHARE_MAX)) {
+            let message = format!(
+                "{share} is not a share of the box diagonal, expected above 0 and at most {WELD_SHARE_MAX}"
+            );
+            return Err(Error::new("bad-size", message));
+        }
+        refuse_sheets(&self.inner, "repaired")?;
+        guarded(&Settings::new(), || {
+            let distance = weld.map(|share| share * self.inner.bounds().diagonal());
+            surface::repair(&mut self.inner, distance);
+            self.sources = vec![given(&self.inner)];
+            Ok(self)
+        })
+    }
+
+    /// The same surface in triangles with edges of `h` at most, where they are longer; new vertices lie on the old triangles.
+    ///
+    /// Errors: defects; a length without a meaning.
+    pub fn refined(mut self, h: Length) -> Result<Self, Error> {
+        guarded(&Settings::new(), || {
+            surface::validate(&self.inner).accept()?;
+            let options = SizeOptions::parse(Some(&h.to_string()), None, None, None)?;
+            (self.inner, _) = refine(&self.inner, &options, &ScratchSpace::boundless())?;
+            self.sources = vec![given(&self.inner)];
+            Ok(self)
+        })
+    }
+
+    /// Divides triangles until their edges are as short as `h` wants them where they are, and the result takes half of `cap` at most.
+    #[doc(hidden)]
+    pub fn divide(
+        &mut self,
+        h: &dyn Fn(Point) -> f64,
+        cap: u64,
+        scratch: &ScratchSpace,
+    ) -> Result<(), Error> {
+        (self.inner, _) = split(&self.inner, h, cap / 2)?;
+        self.keep_all(scratch)
+    }
+
+    /// The same with the triangles of `sheet` inside: faces of the mesh with tetrahedra on both sides, that part no region.
+    ///
+    /// A sheet may be open or closed, end inside, meet other sheets and the surface along edges and vertices that both have, and nowhere
+    /// else. Its labels are called `name:LABEL`, or `name` where it has one alone. Default name: that of its file.
+    pub fn embedded(mut self, sheet: Surface, name: Option<&str>) -> Result<Self, Error> {
+        self.refuse_wires()?;
+        let default = sheet.name();
+        let name = name.unwrap_or(&default);
+        let first = self.inner.n_triangles();
+        self.inner.embed(&sheet.inner, name)?;
+        self.turned += sheet.turned;
+        let is_in_store = |s: &SurfaceSource| s.path == IN_STORE;
+        match sheet.sources.as_slice() {
+            [only] if !is_in_store(only) && !self.sources.iter().any(is_in_store) => {
+                self.sources.push(SurfaceSource {
+                    path: format!("{SHEET}{name}={}", only.path),
+                    ..only.clone()
+                });
+            }
+            _ => {
+                let known = self.sources.iter().find_map(|s| s.path.strip_prefix(SHEETS_FROM));
+                let first = known.map_or(first.to_string(), str::to_owned);
+                let is_open = self.sources.iter().any(|s| s.path == OPEN_PARTS);
+                self.sources = vec![given(&self.inner), mark(format!("{SHEETS_FROM}{first}"))];
+                self.sources.extend(is_open.then(|| mark(OPEN_PARTS.to_owned())));
+            }
+        }
+        Ok(self)
+    }
+
+    /// The same with what of it is not closed as sheets, see [`Surface::embedded`]: triangles at an edge without a second triangle, then
+    /// those that are at one without them, and so on.
+    pub fn open_parts_as_sheets(self) -> Result<Self, Error> {
+        guarded(&Settings::new(), || Ok(self.open_parts_in(&ScratchSpace::boundless())?.0))
+    }
+
+    /// The same, and how many triangles that are.
+    #[doc(hidden)]
+    pub fn open_parts_in(mut self, scratch: &ScratchSpace) -> Result<(Self, usize), Error> {
+        self.refuse_wires()?;
+        let n = attempt(|| self.inner.open_parts_to_sheets(scratch))?;
+        self.sources.push(mark(OPEN_PARTS.to_owned()));
+        Ok((self, n))
+    }
+
+    fn refuse_wires(&self) -> Result<(), Error> {
+        match self.inner.has_wires() {
+            false => Ok(()),
+            true => Err(Error::new("usage", "sheets are embedded before edges and points")),
+        }
+    }
+
+    /// What its first file is called, without folder and extension.
+    fn name(&self) -> String {
+        let file = self.inner.files.first().map(|file| Path::new(&file.name));
+        let stem = file.and_then(Path::file_stem).map(|stem| stem.to_string_lossy());
+        stem.filter(|s| !s.is_empty()).map_or("sheet".to_owned(), |s| s.into_owned())
+    }
+
+    /// Writes it, without embedded edges and points, as `.stl`, `.off`, `.obj` or `.ply`. Errors: `unknown-format`, `lossy-format`; the disk.
+    pub fn write(&self, out: impl AsRef<Path>) -> Result<(), Error> {
+        guarded(&Settings::new(), || {
+            match self.inner.has_wires() {
+                true => write::surface(&self.inner.without_wires(), out.as_ref())?,
+                false => write::surface(&self.inner, out.as_ref())?,
+            };
+            Ok(())
+        })
+    }
+
+    /// Reads files, or one sample, in no more than `cap` bytes of memory.
+    #[doc(hidden)]
+    pub fn load(words: &[String], cap: u64) -> Result<Self, Error> {
+        let samples = words.iter().filter(|word| word.starts_with(PREFIX)).count();
+        match (samples, words) {
+            (1, [word]) => Self::generated(word, cap),
+            (0, _) => Self::read_in(&words.iter().map(PathBuf::from).collect::<Vec<_>>(), cap),
+            _ => Err(Error::new("usage", "a sample cannot be joined with other surfaces")
+                .with_help("write it to a file first")
+                .with_remedy(Remedy::General)),
+        }
+    }
+
+    /// Turns all triangles like their neighbors.
+    #[doc(hidden)]
+    pub fn oriented(mut self, scratch: &ScratchSpace) -> Result<Self, Error> {
+        self.inner.shrink();
+        let orientation = attempt(|| orient_alike_in(&mut self.inner, scratch))?;
+        self.turned = orientation.flipped.len();
+        Ok(self)
+    }
+
+    /// What is worth knowing of how it was read.
+    #[doc(hidden)]
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes: Vec<String> = self.inner.notes.iter().map(ToString::to_string).collect();
+        if self.turned > 0 {
+            notes
+                .push(format!("{} triangles were turned to run like their neighbors", self.turned));
+        }
+        notes
+    }
+
+    /// Puts a copy of a surface that came from no file into the store's folder. Errors: the disk.
+    #[doc(hidden)]
+    pub fn keep_in(&self, store: &Path) -> Result<(), Error> {
+        if self.sources.iter().any(|source| source.path == IN_STORE) {
+            write::surface(&self.inner.without_wires(), &in_store(store))?;
+        }
+        self.keep_wires_in(store)
+    }
+
+    /// The surface a store at `store` was made from, as it was read then.
+    ///
+    /// Errors: `unreadable-file`; `surface-changed` when a file is not what it was.
+    #[doc(hidden)]
+    pub fn of_record(
+        sources: &[SurfaceSource],
+        store: &Path,
+        scratch: &ScratchSpace,
+    ) -> Result<Self, Error> {
+        let cap = scratch.cap();
+        let is_of_sheets = |s: &SurfaceSource| {
+            [SHEET, SHEETS_FROM, OPEN_PARTS, EDGES, POINTS, WIRES]
+                .iter()
+                .any(|mark| s.path.starts_with(mark))
+        };
+        let n = sources.iter().position(is_of_sheets).unwrap_or(sources.len());
+        let (own, of_sheets) = sources.split_at(n);
+        let mut surface = match own {
+            [only] if only.path == IN_STORE => {
+                let mut surface = Self::read_in(&[in_store(store)], cap)?;
+                surface.sources = vec![given(&surface.inner)];
+                surface
+            }
+            _ => Self::load(&own.iter().map(|s| s.path.clone()).collect::<Vec<_>>(), cap)?,
+        };
+        // What the store keeps with sheets was turned before they came in.
+        if !of_sheets.iter().any(|s| s.path.starts_with(SHEETS_FROM)) {
+            surface = surface.oriented(scratch)?;
+        }
+        for source in of_sheets {
+            surface = surface.with_sheets(&source.path, store, scratch)?;
+        }
+        for (then, now) in sources.iter().zip(&surface.sources) {
+            if (then.bytes, then.hash) != (now.bytes, now.hash) {
+                return Err(Error::new(
+                    "surface-changed",
+                    "the surface is not the one the store was begun with",
+                )
+                .at(&now.path)
+                .with_help("put the old file back, or name the surface to compare with")
+                .with_remedy(Remedy::General));
+            }
+        }
+        Ok(surface)
+    }
+
+    /// Adds what a line of the record says of sheets.
+    fn with_sheets(
+        mut self,
+        path: &str,
+        store: &Path,
+        scratch: &ScratchSpace,
+    ) -> Result<Self, Error> {
+        if let Some(first) = path.strip_prefix(SHEETS_FROM) {
+            let first = first.parse::<usize>().ok().filter(|&n| n <= self.inner.n_triangles());
+            let first = first
+                .ok_or_else(|| Error::new("damaged", "the record of sheets cannot be read"))?;
+            self.inner.sheets_from(first);
+            self.sources.push(mark(path.to_owned()));
+            return Ok(self);
+        }
+        if let Some((name, file)) = path.strip_prefix(SHEET).and_then(|rest| rest.split_once('=')) {
+            let sheet = Self::load(&[file.to_owned()], scratch.cap())?.oriented(scratch)?;
+            return self.embedded(sheet, Some(name));
+        }
+        if let Some(counts) = path.strip_prefix(WIRES) {
+            return self.with_kept_wires(counts, store, scratch);
+        }
+        for kind in [WireKind::Edges, WireKind::Points] {
+            let line = path.strip_prefix(mark_of(kind));
+            if let Some((name, file)) = line.and_then(|rest| rest.split_once('=')) {
+                return self.with_wires(Path::new(file), kind, Some(name), scratch);
+            }
+        }
+        Ok(self.open_parts_in(scratch)?.0)
+    }
+
+    fn of(inner: surface::Surface, sources: Vec<SurfaceSource>) -> Self {
+        Self { inner, sources, turned: 0, divides: false }
+    }
+
+    fn generated(word: &str, cap: u64) -> Result<Self, Error> {
+        let spec = SampleSpec::parse(word)?;
+        let source = SurfaceSource { path: spec.canonical(), bytes: 0, hash: [0; 2] };
+        let mut inner = surface::Surface::from(spec.make_within(cap)?);
+        inner.hold_wires(&ScratchSpace::boundless())?;
+        Ok(Self::of(inner, vec![source]))
+    }
+
+    fn read_in(paths: &[PathBuf], cap: u64) -> Result<Self, Error> {
+        // What can be read but once is not there for a later run: the store keeps a copy.
+        let is_stream = paths.iter().any(|path| is_stream(path));
+        let inner = read_surface(paths, cap)?;
+        let sources = match is_stream {
+            true => vec![given(&inner)],
+            false => paths.iter().map(|p| source(p)).collect::<Result<_, _>>()?,
+        };
+        Ok(Self::of(inner, sources))
+    }
+
+    fn built(
+        points: &[[f64; 3]],
+        triangles: &[[u32; 3]],
+        labels: Option<&[&str]>,
+    ) -> Result<Self, Error> {
+        let mut builder = SurfaceBuilder::new();
+        builder.begin_file("arrays");
+        for (i, point) in points.iter().enumerate() {
+            if point.iter().any(|x| !x.is_finite()) {
+                return Err(Error::new("not-a-number", "a coordinate is not a finite number")
+                    .at(format!("point {i}")));
+            }
+            builder.vertex(Point::from_array(*point))?;
+        }
+        for (i, triangle) in triangles.iter().enumerate() {
+            let name = labels.map_or("surface", |labels| labels[i]);
+            let label = builder.label(name);
+            builder.triangle(*triangle, label)?;
+        }
+        builder.end_file()?;
+        let inner = builder.finish();
+        let source = given(&inner);
+        Ok(Self::of(inner, vec![source]))
+    }
+}
+
+/// A line of the record that is no file.
+pub(super) fn mark(path: String) -> SurfaceSource {
+    SurfaceSource { path, ..SurfaceSource::default() }
+}
+
+/// What identifies a surface that came from no file.
+pub(super) fn given(surface: &surface::Surface) -> SurfaceSource {
+    let mut hash = Xxh3::new();
+    for x in surface.points.iter().flat_map(|p| p.to_array()) {
+        hash.update(&x.to_le_bytes());
+    }
+    for (t, triangle) in (0u32..).zip(&surface.triangles) {
+        triangle.iter().for_each(|v| hash.update(&v.to_le_bytes()));
+        hash.update(surface.label_name(t).as_bytes());
+    }
+    SurfaceSource { path: IN_STORE.to_owned(), bytes: 0, hash: halves(&hash) }
+}
+
+/// Where a store keeps the copy of a surface that came from no file.
+#[doc(hidden)]
+pub fn in_store(store: &Path) -> PathBuf {
+    store.join(IN_STORE.trim_start_matches("store:"))
+}
+
+/// What identifies a file later: absolute path, length, hash.
+#[doc(hidden)]
+pub fn source(path: &Path) -> Result<SurfaceSource, Error> {
+    let io = |e: std::io::Error| {
+        let message = match e.kind() {
+            std::io::ErrorKind::NotFound => "there is no such file".to_owned(),
+            _ => format!("the file cannot be read: {e}"),
+        };
+        Error::new("unreadable-file", message).at(path.display())
+    };
+    let absolute = std::path::absolute(path).map_err(io)?;
+    if !std::fs::metadata(path).map_err(io)?.is_file() {
+        let message = "it is not a regular file, and would have to be read twice";
+        return Err(Error::new("unreadable-file", message).at(path.display()));
+    }
+    let mut file = std::fs::File::open(path).map_err(io)?;
+    let mut hash = Xxh3::new();
+    let (mut buffer, mut bytes) = (vec![0; 1 << 16], 0);
+    loop {
+        let n = file.read(&mut buffer).map_err(io)?;
+        if n == 0 {
+            break;
+        }
+        bytes += n as u64;
+        hash.update(&buffer[..n]);
+    }
+    Ok(SurfaceSource { path: absolute.to_string_lossy().into_owned(), bytes, hash: halves(&hash) })
+}
+
+/// Low half first.
+pub(super) fn halves(hash: &Xxh3) -> [u64; 2] {
+    let digest = hash.digest128();
+    [digest as u64, (digest >> 64) as u64]
+}

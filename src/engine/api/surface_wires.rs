@@ -1,0 +1,291 @@
+//! Edges and points in a surface, from files and from arrays.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use tetdb_schema::catalog::SurfaceSource;
+use xxhash_rust::xxh3::Xxh3;
+
+use super::error::Error;
+use super::surface::{SHEETS_FROM, WIRES, given, halves, mark, mark_of, source};
+use super::{Settings, Surface, guarded};
+use tetdb_base::geom::Point;
+use tetdb_base::storage::{ScratchSpace, attempt};
+use tetdb_base::surface::WireSet;
+use tetdb_io::read::{WireKind, read_wires};
+use tetdb_io::write;
+
+impl Surface {
+    /// From now on triangles are divided where the ends of embedded edges and embedded points lie exactly on them.
+    ///
+    /// One inside a triangle divides it in three, one on an edge divides all triangles that have the edge in two. The surface is the same set
+    /// of points: what lies a rounding error beside a triangle is not on it, and refused as too near (`wire-too-near`, with the distance).
+    /// The store keeps a copy of a surface that was divided. Default: what lies on a triangle elsewhere than in a corner is refused.
+    pub fn dividing(mut self) -> Self {
+        self.divides = true;
+        self
+    }
+
+    /// The same with the edges of a file inside: `.obj` (`l`), legacy `.vtk` or `.poly` (facets of two corners).
+    ///
+    /// Each becomes an edge of the mesh, whole and in its place. Edges meet each other, sheets and the surface in vertices that both have,
+    /// and nowhere else. Names: as in [`Surface::embedded`], after which this comes.
+    /// Errors: what cannot be read; `degenerate-edge`, `duplicate-wire`, `wire-contact`, `wire-too-near` name the edge and the place.
+    pub fn embedded_edges(self, file: impl AsRef<Path>, name: Option<&str>) -> Result<Self, Error> {
+        self.with_wires_of(file.as_ref(), WireKind::Edges, name)
+    }
+
+    /// The same with the points of a file inside: `.csv` (x, y, z and a name), `.node`, `.obj` (`p`) or legacy `.vtk`.
+    ///
+    /// Each becomes a vertex of the mesh that is not moved; a point on a triangle is one of its corners. Names and errors: as in
+    /// [`Surface::embedded_edges`].
+    pub fn embedded_points(
+        self,
+        file: impl AsRef<Path>,
+        name: Option<&str>,
+    ) -> Result<Self, Error> {
+        self.with_wires_of(file.as_ref(), WireKind::Points, name)
+    }
+
+    /// [`Surface::embedded_edges`] of arrays: each edge is two positions in `points`.
+    ///
+    /// Shape: `labels`, if given, runs parallel to `edges`; a name each. The store keeps a copy.
+    /// Errors: `index-out-of-range`, `not-a-number`, `count-mismatch` name the edge or the point; as for files.
+    pub fn embedded_edges_of(
+        self,
+        points: &[[f64; 3]],
+        edges: &[[u32; 2]],
+        labels: Option<&[&str]>,
+        name: &str,
+    ) -> Result<Self, Error> {
+        let mut set = set_of(points)?;
+        let labels = labels_of(&mut set, (edges.len(), "edges"), labels, name)?;
+        for (i, (&[a, b], label)) in edges.iter().zip(labels).enumerate() {
+            if let Some(v) = [a, b].into_iter().find(|&v| v as usize >= points.len()) {
+                let message = format!("there is no point {v}, there are {}", points.len());
+                return Err(Error::new("index-out-of-range", message).at(format!("edge {i}")));
+            }
+            set.edges.push([a, b, label]);
+        }
+        self.with_set(&set, name)
+    }
+
+    /// [`Surface::embedded_points`] of an array. Shape and errors: as in [`Surface::embedded_edges_of`].
+    pub fn embedded_points_of(
+        self,
+        points: &[[f64; 3]],
+        labels: Option<&[&str]>,
+        name: &str,
+    ) -> Result<Self, Error> {
+        let mut set = set_of(points)?;
+        let labels = labels_of(&mut set, (points.len(), "points"), labels, name)?;
+        set.marks = (0..).zip(labels).map(|(v, label)| [v, label]).collect();
+        self.with_set(&set, name)
+    }
+
+    fn with_wires_of(self, file: &Path, kind: WireKind, name: Option<&str>) -> Result<Self, Error> {
+        guarded(&Settings::new(), || {
+            let scratch = ScratchSpace::boundless();
+            self.with_wires(file, kind, name, &scratch)
+        })
+    }
+
+    #[doc(hidden)]
+    pub fn with_wires(
+        self,
+        file: &Path,
+        kind: WireKind,
+        name: Option<&str>,
+        scratch: &ScratchSpace,
+    ) -> Result<Self, Error> {
+        let source = source(file)?;
+        let set = read_wires(file, kind, scratch.cap())?;
+        let stem = file.file_stem().unwrap_or_default().to_string_lossy();
+        let name = name.unwrap_or(&stem);
+        let record =
+            SurfaceSource { path: format!("{}{name}={}", mark_of(kind), source.path), ..source };
+        self.with_recorded(&set, name, Some(record), scratch)
+    }
+
+    fn with_set(self, set: &WireSet, name: &str) -> Result<Self, Error> {
+        guarded(&Settings::new(), || {
+            self.with_recorded(set, name, None, &ScratchSpace::boundless())
+        })
+    }
+
+    /// Adds edges and points; `record`: where they can be read again, as long as nothing else changes.
+    fn with_recorded(
+        mut self,
+        set: &WireSet,
+        name: &str,
+        record: Option<SurfaceSource>,
+        scratch: &ScratchSpace,
+    ) -> Result<Self, Error> {
+        let n_divided = match self.divides {
+            true => attempt(|| self.inner.divide_at(set, scratch))??,
+            false => 0,
+        };
+        attempt(|| self.inner.embed_wires(set, name, scratch))??;
+        let is_kept = self.sources.iter().any(|s| s.path.starts_with(WIRES));
+        match record {
+            Some(record) if n_divided == 0 && !is_kept => self.sources.push(record),
+            _ => self.keep_all(scratch)?,
+        }
+        Ok(self)
+    }
+
+    /// Makes the store keep all of it, in the order in which that is read again.
+    pub(super) fn keep_all(&mut self, scratch: &ScratchSpace) -> Result<(), Error> {
+        if !self.inner.has_sheets() && !self.inner.has_wires() {
+            self.sources = vec![given(&self.inner)];
+            return Ok(());
+        }
+        let set = self.inner.wire_set();
+        let mut plain = self.inner.without_wires();
+        let first = plain.sheets_last();
+        self.sources = vec![given(&plain)];
+        if plain.has_sheets() {
+            self.sources.push(mark(format!("{SHEETS_FROM}{first}")));
+        }
+        self.inner = plain;
+        if !set.edges.is_empty() || !set.marks.is_empty() {
+            attempt(|| self.inner.embed_named(&set, scratch))??;
+            self.sources.push(kept(&set));
+        }
+        Ok(())
+    }
+
+    /// Puts a copy of edges and points that are not in files of their own into the store's folder. Errors: the disk.
+    pub(super) fn keep_wires_in(&self, store: &Path) -> Result<(), Error> {
+        if self.sources.iter().any(|s| s.path.starts_with(WIRES)) {
+            write::wires(&self.inner.wire_set(), &in_store(store))?;
+        }
+        Ok(())
+    }
+
+    /// Adds what the store keeps; `counts`: how many edges and points, with a comma between.
+    pub(super) fn with_kept_wires(
+        mut self,
+        counts: &str,
+        store: &Path,
+        scratch: &ScratchSpace,
+    ) -> Result<Self, Error> {
+        let counts = counts.split(',').map(str::parse::<u64>);
+        let kinds = [WireKind::Edges, WireKind::Points];
+        for (count, kind) in counts.zip(kinds) {
+            let damaged = |_| Error::new("damaged", "the record of edges cannot be read");
+            if count.map_err(damaged)? > 0 {
+                let set = read_wires(&in_store(store), kind, scratch.cap())?;
+                attempt(|| self.inner.embed_named(&set, scratch))??;
+            }
+        }
+        self.sources.push(kept(&self.inner.wire_set()));
+        Ok(self)
+    }
+}
+
+/// Where a store keeps edges and points.
+fn in_store(store: &Path) -> PathBuf {
+    store.join("wires.obj")
+}
+
+/// What identifies edges and points that the store keeps.
+fn kept(set: &WireSet) -> SurfaceSource {
+    let mut hash = Xxh3::new();
+    for x in set.points.iter().flat_map(|p| p.to_array()) {
+        hash.update(&x.to_le_bytes());
+    }
+    let words = set.edges.iter().flatten().chain(set.marks.iter().flatten());
+    words.for_each(|word| hash.update(&word.to_le_bytes()));
+    SurfaceSource {
+        path: format!("{WIRES}{},{}", set.edges.len(), set.marks.len()),
+        bytes: 0,
+        hash: halves(&hash),
+    }
+}
+
+fn set_of(points: &[[f64; 3]]) -> Result<WireSet, Error> {
+    let is_bad = |p: &[f64; 3]| p.iter().any(|x| !x.is_finite());
+    if let Some(i) = points.iter().position(is_bad) {
+        let message = "a coordinate is not a finite number";
+        return Err(Error::new("not-a-number", message).at(format!("point {i}")));
+    }
+    Ok(WireSet {
+        points: points.iter().map(|&p| Point::from_array(p)).collect(),
+        ..WireSet::default()
+    })
+}
+
+/// The number of each one's label, all of them `name` where there are none.
+fn labels_of(
+    set: &mut WireSet,
+    (n, what): (usize, &str),
+    labels: Option<&[&str]>,
+    name: &str,
+) -> Result<Vec<u32>, Error> {
+    let Some(labels) = labels else {
+        set.label_names.push(name.to_owned());
+        return Ok(vec![0; n]);
+    };
+    if labels.len() != n {
+        let message = format!("{} labels for {n} {what}", labels.len());
+        return Err(Error::new("count-mismatch", message)
+            .with_help(format!("give one label for each of the {what}")));
+    }
+    let mut known = HashMap::new();
+    let number = |label: &&str| {
+        // As it is read again from the store's copy, a line of which it is.
+        let label = label.trim().replace(['\n', '\r'], " ");
+        *known.entry(label.clone()).or_insert_with(|| {
+            set.label_names.push(label);
+            set.label_names.len() as u32 - 1
+        })
+    };
+    Ok(labels.iter().map(number).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::api::{Length, Mesher, Sizes, VerifyLevel};
+
+    #[test]
+    fn edges_and_points_of_arrays_stay_with_the_store() {
+        let rod = [[0.5, 0.5, 0.5], [0.3, 0.4, 1.0], [0.7, 0.6, 0.2]];
+        let surface = Surface::sample("box,h=0.5").unwrap().dividing();
+        let surface = surface
+            .embedded_edges_of(&rod, &[[0, 1], [0, 2]], Some(&[" up", "down\n"]), "rod")
+            .and_then(|s| s.embedded_points_of(&rod[1..], None, "ends"))
+            .unwrap();
+        assert_eq!(surface.labels()[6..], ["rod:up", "rod:down", "ends"]);
+        let dir = tempfile::tempdir().unwrap();
+        let mesh = |name: &str, sizes: Sizes| {
+            let mesher = Mesher::new(surface.clone()).refine_surface(true);
+            mesher.sizes(sizes).create(dir.path().join(name)).unwrap()
+        };
+        let sizes = || Sizes::interior(Length::units(0.2));
+        let store = mesh("a", sizes());
+        // From what the store keeps alone.
+        assert!(store.verify(VerifyLevel::Delaunay).unwrap().is_valid());
+        assert_eq!(mesh("b", sizes()).summary().digest, store.summary().digest);
+    }
+
+    #[test]
+    fn wrong_arrays_are_refused_with_a_place() {
+        let surface = || Surface::sample("box,h=0.5").unwrap();
+        let points = [[0.5, 0.5, 0.5], [0.5, 0.5, f64::NAN]];
+        let edges = |points: &[[f64; 3]], edges: &[[u32; 2]], labels| {
+            surface().embedded_edges_of(points, edges, labels, "e")
+        };
+        for (code, place, result) in [
+            ("not-a-number", "point 1", edges(&points, &[[0, 1]], None)),
+            ("index-out-of-range", "edge 0", edges(&points[..1], &[[0, 1]], None)),
+            ("count-mismatch", "", edges(&points[..1], &[], Some(&["a"]))),
+            ("wire-contact", "", surface().embedded_points_of(&[[0.3, 0.4, 1.0]], None, "p")),
+        ] {
+            let error = result.expect_err(code);
+            assert_eq!(error.code(), code);
+            assert!(error.place().unwrap_or_default().contains(place), "{error}");
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! Files that a run writes are none that it reads.
+
+use std::path::{Path, PathBuf};
+
+use super::Error;
+use super::surface::{EDGES, IN_STORE, OPEN_PARTS, POINTS, SHEET, SHEETS_FROM, WIRES};
+use tetdb_kernel::samples::PREFIX;
+use tetdb_store::store::Catalog;
+
+/// Endings of files, and of those that are read with them: TetGen's points, the background mesh of sizes.
+const READ: [(&str, &[&str]); 4] = [
+    ("poly", &["node"]),
+    ("smesh", &["node"]),
+    ("sol", &["mesh", "meshb"]),
+    ("solb", &["mesh", "meshb"]),
+];
+/// The same of files that are written.
+const WRITTEN: [(&str, &[&str]); 1] = [("ele", &["node", "face", "edge"])];
+
+/// Refuses to write to `out` where that is a folder, or one of `inputs`, through whatever links; so too for what goes beside either.
+///
+/// Errors: `usage`.
+#[doc(hidden)]
+pub fn check_target(out: &Path, inputs: &[PathBuf]) -> Result<(), Error> {
+    let refused = |message: String| {
+        Err(Error::new("usage", message).with_help("choose another name for what is written"))
+    };
+    if out.is_dir() {
+        let what = match Catalog::open(out).is_ok() {
+            true => "a store",
+            false => "a folder",
+        };
+        return refused(format!("{} is {what}, no file to be written", out.display()));
+    }
+    let written = with_others(out, &WRITTEN);
+    let read = inputs.iter().flat_map(|input| with_others(input, &READ));
+    for input in read {
+        if let Some(out) = written.iter().find(|out| is_same_file(&input, out)) {
+            return refused(format!(
+                "{} would be overwritten: it is {}, which this run reads or the store was meshed from",
+                out.display(),
+                input.display()
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// A file, and those that `others` name by its ending.
+fn with_others(file: &Path, others: &[(&str, &[&str])]) -> Vec<PathBuf> {
+    let ending = file.extension().unwrap_or_default().to_string_lossy();
+    let others = others.iter().filter(|(of, _)| ending.eq_ignore_ascii_case(of));
+    let others = others.flat_map(|(_, endings)| endings.iter().map(|e| file.with_extension(e)));
+    [file.to_owned()].into_iter().chain(others).collect()
+}
+
+/// The files a store was made from.
+#[doc(hidden)]
+pub fn inputs_of(store: &Path) -> Vec<PathBuf> {
+    let job = Catalog::open(store).and_then(|mut catalog| catalog.job());
+    let sources = job.map(|job| job.surfaces).unwrap_or_default();
+    let files = sources.iter().filter_map(|source| file_of(&source.path));
+    files.map(PathBuf::from).collect()
+}
+
+/// The file that a line of the record names, where it names one.
+fn file_of(line: &str) -> Option<&str> {
+    let embedded = [SHEET, EDGES, POINTS];
+    if let Some(named) = embedded.iter().find_map(|mark| line.strip_prefix(mark)) {
+        return named.split_once('=').map(|(_, file)| file);
+    }
+    let others = [IN_STORE, PREFIX, SHEETS_FROM, OPEN_PARTS, WIRES];
+    let is_file = !others.iter().any(|mark| line.starts_with(mark));
+    is_file.then_some(line)
+}
+
+/// Whether two paths lead to one file.
+fn is_same_file(a: &Path, b: &Path) -> bool {
+    let (Ok(a_meta), Ok(b_meta)) = (a.metadata(), b.metadata()) else {
+        return false;
+    };
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt;
+        (a_meta.dev(), a_meta.ino()) == (b_meta.dev(), b_meta.ino())
+    }
+    #[cfg(not(unix))]
+    {
+        let _ = (a_meta, b_meta);
+        matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+    }
+}

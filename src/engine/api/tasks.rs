@@ -1,0 +1,187 @@
+//! A mesh by tasks that a batch scheduler starts, each a process of its own on whatever machine.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use super::store::say_how_locked;
+use super::{Error, Settings, guarded, job};
+use crate::pipeline::{self, Gathered, Performed, Planned, TASKS_MAX, TaskSettings};
+use tetdb_base::storage::{Budget, host_name};
+use tetdb_store::store::Catalog;
+
+/// How long a file may be late by default: file systems of clusters keep for up to a minute what they know of a folder.
+const WAIT: Duration = Duration::from_secs(60);
+
+/// The work that is left of an unfinished store, as tasks.
+///
+/// One process makes the coarse mesh ([`Mesher::coarse_only`](super::Mesher::coarse_only)) and plans; then each stage's tasks run in any
+/// order, on any machines that see the store's folder, as often as anybody likes; between stages one process gathers. The mesh is that of one
+/// process.
+///
+/// ```
+/// # let dir = tempfile::tempdir()?;
+/// # let path = dir.path().join("box.tetdb");
+/// use tetdb::{Mesher, Store, Surface, Tasks};
+///
+/// Mesher::new(Surface::sample("box,h=0.1")?).coarse_only(true).create_unfinished(&path)?;
+/// let tasks = Tasks::of(&path);
+/// let mut next = Some(tasks.plan(2)?);
+/// while let Some(stage) = next {
+///     for task in stage {
+///         tasks.run(task)?; // on a machine of the cluster
+///     }
+///     next = tasks.gather()?;
+/// }
+/// let store = Store::open(&path)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Tasks {
+    store: PathBuf,
+    settings: Settings,
+    how: TaskSettings,
+}
+
+impl Tasks {
+    /// Of the store at `path`.
+    pub fn of(path: impl AsRef<Path>) -> Self {
+        Self {
+            store: path.as_ref().to_owned(),
+            settings: Settings::new(),
+            how: TaskSettings { scratch: None, wait: WAIT },
+        }
+    }
+
+    /// Memory, threads, progress of each call.
+    pub fn settings(mut self, settings: Settings) -> Self {
+        self.settings = settings;
+        self
+    }
+
+    /// A folder of this machine where tasks write before they copy. Default: they write in the store's folder.
+    pub fn scratch(mut self, dir: impl AsRef<Path>) -> Self {
+        self.how.scratch = Some(dir.as_ref().to_owned());
+        self
+    }
+
+    /// How long a file that is expected may be late. Default: a minute.
+    pub fn wait(mut self, wait: Duration) -> Self {
+        self.how.wait = wait;
+        self
+    }
+
+    /// Plans for about `n` tasks at once, at most 1,000 a stage; the tasks that can be done now. The same plan again changes nothing.
+    ///
+    /// Errors: `no-tasks` when the store is finished or has no coarse mesh; `busy`; `usage`.
+    pub fn plan(&self, n: u32) -> Result<Vec<u32>, Error> {
+        if !(1..=TASKS_MAX).contains(&n) {
+            let message = format!("{n} tasks cannot be planned");
+            return Err(Error::new("usage", message).with_help("from 1 to 1000"));
+        }
+        guarded(&self.settings, || {
+            let mut catalog = self.open()?;
+            let options = catalog.job()?.options;
+            pipeline::plan_tasks(&mut catalog, n, &options)?;
+            let gathered = pipeline::gather(&mut catalog, Duration::ZERO)?;
+            Ok(gathered.left.into_iter().map(|(task, _)| task).collect())
+        })
+    }
+
+    /// Does a task; `false` when it had been done before. The store's catalog is not opened.
+    ///
+    /// Errors: `no-tasks` while the stage of the task has not come; `task-file`; those of a run, with the name of this machine.
+    pub fn run(&self, task: u32) -> Result<bool, Error> {
+        guarded(&self.settings, || {
+            let budget = Budget::new(self.settings.cap()?);
+            let watch = self.settings.watcher();
+            let done = pipeline::perform(&self.store, task, &self.how, &budget, &watch);
+            let done = done.map_err(|error| {
+                let mut error = Error::from(error);
+                error.add(&format!(" (task {task} on {})", host_name()));
+                error
+            })?;
+            Ok(done != Performed::Already)
+        })
+    }
+
+    /// Commits what tasks have done. The tasks that can be done now, or `None` when the store is finished.
+    ///
+    /// Errors: `tasks-left` when some of the stage have to be done again, with their numbers; `no-tasks`; `busy`.
+    pub fn gather(&self) -> Result<Option<Vec<u32>>, Error> {
+        let gathered = self.gather_reported()?;
+        match gathered.is_finished {
+            true => Ok(None),
+            false => Ok(Some(gathered.left.into_iter().map(|(task, _)| task).collect())),
+        }
+    }
+
+    /// The same, with all that was found.
+    #[doc(hidden)]
+    pub fn gather_reported(&self) -> Result<Gathered, Error> {
+        guarded(&self.settings, || {
+            let mut catalog = self.open()?;
+            let gathered = pipeline::gather(&mut catalog, self.how.wait)?;
+            if gathered.is_finished {
+                catalog.close()?;
+                return Ok(gathered);
+            }
+            let first = gathered.left.first();
+            match first.filter(|_| gathered.is_begun()) {
+                None => Ok(gathered),
+                Some((task, why)) => {
+                    let left = gathered.left.len();
+                    let message = format!(
+                        "{left} of {} tasks of stage {} have to be done again: {}; of task {task}: {why}",
+                        gathered.tasks.len(),
+                        gathered.stage[0] + 1,
+                        ranges(gathered.left.iter().map(|(task, _)| *task)),
+                    );
+                    let error = Error::new("tasks-left", message).at(self.store.display());
+                    Err(error.with_help("do these tasks again, then gather again"))
+                }
+            }
+        })
+    }
+
+    /// How far tasks are; `None` where none are planned.
+    #[doc(hidden)]
+    pub fn status(&self) -> Result<Option<Planned>, Error> {
+        Ok(pipeline::status(&self.store)?)
+    }
+
+    fn open(&self) -> Result<Catalog, Error> {
+        let mut catalog = Catalog::open_writable(&self.store)?;
+        say_how_locked(&catalog, &self.settings);
+        job::check_recipe(&mut catalog)?;
+        Ok(catalog)
+    }
+}
+
+/// Numbers that ascend, in the form of batch schedulers: `3,7-9`.
+#[doc(hidden)]
+pub fn ranges(numbers: impl IntoIterator<Item = u32>) -> String {
+    let mut ranges: Vec<[u32; 2]> = Vec::new();
+    for n in numbers {
+        match ranges.last_mut() {
+            Some([_, last]) if *last + 1 == n => *last = n,
+            _ => ranges.push([n, n]),
+        }
+    }
+    let words = ranges.iter().map(|[first, last]| match first == last {
+        true => first.to_string(),
+        false => format!("{first}-{last}"),
+    });
+    words.collect::<Vec<_>>().join(",")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_listed_as_schedulers_want_them() {
+        assert_eq!(ranges([]), "");
+        assert_eq!(ranges([3]), "3");
+        assert_eq!(ranges([1, 2, 3, 5, 7, 8]), "1-3,5,7-8");
+    }
+}

@@ -1,0 +1,147 @@
+//! Is it a valid mesh of its surface?
+
+use std::path::Path;
+use std::sync::Arc;
+
+use super::error::{Error, Remedy};
+use super::{Settings, verify_shared};
+use tetdb_base::geom::{Point, short};
+use tetdb_base::storage::attempt;
+use tetdb_base::surface::{Surface, show};
+use tetdb_schema::catalog::StoreState;
+use tetdb_store::audit::{self, Level, Report};
+use tetdb_store::store::{Catalog, StoreError, WriterLock};
+
+/// How much is checked, each level with all before it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum VerifyLevel {
+    /// Positive volumes, faces paired, input triangles present, interfaces alike on both sides.
+    #[default]
+    Geometry,
+    /// Also how many free faces are locally Delaunay.
+    Delaunay,
+}
+
+/// What a verification found.
+#[derive(Clone, Debug)]
+pub struct Verification {
+    #[doc(hidden)]
+    pub report: Report,
+}
+
+impl Verification {
+    /// Whether nothing is wrong.
+    pub fn is_valid(&self) -> bool {
+        self.report.valid
+    }
+
+    /// Tetrahedra that were checked.
+    pub fn n_tets(&self) -> u64 {
+        self.report.tets
+    }
+
+    /// Kinds of what is wrong, in words, with how often each occurs.
+    pub fn findings(&self) -> Vec<(String, u64)> {
+        let findings = self.report.findings.iter();
+        findings.map(|(f, &n)| (format!("{f:?}"), n)).collect()
+    }
+}
+
+/// Verifies within `cap`, less what the surface holds. What is damaged is noted, all of it.
+#[doc(hidden)]
+pub fn check(
+    store: &mut Catalog,
+    settings: &Settings,
+    surface: Option<&Surface>,
+    cap: u64,
+    level: Level,
+) -> Result<Report, Error> {
+    let options = verify_shared::options(cap, surface, level);
+    let verified = attempt(|| verify_shared::verify(store, settings, surface, &options));
+    let error = match verified.map_err(StoreError::from) {
+        Ok(Ok(report)) => return Ok(report),
+        Ok(Err(error)) | Err(error) => error,
+    };
+    if error.is_damage()
+        && let Ok(Ok(list)) = attempt(|| audit::damage(store))
+    {
+        list.iter().for_each(|damage| settings.note(damage.to_string()));
+    }
+    Err(error.into())
+}
+
+/// A valid report in one line.
+#[doc(hidden)]
+pub fn sentence(report: &Report) -> String {
+    let mut text = format!(
+        "verified: {} tetrahedra, all positive by exact signs; {} inner faces paired",
+        report.tets, report.inner_faces
+    );
+    if report.against_input {
+        text += &format!(
+            "; all {} input triangles present, no vertex added on the surface",
+            report.triangles_present + report.triangles_unfilled
+        );
+    }
+    if report.edges_present + report.points_present > 0 {
+        text += &format!(
+            "; all {} embedded edges and {} points present",
+            report.edges_present, report.points_present
+        );
+    }
+    if report.delaunay_tested > 0 {
+        text += &format!(
+            "; {} % of free faces locally Delaunay",
+            // Rounded down: 100 is said of all alone.
+            short((1e4 * report.delaunay_share()).floor() / 100.0)
+        );
+    }
+    text
+}
+
+/// `NotAnInputTriangle` as `not an input triangle`.
+fn words_of(name: &str) -> String {
+    let mut words = String::new();
+    for c in name.chars() {
+        if c.is_uppercase() && !words.is_empty() {
+            words.push(' ');
+        }
+        words.extend(c.to_lowercase());
+    }
+    words
+}
+
+/// The error for an invalid mesh.
+#[doc(hidden)]
+pub fn invalid(report: &Report, path: &Path) -> Error {
+    let findings: Vec<String> = report
+        .findings
+        .iter()
+        .map(|(f, n)| format!("{n} x {}", words_of(&format!("{f:?}"))))
+        .collect();
+    let first = report.offenders.first();
+    Error::new(
+        "invalid-mesh",
+        format!("{} is not a valid mesh: {}", path.display(), findings.join(", ")),
+    )
+    .at(first.map_or_else(String::new, |o| {
+        let tet = (o.tet.as_ref()).map_or(String::new(), |id| format!("tetrahedron {id}: "));
+        let corners: Vec<String> = (o.points.iter()).map(|&p| show(Point::from_array(p))).collect();
+        format!("{tet}{} {}", o.what, corners.join(" "))
+    }))
+    .with_help("a full verification lists examples of each kind")
+    .with_remedy(Remedy::General)
+}
+
+/// Puts on record that a finished store was verified, which nobody else has changed meanwhile: `lock` was held.
+#[doc(hidden)]
+pub fn record(path: &Path, lock: Arc<WriterLock>) -> Result<(), Error> {
+    let mut catalog = Catalog::open_locked(path, lock)?;
+    if catalog.state()? < StoreState::Verified {
+        catalog.commit(|step| {
+            step.set_state(StoreState::Verified);
+            Ok(())
+        })?;
+    }
+    Ok(catalog.close()?)
+}

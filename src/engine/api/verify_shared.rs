@@ -1,0 +1,161 @@
+//! One verification by several threads and processes: each looks at sub-domains by itself, one adds up what they found.
+//!
+//! What another process (`verify_server`) cannot do or fails at is done here: the report and the error are those of one process.
+
+use std::collections::BTreeMap;
+use std::sync::{Mutex, PoisonError};
+
+use rkyv::{Archive, Deserialize, Serialize};
+use tetdb_schema::catalog::{SubdomainRow, SurfaceSource};
+use xxhash_rust::xxh3::Xxh3;
+
+use super::Settings;
+use crate::pipeline::{
+    Hand, Helpers, Kind, PipelineError, Watcher, from_bytes, to_bytes, work_off,
+};
+use tetdb_base::geom::Point;
+use tetdb_base::storage::{attempt, n_threads};
+use tetdb_base::surface::Surface;
+use tetdb_store::audit::{self, Level, PartReport, Report, VerifyOptions};
+use tetdb_store::store::{Catalog, StoreError};
+
+/// What is the same for all sub-domains.
+#[derive(Archive, Serialize, Deserialize, Clone, Debug)]
+pub(super) struct Job {
+    pub store: String,
+    pub level: Level,
+    pub apex: Option<[f64; 3]>,
+    /// What the mesh is compared with, if with anything: where it can be read, and its fingerprint.
+    pub surface: Option<(Vec<SurfaceSource>, u64)>,
+}
+
+/// Verifies within `cap`, less what the surface holds.
+pub(super) fn options(cap: u64, surface: Option<&Surface>, level: Level) -> VerifyOptions {
+    let held = surface.map_or(0, |s| s.bytes() as u64 + audit::wire_bytes(s));
+    let memory = cap.saturating_sub(held).min(1 << 30) / 2;
+    VerifyOptions { level, memory_bytes: memory as usize, temp_dir: std::env::temp_dir() }
+}
+
+/// Bytes for each thread that looks at sub-domains: a second one took 24 to 66 MiB where there was room.
+const THREAD_BYTES: u64 = 64 << 20;
+
+/// Threads of this process that look at sub-domains side by side.
+fn threads(n_subdomains: usize, surface: Option<&Surface>, options: &VerifyOptions) -> usize {
+    let each = THREAD_BYTES + surface.map_or(0, audit::wire_bytes);
+    let room = options.memory_bytes as u64 / each;
+    n_threads().min(n_subdomains).min(room as usize).max(1)
+}
+
+/// Verifies, with several threads and with the other processes of `settings` if there are any. Errors: as [`audit::verify`].
+pub(super) fn verify(
+    store: &mut Catalog,
+    settings: &Settings,
+    surface: Option<&Surface>,
+    options: &VerifyOptions,
+) -> Result<Report, StoreError> {
+    let n_subdomains = store.subdomains()?.len();
+    let n_threads = threads(n_subdomains, surface, options);
+    let helpers = settings.hands.0.clone();
+    if n_subdomains < 2 || helpers.is_none() && n_threads == 1 {
+        return audit::verify(store, surface, options);
+    }
+    let dir = std::path::absolute(store.dir()).unwrap_or_else(|_| store.dir().to_owned());
+    let sources = store.job()?.surfaces;
+    let shares: Vec<_> = (0..n_threads).map(|_| Mutex::new(store.share())).collect();
+    let own_options =
+        VerifyOptions { memory_bytes: options.memory_bytes / n_threads, ..options.clone() };
+    audit::verify_shared(store, surface, options, &mut |rows, apex, add| {
+        let job = || Job {
+            store: dir.to_string_lossy().into_owned(),
+            level: options.level,
+            apex: apex.map(|p| p.to_array()),
+            surface: surface.map(|s| (sources.clone(), fingerprint(s))),
+        };
+        let slots = helpers.as_ref().map_or(0, |helpers| {
+            let begun = helpers.begin(&to_bytes(Kind::Verification, &job()));
+            begun.unwrap_or_else(|failure| {
+                settings.note(format!("note: verified by one process: {}", failure.message));
+                0
+            })
+        });
+        let here = |thread: usize, row: &SubdomainRow| {
+            let share = &shares[thread];
+            let own = share.lock().unwrap_or_else(PoisonError::into_inner);
+            let done = attempt(|| {
+                let mut part = own.open_row(row.clone(), own_options.memory_bytes / 4)?;
+                audit::verify_part(&mut part, apex, surface, &own_options)
+            });
+            done.map_err(StoreError::from).flatten()
+        };
+        let each = |slot, row: &SubdomainRow| {
+            let asked = helpers.as_ref().and_then(|h| ask(&**h, slot, row).ok());
+            asked.map_or_else(|| here(slot % n_threads, row), Ok)
+        };
+        share(rows, [n_threads, slots], &here, &each, add)
+    })
+}
+
+/// What is found of a sub-domain.
+type PartResult = Result<PartReport, StoreError>;
+/// Who looks at one, by number.
+type Look<'a> = &'a (dyn Fn(usize, &SubdomainRow) -> PartResult + Sync);
+
+/// Has each of `rows` looked at, by so many here and so many elsewhere; `add` takes what was found in their order.
+fn share(
+    rows: &[SubdomainRow],
+    [n_here, n_elsewhere]: [usize; 2],
+    here: Look,
+    elsewhere: Look,
+    add: &mut dyn FnMut(PartReport) -> Result<(), StoreError>,
+) -> Result<(), StoreError> {
+    let all = (0..n_here).map(|k| (here, k)).chain((0..n_elsewhere).map(|k| (elsewhere, k)));
+    let all: Vec<_> =
+        all.map(|(look, k)| move |at: usize, _: &Watcher| Ok((at, look(k, &rows[at])))).collect();
+    let hands: Vec<Hand<usize, (usize, PartResult)>> =
+        all.iter().map(|hand| hand as Hand<_, _>).collect();
+    let mut waiting = BTreeMap::new();
+    let mut next = 0;
+    let mut commit = |(at, found): (usize, PartResult)| {
+        waiting.insert(at, found);
+        while let Some(found) = waiting.remove(&next) {
+            next += 1;
+            add(found?)?;
+        }
+        Ok(Vec::new())
+    };
+    // The last of the list is taken first.
+    let jobs = (0..rows.len()).rev().collect();
+    let done = work_off(jobs, &hands, &|_| (), &mut commit);
+    done.map_err(|error| match error {
+        PipelineError::Store(error) => error,
+        other => unreachable!("{other}: only what is added fails"),
+    })
+}
+
+/// Has a sub-domain looked at by a helper. Errors: in words.
+fn ask(helpers: &dyn Helpers, slot: usize, row: &SubdomainRow) -> Result<PartReport, String> {
+    let answer = helpers.perform(slot, to_bytes(Kind::PartOrder, row));
+    from_bytes(Kind::PartReport, &answer.map_err(|e| e.message)?)
+}
+
+/// Of all that a mesh is compared with.
+pub(super) fn fingerprint(surface: &Surface) -> u64 {
+    let mut sum = Xxh3::new();
+    let mut put = |words: &mut dyn Iterator<Item = u32>| {
+        let mut n = 0u64;
+        for word in words {
+            sum.update(&word.to_le_bytes());
+            n += 1;
+        }
+        sum.update(&n.to_le_bytes());
+    };
+    let bits = |p: &Point| p.to_array().map(f64::to_bits);
+    let halves = |x: u64| [x as u32, (x >> 32) as u32];
+    put(&mut surface.points.iter().flat_map(bits).flat_map(halves));
+    put(&mut surface.triangles.iter().flatten().copied());
+    put(&mut surface.sheets.iter().map(|&is_sheet| is_sheet.into()));
+    put(&mut surface.wires.edges.iter().flatten().copied());
+    put(&mut surface.wires.points.iter().flatten().copied());
+    put(&mut surface.wires.fins.iter().flatten().copied());
+    sum.digest()
+}

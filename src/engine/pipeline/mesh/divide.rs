@@ -1,0 +1,67 @@
+//! The bisections of a run, by workers of this process.
+
+use super::commit::{commit_cuts, cut_order};
+use super::run::Run;
+use crate::pipeline::error::PipelineError;
+use crate::pipeline::plan::Plan;
+use crate::pipeline::progress::Watcher;
+use crate::pipeline::tasks::{ask, wrong_receipt};
+use crate::pipeline::tree;
+use crate::pipeline::work::{CutOrder, CutReceipt, Order, Receipt, Worker, Workplace};
+use crate::pipeline::workers::{Hand, work_off};
+use tetdb_kernel::bisect::CutReport;
+
+/// What a cut was, and how it went where this process made it.
+type CutDone = (CutOrder, CutReceipt, Option<CutReport>);
+
+impl Run<'_> {
+    /// Bisects until no part has more than one sub-domain, as many parts at once as there are threads and memory for.
+    pub fn divide_all(&mut self) -> Result<Vec<CutReport>, PipelineError> {
+        let mut parts = tree::parts(self.catalog, self.n)?;
+        parts.retain(|p| p.part.count > 1);
+        if parts.is_empty() {
+            return Ok(Vec::new());
+        }
+        let workers = self.plan.workers();
+        // One part alone has all the memory: its children come when it is done.
+        let share = self.plan.shared_by(parts.len().min(workers).max(1) as u64);
+        let mut orders = Vec::with_capacity(parts.len());
+        for part in parts.into_iter().rev() {
+            orders.push((cut_order(self.catalog, self.n, part)?, share));
+        }
+        let worker = Worker { place: Workplace::in_store(self.catalog)?, common: self.common()? };
+        let watch = self.watch;
+        let mut reports = Vec::new();
+        let share = self.plan.shared_by(workers as u64);
+        let here = |(order, share): (CutOrder, Plan), watch: &Watcher| {
+            let (receipt, report) = worker.cut(&order, share, watch)?;
+            Ok((order, receipt, Some(report)))
+        };
+        let there = self.helpers()?;
+        let store = &worker.place.store;
+        let elsewhere: Vec<_> = (there.iter())
+            .map(|(helpers, slot)| {
+                move |(order, _): (CutOrder, Plan), _: &Watcher| match ask(
+                    &**helpers,
+                    *slot,
+                    &Order::Cut(order.clone()),
+                    store,
+                )? {
+                    Receipt::Cut(receipt) => Ok((order, receipt, None)),
+                    Receipt::Subdomain(_) => Err(wrong_receipt()),
+                }
+            })
+            .collect();
+        let mut hands: Vec<Hand<(CutOrder, Plan), CutDone>> = vec![&here; workers];
+        hands.extend(elsewhere.iter().map(|hand| hand as Hand<_, _>));
+        work_off(orders, &hands, watch, &mut |(order, receipt, report)| {
+            reports.extend(report);
+            commit_cuts(self.catalog, std::slice::from_ref(&receipt))?;
+            self.count(receipt.traffic);
+            let mut orders: Vec<_> = receipt.below(&order.zones).map(|o| (o, share)).collect();
+            orders.reverse();
+            Ok(orders)
+        })?;
+        Ok(reports)
+    }
+}

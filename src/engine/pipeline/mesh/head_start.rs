@@ -1,0 +1,267 @@
+//! A head start: inserting a surface's vertices needs their positions alone, and goes on beside what looks at the surface.
+//!
+//! Validation and sizes need the surface, the Delaunay mesh of its vertices needs neither of them: one thread makes it in frames that
+//! have no file, so that nothing is on disk before the surface is accepted. What does not fit its frames, and what is found not to be
+//! wanted, is dropped.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Sender, channel};
+use std::time::Instant;
+
+use super::coarse::triangulate;
+use crate::pipeline::plan::{Options, Plan};
+use crate::pipeline::progress::{Event, Watcher};
+use tetdb_base::storage::{
+    Backing, Pager, ScratchSpace, StorageError, attempt, in_place_scope, n_threads, raise,
+};
+use tetdb_base::surface::Surface;
+use tetdb_kernel::delaunay::KernelStats;
+use tetdb_kernel::mesh::Mesh;
+use tetdb_kernel::refine::{PATTERN_BYTES, find_pattern};
+
+/// Bytes of frames for each vertex: 6.4 to 7.2 tetrahedra, the vertex and its attribute. What takes more is left for later.
+const FRAMES_VERTEX: u64 = 8 * 32 + 32 + 8;
+/// Bytes of frames for each triangle: its facet, and what pages leave unused.
+const FRAMES_TRIANGLE: u64 = 33;
+/// Bytes of frames for the last page of each kind.
+const FRAMES_LEAST: u64 = 1 << 20;
+/// Bytes held beside frames for each vertex: its place in the order of insertion, its number.
+const BESIDE_VERTEX: u64 = 24;
+/// Bytes that validation and sizes hold for each triangle when all is in memory, and beside that: 140 and a little.
+const LOOK_TRIANGLE: u64 = 160;
+const LOOK_LEAST: u64 = 16 << 20;
+/// Vertices of surfaces whose inside may have room for pieces of the pattern, and whose run is longer than finding it takes (50 ms).
+const PATTERN_FROM: u64 = 1 << 12;
+
+/// The vertices and facets of a surface in a mesh, inserted before there was a store.
+pub struct HeadStart {
+    mesh: Mesh,
+    kernel: KernelStats,
+    /// What it took.
+    pub seconds: f64,
+}
+
+impl HeadStart {
+    /// Bytes of frames it holds.
+    pub fn bytes(&self) -> u64 {
+        frames_bytes(&self.mesh)
+    }
+
+    /// The mesh, with a place for pages that leave memory and `bytes` for frames, which must hold it.
+    pub fn into_mesh(mut self, bytes: u64, backing: Backing) -> (Mesh, KernelStats) {
+        self.mesh.pages_mut().settle(bytes, backing);
+        (self.mesh, self.kernel)
+    }
+}
+
+fn frames_bytes(mesh: &Mesh) -> u64 {
+    mesh.pages().frames_used() as u64 * tetdb_schema::page::FRAME_BYTES as u64
+}
+
+/// What a head start may take, where memory holds it beside all else.
+struct HeadStartShare {
+    frames: u64,
+    /// With frames.
+    all: u64,
+    /// Frames there may be once sizes are known, at most: memory that is not touched is not there.
+    frames_later: u64,
+    /// Whether there is also room to find the pattern's tetrahedra.
+    finds_pattern: bool,
+}
+
+impl HeadStartShare {
+    fn of(surface: &Surface, options: &Options, cap: u64) -> Option<Self> {
+        let [points, triangles] = [surface.n_vertices(), surface.n_triangles()].map(|n| n as u64);
+        // Sizes from a file may take half of the memory for themselves.
+        if n_threads() < 2 || triangles == 0 || options.size_field.is_some() {
+            return None;
+        }
+        let frames = FRAMES_VERTEX * points + FRAMES_TRIANGLE * triangles + FRAMES_LEAST;
+        let all = frames + BESIDE_VERTEX * points;
+        let held = surface.bytes() as u64;
+        let look = LOOK_TRIANGLE * triangles + LOOK_LEAST;
+        // Once sizes are known the frames are part of the plan's.
+        let plan = Plan::new(cap, held + LOOK_LEAST).ok()?;
+        let left = cap.checked_sub(held + all + look)?;
+        (frames <= plan.frames).then_some(Self {
+            frames,
+            all,
+            frames_later: Plan::new(cap, held).ok()?.frames,
+            finds_pattern: points >= PATTERN_FROM && left >= PATTERN_BYTES,
+        })
+    }
+}
+
+/// Does `look`, which finds out whether and how `surface` is to be meshed; meanwhile its vertices are inserted, where there is a second thread
+/// and memory for both under `cap`.
+///
+/// `look` receives how many bytes of the cap it has to leave. What it returns does not depend on that. Effects: none on disk.
+/// Errors: those of `look`; what was inserted is then dropped.
+pub fn ahead<T, E>(
+    surface: &Surface,
+    options: &Options,
+    cap: u64,
+    watch: &Watcher,
+    look: impl FnOnce(u64) -> Result<T, E>,
+) -> Result<(T, Option<HeadStart>), E> {
+    let Some(share) = HeadStartShare::of(surface, options, cap) else {
+        return Ok((look(0)?, None));
+    };
+    let is_vain = AtomicBool::new(false);
+    let made = Mutex::new(None);
+    let (tell, hear) = channel();
+    let looked = in_place_scope(|scope| {
+        let (made, is_vain, share) = (&made, &is_vain, &share);
+        scope.spawn(move |_| {
+            let start = begin(surface, share, is_vain, tell);
+            if start.is_some() && share.finds_pattern {
+                // Nobody waits for it but who needs it. What fails fails again there.
+                rayon::spawn(|| drop(attempt(find_pattern)));
+            }
+            *made.lock().expect("nobody else has it yet") = start;
+        });
+        let vain = Vain(is_vain);
+        let looked = look(share.all)?;
+        std::mem::forget(vain);
+        // A thread of the pool does not wait here: the work may be its own to do.
+        if rayon::current_thread_index().is_none() {
+            hear.iter().for_each(watch);
+        }
+        Ok(looked)
+    })?;
+    let made = made.into_inner().expect("the other thread is done");
+    Ok((looked, made))
+}
+
+/// Makes the work of the other thread vain when it is dropped, be it in a panic.
+struct Vain<'a>(&'a AtomicBool);
+
+impl Drop for Vain<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
+/// Inserts everything, or gives up: there is too little memory, or a point whose error must be reported in its turn, or the run is cancelled.
+fn begin(
+    surface: &Surface,
+    share: &HeadStartShare,
+    is_vain: &AtomicBool,
+    tell: Sender<Event>,
+) -> Option<HeadStart> {
+    let clock = Instant::now();
+    let watch = |event: Event| {
+        if is_vain.load(Ordering::Relaxed) {
+            raise(StorageError::Cancelled);
+        }
+        // Nobody listens once the surface is refused.
+        let _ = tell.send(event);
+    };
+    let inserted = attempt(|| {
+        let mut pages = Pager::new(share.frames_later, None);
+        pages.limit(share.frames);
+        let mut mesh = Mesh::new(pages);
+        let kernel = triangulate(&mut mesh, surface, &ScratchSpace::boundless(), &watch).ok()?;
+        Some((mesh, kernel))
+    });
+    // What failed here fails again, or finds memory, where it is reported.
+    let (mesh, kernel) = inserted.ok()??;
+    Some(HeadStart { mesh, kernel, seconds: clock.elapsed().as_secs_f64() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pipeline::mesh::coarse::inserted;
+    use crate::pipeline::progress::silent;
+    use tetdb_base::storage::{FlatPages, Pages, kind};
+    use tetdb_kernel::samples::SampleSpec;
+    use tetdb_schema::page::SLOT_BITS;
+
+    const CAP: u64 = 1 << 30;
+
+    fn surface() -> Surface {
+        let spec = SampleSpec::parse("balls,count=5,h=0.08").expect("a good sample");
+        spec.make().expect("room for five balls").into()
+    }
+
+    fn with_threads<T: Send>(n: usize, work: impl FnOnce() -> T + Send) -> T {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build();
+        pool.expect("threads").install(work)
+    }
+
+    /// All records of tetrahedra, vertices and facets.
+    fn records<P: Pages>(mesh: &mut Mesh<P>) -> Vec<[u32; 8]> {
+        let mut all = Vec::new();
+        let mut from = 0;
+        while let Some((t, tet)) = mesh.next_tet(from) {
+            from = t + 1;
+            all.push(tet.to_slot().map(u32::from));
+        }
+        for v in mesh.vertex_ids() {
+            all.push(mesh.pages_mut().read::<{ kind::VERTICES }>(v).map(u32::from));
+        }
+        for n in 0..mesh.n_facets() {
+            let facet = mesh.facet(n);
+            let [a, b, c] = facet.vertices;
+            all.push([a, b, c, facet.label, facet.input as u32, 0, 0, 0]);
+        }
+        all
+    }
+
+    #[test]
+    fn what_is_made_ahead_is_what_is_made_in_turn_wherever_its_pages_go() {
+        let (surface, options) = (surface(), Options::default());
+        let mut flat = Mesh::new(FlatPages::default());
+        let kernel = inserted(&mut flat, &surface, &ScratchSpace::boundless(), &silent);
+        let expected = records(&mut flat);
+        let begun =
+            with_threads(2, || ahead(&surface, &options, CAP, &silent, Ok::<_, StorageError>));
+        let (taken, begun) = begun.expect("nothing to object to");
+        let begun = begun.expect("two threads and room for all");
+        assert!(taken > begun.bytes());
+        let dir = tempfile::tempdir().expect("a folder");
+        let backing = Backing {
+            subdomain: 0,
+            generation: 1,
+            spill: dir.path().into(),
+            made: None,
+            base: None,
+            cache_bytes: 1 << 20,
+        };
+        let bytes = begun.bytes();
+        let (mut mesh, found) = begun.into_mesh(bytes, backing);
+        assert_eq!(found, kernel);
+        // As many pages again, so that those inserted early leave memory.
+        let n = mesh.pages().n_pages::<{ kind::SCRATCH }>() + 4 * mesh.pages().frames_used() as u32;
+        for page in 0..n {
+            mesh.set_scratch((page << SLOT_BITS) * 8, page);
+        }
+        mesh.clear_scratch();
+        assert!(mesh.pages().stats().pages_written > 0);
+        assert!(records(&mut mesh) == expected);
+    }
+
+    #[test]
+    fn a_refused_surface_and_too_little_room_leave_nothing() {
+        let (surface, options) = (surface(), Options::default());
+        let refused =
+            with_threads(2, || ahead(&surface, &options, CAP, &silent, |_| Err::<(), _>("bad")));
+        assert_eq!(refused.err(), Some("bad"));
+        for (threads, cap) in [(1, CAP), (2, 16 << 20)] {
+            let looked = with_threads(threads, || {
+                ahead(&surface, &options, cap, &silent, Ok::<_, StorageError>)
+            });
+            assert!(matches!(looked, Ok((0, None))));
+        }
+        let share = HeadStartShare { frames: 0, all: 0, frames_later: CAP, finds_pattern: false };
+        let (tell, _hear) = channel();
+        assert!(begin(&surface, &share, &AtomicBool::new(false), tell.clone()).is_some());
+        assert!(begin(&surface, &share, &AtomicBool::new(true), tell).is_none());
+        let large = SampleSpec::parse("box,h=0.04").expect("a good sample");
+        let large: Surface = large.make().expect("a box").into();
+        let (tell, _hear) = channel();
+        assert!(begin(&large, &share, &AtomicBool::new(false), tell).is_none());
+    }
+}

@@ -1,0 +1,13 @@
+//! One run: the coarse mesh, the bisections, each sub-domain to its final density.
+
+pub(super) mod coarse;
+pub(super) mod commit;
+pub(super) mod divide;
+mod head_start;
+pub(super) mod owners;
+mod run;
+
+pub use coarse::CoarseReport;
+pub use coarse::coarse as coarse_mesh;
+pub use head_start::{HeadStart, ahead};
+pub use run::{Summary, mesh, mesh_prepared};

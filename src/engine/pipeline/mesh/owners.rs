@@ -1,0 +1,111 @@
+//! Who owns the faces of a cut and who neighbors whom, as the catalog keeps it.
+
+use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::pipeline::tree::blob;
+use crate::pipeline::work::InheritedFace;
+use tetdb_kernel::topology::{Neighbors, Owners};
+use tetdb_schema::catalog::{NeighborRow, TopologyRow};
+use tetdb_store::sealed::SealedError;
+use tetdb_store::store::{Catalog, Step, StoreError};
+
+/// A cut as far as neighbors are concerned.
+pub struct NewCut<'a> {
+    pub cut: u32,
+    /// Faces of its interface.
+    pub faces: u32,
+    /// Names of the children; the low one has that of the parent.
+    pub low: u32,
+    pub high: u32,
+    /// Faces that the high child took over.
+    pub inherited: &'a [InheritedFace],
+}
+
+/// What cuts change in the catalog's tables of owners and neighbors.
+pub struct TopologyChange {
+    /// By cut.
+    owners: BTreeMap<u32, Owners>,
+    neighbors: Neighbors,
+    /// Parts whose rows change.
+    names: BTreeSet<u32>,
+}
+
+impl TopologyChange {
+    /// Nothing changes yet. Errors: a damaged catalog.
+    pub fn none(catalog: &mut Catalog) -> Result<Self, StoreError> {
+        Ok(Self {
+            owners: BTreeMap::new(),
+            neighbors: neighbors_of(&catalog.topology()?),
+            names: BTreeSet::new(),
+        })
+    }
+
+    /// One more cut. Errors: a damaged catalog.
+    pub fn add(&mut self, catalog: &mut Catalog, new: &NewCut) -> Result<(), StoreError> {
+        let &NewCut { cut, faces, low, high, .. } = new;
+        let (owners, neighbors) = (&mut self.owners, &mut self.neighbors);
+        owners.insert(cut, Owners::new(faces, low, high));
+        neighbors.set(low, high, u64::from(faces));
+        for face in new.inherited {
+            let table = match owners.entry(face.cut) {
+                Entry::Occupied(entry) => entry.into_mut(),
+                Entry::Vacant(entry) => entry.insert(read_owners(catalog, face.cut)?),
+            };
+            let other = table.other(face.index, face.side).ok_or_else(|| {
+                StoreError::Sealed(SealedError::Content {
+                    path: catalog.dir().to_owned(),
+                    subdomain: low,
+                    what: format!("face {} of cut {} has no owner", face.index, face.cut),
+                })
+            })?;
+            table.faces[face.index as usize][face.side as usize] = high;
+            neighbors.remove(low, other);
+            neighbors.add(high, other);
+        }
+        // Who was a neighbor of the parent is one of a child: no other row changes.
+        let beside = [low, high].into_iter().flat_map(|name| neighbors.of(name));
+        self.names.extend(beside.map(|n| n.0).chain([low, high]));
+        Ok(())
+    }
+
+    /// Puts it into `step`.
+    pub fn commit(&self, step: &mut Step) {
+        for (cut, table) in &self.owners {
+            step.set_blob(blob::OWNERS + cut, &table.to_bytes());
+        }
+        for &name in &self.names {
+            step.set_topology(&topology_row(&self.neighbors, name));
+        }
+    }
+}
+
+/// The owners of a cut's faces.
+pub fn read_owners(catalog: &mut Catalog, cut: u32) -> Result<Owners, StoreError> {
+    let bytes = catalog.blob(blob::OWNERS + cut)?.unwrap_or_default();
+    Owners::from_bytes(&bytes).ok_or_else(|| {
+        StoreError::Sealed(SealedError::Content {
+            path: catalog.dir().to_owned(),
+            subdomain: cut,
+            what: format!("the table of owners of cut {cut} is damaged"),
+        })
+    })
+}
+
+fn neighbors_of(rows: &[TopologyRow]) -> Neighbors {
+    let mut neighbors = Neighbors::default();
+    for row in rows {
+        for neighbor in &row.neighbors {
+            neighbors.set(row.subdomain, neighbor.subdomain, neighbor.faces);
+        }
+    }
+    neighbors
+}
+
+fn topology_row(neighbors: &Neighbors, name: u32) -> TopologyRow {
+    let of = neighbors.of(name).into_iter();
+    TopologyRow {
+        subdomain: name,
+        neighbors: of.map(|(subdomain, faces)| NeighborRow { subdomain, faces }).collect(),
+    }
+}

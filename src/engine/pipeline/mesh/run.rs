@@ -1,0 +1,420 @@
+//! All steps of one run.
+
+use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::coarse::{CoarseReport, inserted, recovered};
+use super::commit::{close, commit_subdomain, subdomain_order};
+use super::head_start::{HeadStart, ahead};
+use crate::pipeline::error::PipelineError;
+use crate::pipeline::plan::estimate::n_subdomains;
+use crate::pipeline::plan::leases::Leases;
+use crate::pipeline::plan::{Estimate, Options, Plan, Prepared, prepare};
+use crate::pipeline::progress::Watcher;
+use crate::pipeline::seal::totals::journal;
+use crate::pipeline::tasks::{ask, begin, wrong_receipt};
+use crate::pipeline::tree::{self, DONE, PartMesh, TreePart, blob};
+use crate::pipeline::work::common::Common;
+use crate::pipeline::work::{
+    FineReport, Helpers, Order, Receipt, SubdomainOrder, SubdomainReceipt, Traffic, Worker,
+    Workplace,
+};
+use crate::pipeline::workers::{Hand, map_bounded};
+use tetdb_base::geom::{Aabb, HilbertFrame};
+use tetdb_base::storage::{Backing, Budget, Pager, PagerStats, ScratchSpace, attempt};
+use tetdb_base::surface::Surface;
+use tetdb_kernel::bisect::{CutReport, load_of};
+use tetdb_kernel::boundary::RegionSummary;
+use tetdb_kernel::mesh::{Mesh, Workspace, renumber};
+use tetdb_kernel::sizing::{SizeField, SizeSummary, TETS_PER_LOAD};
+use tetdb_schema::catalog::{RegionRow, StoreState, WiresRow};
+use tetdb_store::store::{Catalog, INPUT_TRIANGLES};
+
+/// Generation of the coarse mesh.
+const COARSE: u32 = 1;
+
+/// What a run did; a part is absent when an earlier run had done its step.
+#[derive(Clone, Debug)]
+pub struct Summary {
+    /// The coarse mesh of the whole domain.
+    pub coarse: Option<CoarseReport>,
+    /// The size field.
+    pub sizes: Option<SizeSummary>,
+    /// The bisections of this run, in order.
+    pub cuts: Vec<CutReport>,
+    /// What refinement and optimization did to the sub-domains of this run, by rank.
+    pub fine: BTreeMap<u32, FineReport>,
+    /// Sub-domains of the mesh.
+    pub subdomains: u32,
+    /// What was asked for, when that was more than the mesh allows.
+    pub subdomains_asked: Option<u32>,
+    /// Pages read and written.
+    pub pages: PagerStats,
+    /// Most pages held in memory at once.
+    pub frames_used: usize,
+}
+
+/// Meshes `surface`, which must be valid, into the store of `catalog`, going on from where the store stands.
+///
+/// The result depends on surface and options alone: not on the budget, threads, or how often it was interrupted.
+/// Effects: commits one step after the other. Errors: the store stands at its last step.
+pub fn mesh(
+    catalog: &mut Catalog,
+    surface: &Surface,
+    options: &Options,
+    budget: &Budget,
+    watch: &Watcher,
+) -> Result<Summary, PipelineError> {
+    let scratch = catalog.scratch_dir()?;
+    let left = budget.cap().saturating_sub(surface.bytes() as u64);
+    match catalog.blob(blob::SIZE_FIELD)? {
+        None => {
+            let (prepared, begun) = ahead(surface, options, budget.cap(), watch, |taken| {
+                let room = ScratchSpace::new(left.saturating_sub(taken), scratch);
+                prepare(surface, options, None, &room)
+            })?;
+            let surface = Cow::Borrowed(surface);
+            mesh_prepared(catalog, surface, options, (prepared, begun), budget, watch)
+        }
+        Some(bytes) => {
+            let room = ScratchSpace::new(left, scratch);
+            let field = attempt(|| SizeField::from_bytes_in(&bytes, &room))??;
+            drop(bytes);
+            let field = field.with_sources(&options.sizes()?, surface.bounds().diagonal())?;
+            let surface = Cow::Borrowed(surface);
+            go_on(catalog, surface, options, &field, None, budget, watch)
+        }
+    }
+}
+
+/// [`mesh`] into a new store, with what [`prepare`] made of this surface and these options, and what [`ahead`] has made meanwhile.
+///
+/// A surface that is given away is dropped once the coarse mesh exists, which leaves its memory to what follows.
+/// Errors: as [`mesh`].
+pub fn mesh_prepared(
+    catalog: &mut Catalog,
+    surface: Cow<Surface>,
+    options: &Options,
+    (prepared, begun): (Prepared, Option<HeadStart>),
+    budget: &Budget,
+    watch: &Watcher,
+) -> Result<Summary, PipelineError> {
+    let new = New { sizes: prepared.sizes, estimate: prepared.estimate, begun };
+    let field = &prepared.field;
+    go_on(catalog, surface, options, field, Some(new), budget, watch)
+}
+
+/// What is known of a mesh that is not begun.
+struct New {
+    sizes: SizeSummary,
+    estimate: Estimate,
+    begun: Option<HeadStart>,
+}
+
+fn go_on(
+    catalog: &mut Catalog,
+    surface: Cow<Surface>,
+    options: &Options,
+    field: &SizeField,
+    new: Option<New>,
+    budget: &Budget,
+    watch: &Watcher,
+) -> Result<Summary, PipelineError> {
+    let held = Leases::of(&surface, field, options, budget)?;
+    let run = Run {
+        catalog,
+        bounds: surface.bounds(),
+        options,
+        field,
+        plan: held.plan,
+        n: 1,
+        pages: PagerStats::default(),
+        frames_used: 0,
+        watch,
+        slots: None,
+    };
+    // Unwinding from a failed page access ends here; a step's commit is its last act, so nothing is half done.
+    attempt(|| run.steps(surface, new, held, budget))?
+}
+
+pub struct Run<'a> {
+    pub catalog: &'a mut Catalog,
+    pub options: &'a Options,
+    pub field: &'a SizeField,
+    pub plan: Plan,
+    pub bounds: Aabb,
+    /// Number of sub-domains there will be.
+    pub n: u32,
+    pub pages: PagerStats,
+    pub frames_used: usize,
+    pub watch: &'a Watcher<'a>,
+    /// Orders that other processes do at once, when they have begun.
+    pub slots: Option<usize>,
+}
+
+/// One order at a time by other processes: they, and which of theirs it is.
+type Slot = (Arc<dyn Helpers>, usize);
+
+/// A finished sub-domain, and how it went where this process meshed it.
+type SubdomainDone = (Box<SubdomainReceipt>, Option<FineReport>);
+
+impl<'a> Run<'a> {
+    fn steps(
+        mut self,
+        surface: Cow<Surface>,
+        new: Option<New>,
+        mut held: Leases,
+        budget: &Budget,
+    ) -> Result<Summary, PipelineError> {
+        let (mut open, mut coarse, mut sizes) = (None, None, None);
+        let is_given = matches!(surface, Cow::Owned(_));
+        let is_begun = self.catalog.state()? >= StoreState::Coarse;
+        if let Some(new) = new.filter(|_| !is_begun) {
+            let begun = new.begun.filter(|begun| begun.bytes() <= self.plan.frames);
+            let (mesh, report) = self.coarse_step(surface, &new.estimate, begun)?;
+            (open, coarse, sizes) = (Some(mesh), Some(report), Some(new.sizes));
+        } else {
+            drop(surface);
+        }
+        self.n = tree::n_subdomains(self.catalog)?;
+        if is_given {
+            held = held.without_surface(self.options, budget)?;
+            self.plan = held.plan;
+        }
+        if self.options.coarse_only {
+            return self.summary(coarse, sizes, Vec::new());
+        }
+        // Pages of the coarse mesh that are still resident would take the frames of the others.
+        open = open.filter(|_| self.n == 1);
+        let cuts = self.divide_all()?;
+        let mut summary = self.summary(coarse, sizes, cuts)?;
+        let sealed: BTreeSet<u32> = self.catalog.subdomains()?.iter().map(|r| r.rank).collect();
+        let mut left = tree::parts(self.catalog, self.n)?;
+        left.retain(|p| !sealed.contains(&p.part.first));
+        self.leaves(left, open, &mut summary)?;
+        close(self.catalog, self.n)?;
+        (summary.pages, summary.frames_used) = (self.pages, self.frames_used);
+        Ok(summary)
+    }
+
+    fn summary(
+        &self,
+        coarse: Option<CoarseReport>,
+        sizes: Option<SizeSummary>,
+        cuts: Vec<CutReport>,
+    ) -> Result<Summary, PipelineError> {
+        let asked = self.options.subdomain_count()?;
+        Ok(Summary {
+            coarse,
+            sizes,
+            cuts,
+            fine: BTreeMap::new(),
+            subdomains: self.n,
+            subdomains_asked: asked.filter(|&asked| asked > self.n),
+            pages: self.pages,
+            frames_used: self.frames_used,
+        })
+    }
+
+    /// What is the same for all workers.
+    pub fn common(&self) -> Result<Common<'a>, PipelineError> {
+        Common::of(self.options, self.field, self.bounds)
+    }
+
+    fn coarse_step(
+        &mut self,
+        surface: Cow<Surface>,
+        estimate: &Estimate,
+        begun: Option<HeadStart>,
+    ) -> Result<(Mesh, CoarseReport), PipelineError> {
+        let clock = Instant::now();
+        let scratch = self.catalog.scratch_dir()?;
+        let backing = Backing {
+            subdomain: 0,
+            generation: COARSE,
+            spill: scratch.clone(),
+            made: None,
+            base: None,
+            cache_bytes: self.plan.redb as usize,
+        };
+        let head_start = begun.as_ref().map_or(0.0, |begun| begun.seconds);
+        let room = ScratchSpace::new(self.plan.buffers / 2, &scratch);
+        let (mut mesh, kernel) = match begun {
+            Some(begun) => begun.into_mesh(self.plan.frames, backing),
+            None => {
+                let mut mesh = Mesh::new(Pager::new(self.plan.frames, Some(backing)));
+                let kernel = inserted(&mut mesh, &surface, &room, self.watch);
+                (mesh, kernel)
+            }
+        };
+        let label_names = surface.label_names.clone();
+        let wires = surface.has_wires().then(|| wires_row(&surface));
+        let n_triangles = surface.n_own_triangles();
+        // All that is needed from here on is in the mesh.
+        drop(surface);
+        let report = recovered(&mut mesh, kernel, self.options, self.watch)?;
+        let space = Workspace { dir: &scratch, memory: self.plan.buffers / 2 };
+        renumber(&mut mesh, &HilbertFrame::new(&self.bounds), &space)?;
+        let load = self.load(&mut mesh);
+        // Where vertices nearly touch, sizes at a point are next to nothing and the estimate knows no bound; the mesh's own load does.
+        let predicted = estimate.tets().min(TETS_PER_LOAD * load);
+        let (n, _) = n_subdomains(predicted, self.options)?;
+        let path = self.catalog.file_path(0, COARSE);
+        mesh.pages_mut().end_generation(path, COARSE + DONE);
+        let part = PartMesh {
+            part: TreePart { first: 0, count: n },
+            generation: COARSE,
+            state: mesh.state(),
+            extents: mesh.pages().extents(),
+            load,
+        };
+        let (pages, frames_used) = (mesh.pages().stats(), mesh.pages().frames_used());
+        let (field, bounds) = (self.field.to_bytes(), self.bounds);
+        self.catalog.commit(|step| {
+            step.list_file(0, COARSE);
+            step.set_labels(&label_names);
+            step.set_regions(&report.regions.list.iter().map(region_row).collect());
+            let names = report.regions.names();
+            if !names.is_empty() {
+                step.set_region_names(&names);
+            }
+            if let Some(wires) = &wires {
+                step.set_wires(wires);
+            }
+            step.set_blob(blob::SIZE_FIELD, &field);
+            step.set_blob(blob::BOUNDS, &tree::bounds_bytes(&bounds));
+            step.set_blob(blob::SUBDOMAINS, &n.to_le_bytes());
+            step.set_blob(blob::PART, &part.to_bytes());
+            step.set_state(StoreState::Coarse);
+            step.append_journal(&journal(
+                StoreState::Coarse,
+                "coarse mesh",
+                clock,
+                &[
+                    ("missing_segments", f64::from(report.recovery.missing_segments)),
+                    ("missing_facets", f64::from(report.recovery.missing_facets)),
+                    (INPUT_TRIANGLES, n_triangles as f64),
+                    ("predicted_tets", predicted),
+                    ("head_start_s", head_start),
+                    ("pages_read", pages.pages_read as f64),
+                    ("pages_written", pages.pages_written as f64),
+                    ("frames_used", frames_used as f64),
+                ],
+            ));
+            Ok(())
+        })?;
+        Ok((mesh, report))
+    }
+
+    /// The load of the coarse mesh. Effects: sets the sizes of its vertices.
+    fn load(&self, mesh: &mut Mesh) -> f64 {
+        for v in mesh.vertex_ids() {
+            let p = mesh.point(v);
+            mesh.set_size(v, self.field.h(p) as f32);
+        }
+        load_of(mesh, &|p| self.field.h(p))
+    }
+
+    /// Makes the sub-domains that are left, as many at once as there are threads and memory for.
+    fn leaves(
+        &mut self,
+        left: Vec<PartMesh>,
+        open: Option<Mesh>,
+        summary: &mut Summary,
+    ) -> Result<(), PipelineError> {
+        let worker = Worker { place: Workplace::in_store(self.catalog)?, common: self.common()? };
+        if let (Some(mesh), [part]) = (open, &left[..]) {
+            let job =
+                worker.subdomain_job(subdomain_order(self.catalog, self.n, *part)?, self.plan)?;
+            let leaf = job.finish(mesh, worker.common, self.watch)?;
+            return self.seal_step(&leaf.receipt(), Some(leaf.fine), summary);
+        }
+        let (workers, watch) = (self.plan.workers().min(left.len()), self.watch);
+        let share = self.plan.shared_by(workers.max(1) as u64);
+        let here = |order: SubdomainOrder, watch: &Watcher| {
+            let job = worker.subdomain_job(order, share)?;
+            let leaf = job.run(worker.common, watch)?;
+            Ok((Box::new(leaf.receipt()), Some(leaf.fine)))
+        };
+        let there = match left.is_empty() {
+            true => Vec::new(),
+            false => self.helpers()?,
+        };
+        let store = &worker.place.store;
+        let elsewhere: Vec<_> = (there.iter())
+            .map(|(helpers, slot)| {
+                move |order: SubdomainOrder, _: &Watcher| match ask(
+                    &**helpers,
+                    *slot,
+                    &Order::Subdomain(order),
+                    store,
+                )? {
+                    Receipt::Subdomain(receipt) => Ok((Box::new(receipt), None)),
+                    Receipt::Cut(_) => Err(wrong_receipt()),
+                }
+            })
+            .collect();
+        let mut hands: Vec<Hand<SubdomainOrder, SubdomainDone>> = vec![&here; workers];
+        hands.extend(elsewhere.iter().map(|hand| hand as Hand<_, _>));
+        map_bounded(
+            &mut (self, summary),
+            left,
+            &hands,
+            watch,
+            |(run, _), part| Ok(subdomain_order(run.catalog, run.n, part)?),
+            |(run, summary), (leaf, fine)| run.seal_step(&leaf, fine, summary),
+        )
+    }
+
+    fn seal_step(
+        &mut self,
+        leaf: &SubdomainReceipt,
+        fine: Option<FineReport>,
+        summary: &mut Summary,
+    ) -> Result<(), PipelineError> {
+        commit_subdomain(self.catalog, leaf)?;
+        self.count(leaf.traffic);
+        let of_rank = fine.map(|fine| (leaf.row.rank, fine));
+        summary.fine.extend(of_rank);
+        Ok(())
+    }
+
+    /// Other processes that share the work, one entry for each order they do at once. Effects: they begin.
+    pub fn helpers(&mut self) -> Result<Vec<Slot>, PipelineError> {
+        let Some(helpers) = self.options.hands.0.clone() else {
+            return Ok(Vec::new());
+        };
+        let slots = match self.slots {
+            Some(slots) => slots,
+            None => begin(&*helpers, self.catalog, self.options, &self.bounds)?,
+        };
+        self.slots = Some(slots);
+        Ok((0..slots).map(|slot| (helpers.clone(), slot)).collect())
+    }
+
+    /// Adds to what the run has read and written.
+    pub fn count(&mut self, traffic: Traffic) {
+        self.pages.add(traffic.pages());
+        self.frames_used = self.frames_used.max(traffic.frames_used as usize);
+    }
+}
+
+fn wires_row(surface: &Surface) -> WiresRow {
+    WiresRow {
+        edges: surface.wires.edges.clone(),
+        points: surface.wires.points.clone(),
+        fin_first: surface.n_own_triangles() as u64,
+    }
+}
+
+fn region_row(region: &RegionSummary) -> RegionRow {
+    RegionRow {
+        region: region.region,
+        volume: region.volume,
+        tets: 0,
+        filled: region.region != 0,
+        labels: region.labels.clone(),
+    }
+}

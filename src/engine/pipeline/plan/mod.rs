@@ -1,0 +1,15 @@
+//! What is decided before anything is written: options, sizes and what they predict, the shares of the memory cap.
+
+pub(super) mod estimate;
+mod forecast;
+pub(super) mod leases;
+mod memory;
+mod option_text;
+mod options;
+mod recipe;
+mod regions;
+
+pub use estimate::{Estimate, Prepared, least_for, prepare};
+pub use memory::{MEMORY_MIN, Plan};
+pub use options::{Options, Trial};
+pub use recipe::{RECIPE, recipe_of, record_recipe};

@@ -1,0 +1,408 @@
+//! One run that makes sub-domains again: jobs for workers, then one commit.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::previous::{Previous, VERSIONED};
+use super::request::Resaturation;
+use super::sizes::{Recorded, Values};
+use super::summary::{Remade, ResaturateSummary};
+use crate::pipeline::error::PipelineError;
+use crate::pipeline::mesh::owners::read_owners;
+use crate::pipeline::plan::{Options, Plan};
+use crate::pipeline::progress::Watcher;
+use crate::pipeline::seal::totals::{SealedTotals, journal, sum_totals};
+use crate::pipeline::tree::{self, PartMesh, blob};
+use crate::pipeline::work::coarse_snapshot::reopen;
+use crate::pipeline::work::common::Common;
+use crate::pipeline::work::soundness::{check_owners, panic_is_damage_of};
+use crate::pipeline::work::subdomain::{FinishedSubdomain, SubdomainJob};
+use crate::pipeline::workers::{Hand, map_bounded};
+use tetdb_base::geom::{Aabb, Point};
+use tetdb_base::storage::{Backing, Budget, DiskPath, PagerStats, ScratchSpace, attempt};
+use tetdb_kernel::mesh::Workspace;
+use tetdb_kernel::sizing::{BackgroundMesh, SizeField};
+use tetdb_schema::catalog::{CoarseRow, StoreState, SubdomainRow};
+use tetdb_store::sealed::SealedError;
+use tetdb_store::sealed::{CoarseSnapshot, Form};
+use tetdb_store::store::{Catalog, StoreError};
+
+/// One run.
+pub struct RemeshRun<'a> {
+    pub catalog: &'a mut Catalog,
+    options: &'a Options,
+    what: &'a Resaturation,
+    /// Of the whole.
+    pub field: Arc<SizeField>,
+    /// Rows of what is made again, by rank.
+    rows: Vec<(SubdomainRow, CoarseRow)>,
+    /// The latest generation of each sub-domain's files.
+    last: BTreeMap<u32, u32>,
+    /// Steps on record: with their number no generation is given twice, also not that of a file that was undone, which a reader may
+    /// still look for.
+    steps: u32,
+    n: u32,
+    clock: Instant,
+}
+
+/// A sub-domain to be made again.
+struct Job {
+    subdomain: SubdomainJob,
+    kept: CoarseRow,
+    path: DiskPath,
+}
+
+impl Job {
+    fn run(self, common: Common, watch: &Watcher) -> Result<FinishedSubdomain, PipelineError> {
+        let Self { subdomain, kept, path } = self;
+        let (share, generation) = (subdomain.share, subdomain.generation);
+        let (rank, scratch) = (kept.rank, subdomain.scratch.clone());
+        let open = || {
+            let backing = Backing {
+                subdomain: rank,
+                generation,
+                spill: scratch.clone(),
+                made: None,
+                base: None,
+                cache_bytes: share.redb as usize,
+            };
+            let space = Workspace { dir: &scratch, memory: share.buffers / 2 };
+            let mut kept = CoarseSnapshot::open(&path, kept, (share.redb / 2) as usize)?;
+            reopen(&mut kept, backing, share.frames, &space)
+        };
+        attempt(|| {
+            panic_is_damage_of((&path, rank), open, || {
+                let mut mesh = open()?;
+                check_owners(&mut mesh, &subdomain.owners, (&path, rank))?;
+                subdomain.finish(mesh, common, watch)
+            })
+        })?
+    }
+}
+
+impl<'a> RemeshRun<'a> {
+    pub fn open(
+        catalog: &'a mut Catalog,
+        options: &'a Options,
+        what: &'a Resaturation,
+        budget: &Budget,
+    ) -> Result<Self, PipelineError> {
+        let clock = Instant::now();
+        let mut rows = Vec::new();
+        for &rank in &what.ranks {
+            let row = catalog.subdomain(rank)?;
+            let kept = catalog.coarse_snapshot(rank)?;
+            let kept = kept.ok_or_else(|| StoreError::NoCoarseSnapshot {
+                path: catalog.dir().to_owned(),
+                subdomain: rank,
+            })?;
+            rows.push((row, kept));
+        }
+        let mut last = BTreeMap::new();
+        for file in catalog.files()? {
+            let newest = last.entry(file.subdomain).or_insert(file.generation);
+            *newest = file.generation.max(*newest);
+        }
+        Ok(Self {
+            field: Arc::new(recorded_field(catalog, options, &room(catalog, budget)?)?),
+            last,
+            steps: catalog.journal()?.len() as u32,
+            n: tree::n_subdomains(catalog)?,
+            catalog,
+            options,
+            what,
+            rows,
+            clock,
+        })
+    }
+
+    /// The field of each sub-domain that is made again; `None` for that of the whole.
+    pub fn fields(
+        &mut self,
+        budget: &Budget,
+    ) -> Result<BTreeMap<u32, Option<SizeField>>, PipelineError> {
+        let memory = budget.available() / 4;
+        let mut fields = BTreeMap::new();
+        let values = self.what.sizes.as_ref().and_then(|s| s.values.as_ref());
+        if let Some(values) = values {
+            self.count(values)?;
+        }
+        let _lease = match &self.what.sizes {
+            Some(_) => Some(budget.lease(self.field_bytes(values), "building size fields")?),
+            None => None,
+        };
+        let room = room(self.catalog, budget)?;
+        let recorded = Recorded { whole: &self.field, room: &room };
+        let mut from = 0;
+        for (row, _) in &self.rows {
+            let field = match &self.what.sizes {
+                Some(sizes) => {
+                    let first = from;
+                    from += row.tets as usize;
+                    recorded.build_new(self.catalog, row.rank, sizes, first, memory)?
+                }
+                None => recorded.own(self.catalog, row.rank)?,
+            };
+            fields.insert(row.rank, field);
+        }
+        Ok(fields)
+    }
+
+    /// What it takes to build one field after the other, beside the arrays that go to scratch files where they are too large.
+    fn field_bytes(&self, values: Option<&Values>) -> u64 {
+        /// Bytes of a point of the skin, with its size and its place in lists; of a face; of a leaf of the octree while it is built.
+        const POINT: u64 = 24 + 40;
+        const FACE: u64 = 12;
+        const LEAF: u64 = 16;
+        let one = |(row, kept): &(SubdomainRow, CoarseRow)| {
+            let [low, high] = row.bounds.map(Point::from_array);
+            let leaves = self.field.n_leaves_in(&Aabb { low, high }) as u64;
+            let faces = kept.facets + kept.interface_faces;
+            let skin = POINT * kept.vertices + FACE * faces + LEAF * leaves;
+            match values {
+                Some(_) => skin + BackgroundMesh::bytes(row.vertices, row.tets),
+                None => skin,
+            }
+        };
+        let most = self.rows.iter().map(one).max().unwrap_or(0);
+        self.field.bytes() as u64 + most + values.map_or(0, Values::bytes)
+    }
+
+    /// Refuses lengths that are not one for each.
+    fn count(&self, values: &Values) -> Result<(), PipelineError> {
+        let tets: u64 = self.rows.iter().map(|(row, _)| row.tets).sum();
+        let vertices = match &self.rows[..] {
+            [(row, _)] => row.vertices,
+            _ => 0,
+        };
+        let (found, expected) = match values {
+            Values::Tets(h) => (h.len() as u64, tets),
+            Values::Vertices(h) => (h.len() as u64, vertices),
+        };
+        match found == expected {
+            true => Ok(()),
+            false => Err(PipelineError::SizeCount { found, tets, vertices }),
+        }
+    }
+
+    pub fn run(
+        &mut self,
+        fields: BTreeMap<u32, Option<SizeField>>,
+        budget: &Budget,
+        watch: &Watcher,
+    ) -> Result<ResaturateSummary, PipelineError> {
+        let of = |field: &SizeField| field.bytes() as u64;
+        let own: u64 = fields.values().flatten().map(of).sum();
+        let asked = self.what.sizes.as_ref().and_then(|s| s.field.as_ref());
+        // Those of the sub-domains are held as bytes, too, until they are committed.
+        let made: BTreeMap<u32, Vec<u8>> = (fields.iter())
+            .filter_map(|(&rank, field)| Some((rank, field.as_ref()?.to_bytes())))
+            .filter(|_| self.what.sizes.is_some())
+            .collect();
+        let encoded: u64 = made.values().map(|bytes| bytes.len() as u64).sum();
+        let held = own + encoded + of(&self.field) + asked.map_or(0, of);
+        let _fields = budget.lease(held, "the size fields")?;
+        let plan = Plan::new(budget.cap(), held)?;
+        let leased = plan.frames + plan.redb + plan.redb / 2 + plan.buffers;
+        let _lease = budget.lease(leased, "the working mesh")?;
+        let bounds = tree::bounds(self.catalog)?;
+        let workers = plan.workers().min(self.rows.len()).max(1);
+        let share = plan.shared_by(workers as u64).without_file();
+        let parts = tree::parts(self.catalog, self.n)?;
+        let whole = Arc::clone(&self.field);
+        let common = Common::of(self.options, &whole, bounds)?;
+        let mut state = (self, BTreeMap::new());
+        let run = &|job: Job, watch: &Watcher| job.run(common, watch).map(Box::new);
+        map_bounded(
+            &mut state,
+            fields.into_iter().collect(),
+            &vec![run as Hand<Job, Box<FinishedSubdomain>>; workers],
+            watch,
+            |(again, _), (rank, field)| again.job(parts[rank as usize], field, share),
+            |(_, finished), subdomain| {
+                finished.insert(subdomain.sealed.row.rank, *subdomain);
+                Ok(())
+            },
+        )?;
+        let (again, finished) = state;
+        again.commit(finished, &made)
+    }
+
+    fn job(
+        &mut self,
+        part: PartMesh,
+        field: Option<SizeField>,
+        share: Plan,
+    ) -> Result<Job, PipelineError> {
+        let rank = part.part.first;
+        let mut owners = BTreeMap::new();
+        for cut in part.part.cuts_above(self.n) {
+            owners.insert(cut, read_owners(self.catalog, cut)?.across(rank));
+        }
+        // The faces of cuts stay; with sizes of its own a sub-domain may be refined up to them.
+        let zones = match field {
+            Some(_) => Vec::new(),
+            None => tree::zones_above(self.catalog, part.part, self.n)?,
+        };
+        let asked = self.rows.iter().find(|(row, _)| row.rank == rank);
+        let (row, kept) = asked.expect("asked for");
+        let (row, kept) = (row.clone(), *kept);
+        let last = self.last.get(&rank).copied().unwrap_or(0);
+        let generation = last + 2 + 2 * self.steps;
+        let scratch = self.catalog.scratch_dir()?.join(format!("leaf-{rank}"));
+        scratch.create_dir_all()?;
+        let subdomain = SubdomainJob {
+            part,
+            base: self.catalog.coarse_path(rank, kept.generation),
+            sealed: self.catalog.file_path(rank, generation),
+            generation,
+            // As it was.
+            form: Form::of(row.state).unwrap_or_default(),
+            field,
+            kept: None,
+            scratch,
+            zones: zones.into_iter().map(Into::into).collect(),
+            owners,
+            share,
+        };
+        Ok(Job { subdomain, kept, path: self.catalog.coarse_path(rank, kept.generation) })
+    }
+
+    fn commit(
+        &mut self,
+        finished: BTreeMap<u32, FinishedSubdomain>,
+        made: &BTreeMap<u32, Vec<u8>>,
+    ) -> Result<ResaturateSummary, PipelineError> {
+        let (mut totals, mut old_blobs) = (BTreeMap::new(), Vec::new());
+        let mut is_new = self.what.repair;
+        for (row, _) in &self.rows {
+            let (rank, sealed) = (row.rank, &finished[&row.rank].sealed);
+            // The faces of cuts stay whatever is wanted, and a repair is to give all that was there: else the coarse snapshot is another one.
+            let has_other_faces = sealed.row.interface_digest != row.interface_digest;
+            if has_other_faces || self.what.repair && sealed.row.digest != row.digest {
+                return Err(StoreError::Sealed(SealedError::Content {
+                    path: self.catalog.dir().to_owned(),
+                    subdomain: rank,
+                    what: "meshed again, it is not what the catalog says it was".to_owned(),
+                })
+                .into());
+            }
+            is_new |= sealed.row.digest != row.digest;
+            let own = made.get(&rank);
+            is_new |= own.is_some() && own != self.catalog.blob(blob::FIELD + rank)?.as_ref();
+            totals.insert(rank, SealedTotals::of(sealed));
+            for (now, then) in VERSIONED {
+                old_blobs.push((then + rank, self.catalog.blob(now + rank)?));
+            }
+        }
+        if !is_new {
+            return self.leave(finished);
+        }
+        let regions = sum_totals(self.catalog, self.n, &totals)?.regions;
+        let dropped = Previous::of(self.catalog)?;
+        let (what, rows, clock) = (self.what, &self.rows, self.clock);
+        let asked = what.sizes.as_ref().map(|sizes| sizes.asked.as_bytes());
+        let step_name = match what.repair {
+            true => "repair",
+            false => "resaturate",
+        };
+        self.catalog.commit(|step| {
+            if !what.repair {
+                dropped.drop(step);
+                for (number, bytes) in &old_blobs {
+                    if let Some(bytes) = bytes {
+                        step.set_blob(*number, bytes);
+                    }
+                }
+            }
+            for (row, _) in rows {
+                let (rank, subdomain) = (row.rank, &finished[&row.rank]);
+                step.list_file(rank, subdomain.sealed.row.generation);
+                step.set_subdomain(&subdomain.sealed.row);
+                step.set_blob(blob::SEALED + rank, &totals[&rank].to_bytes());
+                match what.repair {
+                    true => step.unlist_file(rank, row.generation),
+                    false => step.set_previous(row),
+                }
+                if let (Some(field), Some(asked)) = (made.get(&rank), asked) {
+                    step.set_blob(blob::FIELD + rank, field);
+                    step.set_blob(blob::ASKED + rank, asked);
+                }
+                let refine = &subdomain.fine.refine;
+                let measures = [
+                    ("tets_before", row.tets as f64),
+                    ("tets", subdomain.sealed.row.tets as f64),
+                    ("inserted_vertices", refine.inserted as f64),
+                    ("frozen_hits", refine.frozen_hits as f64),
+                    ("pages_read", subdomain.pages.pages_read as f64),
+                    ("pages_written", subdomain.pages.pages_written as f64),
+                ];
+                let since = if finished.len() == 1 { clock } else { subdomain.clock };
+                let mut journal = journal(StoreState::Sealed, step_name, since, &measures);
+                journal.subdomain = Some(rank);
+                step.append_journal(&journal);
+            }
+            step.set_regions(&regions);
+            step.set_state(StoreState::Sealed);
+            Ok(())
+        })?;
+        Ok(self.summary(finished))
+    }
+
+    /// Nothing has changed: what was made is dropped, and the version before the last change stays to be brought back.
+    fn leave(
+        &mut self,
+        mut finished: BTreeMap<u32, FinishedSubdomain>,
+    ) -> Result<ResaturateSummary, PipelineError> {
+        for (row, _) in &self.rows {
+            let subdomain = finished.get_mut(&row.rank).expect("made for each");
+            let path = self.catalog.file_path(row.rank, subdomain.sealed.row.generation);
+            // It is not listed: what stays is removed by the next writer.
+            let _ = path.remove_file();
+            subdomain.sealed.row = row.clone();
+        }
+        Ok(self.summary(finished))
+    }
+
+    fn summary(&self, finished: BTreeMap<u32, FinishedSubdomain>) -> ResaturateSummary {
+        if let Ok(scratch) = self.catalog.scratch_dir() {
+            // Nothing in it counts.
+            let _ = scratch.remove_dir_all();
+        }
+        let mut summary =
+            ResaturateSummary { parts: Vec::new(), pages: PagerStats::default(), frames_used: 0 };
+        for ((before, _), subdomain) in self.rows.iter().zip(finished.into_values()) {
+            summary.pages.add(subdomain.pages);
+            summary.frames_used = summary.frames_used.max(subdomain.frames_used);
+            summary.parts.push(Remade {
+                before: before.clone(),
+                after: subdomain.sealed.row,
+                fine: Some(subdomain.fine),
+            });
+        }
+        summary
+    }
+}
+
+/// What is left of the budget, for arrays of size fields.
+pub(super) fn room(catalog: &Catalog, budget: &Budget) -> Result<ScratchSpace, PipelineError> {
+    // A store that is only read may be one that can only be read.
+    let folder = match catalog.lock() {
+        Some(_) => catalog.scratch_dir()?,
+        None => std::env::temp_dir().into(),
+    };
+    Ok(ScratchSpace::new(budget.available(), folder))
+}
+
+/// The recorded field of the whole.
+pub fn recorded_field(
+    catalog: &mut Catalog,
+    options: &Options,
+    room: &ScratchSpace,
+) -> Result<SizeField, PipelineError> {
+    let bytes = catalog.blob(blob::SIZE_FIELD)?.unwrap_or_default();
+    let diagonal = tree::bounds(catalog)?.diagonal();
+    let field = SizeField::from_bytes_in(&bytes, room)?;
+    Ok(field.with_sources(&options.sizes()?, diagonal)?)
+}

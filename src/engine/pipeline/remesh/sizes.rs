@@ -1,0 +1,284 @@
+//! Sizes for sub-domains that are made again.
+
+use crate::pipeline::error::PipelineError;
+use crate::pipeline::tree::blob;
+use tetdb_store::sealed::SealedError;
+use tetdb_store::store::{Catalog, StoreError};
+
+use tetdb_base::geom::Point;
+use tetdb_base::storage::{ScratchSpace, check_cancelled};
+use tetdb_kernel::sizing::{
+    BackgroundMesh, SizeConstraint, SizeField, SizingError, TETS_PER_LOAD, load_of_tet,
+};
+
+/// Sizes that differ by less than this share are the same to `--changed`: where a field is divided differently its values
+/// between the same wishes are off by so much.
+const SAME: f64 = 0.05;
+
+/// Fields of different options that differ by less than this share are the same: where nothing new is wanted they differ by rounding.
+const UNCHANGED: f64 = 1e-5;
+
+/// Lengths one by one.
+#[derive(Clone, Debug)]
+pub enum Values {
+    /// For each tetrahedron of the sub-domains that are made again, by rank, each in its sealed order.
+    Tets(Vec<f64>),
+    /// For each vertex of the only sub-domain that is made again, in its sealed order.
+    Vertices(Vec<f64>),
+}
+
+impl Values {
+    /// Memory held, in bytes.
+    pub fn bytes(&self) -> u64 {
+        let (Self::Tets(h) | Self::Vertices(h)) = self;
+        8 * h.len() as u64
+    }
+}
+
+/// What takes the place of recorded sizes.
+#[derive(Clone, Debug)]
+pub struct NewSizes {
+    /// A field of the whole surface; without it, what is recorded of each sub-domain.
+    pub field: Option<SizeField>,
+    /// Lengths one by one, in place of a field.
+    pub values: Option<Values>,
+    /// Times this.
+    pub factor: f64,
+    /// No length of `values` is taken below or above these.
+    pub limits: [f64; 2],
+    /// Slope with which lengths grow from the faces that stay.
+    pub beta: f64,
+    /// What was asked for, in words to be recorded.
+    pub asked: String,
+}
+
+/// Lengths that are wanted of a sub-domain.
+struct Wanted<'a> {
+    /// What it was last made with.
+    had: &'a SizeField,
+    /// The field of the whole surface it would have been made with, and that of the options asked for now.
+    fields: Option<[&'a SizeField; 2]>,
+    /// Times this.
+    factor: f64,
+}
+
+impl SizeConstraint for Wanted<'_> {
+    /// What the sub-domain has holds where the options asked for say nothing else than those of the first run.
+    fn h(&self, p: Point) -> Result<f64, SizingError> {
+        let h = match self.fields.map(|fields| fields.map(|field| field.h(p))) {
+            Some([whole, new]) if (new - whole).abs() > UNCHANGED * whole => new,
+            _ => self.had.h(p),
+        };
+        Ok(h * self.factor)
+    }
+
+    fn divides(&self, middle: Point, width: f64) -> Option<bool> {
+        let new = self.fields.map(|[_, new]| new);
+        let answers = [Some(self.had), new].map(|field| field?.divides(middle, width));
+        // Where lengths of one field end and those of the other begin, their values alone tell.
+        match (answers, self.fields) {
+            ([Some(true), _] | [_, Some(true)], _) => Some(true),
+            (_, Some([whole, _])) if !std::ptr::eq(self.had, whole) => None,
+            ([had, _], None) => had,
+            ([had, new], _) => had.and(new),
+        }
+    }
+}
+
+/// Fields as the catalog has them.
+pub struct Recorded<'a> {
+    pub whole: &'a SizeField,
+    /// For arrays of fields, and for those that are built.
+    pub room: &'a ScratchSpace,
+}
+
+impl Recorded<'_> {
+    /// The field a sub-domain was last made with, if it is its own.
+    pub fn own(
+        &self,
+        catalog: &mut Catalog,
+        rank: u32,
+    ) -> Result<Option<SizeField>, PipelineError> {
+        match catalog.blob(blob::FIELD + rank)? {
+            Some(bytes) => Ok(Some(SizeField::from_bytes_in(&bytes, self.room)?)),
+            None => Ok(None),
+        }
+    }
+
+    /// The field with which `rank` is to be made, `None` for that of the whole. `from`: where its lengths begin in those given one by one.
+    ///
+    /// Where nothing else is wanted than what it has, that is its field, to the bit.
+    ///
+    /// Errors: lengths that are not as many as there should be; sizes that make no sense; damage.
+    pub fn build_new(
+        &self,
+        catalog: &mut Catalog,
+        rank: u32,
+        sizes: &NewSizes,
+        from: usize,
+        memory: u64,
+    ) -> Result<Option<SizeField>, PipelineError> {
+        let own = self.own(catalog, rank)?;
+        let had = own.as_ref().unwrap_or(self.whole);
+        let background;
+        let wanted;
+        let wish: &dyn SizeConstraint = match &sizes.values {
+            Some(values) => {
+                background = on_mesh(catalog, rank, sizes, values, from, memory)?;
+                &background
+            }
+            None => {
+                wanted = self.wanted(had, sizes);
+                &wanted
+            }
+        };
+        let (points, triangles) = skin(catalog, rank, memory)?;
+        let made = had.within(&points, &triangles, wish, sizes.beta, self.room)?;
+        Ok(made.or(own))
+    }
+
+    fn wanted<'b>(&'b self, had: &'b SizeField, sizes: &'b NewSizes) -> Wanted<'b> {
+        Wanted {
+            had,
+            fields: sizes.field.as_ref().map(|new| [self.whole, new]),
+            factor: sizes.factor,
+        }
+    }
+
+    /// Whether a sub-domain would be made with other sizes than it was: by more than [`SAME`] at some vertex.
+    pub fn differs(
+        &self,
+        catalog: &mut Catalog,
+        rank: u32,
+        sizes: &NewSizes,
+        memory: u64,
+    ) -> Result<bool, PipelineError> {
+        // What was asked for last time and is asked for again changes nothing, however it came out.
+        let asked = catalog.blob(blob::ASKED + rank)?;
+        if sizes.factor == 1.0 && asked.as_deref() == Some(sizes.asked.as_bytes()) {
+            return Ok(false);
+        }
+        let own = self.own(catalog, rank)?;
+        // Of a sub-domain with a field of its own, what near its skin is made of both is compared.
+        let made;
+        let wanted;
+        let (old, new): (&SizeField, &dyn SizeConstraint) = match &own {
+            Some(own) => {
+                made = self.build_new(catalog, rank, sizes, 0, memory)?;
+                (own, made.as_ref().unwrap_or(own))
+            }
+            None => {
+                wanted = self.wanted(self.whole, sizes);
+                (self.whole, &wanted)
+            }
+        };
+        let mut part = catalog.open_subdomain(rank, memory as usize)?;
+        for chunk in part.vertex_chunks() {
+            check_cancelled();
+            for vertex in chunk?.records {
+                let p = Point::from_array(vertex.point);
+                let (old, new) = (old.h(p), new.h(p)?);
+                if (new - old).abs() > SAME * old {
+                    return Ok(true);
+                }
+            }
+        }
+        Ok(false)
+    }
+}
+
+/// Tetrahedra to expect of a sub-domain made with `field`: so many times those it has as its load is larger.
+pub fn predicted(
+    catalog: &mut Catalog,
+    rank: u32,
+    [old, new]: [&SizeField; 2],
+    memory: u64,
+) -> Result<f64, PipelineError> {
+    let mut part = catalog.open_subdomain(rank, memory as usize)?;
+    let tets = part.row().tets as f64;
+    let mut loads = [0.0; 2];
+    for chunk in 0..part.tet_summaries().len() as u32 {
+        check_cancelled();
+        for tet in part.tet_chunk(chunk)?.records {
+            let points = part.corners(tet.nodes)?.map(|c| c.point);
+            let [a, b, c, d] = points;
+            let volume = (b - a).dot((c - a).cross(d - a)) / 6.0;
+            for (load, field) in loads.iter_mut().zip([old, new]) {
+                *load += load_of_tet(volume, points.map(|p| field.h(p)));
+            }
+        }
+    }
+    // A part of which next to nothing is load is all skin.
+    let ratio = loads[1].max(1.0 / TETS_PER_LOAD) / loads[0].max(1.0 / TETS_PER_LOAD);
+    Ok(tets * ratio)
+}
+
+/// Lengths given one by one as a mesh of them; those of tetrahedra become means at vertices.
+fn on_mesh(
+    catalog: &mut Catalog,
+    rank: u32,
+    sizes: &NewSizes,
+    values: &Values,
+    from: usize,
+    memory: u64,
+) -> Result<BackgroundMesh, PipelineError> {
+    let mut part = catalog.open_subdomain(rank, memory as usize)?;
+    let (n_tets, n_vertices) = (part.row().tets as usize, part.row().vertices as usize);
+    let [low, high] = sizes.limits;
+    let length = |h: f64| (h * sizes.factor).clamp(low, high);
+    let mut points = Vec::with_capacity(n_vertices);
+    for chunk in part.vertex_chunks() {
+        points.extend(chunk?.records.iter().map(|v| Point::from_array(v.point)));
+    }
+    let mut tets = Vec::with_capacity(n_tets);
+    for chunk in part.tet_chunks() {
+        check_cancelled();
+        tets.extend(chunk?.records.iter().map(|t| t.nodes));
+    }
+    let h = match values {
+        Values::Vertices(h) => h[from..from + n_vertices].iter().map(|&h| length(h)).collect(),
+        Values::Tets(h) => {
+            let mut sums = vec![(0.0, 0u32); n_vertices];
+            for (tet, &h) in tets.iter().zip(&h[from..from + n_tets]) {
+                for &v in tet {
+                    let sum = &mut sums[v as usize];
+                    *sum = (sum.0 + length(h), sum.1 + 1);
+                }
+            }
+            // A vertex without a tetrahedron lies where no point is asked for.
+            let mean = |&(sum, n): &(f64, u32)| if n > 0 { sum / f64::from(n) } else { 1.0 };
+            sums.iter().map(mean).collect()
+        }
+    };
+    Ok(BackgroundMesh::new(points, tets, h))
+}
+
+/// The faces of a sub-domain that stay: input triangles and interface faces, as triangles that index points.
+fn skin(
+    catalog: &mut Catalog,
+    rank: u32,
+    memory: u64,
+) -> Result<(Vec<Point>, Vec<[u32; 3]>), PipelineError> {
+    let mut leaf = catalog.open_coarse(rank, (memory / 2) as usize)?;
+    let (mut points, mut triangles) = (Vec::new(), Vec::new());
+    for chunk in leaf.vertices() {
+        points.extend(chunk?.records.iter().map(|v| Point::from_array(v.point)));
+    }
+    for chunk in leaf.facets() {
+        let filled = chunk?.records.into_iter().filter(|f| f.regions != [0, 0]);
+        triangles.extend(filled.map(|f| f.vertices));
+    }
+    for chunk in leaf.faces() {
+        triangles.extend(chunk?.records.iter().map(|f| f.vertices));
+    }
+    let n = points.len() as u32;
+    if triangles.iter().flatten().any(|&v| v >= n) {
+        return Err(StoreError::Sealed(SealedError::Content {
+            path: catalog.dir().to_owned(),
+            subdomain: rank,
+            what: "its coarse snapshot has a face without its vertices".to_owned(),
+        })
+        .into());
+    }
+    Ok((points, triangles))
+}

@@ -1,0 +1,281 @@
+//! Seal a finished working mesh: renumber along the Hilbert curve, drop neighbors, compress.
+//!
+//! Everything is a stream or an external sort, so a mesh of any size passes through a small lease:
+//! 1. vertices sorted along the curve; their places become their numbers (a scratch map holds old → new);
+//! 2. tetrahedra sorted by their new numbers, smallest vertex first, which follows the curve too;
+//! 3. their required faces sorted by vertices and joined with the facets, which so learn their tetrahedra.
+
+use tetdb_schema::ids::{Owner, VertexId};
+use tetdb_schema::leaf::TetPlace;
+use tetdb_schema::page::{NONE, RECORDS};
+use tetdb_schema::record::{InterfaceFace, SealedFacet, SealedTet, SealedVertex, tag};
+
+use super::neighbors::Neighbors;
+use super::records::{Claim, RequiredFace, TetRecord};
+use super::target::SealTarget;
+use crate::pipeline::error::PipelineError;
+use crate::pipeline::progress::{Event, Watcher};
+use tetdb_base::geom::HilbertFrame;
+use tetdb_base::storage::{Keyed, Pages, Sorted, Sorter, check_cancelled, kind};
+use tetdb_kernel::mesh::anatomy::FACES;
+use tetdb_kernel::mesh::{Mesh, Scan, VertexTag, dense, scan_parts, tets_of_page};
+use tetdb_store::sealed::{Form, Sealed, SealedWriter, sorted_face};
+
+/// Writes `mesh` to `target`, in the order and under the numbers of a sealed sub-domain whatever the form. Effects: the mesh's scratch map is used up; `tet_of` must be right for all vertices.
+pub fn seal<P: Pages>(
+    mesh: &mut Mesh<P>,
+    target: &SealTarget,
+    watch: &Watcher,
+) -> Result<Sealed, PipelineError> {
+    let mut writer = SealedWriter::create_as(
+        target.form,
+        target.path,
+        target.subdomain,
+        target.generation,
+        (target.memory / 2) as usize,
+    )?;
+    mesh.clear_scratch();
+    vertices(mesh, target, &mut writer, watch)?;
+    let mut neighbors = match target.form {
+        Form::Sealed => None,
+        Form::Pages => Some(Neighbors::of(sort_tets(mesh, target)?, target)?),
+    };
+    let order = sort_tets(mesh, target)?;
+    let faces = tets(order, mesh.n_tets(), &mut neighbors, target, &mut writer, watch)?;
+    facets(mesh, faces, target, &mut writer)?;
+    mesh.clear_scratch();
+    Ok(writer.finish()?)
+}
+
+fn report_progress(watch: &Watcher, stage: &'static str, done: u64, total: u32) {
+    check_cancelled();
+    watch(Event { stage, done, total: Some(u64::from(total)), unit: "records" });
+}
+
+fn vertices<P: Pages>(
+    mesh: &mut Mesh<P>,
+    target: &SealTarget,
+    writer: &mut SealedWriter,
+    watch: &Watcher,
+) -> Result<(), PipelineError> {
+    let frame = HilbertFrame::new(&target.bounds);
+    let mut sorter = Sorter::new(target.scratch, target.memory / 4);
+    for v in mesh.vertex_ids() {
+        // A surface vertex between two empty regions has no tetrahedron, but its facets are listed.
+        if mesh.tet_of(v) == NONE && mesh.vertex_attribute(v).0 != VertexTag::Surface {
+            continue;
+        }
+        let key = frame.index(mesh.point(v));
+        sorter.push(Keyed { key, id: v })?;
+    }
+    for (local, record) in sorter.finish()?.enumerate() {
+        let v = record?.id;
+        let local = local as u32;
+        mesh.set_scratch(dense(v), local);
+        let (point, h) = mesh.point_and_size(v);
+        let (vertex_tag, owner_index) = mesh.vertex_attribute(v);
+        let (tag, id) = match vertex_tag {
+            VertexTag::Surface => {
+                let id = VertexId { owner: Owner::Surface, index: owner_index };
+                (tag::SURFACE, id.number())
+            }
+            VertexTag::Interface => {
+                let (cut, index) = mesh.interface_vertex(v);
+                let owner = Owner::Cut(cut);
+                (tag::INTERFACE, VertexId { owner, index }.number())
+            }
+            VertexTag::Steiner => (tag::STEINER, SealedVertex::own_id(target.subdomain, local)),
+            _ => (tag::FREE, SealedVertex::own_id(target.subdomain, local)),
+        };
+        writer.push_vertex(SealedVertex { point: point.to_array(), h, tag, id })?;
+        if local.is_multiple_of(65_536) {
+            report_progress(watch, "seal vertices", u64::from(local), mesh.n_vertices());
+        }
+    }
+    Ok(())
+}
+
+/// Pages looked at before what was found goes to the sorter: 4 MB of tetrahedra.
+const BATCH: usize = 64;
+
+fn sort_tets<P: Pages>(
+    mesh: &mut Mesh<P>,
+    target: &SealTarget,
+) -> Result<Sorted<TetRecord>, PipelineError> {
+    let mut sorter = Sorter::new(target.scratch, target.memory / 4);
+    let pages: Vec<u32> = (0..mesh.pages().n_pages::<{ kind::TETS }>()).collect();
+    for batch in pages.chunks(BATCH) {
+        check_cancelled();
+        for record in scan_parts(mesh, batch, &Records).into_iter().flatten() {
+            sorter.push(record)?;
+        }
+    }
+    Ok(sorter.finish()?)
+}
+
+/// The tetrahedra of a page under their new numbers.
+struct Records;
+
+impl Scan for Records {
+    type Part = u32;
+    type Output = Vec<TetRecord>;
+
+    fn scan<P: Pages>(&self, mesh: &mut Mesh<P>, &page: &u32) -> Vec<TetRecord> {
+        let mut records = Vec::with_capacity(RECORDS);
+        tets_of_page(mesh, page, |mesh, t, tet| {
+            let mut nodes = [0; 4];
+            for (i, node) in nodes.iter_mut().enumerate() {
+                *node = mesh.scratch(dense(tet.vertex(i)));
+            }
+            let (region, flags) = mesh.tet_attribute(t);
+            let rotated = SealedTet { nodes, region }.rotated();
+            let mut required = 0;
+            if (0..4).any(|i| tet.is_required(i)) {
+                for (i, node) in rotated.nodes.into_iter().enumerate() {
+                    let old = nodes.iter().position(|&n| n == node).unwrap_or(0);
+                    required |= u8::from(tet.is_required(old)) << i;
+                }
+            }
+            records.push(TetRecord { nodes: rotated.nodes, region, flags, required });
+        });
+        records
+    }
+}
+
+fn tets(
+    order: Sorted<TetRecord>,
+    n_tets: u32,
+    neighbors: &mut Option<Neighbors>,
+    target: &SealTarget,
+    writer: &mut SealedWriter,
+    watch: &Watcher,
+) -> Result<Sorted<RequiredFace>, PipelineError> {
+    let mut faces = Sorter::new(target.scratch, target.memory / 4);
+    let (mut order, mut done) = ((0..).zip(order).peekable(), 0);
+    while order.peek().is_some() {
+        let mut placed = (order.by_ref()).map(|(t, record): (u32, _)| {
+            let record: TetRecord = record?;
+            done = u64::from(t) + 1;
+            for i in (0..4).filter(|i| record.required >> i & 1 != 0) {
+                let (vertices, odd) = sorted_face(FACES[i].map(|k| record.nodes[k]));
+                faces.push(RequiredFace { vertices, tet: t, odd })?;
+            }
+            let place = TetPlace {
+                neighbors: match neighbors {
+                    Some(neighbors) => neighbors.next()?,
+                    None => [NONE; 4],
+                },
+                required: record.required,
+                flags: record.flags,
+            };
+            let (nodes, region) = (record.nodes, record.region);
+            Ok::<_, PipelineError>((SealedTet { nodes, region }, place))
+        });
+        writer.push_tets(&mut placed)?;
+        report_progress(watch, "seal tetrahedra", done, n_tets);
+    }
+    Ok(faces.finish()?)
+}
+
+/// Joins facets and interface faces with the faces of tetrahedra; all ascend by their sorted vertices.
+fn facets<P: Pages>(
+    mesh: &mut Mesh<P>,
+    faces: Sorted<RequiredFace>,
+    target: &SealTarget,
+    writer: &mut SealedWriter,
+) -> Result<(), PipelineError> {
+    let mut sorter = Sorter::new(target.scratch, target.memory / 4);
+    for n in 0..mesh.n_facets() {
+        let vertices = mesh.facet(n).vertices.map(|v| mesh.scratch(dense(v)));
+        sorter.push(claim(vertices, n, false))?;
+    }
+    let n_interface_faces = target.owners.map_or(0, |_| mesh.n_interface_faces());
+    for n in 0..n_interface_faces {
+        let face = mesh.interface_face(n);
+        let vertices = face.vertices.map(|v| mesh.scratch(dense(v)));
+        sorter.push(claim(vertices, n, true))?;
+    }
+    let mut faces = faces.peekable();
+    // A face may be both a facet and an interface face: what was read stays at hand.
+    let (mut at, mut sides) = ([0; 3], [NONE; 2]);
+    // Facets of a wall given from both sides: each names the tetrahedron behind it, so both keep their labels.
+    let is_pair =
+        |a: &Claim, b: &Claim| a.vertices == b.vertices && !a.at_interface && !b.at_interface;
+    let mut last: Option<Claim> = None;
+    let mut all = sorter.finish()?.peekable();
+    while let Some(claim) = all.next() {
+        let claim = claim?;
+        if claim.vertices != at || sides == [NONE; 2] {
+            sides = [NONE; 2];
+            at = claim.vertices;
+            let is_up_to = |face: &RequiredFace| face.vertices <= claim.vertices;
+            while let Some(face) = faces.next_if(|f| f.as_ref().map_or(true, is_up_to)) {
+                let face = face?;
+                if face.vertices == claim.vertices {
+                    sides[usize::from(face.odd)] = face.tet;
+                }
+            }
+        }
+        // A tetrahedron sees its face from inside turn as the facet does when it lies behind it.
+        let odd = usize::from(claim.odd);
+        let next = all.peek().and_then(|next| next.as_ref().ok());
+        let has_twin = [last.as_ref(), next].into_iter().flatten().any(|c| is_pair(c, &claim));
+        let front = if has_twin { NONE } else { sides[1 - odd] };
+        let tets = [front, sides[odd]];
+        if claim.at_interface {
+            push_interface_face(mesh, claim.number, tets[1], target, writer)?;
+        } else {
+            push_facet(mesh, claim.number, tets, writer)?;
+        }
+        last = Some(claim);
+    }
+    Ok(())
+}
+
+fn claim(vertices: [u32; 3], number: u32, at_interface: bool) -> Claim {
+    let (vertices, odd) = sorted_face(vertices);
+    Claim { vertices, number, odd, at_interface }
+}
+
+fn push_facet<P: Pages>(
+    mesh: &mut Mesh<P>,
+    number: u32,
+    tets: [u32; 2],
+    writer: &mut SealedWriter,
+) -> Result<(), PipelineError> {
+    let facet = mesh.facet(number);
+    writer.push_facet(SealedFacet {
+        vertices: facet.vertices.map(|v| mesh.scratch(dense(v))),
+        label: facet.label,
+        triangle: facet.input,
+        regions: facet.regions,
+        tets,
+    })?;
+    Ok(())
+}
+
+fn push_interface_face<P: Pages>(
+    mesh: &mut Mesh<P>,
+    number: u32,
+    tet: u32,
+    target: &SealTarget,
+    writer: &mut SealedWriter,
+) -> Result<(), PipelineError> {
+    let face = mesh.interface_face(number);
+    let owners = target.owners.and_then(|o| o.get(&face.cut));
+    let other = owners.and_then(|o| o.other(face.index));
+    let (Some(other), true) = (other, tet != NONE) else {
+        panic!(
+            "face {} of cut {} has no owner on the other side, or no tetrahedron in sub-domain {}",
+            face.index, face.cut, target.subdomain
+        );
+    };
+    writer.push_interface_face(InterfaceFace {
+        vertices: face.vertices.map(|v| mesh.scratch(dense(v))),
+        cut: face.cut,
+        index: face.index,
+        other,
+        tet,
+    })?;
+    Ok(())
+}

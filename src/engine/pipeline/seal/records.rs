@@ -1,0 +1,57 @@
+//! What is sorted while a sub-domain is sealed.
+
+use tetdb_base::storage::sort_record;
+
+sort_record! {
+    /// A tetrahedron by its new numbers.
+    pub struct TetRecord {
+        /// Rotated: the least comes first.
+        pub nodes: [u32; 4],
+        pub region: u32,
+        pub flags: u32,
+        /// Bit i: face i is required.
+        pub required: u8,
+    }
+}
+
+sort_record! {
+    /// A required face of a tetrahedron.
+    pub struct RequiredFace {
+        /// Ascending.
+        pub vertices: [u32; 3],
+        pub tet: u32,
+        /// Whether ascending order is odd in the tetrahedron.
+        pub odd: bool,
+    }
+}
+
+sort_record! {
+    /// A facet or an interface face, which is a required face of its tetrahedra.
+    pub struct Claim {
+        /// Ascending.
+        pub vertices: [u32; 3],
+        pub number: u32,
+        /// Whether ascending order is odd in it.
+        pub odd: bool,
+        /// An interface face, not a facet.
+        pub at_interface: bool,
+    }
+}
+
+sort_record! {
+    /// A face of a tetrahedron.
+    pub struct TetFace {
+        /// Ascending.
+        pub vertices: [u32; 3],
+        /// 4 · tetrahedron + face.
+        pub place: u32,
+    }
+}
+
+sort_record! {
+    /// Two sides of a face, each as 4 · tetrahedron + face.
+    pub struct Link {
+        pub from: u32,
+        pub to: u32,
+    }
+}

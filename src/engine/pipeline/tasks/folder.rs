@@ -1,0 +1,251 @@
+//! The folder of tasks: names, and files that are there as a whole or not at all.
+
+use std::io::{Read, Write};
+use std::path::Path;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use rkyv::api::high::{HighDeserializer, HighSerializer, HighValidator};
+use rkyv::bytecheck::CheckBytes;
+use rkyv::rancor::Error;
+use rkyv::ser::allocator::ArenaHandle;
+use rkyv::util::AlignedVec;
+use rkyv::{Archive, Deserialize, Serialize};
+
+use super::records::{Mark, PlanRecord};
+use crate::pipeline::error::PipelineError;
+use crate::pipeline::plan::RECIPE;
+use crate::pipeline::work::{Kind, body, from_bytes, head, to_bytes};
+use tetdb_base::storage::{DiskPath, StorageError, check_cancelled, host_name};
+
+/// Between two looks for a file that is late.
+const LOOK_AGAIN: Duration = Duration::from_millis(250);
+/// Bytes copied at once.
+const COPY: usize = 1 << 20;
+
+/// Until when a file that is not there may only be late: other machines see new names after a while.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Patience(Option<Instant>);
+
+impl Patience {
+    pub fn of(wait: Duration) -> Self {
+        Self(Instant::now().checked_add(wait))
+    }
+
+    /// Waits a little; `false` when the time is over.
+    fn goes_on(self) -> bool {
+        check_cancelled();
+        let left = self.0.and_then(|end| end.checked_duration_since(Instant::now()));
+        left.is_some_and(|left| {
+            std::thread::sleep(left.min(LOOK_AGAIN));
+            true
+        })
+    }
+
+    /// What `look` finds, at last.
+    pub fn until<T>(
+        self,
+        mut look: impl FnMut() -> Result<Option<T>, StorageError>,
+    ) -> Result<Option<T>, StorageError> {
+        loop {
+            let found = look()?;
+            if found.is_some() || !self.goes_on() {
+                return Ok(found);
+            }
+        }
+    }
+}
+
+/// A name that no other process gives, here or elsewhere.
+pub(super) fn attempt_name() -> String {
+    let host: String =
+        host_name().chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
+    let now = SystemTime::now().duration_since(UNIX_EPOCH);
+    let nanos = now.unwrap_or_default().as_nanos();
+    format!("{host}-{}-{nanos}", std::process::id())
+}
+
+/// The folder `work` of a store.
+#[derive(Clone, Debug)]
+pub(super) struct TaskFolder {
+    pub dir: DiskPath,
+}
+
+impl TaskFolder {
+    pub fn of(dir: DiskPath) -> Self {
+        Self { dir }
+    }
+
+    pub fn plan_path(&self) -> DiskPath {
+        self.dir.join("plan")
+    }
+
+    pub fn stage_path(&self) -> DiskPath {
+        self.dir.join("stage")
+    }
+
+    pub fn field_path(&self) -> DiskPath {
+        self.dir.join("size-field")
+    }
+
+    pub fn orders_path(&self, task: u32) -> DiskPath {
+        self.dir.join(format!("task-{task:05}.orders"))
+    }
+
+    pub fn receipts_path(&self, task: u32) -> DiskPath {
+        self.dir.join(format!("task-{task:05}.receipts"))
+    }
+
+    pub fn mark_path(&self, task: u32) -> DiskPath {
+        self.dir.join(format!("task-{task:05}.mark"))
+    }
+
+    /// Where the files of an attempt are.
+    pub fn files_dir(&self, attempt: &str) -> DiskPath {
+        self.dir.join(format!("files-{attempt}"))
+    }
+
+    /// The plan. Errors: there is none for this version; damage.
+    pub fn plan(&self, patience: Patience) -> Result<PlanRecord, PipelineError> {
+        let path = self.plan_path();
+        let no_plan = |reason: String| PipelineError::NoPlan {
+            path: self.dir.folder().path().to_owned(),
+            reason,
+        };
+        let bytes = patience
+            .until(|| read(&path))?
+            .ok_or_else(|| no_plan("nobody has planned tasks for it".to_owned()))?;
+        let plan: PlanRecord =
+            from_bytes(Kind::Plan, &bytes).map_err(|e| no_plan(format!("its plan: {e}")))?;
+        match plan.recipe {
+            RECIPE => Ok(plan),
+            other => Err(no_plan(format!(
+                "it was planned by version {other} of the recipe, this is version {RECIPE}"
+            ))),
+        }
+    }
+
+    /// The number of the stage that is being done; 0 where nothing says so.
+    pub fn stage(&self) -> Result<usize, StorageError> {
+        let bytes = read(&self.stage_path())?.unwrap_or_default();
+        let text = String::from_utf8_lossy(&bytes);
+        Ok(text.trim().parse().unwrap_or(0))
+    }
+
+    pub fn mark(&self, task: u32) -> Option<Mark> {
+        let bytes = read(&self.mark_path(task)).ok()??;
+        serde_json::from_slice(&bytes).ok()
+    }
+
+    pub fn set_mark(&self, task: u32, mark: &Mark) -> Result<(), StorageError> {
+        let text = serde_json::to_vec(mark).unwrap_or_default();
+        write(&self.mark_path(task), &[&text])
+    }
+
+    /// The size field's bytes. Errors: in words what is wrong with them.
+    pub fn field(&self, patience: Patience) -> Result<Vec<u8>, PipelineError> {
+        let path = self.field_path();
+        let mut bytes =
+            (patience.until(|| read(&path))?).ok_or_else(|| damaged(&path, "it is missing"))?;
+        let length = body(Kind::SizeField, &bytes).map_err(|e| damaged(&path, &e))?.len();
+        bytes.drain(..bytes.len() - length);
+        Ok(bytes)
+    }
+
+    pub fn set_field(&self, field: &[u8]) -> Result<(), StorageError> {
+        write(&self.field_path(), &[&head(Kind::SizeField, field), field])
+    }
+}
+
+/// A file of the folder that cannot be used.
+pub(super) fn damaged(path: &DiskPath, what: &str) -> PipelineError {
+    PipelineError::TaskFile { path: path.path().to_owned(), what: what.to_owned() }
+}
+
+/// All of a file; `None` where there is none.
+pub(super) fn read(path: &DiskPath) -> Result<Option<Vec<u8>>, StorageError> {
+    if !path.is_file() {
+        return Ok(None);
+    }
+    let mut bytes = Vec::new();
+    let opened = path.disk().open_stream(path.path());
+    match opened.and_then(|mut file| file.read_to_end(&mut bytes)) {
+        Ok(_) => Ok(Some(bytes)),
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(e) => Err(StorageError::io(path.path(), e)),
+    }
+}
+
+/// A record of a file; `None` where there is none. Errors: in words what is wrong with it.
+pub(super) fn read_record<T>(
+    path: &DiskPath,
+    kind: Kind,
+) -> Result<Option<Result<T, String>>, StorageError>
+where
+    T: Archive,
+    T::Archived:
+        for<'a> CheckBytes<HighValidator<'a, Error>> + Deserialize<T, HighDeserializer<Error>>,
+{
+    Ok(read(path)?.map(|bytes| from_bytes(kind, &bytes)))
+}
+
+/// Writes a file as a whole.
+pub(super) fn write(path: &DiskPath, bytes: &[&[u8]]) -> Result<(), StorageError> {
+    let draft = draft_of(path);
+    let written = (|| {
+        let mut file = path.disk().create_stream(draft.path())?;
+        bytes.iter().try_for_each(|part| file.write_all(part))?;
+        file.flush()
+    })();
+    end_draft(&draft, path, written)
+}
+
+pub(super) fn write_record<T>(path: &DiskPath, kind: Kind, record: &T) -> Result<(), StorageError>
+where
+    T: for<'a> Serialize<HighSerializer<AlignedVec, ArenaHandle<'a>, Error>>,
+{
+    write(path, &[&to_bytes(kind, record)])
+}
+
+/// Copies a file, which may be on another disk.
+pub(super) fn copy(from: &DiskPath, to: &DiskPath) -> Result<(), StorageError> {
+    let draft = draft_of(to);
+    let mut source =
+        (from.disk().open_stream(from.path())).map_err(|e| StorageError::io(from.path(), e))?;
+    let copied = (|| {
+        let mut file = to.disk().create_stream(draft.path())?;
+        let mut buffer = vec![0; COPY];
+        loop {
+            check_cancelled();
+            match source.read(&mut buffer)? {
+                0 => return file.flush(),
+                n => file.write_all(&buffer[..n])?,
+            }
+        }
+    })();
+    end_draft(&draft, to, copied)
+}
+
+fn draft_of(path: &DiskPath) -> DiskPath {
+    let name = path.path().file_name().unwrap_or_default().to_string_lossy();
+    path.folder().join(format!("{name}.{}", attempt_name()))
+}
+
+fn end_draft(
+    draft: &DiskPath,
+    path: &DiskPath,
+    written: std::io::Result<()>,
+) -> Result<(), StorageError> {
+    let done = written
+        .map_err(|e| StorageError::io(path.path(), e))
+        .and_then(|()| draft.sync_file())
+        .and_then(|()| draft.rename(path));
+    if done.is_err() {
+        let _ = draft.remove_file();
+    }
+    done
+}
+
+/// Where a process of this machine keeps what only it reads.
+pub(super) fn scratch_in(dir: &Path, attempt: &str) -> DiskPath {
+    DiskPath::from(dir).join(format!("tetdb-{attempt}"))
+}

@@ -1,0 +1,310 @@
+//! The side of the tasks that has the store's lock: orders are written, receipts committed.
+
+use std::collections::BTreeSet;
+use std::hash::{BuildHasher, RandomState};
+use std::ops::Range;
+use std::time::Duration;
+
+use super::folder::{Patience, TaskFolder, copy, damaged, read_record, write, write_record};
+use super::records::{PlanRecord, TaskOrders, TaskReceipts};
+use super::schedule::{Stage, StageKind, stages};
+use super::status::is_being_worked;
+use crate::pipeline::error::PipelineError;
+use crate::pipeline::mesh::commit::{
+    close, commit_cuts, commit_subdomain, cut_order, subdomain_order,
+};
+use crate::pipeline::plan::RECIPE;
+use crate::pipeline::tree::{self, PartMesh, TreePart, blob};
+use crate::pipeline::work::{CutReceipt, Kind, Order, Receipt};
+use tetdb_base::storage::{DiskPath, StorageError, attempt};
+use tetdb_schema::catalog::StoreState;
+use tetdb_store::store::{Catalog, StoreError};
+
+/// What a call of [`gather`] found and did.
+#[derive(Clone, Debug, Default)]
+pub struct Gathered {
+    /// Tasks whose receipts were committed.
+    pub committed: Vec<u32>,
+    /// Tasks of the stage that have nothing to commit, and why.
+    pub left: Vec<(u32, String)>,
+    /// Whether these have just got their orders: the stage before is complete.
+    pub is_new_stage: bool,
+    /// The number of the stage, from 0, and how many there are.
+    pub stage: [usize; 2],
+    /// Tasks of the stage.
+    pub tasks: Range<u32>,
+    /// Whether all is done and the store sealed.
+    pub is_finished: bool,
+}
+
+impl Gathered {
+    /// Whether tasks of the stage were begun before: what is left of them has failed, or is not done yet.
+    pub fn is_begun(&self) -> bool {
+        !self.is_new_stage
+    }
+}
+
+/// Plans the rest of an unfinished store, whose coarse mesh is there, for about `tasks` tasks at once. The same plan again changes nothing.
+///
+/// `options` are those of the job, as JSON. Errors: no coarse mesh, or nothing left to do; the disk.
+pub fn plan(catalog: &mut Catalog, tasks: u32, options: &str) -> Result<(), PipelineError> {
+    attempt(|| {
+        let folder = TaskFolder::of(catalog.work_dir());
+        let state = catalog.state()?;
+        let no_plan = |reason: &str| PipelineError::NoPlan {
+            path: folder.dir.folder().path().to_owned(),
+            reason: reason.to_owned(),
+        };
+        if state.is_finished() {
+            return Err(no_plan("it is finished"));
+        }
+        if state < StoreState::Coarse {
+            return Err(no_plan("it has no coarse mesh yet, which one process makes"));
+        }
+        let bounds = tree::bounds(catalog)?;
+        let mut plan = PlanRecord {
+            run: RandomState::new().hash_one(std::process::id()),
+            recipe: RECIPE,
+            n: tree::n_subdomains(catalog)?,
+            tasks,
+            bounds: [bounds.low, bounds.high].map(|p| p.to_array()),
+            options: options.to_owned(),
+        };
+        if let Ok(old) = folder.plan(Patience::of(Duration::ZERO)) {
+            plan.run = old.run;
+            if plan == old {
+                return Ok(());
+            }
+            if let Some((task, host)) = is_being_worked(folder.dir.folder().path())? {
+                let path = folder.dir.folder().path().to_owned();
+                let writer = format!("task {task} on {host}");
+                return Err(StoreError::Busy { path, writer }.into());
+            }
+            // What its tasks have done is not lost; what they still do does not count.
+            gather(catalog, Duration::ZERO)?;
+            plan.run = RandomState::new().hash_one(old.run);
+        }
+        if folder.dir.exists() {
+            folder.dir.remove_dir_all()?;
+        }
+        folder.dir.create_dir_all()?;
+        let field = catalog.blob(blob::SIZE_FIELD)?.unwrap_or_default();
+        folder.set_field(&field)?;
+        write_record(&folder.plan_path(), Kind::Plan, &plan)?;
+        Ok(())
+    })?
+}
+
+/// Commits what tasks have done, and gives orders to those that can begin; seals the store when nothing is left.
+///
+/// A file that is not there is looked for during `wait`. Errors: no plan; the disk. What is committed stays so.
+pub fn gather(catalog: &mut Catalog, wait: Duration) -> Result<Gathered, PipelineError> {
+    attempt(|| {
+        let folder = TaskFolder::of(catalog.work_dir());
+        let patience = Patience::of(wait);
+        if catalog.state()?.is_finished() {
+            return Ok(Gathered { is_finished: true, ..Gathered::default() });
+        }
+        let plan = folder.plan(patience)?;
+        let run = GatherRun { catalog, folder: &folder, plan: &plan, patience };
+        run.all()
+    })?
+}
+
+struct GatherRun<'a> {
+    catalog: &'a mut Catalog,
+    folder: &'a TaskFolder,
+    plan: &'a PlanRecord,
+    patience: Patience,
+}
+
+impl GatherRun<'_> {
+    fn all(mut self) -> Result<Gathered, PipelineError> {
+        let n = self.plan.n;
+        let stages = stages(n, self.plan.tasks);
+        let mut gathered = Gathered::default();
+        for (number, stage) in stages.iter().enumerate() {
+            gathered.stage = [number, stages.len()];
+            gathered.tasks = stage.tasks();
+            let open = self.open_tasks(stage)?;
+            gathered.is_new_stage = open.iter().all(|&t| !self.folder.orders_path(t).exists());
+            for task in open {
+                // Nothing can be late of a task that never had orders.
+                let has_orders = self.folder.orders_path(task).exists();
+                match self.receipts(task, has_orders)? {
+                    Ok(receipts) => {
+                        self.commit(receipts)?;
+                        gathered.committed.push(task);
+                    }
+                    Err(why) => gathered.left.push((task, why)),
+                }
+            }
+            if !gathered.left.is_empty() {
+                for (task, _) in &gathered.left {
+                    self.give_orders(stage, *task)?;
+                }
+                write(&self.folder.stage_path(), &[number.to_string().as_bytes()])?;
+                return Ok(gathered);
+            }
+        }
+        close(self.catalog, n)?;
+        gathered.is_finished = true;
+        Ok(gathered)
+    }
+
+    /// Tasks of a stage that are not committed.
+    fn open_tasks(&mut self, stage: &Stage) -> Result<Vec<u32>, PipelineError> {
+        let parts = tree::parts(self.catalog, self.plan.n)?;
+        let sealed: BTreeSet<u32> = self.catalog.subdomains()?.iter().map(|r| r.rank).collect();
+        let is_open = |part: TreePart| match stage.kind {
+            StageKind::Cuts => parts.iter().any(|p| p.part == part),
+            StageKind::Subtrees => wide_within(&parts, part).next().is_some(),
+            StageKind::Subdomains => {
+                (part.first..part.first + part.count).any(|r| !sealed.contains(&r))
+            }
+        };
+        let tasks = stage.tasks().zip(&stage.parts);
+        Ok(tasks.filter(|(_, part)| is_open(**part)).map(|(task, _)| task).collect())
+    }
+
+    /// What a task has done, its files at hand; else why nothing can be committed.
+    fn receipts(
+        &self,
+        task: u32,
+        may_be_late: bool,
+    ) -> Result<Result<TaskReceipts, String>, PipelineError> {
+        let path = self.folder.receipts_path(task);
+        let patience = match may_be_late {
+            true => self.patience,
+            false => Patience::of(Duration::ZERO),
+        };
+        let look = || {
+            let found = read_record::<TaskReceipts>(&path, Kind::Receipts)?;
+            Ok(found.filter(|found| found.as_ref().map_or(true, |r| r.run == self.plan.run)))
+        };
+        let receipts = match patience.until(look)? {
+            None => return Ok(Err("it has no receipt".to_owned())),
+            Some(Err(e)) => return Ok(Err(format!("its receipt cannot be used: {e}"))),
+            Some(Ok(receipts)) => receipts,
+        };
+        let dir = self.folder.files_dir(&receipts.attempt);
+        for (name, bytes) in &receipts.files {
+            let file = dir.join(name);
+            let is_there = || Ok(file.bytes().is_ok_and(|found| found == *bytes).then_some(()));
+            if patience.until(is_there)?.is_none() {
+                return Ok(Err(format!("its file {name} is missing or not complete")));
+            }
+        }
+        Ok(Ok(receipts))
+    }
+
+    /// Gives the files of a task their place, and commits what it did.
+    fn commit(&mut self, done: TaskReceipts) -> Result<(), PipelineError> {
+        let from = self.folder.files_dir(&done.attempt);
+        let store = self.folder.dir.folder();
+        let files = self.catalog.files()?;
+        let files = files.iter().map(|f| Catalog::file_name(f.subdomain, f.generation));
+        let coarse = self.catalog.coarse_snapshots()?;
+        let coarse = coarse.iter().map(|c| Catalog::coarse_name(c.rank, c.generation));
+        let listed: BTreeSet<String> = files.chain(coarse).collect();
+        for (name, _) in &done.files {
+            // One that counts already is not touched: this part of the task was committed before.
+            if !listed.contains(name) {
+                place(&from.join(name), &store.join(name))?;
+            }
+        }
+        let (mut cuts, mut subdomains) = (Vec::new(), Vec::new());
+        for receipt in done.receipts {
+            match receipt {
+                Receipt::Cut(cut) => cuts.push(cut),
+                Receipt::Subdomain(sub) => subdomains.push(sub),
+            }
+        }
+        self.commit_new_cuts(cuts, done.task)?;
+        let sealed: BTreeSet<u32> = self.catalog.subdomains()?.iter().map(|r| r.rank).collect();
+        for sub in subdomains.iter().filter(|sub| !sealed.contains(&sub.row.rank)) {
+            commit_subdomain(self.catalog, sub)?;
+        }
+        // What remains in it are other names of files that count now.
+        from.remove_dir_all()?;
+        self.folder.receipts_path(done.task).remove_file()?;
+        self.folder.mark_path(done.task).remove_file()?;
+        Ok(())
+    }
+
+    /// Errors: cuts of parts that are not there.
+    fn commit_new_cuts(&mut self, cuts: Vec<CutReceipt>, task: u32) -> Result<(), PipelineError> {
+        let Some(top) = cuts.first() else {
+            return Ok(());
+        };
+        let parts = tree::parts(self.catalog, self.plan.n)?;
+        match parts.contains(&top.parent) {
+            true => commit_cuts(self.catalog, &cuts),
+            false => Err(damaged(
+                &self.folder.receipts_path(task),
+                "it cuts a part that the store has not",
+            )),
+        }
+    }
+
+    fn give_orders(&mut self, stage: &Stage, task: u32) -> Result<(), PipelineError> {
+        let part = stage.part(task).expect("a task of the stage");
+        let n = self.plan.n;
+        let parts = tree::parts(self.catalog, n)?;
+        let mut orders = Vec::new();
+        if stage.kind == StageKind::Subdomains {
+            let sealed: BTreeSet<u32> = self.catalog.subdomains()?.iter().map(|r| r.rank).collect();
+            let within = part.first..part.first + part.count;
+            for part in parts.iter().filter(|p| within.contains(&p.part.first)) {
+                if !sealed.contains(&part.part.first) {
+                    orders.push(Order::Subdomain(subdomain_order(self.catalog, n, *part)?));
+                }
+            }
+        } else {
+            for part in wide_within(&parts, part) {
+                orders.push(Order::Cut(cut_order(self.catalog, n, *part)?));
+            }
+        }
+        let record = TaskOrders {
+            run: self.plan.run,
+            task,
+            orders,
+            below: stage.kind == StageKind::Subtrees,
+        };
+        Ok(write_record(&self.folder.orders_path(task), Kind::Orders, &record)?)
+    }
+}
+
+/// Parts within another that are to be cut.
+fn wide_within(parts: &[PartMesh], part: TreePart) -> impl Iterator<Item = &PartMesh> {
+    let within = part.first..part.first + part.count;
+    (parts.iter()).filter(move |p| p.part.count > 1 && within.contains(&p.part.first))
+}
+
+/// Gives a file a second name, so that nothing is lost if the commit does not follow. Where a disk knows no second names it is copied.
+fn place(from: &DiskPath, to: &DiskPath) -> Result<(), StorageError> {
+    to.remove_file()?;
+    match from.link(to) {
+        Ok(()) => to.folder().sync_dir(),
+        Err(_) => copy(from, to),
+    }
+}
+
+/// For whoever goes on without tasks: what they have done is committed, the plan is dropped. Whether there was one.
+///
+/// Errors: the disk.
+pub fn end_plan(catalog: &mut Catalog) -> Result<bool, PipelineError> {
+    let folder = TaskFolder::of(catalog.work_dir());
+    if !folder.dir.exists() {
+        return Ok(false);
+    }
+    let had_plan = folder.plan_path().exists();
+    match gather(catalog, Duration::ZERO) {
+        Ok(_) | Err(PipelineError::NoPlan { .. } | PipelineError::TaskFile { .. }) => {}
+        Err(error) => return Err(error),
+    }
+    if folder.dir.exists() {
+        folder.dir.remove_dir_all()?;
+    }
+    Ok(had_plan)
+}

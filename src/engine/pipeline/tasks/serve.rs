@@ -1,0 +1,184 @@
+//! Orders and receipts as messages: this process does orders of one that holds the store's lock.
+
+use std::path::Path;
+use std::sync::mpsc::channel;
+use std::time::Duration;
+
+use rkyv::{Archive, Deserialize, Serialize};
+
+use super::folder::{Patience, TaskFolder, attempt_name, copy, damaged, scratch_in};
+use super::perform::TaskSettings;
+use crate::pipeline::error::PipelineError;
+use crate::pipeline::plan::{Options, Plan, RECIPE};
+use crate::pipeline::progress::Watcher;
+use crate::pipeline::tree::blob;
+use crate::pipeline::work::common::Common;
+use crate::pipeline::work::{
+    Helpers, Kind, Order, Receipt, Worker, Workplace, from_bytes, to_bytes,
+};
+use tetdb_base::geom::{Aabb, Point};
+use tetdb_base::storage::RemoteFailure;
+use tetdb_base::storage::{Budget, DiskPath, RunContext, ScratchSpace, attempt};
+use tetdb_kernel::sizing::SizeField;
+use tetdb_store::store::Catalog;
+
+/// How long files of other machines may be late.
+const WAIT: Duration = Duration::from_secs(60);
+
+/// What is the same for all orders.
+#[derive(Archive, Serialize, Deserialize, Clone, Debug)]
+struct Job {
+    recipe: u32,
+    store: String,
+    bounds: [[f64; 3]; 2],
+    /// As JSON.
+    options: String,
+}
+
+/// Begins with helpers; how many orders they do at once. Effects: the size field is in the store's folder of tasks. Errors: the disk; theirs.
+pub fn begin(
+    helpers: &dyn Helpers,
+    catalog: &mut Catalog,
+    options: &Options,
+    bounds: &Aabb,
+) -> Result<usize, PipelineError> {
+    let dir = std::path::absolute(catalog.dir()).unwrap_or_else(|_| catalog.dir().to_owned());
+    let field = catalog.blob(blob::SIZE_FIELD)?.unwrap_or_default();
+    let folder = TaskFolder::of(catalog.work_dir());
+    folder.dir.create_dir_all()?;
+    folder.set_field(&field)?;
+    let job = Job {
+        recipe: RECIPE,
+        store: dir.to_string_lossy().into_owned(),
+        bounds: [bounds.low, bounds.high].map(|p| p.to_array()),
+        options: serde_json::to_string(options).unwrap_or_default(),
+    };
+    Ok(helpers.begin(&to_bytes(Kind::Plan, &job))?)
+}
+
+/// Has an order done by a helper; its files are there then. Errors: theirs; a receipt that cannot be read.
+pub fn ask(
+    helpers: &dyn Helpers,
+    slot: usize,
+    order: &Order,
+    store: &DiskPath,
+) -> Result<Receipt, PipelineError> {
+    let bytes = helpers.perform(slot, to_bytes(Kind::Orders, order))?;
+    let receipt: Receipt = from_bytes(Kind::Receipts, &bytes)
+        .map_err(|e| damaged(store, &format!("a receipt: {e}")))?;
+    let patience = Patience::of(WAIT);
+    for name in receipt.files() {
+        wait_for(&store.join(name), patience)?;
+    }
+    Ok(receipt)
+}
+
+/// A helper that answers something else than it was asked for.
+pub fn wrong_receipt() -> PipelineError {
+    PipelineError::Helper(RemoteFailure {
+        code: "internal".to_owned(),
+        message: "a helper's receipt is of another kind than its order".to_owned(),
+    })
+}
+
+fn wait_for(path: &DiskPath, patience: Patience) -> Result<(), PipelineError> {
+    let found = patience.until(|| Ok(path.is_file().then_some(())))?;
+    found.ok_or_else(|| damaged(path, "it is missing"))
+}
+
+/// Does orders of `job` until `next` has none, as many at once as `started` is given; each order's receipt or error goes to `answer`.
+///
+/// Shape: `next` gives the slot that is to do an order, below the number given to `started`. Errors: of the beginning.
+pub fn serve(
+    job: &[u8],
+    settings: &TaskSettings,
+    budget: &Budget,
+    watch: &(dyn Fn(crate::pipeline::Event) + Sync),
+    started: impl FnOnce(usize),
+    next: &mut dyn FnMut() -> Option<(usize, Vec<u8>)>,
+    answer: &(dyn Fn(usize, Result<Vec<u8>, PipelineError>) + Sync),
+) -> Result<(), PipelineError> {
+    let patience = Patience::of(settings.wait);
+    let store_of = |job: &Job| DiskPath::from(Path::new(&job.store));
+    let job: Job = from_bytes(Kind::Plan, job)
+        .map_err(|e| damaged(&DiskPath::from(Path::new(".")), &format!("the job: {e}")))?;
+    let store = store_of(&job);
+    if job.recipe != RECIPE {
+        return Err(damaged(&store, "another version of the program holds it"));
+    }
+    let options: Options =
+        serde_json::from_str(&job.options).map_err(|e| damaged(&store, &e.to_string()))?;
+    let bounds = Aabb::around(job.bounds.map(Point::from_array));
+    let name = attempt_name();
+    let local = settings.scratch.as_deref().map(|dir| scratch_in(dir, &name));
+    let folder = TaskFolder::of(Catalog::work_dir_at(&store));
+    let scratch = match &local {
+        Some(local) => local.join("scratch"),
+        None => folder.dir.join(format!("scratch-{name}")),
+    };
+    scratch.create_dir_all()?;
+    let space = ScratchSpace::new(budget.cap() / 2, &scratch);
+    let bytes = folder.field(patience)?;
+    let field = attempt(|| SizeField::from_bytes_in(&bytes, &space))??
+        .with_sources(&options.sizes()?, bounds.diagonal())?;
+    drop(bytes);
+    let _field = budget.lease(field.bytes() as u64, "the size field")?;
+    let plan = Plan::new(budget.cap(), field.bytes() as u64)?;
+    let slots = plan.workers();
+    let share = plan.shared_by(slots as u64);
+    let worker = Worker {
+        place: Workplace {
+            output: local.clone().unwrap_or_else(|| store.clone()),
+            store: store.clone(),
+            scratch: scratch.clone(),
+        },
+        common: Common::of(&options, &field, bounds)?,
+    };
+    let one = |order: &[u8], watch: &Watcher| {
+        attempt(|| {
+            let order: Order = from_bytes(Kind::Orders, order).map_err(|e| damaged(&store, &e))?;
+            let patience = Patience::of(settings.wait);
+            wait_for(&store.join(order.input()), patience)?;
+            let receipt = worker.perform(order, share, watch)?;
+            for name in receipt.files() {
+                match &local {
+                    Some(local) => {
+                        let here = local.join(&name);
+                        copy(&here, &store.join(&name))?;
+                        here.remove_file()?;
+                    }
+                    None => store.join(&name).sync_file()?,
+                }
+            }
+            store.sync_dir()?;
+            Ok(to_bytes(Kind::Receipts, &receipt))
+        })?
+    };
+    started(slots);
+    std::thread::scope(|scope| {
+        let orders: Vec<_> = (0..slots)
+            .map(|slot| {
+                let (order, orders) = channel::<Vec<u8>>();
+                let (one, context) = (&one, RunContext::current());
+                scope.spawn(move || {
+                    let work = || {
+                        for order in orders {
+                            answer(slot, one(&order, &|event| watch(event)));
+                        }
+                    };
+                    match context {
+                        Some(context) => context.enter(work),
+                        None => work(),
+                    }
+                });
+                order
+            })
+            .collect();
+        while let Some((slot, order)) = next() {
+            // A slot that is gone has answered with the reason.
+            let _ = orders[slot % slots].send(order);
+        }
+    });
+    let _ = local.unwrap_or(scratch).remove_dir_all();
+    Ok(())
+}

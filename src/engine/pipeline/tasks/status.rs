@@ -1,0 +1,145 @@
+//! How far tasks are, for whoever looks.
+
+use std::ops::Range;
+use std::path::Path;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+use super::folder::{Patience, TaskFolder, read_record};
+use super::records::{Mark, TaskReceipts};
+use super::schedule::{Stage, stages};
+use crate::pipeline::error::PipelineError;
+use crate::pipeline::work::Kind;
+use tetdb_base::storage::{StorageError, is_process_gone};
+use tetdb_store::store::Catalog;
+
+/// A task that has not said for so long that it lives is taken for dead: twelve times what it takes to say so.
+const SILENT: u64 = 60;
+
+/// What a task is at.
+#[derive(Clone, Debug, PartialEq)]
+pub enum TaskState {
+    /// It has not begun.
+    Waiting,
+    /// Somebody is at it.
+    Running {
+        /// Where.
+        host: String,
+    },
+    /// It ended without a receipt, and has to be done again.
+    Failed {
+        /// Where and why.
+        why: String,
+    },
+    /// It took so many seconds, and waits to be gathered.
+    Done {
+        /// Wall time.
+        seconds: f64,
+    },
+}
+
+/// The plan of a store and how far its tasks are.
+#[derive(Clone, Debug)]
+pub struct Planned {
+    /// Sub-domains.
+    pub subdomains: u32,
+    /// Tasks at once, as asked for.
+    pub tasks: u32,
+    /// All stages, in order.
+    pub stages: Vec<Stage>,
+    /// The number of the stage that is being done, from 0.
+    pub stage: usize,
+    /// Its tasks by number.
+    pub states: Vec<(u32, TaskState)>,
+}
+
+impl Planned {
+    /// Tasks of the stage that is being done.
+    pub fn range(&self) -> Range<u32> {
+        self.stages.get(self.stage).map_or(0..0, Stage::tasks)
+    }
+
+    /// How many tasks are done, running, failed and waiting.
+    pub fn counts(&self) -> [usize; 4] {
+        let mut counts = [0; 4];
+        for (_, state) in &self.states {
+            counts[match state {
+                TaskState::Done { .. } => 0,
+                TaskState::Running { .. } => 1,
+                TaskState::Failed { .. } => 2,
+                TaskState::Waiting => 3,
+            }] += 1;
+        }
+        counts
+    }
+
+    /// Mean seconds of the tasks of this stage that are done; `None` while there is none.
+    pub fn seconds_mean(&self) -> Option<f64> {
+        let seconds = self.states.iter().filter_map(|(_, state)| match state {
+            TaskState::Done { seconds } => Some(*seconds),
+            _ => None,
+        });
+        let (n, sum) = seconds.fold((0, 0.0), |(n, sum), s| (n + 1, sum + s));
+        (n > 0).then(|| sum / f64::from(n))
+    }
+}
+
+/// How far the tasks of the store at `store` are; `None` where none are planned. Nothing is changed, and the catalog is not opened.
+pub fn status(store: &Path) -> Result<Option<Planned>, PipelineError> {
+    let folder = TaskFolder::of(Catalog::work_dir_at(store));
+    // Of a finished store it is about to go.
+    if !folder.plan_path().exists() {
+        return Ok(None);
+    }
+    let plan = folder.plan(Patience::of(Duration::ZERO))?;
+    let stages = stages(plan.n, plan.tasks);
+    let stage = folder.stage()?;
+    let range = stages.get(stage).map_or(0..0, Stage::tasks);
+    // Those without orders have been committed.
+    let open = range.filter(|&task| folder.orders_path(task).exists());
+    let states = open.map(|task| Ok((task, state(&folder, plan.run, task)?)));
+    Ok(Some(Planned {
+        subdomains: plan.n,
+        tasks: plan.tasks,
+        states: states.collect::<Result<_, StorageError>>()?,
+        stages,
+        stage,
+    }))
+}
+
+fn state(folder: &TaskFolder, run: u64, task: u32) -> Result<TaskState, StorageError> {
+    let found = read_record::<TaskReceipts>(&folder.receipts_path(task), Kind::Receipts)?;
+    let mark = folder.mark(task);
+    Ok(match (found, mark) {
+        (Some(Ok(receipts)), _) if receipts.run == run => {
+            TaskState::Done { seconds: receipts.seconds }
+        }
+        (Some(Err(why)), _) => {
+            TaskState::Failed { why: format!("its receipt cannot be used: {why}") }
+        }
+        (_, Some(Mark { host, error: Some(error), .. })) => {
+            TaskState::Failed { why: format!("on {host}: {error}") }
+        }
+        (_, Some(mark)) if is_alive(&mark) => TaskState::Running { host: mark.host },
+        (_, Some(mark)) => {
+            TaskState::Failed { why: format!("on {}: it ended without a word", mark.host) }
+        }
+        (_, None) => TaskState::Waiting,
+    })
+}
+
+fn is_alive(mark: &Mark) -> bool {
+    let now = SystemTime::now().duration_since(UNIX_EPOCH);
+    let now = now.unwrap_or_default().as_secs();
+    mark.error.is_none()
+        && mark.renewed + SILENT > now
+        && !is_process_gone(&mark.host, mark.process)
+}
+
+/// Whether a task of the store at `store` is at work; its number and where.
+pub fn is_being_worked(store: &Path) -> Result<Option<(u32, String)>, PipelineError> {
+    let running = |(task, state)| match state {
+        TaskState::Running { host } => Some((task, host)),
+        _ => None,
+    };
+    Ok(status(store)?.and_then(|planned| planned.states.into_iter().find_map(running)))
+}

@@ -1,0 +1,180 @@
+//! One bisection: the part's file in, the files of its two children out.
+
+use std::time::Instant;
+
+use super::common::Common;
+use super::cut_journal::CutJournal;
+use super::order::CutOrder;
+use super::receipt::InheritedFace;
+use super::receipt::{CutReceipt, Traffic};
+use super::soundness::panic_is_damage_of;
+use super::stages::{StageFiles, Stages};
+use crate::pipeline::error::PipelineError;
+use crate::pipeline::plan::Plan;
+use crate::pipeline::progress::{Event, Watcher};
+use crate::pipeline::tree::{DONE, PartMesh, TreePart, open_part};
+use tetdb_base::storage::{Backing, DiskPath, Pager, PagerStats, attempt};
+use tetdb_kernel::bisect::{self, CutPlan, CutReport, Opened, Zone};
+use tetdb_kernel::mesh::{Mesh, Workspace};
+use tetdb_kernel::optimize::Settings;
+use tetdb_schema::catalog::Stage;
+
+/// What it takes to bisect a part.
+pub struct CutJob<'a> {
+    pub order: &'a CutOrder,
+    /// The part's file, and those of its children.
+    pub base: DiskPath,
+    pub written: [DiskPath; 2],
+    /// Where meshes on their way go, when they are kept.
+    pub output: &'a DiskPath,
+    pub scratch: DiskPath,
+    /// Zones of the cuts above it.
+    pub zones: Vec<Zone>,
+    pub common: Common<'a>,
+    pub share: Plan,
+}
+
+/// A child as its file holds it.
+struct Child {
+    mesh: PartMesh,
+    /// Interface faces it took over from its parent.
+    inherited: Vec<InheritedFace>,
+}
+
+impl CutJob<'_> {
+    /// Does the whole job; a failed page access ends here.
+    pub fn run(self, watch: &Watcher) -> Result<(CutReceipt, CutReport), PipelineError> {
+        let place = (&self.base, self.order.parent.part.first);
+        let divide = || panic_is_damage_of(place, || self.open(), || self.divide(watch));
+        let divided = attempt(divide)??;
+        // Empty by now; thousands of cuts would leave as many folders.
+        let _ = self.scratch.remove_dir_all();
+        Ok(divided)
+    }
+
+    fn divide(&self, watch: &Watcher) -> Result<(CutReceipt, CutReport), PipelineError> {
+        let clock = Instant::now();
+        let (parent, common) = (self.order.parent, self.common);
+        let part = parent.part;
+        let space = Workspace { dir: &self.scratch, memory: self.share.buffers / 2 };
+        let mut host = self.open()?;
+        let mut core =
+            Mesh::new(Pager::new(self.share.frames / 4, Some(self.backing(part.first, None, 4))));
+        let plan = CutPlan {
+            cut: part.cut(),
+            low: part.low_share(),
+            method: common.method,
+            earlier: &self.zones,
+            h: &|p| common.field.h(p),
+            bounds: common.bounds,
+            optimize: Settings::of(common.mode),
+        };
+        let progress = |stage, done| {
+            watch(Event { stage, done, total: None, unit: "vertices" });
+        };
+        let kept = common.keeps_stages.then(|| StageFiles {
+            cut: part.cut(),
+            output: self.output,
+            scratch: &self.scratch,
+            memory: self.share.buffers,
+            bounds: common.bounds,
+        });
+        let mut stages = Stages::default();
+        if let Some(kept) = &kept {
+            kept.save(&mut host, Stage::Coarse, &mut stages, watch)?;
+        }
+        let refined = bisect::refine(&mut host, &plan, &space, &progress)?;
+        if let Some(kept) = &kept {
+            kept.save(&mut host, Stage::Refined, &mut stages, watch)?;
+        }
+        let faces = kept.as_ref().map(|_| &mut stages.faces);
+        let opened = bisect::choose(&mut host, &mut core, &plan, refined, faces, &progress);
+        let mut pages = PagerStats::default();
+        let [low, high] = part.children();
+        let mut child = |part, path| {
+            let (child, stats) =
+                self.child((&mut host, &mut core), &opened, (part, path), &space)?;
+            pages.add(stats);
+            Ok::<_, PipelineError>(child)
+        };
+        let low = child(low, &self.written[0])?;
+        let high = child(high, &self.written[1])?;
+        pages.add(host.pages().stats());
+        let journal = CutJournal {
+            cut: part.cut(),
+            subdomain: part.first,
+            report: &opened.report,
+            pages,
+            frames_used: host.pages().frames_used() + core.pages().frames_used(),
+        };
+        let receipt = CutReceipt {
+            parent,
+            zone: opened.zone.into(),
+            children: [low.mesh, high.mesh],
+            faces: opened.report.interface.chosen.faces as u32,
+            inherited: high.inherited,
+            stages: stages.rows(&opened.zone),
+            stage_faces: stages.face_bytes(),
+            journal: journal.row(clock),
+            traffic: Traffic::new(pages, journal.frames_used),
+        };
+        Ok((receipt, opened.report))
+    }
+
+    /// The part's mesh as its file holds it.
+    fn open(&self) -> Result<Mesh, PipelineError> {
+        let parent = self.order.parent;
+        let backing = self.backing(parent.part.first, None, 2);
+        open_part(parent, self.base.clone(), backing, self.share.frames / 2)
+    }
+
+    fn child(
+        &self,
+        (host, core): (&mut Mesh, &mut Mesh),
+        opened: &Opened,
+        (part, path): (TreePart, &DiskPath),
+        space: &Workspace,
+    ) -> Result<(Child, PagerStats), PipelineError> {
+        let backing = self.backing(part.first, Some(path.clone()), 2);
+        let mut mesh = Mesh::new(Pager::new(self.share.frames / 4, Some(backing)));
+        let high = part.first == opened.zone.cut;
+        let bounds = &self.common.bounds;
+        bisect::write_child(host, core, &mut mesh, opened, high, bounds, space)?;
+        let mut inherited = Vec::new();
+        for n in 0..mesh.n_interface_faces() {
+            let face = mesh.interface_face(n);
+            if face.cut != opened.zone.cut {
+                inherited.push(InheritedFace { cut: face.cut, index: face.index, side: face.side });
+            }
+        }
+        inherited.sort_unstable();
+        if mesh.n_tets() == 0 {
+            let cut = opened.zone.cut;
+            return Err(PipelineError::EmptyPart { cut });
+        }
+        let [below, all] = opened.report.plane.load;
+        let load = if high { all - below } else { below };
+        let part_mesh = PartMesh {
+            part,
+            generation: self.order.parent.generation + DONE,
+            state: mesh.state(),
+            extents: mesh.pages().extents(),
+            load,
+        };
+        let stats = mesh.into_pages().finish();
+        let child = Child { mesh: part_mesh, inherited };
+        Ok((child, stats))
+    }
+
+    /// Where pages go that leave memory, with one part in `share` of redb's cache.
+    fn backing(&self, subdomain: u32, made: Option<DiskPath>, share: u64) -> Backing {
+        Backing {
+            subdomain,
+            generation: self.order.parent.generation + DONE,
+            spill: self.scratch.clone(),
+            made,
+            base: None,
+            cache_bytes: (self.share.redb / share) as usize,
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! The fine mesh of one sub-domain: sizes, saturation, optimization.
+
+use std::time::Instant;
+
+use super::common::Common;
+use crate::pipeline::error::PipelineError;
+use crate::pipeline::progress::{Event, Watcher};
+use tetdb_base::storage::Pages;
+use tetdb_kernel::bisect::{OutsideZones, Zone};
+use tetdb_kernel::mesh::{Mesh, Workspace};
+use tetdb_kernel::optimize::{self, OptimizeReport};
+use tetdb_kernel::refine::{Everywhere, Field, PlacementRule, RefineReport, saturate};
+use tetdb_kernel::sizing::SizeField;
+
+/// What the fine step did.
+#[derive(Clone, Debug)]
+pub struct FineReport {
+    /// What the division of edges did.
+    pub refine: RefineReport,
+    /// What the optimization did.
+    pub optimize: OptimizeReport,
+    /// What refinement and optimization took.
+    pub seconds: [f64; 2],
+}
+
+/// Divides and optimizes a coarse mesh; no vertex is added in `zones`, which are final.
+pub fn saturate_and_optimize<P: Pages>(
+    mesh: &mut Mesh<P>,
+    field: &SizeField,
+    common: Common,
+    zones: &[Zone],
+    space: &Workspace,
+    watch: &Watcher,
+) -> Result<FineReport, PipelineError> {
+    watch(Event { stage: "divide edges", done: 0, total: None, unit: "vertices" });
+    let clock = Instant::now();
+    for v in mesh.vertex_ids() {
+        let p = mesh.point(v);
+        mesh.set_size(v, field.h(p) as f32);
+    }
+    let h = |p| field.h(p);
+    let outside = OutsideZones { zones, h: &h };
+    let place: &dyn PlacementRule = if zones.is_empty() { &Everywhere } else { &outside };
+    let wanted =
+        Field { h: &|p| field.h(p), place, lengths: common.method.lengths, bounds: common.bounds };
+    let refine = saturate(mesh, &wanted, space, &mut |inserted| {
+        watch(Event { stage: "divide edges", done: inserted, total: None, unit: "vertices" });
+    })?;
+    let refined = clock.elapsed().as_secs_f64();
+    let optimize = optimize::run(mesh, common.mode, &|p| watch(p.into()));
+    Ok(FineReport { refine, optimize, seconds: [refined, clock.elapsed().as_secs_f64() - refined] })
+}

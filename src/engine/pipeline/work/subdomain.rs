@@ -1,0 +1,171 @@
+//! One sub-domain: saturated, optimized and sealed alone, by a worker of its own.
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use tetdb_schema::ids::SubdomainId;
+
+use super::coarse_snapshot::save;
+use super::common::Common;
+use super::receipt::{SubdomainReceipt, Traffic};
+use super::saturate::{FineReport, saturate_and_optimize};
+use super::soundness::panic_is_damage_of;
+use crate::pipeline::error::PipelineError;
+use crate::pipeline::plan::Plan;
+use crate::pipeline::progress::Watcher;
+use crate::pipeline::seal::compact::seal;
+use crate::pipeline::seal::target::SealTarget;
+use crate::pipeline::seal::totals::{SealedTotals, journal};
+use crate::pipeline::tree::{PartMesh, open_part};
+use tetdb_base::storage::{Backing, DiskPath, PagerStats, attempt};
+use tetdb_kernel::bisect::Zone;
+use tetdb_kernel::mesh::{Mesh, Workspace};
+use tetdb_kernel::sizing::{SizeField, TETS_PER_LOAD};
+use tetdb_kernel::topology::FacesAcross;
+use tetdb_schema::catalog::{CoarseRow, StoreState};
+use tetdb_store::sealed::{Form, Sealed};
+
+/// What a worker needs to make a sub-domain.
+pub struct SubdomainJob {
+    pub part: PartMesh,
+    /// The part's file, the file to make.
+    pub base: DiskPath,
+    pub sealed: DiskPath,
+    pub form: Form,
+    /// Generation of the file to make.
+    pub generation: u32,
+    /// A size field of its own, in place of that of the whole.
+    pub field: Option<SizeField>,
+    /// Where to keep the coarse snapshot, if it is to be kept.
+    pub kept: Option<DiskPath>,
+    pub scratch: DiskPath,
+    pub zones: Vec<Zone>,
+    /// Who has the other side of the faces around it, by cut.
+    pub owners: BTreeMap<u32, FacesAcross>,
+    pub share: Plan,
+}
+
+/// A finished sub-domain; its file is not yet listed.
+pub struct FinishedSubdomain {
+    pub part: PartMesh,
+    pub sealed: Sealed,
+    pub kept: Option<CoarseRow>,
+    /// Seconds it took to keep the coarse snapshot.
+    pub keep_s: f64,
+    pub fine: FineReport,
+    pub pages: PagerStats,
+    pub frames_used: usize,
+    pub seal_seconds: f64,
+    pub clock: Instant,
+}
+
+impl SubdomainJob {
+    /// Does the whole job; a failed page access ends here.
+    pub fn run(self, common: Common, watch: &Watcher) -> Result<FinishedSubdomain, PipelineError> {
+        let (part, base) = (self.part, self.base.clone());
+        let (generation, scratch, share) = (self.generation, self.scratch.clone(), self.share);
+        let open = || {
+            let backing = Backing {
+                subdomain: part.part.first,
+                generation,
+                spill: scratch.clone(),
+                made: None,
+                base: None,
+                cache_bytes: share.redb as usize,
+            };
+            open_part(part, base.clone(), backing, share.frames)
+        };
+        attempt(|| {
+            panic_is_damage_of((&base, part.part.first), open, || {
+                self.finish(open()?, common, watch)
+            })
+        })?
+    }
+
+    /// The same for a mesh already open.
+    pub fn finish(
+        self,
+        mut mesh: Mesh,
+        common: Common,
+        watch: &Watcher,
+    ) -> Result<FinishedSubdomain, PipelineError> {
+        let clock = Instant::now();
+        let space = Workspace { dir: &self.scratch, memory: self.share.buffers / 2 };
+        let (rank, coarse) = (self.part.part.first, self.part.generation);
+        let kept = match &self.kept {
+            Some(path) => Some(save(&mut mesh, path, rank, coarse, self.share.buffers)?),
+            None => None,
+        };
+        let keep_s = clock.elapsed().as_secs_f64();
+        let fine = saturate_and_optimize(
+            &mut mesh,
+            self.field.as_ref().unwrap_or(common.field),
+            common,
+            &self.zones,
+            &space,
+            watch,
+        )?;
+        let generation = self.generation;
+        let target = SealTarget {
+            path: &self.sealed,
+            form: self.form,
+            scratch: &self.scratch,
+            subdomain: SubdomainId::new(rank).expect("fewer parts than ranks"),
+            generation,
+            memory: self.share.buffers,
+            bounds: common.bounds,
+            owners: Some(&self.owners),
+        };
+        let seal_clock = Instant::now();
+        let sealed = seal(&mut mesh, &target, watch)?;
+        let seal_seconds = seal_clock.elapsed().as_secs_f64();
+        let pager = mesh.into_pages();
+        let (pages, frames_used) = (pager.stats(), pager.frames_used());
+        drop(pager);
+        let _ = self.scratch.remove_dir_all();
+        Ok(FinishedSubdomain {
+            part: self.part,
+            sealed,
+            kept,
+            keep_s,
+            fine,
+            pages,
+            frames_used,
+            seal_seconds,
+            clock,
+        })
+    }
+}
+
+impl FinishedSubdomain {
+    /// For whoever commits it; the state of the store after that is set then.
+    pub fn receipt(&self) -> SubdomainReceipt {
+        let refine = &self.fine.refine;
+        let measures = [
+            ("predicted_tets", TETS_PER_LOAD * self.part.load),
+            ("coarse_tets", f64::from(self.part.state.n_tets())),
+            ("keep_s", self.keep_s),
+            ("inserted_vertices", refine.inserted as f64),
+            ("over_constrained_tets", refine.over_constrained as f64),
+            ("zone_rejects", refine.out_of_place as f64),
+            ("frozen_hits", refine.frozen_hits as f64),
+            ("pages_read", self.pages.pages_read as f64),
+            ("pages_written", self.pages.pages_written as f64),
+            ("frames_used", self.frames_used as f64),
+            ("refine_s", self.fine.seconds[0]),
+            ("optimize_s", self.fine.seconds[1]),
+            ("seal_s", self.seal_seconds),
+        ];
+        let step = "saturate, optimize, seal";
+        let mut journal = journal(StoreState::Bisected, step, self.clock, &measures);
+        journal.subdomain = Some(self.part.part.first);
+        SubdomainReceipt {
+            coarse: self.part.generation,
+            row: self.sealed.row.clone(),
+            kept: self.kept,
+            totals: SealedTotals::of(&self.sealed).to_bytes(),
+            journal,
+            traffic: Traffic::new(self.pages, self.frames_used),
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! Who does orders: the same for every carrier.
+
+use std::collections::BTreeMap;
+
+use super::common::Common;
+use super::cut::CutJob;
+use super::order::{CutOrder, Order, SubdomainOrder};
+use super::receipt::{CutReceipt, Receipt};
+use super::subdomain::SubdomainJob;
+use crate::pipeline::error::PipelineError;
+use crate::pipeline::plan::Plan;
+use crate::pipeline::progress::Watcher;
+use crate::pipeline::tree::DONE;
+use tetdb_base::storage::DiskPath;
+use tetdb_kernel::bisect::CutReport;
+use tetdb_store::store::{Catalog, StoreError};
+
+/// Where a worker finds files and leaves new ones.
+#[derive(Clone, Debug)]
+pub struct Workplace {
+    /// The folder of the store.
+    pub store: DiskPath,
+    /// Where new files go, and are looked for first.
+    pub output: DiskPath,
+    /// Where pages and sorted runs go that leave memory.
+    pub scratch: DiskPath,
+}
+
+/// Does orders.
+pub struct Worker<'a> {
+    pub place: Workplace,
+    pub common: Common<'a>,
+}
+
+impl Workplace {
+    /// In the store itself: for who has its lock.
+    pub fn in_store(catalog: &Catalog) -> Result<Self, StoreError> {
+        let store = catalog.disk_path().clone();
+        Ok(Self { output: store.clone(), store, scratch: catalog.scratch_dir()? })
+    }
+
+    fn input(&self, name: String) -> DiskPath {
+        let own = self.output.join(&name);
+        match own.is_file() {
+            true => own,
+            false => self.store.join(&name),
+        }
+    }
+
+    /// A folder of this name for one order.
+    fn scratch(&self, name: String) -> Result<DiskPath, StoreError> {
+        let path = self.scratch.join(name);
+        path.create_dir_all()?;
+        Ok(path)
+    }
+}
+
+impl Worker<'_> {
+    /// Does one order, with the memory of `share`.
+    pub fn perform(
+        &self,
+        order: Order,
+        share: Plan,
+        watch: &Watcher,
+    ) -> Result<Receipt, PipelineError> {
+        match order {
+            Order::Cut(order) => Ok(Receipt::Cut(self.cut(&order, share, watch)?.0)),
+            Order::Subdomain(order) => {
+                let job = self.subdomain_job(order, share)?;
+                let finished = job.run(self.common, watch)?;
+                Ok(Receipt::Subdomain(finished.receipt()))
+            }
+        }
+    }
+
+    /// Bisects a part; a failed page access ends here.
+    pub fn cut(
+        &self,
+        order: &CutOrder,
+        share: Plan,
+        watch: &Watcher,
+    ) -> Result<(CutReceipt, CutReport), PipelineError> {
+        let (parent, cut) = (order.parent, order.parent.part.cut());
+        let written = (parent.part.children()).map(|part| {
+            let name = Catalog::file_name(part.first, parent.generation + DONE);
+            self.place.output.join(name)
+        });
+        let base = Catalog::file_name(parent.part.first, parent.generation);
+        let job = CutJob {
+            order,
+            base: self.place.input(base),
+            written,
+            output: &self.place.output,
+            scratch: self.place.scratch(format!("cut-{cut}"))?,
+            zones: order.zones.iter().map(|&zone| zone.into()).collect(),
+            common: self.common,
+            share,
+        };
+        job.run(watch)
+    }
+
+    /// What a sub-domain takes.
+    pub fn subdomain_job(
+        &self,
+        order: SubdomainOrder,
+        share: Plan,
+    ) -> Result<SubdomainJob, PipelineError> {
+        let SubdomainOrder { part, zones, owners } = order;
+        let (rank, coarse) = (part.part.first, part.generation);
+        let output = |name: String| self.place.output.join(name);
+        let kept = Catalog::coarse_name(rank, coarse);
+        Ok(SubdomainJob {
+            part,
+            base: self.place.input(Catalog::file_name(rank, coarse)),
+            sealed: output(Catalog::file_name(rank, coarse + DONE)),
+            generation: coarse + DONE,
+            form: self.common.form,
+            field: None,
+            kept: self.common.keeps_coarse.then(|| output(kept)),
+            scratch: self.place.scratch(format!("leaf-{rank}"))?,
+            zones: zones.into_iter().map(Into::into).collect(),
+            owners: BTreeMap::from_iter(owners),
+            share: share.without_file(),
+        })
+    }
+}

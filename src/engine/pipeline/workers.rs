@@ -1,0 +1,248 @@
+//! Workers that take jobs from one list; what they finish is committed by one.
+
+use std::cell::Cell;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+use super::error::PipelineError;
+use super::progress::{Event, Watcher};
+use tetdb_base::storage::RunContext;
+
+/// Milliseconds between two words of one worker.
+const TELL_EVERY: u128 = 100;
+
+/// A worker's part.
+pub type Hand<'a, J, D> = &'a (dyn Fn(J, &Watcher) -> Result<D, PipelineError> + Sync);
+
+/// Does `jobs` with a thread for each of `hands`, which do their part; `commit` takes what was done, in whatever order
+/// it is finished, and names the jobs that have become possible.
+///
+/// Threads of their own, not tasks of the pool: a task that waits for a sort would take up another job meanwhile, and its memory.
+/// Errors: the first of `hands` and `commit`; what others finish after it is not committed.
+pub fn work_off<J: Send, D: Send>(
+    jobs: Vec<J>,
+    hands: &[Hand<J, D>],
+    watch: &Watcher,
+    commit: &mut dyn FnMut(D) -> Result<Vec<J>, PipelineError>,
+) -> Result<(), PipelineError> {
+    let list = JobQueue::new(jobs);
+    let (tell, hear) = channel();
+    std::thread::scope(|scope| {
+        for &run in hands {
+            let (list, tell) = (&list, tell.clone());
+            let context = RunContext::current();
+            scope.spawn(move || match context {
+                Some(context) => context.enter(|| work(list, run, &tell)),
+                None => work(list, run, &tell),
+            });
+        }
+        drop(tell);
+        // Who listens may unwind too: `watch` and `commit` are others' code.
+        let _alarm = Alarm(&list);
+        let result = listen(&list, &hear, watch, commit);
+        list.give_up();
+        result
+    })
+}
+
+/// Does a job for each of `items`, in their order; `commit` takes what was done, in whatever order it is finished.
+///
+/// Of thousands of jobs only the next few are drawn up, for each knows the owners of all faces of the cuts above it. `draw` and `commit` share
+/// `state`. Errors: the first of the three.
+pub fn map_bounded<S, I, J: Send, D: Send>(
+    state: &mut S,
+    items: Vec<I>,
+    hands: &[Hand<J, D>],
+    watch: &Watcher,
+    draw: impl Fn(&mut S, I) -> Result<J, PipelineError>,
+    commit: impl Fn(&mut S, D) -> Result<(), PipelineError>,
+) -> Result<(), PipelineError> {
+    let mut items = items.into_iter();
+    let at_hand = 2 * hands.len();
+    let mut jobs = Vec::with_capacity(at_hand);
+    for item in items.by_ref().take(at_hand) {
+        jobs.push(draw(state, item)?);
+    }
+    // The last of the list is taken first.
+    jobs.reverse();
+    work_off(jobs, hands, watch, &mut |done| {
+        commit(state, done)?;
+        let next = items.next().map(|item| draw(state, item));
+        Ok(next.transpose()?.into_iter().collect())
+    })
+}
+
+/// What a worker says.
+enum WorkerMessage<D> {
+    Progress(Event),
+    Done(Box<Result<D, PipelineError>>),
+}
+
+/// Hands on what workers tell, and commits what they finish.
+fn listen<J, D>(
+    list: &JobQueue<J>,
+    hear: &Receiver<WorkerMessage<D>>,
+    watch: &Watcher,
+    commit: &mut dyn FnMut(D) -> Result<Vec<J>, PipelineError>,
+) -> Result<(), PipelineError> {
+    for told in hear {
+        match told {
+            WorkerMessage::Progress(event) => watch(event),
+            WorkerMessage::Done(done) => list.done(commit((*done)?)?),
+        }
+    }
+    Ok(())
+}
+
+/// Takes jobs until there is none and none to come.
+fn work<J, D>(
+    list: &JobQueue<J>,
+    run: &dyn Fn(J, &Watcher) -> Result<D, PipelineError>,
+    tell: &Sender<WorkerMessage<D>>,
+) {
+    let _alarm = Alarm(list);
+    while let Some(job) = list.take() {
+        let last = Cell::new(None::<Instant>);
+        let watch = |event: Event| {
+            let due = last.get().is_none_or(|t| t.elapsed().as_millis() > TELL_EVERY);
+            if due {
+                last.set(Some(Instant::now()));
+                // Nobody listens once a step has failed.
+                let _ = tell.send(WorkerMessage::Progress(event));
+            }
+        };
+        let done = Box::new(RunContext::busy(|| run(job, &watch)));
+        if tell.send(WorkerMessage::Done(done)).is_err() {
+            return;
+        }
+    }
+}
+
+/// Lets nobody wait for a job of one that panicked.
+struct Alarm<'a, J>(&'a JobQueue<J>);
+
+impl<J> Drop for Alarm<'_, J> {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            self.0.give_up();
+        }
+    }
+}
+
+/// Jobs to be taken, the last first.
+struct JobQueue<J> {
+    state: Mutex<Jobs<J>>,
+    changed: Condvar,
+}
+
+struct Jobs<J> {
+    waiting: Vec<J>,
+    /// Jobs waiting, being done, or done and not yet committed: only they can bring new ones. 0: no job is taken any more.
+    open: usize,
+}
+
+impl<J> JobQueue<J> {
+    fn new(waiting: Vec<J>) -> Self {
+        let open = waiting.len();
+        Self { state: Mutex::new(Jobs { waiting, open }), changed: Condvar::new() }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Jobs<J>> {
+        // A worker that panics does so outside of the lock.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Waits for a job; `None` when there will be none.
+    fn take(&self) -> Option<J> {
+        let mut jobs = self.lock();
+        loop {
+            if jobs.open == 0 {
+                return None;
+            }
+            if let Some(job) = jobs.waiting.pop() {
+                return Some(job);
+            }
+            jobs = (self.changed.wait(jobs)).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    /// One job is committed and has brought others.
+    fn done(&self, more: Vec<J>) {
+        let mut jobs = self.lock();
+        if jobs.open > 0 {
+            jobs.open = jobs.open + more.len() - 1;
+            jobs.waiting.extend(more);
+        }
+        self.changed.notify_all();
+    }
+
+    /// No job is taken any more.
+    fn give_up(&self) {
+        let mut jobs = self.lock();
+        jobs.waiting.clear();
+        jobs.open = 0;
+        self.changed.notify_all();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pipeline::progress::silent;
+
+    /// Jobs that halve a number until it is 1: `n` leaves, whatever the order.
+    fn halve(n: u32, workers: usize, fail_at: u32) -> Result<u32, PipelineError> {
+        let mut leaves = 0;
+        let run = &|n: u32, _: &Watcher| match n {
+            n if n == fail_at => Err(PipelineError::NothingFilled { policy: String::new() }),
+            n => Ok(n),
+        };
+        work_off(vec![n], &vec![run as Hand<u32, u32>; workers], &silent, &mut |n| {
+            if n == 1 {
+                leaves += 1;
+                return Ok(Vec::new());
+            }
+            Ok(vec![n / 2, n - n / 2])
+        })?;
+        Ok(leaves)
+    }
+
+    #[test]
+    fn jobs_bring_jobs_and_a_failure_ends_all() {
+        for workers in [1, 2, 5] {
+            assert_eq!(halve(1, workers, 0).ok(), Some(1));
+            assert_eq!(halve(37, workers, 0).ok(), Some(37));
+            assert!(halve(37, workers, 3).is_err());
+        }
+        let nothing: Vec<u32> = Vec::new();
+        assert!(
+            work_off(
+                nothing,
+                &[&|n, _: &Watcher| Ok(n), &|n, _: &Watcher| Ok(n)],
+                &silent,
+                &mut |_| Ok(Vec::new())
+            )
+            .is_ok()
+        );
+    }
+
+    #[test]
+    fn nobody_waits_when_the_listener_unwinds() {
+        let run = &|n: u32, watch: &Watcher| {
+            watch(Event { stage: "a step", done: 1, total: None, unit: "jobs" });
+            Ok(n)
+        };
+        for (in_watch, in_commit) in [(true, false), (false, true)] {
+            let watch = |_: Event| assert!(!in_watch, "the caller's own trouble");
+            let ended = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+                work_off(vec![1, 2], &[run as Hand<u32, u32>; 2], &watch, &mut |n| {
+                    assert!(!in_commit, "the same here");
+                    // One job more than there will ever be.
+                    Ok(vec![n])
+                })
+            }));
+            assert!(ended.is_err());
+        }
+    }
+}

@@ -1,0 +1,336 @@
+//! A child on its way: its vertices and tetrahedra get their numbers, then they are written.
+
+use super::core::{SHARED, copy_attribute, fate, is_held, tet_ids};
+use super::interface_faces::for_each_interface_face;
+use super::opened::Opened;
+use super::surface::CuttingSurface;
+use crate::mesh::anatomy::{FROZEN, REQUIRED};
+use crate::mesh::{FaceRef, InterfaceFace, Mesh, Workspace, dense, sparse};
+use tetdb_base::geom::HilbertFrame;
+use tetdb_base::storage::{Pages, Sorter, StorageError, check_cancelled, sort_record};
+use tetdb_schema::page::NONE;
+
+/// A child on its way.
+pub(super) struct Split<'a, P: Pages, Q: Pages, R: Pages> {
+    pub host: &'a mut Mesh<P>,
+    pub core: &'a mut Mesh<Q>,
+    pub child: &'a mut Mesh<R>,
+    pub opened: &'a Opened,
+    pub high: bool,
+    /// Where the map of tetrahedra begins in each scratch map, behind that of vertices.
+    pub host_base: u32,
+    pub core_base: u32,
+    /// Tetrahedra out of the core with a required face whose vertices may all be in it.
+    pub at_core: Vec<u32>,
+}
+
+impl<P: Pages, Q: Pages, R: Pages> Split<'_, P, Q, R> {
+    /// Bits of the fate of a tetrahedron that goes to this child.
+    fn fate(&self) -> u32 {
+        if self.high { fate::HIGH } else { 0 }
+    }
+
+    /// Whether a vertex of the host that the core does not have is on this side.
+    pub fn is_beside(&mut self, v: u32) -> bool {
+        let p = self.host.point(v);
+        (self.opened.zone.surface.distance(p) >= 0.0) == self.high
+    }
+
+    /// Adds all vertices of the child's tetrahedra; both scratch maps tell their numbers.
+    pub fn add_vertices(
+        &mut self,
+        order: &HilbertFrame,
+        space: &Workspace,
+    ) -> Result<(), StorageError> {
+        self.meet_core_vertices();
+        let mut sorter = Sorter::new(space.dir, space.memory);
+        for n in 0..self.core_base {
+            let (v, met) = (sparse(n), self.core.scratch(n));
+            if met != NONE && !is_held(self.core, v) {
+                let key = order.index(self.core.point(v));
+                sorter.push(ChildVertex { key, met, source: v })?;
+            }
+        }
+        for n in 0..self.host_base {
+            let (v, met) = (sparse(n), self.host.scratch(n));
+            if met == NONE {
+                continue;
+            }
+            if met & SHARED == 0 {
+                if self.is_beside(v) {
+                    let key = order.index(self.host.point(v));
+                    let met = OF_HOST | met;
+                    let source = OF_HOST | v;
+                    sorter.push(ChildVertex { key, met, source })?;
+                }
+                continue;
+            }
+            // Vertices of the rim have in the core no tag of their own.
+            let (copy, met) = (met & !SHARED, self.core.scratch(dense(met & !SHARED)));
+            if met != NONE && is_held(self.core, copy) {
+                let key = order.index(self.host.point(v));
+                let source = OF_HOST | v;
+                sorter.push(ChildVertex { key, met, source })?;
+            }
+        }
+        for vertex in sorter.finish()? {
+            let source = vertex?.source;
+            if source & OF_HOST == 0 {
+                self.add_core_vertex(source);
+                continue;
+            }
+            let v = source & !OF_HOST;
+            let number = self.add_host_vertex(v);
+            let known = self.host.scratch(dense(v));
+            if known & SHARED == 0 {
+                self.host.set_scratch(dense(v), number);
+            } else {
+                self.core.set_scratch(dense(known & !SHARED), number);
+            }
+        }
+        Ok(())
+    }
+
+    /// Numbers the core's vertices as they are met in tetrahedra of this side; in its scratch map others have [`NONE`].
+    fn meet_core_vertices(&mut self) {
+        self.core.clear_scratch();
+        for n in 0..self.core_base {
+            self.core.set_scratch(n, NONE);
+        }
+        let mut met = 0;
+        for t in tet_ids(self.core) {
+            let tet = self.core.tet(t);
+            let ours = tet.is_live() && self.opened.labels.is_high(t) == self.high;
+            self.core.set_scratch(self.core_base + dense(t), if ours { 0 } else { NONE });
+            if !ours {
+                continue;
+            }
+            for v in tet.vertices() {
+                if self.core.scratch(dense(v)) == NONE {
+                    self.core.set_scratch(dense(v), met);
+                    met += 1;
+                }
+            }
+        }
+    }
+
+    fn add_core_vertex(&mut self, v: u32) -> u32 {
+        let (p, h) = self.core.point_and_size(v);
+        let number = self.child.add_vertex(p, h);
+        copy_attribute(self.core, v, self.child, number);
+        self.core.set_scratch(dense(v), number);
+        number
+    }
+
+    /// Adds a vertex of the host; the scratch maps are as before.
+    pub fn add_host_vertex(&mut self, v: u32) -> u32 {
+        let (p, h) = self.host.point_and_size(v);
+        let number = self.child.add_vertex(p, h);
+        copy_attribute(self.host, v, self.child, number);
+        number
+    }
+
+    /// The child's number of a vertex of one of the host's tetrahedra of this side.
+    #[inline]
+    fn host_vertex(&mut self, v: u32) -> u32 {
+        let known = self.host.scratch(dense(v));
+        if known & SHARED == 0 {
+            return known;
+        }
+        let copy = known & !SHARED;
+        let number = self.core.scratch(dense(copy));
+        if number != NONE {
+            return number;
+        }
+        // None of its tetrahedra in the core is on this side: the mesh is pinched there.
+        let number = self.add_host_vertex(v);
+        self.core.set_scratch(dense(copy), number);
+        self.child.set_scratch(dense(number), 0);
+        number
+    }
+
+    /// Whether the host's tetrahedron at position `n` goes to this child; then the number in the scratch map.
+    #[inline]
+    fn of_host(&mut self, n: u32) -> Option<u32> {
+        let word = self.host.scratch(self.host_base + n);
+        (word & fate::BITS == self.fate()).then_some(word & !fate::BITS)
+    }
+
+    /// Puts into the scratch maps the child's number of each of its tetrahedra.
+    pub fn number_tets(&mut self) {
+        let fate = self.fate();
+        for n in 0..dense(self.child.vertex_ids_end()) {
+            self.child.set_scratch(n, 0);
+        }
+        // First the smallest number of a vertex, which is counted in the child's scratch map.
+        for t in tet_ids(self.core) {
+            let place = self.core_base + dense(t);
+            if self.core.scratch(place) == NONE {
+                continue;
+            }
+            let numbers = (self.core.tet(t).vertices()).map(|v| self.core.scratch(dense(v)));
+            let least = least(numbers);
+            self.core.set_scratch(place, least);
+            self.count(least);
+        }
+        for n in 0..dense(self.host.tet_ids_end()) {
+            if n & 1023 == 0 {
+                check_cancelled();
+            }
+            if self.of_host(n).is_some() {
+                let [a, b, c, d] = self.host.tet(sparse(n)).vertices();
+                let numbers = [
+                    self.host_vertex(a),
+                    self.host_vertex(b),
+                    self.host_vertex(c),
+                    self.host_vertex(d),
+                ];
+                let least = least(numbers);
+                self.host.set_scratch(self.host_base + n, fate | least);
+                self.count(least);
+            }
+        }
+        let mut sum = 0;
+        for n in 0..dense(self.child.vertex_ids_end()) {
+            let count = self.child.scratch(n);
+            self.child.set_scratch(n, sum);
+            sum += count;
+        }
+        // Then the place among those with the same.
+        for t in tet_ids(self.core) {
+            let place = self.core_base + dense(t);
+            let least = self.core.scratch(place);
+            if least != NONE {
+                let number = self.next_of(least);
+                self.core.set_scratch(place, number);
+            }
+        }
+        for n in 0..dense(self.host.tet_ids_end()) {
+            if let Some(least) = self.of_host(n) {
+                let number = self.next_of(least);
+                self.host.set_scratch(self.host_base + n, fate | number);
+            }
+        }
+        self.child.clear_scratch();
+        self.child.take_tets(sum);
+    }
+
+    /// Counts a tetrahedron at its first vertex.
+    #[inline]
+    fn count(&mut self, first: u32) {
+        let n = self.child.scratch(dense(first));
+        self.child.set_scratch(dense(first), n + 1);
+    }
+
+    /// The next number of a tetrahedron with that first vertex.
+    #[inline]
+    fn next_of(&mut self, first: u32) -> u32 {
+        let n = self.child.scratch(dense(first));
+        self.child.set_scratch(dense(first), n + 1);
+        sparse(n)
+    }
+
+    pub fn write_host(&mut self) {
+        for n in 0..dense(self.host.tet_ids_end()) {
+            if n & 1023 == 0 {
+                check_cancelled();
+            }
+            let Some(number) = self.of_host(n) else {
+                continue;
+            };
+            let tet = self.host.tet(sparse(n));
+            let mut copy = tet;
+            let (mut required, mut shared) = (0, 0);
+            for i in 0..4 {
+                required |= tet.node[i] & REQUIRED;
+                shared += self.host.scratch(dense(tet.vertex(i))) >> SHARED.trailing_zeros();
+                copy.node[i] = self.host_vertex(tet.vertex(i)) | tet.node[i] & REQUIRED;
+                let across = tet.neighbor[i];
+                if across.exists() {
+                    // Those across the rim are linked from the core.
+                    let other = self.of_host(dense(across.tet()));
+                    copy.neighbor[i] =
+                        other.map_or(FaceRef::NONE, |t| FaceRef::new(t, across.face()));
+                }
+            }
+            if required != 0 && shared > 2 {
+                self.at_core.push(number);
+            }
+            let (region, flags) = self.host.tet_attribute(sparse(n));
+            self.child.place_tet(number, copy);
+            (self.child).set_tet_attribute(number, region, flags & FROZEN);
+        }
+    }
+
+    pub fn write_core(&mut self) {
+        for t in tet_ids(self.core) {
+            let number = self.core.scratch(self.core_base + dense(t));
+            if number == NONE {
+                continue;
+            }
+            let tet = self.core.tet(t);
+            let mut copy = tet;
+            let mut flags = 0;
+            for (i, across) in tet.neighbor.into_iter().enumerate() {
+                let here = FaceRef::new(number, i);
+                let mut node = self.core.scratch(dense(tet.vertex(i))) | tet.node[i] & REQUIRED;
+                if across.exists() {
+                    let other = self.core.scratch(self.core_base + dense(across.tet()));
+                    if other == NONE {
+                        copy.neighbor[i] = FaceRef::NONE;
+                        node |= REQUIRED;
+                        flags = FROZEN;
+                    } else {
+                        copy.neighbor[i] = FaceRef::new(other, across.face());
+                    }
+                } else if let Some(beyond) = self.opened.rim.find(tet.face(i)) {
+                    let there = self.host.tet(beyond.tet());
+                    let other = self.of_host(dense(beyond.tet()));
+                    let other = other.expect("the rim is not free: both sides of it go together");
+                    let other = FaceRef::new(other, beyond.face());
+                    copy.neighbor[i] = other;
+                    self.child.set_neighbor(other, here);
+                    node &= !REQUIRED;
+                    node |= there.node[beyond.face()] & REQUIRED;
+                }
+                copy.node[i] = node;
+            }
+            let (region, _) = self.core.tet_attribute(t);
+            self.child.place_tet(number, copy);
+            self.child.set_tet_attribute(number, region, flags);
+        }
+    }
+
+    pub fn new_interface(&mut self) {
+        let (child, high, cut) = (&mut *self.child, self.high, self.opened.zone.cut);
+        let mut index = 0;
+        for_each_interface_face(self.core, &self.opened.labels, |core, tet, i| {
+            let mut vertices = tet.face(i).map(|v| core.scratch(dense(v)));
+            if high {
+                vertices.swap(1, 2);
+            }
+            child.add_interface_face(InterfaceFace { vertices, cut, index, side: u32::from(high) });
+            index += 1;
+        });
+    }
+}
+
+sort_record! {
+    /// A vertex of the child.
+    struct ChildVertex {
+        /// Its place along the curve.
+        key: u64,
+        /// When it was met; [`OF_HOST`] when in the host alone.
+        met: u32,
+        /// Where it comes from: its id, [`OF_HOST`] when that is one of the host.
+        source: u32,
+    }
+}
+
+/// Of a vertex met in the host alone: after those of the core. Of a source: in the host.
+const OF_HOST: u32 = 1 << 31;
+
+#[inline]
+fn least([a, b, c, d]: [u32; 4]) -> u32 {
+    a.min(b).min(c.min(d))
+}

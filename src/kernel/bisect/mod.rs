@@ -1,0 +1,182 @@
+//! One cut: plane, refined zone, interface, two children.
+//!
+//! 1. `plane`: across an axis of inertia of the load to come, where the load is shared as wanted.
+//! 2. `zone`: edges that meet a band around it are divided until the band has its final density.
+//! 3. `core`: its middle is copied out and optimized as a mesh of its own.
+//! 4. `interface`: faces of these final tetrahedra are chosen, by a minimum cut and moves; from then on they are required.
+//! 5. `split`: each side becomes a mesh of its own.
+//!
+//! What later vertices could destroy of the tetrahedra at the interface (Z) is frozen, so that what is valid stays valid; whether
+//! they ever wanted to is counted. When they did not, the interface has cost the Delaunay property nothing.
+//!
+//! Source: the paper, section 1.1.
+
+mod axes;
+mod child;
+mod core;
+mod flow;
+mod inherit;
+mod interface;
+mod interface_faces;
+mod labels;
+mod load;
+mod moves;
+mod opened;
+mod plane;
+mod report;
+mod split;
+mod spread;
+mod surface;
+mod zone;
+
+pub use axes::principal_axes;
+pub use interface::InterfaceReport;
+pub use labels::InterfaceMeasures;
+pub use load::{SizeAt, load_of};
+pub use moves::Steps;
+pub use opened::Opened;
+pub use plane::{PlaneChoice, choose as choose_plane};
+pub use report::{CutReport, StageSeconds};
+pub use split::write_child;
+pub use spread::ChosenPlane;
+pub use surface::{CuttingSurface, Plane};
+pub use zone::{OutsideZones, WIDTH_MIN, WIDTH_NOISE, Zone};
+
+use std::time::Instant;
+
+use crate::mesh::{Mesh, Workspace};
+use crate::optimize::{self, Settings};
+use crate::refine::{Field, Lengths, RefineReport, saturate};
+use tetdb_base::geom::{Aabb, Point};
+use tetdb_base::storage::{Pages, StorageError};
+
+/// Ways to go, for comparing what each part of the method brings; the default is the method.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Method {
+    /// How the wanted length of an edge is found.
+    pub lengths: Lengths,
+    /// How the cutting plane is chosen.
+    pub plane: PlaneChoice,
+    /// Steps of the choice of the interface.
+    pub steps: Steps,
+}
+
+/// What a cut is to do.
+#[derive(Clone, Copy)]
+pub struct CutPlan<'a> {
+    /// Number of the cut, from 1.
+    pub cut: u32,
+    /// Share of the load that belongs on the low side.
+    pub low: f64,
+    /// Which variant of the method is used.
+    pub method: Method,
+    /// Zones of the cuts above it.
+    pub earlier: &'a [Zone],
+    /// Wanted length at a position.
+    pub h: &'a SizeAt<'a>,
+    /// Box of the whole mesh.
+    pub bounds: Aabb,
+    /// Settings of the optimization of the core.
+    pub optimize: Settings,
+}
+
+/// A sub-domain whose zone is refined.
+pub struct Refined {
+    /// The zone that was refined.
+    pub zone: Zone,
+    plane: ChosenPlane,
+    refine: RefineReport,
+    seconds: StageSeconds,
+}
+
+/// Faces of an interface as points, seen from the low side: before and after the choice.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct InterfaceFaces {
+    /// Faces before the choice.
+    pub natural: Vec<[Point; 3]>,
+    /// Faces of the chosen interface.
+    pub chosen: Vec<[Point; 3]>,
+}
+
+/// Refines the zone of a cut in `host` and chooses the interface in `core`, which must be empty.
+///
+/// `progress` receives a stage and how much of it is done. Effects: all ids of `host` may change. Errors: the disk.
+pub fn open<P: Pages, Q: Pages>(
+    host: &mut Mesh<P>,
+    core: &mut Mesh<Q>,
+    plan: &CutPlan,
+    space: &Workspace,
+    progress: &dyn Fn(&'static str, u64),
+) -> Result<Opened, StorageError> {
+    let refined = refine(host, plan, space, progress)?;
+    Ok(choose(host, core, plan, refined, None, progress))
+}
+
+/// The first part of [`open`]: the plane is chosen and its zone refined.
+///
+/// Errors: the disk.
+pub fn refine<P: Pages>(
+    host: &mut Mesh<P>,
+    plan: &CutPlan,
+    space: &Workspace,
+    progress: &dyn Fn(&'static str, u64),
+) -> Result<Refined, StorageError> {
+    let clock = Instant::now();
+    let mut seconds = StageSeconds::default();
+    progress("choose a plane", 0);
+    plane::set_sizes(host, plan.h);
+    let plane = plane::choose(host, plan.h, plan.bounds.low, plan.low, plan.method.plane);
+    seconds.plane = clock.elapsed().as_secs_f64();
+    let zone = Zone { cut: plan.cut, surface: plane.plane };
+    let field = Field {
+        lengths: plan.method.lengths,
+        h: plan.h,
+        place: &zone::InZone { zone: &zone, earlier: plan.earlier, h: plan.h },
+        bounds: plan.bounds,
+    };
+    let refine = saturate(host, &field, space, &mut |n| progress("refine the zone", n))?;
+    seconds.zone = clock.elapsed().as_secs_f64() - seconds.plane;
+    Ok(Refined { zone, plane, refine, seconds })
+}
+
+/// The second part of [`open`]: the interface is chosen in `core`, which must be empty; `faces` learns what it was and is.
+pub fn choose<P: Pages, Q: Pages>(
+    host: &mut Mesh<P>,
+    core: &mut Mesh<Q>,
+    plan: &CutPlan,
+    refined: Refined,
+    mut faces: Option<&mut InterfaceFaces>,
+    progress: &dyn Fn(&'static str, u64),
+) -> Opened {
+    let Refined { zone, plane, refine, mut seconds } = refined;
+    let clock = Instant::now();
+    progress("choose the interface", 0);
+    let rim = core::extract(host, core, &zone.surface);
+    optimize::run_with(core, plan.optimize, &|_| {});
+    seconds.core = clock.elapsed().as_secs_f64();
+    let natural = faces.as_mut().map(|f| &mut f.natural);
+    let (interface, labels) =
+        interface::choose(core, &zone.surface, &rim, plan.method.steps, natural);
+    if let Some(faces) = faces {
+        faces.chosen = interface_faces::interface_points(core, &labels);
+    }
+    let vertices = interface_faces::number_interface(core, &labels, plan.cut);
+    let (z_tets, z_enclosed) = labels::enclosed(core, &labels, &zone.surface, plan.h);
+    let layers_least = labels::layers_least(host, core, &labels, &rim, &zone.surface);
+    seconds.interface = clock.elapsed().as_secs_f64() - seconds.core;
+    Opened {
+        zone,
+        report: CutReport {
+            plane,
+            refine,
+            interface,
+            vertices,
+            z_tets,
+            z_enclosed,
+            layers_least,
+            seconds,
+        },
+        rim,
+        labels,
+    }
+}

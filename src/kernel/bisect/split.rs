@@ -1,0 +1,44 @@
+//! Write a child: the host's tetrahedra of one side, those of the core with that label, joined at the rim.
+//!
+//! Vertices and tetrahedra get their final numbers before they are written: those of vertices by sorting along the curve, those of
+//! tetrahedra by counting, for they follow that of their first vertex. Each record is then written once, at its place. What is read
+//! for it is read in page order, and of the host's tetrahedra those of the child alone: the scratch map says which.
+
+use super::child::Split;
+use super::inherit::inherit;
+use super::opened::Opened;
+use crate::mesh::{Mesh, Workspace, dense};
+use tetdb_base::geom::{Aabb, HilbertFrame};
+use tetdb_base::storage::{Pages, StorageError};
+
+/// Writes one side into the empty `child`, numbered along the curve: vertices in the order of their positions, tetrahedra in that of
+/// their first vertex, those of the core before others.
+///
+/// Effects: the core's scratch map is used up, that of the host holds the child's numbers in place of what led to them. Errors: the
+/// disk, while sorting.
+pub fn write_child<P: Pages, Q: Pages, R: Pages>(
+    host: &mut Mesh<P>,
+    core: &mut Mesh<Q>,
+    child: &mut Mesh<R>,
+    opened: &Opened,
+    high: bool,
+    bounds: &Aabb,
+    space: &Workspace,
+) -> Result<(), StorageError> {
+    let mut split = Split {
+        host_base: dense(host.vertex_ids_end()),
+        core_base: dense(core.vertex_ids_end()),
+        host,
+        core,
+        child,
+        opened,
+        high,
+        at_core: Vec::new(),
+    };
+    split.add_vertices(&HilbertFrame::new(bounds), space)?;
+    split.number_tets();
+    split.write_host();
+    split.write_core();
+    split.new_interface();
+    inherit(&mut split, space)
+}

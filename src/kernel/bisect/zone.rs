@@ -1,0 +1,182 @@
+//! The band around a cutting surface that is refined to its final density before the cut.
+//!
+//! Its limit is a noisy surface, a function of position alone: a limit at a constant distance would leave a layer of vertices that
+//! shows in the finished mesh (densities between 0.44 and 1.67 of the mean per 0.25 h, measured; with noise they are those of
+//! any other place).
+
+use super::surface::{CuttingSurface, Plane};
+use crate::refine::PlacementRule;
+use tetdb_base::geom::{Point, mix};
+
+/// Half the width of the zone at its narrowest, in units of the wanted length. Circumspheres of a saturated mesh have radii below
+/// 1.03 h, and interface vertices stay within 1.4 h: from 3.5 on no later vertex reaches a tetrahedron at the interface.
+pub const WIDTH_MIN: f64 = 4.0;
+/// How much wider the noise makes it at most.
+pub const WIDTH_NOISE: f64 = 2.0;
+/// Wavelength of the noise in units of h.
+const WAVELENGTH: f64 = 1.5;
+
+/// A refined zone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Zone {
+    /// Number of the cut: makes its noise its own.
+    pub cut: u32,
+    /// The plane in the middle of the zone.
+    pub surface: Plane,
+}
+
+impl Zone {
+    /// Half width at `p` in units of h, on the side of `p`.
+    pub fn width(&self, p: Point, h: f64) -> f64 {
+        let s = self.surface.distance(p);
+        let foot = p - self.surface.normal(p) * s;
+        // Cells of the noise follow the size in steps of two: dividing by h itself would stretch them with the distance from the origin.
+        let cell = WAVELENGTH * f64::from_bits(h.to_bits() & 0xFFF0_0000_0000_0000);
+        let seed = u64::from(self.cut) << 1 | u64::from(s < 0.0);
+        WIDTH_MIN + WIDTH_NOISE * noise(foot / cell, seed)
+    }
+
+    /// Whether no vertex may be added at `p` after the cut. At its noisy limit the zone still has holes that
+    /// only its surroundings, once refined, let one fill; a tetrahedron at the interface reaches nowhere near there.
+    #[inline]
+    pub fn is_final(&self, p: Point, h: f64) -> bool {
+        self.surface.distance(p).abs() <= WIDTH_MIN * h
+    }
+
+    /// Whether `p`, where the wanted length is `h`, lies in the zone.
+    #[inline]
+    pub fn holds(&self, p: Point, h: f64) -> bool {
+        let s = self.surface.distance(p).abs();
+        s <= WIDTH_MIN * h || (s <= (WIDTH_MIN + WIDTH_NOISE) * h && s <= self.width(p, h) * h)
+    }
+}
+
+/// The zone of the cut at hand, without what earlier cuts have settled.
+pub(super) struct InZone<'a> {
+    pub zone: &'a Zone,
+    pub earlier: &'a [Zone],
+    pub h: &'a (dyn Fn(Point) -> f64 + Sync),
+}
+
+/// How far from the surface a zone can reach, in units of h at a point not yet in it: by a third wider than it is, for
+/// the size may grow on the way.
+const REACH: f64 = 1.3 * (WIDTH_MIN + WIDTH_NOISE);
+
+impl PlacementRule for InZone<'_> {
+    fn is_partial(&self) -> bool {
+        true
+    }
+
+    fn reaches(&self, points: &[Point; 4], sizes: &[f32; 4]) -> bool {
+        let (mut near, mut low, mut high) = (false, false, false);
+        for (&p, &h) in points.iter().zip(sizes) {
+            let s = self.zone.surface.distance(p);
+            near |= s.abs() <= REACH * f64::from(h);
+            low |= s < 0.0;
+            high |= s > 0.0;
+        }
+        near || (low && high)
+    }
+
+    fn stretch(&self, a: Point, b: Point, sizes: [f64; 2]) -> Option<[f64; 2]> {
+        if both_in_one(self.earlier, self.h, [a, b], sizes) {
+            return None;
+        }
+        let surface = &self.zone.surface;
+        let near = a + (b - a) * surface.nearest(a, b);
+        let h = (self.h)(near);
+        surface.band(a, b, REACH * h)
+    }
+
+    fn admits(&self, p: Point, h: f64) -> bool {
+        self.zone.holds(p, h)
+    }
+
+    fn forbids(&self, p: Point, h: f64) -> bool {
+        self.earlier.iter().any(|zone| zone.is_final(p, h))
+    }
+}
+
+/// Whether one zone holds both ends of an edge: it was saturated there, and what optimization made of it since is final.
+///
+/// Rounded sizes tell most edges that are not without asking for those of the field.
+fn both_in_one(
+    zones: &[Zone],
+    h: &dyn Fn(Point) -> f64,
+    [a, b]: [Point; 2],
+    [near_a, near_b]: [f64; 2],
+) -> bool {
+    let may_be = |zone: &Zone| {
+        zone.is_final(a, near_a * ROUNDED_UP) && zone.is_final(b, near_b * ROUNDED_UP)
+    };
+    if !zones.iter().any(may_be) {
+        return false;
+    }
+    let (ha, hb) = (h(a), h(b));
+    (zones.iter()).any(|zone| zone.is_final(a, ha) && zone.is_final(b, hb))
+}
+
+/// Makes a size that was rounded to `f32` at least what it was.
+const ROUNDED_UP: f64 = 1.0 + 1e-6;
+
+/// Everywhere but in the zones of earlier cuts.
+pub struct OutsideZones<'a> {
+    /// Zones of earlier cuts.
+    pub zones: &'a [Zone],
+    /// Wanted edge length at a position.
+    pub h: &'a (dyn Fn(Point) -> f64 + Sync),
+}
+
+impl PlacementRule for OutsideZones<'_> {
+    fn stretch(&self, a: Point, b: Point, sizes: [f64; 2]) -> Option<[f64; 2]> {
+        (!both_in_one(self.zones, self.h, [a, b], sizes)).then_some([0.0, 1.0])
+    }
+
+    fn admits(&self, _: Point, _: f64) -> bool {
+        true
+    }
+
+    fn forbids(&self, p: Point, h: f64) -> bool {
+        self.zones.iter().any(|zone| zone.is_final(p, h))
+    }
+}
+
+/// Smooth noise between 0 and 1 with values at whole positions.
+fn noise(p: Point, seed: u64) -> f64 {
+    let cell = p.floor();
+    let local = p - cell;
+    let ease = |t: f64| t * t * (3.0 - 2.0 * t);
+    let [x, y, z] = local.to_array().map(ease);
+    let value = |dx: f64, dy: f64, dz: f64| {
+        let at = (cell + Point::new(dx, dy, dz)).to_array();
+        let bits = at.into_iter().fold(seed, |s, c| mix(s ^ (c as i64 as u64)));
+        (bits >> 11) as f64 / (1u64 << 53) as f64
+    };
+    let blend = |a: f64, b: f64, t: f64| a + (b - a) * t;
+    let edge = |dy: f64, dz: f64| blend(value(0.0, dy, dz), value(1.0, dy, dz), x);
+    let face = |dz: f64| blend(edge(0.0, dz), edge(1.0, dz), y);
+    blend(face(0.0), face(1.0), z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_limit_is_noisy_within_its_bounds_and_continuous() {
+        let zone = Zone { cut: 3, surface: Plane { normal: Point::X, offset: 0.5 } };
+        let (mut least, mut most) = (f64::INFINITY, 0f64);
+        let mut before = None::<f64>;
+        for i in 0..40_000 {
+            let p = Point::new(0.6, f64::from(i) * 1e-3, 0.25);
+            let width = zone.width(p, 1.0);
+            assert!((WIDTH_MIN..=WIDTH_MIN + WIDTH_NOISE).contains(&width));
+            if let Some(before) = before {
+                assert!((width - before).abs() < 0.01);
+            }
+            before = Some(width);
+            (least, most) = (least.min(width), most.max(width));
+        }
+        assert!(most - least > 0.6 * WIDTH_NOISE, "{least} {most}");
+    }
+}

@@ -1,0 +1,108 @@
+//! What seeds say of volumes: which are filled, which stay empty, what they are called.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::error::BoundaryError;
+use super::policy::{Filled, RegionPolicy};
+use tetdb_base::geom::Point;
+use tetdb_base::surface::{Seed, SeedKind};
+
+/// Which regions are filled, and what they are called.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RegionRule {
+    /// What fills them.
+    pub policy: RegionPolicy,
+    /// What was asked for: each must lie in a volume it can say something of.
+    pub seeds: Vec<Seed>,
+    /// What the surface's files say: names of what is filled, passed over where they fit nothing.
+    pub names: Vec<Seed>,
+}
+
+impl From<RegionPolicy> for RegionRule {
+    fn from(policy: RegionPolicy) -> Self {
+        let (seeds, names) = (Vec::new(), Vec::new());
+        Self { policy, seeds, names }
+    }
+}
+
+impl RegionRule {
+    /// Fills, empties and names the volumes `outside + 1 .. end` on top of what the policy has chosen, where `volume_of` tells the one
+    /// around a point.
+    ///
+    /// Errors: [`BoundaryError::Seed`] names the seed.
+    pub fn apply(
+        &self,
+        mut filled: Filled,
+        outside: u32,
+        end: u32,
+        mut volume_of: impl FnMut(Point) -> u32,
+    ) -> Result<Filled, BoundaryError> {
+        let mut holes: BTreeMap<u32, &Seed> = BTreeMap::new();
+        let mut regions: BTreeMap<u32, &Seed> = BTreeMap::new();
+        for seed in &self.seeds {
+            let volume = volume_of(seed.point);
+            if volume == outside {
+                return Err(wrong(seed, "lies outside of all volumes"));
+            }
+            let of_kind = match seed.kind {
+                SeedKind::Hole => &mut holes,
+                SeedKind::Region(_) => &mut regions,
+            };
+            let known = *of_kind.entry(volume).or_insert(seed);
+            if known.kind != seed.kind {
+                let what = format!("lies in the same region as {known}, which has another name");
+                return Err(wrong(seed, &what));
+            }
+        }
+        if let Some((volume, seed)) = regions.iter().find(|(v, _)| holes.contains_key(v)) {
+            let what = format!("lies in the same region as the hole {}", holes[volume]);
+            return Err(wrong(seed, &what));
+        }
+        if self.policy == RegionPolicy::Seeds {
+            filled.volumes = match (regions.is_empty(), holes.is_empty()) {
+                (true, true) => return Err(BoundaryError::NoSeed),
+                (true, false) => (outside + 1..end).collect(),
+                _ => regions.keys().copied().collect(),
+            };
+        }
+        filled.volumes.retain(|v| !holes.contains_key(v));
+        if let Some((_, seed)) = (regions.iter()).find(|(v, _)| !filled.volumes.contains(v)) {
+            return Err(wrong(seed, "lies in a region that stays empty under the chosen rule"));
+        }
+        filled.names = names(&regions);
+        self.take_names(&mut filled, volume_of);
+        Ok(filled)
+    }
+
+    /// Names from the surface's files, for what has none; where two contradict each other, neither.
+    fn take_names(&self, filled: &mut Filled, mut volume_of: impl FnMut(Point) -> u32) {
+        let mut found: BTreeMap<u32, BTreeSet<&str>> = BTreeMap::new();
+        for seed in &self.names {
+            if let SeedKind::Region(Some(name)) = &seed.kind {
+                found.entry(volume_of(seed.point)).or_default().insert(name);
+            }
+        }
+        for (volume, all) in found {
+            if let (1, true) = (all.len(), filled.volumes.contains(&volume)) {
+                let name = all.into_iter().next().unwrap_or_default();
+                filled.names.entry(volume).or_insert_with(|| name.to_owned());
+            }
+        }
+    }
+}
+
+fn names(regions: &BTreeMap<u32, &Seed>) -> BTreeMap<u32, String> {
+    let name = |(&volume, seed): (&u32, &&Seed)| match &seed.kind {
+        SeedKind::Region(Some(name)) => Some((volume, name.clone())),
+        _ => None,
+    };
+    regions.iter().filter_map(name).collect()
+}
+
+fn wrong(seed: &Seed, what: &str) -> BoundaryError {
+    let seed_word = match seed.kind {
+        SeedKind::Hole => "hole",
+        SeedKind::Region(_) => "region seed",
+    };
+    BoundaryError::Seed { message: format!("the {seed_word} {seed} {what}"), point: seed.point }
+}

@@ -1,0 +1,95 @@
+//! Steiner points at the end of recovery: those nobody needs go, the others move away from the planes they were put beside.
+
+use super::free_vertex::{ball_flatness, remove_free};
+use super::kernel::{HalfSpace, center, room};
+use super::report::RecoveryReport;
+use super::space::{PagedSpace, Space};
+use super::suppress::half_space;
+use super::walk::ball;
+use crate::mesh::{Mesh, VertexTag};
+use tetdb_base::geom::{IdSet, Point};
+use tetdb_base::storage::{Pages, check_cancelled};
+
+/// Times all are visited: room grows by a factor each time.
+const ROUNDS_MAX: usize = 8;
+
+/// A move that gives less room than this many times the old is not worth it.
+const GAIN_MIN: f64 = 1.25;
+
+/// Shares of the way to the best place that are tried.
+const SHARES: [f64; 6] = [1.0, 0.5, 0.1, 1e-2, 1e-4, 1e-6];
+
+/// Visits the Steiner points until none goes or moves any more, a bounded number of times.
+pub(super) fn tidy<P: Pages>(mesh: &mut Mesh<P>, report: &mut RecoveryReport) {
+    if report.steiner == 0 {
+        return;
+    }
+    let steiner = |mesh: &mut Mesh<P>, v: u32| {
+        mesh.tet_of(v) != tetdb_schema::page::NONE
+            && mesh.vertex_attribute(v).0 == VertexTag::Steiner
+    };
+    let mut left: Vec<u32> = (0..mesh.n_vertices()).filter(|&v| steiner(mesh, v)).collect();
+    let none = IdSet::default();
+    // Beside what changed: for all others the answer is as it was.
+    let mut beside: IdSet<u32> = left.iter().copied().collect();
+    for _ in 0..ROUNDS_MAX {
+        let due = std::mem::take(&mut beside);
+        left.retain(|&v| {
+            if !due.contains(&v) && !beside.contains(&v) {
+                return true;
+            }
+            check_cancelled();
+            let mut s = PagedSpace(mesh, &none);
+            let ball = ball(&mut s, v);
+            let near: Vec<u32> = ball.iter().flat_map(|&t| s.tet(t).vertices()).collect();
+            let flatness = ball_flatness(&mut s, v);
+            let is_gone = remove_free(&mut s, v, flatness);
+            if is_gone {
+                s.drop_steiner(v);
+                report.steiner = report.steiner.saturating_sub(1);
+            }
+            if is_gone || rise(&mut s, v) {
+                beside.extend(near);
+            }
+            !is_gone
+        });
+        if beside.is_empty() {
+            break;
+        }
+    }
+}
+
+/// Moves a free vertex to where it sees its ball best, if that gives it more room.
+pub(super) fn rise<P: Pages>(s: &mut PagedSpace<'_, P>, v: u32) -> bool {
+    let old = s.position(v);
+    let ball = ball(s, v);
+    let mut reach = 0.0f64;
+    let mut planes: Vec<HalfSpace> = Vec::new();
+    for &t in &ball {
+        let tet = s.tet(t);
+        let Some(i) = tet.local(v) else { continue };
+        let corners = tet.face(i).map(|u| s.position(u) - old);
+        reach = corners.iter().map(|c| c.length()).fold(reach, f64::max);
+        planes.extend(half_space(corners));
+    }
+    let Some(way) = center(&planes, reach) else {
+        return false;
+    };
+    let now = room(&planes, Point::ZERO);
+    // Where doubles see the best place too dimly, one on the way there may do.
+    for share in SHARES {
+        if room(&planes, way * share) <= GAIN_MIN * now.max(0.0) {
+            continue;
+        }
+        s.0.set_point(v, old + way * share);
+        let holds = ball.iter().all(|&t| {
+            let q = s.tet(t).vertices();
+            s.orient(q) > 0.0
+        });
+        if holds {
+            return true;
+        }
+    }
+    s.0.set_point(v, old);
+    false
+}

@@ -1,0 +1,30 @@
+//! The mesher: from triangles to tetrahedra, on pages that need not be in memory.
+//!
+//! | module | subject |
+//! |---|---|
+//! | [`mesh`] | tetrahedra, cursors over pages |
+//! | [`delaunay`] | insertion of one point |
+//! | [`reconnect`] | flips |
+//! | [`sizing`] | wanted edge lengths, load, estimate |
+//! | [`samples`] | generated surfaces |
+//! | [`boundary`] | input segments and facets appear |
+//! | [`refine`] | edges are divided until none is too long |
+//! | [`optimize`] | the worst tetrahedra become better |
+//! | [`bisect`] | one cut: plane, zone, interface, two children |
+//! | [`topology`] | which sub-domains are neighbors |
+//!
+//! This crate knows neither a store nor a file format. Programs use the crate `tetdb`; no promise is made of what is
+//! public here.
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+pub mod bisect;
+pub mod boundary;
+pub mod delaunay;
+pub mod mesh;
+pub mod optimize;
+pub mod reconnect;
+pub mod refine;
+pub mod samples;
+pub mod sizing;
+pub mod topology;

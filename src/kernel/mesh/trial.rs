@@ -1,0 +1,103 @@
+//! Looking ahead: what would come of changes to a mesh, tried on all threads of the run before their turn.
+//!
+//! Each try has a draft of the mesh for itself. What came of it holds as long as nothing changed at the vertices of the tetrahedra that it has read.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use rayon::prelude::*;
+use tetdb_schema::page::SLOT_BITS;
+
+use super::Mesh;
+use super::anatomy::VERTEX_MASK;
+use tetdb_base::storage::{DraftPages, Pages, check_cancelled, kind, parallel};
+
+/// Something to be tried on many items.
+pub trait Trial: Sync {
+    /// What it is tried on.
+    type Item: Sync;
+    /// What one thread uses again and again; must not have a say in what comes of it.
+    type Scratch: Send;
+    /// What comes of it.
+    type Outcome: Send;
+
+    /// Tries it on a draft, which may be left changed where that is part of what is found.
+    fn attempt<P: Pages>(
+        &self,
+        scratch: &mut Self::Scratch,
+        mesh: &mut Mesh<P>,
+        item: &Self::Item,
+    ) -> Option<(Self::Outcome, Draft)>;
+}
+
+/// What is left of a draft.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Draft {
+    /// It is to be as the mesh: else what was found does not count.
+    Unchanged,
+    /// It may be anything.
+    Used,
+}
+
+/// What was found, and what it rests on.
+pub struct Foreseen<F> {
+    /// What came of it.
+    pub found: F,
+    /// Vertices of all tetrahedra read, in ascending order. Where nothing has changed at them, the same comes of it still.
+    pub vertices: Vec<u32>,
+}
+
+/// Tries all items, each on the mesh as it is, which stays so: one thread for each scratch. In the order of the items; nothing where not all of the mesh is in memory.
+pub fn look_ahead<P: Pages, T: Trial>(
+    mesh: &mut Mesh<P>,
+    items: &[T::Item],
+    scratch: &mut [T::Scratch],
+    trial: &T,
+) -> Vec<Option<Foreseen<T::Outcome>>> {
+    let mut all = Vec::new();
+    all.resize_with(items.len(), || None);
+    let Some(shared) = mesh.shared() else {
+        return all;
+    };
+    let (state, base) = (shared.state(), shared.into_pages());
+    let next = AtomicUsize::new(0);
+    let work = |scratch: &mut T::Scratch| {
+        let mut done = Vec::new();
+        let mut draft = Mesh::with_state(DraftPages::new(base), state);
+        loop {
+            let at = next.fetch_add(1, Ordering::Relaxed);
+            let Some(item) = items.get(at) else {
+                return done;
+            };
+            check_cancelled();
+            draft.pages.restart();
+            draft.state = state;
+            let Some((found, left)) = trial.attempt(scratch, &mut draft, item) else {
+                continue;
+            };
+            // What took a number and gave it back has changed which one is next.
+            let is_unchanged = || draft.state == state && draft.pages.is_unchanged();
+            if left == Draft::Used || is_unchanged() {
+                let vertices = vertices_met(&draft.pages);
+                done.push((at, Foreseen { found, vertices }));
+            }
+        }
+    };
+    let done: Vec<_> = parallel(|| scratch.par_iter_mut().map(work).collect());
+    for (at, foreseen) in done.into_iter().flatten() {
+        all[at] = Some(foreseen);
+    }
+    all
+}
+
+fn vertices_met(pages: &DraftPages) -> Vec<u32> {
+    let (mut base, mut vertices) = (pages.base(), Vec::new());
+    let end = base.n_pages::<{ kind::TETS }>() << SLOT_BITS;
+    // What lies beyond was made in the draft.
+    for &t in pages.tets_met().iter().filter(|&&t| t < end) {
+        let slot = base.read::<{ kind::TETS }>(t);
+        vertices.extend(slot[..4].iter().map(|node| node.to_native() & VERTEX_MASK));
+    }
+    vertices.sort_unstable();
+    vertices.dedup();
+    vertices
+}

@@ -1,0 +1,207 @@
+//! Corners of the octree's leaves, numbered once each, and those that hang.
+//!
+//! ```text
+//!   p-------+---+      A corner in the middle of a larger leaf's edge or face hangs: its value
+//!   |       |   |      is the mean of that edge's two or that face's four corners (p, q), so that the
+//!   |       u---+      field is continuous across. Since neighbors differ by one level, the corners
+//!   |       |   |      it hangs on belong to leaves one level up; taken level by level, each chain ends
+//!   +-------q---+      at a corner that is free.
+//! ```
+
+use super::tree::{LATTICE, Leaf, Tree};
+use tetdb_base::storage::{Keyed, ScratchSpace, SpillVec, StorageError, raise, sort_record};
+
+sort_record! {
+    /// A hanging corner and the four corners (an edge's two, twice) whose mean it takes.
+    #[derive(Eq, bytemuck::Pod, bytemuck::Zeroable)]
+    #[repr(C)]
+    pub(super) struct Hanging {
+        /// Level of the smaller leaf: coarser ones come first.
+        pub(super) level: u32,
+        pub(super) corner: u32,
+        pub(super) on: [u32; 4],
+    }
+}
+
+impl Hanging {
+    /// Whether it is in the middle of an edge; else of a face.
+    fn on_edge(&self) -> bool {
+        self.on[0] == self.on[2]
+    }
+
+    /// The two or four corners, once each.
+    pub(super) fn distinct(&self) -> &[u32] {
+        if self.on_edge() { &self.on[..2] } else { &self.on }
+    }
+
+    /// Distance to the corners it hangs on, in units of the root's side.
+    pub(super) fn distance(&self) -> f64 {
+        let side = 1.0 / f64::from(1u32 << self.level);
+        if self.on_edge() { side } else { side * 2f64.sqrt() }
+    }
+}
+
+/// Corners of a tree.
+pub(super) struct Corners {
+    /// Corner numbers of each leaf, in the octants' order.
+    pub(super) of_leaf: SpillVec<[u32; 8]>,
+    pub(super) n_corners: usize,
+    /// Sorted by level, each corner once.
+    pub(super) hanging: SpillVec<Hanging>,
+}
+
+impl Corners {
+    /// A disk that fails unwinds.
+    pub(super) fn of(tree: &Tree, room: &ScratchSpace) -> Self {
+        let numbered = number_corners(tree, room);
+        let (mut of_leaf, n_corners) = numbered.unwrap_or_else(|e| raise(e));
+        let hanging = find_hanging(tree, &mut of_leaf, room).unwrap_or_else(|e| raise(e));
+        Self { of_leaf, n_corners, hanging }
+    }
+}
+
+/// Numbers corners along the Morton curve, so that near corners are near in memory.
+fn number_corners(
+    tree: &Tree,
+    room: &ScratchSpace,
+) -> Result<(SpillVec<[u32; 8]>, usize), StorageError> {
+    let mut keys = room.sorter::<Keyed>();
+    let mut n_leaves = 0;
+    for (i, leaf) in tree.leaves().enumerate() {
+        n_leaves += 1;
+        for c in 0..8 {
+            keys.push(Keyed { key: morton(leaf.corner(c)), id: (8 * i + c) as u32 })?;
+        }
+    }
+    let keys = keys.finish()?;
+    let mut of_leaf = room.column(n_leaves, [0u32; 8]);
+    let mut n_corners = 0u32;
+    let mut last = None;
+    for key in keys {
+        let Keyed { key: corner, id: slot } = key?;
+        if last != Some(corner) {
+            n_corners += 1;
+            last = Some(corner);
+        }
+        let number = n_corners - 1;
+        of_leaf.change(slot as usize / 8, |ids| ids[slot as usize % 8] = number);
+    }
+    Ok((of_leaf, n_corners as usize))
+}
+
+/// Interleaves the bits of a lattice position, 21 per axis.
+#[inline]
+fn morton(p: [u32; 3]) -> u64 {
+    let spread = |x: u32| {
+        let mut x = u64::from(x);
+        x = (x | x << 32) & 0x001f_0000_0000_ffff;
+        x = (x | x << 16) & 0x001f_0000_ff00_00ff;
+        x = (x | x << 8) & 0x100f_00f0_0f00_f00f;
+        x = (x | x << 4) & 0x10c3_0c30_c30c_30c3;
+        (x | x << 2) & 0x1249_2492_4924_9249
+    };
+    spread(p[0]) | spread(p[1]) << 1 | spread(p[2]) << 2
+}
+
+fn find_hanging(
+    tree: &Tree,
+    of_leaf: &mut SpillVec<[u32; 8]>,
+    room: &ScratchSpace,
+) -> Result<SpillVec<Hanging>, StorageError> {
+    let mut found = room.sorter::<Hanging>();
+    for (i, leaf) in tree.leaves().enumerate() {
+        let ids = of_leaf.get(i);
+        for cell in leaf.outer_neighbors() {
+            let Some((large, larger)) = larger_leaf(tree, &leaf, cell) else {
+                continue;
+            };
+            let ids_large = of_leaf.get(larger as usize);
+            for (c, &id) in ids.iter().enumerate() {
+                if let Some(hanging) = hangs(&leaf, c, id, &large, &ids_large) {
+                    found.push(hanging)?;
+                }
+            }
+        }
+    }
+    let mut hanging = room.list();
+    let mut last = None;
+    for next in found.finish()? {
+        let next = next?;
+        if last != Some(next.corner) {
+            hanging.push(next);
+            last = Some(next.corner);
+        }
+    }
+    Ok(hanging.done())
+}
+
+/// The leaf at a neighboring cell, when it is larger.
+fn larger_leaf(tree: &Tree, leaf: &Leaf, cell: [u32; 3]) -> Option<(Leaf, u32)> {
+    let (number, level) = tree.leaf_at(cell);
+    let width = LATTICE >> level;
+    let anchor = cell.map(|x| x & !(width - 1));
+    (level < leaf.level).then_some((Leaf { anchor, level }, number))
+}
+
+/// How a corner of a leaf hangs on a leaf twice as large, if it does.
+fn hangs(
+    leaf: &Leaf,
+    corner: usize,
+    id: u32,
+    large: &Leaf,
+    ids_large: &[u32; 8],
+) -> Option<Hanging> {
+    let p = leaf.corner(corner);
+    let width = leaf.width();
+    // Position on the large leaf in halves of its side: 0, 1, 2, or outside.
+    let mut halves = [0u32; 3];
+    for axis in 0..3 {
+        halves[axis] = p[axis].checked_sub(large.anchor[axis])? / width;
+    }
+    if halves.iter().any(|&x| x > 2) || halves.iter().all(|&x| x != 1) {
+        return None;
+    }
+    let mut on = [0; 4];
+    for (i, on) in on.iter_mut().enumerate() {
+        let mut choice = i;
+        let mut octant = 0;
+        for (axis, &half) in halves.iter().enumerate() {
+            let upper = match half {
+                1 => {
+                    let bit = choice & 1;
+                    choice >>= 1;
+                    bit
+                }
+                half => half as usize / 2,
+            };
+            octant |= upper << axis;
+        }
+        *on = ids_large[octant];
+    }
+    Some(Hanging { level: leaf.level, corner: id, on })
+}
+
+/// Pairs of corners of a cell with the squared distance in sides: all 28 of them.
+pub(super) const PAIRS: [(u8, u8, u8); 28] = pairs();
+
+const fn pairs() -> [(u8, u8, u8); 28] {
+    let mut list = [(0, 0, 0); 28];
+    let mut n = 0;
+    let mut distance2 = 1;
+    while distance2 <= 3 {
+        let mut a = 0u8;
+        while a < 8 {
+            let mut b = a + 1;
+            while b < 8 {
+                if (a ^ b).count_ones() == distance2 {
+                    list[n] = (a, b, distance2 as u8);
+                    n += 1;
+                }
+                b += 1;
+            }
+            a += 1;
+        }
+        distance2 += 1;
+    }
+    list
+}

@@ -1,0 +1,126 @@
+//! Summing up a field.
+
+use super::field::SizeField;
+use super::length::Length;
+use super::options::{SizeOptions, Targets};
+use super::seeds::Seeds;
+use super::summary::{Range, SizeSummary, SizeWarning};
+use tetdb_base::geom::short;
+use tetdb_base::storage::{ScratchSpace, raise, sort_record};
+
+impl SizeField {
+    /// What the field is like, and where its sizes came from. A scratch file that fails unwinds.
+    pub(super) fn summary(
+        &self,
+        seeds: &Seeds,
+        targets: &Targets,
+        options: &SizeOptions,
+        room: &ScratchSpace,
+    ) -> SizeSummary {
+        let side = self.frame.side;
+        let all = seeds.vertices().map(|v| (seeds.h(v) * side, 1.0));
+        let surface = weighted_range(all, room);
+        let middles = self.tree.leaves().enumerate().map(|(i, leaf)| {
+            let values = self.values.get(i);
+            let mean = values.iter().map(|&h| f64::from(h)).sum::<f64>() / 8.0;
+            (mean * side, leaf.side() * leaf.side() * leaf.side())
+        });
+        let median = weighted_range(middles, room).median;
+        let (low, high) = self.range();
+        let wanted = [("hsiz", targets.hsiz), ("hmax", targets.hmax)];
+        let warnings = wanted.into_iter().filter_map(|(option, wanted)| {
+            let wanted = wanted?;
+            if wanted < FAR_BELOW * surface.median {
+                return Some(SizeWarning::FarBelowSurface {
+                    option,
+                    wanted,
+                    surface_median: surface.median,
+                    away: (surface.median - wanted) / targets.beta,
+                });
+            }
+            // An upper bound that nothing comes near is no disappointment.
+            let is_far_above = option == "hsiz" && wanted > FAR_ABOVE * high;
+            is_far_above.then_some(SizeWarning::NeverReached { option, wanted, most: high })
+        });
+        SizeSummary {
+            source: source_of(options, targets),
+            surface,
+            field: Range { low, median, high },
+            beta: targets.beta,
+            n_leaves: self.n_leaves(),
+            bytes: self.bytes(),
+            warnings: warnings.collect(),
+        }
+    }
+}
+
+sort_record! {
+    /// A number and its weight.
+    struct Weighted {
+        x: f64,
+        weight: f64,
+    }
+}
+
+/// Lowest, weighted median and highest of a list of positive numbers with weights that is not empty.
+fn weighted_range(list: impl Iterator<Item = (f64, f64)>, room: &ScratchSpace) -> Range {
+    let mut sorter = room.sorter::<Weighted>();
+    let mut total = 0.0;
+    for (x, weight) in list {
+        total += weight;
+        let pushed = sorter.push(Weighted { x, weight });
+        pushed.unwrap_or_else(|e| raise(e));
+    }
+    let mut sum = 0.0;
+    let mut range = Range { low: f64::INFINITY, median: f64::NAN, high: 0.0 };
+    for next in sorter.finish().unwrap_or_else(|e| raise(e)) {
+        let Weighted { x, weight } = next.unwrap_or_else(|e| raise(e));
+        let is_below = sum < 0.5 * total;
+        sum += weight;
+        if is_below && sum >= 0.5 * total {
+            range.median = x;
+        }
+        (range.low, range.high) = (range.low.min(x), x);
+    }
+    range
+}
+
+/// Below this share of the surface's median edge, an interior size is warned about: the surface is
+/// not divided, so that large triangles would stand against small tetrahedra.
+const FAR_BELOW: f64 = 0.4;
+
+/// Above this multiple of the longest length that the field has, a wanted one is warned about: it is as good as none, and often in another unit.
+const FAR_ABOVE: f64 = 4.0;
+
+fn plural(n: usize, what: &str) -> String {
+    format!("{n} {what}{}", if n == 1 { "" } else { "s" })
+}
+
+fn source_of(options: &SizeOptions, targets: &Targets) -> String {
+    let mut parts = Vec::new();
+    let named = [
+        ("hsiz", options.hsiz, targets.hsiz),
+        ("hmin", options.hmin, targets.hmin),
+        ("hmax", options.hmax, targets.hmax),
+    ];
+    for (name, asked, length) in named {
+        match (asked, length) {
+            (Some(Length::Percent(share)), Some(h)) => {
+                parts.push(format!("{name} {share}% = {}", short(h)));
+            }
+            (Some(_), Some(h)) => parts.push(format!("{name} {h}")),
+            _ => {}
+        }
+    }
+    if !options.sources.is_empty() {
+        parts.push(plural(options.sources.len(), "shape"));
+    }
+    if !options.regions.is_empty() {
+        parts.push(plural(options.regions.len(), "region"));
+    }
+    if options.formula.is_some() {
+        parts.push("size_expr".to_owned());
+    }
+    parts.push("the surface's edges".to_owned());
+    format!("{}, hgrad {}", parts.join(", "), options.hgrad)
+}

@@ -1,0 +1,99 @@
+//! What a user is told about sizes.
+
+use std::fmt;
+
+use tetdb_base::geom::short;
+
+/// Lowest, median and highest of some lengths, in input units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Range {
+    /// The least length.
+    pub low: f64,
+    /// The median length.
+    pub median: f64,
+    /// The greatest length.
+    pub high: f64,
+}
+
+/// Where sizes came from and what they are.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SizeSummary {
+    /// Options in effect, in words.
+    pub source: String,
+    /// Sizes of the surface's vertices: means of their edges' lengths.
+    pub surface: Range,
+    /// Sizes of the field; the median is by volume of the surface's cube, not of the domain.
+    pub field: Range,
+    /// Slope bound, `ln(hgrad)`.
+    pub beta: f64,
+    /// Leaves of the octree.
+    pub n_leaves: usize,
+    /// Memory of the field in bytes.
+    pub bytes: usize,
+    /// What the user may not expect.
+    pub warnings: Vec<SizeWarning>,
+}
+
+/// What will not come out as the user may expect.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SizeWarning {
+    /// The wanted interior size is far below the surface's edges, which are kept.
+    FarBelowSurface {
+        /// The option that asks for the size.
+        option: &'static str,
+        /// The size it asks for.
+        wanted: f64,
+        /// Median size of the surface.
+        surface_median: f64,
+        /// How far from edges of that length the gradation lets sizes come down to it.
+        away: f64,
+    },
+    /// The wanted interior size is longer than the gradation lets sizes grow within the surface.
+    NeverReached {
+        /// The option that asks for the size.
+        option: &'static str,
+        /// The size it asks for.
+        wanted: f64,
+        /// The longest that comes out.
+        most: f64,
+    },
+}
+
+impl fmt::Display for SizeWarning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::FarBelowSurface { option, wanted, surface_median, away } => write!(
+                f,
+                "{option} {} is far below the surface's edges, which are kept: next to them edges of tetrahedra stay near the median of {}, and \
+                 reach {} only {} or more away from them; refine the surface first",
+                short(*wanted),
+                short(*surface_median),
+                short(*wanted),
+                short(*away)
+            ),
+            Self::NeverReached { option, wanted, most } => write!(
+                f,
+                "{option} {} is never reached: from the surface's edges lengths grow to {} at most (hgrad says how fast); is it in the surface's unit?",
+                short(*wanted),
+                short(*most)
+            ),
+        }
+    }
+}
+
+impl fmt::Display for SizeSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Range { low, median, high } = self.surface;
+        write!(
+            f,
+            "sizes from {}; surface median {} ({} to {}), wanted inside its box {} ({} to {})",
+            self.source,
+            short(median),
+            short(low),
+            short(high),
+            short(self.field.median),
+            short(self.field.low),
+            short(self.field.high)
+        )
+    }
+}

@@ -1,0 +1,355 @@
+//! Sizes of a part that is meshed again: wanted lengths inside, what it has along the faces that stay.
+//!
+//! ```text
+//!   h  had ----.            .---- had     The faces of the skin stay as they are, and so do lengths at them. Away from
+//!               `.        .'              them lengths go to the wanted ones as the slope allows: no lower than the
+//!      wanted     `------'                cones below what the part has at its skin, no higher than those above it.
+//!      skin                  skin
+//! ```
+//!
+//! Where the wanted length is what the part has, the result is what the part has, but for rounding: it has the same octree there, and a
+//! leaf may be as steep as it was. Where vertices go hangs on the last digits of lengths (of 20,000 tetrahedra in a steep field, a
+//! hundredth more or fewer), so a part of which nothing else is wanted keeps its field to the bit. Sizes from the skin's edges would not do: vertices next to each other differ far more than the slope
+//! allows on a surface of small and large triangles, and the large ones' cones reach over the zones of the small ones.
+
+use rayon::prelude::*;
+
+use super::SizingError;
+use super::bits::Bits;
+use super::constraint::SizeConstraint;
+use super::constraints::SizeConstraints;
+use super::corners::{Corners, PAIRS};
+use super::field::SizeField;
+use super::options::Targets;
+use super::seeds::Seeds;
+use super::tree::{LATTICE, Tree};
+use super::values::Maker;
+use tetdb_base::geom::{Aabb, Point};
+use tetdb_base::storage::{ScratchSpace, SpillVec};
+
+/// Wanted lengths that are off what the part has by no more than this share are the same: the octree is not divided for them.
+const SAME: f64 = 0.01;
+/// Shapes beside the octree are brought into it up to this share. At a tenth, what suffices for a formula, lengths
+/// around a sphere come out up to a tenth larger than they were.
+const BEND_MAX: f64 = 0.02;
+/// Where a shape ends sizes have a kink, in cells this many sizes wide. With two, a ball of a tenth of the length around it has 2.3 % fewer
+/// tetrahedra when it is made again with the same lengths.
+const CELLS_PER_SIZE: f64 = 1.0;
+/// Corners asked about side by side.
+const CORNERS_AT_ONCE: usize = 1 << 16;
+
+impl SizeField {
+    /// The field of `constraint` inside a skin that stays, of a part that has the lengths of this field: triangles index points.
+    /// `None`: nothing else is wanted than what the part has.
+    ///
+    /// Near the skin lengths are those of this field, away from it they tend to the wish as the slope `beta` allows, to smaller ones as
+    /// well as to larger ones. Where the wish is infinite (outside of what it knows) sizes are those around it, and those of
+    /// this field where nothing at all is wished. `room` changes nothing of it.
+    ///
+    /// Memory: beside the room 40 bytes a point and 16 a leaf.
+    /// # Errors
+    /// A skin without edges; a wish that is no size somewhere; more leaves than can be numbered.
+    pub fn within(
+        &self,
+        points: &[Point],
+        triangles: &[[u32; 3]],
+        constraint: &dyn SizeConstraint,
+        beta: f64,
+        room: &ScratchSpace,
+    ) -> Result<Option<Self>, SizingError> {
+        let frame = self.frame;
+        let seeds = Seeds::with_sizes(points, triangles, frame, |p| self.h(p))?;
+        let used = triangles.iter().flatten().map(|&v| points[v as usize]);
+        let constraints = SizeConstraints {
+            list: &[self, constraint],
+            frame,
+            bounds: Aabb::around(used),
+            least: 0.0,
+            bend_max: BEND_MAX,
+            cells_per_size: CELLS_PER_SIZE,
+            // Else corners on the box's walls would hang on coarser cells outside, with other sizes than they had.
+            beside: 1.0,
+        };
+        let tree = self.tree_within(points, &seeds, &constraints)?;
+        let mut corners = Corners::of(&tree, room);
+        let mut had = at_corners(&tree, &mut corners, frame.side, room, &|p| {
+            Ok(self.h(frame.low + p * frame.side))
+        })?;
+        let mut wanted = at_corners(&tree, &mut corners, frame.side, room, &|p| {
+            constraint.h(frame.low + p * frame.side)
+        })?;
+        if is_same(&tree, &mut corners, [&mut had, &mut wanted], &constraints) {
+            return Ok(None);
+        }
+        let steeper = steeper(&tree, &mut corners, &mut had, beta, room);
+        let mut maker = Maker {
+            tree: &tree,
+            corners: &mut corners,
+            seeds: &seeds,
+            beta,
+            steeper: Some(steeper),
+            room,
+        };
+        let (mut at_skin, nearest) = maker.gather(|seeds, v| seeds.h(v), true);
+        for i in 0..at_skin.len() {
+            if at_skin.get(i).is_finite() {
+                at_skin.set(i, had.get(i));
+            }
+        }
+        let cones = nearest.map(|nearest| maker.cones(&mut at_skin, nearest));
+        let mut h = maker.fill(wanted);
+        if let Some([mut lower, mut upper]) = cones {
+            for i in 0..h.len() {
+                let had = had.get(i);
+                let wanted = Some(h.get(i)).filter(|h| h.is_finite()).unwrap_or(had);
+                // Rounded slopes are not to move what the part has.
+                let (low, high) = (lower.get(i).min(had), upper.get(i).max(had));
+                h.set(i, wanted.max(low).min(high));
+            }
+        }
+        maker.grading().grade_closed(&mut h);
+        Ok(Some(Self::of_corners(frame, beta, tree, corners, h, room)))
+    }
+
+    /// As fine as this field and the wish are in the skin's box, and along the skin where they differ: there cones begin.
+    fn tree_within(
+        &self,
+        points: &[Point],
+        seeds: &Seeds,
+        constraints: &SizeConstraints,
+    ) -> Result<Tree, SizingError> {
+        let mut moved = Vec::new();
+        for v in seeds.vertices() {
+            let had = seeds.h(v) * self.frame.side;
+            let wanted = constraints.list[1].h(points[v as usize])?;
+            if wanted.is_finite() && (wanted - had).abs() > SAME * had {
+                moved.push(v);
+            }
+        }
+        // A wanted length of nothing differs from any: cells along the skin are as fine as what is there.
+        let along_skin = Targets {
+            hsiz: Some(0.0),
+            hmin: None,
+            hmax: None,
+            beta: self.beta,
+            beta_needles: self.beta,
+        };
+        Tree::build_near(&moved, seeds, &along_skin, |tree| constraints.refine(tree))
+    }
+}
+
+/// A size at each corner, in units of the cube's side; `size` is asked in those, and answers in input units.
+fn at_corners(
+    tree: &Tree,
+    corners: &mut Corners,
+    side: f64,
+    room: &ScratchSpace,
+    size: &(dyn Fn(Point) -> Result<f64, SizingError> + Sync),
+) -> Result<SpillVec<f32>, SizingError> {
+    let mut h = room.column(corners.n_corners, 0.0f32);
+    let mut is_known = Bits::new(corners.n_corners);
+    let mut places: Vec<(u32, Point)> = Vec::new();
+    let mut ask = |places: &mut Vec<(u32, Point)>| {
+        let asked: Result<Vec<f64>, _> = places.par_iter().map(|&(_, p)| size(p)).collect();
+        for ((id, _), size) in places.drain(..).zip(asked?) {
+            h.set(id as usize, (size / side) as f32);
+        }
+        Ok(())
+    };
+    for (i, leaf) in tree.leaves().enumerate() {
+        for (c, id) in corners.of_leaf.get(i).into_iter().enumerate() {
+            if !is_known.set(id) {
+                let [x, y, z] = leaf.corner(c).map(f64::from);
+                places.push((id, Point::new(x, y, z) * (1.0 / f64::from(LATTICE))));
+            }
+        }
+        if places.len() >= CORNERS_AT_ONCE {
+            ask(&mut places)?;
+        }
+    }
+    ask(&mut places)?;
+    Ok(h)
+}
+
+/// Whether two lists of sizes are equal wherever leaves meet the box of the skin: the octree is as fine as either needs there.
+fn is_same(
+    tree: &Tree,
+    corners: &mut Corners,
+    [had, wanted]: [&mut SpillVec<f32>; 2],
+    constraints: &SizeConstraints,
+) -> bool {
+    tree.leaves().enumerate().all(|(i, leaf)| {
+        !constraints.is_in_bounds(leaf) || {
+            let mut ids = corners.of_leaf.get(i).into_iter();
+            ids.all(|id| had.get(id as usize) == wanted.get(id as usize))
+        }
+    })
+}
+
+/// By leaf, the slope of what the part has between its corners, over `beta`; at least one.
+fn steeper(
+    tree: &Tree,
+    corners: &mut Corners,
+    had: &mut SpillVec<f32>,
+    beta: f64,
+    room: &ScratchSpace,
+) -> SpillVec<f32> {
+    let mut steeper = room.column(corners.of_leaf.len(), 1.0f32);
+    for (i, leaf) in tree.leaves().enumerate() {
+        let h = corners.of_leaf.get(i).map(|id| f64::from(had.get(id as usize)));
+        let slope = PAIRS.iter().fold(0.0f64, |most, &(a, b, distance2)| {
+            let distance = f64::from(distance2).sqrt() * leaf.side();
+            most.max((h[a as usize] - h[b as usize]).abs() / distance)
+        });
+        steeper.set(i, (slope / beta).max(1.0) as f32);
+    }
+    steeper
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sizing::SizeOptions;
+
+    fn room() -> ScratchSpace {
+        ScratchSpace::boundless()
+    }
+
+    struct Constant(f64);
+
+    impl SizeConstraint for Constant {
+        fn h(&self, _: Point) -> Result<f64, SizingError> {
+            Ok(self.0)
+        }
+    }
+
+    /// The skin of a cube in squares of side 0.1, each of two triangles.
+    fn skin() -> (Vec<Point>, Vec<[u32; 3]>) {
+        const N: u32 = 10;
+        let (mut points, mut triangles) = (Vec::new(), Vec::new());
+        for axis in 0..3 {
+            for side in [0.0, 1.0] {
+                let first = points.len() as u32;
+                for k in 0..(N + 1) * (N + 1) {
+                    let at = [f64::from(k % (N + 1)), f64::from(k / (N + 1))];
+                    let mut p = [side; 3];
+                    p[(axis + 1) % 3] = at[0] / f64::from(N);
+                    p[(axis + 2) % 3] = at[1] / f64::from(N);
+                    points.push(Point::from_array(p));
+                }
+                for k in 0..N * N {
+                    let a = first + k % N + k / N * (N + 1);
+                    triangles.push([a, a + 1, a + N + 2]);
+                    triangles.push([a, a + N + 2, a + N + 1]);
+                }
+            }
+        }
+        (points, triangles)
+    }
+
+    #[test]
+    fn sizes_go_from_the_skin_to_the_wish_at_the_slope() {
+        let (points, triangles) = skin();
+        let beta = 1.3f64.ln();
+        for constraint in [0.03, 0.1, 0.2] {
+            let had = SizeField::build(&points, &triangles, &SizeOptions::default())
+                .expect("a good surface");
+            let field = had.within(&points, &triangles, &Constant(constraint), beta, &room());
+            let field = field.expect("a good skin").expect("another size");
+            let middle = field.h(Point::splat(0.5));
+            let reach = 0.5 * beta;
+            let expected = constraint.clamp(0.11 - reach, 0.11 + reach);
+            assert!((middle / expected - 1.0).abs() < 0.15, "{constraint}: {middle}");
+            for y in [0.21, 0.5, 0.77] {
+                let at_skin = field.h(Point::new(0.0, y, 0.45));
+                assert!((0.08..0.14).contains(&at_skin), "{constraint}: {at_skin}");
+            }
+            let mut before = None::<f64>;
+            for i in 0..=200 {
+                let h = field.h(Point::new(f64::from(i) * 0.005, 0.5, 0.5));
+                if let Some(before) = before {
+                    assert!((h - before).abs() < 1.75 * beta * 0.005, "{constraint} {i}");
+                }
+                before = Some(h);
+            }
+        }
+    }
+
+    #[test]
+    fn no_size_is_an_error_and_nothing_wished_is_the_skins() {
+        let (points, triangles) = skin();
+        let had = SizeField::build(&points, &triangles, &SizeOptions::default());
+        let had = had.expect("a good surface");
+        let field = had.within(&points, &triangles, &Constant(f64::INFINITY), 0.26, &room());
+        let field = field.expect("a good skin").expect("no size at all");
+        let middle = field.h(Point::splat(0.5));
+        assert!(middle > 0.1 && middle < 0.3, "{middle}");
+        assert!(had.within(&points, &[], &Constant(1.0), 0.26, &room()).is_err());
+    }
+
+    /// A box of which one end is fine: the slope bounds sizes all along it.
+    fn graded() -> (Vec<Point>, Vec<[u32; 3]>, SizeField) {
+        let (mut points, triangles) = skin();
+        for p in &mut points {
+            // Steps from 0.002 to 0.5.
+            p.x = (0.002 * (2f64.powf(10.0 * p.x) - 1.0)).min(2.0);
+        }
+        let field = SizeField::build(&points, &triangles, &SizeOptions::default());
+        (points, triangles, field.expect("a good surface"))
+    }
+
+    fn places() -> impl Iterator<Item = Point> {
+        (0..4000).map(|k| {
+            let at = |step: u32| f64::from(k * step % 4001) / 4000.0;
+            Point::new(2.0 * at(7) * at(7), at(1511), at(2903))
+        })
+    }
+
+    #[test]
+    fn where_the_wish_is_what_the_part_has_nothing_changes() {
+        /// Another length in one corner alone.
+        struct But<'a>(&'a SizeField);
+        impl SizeConstraint for But<'_> {
+            fn h(&self, p: Point) -> Result<f64, SizingError> {
+                let is_there = p.distance(Point::new(2.0, 1.0, 1.0)) < 0.2;
+                Ok(self.0.h(p) * if is_there { 0.9 } else { 1.0 })
+            }
+        }
+        let (points, triangles, had) = graded();
+        let within = |wish: &dyn SizeConstraint| {
+            let field = had.within(&points, &triangles, wish, had.beta(), &room());
+            field.expect("a good skin")
+        };
+        assert!(within(&had).is_none());
+        let field = within(&But(&had)).expect("another length");
+        for p in places().filter(|p| p.x < 0.8) {
+            let (old, new) = (had.h(p), field.h(p));
+            assert!((new / old - 1.0).abs() < 1e-3, "{p} {old} {new}");
+        }
+    }
+
+    #[test]
+    fn a_smaller_wish_makes_no_place_coarser() {
+        struct Share<'a>(&'a SizeField, f64);
+        impl SizeConstraint for Share<'_> {
+            fn h(&self, p: Point) -> Result<f64, SizingError> {
+                Ok(self.0.h(p) * self.1)
+            }
+            fn divides(&self, middle: Point, width: f64) -> Option<bool> {
+                self.0.divides(middle, width)
+            }
+        }
+        let (points, triangles, had) = graded();
+        let mut before = had.clone();
+        for share in [0.95, 0.8, 0.5] {
+            let field = had.within(&points, &triangles, &Share(&had, share), had.beta(), &room());
+            let field = field.expect("a good skin").expect("other sizes");
+            for p in places() {
+                let (old, new) = (had.h(p), field.h(p));
+                assert!(new < old * 1.01 && new > 0.9 * share * old, "{p} {old} {new}");
+                assert!(new < before.h(p) * 1.1, "{p} {share}");
+            }
+            before = field;
+        }
+    }
+}

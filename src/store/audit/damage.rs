@@ -1,0 +1,132 @@
+//! Whatever cannot be read as it was written, all of it, with its places.
+//!
+//! The mesh itself is read by [`verify`](super::verify), chunk by chunk; here every file that counts is, also those that are only kept:
+//! coarse snapshots, previous versions, stages.
+
+use crate::store::{Catalog, StoreError};
+use tetdb_base::storage::check_cancelled;
+use tetdb_schema::catalog::{CoarseRow, SubdomainRow};
+
+/// For chunks and what redb holds of a file.
+const MEMORY_BYTES: usize = 8 << 20;
+/// More are not listed.
+const LISTED_MAX: usize = 1000;
+
+/// What is damaged in the files of sub-domains, coarse snapshots, previous versions and stages, in that order; nothing in a sound store.
+///
+/// Errors: a damaged catalog, which tells what files there are; failures of the disk that are no damage.
+pub fn damage(store: &mut Catalog) -> Result<Vec<StoreError>, StoreError> {
+    let mut found = DamageFound(Vec::new());
+    for row in store.subdomains()? {
+        found.of_part(store, row)?;
+    }
+    found.of_snapshots(store)?;
+    Ok(found.0)
+}
+
+/// The same of the files that are no part of the mesh. Errors: as [`damage`].
+pub(super) fn damage_of_snapshots(store: &mut Catalog) -> Result<Vec<StoreError>, StoreError> {
+    let mut found = DamageFound(Vec::new());
+    found.of_snapshots(store)?;
+    Ok(found.0)
+}
+
+struct DamageFound(Vec<StoreError>);
+
+impl DamageFound {
+    /// Takes damage; hands other errors on. Whether there was none.
+    fn note<T, E: Into<StoreError>>(&mut self, read: Result<T, E>) -> Result<bool, StoreError> {
+        check_cancelled();
+        match read.map_err(E::into) {
+            Ok(_) => Ok(true),
+            Err(error) if error.is_damage() => {
+                if self.0.len() < LISTED_MAX {
+                    self.0.push(error);
+                }
+                Ok(false)
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Reads one after the other, until no more damage is listed: a count of chunks that was changed may be any. Whether all were sound.
+    fn all<T, E: Into<StoreError>>(
+        &mut self,
+        chunks: impl Iterator<Item = Result<T, E>>,
+    ) -> Result<bool, StoreError> {
+        let mut is_sound = true;
+        for chunk in chunks {
+            is_sound &= self.note(chunk)?;
+            if self.0.len() >= LISTED_MAX {
+                break;
+            }
+        }
+        Ok(is_sound)
+    }
+
+    fn of_snapshots(&mut self, store: &mut Catalog) -> Result<(), StoreError> {
+        for row in store.coarse_snapshots()? {
+            self.of_snapshot(store, row)?;
+        }
+        for row in store.previous()? {
+            self.of_part(store, row)?;
+        }
+        for stage in store.stages()? {
+            self.of_part(store, stage.row)?;
+        }
+        Ok(())
+    }
+
+    fn of_part(&mut self, store: &mut Catalog, row: SubdomainRow) -> Result<(), StoreError> {
+        let [tets, vertices, facets, faces, ..] = row.chunks;
+        let mut part = match store.open_row(row, MEMORY_BYTES) {
+            Ok(part) => part,
+            Err(error) => return self.note::<(), _>(Err(error)).map(drop),
+        };
+        let mut is_sound = self.all((0..vertices).map(|chunk| part.vertex_chunk(chunk)))?;
+        is_sound &= self.all((0..tets).map(|chunk| part.tet_chunk(chunk)))?;
+        is_sound &= self.all((0..facets).map(|chunk| part.facet_chunk(chunk)))?;
+        is_sound &= self.all((0..faces).map(|chunk| part.interface_chunk(chunk)))?;
+        // Damage of chunks was reported with their places by now; what is left is in the tree between them.
+        if is_sound {
+            self.note(part.check())?;
+        }
+        Ok(())
+    }
+
+    fn of_snapshot(&mut self, store: &mut Catalog, row: CoarseRow) -> Result<(), StoreError> {
+        let mut leaf = match store.open_coarse(row.rank, MEMORY_BYTES) {
+            Ok(leaf) => leaf,
+            Err(error) => return self.note::<(), StoreError>(Err(error)).map(drop),
+        };
+        let mut is_sound = self.all(leaf.vertices())?;
+        is_sound &= self.all(leaf.tets())?;
+        is_sound &= self.all(leaf.facets())?;
+        is_sound &= self.all(leaf.faces())?;
+        if is_sound {
+            self.note(leaf.check())?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sealed::SealedError;
+
+    #[test]
+    fn a_count_without_end_is_not_followed_to_it() {
+        let missing = || {
+            Err::<(), _>(SealedError::Content {
+                path: "part.redb".into(),
+                subdomain: 0,
+                what: "a chunk is missing".to_owned(),
+            })
+        };
+        let mut found = DamageFound(Vec::new());
+        let is_sound = found.all(std::iter::repeat_with(missing));
+        assert!(!is_sound.expect("damage alone"));
+        assert_eq!(found.0.len(), LISTED_MAX);
+    }
+}

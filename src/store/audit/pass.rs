@@ -1,0 +1,579 @@
+//! Once through each sub-domain: facets, then tetrahedra chunk by chunk, then the faces left open.
+
+use std::path::Path;
+
+use rayon::prelude::*;
+use tetdb_schema::chunk::{ChunkRecord, TetSummary};
+use tetdb_schema::digest::Digest;
+use tetdb_schema::record::{FACES, NO_TET, SealedTet};
+
+use super::against::{Input, check_owners};
+use super::claims::{Claims, FACET, INTERFACE, SortedClaims};
+use super::interface::Interfaces;
+use super::pairing::{OpenSides, Side};
+use super::part_report::{PartReport, Volumes};
+use super::rows::{Rederived, RegionSums, check_regions};
+use super::wires::WireSearch;
+use super::{Finding, Level, Offender, Report, VerifyOptions};
+use crate::sealed::SealedError;
+use crate::sealed::{Corner, FacePairs, Paired, Subdomain, sorted_face};
+use crate::store::StoreError;
+use tetdb_base::geom::{Point, insphere, orient};
+use tetdb_base::storage::{check_cancelled, parallel};
+use tetdb_schema::catalog::{InterfaceRow, RegionRow};
+
+/// Volumes that agree this well, relative to the sum of what was added, are the same: sums of
+/// millions of terms lose some six of sixteen digits at most.
+const VOLUME_TOLERANCE: f64 = 1e-9;
+
+/// A verification under way.
+pub(super) struct Audit<'a> {
+    options: &'a VerifyOptions,
+    scratch: &'a Path,
+    input: Option<Input<'a>>,
+    wires: Option<WireSearch<'a>>,
+    interfaces: Interfaces,
+    pairs: FacePairs,
+    report: Report,
+    digests: [Digest; 2],
+    regions: RegionSums,
+    volumes: Volumes,
+    /// The first corner of the boundary: seen from near, cones do not cancel.
+    apex: Option<Point>,
+}
+
+/// Two faces of a chunk that are one.
+struct Pair {
+    a: u32,
+    b: u32,
+}
+
+impl<'a> Audit<'a> {
+    /// `apex`: the first corner of the boundary, where the first sub-domains are looked at elsewhere.
+    pub(super) fn new(
+        surface: Option<&'a tetdb_base::surface::Surface>,
+        options: &'a VerifyOptions,
+        scratch: &'a Path,
+        apex: Option<Point>,
+    ) -> Self {
+        let mut report = Report::new(options.level);
+        report.against_input = surface.is_some() && options.level >= Level::Geometry;
+        Self {
+            options,
+            scratch,
+            input: surface.map(Input::new),
+            wires: surface.and_then(WireSearch::new),
+            interfaces: Interfaces::new(scratch, options.memory_bytes / 16),
+            pairs: FacePairs::new(SealedTet::COUNT_MAX),
+            report,
+            digests: [Digest::default(); 2],
+            regions: RegionSums::new(),
+            volumes: Volumes::default(),
+            apex,
+        }
+    }
+
+    fn level(&self, level: Level) -> bool {
+        self.options.level >= level
+    }
+
+    pub(super) fn subdomain(&mut self, part: &mut Subdomain) -> Result<(), StoreError> {
+        // Summed by itself, for sums must not depend on who looked at which.
+        let others = std::mem::take(&mut self.volumes);
+        self.walk(part)?;
+        self.volumes = others.and(&self.volumes);
+        // Damage of chunks was reported with their places by now; what is left is in the tree between them.
+        Ok(part.check()?)
+    }
+
+    fn walk(&mut self, part: &mut Subdomain) -> Result<(), StoreError> {
+        let row = part.row().clone();
+        let report = &mut self.report;
+        report.subdomains += 1;
+        report.tets += row.tets;
+        report.vertices += row.vertices;
+        report.facets += row.facets;
+        report.interface_faces += row.interface_faces;
+        let mut used = vec![0u64; (row.vertices as usize).div_ceil(64)];
+        let mut claims = self.facets(part, &mut used)?;
+        let digest = self.tets(part, &mut claims, &mut used)?;
+        while let Some(claim) = claims.next_below(u32::MAX)? {
+            self.stray(part, claim.tet, &claim.face)?;
+        }
+        self.unused(part, &used)?;
+        if digest[0].lanes != row.digest || digest[1].lanes != row.interface_digest {
+            let finding = Finding::CatalogDiffers;
+            self.report.find(finding, || {
+                let what = format!(
+                    "the digests are {} and {}, not those of the catalog",
+                    digest[0], digest[1]
+                );
+                Offender::new(finding, Some(row.rank), what)
+            });
+        }
+        for (sum, part) in self.digests.iter_mut().zip(digest) {
+            sum.merge(&part);
+        }
+        Ok(())
+    }
+
+    /// Reads facets; returns what they and the interface faces say of tetrahedra.
+    fn facets(
+        &mut self,
+        part: &mut Subdomain,
+        used: &mut [u64],
+    ) -> Result<SortedClaims, StoreError> {
+        let rank = part.id().rank();
+        let mut claims = Claims::new(self.scratch, self.options.memory_bytes / 8);
+        let (chunks, total) = (part.row().chunks[2], part.row().facets);
+        let mut n = 0;
+        for chunk in 0..chunks {
+            check_cancelled();
+            for facet in part.facet_chunk(chunk)?.records {
+                n += 1;
+                let corners = part.corners(facet.vertices)?;
+                mark(used, &facet.vertices);
+                for (side, tet) in facet.tets.into_iter().enumerate() {
+                    if tet != NO_TET {
+                        claims.push(tet, facet.vertices, side == 0, FACET)?;
+                    }
+                }
+                if self.level(Level::Geometry) {
+                    check_owners(rank, &corners, &mut self.report);
+                    self.boundary_volume(&facet.tets, &corners);
+                    if let Some(input) = &mut self.input {
+                        input.check(rank, &facet, &corners, &mut self.report);
+                    }
+                }
+            }
+        }
+        counted(part, "facets", n, total)?;
+        self.interface_faces(part, &mut claims)?;
+        Ok(claims.finish()?)
+    }
+
+    fn interface_faces(
+        &mut self,
+        part: &mut Subdomain,
+        claims: &mut Claims,
+    ) -> Result<(), StoreError> {
+        let rank = part.id().rank();
+        let (chunks, total) = (part.row().chunks[3], part.row().interface_faces);
+        let mut n = 0;
+        for chunk in 0..chunks {
+            for face in part.interface_chunk(chunk)?.records {
+                n += 1;
+                let corners = part.corners(face.vertices)?;
+                claims.push(face.tet, face.vertices, false, INTERFACE)?;
+                self.interfaces.push(rank, &face, &corners)?;
+            }
+        }
+        counted(part, "interface faces", n, total)
+    }
+
+    /// Adds a facet's share of the volume within the boundary: a cone to one point for each filled side.
+    fn boundary_volume(&mut self, tets: &[u32; 2], corners: &[Corner; 3]) {
+        let apex = *self.apex.get_or_insert(corners[0].point);
+        let [a, b, c] = corners.map(|c| c.point - apex);
+        let (u, v) = (b - a, c - a);
+        let cone = a.dot(u.cross(v)) / 6.0;
+        let sides = tets.map(|t| f64::from(u8::from(t != NO_TET)));
+        let sums = &mut self.volumes;
+        sums.within_boundary += cone * (sides[1] - sides[0]);
+        sums.scale += cone.abs();
+        sums.rounding += 4.0 * f64::EPSILON * a.length() * u.length() * v.length();
+    }
+
+    fn tets(
+        &mut self,
+        part: &mut Subdomain,
+        claims: &mut SortedClaims,
+        used: &mut [u64],
+    ) -> Result<[Digest; 2], StoreError> {
+        let rank = part.id().rank();
+        let mut digest = [Digest::default(); 2];
+        let mut rows = Rederived::new(rank);
+        let mut open = OpenSides::new(self.scratch, self.options.memory_bytes / 4);
+        let mut expected = 0;
+        for place in 0..part.tet_summaries().len() {
+            check_cancelled();
+            let chunk = part.tet_chunk(place as u32)?;
+            let summary = part.tet_summaries()[place];
+            if chunk.first != expected {
+                return Err(StoreError::Sealed(SealedError::Content {
+                    path: part.path().to_owned(),
+                    subdomain: rank,
+                    what: format!(
+                        "a chunk of tetrahedra starts at {}, expected {expected}",
+                        chunk.first
+                    ),
+                }));
+            }
+            expected += chunk.records.len() as u32;
+            let tets = &chunk.records;
+            let mut corners = Vec::with_capacity(tets.len());
+            for (i, tet) in tets.iter().enumerate() {
+                let c = part.corners(tet.nodes)?;
+                mark(used, &tet.nodes);
+                self.distinct(rank, chunk.first + i as u32, tet, &c);
+                if let Some(wires) = &mut self.wires {
+                    wires.see(&c);
+                }
+                corners.push(c);
+            }
+            rows.add(tets, &corners, &summary, &mut self.report);
+            let marks = self.marks(part, claims, chunk.first, tets)?;
+            if self.level(Level::Geometry) {
+                self.orientations(rank, chunk.first, &corners);
+            }
+            if self.level(Level::Adjacency) {
+                self.pair(rank, &summary, tets, &corners, &marks, &mut open)?;
+            }
+        }
+        let total = part.row().tets;
+        counted(part, "tetrahedra", u64::from(expected), total)?;
+        digest[0] = rows.digest();
+        rows.finish(part, &mut self.regions, &mut self.report)?;
+        for chunk in 0..part.row().chunks[3] {
+            for face in part.interface_chunk(chunk)?.records {
+                let mixes = part.corners(face.vertices)?.map(|c| c.mix);
+                digest[1].add_face(mixes, face.cut);
+            }
+        }
+        open.for_each_face(|sides| self.open_face(part, sides))?;
+        Ok(digest)
+    }
+
+    fn distinct(&mut self, rank: u32, number: u32, tet: &SealedTet, corners: &[Corner; 4]) {
+        let [a, b, c, d] = tet.nodes;
+        if a == b || a == c || a == d || b == c || b == d || c == d {
+            let finding = Finding::RepeatedNode;
+            self.report.find(finding, || {
+                Offender::new(finding, Some(rank), "two nodes are the same")
+                    .with_tet(number)
+                    .with_corners(corners)
+            });
+        }
+    }
+
+    /// What makes each face of a chunk required; findings where a claim is false.
+    fn marks(
+        &mut self,
+        part: &mut Subdomain,
+        claims: &mut SortedClaims,
+        first: u32,
+        tets: &[SealedTet],
+    ) -> Result<Vec<[u8; 4]>, StoreError> {
+        let mut marks = vec![[0; 4]; tets.len()];
+        while let Some(claim) = claims.next_below(first + tets.len() as u32)? {
+            let place = (claim.tet - first) as usize;
+            let nodes = tets[place].nodes;
+            let face = (0..4)
+                .find(|&i| sorted_face(FACES[i].map(|k| nodes[k])) == (claim.face, claim.odd));
+            match face {
+                Some(i) if marks[place][i] & claim.kind == 0 => marks[place][i] |= claim.kind,
+                _ => self.stray(part, claim.tet, &claim.face)?,
+            }
+        }
+        Ok(marks)
+    }
+
+    fn stray(&mut self, part: &mut Subdomain, tet: u32, face: &[u32; 3]) -> Result<(), StoreError> {
+        let corners = part.corners(*face)?;
+        if self.level(Level::Topology) {
+            let finding = Finding::StrayFacet;
+            self.report.find(finding, || {
+                let what = "the tetrahedron named by a facet or interface face does not have it on that side, or is named twice";
+                Offender::new(finding, Some(part.id().rank()), what)
+                    .with_tet(tet)
+                    .with_corners(&corners)
+            });
+        }
+        Ok(())
+    }
+
+    fn orientations(&mut self, rank: u32, first: u32, corners: &[[Corner; 4]]) {
+        let volumes: Vec<f64> = parallel(|| {
+            corners
+                .par_iter()
+                .with_min_len(1024)
+                .map(|c| {
+                    let [a, b, c, d] = c.map(|c| c.point);
+                    orient(a, b, c, d)
+                })
+                .collect()
+        });
+        for (i, &six_volumes) in volumes.iter().enumerate() {
+            self.volumes.of_tets += six_volumes / 6.0;
+            if six_volumes <= 0.0 {
+                let finding = Finding::NotPositive;
+                self.report.find(finding, || {
+                    Offender::new(finding, Some(rank), "its orientation is not positive")
+                        .with_tet(first + i as u32)
+                        .with_corners(&corners[i])
+                });
+            }
+        }
+    }
+
+    /// Matches the faces of a chunk; sends the others to the sort.
+    fn pair(
+        &mut self,
+        rank: u32,
+        summary: &TetSummary,
+        tets: &[SealedTet],
+        corners: &[[Corner; 4]],
+        marks: &[[u8; 4]],
+        open: &mut OpenSides,
+    ) -> Result<(), StoreError> {
+        let (first, mut n_open) = (summary.first, 0);
+        self.pairs.clear();
+        let mut inner = Vec::with_capacity(tets.len() * 2);
+        for (t, tet) in tets.iter().enumerate() {
+            for (i, face) in FACES.iter().enumerate() {
+                let (key, odd) = sorted_face(face.map(|k| tet.nodes[k]));
+                let reference = (t * 4 + i) as u32;
+                match self.pairs.add(key, odd, reference) {
+                    Paired::Open => {}
+                    Paired::With(other) => inner.push(Pair { a: other, b: reference }),
+                    Paired::Same(_) | Paired::Third => {
+                        let c = face.map(|k| corners[t][k]);
+                        self.crowded(rank, first + t as u32, &c);
+                    }
+                }
+            }
+        }
+        for (key, odd, reference) in self.pairs.open() {
+            let (t, i) = (reference as usize / 4, reference as usize % 4);
+            n_open += 1;
+            open.push(&Side {
+                face: key,
+                odd,
+                reference: first * 4 + reference,
+                apex: tets[t].nodes[i],
+                region: tets[t].region,
+                mark: marks[t][i],
+            })?;
+        }
+        if n_open != summary.open_faces {
+            let finding = Finding::CatalogDiffers;
+            self.report.find(finding, || {
+                let what = format!(
+                    "a chunk has {n_open} open faces, its summary counts {}",
+                    summary.open_faces
+                );
+                Offender::new(finding, Some(rank), what).with_tet(first)
+            });
+        }
+        self.report.inner_faces += inner.len() as u64;
+        for pair in &inner {
+            let [(a, i), (b, j)] = [pair.a, pair.b].map(|r| (r as usize / 4, r as usize % 4));
+            let c = FACES[i].map(|k| corners[a][k]);
+            let number = first + a as u32;
+            let regions = [tets[a].region, tets[b].region];
+            self.agree(rank, number, [marks[a][i], marks[b][j]], regions, &c);
+        }
+        if self.level(Level::Delaunay) {
+            let tested = parallel(|| {
+                inner
+                    .par_iter()
+                    .with_min_len(1024)
+                    .filter(|p| marks[p.a as usize / 4][p.a as usize % 4] == 0)
+                    .map(|p| {
+                        let [a, b, c, d] = corners[p.a as usize / 4].map(|c| c.point);
+                        let apex = corners[p.b as usize / 4][p.b as usize % 4].point;
+                        (1, u64::from(insphere(a, b, c, d, apex) <= 0.0))
+                    })
+                    .reduce(|| (0, 0), |x, y| (x.0 + y.0, x.1 + y.1))
+            });
+            self.report.delaunay_tested += tested.0;
+            self.report.delaunay_faces += tested.1;
+        }
+        Ok(())
+    }
+
+    fn crowded(&mut self, rank: u32, tet: u32, corners: &[Corner; 3]) {
+        let finding = Finding::CrowdedFace;
+        self.report.find(finding, || {
+            let what = "more than one tetrahedron on one side of a face";
+            Offender::new(finding, Some(rank), what).with_tet(tet).with_corners(corners)
+        });
+    }
+
+    /// The two sides of an inner face: the same marks, none of them an interface's, and the same region where there are none.
+    fn agree(
+        &mut self,
+        rank: u32,
+        tet: u32,
+        marks: [u8; 2],
+        regions: [u32; 2],
+        corners: &[Corner; 3],
+    ) {
+        if !self.level(Level::Topology) {
+            return;
+        }
+        let (finding, what) = if marks[0] & INTERFACE != 0 || marks[1] & INTERFACE != 0 {
+            let what = "an interface face has both its sides in one sub-domain";
+            (Finding::UnmatchedInterface, what.to_owned())
+        } else if marks[0] != marks[1] {
+            let what = "only one of the two sides of a face is a facet";
+            (Finding::OneSidedFacet, what.to_owned())
+        } else if marks[0] == 0 && regions[0] != regions[1] {
+            let [a, b] = regions;
+            let what = format!("regions {a} and {b} meet at a face that is no facet");
+            (Finding::RegionLeak, what)
+        } else {
+            return;
+        };
+        self.report.find(finding, || {
+            Offender::new(finding, Some(rank), what).with_tet(tet).with_corners(corners)
+        });
+    }
+
+    /// A face that its chunk left open, with all its sides.
+    fn open_face(&mut self, part: &mut Subdomain, sides: &[Side]) -> Result<(), StoreError> {
+        let rank = part.id().rank();
+        let tet = sides[0].reference / 4;
+        match sides {
+            [one] => {
+                if one.mark & FACET != 0 {
+                    self.report.boundary_faces += 1;
+                }
+                if one.mark == 0 {
+                    let corners = part.corners(one.face)?;
+                    let finding = Finding::OpenFace;
+                    self.report.find(finding, || {
+                        let what = "a face with one side is neither a facet nor an interface face";
+                        Offender::new(finding, Some(rank), what)
+                            .with_tet(tet)
+                            .with_corners(&corners)
+                    });
+                }
+            }
+            [a, b] if a.odd != b.odd => {
+                self.report.inner_faces += 1;
+                let corners = part.corners(a.face)?;
+                self.agree(rank, tet, [a.mark, b.mark], [a.region, b.region], &corners);
+                if self.level(Level::Delaunay) && a.mark == 0 {
+                    let [p, q, r] = corners.map(|c| c.point);
+                    let [x, y] = part.corners([a.apex, b.apex])?.map(|c| c.point);
+                    // Outward from the apex the face turns one way or the other.
+                    let (q, r) = if a.odd { (r, q) } else { (q, r) };
+                    let empty = insphere(x, p, q, r, y) <= 0.0;
+                    self.report.delaunay_tested += 1;
+                    self.report.delaunay_faces += u64::from(empty);
+                }
+            }
+            _ => {
+                let corners = part.corners(sides[0].face)?;
+                self.crowded(rank, tet, &corners);
+            }
+        }
+        Ok(())
+    }
+
+    fn unused(&mut self, part: &mut Subdomain, used: &[u64]) -> Result<(), StoreError> {
+        for v in 0..part.row().vertices as u32 {
+            if used[v as usize / 64] >> (v % 64) & 1 == 0 {
+                let corner = part.corner(v)?;
+                let finding = Finding::UnusedVertex;
+                self.report.find(finding, || {
+                    let what = "no tetrahedron and no facet has the vertex";
+                    Offender::new(finding, Some(part.id().rank()), what).with_corners(&[corner])
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// What was found, for [`add`](Self::add) elsewhere. Errors: the disk.
+    pub(super) fn into_part(mut self) -> Result<PartReport, StoreError> {
+        Ok(PartReport {
+            digests: self.digests.map(|digest| digest.lanes),
+            regions: (self.regions.iter())
+                .map(|(&region, sum)| (region, sum.tets, sum.volume))
+                .collect(),
+            volumes: self.volumes,
+            interfaces: self.interfaces.into_sides()?,
+            triangles: self.input.take().map(Input::into_seen),
+            wires: self.wires.take().map(WireSearch::into_seen),
+            report: self.report,
+        })
+    }
+
+    /// Adds what was found of the next sub-domain. Errors: the disk.
+    pub(super) fn add(&mut self, part: PartReport) -> Result<(), StoreError> {
+        self.report.add(part.report);
+        for (sum, lanes) in self.digests.iter_mut().zip(part.digests) {
+            sum.merge(&Digest { lanes });
+        }
+        for (region, tets, volume) in part.regions {
+            let sum = self.regions.entry(region).or_default();
+            sum.tets += tets;
+            sum.volume += volume;
+        }
+        self.volumes = self.volumes.and(&part.volumes);
+        self.interfaces.add(part.interfaces)?;
+        if let (Some(input), Some(seen)) = (&mut self.input, part.triangles) {
+            input.add(seen);
+        }
+        if let (Some(wires), Some(seen)) = (&mut self.wires, part.wires) {
+            wires.add(&seen);
+        }
+        Ok(())
+    }
+
+    pub(super) fn finish(
+        mut self,
+        interfaces: &[InterfaceRow],
+        regions: &[RegionRow],
+    ) -> Result<Report, StoreError> {
+        if self.level(Level::Topology) {
+            self.interfaces.finish(interfaces, &mut self.report)?;
+        }
+        check_regions(regions, &self.regions, &mut self.report);
+        self.report.volume = self.volumes.of_tets;
+        self.report.volume_within_boundary = self.volumes.within_boundary;
+        if self.options.level >= Level::Geometry {
+            let (found, expected) = (self.report.volume, self.report.volume_within_boundary);
+            let tolerance =
+                VOLUME_TOLERANCE * self.volumes.scale.max(found) + self.volumes.rounding;
+            if (found - expected).abs() > tolerance {
+                let finding = Finding::VolumeDiffers;
+                self.report.find(finding, || {
+                    let what = format!(
+                        "the tetrahedra have volume {found}, their boundary encloses {expected}"
+                    );
+                    Offender::new(finding, None, what)
+                });
+            }
+            if let Some(input) = self.input.take() {
+                input.finish(&mut self.report);
+            }
+            if let Some(wires) = self.wires.take() {
+                wires.finish(&mut self.report);
+            }
+        }
+        self.report.digest = self.digests[0].to_string();
+        self.report.interface_digest = self.digests[1].to_string();
+        Ok(self.report)
+    }
+}
+
+/// The chunks hold as many records as the catalog counts.
+fn counted(part: &Subdomain, what: &str, found: u64, total: u64) -> Result<(), StoreError> {
+    if found == total {
+        return Ok(());
+    }
+    Err(StoreError::Sealed(SealedError::Content {
+        path: part.path().to_owned(),
+        subdomain: part.id().rank(),
+        what: format!("its chunks hold {found} {what}, the catalog counts {total}"),
+    }))
+}
+
+fn mark(used: &mut [u64], vertices: &[u32]) {
+    for &v in vertices {
+        used[v as usize / 64] |= 1 << (v % 64);
+    }
+}

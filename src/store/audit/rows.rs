@@ -1,0 +1,173 @@
+//! What summaries and rows of the catalog say, compared with what the records give again.
+//!
+//! The writer sums in the order of the records, and so is it done here: numbers must agree bit for bit.
+
+use std::collections::BTreeMap;
+use std::convert::Infallible;
+
+use tetdb_schema::catalog::{InterfaceRow, NeighborRow, RegionRow, SubdomainRow, TopologyRow};
+use tetdb_schema::chunk::{TetSummary, VertexSummary};
+use tetdb_schema::digest::Digest;
+use tetdb_schema::record::SealedTet;
+
+use super::{Finding, Offender, Report};
+use crate::sealed::{Corner, RegionTotals, Subdomain, Totals};
+use crate::store::{Catalog, StoreError};
+use tetdb_base::geom::{Aabb, Point};
+
+/// Of one sub-domain.
+pub(super) struct Rederived {
+    totals: Totals,
+    rank: u32,
+}
+
+/// Regions of the whole mesh, summed sub-domain by sub-domain.
+pub(super) type RegionSums = BTreeMap<u32, RegionTotals>;
+
+impl Rederived {
+    pub(super) fn new(rank: u32) -> Self {
+        let totals = Totals::default();
+        Self { totals, rank }
+    }
+
+    /// The next chunk of tetrahedra, its corners and its summary.
+    pub(super) fn add(
+        &mut self,
+        tets: &[SealedTet],
+        corners: &[[Corner; 4]],
+        stored: &TetSummary,
+        report: &mut Report,
+    ) {
+        let mut corners = corners.iter();
+        let corners_of = |_: &SealedTet| {
+            let next = corners.next().expect("as many as there are tetrahedra");
+            Ok::<_, Infallible>(*next)
+        };
+        let (first, rank) = (stored.first, self.rank);
+        let Ok(mut found) = self.totals.add(first, tets, rank, corners_of);
+        // Both are known elsewhere: faces are counted when they are paired, bytes when they are read.
+        (found.open_faces, found.bytes) = (stored.open_faces, stored.bytes);
+        // Summaries of earlier versions lack it.
+        if stored.edge_max == 0.0 {
+            found.edge_max = 0.0;
+        }
+        if found != *stored {
+            let what =
+                format!("the summary of the chunk of tetrahedra {first} and on is another's");
+            differs(rank, what, report);
+        }
+    }
+
+    /// Digest of all tetrahedra.
+    pub(super) fn digest(&self) -> Digest {
+        self.totals.digest
+    }
+
+    /// Compares all vertices with their summaries, and the row with everything; adds the regions to those of the whole.
+    pub(super) fn finish(
+        self,
+        part: &mut Subdomain,
+        regions: &mut RegionSums,
+        report: &mut Report,
+    ) -> Result<(), StoreError> {
+        let rank = self.rank;
+        let mut around = Aabb::EMPTY;
+        for chunk in 0..part.vertex_summaries().len() {
+            let records = part.vertex_chunk(chunk as u32)?;
+            let points = || records.records.iter().map(|v| v.point);
+            let own = Aabb::around(points().map(Point::from_array));
+            around = around.with(own.low).with(own.high);
+            let bounds = [own.low, own.high].map(|p| p.to_array());
+            let stored = part.vertex_summaries()[chunk];
+            let mut found = VertexSummary {
+                bounds,
+                first: records.first,
+                count: records.records.len() as u32,
+                cells: VertexSummary::cells_of(&bounds, points()),
+            };
+            if stored.cells == 0 {
+                found.cells = 0;
+            }
+            if found != stored {
+                let what = format!("the summary of chunk {chunk} of vertices is another's");
+                differs(rank, what, report);
+            }
+        }
+        let row = part.row();
+        let bytes = std::fs::metadata(part.path()).map_or(row.bytes, |file| file.len());
+        let found = SubdomainRow {
+            quality: self.totals.quality(),
+            volume: self.totals.volume,
+            bounds: [around.low, around.high].map(|p| p.to_array()),
+            bytes,
+            ..row.clone()
+        };
+        if found != *row {
+            let what =
+                "its row gives another quality, volume, box or length of the file".to_owned();
+            differs(rank, what, report);
+        }
+        for (region, here) in self.totals.regions {
+            let sum = regions.entry(region).or_default();
+            sum.tets += here.tets;
+            sum.volume += here.volume;
+        }
+        Ok(())
+    }
+}
+
+/// Compares the regions' rows with the sums over all sub-domains.
+pub(super) fn check_regions(rows: &[RegionRow], sums: &RegionSums, report: &mut Report) {
+    for row in rows {
+        let found = sums.get(&row.region).copied().unwrap_or_default();
+        // Of an empty region only its surface is known.
+        if row.tets != found.tets || (row.filled && row.volume != found.volume) {
+            let RegionRow { region, tets, .. } = row;
+            let what = format!(
+                "region {region} has {} tetrahedra of volume {}, the catalog says {tets} of {}",
+                found.tets, found.volume, row.volume
+            );
+            report.find(Finding::CatalogDiffers, || {
+                Offender::new(Finding::CatalogDiffers, None, what)
+            });
+        }
+    }
+}
+
+/// Compares who neighbors whom with the interfaces, which were compared with their faces; and the list of files with who needs them.
+///
+/// Errors: a damaged catalog.
+pub(super) fn check_catalog(store: &mut Catalog, report: &mut Report) -> Result<(), StoreError> {
+    let mut expected = BTreeMap::<u32, BTreeMap<u32, u64>>::new();
+    for InterfaceRow { low, high, faces, .. } in store.interfaces()? {
+        for [a, b] in [[low, high], [high, low]] {
+            *expected.entry(a).or_default().entry(b).or_default() += faces;
+        }
+    }
+    for TopologyRow { subdomain, neighbors } in store.topology()? {
+        let of = expected.remove(&subdomain).unwrap_or_default().into_iter();
+        let of = of.map(|(subdomain, faces)| NeighborRow { subdomain, faces });
+        if !of.eq(neighbors) {
+            let what = "its row of neighbors is not what its interfaces say".to_owned();
+            differs(subdomain, what, report);
+        }
+    }
+    for rank in expected.into_keys() {
+        differs(rank, "it has interfaces and no row of neighbors".to_owned(), report);
+    }
+    let mut needed: Vec<[u32; 2]> = Vec::new();
+    for row in store.subdomains()?.into_iter().chain(store.previous()?) {
+        needed.push([row.rank, row.generation]);
+    }
+    let listed: Vec<[u32; 2]> =
+        (store.files()?.iter()).map(|file| [file.subdomain, file.generation]).collect();
+    for missing in needed.iter().filter(|file| !listed.contains(file)) {
+        differs(missing[0], "its file is not listed".to_owned(), report);
+    }
+    Ok(())
+}
+
+fn differs(rank: u32, what: String, report: &mut Report) {
+    let finding = Finding::CatalogDiffers;
+    report.find(finding, || Offender::new(finding, Some(rank), what));
+}

@@ -1,0 +1,17 @@
+//! Finished stores: the catalog, sealed sub-domains, questions about them, and their verification.
+//!
+//! | module | subject |
+//! |---|---|
+//! | [`sealed`] | compressed sub-domains, read chunk by chunk |
+//! | [`store`] | the catalog of job, steps and sub-domains; one commit a step |
+//! | [`query`] | locate, select, order |
+//! | [`audit`] | verification, digest, comparison |
+//!
+//! This crate does no meshing. Programs use the crate `tetdb`; no promise is made of what is public here.
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+pub mod audit;
+pub mod query;
+pub mod sealed;
+pub mod store;

@@ -1,0 +1,83 @@
+//! Tetrahedra around a vertex, around an edge, next to one: those that share so many vertices.
+//!
+//! A vertex is at the same place in every sub-domain that has it, and every tetrahedron that has it is in a chunk whose
+//! box holds that place: neither neighbors nor interfaces need be followed.
+
+use tetdb_schema::ids::{Owner, TetId, VertexId};
+
+use super::hit::Hit;
+use super::selection::{Selection, Sharing};
+use super::{QueryError, QuerySession};
+use tetdb_base::geom::Point;
+use tetdb_base::storage::check_cancelled;
+
+impl QuerySession {
+    /// One tetrahedron. Errors: the store has no such one.
+    pub fn tet(&mut self, id: TetId) -> Result<Hit, QueryError> {
+        let selection = Selection { tets: Some(vec![id]), ..Selection::default() };
+        let found = self.select(selection)?.next();
+        found.unwrap_or(Err(QueryError::NoTet { id }))
+    }
+
+    /// Tetrahedra that have all these vertices: the ball of one, the shell of an edge.
+    ///
+    /// Reads vertices in order until those of the surface and of cuts are found. Errors: the store has no such vertex.
+    pub fn around(&mut self, vertices: &[VertexId]) -> Result<Sharing, QueryError> {
+        let mut placed = Vec::new();
+        for &id in vertices {
+            placed.push((id.number(), self.vertex(id)?));
+        }
+        Ok(Sharing { at_least: placed.len(), vertices: placed, except: None })
+    }
+
+    /// Tetrahedra that share a face with this one. Errors: the store has no such one.
+    pub fn next_to(&mut self, id: TetId) -> Result<Sharing, QueryError> {
+        let tet = self.tet(id)?;
+        Ok(Sharing {
+            vertices: tet.vertices.into_iter().zip(tet.corners).collect(),
+            at_least: 3,
+            except: Some(id),
+        })
+    }
+
+    /// Where a vertex is.
+    fn vertex(&mut self, id: VertexId) -> Result<Point, QueryError> {
+        let ranks: Vec<u32> = match id.owner {
+            Owner::Subdomain(s) => {
+                let own = self.rows.iter().filter(|row| row.rank == s.rank());
+                own.map(|row| row.rank).collect()
+            }
+            _ => self.rows.iter().map(|row| row.rank).collect(),
+        };
+        for rank in ranks {
+            if let Some(point) = self.vertex_in(rank, id)? {
+                return Ok(point);
+            }
+        }
+        Err(QueryError::NoVertex { id })
+    }
+
+    fn vertex_in(&mut self, rank: u32, id: VertexId) -> Result<Option<Point>, QueryError> {
+        let part = &mut self.part(rank)?.subdomain;
+        // Its own vertices have the numbers they were sealed with.
+        if u64::from(id.index) < part.row().vertices {
+            let corner = part.corner(id.index)?;
+            if corner.id == id.number() {
+                return Ok(Some(corner.point));
+            }
+        }
+        let mut read = 0;
+        let mut found = None;
+        for chunk in part.vertex_chunks() {
+            check_cancelled();
+            read += 1;
+            let chunk = chunk?;
+            if let Some(vertex) = chunk.records.iter().find(|v| v.id == id.number()) {
+                found = Some(Point::from_array(vertex.point));
+                break;
+            }
+        }
+        self.count_vertices(read);
+        Ok(found)
+    }
+}

@@ -1,0 +1,110 @@
+//! A decoded chunk of tetrahedra with the vertices it needs, free of everything else.
+
+use super::hit::Hit;
+use super::tree::BoxTree;
+use crate::sealed::{Chunk, Corner, Subdomain};
+use crate::store::StoreError;
+use tetdb_base::geom::{Aabb, IdMap, Point};
+use tetdb_schema::ids::{SubdomainId, TetId};
+use tetdb_schema::record::SealedTet;
+
+/// A tetrahedron of a frame.
+#[derive(Clone, Copy)]
+pub(super) struct FrameTet {
+    /// Its number in the sub-domain.
+    pub local: u32,
+    pub region: u32,
+    /// Places of its vertices in the frame.
+    pub nodes: [u32; 4],
+}
+
+/// Shape: `tets` ascending by number; `points[v]`, `ids[v]` = position and lasting id of vertex `v` of the frame.
+pub(super) struct DecodedChunk {
+    part: SubdomainId,
+    pub tets: Vec<FrameTet>,
+    points: Vec<Point>,
+    ids: Vec<u64>,
+}
+
+/// A frame of a whole chunk, and a tree to find points in it.
+pub(super) struct Searched {
+    pub frame: DecodedChunk,
+    pub tree: BoxTree,
+}
+
+impl DecodedChunk {
+    /// The tetrahedra of a chunk that `keep` wants, with their vertices.
+    ///
+    /// Errors: damage.
+    pub fn new(
+        part: &mut Subdomain,
+        chunk: &Chunk<SealedTet>,
+        mut keep: impl FnMut(&Subdomain, u32, &SealedTet) -> bool,
+    ) -> Result<Self, StoreError> {
+        let mut places: IdMap<u32, u32> = IdMap::default();
+        let mut frame =
+            Self { part: part.id(), tets: Vec::new(), points: Vec::new(), ids: Vec::new() };
+        let mut locals = Vec::new();
+        for (local, tet) in (chunk.first..).zip(&chunk.records) {
+            if !keep(part, local, tet) {
+                continue;
+            }
+            let nodes = tet.nodes.map(|v| {
+                *places.entry(v).or_insert_with(|| {
+                    locals.push(v);
+                    locals.len() as u32 - 1
+                })
+            });
+            frame.tets.push(FrameTet { local, region: tet.region, nodes });
+        }
+        // In order, so that each chunk of vertices is wanted once.
+        let mut order: Vec<(u32, u32)> = locals.into_iter().zip(0..).collect();
+        order.sort_unstable();
+        frame.points.resize(order.len(), Point::ZERO);
+        frame.ids.resize(order.len(), 0);
+        for (v, place) in order {
+            let Corner { point, id, .. } = part.corner(v)?;
+            frame.points[place as usize] = point;
+            frame.ids[place as usize] = id;
+        }
+        Ok(frame)
+    }
+
+    pub fn corners(&self, tet: &FrameTet) -> [Point; 4] {
+        tet.nodes.map(|v| self.points[v as usize])
+    }
+
+    pub fn ids(&self, tet: &FrameTet) -> [u64; 4] {
+        tet.nodes.map(|v| self.ids[v as usize])
+    }
+
+    /// Its lasting id.
+    pub fn id(&self, tet: &FrameTet) -> TetId {
+        let id = TetId::new(self.part, tet.local);
+        id.expect("the reader counted the tetrahedra of the sub-domain")
+    }
+
+    /// A tetrahedron with all that is known of it.
+    pub fn hit(&self, tet: &FrameTet) -> Hit {
+        Hit::new(self.id(tet), tet.region, self.ids(tet), self.corners(tet))
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.tets.capacity() * size_of::<FrameTet>()
+            + self.points.capacity() * size_of::<Point>()
+            + self.ids.capacity() * 8
+    }
+}
+
+impl Searched {
+    pub fn new(frame: DecodedChunk) -> Self {
+        let around = |i: usize| Aabb::around(frame.corners(&frame.tets[i]));
+        let tree = BoxTree::new(frame.tets.len(), around);
+        Self { frame, tree }
+    }
+
+    pub fn bytes(&self) -> usize {
+        self.frame.bytes() + self.tree.bytes()
+    }
+}

@@ -1,0 +1,221 @@
+//! The tetrahedra of a selection, one after the other in the order of their ids.
+
+use std::vec::IntoIter;
+
+use tetdb_schema::ids::TetId;
+
+use super::hit::Hit;
+use super::locate::leaders;
+use super::marks::Marks;
+use super::selection::Selection;
+use super::session::{bounds_of, reach, vertex_chunk};
+use super::{QueryError, QuerySession};
+use crate::sealed::Subdomain;
+use tetdb_base::geom::{Aabb, IdMap, Point};
+
+/// The answers to [`QuerySession::select`]; holds one chunk's at a time. Ends after the first error.
+pub struct Selected<'a> {
+    inquiry: &'a mut QuerySession,
+    selection: Selection,
+    ranks: IntoIter<u32>,
+    rank: u32,
+    /// Chunks of the sub-domain to be read.
+    chunks: IntoIter<u32>,
+    marks: Option<Marks>,
+    ready: IntoIter<Hit>,
+}
+
+impl QuerySession {
+    /// Tetrahedra of which all of `selection` holds, in the order of their ids.
+    ///
+    /// Errors: sub-domains the store does not have; an interface that is not there.
+    pub fn select(&mut self, selection: Selection) -> Result<Selected<'_>, QueryError> {
+        self.check(&selection)?;
+        let ranks: Vec<u32> = self
+            .rows
+            .iter()
+            .filter(|row| selection.may_be_in(row.rank, &bounds_of(row)))
+            .map(|row| row.rank)
+            .collect();
+        Ok(Selected {
+            inquiry: self,
+            selection,
+            ranks: ranks.into_iter(),
+            rank: 0,
+            chunks: Vec::new().into_iter(),
+            marks: None,
+            ready: Vec::new().into_iter(),
+        })
+    }
+
+    pub(super) fn check(&mut self, selection: &Selection) -> Result<(), QueryError> {
+        let named = selection.subdomains.iter().flatten();
+        for &rank in named.chain(selection.interface.iter().flatten()) {
+            self.store.subdomain(rank)?;
+        }
+        if let Some([a, b]) = selection.interface {
+            let rows = self.store.interfaces()?;
+            let pair = [a.min(b), a.max(b)];
+            if !rows.iter().any(|row| [row.low, row.high] == pair) {
+                return Err(QueryError::NoInterface(a, b));
+            }
+        }
+        for &id in selection.tets.iter().flatten() {
+            let row = self.rows.iter().find(|r| r.rank == id.subdomain().rank());
+            if row.is_none_or(|row| u64::from(id.local()) >= row.tets) {
+                return Err(QueryError::NoTet { id });
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Selected<'_> {
+    /// What it has cost so far.
+    pub fn measures(&self) -> crate::query::Measures {
+        self.inquiry.measures()
+    }
+
+    /// Opens the next sub-domain, or returns `false` after the last.
+    fn next_part(&mut self) -> Result<bool, QueryError> {
+        let Some(rank) = self.ranks.next() else {
+            return Ok(false);
+        };
+        self.rank = rank;
+        self.marks = None;
+        let marks = self.inquiry.marks(rank, &self.selection)?;
+        let part = self.inquiry.part(rank)?;
+        let mut chunks = Vec::new();
+        for (chunk, summary) in (0u32..).zip(part.subdomain.tet_summaries()) {
+            let marked = marks.as_ref().is_none_or(|m| m.any(summary.first, summary.count));
+            if marked
+                && self.selection.may_be_among(rank, summary)
+                && (!self.selection.is_local()
+                    || is_led_near(&part.subdomain, &self.selection, chunk as usize))
+            {
+                chunks.push(chunk);
+            }
+        }
+        self.marks = marks;
+        self.chunks = chunks.into_iter();
+        Ok(true)
+    }
+
+    fn read(&mut self, chunk: u32) -> Result<(), QueryError> {
+        let found = hits_in(self.inquiry, &self.selection, &self.marks, self.rank, chunk)?;
+        self.ready = found.into_iter();
+        Ok(())
+    }
+
+    fn advance(&mut self) -> Result<Option<Hit>, QueryError> {
+        loop {
+            if let Some(found) = self.ready.next() {
+                return Ok(Some(found));
+            }
+            if let Some(chunk) = self.chunks.next() {
+                self.read(chunk)?;
+            } else if !self.next_part()? {
+                return Ok(None);
+            }
+        }
+    }
+}
+
+impl Iterator for Selected<'_> {
+    type Item = Result<Hit, QueryError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let next = self.advance();
+        if next.is_err() {
+            self.ranks = Vec::new().into_iter();
+            self.chunks = Vec::new().into_iter();
+        }
+        next.transpose()
+    }
+}
+
+/// What suits in one chunk, ascending by id.
+pub(super) fn hits_in(
+    inquiry: &mut QuerySession,
+    selection: &Selection,
+    marks: &Option<Marks>,
+    rank: u32,
+    chunk: u32,
+) -> Result<Vec<Hit>, QueryError> {
+    let mut nearby = Nearby::default();
+    let surface = match selection.needs_surface() {
+        true => Some(inquiry.surface_of(rank)?),
+        false => None,
+    };
+    let mut on_surface = Vec::new();
+    let frame = inquiry.frame(rank, chunk, |part, local, tet| {
+        let keep = marks.as_ref().is_none_or(|m| m.has(local))
+            && TetId::new(part.id(), local).is_some_and(|id| selection.may_be(id, tet.region))
+            && (!selection.is_local() || nearby.may_meet(part, selection, chunk, tet.nodes));
+        if keep {
+            on_surface.push(surface.as_ref().map(|faces| faces.of(local, tet)));
+        }
+        keep
+    })?;
+    let found = frame.tets.iter().zip(on_surface);
+    let found = found.map(|(tet, on_surface)| Hit { on_surface, ..frame.hit(tet) });
+    Ok(found.filter(|found| selection.holds(found)).collect())
+}
+
+/// Which places of a chunk of tetrahedra matter to a selection: a tetrahedron that meets it has all its vertices as near as its longest edge is long.
+#[derive(Default)]
+struct Nearby {
+    /// For a chunk of vertices a box around those of its cells that are near enough; empty where none are.
+    boxes: IdMap<usize, Aabb>,
+    place: usize,
+}
+
+impl Nearby {
+    /// What chunk `c` of vertices has for tetrahedra with edges not longer than `reach`.
+    fn of(&mut self, part: &Subdomain, selection: &Selection, reach: f64, c: usize) -> Aabb {
+        *self.boxes.entry(c).or_insert_with(|| {
+            let mut near = Aabb::EMPTY;
+            for cell in part.vertex_summaries()[c].cells() {
+                let [low, high] = cell.map(Point::from_array);
+                let widened = Aabb { low: low - reach, high: high + reach };
+                if selection.may_meet(&widened) {
+                    near = near.with(low).with(high);
+                }
+            }
+            near
+        })
+    }
+
+    /// Whether a tetrahedron of the chunk with these vertices may meet the selection.
+    fn may_meet(
+        &mut self,
+        part: &Subdomain,
+        selection: &Selection,
+        chunk: u32,
+        nodes: [u32; 4],
+    ) -> bool {
+        let reach = reach(part, chunk as usize);
+        let mut around = Aabb::EMPTY;
+        for v in nodes {
+            let c = vertex_chunk(part, v, &mut self.place);
+            let near = self.of(part, selection, reach, c);
+            if near.low.x > near.high.x {
+                return false;
+            }
+            around = around.with(near.low).with(near.high);
+        }
+        selection.may_meet(&around)
+    }
+}
+
+/// Whether a vertex that leads tetrahedra of the chunk may be near enough to the selection.
+fn is_led_near(part: &Subdomain, selection: &Selection, chunk: usize) -> bool {
+    let leaders = leaders(part, chunk);
+    let first = part.vertex_chunk_of(leaders.start);
+    let last = part.vertex_chunk_of(leaders.end.saturating_sub(1)).max(first);
+    let (mut nearby, reach) = (Nearby::default(), reach(part, chunk));
+    (first..=last).any(|c| {
+        let near = nearby.of(part, selection, reach, c);
+        near.low.x <= near.high.x
+    })
+}

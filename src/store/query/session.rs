@@ -1,0 +1,374 @@
+//! What is held open while questions are answered, within a budget.
+
+use std::sync::Arc;
+
+use lru::LruCache;
+use tetdb_schema::ids::TetId;
+use tetdb_schema::record::SealedTet;
+
+use super::QueryError;
+use super::decoded::{DecodedChunk, Searched};
+use super::surface_faces::SurfaceFaces;
+use super::tree::BoxTree;
+use crate::sealed::SealedError;
+use crate::sealed::{Chunk, Subdomain};
+use crate::store::{Catalog, StoreError};
+use tetdb_base::geom::{Aabb, Point};
+use tetdb_base::storage::{Budget, Lease, check_cancelled};
+use tetdb_schema::catalog::{Stage, SubdomainRow, WiresRow};
+
+/// Memory of one open sub-domain: half for redb, half for decoded vertices.
+const PART_BYTES: u64 = 8 << 20;
+/// More sub-domains are not held open: their summaries are not counted exactly.
+const PARTS_MAX: u64 = 64;
+/// Bytes beyond which more frames help no question.
+const FRAMES_BYTES_MAX: u64 = 2 << 30;
+/// What the summaries of a chunk take, twice, for trees.
+const SUMMARY_BYTES: u64 = 256;
+
+/// What questions cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct Measures {
+    /// Chunks of tetrahedra read, and of vertices; one read twice counts twice.
+    pub tet_chunks_read: u64,
+    /// Chunks of vertices read.
+    pub vertex_chunks_read: u64,
+    /// Chunks of facets and interface faces read.
+    pub face_chunks_read: u64,
+    /// Chunks of tetrahedra and of vertices in the store.
+    pub tet_chunks: u64,
+    /// Chunks of vertices in the store.
+    pub vertex_chunks: u64,
+}
+
+/// An open sub-domain.
+pub struct OpenSubdomain {
+    pub subdomain: Subdomain,
+    /// Over the boxes of its chunks of tetrahedra.
+    pub(super) tree: BoxTree,
+    _lease: Option<Lease>,
+}
+
+/// A store open for questions.
+///
+/// ```
+/// use tetdb::store::Catalog;
+/// use tetdb::expr::Expression;
+/// use tetdb::geom::Point;
+/// use tetdb::query::{QuerySession, Selection, Solid, VARIABLES};
+/// use tetdb::storage::Budget;
+/// # use tetdb_schema::catalog::Job;
+/// # let dir = tempfile::tempdir()?;
+/// # let path = dir.path().join("box.tetdb");
+/// # let surface = tetdb::samples::SampleSpec::parse("box,h=0.5")?.make()?.into();
+/// # let mut catalog = Catalog::create(&path, &Job::default())?;
+/// # let options = Default::default();
+/// # tetdb::pipeline::mesh(&mut catalog, &surface, &options, &Budget::new(256 << 20), &|_| {})?;
+/// # catalog.close()?;
+///
+/// let mut inquiry = QuerySession::open(Catalog::open(&path)?, &Budget::new(64 << 20))?;
+/// let center = Point::splat(0.5);
+/// let located = inquiry.locate(&[center, Point::splat(7.0)])?;
+/// assert!(located[0].found.is_some() && located[1].found.is_none());
+///
+/// let mut selection = Selection::default();
+/// selection.solids.push(Solid::Sphere { center, radius: 0.2 });
+/// selection.condition = Some(Expression::parse("quality < 3 and x > 0.1", &VARIABLES)?);
+/// for tet in inquiry.select(selection)? {
+///     assert!(tet?.shape.quality < 3.0);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// Shape: `rows` by rank. Memory: half of the budget for decoded chunks, a quarter for open sub-domains, the rest for
+/// answers on their way.
+pub struct QuerySession {
+    /// The store asked about.
+    pub store: Catalog,
+    /// Its sub-domains by rank.
+    pub rows: Vec<SubdomainRow>,
+    /// Names of labels of the surface.
+    pub labels: Vec<String>,
+    /// Of region 1, 2, …; empty for one without a name.
+    pub region_names: Vec<String>,
+    /// Embedded edges and points.
+    pub wires: WiresRow,
+    /// Over the boxes of the sub-domains.
+    pub(super) tree: BoxTree,
+    bounds: Aabb,
+    parts: LruCache<u32, OpenSubdomain>,
+    parts_max: usize,
+    frames: LruCache<(u32, u32), Arc<Searched>>,
+    frames_bytes: usize,
+    frames_bytes_max: usize,
+    /// Memory left for other uses.
+    pub budget: Budget,
+    /// Faces on the surface of the sub-domain asked about last, where excess is asked for.
+    pub(super) surface: Option<Arc<SurfaceFaces>>,
+    measures: Measures,
+    /// The plane of the cut, of a mesh that was kept on its way.
+    cutting: Option<[Point; 2]>,
+    _lease: Lease,
+}
+
+impl QuerySession {
+    /// Opens questions to a finished store.
+    ///
+    /// Errors: damage; sub-domains that are not sealed; a budget below some ten MiB.
+    pub fn open(mut store: Catalog, budget: &Budget) -> Result<Self, QueryError> {
+        let rows = store.subdomains()?;
+        Self::of_rows(store, rows, budget)
+    }
+
+    /// Opens questions to a mesh that was kept on its way.
+    ///
+    /// Errors: [`QueryError::NoStage`]; as [`QuerySession::open`].
+    pub fn open_stage(
+        mut store: Catalog,
+        cut: u32,
+        stage: Stage,
+        budget: &Budget,
+    ) -> Result<Self, QueryError> {
+        let kept = store.stages()?;
+        let Some(row) = kept.iter().find(|s| (s.cut, s.stage) == (cut, stage)) else {
+            let kept = kept.iter().map(|s| s.cut).collect();
+            return Err(QueryError::NoStage { cut, kept });
+        };
+        let normal = Point::from_array(row.normal);
+        let mut inquiry = Self::of_rows(store, vec![row.row.clone()], budget)?;
+        inquiry.cutting = Some([normal * row.offset, normal]);
+        Ok(inquiry)
+    }
+
+    fn of_rows(
+        mut store: Catalog,
+        rows: Vec<SubdomainRow>,
+        budget: &Budget,
+    ) -> Result<Self, QueryError> {
+        let (labels, region_names) = (store.labels()?, store.region_names()?);
+        let wires = store.wires()?;
+        let cap = budget.cap();
+        let frames_bytes_max = (cap / 2).min(FRAMES_BYTES_MAX);
+        let parts_max = (cap / 4 / PART_BYTES).clamp(1, PARTS_MAX);
+        let n_wires = (wires.edges.len() + wires.points.len()) as u64;
+        let lease = budget.lease(
+            frames_bytes_max + parts_max * PART_BYTES + n_wires * size_of::<[u32; 3]>() as u64,
+            "decoded chunks, open sub-domains and embedded edges",
+        )?;
+        let measures = Measures {
+            tet_chunks: rows.iter().map(|r| u64::from(r.chunks[0])).sum(),
+            vertex_chunks: rows.iter().map(|r| u64::from(r.chunks[1])).sum(),
+            ..Measures::default()
+        };
+        let bounds = (rows.iter().map(bounds_of)).fold(Aabb::EMPTY, Aabb::union);
+        Ok(Self {
+            store,
+            tree: BoxTree::new(rows.len(), |i| bounds_of(&rows[i])),
+            rows,
+            labels,
+            region_names,
+            wires,
+            bounds,
+            parts: LruCache::unbounded(),
+            parts_max: parts_max as usize,
+            frames: LruCache::unbounded(),
+            frames_bytes: 0,
+            frames_bytes_max: frames_bytes_max as usize,
+            budget: budget.clone(),
+            surface: None,
+            measures,
+            cutting: None,
+            _lease: lease,
+        })
+    }
+
+    /// A point and the normal of the plane that was to cut it, of a mesh that was kept on its way.
+    pub fn cutting(&self) -> Option<[Point; 2]> {
+        self.cutting
+    }
+
+    /// What all questions so far have cost.
+    pub fn measures(&self) -> Measures {
+        let mut sum = self.measures;
+        for (_, part) in &self.parts {
+            sum.vertex_chunks_read += part.subdomain.vertex_chunks_read();
+        }
+        sum
+    }
+
+    /// The box of the mesh.
+    pub fn bounds(&self) -> Aabb {
+        self.bounds
+    }
+
+    /// The sub-domains by rank.
+    pub fn subdomains(&self) -> &[SubdomainRow] {
+        &self.rows
+    }
+
+    /// Names of the labels; their place is their number.
+    pub fn labels(&self) -> &[String] {
+        &self.labels
+    }
+
+    /// The open sub-domain of this rank.
+    pub fn part(&mut self, rank: u32) -> Result<&mut OpenSubdomain, QueryError> {
+        if !self.parts.contains(&rank) {
+            while self.parts.len() >= self.parts_max {
+                let Some((_, part)) = self.parts.pop_lru() else {
+                    break;
+                };
+                self.measures.vertex_chunks_read += part.subdomain.vertex_chunks_read();
+            }
+            let row = self.rows.iter().find(|row| row.rank == rank);
+            let row = match row {
+                Some(row) => row.clone(),
+                // Says that there is none.
+                None => self.store.subdomain(rank)?,
+            };
+            let subdomain = self.store.open_row(row, PART_BYTES as usize)?;
+            let chunks = subdomain.tet_summaries().len() + subdomain.vertex_summaries().len();
+            let bytes = chunks as u64 * SUMMARY_BYTES;
+            // What the share of a sub-domain does not cover.
+            let more = bytes.saturating_sub(PART_BYTES / 8);
+            let lease = match more {
+                0 => None,
+                more => Some(self.budget.lease(more, "summaries of a sub-domain")?),
+            };
+            let tree =
+                BoxTree::new(subdomain.tet_summaries().len(), |i| chunk_bounds(&subdomain, i));
+            let part = OpenSubdomain { subdomain, tree, _lease: lease };
+            self.parts.put(rank, part);
+        }
+        Ok(self.parts.get_mut(&rank).expect("it was just put there"))
+    }
+
+    /// Whether a chunk is decoded at hand.
+    pub fn is_resident(&self, rank: u32, chunk: u32) -> bool {
+        self.frames.contains(&(rank, chunk))
+    }
+
+    /// A whole chunk, decoded.
+    pub(super) fn searched(&mut self, rank: u32, chunk: u32) -> Result<Arc<Searched>, QueryError> {
+        if let Some(frame) = self.frames.get(&(rank, chunk)) {
+            return Ok(Arc::clone(frame));
+        }
+        let searched = Arc::new(Searched::new(self.frame(rank, chunk, |_, _, _| true)?));
+        self.frames_bytes += searched.bytes();
+        self.frames.put((rank, chunk), Arc::clone(&searched));
+        while self.frames_bytes > self.frames_bytes_max && self.frames.len() > 1 {
+            if let Some((_, old)) = self.frames.pop_lru() {
+                self.frames_bytes -= old.bytes();
+            }
+        }
+        Ok(searched)
+    }
+
+    /// The tetrahedra of a chunk that `keep` wants, decoded.
+    pub(super) fn frame(
+        &mut self,
+        rank: u32,
+        chunk: u32,
+        keep: impl FnMut(&Subdomain, u32, &SealedTet) -> bool,
+    ) -> Result<DecodedChunk, QueryError> {
+        check_cancelled();
+        self.measures.tet_chunks_read += 1;
+        let part = &mut self.part(rank)?.subdomain;
+        let records = checked_chunk(part, chunk)?;
+        Ok(DecodedChunk::new(part, &records, keep)?)
+    }
+
+    /// The faces of a sub-domain that are input triangles, kept until another's are wanted.
+    ///
+    /// Errors: damage; a budget without 16 bytes for each of their sides.
+    pub fn surface_of(&mut self, rank: u32) -> Result<Arc<SurfaceFaces>, QueryError> {
+        if let Some(known) = self.surface.as_ref().filter(|s| s.rank == rank) {
+            return Ok(known.clone());
+        }
+        self.surface = None;
+        let part = &self.part(rank)?.subdomain;
+        let (bytes, chunks) = (SurfaceFaces::bytes(part), part.row().chunks[2]);
+        self.measures.face_chunks_read += u64::from(chunks);
+        let lease = (self.budget).lease(bytes, "the sides of the input triangles")?;
+        let read = SurfaceFaces::read(&mut self.part(rank)?.subdomain, lease)?;
+        Ok(self.surface.insert(Arc::new(read)).clone())
+    }
+
+    /// Counts a chunk of tetrahedra read elsewhere.
+    pub fn count_tets(&mut self) {
+        self.measures.tet_chunks_read += 1;
+    }
+
+    /// Counts chunks of vertices read elsewhere.
+    pub fn count_vertices(&mut self, chunks: u64) {
+        self.measures.vertex_chunks_read += chunks;
+    }
+
+    /// Counts a chunk of faces read elsewhere.
+    pub fn count_faces(&mut self) {
+        self.measures.face_chunks_read += 1;
+    }
+}
+
+/// A chunk of tetrahedra that is what its summary says.
+pub fn checked_chunk(part: &mut Subdomain, chunk: u32) -> Result<Chunk<SealedTet>, StoreError> {
+    let records = part.tet_chunk(chunk)?;
+    let summary = &part.tet_summaries()[chunk as usize];
+    let end = u64::from(summary.first) + u64::from(summary.count);
+    if (records.first, records.records.len()) == (summary.first, summary.count as usize)
+        && end <= u64::from(TetId::LOCAL_MAX)
+        && end <= part.row().tets
+    {
+        return Ok(records);
+    }
+    Err(StoreError::Sealed(SealedError::Content {
+        path: part.path().to_owned(),
+        subdomain: part.id().rank(),
+        what: format!("chunk {chunk} of tetrahedra is not the one its summary tells of"),
+    }))
+}
+
+/// The box of a sub-domain.
+pub fn bounds_of(row: &SubdomainRow) -> Aabb {
+    let [low, high] = row.bounds.map(Point::from_array);
+    Aabb { low, high }
+}
+
+/// The box of a chunk of tetrahedra.
+pub fn chunk_bounds(part: &Subdomain, chunk: usize) -> Aabb {
+    let [low, high] = part.tet_summaries()[chunk].bounds.map(Point::from_array);
+    Aabb { low, high }
+}
+
+/// How far the vertices of a chunk's tetrahedra can be from a point that one of them holds: not farther than its longest edge.
+pub fn reach(part: &Subdomain, chunk: usize) -> f64 {
+    /// More than what rounding takes from lengths.
+    const SLACK: f64 = 1.0 + 1e-6;
+    match part.tet_summaries()[chunk].edge_max {
+        told if told > 0.0 => f64::from(told) * SLACK,
+        _ => f64::INFINITY,
+    }
+}
+
+/// The chunk of vertices that holds vertex `v`, `place` being the one found last.
+#[inline]
+pub fn vertex_chunk(part: &Subdomain, v: u32, place: &mut usize) -> usize {
+    let last = &part.vertex_summaries()[*place];
+    if v < last.first || v - last.first >= last.count {
+        *place = part.vertex_chunk_of(v);
+    }
+    *place
+}
+
+/// The numbers of all regions called `name`, of the names from region 1 on. Errors: there is none.
+pub fn regions_called(names: &[String], name: &str) -> Result<Vec<u32>, QueryError> {
+    let all = (1..).zip(names).filter(|(_, known)| *known == name);
+    let found: Vec<u32> = all.map(|(region, _)| region).collect();
+    match found.is_empty() || name.is_empty() {
+        false => Ok(found),
+        true => Err(QueryError::NoRegion {
+            name: name.to_owned(),
+            known: names.iter().filter(|n| !n.is_empty()).cloned().collect(),
+        }),
+    }
+}

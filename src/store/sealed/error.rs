@@ -1,0 +1,57 @@
+use std::path::{Path, PathBuf};
+
+use tetdb_schema::chunk::ChunkError;
+use thiserror::Error;
+
+use tetdb_base::storage::StorageError;
+
+/// What can be wrong with the file of a sub-domain.
+#[derive(Debug, Error)]
+pub enum SealedError {
+    /// The sub-domain is not sealed yet.
+    #[error("sub-domain {subdomain} of {path} is not finished")]
+    NotSealed {
+        /// The file or folder.
+        path: PathBuf,
+        /// Rank of the sub-domain.
+        subdomain: u32,
+    },
+    /// A chunk is not what its address says.
+    #[error("{path} is damaged: {source}")]
+    Chunk {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the cause was.
+        #[source]
+        source: ChunkError,
+    },
+    /// Parts of a sub-domain that contradict each other, or a missing one.
+    #[error("{path} is damaged: sub-domain {subdomain}, {what}")]
+    Content {
+        /// The file or folder.
+        path: PathBuf,
+        /// Rank of the sub-domain.
+        subdomain: u32,
+        /// What of it.
+        what: String,
+    },
+    /// The file itself.
+    #[error(transparent)]
+    Storage(#[from] StorageError),
+}
+
+impl SealedError {
+    /// Whether what is on disk is not what was written.
+    pub fn is_damage(&self) -> bool {
+        match self {
+            Self::Chunk { .. } | Self::Content { .. } => true,
+            Self::Storage(error) => error.is_damage(),
+            Self::NotSealed { .. } => false,
+        }
+    }
+
+    /// Wraps a failed operation on `path`.
+    pub fn io(path: &Path, source: std::io::Error) -> Self {
+        Self::Storage(StorageError::io(path, source))
+    }
+}

@@ -1,0 +1,231 @@
+//! What is summed over the tetrahedra of a sub-domain while it is written.
+
+use std::collections::BTreeMap;
+
+use tetdb_schema::chunk::TetSummary;
+use tetdb_schema::digest::Digest;
+use tetdb_schema::record::{FACES, SealedTet};
+
+use super::{Corner, FacePairs, Paired, Shape, quality_bin, sorted_face};
+use tetdb_base::geom::{Aabb, Point};
+use tetdb_base::storage::map_into;
+use tetdb_schema::catalog::QUALITY_BINS;
+use tetdb_schema::catalog::QualityRow;
+
+/// Tetrahedra whose corners are held at once.
+const PIECE: usize = 4096;
+
+/// What is summed over tetrahedra, in their order.
+pub struct Totals {
+    /// Of the tetrahedra.
+    pub digest: Digest,
+    /// Of the vertices; whoever has them sets it.
+    pub bounds: Aabb,
+    /// As in [`QualityRow`].
+    pub bins: [u64; QUALITY_BINS],
+    /// Greatest quality.
+    pub worst: f64,
+    /// The first that has it.
+    pub worst_tet: u32,
+    /// Least and greatest cosine of a dihedral angle.
+    pub cosines: [f64; 2],
+    /// Sum in order.
+    pub volume: f64,
+    /// By number.
+    pub regions: BTreeMap<u32, RegionTotals>,
+    /// Of the piece at hand; kept, for memory that is asked for anew is cleared by the system each time.
+    corners: Vec<[Spot; 4]>,
+    shapes: Vec<Shape>,
+}
+
+/// What is summed of a vertex.
+#[derive(Clone, Copy)]
+struct Spot {
+    point: Point,
+    mix: u64,
+}
+
+impl Spot {
+    #[inline(always)]
+    fn of(corner: &Corner) -> Self {
+        Self { point: corner.point, mix: corner.mix }
+    }
+}
+
+/// Tetrahedra of one region that follow each other: the map of regions is asked once for all.
+struct RegionRun {
+    region: u32,
+    totals: RegionTotals,
+}
+
+impl RegionRun {
+    fn of(region: u32, regions: &BTreeMap<u32, RegionTotals>) -> Self {
+        let totals = regions.get(&region).copied().unwrap_or_default();
+        Self { region, totals }
+    }
+
+    fn end(self, regions: &mut BTreeMap<u32, RegionTotals>) {
+        regions.insert(self.region, self.totals);
+    }
+}
+
+/// Extends a box to a point: one instruction for each side, where a minimum that knows what is no number takes four. Coordinates that are
+/// none are left out here too.
+#[inline(always)]
+fn extend(bounds: &mut Aabb, p: Point) {
+    let less = |a: f64, b: f64| if a < b { a } else { b };
+    let more = |a: f64, b: f64| if a > b { a } else { b };
+    let (low, high) = (bounds.low, bounds.high);
+    bounds.low = Point::new(less(p.x, low.x), less(p.y, low.y), less(p.z, low.z));
+    bounds.high = Point::new(more(p.x, high.x), more(p.y, high.y), more(p.z, high.z));
+}
+
+/// Least and greatest coordinates.
+pub(super) fn array(bounds: &Aabb) -> [[f64; 3]; 2] {
+    [bounds.low.to_array(), bounds.high.to_array()]
+}
+
+/// The least number not below `x` that 32 bits can hold.
+fn rounded_up(x: f64) -> f32 {
+    let near = x as f32;
+    if f64::from(near) < x { near.next_up() } else { near }
+}
+
+/// Faces of a chunk that have no partner in it.
+pub(super) fn count_open(pairs: &mut FacePairs, tets: &[SealedTet]) -> u32 {
+    pairs.clear();
+    let mut open = 0u32;
+    for tet in tets {
+        for corners in FACES {
+            let (face, odd) = sorted_face(corners.map(|i| tet.nodes[i]));
+            match pairs.add(face, odd, 0) {
+                Paired::With(_) => open -= 1,
+                Paired::Open => open += 1,
+                Paired::Same(_) | Paired::Third => {}
+            }
+        }
+    }
+    open
+}
+
+/// Of nothing.
+impl Default for Totals {
+    fn default() -> Self {
+        Self {
+            digest: Digest::default(),
+            bounds: Aabb::EMPTY,
+            bins: [0; QUALITY_BINS],
+            worst: 0.0,
+            worst_tet: 0,
+            cosines: [1.0, -1.0],
+            volume: 0.0,
+            regions: BTreeMap::new(),
+            corners: Vec::with_capacity(PIECE),
+            shapes: Vec::with_capacity(PIECE),
+        }
+    }
+}
+
+impl Totals {
+    /// Adds a chunk and returns its summary, but for what only its bytes and faces tell.
+    ///
+    /// Errors: those of `corners_of`.
+    pub fn add<E>(
+        &mut self,
+        first: u32,
+        tets: &[SealedTet],
+        rank: u32,
+        mut corners_of: impl FnMut(&SealedTet) -> Result<[Corner; 4], E>,
+    ) -> Result<TetSummary, E> {
+        let mut bounds = Aabb::EMPTY;
+        let mut summary = TetSummary {
+            bounds: [[0.0; 3]; 2],
+            volume: 0.0,
+            quality: [0.0; 2],
+            regions: [u32::MAX, 0],
+            vertices: [u32::MAX, 0],
+            first,
+            count: tets.len() as u32,
+            open_faces: 0,
+            bytes: 0,
+            edge_max: 0.0,
+        };
+        let mut buffers = (std::mem::take(&mut self.corners), std::mem::take(&mut self.shapes));
+        let (corners, shapes) = (&mut buffers.0, &mut buffers.1);
+        // Rounded once: what is rounded keeps its order.
+        let (mut quality, mut edge_max) = ([f64::INFINITY, 0.0f64], 0.0f64);
+        // A piece at a time: the corners of a whole chunk would take ten times its bytes.
+        for (piece, first) in tets.chunks(PIECE).zip((first..).step_by(PIECE)) {
+            corners.clear();
+            for tet in piece {
+                let [a, b, c, d] = &corners_of(tet)?;
+                corners.push([Spot::of(a), Spot::of(b), Spot::of(c), Spot::of(d)]);
+            }
+            // Shapes in parallel, sums in order: the same for any number of threads.
+            let known = self.cosines;
+            map_into(corners, shapes, |[a, b, c, d]| {
+                Shape::beyond([a.point, b.point, c.point, d.point], known)
+            });
+            let known = piece.iter().zip(&*corners).zip(&*shapes);
+            let mut run = RegionRun::of(piece[0].region, &self.regions);
+            for (place, ((tet, corners), shape)) in (first..).zip(known) {
+                let [a, b, c, d] = corners;
+                self.digest.add_tet([a.mix, b.mix, c.mix, d.mix], tet.region, rank);
+                corners.iter().for_each(|c| extend(&mut bounds, c.point));
+                self.add_shape(place, shape);
+                if run.region != tet.region {
+                    run.end(&mut self.regions);
+                    run = RegionRun::of(tet.region, &self.regions);
+                }
+                run.totals.tets += 1;
+                run.totals.volume += shape.volume;
+                summary.volume += shape.volume;
+                edge_max = edge_max.max(shape.edge_max);
+                quality = [quality[0].min(shape.quality), quality[1].max(shape.quality)];
+                let [least, most] = summary.regions;
+                summary.regions = [least.min(tet.region), most.max(tet.region)];
+                for v in tet.nodes {
+                    let [least, most] = summary.vertices;
+                    summary.vertices = [least.min(v), most.max(v)];
+                }
+            }
+            run.end(&mut self.regions);
+        }
+        (self.corners, self.shapes) = buffers;
+        summary.bounds = array(&bounds);
+        summary.quality = quality.map(|q| q as f32);
+        summary.edge_max = rounded_up(edge_max);
+        Ok(summary)
+    }
+
+    fn add_shape(&mut self, place: u32, shape: &Shape) {
+        self.bins[quality_bin(shape.quality)] += 1;
+        if shape.quality > self.worst {
+            self.worst = shape.quality;
+            self.worst_tet = place;
+        }
+        let [least, most] = self.cosines;
+        self.cosines = [least.min(shape.cosines[0]), most.max(shape.cosines[1])];
+        self.volume += shape.volume;
+    }
+
+    /// The table of qualities.
+    pub fn quality(&self) -> QualityRow {
+        let angle = |cosine: f64| cosine.clamp(-1.0, 1.0).acos();
+        QualityRow {
+            bins: self.bins,
+            worst: self.worst,
+            worst_tet: self.worst_tet,
+            dihedral: [angle(self.cosines[1]), angle(self.cosines[0])],
+        }
+    }
+}
+
+/// What a region has in this sub-domain.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct RegionTotals {
+    /// Its tetrahedra.
+    pub tets: u64,
+    /// Summed in the sealed order.
+    pub volume: f64,
+}

@@ -1,0 +1,240 @@
+//! Vertices of a sealed sub-domain by number, from a bounded set of decoded chunks.
+
+use lru::LruCache;
+use tetdb_schema::chunk::{ChunkAddress, ChunkKind};
+use tetdb_schema::digest::vertex_mix;
+use tetdb_schema::record::SealedVertex;
+
+use super::Form;
+use super::SealedError;
+use super::form::Loader;
+use tetdb_base::geom::Point;
+use tetdb_base::storage::StoreFile;
+
+/// Chunks kept whatever the budget: a tetrahedron needs four at once.
+const CHUNKS_LEAST: usize = 4;
+const NOT_RESIDENT: u32 = u32::MAX;
+
+/// A vertex as an algorithm wants it.
+#[derive(Clone, Copy, Debug)]
+pub struct Corner {
+    /// Its position.
+    pub point: Point,
+    /// Its mix in the digest.
+    pub mix: u64,
+    /// Its name for ever, as a number.
+    pub id: u64,
+    /// One of [`tag`](tetdb_schema::record::tag).
+    pub tag: u32,
+    /// The edge length wanted there; 0 where none was.
+    pub h: f32,
+}
+
+/// The vertices of a resident chunk.
+#[derive(Clone, Copy)]
+struct Window {
+    chunk: u32,
+    /// Vertices from this one on, below that.
+    first: u32,
+    end: u32,
+    /// Place in `resident`.
+    place: u32,
+}
+
+impl Window {
+    const EMPTY: Self = Self { chunk: NOT_RESIDENT, first: 0, end: 0, place: 0 };
+}
+
+/// Decoded vertex chunks within a budget.
+///
+/// Turning to a chunk other than the last two sets its reference bit; the `lru` crate orders the chunks when one is missed, and a chunk
+/// whose bit is set gets a second chance. Shape: `firsts[i]` = number of the first vertex of chunk `i`.
+pub struct VertexCache {
+    subdomain: u32,
+    generation: u32,
+    firsts: Vec<u32>,
+    n_vertices: u32,
+    /// Chunk to place in `resident`, or [`NOT_RESIDENT`].
+    places: Vec<u32>,
+    resident: Vec<Vec<Corner>>,
+    vacant: Vec<u32>,
+    referenced: Vec<bool>,
+    order: LruCache<u32, ()>,
+    loader: Loader<SealedVertex>,
+    scratch: Vec<SealedVertex>,
+    /// Chunks asked last: corners of near tetrahedra lie in one or two.
+    last: [Window; 2],
+    bytes: usize,
+    bytes_max: usize,
+    loads: u64,
+}
+
+impl VertexCache {
+    /// A cache for a sub-domain of this form whose vertex chunks start at `firsts`.
+    ///
+    /// Errors: the decoder cannot be created.
+    pub fn new(
+        form: Form,
+        (subdomain, generation): (u32, u32),
+        firsts: Vec<u32>,
+        n_vertices: u32,
+        bytes_max: usize,
+    ) -> std::io::Result<Self> {
+        Ok(Self {
+            subdomain,
+            generation,
+            places: vec![NOT_RESIDENT; firsts.len()],
+            referenced: vec![false; firsts.len()],
+            firsts,
+            n_vertices,
+            resident: Vec::new(),
+            vacant: Vec::new(),
+            order: LruCache::unbounded(),
+            loader: Loader::of(form, (subdomain, generation))?,
+            scratch: Vec::new(),
+            last: [Window::EMPTY; 2],
+            bytes: 0,
+            bytes_max,
+            loads: 0,
+        })
+    }
+
+    /// Chunks read so far.
+    pub fn loads(&self) -> u64 {
+        self.loads
+    }
+
+    /// The chunk vertex `v` is in; of a number no vertex has, the last one.
+    pub fn chunk_of(&self, v: u32) -> usize {
+        self.firsts.partition_point(|&f| f <= v).saturating_sub(1)
+    }
+
+    /// Vertex `v`, read from `file` when its chunk is not resident.
+    ///
+    /// Errors: a damaged chunk; a number no vertex has.
+    #[inline(always)]
+    pub fn corner(&mut self, file: &mut StoreFile, v: u32) -> Result<Corner, SealedError> {
+        let [a, b] = &self.last;
+        let within = |w: &Window| w.first <= v && v < w.end;
+        let w = if within(a) {
+            *a
+        } else if within(b) {
+            *b
+        } else {
+            self.turn_to(file, v)?
+        };
+        match self.resident[w.place as usize].get((v - w.first) as usize) {
+            Some(&corner) => Ok(corner),
+            None => Err(self.no_such_vertex(file, v)),
+        }
+    }
+
+    /// The chunk of `v`, resident, in place of the one of the last two that was asked first.
+    #[inline(never)]
+    fn turn_to(&mut self, file: &mut StoreFile, v: u32) -> Result<Window, SealedError> {
+        if v >= self.n_vertices {
+            return Err(self.no_such_vertex(file, v));
+        }
+        let chunk = self.chunk_of(v);
+        if self.places[chunk] == NOT_RESIDENT {
+            self.load(file, chunk)?;
+        }
+        self.referenced[chunk] = true;
+        let window = Window {
+            chunk: chunk as u32,
+            first: self.firsts[chunk],
+            end: self.firsts.get(chunk + 1).copied().unwrap_or(self.n_vertices),
+            place: self.places[chunk],
+        };
+        self.last = [window, self.last[0]];
+        Ok(window)
+    }
+
+    /// The corners of a tetrahedron or face.
+    #[inline(always)]
+    pub fn corners<const N: usize>(
+        &mut self,
+        file: &mut StoreFile,
+        vertices: [u32; N],
+    ) -> Result<[Corner; N], SealedError> {
+        let mut corners = [Corner { point: Point::ZERO, mix: 0, id: 0, tag: 0, h: 0.0 }; N];
+        for (corner, v) in corners.iter_mut().zip(vertices) {
+            *corner = self.corner(file, v)?;
+        }
+        Ok(corners)
+    }
+
+    #[cold]
+    fn no_such_vertex(&self, file: &StoreFile, v: u32) -> SealedError {
+        SealedError::Content {
+            path: file.path().to_owned(),
+            subdomain: self.subdomain,
+            what: format!("vertex {v} is named, there are {}", self.n_vertices),
+        }
+    }
+
+    #[cold]
+    fn load(&mut self, file: &mut StoreFile, chunk: usize) -> Result<(), SealedError> {
+        let address = ChunkAddress {
+            kind: ChunkKind::Vertices,
+            subdomain: self.subdomain,
+            generation: self.generation,
+            chunk: chunk as u32,
+        };
+        let first = self.loader.load(file, address, &mut self.scratch)?;
+        self.loads += 1;
+        if first != self.firsts[chunk] {
+            return Err(SealedError::Content {
+                path: file.path().to_owned(),
+                subdomain: self.subdomain,
+                what: format!(
+                    "vertex chunk {chunk} starts at {first}, expected {}",
+                    self.firsts[chunk]
+                ),
+            });
+        }
+        let needed = self.scratch.len() * size_of::<Corner>();
+        while self.bytes + needed > self.bytes_max && self.order.len() >= CHUNKS_LEAST {
+            self.evict();
+        }
+        let place = self.vacant.pop().unwrap_or_else(|| {
+            self.resident.push(Vec::new());
+            self.resident.len() as u32 - 1
+        });
+        self.resident[place as usize] = self
+            .scratch
+            .iter()
+            .map(|v| Corner {
+                point: Point::from_array(v.point),
+                mix: vertex_mix(v.point),
+                id: v.id,
+                tag: v.tag,
+                h: v.h,
+            })
+            .collect();
+        self.bytes += needed;
+        self.places[chunk] = place;
+        self.order.put(chunk as u32, ());
+        Ok(())
+    }
+
+    fn evict(&mut self) {
+        while let Some((chunk, ())) = self.order.pop_lru() {
+            if std::mem::take(&mut self.referenced[chunk as usize]) {
+                self.order.put(chunk, ());
+                continue;
+            }
+            // Whoever asks for it next has it read again.
+            for window in &mut self.last {
+                if window.chunk == chunk {
+                    *window = Window::EMPTY;
+                }
+            }
+            let place = std::mem::replace(&mut self.places[chunk as usize], NOT_RESIDENT);
+            let corners = std::mem::take(&mut self.resident[place as usize]);
+            self.bytes -= corners.len() * size_of::<Corner>();
+            self.vacant.push(place);
+            return;
+        }
+    }
+}

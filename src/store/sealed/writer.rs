@@ -1,0 +1,380 @@
+//! Makes the file of a finished sub-domain: vertices, then tetrahedra, then faces, each a stream.
+
+use std::collections::BTreeMap;
+
+use tetdb_schema::chunk::{
+    ChunkKind, ChunkRecord, Packer, RangeSummary, TetSummary, VertexSummary,
+};
+use tetdb_schema::digest::Digest;
+use tetdb_schema::ids::{SubdomainId, TetId};
+use tetdb_schema::leaf::TetPlace;
+use tetdb_schema::record::{InterfaceFace, SealedFacet, SealedTet, SealedVertex};
+
+use super::SealedError;
+use super::batch::Batch;
+use super::form::{Cut, Cutter};
+use super::totals::{RegionTotals, Totals, array, count_open};
+use super::{FacePairs, Form, VertexCache};
+use tetdb_base::geom::{Aabb, Point};
+use tetdb_base::storage::{DiskPath, StoreFile, join};
+use tetdb_schema::catalog::SubdomainRow;
+
+/// One side of an interface as this sub-domain has it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct InterfaceSide {
+    /// Number of the cut, from 1.
+    pub cut: u32,
+    /// The sub-domain on the other side.
+    pub other: u32,
+    /// How many faces there are.
+    pub faces: u64,
+    /// Of the faces, seen from this side.
+    pub digest: Digest,
+}
+
+/// What was sealed.
+#[derive(Clone, Debug)]
+pub struct Sealed {
+    /// The row to put into the catalog.
+    pub row: SubdomainRow,
+    /// Of each region with tetrahedra here, by number.
+    pub regions: BTreeMap<u32, RegionTotals>,
+    /// By cut, then by the other sub-domain.
+    pub interfaces: Vec<InterfaceSide>,
+}
+
+/// Tetrahedra packed at once: a chunk or two, 2 MB.
+const TETS_AT_ONCE: usize = SealedTet::COUNT_MAX;
+
+/// Writes one sub-domain, once.
+///
+/// Order of calls: all vertices, all tetrahedra, then facets and interface faces. The file holds
+/// nothing that counts until [`SealedWriter::finish`] returns and the catalog lists it.
+/// Memory: about the bytes given, for redb's cache, the batch and decoded vertices.
+pub struct SealedWriter {
+    path: DiskPath,
+    file: StoreFile,
+    subdomain: SubdomainId,
+    generation: u32,
+    memory_bytes: usize,
+    batch: Batch,
+    form: Form,
+    vertices: Cutter<SealedVertex>,
+    vertex_chunks: Vec<VertexSummary>,
+    cache: Option<VertexCache>,
+    tets: Cutter<SealedTet>,
+    /// To be summed up and stored.
+    packed: Vec<Cut<SealedTet>>,
+    tet_chunks: Vec<TetSummary>,
+    facets: Cutter<SealedFacet>,
+    facet_chunks: Vec<RangeSummary<false>>,
+    faces: Cutter<InterfaceFace>,
+    face_chunks: Vec<RangeSummary<true>>,
+    pairs: FacePairs,
+    totals: Totals,
+    interfaces: BTreeMap<(u32, u32), (u64, Digest)>,
+}
+
+impl SealedWriter {
+    /// Starts the file of `subdomain` in `generation` at `path`, which must not exist.
+    ///
+    /// Errors: the file cannot be created.
+    pub fn create(
+        path: impl Into<DiskPath>,
+        subdomain: SubdomainId,
+        generation: u32,
+        memory_bytes: usize,
+    ) -> Result<Self, SealedError> {
+        Self::create_as(Form::Sealed, path, subdomain, generation, memory_bytes)
+    }
+
+    /// The same in either form. Errors: as [`SealedWriter::create`].
+    pub fn create_as(
+        form: Form,
+        path: impl Into<DiskPath>,
+        subdomain: SubdomainId,
+        generation: u32,
+        memory_bytes: usize,
+    ) -> Result<Self, SealedError> {
+        let path = path.into();
+        let file = StoreFile::create_unsynced(&path, memory_bytes / 2)?;
+        let name = path.path().to_owned();
+        let io = |e| SealedError::io(&name, e);
+        let rank = subdomain.rank();
+        Ok(Self {
+            path,
+            file,
+            subdomain,
+            generation,
+            memory_bytes,
+            batch: Batch::of(memory_bytes),
+            form,
+            vertices: Cutter::new(form, rank, generation).map_err(io)?,
+            vertex_chunks: Vec::new(),
+            cache: None,
+            tets: Cutter::new(form, rank, generation).map_err(io)?,
+            packed: Vec::new(),
+            tet_chunks: Vec::new(),
+            facets: Cutter::new(form, rank, generation).map_err(io)?,
+            facet_chunks: Vec::new(),
+            faces: Cutter::new(form, rank, generation).map_err(io)?,
+            face_chunks: Vec::new(),
+            pairs: FacePairs::new(SealedTet::COUNT_MAX),
+            totals: Totals::default(),
+            interfaces: BTreeMap::new(),
+        })
+    }
+
+    /// The next vertex; its number is its place in the stream.
+    ///
+    /// Errors: the disk.
+    pub fn push_vertex(&mut self, vertex: SealedVertex) -> Result<(), SealedError> {
+        assert!(self.cache.is_none(), "vertices come before tetrahedra");
+        let rank = self.subdomain.rank();
+        let cut = self.vertices.push(vertex, |v| v.to_working(rank));
+        if let Some(chunk) = cut.map_err(self.io())? {
+            self.put_vertices(chunk)?;
+        }
+        Ok(())
+    }
+
+    fn io(&self) -> impl Fn(std::io::Error) -> SealedError + use<> {
+        let path = self.path.path().to_owned();
+        move |e| SealedError::io(&path, e)
+    }
+
+    fn put_vertices(&mut self, chunk: Cut<SealedVertex>) -> Result<(), SealedError> {
+        let points = chunk.records.iter().map(|v| Point::from_array(v.point));
+        let bounds = Aabb::around(points);
+        self.totals.bounds = self.totals.bounds.with(bounds.low).with(bounds.high);
+        let (bounds, points) = (array(&bounds), chunk.records.iter().map(|v| v.point));
+        self.vertex_chunks.push(VertexSummary {
+            cells: VertexSummary::cells_of(&bounds, points),
+            bounds,
+            first: chunk.first,
+            count: chunk.records.len() as u32,
+        });
+        self.put(chunk.values)
+    }
+
+    /// Ends the stream of vertices: from now on they can be read.
+    fn end_vertices(&mut self) -> Result<(), SealedError> {
+        if self.cache.is_some() {
+            return Ok(());
+        }
+        while let Some(chunk) = self.vertices.cut().map_err(self.io())? {
+            self.put_vertices(chunk)?;
+        }
+        self.batch.flush(&mut self.file)?;
+        let firsts = self.vertex_chunks.iter().map(|s| s.first).collect();
+        let cache = VertexCache::new(
+            self.form,
+            (self.subdomain.rank(), self.generation),
+            firsts,
+            self.vertices.count() as u32,
+            self.memory_bytes / 4,
+        );
+        self.cache = Some(cache.map_err(self.io())?);
+        Ok(())
+    }
+
+    /// All tetrahedra, by nodes and region: positive, in the order of their numbers.
+    ///
+    /// Errors: as [`SealedWriter::push_tets`].
+    pub fn push_all_tets(
+        &mut self,
+        tets: impl Iterator<Item = ([u32; 4], u32)> + Send,
+    ) -> Result<(), SealedError> {
+        let place = TetPlace { neighbors: [tetdb_schema::page::NONE; 4], required: 0, flags: 0 };
+        let placed = tets.map(|(nodes, region)| Ok((SealedTet { nodes, region }.rotated(), place)));
+        let mut placed = placed.peekable();
+        while placed.peek().is_some() {
+            self.push_tets::<SealedError>(&mut placed)?;
+        }
+        Ok(())
+    }
+
+    /// Some thousands of the next tetrahedra, rotated ([`SealedTet::rotated`]), each with what a working page tells of it; chunks do not. The number of
+    /// each is its place in the stream.
+    ///
+    /// They are taken and packed while another thread sums up those before. Smallest when they come sorted by their nodes.
+    /// Errors: those of `tets`; the disk; a vertex that was not pushed.
+    pub fn push_tets<E: From<SealedError> + Send>(
+        &mut self,
+        tets: &mut (impl Iterator<Item = Result<(SealedTet, TetPlace), E>> + Send),
+    ) -> Result<(), E> {
+        self.end_vertices()?;
+        let (io, rank) = (self.io(), self.subdomain.rank());
+        let before = std::mem::take(&mut self.packed);
+        let (cutter, packed, pairs) = (&mut self.tets, &mut self.packed, &mut self.pairs);
+        let pack = || {
+            let open = before.iter().map(|cut| count_open(pairs, &cut.records));
+            let open: Vec<u32> = open.collect();
+            for tet in tets.take(TETS_AT_ONCE) {
+                let (tet, place) = tet?;
+                debug_assert_eq!(tet, tet.rotated());
+                let cut = cutter.push(tet, |tet| tet.to_working(&place));
+                packed.extend(cut.map_err(&io)?);
+            }
+            Ok::<_, E>(open)
+        };
+        let cache = self.cache.as_mut().expect("vertices have ended");
+        let (file, totals) = (&mut self.file, &mut self.totals);
+        let sum_up = || {
+            let mut corners_of = |tet: &SealedTet| cache.corners(file, tet.nodes);
+            let add =
+                |cut: &Cut<SealedTet>| totals.add(cut.first, &cut.records, rank, &mut corners_of);
+            before.iter().map(add).collect::<Result<Vec<_>, _>>()
+        };
+        let (open, summaries) = join(pack, sum_up);
+        for ((cut, mut summary), open) in before.into_iter().zip(summaries?).zip(open?) {
+            (summary.open_faces, summary.bytes) = (open, cut.bytes());
+            self.tet_chunks.push(summary);
+            self.put(cut.values)?;
+        }
+        assert!(
+            self.tets.count() <= u64::from(TetId::LOCAL_MAX),
+            "sub-domain {} has more tetrahedra than ids",
+            self.subdomain
+        );
+        Ok(())
+    }
+
+    fn put(&mut self, values: Vec<(u64, Vec<u8>)>) -> Result<(), SealedError> {
+        for (key, value) in values {
+            self.batch.push(&mut self.file, key, value)?;
+        }
+        Ok(())
+    }
+
+    /// The next facet.
+    ///
+    /// Errors: the disk.
+    pub fn push_facet(&mut self, facet: SealedFacet) -> Result<(), SealedError> {
+        let cut = self.facets.push(facet, SealedFacet::to_working);
+        if let Some(chunk) = cut.map_err(self.io())? {
+            self.put_facets(chunk)?;
+        }
+        Ok(())
+    }
+
+    fn put_facets(&mut self, chunk: Cut<SealedFacet>) -> Result<(), SealedError> {
+        self.facet_chunks
+            .push(RangeSummary { first: chunk.first, count: chunk.records.len() as u32 });
+        self.put(chunk.values)
+    }
+
+    /// The next interface face.
+    ///
+    /// Errors: the disk; a vertex that was not pushed.
+    pub fn push_interface_face(&mut self, face: InterfaceFace) -> Result<(), SealedError> {
+        self.end_vertices()?;
+        let cache = self.cache.as_mut().expect("vertices have ended");
+        let corners = cache.corners(&mut self.file, face.vertices)?;
+        let side = self.interfaces.entry((face.cut, face.other)).or_default();
+        side.0 += 1;
+        side.1.add_face(corners.map(|c| c.mix), face.cut);
+        let rank = self.subdomain.rank();
+        let cut = self.faces.push(face, |face| face.to_working(rank));
+        if let Some(chunk) = cut.map_err(self.io())? {
+            self.put_faces(chunk)?;
+        }
+        Ok(())
+    }
+
+    fn put_faces(&mut self, chunk: Cut<InterfaceFace>) -> Result<(), SealedError> {
+        self.face_chunks
+            .push(RangeSummary { first: chunk.first, count: chunk.records.len() as u32 });
+        self.put(chunk.values)
+    }
+
+    fn put_summaries<R: ChunkRecord>(&mut self, summaries: &[R]) -> Result<u32, SealedError> {
+        let io = self.io();
+        let mut packer = Packer::new(self.subdomain.rank(), self.generation).map_err(&io)?;
+        let mut blocks = Vec::new();
+        for &summary in summaries {
+            blocks.extend(packer.push(summary).map_err(&io)?);
+        }
+        while let Some(block) = packer.cut().map_err(&io)? {
+            blocks.push(block);
+        }
+        for block in blocks {
+            self.batch.push(&mut self.file, block.address.key(), block.value)?;
+        }
+        Ok(packer.chunks())
+    }
+
+    /// Writes what is left, shrinks the file and closes it.
+    ///
+    /// Errors: the disk.
+    pub fn finish(mut self) -> Result<Sealed, SealedError> {
+        let io = self.io();
+        let mut none = std::iter::empty();
+        self.push_tets::<SealedError>(&mut none)?;
+        while let Some(chunk) = self.tets.cut().map_err(&io)? {
+            self.packed.push(chunk);
+        }
+        let mut none = std::iter::empty();
+        self.push_tets::<SealedError>(&mut none)?;
+        while let Some(chunk) = self.facets.cut().map_err(&io)? {
+            self.put_facets(chunk)?;
+        }
+        while let Some(chunk) = self.faces.cut().map_err(&io)? {
+            self.put_faces(chunk)?;
+        }
+        let tets = std::mem::take(&mut self.tet_chunks);
+        let vertices = std::mem::take(&mut self.vertex_chunks);
+        let facets = std::mem::take(&mut self.facet_chunks);
+        let faces = std::mem::take(&mut self.face_chunks);
+        let blocks = [
+            self.put_summaries(&tets)?,
+            self.put_summaries(&vertices)?,
+            self.put_summaries(&facets)?,
+            self.put_summaries(&faces)?,
+        ];
+        self.batch.flush(&mut self.file)?;
+        self.file.compact()?;
+        let bytes = self.path.bytes()?;
+        let mut interface_digest = Digest::default();
+        let mut interfaces = Vec::with_capacity(self.interfaces.len());
+        for ((cut, other), (faces, digest)) in self.interfaces {
+            interface_digest.merge(&digest);
+            interfaces.push(InterfaceSide { cut, other, faces, digest });
+        }
+        let totals = self.totals;
+        let chunks =
+            [self.tets.chunks(), self.vertices.chunks(), self.facets.chunks(), self.faces.chunks()];
+        let mut both = [0; 8];
+        both[..4].copy_from_slice(&chunks);
+        both[4..].copy_from_slice(&blocks);
+        let row = SubdomainRow {
+            rank: self.subdomain.rank(),
+            generation: self.generation,
+            state: self.form.state(),
+            tets: self.tets.count(),
+            vertices: self.vertices.count(),
+            facets: self.facets.count(),
+            interface_faces: self.faces.count(),
+            chunks: both,
+            digest: totals.digest.lanes,
+            interface_digest: interface_digest.lanes,
+            quality: totals.quality(),
+            volume: totals.volume,
+            bounds: array(&totals.bounds),
+            bytes,
+        };
+        Ok(Sealed { row, regions: totals.regions, interfaces })
+    }
+}
+
+/// The kinds of chunks in the order of [`SubdomainRow::chunks`].
+pub(super) const CHUNK_KINDS: [ChunkKind; 8] = [
+    ChunkKind::Tets,
+    ChunkKind::Vertices,
+    ChunkKind::Facets,
+    ChunkKind::InterfaceFaces,
+    ChunkKind::TetSummaries,
+    ChunkKind::VertexSummaries,
+    ChunkKind::FacetSummaries,
+    ChunkKind::InterfaceSummaries,
+];

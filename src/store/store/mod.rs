@@ -1,0 +1,29 @@
+//! The catalog of a store: the job, the steps, sub-domain rows; one commit a step.
+//!
+//! A store is a directory. Its catalog names the files that count; a step of the mesher writes new
+//! files and then flips the catalog in one commit, so that a store is at any moment as one of its
+//! steps left it.
+
+#![warn(missing_docs)]
+
+mod catalog;
+mod error;
+mod rows;
+mod step;
+#[cfg(test)]
+mod tests;
+mod two;
+mod writer_lock;
+
+pub use catalog::Catalog;
+pub use catalog::INPUT_TRIANGLES;
+pub use error::StoreError;
+pub use step::Step;
+pub use tetdb_schema::catalog::{
+    CoarseRow, FileRow, InterfaceRow, Job, JournalRow, Measure, NeighborRow, QUALITY_BINS,
+    QualityRow, RegionRow, Stage, StageRow, StoreState, SubdomainRow, SubdomainState,
+    SurfaceSource, TopologyRow,
+};
+#[doc(hidden)]
+pub use two::two_subdomains;
+pub use writer_lock::WriterLock;
