@@ -4,9 +4,9 @@
 
 #[doc(inline)]
 pub use tetdb_engine::api::{
-    Answers, Bytes, CODES, CancelToken, CheckReport, CodeRow, ColorBy, DefectPlace, Error, Event,
-    Existing, ExportOptions, Exported, Length, MeshFormat, Mesher, Optimize, Order, Prediction,
-    Query, Regions, Remesh, Remeshed, Seal, Settings, Sizes, Snapped, Snapshot, Store, Subdomains,
+    Answers, Bytes, CancelToken, CheckReport, Code, ColorBy, DefectPlace, Error, Event, Existing,
+    ExportOptions, Exported, Length, MeshFormat, Mesher, Optimize, Order, Prediction, Query,
+    Regions, Remesh, Remeshed, Seal, Settings, Sizes, Snapped, Snapshot, Store, Subdomains,
     Summary, Surface, Tasks, Verification, VerifyLevel,
 };
 

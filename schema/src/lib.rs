@@ -4,6 +4,7 @@
 
 pub mod catalog;
 pub mod chunk;
+pub mod code;
 pub mod digest;
 pub mod ids;
 pub mod leaf;

@@ -1,6 +1,7 @@
 //! `check`: can a surface be meshed, what would mend it, what mesh does it allow?
 
 use std::path::PathBuf;
+use tetdb_schema::code::Code;
 
 use serde_json::json;
 
@@ -31,7 +32,7 @@ struct Mended {
 pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
     // Options are checked before anything is read.
     if args.repair && (args.sheets.allow_open || args.sheets.files().next().is_some()) {
-        return Err(Failure::new("usage", "a surface is repaired before sheets are embedded")
+        return Err(Failure::new(Code::Usage, "a surface is repaired before sheets are embedded")
             .help("repair each file for itself"));
     }
     let weld_share = args.weld.as_deref().map(share).transpose()?;
@@ -72,7 +73,7 @@ fn share(text: &str) -> Result<f64, Failure> {
     match text.parse::<f64>() {
         Ok(share) if share > 0.0 && share <= WELD_SHARE_MAX => Ok(share),
         _ => Err(Failure::new(
-            "bad-size",
+            Code::BadSize,
             format!(
                 "--weld {text} is not a share of the box diagonal, expected above 0 and at most {WELD_SHARE_MAX}"
             ),
@@ -95,7 +96,7 @@ fn mend(
             surface.n_triangles(),
             memory::show(least)
         );
-        return Err(Error::new("memory", message).with_remedy(Remedy::Memory(least)).into());
+        return Err(Error::new(Code::Memory, message).with_remedy(Remedy::Memory(least)).into());
     }
     let scratch = space.scratch(surface)?;
     let n_defects = attempt(|| validate_in(surface, &scratch))?.n_defects;

@@ -1,6 +1,7 @@
 //! The options that shape the mesh, from the command line and a file.
 
 use std::path::Path;
+use tetdb_schema::code::Code;
 
 use clap::ValueEnum;
 
@@ -21,7 +22,7 @@ pub fn options(args: &ShapeArgs) -> Result<Options, Failure> {
         None => Options::default(),
         Some(path) => {
             let text = text(path).map_err(|e| {
-                Failure::new("unreadable-file", format!("the file cannot be read: {e}"))
+                Failure::new(Code::UnreadableFile, format!("the file cannot be read: {e}"))
                     .at(path.display())
                     .help("a configuration is a regular file of some lines")
             })?;
@@ -90,7 +91,7 @@ fn take_seeds(args: &ShapeArgs, options: &mut Options) -> Result<(), Failure> {
         return Ok(());
     };
     let text = text(path).map_err(|e| {
-        Failure::new("unreadable-file", format!("the file cannot be read: {e}"))
+        Failure::new(Code::UnreadableFile, format!("the file cannot be read: {e}"))
             .at(path.display())
             .help("seeds are in a regular file, a line for each")
     })?;
@@ -100,7 +101,7 @@ fn take_seeds(args: &ShapeArgs, options: &mut Options) -> Result<(), Failure> {
             continue;
         }
         let seed = Seed::parse_line(line).ok_or_else(|| {
-            Failure::new("bad-seed", format!("`{line}` is no seed"))
+            Failure::new(Code::BadSeed, format!("`{line}` is no seed"))
                 .at(format!("{}, line {number}", path.display()))
                 .help("a line is `x y z name`, `x y z` or `x y z hole`")
         })?;
@@ -156,7 +157,7 @@ fn read(text: &str) -> Result<Options, Failure> {
 }
 
 fn bad(what: String) -> Failure {
-    Failure::new("bad-config", what).help(
+    Failure::new(Code::BadConfig, what).help(
         "keys are those of `tetdb mesh --help`, for example hsiz = 0.1, hmax = \"2%\" or size_sphere = [[0, 0, 0, 1, 0.1]]",
     )
 }

@@ -3,6 +3,7 @@
 use std::io::{IsTerminal, Write};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
+use tetdb_schema::code::Code;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use serde::Serialize;
@@ -290,8 +291,8 @@ pub(super) fn unwritten(error: &std::io::Error, written: &str) -> Result<(), Fai
     use std::io::ErrorKind::{BrokenPipe, StorageFull};
     let code = match error.kind() {
         BrokenPipe => return Ok(()),
-        StorageFull => "disk-full",
-        _ => "io",
+        StorageFull => Code::DiskFull,
+        _ => Code::Io,
     };
     let message =
         format!("the answer could not be written to the standard output: {error}{written}");

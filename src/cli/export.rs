@@ -1,6 +1,7 @@
 //! `export`: files for other programs.
 
 use std::path::{Path, PathBuf};
+use tetdb_schema::code::Code;
 
 use serde_json::json;
 
@@ -68,7 +69,7 @@ fn write_share(
     let settings = console.settings(memory::asked(args.read.memory.as_deref())?, None);
     let format = match &args.format {
         Some(word) => Some(MeshFormat::of_word(word).ok_or_else(|| {
-            Failure::new("unknown-format", "no format has this name")
+            Failure::new(Code::UnknownFormat, "no format has this name")
                 .at(word)
                 .help(format!("choose msh22, or an ending without its dot: {ENDINGS}"))
         })?),
@@ -110,8 +111,11 @@ fn write_share(
     }
     let to_stdout = args.out.iter().any(|out| out == Path::new("-"));
     if to_stdout && (console.is_json() || args.out.len() > 1) {
-        return Err(Failure::new("usage", "the standard output holds one mesh and nothing else")
-            .help("leave --json and other names out"));
+        return Err(Failure::new(
+            Code::Usage,
+            "the standard output holds one mesh and nothing else",
+        )
+        .help("leave --json and other names out"));
     }
     if !args.force {
         let inputs = inputs_of(&args.store);
@@ -151,7 +155,7 @@ fn rows(args: &ExportArgs) -> Result<Option<QueryArgs>, Failure> {
     ];
     let ([out], false) = (&args.out[..], of_meshes.contains(&true)) else {
         let message = ".csv and .jsonl are one file of rows, a tetrahedron each, and no mesh";
-        return Err(Failure::new("usage", message).help(
+        return Err(Failure::new(Code::Usage, message).help(
             "export it alone, with --subdomain, --region or --memory only; `tetdb query` chooses rows and columns",
         ));
     };
@@ -174,7 +178,7 @@ pub fn check_format(out: &Path) -> Result<(), Failure> {
     match MeshFormat::of_extension(out) {
         Some(_) => Ok(()),
         None => Err(Failure::new(
-            "unknown-format",
+            Code::UnknownFormat,
             "the format of a mesh file does not follow from its name",
         )
         .at(out.display())

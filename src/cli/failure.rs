@@ -1,6 +1,7 @@
 //! Errors as the user sees them: a word, an exit code, what happened, where, what to do.
 
 use clap::CommandFactory;
+use tetdb_schema::code::Code;
 
 use super::args::Args;
 use tetdb_base::storage::StorageError;
@@ -15,19 +16,17 @@ use tetdb_store::query::QueryError;
 use tetdb_store::sealed::SealedError;
 use tetdb_store::store::StoreError;
 
-pub use tetdb_engine::api::{CODES, CodeRow};
-
 /// An error on its way to the user.
 #[derive(Debug)]
 pub struct Failure {
-    pub code: &'static str,
+    pub code: Code,
     pub message: String,
     pub place: Option<String>,
     pub help: Option<String>,
 }
 
 impl Failure {
-    pub fn new(code: &'static str, message: impl ToString) -> Self {
+    pub fn new(code: Code, message: impl ToString) -> Self {
         Self { code, message: message.to_string(), place: None, help: None }
     }
 
@@ -43,11 +42,10 @@ impl Failure {
 
     /// The exit code of its word.
     pub fn exit(&self) -> u8 {
-        if self.code == "stopped" {
-            return super::signals::exit_code();
+        match self.code {
+            Code::Stopped => super::signals::exit_code(),
+            code => code.exit(),
         }
-        let row = CODES.iter().find(|row| row.code == self.code);
-        row.map_or(1, |row| row.exit)
     }
 }
 
@@ -110,83 +108,87 @@ pub fn in_flags(text: &str) -> String {
     }
 }
 
-fn help_of(code: &str) -> &'static str {
+fn help_of(code: Code) -> &'static str {
     match code {
-        "busy" => "wait for the other process, or stop it",
-        "disk-full" => "free some space, then `tetdb resume STORE`",
-        "damaged" => {
+        Code::Busy => "wait for the other process, or stop it",
+        Code::DiskFull => "free some space, then `tetdb resume STORE`",
+        Code::Damaged => {
             "`tetdb verify STORE` lists what is damaged; `tetdb resaturate STORE --repair` meshes damaged sub-domains again, `--forget` drops a damaged previous version"
         }
-        "memory" => "give more with --memory, or take a coarser surface",
-        "stopped" if super::signals::has_store() => {
+        Code::Memory => "give more with --memory, or take a coarser surface",
+        Code::Stopped if super::signals::has_store() => {
             "`tetdb resume STORE` goes on from the last finished step"
         }
-        "stopped" => "nothing was begun; run it again",
-        "no-such-part" => "`tetdb info STORE` lists what there is",
-        "no-such-store" => "check the path; `tetdb mesh SURFACE -o STORE` creates a store",
-        "not-a-store" => {
+        Code::Stopped => "nothing was begun; run it again",
+        Code::NoSuchPart => "`tetdb info STORE` lists what there is",
+        Code::NoSuchStore => "check the path; `tetdb mesh SURFACE -o STORE` creates a store",
+        Code::NotAStore => {
             "a store is a directory that this program wrote; a surface is looked at by `tetdb check SURFACE`, and a new store takes another path"
         }
-        "store-exists" => "choose another path, or replace it with --force",
-        "no-coarse-leaf" => "mesh the surface again without --drop-coarse",
-        "store-unfinished" => "`tetdb resume STORE` goes on with it",
-        "store-format" => "use the version of this program that wrote the store, or mesh again",
-        "store-recipe" => {
+        Code::StoreExists => "choose another path, or replace it with --force",
+        Code::NoCoarseLeaf => "mesh the surface again without --drop-coarse",
+        Code::StoreUnfinished => "`tetdb resume STORE` goes on with it",
+        Code::StoreFormat => "use the version of this program that wrote the store, or mesh again",
+        Code::StoreRecipe => {
             "go on with the version of this program that began it, or mesh again with --force"
         }
-        "degenerate-triangle" | "duplicate-triangle" => {
+        Code::DegenerateTriangle | Code::DuplicateTriangle => {
             "`tetdb check SURFACE` lists all such triangles; `tetdb check SURFACE --repair --write OUT` drops them"
         }
-        "open-surface" => {
+        Code::OpenSurface => {
             "`tetdb check SURFACE` lists the holes and says whether a repair closes them; otherwise close them where the surface was made; a sheet inside is none: give it with --embed FILE, or --allow-open"
         }
-        "self-intersection" => {
+        Code::SelfIntersection => {
             "`tetdb check SURFACE` lists the places; unite or separate the parts where the surface was made"
         }
-        "empty-surface" => "choose a file that holds triangles",
-        "coordinate-range" => "scale the surface to ordinary units, for example metres",
-        "surface-too-large" => "split the surface into parts and mesh them one by one",
-        "index-out-of-range" => {
+        Code::EmptySurface => "choose a file that holds triangles",
+        Code::CoordinateRange => "scale the surface to ordinary units, for example metres",
+        Code::SurfaceTooLarge => "split the surface into parts and mesh them one by one",
+        Code::IndexOutOfRange => {
             "write the file again from the program it comes from; vertex numbers must name vertices of the file"
         }
-        "contradicting-orientation" => {
+        Code::ContradictingOrientation => {
             "`--regions all` fills every volume whatever the orientation; or give each shared wall from both sides, once in each file"
         }
-        "nothing-filled" => "try --regions all, and look at the surface with `tetdb check SURFACE`",
-        "sheet-outside" => {
+        Code::NothingFilled => {
+            "try --regions all, and look at the surface with `tetdb check SURFACE`"
+        }
+        Code::SheetOutside => {
             "cut sheets off where they leave the filled regions, or fill the region they lie in (--regions)"
         }
-        "wire-outside" => {
+        Code::WireOutside => {
             "leave out what is outside the filled regions, or fill the region it lies in (--regions)"
         }
-        "degenerate-edge" | "duplicate-wire" => {
+        Code::DegenerateEdge | Code::DuplicateWire => {
             "give each edge and each point once, edges between different vertices"
         }
-        "wire-contact" => {
+        Code::WireContact => {
             "edges and points meet triangles, and edges each other, in common vertices alone; `--refine-surface` puts in what lies exactly on one"
         }
-        "wire-too-near" => {
+        Code::WireTooNear => {
             "join what is meant to meet, or move it apart: beside a triangle is not on it"
         }
-        "nothing-to-undo" => {
+        Code::NothingToUndo => {
             "only the last `tetdb resaturate` can be undone, once, and not after --forget"
         }
-        "count-mismatch" => {
+        Code::CountMismatch => {
             "`tetdb export STORE part.npy --subdomain N` writes the arrays of a sub-domain in that order"
         }
-        "unrecovered-triangles" => {
+        Code::UnrecoveredTriangles => {
             "look at these triangles with `tetdb check SURFACE`; a finer or better shaped surface there helps"
         }
-        "bad-sample" => {
+        Code::BadSample => {
             "for example sample:balls,count=100 or sample:box,h=0.1; see `tetdb sample --help`"
         }
-        "surface-changed" => "put the old file back, or give the surface with --against",
-        "size-field-changed" => "put the old files back, or mesh again with --force",
-        "usage" => "write it to a file first: `tetdb sample balls,count=10 -o balls.stl`",
-        "no-room" => {
+        Code::SurfaceChanged => "put the old file back, or give the surface with --against",
+        Code::SizeFieldChanged => "put the old files back, or mesh again with --force",
+        Code::Usage => "write it to a file first: `tetdb sample balls,count=10 -o balls.stl`",
+        Code::NoRoom => {
             "`tetdb estimate SURFACE` tells what a mesh takes; ask for longer edges (--hsiz), give more --memory, or put the store on another disk with -o"
         }
-        "invalid-mesh" => "`tetdb verify STORE --full --json` has examples; --embed names sheets",
+        Code::InvalidMesh => {
+            "`tetdb verify STORE --full --json` has examples; --embed names sheets"
+        }
         _ => "check the path and its permissions",
     }
 }

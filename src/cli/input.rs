@@ -1,6 +1,7 @@
 //! Surfaces as arguments: files, or samples generated on the spot.
 
 use std::path::Path;
+use tetdb_schema::code::Code;
 
 use super::args::SheetArgs;
 use super::console::Console;
@@ -58,7 +59,7 @@ pub fn load_with(
         let (file, name) = text.rsplit_once('=').unwrap_or((text, ""));
         if name.is_empty() || !sheets.files().any(|embedded| embedded == file) {
             let message = format!("--name {text} is not an embedded file, `=` and a name");
-            return Err(Failure::new("usage", message)
+            return Err(Failure::new(Code::Usage, message)
                 .help("such as --embed fault.stl --name fault.stl=north"));
         }
         names.push((file, name));

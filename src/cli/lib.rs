@@ -39,6 +39,7 @@ mod words;
 
 use std::io::Write;
 use std::process::ExitCode;
+use tetdb_schema::code::Code;
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, Parser};
@@ -49,8 +50,6 @@ use failure::Failure;
 
 use tetdb_base::storage::StorageError;
 use tetdb_engine::api::guarded;
-
-pub use failure::{CODES, CodeRow};
 
 /// Runs the command line of this process and returns its exit code.
 pub fn run() -> ExitCode {
@@ -92,7 +91,7 @@ fn run_rank(ranks: &ranks::Ranks) -> ExitCode {
         Command::Mesh(args) => mesh::begin(&args.run, &[], &console),
         Command::Resume(args) => mesh::begin(&args.run, &[], &console),
         Command::Verify(args) => verify::settings(args, &console),
-        _ => Err(Failure::new("internal", "a rank was asked for what it cannot do")),
+        _ => Err(Failure::new(Code::Internal, "a rank was asked for what it cannot do")),
     }))
 }
 
@@ -149,18 +148,18 @@ fn unparsed(error: &clap::Error) -> ExitCode {
         );
         let message = format!("{word} looks like a negative number, and no option here takes one");
         return ExitCode::from(
-            Console::new(is_json).fail(&Failure::new("usage", message).help(help)),
+            Console::new(is_json).fail(&Failure::new(Code::Usage, message).help(help)),
         );
     }
     if is_apart(error) {
         let message = "numbers of one option stand apart";
         let help = "write them as one word with commas, as in --point 0.1,0.2,0.3";
         return ExitCode::from(
-            Console::new(is_json).fail(&Failure::new("usage", message).help(help)),
+            Console::new(is_json).fail(&Failure::new(Code::Usage, message).help(help)),
         );
     }
     let help = format!("`tetdb {} --help`", command.unwrap_or_default()).replace("  ", " ");
-    ExitCode::from(Console::new(is_json).fail(&Failure::new("usage", message).help(help)))
+    ExitCode::from(Console::new(is_json).fail(&Failure::new(Code::Usage, message).help(help)))
 }
 
 /// Whether what was not expected is a number behind another one.

@@ -5,6 +5,7 @@ use tetdb_engine::api::default_cap;
 pub use tetdb_engine::api::peak_bytes as peak;
 pub(super) use tetdb_engine::api::show_bytes as show;
 use tetdb_engine::pipeline::MEMORY_MIN;
+use tetdb_schema::code::Code;
 
 /// The cap in bytes: what is asked for, or a share of what is free. Errors: as [`asked`].
 pub fn cap(option: Option<&str>) -> Result<u64, Failure> {
@@ -19,7 +20,7 @@ pub fn asked(option: Option<&str>) -> Result<Option<u64>, Failure> {
         let least = MEMORY_MIN >> 20;
         let message = format!("--memory {text} is less than the {least} MiB any run needs");
         let help = format!("give at least --memory {least}MiB");
-        return Err(Failure::new("memory", message).help(help));
+        return Err(Failure::new(Code::Memory, message).help(help));
     }
     Ok(Some(bytes))
 }
@@ -27,7 +28,7 @@ pub fn asked(option: Option<&str>) -> Result<Option<u64>, Failure> {
 /// Reads `512MiB`, `8G`, `2GB`.
 pub fn parse(text: &str) -> Result<u64, Failure> {
     let bad = |why: &str| {
-        Failure::new("bad-memory", format!("'{text}' is not a memory size: {why}"))
+        Failure::new(Code::BadMemory, format!("'{text}' is not a memory size: {why}"))
             .help("write a number with its unit: 512MiB, 8GiB (or 8G), 2GB (10^9 bytes)")
     };
     let text = text.trim();

@@ -1,6 +1,7 @@
 //! `mesh` and `resume`.
 
 use std::path::{Path, PathBuf};
+use tetdb_schema::code::Code;
 
 use serde_json::json;
 
@@ -18,7 +19,7 @@ pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
     if let Some(file) = args.output.as_deref().filter(|out| export::check_format(out).is_ok()) {
         let message = format!("-o {0} names a mesh file; -o names the store", file.display());
         let help = format!("`--export {}` writes that file as well", file.display());
-        return Err(Failure::new("usage", message).help(help));
+        return Err(Failure::new(Code::Usage, message).help(help));
     }
     let options = config::options(&args.shape)?;
     // Sizes are checked before anything is read.

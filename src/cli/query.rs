@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, stdin};
 use std::path::Path;
+use tetdb_schema::code::Code;
 
 use super::args::QueryArgs;
 use super::console::Console;
@@ -240,7 +241,7 @@ fn line(from: &mut dyn BufRead) -> std::io::Result<Option<String>> {
 }
 
 fn unreadable(path: &Path, error: &std::io::Error) -> Failure {
-    Failure::new("unreadable-file", format!("the points cannot be read: {error}"))
+    Failure::new(Code::UnreadableFile, format!("the points cannot be read: {error}"))
         .at(path.display())
         .help("check the path and its permissions")
 }
@@ -263,13 +264,13 @@ fn parse_line(path: &Path, number: u64, line: &str) -> Result<Option<Point>, Fai
     let mut point = [0.0; 3];
     if words.len() != 3 {
         let message = format!("expected three coordinates, found {}", words.len());
-        return Err(fault("unexpected-text", message));
+        return Err(fault(Code::UnexpectedText, message));
     }
     for (x, word) in point.iter_mut().zip(&words) {
         *x = word.parse().unwrap_or(f64::NAN);
         if !x.is_finite() {
             let message = format!("{word} is not a finite number");
-            return Err(fault("not-a-number", message));
+            return Err(fault(Code::NotANumber, message));
         }
     }
     Ok(Some(Point::from_array(point)))

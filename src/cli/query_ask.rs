@@ -4,11 +4,12 @@ use super::args::QueryArgs;
 use super::failure::Failure;
 use tetdb_base::expr::{ExprError, Expression, Kind};
 use tetdb_base::geom::{Aabb, Point};
+use tetdb_schema::code::Code;
 use tetdb_store::query::{QueryError, QuerySession, Selection, Solid, VARIABLES, regions_called};
 
 /// An option's value that makes no sense.
 pub fn bad(option: &str, found: &str, expected: &str) -> Failure {
-    Failure::new("bad-query", format!("{option} {found}: expected {expected}"))
+    Failure::new(Code::BadQuery, format!("{option} {found}: expected {expected}"))
         .help("`tetdb query --help` has examples")
 }
 
@@ -18,7 +19,7 @@ pub fn bad_expression(text: &str, error: &ExprError) -> Failure {
     let before = text[..error.at].chars().count();
     // The place is told behind "  at: ".
     let caret = format!("{:1$}^", "", before + "  at: ".len());
-    Failure::new("bad-expression", error)
+    Failure::new(Code::BadExpression, error)
         .at(format!("{line}\n{caret}"))
         .help("such as \"quality > 6 and region in [1, 2]\" or \"0.1 + 0.05*x\"")
 }

@@ -1,6 +1,7 @@
 //! Answers of a query as rows of named cells, and where they go: a table, values, objects, files.
 
 use std::path::{Path, PathBuf};
+use tetdb_schema::code::Code;
 
 use serde_json::{Map, Value, json};
 use tetdb_schema::ids::VertexId;
@@ -211,7 +212,7 @@ impl FileSink {
             "vtu" => Self::Vtu(SelectedVtu::new(out, memory)?),
             _ => {
                 let message = "the format of a file of answers does not follow from its name";
-                return Err(Failure::new("unknown-format", message)
+                return Err(Failure::new(Code::UnknownFormat, message)
                     .at(out.display())
                     .help("end the name with .csv, .jsonl, .npy or .vtu"));
             }

@@ -13,6 +13,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
+use tetdb_schema::code::Code;
 
 use mpi::Threading;
 use mpi::topology::SimpleCommunicator;
@@ -23,10 +24,10 @@ use serde_json::{Value, json};
 
 use super::failure::Failure;
 use super::tasks;
-use tetdb_base::storage::{Budget, RunContext, host_name};
+use tetdb_base::storage::{Budget, RemoteFailure, RunContext, host_name};
 use tetdb_engine::api::verify_server::Server;
 use tetdb_engine::api::{Error, Settings, guarded};
-use tetdb_engine::pipeline::{self, Hands, Helpers, PipelineError, RemoteFailure, TaskSettings};
+use tetdb_engine::pipeline::{self, Hands, Helpers, PipelineError, TaskSettings};
 use tetdb_io::write::{Share, Writers};
 
 /// Tag of what is no order: jobs, their answers, the end.
@@ -96,7 +97,7 @@ pub(super) fn begin() -> Result<Option<Arc<Ranks>>, Failure> {
         let message = format!(
             "the launcher has started {launched} processes, and the MPI that this program was built with sees one"
         );
-        return Err(Failure::new("usage", message).help(
+        return Err(Failure::new(Code::Usage, message).help(
             "start it with the mpirun of the MPI it was built with, or build it with this one",
         ));
     }
@@ -145,7 +146,7 @@ pub(super) fn gather<T: Serialize + DeserializeOwned>(
     for answer in others {
         let answer = answer.map_err(PipelineError::from)?;
         let theirs = serde_json::from_slice(&answer);
-        add(&mut all, theirs.map_err(|e| Failure::new("internal", e))?);
+        add(&mut all, theirs.map_err(|e| Failure::new(Code::Internal, e))?);
     }
     Ok(all)
 }
@@ -192,7 +193,7 @@ impl Writers for SharedFile {
     fn say(&self, done: Result<(), RemoteFailure>) {
         let letter = match done {
             Ok(()) => vec![DONE],
-            Err(failure) => failed(&failure.code, &failure.message),
+            Err(failure) => failed(failure.code, &failure.message),
         };
         self.ranks.send(0, FILE, letter);
     }
@@ -380,7 +381,7 @@ impl Ranks {
 }
 
 /// An error as a message, with the name of this machine.
-fn failed(code: &str, message: &str) -> Vec<u8> {
+fn failed(code: Code, message: &str) -> Vec<u8> {
     let text = json!({ "code": code, "message": format!("{message} (on {})", host_name()) });
     [vec![FAILED], text.to_string().into_bytes()].concat()
 }
@@ -404,7 +405,7 @@ impl RankHelpers {
     fn ask(&self, rank: i32, tag: i32, message: Vec<u8>) -> Result<(), RemoteFailure> {
         if i32::try_from(message.len()).is_err() {
             return Err(RemoteFailure {
-                code: "memory".to_owned(),
+                code: Code::Memory,
                 message: format!(
                     "an order of {} bytes is more than a message can hold",
                     message.len()
@@ -416,20 +417,21 @@ impl RankHelpers {
     }
 
     fn answer(&self, rank: i32, tag: i32) -> Result<Vec<u8>, RemoteFailure> {
-        let failure = |code: &str, message: &str| RemoteFailure {
-            code: code.to_owned(),
-            message: message.to_owned(),
-        };
+        let failure =
+            |code: Code, message: &str| RemoteFailure { code, message: message.to_owned() };
         let bytes = self.ranks.receive_from(rank, tag);
-        let mut bytes =
-            bytes.ok_or_else(|| failure("stopped", "stopped while another rank was at work"))?;
+        let mut bytes = bytes
+            .ok_or_else(|| failure(Code::Stopped, "stopped while another rank was at work"))?;
         match bytes.first() {
             Some(&DONE) => Ok(bytes.split_off(1)),
             _ => {
                 let error: Value =
                     serde_json::from_slice(bytes.get(1..).unwrap_or_default()).unwrap_or_default();
                 let text = |key| error[key].as_str().unwrap_or_default().to_owned();
-                Err(failure(&text("code"), &format!("rank {rank}: {}", text("message"))))
+                Err(failure(
+                    text("code").parse().unwrap_or(Code::Internal),
+                    &format!("rank {rank}: {}", text("message")),
+                ))
             }
         }
     }
@@ -459,7 +461,7 @@ impl Helpers for RankHelpers {
     fn perform(&self, slot: usize, order: Vec<u8>) -> Result<Vec<u8>, RemoteFailure> {
         let found = self.slots().get(slot).copied();
         let (rank, of_rank) = found.ok_or_else(|| RemoteFailure {
-            code: "internal".to_owned(),
+            code: Code::Internal,
             message: "an order for a rank that has not begun".to_owned(),
         })?;
         self.ask(rank, of_rank + 1, order)?;

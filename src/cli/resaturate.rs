@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
+use tetdb_schema::code::Code;
 
 use serde_json::{Value, json};
 
@@ -84,7 +85,7 @@ pub fn run(args: &ResaturateArgs, console: &Console) -> Result<u8, Failure> {
 
 /// Refuses what makes no sense together, before anything is read.
 fn check(args: &ResaturateArgs) -> Result<(), Failure> {
-    let usage = |message: &str, help: &str| Err(Failure::new("usage", message).help(help));
+    let usage = |message: &str, help: &str| Err(Failure::new(Code::Usage, message).help(help));
     let has_sizes = resaturate_sizes::are_given(args);
     if args.undo || args.forget || args.repair {
         return match has_sizes {

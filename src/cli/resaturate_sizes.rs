@@ -1,6 +1,7 @@
 //! Sizes for sub-domains that are made again, as typed.
 
 use std::path::Path;
+use tetdb_schema::code::Code;
 
 use serde_json::json;
 
@@ -54,7 +55,7 @@ pub fn new_sizes(
         };
         if others != SizeArgs::default() || args.changed {
             return Err(Failure::new(
-                "usage",
+                Code::Usage,
                 "lengths one by one go with --subdomain, --hmin, --hmax, --hgrad and --refine-by only",
             )
             .at(file)

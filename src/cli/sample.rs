@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
+use tetdb_schema::code::Code;
 
 use serde_json::json;
 
@@ -19,9 +20,9 @@ fn to_stdout(word: &str, format: &str, space: Space, console: &Console) -> Resul
     let surface = input::load(&[word.to_owned()], space, console)?.inner;
     // A file first, with a name nobody else has: the writers know files alone.
     let file = std::env::temp_dir().join(format!("tetdb-sample-{}.{format}", std::process::id()));
-    let copied = write::surface(&surface, &file)
-        .map_err(Failure::from)
-        .and_then(|_| copy(&file, console).map_err(|e| Failure::new("io", e).at(file.display())));
+    let copied = write::surface(&surface, &file).map_err(Failure::from).and_then(|_| {
+        copy(&file, console).map_err(|e| Failure::new(Code::Io, e).at(file.display()))
+    });
     let _ = std::fs::remove_file(&file);
     copied.map(|()| 0)
 }
@@ -61,7 +62,9 @@ pub fn run(args: &SampleArgs, console: &Console) -> Result<u8, Failure> {
     }
     if args.format.is_some() {
         let message = "--format is for -o -; a file's ending says its format";
-        return Err(Failure::new("usage", message).help("name the file .stl, .off, .obj or .ply"));
+        return Err(
+            Failure::new(Code::Usage, message).help("name the file .stl, .off, .obj or .ply")
+        );
     }
     check_target(&args.output, &[])?;
     let surface = input::load(&[word], space, console)?.inner;

@@ -1,6 +1,7 @@
 //! `completions` and `man`: what shells and manual readers want to know of the command line.
 
 use std::path::Path;
+use tetdb_schema::code::Code;
 
 use clap::{Command, CommandFactory};
 
@@ -29,7 +30,7 @@ pub fn man(args: &ManArgs, console: &Console) -> Result<u8, Failure> {
     let command = match &args.command {
         None => &root,
         Some(word) => pages(&root).find(|c| c.get_name() == word.as_str()).ok_or_else(|| {
-            Failure::new("usage", format!("there is no command {word}")).help("`tetdb --help`")
+            Failure::new(Code::Usage, format!("there is no command {word}")).help("`tetdb --help`")
         })?,
     };
     console.write(&page(command)?);
@@ -54,7 +55,7 @@ fn page(command: &Command) -> Result<Vec<u8>, Failure> {
     let rendered = clap_mangen::Man::new(command.clone().after_help(rest))
         .title(name(command))
         .render(&mut text);
-    rendered.map_err(|e| Failure::new("internal", e))?;
+    rendered.map_err(|e| Failure::new(Code::Internal, e))?;
     if !examples.is_empty() {
         text.extend_from_slice(b".SH EXAMPLES\n.nf\n");
         for line in examples {
@@ -83,5 +84,5 @@ fn examples(after: &str) -> (Vec<&str>, String) {
 }
 
 fn unwritable(path: &Path, error: &std::io::Error) -> Failure {
-    Failure::new("io", error).at(path.display()).help("give a folder that exists with --dir")
+    Failure::new(Code::Io, error).at(path.display()).help("give a folder that exists with --dir")
 }

@@ -8,6 +8,7 @@ use super::query_ask::{bad, condition, numbers};
 use tetdb_engine::api::picture::take;
 use tetdb_engine::api::targets::{check_target, inputs_of};
 use tetdb_engine::api::{self, Snapped, Snapshot};
+use tetdb_schema::code::Code;
 
 /// Least and greatest side of a picture in pixels.
 const SIDE: std::ops::RangeInclusive<u32> = 64..=16_384;
@@ -16,12 +17,12 @@ pub fn run(args: &SnapshotArgs, console: &Console) -> Result<u8, Failure> {
     check_target(&args.output, &inputs_of(&args.store))?;
     let settings = console.settings(memory::asked(args.read.memory.as_deref())?, None);
     let snapshot = snapshot(args).map_err(|error| match error.code {
-        "bad-query" => error.help("`tetdb snapshot --help` has examples"),
+        Code::BadQuery => error.help("`tetdb snapshot --help` has examples"),
         _ => error,
     })?;
     let snapped = take(&args.store, &args.output, &snapshot, &settings);
     let snapped = snapped.map_err(|error| match (error.code(), &args.plane) {
-        ("bad-query", Some(plane)) => {
+        (Code::BadQuery, Some(plane)) => {
             bad("--plane", plane, "a plane that cuts tetrahedra of the mesh")
         }
         _ => error.into(),

@@ -1,12 +1,13 @@
 //! Numbers of threads as typed.
 
 use super::failure::Failure;
+use tetdb_schema::code::Code;
 
 /// The number of threads that is asked for. Errors: none at all.
 pub(super) fn asked(option: Option<usize>) -> Result<Option<usize>, Failure> {
     if option == Some(0) {
         let message = "--threads 0 is no thread to work with";
-        return Err(Failure::new("usage", message).help("give 1 or more"));
+        return Err(Failure::new(Code::Usage, message).help("give 1 or more"));
     }
     Ok(option)
 }

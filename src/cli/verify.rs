@@ -1,6 +1,7 @@
 //! `verify`: is it a valid mesh of its surface?
 
 use serde_json::json;
+use tetdb_schema::code::Code;
 
 use super::args::VerifyArgs;
 use super::console::Console;
@@ -25,7 +26,7 @@ fn verify(args: &VerifyArgs, settings: &Settings, console: &Console) -> Result<u
     if embeds && args.against.is_empty() {
         let message =
             "what was embedded is named beside the surface alone, and --against names none";
-        return Err(Failure::new("usage", message)
+        return Err(Failure::new(Code::Usage, message)
             .help("name all files with --against and --embed…, or none: the store knows them"));
     }
     let cap = settings.cap()?;

@@ -10,7 +10,7 @@ use std::fs::{self, File};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use tetdb::CODES;
+use tetdb::Code;
 
 const README: &str = include_str!("../../README.md");
 const ERRORS: &str = include_str!("../../src/guide/errors.md");
@@ -222,8 +222,10 @@ fn the_table_of_errors_is_the_programs() {
             Some((word.to_owned(), exit.split('/').next()?.parse().ok()?, meaning.to_owned()))
         })
         .collect();
-    let own: Vec<(String, u8, String)> =
-        CODES.iter().map(|row| (row.code.to_owned(), row.exit, row.meaning.to_owned())).collect();
+    let own: Vec<(String, u8, String)> = Code::ALL
+        .iter()
+        .map(|c| (c.as_str().to_owned(), c.exit(), c.meaning().to_owned()))
+        .collect();
     assert_eq!(rows, own);
 }
 

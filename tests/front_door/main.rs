@@ -6,6 +6,7 @@
 use std::path::Path;
 use std::process::{Command, Output};
 use std::sync::atomic::{AtomicBool, Ordering};
+use tetdb::Code;
 
 use tetdb::{
     CancelToken, Event, Length, Mesher, Order, Settings, Sizes, Store, Subdomains, Surface,
@@ -86,7 +87,7 @@ fn what_the_program_makes_the_library_goes_on_with() -> Outcome {
         .create(dir.path().join("ours.tetdb"))?;
     assert!(again.is_same_mesh(&ours));
     let other = Mesher::new(Surface::sample("box,h=0.25")?).create(dir.path().join("ours.tetdb"));
-    assert_eq!(other.err().map(|e| e.code()), Some("store-exists"));
+    assert_eq!(other.err().map(|e| e.code()), Some(Code::StoreExists));
     Ok(())
 }
 
@@ -106,7 +107,7 @@ fn a_cancelled_run_goes_on_in_the_same_process_and_in_the_program() -> Outcome {
         assert!(error.is_cancelled(), "{error}");
         assert_eq!(error.exit_code(), 130);
         let refused = Store::open(&path).err().map(|e| e.code());
-        assert_eq!(refused, Some("store-unfinished"));
+        assert_eq!(refused, Some(Code::StoreUnfinished));
         token.reset();
         let store = match by_program {
             true => {
@@ -147,7 +148,7 @@ fn of_three_runs_at_once_each_ends_in_its_own_way() -> Outcome {
         let cancelled = cancelled.join().expect("no call unwinds into its caller");
         was_cancelled.store(cancelled.is_err_and(|e| e.is_cancelled()), Ordering::Relaxed);
         let refused = refused.join().expect("no call unwinds into its caller");
-        assert_eq!(refused.err().map(|e| e.code()), Some("open-surface"));
+        assert_eq!(refused.err().map(|e| e.code()), Some(Code::OpenSurface));
         let finished = finished.join().expect("no call unwinds into its caller");
         assert!(finished?.is_same_mesh(&whole));
         Ok(())
@@ -197,7 +198,7 @@ fn a_store_of_another_recipe_is_not_gone_on_with() -> Outcome {
     })?;
     catalog.close()?;
     let error = Store::resume(&path, Settings::new()).err().ok_or("refused")?;
-    assert_eq!((error.code(), error.exit_code()), ("store-recipe", 8));
+    assert_eq!((error.code(), error.exit_code()), (Code::StoreRecipe, 8));
     assert!(error.message().contains("99"), "{error}");
     let output = program(dir.path(), &["resume", "old.tetdb"])?;
     assert_eq!(output.status.code(), Some(8));
@@ -211,23 +212,23 @@ fn what_makes_no_sense_is_an_error_with_a_word() -> Outcome {
     let code = |result: Result<Surface, tetdb::Error>| result.err().map(|e| e.code());
     let mut wild = triangles.clone();
     wild[3][1] = 77;
-    assert_eq!(code(Surface::from_arrays(&points, &wild, None)), Some("index-out-of-range"));
+    assert_eq!(code(Surface::from_arrays(&points, &wild, None)), Some(Code::IndexOutOfRange));
     let mut nan = points.clone();
     nan[2][0] = f64::NAN;
-    assert_eq!(code(Surface::from_arrays(&nan, &triangles, None)), Some("not-a-number"));
+    assert_eq!(code(Surface::from_arrays(&nan, &triangles, None)), Some(Code::NotANumber));
     assert_eq!(
         code(Surface::from_arrays(&points, &triangles, Some(&["a"]))),
-        Some("count-mismatch")
+        Some(Code::CountMismatch)
     );
-    assert_eq!(code(Surface::sample("teapot")), Some("bad-sample"));
-    assert_eq!(code(Surface::read(["nowhere.stl"])), Some("unreadable-file"));
+    assert_eq!(code(Surface::sample("teapot")), Some(Code::BadSample));
+    assert_eq!(code(Surface::read(["nowhere.stl"])), Some(Code::UnreadableFile));
     let path = dir.path().join("x.tetdb");
     let word = |mesher: Mesher| mesher.create(&path).err().map(|e| e.code());
     let sizes = Sizes::interior(Length::units(-1.0));
-    assert_eq!(word(mesher()?.sizes(sizes)), Some("bad-size"));
-    assert_eq!(word(mesher()?.subdomains(Subdomains::Exactly(0))), Some("usage"));
-    assert_eq!(word(mesher()?.threads(0)), Some("usage"));
-    assert_eq!(word(mesher()?.memory(tetdb::Bytes::mib(3))), Some("memory"));
+    assert_eq!(word(mesher()?.sizes(sizes)), Some(Code::BadSize));
+    assert_eq!(word(mesher()?.subdomains(Subdomains::Exactly(0))), Some(Code::Usage));
+    assert_eq!(word(mesher()?.threads(0)), Some(Code::Usage));
+    assert_eq!(word(mesher()?.memory(tetdb::Bytes::mib(3))), Some(Code::Memory));
     assert!(!path.exists(), "a refused run leaves nothing");
     Ok(())
 }
@@ -314,7 +315,7 @@ fn pages_that_are_no_mesh_are_damage() -> Outcome {
             for threads in [1, 2] {
                 let resumed = Store::resume(&path, Settings::new().threads(threads));
                 let code = resumed.err().map(|e| e.code());
-                assert_eq!(code, Some("damaged"), "word {word} of {kind:?}, {number}");
+                assert_eq!(code, Some(Code::Damaged), "word {word} of {kind:?}, {number}");
             }
         }
     }

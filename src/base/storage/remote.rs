@@ -1,10 +1,12 @@
 //! Failures of work that another process did.
 
+use tetdb_schema::code::Code;
+
 /// Why another process did not do its share of the work.
 #[derive(Clone, Debug)]
 pub struct RemoteFailure {
     /// The error code.
-    pub code: String,
+    pub code: Code,
     /// What happened, and where.
     pub message: String,
 }

@@ -3,6 +3,7 @@
 use super::contact::ContactKind;
 use super::wire_set::WireError;
 use crate::geom::Point;
+use tetdb_schema::code::Code;
 
 /// A surface that cannot be built or meshed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -87,12 +88,12 @@ impl SurfaceError {
     }
 
     /// The word for this error.
-    pub fn code(&self) -> &'static str {
+    pub fn code(&self) -> Code {
         match self {
-            Self::TooLarge { .. } => "surface-too-large",
-            Self::Memory { .. } | Self::WireMemory { .. } => "memory",
-            Self::NoSuchVertex { .. } => "index-out-of-range",
-            Self::TooSmall { .. } => "coordinate-range",
+            Self::TooLarge { .. } => Code::SurfaceTooLarge,
+            Self::Memory { .. } | Self::WireMemory { .. } => Code::Memory,
+            Self::NoSuchVertex { .. } => Code::IndexOutOfRange,
+            Self::TooSmall { .. } => Code::CoordinateRange,
             Self::Invalid { defect, .. } => defect.code(),
             Self::Wire(wire) => wire.code(),
         }
@@ -176,13 +177,13 @@ fn show_number(x: f64) -> String {
 
 impl Defect {
     /// The word for this kind of defect.
-    pub fn code(&self) -> &'static str {
+    pub fn code(&self) -> Code {
         match self {
-            Self::Empty => "empty-surface",
-            Self::Degenerate { .. } => "degenerate-triangle",
-            Self::Duplicate { .. } => "duplicate-triangle",
-            Self::OpenEdge { .. } => "open-surface",
-            Self::SelfIntersection { .. } => "self-intersection",
+            Self::Empty => Code::EmptySurface,
+            Self::Degenerate { .. } => Code::DegenerateTriangle,
+            Self::Duplicate { .. } => Code::DuplicateTriangle,
+            Self::OpenEdge { .. } => Code::OpenSurface,
+            Self::SelfIntersection { .. } => Code::SelfIntersection,
         }
     }
 

@@ -44,7 +44,7 @@ fn two_cubes(map: impl Fn(Point) -> Point) -> Surface {
 }
 
 fn codes(surface: &Surface) -> Vec<&'static str> {
-    let mut codes: Vec<_> = validate(surface).defects.iter().map(Defect::code).collect();
+    let mut codes: Vec<_> = validate(surface).defects.iter().map(|d| d.code().as_str()).collect();
     codes.dedup();
     codes
 }

@@ -2,6 +2,7 @@
 
 use super::contact::ContactKind;
 use crate::geom::Point;
+use tetdb_schema::code::Code;
 
 /// Edges and points of a surface that are no parts of its triangles, or are to be known by a name of their own.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -101,12 +102,12 @@ fn far(distance: Option<f64>) -> String {
 
 impl WireError {
     /// The word for this error.
-    pub fn code(&self) -> &'static str {
+    pub fn code(&self) -> Code {
         match self {
-            Self::NoLength { .. } => "degenerate-edge",
-            Self::Repeated { .. } => "duplicate-wire",
-            Self::Touching { .. } => "wire-contact",
-            Self::TooNear { .. } => "wire-too-near",
+            Self::NoLength { .. } => Code::DegenerateEdge,
+            Self::Repeated { .. } => Code::DuplicateWire,
+            Self::Touching { .. } => Code::WireContact,
+            Self::TooNear { .. } => Code::WireTooNear,
         }
     }
 

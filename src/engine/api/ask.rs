@@ -5,6 +5,7 @@ use super::{Error, Store};
 use tetdb_base::expr::{ExprError, Expression, Kind};
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::RunContext;
+use tetdb_schema::code::Code;
 use tetdb_store::query::{
     Hit, Ordered, QueryError, QuerySession, Selection, Solid, VARIABLES, regions_called,
 };
@@ -146,7 +147,7 @@ impl<'s> Query<'s> {
     pub fn order_by(mut self, variable: &str, order: Order) -> Result<Self, Error> {
         let Some(place) = VARIABLES.iter().position(|v| *v == variable) else {
             let message = format!("{variable}: expected one of {}", VARIABLES.join(", "));
-            return Err(Error::new("bad-query", message));
+            return Err(Error::new(Code::BadQuery, message));
         };
         self.selection.excess |= variable == "excess";
         self.order = Some((place, order));
@@ -205,7 +206,7 @@ impl Iterator for Answers<'_> {
 
 pub(super) fn condition_of(text: &str) -> Result<Expression, Error> {
     let wrong = |error: ExprError| {
-        Error::new("bad-expression", &error)
+        Error::new(Code::BadExpression, &error)
             .at(format!("character {} of {text}", error.at + 1))
             .with_help("such as quality > 6 and region in [1, 2]")
     };

@@ -1,13 +1,14 @@
 //! Where the defects of a surface are.
 
 use tetdb_base::surface::{Defect, Validation};
+use tetdb_schema::code::Code;
 
 /// Where a defect is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct DefectPlace {
-    /// The word for it, one of [`CODES`](super::CODES).
-    pub code: &'static str,
+    /// The word for it, one of [`Code`].
+    pub code: Code,
     /// The triangle it is about, and the second one where there are two. `None`: the surface has none.
     pub triangles: [Option<u32>; 2],
     /// A position where it can be seen.

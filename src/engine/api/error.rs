@@ -2,15 +2,15 @@
 
 use std::fmt;
 
-use super::CODES;
+use tetdb_schema::code::Code;
 
 /// Why a call did not do what was asked: a word, a message, a place and, where one is known, a way out.
 ///
-/// The words are those of [`CODES`], the same as the program's. Nothing of a failed call is left behind but a store that can be
+/// The words are those of [`Code`], the same as the program's. Nothing of a failed call is left behind but a store that can be
 /// resumed. Messages name no option of any caller: which argument helps is the caller's knowledge.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Error {
-    code: &'static str,
+    code: Code,
     message: String,
     place: Option<String>,
     help: Option<String>,
@@ -33,7 +33,7 @@ pub enum Remedy {
 
 impl Error {
     #[doc(hidden)]
-    pub fn new(code: &'static str, message: impl ToString) -> Self {
+    pub fn new(code: Code, message: impl ToString) -> Self {
         Self { code, message: message.to_string(), place: None, help: None, remedy: Remedy::AsSaid }
     }
 
@@ -62,12 +62,12 @@ impl Error {
 
     #[doc(hidden)]
     pub fn internal(message: String) -> Self {
-        Self::new("internal", message)
+        Self::new(Code::Internal, message)
             .with_help("this is a bug; please report the call and this message")
     }
 
-    /// The word for it, one of [`CODES`].
-    pub fn code(&self) -> &'static str {
+    /// The word for it, one of [`Code::ALL`].
+    pub fn code(&self) -> Code {
         self.code
     }
 
@@ -88,8 +88,7 @@ impl Error {
 
     /// The exit code the program has for it.
     pub fn exit_code(&self) -> u8 {
-        let row = CODES.iter().find(|row| row.code == self.code);
-        row.map_or(1, |row| row.exit)
+        self.code.exit()
     }
 
     /// Whether the run was cancelled; what it had finished is kept.

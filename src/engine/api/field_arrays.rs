@@ -2,6 +2,7 @@
 
 use std::io::Write;
 use std::path::Path;
+use tetdb_schema::code::Code;
 
 use xxhash_rust::xxh3::{Xxh3, xxh3_128};
 
@@ -39,26 +40,26 @@ fn check(points: &[[f64; 3]], tets: &[[u32; 4]], lengths: &[f64]) -> Result<(), 
             points.len(),
             tets.len()
         );
-        return Err(Error::new("count-mismatch", message)
+        return Err(Error::new(Code::CountMismatch, message)
             .with_help("give one length for each point, and the tetrahedra between them"));
     }
     if let Some(i) = (points.iter()).position(|p| p.iter().any(|x| !x.is_finite())) {
-        let error = Error::new("not-a-number", "a coordinate is not a finite number");
+        let error = Error::new(Code::NotANumber, "a coordinate is not a finite number");
         return Err(error.at(format!("point {i} of the sizes")));
     }
     if let Some(i) = (lengths.iter()).position(|h| !(h.is_normal() && *h > 0.0)) {
         let message = format!("{} is no length, expected one above zero", lengths[i]);
-        return Err(Error::new("bad-size", message).at(format!("point {i} of the sizes")));
+        return Err(Error::new(Code::BadSize, message).at(format!("point {i} of the sizes")));
     }
     for (i, tet) in tets.iter().enumerate() {
         let at = || format!("tetrahedron {i} of the sizes");
         if let Some(v) = tet.iter().find(|v| **v as usize >= points.len()) {
             let message = format!("it names point {v}, but there are {}", points.len());
-            return Err(Error::new("index-out-of-range", message).at(at()));
+            return Err(Error::new(Code::IndexOutOfRange, message).at(at()));
         }
         let [a, b, c, d] = tet.map(|v| Point::from_array(points[v as usize]));
         if (b - a).cross(c - a).dot(d - a) == 0.0 {
-            return Err(Error::new("unsupported-content", "it has no volume").at(at()));
+            return Err(Error::new(Code::UnsupportedContent, "it has no volume").at(at()));
         }
     }
     Ok(())
@@ -78,7 +79,7 @@ impl FieldArrays {
         let needed = BackgroundMesh::bytes(self.points.len() as u64, self.tets.len() as u64);
         if needed > cap / 2 {
             let message = format!("the sizes need {} MiB", needed.div_ceil(1 << 20));
-            return Err(Error::new("memory", message)
+            return Err(Error::new(Code::Memory, message)
                 .with_help("allow more memory, or give sizes on a coarser background mesh"));
         }
         let points = self.points.iter().map(|p| Point::from_array(*p)).collect();
@@ -99,7 +100,7 @@ impl FieldArrays {
                 file.write_all(&bytes)?;
                 file.sync_all()
             };
-            write().map_err(|e| Error::new("io", e).at(path.display()))?;
+            write().map_err(|e| Error::new(Code::Io, e).at(path.display()))?;
         }
         Ok(())
     }

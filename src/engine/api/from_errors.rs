@@ -9,6 +9,7 @@ use tetdb_io::write::WriteError;
 use tetdb_kernel::boundary::BoundaryError;
 use tetdb_kernel::samples::SampleError;
 use tetdb_kernel::sizing::SizingError;
+use tetdb_schema::code::Code;
 use tetdb_store::query::QueryError;
 use tetdb_store::sealed::SealedError;
 use tetdb_store::store::StoreError;
@@ -52,9 +53,9 @@ impl From<SurfaceError> for Error {
 impl From<SampleError> for Error {
     fn from(e: SampleError) -> Self {
         if let SampleError::Memory { needed, .. } = e {
-            return Self::new("memory", &e).with_remedy(Remedy::Memory(needed));
+            return Self::new(Code::Memory, &e).with_remedy(Remedy::Memory(needed));
         }
-        Self::new("bad-sample", e)
+        Self::new(Code::BadSample, e)
             .with_help("for example balls,count=100 or box,h=0.1")
             .with_remedy(Remedy::General)
     }
@@ -63,16 +64,16 @@ impl From<SampleError> for Error {
 impl From<StorageError> for Error {
     fn from(e: StorageError) -> Self {
         let code = match &e {
-            StorageError::Busy { .. } => "busy",
-            StorageError::Full { .. } => "disk-full",
+            StorageError::Busy { .. } => Code::Busy,
+            StorageError::Full { .. } => Code::DiskFull,
             StorageError::Damaged { .. }
             | StorageError::Page { .. }
-            | StorageError::Missing { .. } => "damaged",
+            | StorageError::Missing { .. } => Code::Damaged,
             StorageError::Budget { .. }
             | StorageError::NoMemory { .. }
-            | StorageError::TooMany { .. } => "memory",
-            StorageError::Cancelled => "stopped",
-            _ => "io",
+            | StorageError::TooMany { .. } => Code::Memory,
+            StorageError::Cancelled => Code::Stopped,
+            _ => Code::Io,
         };
         match e {
             StorageError::NoMemory { .. } => Self::new(code, &e).with_help(
@@ -94,17 +95,17 @@ impl From<StoreError> for Error {
         let code = match e {
             StoreError::Storage(inner) => return inner.into(),
             StoreError::Sealed(SealedError::Storage(inner)) => return inner.into(),
-            StoreError::Busy { .. } => "busy",
-            StoreError::Changed { .. } => "store-changed",
-            StoreError::NotFound { .. } => "no-such-store",
-            StoreError::NoSubdomain { .. } => "no-such-part",
-            StoreError::NotOurs { .. } => "not-a-store",
-            StoreError::Finished { .. } => "store-exists",
-            StoreError::Unfinished { .. } => "store-unfinished",
-            StoreError::NoCoarseSnapshot { .. } => "no-coarse-leaf",
-            StoreError::Format { .. } => "store-format",
-            StoreError::Sealed(SealedError::NotSealed { .. }) => "store-unfinished",
-            StoreError::Row { .. } | StoreError::Sealed(_) => "damaged",
+            StoreError::Busy { .. } => Code::Busy,
+            StoreError::Changed { .. } => Code::StoreChanged,
+            StoreError::NotFound { .. } => Code::NoSuchStore,
+            StoreError::NoSubdomain { .. } => Code::NoSuchPart,
+            StoreError::NotOurs { .. } => Code::NotAStore,
+            StoreError::Finished { .. } => Code::StoreExists,
+            StoreError::Unfinished { .. } => Code::StoreUnfinished,
+            StoreError::NoCoarseSnapshot { .. } => Code::NoCoarseLeaf,
+            StoreError::Format { .. } => Code::StoreFormat,
+            StoreError::Sealed(SealedError::NotSealed { .. }) => Code::StoreUnfinished,
+            StoreError::Row { .. } | StoreError::Sealed(_) => Code::Damaged,
         };
         with_general_help(code, &e)
     }
@@ -114,7 +115,7 @@ impl From<QueryError> for Error {
     fn from(e: QueryError) -> Self {
         match e {
             QueryError::Store(e) => e.into(),
-            other => with_general_help("no-such-part", &other),
+            other => with_general_help(Code::NoSuchPart, &other),
         }
     }
 }
@@ -129,27 +130,27 @@ impl From<SizingError> for Error {
                 "a length is a number in the surface's own unit, such as 0.5, or a share of its box diagonal, such as 1%"
             }
         };
-        Self::new("bad-size", e).with_help(help)
+        Self::new(Code::BadSize, e).with_help(help)
     }
 }
 
 impl From<BoundaryError> for Error {
     fn from(e: BoundaryError) -> Self {
         if matches!(e, BoundaryError::Orientation { .. }) {
-            return Self::new("contradicting-orientation", &e)
+            return Self::new(Code::ContradictingOrientation, &e)
                 .with_help("fill all regions, which needs no orientation, or give each shared wall from both sides")
                 .with_remedy(Remedy::General);
         }
         if let BoundaryError::Seed { point, .. } = &e {
-            return Self::new("bad-seed", &e)
+            return Self::new(Code::BadSeed, &e)
                 .at(show(*point))
                 .with_help("a seed lies inside the region that it fills or names, off its triangles; one for each region");
         }
         if let BoundaryError::NoSeed = &e {
-            return Self::new("bad-seed", &e)
+            return Self::new(Code::BadSeed, &e)
                 .with_help("give a point inside each region to fill, or inside each hole");
         }
-        Self::new("unrecovered-triangles", &e)
+        Self::new(Code::UnrecoveredTriangles, &e)
             .with_help("look at these triangles; a finer or better shaped surface there helps")
             .with_remedy(Remedy::General)
     }
@@ -163,59 +164,58 @@ impl From<PipelineError> for Error {
             PipelineError::Sizing(e) => e.into(),
             PipelineError::Store(e) => e.into(),
             PipelineError::Storage(e) => e.into(),
-            PipelineError::NothingFilled { .. } => Self::new("nothing-filled", &e)
+            PipelineError::NothingFilled { .. } => Self::new(Code::NothingFilled, &e)
                 .with_help("fill all regions, and look at the surface")
                 .with_remedy(Remedy::General),
-            PipelineError::NothingToUndo { .. } => Self::new("nothing-to-undo", &e)
+            PipelineError::NothingToUndo { .. } => Self::new(Code::NothingToUndo, &e)
                 .with_help("only the last change can be undone, once, and not after its old version was dropped")
                 .with_remedy(Remedy::General),
-            PipelineError::SheetOutside { ref at, .. } => Self::new("sheet-outside", &e)
+            PipelineError::SheetOutside { ref at, .. } => Self::new(Code::SheetOutside, &e)
                 .at(show(*at))
                 .with_help("cut sheets off where they leave the filled regions, or fill the region they lie in")
                 .with_remedy(Remedy::General),
-            PipelineError::WireOutside { ref at, .. } => Self::new("wire-outside", &e)
+            PipelineError::WireOutside { ref at, .. } => Self::new(Code::WireOutside, &e)
                 .at(show(*at))
                 .with_help("leave out what is outside the filled regions, or fill the region it lies in")
                 .with_remedy(Remedy::General),
-            PipelineError::BadSeed { option, .. } => Self::new("bad-seed", &e).with_help(match option {
+            PipelineError::BadSeed { option, .. } => Self::new(Code::BadSeed, &e).with_help(match option {
                 "hole" => "such as 0.5,0.5,0.2",
                 _ => "such as 0.5,0.5,0.2,rock",
             }),
-            PipelineError::SizeCount { .. } => Self::new("count-mismatch", &e)
+            PipelineError::SizeCount { .. } => Self::new(Code::CountMismatch, &e)
                 .with_help("give one length for each, in the order of the exported arrays")
                 .with_remedy(Remedy::General),
             PipelineError::Helper(failure) => {
-                let row = super::CODES.iter().find(|row| row.code == failure.code);
-                with_general_help(row.map_or("internal", |row| row.code), &failure.message)
+                with_general_help(failure.code, &failure.message)
             }
-            PipelineError::NoPlan { .. } => Self::new("no-tasks", &e)
+            PipelineError::NoPlan { .. } => Self::new(Code::NoTasks, &e)
                 .with_help("the store's summary says how far it is; the stage before a task has to be gathered first")
                 .with_remedy(Remedy::General),
-            PipelineError::TaskFile { .. } => Self::new("task-file", &e)
+            PipelineError::TaskFile { .. } => Self::new(Code::TaskFile, &e)
                 .with_help("gather again, which writes orders anew, then do the task again")
                 .with_remedy(Remedy::General),
-            other => Self::new("usage", other),
+            other => Self::new(Code::Usage, other),
         }
     }
 }
 
-fn with_general_help(code: &'static str, e: &impl ToString) -> Error {
+fn with_general_help(code: Code, e: &impl ToString) -> Error {
     let help = match code {
-        "busy" => "wait for the other process, or stop it",
-        "store-changed" => "ask again: the answer is then of the store as it is now",
-        "disk-full" => "free some space, then resume",
-        "damaged" => {
+        Code::Busy => "wait for the other process, or stop it",
+        Code::StoreChanged => "ask again: the answer is then of the store as it is now",
+        Code::DiskFull => "free some space, then resume",
+        Code::Damaged => {
             "verify the store to see what is damaged; damaged sub-domains can be meshed again"
         }
-        "memory" => "allow more memory, or mesh a coarser surface",
-        "stopped" => "resume goes on from the last finished step",
-        "no-such-store" => "check the path",
-        "not-a-store" => "choose another path; what is there was not written by tetdb",
-        "store-exists" => "choose another path, or allow it to be replaced",
-        "no-coarse-leaf" => "mesh the surface again and keep the coarse snapshots",
-        "store-unfinished" => "resume goes on with it",
-        "store-format" => "use the version of tetdb that wrote the store, or mesh again",
-        "no-such-part" => "the store's summary lists its parts",
+        Code::Memory => "allow more memory, or mesh a coarser surface",
+        Code::Stopped => "resume goes on from the last finished step",
+        Code::NoSuchStore => "check the path",
+        Code::NotAStore => "choose another path; what is there was not written by tetdb",
+        Code::StoreExists => "choose another path, or allow it to be replaced",
+        Code::NoCoarseLeaf => "mesh the surface again and keep the coarse snapshots",
+        Code::StoreUnfinished => "resume goes on with it",
+        Code::StoreFormat => "use the version of tetdb that wrote the store, or mesh again",
+        Code::NoSuchPart => "the store's summary lists its parts",
         _ => "check the path and its permissions",
     };
     Error::new(code, e.to_string()).with_help(help).with_remedy(Remedy::General)

@@ -1,6 +1,7 @@
 //! Nothing unwinds into the caller: failures, requests to stop and panics become errors.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use tetdb_schema::code::Code;
 
 use super::{Error, Settings};
 use tetdb_base::storage::{RunContext, StorageError};
@@ -41,7 +42,7 @@ pub fn guarded_in<T>(
 pub fn of_panic(context: &RunContext) -> Error {
     match context.take_panic() {
         Some(panic) if panic.is_in_redb => Error::new(
-            "damaged",
+            Code::Damaged,
             "a database file of the store cannot be followed",
         )
         .at(panic.message.replace('\n', " "))

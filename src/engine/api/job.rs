@@ -1,6 +1,7 @@
 //! What a store has on record of how it was made: options, surface, sizes from a file, the recipe's version.
 
 use std::path::{Path, PathBuf};
+use tetdb_schema::code::Code;
 
 use tetdb_schema::catalog::Job;
 use xxhash_rust::xxh3::Xxh3;
@@ -30,7 +31,8 @@ pub fn job(options: &Options, surfaces: &[SurfaceSource]) -> Job {
 #[doc(hidden)]
 pub fn options_of(job: &Job, store: &Path) -> Result<Options, Error> {
     serde_json::from_str(&job.options).map_err(|e| {
-        Error::new("damaged", format!("the job's options cannot be read: {e}")).at(store.display())
+        Error::new(Code::Damaged, format!("the job's options cannot be read: {e}"))
+            .at(store.display())
     })
 }
 
@@ -55,7 +57,7 @@ pub fn check_recipe(catalog: &mut Catalog) -> Result<(), Error> {
         return Ok(());
     }
     Err(Error::new(
-        "store-recipe",
+        Code::StoreRecipe,
         format!("the store was begun by version {found} of the recipe, this is version {RECIPE}"),
     )
     .at(catalog.dir().display())
@@ -72,7 +74,7 @@ pub fn identify_sizes(options: &mut Options) -> Result<(), Error> {
     options.size_field_hash = None;
     if let Some(file) = &options.size_field {
         let path =
-            std::path::absolute(file).map_err(|e| Error::new("unreadable-file", e).at(file))?;
+            std::path::absolute(file).map_err(|e| Error::new(Code::UnreadableFile, e).at(file))?;
         options.size_field_hash = Some(hash(&path)?);
         options.size_field = Some(path.to_string_lossy().into_owned());
     }
@@ -116,7 +118,7 @@ pub fn read_background(
     };
     if options.size_field_hash != Some(hash(path)?) {
         return Err(Error::new(
-            "size-field-changed",
+            Code::SizeFieldChanged,
             "the sizes are not those the store was begun with",
         )
         .at(file)

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
+use tetdb_schema::code::Code;
 
 use super::field_arrays::FieldArrays;
 use super::preflight::{self, preflight, scratch_beside, with_free_space};
@@ -294,7 +295,7 @@ impl Mesher {
         self.options.subdomain_count()?;
         if self.options.coarse_only && self.existing == Existing::Replace {
             let message = "a store is not replaced by one that stays unfinished";
-            return Err(Error::new("usage", message).with_help("choose another path"));
+            return Err(Error::new(Code::Usage, message).with_help("choose another path"));
         }
         job::identify_sizes(&mut self.options)?;
         job::take_seeds(&mut self.options, &self.surface.inner.seeds);
@@ -314,7 +315,7 @@ impl Mesher {
         let prepared = self.prepare(path, cap, settings)?;
         let (summary, lock) = match self.mesh(path, cap, prepared, settings) {
             // Another run was faster: what it left decides.
-            Err(error) if error.code() == "store-exists" && self.is_there(path)? => {
+            Err(error) if error.code() == Code::StoreExists && self.is_there(path)? => {
                 return Ok(Created { path: path.to_owned(), summary: None, was_there: true });
             }
             other => other?,

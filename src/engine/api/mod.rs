@@ -7,7 +7,7 @@
 //! another), `guard` (nothing unwinds into the caller).
 
 mod ask;
-mod codes;
+
 mod defects;
 #[doc(hidden)]
 pub mod error;
@@ -54,7 +54,6 @@ pub mod verify_server;
 mod verify_shared;
 
 pub use ask::{Answers, Order, Query};
-pub use codes::{CODES, CodeRow};
 pub use defects::DefectPlace;
 pub use error::Error;
 #[doc(hidden)]
@@ -81,4 +80,5 @@ pub use surface::{CheckReport, Surface};
 pub use tasks::Tasks;
 pub use tetdb_base::storage::CancelToken;
 pub use tetdb_io::write::MeshFormat;
+pub use tetdb_schema::code::Code;
 pub use verify::{Verification, VerifyLevel};

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use tetdb_schema::code::Code;
 
 use serde_json::{Value, json};
 
@@ -49,7 +50,7 @@ impl Store {
 pub fn write_page(path: &Path, out: &Path, settings: &Settings) -> Result<Written, Error> {
     if !page::is_page(out) {
         let what = "a report is a page for a browser, and its name must say so";
-        let error = Error::new("unknown-format", what).at(out.display());
+        let error = Error::new(Code::UnknownFormat, what).at(out.display());
         return Err(error.with_help(format!("end the name with {}", page::ENDINGS)));
     }
     let cap = settings.cap()?;

@@ -1,6 +1,7 @@
 //! Pictures of a mesh: cuts through it, surfaces in space.
 
 use std::path::Path;
+use tetdb_schema::code::Code;
 
 use super::ask::condition_of;
 use super::store::open_finished;
@@ -168,7 +169,7 @@ impl Snapshot {
     /// Errors: what has no meaning together.
     #[doc(hidden)]
     pub fn check(&self) -> Result<(), Error> {
-        let bad = |message: &str| Err(Error::new("bad-query", message));
+        let bad = |message: &str| Err(Error::new(Code::BadQuery, message));
         let in_space = matches!(self.subject, Subject::Surface(_));
         if self.from.is_some() && !in_space {
             return bad("a direction to look from: expected a picture in space");
@@ -234,7 +235,7 @@ impl Snapshot {
         if extent.n == 0 {
             let message = "the plane cuts no tetrahedron of the mesh";
             let help = "choose a point within the bounds of the mesh";
-            return Err(Error::new("bad-query", message).with_help(help));
+            return Err(Error::new(Code::BadQuery, message).with_help(help));
         }
         let frame = PictureFrame {
             pixels: self.pixels,

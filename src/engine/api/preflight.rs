@@ -1,6 +1,7 @@
 //! What is refused before anything is written: too little memory, too little disk.
 
 use std::path::{Path, PathBuf};
+use tetdb_schema::code::Code;
 
 use super::error::{Error, Remedy};
 use super::{Settings, show_bytes};
@@ -16,7 +17,7 @@ const REFUSED_BELOW: f64 = 0.7;
 #[doc(hidden)]
 pub fn scratch_beside(surface: &Surface, cap: u64, store: &Path) -> Result<ScratchSpace, Error> {
     let folder = folder_of(store)
-        .ok_or_else(|| Error::new("io", "there is no folder above it").at(store.display()))?;
+        .ok_or_else(|| Error::new(Code::Io, "there is no folder above it").at(store.display()))?;
     Ok(ScratchSpace::new(cap.saturating_sub(surface.bytes() as u64), &folder))
 }
 
@@ -32,7 +33,7 @@ pub fn surface_fits(surface: &Surface, cap: u64) -> Result<(), Error> {
         show_bytes(surface.bytes() as u64),
         show_bytes(cap)
     );
-    Err(Error::new("memory", message).with_remedy(Remedy::Memory(least)))
+    Err(Error::new(Code::Memory, message).with_remedy(Remedy::Memory(least)))
 }
 
 /// Refuses a mesh that memory or disk cannot hold.
@@ -50,7 +51,7 @@ pub fn preflight(
             show_bytes(estimate.resident_bytes(cap)),
             show_bytes(cap)
         );
-        return Err(Error::new("memory", message).with_remedy(Remedy::Memory(least)));
+        return Err(Error::new(Code::Memory, message).with_remedy(Remedy::Memory(least)));
     }
     let Some(free) = free_at(store) else {
         return Ok(());
@@ -63,7 +64,7 @@ pub fn preflight(
             show_bytes(needed),
             show_bytes(free)
         );
-        return Err(Error::new("no-room", message)
+        return Err(Error::new(Code::NoRoom, message)
             .at(store.display())
             .with_help("ask for longer edges, allow more memory, or put the store on another disk")
             .with_remedy(Remedy::General));
@@ -81,7 +82,7 @@ pub fn preflight(
 /// Says of a full disk what is missing: what is free, and what a run that is expected to need `needed` bytes in all still lacks.
 #[doc(hidden)]
 pub fn with_free_space(mut error: Error, store: &Path, needed: Option<u64>) -> Error {
-    if let ("disk-full", Some(free)) = (error.code(), free_at(store)) {
+    if let (Code::DiskFull, Some(free)) = (error.code(), free_at(store)) {
         error.add(&format!("; {} are free", show_bytes(free)));
         let missing = needed.map_or(0, |n| n.saturating_sub(bytes_on_disk(store) + free));
         if missing > 0 {

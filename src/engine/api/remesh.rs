@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
+use tetdb_schema::code::Code;
 
 use serde_json::{Value, json};
 
@@ -211,12 +212,12 @@ impl Remesh {
         if !(self.factor.is_normal() && self.factor > 0.0) {
             let message =
                 format!("a factor of {} scales nothing, expected one above zero", self.factor);
-            return Err(Error::new("bad-size", message));
+            return Err(Error::new(Code::BadSize, message));
         }
         let given = self.sizes.clone();
         if given.as_ref().is_some_and(|given| given.field.is_some()) {
             let message = "a background mesh of arrays is for a new mesh";
-            return Err(Error::new("usage", message)
+            return Err(Error::new(Code::Usage, message)
                 .with_help("give a length for each tetrahedron or vertex instead"));
         }
         let asked = AskedSizes {

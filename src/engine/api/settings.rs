@@ -3,6 +3,7 @@
 use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
+use tetdb_schema::code::Code;
 
 use super::memory::{Bytes, default_cap};
 use super::{Error, error::Remedy};
@@ -107,7 +108,7 @@ impl Settings {
     pub fn cap(&self) -> Result<u64, Error> {
         if self.threads == Some(0) {
             return Err(
-                Error::new("usage", "no thread is left to work").with_help("allow one or more")
+                Error::new(Code::Usage, "no thread is left to work").with_help("allow one or more")
             );
         }
         match self.memory {
@@ -116,7 +117,7 @@ impl Settings {
                 let least = MEMORY_MIN >> 20;
                 let message =
                     format!("{} are less than the {least} MiB any run needs", Bytes(bytes));
-                Err(Error::new("memory", message).with_remedy(Remedy::Memory(MEMORY_MIN)))
+                Err(Error::new(Code::Memory, message).with_remedy(Remedy::Memory(MEMORY_MIN)))
             }
             Some(Bytes(bytes)) => Ok(bytes),
         }

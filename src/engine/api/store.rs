@@ -1,6 +1,7 @@
 //! A finished store.
 
 use std::path::{Path, PathBuf};
+use tetdb_schema::code::Code;
 
 use super::guard::guarded_in;
 use super::preflight::scratch_beside;
@@ -146,7 +147,7 @@ impl Store {
             )?;
             let surface = match Surface::of_record(&sources, &self.path, &scratch) {
                 Ok(surface) => Some(surface.inner),
-                Err(error) if error.code() == "unreadable-file" => {
+                Err(error) if error.code() == Code::UnreadableFile => {
                     self.settings.note(
                         "note: the surface is not where it was; the mesh is verified without it",
                     );

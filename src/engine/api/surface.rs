@@ -2,6 +2,7 @@
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use tetdb_schema::code::Code;
 
 use tetdb_schema::catalog::SurfaceSource;
 use xxhash_rust::xxh3::Xxh3;
@@ -125,7 +126,7 @@ fn refuse_sheets(surface: &surface::Surface, what: &str) -> Result<(), Error> {
     match surface.has_sheets() || surface.has_wires() {
         false => Ok(()),
         true => {
-            Err(Error::new("usage", format!("a surface is {what} before anything is embedded")))
+            Err(Error::new(Code::Usage, format!("a surface is {what} before anything is embedded")))
         }
     }
 }
@@ -153,9 +154,8 @@ impl Surface {
     ) -> Result<Self, Error> {
         if let Some(labels) = labels.filter(|labels| labels.len() != triangles.len()) {
             let message = format!("{} labels for {} triangles", labels.len(), triangles.len());
-            return Err(
-                Error::new("count-mismatch", message).with_help("give one label for each triangle")
-            );
+            return Err(Error::new(Code::CountMismatch, message)
+                .with_help("give one label for each triangle"));
         }
         guarded(&Settings::new(), || {
             Self::built(points, triangles, labels)?.oriented(&ScratchSpace::boundless())
@@ -217,7 +217,7 @@ impl Surface {
             let message = format!(
                 "{share} is not a share of the box diagonal, expected above 0 and at most {WELD_SHARE_MAX}"
             );
-            return Err(Error::new("bad-size", message));
+            return Err(Error::new(Code::BadSize, message));
         }
         refuse_sheets(&self.inner, "repaired")?;
         guarded(&Settings::new(), || {
@@ -301,7 +301,7 @@ impl Surface {
     fn refuse_wires(&self) -> Result<(), Error> {
         match self.inner.has_wires() {
             false => Ok(()),
-            true => Err(Error::new("usage", "sheets are embedded before edges and points")),
+            true => Err(Error::new(Code::Usage, "sheets are embedded before edges and points")),
         }
     }
 
@@ -330,7 +330,7 @@ impl Surface {
         match (samples, words) {
             (1, [word]) => Self::generated(word, cap),
             (0, _) => Self::read_in(&words.iter().map(PathBuf::from).collect::<Vec<_>>(), cap),
-            _ => Err(Error::new("usage", "a sample cannot be joined with other surfaces")
+            _ => Err(Error::new(Code::Usage, "a sample cannot be joined with other surfaces")
                 .with_help("write it to a file first")
                 .with_remedy(Remedy::General)),
         }
@@ -400,7 +400,7 @@ impl Surface {
         for (then, now) in sources.iter().zip(&surface.sources) {
             if (then.bytes, then.hash) != (now.bytes, now.hash) {
                 return Err(Error::new(
-                    "surface-changed",
+                    Code::SurfaceChanged,
                     "the surface is not the one the store was begun with",
                 )
                 .at(&now.path)
@@ -421,7 +421,7 @@ impl Surface {
         if let Some(first) = path.strip_prefix(SHEETS_FROM) {
             let first = first.parse::<usize>().ok().filter(|&n| n <= self.inner.n_triangles());
             let first = first
-                .ok_or_else(|| Error::new("damaged", "the record of sheets cannot be read"))?;
+                .ok_or_else(|| Error::new(Code::Damaged, "the record of sheets cannot be read"))?;
             self.inner.sheets_from(first);
             self.sources.push(mark(path.to_owned()));
             return Ok(self);
@@ -474,7 +474,7 @@ impl Surface {
         builder.begin_file("arrays");
         for (i, point) in points.iter().enumerate() {
             if point.iter().any(|x| !x.is_finite()) {
-                return Err(Error::new("not-a-number", "a coordinate is not a finite number")
+                return Err(Error::new(Code::NotANumber, "a coordinate is not a finite number")
                     .at(format!("point {i}")));
             }
             builder.vertex(Point::from_array(*point))?;
@@ -523,12 +523,12 @@ pub fn source(path: &Path) -> Result<SurfaceSource, Error> {
             std::io::ErrorKind::NotFound => "there is no such file".to_owned(),
             _ => format!("the file cannot be read: {e}"),
         };
-        Error::new("unreadable-file", message).at(path.display())
+        Error::new(Code::UnreadableFile, message).at(path.display())
     };
     let absolute = std::path::absolute(path).map_err(io)?;
     if !std::fs::metadata(path).map_err(io)?.is_file() {
         let message = "it is not a regular file, and would have to be read twice";
-        return Err(Error::new("unreadable-file", message).at(path.display()));
+        return Err(Error::new(Code::UnreadableFile, message).at(path.display()));
     }
     let mut file = std::fs::File::open(path).map_err(io)?;
     let mut hash = Xxh3::new();

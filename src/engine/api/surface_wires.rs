@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use tetdb_schema::code::Code;
 
 use tetdb_schema::catalog::SurfaceSource;
 use xxhash_rust::xxh3::Xxh3;
@@ -63,7 +64,7 @@ impl Surface {
         for (i, (&[a, b], label)) in edges.iter().zip(labels).enumerate() {
             if let Some(v) = [a, b].into_iter().find(|&v| v as usize >= points.len()) {
                 let message = format!("there is no point {v}, there are {}", points.len());
-                return Err(Error::new("index-out-of-range", message).at(format!("edge {i}")));
+                return Err(Error::new(Code::IndexOutOfRange, message).at(format!("edge {i}")));
             }
             set.edges.push([a, b, label]);
         }
@@ -173,7 +174,7 @@ impl Surface {
         let counts = counts.split(',').map(str::parse::<u64>);
         let kinds = [WireKind::Edges, WireKind::Points];
         for (count, kind) in counts.zip(kinds) {
-            let damaged = |_| Error::new("damaged", "the record of edges cannot be read");
+            let damaged = |_| Error::new(Code::Damaged, "the record of edges cannot be read");
             if count.map_err(damaged)? > 0 {
                 let set = read_wires(&in_store(store), kind, scratch.cap())?;
                 attempt(|| self.inner.embed_named(&set, scratch))??;
@@ -208,7 +209,7 @@ fn set_of(points: &[[f64; 3]]) -> Result<WireSet, Error> {
     let is_bad = |p: &[f64; 3]| p.iter().any(|x| !x.is_finite());
     if let Some(i) = points.iter().position(is_bad) {
         let message = "a coordinate is not a finite number";
-        return Err(Error::new("not-a-number", message).at(format!("point {i}")));
+        return Err(Error::new(Code::NotANumber, message).at(format!("point {i}")));
     }
     Ok(WireSet {
         points: points.iter().map(|&p| Point::from_array(p)).collect(),
@@ -229,7 +230,7 @@ fn labels_of(
     };
     if labels.len() != n {
         let message = format!("{} labels for {n} {what}", labels.len());
-        return Err(Error::new("count-mismatch", message)
+        return Err(Error::new(Code::CountMismatch, message)
             .with_help(format!("give one label for each of the {what}")));
     }
     let mut known = HashMap::new();

@@ -1,6 +1,7 @@
 //! Files that a run writes are none that it reads.
 
 use std::path::{Path, PathBuf};
+use tetdb_schema::code::Code;
 
 use super::Error;
 use super::surface::{EDGES, IN_STORE, OPEN_PARTS, POINTS, SHEET, SHEETS_FROM, WIRES};
@@ -23,7 +24,7 @@ const WRITTEN: [(&str, &[&str]); 1] = [("ele", &["node", "face", "edge"])];
 #[doc(hidden)]
 pub fn check_target(out: &Path, inputs: &[PathBuf]) -> Result<(), Error> {
     let refused = |message: String| {
-        Err(Error::new("usage", message).with_help("choose another name for what is written"))
+        Err(Error::new(Code::Usage, message).with_help("choose another name for what is written"))
     };
     if out.is_dir() {
         let what = match Catalog::open(out).is_ok() {

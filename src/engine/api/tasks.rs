@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+use tetdb_schema::code::Code;
 
 use super::store::say_how_locked;
 use super::{Error, Settings, guarded, job};
@@ -76,7 +77,7 @@ impl Tasks {
     pub fn plan(&self, n: u32) -> Result<Vec<u32>, Error> {
         if !(1..=TASKS_MAX).contains(&n) {
             let message = format!("{n} tasks cannot be planned");
-            return Err(Error::new("usage", message).with_help("from 1 to 1000"));
+            return Err(Error::new(Code::Usage, message).with_help("from 1 to 1000"));
         }
         guarded(&self.settings, || {
             let mut catalog = self.open()?;
@@ -136,7 +137,7 @@ impl Tasks {
                         gathered.stage[0] + 1,
                         ranges(gathered.left.iter().map(|(task, _)| *task)),
                     );
-                    let error = Error::new("tasks-left", message).at(self.store.display());
+                    let error = Error::new(Code::TasksLeft, message).at(self.store.display());
                     Err(error.with_help("do these tasks again, then gather again"))
                 }
             }

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 use std::sync::Arc;
+use tetdb_schema::code::Code;
 
 use super::error::{Error, Remedy};
 use super::{Settings, verify_shared};
@@ -121,7 +122,7 @@ pub fn invalid(report: &Report, path: &Path) -> Error {
         .collect();
     let first = report.offenders.first();
     Error::new(
-        "invalid-mesh",
+        Code::InvalidMesh,
         format!("{} is not a valid mesh: {}", path.display(), findings.join(", ")),
     )
     .at(first.map_or_else(String::new, |o| {

@@ -3,6 +3,7 @@
 //! It takes the order, the file it names and the surface; the catalog is never opened.
 
 use std::path::Path;
+use tetdb_schema::code::Code;
 
 use tetdb_schema::catalog::SubdomainRow;
 
@@ -43,7 +44,7 @@ impl Server {
                 let read = api::Surface::of_record(sources, Path::new(&job.store), &space)?.inner;
                 if fingerprint(&read) != *print {
                     let message = "the surface that was read is not the one to compare with";
-                    return Err(Error::new("surface-changed", message));
+                    return Err(Error::new(Code::SurfaceChanged, message));
                 }
                 Some(read)
             }

@@ -52,7 +52,7 @@ fn the_collection_reads_and_validates_as_its_index_says() {
             Ok(surface) => surface,
             Err(e) => {
                 println!("{name:34} error[{}]: {e}; {}", e.code(), e.place());
-                if class != "invalid" || !fitting(column[9]).contains(&e.code()) {
+                if class != "invalid" || !fitting(column[9]).contains(&e.code().as_str()) {
                     raise(format!("refused: {e}"));
                 }
                 continue;
@@ -67,9 +67,9 @@ fn the_collection_reads_and_validates_as_its_index_says() {
         let us = valid_ms * 1e3 / t as f64;
         let mut codes: Vec<(&str, usize)> = Vec::new();
         for defect in &found.defects {
-            match codes.iter_mut().find(|(code, _)| *code == defect.code()) {
+            match codes.iter_mut().find(|(code, _)| defect.code() == *code) {
                 Some((_, n)) => *n += 1,
-                None => codes.push((defect.code(), 1)),
+                None => codes.push((defect.code().as_str(), 1)),
             }
         }
         let flips = turned.as_ref().map_or(0, |o| o.flipped.len());

@@ -1,6 +1,7 @@
 //! Why a file could not be read, and where.
 
 use std::fmt;
+use tetdb_schema::code::Code;
 
 use tetdb_base::surface::SurfaceError;
 
@@ -176,20 +177,20 @@ pub enum ReadError {
 
 impl ReadError {
     /// The word for this error.
-    pub fn code(&self) -> &'static str {
+    pub fn code(&self) -> Code {
         match self {
-            Self::Unreadable { .. } => "unreadable-file",
-            Self::UnknownFormat { .. } | Self::SolidModel { .. } => "unknown-format",
-            Self::Truncated { .. } => "truncated-file",
-            Self::Unexpected { .. } => "unexpected-text",
-            Self::NotANumber { .. } => "not-a-number",
-            Self::IndexOutOfRange { .. } => "index-out-of-range",
-            Self::CountMismatch { .. } => "count-mismatch",
-            Self::CoordinateRange { .. } => "coordinate-range",
-            Self::Unsupported { .. } => "unsupported-content",
-            Self::Empty { .. } => "empty-surface",
-            Self::TooLarge { .. } => "memory",
-            Self::Alone { .. } => "unreadable-file",
+            Self::Unreadable { .. } => Code::UnreadableFile,
+            Self::UnknownFormat { .. } | Self::SolidModel { .. } => Code::UnknownFormat,
+            Self::Truncated { .. } => Code::TruncatedFile,
+            Self::Unexpected { .. } => Code::UnexpectedText,
+            Self::NotANumber { .. } => Code::NotANumber,
+            Self::IndexOutOfRange { .. } => Code::IndexOutOfRange,
+            Self::CountMismatch { .. } => Code::CountMismatch,
+            Self::CoordinateRange { .. } => Code::CoordinateRange,
+            Self::Unsupported { .. } => Code::UnsupportedContent,
+            Self::Empty { .. } => Code::EmptySurface,
+            Self::TooLarge { .. } => Code::Memory,
+            Self::Alone { .. } => Code::UnreadableFile,
             Self::Surface { source, .. } => source.code(),
         }
     }

@@ -37,7 +37,7 @@ fn read_tetrahedron(format: Format, bytes: impl AsRef<[u8]>) -> Surface {
 fn refuse(format: Format, bytes: impl AsRef<[u8]>) -> (&'static str, Spot) {
     let error = read(format, bytes).expect_err("the file is bad");
     assert!(!error.help().is_empty() && !error.to_string().is_empty());
-    (error.code(), error.place().spot)
+    (error.code().as_str(), error.place().spot)
 }
 
 #[test]

@@ -71,7 +71,7 @@ pub fn defects(surface: &Surface, defects: &[Defect], out: &Path) -> Result<u64>
 fn numbered(defects: &[Defect]) -> BTreeMap<u32, (i32, i32)> {
     let mut bad = BTreeMap::new();
     for defect in defects {
-        let kind = KINDS.iter().position(|word| *word == defect.code());
+        let kind = KINDS.iter().position(|word| defect.code() == *word);
         let kind = kind.unwrap_or_default() as i32;
         for &t in defect.triangles() {
             let entry = bad.entry(t).or_insert((kind, 0));

@@ -1,6 +1,7 @@
 //! Why a file could not be written.
 
 use std::path::{Path, PathBuf};
+use tetdb_schema::code::Code;
 
 use thiserror::Error;
 
@@ -104,20 +105,20 @@ pub enum WriteError {
 
 impl WriteError {
     /// The word for this error.
-    pub fn code(&self) -> &'static str {
+    pub fn code(&self) -> Code {
         match self {
-            Self::UnknownFormat { .. } => "unknown-format",
-            Self::Unsupported { .. } => "usage",
-            Self::Lossy { .. } => "lossy-format",
-            Self::NoRegion { .. } => "no-such-part",
-            Self::TooLarge { .. } => "format-limit",
-            Self::NoSpace { .. } | Self::DiskFull { .. } => "disk-full",
+            Self::UnknownFormat { .. } => Code::UnknownFormat,
+            Self::Unsupported { .. } => Code::Usage,
+            Self::Lossy { .. } => Code::LossyFormat,
+            Self::NoRegion { .. } => Code::NoSuchPart,
+            Self::TooLarge { .. } => Code::FormatLimit,
+            Self::NoSpace { .. } | Self::DiskFull { .. } => Code::DiskFull,
             Self::StandardOutput { source, .. }
                 if source.kind() == std::io::ErrorKind::StorageFull =>
             {
-                "disk-full"
+                Code::DiskFull
             }
-            Self::Io { .. } | Self::StandardOutput { .. } | Self::Elsewhere(_) => "io",
+            Self::Io { .. } | Self::StandardOutput { .. } | Self::Elsewhere(_) => Code::Io,
             Self::Store(error) => word_of(error),
         }
     }
@@ -181,19 +182,19 @@ fn among(filled: &[u32]) -> String {
 }
 
 /// The word for a store that cannot be read.
-fn word_of(error: &StoreError) -> &'static str {
+fn word_of(error: &StoreError) -> Code {
     match error {
-        StoreError::Storage(StorageError::Cancelled) => "stopped",
-        StoreError::NotFound { .. } | StoreError::NoSubdomain { .. } => "no-such-store",
-        StoreError::NotOurs { .. } => "not-a-store",
+        StoreError::Storage(StorageError::Cancelled) => Code::Stopped,
+        StoreError::NotFound { .. } | StoreError::NoSubdomain { .. } => Code::NoSuchStore,
+        StoreError::NotOurs { .. } => Code::NotAStore,
         StoreError::Unfinished { .. } | StoreError::Sealed(SealedError::NotSealed { .. }) => {
-            "store-unfinished"
+            Code::StoreUnfinished
         }
-        StoreError::Format { .. } => "store-format",
-        _ if error.is_damage() => "damaged",
-        StoreError::Busy { .. } => "busy",
-        StoreError::Changed { .. } => "store-changed",
-        _ => "io",
+        StoreError::Format { .. } => Code::StoreFormat,
+        _ if error.is_damage() => Code::Damaged,
+        StoreError::Busy { .. } => Code::Busy,
+        StoreError::Changed { .. } => Code::StoreChanged,
+        _ => Code::Io,
     }
 }
 

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, channel};
+use tetdb_schema::code::Code;
 
 use tetdb_schema::ids::{Owner, SubdomainId, VertexId};
 use tetdb_schema::record::{
@@ -568,11 +569,11 @@ fn what_a_format_cannot_hold_is_refused() -> Outcome {
     };
     let text = || Selection { ascii: true, ..Selection::default() };
     let ghosts = |pieces| Selection { ghosts: true, pieces, ..Selection::default() };
-    assert_eq!(of("a.vtu", text()), Some("usage"));
+    assert_eq!(of("a.vtu", text()), Some(Code::Usage));
     assert_eq!(of("a.msh", text()), None);
-    assert_eq!(of("a.foam", ghosts(false)), Some("usage"));
+    assert_eq!(of("a.foam", ghosts(false)), Some(Code::Usage));
     assert_eq!(of("a.msh", ghosts(true)), None);
-    assert_eq!(of("a.mfem", ghosts(false)), Some("usage"));
+    assert_eq!(of("a.mfem", ghosts(false)), Some(Code::Usage));
     let vtu = Selection { format: Some(MeshFormat::Vtu), ..Selection::default() };
     let to_stdout = check(Path::new("-"), &vtu);
     assert_eq!(to_stdout.err().ok_or("an error")?.code(), "usage");
@@ -612,7 +613,7 @@ fn what_cannot_be_written_leaves_nothing() -> Outcome {
             export(&mut store, &dir.path().join(name), &Selection::default(), 1 << 20, &quiet);
         error.map(|_| "written").unwrap_or_else(|e| {
             assert!(!e.help().is_empty() && e.to_string().contains(name));
-            e.code()
+            e.code().as_str()
         })
     };
     assert_eq!(code("a.xyz"), "unknown-format");

@@ -7,6 +7,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, OnceLock};
 use std::time::{Duration, Instant};
+use tetdb::Code;
 
 use redb::{Database, ReadableDatabase, ReadableTable, TableDefinition};
 use tetdb::{
@@ -97,7 +98,7 @@ fn sound(made: Made) -> Sound {
             });
             let surface = Surface::sample("box,h=0.4").expect("a box");
             let ended = Mesher::new(surface).settings(ending).create(&path);
-            assert_eq!(ended.err().map(|e| e.code()), Some("stopped"));
+            assert_eq!(ended.err().map(|e| e.code()), Some(Code::Stopped));
         }
     }
     let mut files = entries(&path);

@@ -48,7 +48,7 @@ impl Failure {
 impl From<tetdb::Error> for Failure {
     fn from(error: tetdb::Error) -> Self {
         Self {
-            code: error.code().to_owned(),
+            code: error.code().to_string(),
             message: error.message().to_owned(),
             place: error.place().map(str::to_owned),
             help: error.help().map(str::to_owned),

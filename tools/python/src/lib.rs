@@ -33,7 +33,7 @@ mod _native {
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
-        let codes = tetdb::CODES.iter().map(|row| row.code);
+        let codes = tetdb::Code::ALL.iter().map(|code| code.as_str());
         module.add("CODES", codes.collect::<Vec<_>>())
     }
 }

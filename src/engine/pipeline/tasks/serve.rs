@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::mpsc::channel;
 use std::time::Duration;
+use tetdb_schema::code::Code;
 
 use rkyv::{Archive, Deserialize, Serialize};
 
@@ -76,7 +77,7 @@ pub fn ask(
 /// A helper that answers something else than it was asked for.
 pub fn wrong_receipt() -> PipelineError {
     PipelineError::Helper(RemoteFailure {
-        code: "internal".to_owned(),
+        code: Code::Internal,
         message: "a helper's receipt is of another kind than its order".to_owned(),
     })
 }
