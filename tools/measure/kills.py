@@ -1,19 +1,19 @@
 #!/usr/bin/env python3
-"""Kills ranks, tasks and gathers, lets two runs meet, and shows files late: the mesh must be that of one process, with its files and no others.
+"""Kills tetdb at random times (SIGKILL) and checks what is left: nothing may be lost, mixed or half written.
 
-  carrier_kills.py TETDB FOLDER [--mpi PROGRAM=MPIRUN] [--job "SURFACE --subdomains N"] [--memory 96MiB] [--ranks 100] [--tasks 100]
-                   [--gathers 50] [--steps] [--slurm 20] [--races 50] [--late] [--seed 1]
+  kills.py mesh     TETDB STORE --subdomain LIST [--refine-by 0.9] [--kills 50] [--verify-every 10]
+  kills.py export   TETDB STORE FOLDER [--small FOLDER] [--kills 20]
+  kills.py carriers TETDB FOLDER [--mpi PROGRAM=MPIRUN] [--ranks N] [--tasks N] [--gathers N] [--steps] [--slurm N] [--races N] [--late]
 
---ranks: so many SIGKILLs of a random rank of four at a random time; after each `resume` goes on, or `mesh` where there is no store yet.
---tasks, --gathers: so many SIGKILLs of `tetdb work` and `tetdb gather` at a random time of theirs.
---steps: SIGKILL at every single rename, link, unlink, sync and folder of one task and one gather of each stage, by strace.
---slurm: so many SIGKILLs of random tasks of arrays of a Slurm of one node, started here; after each script the same script again.
---races: so many times two runs at once on one store (`mesh` and `mesh`, `gather` and `gather`), a third of them where locks are refused
-(ENOLCK) and a third where everybody gets the lock it asks for, by strace.
---late: names of new files are hidden from other processes for two seconds, by a library that is loaded before others (needs cc).
+`mesh` kills `tetdb resaturate`: the store has the old mesh or the new one. `export` kills `tetdb export` of every format, fills its disk,
+and compares the pieces of many writers. `carriers` kills ranks of MPI, tasks and gathers. Each sub-command has its own --help.
 
-A line of JSON for each mesh goes to FOLDER/kills.jsonl, with what was killed; what is counted there with this program is not done again.
-Exit code 0 when every mesh was the same.
+  tetdb mesh sample:box,h=0.05 -o box.tetdb --subdomains 4
+  kills.py mesh tetdb box.tetdb --subdomain 1 --kills 10
+  kills.py export tetdb box.tetdb /tmp/exports --kills 3
+  kills.py carriers tetdb /tmp/carriers --tasks 20 --gathers 10 --late
+
+--seed chooses the times. Exit code 0 when everything was as it has to be.
 """
 import argparse
 import hashlib
@@ -25,11 +25,160 @@ import subprocess
 import sys
 import time
 
-from carriers import ENV, HERE, Bench, Differs, run
+TOOLS = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+sys.path.insert(0, TOOLS)
+from carriers import ENV, Bench, Differs, run  # noqa: E402
 
+NAMES = ["a.vtu", "a.pvtu", "a.vtkhdf", "a.foam", "a.msh", "a.mesh", "a.meshb", "a.mfem", "a.inp", "a.ele", "a.npy", "a.json"]
+PIECES = ["a.vtu", "a.foam", "a.msh", "a.mesh", "a.meshb", "a.mfem", "a.inp", "a.ele", "a.npy"]
+CASES = [[n] for n in NAMES] + [["a.msh", "--format", "msh22"], ["a.msh", "--ghosts"], ["a.msh", "--pieces", "--ghosts"],
+         ["a.foam", "--pieces"], ["a.mfem", "--pieces"], ["a.vtu", "--order", "2"], ["a.vtkhdf", "--region", "1"]]
 KILLS_PER_MESH = 6
 STEPS = ["rename", "link", "linkat", "unlink", "unlinkat", "mkdir", "rmdir", "fsync", "fdatasync", "copy_file_range", "ftruncate"]
 LOCKS = {"as they are": [], "refused": ["error=ENOLCK"], "given to all": ["retval=0"]}
+
+
+def mesh(args):
+    """The change is made once, timed and undone. Then it is begun again and again, and killed at a time drawn evenly from that of a whole run
+    and a twentieth more. After each kill the digests of all sub-domains and interfaces must be those of before or those of after. Every
+    fifth time an old mesh is changed without a kill; each new one is undone. Prints a line of JSON for each kill and a summary."""
+    change = ["resaturate", args.store, "--subdomain", args.subdomain, "--refine-by", args.refine_by, "--no-verify"]
+
+    def run(*words):
+        done = subprocess.run([args.tetdb, *words], capture_output=True, text=True)
+        if done.returncode:
+            sys.exit(f"{' '.join(words)}: exit {done.returncode}\n{done.stderr}")
+        return done.stdout
+
+    def state():
+        info = json.loads(run("info", args.store, "--json"))
+        parts = [(s["id"], s["digest"], s["interface_digest"]) for s in info["subdomains"]]
+        return json.dumps([parts, info["interfaces"], info["regions"]])
+
+    draw = random.Random(args.seed)
+    old = state()
+    begun = time.time()
+    run(*change)
+    whole = time.time() - begun
+    new = state()
+    if old == new:
+        sys.exit("the change changes nothing: choose another --refine-by")
+    run("resaturate", args.store, "--undo", "--no-verify")
+    counts = {"old": 0, "new": 0}
+    for kill in range(args.kills):
+        wait = draw.uniform(0, 1.05 * whole)
+        child = subprocess.Popen([args.tetdb, *change], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        try:
+            child.wait(wait)
+        except subprocess.TimeoutExpired:
+            child.kill()
+            child.wait()
+        found = state()
+        if found not in (old, new):
+            sys.exit(f"kill {kill} after {wait:.3f} s left a mesh that is neither the old one nor the new one")
+        word = "old" if found == old else "new"
+        counts[word] += 1
+        print(json.dumps({"kill": kill, "after_s": round(wait, 3), "exit": child.returncode, "found": word}), flush=True)
+        if args.verify_every and kill % args.verify_every == 0:
+            run("verify", args.store)
+        if word == "old" and kill % 5 == 4:
+            run(*change)
+            if state() != new:
+                sys.exit(f"after kill {kill} the change gave another mesh")
+            word = "new"
+        if word == "new":
+            run("resaturate", args.store, "--undo", "--no-verify")
+            if state() != old:
+                sys.exit(f"after kill {kill} undoing gave another mesh")
+    print(json.dumps({"kills": args.kills, "seed": args.seed, "whole_s": round(whole, 2), **counts}))
+
+
+def export(args):
+    """STORE has two sub-domains or more; FOLDER is created and removed. After each kill, at a time drawn evenly from that of a whole export,
+    either no file has its name yet, or all files of a whole export have their names and bytes. The next export must remove what was left
+    in hidden folders and write the same bytes. Pieces are written by one process, by one process each, and by two at once, and compared.
+    --small: a folder on a file system too small for most exports (a tmpfs of 1 MiB). An export that does not fit must end with exit code 6
+    and leave the folder empty."""
+    draw, wrong = random.Random(args.seed), 0
+    tetdb, store = os.path.abspath(args.tetdb), os.path.abspath(args.store)
+
+    def complain(words, text):
+        nonlocal wrong
+        wrong += 1
+        print("WRONG:", *words, text)
+
+    def begin(folder, words):
+        os.makedirs(folder, exist_ok=True)
+        return subprocess.Popen([tetdb, "export", "-q", store, *words], cwd=folder, stderr=subprocess.PIPE, text=True)
+
+    def export_all(folder, words):
+        shutil.rmtree(folder, ignore_errors=True)
+        child = begin(folder, words)
+        said = child.communicate()[1]
+        if child.returncode:
+            sys.exit(f"export {' '.join(words)}: exit {child.returncode}\n{said}")
+        return files(folder)
+
+    def files(folder):
+        """Digests of all files with a name, and the hidden folders."""
+        named, hidden = {}, []
+        for at, folders, names in os.walk(folder):
+            hidden += [f for f in folders if f.startswith(".")]
+            folders[:] = [f for f in folders if not f.startswith(".")]
+            for name in names:
+                path = os.path.join(at, name)
+                named[os.path.relpath(path, folder)] = hashlib.sha256(open(path, "rb").read()).hexdigest()
+        return named, hidden
+
+    folder = os.path.abspath(args.folder)
+    for words in CASES:
+        begun = time.time()
+        whole, hidden = export_all(folder, words)
+        size = sum(os.path.getsize(os.path.join(folder, name)) for name in whole)
+        seconds, counts = time.time() - begun, {"nothing": 0, "all": 0}
+        if hidden:
+            complain(words, f"left {hidden}")
+        shutil.rmtree(folder)
+        for _ in range(args.kills):
+            child = begin(folder, words)
+            time.sleep(draw.uniform(0, seconds))
+            child.kill()
+            child.communicate()
+            named, _ = files(folder)
+            if named not in ({}, whole):
+                complain(words, f"after a kill {len(named)} of {len(whole)} files are there, or others")
+            counts["all" if named else "nothing"] += 1
+            for name in named:
+                os.remove(os.path.join(folder, name))
+        child = begin(folder, words)
+        child.communicate()
+        after = files(folder)
+        if after != (whole, []):
+            complain(words, f"the export after the kills is another, or left {after[1]}")
+        line = {"export": " ".join(words), "files": len(whole), "seconds": round(seconds, 2), "killed with nothing": counts["nothing"], "with all": counts["all"]}
+        # What fits is no test.
+        if args.small and size > shutil.disk_usage(args.small).free:
+            child = begin(args.small, words)
+            said = child.communicate()[1]
+            line["full disk"] = child.returncode
+            if child.returncode != 6 or os.listdir(args.small):
+                complain(words, f"on a full disk: exit {child.returncode}, {os.listdir(args.small)} there\n{said}")
+        print(json.dumps(line), flush=True)
+    parts = len(json.loads(subprocess.run([tetdb, "info", store, "--json"], capture_output=True, check=True).stdout)["subdomains"])
+    for name in PIECES:
+        words = [name, "--pieces", *(["--ghosts"] if name == "a.msh" else [])]
+        (whole, _), before = export_all(folder, words), wrong
+        for at_once in (1, 2):
+            shutil.rmtree(folder)
+            for first in range(0, parts, at_once):
+                children = [begin(folder, [*words, "--subdomain", str(k)]) for k in range(first, min(first + at_once, parts))]
+                for child in children:
+                    child.communicate()
+            if files(folder) != (whole, []):
+                complain(words, f"pieces of {at_once} writers at once differ from those of one")
+        print(json.dumps({"export": " ".join(words), "files": len(whole), "alike whoever writes": wrong == before}), flush=True)
+    shutil.rmtree(folder)
+    return 1 if wrong else 0
 
 
 class Kills(Bench):
@@ -198,7 +347,7 @@ class Kills(Bench):
 
     def slurm(self, n):
         slurm = run(["mktemp", "-d"]).strip()
-        tool = os.path.join(HERE, "slurm-here.sh")
+        tool = os.path.join(TOOLS, "slurm-here.sh")
         env = dict(ENV, SLURM_CONF=os.path.join(slurm, "slurm.conf"))
         try:
             subprocess.run([tool, "start", slurm], check=True, stdout=subprocess.DEVNULL)
@@ -258,7 +407,7 @@ class Kills(Bench):
         if self.known("late"):
             return
         library = os.path.join(self.folder, "late.so")
-        run(["cc", "-shared", "-fPIC", "-O1", "-o", library, os.path.join(HERE, "late.c"), "-ldl"])
+        run(["cc", "-shared", "-fPIC", "-O1", "-o", library, os.path.join(TOOLS, "late.c"), "-ldl"])
         env = dict(ENV, LD_PRELOAD=library, LATE_SECONDS="2", LATE_BELOW=self.folder)
         store = self.planned("late")
         begun, again = time.time(), 0
@@ -284,19 +433,10 @@ class Kills(Bench):
         self.note("late", again, wall_s=round(time.time() - begun, 1))
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("tetdb")
-    parser.add_argument("folder")
-    parser.add_argument("--mpi", action="append", default=[])
-    parser.add_argument("--job", default="sample:box,h=0.04 --subdomains 4")
-    parser.add_argument("--memory", default="96MiB")
-    for kind in ("ranks", "tasks", "gathers", "slurm", "races"):
-        parser.add_argument(f"--{kind}", type=int, default=0, metavar="N")
-    parser.add_argument("--steps", action="store_true")
-    parser.add_argument("--late", action="store_true")
-    parser.add_argument("--seed", type=int, default=1)
-    args = parser.parse_args()
+def carriers(args):
+    """Kills ranks, tasks and gathers, lets two runs meet, and shows files late: the mesh must be that of one process, with its files and no
+    others. A line of JSON for each mesh goes to FOLDER/kills.jsonl, with what was killed; what is counted there with this program is not
+    done again."""
     kills = Kills(args)
     try:
         if args.late:
@@ -314,6 +454,42 @@ def main():
     except Differs as error:
         sys.exit(f"WRONG: {error}")
     shutil.rmtree(kills.one)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    def command(function, *names):
+        sub = commands.add_parser(function.__name__, description=function.__doc__)
+        sub.set_defaults(function=function)
+        for name in names:
+            sub.add_argument(name)
+        sub.add_argument("--seed", type=int, default=1)
+        return sub
+
+    sub = command(mesh, "tetdb", "store")
+    sub.add_argument("--subdomain", required=True)
+    sub.add_argument("--refine-by", default="0.9")
+    sub.add_argument("--kills", type=int, default=50)
+    sub.add_argument("--verify-every", type=int, default=10)
+    sub = command(export, "tetdb", "store", "folder")
+    sub.add_argument("--small")
+    sub.add_argument("--kills", type=int, default=20, help="of each format")
+    sub = command(carriers, "tetdb", "folder")
+    sub.add_argument("--mpi", action="append", default=[], metavar="PROGRAM=MPIRUN")
+    sub.add_argument("--job", default="sample:box,h=0.04 --subdomains 4")
+    sub.add_argument("--memory", default="96MiB")
+    for kind, text in (("ranks", "kills of a random rank of four; `resume` goes on, or `mesh` where there is no store yet"),
+                       ("tasks", "kills of `tetdb work`"), ("gathers", "kills of `tetdb gather`"),
+                       ("slurm", "kills of random tasks of arrays of a Slurm of one node, started here"),
+                       ("races", "two runs at once on one store (`mesh`, `gather`); for a third of them strace refuses locks (ENOLCK), for a "
+                                 "third it gives every lock")):
+        sub.add_argument(f"--{kind}", type=int, default=0, metavar="N", help=text)
+    sub.add_argument("--steps", action="store_true", help="kill at every rename, link, unlink, sync and folder of one task and one gather, by strace")
+    sub.add_argument("--late", action="store_true", help="new files are hidden from other processes for two seconds (needs cc)")
+    args = parser.parse_args()
+    sys.exit(args.function(args))
 
 
 if __name__ == "__main__":

@@ -1,23 +1,21 @@
 #!/usr/bin/env python3
-"""Can one see in a finished mesh where it was cut?
+"""Do the tetrahedra near an interface between two sub-domains differ from the others?
 
-    python3 tools/invisible.py --sample box,h=0.0155 --sample box,h=0.017 ... [--tetdb PATH]
-    python3 tools/invisible.py --pair parts.vtu whole.vtu --pair ...
+  invisible.py --sample box,h=0.0155 --sample box,h=0.017 [--tetdb PROGRAM] [--graded]
+  invisible.py --pair parts.vtu whole.vtu
 
-Each cut is a pair of exports: of a mesh in two sub-domains, and of the same surface and options in one; with `--sample` both are
-made. In the mesh of one piece the interface of the other is a fake cut, which tells what chance and the surface do. Sizes are taken as
-uniform (such as in a box), the median edge length; with `--graded` as the mean length of the edges of some hundred vertices around, in the
-mesh of one piece.
+Each cut is a pair of exports: a mesh in two sub-domains, and a mesh of the same surface in one. --sample generates both; it may name a surface
+file. In the mesh of one sub-domain the other's interface is a fake cut, which shows what chance and the surface do. The wanted length is the
+median edge of the whole mesh, or with --graded the mean edge around some hundred vertices.
 
-Printed for the true and the fake cuts, all together, over tetrahedra away from the surface (farther than
-2 h) and near it:
-- Kolmogorov distances of quality, of metric edge length and of its mean in each tetrahedron between tetrahedra nearer than 1 h to the interface (and at 3.5 to
-  6.5 h, where the refined zone ended) and those farther than 8 h;
-- densities of vertices in slices of 0.25 h out to 8 h from the plane of the cut: coefficient of variation, and what chance alone would make of it;
-- the area under the curve of a classifier that tries to tell near tetrahedra from far ones by their shape, size, valences and
-  directions, trained on all cuts but one and tested on that one (on halves of the plane when there is one cut); 0.5 is guessing;
-- the mean and the 95th percentile of edge lengths within 4 h of the interface, in the cut mesh over the other.
-Needs numpy, scipy, pyvista and scikit-learn.
+Printed for true and fake cuts, all cuts together, away from the surface (farther than 2 h) and near it:
+- Kolmogorov distances of quality, of edge length over h and of its mean in each tetrahedron, between tetrahedra nearer than 1 h to the
+  interface (or at 3.5 to 6.5 h, where the refined zone ended) and those farther than 8 h;
+- the area under the curve of a classifier that tells near from far tetrahedra by shape, size, valences and directions; it is trained on all
+  cuts but one and tested on that one (with one cut, on halves of the plane). 0.5 is guessing;
+- densities of vertices in slices of 0.25 h out to 8 h from the plane: coefficient of variation, and that of chance alone;
+- mean and 95th percentile of edge lengths within 4 h of the interface, over those of the mesh in one sub-domain.
+Needs numpy, scipy, pyvista and scikit-learn. Small meshes have nothing farther than 8 h: use h <= 0.03 on the box.
 """
 import argparse
 import pathlib
@@ -30,8 +28,7 @@ from scipy.spatial import cKDTree
 from sklearn.ensemble import HistGradientBoostingClassifier
 from sklearn.metrics import roc_auc_score
 
-FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
-EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
+from quality import EDGES, FACES, qualities
 
 
 def read(path):
@@ -58,7 +55,7 @@ def unique_edges(tets):
 
 
 class Sizes:
-    """Lengths the mesh was to have, at any points: one for all, or what edges measure around them."""
+    """Wanted lengths at any points: one for all, or the mean of the edges around."""
 
     def __init__(self, points, tets, graded):
         edges = unique_edges(tets)
@@ -69,7 +66,7 @@ class Sizes:
             n = np.bincount(edges.ravel(), minlength=len(points))
             sums = np.bincount(edges[:, 0], length, len(points)) + np.bincount(edges[:, 1], length, len(points))
             mean = sums / np.maximum(n, 1)
-            # Some hundred neighbors: the noise of each goes, what a zone of a few lengths does stays in part and is the less seen.
+            # Some hundred neighbors average out the noise of single edges; the effect of a zone of a few lengths stays in part.
             self.tree = cKDTree(points)
             self.values = np.concatenate([mean[self.tree.query(some, 200, workers=2)[1]].mean(1)
                                           for some in np.array_split(points, 1 + len(points) // 100000)])
@@ -85,8 +82,7 @@ def features(points, tets, normal, size):
     edges = p[:, EDGES[:, 1]] - p[:, EDGES[:, 0]]
     length = np.linalg.norm(edges, axis=2)
     volume = np.einsum("ij,ij->i", edges[:, 0], np.cross(edges[:, 1], edges[:, 2])) / 6
-    areas = [np.linalg.norm(np.cross(p[:, f[1]] - p[:, f[0]], p[:, f[2]] - p[:, f[0]]), axis=1) / 2 for f in FACES]
-    quality = np.sqrt(6) / 12 * length.max(1) / (3 * volume / np.sum(areas, axis=0))
+    quality, _ = qualities(points, tets)
     valence = np.bincount(unique_edges(tets).ravel(), minlength=len(points))
     length = length / size[:, None]
     slope = np.sort(np.abs(edges @ normal) / (length * size[:, None]), axis=1)
@@ -144,7 +140,7 @@ def some(rng, chosen):
 
 
 def auc(cuts, kind, inner):
-    """Mean over the cuts of the area under the curve, each judged by what the others taught."""
+    """Mean over the cuts of the area under the curve, each tested with a classifier trained on the others."""
     rng = np.random.default_rng(1)
     if len(cuts) > 1:
         folds = [([(c, True) for j, c in enumerate(cuts) if j != i], [(cuts[i], True)]) for i in range(len(cuts))]
@@ -164,7 +160,7 @@ def auc(cuts, kind, inner):
     return float(np.mean(areas))
 
 
-def judge(name, cuts):
+def report(name, cuts):
     for inner in (True, False):
         place = "away from the surface" if inner else "near the surface"
         for kind in NEAR:
@@ -181,21 +177,21 @@ def judge(name, cuts):
     print(f"{name:10} density in 64 slices: cv {shares.std():.4f}, chance {chance:.4f}, extremes {shares.min() - 1:+.3f} {shares.max() - 1:+.3f}", flush=True)
 
 
-def make(surface, tetdb, folder):
+def exports(surface, tetdb, folder):
     """Exports of the surface in two sub-domains and in one."""
     paths = []
     surface = surface if pathlib.Path(surface).exists() else f"sample:{surface}"
     for n in (2, 1):
         store, out = folder / "cut.tetdb", folder / f"{n}.vtu"
-        for command in (["mesh", surface, "-o", store, "--subdomains", n, "--no-verify", "--force"],
-                        ["export", store, out]):
+        for command in (["mesh", surface, "-o", store, "--subdomains", n, "--no-verify", "--force", "-q"],
+                        ["export", store, out, "-q"]):
             subprocess.run([tetdb, *map(str, command)], check=True, stdout=subprocess.DEVNULL)
         paths.append(out)
     return paths
 
 
-def look(name, parts, whole, graded):
-    """The true cut and the fake one."""
+def compare(name, parts, whole, graded):
+    """The true cut and the fake one of a pair of exports."""
     points, tets, part = read(parts)
     a, b, faces, _, _ = pair_faces(tets)
     cut = part[a] != part[b]
@@ -222,17 +218,17 @@ def main():
     parser.add_argument("--pair", nargs=2, action="append", default=[], metavar=("PARTS", "WHOLE"))
     parser.add_argument("--sample", action="append", default=[], help="a sample's name, or a surface file")
     parser.add_argument("--graded", action="store_true")
-    parser.add_argument("--tetdb", default="target/release/tetdb")
+    parser.add_argument("--tetdb", default="tetdb")
     args = parser.parse_args()
     if not args.pair and not args.sample:
         parser.error("give --sample or --pair")
-    looked = [look(pair[0], *pair, args.graded) for pair in args.pair]
+    pairs = [compare(pair[0], *pair, args.graded) for pair in args.pair]
     for sample in args.sample:
         with tempfile.TemporaryDirectory() as folder:
-            looked.append(look(sample, *make(sample, args.tetdb, pathlib.Path(folder)), args.graded))
-    cut, fake = zip(*looked)
-    judge("cuts", cut)
-    judge("fakes", fake)
+            pairs.append(compare(sample, *exports(sample, args.tetdb, pathlib.Path(folder)), args.graded))
+    cut, fake = zip(*pairs)
+    report("cuts", cut)
+    report("fakes", fake)
 
 
 if __name__ == "__main__":
