@@ -263,7 +263,7 @@ def spiked(points, triangles):
 
 
 def python(args):
-    """Arrays in, arrays out, sizes by each one's defaults. `module` is tetdb's Python package, which has to be installed. The last column
+    """Arrays in, arrays out, sizes by each one's defaults (TetGen with a greatest volume, as in `speed`). `module` is tetdb's Python package, which has to be installed. The last column
     is the same surface with a spike through it."""
     print("| surface | mesher | CPU s | tetrahedra | mean q | q > 3 | worst q | peak MiB | input vertices kept | with a spike through it |")
     print("|---" * 10 + "|")
@@ -283,10 +283,10 @@ def python(args):
                 except meshers.FAILURES as failure:
                     cells = meshers.why(failure) + " |" * 6
                 try:
-                    told = f"returns {meshers.run_other(mesher, bad, None, timeout=args.timeout)['tets']} tetrahedra"
+                    outcome = f"returns {meshers.run_other(mesher, bad, None, timeout=args.timeout)['tets']} tetrahedra"
                 except meshers.FAILURES as failure:
-                    told = meshers.why(failure)
-                print(f"| {surface} | {mesher} | {cells} | {told} |", flush=True)
+                    outcome = meshers.why(failure)
+                print(f"| {surface} | {mesher} | {cells} | {outcome} |", flush=True)
 
 
 def poisson(args):
