@@ -10,7 +10,7 @@ use std::time::Instant;
 use tetdb_base::geom::{Point, mix};
 use tetdb_base::storage::{Backing, Budget, Pager, ScratchSpace, attempt};
 use tetdb_base::surface::Surface;
-use tetdb_engine::pipeline::{self, Options, silent};
+use tetdb_engine::pipeline::{self, Options, OptionsText, RunOptions, silent};
 use tetdb_kernel::bisect::{self, CutPlan, CutReport, Method, PlaneChoice, Steps, load_of};
 use tetdb_kernel::mesh::{Mesh, Workspace, renumber};
 use tetdb_kernel::optimize::{Mode, Settings};
@@ -179,12 +179,16 @@ fn balance(least: f64, n: u32) {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let mut catalog =
             Catalog::create(dir.path().join("b.tetdb"), &Job::default()).expect("an empty place");
-        let options = Options {
+        let text = OptionsText {
             size_expr: Some(format!("min({coarse}, {least} + 0.26 * x)")),
             subdomains: Some(n.to_string()),
             optimize: Some("none".to_owned()),
-            method: Method { plane, ..Method::default() },
-            ..Options::default()
+            ..OptionsText::default()
+        };
+        let method = Method { plane, ..Method::default() };
+        let options = Options {
+            mesh: text.try_into().expect("good options"),
+            run: RunOptions { method, ..RunOptions::default() },
         };
         let budget = Budget::new(4 << 30);
         pipeline::mesh(&mut catalog, &surface, &options, &budget, &silent).expect("a mesh");

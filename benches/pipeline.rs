@@ -12,7 +12,7 @@ use std::time::Instant;
 use tetdb_base::geom::Point;
 use tetdb_base::storage::Budget;
 use tetdb_base::surface::Surface;
-use tetdb_engine::pipeline::{self, Event, Options};
+use tetdb_engine::pipeline::{self, Event, Options, OptionsText, RunOptions};
 use tetdb_kernel::bisect::Method;
 use tetdb_kernel::refine::Lengths;
 use tetdb_kernel::samples::SampleSpec;
@@ -85,11 +85,11 @@ fn main() {
         Some("ends") => Lengths::Ends,
         _ => Lengths::Field,
     };
+    let text = OptionsText { optimize, subdomains: Some("1".to_owned()), ..OptionsText::default() };
+    let method = Method { lengths, ..Method::default() };
     let options = Options {
-        optimize,
-        method: Method { lengths, ..Method::default() },
-        subdomains: Some("1".to_owned()),
-        ..Options::default()
+        mesh: text.try_into().expect("a word of --optimize"),
+        run: RunOptions { method, ..RunOptions::default() },
     };
     let surface: Surface =
         SampleSpec::parse(&word).and_then(|spec| spec.make()).expect("a sample").into();

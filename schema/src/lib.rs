@@ -10,3 +10,4 @@ pub mod ids;
 pub mod leaf;
 pub mod page;
 pub mod record;
+pub mod word;

@@ -3,23 +3,22 @@
 use std::path::Path;
 use tetdb_schema::code::Code;
 
-use clap::ValueEnum;
-
-use super::args::{Optimize, Regions, ShapeArgs, SizeArgs};
+use super::args::{ShapeArgs, SizeArgs};
 use super::failure::Failure;
 use tetdb_base::surface::{Seed, SeedKind};
 use tetdb_engine::api::job::identify_sizes;
-use tetdb_engine::pipeline::Options;
+use tetdb_engine::pipeline::{MeshOptions, OptionsText, PipelineError};
+use tetdb_schema::word::Word;
 
 /// No configuration is longer.
 const BYTES_MAX: u64 = 1 << 20;
 
-/// The options of a run: the file's, then the command line's over them, then the defaults.
+/// The options of a run: the command line's over those of the file, and defaults for the rest.
 ///
-/// Lists of shapes on the command line replace those of the file. Errors: the file, with its line and column.
-pub fn options(args: &ShapeArgs) -> Result<Options, Failure> {
-    let mut options = match &args.config {
-        None => Options::default(),
+/// Lists on the command line replace those of the file. Errors: the file, with its line and column; values without a meaning.
+pub fn options(args: &ShapeArgs) -> Result<MeshOptions, Failure> {
+    let file = match &args.config {
+        None => OptionsText::default(),
         Some(path) => {
             let text = text(path).map_err(|e| {
                 Failure::new(Code::UnreadableFile, format!("the file cannot be read: {e}"))
@@ -29,117 +28,80 @@ pub fn options(args: &ShapeArgs) -> Result<Options, Failure> {
             read(&text).map_err(|failure| failure.at(path.display()))?
         }
     };
-    take_sizes(&args.sizes, &mut options);
-    let texts = [
-        (&args.regions.map(word), &mut options.regions),
-        (&args.optimize.map(word), &mut options.optimize),
-        (&args.subdomains, &mut options.subdomains),
-        (&args.seal.map(word), &mut options.seal),
-    ];
-    for (given, option) in texts {
-        if given.is_some() {
-            option.clone_from(given);
-        }
-    }
-    options.drop_coarse |= args.drop_coarse;
-    options.keep_stages |= args.keep_stages;
-    options.refine_surface |= args.refine_surface;
-    take_seeds(args, &mut options)?;
-    let is_seeded = !(options.region_seed.is_empty() && options.hole.is_empty());
-    // The words are stored in full, so that a store tells all of what made it.
-    options.regions.get_or_insert_with(|| match is_seeded {
-        true => word(Regions::Seeds),
-        false => word(Regions::Parity),
-    });
-
-    options.optimize.get_or_insert_with(|| word(Optimize::Full));
-    if options.region_policy().is_none() || options.optimize_mode().is_none() {
-        let words = [&options.regions, &options.optimize].map(|w| w.clone().unwrap_or_default());
-        let failure = bad(format!("`{}` or `{}` is no known word", words[0], words[1]));
-        return Err(match &args.config {
-            Some(path) => failure.at(path.display()),
-            None => failure,
-        });
-    }
-    options.region_rule()?;
-    options.subdomain_count()?;
-    options.form()?;
+    let typed = text_of(args)?;
+    let mut options =
+        MeshOptions::try_from(file.overridden_by(typed)).map_err(|e| match (e, &args.config) {
+            (PipelineError::Option { option, value }, Some(path)) => {
+                bad(format!("`{value}` is no value of {option}")).at(path.display())
+            }
+            (e, _) => e.into(),
+        })?;
     identify_sizes(&mut options)?;
     Ok(options)
 }
 
-/// Puts the sizes of the command line over those of `options`: its lists replace theirs.
-pub fn take_sizes(args: &SizeArgs, options: &mut Options) {
-    take_lengths(args, options);
-    for (given, option) in lists(args, options) {
-        if !given.is_empty() {
-            option.clone_from(given);
-        }
+/// The sizes of the command line.
+pub fn sizes_of(args: &SizeArgs) -> OptionsText {
+    OptionsText {
+        hsiz: args.hsiz.clone(),
+        hmin: args.hmin.clone(),
+        hmax: args.hmax.clone(),
+        hgrad: args.hgrad.clone(),
+        size_box: args.size_box.clone(),
+        size_sphere: args.size_sphere.clone(),
+        size_cylinder: args.size_cylinder.clone(),
+        size_region: args.size_region.clone(),
+        size_expr: args.size_expr.clone(),
+        size_field: args.size_field.clone(),
+        ..OptionsText::default()
     }
 }
 
-/// Seeds of the command line and of its file replace those of `options`. Errors: the file, with its line.
-fn take_seeds(args: &ShapeArgs, options: &mut Options) -> Result<(), Failure> {
-    for (given, option) in
-        [(&args.region_seed, &mut options.region_seed), (&args.hole, &mut options.hole)]
-    {
-        if !given.is_empty() {
-            option.clone_from(given);
+/// All options of the command line. Errors: the file of seeds, with its line.
+fn text_of(args: &ShapeArgs) -> Result<OptionsText, Failure> {
+    let mut text = OptionsText {
+        regions: args.regions.map(|regions| regions.word().to_owned()),
+        region_seed: args.region_seed.clone(),
+        hole: args.hole.clone(),
+        optimize: args.optimize.map(|optimize| optimize.word().to_owned()),
+        subdomains: args.subdomains.clone(),
+        drop_coarse: args.drop_coarse,
+        seal: args.seal.map(|seal| seal.word().to_owned()),
+        keep_stages: args.keep_stages,
+        refine_surface: args.refine_surface,
+        ..sizes_of(&args.sizes)
+    };
+    if let Some(path) = &args.seeds {
+        for seed in seeds(path)? {
+            match seed.kind {
+                SeedKind::Hole => text.hole.push(seed.to_string()),
+                SeedKind::Region(_) => text.region_seed.push(seed.to_string()),
+            }
         }
     }
-    let Some(path) = &args.seeds else {
-        return Ok(());
-    };
+    Ok(text)
+}
+
+/// The seeds of a file. Errors: its line.
+fn seeds(path: &Path) -> Result<Vec<Seed>, Failure> {
     let text = text(path).map_err(|e| {
         Failure::new(Code::UnreadableFile, format!("the file cannot be read: {e}"))
             .at(path.display())
             .help("seeds are in a regular file, a line for each")
     })?;
+    let mut seeds = Vec::new();
     for (number, line) in (1..).zip(text.lines()) {
         let line = line.split('#').next().unwrap_or_default().trim();
         if line.is_empty() {
             continue;
         }
-        let seed = Seed::parse_line(line).ok_or_else(|| {
+        seeds.push(Seed::parse_line(line).ok_or_else(|| {
             Failure::new(Code::BadSeed, format!("`{line}` is no seed"))
                 .at(format!("{}, line {number}", path.display()))
                 .help("a line is `x y z name`, `x y z` or `x y z hole`")
-        })?;
-        match seed.kind {
-            SeedKind::Hole => options.hole.push(seed.to_string()),
-            SeedKind::Region(_) => options.region_seed.push(seed.to_string()),
-        }
+        })?);
     }
-    Ok(())
-}
-
-fn take_lengths(args: &SizeArgs, options: &mut Options) {
-    let texts = [
-        (&args.hsiz, &mut options.hsiz),
-        (&args.hmin, &mut options.hmin),
-        (&args.hmax, &mut options.hmax),
-        (&args.hgrad, &mut options.hgrad),
-        (&args.size_expr, &mut options.size_expr),
-        (&args.size_field, &mut options.size_field),
-    ];
-    for (given, option) in texts {
-        if given.is_some() {
-            option.clone_from(given);
-        }
-    }
-}
-
-/// Shapes and regions, of the command line and of options.
-fn lists<'a>(
-    args: &'a SizeArgs,
-    options: &'a mut Options,
-) -> [(&'a Vec<String>, &'a mut Vec<String>); 4] {
-    [
-        (&args.size_box, &mut options.size_box),
-        (&args.size_sphere, &mut options.size_sphere),
-        (&args.size_cylinder, &mut options.size_cylinder),
-        (&args.size_region, &mut options.size_region),
-    ]
+    Ok(seeds)
 }
 
 /// What a file holds. Errors: a pipe or a device, which may have no end; a file that is far too long for options.
@@ -152,7 +114,7 @@ fn text(path: &Path) -> std::io::Result<String> {
     }
 }
 
-fn read(text: &str) -> Result<Options, Failure> {
+fn read(text: &str) -> Result<OptionsText, Failure> {
     toml::from_str(text).map_err(|e| bad(e.to_string().trim_end().to_owned()))
 }
 
@@ -160,10 +122,6 @@ fn bad(what: String) -> Failure {
     Failure::new(Code::BadConfig, what).help(
         "keys are those of `tetdb mesh --help`, for example hsiz = 0.1, hmax = \"2%\" or size_sphere = [[0, 0, 0, 1, 0.1]]",
     )
-}
-
-fn word(value: impl ValueEnum) -> String {
-    value.to_possible_value().map(|p| p.get_name().to_owned()).unwrap_or_default()
 }
 
 #[cfg(test)]

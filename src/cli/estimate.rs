@@ -18,7 +18,6 @@ use tetdb_engine::api::{default_cap, divide, predict};
 
 pub fn run(args: &EstimateArgs, console: &Console) -> Result<u8, Failure> {
     let mut options = config::options(&args.shape)?;
-    options.sizes()?;
     let (cap, whence) = match memory::asked(args.memory.as_deref())? {
         Some(cap) => (cap, "--memory".to_owned()),
         None => default_cap(),
@@ -32,8 +31,9 @@ pub fn run(args: &EstimateArgs, console: &Console) -> Result<u8, Failure> {
     take_seeds(&mut options, &surface.inner.seeds);
     if options.refine_surface {
         let settings = console.settings(Some(cap), args.threads);
-        divide(&mut surface, &options, None, cap, store, &settings)?;
+        divide(&mut surface, &options.clone().into(), None, cap, store, &settings)?;
     }
+    let options = options.into();
     let prepared = predict(&surface.inner, &options, cap, store)?;
     let estimate = &prepared.estimate;
     let disk_free = free_at(store);

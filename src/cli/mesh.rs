@@ -22,8 +22,6 @@ pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
         return Err(Failure::new(Code::Usage, message).help(help));
     }
     let options = config::options(&args.shape)?;
-    // Sizes are checked before anything is read.
-    options.sizes()?;
     let files =
         (args.surfaces.iter()).chain(&args.shape.sizes.size_field).chain(args.sheets.files());
     let inputs: Vec<PathBuf> = files.map(PathBuf::from).collect();
@@ -40,7 +38,7 @@ pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
         Space { cap: settings.cap()?, beside: &path },
         console,
     )?;
-    let created = Mesher::of_options(surface, options)
+    let created = Mesher::with_options(surface, options)
         .settings(settings.clone())
         .existing(existing)
         .preflight(!args.no_preflight)

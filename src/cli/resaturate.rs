@@ -48,7 +48,7 @@ pub fn run(args: &ResaturateArgs, console: &Console) -> Result<u8, Failure> {
         }
         return finish(args, &summary, &settings, console);
     }
-    let options = options_of(&open.job()?, &args.store)?;
+    let options = Options::from(options_of(&open.job()?, &args.store)?);
     let sizes = new_sizes(args, &mut open, &options, &settings)?;
     let ranks = ranks(args, &mut open, &options, sizes.as_ref(), &budget)?;
     if ranks.is_empty() {

@@ -33,12 +33,11 @@ pub fn new_sizes(
     if !are_given(args) {
         return Ok(None);
     }
-    let mut asked = Options::default();
-    config::take_sizes(&args.sizes, &mut asked);
+    let mut asked = config::sizes_of(&args.sizes);
     let file = asked.size_field.take_if(|file| file.ends_with(".npy"));
-    asked.sizes()?;
+    let given = (asked.sizes()?, asked.size_file());
     let mut sizes = AskedSizes {
-        options: (args.sizes != SizeArgs::default()).then_some(asked),
+        sizes: (args.sizes != SizeArgs::default()).then_some(given),
         values: None,
         file,
         factor: factor(args.refine_by.as_deref())?,

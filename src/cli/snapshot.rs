@@ -1,13 +1,13 @@
 //! `snapshot`: a picture of a cut through the mesh, or of surfaces in space.
 
-use super::args::{ColorBy, SnapshotArgs};
+use super::args::SnapshotArgs;
 use super::console::Console;
 use super::failure::Failure;
 use super::memory;
 use super::query_ask::{bad, condition, numbers};
 use tetdb_engine::api::picture::take;
 use tetdb_engine::api::targets::{check_target, inputs_of};
-use tetdb_engine::api::{self, Snapped, Snapshot};
+use tetdb_engine::api::{ColorBy, Snapped, Snapshot};
 use tetdb_schema::code::Code;
 
 /// Least and greatest side of a picture in pixels.
@@ -48,13 +48,7 @@ fn snapshot(args: &SnapshotArgs) -> Result<Snapshot, Failure> {
         let expected = "with --surface or --shell, for tetrahedra have no label";
         return Err(bad("--color", "label", expected));
     }
-    snapshot = snapshot.pixels(width, height).color(match args.color {
-        ColorBy::Subdomain => api::ColorBy::Subdomain,
-        ColorBy::Region => api::ColorBy::Region,
-        ColorBy::Quality => api::ColorBy::Quality,
-        ColorBy::Size => api::ColorBy::Size,
-        ColorBy::Label => api::ColorBy::Label,
-    });
+    snapshot = snapshot.pixels(width, height).color(args.color);
     if let Some(text) = &args.plane {
         let expected = "six numbers, a point and a direction towards the viewer";
         let [x, y, z, nx, ny, nz] = numbers("--plane", text, expected)?;

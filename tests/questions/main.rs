@@ -15,6 +15,7 @@ use grid::Grid;
 use tetdb_base::expr::Expression;
 use tetdb_base::geom::{Aabb, Point, mix};
 use tetdb_base::storage::Budget;
+use tetdb_engine::pipeline::{MeshOptions, Subdomains};
 use tetdb_schema::catalog::Job;
 use tetdb_store::query::*;
 use tetdb_store::store::Catalog;
@@ -75,9 +76,10 @@ fn real() -> Outcome<Fixture> {
 fn real_of(sample: &str) -> Outcome<Fixture> {
     let made = Fixture { dir: tempfile::tempdir()? };
     let surface = tetdb_kernel::samples::SampleSpec::parse(sample)?.make()?;
-    let options =
-        tetdb_engine::pipeline::Options { subdomains: Some("2".to_owned()), ..Default::default() };
+    let subdomains = Subdomains::Exactly(2);
+    let options = MeshOptions { subdomains, ..MeshOptions::default() };
     let job = Job { options: serde_json::to_string(&options)?, ..Job::default() };
+    let options = options.into();
     let mut catalog = Catalog::create(made.path(), &job)?;
     let budget = Budget::new(512 << 20);
     tetdb_engine::pipeline::mesh(&mut catalog, &surface.into(), &options, &budget, &|_| {})?;

@@ -10,7 +10,7 @@ use std::time::Duration;
 use tetdb_base::geom::{HilbertFrame, orient};
 use tetdb_base::storage::{Budget, FlatPages};
 use tetdb_base::surface::{Surface, orient_alike, validate};
-use tetdb_engine::pipeline::{self, Options, PipelineError};
+use tetdb_engine::pipeline::{self, MeshOptions, Options, OptionsText, PipelineError};
 use tetdb_kernel::boundary::{BoundaryError, RecoveryReport, RegionPolicy, fill_regions, recover};
 use tetdb_kernel::delaunay::{Kernel, enclose, insertion_key};
 use tetdb_kernel::mesh::{FaceRef, Facet, Mesh, VertexTag};
@@ -89,13 +89,14 @@ pub fn whole(shape: &Shape, optimize: &str) -> Outcome {
     let job = Job { options: String::new(), surfaces: Vec::new(), tool_version: String::new() };
     let mut catalog = Catalog::create(&path, &job).expect("an empty folder");
     // Few tetrahedra: what is tested is the surface.
-    let options = Options {
+    let text = OptionsText {
         hsiz: Some("1000%".into()),
         hgrad: Some("10".into()),
         regions: Some("all".into()),
         optimize: Some(optimize.into()),
-        ..Options::default()
+        ..OptionsText::default()
     };
+    let options = Options::from(MeshOptions::try_from(text).expect("good options"));
     let budget = Budget::new(256 << 20);
     let made = pipeline::mesh(&mut catalog, &surface, &options, &budget, &pipeline::silent);
     let summary = match made {

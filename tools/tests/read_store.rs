@@ -4,7 +4,7 @@
 //! How: a small mesh in two sub-domains, read by the example and by the library; the example's text names no `tetdb::`.
 
 use tetdb_base::storage::Budget;
-use tetdb_engine::pipeline::{self, Options};
+use tetdb_engine::pipeline::{self, MeshOptions, OptionsText};
 use tetdb_kernel::samples::SampleSpec;
 use tetdb_schema::catalog::Job;
 use tetdb_store::store::Catalog;
@@ -25,12 +25,13 @@ fn check(seal: &str) -> Result<String, Box<dyn std::error::Error>> {
     let dir = tempfile::tempdir()?;
     let path = dir.path().join("box.tetdb");
     let surface = SampleSpec::parse("box,h=0.05")?.make()?.into();
-    let options = Options {
+    let text = OptionsText {
         subdomains: Some("2".to_owned()),
         seal: Some(seal.to_owned()),
-        ..Options::default()
+        ..OptionsText::default()
     };
-    let job = Job { options: serde_json::to_string(&options)?, ..Job::default() };
+    let job = Job { options: serde_json::to_string(&text)?, ..Job::default() };
+    let options = MeshOptions::try_from(text)?.into();
     let mut catalog = Catalog::create(&path, &job)?;
     pipeline::mesh(&mut catalog, &surface, &options, &Budget::new(256 << 20), &|_| {})?;
     catalog.close()?;

@@ -9,6 +9,7 @@ mod show;
 mod store;
 mod surface;
 mod tasks;
+mod words;
 
 use clap::{Parser, Subcommand};
 
@@ -16,8 +17,8 @@ pub use mesh::{EstimateArgs, MeshArgs, ResumeArgs};
 pub use query::QueryArgs;
 pub use resaturate::ResaturateArgs;
 pub use run::RunArgs;
-pub use shape::{Optimize, Regions, ShapeArgs, SizeArgs};
-pub use show::{ColorBy, CompletionsArgs, ManArgs, ReportArgs, SnapshotArgs};
+pub use shape::{ShapeArgs, SizeArgs};
+pub use show::{CompletionsArgs, ManArgs, ReportArgs, SnapshotArgs};
 pub use store::{CompareArgs, ExportArgs, InfoArgs, StoreArgs, VerifyArgs};
 pub use surface::{CheckArgs, RefineSurfaceArgs, SampleArgs, SheetArgs};
 pub use tasks::{GatherArgs, PlanArgs, WorkArgs};

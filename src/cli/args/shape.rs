@@ -2,39 +2,26 @@
 
 use std::path::PathBuf;
 
-use clap::ValueEnum;
+use tetdb_engine::api::{Optimize, Regions, Seal};
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Regions {
-    /// Regions that an odd number of shells separates from the outside: a shell in a shell is a hole
-    Parity,
-    /// Every bounded region
-    All,
-    /// Only the region directly behind the outermost shells
-    Outer,
-    /// Regions behind triangles whose front side looks away from them
-    ByOrientation,
-    /// Regions with a seed (--region-seed, --seeds, or regions in the surface's files); where only holes are given, all others
-    Seeds,
-}
+use super::words::word_of;
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Optimize {
-    /// Nothing after the last vertex is inserted
-    None,
-    /// Only changes that keep the mesh locally Delaunay
-    Delaunay,
-    /// Until no badly shaped tetrahedron can be improved
-    Full,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Seal {
-    /// In chunks, packed
-    Packed,
-    /// As the pages they are worked in: no time is taken to pack or unpack them, at six times the bytes
-    None,
-}
+const REGIONS: &[&str] = &[
+    "Regions that an odd number of shells separates from the outside: a shell in a shell is a hole",
+    "Every bounded region",
+    "Only the region directly behind the outermost shells",
+    "Regions behind triangles whose front side looks away from them",
+    "Regions with a seed (--region-seed, --seeds, or regions in the surface's files); where only holes are given, all others",
+];
+const OPTIMIZE: &[&str] = &[
+    "Nothing after the last vertex is inserted",
+    "Only changes that keep the mesh locally Delaunay",
+    "Until no badly shaped tetrahedron can be improved",
+];
+const SEAL: &[&str] = &[
+    "In chunks, packed",
+    "As the pages they are worked in: no time is taken to pack or unpack them, at six times the bytes",
+];
 
 /// Wanted edge lengths.
 #[derive(Clone, Debug, Default, PartialEq, clap::Args)]
@@ -85,7 +72,7 @@ pub struct ShapeArgs {
     #[arg(long, help_heading = "Sizes")]
     pub refine_surface: bool,
     /// Which regions to fill [default: parity; with seeds or holes: seeds]
-    #[arg(long, value_enum, help_heading = "Regions")]
+    #[arg(long, value_name = "RULE", value_parser = word_of::<Regions>(REGIONS), help_heading = "Regions")]
     pub regions: Option<Regions>,
     /// A point inside a region, and what it is called; may be repeated
     #[arg(long, value_name = "X,Y,Z[,NAME]", allow_hyphen_values = true, help_heading = "Regions")]
@@ -97,13 +84,13 @@ pub struct ShapeArgs {
     #[arg(long, value_name = "FILE", help_heading = "Regions")]
     pub seeds: Option<PathBuf>,
     /// How much to improve the shapes of tetrahedra [default: full]
-    #[arg(long, value_enum, help_heading = None)]
+    #[arg(long, value_name = "HOW", value_parser = word_of::<Optimize>(OPTIMIZE), help_heading = None)]
     pub optimize: Option<Optimize>,
     /// Do not keep coarse snapshots: the store is smaller, and `tetdb resaturate` cannot mesh its sub-domains again
     #[arg(long, help_heading = "Store")]
     pub drop_coarse: bool,
     /// How finished sub-domains are kept [default: packed]
-    #[arg(long, value_enum, help_heading = "Store")]
+    #[arg(long, value_name = "HOW", value_parser = word_of::<Seal>(SEAL), help_heading = "Store")]
     pub seal: Option<Seal>,
     /// Number of sub-domains: auto, or a number [default: auto, one up to 2 million tetrahedra, above one for each 5 million, of large meshes 10 million]
     #[arg(long, value_name = "N", alias = "domains", help_heading = "Store")]

@@ -2,19 +2,11 @@
 
 use std::path::PathBuf;
 
-use clap::ValueEnum;
+use tetdb_engine::api::ColorBy;
+
+use super::words::word_of;
 
 use super::run::ReadArgs;
-
-/// What colors stand for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum ColorBy {
-    Subdomain,
-    Region,
-    Quality,
-    Size,
-    Label,
-}
 
 /// A cut through the mesh by a plane, seen from the side its direction points to; or surfaces in space. Reads only what is seen.
 #[derive(Debug, clap::Args)]
@@ -53,7 +45,7 @@ pub struct SnapshotArgs {
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub from: Option<String>,
     /// What colors stand for: size is the mean of the longest and the shortest edge, label that of input triangles with --surface or --shell
-    #[arg(long, value_enum, default_value = "subdomain", value_name = "WHAT")]
+    #[arg(long, value_parser = word_of::<ColorBy>(&[]), default_value = "subdomain", value_name = "WHAT")]
     pub color: ColorBy,
     /// Draw only tetrahedra for which this holds, as in `tetdb query`
     #[arg(long = "where", value_name = "EXPRESSION", allow_hyphen_values = true)]

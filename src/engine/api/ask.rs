@@ -25,6 +25,7 @@ pub enum Order {
 /// A question: the tetrahedra that all of it holds of; without a condition, all there are.
 ///
 /// ```
+/// # use tetdb_engine::api as tetdb;
 /// # let dir = tempfile::tempdir()?;
 /// # let path = dir.path().join("box.tetdb");
 /// # let mut store = tetdb::Mesher::new(tetdb::Surface::sample("box,h=0.2")?).create(&path)?;

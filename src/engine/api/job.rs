@@ -9,7 +9,7 @@ use xxhash_rust::xxh3::Xxh3;
 use super::error::{Error, Remedy};
 use super::field_arrays::is_in_store;
 use super::surface::source;
-use crate::pipeline::{Options, RECIPE, recipe_of};
+use crate::pipeline::{MeshOptions, RECIPE, recipe_of};
 use tetdb_base::surface::{Seed, SeedKind};
 use tetdb_io::read::{FileSizes, read_sizes, size_files};
 use tetdb_kernel::boundary::RegionPolicy;
@@ -19,7 +19,7 @@ use tetdb_store::store::Catalog;
 
 /// The record of a run.
 #[doc(hidden)]
-pub fn job(options: &Options, surfaces: &[SurfaceSource]) -> Job {
+pub fn job(options: &MeshOptions, surfaces: &[SurfaceSource]) -> Job {
     Job {
         options: serde_json::to_string(options).unwrap_or_default(),
         surfaces: surfaces.to_vec(),
@@ -29,7 +29,7 @@ pub fn job(options: &Options, surfaces: &[SurfaceSource]) -> Job {
 
 /// The options a store was made with. Errors: `damaged`.
 #[doc(hidden)]
-pub fn options_of(job: &Job, store: &Path) -> Result<Options, Error> {
+pub fn options_of(job: &Job, store: &Path) -> Result<MeshOptions, Error> {
     serde_json::from_str(&job.options).map_err(|e| {
         Error::new(Code::Damaged, format!("the job's options cannot be read: {e}"))
             .at(store.display())
@@ -38,12 +38,11 @@ pub fn options_of(job: &Job, store: &Path) -> Result<Options, Error> {
 
 /// Whether a job would give the same mesh as these options and surfaces.
 #[doc(hidden)]
-pub fn is_same(job: &Job, options: &Options, surfaces: &[SurfaceSource]) -> bool {
-    let same = serde_json::from_str::<Options>(&job.options).is_ok_and(|mut o| {
+pub fn is_same(job: &Job, options: &MeshOptions, surfaces: &[SurfaceSource]) -> bool {
+    let same = serde_json::from_str::<MeshOptions>(&job.options).is_ok_and(|mut o| {
         // A store that kept more or less than asked for holds the same mesh.
         o.drop_coarse = options.drop_coarse;
-        o.seal.clone_from(&options.seal);
-        o.coarse_only = options.coarse_only;
+        o.seal = options.seal;
         o == *options
     });
     same && job.surfaces == surfaces
@@ -64,64 +63,59 @@ pub fn check_recipe(catalog: &mut Catalog) -> Result<(), Error> {
     .with_help("go on with the version of tetdb that began it, or mesh again"))
 }
 
-/// Notes in the options where the file of sizes is and what it holds.
+/// Completes the record of the file of sizes: its full path and the hash of its contents.
 #[doc(hidden)]
-pub fn identify_sizes(options: &mut Options) -> Result<(), Error> {
-    // What was given as arrays is identified already.
-    if options.size_field.as_deref().is_some_and(is_in_store) {
+pub fn identify_sizes(options: &mut MeshOptions) -> Result<(), Error> {
+    // Sizes from arrays have their hash already.
+    let Some(file) = options.size_field.as_mut().filter(|file| !is_in_store(&file.path)) else {
         return Ok(());
-    }
-    options.size_field_hash = None;
-    if let Some(file) = &options.size_field {
-        let path =
-            std::path::absolute(file).map_err(|e| Error::new(Code::UnreadableFile, e).at(file))?;
-        options.size_field_hash = Some(hash(&path)?);
-        options.size_field = Some(path.to_string_lossy().into_owned());
-    }
+    };
+    let path = std::path::absolute(&file.path)
+        .map_err(|e| Error::new(Code::UnreadableFile, e).at(&file.path))?;
+    file.hash = Some(hash(&path)?);
+    file.path = path.to_string_lossy().into_owned();
     Ok(())
 }
 
-/// Puts what the surface's files say of regions into the options, so that the record is complete: under the rule `seeds` as if it was asked
-/// for; names alone under any other rule.
+/// Adds the seeds of the surface's files to the options, so that the record is complete. Under the rule `seeds` they count like
+/// seeds of the user; under any other rule only their names are taken.
 #[doc(hidden)]
-pub fn take_seeds(options: &mut Options, seeds: &[Seed]) {
-    let is_rule = options.region_policy() == Some(RegionPolicy::Seeds);
+pub fn take_seeds(options: &mut MeshOptions, seeds: &[Seed]) {
+    let is_rule = options.regions.policy == RegionPolicy::Seeds;
     for seed in seeds {
         let list = match (is_rule, &seed.kind) {
-            (true, SeedKind::Hole) => &mut options.hole,
-            (true, SeedKind::Region(_)) => &mut options.region_seed,
-            (false, SeedKind::Region(Some(_))) => &mut options.region_name,
+            (true, _) => &mut options.regions.seeds,
+            (false, SeedKind::Region(Some(_))) => &mut options.regions.names,
             (false, _) => continue,
         };
-        let text = seed.to_string();
-        if !list.contains(&text) {
-            list.push(text);
+        if !list.contains(seed) {
+            list.push(seed.clone());
         }
     }
 }
 
-/// Reads the sizes of identified options, in at most half of what may be held; those that were given as arrays from `store`.
+/// Reads the sizes of identified options into at most half of `cap`; sizes that were given as arrays are in `store`.
 ///
-/// Errors: `size-field-changed` when the files are not what they were.
+/// Errors: `size-field-changed` if the files have other contents than on record.
 #[doc(hidden)]
 pub fn read_background(
-    options: &Options,
+    options: &MeshOptions,
     store: &Path,
     cap: u64,
 ) -> Result<Option<Background>, Error> {
     let Some(file) = &options.size_field else {
         return Ok(None);
     };
-    let path = &match is_in_store(file) {
-        true => store.join(file.trim_start_matches("store:")),
-        false => PathBuf::from(file),
+    let path = &match is_in_store(&file.path) {
+        true => store.join(file.path.trim_start_matches("store:")),
+        false => PathBuf::from(&file.path),
     };
-    if options.size_field_hash != Some(hash(path)?) {
+    if file.hash != Some(hash(path)?) {
         return Err(Error::new(
             Code::SizeFieldChanged,
             "the sizes are not those the store was begun with",
         )
-        .at(file)
+        .at(&file.path)
         .with_help("put the old files back, or mesh again")
         .with_remedy(Remedy::General));
     }

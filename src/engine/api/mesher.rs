@@ -13,7 +13,7 @@ use super::{
     Bytes, Error, Event, Optimize, Regions, Seal, Settings, Sizes, Store, Subdomains, Surface,
     Verification, guarded, job, replace, verify,
 };
-use crate::pipeline::{self, Estimate, Options, Prepared, RECIPE};
+use crate::pipeline::{self, Estimate, MeshOptions, Options, PipelineError, Prepared, RECIPE};
 use tetdb_base::geom::Point;
 use tetdb_base::storage::{Budget, CancelToken, attempt, n_threads};
 use tetdb_base::surface::{self, Seed, SeedKind};
@@ -37,6 +37,7 @@ pub enum Existing {
 /// Meshes a surface into a new store: validated, refused before anything is written, on record, resumable, verified.
 ///
 /// ```
+/// # use tetdb_engine::api as tetdb;
 /// # let dir = tempfile::tempdir()?;
 /// # let path = dir.path().join("box.tetdb");
 /// use tetdb::{Length, Mesher, Sizes, Surface};
@@ -50,8 +51,8 @@ pub enum Existing {
 #[derive(Clone, Debug)]
 pub struct Mesher {
     surface: Surface,
+    sizes: Sizes,
     options: Options,
-    field: Option<Arc<FieldArrays>>,
     settings: Settings,
     existing: Existing,
     preflight: bool,
@@ -90,20 +91,15 @@ pub struct Created {
 impl Mesher {
     /// With the sizes of the surface's own edges and all other defaults.
     pub fn new(surface: Surface) -> Self {
-        let options = Options {
-            regions: Some(Regions::default().word().to_owned()),
-            optimize: Some(Optimize::default().word().to_owned()),
-            ..Options::default()
-        };
-        Self::of_options(surface, options)
+        Self::with_options(surface, MeshOptions::default())
     }
 
     #[doc(hidden)]
-    pub fn of_options(surface: Surface, options: Options) -> Self {
+    pub fn with_options(surface: Surface, mesh: MeshOptions) -> Self {
         Self {
             surface,
-            options,
-            field: None,
+            sizes: (mesh.sizes.clone(), mesh.size_field.clone()).into(),
+            options: mesh.into(),
             settings: Settings::new(),
             existing: Existing::default(),
             preflight: true,
@@ -113,24 +109,13 @@ impl Mesher {
 
     /// Wanted edge lengths.
     pub fn sizes(mut self, sizes: Sizes) -> Self {
-        let old = std::mem::replace(&mut self.options, sizes.options);
-        self.field = sizes.field;
-        self.options.regions = old.regions;
-        self.options.optimize = old.optimize;
-        self.options.subdomains = old.subdomains;
-        self.options.seal = old.seal;
-        self.options.drop_coarse = old.drop_coarse;
-        self.options.keep_stages = old.keep_stages;
-        self.options.coarse_only = old.coarse_only;
-        self.options.region_seed = old.region_seed;
-        self.options.hole = old.hole;
-        self.options.refine_surface = old.refine_surface;
+        self.sizes = sizes;
         self
     }
 
     /// Which regions are filled.
     pub fn regions(mut self, regions: Regions) -> Self {
-        self.options.regions = Some(regions.word().to_owned());
+        self.options.mesh.regions.policy = regions;
         self
     }
 
@@ -141,47 +126,44 @@ impl Mesher {
     pub fn region_seed(mut self, point: [f64; 3], name: Option<&str>) -> Self {
         let kind = SeedKind::Region(name.map(str::to_owned));
         let point = Point::from_array(point);
-        self.options.region_seed.push(Seed { point, kind }.to_string());
+        self.options.mesh.regions.seeds.push(Seed { point, kind });
         self
     }
 
     /// The region around `point` stays empty, whatever the rule; may be repeated.
     pub fn hole(mut self, point: [f64; 3]) -> Self {
         let (point, kind) = (Point::from_array(point), SeedKind::Hole);
-        self.options.hole.push(Seed { point, kind }.to_string());
+        self.options.mesh.regions.seeds.push(Seed { point, kind });
         self
     }
 
     /// Into how many sub-domains the mesh is divided.
     pub fn subdomains(mut self, n: Subdomains) -> Self {
-        self.options.subdomains = match n {
-            Subdomains::Auto => None,
-            Subdomains::Exactly(n) => Some(n.to_string()),
-        };
+        self.options.mesh.subdomains = n;
         self
     }
 
     /// How far tetrahedra are improved.
     pub fn optimize(mut self, optimize: Optimize) -> Self {
-        self.options.optimize = Some(optimize.word().to_owned());
+        self.options.mesh.optimize = optimize;
         self
     }
 
     /// How finished sub-domains are kept.
     pub fn seal(mut self, seal: Seal) -> Self {
-        self.options.seal = (seal != Seal::default()).then(|| seal.word().to_owned());
+        self.options.mesh.seal = seal;
         self
     }
 
     /// Whether what sub-domains are meshed from is kept, so that they can be meshed again. Default: it is.
     pub fn keep_coarse(mut self, keep: bool) -> Self {
-        self.options.drop_coarse = !keep;
+        self.options.mesh.drop_coarse = !keep;
         self
     }
 
     /// Whether meshes on the way (before each cut, with its zone refined) are kept to be looked at. Default: they are not.
     pub fn keep_stages(mut self, keep: bool) -> Self {
-        self.options.keep_stages = keep;
+        self.options.mesh.keep_stages = keep;
         self
     }
 
@@ -190,13 +172,13 @@ impl Mesher {
     ///
     /// No point of the surface moves. The store keeps a copy of the divided surface, and the mesh is verified against that.
     pub fn refine_surface(mut self, refine: bool) -> Self {
-        self.options.refine_surface = refine;
+        self.options.mesh.refine_surface = refine;
         self
     }
 
     /// Whether the run ends with the coarse mesh, and leaves the rest to [`Tasks`](super::Tasks) or [`Store::resume`]. Default: it does not.
     pub fn coarse_only(mut self, coarse_only: bool) -> Self {
-        self.options.coarse_only = coarse_only;
+        self.options.run.coarse_only = coarse_only;
         self
     }
 
@@ -249,18 +231,35 @@ impl Mesher {
         self
     }
 
+    /// The options as they go on record: with sizes checked and the seeds of the surface's files. Errors: values without a meaning.
+    fn complete_options(&self) -> Result<Options, Error> {
+        let mut options = self.options.clone();
+        let mesh = &mut options.mesh;
+        mesh.sizes = self.sizes.options()?;
+        mesh.size_field.clone_from(&self.sizes.file);
+        if mesh.subdomains == Subdomains::Exactly(0) {
+            let value = "0".to_owned();
+            return Err(PipelineError::Option { option: "subdomains", value }.into());
+        }
+        if let Some(seed) = mesh.regions.seeds.iter().find(|seed| !seed.point.is_finite()) {
+            let option = if seed.kind == SeedKind::Hole { "hole" } else { "region_seed" };
+            return Err(PipelineError::BadSeed { option, found: seed.to_string() }.into());
+        }
+        job::identify_sizes(mesh)?;
+        job::take_seeds(mesh, &self.surface.inner.seeds);
+        Ok(options)
+    }
+
     /// What to expect of the mesh; nothing is written. Errors: sizes that make no sense, a surface with defects.
     pub fn predict(&self) -> Result<Prediction, Error> {
         guarded(&self.settings, || {
             let cap = self.settings.cap()?;
-            let mut options = self.options.clone();
-            job::identify_sizes(&mut options)?;
-            job::take_seeds(&mut options, &self.surface.inner.seeds);
-            let (here, field) = (Path::new("."), self.field.as_deref());
+            let options = self.complete_options()?;
+            let (here, field) = (Path::new("."), self.sizes.field.as_deref());
             let mut surface = Cow::Borrowed(&self.surface);
             let scratch = scratch_beside(&surface.inner, cap, here)?;
             attempt(|| surface::validate_in(&surface.inner, &scratch))?.accept()?;
-            if options.refine_surface {
+            if options.mesh.refine_surface {
                 divide(surface.to_mut(), &options, field, cap, here, &self.settings)?;
             }
             let prepared = predict_with(&surface.inner, &options, field, cap, here)?;
@@ -291,19 +290,15 @@ impl Mesher {
     }
 
     fn run(&mut self, path: &Path, settings: &Settings) -> Result<Created, Error> {
-        self.options.sizes()?;
-        self.options.subdomain_count()?;
-        if self.options.coarse_only && self.existing == Existing::Replace {
+        self.options = self.complete_options()?;
+        if self.options.run.coarse_only && self.existing == Existing::Replace {
             let message = "a store is not replaced by one that stays unfinished";
             return Err(Error::new(Code::Usage, message).with_help("choose another path"));
         }
-        job::identify_sizes(&mut self.options)?;
-        job::take_seeds(&mut self.options, &self.surface.inner.seeds);
-        self.options.region_rule()?;
-        self.options.hands = settings.hands.clone();
+        self.options.run.hands = settings.hands.clone();
         let cap = settings.cap()?;
         replace::settle(path, settings)?;
-        if self.options.refine_surface {
+        if self.options.mesh.refine_surface {
             self.divide_surface(path, cap, settings)?;
         }
         if self.is_there(path)? {
@@ -321,7 +316,7 @@ impl Mesher {
             other => other?,
         };
         report(&summary, settings);
-        if self.verify && !self.options.coarse_only {
+        if self.verify && !self.options.run.coarse_only {
             let surface = match self.surface.n_triangles() {
                 0 => None,
                 _ => Some(&self.surface.inner),
@@ -366,7 +361,7 @@ impl Mesher {
         match self.existing {
             Existing::Replace => Ok(false),
             _ if !state.is_finished() => Err(StoreError::Unfinished { path }.into()),
-            _ if job::is_same(&job, &self.options, &self.surface.sources) => Ok(true),
+            _ if job::is_same(&job, &self.options.mesh, &self.surface.sources) => Ok(true),
             _ => Err(StoreError::Finished { path }.into()),
         }
     }
@@ -375,7 +370,7 @@ impl Mesher {
     fn divide_surface(&mut self, path: &Path, cap: u64, settings: &Settings) -> Result<(), Error> {
         let scratch = scratch_beside(&self.surface.inner, cap, path)?;
         attempt(|| surface::validate_in(&self.surface.inner, &scratch))?.accept()?;
-        let field = self.field.as_deref();
+        let field = self.sizes.field.as_deref();
         divide(&mut self.surface, &self.options, field, cap, path, settings)
     }
 
@@ -403,7 +398,7 @@ impl Mesher {
                 clock.elapsed().as_secs_f64()
             ));
             settings.note(format!("memory: {}", settings.cap_in_words()));
-            let field = self.field.as_deref();
+            let field = self.sizes.field.as_deref();
             let prepared = predict_with(surface, &self.options, field, left, path)?;
             for note in &prepared.notes {
                 settings.note(format!("note: {note}"));
@@ -468,7 +463,7 @@ impl Mesher {
         replaces: bool,
         settings: &Settings,
     ) -> Result<Catalog, Error> {
-        let job = job::job(&self.options, &self.surface.sources);
+        let job = job::job(&self.options.mesh, &self.surface.sources);
         let is_same = |begun: &mut Catalog| {
             begun.job().is_ok_and(|begun| begun == job)
                 && pipeline::recipe_of(begun).is_ok_and(|recipe| recipe == RECIPE)
@@ -479,7 +474,7 @@ impl Mesher {
         }
         let catalog = Catalog::create_with(place, &job, pipeline::record_recipe)?;
         self.surface.keep_in(place)?;
-        if let Some(field) = &self.field {
+        if let Some(field) = &self.sizes.field {
             field.keep_in(place)?;
         }
         Ok(catalog)
@@ -514,7 +509,7 @@ pub fn divide(
 ) -> Result<(), Error> {
     let before = surface.n_triangles();
     let diagonal = surface.inner.bounds().diagonal();
-    let wanted = options.sizes()?.hsiz;
+    let wanted = options.mesh.sizes.hsiz;
     let wanted = wanted.map_or(f64::INFINITY, |length| length.resolve(diagonal));
     let sizes = predict_with(&surface.inner, options, field, cap, store)?.field;
     let scratch = scratch_beside(&surface.inner, cap, store)?;
@@ -547,7 +542,7 @@ fn predict_with(
 ) -> Result<Prepared, Error> {
     let background = match field {
         Some(field) => Some(field.background(cap)?),
-        None => job::read_background(options, store, cap)?,
+        None => job::read_background(&options.mesh, store, cap)?,
     };
     let scratch = scratch_beside(surface, cap, store)?;
     Ok(pipeline::prepare(surface, options, background.as_ref(), &scratch)?)

@@ -67,14 +67,14 @@ pub use memory::show_bytes;
 pub use mesher::{Existing, Mesher, Prediction};
 #[doc(hidden)]
 pub use mesher::{divide, predict};
-pub use options::{Optimize, Regions, Seal, Subdomains};
+pub use options::{Length, Optimize, Regions, Seal, Subdomains};
 pub use picture::{ColorBy, Snapped, Snapshot};
 pub use remesh::{Remesh, Remeshed};
 #[doc(hidden)]
 pub use resume::resume_reported;
 pub use settings::{Event, Settings};
 pub use show::{ExportOptions, Exported};
-pub use sizes::{Length, Sizes};
+pub use sizes::Sizes;
 pub use store::{Store, Summary};
 pub use surface::{CheckReport, Surface};
 pub use tasks::Tasks;

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 use tetdb_schema::code::Code;
+use tetdb_schema::word::Word;
 
 use super::ask::condition_of;
 use super::store::open_finished;
@@ -39,6 +40,16 @@ pub enum ColorBy {
     Size,
     /// The label of input triangles, in space; tetrahedra are gray.
     Label,
+}
+
+impl Word for ColorBy {
+    const WORDS: &'static [(Self, &'static str)] = &[
+        (Self::Subdomain, "subdomain"),
+        (Self::Region, "region"),
+        (Self::Quality, "quality"),
+        (Self::Size, "size"),
+        (Self::Label, "label"),
+    ];
 }
 
 /// What is drawn.

@@ -11,8 +11,11 @@ use super::mesher::predict;
 use super::preflight::scratch_beside;
 use super::store::{open_finished, open_to_change};
 use super::{Error, Settings, Sizes, Store, Surface, guarded, job, verify};
-use crate::pipeline::{self, NewSizes, Options, RECIPE, ResaturateSummary, Resaturation, Values};
-use tetdb_kernel::sizing::SizeField;
+use crate::pipeline::{
+    self, MeshOptions, NewSizes, Options, OptionsText, RECIPE, ResaturateSummary, Resaturation,
+    SizeFile, Values,
+};
+use tetdb_kernel::sizing::{SizeField, SizeOptions};
 use tetdb_schema::catalog::SubdomainRow;
 use tetdb_store::audit::Level;
 use tetdb_store::store::{Catalog, StoreError, WriterLock};
@@ -20,6 +23,7 @@ use tetdb_store::store::{Catalog, StoreError, WriterLock};
 /// What is to be meshed again, and how; begun by [`Store::remesh`].
 ///
 /// ```
+/// # use tetdb_engine::api as tetdb;
 /// # let dir = tempfile::tempdir()?;
 /// # let path = dir.path().join("box.tetdb");
 /// # let store = tetdb::Mesher::new(tetdb::Surface::sample("box,h=0.25")?).create(&path)?;
@@ -188,7 +192,7 @@ impl Remesh {
             None => open_to_change(&self.path, &self.settings)?,
         };
         let lock = open.lock().expect("it is open for writing");
-        let options = job::options_of(&open.job()?, &self.path)?;
+        let options = Options::from(job::options_of(&open.job()?, &self.path)?);
         let ranks = match self.repair && self.ranks.is_empty() {
             true => damaged(&mut open)?,
             false => self.ranks.clone(),
@@ -220,8 +224,9 @@ impl Remesh {
             return Err(Error::new(Code::Usage, message)
                 .with_help("give a length for each tetrahedron or vertex instead"));
         }
+        let sizes = given.map(|given| Ok::<_, Error>((given.options()?, given.file)));
         let asked = AskedSizes {
-            options: given.map(|given| given.options),
+            sizes: sizes.transpose()?,
             values: self.lengths.clone(),
             file: None,
             factor: self.factor,
@@ -236,7 +241,7 @@ impl Remesh {
 #[doc(hidden)]
 pub struct AskedSizes {
     /// Sizes beside those on record.
-    pub options: Option<Options>,
+    pub sizes: Option<(SizeOptions, Option<SizeFile>)>,
     /// Lengths one by one: of the options only the gradation counts beside them.
     pub values: Option<Values>,
     /// Where those were read from.
@@ -257,20 +262,25 @@ impl AskedSizes {
         options: &Options,
         settings: &Settings,
     ) -> Result<NewSizes, Error> {
-        let mut asked = self.options.clone().unwrap_or_default();
-        let beta = match &asked.hgrad {
-            Some(_) => asked.sizes()?.beta(),
-            None => options.sizes()?.beta(),
+        let (sizes, file) = self.sizes.clone().unwrap_or_default();
+        let beta = match sizes.hgrad {
+            Some(_) => sizes.beta(),
+            None => options.mesh.sizes.beta(),
         };
-        let field = match (&self.options, &self.values) {
+        let mut asked = MeshOptions { sizes, size_field: file, ..MeshOptions::default() };
+        let field = match (&self.sizes, &self.values) {
             (Some(_), None) => {
                 job::identify_sizes(&mut asked)?;
                 let mut all = options.clone();
-                all.add_sizes(&asked);
+                all.mesh.sizes.add(&asked.sizes);
+                if asked.size_field.is_some() {
+                    all.mesh.size_field.clone_from(&asked.size_field);
+                }
                 Some(field_of_surface(open, &all, settings)?)
             }
             _ => None,
         };
+        let mut asked = OptionsText::from_sizes(&asked.sizes, asked.size_field.as_ref());
         asked.size_field = self.file.or(asked.size_field);
         let asked = serde_json::to_value(&asked).unwrap_or_default();
         Ok(NewSizes {

@@ -64,8 +64,8 @@ fn run(path: &Path, settings: &Settings, verify: bool) -> Result<Created, Error>
             None
         }
         false => {
-            let mut options = job::options_of(&job, &place)?;
-            options.hands = settings.hands.clone();
+            let mut options = pipeline::Options::from(job::options_of(&job, &place)?);
+            options.run.hands = settings.hands.clone();
             let catalog = Catalog::open_locked(&place, lock.clone())?;
             Some(go_on(catalog, &options, &mut surface, cap, settings)?)
         }

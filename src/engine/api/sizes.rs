@@ -1,61 +1,23 @@
 //! Wanted edge lengths.
 
-use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
 
 use super::Error;
 use super::field_arrays::{FieldArrays, IN_STORE};
-use crate::pipeline::Options;
-
-/// A length in the units of the surface, or a share of its box diagonal.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Length {
-    /// In the units of the surface.
-    Units(f64),
-    /// A share of the diagonal of the surface's box: 0.01 is one percent.
-    ShareOfDiagonal(f64),
-    /// The same in percent, on record as it is given.
-    Percent(f64),
-}
-
-impl Length {
-    /// A length in the units of the surface.
-    pub const fn units(length: f64) -> Self {
-        Self::Units(length)
-    }
-
-    /// A share of the diagonal of the surface's box: 0.01 is one percent.
-    pub const fn share_of_diagonal(share: f64) -> Self {
-        Self::ShareOfDiagonal(share)
-    }
-
-    /// A share of the diagonal of the surface's box in percent.
-    pub const fn percent(percent: f64) -> Self {
-        Self::Percent(percent)
-    }
-}
-
-impl fmt::Display for Length {
-    /// As it is put on record.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Units(length) => write!(f, "{length}"),
-            Self::ShareOfDiagonal(share) => write!(f, "{}%", 100.0 * share),
-            Self::Percent(percent) => write!(f, "{percent}%"),
-        }
-    }
-}
+use crate::pipeline::SizeFile;
+use tetdb_base::geom::Point;
+use tetdb_kernel::sizing::{Formula, Length, RegionSize, Shape, SizeOptions, SizeSource};
 
 /// Wanted edge lengths: those of the surface's own edges, and where something else is said here, the least of all.
 ///
 /// Values without a meaning are refused when the mesh is begun.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sizes {
-    #[doc(hidden)]
-    pub options: Options,
-    #[doc(hidden)]
-    pub field: Option<Arc<FieldArrays>>,
+    sizes: SizeOptions,
+    expression: Option<String>,
+    pub(super) file: Option<SizeFile>,
+    pub(super) field: Option<Arc<FieldArrays>>,
 }
 
 impl Sizes {
@@ -67,83 +29,75 @@ impl Sizes {
     /// `h` inside, joined to the surface's edges by the gradation.
     pub fn interior(h: Length) -> Self {
         let mut sizes = Self::default();
-        sizes.options.hsiz = Some(h.to_string());
+        sizes.sizes.hsiz = Some(h);
         sizes
     }
 
     /// No length below `h` away from the surface.
     pub fn at_least(mut self, h: Length) -> Self {
-        self.options.hmin = Some(h.to_string());
+        self.sizes.hmin = Some(h);
         self
     }
 
     /// No length above `h`.
     pub fn at_most(mut self, h: Length) -> Self {
-        self.options.hmax = Some(h.to_string());
+        self.sizes.hmax = Some(h);
         self
     }
 
     /// The ratio of neighboring edge lengths at most, above 1. Default: 1.3.
     pub fn gradation(mut self, ratio: f64) -> Self {
-        self.options.hgrad = Some(ratio.to_string());
+        self.sizes.hgrad = Some(ratio);
         self
     }
 
     /// `h` in the box between two corners; outside of it lengths grow, or are `outside` at most.
-    pub fn in_box(
-        mut self,
-        low: [f64; 3],
-        high: [f64; 3],
-        h: Length,
-        outside: Option<Length>,
-    ) -> Self {
-        let numbers = [low, high].concat();
-        self.options.size_box.push(list(&numbers, h, outside));
-        self
+    pub fn in_box(self, low: [f64; 3], high: [f64; 3], h: Length, outside: Option<Length>) -> Self {
+        let [p, q] = [low, high].map(Point::from_array);
+        self.with_shape(Shape::Box { low: p.min(q), high: p.max(q) }, h, outside)
     }
 
     /// `h` in a ball; outside of it lengths grow, or are `outside` at most.
     pub fn in_sphere(
-        mut self,
+        self,
         center: [f64; 3],
         radius: f64,
         h: Length,
         outside: Option<Length>,
     ) -> Self {
-        let numbers = [&center[..], &[radius]].concat();
-        self.options.size_sphere.push(list(&numbers, h, outside));
-        self
+        let center = Point::from_array(center);
+        self.with_shape(Shape::Sphere { center, radius }, h, outside)
     }
 
     /// `h` in a cylinder around the axis from `a` to `b`; outside of it lengths grow, or are `outside` at most.
     pub fn in_cylinder(
-        mut self,
+        self,
         a: [f64; 3],
         b: [f64; 3],
         radius: f64,
         h: Length,
         outside: Option<Length>,
     ) -> Self {
-        let numbers = [&a[..], &b[..], &[radius]].concat();
-        self.options.size_cylinder.push(list(&numbers, h, outside));
-        self
+        let ends = [a, b].map(Point::from_array);
+        self.with_shape(Shape::Cylinder { ends, radius }, h, outside)
     }
 
     /// `h` at most in a region, named by its number or by a label on it.
     pub fn in_region(mut self, region_or_label: &str, h: Length) -> Self {
-        self.options.size_region.push(format!("{region_or_label},{h}"));
+        self.sizes.regions.push(RegionSize { which: region_or_label.trim().to_owned(), h });
         self
     }
 
     /// A length as an expression in x, y and z, such as `0.06 + 0.1*abs(z)`.
     pub fn expression(mut self, text: &str) -> Self {
-        self.options.size_expr = Some(text.to_owned());
+        self.expression = Some(text.to_owned());
         self
     }
 
     /// Lengths at the vertices of a background mesh: a MEDIT `.sol` with its `.mesh` beside it.
     pub fn field(mut self, file: impl AsRef<Path>) -> Self {
-        self.options.size_field = Some(file.as_ref().to_string_lossy().into_owned());
+        let path = file.as_ref().to_string_lossy().into_owned();
+        self.file = Some(SizeFile { path, hash: None });
         self.field = None;
         self
     }
@@ -159,34 +113,67 @@ impl Sizes {
         lengths: &[f64],
     ) -> Result<Self, Error> {
         let field = FieldArrays::new(points, tets, lengths)?;
-        self.options.size_field = Some(IN_STORE.to_owned());
-        self.options.size_field_hash = Some(field.hash());
+        self.file = Some(SizeFile { path: IN_STORE.to_owned(), hash: Some(field.hash()) });
         self.field = Some(Arc::new(field));
         Ok(self)
     }
+
+    fn with_shape(mut self, shape: Shape, inside: Length, outside: Option<Length>) -> Self {
+        self.sizes.sources.push(SizeSource { shape, inside, outside });
+        self
+    }
+
+    /// The sizes without those of files and arrays. Errors: values without a meaning.
+    pub(super) fn options(&self) -> Result<SizeOptions, Error> {
+        let formula = self.expression.as_deref().map(Formula::parse).transpose()?;
+        let sizes =
+            SizeOptions { formula: formula.or(self.sizes.formula.clone()), ..self.sizes.clone() };
+        sizes.check()?;
+        Ok(sizes)
+    }
 }
 
-fn list(numbers: &[f64], h: Length, outside: Option<Length>) -> String {
-    let mut words: Vec<String> = numbers.iter().map(f64::to_string).collect();
-    words.push(h.to_string());
-    words.extend(outside.map(|h| h.to_string()));
-    words.join(",")
+impl From<(SizeOptions, Option<SizeFile>)> for Sizes {
+    fn from((sizes, file): (SizeOptions, Option<SizeFile>)) -> Self {
+        Self { sizes, expression: None, file, field: None }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pipeline::OptionsText;
 
     #[test]
-    fn what_is_typed_in_code_means_what_is_typed_in_a_shell() {
+    fn values_on_record_mean_what_they_mean_in_code() {
         let sizes = Sizes::interior(Length::share_of_diagonal(0.02))
             .gradation(1.4)
             .in_sphere([0.5, -1e-7, 0.0], 0.1, Length::units(0.01), None)
-            .in_region("rock", Length::units(0.25));
-        let options = sizes.options;
-        assert_eq!(options.hsiz.as_deref(), Some("2%"));
-        assert_eq!(options.size_sphere, ["0.5,-0.0000001,0,0.1,0.01"]);
-        assert_eq!(options.size_region, ["rock,0.25"]);
-        assert!(options.sizes().is_ok());
+            .in_box([0.0; 3], [1.0, 2.0, 3.0], Length::percent(1.0), Some(Length::units(0.3)))
+            .in_cylinder([0.0; 3], [1.0; 3], 0.25, Length::units(0.1), None)
+            .expression("x + 1")
+            .in_region("rock, wet", Length::units(0.25));
+        let options = sizes.options().expect("good sizes");
+        let text = OptionsText::from_sizes(&options, None);
+        assert_eq!(text.hsiz.as_deref(), Some("2%"));
+        assert_eq!(text.size_sphere, ["0.5,-0.0000001,0,0.1,0.01"]);
+        assert_eq!(text.size_region, ["rock, wet,0.25"]);
+        assert_eq!(text.sizes(), Ok(options));
+        for bad in [f64::NAN, 0.0, -1.0, f64::INFINITY] {
+            let bad = Length::units(bad);
+            let inside = |h| Sizes::default().in_sphere([0.0; 3], 1.0, h, None);
+            for sizes in [Sizes::interior(bad), inside(bad), Sizes::default().in_region("1", bad)] {
+                assert_eq!(
+                    sizes.options().map_err(|e| e.code()).err(),
+                    Some("bad-size".parse().expect("a code"))
+                );
+            }
+        }
+        assert!(
+            Sizes::default()
+                .in_sphere([f64::NAN; 3], 1.0, Length::units(0.1), None)
+                .options()
+                .is_err()
+        );
     }
 }

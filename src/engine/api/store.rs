@@ -20,6 +20,7 @@ const SUBDOMAIN_BYTES: usize = 16 << 20;
 /// opened in, or with the error `store-changed` where files of that state are gone.
 ///
 /// ```
+/// # use tetdb_engine::api as tetdb;
 /// # let dir = tempfile::tempdir()?;
 /// # let path = dir.path().join("box.tetdb");
 /// # tetdb::Mesher::new(tetdb::Surface::sample("box,h=0.5")?).create(&path)?;

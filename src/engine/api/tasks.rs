@@ -20,6 +20,7 @@ const WAIT: Duration = Duration::from_secs(60);
 /// process.
 ///
 /// ```
+/// # use tetdb_engine::api as tetdb;
 /// # let dir = tempfile::tempdir()?;
 /// # let path = dir.path().join("box.tetdb");
 /// use tetdb::{Mesher, Store, Surface, Tasks};

@@ -27,8 +27,8 @@ pub use error::PipelineError;
 pub use mesh::coarse_mesh;
 pub use mesh::{CoarseReport, HeadStart, Summary, ahead, mesh, mesh_prepared};
 pub use plan::{
-    Estimate, MEMORY_MIN, Options, Plan, Prepared, RECIPE, Trial, least_for, prepare, recipe_of,
-    record_recipe,
+    Estimate, MEMORY_MIN, MeshOptions, Options, OptionsText, Plan, Prepared, RECIPE, RunOptions,
+    SizeFile, Subdomains, Trial, least_for, prepare, recipe_of, record_recipe,
 };
 pub use progress::silent;
 pub use progress::{Event, Watcher};

@@ -4,23 +4,35 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use super::error::BoundaryError;
 use tetdb_base::surface::Wall;
+use tetdb_schema::word::Word;
 
 /// How pairs of volumes meet, the lower-numbered one first.
 pub type Walls = BTreeMap<(u32, u32), Wall>;
 
-/// Which bounded volumes get tetrahedra.
-#[derive(Clone, Debug, PartialEq)]
+/// Which regions that the surface encloses are filled with tetrahedra.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum RegionPolicy {
-    /// What an odd number of shells separates from the outside; all where that is contradictory.
+    /// Regions that an odd number of shells separates from the outside; all regions where shells contradict each other.
+    #[default]
     Parity,
-    /// Every bounded volume.
+    /// Every bounded region.
     All,
-    /// What lies directly behind the outside.
+    /// Regions that touch the outer shells from inside.
     Outer,
-    /// What the normals point out of.
+    /// Regions behind triangles whose front side looks away from them.
     ByOrientation,
-    /// The volumes of seeds; where only holes are given, all others.
+    /// Regions with a seed; where only holes are given, all others.
     Seeds,
+}
+
+impl Word for RegionPolicy {
+    const WORDS: &'static [(Self, &'static str)] = &[
+        (Self::Parity, "parity"),
+        (Self::All, "all"),
+        (Self::Outer, "outer"),
+        (Self::ByOrientation, "by-orientation"),
+        (Self::Seeds, "seeds"),
+    ];
 }
 
 /// The volumes a policy chooses.

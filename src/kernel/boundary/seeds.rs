@@ -7,14 +7,14 @@ use super::policy::{Filled, RegionPolicy};
 use tetdb_base::geom::Point;
 use tetdb_base::surface::{Seed, SeedKind};
 
-/// Which regions are filled, and what they are called.
-#[derive(Clone, Debug, PartialEq)]
+/// Which regions are filled, and their names.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct RegionRule {
-    /// What fills them.
+    /// The rule without seeds.
     pub policy: RegionPolicy,
-    /// What was asked for: each must lie in a volume it can say something of.
+    /// Seeds of the user. Each must lie in a region that it can fill, name or empty.
     pub seeds: Vec<Seed>,
-    /// What the surface's files say: names of what is filled, passed over where they fit nothing.
+    /// Named seeds of the surface's files; those that lie in no filled region are ignored.
     pub names: Vec<Seed>,
 }
 

@@ -8,17 +8,23 @@ use super::pages::{PageFlags, Way, clear_marks};
 use super::rounds::Rounds;
 use crate::mesh::{Mesh, dense, sparse};
 use tetdb_base::storage::Pages;
+use tetdb_schema::word::Word;
 
-/// How far to go.
+/// How far tetrahedra are improved.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mode {
-    /// Only restore local Delaunay by flips.
+    /// Only flips that restore the constrained Delaunay mesh.
     None,
-    /// Move free vertices too, and restore: still Delaunay wherever no constraint forbids.
+    /// Free vertices move too. The mesh stays Delaunay wherever no constraint forbids it.
     Delaunay,
-    /// Then raise the worst qualities, at the price of about one face in a hundred that is not locally Delaunay.
+    /// The worst qualities are raised as well, at the price of about one face in a hundred that is not locally Delaunay.
     #[default]
     Full,
+}
+
+impl Word for Mode {
+    const WORDS: &'static [(Self, &'static str)] =
+        &[(Self::None, "none"), (Self::Delaunay, "delaunay"), (Self::Full, "full")];
 }
 
 /// Sweeps of smoothing end when no greater share of the vertices moves by more than a fiftieth of a length. A box is at rest after three,

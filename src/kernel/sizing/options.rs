@@ -1,4 +1,6 @@
-//! What the user asks of sizes.
+//! Wanted sizes, as asked for.
+
+use std::fmt;
 
 use super::SizingError;
 use super::closed::slope_of_gradation;
@@ -16,7 +18,7 @@ pub struct RegionSize {
 }
 
 impl RegionSize {
-    /// Reads `REGION_OR_LABEL,H`; a label may hold commas.
+    /// Parses `REGION_OR_LABEL,H`; a label may have commas.
     ///
     /// # Errors
     /// Names the option and the value.
@@ -31,8 +33,22 @@ impl RegionSize {
     }
 }
 
+impl fmt::Display for RegionSize {
+    /// As [`RegionSize::parse`] reads it.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{},{}", self.which, self.h)
+    }
+}
+
+/// Ratio of the lengths of two edges that follow each other, where none is asked for: slope 0.262. At 1.1 meshes of solids have
+/// three times as many tetrahedra as the surface needs; at 2 neighbors differ so much that their quality suffers.
+const GRADATION: f64 = 1.3;
+/// The same next to needles, where quality is lost anyway. With 1.3 a lever of a CAD program takes 31,000 tetrahedra instead of 2,900
+/// and more bad ones; with 2 everywhere even scans lose up to a quarter of theirs.
+const GRADATION_NEEDLES: f64 = 2.0;
+
 /// Wanted sizes. By default they come from the surface's own edges.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct SizeOptions {
     /// One size for the whole interior, joined to the surface's edges by the gradation.
     pub hsiz: Option<Length>,
@@ -40,36 +56,15 @@ pub struct SizeOptions {
     pub hmin: Option<Length>,
     /// Largest size of the interior.
     pub hmax: Option<Length>,
-    /// Largest ratio of the lengths of two edges that follow each other. The field's slope is at
-    /// most `beta = ln(hgrad)`: in a field of that slope, steps of one h grow by `exp(beta)` each.
-    pub hgrad: f64,
-    /// The same where the surface has needles; no less than `hgrad`, and just that where the user asks for one.
-    pub hgrad_needles: f64,
+    /// Largest ratio of the lengths of two edges that follow each other; by default 1.3, and 2 next to needles. The field's slope
+    /// is at most `beta = ln(hgrad)`: in a field of that slope, steps of one h grow by `exp(beta)` each.
+    pub hgrad: Option<f64>,
     /// Shapes with sizes of their own; `hmin` bounds them too.
     pub sources: Vec<SizeSource>,
     /// A length by position; `hmin` bounds it too.
     pub formula: Option<Formula>,
-    /// Lengths of regions; `hmin` bounds them too. Whoever builds the field makes [`Region`](super::Region)s of them.
+    /// Lengths of regions; `hmin` bounds them too. The builder of the field turns them into [`Region`](super::Region)s.
     pub regions: Vec<RegionSize>,
-}
-
-impl Default for SizeOptions {
-    /// Gradation 1.3, slope 0.262. At 1.1 meshes of solids have three times as many tetrahedra as the
-    /// surface needs; at 2 neighbors differ so much that their quality suffers. Next to needles, where quality is lost
-    /// anyway, 2: with 1.3 a lever of a CAD program takes 31,000 tetrahedra instead of 2,900 and more bad ones; with 2 everywhere even scans lose up to a
-    /// quarter of theirs.
-    fn default() -> Self {
-        Self {
-            hsiz: None,
-            hmin: None,
-            hmax: None,
-            hgrad: 1.3,
-            hgrad_needles: 2.0,
-            sources: Vec::new(),
-            formula: None,
-            regions: Vec::new(),
-        }
-    }
 }
 
 impl SizeOptions {
@@ -93,26 +88,59 @@ impl SizeOptions {
         };
         if let Some(text) = hgrad {
             let value = text.trim().parse().ok().filter(|&x| gradation_is_good(x));
-            options.hgrad = value.ok_or_else(|| bad_gradation(text))?;
-            options.hgrad_needles = options.hgrad;
+            options.hgrad = Some(value.ok_or_else(|| bad_gradation(text))?);
         }
         Ok(options)
     }
 
+    /// Adds other sizes: single values replace those here, shapes and regions join the lists.
+    pub fn add(&mut self, other: &Self) {
+        self.hsiz = other.hsiz.or(self.hsiz);
+        self.hmin = other.hmin.or(self.hmin);
+        self.hmax = other.hmax.or(self.hmax);
+        self.hgrad = other.hgrad.or(self.hgrad);
+        self.sources.extend_from_slice(&other.sources);
+        self.regions.extend_from_slice(&other.regions);
+        if other.formula.is_some() {
+            self.formula.clone_from(&other.formula);
+        }
+    }
+
+    /// Checks each value by itself.
+    ///
+    /// # Errors
+    /// Names the option and the value.
+    pub fn check(&self) -> Result<(), SizingError> {
+        for (option, length) in [("hsiz", self.hsiz), ("hmin", self.hmin), ("hmax", self.hmax)] {
+            length.map_or(Ok(()), |length| length.check(option))?;
+        }
+        match self.hgrad {
+            Some(x) if !gradation_is_good(x) => return Err(bad_gradation(&x.to_string())),
+            _ => {}
+        }
+        self.sources.iter().try_for_each(SizeSource::check)?;
+        self.regions.iter().try_for_each(|region| region.h.check("size_region"))
+    }
+
+    /// Largest ratio of the lengths of two edges that follow each other.
+    pub fn gradation(&self) -> f64 {
+        self.hgrad.unwrap_or(GRADATION)
+    }
+
     /// Slope bound of the field, `ln(hgrad)`.
     pub fn beta(&self) -> f64 {
-        slope_of_gradation(self.hgrad)
+        slope_of_gradation(self.gradation())
     }
 
     /// The same next to needles.
     pub(super) fn beta_needles(&self) -> f64 {
-        slope_of_gradation(self.hgrad_needles.max(self.hgrad))
+        slope_of_gradation(self.hgrad.unwrap_or(GRADATION_NEEDLES))
     }
 
     /// Lengths for a box of that diagonal, checked together.
     pub(super) fn resolve(&self, diagonal: f64) -> Result<Targets, SizingError> {
-        if !gradation_is_good(self.hgrad) {
-            return Err(bad_gradation(&self.hgrad.to_string()));
+        if !gradation_is_good(self.gradation()) {
+            return Err(bad_gradation(&self.gradation().to_string()));
         }
         let resolve = |option: &'static str, length: Option<Length>| {
             let Some(length) = length else {
@@ -132,7 +160,7 @@ impl SizeOptions {
             hsiz: resolve("hsiz", self.hsiz)?,
             hmin: resolve("hmin", self.hmin)?,
             hmax: resolve("hmax", self.hmax)?,
-            beta: slope_of_gradation(self.hgrad),
+            beta: self.beta(),
             beta_needles: self.beta_needles(),
         };
         match (targets.hmin, targets.hmax) {

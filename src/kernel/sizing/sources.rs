@@ -3,6 +3,8 @@
 //! Inside the shape the size is `inside`, away from it at most `outside` (no bound when it is not given), and
 //! between the two it changes with the slope of the gradation: the minimum with the octree keeps that slope.
 
+use std::fmt;
+
 use super::SizingError;
 use super::length::Length;
 use tetdb_base::geom::Point;
@@ -97,6 +99,27 @@ impl SizeSource {
         Ok(Self { shape: Shape::Cylinder { ends, radius }, inside, outside })
     }
 
+    /// The option that asks for such a source.
+    pub fn option(&self) -> &'static str {
+        match self.shape {
+            Shape::Box { .. } => "size_box",
+            Shape::Sphere { .. } => "size_sphere",
+            Shape::Cylinder { .. } => "size_cylinder",
+        }
+    }
+
+    /// # Errors
+    /// Names the option and the value.
+    pub(super) fn check(&self) -> Result<(), SizingError> {
+        let form = self.to_string();
+        match self.shape {
+            Shape::Box { .. } => Self::parse_box(&form),
+            Shape::Sphere { .. } => Self::parse_sphere(&form),
+            Shape::Cylinder { .. } => Self::parse_cylinder(&form),
+        }
+        .map(|_| ())
+    }
+
     /// The source for a surface whose box has that diagonal; no size below `least`.
     pub(super) fn resolve(&self, diagonal: f64, least: f64) -> ResolvedSource {
         ResolvedSource {
@@ -104,6 +127,21 @@ impl SizeSource {
             inside: self.inside.resolve(diagonal).max(least),
             outside: self.outside.map_or(f64::INFINITY, |h| h.resolve(diagonal).max(least)),
         }
+    }
+}
+
+impl fmt::Display for SizeSource {
+    /// As the parser of its shape reads it.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (points, radius) = match self.shape {
+            Shape::Box { low, high } => (vec![low, high], None),
+            Shape::Sphere { center, radius } => (vec![center], Some(radius)),
+            Shape::Cylinder { ends, radius } => (ends.to_vec(), Some(radius)),
+        };
+        let numbers = points.iter().flat_map(|p| p.to_array()).chain(radius);
+        let lengths = [Some(self.inside), self.outside].into_iter().flatten();
+        let words = numbers.map(|x| x.to_string()).chain(lengths.map(|h| h.to_string()));
+        f.write_str(&words.collect::<Vec<_>>().join(","))
     }
 }
 

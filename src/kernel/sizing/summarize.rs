@@ -122,5 +122,5 @@ fn source_of(options: &SizeOptions, targets: &Targets) -> String {
         parts.push("size_expr".to_owned());
     }
     parts.push("the surface's edges".to_owned());
-    format!("{}, hgrad {}", parts.join(", "), options.hgrad)
+    format!("{}, hgrad {}", parts.join(", "), options.gradation())
 }

@@ -268,7 +268,7 @@ fn formulas_are_followed_as_far_as_the_gradation_allows() {
     assert!(ball.h(Point::splat(0.9)) > 0.9 * surface_h);
     // No size goes below --hmin.
     let mut floored = formula("0.004");
-    floored.hmin = Some(Length::Absolute(0.03));
+    floored.hmin = Some(Length::Units(0.03));
     let h = build(&even, &floored).h(Point::splat(0.5));
     assert!((h / 0.03 - 1.0).abs() < 1e-5, "{h}");
 }

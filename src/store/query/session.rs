@@ -51,35 +51,6 @@ pub struct OpenSubdomain {
 
 /// A store open for questions.
 ///
-/// ```
-/// use tetdb::store::Catalog;
-/// use tetdb::expr::Expression;
-/// use tetdb::geom::Point;
-/// use tetdb::query::{QuerySession, Selection, Solid, VARIABLES};
-/// use tetdb::storage::Budget;
-/// # use tetdb_schema::catalog::Job;
-/// # let dir = tempfile::tempdir()?;
-/// # let path = dir.path().join("box.tetdb");
-/// # let surface = tetdb::samples::SampleSpec::parse("box,h=0.5")?.make()?.into();
-/// # let mut catalog = Catalog::create(&path, &Job::default())?;
-/// # let options = Default::default();
-/// # tetdb::pipeline::mesh(&mut catalog, &surface, &options, &Budget::new(256 << 20), &|_| {})?;
-/// # catalog.close()?;
-///
-/// let mut inquiry = QuerySession::open(Catalog::open(&path)?, &Budget::new(64 << 20))?;
-/// let center = Point::splat(0.5);
-/// let located = inquiry.locate(&[center, Point::splat(7.0)])?;
-/// assert!(located[0].found.is_some() && located[1].found.is_none());
-///
-/// let mut selection = Selection::default();
-/// selection.solids.push(Solid::Sphere { center, radius: 0.2 });
-/// selection.condition = Some(Expression::parse("quality < 3 and x > 0.1", &VARIABLES)?);
-/// for tet in inquiry.select(selection)? {
-///     assert!(tet?.shape.quality < 3.0);
-/// }
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-///
 /// Shape: `rows` by rank. Memory: half of the budget for decoded chunks, a quarter for open sub-domains, the rest for
 /// answers on their way.
 pub struct QuerySession {

@@ -9,22 +9,28 @@ use tetdb_schema::page::PageError;
 use super::SealedError;
 use tetdb_base::storage::{StorageError, StoreFile};
 use tetdb_schema::catalog::SubdomainState;
+use tetdb_schema::word::Word;
 
-/// How the records of a finished sub-domain are kept.
+/// How the records of a finished sub-domain are stored. The form does not shape the mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Form {
-    /// Packed into chunks.
+    /// Sorted and packed into chunks.
     #[default]
-    Sealed,
-    /// As they are worked with: six times the bytes, nothing to unpack, neighbors at hand.
+    Packed,
+    /// As working pages: six times the bytes, nothing to unpack, neighbors at hand.
     Pages,
+}
+
+impl Word for Form {
+    const WORDS: &'static [(Self, &'static str)] =
+        &[(Self::Packed, "packed"), (Self::Pages, "none")];
 }
 
 impl Form {
     /// The form of a finished sub-domain; `None` for one that is not finished.
     pub fn of(state: SubdomainState) -> Option<Self> {
         match state {
-            SubdomainState::Sealed => Some(Self::Sealed),
+            SubdomainState::Sealed => Some(Self::Packed),
             SubdomainState::Optimized => Some(Self::Pages),
             SubdomainState::Coarse | SubdomainState::Saturated => None,
         }
@@ -33,7 +39,7 @@ impl Form {
     /// The state of a sub-domain finished in this form.
     pub fn state(self) -> SubdomainState {
         match self {
-            Self::Sealed => SubdomainState::Sealed,
+            Self::Packed => SubdomainState::Sealed,
             Self::Pages => SubdomainState::Optimized,
         }
     }
@@ -79,7 +85,7 @@ impl<R: PageRecord> Cutter<R> {
     /// Errors: those of zstd.
     pub fn new(form: Form, subdomain: u32, generation: u32) -> std::io::Result<Self> {
         Ok(match form {
-            Form::Sealed => Self::Chunks(Box::new(Packer::new(subdomain, generation)?)),
+            Form::Packed => Self::Chunks(Box::new(Packer::new(subdomain, generation)?)),
             Form::Pages => Self::Pages(PagePacker::new(subdomain, generation)),
         })
     }
@@ -162,7 +168,7 @@ impl<R: PageRecord> Loader<R> {
     /// Of a sub-domain's records in either form. Errors: those of zstd.
     pub fn of(form: Form, (subdomain, generation): (u32, u32)) -> std::io::Result<Self> {
         Ok(match form {
-            Form::Sealed => Self::chunks()?,
+            Form::Packed => Self::chunks()?,
             Form::Pages => Self::Pages {
                 frames: PageDecoder::new(subdomain, generation),
                 read: read_page::<R>,

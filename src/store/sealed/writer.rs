@@ -85,7 +85,7 @@ impl SealedWriter {
         generation: u32,
         memory_bytes: usize,
     ) -> Result<Self, SealedError> {
-        Self::create_as(Form::Sealed, path, subdomain, generation, memory_bytes)
+        Self::create_as(Form::Packed, path, subdomain, generation, memory_bytes)
     }
 
     /// The same in either form. Errors: as [`SealedWriter::create`].

@@ -15,7 +15,7 @@ use tetdb::{
     Snapshot, Store, Surface, VerifyLevel,
 };
 use tetdb_base::storage::Budget;
-use tetdb_engine::pipeline::{self, Options, Trial};
+use tetdb_engine::pipeline::{self, MeshOptions, Options, RunOptions, Subdomains, Trial};
 use tetdb_schema::catalog::{Job, StoreState};
 use tetdb_store::store::Catalog;
 use xxhash_rust::xxh3::xxh3_64_with_seed;
@@ -46,7 +46,7 @@ enum Made {
 }
 
 const MADE: [Made; 4] =
-    [Made::Whole(Seal::Packed), Made::Whole(Seal::None), Made::Divided, Made::Begun];
+    [Made::Whole(Seal::Packed), Made::Whole(Seal::Pages), Made::Divided, Made::Begun];
 
 fn settings() -> Settings {
     Settings::default().threads(1).memory(Bytes(MEMORY))
@@ -111,10 +111,10 @@ fn sound(made: Made) -> Sound {
 fn divided(path: &Path) {
     let surface =
         tetdb_kernel::samples::SampleSpec::parse("box,h=0.2").and_then(|spec| spec.make());
+    let trial = Trial { subdomains_small: true, ..Trial::default() };
     let options = Options {
-        subdomains: Some("4".to_owned()),
-        trial: Trial { subdomains_small: true, ..Trial::default() },
-        ..Options::default()
+        mesh: MeshOptions { subdomains: Subdomains::Exactly(4), ..MeshOptions::default() },
+        run: RunOptions { trial, ..RunOptions::default() },
     };
     let job = Job { options: "{}".to_owned(), ..Job::default() };
     let mut catalog = Catalog::create(path, &job).expect("a new store");

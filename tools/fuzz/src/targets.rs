@@ -6,7 +6,7 @@
 use tetdb_base::expr::{Expression, Kind};
 use tetdb_base::storage::kind;
 use tetdb_base::surface::{orient_alike, validate};
-use tetdb_engine::pipeline::Options;
+use tetdb_engine::pipeline::MeshOptions;
 use tetdb_io::read::{Format, read_memory};
 use tetdb_kernel::samples::SampleSpec;
 use tetdb_kernel::sizing::{RegionSize, SizeOptions, SizeSource};
@@ -90,14 +90,12 @@ fn config(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else {
         return;
     };
-    let Ok(options) = toml::from_str::<Options>(text) else {
+    let Ok(options) = toml::from_str::<MeshOptions>(text) else {
         return;
     };
-    let _ = (options.sizes(), options.subdomain_count(), options.form());
-    let _ = (options.region_policy(), options.optimize_mode());
     // What a store has on record comes back as it was.
     let recorded = serde_json::to_string(&options).expect("options are text");
-    assert_eq!(serde_json::from_str::<Options>(&recorded).ok(), Some(options));
+    assert_eq!(serde_json::from_str::<MeshOptions>(&recorded).ok(), Some(options));
 }
 
 /// One option as typed; the first byte says which.

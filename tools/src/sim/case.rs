@@ -5,8 +5,10 @@ use std::sync::Arc;
 use tetdb_base::storage::{Budget, DiskPath, StoreFile};
 use tetdb_base::surface::Surface;
 use tetdb_engine::pipeline::{
-    self, NewSizes, Options, PipelineError, Plan, Resaturation, Trial, silent,
+    self, MeshOptions, NewSizes, Options, PipelineError, Plan, Resaturation, RunOptions,
+    Subdomains, Trial, silent,
 };
+use tetdb_kernel::optimize::Mode;
 use tetdb_kernel::samples::SampleSpec;
 use tetdb_schema::catalog::{Job, StoreState};
 use tetdb_schema::digest::Digest;
@@ -37,13 +39,14 @@ impl Case {
     /// `words` name a sample, such as `box,h=0.1`.
     pub fn new(words: &str, subdomains: u32) -> Self {
         let surface = SampleSpec::parse(words).and_then(|spec| spec.make());
+        let trial = Trial {
+            subdomains_small: true,
+            plan: Some(Plan { frames: 1 << 20, redb: 512 << 10, buffers: 128 << 10 }),
+        };
+        let subdomains = Subdomains::Exactly(subdomains);
         let options = Options {
-            subdomains: Some(subdomains.to_string()),
-            trial: Trial {
-                subdomains_small: true,
-                plan: Some(Plan { frames: 1 << 20, redb: 512 << 10, buffers: 128 << 10 }),
-            },
-            ..Options::default()
+            mesh: MeshOptions { subdomains, ..MeshOptions::default() },
+            run: RunOptions { trial, ..RunOptions::default() },
         };
         Self { surface: surface.expect("a sample").into(), options, budget: 128 << 20 }
     }
@@ -57,7 +60,7 @@ impl Case {
     /// the tetrahedra that eight sub-domains of edges of 0.12 have, a run takes half the time for as many calls.
     pub fn tiny() -> Self {
         let mut case = Self::new("box,h=0.2", 8);
-        case.options.optimize = Some("none".to_owned());
+        case.options.mesh.optimize = Mode::None;
         case
     }
 
@@ -94,7 +97,7 @@ impl Case {
             values: None,
             factor: 0.8,
             limits: [0.0, f64::INFINITY],
-            beta: self.options.sizes().expect("no options, no errors").beta(),
+            beta: self.options.mesh.sizes.beta(),
             asked: "{}".to_owned(),
         };
         let what = Resaturation { ranks: [2, 5].into(), sizes: Some(sizes), repair: false };

@@ -10,6 +10,7 @@ use tetdb_kernel::boundary::{RecoveryReport, Regions, fill_regions, recover_watc
 use tetdb_kernel::delaunay::{Kernel, KernelStats, Rejected, enclose, insertion_key};
 use tetdb_kernel::mesh::{Facet, Mesh, SHEET, VertexTag};
 use tetdb_kernel::optimize;
+use tetdb_schema::word::Word;
 
 /// What the coarse step did.
 #[derive(Clone, Debug)]
@@ -70,10 +71,10 @@ pub fn recovered<P: Pages>(
         });
     })?;
     watch(stage("color the regions"));
-    let regions = fill_regions(mesh, &options.region_rule()?)?;
+    let regions = fill_regions(mesh, &options.mesh.regions)?;
     if mesh.n_tets() == 0 {
         return Err(PipelineError::NothingFilled {
-            policy: options.regions.clone().unwrap_or_else(|| "parity".to_owned()),
+            policy: options.mesh.regions.policy.word().to_owned(),
         });
     }
     if recovery.missing_segments + recovery.missing_facets > 0 {

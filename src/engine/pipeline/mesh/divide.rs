@@ -29,7 +29,7 @@ impl Run<'_> {
         for part in parts.into_iter().rev() {
             orders.push((cut_order(self.catalog, self.n, part)?, share));
         }
-        let worker = Worker { place: Workplace::in_store(self.catalog)?, common: self.common()? };
+        let worker = Worker { place: Workplace::in_store(self.catalog)?, common: self.common() };
         let watch = self.watch;
         let mut reports = Vec::new();
         let share = self.plan.shared_by(workers as u64);

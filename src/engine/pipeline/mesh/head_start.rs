@@ -74,7 +74,7 @@ impl HeadStartShare {
     fn of(surface: &Surface, options: &Options, cap: u64) -> Option<Self> {
         let [points, triangles] = [surface.n_vertices(), surface.n_triangles()].map(|n| n as u64);
         // Sizes from a file may take half of the memory for themselves.
-        if n_threads() < 2 || triangles == 0 || options.size_field.is_some() {
+        if n_threads() < 2 || triangles == 0 || options.mesh.size_field.is_some() {
             return None;
         }
         let frames = FRAMES_VERTEX * points + FRAMES_TRIANGLE * triangles + FRAMES_LEAST;

@@ -82,7 +82,7 @@ pub fn mesh(
             let room = ScratchSpace::new(left, scratch);
             let field = attempt(|| SizeField::from_bytes_in(&bytes, &room))??;
             drop(bytes);
-            let field = field.with_sources(&options.sizes()?, surface.bounds().diagonal())?;
+            let field = field.with_sources(&options.mesh.sizes, surface.bounds().diagonal())?;
             let surface = Cow::Borrowed(surface);
             go_on(catalog, surface, options, &field, None, budget, watch)
         }
@@ -183,7 +183,7 @@ impl<'a> Run<'a> {
             held = held.without_surface(self.options, budget)?;
             self.plan = held.plan;
         }
-        if self.options.coarse_only {
+        if self.options.run.coarse_only {
             return self.summary(coarse, sizes, Vec::new());
         }
         // Pages of the coarse mesh that are still resident would take the frames of the others.
@@ -205,7 +205,7 @@ impl<'a> Run<'a> {
         sizes: Option<SizeSummary>,
         cuts: Vec<CutReport>,
     ) -> Result<Summary, PipelineError> {
-        let asked = self.options.subdomain_count()?;
+        let asked = self.options.mesh.subdomains.count();
         Ok(Summary {
             coarse,
             sizes,
@@ -219,8 +219,8 @@ impl<'a> Run<'a> {
     }
 
     /// What is the same for all workers.
-    pub fn common(&self) -> Result<Common<'a>, PipelineError> {
-        Common::of(self.options, self.field, self.bounds)
+    pub fn common(&self) -> Common<'a> {
+        Common::new(self.options, self.field, self.bounds)
     }
 
     fn coarse_step(
@@ -260,7 +260,7 @@ impl<'a> Run<'a> {
         let load = self.load(&mut mesh);
         // Where vertices nearly touch, sizes at a point are next to nothing and the estimate knows no bound; the mesh's own load does.
         let predicted = estimate.tets().min(TETS_PER_LOAD * load);
-        let (n, _) = n_subdomains(predicted, self.options)?;
+        let (n, _) = n_subdomains(predicted, self.options);
         let path = self.catalog.file_path(0, COARSE);
         mesh.pages_mut().end_generation(path, COARSE + DONE);
         let part = PartMesh {
@@ -324,7 +324,7 @@ impl<'a> Run<'a> {
         open: Option<Mesh>,
         summary: &mut Summary,
     ) -> Result<(), PipelineError> {
-        let worker = Worker { place: Workplace::in_store(self.catalog)?, common: self.common()? };
+        let worker = Worker { place: Workplace::in_store(self.catalog)?, common: self.common() };
         if let (Some(mesh), [part]) = (open, &left[..]) {
             let job =
                 worker.subdomain_job(subdomain_order(self.catalog, self.n, *part)?, self.plan)?;
@@ -383,7 +383,7 @@ impl<'a> Run<'a> {
 
     /// Other processes that share the work, one entry for each order they do at once. Effects: they begin.
     pub fn helpers(&mut self) -> Result<Vec<Slot>, PipelineError> {
-        let Some(helpers) = self.options.hands.0.clone() else {
+        let Some(helpers) = self.options.run.hands.0.clone() else {
             return Ok(Vec::new());
         };
         let slots = match self.slots {

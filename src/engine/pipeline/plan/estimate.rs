@@ -147,10 +147,10 @@ fn prepare_in(
     background: Option<&Background>,
     scratch: &ScratchSpace,
 ) -> Result<Prepared, PipelineError> {
-    if let (Some(file), None) = (&options.size_field, background) {
-        return Err(PipelineError::SizeField { file: file.clone() });
+    if let (Some(file), None) = (&options.mesh.size_field, background) {
+        return Err(PipelineError::SizeField { file: file.path.clone() });
     }
-    let asked = options.sizes()?;
+    let asked = &options.mesh.sizes;
     let lone_points = surface.lone_points();
     let built = |regions: &[Region]| {
         let mut constraints: Vec<&dyn SizeConstraint> =
@@ -162,7 +162,7 @@ fn prepare_in(
             None => {}
         }
         let further = Further { constraints: &constraints, at_vertices, at_points: &lone_points };
-        SizeField::build_with(&surface.points, &surface.triangles, &asked, &further, scratch)
+        SizeField::build_with(&surface.points, &surface.triangles, asked, &further, scratch)
     };
     let enclosed = || {
         // Counted before the tree takes its share of what is left.
@@ -192,7 +192,7 @@ fn prepare_in(
     let domain = Domain { seeker: &seeker, volumes: &volumes, filled: &filled };
     let (field, mut sizes) = match early {
         Some(built) => built,
-        None => built(&region_sizes(&domain, &chosen.names, &asked, scratch)?)?,
+        None => built(&region_sizes(&domain, &chosen.names, asked, scratch)?)?,
     };
     if background.is_some() {
         sizes.source = format!("a size field, {}", sizes.source);
@@ -203,7 +203,7 @@ fn prepare_in(
 
 /// The volumes that are filled. Errors: seeds that say what cannot be.
 fn chosen(seeker: &Seeker, volumes: &Volumes, options: &Options) -> Result<Filled, PipelineError> {
-    let rule = options.region_rule()?;
+    let rule = &options.mesh.regions;
     let reach = ON_SURFACE * seeker.surface().bounds().diagonal();
     for seed in &rule.seeds {
         if seeker.distance(seed.point, reach).is_finite() {
@@ -228,7 +228,7 @@ fn notes(chosen: &Filled, options: &Options, n: u32) -> Vec<String> {
     if !chosen.names.is_empty() && unnamed > 0 {
         notes.push(format!("{unnamed} of {filled} filled regions have no name"));
     }
-    if options.region_policy() == Some(RegionPolicy::Seeds) && empty > 0 {
+    if options.mesh.regions.policy == RegionPolicy::Seeds && empty > 0 {
         notes.push(format!("{empty} of {n} regions stay empty: no seed is inside, or a hole"));
     }
     notes
@@ -238,12 +238,12 @@ impl Estimate {
     fn of(domain: &Domain, options: &Options, field: &SizeField) -> Result<Self, PipelineError> {
         let surface = domain.seeker.surface();
         let mut counts = field.counts(domain);
-        counts.inner_tets *= match options.mode()? {
+        counts.inner_tets *= match options.mesh.optimize {
             Mode::None => UNOPTIMIZED,
             Mode::Delaunay => DELAUNAY,
             Mode::Full => 1.0,
         };
-        let (subdomains, subdomains_asked) = n_subdomains(counts.tets(), options)?;
+        let (subdomains, subdomains_asked) = n_subdomains(counts.tets(), options);
         let sides = (0..surface.n_triangles())
             .flat_map(|t| domain.volumes.of_side[t])
             .filter(|&v| domain.filled[v as usize]);
@@ -256,11 +256,11 @@ impl Estimate {
             subdomains,
             subdomains_asked,
             surface_bytes: surface.bytes() as u64,
-            least_to_prepare: least_to_prepare(surface, !options.sizes()?.regions.is_empty()),
+            least_to_prepare: least_to_prepare(surface, !options.mesh.sizes.regions.is_empty()),
             octree_bytes: field.bytes_in(0) - SizeField::share_of(0).min(sizes_bytes),
             sizes_bytes,
-            form: options.form()?,
-            keeps_coarse: !options.drop_coarse,
+            form: options.mesh.seal,
+            keeps_coarse: !options.mesh.drop_coarse,
         })
     }
 
@@ -278,7 +278,7 @@ impl Estimate {
     /// Bytes of the finished store.
     pub fn store_bytes(&self) -> u64 {
         let [tet, vertex, facet] = match self.form {
-            Form::Sealed => [SEALED_TET, SEALED_VERTEX, SEALED_FACET],
+            Form::Packed => [SEALED_TET, SEALED_VERTEX, SEALED_FACET],
             Form::Pages => [PAGES_RECORD; 3],
         };
         let sealed = tet * self.tets() + vertex * self.vertices + facet * self.triangles as f64;
@@ -415,24 +415,25 @@ fn least_to_prepare(surface: &Surface, regions_have_sizes: bool) -> u64 {
     (surface.bytes() + beside + PREPARE_LEAST) as u64
 }
 
-/// How many sub-domains a mesh of so many tetrahedra is made in, and what was asked for when that is more.
-pub fn n_subdomains(tets: f64, options: &Options) -> Result<(u32, Option<u32>), PipelineError> {
-    let asked = options.subdomain_count()?;
+/// Number of sub-domains for a mesh of `tets` tetrahedra, and the number asked for where that is larger.
+pub fn n_subdomains(tets: f64, options: &Options) -> (u32, Option<u32>) {
+    let asked = options.mesh.subdomains.count();
     let each = (tets / MANY).clamp(TETS_PER_SUBDOMAIN, TETS_PER_SUBDOMAIN_MAX);
     // An even number of them: three take longer on two threads than two or four.
     let auto = match tets > TETS_ALONE {
         true => 2.0 * (0.5 * tets / each).ceil(),
         false => 1.0,
     };
-    let most = (tets / options.subdomain_tets_min()).floor().max(1.0);
+    let most = (tets / options.run.subdomain_tets_min()).floor().max(1.0);
     let wanted = asked.map_or(auto, f64::from);
     let n = wanted.min(most).min(f64::from(1u32 << 20)) as u32;
-    Ok((n, asked.filter(|_| wanted > most && wanted > 1.0)))
+    (n, asked.filter(|_| wanted > most && wanted > 1.0))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pipeline::plan::MeshOptions;
     use tetdb_base::surface::{orient_alike_in, validate_in};
     use tetdb_kernel::samples::SampleSpec;
 
@@ -441,7 +442,8 @@ mod tests {
         let dir = tempfile::tempdir()?;
         let mut surface: Surface = SampleSpec::parse("grains,count=400")?.make()?.into();
         surface.shrink();
-        let options = Options { regions: Some("all".to_owned()), ..Options::default() };
+        let options: Options =
+            MeshOptions { regions: RegionPolicy::All.into(), ..MeshOptions::default() }.into();
         let wide = prepare(&surface, &options, None, &ScratchSpace::boundless())?;
         let narrow = ScratchSpace::new(surface.bytes() as u64 / 4, dir.path());
         orient_alike_in(&mut surface, &narrow);
@@ -457,16 +459,15 @@ mod tests {
     }
 
     #[test]
-    fn a_large_mesh_has_fewer_subdomains_for_its_size() -> Result<(), PipelineError> {
+    fn a_large_mesh_has_fewer_subdomains_for_its_size() {
         let options = Options::default();
         // From 32 on they grow, and when they are twice as large there are more of them.
         let shares = [(0.6, 2), (2.0, 2), (2.1, 4), (10.0, 10), (32.0, 32), (48.0, 32)];
         for (shares, n) in shares.into_iter().chain([(500.0, 250)]) {
-            assert_eq!(n_subdomains(shares * TETS_PER_SUBDOMAIN, &options)?.0, n);
+            assert_eq!(n_subdomains(shares * TETS_PER_SUBDOMAIN, &options).0, n);
         }
-        assert_eq!(n_subdomains(TETS_ALONE, &options)?.0, 1);
-        assert_eq!(n_subdomains(1.01 * TETS_ALONE, &options)?.0, 2);
-        Ok(())
+        assert_eq!(n_subdomains(TETS_ALONE, &options).0, 1);
+        assert_eq!(n_subdomains(1.01 * TETS_ALONE, &options).0, 2);
     }
 
     #[test]

@@ -39,7 +39,7 @@ impl Leases {
         options: &Options,
         budget: &Budget,
     ) -> Result<(Plan, Lease), PipelineError> {
-        let plan = match options.trial.plan {
+        let plan = match options.run.trial.plan {
             Some(plan) => plan,
             None => Plan::new(budget.cap(), held)?,
         };

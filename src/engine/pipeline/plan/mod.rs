@@ -11,5 +11,6 @@ mod regions;
 
 pub use estimate::{Estimate, Prepared, least_for, prepare};
 pub use memory::{MEMORY_MIN, Plan};
-pub use options::{Options, Trial};
+pub use option_text::OptionsText;
+pub use options::{MeshOptions, Options, RunOptions, SizeFile, Subdomains, Trial};
 pub use recipe::{RECIPE, recipe_of, record_recipe};

@@ -1,41 +1,287 @@
-//! Options as typed, from files where a number is a number and a list of numbers a list.
+//! Options as text: how a job has them on record, and how a file of options and the command line give them.
 
 use std::fmt;
 
-use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Visitor};
+use serde::de::{Deserializer, Error, SeqAccess, Visitor};
+use serde::{Deserialize, Serialize, Serializer};
+
+use super::options::{MeshOptions, SizeFile, Subdomains};
+use crate::pipeline::error::PipelineError;
+use tetdb_base::surface::{Seed, SeedKind};
+use tetdb_kernel::boundary::{RegionPolicy, RegionRule};
+use tetdb_kernel::sizing::{Formula, RegionSize, SizeOptions, SizeSource, SizingError};
+use tetdb_schema::word::Word as _;
+
+/// Options as text, a key for each. Lengths are numbers or `1%` of the box diagonal; shapes and seeds are numbers with commas.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct OptionsText {
+    /// Edge length inside.
+    #[serde(deserialize_with = "text")]
+    pub hsiz: Option<String>,
+    /// Least edge length.
+    #[serde(deserialize_with = "text")]
+    pub hmin: Option<String>,
+    /// Greatest edge length.
+    #[serde(deserialize_with = "text")]
+    pub hmax: Option<String>,
+    /// Gradation.
+    #[serde(deserialize_with = "text")]
+    pub hgrad: Option<String>,
+    /// Sizes in boxes.
+    #[serde(deserialize_with = "texts", skip_serializing_if = "Vec::is_empty")]
+    pub size_box: Vec<String>,
+    /// Sizes in spheres.
+    #[serde(deserialize_with = "texts", skip_serializing_if = "Vec::is_empty")]
+    pub size_sphere: Vec<String>,
+    /// Sizes in cylinders.
+    #[serde(deserialize_with = "texts", skip_serializing_if = "Vec::is_empty")]
+    pub size_cylinder: Vec<String>,
+    /// Sizes of regions.
+    #[serde(deserialize_with = "texts", skip_serializing_if = "Vec::is_empty")]
+    pub size_region: Vec<String>,
+    /// A length as an expression in x, y and z.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_expr: Option<String>,
+    /// A file of sizes at the vertices of a mesh, on record with its full path.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_field: Option<String>,
+    /// Hash of the files of `size_field`, written by the program.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_field_hash: Option<String>,
+    /// A word of [`RegionPolicy`].
+    pub regions: Option<String>,
+    /// Points in regions to fill or name.
+    #[serde(deserialize_with = "texts", skip_serializing_if = "Vec::is_empty")]
+    pub region_seed: Vec<String>,
+    /// Points in regions that stay empty.
+    #[serde(deserialize_with = "texts", skip_serializing_if = "Vec::is_empty")]
+    pub hole: Vec<String>,
+    /// Names of regions in the surface's files, written by the program.
+    #[serde(deserialize_with = "texts", skip_serializing_if = "Vec::is_empty")]
+    pub region_name: Vec<String>,
+    /// A word of [`Mode`](tetdb_kernel::optimize::Mode).
+    pub optimize: Option<String>,
+    /// `auto` or a number.
+    #[serde(deserialize_with = "text", skip_serializing_if = "Option::is_none")]
+    pub subdomains: Option<String>,
+    /// See [`MeshOptions::drop_coarse`].
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub drop_coarse: bool,
+    /// A word of [`Form`](tetdb_store::sealed::Form).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seal: Option<String>,
+    /// See [`MeshOptions::keep_stages`].
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub keep_stages: bool,
+    /// See [`MeshOptions::refine_surface`].
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub refine_surface: bool,
+}
+
+impl OptionsText {
+    /// The sizes alone, all else absent.
+    pub fn from_sizes(sizes: &SizeOptions, file: Option<&SizeFile>) -> Self {
+        let sources = |option: &str| {
+            let of_shape = sizes.sources.iter().filter(|source| source.option() == option);
+            of_shape.map(SizeSource::to_string).collect()
+        };
+        Self {
+            hsiz: sizes.hsiz.map(|h| h.to_string()),
+            hmin: sizes.hmin.map(|h| h.to_string()),
+            hmax: sizes.hmax.map(|h| h.to_string()),
+            hgrad: sizes.hgrad.map(|ratio| ratio.to_string()),
+            size_box: sources("size_box"),
+            size_sphere: sources("size_sphere"),
+            size_cylinder: sources("size_cylinder"),
+            size_region: sizes.regions.iter().map(RegionSize::to_string).collect(),
+            size_expr: sizes.formula.as_ref().map(Formula::to_string),
+            size_field: file.map(|file| file.path.clone()),
+            size_field_hash: file.and_then(|file| file.hash.clone()),
+            ..Self::default()
+        }
+    }
+
+    /// These options with those of `other` in their place wherever `other` has any; a list replaces a list.
+    pub fn overridden_by(self, other: Self) -> Self {
+        let list =
+            |own: Vec<String>, other: Vec<String>| if other.is_empty() { own } else { other };
+        Self {
+            hsiz: other.hsiz.or(self.hsiz),
+            hmin: other.hmin.or(self.hmin),
+            hmax: other.hmax.or(self.hmax),
+            hgrad: other.hgrad.or(self.hgrad),
+            size_box: list(self.size_box, other.size_box),
+            size_sphere: list(self.size_sphere, other.size_sphere),
+            size_cylinder: list(self.size_cylinder, other.size_cylinder),
+            size_region: list(self.size_region, other.size_region),
+            size_expr: other.size_expr.or(self.size_expr),
+            size_field: other.size_field.or(self.size_field),
+            size_field_hash: other.size_field_hash.or(self.size_field_hash),
+            regions: other.regions.or(self.regions),
+            region_seed: list(self.region_seed, other.region_seed),
+            hole: list(self.hole, other.hole),
+            region_name: list(self.region_name, other.region_name),
+            optimize: other.optimize.or(self.optimize),
+            subdomains: other.subdomains.or(self.subdomains),
+            drop_coarse: other.drop_coarse || self.drop_coarse,
+            seal: other.seal.or(self.seal),
+            keep_stages: other.keep_stages || self.keep_stages,
+            refine_surface: other.refine_surface || self.refine_surface,
+        }
+    }
+
+    /// Parses the sizes.
+    ///
+    /// # Errors
+    /// The option and the value that make no sense.
+    pub fn sizes(&self) -> Result<SizeOptions, SizingError> {
+        let [hsiz, hmin, hmax, hgrad] =
+            [&self.hsiz, &self.hmin, &self.hmax, &self.hgrad].map(|o| o.as_deref());
+        let boxes = self.size_box.iter().map(|t| SizeSource::parse_box(t));
+        let spheres = self.size_sphere.iter().map(|t| SizeSource::parse_sphere(t));
+        let cylinders = self.size_cylinder.iter().map(|t| SizeSource::parse_cylinder(t));
+        Ok(SizeOptions {
+            sources: boxes.chain(spheres).chain(cylinders).collect::<Result<_, _>>()?,
+            formula: self.size_expr.as_deref().map(Formula::parse).transpose()?,
+            regions: self
+                .size_region
+                .iter()
+                .map(|t| RegionSize::parse(t))
+                .collect::<Result<_, _>>()?,
+            ..SizeOptions::parse(hsiz, hmin, hmax, hgrad)?
+        })
+    }
+
+    /// The file of sizes, if one is named.
+    pub fn size_file(&self) -> Option<SizeFile> {
+        let path = self.size_field.clone()?;
+        Some(SizeFile { path, hash: self.size_field_hash.clone() })
+    }
+
+    /// Without a word, seeds or holes mean [`RegionPolicy::Seeds`].
+    fn region_rule(&self) -> Result<RegionRule, PipelineError> {
+        let bad = |option, text: &str| PipelineError::BadSeed { option, found: text.to_owned() };
+        let region =
+            |text: &String| Seed::parse_region(text).ok_or_else(|| bad("region_seed", text));
+        let hole = |text: &String| Seed::parse_hole(text).ok_or_else(|| bad("hole", text));
+        let seeds = self.region_seed.iter().map(region).chain(self.hole.iter().map(hole));
+        let seeds: Vec<Seed> = seeds.collect::<Result<_, _>>()?;
+        let usual = if seeds.is_empty() { RegionPolicy::Parity } else { RegionPolicy::Seeds };
+        Ok(RegionRule {
+            policy: word("regions", &self.regions, usual)?,
+            seeds,
+            names: self.region_name.iter().map(region).collect::<Result<_, _>>()?,
+        })
+    }
+}
+
+impl Serialize for MeshOptions {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        OptionsText::from(self.clone()).serialize(to)
+    }
+}
+
+impl<'de> Deserialize<'de> for MeshOptions {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        OptionsText::deserialize(from)?.try_into().map_err(D::Error::custom)
+    }
+}
+
+impl TryFrom<OptionsText> for MeshOptions {
+    type Error = PipelineError;
+
+    fn try_from(text: OptionsText) -> Result<Self, PipelineError> {
+        Ok(Self {
+            sizes: text.sizes()?,
+            size_field: text.size_file(),
+            regions: text.region_rule()?,
+            optimize: word("optimize", &text.optimize, Default::default())?,
+            subdomains: match text.subdomains.as_deref() {
+                None | Some("auto") => Subdomains::Auto,
+                Some(n) => Subdomains::Exactly(
+                    n.parse().ok().filter(|&n| n > 0).ok_or_else(|| unknown("subdomains", n))?,
+                ),
+            },
+            drop_coarse: text.drop_coarse,
+            seal: word("seal", &text.seal, Default::default())?,
+            keep_stages: text.keep_stages,
+            refine_surface: text.refine_surface,
+        })
+    }
+}
+
+impl From<MeshOptions> for OptionsText {
+    fn from(options: MeshOptions) -> Self {
+        let rule = &options.regions;
+        let seeds = |is_hole| {
+            let kept = rule.seeds.iter().filter(move |s| (s.kind == SeedKind::Hole) == is_hole);
+            kept.map(Seed::to_string).collect()
+        };
+        let seal = Some(options.seal).filter(|&seal| seal != Default::default());
+        Self {
+            regions: Some(rule.policy.word().to_owned()),
+            region_seed: seeds(false),
+            hole: seeds(true),
+            region_name: rule.names.iter().map(Seed::to_string).collect(),
+            optimize: Some(options.optimize.word().to_owned()),
+            subdomains: options.subdomains.count().map(|n| n.to_string()),
+            drop_coarse: options.drop_coarse,
+            seal: seal.map(|seal| seal.word().to_owned()),
+            keep_stages: options.keep_stages,
+            refine_surface: options.refine_surface,
+            ..Self::from_sizes(&options.sizes, options.size_field.as_ref())
+        }
+    }
+}
+
+fn word<T: tetdb_schema::word::Word>(
+    option: &'static str,
+    text: &Option<String>,
+    usual: T,
+) -> Result<T, PipelineError> {
+    match text {
+        None => Ok(usual),
+        Some(text) => T::from_word(text).ok_or_else(|| unknown(option, text)),
+    }
+}
+
+fn unknown(option: &'static str, value: &str) -> PipelineError {
+    PipelineError::Option { option, value: value.to_owned() }
+}
 
 /// A text, as it would be typed, of a text or a number.
-struct Word(String);
+struct Scalar(String);
 
-struct WordVisitor;
+struct ScalarVisitor;
 
-impl Visitor<'_> for WordVisitor {
-    type Value = Word;
+impl Visitor<'_> for ScalarVisitor {
+    type Value = Scalar;
 
     fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.write_str("a text or a number")
     }
 
-    fn visit_str<E: Error>(self, text: &str) -> Result<Word, E> {
-        Ok(Word(text.to_owned()))
+    fn visit_str<E: Error>(self, text: &str) -> Result<Scalar, E> {
+        Ok(Scalar(text.to_owned()))
     }
 
-    fn visit_i64<E: Error>(self, x: i64) -> Result<Word, E> {
-        Ok(Word(x.to_string()))
+    fn visit_i64<E: Error>(self, x: i64) -> Result<Scalar, E> {
+        Ok(Scalar(x.to_string()))
     }
 
-    fn visit_u64<E: Error>(self, x: u64) -> Result<Word, E> {
-        Ok(Word(x.to_string()))
+    fn visit_u64<E: Error>(self, x: u64) -> Result<Scalar, E> {
+        Ok(Scalar(x.to_string()))
     }
 
-    fn visit_f64<E: Error>(self, x: f64) -> Result<Word, E> {
-        Ok(Word(x.to_string()))
+    fn visit_f64<E: Error>(self, x: f64) -> Result<Scalar, E> {
+        Ok(Scalar(x.to_string()))
     }
 }
 
-impl<'de> Deserialize<'de> for Word {
+impl<'de> Deserialize<'de> for Scalar {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-        from.deserialize_any(WordVisitor)
+        from.deserialize_any(ScalarVisitor)
     }
 }
 
@@ -69,7 +315,7 @@ impl<'de> Visitor<'de> for TypedVisitor {
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Typed, A::Error> {
         let mut parts = Vec::new();
-        while let Some(Word(part)) = list.next_element()? {
+        while let Some(Scalar(part)) = list.next_element()? {
             parts.push(part);
         }
         Ok(Typed(parts.join(",")))
@@ -83,12 +329,12 @@ impl<'de> Deserialize<'de> for Typed {
 }
 
 /// One option.
-pub(super) fn text<'de, D: Deserializer<'de>>(from: D) -> Result<Option<String>, D::Error> {
-    Ok(Option::<Word>::deserialize(from)?.map(|Word(text)| text))
+fn text<'de, D: Deserializer<'de>>(from: D) -> Result<Option<String>, D::Error> {
+    Ok(Option::<Scalar>::deserialize(from)?.map(|Scalar(text)| text))
 }
 
 /// A list of options.
-pub(super) fn texts<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {
+fn texts<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {
     let all = Vec::<Typed>::deserialize(from)?;
     Ok(all.into_iter().map(|Typed(text)| text).collect())
 }

@@ -211,7 +211,7 @@ impl<'a> RemeshRun<'a> {
         let share = plan.shared_by(workers as u64).without_file();
         let parts = tree::parts(self.catalog, self.n)?;
         let whole = Arc::clone(&self.field);
-        let common = Common::of(self.options, &whole, bounds)?;
+        let common = Common::new(self.options, &whole, bounds);
         let mut state = (self, BTreeMap::new());
         let run = &|job: Job, watch: &Watcher| job.run(common, watch).map(Box::new);
         map_bounded(
@@ -404,5 +404,5 @@ pub fn recorded_field(
     let bytes = catalog.blob(blob::SIZE_FIELD)?.unwrap_or_default();
     let diagonal = tree::bounds(catalog)?.diagonal();
     let field = SizeField::from_bytes_in(&bytes, room)?;
-    Ok(field.with_sources(&options.sizes()?, diagonal)?)
+    Ok(field.with_sources(&options.mesh.sizes, diagonal)?)
 }

@@ -37,7 +37,7 @@ pub fn seal<P: Pages>(
     mesh.clear_scratch();
     vertices(mesh, target, &mut writer, watch)?;
     let mut neighbors = match target.form {
-        Form::Sealed => None,
+        Form::Packed => None,
         Form::Pages => Some(Neighbors::of(sort_tets(mesh, target)?, target)?),
     };
     let order = sort_tets(mesh, target)?;

@@ -69,7 +69,7 @@ impl Neighbors {
 mod tests {
     use super::*;
     use crate::pipeline::mesh;
-    use crate::pipeline::plan::{Options, Trial};
+    use crate::pipeline::plan::{MeshOptions, Options, RunOptions, Subdomains, Trial};
     use tetdb_base::storage::{Backing, Budget, Pager, StoreFile};
     use tetdb_kernel::mesh::{FaceRef, Mesh, MeshState, dense, sparse};
     use tetdb_kernel::samples::SampleSpec;
@@ -82,11 +82,11 @@ mod tests {
     fn kept_pages_open_as_a_working_mesh() -> Result<(), Box<dyn std::error::Error>> {
         let dir = tempfile::tempdir()?;
         let surface = SampleSpec::parse("box,h=0.12")?.make()?.into();
+        let (subdomains, seal) = (Subdomains::Exactly(2), Form::Pages);
+        let trial = Trial { subdomains_small: true, plan: None };
         let options = Options {
-            subdomains: Some("2".to_owned()),
-            seal: Some("none".to_owned()),
-            trial: Trial { subdomains_small: true, plan: None },
-            ..Options::default()
+            mesh: MeshOptions { subdomains, seal, ..MeshOptions::default() },
+            run: RunOptions { trial, ..RunOptions::default() },
         };
         let mut catalog = Catalog::create(dir.path().join("a.tetdb"), &Job::default())?;
         let budget = Budget::new(256 << 20);

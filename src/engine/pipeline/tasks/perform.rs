@@ -12,7 +12,7 @@ use super::folder::{
 use super::records::{Mark, PlanRecord, TaskOrders, TaskReceipts};
 use super::schedule::stages;
 use crate::pipeline::error::PipelineError;
-use crate::pipeline::plan::{Options, Plan};
+use crate::pipeline::plan::{MeshOptions, Options, Plan};
 use crate::pipeline::progress::Watcher;
 use crate::pipeline::tree::ZoneRow;
 use crate::pipeline::work::common::Common;
@@ -219,12 +219,13 @@ impl<'a> Attempt<'a> {
         budget: &Budget,
         watch: &Watcher,
     ) -> Result<Vec<Receipt>, PipelineError> {
-        let options: Options = serde_json::from_str(&self.plan.options)
+        let options: MeshOptions = serde_json::from_str(&self.plan.options)
             .map_err(|e| damaged(&self.folder.plan_path(), &e.to_string()))?;
+        let options = Options::from(options);
         let bounds = Aabb::around(self.plan.bounds.map(Point::from_array));
         let space = ScratchSpace::new(budget.cap() / 2, scratch);
         let field = SizeField::from_bytes_in(&self.folder.field(patience)?, &space)?
-            .with_sources(&options.sizes()?, bounds.diagonal())?;
+            .with_sources(&options.mesh.sizes, bounds.diagonal())?;
         let _field = budget.lease(field.bytes() as u64, "the size field")?;
         let share = Plan::new(budget.cap(), field.bytes() as u64)?;
         let leased = share.frames + share.redb + share.redb / 2 + share.buffers;
@@ -235,7 +236,7 @@ impl<'a> Attempt<'a> {
                 output: output.clone(),
                 scratch: scratch.clone(),
             },
-            common: Common::of(&options, &field, bounds)?,
+            common: Common::new(&options, &field, bounds),
         };
         self.wait_for_inputs(patience)?;
         let orders = &self.orders.orders;

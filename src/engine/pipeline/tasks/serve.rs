@@ -10,7 +10,7 @@ use rkyv::{Archive, Deserialize, Serialize};
 use super::folder::{Patience, TaskFolder, attempt_name, copy, damaged, scratch_in};
 use super::perform::TaskSettings;
 use crate::pipeline::error::PipelineError;
-use crate::pipeline::plan::{Options, Plan, RECIPE};
+use crate::pipeline::plan::{MeshOptions, Options, Plan, RECIPE};
 use crate::pipeline::progress::Watcher;
 use crate::pipeline::tree::blob;
 use crate::pipeline::work::common::Common;
@@ -52,7 +52,7 @@ pub fn begin(
         recipe: RECIPE,
         store: dir.to_string_lossy().into_owned(),
         bounds: [bounds.low, bounds.high].map(|p| p.to_array()),
-        options: serde_json::to_string(options).unwrap_or_default(),
+        options: serde_json::to_string(&options.mesh).unwrap_or_default(),
     };
     Ok(helpers.begin(&to_bytes(Kind::Plan, &job))?)
 }
@@ -107,8 +107,9 @@ pub fn serve(
     if job.recipe != RECIPE {
         return Err(damaged(&store, "another version of the program holds it"));
     }
-    let options: Options =
+    let options: MeshOptions =
         serde_json::from_str(&job.options).map_err(|e| damaged(&store, &e.to_string()))?;
+    let options = Options::from(options);
     let bounds = Aabb::around(job.bounds.map(Point::from_array));
     let name = attempt_name();
     let local = settings.scratch.as_deref().map(|dir| scratch_in(dir, &name));
@@ -121,7 +122,7 @@ pub fn serve(
     let space = ScratchSpace::new(budget.cap() / 2, &scratch);
     let bytes = folder.field(patience)?;
     let field = attempt(|| SizeField::from_bytes_in(&bytes, &space))??
-        .with_sources(&options.sizes()?, bounds.diagonal())?;
+        .with_sources(&options.mesh.sizes, bounds.diagonal())?;
     drop(bytes);
     let _field = budget.lease(field.bytes() as u64, "the size field")?;
     let plan = Plan::new(budget.cap(), field.bytes() as u64)?;
@@ -133,7 +134,7 @@ pub fn serve(
             store: store.clone(),
             scratch: scratch.clone(),
         },
-        common: Common::of(&options, &field, bounds)?,
+        common: Common::new(&options, &field, bounds),
     };
     let one = |order: &[u8], watch: &Watcher| {
         attempt(|| {

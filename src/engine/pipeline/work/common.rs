@@ -1,6 +1,5 @@
 //! What is the same for all parts of a run.
 
-use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::Options;
 use tetdb_base::geom::Aabb;
 use tetdb_kernel::bisect::Method;
@@ -23,20 +22,15 @@ pub struct Common<'a> {
 }
 
 impl<'a> Common<'a> {
-    /// Errors: a word of the options that is not known.
-    pub fn of(
-        options: &Options,
-        field: &'a SizeField,
-        bounds: Aabb,
-    ) -> Result<Self, PipelineError> {
-        Ok(Self {
+    pub fn new(options: &Options, field: &'a SizeField, bounds: Aabb) -> Self {
+        Self {
             field,
-            mode: options.mode()?,
-            method: options.method,
+            mode: options.mesh.optimize,
+            method: options.run.method,
             bounds,
-            form: options.form()?,
-            keeps_coarse: !options.drop_coarse,
-            keeps_stages: options.keep_stages,
-        })
+            form: options.mesh.seal,
+            keeps_coarse: !options.mesh.drop_coarse,
+            keeps_stages: options.mesh.keep_stages,
+        }
     }
 }

@@ -51,7 +51,7 @@ impl StageFiles<'_> {
     ) -> Result<(), PipelineError> {
         let name = Catalog::file_name(self.cut, generation(stage));
         let target = SealTarget {
-            form: Form::Sealed,
+            form: Form::Packed,
             path: &self.output.join(name),
             scratch: self.scratch,
             subdomain: SubdomainId::new(self.cut).expect("fewer cuts than ranks"),
