@@ -105,7 +105,8 @@ impl Console {
         match *event {
             Event::Progress { stage, done, total, unit } => self.progress(stage, done, total, unit),
             Event::Note(ref text) => self.note(text),
-            Event::Warning(ref text) => self.warn(&in_flags(text)),
+            Event::Warning(ref text) => self.warn(text),
+            Event::SizeWarning(ref warning) => self.warn(&in_flags(warning)),
             Event::StoreBegun(_) => super::signals::store_begins(),
             _ => {}
         }

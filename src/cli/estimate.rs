@@ -71,7 +71,7 @@ pub fn run(args: &EstimateArgs, console: &Console) -> Result<u8, Failure> {
     }
     console.line(&prepared.sizes.to_string());
     for warning in &prepared.sizes.warnings {
-        console.warn(&in_flags(&warning.to_string()));
+        console.warn(&in_flags(warning));
     }
     console.line(&format!(
         "about {} tetrahedra and {} vertices from {} triangles, in {}",

@@ -1,9 +1,7 @@
 //! Errors as the user sees them: a word, an exit code, what happened, where, what to do.
 
-use clap::CommandFactory;
 use tetdb_schema::code::Code;
 
-use super::args::Args;
 use tetdb_base::storage::StorageError;
 use tetdb_base::surface::SurfaceError;
 use tetdb_engine::api::error::{Error, Remedy};
@@ -11,7 +9,7 @@ use tetdb_engine::pipeline::PipelineError;
 use tetdb_io::read::ReadError;
 use tetdb_io::write::WriteError;
 use tetdb_kernel::boundary::BoundaryError;
-use tetdb_kernel::sizing::SizingError;
+use tetdb_kernel::sizing::{SizeWarning, SizingError};
 use tetdb_store::query::QueryError;
 use tetdb_store::sealed::SealedError;
 use tetdb_store::store::StoreError;
@@ -61,7 +59,10 @@ impl From<Error> for Failure {
         };
         Self {
             code: e.code(),
-            message: in_flags(e.message()),
+            message: match e.option() {
+                Some(option) => flag(option) + &e.message()[option.len()..],
+                None => e.message().to_owned(),
+            },
             place: e.place().map(str::to_owned),
             help,
         }
@@ -92,20 +93,18 @@ failures!(
     WriteError
 );
 
-/// A message that begins with an option's key, with the option as it is typed; and what makes a surface finer.
-pub fn in_flags(text: &str) -> String {
-    let text = text.replace(
-        "refine the surface first",
-        "refine it first with `tetdb refine-surface SURFACE FINE --hsiz H`",
-    );
-    let end = text.find([' ', ':']).unwrap_or(text.len());
-    let (key, rest) = text.split_at(end);
-    let root = Args::command();
-    let mut options = (root.find_subcommand("mesh").into_iter()).flat_map(|m| m.get_arguments());
-    match options.any(|option| option.get_id() == key && option.get_long().is_some()) {
-        true => format!("--{}{rest}", key.replace('_', "-")),
-        false => text,
-    }
+/// The option of a file of options as it is typed.
+fn flag(option: &str) -> String {
+    format!("--{}", option.replace('_', "-"))
+}
+
+/// A warning in the words of the command line.
+pub fn in_flags(warning: &SizeWarning) -> String {
+    let help = match warning.needs_finer_surface() {
+        true => "; refine it first with `tetdb refine-surface SURFACE FINE --hsiz H`",
+        false => "",
+    };
+    format!("{} {}{help}", flag(warning.option()), warning.detail())
 }
 
 fn help_of(code: Code) -> &'static str {

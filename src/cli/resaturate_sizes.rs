@@ -73,7 +73,7 @@ fn factor(text: Option<&str>) -> Result<f64, Failure> {
     match text.trim().parse::<f64>() {
         Ok(x) if x.is_normal() && x > 0.0 => Ok(x),
         _ => Err(SizingError::BadValue {
-            option: "--refine-by",
+            option: "refine_by",
             found: text.to_owned(),
             expected: "a factor above zero, such as 0.5",
         }
@@ -96,8 +96,8 @@ fn limits(open: &mut Catalog, args: &ResaturateArgs) -> Result<[f64; 2], Failure
         }
         None => Ok::<_, SizingError>(None),
     };
-    let hmin = parse("--hmin", &args.sizes.hmin)?;
-    let hmax = parse("--hmax", &args.sizes.hmax)?;
+    let hmin = parse("hmin", &args.sizes.hmin)?;
+    let hmax = parse("hmax", &args.sizes.hmax)?;
     if let (Some(hmin), Some(hmax)) = (hmin, hmax)
         && hmin > hmax
     {

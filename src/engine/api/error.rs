@@ -14,6 +14,7 @@ pub struct Error {
     message: String,
     place: Option<String>,
     help: Option<String>,
+    option: Option<&'static str>,
     #[doc(hidden)]
     pub remedy: Remedy,
 }
@@ -34,7 +35,8 @@ pub enum Remedy {
 impl Error {
     #[doc(hidden)]
     pub fn new(code: Code, message: impl ToString) -> Self {
-        Self { code, message: message.to_string(), place: None, help: None, remedy: Remedy::AsSaid }
+        let (message, remedy) = (message.to_string(), Remedy::AsSaid);
+        Self { code, message, place: None, help: None, option: None, remedy }
     }
 
     #[doc(hidden)]
@@ -52,6 +54,12 @@ impl Error {
     #[doc(hidden)]
     pub fn with_remedy(mut self, remedy: Remedy) -> Self {
         self.remedy = remedy;
+        self
+    }
+
+    /// `option` is the first word of the message.
+    pub(super) fn with_option(mut self, option: Option<&'static str>) -> Self {
+        self.option = option.filter(|option| self.message.starts_with(option));
         self
     }
 
@@ -79,6 +87,11 @@ impl Error {
     /// Where: a file with its line or byte, ids, coordinates.
     pub fn place(&self) -> Option<&str> {
         self.place.as_deref()
+    }
+
+    /// The option or argument that has no meaning, by its key in a file of options. The message begins with it.
+    pub fn option(&self) -> Option<&'static str> {
+        self.option
     }
 
     /// What to do about it.

@@ -130,7 +130,7 @@ impl From<SizingError> for Error {
                 "a length is a number in the surface's own unit, such as 0.5, or a share of its box diagonal, such as 1%"
             }
         };
-        Self::new(Code::BadSize, e).with_help(help)
+        Self::new(Code::BadSize, &e).with_help(help).with_option(e.option())
     }
 }
 
@@ -178,7 +178,7 @@ impl From<PipelineError> for Error {
                 .at(show(*at))
                 .with_help("leave out what is outside the filled regions, or fill the region it lies in")
                 .with_remedy(Remedy::General),
-            PipelineError::BadSeed { option, .. } => Self::new(Code::BadSeed, &e).with_help(match option {
+            PipelineError::BadSeed { option, .. } => Self::new(Code::BadSeed, &e).with_option(Some(option)).with_help(match option {
                 "hole" => "such as 0.5,0.5,0.2",
                 _ => "such as 0.5,0.5,0.2,rock",
             }),
@@ -194,7 +194,7 @@ impl From<PipelineError> for Error {
             PipelineError::TaskFile { .. } => Self::new(Code::TaskFile, &e)
                 .with_help("gather again, which writes orders anew, then do the task again")
                 .with_remedy(Remedy::General),
-            other => Self::new(Code::Usage, other),
+            other => Self::new(Code::Usage, &other).with_option(other.option()),
         }
     }
 }

@@ -492,7 +492,7 @@ pub(super) fn report(summary: &pipeline::Summary, settings: &Settings) {
     if let Some(sizes) = &summary.sizes {
         settings.note(sizes.to_string());
         for warning in &sizes.warnings {
-            settings.warn(warning.to_string());
+            settings.say(&Event::SizeWarning(warning.clone()));
         }
     }
 }

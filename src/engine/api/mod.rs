@@ -80,5 +80,6 @@ pub use surface::{CheckReport, Surface};
 pub use tasks::Tasks;
 pub use tetdb_base::storage::CancelToken;
 pub use tetdb_io::write::MeshFormat;
+pub use tetdb_kernel::sizing::SizeWarning;
 pub use tetdb_schema::code::Code;
 pub use verify::{Verification, VerifyLevel};

@@ -9,6 +9,7 @@ use super::memory::{Bytes, default_cap};
 use super::{Error, error::Remedy};
 use crate::pipeline::{self, Hands, MEMORY_MIN, Watcher};
 use tetdb_base::storage::{Budget, CancelToken};
+use tetdb_kernel::sizing::SizeWarning;
 
 /// What a run says while it works.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,6 +30,8 @@ pub enum Event {
     Note(String),
     /// Something that may not be as wanted.
     Warning(String),
+    /// A wanted size that the mesh will not have; see [`SizeWarning`].
+    SizeWarning(SizeWarning),
     /// From now on there is a store at this path, which can be resumed.
     StoreBegun(PathBuf),
 }

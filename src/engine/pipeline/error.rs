@@ -136,6 +136,17 @@ impl From<SealedError> for PipelineError {
     }
 }
 
+impl PipelineError {
+    /// The option that the message begins with.
+    pub fn option(&self) -> Option<&'static str> {
+        match self {
+            Self::Option { option, .. } | Self::BadSeed { option, .. } => Some(option),
+            Self::Sizing(e) => e.option(),
+            _ => None,
+        }
+    }
+}
+
 impl From<RemoteFailure> for PipelineError {
     fn from(failure: RemoteFailure) -> Self {
         Self::Helper(failure)

@@ -1,5 +1,19 @@
 //! What can be wrong with wanted sizes.
 
+impl SizingError {
+    /// The option that the message begins with.
+    pub fn option(&self) -> Option<&'static str> {
+        match self {
+            Self::BadValue { option, .. } => Some(option),
+            Self::Crossed { .. } => Some("hmin"),
+            Self::BadFormula { .. } | Self::NoSize { .. } => Some("size_expr"),
+            Self::BadRegion { .. } => Some("size_region"),
+            Self::SizeCount { .. } => Some("size_field"),
+            Self::NoEdges | Self::TooLarge { .. } | Self::Damaged { .. } => None,
+        }
+    }
+}
+
 /// Why there is no size field.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SizingError {
@@ -54,7 +68,7 @@ pub enum SizingError {
     },
     /// A file of sizes has another number of them than the surface has vertices.
     #[error(
-        "size_field: {found} sizes for the {expected} vertices of the surface; without a mesh of tetrahedra beside it the file must have one for each"
+        "size_field has {found} sizes for the {expected} vertices of the surface; without a mesh of tetrahedra beside it the file must have one for each"
     )]
     SizeCount {
         /// Number of sizes found.

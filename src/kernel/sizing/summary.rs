@@ -59,24 +59,45 @@ pub enum SizeWarning {
     },
 }
 
-impl fmt::Display for SizeWarning {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+impl SizeWarning {
+    /// The option that asks for the size.
+    pub fn option(&self) -> &'static str {
         match self {
-            Self::FarBelowSurface { option, wanted, surface_median, away } => write!(
-                f,
-                "{option} {} is far below the surface's edges, which are kept: next to them edges of tetrahedra stay near the median of {}, and \
-                 reach {} only {} or more away from them; refine the surface first",
+            Self::FarBelowSurface { option, .. } | Self::NeverReached { option, .. } => option,
+        }
+    }
+
+    /// Whether dividing the surface's triangles first would help.
+    pub fn needs_finer_surface(&self) -> bool {
+        matches!(self, Self::FarBelowSurface { .. })
+    }
+
+    /// The sentence behind the option.
+    pub fn detail(&self) -> String {
+        match self {
+            Self::FarBelowSurface { wanted, surface_median, away, .. } => format!(
+                "{} is far below the surface's edges, which are kept: next to them edges of tetrahedra stay near the median of {}, and \
+                 reach {} only {} or more away from them",
                 short(*wanted),
                 short(*surface_median),
                 short(*wanted),
                 short(*away)
             ),
-            Self::NeverReached { option, wanted, most } => write!(
-                f,
-                "{option} {} is never reached: from the surface's edges lengths grow to {} at most (hgrad says how fast); is it in the surface's unit?",
+            Self::NeverReached { wanted, most, .. } => format!(
+                "{} is never reached: from the surface's edges lengths grow to {} at most (hgrad says how fast); is it in the surface's unit?",
                 short(*wanted),
                 short(*most)
             ),
+        }
+    }
+}
+
+impl fmt::Display for SizeWarning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}", self.option(), self.detail())?;
+        match self.needs_finer_surface() {
+            true => f.write_str("; refine the surface first"),
+            false => Ok(()),
         }
     }
 }

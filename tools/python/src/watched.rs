@@ -59,6 +59,7 @@ impl Listener<'_> {
                 }
                 Event::Note(text) => say(py, callable, "note", &text)?,
                 Event::Warning(text) => say(py, callable, "warning", &text)?,
+                Event::SizeWarning(warning) => say(py, callable, "warning", &warning.to_string())?,
                 Event::StoreBegun(path) => say(py, callable, "store", &path.to_string_lossy())?,
                 _ => continue,
             };
