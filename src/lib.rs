@@ -7,7 +7,7 @@ pub use tetdb_engine::api::{
     Answers, Bytes, CancelToken, CheckReport, Code, ColorBy, DefectPlace, Error, Event, Existing,
     ExportOptions, Exported, Length, MeshFormat, Mesher, Optimize, Order, Prediction, Query,
     Regions, Remesh, Remeshed, Seal, Settings, SizeWarning, Sizes, Snapped, Snapshot, Store,
-    Subdomains, Summary, Surface, Tasks, Verification, VerifyLevel,
+    StoreInfo, Subdomains, Summary, Surface, Tasks, Verification, VerifyLevel,
 };
 
 #[doc(inline)]

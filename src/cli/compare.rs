@@ -6,39 +6,27 @@ use super::args::CompareArgs;
 use super::console::Console;
 use super::failure::Failure;
 use super::memory;
-use tetdb_engine::api::store::open_finished;
-use tetdb_store::audit::{Population, Qualities, qualities};
+use tetdb_engine::api::{Comparison, Population, Qualities};
 
 /// Exit code when the meshes differ.
 const DIFFERENT: u8 = 7;
 
 pub fn run(args: &CompareArgs, console: &Console) -> Result<u8, Failure> {
-    let cap = memory::cap(args.read.memory.as_deref())?;
-    let memory = (cap / 4).min(256 << 20) as usize;
-    let mut found = Vec::with_capacity(2);
-    for path in [&args.first, &args.second] {
-        let mut open = open_finished(path)?;
-        let digest = open.digest()?;
-        found.push((digest, qualities(&mut open, memory)?));
-    }
-    let [(digest_a, a), (digest_b, b)] = &found[..] else {
-        unreachable!("two stores were read");
-    };
-    let same = digest_a == digest_b;
+    let settings = console.settings(memory::asked(args.read.memory.as_deref())?, None);
+    let found = Comparison::of(&args.first, &args.second, &settings)?;
     if console.is_json() {
-        console.answer(&json!({
-            "schema": 1, "same": same, "first": a, "second": b,
-            "digests": [digest_a[0].to_string(), digest_b[0].to_string()],
-        }));
+        let mut answer = json!(found);
+        answer["schema"] = json!(1);
+        console.answer(&answer);
     } else {
-        print(a, b, console);
-        console.line(if same {
+        print(&found.first, &found.second, console);
+        console.line(if found.same {
             "the meshes are the same, bit by bit"
         } else {
             "the meshes differ"
         });
     }
-    Ok(if same { 0 } else { DIFFERENT })
+    Ok(if found.same { 0 } else { DIFFERENT })
 }
 
 fn print(a: &Qualities, b: &Qualities, console: &Console) {

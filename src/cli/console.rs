@@ -107,6 +107,9 @@ impl Console {
             Event::Note(ref text) => self.note(text),
             Event::Warning(ref text) => self.warn(text),
             Event::SizeWarning(ref warning) => self.warn(&in_flags(warning)),
+            Event::SurfaceMissing => self.note(
+                "note: the surface is not where it was; the mesh is verified without it (give it with --against)",
+            ),
             Event::StoreBegun(_) => super::signals::store_begins(),
             _ => {}
         }

@@ -6,17 +6,18 @@ use super::args::StoreArgs;
 use super::console::Console;
 use super::failure::Failure;
 use super::memory;
-use tetdb_engine::api::store::open_finished;
+use tetdb_engine::api::Store;
 
 pub fn run(args: &StoreArgs, console: &Console) -> Result<u8, Failure> {
-    // One row of the catalog is read.
-    memory::asked(args.memory.as_deref())?;
-    let mut store = open_finished(&args.store)?;
-    let [tets, interfaces] = store.digest()?;
+    let settings = console.settings(memory::asked(args.memory.as_deref())?, None);
+    let store = Store::open_with(&args.store, settings)?;
+    let (digest, interface_digest) = (&store.summary().digest, &store.summary().interface_digest);
     if console.is_json() {
-        console.answer(&json!({ "schema": 1, "digest": tets.to_string(), "interface_digest": interfaces.to_string() }));
+        console.answer(
+            &json!({ "schema": 1, "digest": digest, "interface_digest": interface_digest }),
+        );
     } else {
-        console.line(&tets.to_string());
+        console.line(digest);
     }
     Ok(0)
 }

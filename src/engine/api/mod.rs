@@ -8,6 +8,7 @@
 
 mod ask;
 
+mod compare;
 mod defects;
 #[doc(hidden)]
 pub mod error;
@@ -16,6 +17,7 @@ pub mod field_arrays;
 mod from_errors;
 #[doc(hidden)]
 pub mod guard;
+mod info;
 #[doc(hidden)]
 pub mod job;
 mod located;
@@ -54,10 +56,12 @@ pub mod verify_server;
 mod verify_shared;
 
 pub use ask::{Answers, Order, Query};
+pub use compare::Comparison;
 pub use defects::DefectPlace;
 pub use error::Error;
 #[doc(hidden)]
 pub use guard::guarded;
+pub use info::{EmbeddedInfo, RegionInfo, StageInfo, StoreInfo, SubdomainInfo};
 pub use memory::Bytes;
 #[doc(hidden)]
 pub use memory::default_cap;
@@ -78,8 +82,11 @@ pub use sizes::Sizes;
 pub use store::{Store, Summary};
 pub use surface::{CheckReport, Surface};
 pub use tasks::Tasks;
+#[doc(hidden)]
+pub use tetdb_base::geom::short;
 pub use tetdb_base::storage::CancelToken;
 pub use tetdb_io::write::MeshFormat;
 pub use tetdb_kernel::sizing::SizeWarning;
 pub use tetdb_schema::code::Code;
+pub use tetdb_store::audit::{Population, Qualities};
 pub use verify::{Verification, VerifyLevel};

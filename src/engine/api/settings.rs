@@ -8,7 +8,7 @@ use tetdb_schema::code::Code;
 use super::memory::{Bytes, default_cap};
 use super::{Error, error::Remedy};
 use crate::pipeline::{self, Hands, MEMORY_MIN, Watcher};
-use tetdb_base::storage::{Budget, CancelToken};
+use tetdb_base::storage::{Budget, CancelToken, ScratchSpace};
 use tetdb_kernel::sizing::SizeWarning;
 
 /// What a run says while it works.
@@ -32,6 +32,8 @@ pub enum Event {
     Warning(String),
     /// A wanted size that the mesh will not have; see [`SizeWarning`].
     SizeWarning(SizeWarning),
+    /// The surface of a store is not where it was: its mesh is verified without it.
+    SurfaceMissing,
     /// From now on there is a store at this path, which can be resumed.
     StoreBegun(PathBuf),
 }
@@ -46,6 +48,7 @@ pub struct Settings {
     #[doc(hidden)]
     pub cancel: CancelToken,
     progress: Option<Listener>,
+    scratch: Option<PathBuf>,
     /// Other processes that share the work.
     #[doc(hidden)]
     pub hands: Hands,
@@ -85,6 +88,24 @@ impl Settings {
     pub fn progress(mut self, listener: impl Fn(&Event) + Send + Sync + 'static) -> Self {
         self.progress = Some(Arc::new(listener));
         self
+    }
+
+    /// Folder of the temporary files of calls that only read. Default: that of the system. A new mesh keeps its own beside the store.
+    pub fn scratch(mut self, folder: impl Into<PathBuf>) -> Self {
+        self.scratch = Some(folder.into());
+        self
+    }
+
+    /// Memory and temporary files of a call that only reads, less `held` bytes.
+    #[doc(hidden)]
+    pub fn scratch_space(&self, held: u64) -> Result<ScratchSpace, Error> {
+        Ok(ScratchSpace::new(self.cap()?.saturating_sub(held), &self.scratch_dir()))
+    }
+
+    /// Folder of the temporary files of calls that only read.
+    #[doc(hidden)]
+    pub fn scratch_dir(&self) -> PathBuf {
+        self.scratch.clone().unwrap_or_else(std::env::temp_dir)
     }
 
     #[doc(hidden)]

@@ -4,8 +4,7 @@ use std::path::{Path, PathBuf};
 use tetdb_schema::code::Code;
 
 use super::guard::guarded_in;
-use super::preflight::scratch_beside;
-use super::{Error, Settings, Surface, Verification, VerifyLevel, verify};
+use super::{Error, Event, Settings, Surface, Verification, VerifyLevel, verify};
 use tetdb_base::storage::RunContext;
 use tetdb_schema::catalog::{InterfaceRow, RegionRow, StoreState, SubdomainRow};
 use tetdb_store::audit::Level;
@@ -57,6 +56,8 @@ pub struct Summary {
     pub bytes: u64,
     /// One number for the mesh, the same for equal meshes: 32 hexadecimal digits.
     pub digest: String,
+    /// The same of the interface faces.
+    pub interface_digest: String,
     /// Whether a verification is on record.
     pub is_verified: bool,
     /// The greatest q = √6/12 · longest edge / inradius; 1 is regular.
@@ -138,31 +139,44 @@ impl Store {
     /// Errors: damage; an invalid mesh is an answer.
     pub fn verify(&self, level: VerifyLevel) -> Result<Verification, Error> {
         guarded_in(&self.context, || {
-            let cap = self.settings.cap()?;
-            let mut catalog = self.catalog.share();
-            let sources = catalog.job()?.surfaces;
-            let scratch = scratch_beside(
-                &tetdb_base::surface::Surface::default(),
-                cap,
-                &std::env::temp_dir().join("verify"),
-            )?;
+            let sources = self.catalog.share().job()?.surfaces;
+            let scratch = self.settings.scratch_space(0)?;
             let surface = match Surface::of_record(&sources, &self.path, &scratch) {
-                Ok(surface) => Some(surface.inner),
+                Ok(surface) => Some(surface),
                 Err(error) if error.code() == Code::UnreadableFile => {
-                    self.settings.note(
-                        "note: the surface is not where it was; the mesh is verified without it",
-                    );
+                    self.settings.say(&Event::SurfaceMissing);
                     None
                 }
                 Err(error) => return Err(error),
             };
-            let level = match level {
-                VerifyLevel::Geometry => Level::Geometry,
-                VerifyLevel::Delaunay => Level::Delaunay,
-            };
-            let report = verify::check(&mut catalog, &self.settings, surface.as_ref(), cap, level)?;
-            Ok(Verification { report })
+            drop(scratch);
+            self.verify_with(surface.as_ref(), level)
         })
+    }
+
+    /// The same against a surface at hand, in place of the files on record.
+    pub fn verify_against(
+        &self,
+        surface: &Surface,
+        level: VerifyLevel,
+    ) -> Result<Verification, Error> {
+        guarded_in(&self.context, || self.verify_with(Some(surface), level))
+    }
+
+    fn verify_with(
+        &self,
+        surface: Option<&Surface>,
+        level: VerifyLevel,
+    ) -> Result<Verification, Error> {
+        let cap = self.settings.cap()?;
+        let level = match level {
+            VerifyLevel::Geometry => Level::Geometry,
+            VerifyLevel::Delaunay => Level::Delaunay,
+        };
+        let surface = surface.map(|surface| &surface.inner);
+        let mut catalog = self.catalog.share();
+        let report = verify::check(&mut catalog, &self.settings, surface, cap, level)?;
+        Ok(Verification { report })
     }
 
     /// Whether another store holds the same mesh, bit for bit, in the same sub-domains.
@@ -201,11 +215,13 @@ impl Summary {
     fn of(catalog: &mut Catalog) -> Result<Self, Error> {
         let subdomains = catalog.subdomains()?;
         let worst = subdomains.iter().map(|r| r.quality.worst);
+        let [digest, interface_digest] = catalog.digest()?;
         Ok(Self {
             n_tets: subdomains.iter().map(|r| r.tets).sum(),
             n_vertices: subdomains.iter().map(|r| r.vertices).sum(),
             bytes: subdomains.iter().map(|r| r.bytes).sum(),
-            digest: catalog.digest()?[0].to_string(),
+            digest: digest.to_string(),
+            interface_digest: interface_digest.to_string(),
             is_verified: catalog.state()? == StoreState::Verified,
             worst_quality: worst.fold(0.0, f64::max),
             labels: catalog.labels()?,

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 use std::sync::Arc;
+
+use serde::Serialize;
 use tetdb_schema::code::Code;
 
 use super::error::{Error, Remedy};
@@ -23,11 +25,11 @@ pub enum VerifyLevel {
     Delaunay,
 }
 
-/// What a verification found.
-#[derive(Clone, Debug)]
+/// What a verification found. Serialized, it is the answer of `tetdb verify --json`; the guide lists the keys.
+#[derive(Clone, Debug, Serialize)]
+#[serde(transparent)]
 pub struct Verification {
-    #[doc(hidden)]
-    pub report: Report,
+    pub(super) report: Report,
 }
 
 impl Verification {
@@ -41,6 +43,19 @@ impl Verification {
         self.report.tets
     }
 
+    /// What was checked, of a valid mesh, in one line.
+    pub fn sentence(&self) -> String {
+        sentence(&self.report)
+    }
+
+    /// The error that says what is wrong with the mesh at `store`; none of a valid one.
+    ///
+    /// # Errors
+    /// `invalid-mesh`, with the first offending tetrahedron.
+    pub fn accept(&self, store: &Path) -> Result<(), Error> {
+        if self.report.valid { Ok(()) } else { Err(invalid(&self.report, store)) }
+    }
+
     /// Kinds of what is wrong, in words, with how often each occurs.
     pub fn findings(&self) -> Vec<(String, u64)> {
         let findings = self.report.findings.iter();
@@ -49,8 +64,7 @@ impl Verification {
 }
 
 /// Verifies within `cap`, less what the surface holds. What is damaged is noted, all of it.
-#[doc(hidden)]
-pub fn check(
+pub(super) fn check(
     store: &mut Catalog,
     settings: &Settings,
     surface: Option<&Surface>,
@@ -72,8 +86,7 @@ pub fn check(
 }
 
 /// A valid report in one line.
-#[doc(hidden)]
-pub fn sentence(report: &Report) -> String {
+pub(super) fn sentence(report: &Report) -> String {
     let mut text = format!(
         "verified: {} tetrahedra, all positive by exact signs; {} inner faces paired",
         report.tets, report.inner_faces
@@ -113,8 +126,7 @@ fn words_of(name: &str) -> String {
 }
 
 /// The error for an invalid mesh.
-#[doc(hidden)]
-pub fn invalid(report: &Report, path: &Path) -> Error {
+pub(super) fn invalid(report: &Report, path: &Path) -> Error {
     let findings: Vec<String> = report
         .findings
         .iter()
@@ -135,8 +147,7 @@ pub fn invalid(report: &Report, path: &Path) -> Error {
 }
 
 /// Puts on record that a finished store was verified, which nobody else has changed meanwhile: `lock` was held.
-#[doc(hidden)]
-pub fn record(path: &Path, lock: Arc<WriterLock>) -> Result<(), Error> {
+pub(super) fn record(path: &Path, lock: Arc<WriterLock>) -> Result<(), Error> {
     let mut catalog = Catalog::open_locked(path, lock)?;
     if catalog.state()? < StoreState::Verified {
         catalog.commit(|step| {
