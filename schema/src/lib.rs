@@ -10,4 +10,5 @@ pub mod ids;
 pub mod leaf;
 pub mod page;
 pub mod record;
+pub mod source;
 pub mod word;

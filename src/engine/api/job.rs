@@ -14,15 +14,15 @@ use tetdb_base::surface::{Seed, SeedKind};
 use tetdb_io::read::{FileSizes, read_sizes, size_files};
 use tetdb_kernel::boundary::RegionPolicy;
 use tetdb_kernel::sizing::{Background, BackgroundMesh};
-use tetdb_schema::catalog::SurfaceSource;
+use tetdb_schema::source::Source;
 use tetdb_store::store::Catalog;
 
 /// The record of a run.
 #[doc(hidden)]
-pub fn job(options: &MeshOptions, surfaces: &[SurfaceSource]) -> Job {
+pub fn job(options: &MeshOptions, surfaces: &[Source]) -> Job {
     Job {
         options: serde_json::to_string(options).unwrap_or_default(),
-        surfaces: surfaces.to_vec(),
+        surfaces: surfaces.iter().map(Source::to_record).collect(),
         tool_version: env!("CARGO_PKG_VERSION").to_owned(),
     }
 }
@@ -38,14 +38,15 @@ pub fn options_of(job: &Job, store: &Path) -> Result<MeshOptions, Error> {
 
 /// Whether a job would give the same mesh as these options and surfaces.
 #[doc(hidden)]
-pub fn is_same(job: &Job, options: &MeshOptions, surfaces: &[SurfaceSource]) -> bool {
+pub fn is_same(job: &Job, options: &MeshOptions, surfaces: &[Source]) -> bool {
     let same = serde_json::from_str::<MeshOptions>(&job.options).is_ok_and(|mut o| {
         // A store that kept more or less than asked for holds the same mesh.
         o.drop_coarse = options.drop_coarse;
         o.seal = options.seal;
         o == *options
     });
-    same && job.surfaces == surfaces
+    same && job.surfaces.len() == surfaces.len()
+        && job.surfaces.iter().zip(surfaces).all(|(then, now)| *then == now.to_record())
 }
 
 /// Refuses to go on with a store that another version of the recipe began: the result would be of neither.

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use tetdb_schema::code::Code;
 
 use tetdb_schema::catalog::SurfaceSource;
+use tetdb_schema::source::{NamedFile, Origin, Source};
 use xxhash_rust::xxh3::Xxh3;
 
 use super::error::{Error, Remedy};
@@ -25,7 +26,7 @@ pub struct Surface {
     #[doc(hidden)]
     pub inner: surface::Surface,
     #[doc(hidden)]
-    pub sources: Vec<SurfaceSource>,
+    pub sources: Vec<Source>,
     /// Triangles that were turned round.
     #[doc(hidden)]
     pub turned: usize,
@@ -97,28 +98,6 @@ pub fn refine(
     let (field, _) = attempt(built)??;
     let left = scratch.available().saturating_sub(field.bytes() as u64);
     Ok(split(surface, &|p| field.h(p).min(wanted), left)?)
-}
-
-/// What stands for the path of a surface that was given as arrays: a file in the store.
-#[doc(hidden)]
-pub const IN_STORE: &str = "store:surface.obj";
-
-/// Lines of the record that say what of the surface before them are sheets: a file and its name; triangles from a number on; all that is
-/// not closed.
-pub(super) const SHEET: &str = "sheet:";
-pub(super) const SHEETS_FROM: &str = "sheets-from:";
-pub(super) const OPEN_PARTS: &str = "open-parts:";
-/// Lines that name a file of edges, or of points, as that of a sheet; and how many edges and points the store has in a file of its own.
-pub(super) const EDGES: &str = "edges:";
-pub(super) const POINTS: &str = "points:";
-pub(super) const WIRES: &str = "wires:";
-
-/// What begins the line of a file.
-pub(super) fn mark_of(kind: WireKind) -> &'static str {
-    match kind {
-        WireKind::Edges => EDGES,
-        WireKind::Points => POINTS,
-    }
 }
 
 /// What cannot be done any more once there are sheets.
@@ -264,20 +243,24 @@ impl Surface {
         let first = self.inner.n_triangles();
         self.inner.embed(&sheet.inner, name)?;
         self.turned += sheet.turned;
-        let is_in_store = |s: &SurfaceSource| s.path == IN_STORE;
+        let is_kept = self.sources.iter().any(|s| s.origin == Origin::Copy);
         match sheet.sources.as_slice() {
-            [only] if !is_in_store(only) && !self.sources.iter().any(is_in_store) => {
-                self.sources.push(SurfaceSource {
-                    path: format!("{SHEET}{name}={}", only.path),
-                    ..only.clone()
-                });
+            [Source { origin: Origin::File(file) | Origin::Sample(file), bytes, hash }]
+                if !is_kept =>
+            {
+                let sheet = NamedFile { name: name.to_owned(), file: file.clone() };
+                let (origin, bytes, hash) = (Origin::Sheet(sheet), *bytes, *hash);
+                self.sources.push(Source { origin, bytes, hash });
             }
             _ => {
-                let known = self.sources.iter().find_map(|s| s.path.strip_prefix(SHEETS_FROM));
-                let first = known.map_or(first.to_string(), str::to_owned);
-                let is_open = self.sources.iter().any(|s| s.path == OPEN_PARTS);
-                self.sources = vec![given(&self.inner), mark(format!("{SHEETS_FROM}{first}"))];
-                self.sources.extend(is_open.then(|| mark(OPEN_PARTS.to_owned())));
+                let known = self.sources.iter().find_map(|s| match s.origin {
+                    Origin::SheetsFrom(first) => Some(first),
+                    _ => None,
+                });
+                let is_open = self.sources.iter().any(|s| s.origin == Origin::OpenParts);
+                let first = Origin::SheetsFrom(known.unwrap_or(first));
+                self.sources = vec![given(&self.inner), Source::unmarked(first)];
+                self.sources.extend(is_open.then(|| Source::unmarked(Origin::OpenParts)));
             }
         }
         Ok(self)
@@ -294,7 +277,7 @@ impl Surface {
     pub fn open_parts_in(mut self, scratch: &ScratchSpace) -> Result<(Self, usize), Error> {
         self.refuse_wires()?;
         let n = attempt(|| self.inner.open_parts_to_sheets(scratch))?;
-        self.sources.push(mark(OPEN_PARTS.to_owned()));
+        self.sources.push(Source::unmarked(Origin::OpenParts));
         Ok((self, n))
     }
 
@@ -359,7 +342,7 @@ impl Surface {
     /// Puts a copy of a surface that came from no file into the store's folder. Errors: the disk.
     #[doc(hidden)]
     pub fn keep_in(&self, store: &Path) -> Result<(), Error> {
-        if self.sources.iter().any(|source| source.path == IN_STORE) {
+        if self.sources.iter().any(|source| source.origin == Origin::Copy) {
             write::surface(&self.inner.without_wires(), &in_store(store))?;
         }
         self.keep_wires_in(store)
@@ -375,27 +358,27 @@ impl Surface {
         scratch: &ScratchSpace,
     ) -> Result<Self, Error> {
         let cap = scratch.cap();
-        let is_of_sheets = |s: &SurfaceSource| {
-            [SHEET, SHEETS_FROM, OPEN_PARTS, EDGES, POINTS, WIRES]
-                .iter()
-                .any(|mark| s.path.starts_with(mark))
-        };
-        let n = sources.iter().position(is_of_sheets).unwrap_or(sources.len());
-        let (own, of_sheets) = sources.split_at(n);
+        let sources: Option<Vec<Source>> = sources.iter().map(Source::from_record).collect();
+        let sources = sources.ok_or_else(|| {
+            Error::new(Code::Damaged, "the record of the surface cannot be read")
+                .at(store.display())
+        })?;
+        let n = sources.iter().position(|s| s.origin.is_inside()).unwrap_or(sources.len());
+        let (own, inside) = sources.split_at(n);
         let mut surface = match own {
-            [only] if only.path == IN_STORE => {
+            [Source { origin: Origin::Copy, .. }] => {
                 let mut surface = Self::read_in(&[in_store(store)], cap)?;
                 surface.sources = vec![given(&surface.inner)];
                 surface
             }
-            _ => Self::load(&own.iter().map(|s| s.path.clone()).collect::<Vec<_>>(), cap)?,
+            _ => Self::load(&own.iter().map(|s| s.to_record().path).collect::<Vec<_>>(), cap)?,
         };
-        // What the store keeps with sheets was turned before they came in.
-        if !of_sheets.iter().any(|s| s.path.starts_with(SHEETS_FROM)) {
+        // A copy with sheets was turned before they came in.
+        if !inside.iter().any(|s| matches!(s.origin, Origin::SheetsFrom(_))) {
             surface = surface.oriented(scratch)?;
         }
-        for source in of_sheets {
-            surface = surface.with_sheets(&source.path, store, scratch)?;
+        for source in inside {
+            surface = surface.with_inside(&source.origin, store, scratch)?;
         }
         for (then, now) in sources.iter().zip(&surface.sources) {
             if (then.bytes, then.hash) != (now.bytes, now.hash) {
@@ -403,7 +386,7 @@ impl Surface {
                     Code::SurfaceChanged,
                     "the surface is not the one the store was begun with",
                 )
-                .at(&now.path)
+                .at(now.to_record().path)
                 .with_help("put the old file back, or name the surface to compare with")
                 .with_remedy(Remedy::General));
             }
@@ -411,44 +394,46 @@ impl Surface {
         Ok(surface)
     }
 
-    /// Adds what a line of the record says of sheets.
-    fn with_sheets(
+    /// Adds a part inside that is on record.
+    fn with_inside(
         mut self,
-        path: &str,
+        origin: &Origin,
         store: &Path,
         scratch: &ScratchSpace,
     ) -> Result<Self, Error> {
-        if let Some(first) = path.strip_prefix(SHEETS_FROM) {
-            let first = first.parse::<usize>().ok().filter(|&n| n <= self.inner.n_triangles());
-            let first = first
-                .ok_or_else(|| Error::new(Code::Damaged, "the record of sheets cannot be read"))?;
-            self.inner.sheets_from(first);
-            self.sources.push(mark(path.to_owned()));
-            return Ok(self);
-        }
-        if let Some((name, file)) = path.strip_prefix(SHEET).and_then(|rest| rest.split_once('=')) {
-            let sheet = Self::load(&[file.to_owned()], scratch.cap())?.oriented(scratch)?;
-            return self.embedded(sheet, Some(name));
-        }
-        if let Some(counts) = path.strip_prefix(WIRES) {
-            return self.with_kept_wires(counts, store, scratch);
-        }
-        for kind in [WireKind::Edges, WireKind::Points] {
-            let line = path.strip_prefix(mark_of(kind));
-            if let Some((name, file)) = line.and_then(|rest| rest.split_once('=')) {
-                return self.with_wires(Path::new(file), kind, Some(name), scratch);
+        match origin {
+            Origin::SheetsFrom(first) => {
+                if *first > self.inner.n_triangles() {
+                    return Err(Error::new(Code::Damaged, "the record of sheets cannot be read"));
+                }
+                self.inner.sheets_from(*first);
+                self.sources.push(Source::unmarked(origin.clone()));
+                Ok(self)
+            }
+            Origin::Sheet(NamedFile { name, file }) => {
+                let sheet = Self::load(&[file.clone()], scratch.cap())?.oriented(scratch)?;
+                self.embedded(sheet, Some(name))
+            }
+            Origin::EmbeddedCopy(counts) => self.with_kept_wires(*counts, store, scratch),
+            Origin::Edges(NamedFile { name, file }) => {
+                self.with_wires(Path::new(file), WireKind::Edges, Some(name), scratch)
+            }
+            Origin::Points(NamedFile { name, file }) => {
+                self.with_wires(Path::new(file), WireKind::Points, Some(name), scratch)
+            }
+            Origin::OpenParts | Origin::File(_) | Origin::Sample(_) | Origin::Copy => {
+                Ok(self.open_parts_in(scratch)?.0)
             }
         }
-        Ok(self.open_parts_in(scratch)?.0)
     }
 
-    fn of(inner: surface::Surface, sources: Vec<SurfaceSource>) -> Self {
+    fn of(inner: surface::Surface, sources: Vec<Source>) -> Self {
         Self { inner, sources, turned: 0, divides: false }
     }
 
     fn generated(word: &str, cap: u64) -> Result<Self, Error> {
         let spec = SampleSpec::parse(word)?;
-        let source = SurfaceSource { path: spec.canonical(), bytes: 0, hash: [0; 2] };
+        let source = Source::unmarked(Origin::Sample(spec.canonical()));
         let mut inner = surface::Surface::from(spec.make_within(cap)?);
         inner.hold_wires(&ScratchSpace::boundless())?;
         Ok(Self::of(inner, vec![source]))
@@ -491,13 +476,8 @@ impl Surface {
     }
 }
 
-/// A line of the record that is no file.
-pub(super) fn mark(path: String) -> SurfaceSource {
-    SurfaceSource { path, ..SurfaceSource::default() }
-}
-
 /// What identifies a surface that came from no file.
-pub(super) fn given(surface: &surface::Surface) -> SurfaceSource {
+pub(super) fn given(surface: &surface::Surface) -> Source {
     let mut hash = Xxh3::new();
     for x in surface.points.iter().flat_map(|p| p.to_array()) {
         hash.update(&x.to_le_bytes());
@@ -506,18 +486,18 @@ pub(super) fn given(surface: &surface::Surface) -> SurfaceSource {
         triangle.iter().for_each(|v| hash.update(&v.to_le_bytes()));
         hash.update(surface.label_name(t).as_bytes());
     }
-    SurfaceSource { path: IN_STORE.to_owned(), bytes: 0, hash: halves(&hash) }
+    Source { origin: Origin::Copy, bytes: 0, hash: halves(&hash) }
 }
 
 /// Where a store keeps the copy of a surface that came from no file.
 #[doc(hidden)]
 pub fn in_store(store: &Path) -> PathBuf {
-    store.join(IN_STORE.trim_start_matches("store:"))
+    store.join("surface.obj")
 }
 
 /// What identifies a file later: absolute path, length, hash.
 #[doc(hidden)]
-pub fn source(path: &Path) -> Result<SurfaceSource, Error> {
+pub fn source(path: &Path) -> Result<Source, Error> {
     let io = |e: std::io::Error| {
         let message = match e.kind() {
             std::io::ErrorKind::NotFound => "there is no such file".to_owned(),
@@ -541,7 +521,8 @@ pub fn source(path: &Path) -> Result<SurfaceSource, Error> {
         bytes += n as u64;
         hash.update(&buffer[..n]);
     }
-    Ok(SurfaceSource { path: absolute.to_string_lossy().into_owned(), bytes, hash: halves(&hash) })
+    let origin = Origin::File(absolute.to_string_lossy().into_owned());
+    Ok(Source { origin, bytes, hash: halves(&hash) })
 }
 
 /// Low half first.

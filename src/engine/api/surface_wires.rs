@@ -4,11 +4,11 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use tetdb_schema::code::Code;
 
-use tetdb_schema::catalog::SurfaceSource;
+use tetdb_schema::source::{NamedFile, Origin, Source};
 use xxhash_rust::xxh3::Xxh3;
 
 use super::error::Error;
-use super::surface::{SHEETS_FROM, WIRES, given, halves, mark, mark_of, source};
+use super::surface::{given, halves, source};
 use super::{Settings, Surface, guarded};
 use tetdb_base::geom::Point;
 use tetdb_base::storage::{ScratchSpace, attempt};
@@ -99,13 +99,17 @@ impl Surface {
         name: Option<&str>,
         scratch: &ScratchSpace,
     ) -> Result<Self, Error> {
-        let source = source(file)?;
+        let Source { origin, bytes, hash } = source(file)?;
         let set = read_wires(file, kind, scratch.cap())?;
         let stem = file.file_stem().unwrap_or_default().to_string_lossy();
         let name = name.unwrap_or(&stem);
-        let record =
-            SurfaceSource { path: format!("{}{name}={}", mark_of(kind), source.path), ..source };
-        self.with_recorded(&set, name, Some(record), scratch)
+        let path = origin.file().unwrap_or_default().to_owned();
+        let named = NamedFile { name: name.to_owned(), file: path };
+        let origin = match kind {
+            WireKind::Edges => Origin::Edges(named),
+            WireKind::Points => Origin::Points(named),
+        };
+        self.with_recorded(&set, name, Some(Source { origin, bytes, hash }), scratch)
     }
 
     fn with_set(self, set: &WireSet, name: &str) -> Result<Self, Error> {
@@ -119,7 +123,7 @@ impl Surface {
         mut self,
         set: &WireSet,
         name: &str,
-        record: Option<SurfaceSource>,
+        record: Option<Source>,
         scratch: &ScratchSpace,
     ) -> Result<Self, Error> {
         let n_divided = match self.divides {
@@ -127,7 +131,7 @@ impl Surface {
             false => 0,
         };
         attempt(|| self.inner.embed_wires(set, name, scratch))??;
-        let is_kept = self.sources.iter().any(|s| s.path.starts_with(WIRES));
+        let is_kept = self.keeps_embedded();
         match record {
             Some(record) if n_divided == 0 && !is_kept => self.sources.push(record),
             _ => self.keep_all(scratch)?,
@@ -146,7 +150,7 @@ impl Surface {
         let first = plain.sheets_last();
         self.sources = vec![given(&plain)];
         if plain.has_sheets() {
-            self.sources.push(mark(format!("{SHEETS_FROM}{first}")));
+            self.sources.push(Source::unmarked(Origin::SheetsFrom(first)));
         }
         self.inner = plain;
         if !set.edges.is_empty() || !set.marks.is_empty() {
@@ -158,24 +162,26 @@ impl Surface {
 
     /// Puts a copy of edges and points that are not in files of their own into the store's folder. Errors: the disk.
     pub(super) fn keep_wires_in(&self, store: &Path) -> Result<(), Error> {
-        if self.sources.iter().any(|s| s.path.starts_with(WIRES)) {
+        if self.keeps_embedded() {
             write::wires(&self.inner.wire_set(), &in_store(store))?;
         }
         Ok(())
     }
 
-    /// Adds what the store keeps; `counts`: how many edges and points, with a comma between.
+    /// Whether the store keeps a copy of the embedded edges and points.
+    fn keeps_embedded(&self) -> bool {
+        self.sources.iter().any(|s| matches!(s.origin, Origin::EmbeddedCopy(_)))
+    }
+
+    /// Adds the copy of embedded edges and points in the store; `counts` has the number of each.
     pub(super) fn with_kept_wires(
         mut self,
-        counts: &str,
+        counts: [u64; 2],
         store: &Path,
         scratch: &ScratchSpace,
     ) -> Result<Self, Error> {
-        let counts = counts.split(',').map(str::parse::<u64>);
-        let kinds = [WireKind::Edges, WireKind::Points];
-        for (count, kind) in counts.zip(kinds) {
-            let damaged = |_| Error::new(Code::Damaged, "the record of edges cannot be read");
-            if count.map_err(damaged)? > 0 {
+        for (count, kind) in counts.into_iter().zip([WireKind::Edges, WireKind::Points]) {
+            if count > 0 {
                 let set = read_wires(&in_store(store), kind, scratch.cap())?;
                 attempt(|| self.inner.embed_named(&set, scratch))??;
             }
@@ -191,18 +197,15 @@ fn in_store(store: &Path) -> PathBuf {
 }
 
 /// What identifies edges and points that the store keeps.
-fn kept(set: &WireSet) -> SurfaceSource {
+fn kept(set: &WireSet) -> Source {
     let mut hash = Xxh3::new();
     for x in set.points.iter().flat_map(|p| p.to_array()) {
         hash.update(&x.to_le_bytes());
     }
     let words = set.edges.iter().flatten().chain(set.marks.iter().flatten());
     words.for_each(|word| hash.update(&word.to_le_bytes()));
-    SurfaceSource {
-        path: format!("{WIRES}{},{}", set.edges.len(), set.marks.len()),
-        bytes: 0,
-        hash: halves(&hash),
-    }
+    let counts = [set.edges.len(), set.marks.len()].map(|n| n as u64);
+    Source { origin: Origin::EmbeddedCopy(counts), bytes: 0, hash: halves(&hash) }
 }
 
 fn set_of(points: &[[f64; 3]]) -> Result<WireSet, Error> {

@@ -4,8 +4,7 @@ use std::path::{Path, PathBuf};
 use tetdb_schema::code::Code;
 
 use super::Error;
-use super::surface::{EDGES, IN_STORE, OPEN_PARTS, POINTS, SHEET, SHEETS_FROM, WIRES};
-use tetdb_kernel::samples::PREFIX;
+use tetdb_schema::source::Source;
 use tetdb_store::store::Catalog;
 
 /// Endings of files, and of those that are read with them: TetGen's points, the background mesh of sizes.
@@ -60,19 +59,8 @@ fn with_others(file: &Path, others: &[(&str, &[&str])]) -> Vec<PathBuf> {
 pub fn inputs_of(store: &Path) -> Vec<PathBuf> {
     let job = Catalog::open(store).and_then(|mut catalog| catalog.job());
     let sources = job.map(|job| job.surfaces).unwrap_or_default();
-    let files = sources.iter().filter_map(|source| file_of(&source.path));
-    files.map(PathBuf::from).collect()
-}
-
-/// The file that a line of the record names, where it names one.
-fn file_of(line: &str) -> Option<&str> {
-    let embedded = [SHEET, EDGES, POINTS];
-    if let Some(named) = embedded.iter().find_map(|mark| line.strip_prefix(mark)) {
-        return named.split_once('=').map(|(_, file)| file);
-    }
-    let others = [IN_STORE, PREFIX, SHEETS_FROM, OPEN_PARTS, WIRES];
-    let is_file = !others.iter().any(|mark| line.starts_with(mark));
-    is_file.then_some(line)
+    let sources = sources.iter().filter_map(Source::from_record);
+    sources.filter_map(|source| source.origin.file().map(PathBuf::from)).collect()
 }
 
 /// Whether two paths lead to one file.
