@@ -8,7 +8,6 @@ mod check_report;
 mod compare;
 mod config;
 mod console;
-mod cures;
 mod digest;
 mod estimate;
 mod export;

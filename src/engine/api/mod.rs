@@ -41,9 +41,12 @@ pub mod show;
 mod sizes;
 #[doc(hidden)]
 pub mod store;
+mod suggestions;
 #[doc(hidden)]
 pub mod surface;
 mod surface_arrays;
+mod surface_repair;
+mod surface_report;
 mod surface_wires;
 #[doc(hidden)]
 pub mod targets;
@@ -80,12 +83,19 @@ pub use settings::{Event, Settings};
 pub use show::{ExportOptions, Exported};
 pub use sizes::Sizes;
 pub use store::{Store, Summary};
+pub use suggestions::Suggestion;
 pub use surface::{CheckReport, Surface};
+pub use surface_repair::{RepairReport, WELD_SHARE_MAX};
+pub use surface_report::SurfaceReport;
 pub use tasks::Tasks;
 #[doc(hidden)]
 pub use tetdb_base::geom::short;
 pub use tetdb_base::storage::CancelToken;
+pub use tetdb_base::surface::Defect;
+#[doc(hidden)]
+pub use tetdb_base::surface::show as show_point;
 pub use tetdb_io::write::MeshFormat;
+pub use tetdb_io::write::SurfaceReport as SurfaceWritten;
 pub use tetdb_kernel::sizing::SizeWarning;
 pub use tetdb_schema::code::Code;
 pub use tetdb_store::audit::{Population, Qualities};

@@ -14,7 +14,7 @@ use tetdb_base::geom::Point;
 use tetdb_base::storage::{ScratchSpace, attempt};
 use tetdb_base::surface::{self, SplitReport, SurfaceBuilder, orient_alike_in, split};
 use tetdb_io::read::{WireKind, is_stream, read_surface};
-use tetdb_io::write;
+use tetdb_io::write::{self, SurfaceReport as SurfaceWritten};
 use tetdb_kernel::samples::{PREFIX, SampleSpec};
 use tetdb_kernel::sizing::{Further, SizeField, SizeOptions};
 
@@ -78,10 +78,6 @@ impl CheckReport {
     }
 }
 
-/// Points are joined up to this share of the box diagonal at most: beyond it a surface loses its shape.
-#[doc(hidden)]
-pub const WELD_SHARE_MAX: f64 = 0.01;
-
 /// Divides triangles until their edges are as short as `options` want them; where the surface is finer, sizes grow from its edges.
 ///
 /// Errors: more triangles than `scratch` has memory for.
@@ -101,7 +97,7 @@ pub fn refine(
 }
 
 /// What cannot be done any more once there are sheets.
-fn refuse_sheets(surface: &surface::Surface, what: &str) -> Result<(), Error> {
+pub(super) fn refuse_sheets(surface: &surface::Surface, what: &str) -> Result<(), Error> {
     match surface.has_sheets() || surface.has_wires() {
         false => Ok(()),
         true => {
@@ -186,24 +182,6 @@ impl Surface {
             let validation = surface::validate(&self.inner);
             let fitness = surface::fitness(&self.inner, &validation.closedness);
             Ok(CheckReport::of(&validation, &fitness))
-        })
-    }
-
-    /// Without triangles of no area and repeated ones, divided where vertices lie exactly on open edges, turned alike; and points nearer
-    /// than `weld`, a share of the box diagonal up to 0.01, joined.
-    pub fn repaired(mut self, weld: Option<f64>) -> Result<Self, Error> {
-        if let Some(share) = weld.filter(|share| !(*share > 0.0 && *share <= WELD_SHARE_MAX)) {
-            let message = format!(
-                "{share} is not a share of the box diagonal, expected above 0 and at most {WELD_SHARE_MAX}"
-            );
-            return Err(Error::new(Code::BadSize, message));
-        }
-        refuse_sheets(&self.inner, "repaired")?;
-        guarded(&Settings::new(), || {
-            let distance = weld.map(|share| share * self.inner.bounds().diagonal());
-            surface::repair(&mut self.inner, distance);
-            self.sources = vec![given(&self.inner)];
-            Ok(self)
         })
     }
 
@@ -296,13 +274,12 @@ impl Surface {
     }
 
     /// Writes it, without embedded edges and points, as `.stl`, `.off`, `.obj` or `.ply`. Errors: `unknown-format`, `lossy-format`; the disk.
-    pub fn write(&self, out: impl AsRef<Path>) -> Result<(), Error> {
+    pub fn write(&self, out: impl AsRef<Path>) -> Result<SurfaceWritten, Error> {
         guarded(&Settings::new(), || {
-            match self.inner.has_wires() {
+            Ok(match self.inner.has_wires() {
                 true => write::surface(&self.inner.without_wires(), out.as_ref())?,
                 false => write::surface(&self.inner, out.as_ref())?,
-            };
-            Ok(())
+            })
         })
     }
 

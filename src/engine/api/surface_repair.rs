@@ -1,0 +1,104 @@
+//! Repairs of a surface.
+
+use serde::Serialize;
+use serde_json::{Value, json};
+use tetdb_schema::code::Code;
+
+use super::error::{Error, Remedy};
+use super::surface::{given, refuse_sheets};
+use super::{Bytes, Settings, Surface, guarded};
+use tetdb_base::storage::attempt;
+use tetdb_base::surface::{Repair, repair, repair_bytes, validate_in};
+
+/// Points are joined up to this share of the box diagonal at most: beyond it a surface loses its shape.
+pub const WELD_SHARE_MAX: f64 = 0.01;
+
+/// A repair that was done. Serialized, it is the key `repair` of `tetdb check --json`.
+#[derive(Clone, Debug, Serialize)]
+#[serde(into = "Value")]
+#[non_exhaustive]
+pub struct RepairReport {
+    /// Points nearer than this share of the box diagonal were joined.
+    pub weld: Option<f64>,
+    /// The same in input units.
+    pub weld_distance: Option<f64>,
+    /// Points, triangles and how many of them were joined, dropped, divided or turned.
+    pub done: Repair,
+    /// Triangles before.
+    pub triangles_before: usize,
+    /// Vertices before.
+    pub vertices_before: usize,
+    /// Defects before.
+    pub n_defects_before: u64,
+}
+
+impl From<RepairReport> for Value {
+    fn from(report: RepairReport) -> Self {
+        let done = &report.done;
+        json!({
+            "weld": report.weld, "weld_distance": report.weld_distance, "points_joined": done.points_joined,
+            "collapsed_dropped": done.collapsed_dropped, "repeated_dropped": done.repeated_dropped,
+            "divided": done.divided, "turned": done.turned,
+            "before": {
+                "triangles": report.triangles_before, "vertices": report.vertices_before,
+                "n_defects": report.n_defects_before,
+            },
+        })
+    }
+}
+
+impl Surface {
+    /// Without triangles of no area and repeated ones, divided where vertices lie exactly on open edges, turned alike; and points nearer
+    /// than `weld`, a share of the box diagonal up to 0.01, joined.
+    pub fn repaired(self, weld: Option<f64>) -> Result<Self, Error> {
+        Ok(self.repair_reported(weld, &Settings::new())?.0)
+    }
+
+    /// [`Surface::repaired`], and what was done.
+    ///
+    /// # Errors
+    /// `bad-size` for a share that is too large; `memory`; `usage` after something was embedded.
+    pub fn repair_reported(
+        mut self,
+        weld: Option<f64>,
+        settings: &Settings,
+    ) -> Result<(Self, RepairReport), Error> {
+        if let Some(share) = weld.filter(|share| !(*share > 0.0 && *share <= WELD_SHARE_MAX)) {
+            let message = format!(
+                "{share} is not a share of the box diagonal, expected above 0 and at most {WELD_SHARE_MAX}"
+            );
+            return Err(Error::new(Code::BadSize, message));
+        }
+        refuse_sheets(&self.inner, "repaired")?;
+        guarded(settings, || {
+            let least = repair_bytes(&self.inner);
+            if settings.cap()? < least {
+                let message = format!(
+                    "a surface of {} triangles is repaired in {} of memory",
+                    self.inner.n_triangles(),
+                    Bytes(least)
+                );
+                return Err(Error::new(Code::Memory, message).with_remedy(Remedy::Memory(least)));
+            }
+            let scratch = settings.scratch_space(self.inner.bytes() as u64)?;
+            let n_defects_before = attempt(|| validate_in(&self.inner, &scratch))?.n_defects;
+            let (triangles_before, vertices_before) =
+                (self.inner.n_triangles(), self.inner.n_vertices());
+            let weld_distance = weld.map(|share| share * self.inner.bounds().diagonal());
+            let mut done = repair(&mut self.inner, weld_distance);
+            // Triangles that were turned when the surface was read count too.
+            done.turned += self.turned;
+            self.turned = done.turned;
+            self.sources = vec![given(&self.inner)];
+            let report = RepairReport {
+                weld,
+                weld_distance,
+                done,
+                triangles_before,
+                vertices_before,
+                n_defects_before,
+            };
+            Ok((self, report))
+        })
+    }
+}

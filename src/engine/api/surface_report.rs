@@ -1,0 +1,228 @@
+//! Everything that is known of a surface before it is meshed.
+
+use std::path::Path;
+
+use serde::{Serialize, Serializer};
+use serde_json::{Value, json};
+
+use super::suggestions::{Suggestion, suggestions};
+use super::{Bytes, Error, Settings, Surface, guarded, predict};
+use crate::pipeline::{MeshOptions, Prepared, least_for};
+use tetdb_base::geom::short;
+use tetdb_base::shape::face_least;
+use tetdb_base::storage::attempt;
+use tetdb_base::surface::{
+    self, BoundaryLoop, Closing, Defect, Fitness, Validation, boundary_loops, closing, fitness,
+    repair_bytes, validate_in,
+};
+use tetdb_io::write;
+
+/// Of surfaces with more triangles the tetrahedra are estimated only on request: sizes and their sum take two to three times as long as
+/// all the rest of a report.
+const ESTIMATED_MAX: usize = 100_000;
+/// Above this share of forced tetrahedra, or of triangles with small angles, better triangles are advised.
+const POOR_SHARE: f64 = 0.01;
+/// Above this ratio of edge lengths short edges are pointed at.
+const POOR_RATIO: f64 = 1e5;
+
+/// Defects, openness and shapes of a surface, and what would improve it. Serialized, it is the answer of `tetdb check --json`; the
+/// guide lists the keys.
+#[non_exhaustive]
+pub struct SurfaceReport<'a> {
+    surface: &'a surface::Surface,
+    /// Triangles that were turned to run like their neighbors.
+    pub n_turned: usize,
+    /// Defects, open edges and parts.
+    pub validation: Validation,
+    /// Boundaries of the holes, the longest first.
+    pub boundary_loops: Vec<BoundaryLoop>,
+    /// Repairs that were tried on an open surface, with growing distance; empty for a closed one.
+    pub closing: Vec<Closing>,
+    /// Shapes of the triangles.
+    pub fitness: Fitness,
+    /// Estimated tetrahedra with default sizes; `None` for a surface that cannot be meshed, or a large one unless asked for.
+    pub tets_expected: Option<f64>,
+    /// Changes that would give a better mesh.
+    pub suggestions: Vec<Suggestion>,
+}
+
+impl Surface {
+    /// Reports on the surface. With `estimated` the tetrahedra of a large surface are estimated too.
+    ///
+    /// # Errors
+    /// `memory`. Defects are no error.
+    pub fn report(&self, settings: &Settings, estimated: bool) -> Result<SurfaceReport<'_>, Error> {
+        guarded(settings, || SurfaceReport::new(&self.inner, self.turned, settings, estimated))
+    }
+
+    /// Writes the triangles with defects to a `.vtu` file, and returns how many there are. Without any, no file is written.
+    ///
+    /// # Errors
+    /// `unknown-format`; the disk.
+    pub fn write_defects(
+        &self,
+        report: &SurfaceReport,
+        out: impl AsRef<Path>,
+    ) -> Result<u64, Error> {
+        match report.validation.defects.as_slice() {
+            [] => Ok(0),
+            defects => Ok(write::defects(&self.inner, defects, out.as_ref())?),
+        }
+    }
+}
+
+impl<'a> SurfaceReport<'a> {
+    fn new(
+        surface: &'a surface::Surface,
+        n_turned: usize,
+        settings: &Settings,
+        estimated: bool,
+    ) -> Result<Self, Error> {
+        let cap = settings.cap()?;
+        let scratch = settings.scratch_space(surface.bytes() as u64)?;
+        let validation = attempt(|| validate_in(surface, &scratch))?;
+        drop(scratch);
+        let fitness = fitness(surface, &validation.closedness);
+        let is_estimated =
+            validation.is_valid() && (surface.n_triangles() <= ESTIMATED_MAX || estimated);
+        let closing = match validation.closedness.is_closed() {
+            true => Vec::new(),
+            false if cap < repair_bytes(surface) => {
+                settings.note(format!(
+                    "note: what would close it was not tried, which takes {} of memory",
+                    Bytes(repair_bytes(surface))
+                ));
+                Vec::new()
+            }
+            false => closing(surface),
+        };
+        let prepared = is_estimated.then(|| expected(surface, settings, cap)).flatten();
+        let suggestions = match &prepared {
+            Some(prepared) => suggestions(surface, &fitness, &prepared.field, settings)?,
+            None => Vec::new(),
+        };
+        Ok(Self {
+            surface,
+            n_turned,
+            boundary_loops: boundary_loops(surface, &validation.closedness),
+            closing,
+            fitness,
+            tets_expected: prepared.map(|prepared| prepared.estimate.tets()),
+            suggestions,
+            validation,
+        })
+    }
+
+    /// Whether the surface can be meshed.
+    pub fn is_valid(&self) -> bool {
+        self.validation.is_valid()
+    }
+
+    /// The repair with the least distance that closes the surface.
+    pub fn closes(&self) -> Option<&Closing> {
+        self.closing.last().filter(|tried| tried.closes)
+    }
+
+    /// Least share of the estimated tetrahedra that cannot be good: at least one stands on each triangle.
+    pub fn forced_share(&self) -> Option<f64> {
+        let n = self.fitness.forcing_triangles as f64;
+        self.tets_expected.map(|tets| n / tets)
+    }
+
+    /// The least quality that a tetrahedron on the worst triangle can have, and the triangle's centroid.
+    pub fn least_quality(&self) -> (f64, [f64; 3]) {
+        let corners = self.surface.corners(self.fitness.worst_triangle);
+        let [a, b, c] = corners;
+        (face_least(corners), ((a + b + c) / 3.0).to_array())
+    }
+
+    /// Sentences on what would make a better mesh.
+    pub fn advice(&self) -> Vec<String> {
+        let f = &self.fitness;
+        let mut advice = Vec::new();
+        if f.small_angle_share > POOR_SHARE || self.forced_share().is_some_and(|s| s > POOR_SHARE) {
+            let spoiled = match f.hopeless_triangles {
+                0 => String::new(),
+                n => format!(", {n} of them 10 or worse"),
+            };
+            advice.push(format!(
+                "{} triangles make every tetrahedron on them quality 2 or worse{spoiled}; all input triangles stay, so remesh the \
+                 surface first, with angles above 15 degrees",
+                f.forcing_triangles
+            ));
+        }
+        if f.edge_min > 0.0 && f.edge_max / f.edge_min > POOR_RATIO {
+            advice.push(format!(
+                "the shortest edge is {} of the longest; if such edges are no intended detail, remove them in the program the surface comes from",
+                short(f.edge_min / f.edge_max)
+            ));
+        }
+        advice
+    }
+
+    fn json(&self) -> Value {
+        let (surface, found, edges) = (self.surface, &self.validation, &self.validation.closedness);
+        let bounds = [surface.bounds().low, surface.bounds().high].map(|p| p.to_array());
+        let point = |v: u32| surface.points[v as usize].to_array();
+        let open_loops: Vec<Value> = self
+            .boundary_loops
+            .iter()
+            .map(|edge_loop| {
+                json!({ "edges": edge_loop.n_edges, "length": edge_loop.length, "triangle": edge_loop.triangle, "at": edge_loop.at.to_array() })
+            })
+            .collect();
+        let junctions: Vec<Value> = found
+            .t_junctions
+            .iter()
+            .map(|j| {
+                json!({ "at": j.at.to_array(), "triangle": j.triangle, "edge": j.edge.map(point), "distance": j.distance })
+            })
+            .collect();
+        let mut fitness = json!(self.fitness);
+        fitness["tets_expected"] = json!(self.tets_expected);
+        fitness["forced_share"] = json!(self.forced_share());
+        if surface.n_triangles() > 0 {
+            let (least, at) = self.least_quality();
+            // Infinite without area: then it is null.
+            fitness["least_quality"] = json!(least);
+            fitness["least_quality_at"] = json!(at);
+        }
+        json!({
+            "triangles": surface.n_triangles(), "vertices": surface.n_vertices(),
+            "labels": surface.label_names, "bounds": bounds, "turned_triangles": self.n_turned,
+            "edges": edges.n_edges, "parts": edges.n_components, "open_edges": edges.open.len(),
+            "nonmanifold_edges": edges.n_nonmanifold, "two_sided_triangles": edges.two_sided.len(),
+            "valid": self.is_valid(), "n_defects": found.n_defects,
+            "defects": found.defects.iter().map(defect_json).collect::<Vec<_>>(),
+            "open_loops": open_loops, "t_junctions": junctions,
+            "closing": { "tried": self.closing, "smallest": self.closes().map(|c| c.share) },
+            "fitness": fitness, "advice": self.advice(), "cures": self.suggestions,
+        })
+    }
+}
+
+impl Serialize for SurfaceReport<'_> {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        self.json().serialize(to)
+    }
+}
+
+/// Default sizes and the mesh they predict; `None` where no size makes sense.
+fn expected(surface: &surface::Surface, settings: &Settings, cap: u64) -> Option<Prepared> {
+    if cap < least_for(surface) {
+        return None;
+    }
+    let beside = settings.scratch_dir().join("check");
+    predict(surface, &MeshOptions::default().into(), cap, &beside).ok()
+}
+
+fn defect_json(defect: &Defect) -> Value {
+    let mut value = json!({
+        "code": defect.code(), "triangles": defect.triangles(), "at": defect.at().map(|p| p.to_array()),
+        "message": defect.to_string(), "help": defect.help(),
+    });
+    if let Defect::SelfIntersection { kind, .. } = defect {
+        value["kind"] = json!(kind.word());
+    }
+    value
+}
