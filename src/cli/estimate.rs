@@ -1,4 +1,4 @@
-//! `estimate`, and the look at disk and memory before `mesh` begins.
+//! `estimate`: a mesh and what it takes, before it is begun.
 
 use std::path::Path;
 
@@ -10,112 +10,97 @@ use super::failure::{Failure, in_flags};
 use super::input::Space;
 use super::words::count;
 use super::{config, input, memory, threads};
-use tetdb_base::geom::short;
-use tetdb_base::storage::n_threads;
-use tetdb_engine::api::job::take_seeds;
-use tetdb_engine::api::preflight::free_at;
-use tetdb_engine::api::{default_cap, divide, predict};
+use tetdb_engine::api::{Mesher, default_cap, short};
 
 pub fn run(args: &EstimateArgs, console: &Console) -> Result<u8, Failure> {
-    let mut options = config::options(&args.shape)?;
+    let options = config::options(&args.shape)?;
     let (cap, whence) = match memory::asked(args.memory.as_deref())? {
         Some(cap) => (cap, "--memory".to_owned()),
         None => default_cap(),
     };
-    let threads = threads::asked(args.threads)?.unwrap_or_else(n_threads);
+    let settings = console.settings(Some(cap), threads::asked(args.threads)?);
+    let threads = settings.n_threads();
     let store = args.output.as_deref().unwrap_or(Path::new("."));
     // The cap is that of the run to come; what is said of it needs the surface, however large.
     let space = Space { cap: cap.max(default_cap().0), beside: store };
-    let mut surface =
-        input::load_valid(&args.surfaces, (&args.sheets, options.refine_surface), space, console)?;
-    take_seeds(&mut options, &surface.inner.seeds);
-    if options.refine_surface {
-        let settings = console.settings(Some(cap), args.threads);
-        divide(&mut surface, &options.clone().into(), None, cap, store, &settings)?;
-    }
-    let options = options.into();
-    let prepared = predict(&surface.inner, &options, cap, store)?;
-    let estimate = &prepared.estimate;
-    let disk_free = free_at(store);
-    let disk = estimate.disk_peak_bytes(cap, threads);
-    let fits_memory = cap >= estimate.memory_least_bytes();
-    let fits_disk = disk_free.is_none_or(|free| free >= disk);
+    let refines = options.refine_surface;
+    let surface = input::load_valid(&args.surfaces, (&args.sheets, refines), space, console)?;
+    let found = Mesher::with_options(surface, options).settings(settings).predict_at(store)?;
+    let (fits_memory, fits_disk) = (found.fits_memory, found.fits_disk());
     if console.is_json() {
         console.answer(&json!({
             "schema": 1,
-            "tets": round(estimate.tets()),
-            "vertices": round(estimate.vertices),
-            "triangles": estimate.triangles,
-            "subdomains": estimate.subdomains,
-            "sizes": prepared.sizes.to_string(),
-            "size_field": { "leaves": prepared.sizes.n_leaves, "bytes": prepared.sizes.bytes },
-            "store_bytes": estimate.store_bytes(),
-            "disk_peak_bytes": disk,
-            "disk_free_bytes": disk_free,
+            "tets": round(found.tets),
+            "vertices": round(found.vertices),
+            "triangles": found.triangles,
+            "subdomains": found.subdomains,
+            "sizes": found.sizes.to_string(),
+            "size_field": { "leaves": found.sizes.n_leaves, "bytes": found.sizes.bytes },
+            "store_bytes": found.store.0,
+            "disk_peak_bytes": found.disk_peak.0,
+            "disk_free_bytes": found.disk_free.map(|free| free.0),
             "memory_cap_bytes": cap,
-            "peak_bytes": estimate.memory_bytes(cap, threads),
-            "memory_least_bytes": estimate.memory_least_bytes(),
-            "memory_full_bytes": estimate.memory_full_bytes(threads),
+            "peak_bytes": found.memory.0,
+            "memory_least_bytes": found.memory_least.0,
+            "memory_full_bytes": found.memory_full.0,
             "threads": threads,
-            "wall_s": estimate.seconds(threads),
+            "wall_s": found.seconds,
             "workers": args.workers.map(|n| {
-                let forecast = estimate.forecast(n);
+                let of = found.workers(n);
                 json!({
-                    "n": n, "wall_s": forecast.wall_s(), "serial_s": forecast.serial_s, "cuts_s": forecast.cuts_s,
-                    "subdomains_s": forecast.subdomains_s, "wall_least_s": estimate.forecast(u32::MAX).wall_s(),
+                    "n": n, "wall_s": of.wall_s, "serial_s": of.serial_s, "cuts_s": of.cuts_s,
+                    "subdomains_s": of.subdomains_s, "wall_least_s": of.wall_least_s,
                 })
             }),
             "fits": { "memory": fits_memory, "disk": fits_disk },
         }));
         return Ok(0);
     }
-    console.line(&prepared.sizes.to_string());
-    for warning in &prepared.sizes.warnings {
+    console.line(&found.sizes.to_string());
+    for warning in &found.sizes.warnings {
         console.warn(&in_flags(warning));
     }
     console.line(&format!(
         "about {} tetrahedra and {} vertices from {} triangles, in {}",
-        round(estimate.tets()),
-        round(estimate.vertices),
-        estimate.triangles,
-        match estimate.subdomains {
+        round(found.tets),
+        round(found.vertices),
+        found.triangles,
+        match found.subdomains {
             1 => "one piece".to_owned(),
             n => format!("{n} sub-domains"),
         }
     ));
-    let (least, full) = (estimate.memory_least_bytes(), estimate.memory_full_bytes(threads));
+    let (least, full) = (found.memory_least, found.memory_full);
     console.line(&format!(
-        "memory: {} with a cap of {} ({whence}); the smallest cap is {}{}",
-        memory::show(estimate.memory_bytes(cap, threads)),
+        "memory: {} with a cap of {} ({whence}); the smallest cap is {least}{}",
+        found.memory,
         memory::show(cap),
-        memory::show(least),
         match full > least {
-            true => format!(", and more than {} brings nothing", memory::show(full)),
+            true => format!(", and more than {full} brings nothing"),
             false => String::new(),
         }
     ));
-    let free = disk_free.map_or(String::new(), |free| format!("; {} are free", memory::show(free)));
+    let free = found.disk_free.map_or(String::new(), |free| format!("; {free} are free"));
     console.line(&format!(
         "disk: {} at most on the way, {} for the finished store{free}",
-        memory::show(disk),
-        memory::show(estimate.store_bytes()),
+        found.disk_peak, found.store
     ));
+    let seconds = |s: f64| short(s.max(1.0).round());
     console.line(&format!(
         "time: about {} s on {} of a 2.6 GHz server; needle-shaped triangles make it longer",
-        short(estimate.seconds(threads).max(1.0).round()),
+        seconds(found.seconds),
         count(threads as u64, "thread")
     ));
     if let Some(n) = args.workers {
-        let forecast = estimate.forecast(n);
-        let seconds = |s: f64| short(s.max(1.0).round());
+        let of = found.workers(n);
         console.line(&format!(
             "time: about {} s with {}, of these {} for what one process does, {} for cuts, {} for sub-domains; no number of them takes less than {} s",
-            seconds(forecast.wall_s()),
+            seconds(of.wall_s),
             count(n, "worker"),
-            seconds(forecast.serial_s),
-            seconds(forecast.cuts_s),
-            seconds(forecast.subdomains_s),
-            seconds(estimate.forecast(u32::MAX).wall_s()),
+            seconds(of.serial_s),
+            seconds(of.cuts_s),
+            seconds(of.subdomains_s),
+            seconds(of.wall_least_s),
         ));
     }
     console.line(match (fits_memory, fits_disk) {

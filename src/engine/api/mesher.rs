@@ -7,13 +7,14 @@ use std::time::Instant;
 use tetdb_schema::code::Code;
 
 use super::field_arrays::FieldArrays;
+use super::prediction::Prediction;
 use super::preflight::{self, preflight, scratch_beside, with_free_space};
 use super::store::say_how_locked;
 use super::{
     Bytes, Error, Event, Optimize, Regions, Seal, Settings, Sizes, Store, Subdomains, Surface,
     Verification, guarded, job, replace, verify,
 };
-use crate::pipeline::{self, Estimate, MeshOptions, Options, PipelineError, Prepared, RECIPE};
+use crate::pipeline::{self, MeshOptions, Options, PipelineError, Prepared, RECIPE};
 use tetdb_base::geom::Point;
 use tetdb_base::storage::{Budget, CancelToken, attempt, n_threads};
 use tetdb_base::surface::{self, Seed, SeedKind};
@@ -57,26 +58,6 @@ pub struct Mesher {
     existing: Existing,
     preflight: bool,
     verify: bool,
-}
-
-/// What to expect of a mesh, before it is begun.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct Prediction {
-    /// Tetrahedra.
-    pub tets: f64,
-    /// Vertices.
-    pub vertices: f64,
-    /// Sub-domains.
-    pub subdomains: u32,
-    /// Of the finished store.
-    pub store: Bytes,
-    /// Of disk while it is meshed.
-    pub disk_peak: Bytes,
-    /// The smallest cap that would do.
-    pub memory_least: Bytes,
-    /// Seconds on a server of 2.6 GHz.
-    pub seconds: f64,
 }
 
 /// What a run left at its path.
@@ -250,20 +231,25 @@ impl Mesher {
         Ok(options)
     }
 
-    /// What to expect of the mesh; nothing is written. Errors: sizes that make no sense, a surface with defects.
+    /// Predicts the mesh and what it takes; nothing is written. Errors: sizes that make no sense, a surface with defects.
     pub fn predict(&self) -> Result<Prediction, Error> {
+        self.predict_at(".")
+    }
+
+    /// The same for a store at `store`, whose disk is looked at.
+    pub fn predict_at(&self, store: impl AsRef<Path>) -> Result<Prediction, Error> {
         guarded(&self.settings, || {
-            let cap = self.settings.cap()?;
+            let (cap, store) = (self.settings.cap()?, store.as_ref());
             let options = self.complete_options()?;
-            let (here, field) = (Path::new("."), self.sizes.field.as_deref());
+            let field = self.sizes.field.as_deref();
             let mut surface = Cow::Borrowed(&self.surface);
-            let scratch = scratch_beside(&surface.inner, cap, here)?;
+            let scratch = scratch_beside(&surface.inner, cap, store)?;
             attempt(|| surface::validate_in(&surface.inner, &scratch))?.accept()?;
             if options.mesh.refine_surface {
-                divide(surface.to_mut(), &options, field, cap, here, &self.settings)?;
+                divide(surface.to_mut(), &options, field, cap, store, &self.settings)?;
             }
-            let prepared = predict_with(&surface.inner, &options, field, cap, here)?;
-            Ok(Prediction::of(&prepared.estimate, cap, n_threads()))
+            let prepared = predict_with(&surface.inner, &options, field, cap, store)?;
+            Ok(Prediction::new(prepared, cap, n_threads(), store))
         })
     }
 
@@ -583,18 +569,4 @@ pub(super) fn verify_new(
     settings.note(verify::sentence(&report));
     verify::record(path, lock)?;
     Ok(Verification { report })
-}
-
-impl Prediction {
-    fn of(estimate: &Estimate, cap: u64, threads: usize) -> Self {
-        Self {
-            tets: estimate.tets(),
-            vertices: estimate.vertices,
-            subdomains: estimate.subdomains,
-            store: Bytes(estimate.store_bytes()),
-            disk_peak: Bytes(estimate.disk_peak_bytes(cap, threads)),
-            memory_least: Bytes(estimate.memory_least_bytes()),
-            seconds: estimate.seconds(threads),
-        }
-    }
 }

@@ -28,6 +28,7 @@ mod options;
 pub mod page;
 #[doc(hidden)]
 pub mod picture;
+mod prediction;
 #[doc(hidden)]
 pub mod preflight;
 #[doc(hidden)]
@@ -71,11 +72,12 @@ pub use memory::default_cap;
 pub use memory::peak_bytes;
 #[doc(hidden)]
 pub use memory::show_bytes;
-pub use mesher::{Existing, Mesher, Prediction};
+pub use mesher::{Existing, Mesher};
 #[doc(hidden)]
 pub use mesher::{divide, predict};
 pub use options::{Length, Optimize, Regions, Seal, Subdomains};
 pub use picture::{ColorBy, Snapped, Snapshot};
+pub use prediction::{Prediction, WorkersPrediction};
 pub use remesh::{Remesh, Remeshed};
 #[doc(hidden)]
 pub use resume::resume_reported;
