@@ -1,7 +1,6 @@
 //! `check`: can a surface be meshed, what would mend it, what mesh does it allow?
 
 use std::path::PathBuf;
-use tetdb_schema::code::Code;
 
 use serde_json::json;
 
@@ -9,10 +8,10 @@ use super::args::CheckArgs;
 use super::check_report::Printed;
 use super::console::Console;
 use super::failure::Failure;
-use super::input::{self, Space};
+use super::input;
 use super::memory;
 use tetdb_engine::api::targets::check_target;
-use tetdb_engine::api::{RepairReport, Surface, SurfaceReport, WELD_SHARE_MAX, short};
+use tetdb_engine::api::{Code, RepairReport, Surface, SurfaceReport, WELD_SHARE_MAX, short};
 
 pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
     // Options are checked before anything is read.
@@ -28,9 +27,8 @@ pub fn run(args: &CheckArgs, console: &Console) -> Result<u8, Failure> {
     }
     // A check writes nothing beside what it reads.
     let settings = console.settings(memory::asked(args.memory.as_deref())?, None);
-    let beside = settings.scratch_dir().join("check");
-    let space = Space { cap: settings.cap()?, beside: &beside };
-    let mut surface = input::load_with(&args.surfaces, (&args.sheets, false), space, console)?;
+    let sheets = (&args.sheets, false);
+    let mut surface = input::load_with(&args.surfaces, sheets, &settings, console)?;
     let mut repair = None;
     if args.repair {
         let done;

@@ -1,14 +1,10 @@
 //! The options that shape the mesh, from the command line and a file.
 
 use std::path::Path;
-use tetdb_schema::code::Code;
+use tetdb_engine::api::{Code, MeshOptions, OptionsText, Seed, SeedKind, Word, typed};
 
 use super::args::{ShapeArgs, SizeArgs};
 use super::failure::Failure;
-use tetdb_base::surface::{Seed, SeedKind};
-use tetdb_engine::api::job::identify_sizes;
-use tetdb_engine::pipeline::{MeshOptions, OptionsText, PipelineError};
-use tetdb_schema::word::Word;
 
 /// No configuration is longer.
 const BYTES_MAX: u64 = 1 << 20;
@@ -28,16 +24,13 @@ pub fn options(args: &ShapeArgs) -> Result<MeshOptions, Failure> {
             read(&text).map_err(|failure| failure.at(path.display()))?
         }
     };
-    let typed = text_of(args)?;
-    let mut options =
-        MeshOptions::try_from(file.overridden_by(typed)).map_err(|e| match (e, &args.config) {
-            (PipelineError::Option { option, value }, Some(path)) => {
-                bad(format!("`{value}` is no value of {option}")).at(path.display())
-            }
-            (e, _) => e.into(),
-        })?;
-    identify_sizes(&mut options)?;
-    Ok(options)
+    typed(file.overridden_by(text_of(args)?)).map_err(|e| match (&args.config, e.option()) {
+        // Words of the command line are known, so this one is the file's.
+        (Some(path), Some(_)) if e.code() == Code::Usage => {
+            bad(e.message().to_owned()).at(path.display())
+        }
+        _ => e.into(),
+    })
 }
 
 /// The sizes of the command line.

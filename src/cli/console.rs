@@ -3,16 +3,13 @@
 use std::io::{IsTerminal, Write};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
-use tetdb_schema::code::Code;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use serde::Serialize;
 
 use super::failure::{Failure, in_flags};
 use super::words;
-use tetdb_base::geom::short;
-use tetdb_base::storage::CancelToken;
-use tetdb_engine::api::{Bytes, Event, Settings};
+use tetdb_engine::api::{Bytes, CancelToken, Code, Event, Settings, short};
 
 /// Without a terminal, progress is one line in so much time.
 const PLAIN_EVERY: Duration = Duration::from_secs(10);

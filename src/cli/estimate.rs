@@ -7,7 +7,6 @@ use serde_json::json;
 use super::args::EstimateArgs;
 use super::console::Console;
 use super::failure::{Failure, in_flags};
-use super::input::Space;
 use super::words::count;
 use super::{config, input, memory, threads};
 use tetdb_engine::api::{Mesher, default_cap, short};
@@ -22,9 +21,10 @@ pub fn run(args: &EstimateArgs, console: &Console) -> Result<u8, Failure> {
     let threads = settings.n_threads();
     let store = args.output.as_deref().unwrap_or(Path::new("."));
     // The cap is that of the run to come; what is said of it needs the surface, however large.
-    let space = Space { cap: cap.max(default_cap().0), beside: store };
-    let refines = options.refine_surface;
-    let surface = input::load_valid(&args.surfaces, (&args.sheets, refines), space, console)?;
+    let wide = console.settings(Some(cap.max(default_cap().0)), args.threads);
+    let (wide, sheets) = (input::beside(wide, store), (&args.sheets, options.refine_surface));
+    let surface = input::load_with(&args.surfaces, sheets, &wide, console)?;
+    surface.validate_with(&wide)?;
     let found = Mesher::with_options(surface, options).settings(settings).predict_at(store)?;
     let (fits_memory, fits_disk) = (found.fits_memory, found.fits_disk());
     if console.is_json() {

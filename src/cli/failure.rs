@@ -1,9 +1,8 @@
 //! Errors as the user sees them: a word, an exit code, what happened, where, what to do.
 
-use tetdb_schema::code::Code;
-
 use tetdb_base::storage::StorageError;
 use tetdb_base::surface::SurfaceError;
+use tetdb_engine::api::Code;
 use tetdb_engine::api::error::{Error, Remedy};
 use tetdb_engine::pipeline::PipelineError;
 use tetdb_io::read::ReadError;

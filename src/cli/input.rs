@@ -1,57 +1,29 @@
 //! Surfaces as arguments: files, or samples generated on the spot.
 
 use std::path::Path;
-use tetdb_schema::code::Code;
 
 use super::args::SheetArgs;
 use super::console::Console;
 use super::failure::Failure;
-use super::memory;
 use super::words::count;
-use tetdb_base::storage::{ScratchSpace, attempt};
-use tetdb_base::surface;
-use tetdb_engine::api::Surface;
-use tetdb_engine::api::preflight::scratch_beside;
-use tetdb_io::read::WireKind;
+use tetdb_engine::api::{Code, EmbeddedKind, Settings, Surface};
 
-/// The memory a command may hold, and where its scratch files go.
-#[derive(Clone, Copy)]
-pub struct Space<'a> {
-    /// Bytes in all.
-    pub cap: u64,
-    /// Scratch files are created beside this, which need not exist.
-    pub beside: &'a Path,
-}
-
-impl<'a> Space<'a> {
-    /// As the option asks.
-    pub fn of(option: Option<&str>, beside: &'a Path) -> Result<Self, Failure> {
-        let cap = memory::cap(option)?;
-        Ok(Self { cap, beside })
-    }
-
-    /// What is left beside a surface.
-    pub fn scratch(self, surface: &surface::Surface) -> Result<ScratchSpace, Failure> {
-        Ok(scratch_beside(surface, self.cap, self.beside)?)
+/// The same settings with temporary files in the folder of `file`, or the nearest above it that exists.
+pub fn beside(settings: Settings, file: &Path) -> Settings {
+    let absolute = std::path::absolute(file).unwrap_or_default();
+    let above = absolute.ancestors().skip(usize::from(file != Path::new(".")));
+    match above.into_iter().find(|folder| folder.is_dir()) {
+        Some(folder) => settings.scratch(folder),
+        None => settings,
     }
 }
 
-/// Reads files or generates a sample.
-pub fn load(arguments: &[String], space: Space, console: &Console) -> Result<Surface, Failure> {
-    let surface = Surface::load(arguments, space.cap)?;
-    let scratch = space.scratch(&surface.inner)?;
-    let surface = surface.oriented(&scratch)?;
-    for note in surface.notes() {
-        console.note(&format!("note: {note}"));
-    }
-    Ok(surface)
-}
-
-/// [`load`], with the sheets in it, divided where edges and points lie on triangles if it `divides`.
+/// Reads files or generates a sample, and embeds sheets, edges and points. Triangles are divided where edges and points lie on them
+/// if the surface `divides`.
 pub fn load_with(
     arguments: &[String],
     (sheets, divides): (&SheetArgs, bool),
-    space: Space,
+    settings: &Settings,
     console: &Console,
 ) -> Result<Surface, Failure> {
     let mut names: Vec<(&str, &str)> = Vec::new();
@@ -64,9 +36,9 @@ pub fn load_with(
         }
         names.push((file, name));
     }
-    let mut surface = load(arguments, space, console)?;
+    let mut surface = Surface::load(arguments, settings)?;
     if sheets.allow_open {
-        let (with, n) = surface.open_parts_in(&space.scratch(&Default::default())?)?;
+        let (with, n) = surface.open_parts_with(settings)?;
         surface = with;
         console.note(&format!("note: sheets: {} of open parts", count(n as u64, "triangle")));
     }
@@ -75,21 +47,19 @@ pub fn load_with(
         name.map(|(_, name)| *name)
     };
     for file in &sheets.embed {
-        let sheet = load(std::slice::from_ref(file), space, console)?;
+        let sheet = Surface::load(std::slice::from_ref(file), settings)?;
         surface = surface.embedded(sheet, name_of(file))?;
     }
     if divides {
         surface = surface.dividing();
     }
-    let edges = sheets.embed_edges.iter().map(|file| (file, WireKind::Edges));
-    let points = sheets.embed_points.iter().map(|file| (file, WireKind::Points));
+    let edges = sheets.embed_edges.iter().map(|file| (file, EmbeddedKind::Edges));
+    let points = sheets.embed_points.iter().map(|file| (file, EmbeddedKind::Points));
     for (file, kind) in edges.chain(points) {
-        let scratch = space.scratch(&surface.inner)?;
-        surface = surface.with_wires(Path::new(file), kind, name_of(file), &scratch)?;
+        surface = surface.embedded_with(file, kind, name_of(file), settings)?;
     }
-    if surface.inner.has_wires() {
-        let wires = &surface.inner.wires;
-        let (edges, points) = (wires.edges.len() as u64, wires.points.len() as u64);
+    let [edges, points] = surface.n_embedded().map(|n| n as u64);
+    if edges + points > 0 {
         console.note(&format!(
             "note: inside: {} and {}",
             count(edges, "edge"),
@@ -97,22 +67,4 @@ pub fn load_with(
         ));
     }
     Ok(surface)
-}
-
-/// [`load_with`], and refuse a surface with defects.
-pub fn load_valid(
-    arguments: &[String],
-    sheets: (&SheetArgs, bool),
-    space: Space,
-    console: &Console,
-) -> Result<Surface, Failure> {
-    let surface = load_with(arguments, sheets, space, console)?;
-    validated(&surface.inner, space)?;
-    Ok(surface)
-}
-
-/// Validates completely.
-pub fn validated(surface: &surface::Surface, space: Space) -> Result<(), Failure> {
-    let scratch = space.scratch(surface)?;
-    Ok(attempt(|| surface::validate_in(surface, &scratch))?.accept()?)
 }

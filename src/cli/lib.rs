@@ -38,7 +38,7 @@ mod words;
 
 use std::io::Write;
 use std::process::ExitCode;
-use tetdb_schema::code::Code;
+use tetdb_engine::api::{Code, Error};
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, Parser};
@@ -47,7 +47,6 @@ use args::{Args, Command};
 use console::Console;
 use failure::Failure;
 
-use tetdb_base::storage::StorageError;
 use tetdb_engine::api::guarded;
 
 /// Runs the command line of this process and returns its exit code.
@@ -97,9 +96,7 @@ fn run_rank(ranks: &ranks::Ranks) -> ExitCode {
 /// Signals end the run from now on.
 fn listen(console: &Console) {
     let is_json = console.is_json();
-    signals::listen(console.cancel(), move || {
-        Console::new(is_json).fail(&StorageError::Cancelled.into())
-    });
+    signals::listen(console.cancel(), move || Console::new(is_json).fail(&Error::stopped().into()));
 }
 
 fn run_alone() -> ExitCode {

@@ -1,11 +1,11 @@
 //! Sizes of memory as typed.
 
 use super::failure::Failure;
+use tetdb_engine::api::Code;
 use tetdb_engine::api::default_cap;
 pub use tetdb_engine::api::peak_bytes as peak;
 pub(super) use tetdb_engine::api::show_bytes as show;
 use tetdb_engine::pipeline::MEMORY_MIN;
-use tetdb_schema::code::Code;
 
 /// The cap in bytes: what is asked for, or a share of what is free. Errors: as [`asked`].
 pub fn cap(option: Option<&str>) -> Result<u64, Failure> {

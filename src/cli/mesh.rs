@@ -1,17 +1,16 @@
 //! `mesh` and `resume`.
 
 use std::path::{Path, PathBuf};
-use tetdb_schema::code::Code;
 
 use serde_json::json;
 
 use super::args::{MeshArgs, ResumeArgs, RunArgs};
 use super::console::Console;
 use super::failure::Failure;
-use super::input::{self, Space};
+use super::input;
 use super::{config, export, info, memory, threads};
 use tetdb_engine::api::targets::{check_target, inputs_of};
-use tetdb_engine::api::{Existing, Mesher, Settings, resume_reported};
+use tetdb_engine::api::{Code, Existing, Mesher, SAMPLE_PREFIX, Settings, resume_reported};
 use tetdb_engine::pipeline::Summary;
 use tetdb_io::write::Selection;
 
@@ -35,7 +34,7 @@ pub fn run(args: &MeshArgs, console: &Console) -> Result<u8, Failure> {
     let surface = input::load_with(
         &args.surfaces,
         (&args.sheets, options.refine_surface),
-        Space { cap: settings.cap()?, beside: &path },
+        &input::beside(settings.clone(), &path),
         console,
     )?;
     let created = Mesher::with_options(surface, options)
@@ -107,7 +106,7 @@ pub(super) fn begin(
 fn output(args: &MeshArgs) -> PathBuf {
     args.output.clone().unwrap_or_else(|| {
         let first = args.surfaces.first().map_or("mesh", String::as_str);
-        let stem = match first.strip_prefix(tetdb_kernel::samples::PREFIX) {
+        let stem = match first.strip_prefix(SAMPLE_PREFIX) {
             Some(sample) => sample.split(',').next().map(Into::into),
             None => Path::new(first).file_stem().map(PathBuf::from),
         };

@@ -4,32 +4,31 @@ use std::path::PathBuf;
 
 use serde_json::json;
 
-use super::args::{RefineSurfaceArgs, SheetArgs};
+use super::args::RefineSurfaceArgs;
 use super::console::Console;
 use super::failure::Failure;
-use super::input::{self, Space};
-use tetdb_base::geom::short;
-use tetdb_engine::api::surface::refine;
+use super::{input, memory};
 use tetdb_engine::api::targets::check_target;
-use tetdb_io::write;
-use tetdb_kernel::sizing::SizeOptions;
+use tetdb_engine::api::{OptionsText, Surface, short};
 
 pub fn run(args: &RefineSurfaceArgs, console: &Console) -> Result<u8, Failure> {
-    let options = SizeOptions::parse(Some(&args.hsiz), None, None, args.hgrad.as_deref())?;
+    let sizes = OptionsText {
+        hsiz: Some(args.hsiz.clone()),
+        hgrad: args.hgrad.clone(),
+        ..OptionsText::default()
+    };
+    let sizes = sizes.sizes()?;
+    let Some(h) = sizes.hsiz else {
+        unreachable!("it was given");
+    };
     if !args.force {
         check_target(&args.output, &[PathBuf::from(&args.surface)])?;
     }
-    let space = Space::of(args.memory.as_deref(), &args.output)?;
-    let input = input::load_valid(
-        std::slice::from_ref(&args.surface),
-        (&SheetArgs::default(), false),
-        space,
-        console,
-    )?;
-    let surface = input.inner;
-    let (fine, report) = refine(&surface, &options, &space.scratch(&surface)?)?;
-    input::validated(&fine, space)?;
-    write::surface(&fine, &args.output)?;
+    let settings = console.settings(memory::asked(args.memory.as_deref())?, None);
+    let settings = input::beside(settings, &args.output);
+    let surface = Surface::load(std::slice::from_ref(&args.surface), &settings)?;
+    let (fine, report) = surface.refined_with(h, sizes.hgrad, &settings)?;
+    fine.write(&args.output)?;
     let (triangles, vertices) = (fine.n_triangles(), fine.n_vertices());
     if console.is_json() {
         console.answer(&json!({

@@ -3,24 +3,28 @@
 use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use tetdb_schema::code::Code;
 
 use serde_json::json;
 
 use super::args::SampleArgs;
 use super::console::Console;
 use super::failure::Failure;
-use super::input::{self, Space};
+use super::{input, memory};
 use tetdb_engine::api::targets::check_target;
-use tetdb_io::write;
-use tetdb_kernel::samples::PREFIX;
+use tetdb_engine::api::{Code, SAMPLE_PREFIX as PREFIX, Settings, Surface};
 
 /// Writes to the standard output.
-fn to_stdout(word: &str, format: &str, space: Space, console: &Console) -> Result<u8, Failure> {
-    let surface = input::load(&[word.to_owned()], space, console)?.inner;
-    // A file first, with a name nobody else has: the writers know files alone.
-    let file = std::env::temp_dir().join(format!("tetdb-sample-{}.{format}", std::process::id()));
-    let copied = write::surface(&surface, &file).map_err(Failure::from).and_then(|_| {
+fn to_stdout(
+    word: &str,
+    format: &str,
+    settings: &Settings,
+    console: &Console,
+) -> Result<u8, Failure> {
+    let surface = Surface::load(&[word.to_owned()], settings)?;
+    // The writers write files alone, so there is one first, with the name of this process.
+    let name = format!("tetdb-sample-{}.{format}", std::process::id());
+    let file = settings.scratch_dir().join(name);
+    let copied = surface.write(&file).map_err(Failure::from).and_then(|_| {
         copy(&file, console).map_err(|e| Failure::new(Code::Io, e).at(file.display()))
     });
     let _ = std::fs::remove_file(&file);
@@ -53,12 +57,9 @@ pub fn run(args: &SampleArgs, console: &Console) -> Result<u8, Failure> {
         format!("{PREFIX}{}", args.sample)
     };
     let format = args.format.as_deref().unwrap_or("stl");
-    let temporary = std::env::temp_dir().join("sample");
-    let is_stdout = args.output == Path::new("-");
-    let place = if is_stdout { &temporary } else { &args.output };
-    let space = Space::of(args.memory.as_deref(), place)?;
-    if is_stdout {
-        return to_stdout(&word, format, space, console);
+    let settings = console.settings(memory::asked(args.memory.as_deref())?, None);
+    if args.output == Path::new("-") {
+        return to_stdout(&word, format, &settings, console);
     }
     if args.format.is_some() {
         let message = "--format is for -o -; a file's ending says its format";
@@ -67,35 +68,35 @@ pub fn run(args: &SampleArgs, console: &Console) -> Result<u8, Failure> {
         );
     }
     check_target(&args.output, &[])?;
-    let surface = input::load(&[word], space, console)?.inner;
+    let surface = Surface::load(&[word], &input::beside(settings, &args.output))?;
+    let [shell, sheets] = surface.split_sheets();
     let mut embed = String::new();
     if surface.n_sheet_triangles() > 0 {
-        let sheets = beside(&args.output, "sheets", None);
-        check_target(&sheets, &[])?;
-        write::surface(&surface.part(true), &sheets)?;
-        embed += &format!(" --embed {}", sheets.display());
+        let file = beside(&args.output, "sheets", None);
+        check_target(&file, &[])?;
+        sheets.write(&file)?;
+        embed += &format!(" --embed {}", file.display());
     }
-    if surface.has_wires() {
-        let wires = beside(&args.output, "wires", Some("obj"));
-        check_target(&wires, &[])?;
-        write::wires(&surface.wire_set(), &wires)?;
-        for (option, n) in
-            [("edges", surface.wires.edges.len()), ("points", surface.wires.points.len())]
-        {
+    let [edges, points] = surface.n_embedded();
+    if edges + points > 0 {
+        let file = beside(&args.output, "wires", Some("obj"));
+        check_target(&file, &[])?;
+        surface.write_embedded(&file)?;
+        for (option, n) in [("edges", edges), ("points", points)] {
             if n > 0 {
-                embed += &format!(" --embed-{option} {}", wires.display());
+                embed += &format!(" --embed-{option} {}", file.display());
             }
         }
     }
     match embed.is_empty() {
-        true => write::surface(&surface, &args.output)?,
-        false => write::surface(&surface.part(false), &args.output)?,
+        true => surface.write(&args.output)?,
+        false => shell.write(&args.output)?,
     };
     if !embed.is_empty() {
         let shell = args.output.display();
         console.note(&format!("what is inside has files of its own: `tetdb mesh {shell}{embed}`"));
     }
-    let (triangles, vertices) = (surface.n_own_triangles(), surface.n_vertices());
+    let (triangles, vertices) = (surface.n_triangles(), surface.n_vertices());
     if console.is_json() {
         let file = args.output.display().to_string();
         console.answer(

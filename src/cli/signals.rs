@@ -3,12 +3,11 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
 use std::time::Duration;
+use tetdb_engine::api::CancelToken;
 
 use signal_hook::consts::{SIGABRT, SIGHUP, SIGINT, SIGTERM};
 use signal_hook::flag::register_conditional_shutdown;
 use signal_hook::iterator::Signals;
-
-use tetdb_base::storage::CancelToken;
 
 static RECEIVED: AtomicI32 = AtomicI32::new(0);
 /// Whether there is a store that can be resumed.

@@ -1,14 +1,13 @@
 //! `verify`: is it a valid mesh of its surface?
 
 use serde_json::json;
-use tetdb_schema::code::Code;
 
 use super::args::VerifyArgs;
 use super::console::Console;
 use super::failure::Failure;
-use super::input::{self, Space};
+use super::input;
 use super::{memory, threads};
-use tetdb_engine::api::{Settings, Store, VerifyLevel};
+use tetdb_engine::api::{Code, Settings, Store, VerifyLevel};
 
 pub fn run(args: &VerifyArgs, console: &Console) -> Result<u8, Failure> {
     let embeds = args.sheets.files().next().is_some() || args.sheets.allow_open;
@@ -24,10 +23,8 @@ pub fn run(args: &VerifyArgs, console: &Console) -> Result<u8, Failure> {
     let found = match args.against.is_empty() {
         true => store.verify(level)?,
         false => {
-            // The store may be one that can only be read.
-            let scratch = std::env::temp_dir().join("verify");
-            let space = Space { cap: settings.cap()?, beside: &scratch };
-            let surface = input::load_with(&args.against, (&args.sheets, false), space, console)?;
+            let sheets = (&args.sheets, false);
+            let surface = input::load_with(&args.against, sheets, &settings, console)?;
             store.verify_against(&surface, level)?
         }
     };

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use tetdb_base::geom::short;
+use tetdb_engine::api::short;
 
 /// Names listed for people.
 const LISTED: usize = 12;

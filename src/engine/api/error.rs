@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use tetdb_base::storage::StorageError;
 use tetdb_schema::code::Code;
 
 /// Why a call did not do what was asked: a word, a message, a place and, where one is known, a way out.
@@ -87,6 +88,11 @@ impl Error {
     /// Where: a file with its line or byte, ids, coordinates.
     pub fn place(&self) -> Option<&str> {
         self.place.as_deref()
+    }
+
+    /// The error of a run that was cancelled.
+    pub fn stopped() -> Self {
+        StorageError::Cancelled.into()
     }
 
     /// The option or argument that has no meaning, by its key in a file of options. The message begins with it.

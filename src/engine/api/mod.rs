@@ -46,6 +46,7 @@ mod suggestions;
 #[doc(hidden)]
 pub mod surface;
 mod surface_arrays;
+mod surface_limits;
 mod surface_repair;
 mod surface_report;
 mod surface_wires;
@@ -59,6 +60,7 @@ pub mod verify;
 pub mod verify_server;
 mod verify_shared;
 
+pub use crate::pipeline::{MeshOptions, OptionsText};
 pub use ask::{Answers, Order, Query};
 pub use compare::Comparison;
 pub use defects::DefectPlace;
@@ -75,7 +77,7 @@ pub use memory::show_bytes;
 pub use mesher::{Existing, Mesher};
 #[doc(hidden)]
 pub use mesher::{divide, predict};
-pub use options::{Length, Optimize, Regions, Seal, Subdomains};
+pub use options::{Length, Optimize, Regions, Seal, Subdomains, typed};
 pub use picture::{ColorBy, Snapped, Snapshot};
 pub use prediction::{Prediction, WorkersPrediction};
 pub use remesh::{Remesh, Remeshed};
@@ -93,12 +95,16 @@ pub use tasks::Tasks;
 #[doc(hidden)]
 pub use tetdb_base::geom::short;
 pub use tetdb_base::storage::CancelToken;
-pub use tetdb_base::surface::Defect;
 #[doc(hidden)]
 pub use tetdb_base::surface::show as show_point;
+pub use tetdb_base::surface::{Defect, SplitReport};
+pub use tetdb_base::surface::{Seed, SeedKind};
+pub use tetdb_io::read::WireKind as EmbeddedKind;
 pub use tetdb_io::write::MeshFormat;
 pub use tetdb_io::write::SurfaceReport as SurfaceWritten;
+pub use tetdb_kernel::samples::PREFIX as SAMPLE_PREFIX;
 pub use tetdb_kernel::sizing::SizeWarning;
 pub use tetdb_schema::code::Code;
+pub use tetdb_schema::word::Word;
 pub use tetdb_store::audit::{Population, Qualities};
 pub use verify::{Verification, VerifyLevel};

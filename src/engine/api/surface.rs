@@ -81,8 +81,7 @@ impl CheckReport {
 /// Divides triangles until their edges are as short as `options` want them; where the surface is finer, sizes grow from its edges.
 ///
 /// Errors: more triangles than `scratch` has memory for.
-#[doc(hidden)]
-pub fn refine(
+pub(super) fn refine(
     surface: &surface::Surface,
     options: &SizeOptions,
     scratch: &ScratchSpace,
@@ -251,8 +250,7 @@ impl Surface {
     }
 
     /// The same, and how many triangles that are.
-    #[doc(hidden)]
-    pub fn open_parts_in(mut self, scratch: &ScratchSpace) -> Result<(Self, usize), Error> {
+    pub(super) fn open_parts_in(mut self, scratch: &ScratchSpace) -> Result<(Self, usize), Error> {
         self.refuse_wires()?;
         let n = attempt(|| self.inner.open_parts_to_sheets(scratch))?;
         self.sources.push(Source::unmarked(Origin::OpenParts));
@@ -284,8 +282,7 @@ impl Surface {
     }
 
     /// Reads files, or one sample, in no more than `cap` bytes of memory.
-    #[doc(hidden)]
-    pub fn load(words: &[String], cap: u64) -> Result<Self, Error> {
+    pub(super) fn load_within(words: &[String], cap: u64) -> Result<Self, Error> {
         let samples = words.iter().filter(|word| word.starts_with(PREFIX)).count();
         match (samples, words) {
             (1, [word]) => Self::generated(word, cap),
@@ -297,8 +294,7 @@ impl Surface {
     }
 
     /// Turns all triangles like their neighbors.
-    #[doc(hidden)]
-    pub fn oriented(mut self, scratch: &ScratchSpace) -> Result<Self, Error> {
+    pub(super) fn oriented(mut self, scratch: &ScratchSpace) -> Result<Self, Error> {
         self.inner.shrink();
         let orientation = attempt(|| orient_alike_in(&mut self.inner, scratch))?;
         self.turned = orientation.flipped.len();
@@ -306,8 +302,7 @@ impl Surface {
     }
 
     /// What is worth knowing of how it was read.
-    #[doc(hidden)]
-    pub fn notes(&self) -> Vec<String> {
+    pub(super) fn notes(&self) -> Vec<String> {
         let mut notes: Vec<String> = self.inner.notes.iter().map(ToString::to_string).collect();
         if self.turned > 0 {
             notes
@@ -348,7 +343,9 @@ impl Surface {
                 surface.sources = vec![given(&surface.inner)];
                 surface
             }
-            _ => Self::load(&own.iter().map(|s| s.to_record().path).collect::<Vec<_>>(), cap)?,
+            _ => {
+                Self::load_within(&own.iter().map(|s| s.to_record().path).collect::<Vec<_>>(), cap)?
+            }
         };
         // A copy with sheets was turned before they came in.
         if !inside.iter().any(|s| matches!(s.origin, Origin::SheetsFrom(_))) {
@@ -388,7 +385,7 @@ impl Surface {
                 Ok(self)
             }
             Origin::Sheet(NamedFile { name, file }) => {
-                let sheet = Self::load(&[file.clone()], scratch.cap())?.oriented(scratch)?;
+                let sheet = Self::load_within(&[file.clone()], scratch.cap())?.oriented(scratch)?;
                 self.embedded(sheet, Some(name))
             }
             Origin::EmbeddedCopy(counts) => self.with_kept_wires(*counts, store, scratch),
@@ -402,6 +399,12 @@ impl Surface {
                 Ok(self.open_parts_in(scratch)?.0)
             }
         }
+    }
+
+    /// A surface that came from no file.
+    pub(super) fn given(inner: surface::Surface) -> Self {
+        let source = given(&inner);
+        Self::of(inner, vec![source])
     }
 
     fn of(inner: surface::Surface, sources: Vec<Source>) -> Self {
@@ -448,8 +451,7 @@ impl Surface {
         }
         builder.end_file()?;
         let inner = builder.finish();
-        let source = given(&inner);
-        Ok(Self::of(inner, vec![source]))
+        Ok(Self::given(inner))
     }
 }
 

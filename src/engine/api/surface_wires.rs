@@ -91,8 +91,7 @@ impl Surface {
         })
     }
 
-    #[doc(hidden)]
-    pub fn with_wires(
+    pub(super) fn with_wires(
         self,
         file: &Path,
         kind: WireKind,

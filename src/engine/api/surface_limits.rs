@@ -1,0 +1,95 @@
+//! Surfaces read, completed and validated within the limits of a run.
+
+use std::path::Path;
+
+use super::surface::refine;
+use super::{Error, Length, Settings, Surface, guarded};
+use tetdb_base::storage::attempt;
+use tetdb_base::surface::{SplitReport, validate_in};
+use tetdb_io::read::WireKind as EmbeddedKind;
+use tetdb_io::write;
+use tetdb_kernel::sizing::SizeOptions;
+
+impl Surface {
+    /// Reads files as one surface, or generates the only sample, within the memory of `settings`. Notes on the content go to its
+    /// listener.
+    ///
+    /// # Errors
+    /// As [`Surface::read`] and [`Surface::sample`].
+    pub fn load(words: &[String], settings: &Settings) -> Result<Self, Error> {
+        guarded(settings, || {
+            let surface = Self::load_within(words, settings.cap()?)?;
+            let scratch = settings.scratch_space(surface.inner.bytes() as u64)?;
+            let surface = surface.oriented(&scratch)?;
+            surface.notes().iter().for_each(|note| settings.note(format!("note: {note}")));
+            Ok(surface)
+        })
+    }
+
+    /// [`Surface::open_parts_as_sheets`], and how many triangles these are.
+    pub fn open_parts_with(self, settings: &Settings) -> Result<(Self, usize), Error> {
+        guarded(settings, || self.open_parts_in(&settings.scratch_space(0)?))
+    }
+
+    /// [`Surface::embedded_edges`] or [`Surface::embedded_points`] within the memory of `settings`.
+    pub fn embedded_with(
+        self,
+        file: impl AsRef<Path>,
+        kind: EmbeddedKind,
+        name: Option<&str>,
+        settings: &Settings,
+    ) -> Result<Self, Error> {
+        guarded(settings, || {
+            let scratch = settings.scratch_space(self.inner.bytes() as u64)?;
+            self.with_wires(file.as_ref(), kind, name, &scratch)
+        })
+    }
+
+    /// [`Surface::validate`] within the memory of `settings`.
+    pub fn validate_with(&self, settings: &Settings) -> Result<(), Error> {
+        guarded(settings, || {
+            let scratch = settings.scratch_space(self.inner.bytes() as u64)?;
+            Ok(attempt(|| validate_in(&self.inner, &scratch))?.accept()?)
+        })
+    }
+
+    /// [`Surface::refined`] with a gradation, and what was done. The result is validated as well.
+    pub fn refined_with(
+        &self,
+        h: Length,
+        gradation: Option<f64>,
+        settings: &Settings,
+    ) -> Result<(Self, SplitReport), Error> {
+        let sizes = SizeOptions { hsiz: Some(h), hgrad: gradation, ..SizeOptions::default() };
+        sizes.check()?;
+        self.validate_with(settings)?;
+        guarded(settings, || {
+            let scratch = settings.scratch_space(self.inner.bytes() as u64)?;
+            let (inner, report) = refine(&self.inner, &sizes, &scratch)?;
+            let fine = Self::given(inner);
+            fine.validate_with(settings)?;
+            Ok((fine, report))
+        })
+    }
+
+    /// Numbers of embedded edges and of embedded points.
+    pub fn n_embedded(&self) -> [usize; 2] {
+        let embedded = &self.inner.wires;
+        [embedded.edges.len(), embedded.points.len()]
+    }
+
+    /// Number of triangles that are sheets.
+    pub fn n_sheet_triangles(&self) -> usize {
+        self.inner.n_sheet_triangles()
+    }
+
+    /// The shell without the sheets, and the sheets alone.
+    pub fn split_sheets(&self) -> [Self; 2] {
+        [false, true].map(|sheets| Self::given(self.inner.part(sheets)))
+    }
+
+    /// Writes embedded edges and points to an `.obj` file. Errors: the disk.
+    pub fn write_embedded(&self, out: impl AsRef<Path>) -> Result<(), Error> {
+        Ok(write::wires(&self.inner.wire_set(), out.as_ref())?)
+    }
+}
