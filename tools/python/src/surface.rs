@@ -109,7 +109,7 @@ impl Surface {
         let places: Vec<_> = report.places.iter().map(at).collect();
         Ok((
             words.to_string(),
-            report.places.iter().map(|place| place.code).collect(),
+            report.places.iter().map(|place| place.code.as_str()).collect(),
             rows(py, bytemuck::cast_slice(&all), 2),
             rows(py, bytemuck::cast_slice(&places), 3),
         ))
@@ -185,7 +185,7 @@ impl Surface {
     }
 
     fn write(&self, py: Python<'_>, out: PathBuf) -> PyResult<()> {
-        let work = || Ok(self.inner.write(out)?);
+        let work = || Ok(self.inner.write(out).map(|_| ())?);
         watched(py, &CancelToken::new(), None, work)
     }
 }
