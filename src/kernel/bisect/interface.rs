@@ -11,7 +11,7 @@ use super::core::CoreBoundary;
 use super::flow::{Arc, Graph};
 use super::interface_faces::interface_points;
 use super::labels::{InterfaceMeasures, Labels, face_cost, measure};
-use super::moves::{Moves, Steps};
+use super::moves::Moves;
 use super::surface::CuttingSurface;
 use crate::mesh::{Mesh, Tet, dense};
 use tetdb_base::geom::Point;
@@ -54,7 +54,6 @@ pub(super) fn choose<P: Pages>(
     core: &mut Mesh<P>,
     surface: &impl CuttingSurface,
     rim: &CoreBoundary,
-    steps: Steps,
     natural: Option<&mut Vec<[Point; 3]>>,
 ) -> (InterfaceReport, Labels) {
     let (labels, free) = Labels::begin(core, surface, rim);
@@ -65,13 +64,11 @@ pub(super) fn choose<P: Pages>(
     let mut moves = Moves::new(core, labels, surface, rim);
     report.natural = measure(core, &moves.labels, rim);
     report.natural.pinched = moves.count_pinched(core, &free);
-    if steps.minimum_cut {
-        report.bytes = minimum_cut(core, &mut moves.labels, surface, &free);
-    }
+    report.bytes = minimum_cut(core, &mut moves.labels, surface, &free);
     report.bytes += size_of_val(&free[..]) as u64 + moves.bytes() + moves.labels.bytes();
     report.minimum = measure(core, &moves.labels, rim);
     report.minimum.pinched = moves.count_pinched(core, &free);
-    report.moves = moves.run(core, &free, steps);
+    report.moves = moves.run(core, &free);
     report.chosen = measure(core, &moves.labels, rim);
     report.chosen.pinched = moves.count_pinched(core, &free);
     (report, moves.labels)

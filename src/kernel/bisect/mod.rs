@@ -33,7 +33,6 @@ pub use axes::principal_axes;
 pub use interface::InterfaceReport;
 pub use labels::InterfaceMeasures;
 pub use load::{SizeAt, load_of};
-pub use moves::Steps;
 pub use opened::Opened;
 pub use plane::{PlaneChoice, choose as choose_plane};
 pub use report::{CutReport, StageSeconds};
@@ -57,8 +56,6 @@ pub struct Method {
     pub lengths: Lengths,
     /// How the cutting plane is chosen.
     pub plane: PlaneChoice,
-    /// Steps of the choice of the interface.
-    pub steps: Steps,
 }
 
 /// What a cut is to do.
@@ -155,8 +152,7 @@ pub fn choose<P: Pages, Q: Pages>(
     optimize::run_with(core, plan.optimize, &|_| {});
     seconds.core = clock.elapsed().as_secs_f64();
     let natural = faces.as_mut().map(|f| &mut f.natural);
-    let (interface, labels) =
-        interface::choose(core, &zone.surface, &rim, plan.method.steps, natural);
+    let (interface, labels) = interface::choose(core, &zone.surface, &rim, natural);
     if let Some(faces) = faces {
         faces.chosen = interface_faces::interface_points(core, &labels);
     }

@@ -22,8 +22,6 @@ const SHIFT: f64 = 0.2;
 const GRAZED: f64 = 0.35;
 /// Largest share of the load a shift may bring to the other side: over a dozen cuts it stays within the balance wanted.
 const TOLERANCE: f64 = 0.003;
-/// Lengths along the diagonal where volume stands for load: pieces of some lengths are then as fine as a histogram needs.
-const VOLUME_STEPS: f64 = 200.0;
 /// Least gain in grazed vertices that a shift away from the balanced position must bring, as a share.
 const GAIN: f64 = 0.1;
 
@@ -35,8 +33,6 @@ pub enum PlaneChoice {
     Load,
     /// As the paper says: centroids of the mesh, unweighted; the axis of the largest moment; placed by load.
     Centroids,
-    /// As `Load`, but shared by volume: what becomes of the balance when sizes do not count.
-    Volume,
     /// This one, as it is.
     Given(Plane),
 }
@@ -51,13 +47,6 @@ pub fn choose<P: Pages>(
     low: f64,
     choice: PlaneChoice,
 ) -> ChosenPlane {
-    if choice == PlaneChoice::Volume {
-        let everywhere = bounds(mesh).diagonal() / VOLUME_STEPS;
-        set_sizes(mesh, &|_| everywhere);
-        let chosen = choose(mesh, &|_| everywhere, origin, low, PlaneChoice::Load);
-        set_sizes(mesh, h);
-        return chosen;
-    }
     let spread = match choice {
         PlaneChoice::Given(plane) => {
             return Spread::gather(mesh, h, plane.normal).at(plane.offset);
@@ -66,7 +55,7 @@ pub fn choose<P: Pages>(
             let axis = principal_axes(&centroid_moments(mesh, origin))[0];
             Spread::gather(mesh, h, axis)
         }
-        PlaneChoice::Load | PlaneChoice::Volume => {
+        PlaneChoice::Load => {
             let (grid, mut along) = Grid::gather(mesh, h);
             let mut axes = principal_axes(&grid.moments().matrix()).to_vec();
             axes.extend(COORDINATES);
@@ -200,18 +189,6 @@ impl Grid {
 fn bounds_of_vertices<P: Pages>(mesh: &mut Mesh<P>) -> Aabb {
     let vertices = mesh.vertex_ids();
     vertices.fold(Aabb::EMPTY, |bounds, v| bounds.with(mesh.point(v)))
-}
-
-fn bounds<P: Pages>(mesh: &mut Mesh<P>) -> Aabb {
-    let mut bounds = Aabb::EMPTY;
-    let mut from = 0;
-    while let Some((t, tet)) = mesh.next_tet(from) {
-        from = t + 1;
-        for p in mesh.points(&tet) {
-            bounds = bounds.with(p);
-        }
-    }
-    bounds
 }
 
 fn centroid_moments<P: Pages>(mesh: &mut Mesh<P>, origin: Point) -> [[f64; 3]; 3] {

@@ -56,9 +56,7 @@ impl<P: Pages> Mesh<P> {
     /// Writes a record to an id that may lie in the next page not yet there.
     #[inline(always)]
     pub(super) fn place_record<const K: usize>(&mut self, to: u32, record: Slot) {
-        if to >> SLOT_BITS == self.pages.n_pages::<K>() {
-            self.pages.append_page::<K>();
-        }
+        self.pages.append_up_to::<K>(to);
         *self.pages.write::<K>(to) = record;
     }
 
@@ -83,9 +81,7 @@ impl<P: Pages> Mesh<P> {
         }
         let (record, word) = attribute_place(to);
         let record = record + (first << SLOT_BITS);
-        while record >> SLOT_BITS >= self.pages.n_pages::<K>() {
-            self.pages.append_page::<K>();
-        }
+        self.pages.append_up_to::<K>(record);
         let slot = self.pages.write::<K>(record);
         slot[word] = u32_le::from_native(a);
         slot[word + 1] = u32_le::from_native(b);
@@ -128,9 +124,7 @@ impl<P: Pages> Mesh<P> {
         if id >= VERTEX_MASK - SLOTS as u32 {
             raise(StorageError::TooMany { what });
         }
-        if id >> SLOT_BITS == pages.n_pages::<K>() {
-            pages.append_page::<K>();
-        }
+        pages.append_up_to::<K>(id);
         arena.fresh = next_id(id);
         id
     }
@@ -234,9 +228,7 @@ impl<P: Pages> Mesh<P> {
     /// Writes a tetrahedron whose id was taken by [`Mesh::take_tets`], or is to lie behind all.
     #[inline]
     pub fn place_tet(&mut self, t: u32, tet: Tet) {
-        while t >> SLOT_BITS >= self.pages.n_pages::<{ kind::TETS }>() {
-            self.pages.append_page::<{ kind::TETS }>();
-        }
+        self.pages.append_up_to::<{ kind::TETS }>(t);
         self.set_tet(t, tet);
     }
 
@@ -287,9 +279,7 @@ impl<P: Pages> Mesh<P> {
 
     pub(super) fn set_attribute<const K: usize>(&mut self, id: u32, first: u32, second: u32) {
         let (record, word) = attribute_place(id);
-        while record >> SLOT_BITS >= self.pages.n_pages::<K>() {
-            self.pages.append_page::<K>();
-        }
+        self.pages.append_up_to::<K>(record);
         let slot = self.pages.write::<K>(record);
         slot[word] = u32_le::from_native(first);
         slot[word + 1] = u32_le::from_native(second);
@@ -324,9 +314,7 @@ impl<P: Pages> Mesh<P> {
     #[inline]
     pub fn set_scratch(&mut self, n: u32, word: u32) {
         let slot = sparse(n >> 3);
-        while slot >> SLOT_BITS >= self.pages.n_pages::<{ kind::SCRATCH }>() {
-            self.pages.append_page::<{ kind::SCRATCH }>();
-        }
+        self.pages.append_up_to::<{ kind::SCRATCH }>(slot);
         self.pages.write::<{ kind::SCRATCH }>(slot)[n as usize & 7] = u32_le::from_native(word);
     }
 
