@@ -81,36 +81,31 @@ impl BoxTree {
         Self { order: order.done().fixed(), boxes, levels }
     }
 
-    /// Calls `visit` with the things whose boxes hold `p`, in curve order, until it returns true.
-    pub fn at(&self, p: Point, mut visit: impl FnMut(u32) -> bool) {
-        let holds = |b: &Aabb| b.low.cmple(p).all() && p.cmple(b.high).all();
-        let top = self.levels.len() - 1;
-        let mut stack: Vec<(usize, usize)> =
-            (0..self.levels[top].len()).map(|n| (top, n)).collect();
-        while let Some((level, node)) = stack.pop() {
-            if !holds(&self.levels[level].get(node)) {
-                continue;
-            }
-            if level > 0 {
-                let children = self.children(level, node).rev();
-                stack.extend(children.map(|child| (level - 1, child)));
-                continue;
-            }
-            for i in self.members(node) {
-                if holds(&self.boxes.get(i)) && visit(self.order.get(i)) {
-                    return;
-                }
-            }
-        }
+    /// Calls `visit` with the items whose boxes contain `p`, in curve order, until it returns true.
+    pub fn at(&self, p: Point, visit: impl FnMut(u32) -> bool) {
+        self.search(|b| b.low.cmple(p).all() && p.cmple(b.high).all(), visit);
     }
 
-    /// Calls `visit` with the things whose boxes share a point with some bounds, in curve order.
+    /// Calls `visit` with the items whose boxes share a point with `bounds`, in curve order.
     pub fn meeting(&self, bounds: &Aabb, mut visit: impl FnMut(u32)) {
+        self.search(
+            |b| b.meets(bounds),
+            |item| {
+                visit(item);
+                false
+            },
+        );
+    }
+
+    /// Calls `visit` with the items whose boxes `matches`, in curve order, until it returns true.
+    ///
+    /// A box around matching boxes must match as well.
+    fn search(&self, matches: impl Fn(&Aabb) -> bool, mut visit: impl FnMut(u32) -> bool) {
         let top = self.levels.len() - 1;
         let mut stack: Vec<(usize, usize)> =
             (0..self.levels[top].len()).map(|n| (top, n)).collect();
         while let Some((level, node)) = stack.pop() {
-            if !self.levels[level].get(node).meets(bounds) {
+            if !matches(&self.levels[level].get(node)) {
                 continue;
             }
             if level > 0 {
@@ -119,8 +114,8 @@ impl BoxTree {
                 continue;
             }
             for i in self.members(node) {
-                if self.boxes.get(i).meets(bounds) {
-                    visit(self.order.get(i));
+                if matches(&self.boxes.get(i)) && visit(self.order.get(i)) {
+                    return;
                 }
             }
         }

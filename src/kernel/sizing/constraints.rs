@@ -8,10 +8,10 @@
 //!   +---+---+
 //! ```
 
+use fixedbitset::FixedBitSet;
 use rayon::prelude::*;
 
 use super::SizingError;
-use super::bits::Bits;
 use super::constraint::SizeConstraint;
 use super::corners::Corners;
 use super::seeds::OctreeFrame;
@@ -158,11 +158,11 @@ impl SizeConstraints<'_> {
         if self.list.is_empty() {
             return Ok(());
         }
-        let mut is_known = Bits::new(corners.n_corners);
+        let mut is_known = FixedBitSet::with_capacity(corners.n_corners);
         let mut places: Vec<(u32, [u32; 3])> = Vec::with_capacity(CELLS_AT_ONCE + 8);
         for (i, leaf) in tree.leaves().enumerate() {
             for (c, id) in corners.of_leaf.get(i).into_iter().enumerate() {
-                if !is_known.set(id) {
+                if !is_known.put(id as usize) {
                     places.push((id, leaf.corner(c)));
                 }
             }

@@ -1,6 +1,7 @@
 //! Sizes that grow no steeper than the gradation allows.
 
-use super::bits::Bits;
+use fixedbitset::FixedBitSet;
+
 use super::corners::{Corners, PAIRS};
 use super::tree::{Leaf, Tree};
 use tetdb_base::storage::{SpillVec, check_cancelled};
@@ -46,9 +47,9 @@ impl Grading<'_> {
     /// what is lowered is carried along by the sweep that goes its way.
     pub(super) fn grade(&mut self, h: &mut SpillVec<f32>) {
         // Corners whose neighbors have not been looked at since they were lowered.
-        let mut changed = Bits::new(h.len());
-        changed.set_all();
-        let mut next = Bits::new(h.len());
+        let mut changed = FixedBitSet::with_capacity(h.len());
+        changed.insert_range(..);
+        let mut next = FixedBitSet::with_capacity(h.len());
         let mut is_backward = false;
         loop {
             check_cancelled();
@@ -106,8 +107,8 @@ struct Sweep<'a> {
     of_leaf: &'a mut SpillVec<[u32; 8]>,
     steeper: Option<&'a mut SpillVec<f32>>,
     h: &'a mut SpillVec<f32>,
-    changed: &'a mut Bits,
-    next: &'a mut Bits,
+    changed: &'a mut FixedBitSet,
+    next: &'a mut FixedBitSet,
     beta: f64,
     is_done: bool,
 }
@@ -116,7 +117,7 @@ impl Sweep<'_> {
     #[inline]
     fn relax(&mut self, number: u32, leaf: Leaf) {
         let ids = self.of_leaf.get(number as usize);
-        if !ids.iter().any(|&id| self.changed.get(id)) {
+        if !ids.iter().any(|&id| self.changed.contains(id as usize)) {
             return;
         }
         let mut before = [0.0; 8];
@@ -139,8 +140,8 @@ impl Sweep<'_> {
         for ((id, h), before) in ids.into_iter().zip(h).zip(before) {
             if h != before {
                 self.h.set(id as usize, h);
-                self.changed.set(id);
-                self.next.set(id);
+                self.changed.insert(id as usize);
+                self.next.insert(id as usize);
             }
         }
     }

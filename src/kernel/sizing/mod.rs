@@ -18,7 +18,6 @@
 //! to scratch files where the room given is too small (`store::ScratchSpace`). The room and the number of threads change nothing of the field.
 
 mod background;
-mod bits;
 mod closed;
 mod codec;
 mod constraint;

@@ -1,7 +1,8 @@
 //! Sizes at the octree's corners: gathered from the surface, filled in between, graded.
 
+use fixedbitset::FixedBitSet;
+
 use super::SizingError;
-use super::bits::Bits;
 use super::constraints::SizeConstraints;
 use super::corners::Corners;
 use super::grading::{Grading, bound, close_finite};
@@ -153,17 +154,17 @@ impl Maker<'_> {
     /// filled ones among themselves, which tends to the harmonic interpolation.
     pub(super) fn fill(&mut self, gathered: SpillVec<f32>) -> SpillVec<f32> {
         let mut h = gathered;
-        let mut is_open = Bits::new(h.len());
+        let mut is_open = FixedBitSet::with_capacity(h.len());
         for i in 0..h.len() {
             if h.get(i).is_infinite() {
-                is_open.set(i as u32);
+                is_open.insert(i);
             }
         }
         // Leaves with a corner to fill, as (leaf, weight): a cell's edge conducts as its width.
         let mut open = self.room.list::<[u32; 2]>();
         for (i, leaf) in self.tree.leaves().enumerate() {
             let ids = self.corners.of_leaf.get(i);
-            if ids.iter().any(|&c| is_open.get(c)) {
+            if ids.iter().any(|&c| is_open.contains(c as usize)) {
                 open.push([i as u32, (leaf.side() as f32).to_bits()]);
             }
         }
@@ -190,7 +191,7 @@ impl Maker<'_> {
             }
             let mut complete = true;
             for i in 0..h.len() {
-                if is_open.get(i as u32) {
+                if is_open.contains(i) {
                     let [sum, weight] = sums.get(i);
                     if weight > 0.0 {
                         let (old, older) = (h.get(i), before.get(i));
@@ -249,7 +250,7 @@ impl Maker<'_> {
 fn average(
     ids: &[u32; 8],
     weight: f32,
-    is_open: &Bits,
+    is_open: &FixedBitSet,
     h: &mut SpillVec<f32>,
     sums: &mut SpillVec<[f32; 2]>,
 ) {
@@ -258,7 +259,7 @@ fn average(
         *value = h.get(id as usize);
     }
     for (&id, along) in ids.iter().zip(ALONG_EDGES) {
-        if !is_open.get(id) {
+        if !is_open.contains(id as usize) {
             continue;
         }
         sums.change(id as usize, |sum| {

@@ -12,10 +12,10 @@
 //! hundredth more or fewer), so a part of which nothing else is wanted keeps its field to the bit. Sizes from the skin's edges would not do: vertices next to each other differ far more than the slope
 //! allows on a surface of small and large triangles, and the large ones' cones reach over the zones of the small ones.
 
+use fixedbitset::FixedBitSet;
 use rayon::prelude::*;
 
 use super::SizingError;
-use super::bits::Bits;
 use super::constraint::SizeConstraint;
 use super::constraints::SizeConstraints;
 use super::corners::{Corners, PAIRS};
@@ -147,7 +147,7 @@ fn at_corners(
     size: &(dyn Fn(Point) -> Result<f64, SizingError> + Sync),
 ) -> Result<SpillVec<f32>, SizingError> {
     let mut h = room.column(corners.n_corners, 0.0f32);
-    let mut is_known = Bits::new(corners.n_corners);
+    let mut is_known = FixedBitSet::with_capacity(corners.n_corners);
     let mut places: Vec<(u32, Point)> = Vec::new();
     let mut ask = |places: &mut Vec<(u32, Point)>| {
         let asked: Result<Vec<f64>, _> = places.par_iter().map(|&(_, p)| size(p)).collect();
@@ -158,7 +158,7 @@ fn at_corners(
     };
     for (i, leaf) in tree.leaves().enumerate() {
         for (c, id) in corners.of_leaf.get(i).into_iter().enumerate() {
-            if !is_known.set(id) {
+            if !is_known.put(id as usize) {
                 let [x, y, z] = leaf.corner(c).map(f64::from);
                 places.push((id, Point::new(x, y, z) * (1.0 / f64::from(LATTICE))));
             }
