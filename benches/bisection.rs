@@ -57,7 +57,7 @@ impl Bench {
             subdomain: 0,
             generation: 1,
             spill: self.dir.path().into(),
-            made: made.map(|name| self.dir.path().join(name).into()),
+            output: made.map(|name| self.dir.path().join(name).into()),
             base: None,
             cache_bytes: 16 << 20,
         };

@@ -12,7 +12,7 @@ use super::input::{self, Space};
 use super::memory;
 use tetdb_base::geom::short;
 use tetdb_base::storage::attempt;
-use tetdb_base::surface::{Repair, Surface, repair, repair_bytes, validate_in};
+use tetdb_base::surface::{Repair, Surface, repair, repair_bytes, validate_with};
 use tetdb_engine::api;
 use tetdb_engine::api::error::{Error, Remedy};
 use tetdb_engine::api::surface::WELD_SHARE_MAX;
@@ -98,7 +98,7 @@ fn mend(
         return Err(Error::new("memory", message).with_remedy(Remedy::Memory(least)).into());
     }
     let scratch = space.scratch(surface)?;
-    let n_defects = attempt(|| validate_in(surface, &scratch))?.n_defects;
+    let n_defects = attempt(|| validate_with(surface, &scratch))?.n_defects;
     let before = (surface.n_triangles(), surface.n_vertices(), n_defects);
     let weld_distance = weld_share.map(|share| share * surface.bounds().diagonal());
     let mut done = repair(surface, weld_distance);

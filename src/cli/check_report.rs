@@ -14,7 +14,7 @@ use tetdb_base::shape::face_least;
 use tetdb_base::storage::attempt;
 use tetdb_base::surface::{
     BoundaryLoop, Closing, Defect, Fitness, Surface, Validation, boundary_loops, closing, fitness,
-    repair_bytes, show, validate_in,
+    repair_bytes, show, validate_with,
 };
 use tetdb_engine::api::predict;
 use tetdb_engine::pipeline::{Options, Prepared, least_for};
@@ -51,7 +51,7 @@ impl<'a> Findings<'a> {
         console: &Console,
     ) -> Result<Self, Failure> {
         let scratch = space.scratch(surface)?;
-        let validation = attempt(|| validate_in(surface, &scratch))?;
+        let validation = attempt(|| validate_with(surface, &scratch))?;
         drop(scratch);
         let is_closed = validation.closedness.is_closed();
         let fitness = fitness(surface, &validation.closedness);

@@ -86,8 +86,8 @@ pub fn load_with(
         let scratch = space.scratch(&surface.inner)?;
         surface = surface.with_wires(Path::new(file), kind, name_of(file), &scratch)?;
     }
-    if surface.inner.has_wires() {
-        let wires = &surface.inner.wires;
+    if surface.inner.has_embedded() {
+        let wires = &surface.inner.embedded;
         let (edges, points) = (wires.edges.len() as u64, wires.points.len() as u64);
         console.note(&format!(
             "note: inside: {} and {}",
@@ -113,5 +113,5 @@ pub fn load_valid(
 /// Validates completely.
 pub fn validated(surface: &surface::Surface, space: Space) -> Result<(), Failure> {
     let scratch = space.scratch(surface)?;
-    Ok(attempt(|| surface::validate_in(surface, &scratch))?.accept()?)
+    Ok(attempt(|| surface::validate_with(surface, &scratch))?.accept()?)
 }

@@ -72,12 +72,12 @@ pub fn run(args: &SampleArgs, console: &Console) -> Result<u8, Failure> {
         write::surface(&surface.part(true), &sheets)?;
         embed += &format!(" --embed {}", sheets.display());
     }
-    if surface.has_wires() {
+    if surface.has_embedded() {
         let wires = beside(&args.output, "wires", Some("obj"));
         check_target(&wires, &[])?;
-        write::wires(&surface.wire_set(), &wires)?;
+        write::wires(&surface.embedded_set(), &wires)?;
         for (option, n) in
-            [("edges", surface.wires.edges.len()), ("points", surface.wires.points.len())]
+            [("edges", surface.embedded.edges.len()), ("points", surface.embedded.points.len())]
         {
             if n > 0 {
                 embed += &format!(" --embed-{option} {}", wires.display());
@@ -92,7 +92,7 @@ pub fn run(args: &SampleArgs, console: &Console) -> Result<u8, Failure> {
         let shell = args.output.display();
         console.note(&format!("what is inside has files of its own: `tetdb mesh {shell}{embed}`"));
     }
-    let (triangles, vertices) = (surface.n_own_triangles(), surface.n_vertices());
+    let (triangles, vertices) = (surface.n_input_triangles(), surface.n_vertices());
     if console.is_json() {
         let file = args.output.display().to_string();
         console.answer(

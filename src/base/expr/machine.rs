@@ -1,6 +1,6 @@
 //! What operations do: postfix on a short stack of numbers. A truth is 1 or 0.
 
-use super::op::{Binary, Op, STACK_MAX, Unary};
+use super::op::{BinaryOp, Op, STACK_MAX, Unary};
 
 impl Unary {
     pub(super) fn of(self, x: f64) -> f64 {
@@ -23,7 +23,7 @@ impl Unary {
     }
 }
 
-impl Binary {
+impl BinaryOp {
     pub(super) fn of(self, a: f64, b: f64) -> f64 {
         match self {
             Self::Add => a + b,
@@ -66,7 +66,7 @@ pub(super) fn run(ops: &[Op], lists: &[Vec<f64>], values: &[f64]) -> f64 {
                 n += 1;
             }
             Op::Unary(f) => stack[n - 1] = f.of(stack[n - 1]),
-            Op::Binary(f) => {
+            Op::BinaryOp(f) => {
                 n -= 1;
                 stack[n - 1] = f.of(stack[n - 1], stack[n]);
             }

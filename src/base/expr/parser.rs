@@ -1,7 +1,7 @@
 //! Words to operations: precedence climbing, kinds checked on the way.
 
-use super::op::{Binary, Op, Unary};
-use super::words::{Word, fault, next_word};
+use super::op::{BinaryOp, Op, Unary};
+use super::words::{Token, fault, next_word};
 use super::{ExprError, Expression, Kind};
 
 /// How tightly operators bind, from the loosest.
@@ -18,24 +18,24 @@ struct Infix {
     /// The kind of its operands.
     takes: Kind,
     gives: Kind,
-    op: Binary,
+    op: BinaryOp,
 }
 
-fn infix(word: Word) -> Option<Infix> {
+fn infix(word: Token) -> Option<Infix> {
     let (binds, op) = match word {
-        Word::Name("or") => (OR, Binary::Or),
-        Word::Name("and") => (AND, Binary::And),
-        Word::Sign("=" | "==") => (COMPARISON, Binary::Equal),
-        Word::Sign("!=") => (COMPARISON, Binary::NotEqual),
-        Word::Sign("<") => (COMPARISON, Binary::Less),
-        Word::Sign("<=") => (COMPARISON, Binary::LessEqual),
-        Word::Sign(">") => (COMPARISON, Binary::Greater),
-        Word::Sign(">=") => (COMPARISON, Binary::GreaterEqual),
-        Word::Sign("+") => (SUM, Binary::Add),
-        Word::Sign("-") => (SUM, Binary::Subtract),
-        Word::Sign("*") => (PRODUCT, Binary::Multiply),
-        Word::Sign("/") => (PRODUCT, Binary::Divide),
-        Word::Sign("^") => (POWER, Binary::Power),
+        Token::Name("or") => (OR, BinaryOp::Or),
+        Token::Name("and") => (AND, BinaryOp::And),
+        Token::Sign("=" | "==") => (COMPARISON, BinaryOp::Equal),
+        Token::Sign("!=") => (COMPARISON, BinaryOp::NotEqual),
+        Token::Sign("<") => (COMPARISON, BinaryOp::Less),
+        Token::Sign("<=") => (COMPARISON, BinaryOp::LessEqual),
+        Token::Sign(">") => (COMPARISON, BinaryOp::Greater),
+        Token::Sign(">=") => (COMPARISON, BinaryOp::GreaterEqual),
+        Token::Sign("+") => (SUM, BinaryOp::Add),
+        Token::Sign("-") => (SUM, BinaryOp::Subtract),
+        Token::Sign("*") => (PRODUCT, BinaryOp::Multiply),
+        Token::Sign("/") => (PRODUCT, BinaryOp::Divide),
+        Token::Sign("^") => (POWER, BinaryOp::Power),
         _ => return None,
     };
     let (takes, gives) = match binds {
@@ -49,9 +49,9 @@ fn infix(word: Word) -> Option<Infix> {
 /// What a name in front of a bracket does.
 enum Function {
     One(Unary),
-    Two(Binary),
+    Two(BinaryOp),
     /// Two or more.
-    Many(Binary),
+    Many(BinaryOp),
     If,
 }
 
@@ -67,9 +67,9 @@ fn function(name: &str) -> Option<Function> {
         "floor" => Function::One(Unary::Floor),
         "if" => Function::If,
         "log" => Function::One(Unary::Log),
-        "max" => Function::Many(Binary::Max),
-        "min" => Function::Many(Binary::Min),
-        "pow" => Function::Two(Binary::Power),
+        "max" => Function::Many(BinaryOp::Max),
+        "min" => Function::Many(BinaryOp::Min),
+        "pow" => Function::Two(BinaryOp::Power),
         "round" => Function::One(Unary::Round),
         "sign" => Function::One(Unary::Sign),
         "sin" => Function::One(Unary::Sin),
@@ -83,7 +83,7 @@ struct Parser<'a> {
     text: &'a str,
     variables: &'a [&'a str],
     /// The word to be looked at, where it begins and ends.
-    word: Word<'a>,
+    word: Token<'a>,
     start: usize,
     end: usize,
     ops: Vec<Op>,
@@ -112,7 +112,7 @@ fn parse(text: &str, variables: &[&str]) -> Result<Expression, ExprError> {
     let mut parser = Parser {
         text,
         variables,
-        word: Word::End,
+        word: Token::End,
         start: 0,
         end: 0,
         ops: Vec::new(),
@@ -122,7 +122,7 @@ fn parse(text: &str, variables: &[&str]) -> Result<Expression, ExprError> {
     };
     parser.advance()?;
     let kind = parser.expression(OR)?;
-    if parser.word != Word::End {
+    if parser.word != Token::End {
         let what = parser.found();
         return Err(fault(parser.start, format!("expected an operator or the end, found {what}")));
     }
@@ -138,13 +138,13 @@ impl<'a> Parser<'a> {
     /// The word at hand as a message names it.
     fn found(&self) -> String {
         match self.word {
-            Word::End => "the end".to_owned(),
+            Token::End => "the end".to_owned(),
             _ => format!("`{}`", &self.text[self.start..self.end]),
         }
     }
 
     fn expect(&mut self, sign: &'static str) -> Result<(), ExprError> {
-        if self.word != Word::Sign(sign) {
+        if self.word != Token::Sign(sign) {
             let found = self.found();
             return Err(fault(self.start, format!("expected `{sign}`, found {found}")));
         }
@@ -155,7 +155,7 @@ impl<'a> Parser<'a> {
         match op {
             Op::Constant(_) | Op::Variable(_) => self.waiting += 1,
             Op::Unary(_) | Op::In(_) => {}
-            Op::Binary(_) => self.waiting -= 1,
+            Op::BinaryOp(_) => self.waiting -= 1,
             Op::If => self.waiting -= 2,
         }
         if self.waiting > Expression::STACK_MAX {
@@ -179,7 +179,7 @@ impl<'a> Parser<'a> {
         let mut kind = self.operand()?;
         let mut compared = false;
         loop {
-            if self.word == Word::Name("in") && least <= COMPARISON {
+            if self.word == Token::Name("in") && least <= COMPARISON {
                 self.not_chained(compared)?;
                 check(kind, Kind::Number, start, "in")?;
                 kind = self.list()?;
@@ -200,7 +200,7 @@ impl<'a> Parser<'a> {
             let binds = operator.binds + u8::from(operator.binds != POWER);
             let other = self.expression(binds)?;
             check(other, operator.takes, right, name)?;
-            self.push(Op::Binary(operator.op))?;
+            self.push(Op::BinaryOp(operator.op))?;
             kind = operator.gives;
             compared = operator.binds == COMPARISON;
         }
@@ -218,20 +218,20 @@ impl<'a> Parser<'a> {
     fn operand(&mut self) -> Result<Kind, ExprError> {
         let (word, start) = (self.word, self.start);
         match word {
-            Word::Number(value) => {
+            Token::Number(value) => {
                 self.advance()?;
                 self.push(Op::Constant(value))?;
                 Ok(Kind::Number)
             }
-            Word::Sign("(") => {
+            Token::Sign("(") => {
                 self.advance()?;
                 let kind = self.expression(OR)?;
                 self.expect(")")?;
                 Ok(kind)
             }
-            Word::Sign("-") => self.prefix(Unary::Negate, POWER, Kind::Number),
-            Word::Name("not") => self.prefix(Unary::Not, COMPARISON, Kind::Truth),
-            Word::Name(name) if !matches!(name, "and" | "or" | "in") => self.name(name),
+            Token::Sign("-") => self.prefix(Unary::Negate, POWER, Kind::Number),
+            Token::Name("not") => self.prefix(Unary::Not, COMPARISON, Kind::Truth),
+            Token::Name(name) if !matches!(name, "and" | "or" | "in") => self.name(name),
             _ => {
                 let found = self.found();
                 Err(fault(start, format!("expected a number, a name or `(`, found {found}")))
@@ -272,7 +272,7 @@ impl<'a> Parser<'a> {
     }
 
     fn unknown(&self, name: &str, start: usize) -> ExprError {
-        let message = if self.word == Word::Sign("(") {
+        let message = if self.word == Token::Sign("(") {
             format!("there is no function `{name}`; there are {FUNCTIONS}")
         } else if self.variables.is_empty() {
             format!("there is no variable `{name}`")
@@ -294,15 +294,15 @@ impl<'a> Parser<'a> {
                 self.argument(name, Kind::Number)?;
                 self.expect(",")?;
                 self.argument(name, Kind::Number)?;
-                self.push(Op::Binary(*op))?;
+                self.push(Op::BinaryOp(*op))?;
             }
             Function::Many(op) => {
                 self.argument(name, Kind::Number)?;
                 loop {
                     self.expect(",")?;
                     self.argument(name, Kind::Number)?;
-                    self.push(Op::Binary(*op))?;
-                    if self.word == Word::Sign(")") {
+                    self.push(Op::BinaryOp(*op))?;
+                    if self.word == Token::Sign(")") {
                         break;
                     }
                 }
@@ -332,17 +332,17 @@ impl<'a> Parser<'a> {
         self.expect("[")?;
         let mut list = Vec::new();
         loop {
-            let negative = self.word == Word::Sign("-");
+            let negative = self.word == Token::Sign("-");
             if negative {
                 self.advance()?;
             }
-            let Word::Number(value) = self.word else {
+            let Token::Number(value) = self.word else {
                 let found = self.found();
                 return Err(fault(self.start, format!("a list holds numbers, found {found}")));
             };
             list.push(if negative { -value } else { value });
             self.advance()?;
-            if self.word != Word::Sign(",") {
+            if self.word != Token::Sign(",") {
                 break;
             }
             self.advance()?;

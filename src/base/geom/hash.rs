@@ -19,9 +19,9 @@ pub const STEP: u64 = 0x9E37_79B9_7F4A_7C15;
 
 /// Spreads numbers over the places of a table; they are the program's own, not an adversary's.
 #[derive(Default)]
-pub struct Spread(u64);
+pub struct IdHasher(u64);
 
-impl Hasher for Spread {
+impl Hasher for IdHasher {
     fn finish(&self) -> u64 {
         self.0
     }
@@ -52,6 +52,6 @@ impl Hasher for Spread {
 }
 
 /// A table by numbers of the program's own, such as ids.
-pub type IdMap<K, V> = HashMap<K, V, BuildHasherDefault<Spread>>;
+pub type IdMap<K, V> = HashMap<K, V, BuildHasherDefault<IdHasher>>;
 /// A set of them.
-pub type IdSet<K> = HashSet<K, BuildHasherDefault<Spread>>;
+pub type IdSet<K> = HashSet<K, BuildHasherDefault<IdHasher>>;

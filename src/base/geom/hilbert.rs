@@ -59,7 +59,7 @@ pub fn hilbert_index(cell: [u32; 3]) -> u64 {
 
 /// How the curve is turned at a level: which axis each of its axes is, which of them run backward, and whether its digits do.
 #[derive(Clone, Copy)]
-struct Turn {
+struct CurveTurn {
     axis: [u8; 3],
     back: [bool; 3],
     digits_back: bool,
@@ -69,7 +69,7 @@ struct Turn {
 const TURNS: usize = 96;
 const ORDERS: [[u8; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
 
-impl Turn {
+impl CurveTurn {
     const fn from_number(n: usize) -> Self {
         Self {
             axis: ORDERS[n / 16],
@@ -126,7 +126,7 @@ const ONE_LEVEL: [[(u8, u8); 8]; TURNS] = {
     while n < TURNS {
         let mut bits = 0;
         while bits < 8 {
-            let (digit, next) = Turn::from_number(n).step(bits);
+            let (digit, next) = CurveTurn::from_number(n).step(bits);
             table[n][bits] = (digit, next.number() as u8);
             bits += 1;
         }

@@ -21,8 +21,9 @@ pub use dyadic::Dyadic;
 pub use hash::{IdMap, IdSet, STEP, mix};
 pub use hilbert::{HilbertFrame, hilbert_index};
 pub use number::short;
-pub use pair::Pair;
+pub use pair::DoublePair;
 pub use point::{Aabb, Point};
 pub use sign::{
-    Seen, in_sphere_perturbed, insphere, insphere_filtered, larger, lex_cmp, orient, orient_sign,
+    RelativePoint, in_sphere_perturbed, insphere, insphere_filtered, larger, lex_cmp, orient,
+    orient_sign,
 };

@@ -108,9 +108,9 @@ pub fn insphere_truth([a, b, c, d, e]: &[Exact; 5]) -> Ordering {
 }
 
 /// Seeded, uniform in [-0.5, 0.5).
-pub struct Numbers(pub u64);
+pub struct RandomNumbers(pub u64);
 
-impl Numbers {
+impl RandomNumbers {
     pub fn next(&mut self) -> f64 {
         self.0 =
             self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

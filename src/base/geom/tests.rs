@@ -5,10 +5,10 @@
 
 use std::cmp::Ordering;
 
-use super::oracle::{Numbers, cases, exact, insphere_truth, orient_truth};
+use super::oracle::{RandomNumbers, cases, exact, insphere_truth, orient_truth};
 use super::{Point, in_sphere_perturbed, insphere, orient};
 
-impl Numbers {
+impl RandomNumbers {
     /// One unit in the last place up, down, or none, on each axis.
     fn nudged(&mut self, p: Point) -> Point {
         Point::from_array(p.to_array().map(|x| match (self.next() * 6.0) as i32 {
@@ -20,7 +20,7 @@ impl Numbers {
 }
 
 /// Five points of the kind `k`.
-fn hard_points(numbers: &mut Numbers, k: usize) -> [Point; 5] {
+fn hard_points(numbers: &mut RandomNumbers, k: usize) -> [Point; 5] {
     let offset = numbers.point() * [0.0, 1.0, 1e3, 1e8][k / 8 % 4];
     let scale = [1.0, 1e-12, 1e20, 1e-25][k / 32 % 4];
     let (a, b, c) = (numbers.point(), numbers.point(), numbers.point());
@@ -56,7 +56,7 @@ fn sign(x: f64) -> Ordering {
 
 #[test]
 fn signs_are_those_of_exact_numbers() {
-    let mut numbers = Numbers(3);
+    let mut numbers = RandomNumbers(3);
     let mut seen = [[0u32; 3]; 2];
     for k in 0..cases() {
         let p = hard_points(&mut numbers, k);
@@ -75,7 +75,7 @@ fn signs_are_those_of_exact_numbers() {
 
 #[test]
 fn ties_are_decided_alike_from_every_side() {
-    let mut numbers = Numbers(5);
+    let mut numbers = RandomNumbers(5);
     let mut ties = 0;
     for _ in 0..cases() / 10 {
         let p = [0; 5].map(|_| (numbers.point() * 4.0).round());

@@ -195,12 +195,12 @@ impl Columns {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geom::oracle::Numbers;
+    use crate::geom::oracle::RandomNumbers;
     use crate::geom::oracle::{exact, insphere_truth};
 
     #[test]
     fn nearly_all_points_of_one_sphere_fit_and_get_their_sign() {
-        let mut numbers = Numbers(7);
+        let mut numbers = RandomNumbers(7);
         let (mut decided, mut ties) = (0, 0);
         for round in 0..4000 {
             let center = numbers.point() * 3.0;

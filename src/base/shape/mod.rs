@@ -13,5 +13,6 @@ pub use bound::{excess, face_floor, face_least, face_most, least};
 pub use bound_table::excess_near;
 pub use climb::Climb;
 pub use quality::{
-    ALPHA, CONTENT, GOODNESS_WANTED, face_bound, inverse_quality, is_below, is_forcing, quality,
+    ALPHA, CONTENT, INVERSE_QUALITY_WANTED, face_bound, inverse_quality, is_below, is_forcing,
+    quality,
 };

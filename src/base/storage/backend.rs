@@ -105,11 +105,11 @@ const BLOCK: u64 = 4096;
 #[derive(Debug)]
 pub(super) struct Private {
     file: Box<dyn StorageBackend>,
-    changes: Mutex<Changes>,
+    changes: Mutex<PrivateChanges>,
 }
 
 #[derive(Debug)]
-struct Changes {
+struct PrivateChanges {
     len: u64,
     /// The file counts up to here; what is beyond it and in no block is zero.
     len_of_file: u64,
@@ -119,16 +119,16 @@ struct Changes {
 impl Private {
     pub(super) fn new(file: Box<dyn StorageBackend>) -> io::Result<Self> {
         let len = file.len()?;
-        let changes = Mutex::new(Changes { len, len_of_file: len, blocks: BTreeMap::new() });
+        let changes = Mutex::new(PrivateChanges { len, len_of_file: len, blocks: BTreeMap::new() });
         Ok(Self { file, changes })
     }
 
-    fn changes(&self) -> MutexGuard<'_, Changes> {
+    fn changes(&self) -> MutexGuard<'_, PrivateChanges> {
         self.changes.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Reads past the changes.
-    fn read_file(&self, changes: &Changes, offset: u64, out: &mut [u8]) -> io::Result<()> {
+    fn read_file(&self, changes: &PrivateChanges, offset: u64, out: &mut [u8]) -> io::Result<()> {
         let within = changes.len_of_file.saturating_sub(offset);
         let n = out.len().min(usize::try_from(within).unwrap_or(usize::MAX));
         let (inside, beyond) = out.split_at_mut(n);

@@ -20,7 +20,7 @@ pub trait Disk: Debug + Send + Sync {
     /// Opens a database file for reading and writing.
     fn open(&self, path: &Path) -> io::Result<Box<dyn StorageBackend>>;
     /// Opens a database file for reading, whoever has it.
-    fn open_to_look(&self, path: &Path) -> io::Result<Box<dyn StorageBackend>>;
+    fn open_read_only(&self, path: &Path) -> io::Result<Box<dyn StorageBackend>>;
     /// Opens the database in a file for reading, beside other readers: redb does so for real files only, by their paths. `None`: this disk
     /// has none.
     fn open_shared(
@@ -53,7 +53,7 @@ pub trait Disk: Debug + Send + Sync {
     /// Names in a folder, in any order.
     fn list(&self, dir: &Path) -> io::Result<Vec<String>>;
     /// What is at a path; `None`: nothing, or nothing that may be seen.
-    fn entry(&self, path: &Path) -> Option<Entry>;
+    fn entry(&self, path: &Path) -> Option<DiskEntry>;
     /// Which file has this name now; `None`: none.
     fn id(&self, path: &Path) -> Option<FileId>;
 }
@@ -63,7 +63,7 @@ pub type FileId = (u64, u64);
 
 /// What has a name on a disk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Entry {
+pub enum DiskEntry {
     /// A folder.
     Folder,
     /// A file of this many bytes.

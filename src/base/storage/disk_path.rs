@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::StorageError;
-use super::disk::{Disk, Entry, FileId};
+use super::disk::{Disk, DiskEntry, FileId};
 use super::file_lock::{FileLock, Refused};
 use super::real_disk::RealDisk;
 
@@ -55,12 +55,12 @@ impl DiskPath {
 
     /// Whether a file is there.
     pub fn is_file(&self) -> bool {
-        matches!(self.disk.entry(&self.path), Some(Entry::File(_)))
+        matches!(self.disk.entry(&self.path), Some(DiskEntry::File(_)))
     }
 
     /// Whether a folder is there.
     pub fn is_dir(&self) -> bool {
-        self.disk.entry(&self.path) == Some(Entry::Folder)
+        self.disk.entry(&self.path) == Some(DiskEntry::Folder)
     }
 
     /// Which file has this name now.
@@ -76,7 +76,7 @@ impl DiskPath {
     /// Length of the file in bytes. Errors: there is none.
     pub fn bytes(&self) -> Result<u64, StorageError> {
         match self.disk.entry(&self.path) {
-            Some(Entry::File(bytes)) => Ok(bytes),
+            Some(DiskEntry::File(bytes)) => Ok(bytes),
             _ => self.at_path(Err(io::ErrorKind::NotFound.into())),
         }
     }

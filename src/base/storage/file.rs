@@ -189,10 +189,10 @@ impl StoreFile {
     }
 
     /// What a read that failed means: behind damage that was found, redb's refusal to go on is that damage.
-    fn failed(&mut self, failure: Failure) -> StorageError {
+    fn failed(&mut self, failure: RedbFailure) -> StorageError {
         let path = self.path.path();
         match (failure, &self.damage) {
-            (Failure::Error(redb::Error::PreviousIo), Some(reason)) => {
+            (RedbFailure::Error(redb::Error::PreviousIo), Some(reason)) => {
                 StorageError::Damaged { path: path.to_owned(), reason: reason.clone() }
             }
             (failure, _) => {
@@ -367,7 +367,7 @@ fn open_writable(path: &DiskPath, builder: &redb::Builder) -> Result<Database, D
 
 /// Opens what is there, changing nothing.
 fn open_private(path: &DiskPath, builder: &redb::Builder) -> Result<Database, DatabaseError> {
-    let file = path.disk().open_to_look(path.path());
+    let file = path.disk().open_read_only(path.path());
     let file = file.map_err(redb::StorageError::Io)?;
     refuse_empty(&*file)?;
     builder.create_with_backend(Private::new(file).map_err(redb::StorageError::Io)?)
@@ -381,12 +381,12 @@ fn refuse_empty(file: &dyn StorageBackend) -> Result<(), redb::StorageError> {
 }
 
 /// A failure inside redb: an error it returned, or a panic on a tree it could not follow.
-enum Failure {
+enum RedbFailure {
     Error(redb::Error),
     Panic(String),
 }
 
-impl Failure {
+impl RedbFailure {
     fn at(self, path: &Path) -> StorageError {
         let path = path.to_owned();
         match self {
@@ -418,10 +418,10 @@ impl Failure {
 }
 
 /// Runs a call into redb and makes what it returns one kind of failure.
-fn guarded<T, E: Into<redb::Error>>(call: impl FnOnce() -> Result<T, E>) -> Result<T, Failure> {
+fn guarded<T, E: Into<redb::Error>>(call: impl FnOnce() -> Result<T, E>) -> Result<T, RedbFailure> {
     match caught(call) {
-        Ok(result) => result.map_err(|e| Failure::Error(e.into())),
-        Err(reason) => Err(Failure::Panic(reason)),
+        Ok(result) => result.map_err(|e| RedbFailure::Error(e.into())),
+        Err(reason) => Err(RedbFailure::Panic(reason)),
     }
 }
 

@@ -23,12 +23,12 @@ thread_local! {
 /// The context of one run. Clones are the same run.
 #[derive(Clone)]
 pub struct RunContext {
-    run: Arc<Run>,
+    run: Arc<RunState>,
     /// `None` on the pool's own threads, which are where parallel work belongs already.
     pool: Option<Arc<Pool>>,
 }
 
-struct Run {
+struct RunState {
     cancel: CancelToken,
     panic: Mutex<Option<CaughtPanic>>,
     /// Threads beside the pool that have work of their own.
@@ -47,21 +47,21 @@ pub struct CaughtPanic {
 /// Threads, begun when they are first needed and ended with the run.
 struct Pool {
     n_threads: usize,
-    run: Arc<Run>,
+    run: Arc<RunState>,
     threads: OnceLock<Option<ThreadPool>>,
-    left: Arc<(Mutex<usize>, Condvar)>,
+    n_alive: Arc<(Mutex<usize>, Condvar)>,
 }
 
 impl RunContext {
     /// A run with `n_threads` threads of its own, which ends when `cancel` says so.
     pub fn new(n_threads: usize, cancel: CancelToken) -> Self {
         catch_messages();
-        let run = Arc::new(Run { cancel, panic: Mutex::new(None), busy: AtomicUsize::new(0) });
+        let run = Arc::new(RunState { cancel, panic: Mutex::new(None), busy: AtomicUsize::new(0) });
         let pool = Pool {
             n_threads: n_threads.max(1),
             run: Arc::clone(&run),
             threads: OnceLock::new(),
-            left: Arc::default(),
+            n_alive: Arc::default(),
         };
         Self { run, pool: Some(Arc::new(pool)) }
     }
@@ -118,18 +118,18 @@ impl Pool {
     /// `None` where the system gives no threads: the caller's does all the work then.
     fn threads(&self) -> Option<&ThreadPool> {
         let begin = || {
-            let (run, left) = (Arc::clone(&self.run), Arc::clone(&self.left));
-            let gone = Arc::clone(&self.left);
+            let (run, n_alive) = (Arc::clone(&self.run), Arc::clone(&self.n_alive));
+            let n_alive_at_exit = Arc::clone(&self.n_alive);
             let built = ThreadPoolBuilder::new()
                 .num_threads(self.n_threads)
                 .start_handler(move |_| {
                     let run = Arc::clone(&run);
                     CURRENT.set(Some(RunContext { run, pool: None }));
-                    *left.0.lock().unwrap_or_else(PoisonError::into_inner) += 1;
+                    *n_alive.0.lock().unwrap_or_else(PoisonError::into_inner) += 1;
                 })
                 .exit_handler(move |_| {
-                    *gone.0.lock().unwrap_or_else(PoisonError::into_inner) -= 1;
-                    gone.1.notify_all();
+                    *n_alive_at_exit.0.lock().unwrap_or_else(PoisonError::into_inner) -= 1;
+                    n_alive_at_exit.1.notify_all();
                 })
                 .build();
             built.ok()
@@ -145,8 +145,8 @@ impl Drop for Pool {
             // A thread that has not begun yet is counted only when it does.
             threads.as_ref().map(|pool| pool.broadcast(|_| ()));
             drop(threads);
-            let left = self.left.0.lock().unwrap_or_else(PoisonError::into_inner);
-            drop(self.left.1.wait_while(left, |n| *n > 0));
+            let n_alive = self.n_alive.0.lock().unwrap_or_else(PoisonError::into_inner);
+            drop(self.n_alive.1.wait_while(n_alive, |n| *n > 0));
         }
     }
 }
@@ -230,7 +230,7 @@ fn catch_messages() {
     });
 }
 
-impl Run {
+impl RunState {
     fn remember(&self, info: &PanicHookInfo) {
         let file = info.location().map_or("", std::panic::Location::file);
         let mut panic = self.panic.lock().unwrap_or_else(PoisonError::into_inner);
@@ -284,7 +284,7 @@ mod tests {
     #[test]
     fn a_panic_is_kept_by_its_run_and_no_thread_is_left() {
         let run = RunContext::new(3, CancelToken::new());
-        let left = Arc::clone(&run.pool.as_ref().expect("it has a pool").left);
+        let n_alive = Arc::clone(&run.pool.as_ref().expect("it has a pool").n_alive);
         let ended = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
             run.enter(|| parallel(|| panic!("a broken invariant")))
         }));
@@ -293,6 +293,6 @@ mod tests {
         assert!(panic.message.contains("a broken invariant") && !panic.is_in_redb);
         assert_eq!(run.enter(n_threads), 3);
         drop(run);
-        assert_eq!(*left.0.lock().expect("nobody panics with it"), 0);
+        assert_eq!(*n_alive.0.lock().expect("nobody panics with it"), 0);
     }
 }

@@ -29,11 +29,11 @@ pub struct Sorter<R: SortRecord> {
     records_max: usize,
     memory_bytes: usize,
     dir: DiskPath,
-    runs: VecDeque<Run>,
+    runs: VecDeque<SortedRun>,
 }
 
 /// Sorted records in a part of a file.
-struct Run {
+struct SortedRun {
     file: Arc<ScratchFile>,
     /// Bytes from here on.
     at: u64,
@@ -124,7 +124,7 @@ impl<R: SortRecord> Sorter<R> {
         while self.runs.len() > at_once {
             check_cancelled();
             let n = at_once.min(self.runs.len() - at_once + 1);
-            let oldest: VecDeque<Run> = self.runs.drain(..n).collect();
+            let oldest: VecDeque<SortedRun> = self.runs.drain(..n).collect();
             // Each round has a file of its own, so that the one before goes when all its runs are read.
             let is_read = |file| oldest.iter().any(|run| Arc::ptr_eq(&run.file, file));
             let beside = self.runs.back().filter(|last| !is_read(&last.file));
@@ -140,18 +140,18 @@ impl<R: SortRecord> Sorter<R> {
 
 /// Writes a run.
 struct RunWriter {
-    run: Run,
+    run: SortedRun,
     buffer: Vec<u8>,
 }
 
 impl RunWriter {
     /// Behind another run in its file, or in a file of its own. Errors: the disk.
-    fn after(last: Option<&Run>, dir: &DiskPath) -> Result<Self, StorageError> {
+    fn after(last: Option<&SortedRun>, dir: &DiskPath) -> Result<Self, StorageError> {
         let (file, at) = match last {
             Some(run) => (Arc::clone(&run.file), run.end),
             None => (Arc::new(ScratchFile::create(dir)?), 0),
         };
-        let run = Run { file, at, end: at };
+        let run = SortedRun { file, at, end: at };
         let buffer = Vec::with_capacity(WRITE_BYTES);
         Ok(Self { run, buffer })
     }
@@ -172,14 +172,14 @@ impl RunWriter {
         Ok(())
     }
 
-    fn done(mut self) -> Result<Run, StorageError> {
+    fn done(mut self) -> Result<SortedRun, StorageError> {
         self.flush()?;
         Ok(self.run)
     }
 }
 
 struct RunReader {
-    run: Run,
+    run: SortedRun,
     buffer: Vec<u8>,
     /// Bytes of the buffer already given.
     given: usize,
@@ -216,7 +216,7 @@ pub struct Sorted<R: SortRecord> {
 
 impl<R: SortRecord> Sorted<R> {
     /// Merges runs while they are read, each through its share of so much memory.
-    fn of(runs: VecDeque<Run>, memory_bytes: usize) -> Result<Self, StorageError> {
+    fn of(runs: VecDeque<SortedRun>, memory_bytes: usize) -> Result<Self, StorageError> {
         let share = (memory_bytes / runs.len()).clamp(READ_BYTES_MIN, READ_BYTES_MAX);
         let mut sorted = Self {
             memory: Vec::new().into_iter(),

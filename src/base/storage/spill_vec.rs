@@ -303,15 +303,15 @@ mod tests {
         let dir = tempfile::tempdir().expect("a folder");
         let n = 300_000;
         let mut found = Vec::new();
-        for room in [ScratchSpace::boundless(), ScratchSpace::new(1 << 20, dir.path())] {
-            let mut column = room.column(n, [7u32, 0]);
+        for scratch in [ScratchSpace::boundless(), ScratchSpace::new(1 << 20, dir.path())] {
+            let mut column = scratch.column(n, [7u32, 0]);
             let is_paged = matches!(column.place, Residence::Disk(_));
-            assert_eq!(is_paged, room.dir.is_some());
+            assert_eq!(is_paged, scratch.dir.is_some());
             for i in places(n) {
                 let [a, b] = column.get(i);
                 column.set(i, [a.wrapping_mul(3), b + 1]);
             }
-            let mut list = room.list();
+            let mut list = scratch.list();
             for i in 0..n {
                 list.push(column.get(i));
             }
@@ -334,8 +334,8 @@ mod tests {
     #[test]
     fn a_folder_that_is_not_there_is_an_error() {
         let dir = tempfile::tempdir().expect("a folder");
-        let room = ScratchSpace::new(1 << 20, dir.path().join("missing"));
-        let made = attempt(|| drop(room.column(1 << 20, 0u64)));
-        assert!(matches!(made, Err(crate::storage::StorageError::Io { .. })), "{made:?}");
+        let scratch = ScratchSpace::new(1 << 20, dir.path().join("missing"));
+        let output = attempt(|| drop(scratch.column(1 << 20, 0u64)));
+        assert!(matches!(output, Err(crate::storage::StorageError::Io { .. })), "{output:?}");
     }
 }

@@ -34,12 +34,12 @@ impl BoxTree {
     pub fn new(
         bounds: &Aabb,
         n: u32,
-        room: &ScratchSpace,
+        scratch: &ScratchSpace,
         keep: impl Fn(u32) -> bool + Sync,
         box_of: impl Fn(u32) -> Aabb + Sync,
     ) -> Self {
         let frame = HilbertFrame::new(bounds);
-        let mut sorter = room.sorter::<Keyed>();
+        let mut sorter = scratch.sorter::<Keyed>();
         for first in (0..n).step_by(AT_ONCE) {
             let some = first..n.min(first.saturating_add(AT_ONCE as u32));
             let keys: Vec<Keyed> = parallel(|| {
@@ -57,7 +57,7 @@ impl BoxTree {
             }
         }
         let mut sorted = sorter.finish().unwrap_or_else(|e| raise(e));
-        let (mut order, mut boxes) = (room.list(), room.list());
+        let (mut order, mut boxes) = (scratch.list(), scratch.list());
         loop {
             let some: Vec<u32> = sorted
                 .by_ref()
@@ -72,11 +72,11 @@ impl BoxTree {
             around.into_iter().for_each(|b| boxes.push(b));
         }
         let boxes = boxes.done().fixed();
-        let mut levels = vec![enclose(&boxes, LEAF, room)];
+        let mut levels = vec![enclose(&boxes, LEAF, scratch)];
         while let Some(last) = levels.last()
             && last.len() > 1
         {
-            levels.push(enclose(last, ARITY, room));
+            levels.push(enclose(last, ARITY, scratch));
         }
         Self { order: order.done().fixed(), boxes, levels }
     }
@@ -135,9 +135,9 @@ impl BoxTree {
 fn enclose(
     boxes: &FrozenSpillVec<Aabb>,
     group: usize,
-    room: &ScratchSpace,
+    scratch: &ScratchSpace,
 ) -> FrozenSpillVec<Aabb> {
-    let mut around = room.list();
+    let mut around = scratch.list();
     for first in (0..boxes.len()).step_by(group) {
         let group = first..(first + group).min(boxes.len());
         around.push(group.fold(Aabb::EMPTY, |a, i| a.union(boxes.get(i))));

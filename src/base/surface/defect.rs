@@ -1,7 +1,7 @@
 //! What can be wrong with a surface, in words, with the place and the way out.
 
 use super::contact::ContactKind;
-use super::wire_set::WireError;
+use super::embedded_set::EmbedError;
 use crate::geom::Point;
 
 /// A surface that cannot be built or meshed.
@@ -31,7 +31,7 @@ pub enum SurfaceError {
     #[error(
         "edges and points of {vertices} vertices, or more, take more than the {bytes_max} bytes of memory allowed"
     )]
-    WireMemory {
+    EmbedMemory {
         /// Bytes allowed.
         bytes_max: u64,
         /// Vertices known so far.
@@ -65,12 +65,12 @@ pub enum SurfaceError {
     },
     /// An embedded edge or point cannot be there.
     #[error(transparent)]
-    Wire(Box<WireError>),
+    Embed(Box<EmbedError>),
 }
 
-impl From<WireError> for SurfaceError {
-    fn from(error: WireError) -> Self {
-        Self::Wire(Box::new(error))
+impl From<EmbedError> for SurfaceError {
+    fn from(error: EmbedError) -> Self {
+        Self::Embed(Box::new(error))
     }
 }
 
@@ -90,11 +90,11 @@ impl SurfaceError {
     pub fn code(&self) -> &'static str {
         match self {
             Self::TooLarge { .. } => "surface-too-large",
-            Self::Memory { .. } | Self::WireMemory { .. } => "memory",
+            Self::Memory { .. } | Self::EmbedMemory { .. } => "memory",
             Self::NoSuchVertex { .. } => "index-out-of-range",
             Self::TooSmall { .. } => "coordinate-range",
             Self::Invalid { defect, .. } => defect.code(),
-            Self::Wire(wire) => wire.code(),
+            Self::Embed(wire) => wire.code(),
         }
     }
 
@@ -103,11 +103,11 @@ impl SurfaceError {
         match self {
             Self::TooLarge { .. } => "split the surface into parts and mesh them one by one",
             Self::Memory { .. } => "allow more memory, or take a coarser surface",
-            Self::WireMemory { .. } => "allow more memory, or take fewer edges and points",
+            Self::EmbedMemory { .. } => "allow more memory, or take fewer edges and points",
             Self::NoSuchVertex { .. } => "write the file again from the program that made it",
             Self::TooSmall { .. } => "scale the surface to ordinary units, for example metres",
             Self::Invalid { defect, .. } => defect.help(),
-            Self::Wire(wire) => wire.help(),
+            Self::Embed(wire) => wire.help(),
         }
     }
 }

@@ -55,7 +55,7 @@ pub(super) struct Facets {
     pub duplicates: Vec<[u32; 2]>,
     pub two_sided: Vec<[u32; 2]>,
     /// Uses of edges by facets, sorted by edge.
-    uses: SpillVec<EdgeUse>,
+    uses: SpillVec<TriangleAtEdge>,
     /// Per triangle: not the first of its vertices, or a vertex repeated.
     pub is_left_out: Vec<bool>,
 }
@@ -64,7 +64,7 @@ sort_record! {
     /// One facet at one edge.
     #[derive(Eq, PartialOrd, Ord, bytemuck::Pod, bytemuck::Zeroable)]
     #[repr(C)]
-    pub(super) struct EdgeUse {
+    pub(super) struct TriangleAtEdge {
         /// The edge's vertices, the smaller one first.
         pub edge: [u32; 2],
         /// `4 * triangle + k`, the edge going from corner k to the next.
@@ -81,7 +81,7 @@ sort_record! {
     }
 }
 
-impl EdgeUse {
+impl TriangleAtEdge {
     pub fn triangle(self) -> u32 {
         self.half >> 2
     }
@@ -104,13 +104,13 @@ impl EdgeUse {
 }
 
 /// Whether two uses of one edge run along it in the same direction.
-pub(super) fn same_direction(surface: &Surface, a: EdgeUse, b: EdgeUse) -> bool {
+pub(super) fn same_direction(surface: &Surface, a: TriangleAtEdge, b: TriangleAtEdge) -> bool {
     a.is_forward(surface) == b.is_forward(surface)
 }
 
 impl Facets {
     /// A scratch file that fails unwinds.
-    pub fn of(surface: &Surface, room: &ScratchSpace) -> Self {
+    pub fn of(surface: &Surface, scratch: &ScratchSpace) -> Self {
         let degenerate: Vec<(u32, bool)> = parallel(|| {
             (0..surface.n_triangles() as u32)
                 .into_par_iter()
@@ -121,20 +121,20 @@ impl Facets {
         for &(t, repeated) in &degenerate {
             is_left_out[t as usize] = repeated;
         }
-        let (duplicates, two_sided) = repetitions(surface, &mut is_left_out, room);
-        let mut sorter = room.sorter::<EdgeUse>();
+        let (duplicates, two_sided) = repetitions(surface, &mut is_left_out, scratch);
+        let mut sorter = scratch.sorter::<TriangleAtEdge>();
         for (t, triangle) in (0u32..).zip(&surface.triangles) {
             if is_left_out[t as usize] {
                 continue;
             }
             for k in 0..3 {
                 let (a, b) = (triangle[k as usize], triangle[(k as usize + 1) % 3]);
-                let edge_use = EdgeUse { edge: [a.min(b), a.max(b)], half: 4 * t + k };
+                let edge_use = TriangleAtEdge { edge: [a.min(b), a.max(b)], half: 4 * t + k };
                 let pushed = sorter.push(edge_use);
                 pushed.unwrap_or_else(|e| raise(e));
             }
         }
-        let mut uses = room.list();
+        let mut uses = scratch.list();
         for edge_use in sorter.finish().unwrap_or_else(|e| raise(e)) {
             uses.push(edge_use.unwrap_or_else(|e| raise(e)));
         }
@@ -143,11 +143,11 @@ impl Facets {
     }
 
     /// Calls `visit` with the uses of each edge together.
-    pub fn each_edge(&mut self, mut visit: impl FnMut(&[EdgeUse])) {
+    pub fn each_edge(&mut self, mut visit: impl FnMut(&[TriangleAtEdge])) {
         let mut together = Vec::new();
         for i in 0..self.uses.len() {
             let next = self.uses.get(i);
-            if together.last().is_some_and(|u: &EdgeUse| u.edge != next.edge) {
+            if together.last().is_some_and(|u: &TriangleAtEdge| u.edge != next.edge) {
                 visit(&together);
                 together.clear();
             }
@@ -215,9 +215,9 @@ fn collapse(surface: &Surface, t: u32) -> Option<bool> {
 fn repetitions(
     surface: &Surface,
     is_left_out: &mut [bool],
-    room: &ScratchSpace,
+    scratch: &ScratchSpace,
 ) -> (Vec<[u32; 2]>, Vec<[u32; 2]>) {
-    let mut sorter = room.sorter::<SortedTriangle>();
+    let mut sorter = scratch.sorter::<SortedTriangle>();
     for (t, triangle) in (0u32..).zip(&surface.triangles) {
         if !is_left_out[t as usize] {
             let mut vertices = *triangle;

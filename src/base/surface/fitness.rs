@@ -43,7 +43,7 @@ pub struct Fitness {
 
 /// Sums over triangles.
 #[derive(Clone, Copy)]
-struct Sums {
+struct ShapeSums {
     n_small: u64,
     angle: f64,
     low: f64,
@@ -63,7 +63,7 @@ pub fn fitness(surface: &Surface, closedness: &Closedness) -> Fitness {
     if n == 0 {
         return Fitness::default();
     }
-    let none = Sums {
+    let none = ShapeSums {
         n_small: 0,
         angle: f64::INFINITY,
         low: f64::INFINITY,
@@ -95,8 +95,8 @@ pub fn fitness(surface: &Surface, closedness: &Closedness) -> Fitness {
     }
 }
 
-fn join(a: Sums, b: Sums) -> Sums {
-    Sums {
+fn join(a: ShapeSums, b: ShapeSums) -> ShapeSums {
+    ShapeSums {
         n_small: a.n_small + b.n_small,
         angle: a.angle.min(b.angle),
         low: a.low.min(b.low),
@@ -121,7 +121,7 @@ fn area(surface: &Surface, t: u32) -> f64 {
     0.5 * (b - a).cross(c - a).length()
 }
 
-fn shape(surface: &Surface, t: u32) -> Sums {
+fn shape(surface: &Surface, t: u32) -> ShapeSums {
     let lengths = edge_lengths(surface, t);
     let corners = surface.corners(t);
     let angles = [0, 1, 2].map(|i| {
@@ -135,7 +135,7 @@ fn shape(surface: &Surface, t: u32) -> Sums {
     // A collapsed triangle has inradius 0, or none at all; then the quality is without bound.
     let quality = ALPHA * high / inradius;
     let is_worse = |bound: f64| u64::from(quality.is_nan() || quality >= bound);
-    Sums {
+    ShapeSums {
         n_small: u64::from(angle < SMALL_ANGLE_DEGREES.to_radians()),
         angle,
         low: lengths.into_iter().fold(f64::INFINITY, f64::min),

@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use super::Surface;
 use super::boundary_loops::{TJunction, has_near_junctions, t_junctions};
 use super::edges::{Closedness, Facets, closedness};
-use super::near::{n_near, weld_near};
 use super::orientation::orient_alike;
 use super::validate::validate;
 use super::weld::drop_unused_points;
+use super::weld_near::{n_near, weld_near};
 use crate::storage::ScratchSpace;
 
 /// Shares of the box diagonal that [`closing`] tries after none.

@@ -1,6 +1,6 @@
 //! Embedded sheets: triangles that become faces of the mesh with volume on both sides, and part nothing.
 
-use super::edges::{EdgeUse, Facets};
+use super::edges::{Facets, TriangleAtEdge};
 use super::weld::{PointTable, drop_unused_labels, drop_unused_points};
 use super::{SourceFile, Surface, SurfaceError};
 use crate::storage::ScratchSpace;
@@ -19,13 +19,13 @@ impl Surface {
 
     /// Triangles of embedded sheets.
     pub fn n_sheet_triangles(&self) -> usize {
-        let own = self.sheets.iter().take(self.n_own_triangles());
+        let own = self.sheets.iter().take(self.n_input_triangles());
         own.filter(|&&is_sheet| is_sheet).count()
     }
 
     /// The sheets alone, as triangles like others, or what they are in.
     pub fn part(&self, sheets: bool) -> Self {
-        let mut part = self.without_wires();
+        let mut part = self.without_embedded();
         let flags = std::mem::take(&mut part.sheets);
         let is_kept = |t: usize| flags.get(t).copied().unwrap_or(false) == sheets;
         let mut kept = (0..part.n_triangles()).map(is_kept);
@@ -103,8 +103,8 @@ impl Surface {
     /// Takes for sheets what is not closed: triangles at an open edge, then those that are at one without them, and so on.
     ///
     /// Returns how many. Memory: 24 bytes a triangle. A scratch file that fails unwinds.
-    pub fn open_parts_to_sheets(&mut self, room: &ScratchSpace) -> usize {
-        let mut edges = OpenEdges::of(self, room);
+    pub fn open_parts_to_sheets(&mut self, scratch: &ScratchSpace) -> usize {
+        let mut edges = OpenEdges::of(self, scratch);
         let mut n = 0;
         while let Some(t) = edges.next() {
             if self.sheets.is_empty() {
@@ -130,10 +130,10 @@ struct OpenEdges {
 const NO_EDGE: u32 = u32::MAX;
 
 impl OpenEdges {
-    fn of(surface: &Surface, room: &ScratchSpace) -> Self {
+    fn of(surface: &Surface, scratch: &ScratchSpace) -> Self {
         let mut edges = vec![[NO_EDGE; 3]; surface.n_triangles()];
         let mut uses = Vec::new();
-        Facets::of(surface, room).each_edge(|all| {
+        Facets::of(surface, scratch).each_edge(|all| {
             let mut here = (0, 0);
             for use_ in all.iter().filter(|u| !surface.is_sheet(u.triangle())) {
                 edges[use_.triangle() as usize][use_.corner()] = uses.len() as u32;
@@ -171,8 +171,8 @@ impl OpenEdges {
 /// Calls `visit` with the two shell triangles at an edge if there are two, then with the two sheet triangles.
 pub(super) fn each_pair(
     surface: &Surface,
-    uses: &[EdgeUse],
-    mut visit: impl FnMut(EdgeUse, EdgeUse),
+    uses: &[TriangleAtEdge],
+    mut visit: impl FnMut(TriangleAtEdge, TriangleAtEdge),
 ) {
     if !surface.has_sheets() {
         if let [a, b] = uses {

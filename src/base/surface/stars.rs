@@ -14,7 +14,7 @@ use std::f64::consts::{PI, TAU};
 
 use rayon::prelude::*;
 
-use super::broad::{FOUND_MAX, tree_of};
+use super::box_pairs::{FOUND_MAX, tree_of};
 use super::{BoxTree, Surface};
 use crate::geom::{Aabb, Point};
 use crate::storage::ScratchSpace;
@@ -40,7 +40,7 @@ enum Center {
 }
 
 /// Triangles with a center in common.
-struct Star {
+struct TriangleStar {
     /// Of the edge they share, or the vertex twice.
     ends: [Point; 2],
     /// Direction of the edge, if it is one.
@@ -59,12 +59,12 @@ struct Star {
 pub(super) fn touching<T: Send>(
     surface: &Surface,
     is_left_out: &mut [bool],
-    room: &ScratchSpace,
+    scratch: &ScratchSpace,
     listed_max: usize,
     test: impl Fn(u32, u32) -> Option<T> + Sync,
 ) -> (Vec<T>, u64) {
     let stars = stars(surface, is_left_out);
-    let tree = tree_of(surface, room, |t| !is_left_out[t as usize]);
+    let tree = tree_of(surface, scratch, |t| !is_left_out[t as usize]);
     let (mut listed, mut n_found) = tree.pairs(listed_max, &test);
     let mut add = |(found, n): (Vec<T>, u64)| {
         let free = listed_max - listed.len();
@@ -77,16 +77,16 @@ pub(super) fn touching<T: Send>(
         if add(star.tree.pairs(listed_max, own)) {
             break;
         }
-        let mut beside = Vec::new();
-        tree.meeting(&star.bounds, |t| beside.push(t));
+        let mut adjacent = Vec::new();
+        tree.meeting(&star.bounds, |t| adjacent.push(t));
         for other in &stars[k + 1..] {
             if other.bounds.meets(&star.bounds) {
-                beside.extend(&other.members);
+                adjacent.extend(&other.members);
             }
         }
-        let is_hopeless =
-            beside.chunks(AT_ONCE).any(|some| add(star.with(surface, some, listed_max, &test)));
-        if is_hopeless {
+        let is_over_limit =
+            adjacent.chunks(AT_ONCE).any(|some| add(star.with(surface, some, listed_max, &test)));
+        if is_over_limit {
             break;
         }
     }
@@ -94,7 +94,7 @@ pub(super) fn touching<T: Send>(
 }
 
 /// The stars of a surface, by vertex and edge; their triangles are left out from now on.
-fn stars(surface: &Surface, is_left_out: &mut [bool]) -> Vec<Star> {
+fn stars(surface: &Surface, is_left_out: &mut [bool]) -> Vec<TriangleStar> {
     let mut degrees = vec![0u32; surface.n_vertices()];
     let counts = |t: &usize| !is_left_out[*t];
     for t in (0..surface.n_triangles()).filter(counts) {
@@ -139,11 +139,11 @@ fn stars(surface: &Surface, is_left_out: &mut [bool]) -> Vec<Star> {
             centers[k].1.push(t as u32);
         }
     }
-    let star = |(center, members)| Star::new(surface, center, members);
+    let star = |(center, members)| TriangleStar::new(surface, center, members);
     centers.into_iter().map(star).collect()
 }
 
-impl Star {
+impl TriangleStar {
     fn new(surface: &Surface, center: Center, members: Vec<u32>) -> Self {
         let at = |v: u32| surface.points[v as usize];
         let ends = match center {
@@ -309,8 +309,8 @@ mod tests {
     fn found(surface: &Surface) -> (Vec<[u32; 2]>, u64, u64) {
         let looked = AtomicU64::new(0);
         let mut is_left_out = vec![false; surface.n_triangles()];
-        let room = ScratchSpace::boundless();
-        let (mut pairs, n) = touching(surface, &mut is_left_out, &room, usize::MAX, |a, b| {
+        let scratch = ScratchSpace::boundless();
+        let (mut pairs, n) = touching(surface, &mut is_left_out, &scratch, usize::MAX, |a, b| {
             looked.fetch_add(1, Ordering::Relaxed);
             contact_of(surface, a, b).then_some([a, b])
         });

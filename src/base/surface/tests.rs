@@ -413,13 +413,13 @@ fn a_room_too_small_changes_nothing() {
         let narrow = ScratchSpace::new(16 << 10, dir.path());
         assert!(surface.bytes() as u64 > narrow.cap());
         let validation = validate(&surface);
-        assert_eq!(validate_in(&surface, &narrow), validation);
+        assert_eq!(validate_with(&surface, &narrow), validation);
         let (mut a, mut b) = (surface.clone(), surface);
-        assert_eq!(orient_alike(&mut a), orient_alike_in(&mut b, &narrow));
+        assert_eq!(orient_alike(&mut a), orient_alike_with(&mut b, &narrow));
         assert_eq!(a, b);
         let seeker = Seeker::of(&a, &narrow, |_| true);
         let wide = Seeker::new(&a);
-        assert_eq!(Volumes::of_in(&seeker, &narrow), Volumes::of(&wide));
+        assert_eq!(Volumes::new_in(&seeker, &narrow), Volumes::of(&wide));
         for k in 0..500 {
             let p = Point::new(f64::from(k * 7 % 61), f64::from(k * 11 % 61), 0.3);
             assert_eq!(seeker.distance(p, 9.0), wide.distance(p, 9.0));

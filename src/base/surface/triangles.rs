@@ -4,7 +4,7 @@ use std::fmt;
 use std::mem::size_of;
 
 use super::Seed;
-use super::wire_set::Wires;
+use super::embedded_set::Embedded;
 use crate::geom::{Aabb, Point};
 
 /// An indexed triangle surface with a label on each triangle.
@@ -29,7 +29,7 @@ pub struct Surface {
     /// Whether each triangle is part of an embedded sheet; empty where none is.
     pub sheets: Vec<bool>,
     /// Embedded edges and points, and what holds them.
-    pub wires: Wires,
+    pub embedded: Embedded,
     /// What a reader found worth telling, in order.
     pub notes: Vec<Note>,
     /// What the files say of volumes, in order.
@@ -95,8 +95,8 @@ impl Surface {
             + self.triangles.capacity() * size_of::<[u32; 3]>()
             + self.labels.capacity() * size_of::<u32>()
             + self.sheets.capacity()
-            + self.wires.edges.capacity() * size_of::<[u32; 3]>()
-            + self.wires.points.capacity() * size_of::<[u32; 4]>()
+            + self.embedded.edges.capacity() * size_of::<[u32; 3]>()
+            + self.embedded.points.capacity() * size_of::<[u32; 4]>()
             + names
     }
 }

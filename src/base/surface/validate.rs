@@ -61,14 +61,14 @@ impl Validation {
 /// Near-linear time where boxes of triangles overlap few others, but for those around one vertex or one edge, of which there may be many; about 150 bytes per triangle. Same
 /// result for any number of threads. Orientation is no defect: see [`Closedness::n_inconsistent`].
 pub fn validate(surface: &Surface) -> Validation {
-    validate_in(surface, &ScratchSpace::boundless())
+    validate_with(surface, &ScratchSpace::boundless())
 }
 
 /// [`validate`] in a room: 8 bytes a triangle are held beside the surface and 60 for each around a vertex of hundreds, the rest goes to scratch files where the room is too small.
 ///
 /// A scratch file that fails unwinds ([`attempt`](crate::storage::attempt)).
-pub fn validate_in(surface: &Surface, room: &ScratchSpace) -> Validation {
-    let mut facets = Facets::of(surface, room);
+pub fn validate_with(surface: &Surface, scratch: &ScratchSpace) -> Validation {
+    let mut facets = Facets::of(surface, scratch);
     let closedness = facets.closedness(surface);
     let t_junctions = match closedness.is_closed() {
         true => Vec::new(),
@@ -85,7 +85,7 @@ pub fn validate_in(surface: &Surface, room: &ScratchSpace) -> Validation {
         Some(([a, b], found))
     };
     let (mut touching, n_intersections) =
-        touching(surface, &mut is_left_out, room, LISTED_MAX, look);
+        touching(surface, &mut is_left_out, scratch, LISTED_MAX, look);
     touching.sort_unstable_by_key(|(triangles, _)| *triangles);
     let n_defects = defects.len() as u64 + n_intersections;
     defects.extend(touching.into_iter().map(|(triangles, found)| Defect::SelfIntersection {

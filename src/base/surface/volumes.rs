@@ -11,8 +11,8 @@ use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::Surface;
-use super::edges::{EdgeUse, Facets, Groups};
-use super::seek::Seeker;
+use super::edges::{Facets, Groups, TriangleAtEdge};
+use super::seeker::Seeker;
 use crate::geom::{Point, orient_sign};
 use crate::storage::ScratchSpace;
 
@@ -46,17 +46,17 @@ pub struct Volumes {
 }
 
 impl Volumes {
-    /// [`Volumes::of_in`] in memory.
+    /// [`Volumes::new_in`] in memory.
     pub fn of(seeker: &Seeker) -> Self {
-        Self::of_in(seeker, &ScratchSpace::boundless())
+        Self::new_in(seeker, &ScratchSpace::boundless())
     }
 
     /// Sides at open edges are joined, so an open surface encloses nothing. Beside the room's arrays [`VOLUMES_TRIANGLE`] bytes a triangle are held at
     /// most, which the caller counts; a scratch file that fails unwinds.
-    pub fn of_in(seeker: &Seeker, room: &ScratchSpace) -> Self {
+    pub fn new_in(seeker: &Seeker, scratch: &ScratchSpace) -> Self {
         let surface = seeker.surface();
         let n = surface.n_triangles();
-        let mut facets = Facets::of(surface, room);
+        let mut facets = Facets::of(surface, scratch);
         let mut sides = Groups::new(2 * n + 1);
         let mut shells = Groups::new(n);
         facets.each_edge(|uses| {
@@ -157,7 +157,7 @@ impl Volumes {
         })
     }
 
-    fn add_angles(&mut self, surface: &Surface, uses: &[EdgeUse]) {
+    fn add_angles(&mut self, surface: &Surface, uses: &[TriangleAtEdge]) {
         for [this, next] in pairs_around(surface, uses) {
             let side = this.side_after(surface) as usize;
             let volume = self.of_side[side / 2][side % 2];
@@ -171,14 +171,14 @@ impl Volumes {
 }
 
 /// Joins the sides that face each other around one edge.
-fn join_around(surface: &Surface, uses: &[EdgeUse], sides: &mut Groups) {
+fn join_around(surface: &Surface, uses: &[TriangleAtEdge], sides: &mut Groups) {
     for [this, next] in pairs_around(surface, uses) {
         sides.join(this.side_after(surface), next.side_before(surface));
     }
 }
 
 /// Triangles that follow each other around an edge.
-fn pairs_around(surface: &Surface, uses: &[EdgeUse]) -> Vec<[EdgeUse; 2]> {
+fn pairs_around(surface: &Surface, uses: &[TriangleAtEdge]) -> Vec<[TriangleAtEdge; 2]> {
     let mut order = uses.to_vec();
     if uses.len() > 2 {
         sort_around(surface, &mut order);
@@ -198,7 +198,7 @@ fn angle(x: f64, y: f64) -> f64 {
     if y < 0.0 { 2.0 * PI - half } else { half }
 }
 
-impl EdgeUse {
+impl TriangleAtEdge {
     /// The side seen when turning on from the triangle, counter-clockwise seen from the edge's larger vertex.
     fn side_after(self, surface: &Surface) -> u32 {
         2 * self.triangle() + u32::from(!self.is_forward(surface))
@@ -224,7 +224,7 @@ impl EdgeUse {
 }
 
 /// Sorts triangles around their edge, counter-clockwise, from the first.
-fn sort_around(surface: &Surface, uses: &mut [EdgeUse]) {
+fn sort_around(surface: &Surface, uses: &mut [TriangleAtEdge]) {
     let [a, b] = uses[0].edge.map(|v| surface.points[v as usize]);
     let first = uses[0].apex(surface);
     // Quarter: the first itself, less than half a turn on, half a turn, more.

@@ -19,7 +19,7 @@ pub(super) const SHARED: u32 = 1 << 31;
 
 /// The host's scratch map from the extraction of the core to the end of the split, behind one word a vertex: what became of each
 /// tetrahedron, in the two highest bits, with a number.
-pub(super) mod fate {
+pub(super) mod placement {
     use tetdb_schema::page::NONE;
 
     /// Of neither side and not in the core: its id is not in use.
@@ -48,7 +48,7 @@ impl Sides {
 
 /// Sides of the vertices of `tet`, and the least distance in units of h.
 #[inline]
-pub(super) fn place<P: Pages>(
+pub(super) fn sides_and_distance<P: Pages>(
     mesh: &mut Mesh<P>,
     tet: &Tet,
     surface: &impl CuttingSurface,
@@ -80,7 +80,7 @@ pub(super) struct CoreBoundary {
 }
 
 impl CoreBoundary {
-    /// The host's face at the core's face with these vertices, if it is one of the rim.
+    /// The host's face at the core's face with these vertices, if it is one of the core boundary.
     pub(super) fn find(&self, mut vertices: [u32; 3]) -> Option<FaceRef> {
         vertices.sort_unstable();
         let at = self.faces.binary_search_by_key(&vertices, |f| f.vertices);
@@ -91,13 +91,13 @@ impl CoreBoundary {
 /// Whether `t` was copied into the core, as the scratch map of [`extract`] tells.
 pub(super) fn is_in_core<P: Pages>(host: &mut Mesh<P>, t: u32) -> bool {
     let base = dense(host.vertex_ids_end());
-    host.scratch(base + dense(t)) & fate::BITS == fate::IN_CORE
+    host.scratch(base + dense(t)) & placement::BITS == placement::IN_CORE
 }
 
-/// Copies the core of `host` into the empty `core`; tells the rim.
+/// Copies the core of `host` into the empty `core`; tells the core boundary.
 ///
 /// Effects: the host's scratch map holds for each vertex the number in the core with [`SHARED`], or else how many were met before it in
-/// tetrahedra out of the core, or [`NONE`]; behind that the [`fate`] of each tetrahedron.
+/// tetrahedra out of the core, or [`NONE`]; behind that the [`placement`] of each tetrahedron.
 pub(super) fn extract<P: Pages, Q: Pages>(
     host: &mut Mesh<P>,
     core: &mut Mesh<Q>,
@@ -116,9 +116,9 @@ pub(super) fn extract<P: Pages, Q: Pages>(
         }
         let tet = host.tet(t);
         let word = if tet.is_live() {
-            let (sides, least) = place(host, &tet, surface);
+            let (sides, least) = sides_and_distance(host, &tet, surface);
             if sides.crosses() || least <= CORE {
-                fate::IN_CORE | copy_tet(host, core, t, &tet)
+                placement::IN_CORE | copy_tet(host, core, t, &tet)
             } else {
                 for v in tet.vertices() {
                     if host.scratch(dense(v)) == NONE {
@@ -126,17 +126,17 @@ pub(super) fn extract<P: Pages, Q: Pages>(
                         met += 1;
                     }
                 }
-                if sides.high { fate::HIGH } else { 0 }
+                if sides.high { placement::HIGH } else { 0 }
             }
         } else {
-            fate::UNUSED
+            placement::UNUSED
         };
         host.set_scratch(at, word);
         at += 1;
         t = next_id(t);
     }
     // The copies still name the host's neighbors.
-    let mut rim = CoreBoundary::default();
+    let mut core_boundary = CoreBoundary::default();
     let mut from = 0;
     while let Some((t, mut tet)) = core.next_tet(from) {
         from = t + 1;
@@ -146,8 +146,8 @@ pub(super) fn extract<P: Pages, Q: Pages>(
                 continue;
             }
             let word = host.scratch(base + dense(across.tet()));
-            if word & fate::BITS == fate::IN_CORE {
-                tet.neighbor[i] = FaceRef::new(word & !fate::BITS, across.face());
+            if word & placement::BITS == placement::IN_CORE {
+                tet.neighbor[i] = FaceRef::new(word & !placement::BITS, across.face());
                 continue;
             }
             tet.neighbor[i] = FaceRef::NONE;
@@ -159,12 +159,12 @@ pub(super) fn extract<P: Pages, Q: Pages>(
                 }
             }
             vertices.sort_unstable();
-            rim.faces.push(BoundaryFace { vertices, host: across });
+            core_boundary.faces.push(BoundaryFace { vertices, host: across });
         }
         core.set_tet(t, tet);
     }
-    rim.faces.sort_unstable();
-    rim
+    core_boundary.faces.sort_unstable();
+    core_boundary
 }
 
 fn copy_tet<P: Pages, Q: Pages>(host: &mut Mesh<P>, core: &mut Mesh<Q>, t: u32, tet: &Tet) -> u32 {
@@ -192,7 +192,7 @@ fn copy_vertex<P: Pages, Q: Pages>(host: &mut Mesh<P>, core: &mut Mesh<Q>, v: u3
     copy
 }
 
-/// Whether a vertex of the core is fixed only because it lies on the rim.
+/// Whether a vertex of the core is fixed only because it lies on the core boundary.
 pub(super) fn is_held<P: Pages>(core: &mut Mesh<P>, v: u32) -> bool {
     core.vertex_attribute(v).0 == VertexTag::Interface && core.interface_vertex(v).0 == 0
 }

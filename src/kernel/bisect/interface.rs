@@ -1,6 +1,6 @@
 //! The interface: a minimum cut of the cutting zone, then moves that no sum over faces can see.
 //!
-//! Labels by the side of the middle give 3.85 faces per h² of the plane, many tetrahedra with two or three of them and pinched
+//! SideLabels by the side of the middle give 3.85 faces per h² of the plane, many tetrahedra with two or three of them and pinched
 //! vertices. The minimum cut of the dual graph is the best of all interfaces for any cost that is a sum over faces:
 //! 2.8 faces per h². Over-constrained tetrahedra and pinched vertices depend on several faces at once; they are reduced by
 //! moving all free tetrahedra around an interface vertex to one side, or a single tetrahedron, as long as that gains.
@@ -8,10 +8,10 @@
 //! Source: the paper, section 1.1, "Choosing the interface", which makes the moves alone.
 
 use super::core::CoreBoundary;
-use super::flow::{Arc, Graph};
+use super::flow::{FlowArc, Graph};
 use super::interface_faces::interface_points;
-use super::labels::{InterfaceMeasures, Labels, face_cost, measure};
 use super::moves::Moves;
+use super::side_labels::{InterfaceMeasures, SideLabels, face_cost, measure};
 use super::surface::CuttingSurface;
 use crate::mesh::{Mesh, Tet, dense};
 use tetdb_base::geom::Point;
@@ -53,23 +53,23 @@ pub struct InterfaceReport {
 pub(super) fn choose<P: Pages>(
     core: &mut Mesh<P>,
     surface: &impl CuttingSurface,
-    rim: &CoreBoundary,
+    core_boundary: &CoreBoundary,
     natural: Option<&mut Vec<[Point; 3]>>,
-) -> (InterfaceReport, Labels) {
-    let (labels, free) = Labels::begin(core, surface, rim);
+) -> (InterfaceReport, SideLabels) {
+    let (labels, free) = SideLabels::new(core, surface, core_boundary);
     if let Some(natural) = natural {
         *natural = interface_points(core, &labels);
     }
     let mut report = InterfaceReport { free_tets: free.len() as u64, ..InterfaceReport::default() };
-    let mut moves = Moves::new(core, labels, surface, rim);
-    report.natural = measure(core, &moves.labels, rim);
+    let mut moves = Moves::new(core, labels, surface, core_boundary);
+    report.natural = measure(core, &moves.labels, core_boundary);
     report.natural.pinched = moves.count_pinched(core, &free);
     report.bytes = minimum_cut(core, &mut moves.labels, surface, &free);
     report.bytes += size_of_val(&free[..]) as u64 + moves.bytes() + moves.labels.bytes();
-    report.minimum = measure(core, &moves.labels, rim);
+    report.minimum = measure(core, &moves.labels, core_boundary);
     report.minimum.pinched = moves.count_pinched(core, &free);
     report.moves = moves.run(core, &free);
-    report.chosen = measure(core, &moves.labels, rim);
+    report.chosen = measure(core, &moves.labels, core_boundary);
     report.chosen.pinched = moves.count_pinched(core, &free);
     (report, moves.labels)
 }
@@ -80,7 +80,7 @@ const AT_ONCE: usize = 2;
 /// Cuts strip by strip; returns the most bytes held.
 fn minimum_cut<P: Pages>(
     core: &mut Mesh<P>,
-    labels: &mut Labels,
+    labels: &mut SideLabels,
     surface: &impl CuttingSurface,
     free: &[u32],
 ) -> u64 {
@@ -167,7 +167,7 @@ fn sort_along<P: Pages>(
 /// Makes the graph of a strip; what lies around it is source or sink.
 fn read_strip<P: Pages>(
     core: &mut Mesh<P>,
-    labels: &Labels,
+    labels: &SideLabels,
     surface: &impl CuttingSurface,
     strip: &[u32],
     graph: &mut Graph,
@@ -178,7 +178,7 @@ fn read_strip<P: Pages>(
     graph.clear();
     for &t in strip {
         let tet = core.tet(t);
-        let mut arcs = [Arc::NONE; 4];
+        let mut arcs = [FlowArc::NONE; 4];
         let mut capacity = [0; 4];
         let mut terminal = pull(core, &tet, surface);
         for (i, across) in tet.neighbor.into_iter().enumerate() {
@@ -188,14 +188,14 @@ fn read_strip<P: Pages>(
             let node = core.scratch(dense(across.tet()));
             if node != NONE && (node as usize) < graph.n_nodes() {
                 // Its own cost was found from the other side.
-                arcs[i] = Arc::new(node, across.face());
+                arcs[i] = FlowArc::new(node, across.face());
                 capacity[i] = graph.capacity(node, across.face());
                 continue;
             }
             let corners = tet.face(i).map(|v| core.point(v));
             let cost = symmetric_cost(corners, surface);
             if node != NONE {
-                (arcs[i], capacity[i]) = (Arc::new(node, across.face()), cost);
+                (arcs[i], capacity[i]) = (FlowArc::new(node, across.face()), cost);
             } else {
                 terminal[usize::from(labels.is_high(across.tet()))] += cost;
             }
@@ -219,8 +219,8 @@ fn pull<P: Pages>(core: &mut Mesh<P>, tet: &Tet, surface: &impl CuttingSurface) 
     if away < 0.0 { [cost, 0] } else { [0, cost] }
 }
 
-/// Labels a strip as its graph was cut.
-fn label_strip(labels: &mut Labels, strip: &[u32], graph: &Graph) {
+/// SideLabels a strip as its graph was cut.
+fn label_strip(labels: &mut SideLabels, strip: &[u32], graph: &Graph) {
     for (node, &t) in strip.iter().enumerate() {
         debug_assert!(labels.is_free(t));
         labels.set_high(t, !graph.is_source_side(node as u32));

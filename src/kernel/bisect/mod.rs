@@ -12,33 +12,33 @@
 //! Source: the paper, section 1.1.
 
 mod axes;
-mod child;
+mod child_builder;
 mod core;
 mod flow;
 mod inherit;
 mod interface;
 mod interface_faces;
-mod labels;
 mod load;
+mod load_profile;
 mod moves;
-mod opened;
+mod open_cut;
 mod plane;
 mod report;
-mod split;
-mod spread;
+mod side_labels;
 mod surface;
+mod write_child;
 mod zone;
 
 pub use axes::principal_axes;
 pub use interface::InterfaceReport;
-pub use labels::InterfaceMeasures;
-pub use load::{SizeAt, load_of};
-pub use opened::Opened;
+pub use load::{SizeFn, load_of};
+pub use load_profile::ChosenPlane;
+pub use open_cut::OpenCut;
 pub use plane::{PlaneChoice, choose as choose_plane};
 pub use report::{CutReport, StageSeconds};
-pub use split::write_child;
-pub use spread::ChosenPlane;
+pub use side_labels::InterfaceMeasures;
 pub use surface::{CuttingSurface, Plane};
+pub use write_child::write_child;
 pub use zone::{OutsideZones, WIDTH_MIN, WIDTH_NOISE, Zone};
 
 use std::time::Instant;
@@ -70,7 +70,7 @@ pub struct CutPlan<'a> {
     /// Zones of the cuts above it.
     pub earlier: &'a [Zone],
     /// Wanted length at a position.
-    pub h: &'a SizeAt<'a>,
+    pub h: &'a SizeFn<'a>,
     /// Box of the whole mesh.
     pub bounds: Aabb,
     /// Settings of the optimization of the core.
@@ -78,7 +78,7 @@ pub struct CutPlan<'a> {
 }
 
 /// A sub-domain whose zone is refined.
-pub struct Refined {
+pub struct RefinedZone {
     /// The zone that was refined.
     pub zone: Zone,
     plane: ChosenPlane,
@@ -104,7 +104,7 @@ pub fn open<P: Pages, Q: Pages>(
     plan: &CutPlan,
     space: &Workspace,
     progress: &dyn Fn(&'static str, u64),
-) -> Result<Opened, StorageError> {
+) -> Result<OpenCut, StorageError> {
     let refined = refine(host, plan, space, progress)?;
     Ok(choose(host, core, plan, refined, None, progress))
 }
@@ -117,7 +117,7 @@ pub fn refine<P: Pages>(
     plan: &CutPlan,
     space: &Workspace,
     progress: &dyn Fn(&'static str, u64),
-) -> Result<Refined, StorageError> {
+) -> Result<RefinedZone, StorageError> {
     let clock = Instant::now();
     let mut seconds = StageSeconds::default();
     progress("choose a plane", 0);
@@ -133,7 +133,7 @@ pub fn refine<P: Pages>(
     };
     let refine = saturate(host, &field, space, &mut |n| progress("refine the zone", n))?;
     seconds.zone = clock.elapsed().as_secs_f64() - seconds.plane;
-    Ok(Refined { zone, plane, refine, seconds })
+    Ok(RefinedZone { zone, plane, refine, seconds })
 }
 
 /// The second part of [`open`]: the interface is chosen in `core`, which must be empty; `faces` learns what it was and is.
@@ -141,26 +141,27 @@ pub fn choose<P: Pages, Q: Pages>(
     host: &mut Mesh<P>,
     core: &mut Mesh<Q>,
     plan: &CutPlan,
-    refined: Refined,
+    refined: RefinedZone,
     mut faces: Option<&mut InterfaceFaces>,
     progress: &dyn Fn(&'static str, u64),
-) -> Opened {
-    let Refined { zone, plane, refine, mut seconds } = refined;
+) -> OpenCut {
+    let RefinedZone { zone, plane, refine, mut seconds } = refined;
     let clock = Instant::now();
     progress("choose the interface", 0);
-    let rim = core::extract(host, core, &zone.surface);
+    let core_boundary = core::extract(host, core, &zone.surface);
     optimize::run_with(core, plan.optimize, &|_| {});
     seconds.core = clock.elapsed().as_secs_f64();
     let natural = faces.as_mut().map(|f| &mut f.natural);
-    let (interface, labels) = interface::choose(core, &zone.surface, &rim, natural);
+    let (interface, labels) = interface::choose(core, &zone.surface, &core_boundary, natural);
     if let Some(faces) = faces {
         faces.chosen = interface_faces::interface_points(core, &labels);
     }
     let vertices = interface_faces::number_interface(core, &labels, plan.cut);
-    let (z_tets, z_enclosed) = labels::enclosed(core, &labels, &zone.surface, plan.h);
-    let layers_least = labels::layers_least(host, core, &labels, &rim, &zone.surface);
+    let (z_tets, z_enclosed) = side_labels::enclosed(core, &labels, &zone.surface, plan.h);
+    let layers_least =
+        side_labels::layers_least(host, core, &labels, &core_boundary, &zone.surface);
     seconds.interface = clock.elapsed().as_secs_f64() - seconds.core;
-    Opened {
+    OpenCut {
         zone,
         report: CutReport {
             plane,
@@ -172,7 +173,7 @@ pub fn choose<P: Pages, Q: Pages>(
             layers_least,
             seconds,
         },
-        rim,
+        core_boundary,
         labels,
     }
 }

@@ -1,7 +1,7 @@
 //! Moves tetrahedra from one side of the interface to the other, as long as that lowers its cost.
 
 use super::core::CoreBoundary;
-use super::labels::{Labels, face_cost, is_constrained};
+use super::side_labels::{SideLabels, face_cost, is_constrained};
 use super::surface::CuttingSurface;
 use crate::mesh::{Mesh, Tet, dense};
 use crate::reconnect::Ball;
@@ -28,7 +28,7 @@ const MOVED: u8 = 2;
 /// Scratch of the moves. Memory: one byte for each vertex of the core, three for each tetrahedron.
 pub(super) struct Moves<'a, S> {
     /// The current sides.
-    pub(super) labels: Labels,
+    pub(super) labels: SideLabels,
     surface: &'a S,
     boundary: &'a CoreBoundary,
     ball: Ball,
@@ -50,7 +50,7 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
     /// `core` must not change while this value is in use; only sides may.
     pub(super) fn new<P: Pages>(
         core: &Mesh<P>,
-        labels: Labels,
+        labels: SideLabels,
         surface: &'a S,
         boundary: &'a CoreBoundary,
     ) -> Self {

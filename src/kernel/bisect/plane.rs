@@ -7,8 +7,8 @@
 //! Source: the paper, section 1.1, "Defining the cutting plane".
 
 use super::axes::{Moments, principal_axes};
-use super::load::{SizeAt, tally};
-use super::spread::{ChosenPlane, Ramps, Spread};
+use super::load::{SizeFn, tally};
+use super::load_profile::{ChosenPlane, LoadProfile, ProfileBuilder};
 use super::surface::{CuttingSurface, Plane};
 use crate::mesh::Mesh;
 use tetdb_base::geom::{Aabb, Point};
@@ -42,21 +42,21 @@ pub enum PlaneChoice {
 /// Sizes must be set at all vertices. `origin` is a point near the mesh: moments are taken about it, so that digits are kept.
 pub fn choose<P: Pages>(
     mesh: &mut Mesh<P>,
-    h: &SizeAt,
+    h: &SizeFn,
     origin: Point,
     low: f64,
     choice: PlaneChoice,
 ) -> ChosenPlane {
     let spread = match choice {
         PlaneChoice::Given(plane) => {
-            return Spread::gather(mesh, h, plane.normal).at(plane.offset);
+            return LoadProfile::gather(mesh, h, plane.normal).at(plane.offset);
         }
         PlaneChoice::Centroids => {
             let axis = principal_axes(&centroid_moments(mesh, origin))[0];
-            Spread::gather(mesh, h, axis)
+            LoadProfile::gather(mesh, h, axis)
         }
         PlaneChoice::Load => {
-            let (grid, mut along) = Grid::gather(mesh, h);
+            let (grid, mut profiles) = Grid::gather(mesh, h);
             let mut axes = principal_axes(&grid.moments().matrix()).to_vec();
             axes.extend(COORDINATES);
             // Fewest faces; of equals the first, but an axis along a coordinate is preferred where it costs a hundredth at most.
@@ -68,8 +68,8 @@ pub fn choose<P: Pages>(
             let best = scores.zip(0..).min_by(|a, b| a.0.total_cmp(&b.0));
             let best: usize = best.expect("there are axes").1;
             match best.checked_sub(3) {
-                Some(coordinate) => along.swap_remove(coordinate),
-                None => Spread::gather(mesh, h, axes[best]),
+                Some(coordinate) => profiles.swap_remove(coordinate),
+                None => LoadProfile::gather(mesh, h, axes[best]),
             }
         }
     };
@@ -78,7 +78,7 @@ pub fn choose<P: Pages>(
 }
 
 /// Sets the size of every vertex.
-pub(super) fn set_sizes<P: Pages>(mesh: &mut Mesh<P>, h: &SizeAt) {
+pub(super) fn set_sizes<P: Pages>(mesh: &mut Mesh<P>, h: &SizeFn) {
     for v in mesh.vertex_ids() {
         let p = mesh.point(v);
         mesh.set_size(v, h(p) as f32);
@@ -102,7 +102,7 @@ struct Grid {
 
 impl Grid {
     /// The grid, and the spreads along [`COORDINATES`].
-    fn gather<P: Pages>(mesh: &mut Mesh<P>, h: &SizeAt) -> (Self, Vec<Spread>) {
+    fn gather<P: Pages>(mesh: &mut Mesh<P>, h: &SizeFn) -> (Self, Vec<LoadProfile>) {
         // Nearly always that of the tetrahedra: few vertices have none.
         let around_all = bounds_of_vertices(mesh);
         let (gathered, around_tets) = Self::gather_in(mesh, h, around_all);
@@ -115,19 +115,20 @@ impl Grid {
     /// Gathers in a box, which should be that of the corners of all tetrahedra; returns that too.
     fn gather_in<P: Pages>(
         mesh: &mut Mesh<P>,
-        h: &SizeAt,
+        h: &SizeFn,
         bounds: Aabb,
-    ) -> ((Self, Vec<Spread>), Aabb) {
-        let mut seen = Aabb::EMPTY;
+    ) -> ((Self, Vec<LoadProfile>), Aabb) {
+        let mut bounds_of_tets = Aabb::EMPTY;
         let width = (bounds.high - bounds.low) / CELLS as f64;
         let (low, high) = (bounds.low.to_array(), bounds.high.to_array());
         let empty = || {
-            let along = [0, 1, 2].map(|k| Ramps::new(COORDINATES[k], [low[k], high[k]]));
-            (vec![[0.0; 2]; CELLS * CELLS * CELLS], along)
+            let profiles =
+                [0, 1, 2].map(|k| ProfileBuilder::new(COORDINATES[k], [low[k], high[k]]));
+            (vec![[0.0; 2]; CELLS * CELLS * CELLS], profiles)
         };
-        let see = &mut |p| seen = seen.with(p);
-        let [(mut cells, mut along), others @ ..] =
-            tally(mesh, h, empty, see, |(cells, along), piece| {
+        let visit_corner = &mut |p| bounds_of_tets = bounds_of_tets.with(p);
+        let [(mut cells, mut profiles), others @ ..] =
+            tally(mesh, h, empty, visit_corner, |(cells, profiles), piece| {
                 let [a, b, c, d] = piece.points;
                 let middle = (a + b + c + d) * 0.25;
                 let section = piece.load * piece.h;
@@ -138,19 +139,19 @@ impl Grid {
                 *cell = [cell[0] + piece.load, cell[1] + section];
                 let from = a.min(b).min(c.min(d)).to_array();
                 let to = a.max(b).max(c.max(d)).to_array();
-                for (k, ramps) in along.iter_mut().enumerate() {
+                for (k, ramps) in profiles.iter_mut().enumerate() {
                     ramps.add(from[k], to[k], piece.load, section);
                 }
             });
-        for (more_cells, more_along) in &others {
+        for (more_cells, more_profiles) in &others {
             for (cell, more) in cells.iter_mut().zip(more_cells) {
                 *cell = [cell[0] + more[0], cell[1] + more[1]];
             }
-            (along.iter_mut().zip(more_along)).for_each(|(ramps, more)| ramps.add_all(more));
+            (profiles.iter_mut().zip(more_profiles)).for_each(|(ramps, more)| ramps.add_all(more));
         }
         let grid = Self { low: bounds.low, width, cells };
-        let along = along.into_iter().map(Ramps::sum_up).collect();
-        ((grid, along), seen)
+        let profiles = profiles.into_iter().map(ProfileBuilder::sum_up).collect();
+        ((grid, profiles), bounds_of_tets)
     }
 
     /// Middles of the cells with something in them.
@@ -171,13 +172,13 @@ impl Grid {
         moments
     }
 
-    fn spread(&self, axis: Point) -> Spread {
+    fn spread(&self, axis: Point) -> LoadProfile {
         let half = (self.width * 0.5).abs().dot(axis.abs());
         let ends = self.filled().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], (p, _)| {
             let s = axis.dot(p);
             [l.min(s - half), h.max(s + half)]
         });
-        let mut ramps = Ramps::new(axis, ends);
+        let mut ramps = ProfileBuilder::new(axis, ends);
         for (middle, [load, section]) in self.filled() {
             let s = axis.dot(middle);
             ramps.add(s - half, s + half, load, section);
@@ -203,7 +204,7 @@ fn centroid_moments<P: Pages>(mesh: &mut Mesh<P>, origin: Point) -> [[f64; 3]; 3
 }
 
 /// Moves the plane a little where it would graze fixed vertices.
-fn shift<P: Pages>(mesh: &mut Mesh<P>, chosen: ChosenPlane, spread: &Spread) -> ChosenPlane {
+fn shift<P: Pages>(mesh: &mut Mesh<P>, chosen: ChosenPlane, spread: &LoadProfile) -> ChosenPlane {
     let plane = chosen.plane;
     let share = chosen.load[0] / chosen.load[1];
     let reach = [-TOLERANCE, TOLERANCE].map(|t| (spread.quantile(share + t) - plane.offset).abs());

@@ -1,7 +1,7 @@
 //! What a cut did.
 
 use super::interface::InterfaceReport;
-use super::spread::ChosenPlane;
+use super::load_profile::ChosenPlane;
 use crate::refine::RefineReport;
 
 /// How a cut went.

@@ -52,7 +52,7 @@ pub enum BoundaryError {
         /// Where it is.
         point: Point,
     },
-    /// Regions are to be filled by seeds, and there is none.
+    /// VolumeRegions are to be filled by seeds, and there is none.
     #[error("neither a region seed nor a hole is given, and regions are filled by seeds")]
     NoSeed,
     /// What triangles point out of cannot be decided.

@@ -4,7 +4,7 @@
 //! two when `s` and `t` are. Signs of orientations of such points are found without rounding.
 //! They exist in memory only, while a patch is at work.
 
-use tetdb_base::geom::{Dyadic, Pair, Point, orient};
+use tetdb_base::geom::{DoublePair, Dyadic, Point, orient};
 
 /// A point whose coordinates are exact values.
 #[derive(Clone, Debug)]
@@ -60,7 +60,7 @@ impl ExactPoint {
 
 /// A position, rounded, with the exact one where they differ.
 #[derive(Clone, Copy)]
-pub(super) struct Placed<'a> {
+pub(super) struct PlacedPoint<'a> {
     pub point: Point,
     pub exact: Option<&'a ExactPoint>,
 }
@@ -75,13 +75,13 @@ const PAIR_OFF: f64 = EPSILON * EPSILON * 4.0;
 
 /// Six times the signed volume; the sign is exact.
 #[cfg(test)]
-pub(super) fn orient_placed(p: [Placed<'_>; 4]) -> f64 {
+pub(super) fn orient_placed(p: [PlacedPoint<'_>; 4]) -> f64 {
     (orient_filtered(p).or_else(|| orient_in_pairs(p)))
         .unwrap_or_else(|| orient_exact(p).estimate())
 }
 
 /// Six times the signed volume, where doubles suffice for its sign.
-pub(super) fn orient_filtered(p: [Placed<'_>; 4]) -> Option<f64> {
+pub(super) fn orient_filtered(p: [PlacedPoint<'_>; 4]) -> Option<f64> {
     if p.iter().all(|p| p.exact.is_none()) {
         return Some(orient(p[0].point, p[1].point, p[2].point, p[3].point));
     }
@@ -99,13 +99,13 @@ pub(super) fn orient_filtered(p: [Placed<'_>; 4]) -> Option<f64> {
 }
 
 /// Six times the signed volume, where twice the bits of doubles suffice for its sign.
-pub(super) fn orient_in_pairs(p: [Placed<'_>; 4]) -> Option<f64> {
+pub(super) fn orient_in_pairs(p: [PlacedPoint<'_>; 4]) -> Option<f64> {
     let [a, b, c, d] = p.map(|p| match p.exact {
         Some(exact) => (exact.rounded, exact.rest),
         None => (p.point, Point::ZERO),
     });
-    let [u, v, w] =
-        [b, c, d].map(|q| [0, 1, 2].map(|i| Pair::difference(q.0[i], a.0[i], q.1[i] - a.1[i])));
+    let [u, v, w] = [b, c, d]
+        .map(|q| [0, 1, 2].map(|i| DoublePair::difference(q.0[i], a.0[i], q.1[i] - a.1[i])));
     let terms = [(0, 1, 2), (1, 2, 0), (2, 0, 1)];
     let [x, y, z] = terms.map(|(i, j, k)| u[i].times(v[j].times(w[k]).minus(v[k].times(w[j]))));
     let det = x.plus(y).plus(z).value();
@@ -122,7 +122,7 @@ pub(super) fn orient_in_pairs(p: [Placed<'_>; 4]) -> Option<f64> {
 
 /// Six times the signed volume, without rounding.
 #[cold]
-pub(super) fn orient_exact(p: [Placed<'_>; 4]) -> Dyadic {
+pub(super) fn orient_exact(p: [PlacedPoint<'_>; 4]) -> Dyadic {
     let [a, b, c, d] = p.map(|p| match p.exact {
         Some(exact) => exact.clone(),
         None => ExactPoint::explicit(p.point),
@@ -147,13 +147,13 @@ mod tests {
         let b = Point::new(1.9, -0.2, 0.45);
         let c = Point::new(-0.6, 0.33, 1.7);
         let d = Point::new(0.2, 0.9, 5.3);
-        let place = |point| Placed { point, exact: None };
+        let place = |point| PlacedPoint { point, exact: None };
         for k in 1..50 {
             let [s, t] = [97.3, 131.7].map(|n| Dyadic::from(f64::from(k) / n));
             let on_edge = ExactPoint::combination(a, &[(b, &s)]);
             let in_face = ExactPoint::combination(a, &[(b, &s), (c, &t)]);
-            let x = Placed { point: on_edge.rounded(), exact: Some(&on_edge) };
-            let y = Placed { point: in_face.rounded(), exact: Some(&in_face) };
+            let x = PlacedPoint { point: on_edge.rounded(), exact: Some(&on_edge) };
+            let y = PlacedPoint { point: in_face.rounded(), exact: Some(&in_face) };
             assert_eq!(orient_placed([place(a), place(b), x, place(d)]), 0.0);
             assert_eq!(orient_placed([place(a), place(b), place(c), y]), 0.0);
             assert_eq!(orient_placed([x, place(b), place(c), y]), 0.0);

@@ -1,7 +1,7 @@
 //! Which segments and facets the mesh has, and recovery of one that is missing.
 
+use super::complex::TetComplex;
 use super::flips::{CROSSINGS_MAX, Flipper};
-use super::space::Space;
 use super::target::RecoveryTarget;
 use super::walk::{Exit, crossings, edge_at, find_edge, opposite, shell};
 use crate::mesh::FaceRef;
@@ -18,7 +18,7 @@ pub(super) enum SearchResult {
 }
 
 /// Looks for the face `a b c` around its edge `a b`.
-pub(super) fn find_face<S: Space>(s: &mut S, [a, b, c]: [u32; 3]) -> SearchResult {
+pub(super) fn find_face<S: TetComplex>(s: &mut S, [a, b, c]: [u32; 3]) -> SearchResult {
     let Some(t) = find_edge(s, a, b) else {
         return SearchResult::Nothing;
     };
@@ -52,7 +52,7 @@ pub(super) fn find_face<S: Space>(s: &mut S, [a, b, c]: [u32; 3]) -> SearchResul
 }
 
 /// The edges that cross facet `f`, whose own edges all exist; starts in `t`, which it cuts.
-pub(super) fn crossing_edges<S: Space>(
+pub(super) fn crossing_edges<S: TetComplex>(
     s: &mut S,
     f: [u32; 3],
     t: u32,
@@ -108,7 +108,7 @@ const WORK_IN_PLANE: u32 = 20;
 /// Neutral steps a target may take, beyond this many per part it crosses.
 const NEUTRAL_MAX: usize = 3;
 
-impl<S: Space> Flipper<'_, S> {
+impl<S: TetComplex> Flipper<'_, S> {
     /// Flips until the edge `a b` exists.
     ///
     /// The number of parts it crosses falls with each step kept, except for a bounded number of neutral ones: in the

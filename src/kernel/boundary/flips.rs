@@ -10,8 +10,8 @@
 //! When no triangulation of a ring is valid, an edge that joins it to `c` or `d` and stands in the way is
 //! removed first, down to a given level; what does not lead to success is undone.
 
+use super::complex::TetComplex;
 use super::polygon::triangulate;
-use super::space::Space;
 use super::target::RecoveryTarget;
 use super::walk::{EdgeRing, edge_at, find_edge, shell};
 use crate::mesh::FaceRef;
@@ -31,7 +31,7 @@ struct Done {
 }
 
 /// A surgeon for one target after another.
-pub(super) struct Flipper<'a, S: Space> {
+pub(super) struct Flipper<'a, S: TetComplex> {
     pub s: &'a mut S,
     pub target: RecoveryTarget,
     log: Vec<Done>,
@@ -43,7 +43,7 @@ pub(super) struct Flipper<'a, S: Space> {
     pub flips: u64,
 }
 
-impl<'a, S: Space> Flipper<'a, S> {
+impl<'a, S: TetComplex> Flipper<'a, S> {
     pub(super) fn new(s: &'a mut S, target: RecoveryTarget) -> Self {
         Self { s, target, log: Vec::new(), work: 0, crossings_max: CROSSINGS_MAX, flips: 0 }
     }
@@ -225,7 +225,13 @@ impl<'a, S: Space> Flipper<'a, S> {
 }
 
 /// The worse of the two tetrahedra over a ring triangle: volume over cubed edge; 0 when it may not be.
-fn shape<S: Space>(s: &mut S, target: RecoveryTarget, [x, y, z]: [u32; 3], c: u32, d: u32) -> f64 {
+fn shape<S: TetComplex>(
+    s: &mut S,
+    target: RecoveryTarget,
+    [x, y, z]: [u32; 3],
+    c: u32,
+    d: u32,
+) -> f64 {
     let up = s.orient([x, y, z, d]);
     if up <= 0.0 {
         return 0.0;

@@ -55,15 +55,15 @@ impl Flood {
             }
         }
         for batch in pages.chunks(BATCH) {
-            for [a, b] in scan_parts(mesh, batch, &Meetings).into_iter().flatten() {
-                let (a, b) = (first_of(mesh, a), first_of(mesh, b));
+            for [a, b] in scan_parts(mesh, batch, &AdjacentParts).into_iter().flatten() {
+                let (a, b) = (root_of(mesh, a), root_of(mesh, b));
                 mesh.set_scratch(a.max(b), a.min(b));
             }
         }
         let t = mesh.tet_of(0);
         let part = mesh.tet_attribute(t).0;
         let mut components = vec![Component::default(); 2];
-        let outside = first_of(mesh, part);
+        let outside = root_of(mesh, part);
         for part in 0..n_parts {
             // What it hangs on comes before it, and has its component's number already.
             let on = mesh.scratch(part);
@@ -81,7 +81,7 @@ impl Flood {
             component.side_first = u64::MAX;
         }
         for batch in pages.chunks(BATCH) {
-            for page in scan_parts(mesh, batch, &Sums) {
+            for page in scan_parts(mesh, batch, &SumsByComponent) {
                 for (t, component) in page.tets {
                     let (_, flags) = mesh.tet_attribute(t);
                     mesh.set_tet_attribute(t, component, flags);
@@ -139,7 +139,7 @@ impl Flood {
 }
 
 /// The first of the parts that hang together with `part`, which from now on hangs on it more directly.
-fn first_of<P: Pages>(mesh: &mut Mesh<P>, mut part: u32) -> u32 {
+fn root_of<P: Pages>(mesh: &mut Mesh<P>, mut part: u32) -> u32 {
     loop {
         let on = mesh.scratch(part);
         if on == part {
@@ -210,9 +210,9 @@ impl Scan for PartsOfPage {
 }
 
 /// Pairs of parts with a face between them that is not required, from the page of the later tetrahedron, once each.
-struct Meetings;
+struct AdjacentParts;
 
-impl Scan for Meetings {
+impl Scan for AdjacentParts {
     type Part = u32;
     type Output = Vec<[u32; 2]>;
 
@@ -234,7 +234,7 @@ impl Scan for Meetings {
 }
 
 /// Components of a page's tetrahedra, and what these are together.
-struct Sums;
+struct SumsByComponent;
 
 struct PageSums {
     /// Tetrahedron, component.
@@ -243,7 +243,7 @@ struct PageSums {
     sums: Vec<(u32, f64, u32)>,
 }
 
-impl Scan for Sums {
+impl Scan for SumsByComponent {
     type Part = u32;
     type Output = PageSums;
 

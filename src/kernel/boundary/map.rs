@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
+use super::complex::{PagedComplex, TetComplex, edge_key, sorted};
 use super::find::{SearchResult, find_face};
-use super::space::{PagedSpace, Space, edge_key, sorted};
 use super::walk::find_edge;
 use crate::mesh::{FaceRef, Facet, Mesh, Scan, scan_parts};
 use tetdb_base::geom::IdSet;
@@ -35,7 +35,7 @@ impl Scan for FacesOfFacets {
         let none = IdSet::default();
         let face = |n| {
             let f = mesh.facet(n).vertices;
-            match find_face(&mut PagedSpace(mesh, &none), f) {
+            match find_face(&mut PagedComplex(mesh, &none), f) {
                 SearchResult::Face(face) => Some(face),
                 _ => None,
             }
@@ -58,7 +58,7 @@ pub(super) fn map<P: Pages>(mesh: &mut Mesh<P>) -> MissingFacets {
         for (n, face) in (parts[0].start..).zip(found) {
             let mut facet = mesh.facet(n);
             let f = facet.vertices;
-            let mut s = PagedSpace(mesh, &none);
+            let mut s = PagedComplex(mesh, &none);
             if let Some(face) = face {
                 s.require(face);
                 // No region is known yet: the place serves whoever looks for the facet next.

@@ -16,18 +16,20 @@
 //! (2003); N. P. Weatherill and O. Hassan (1994); M. Attene and others for points kept implicit (2020-2023).
 
 mod chain;
+mod complex;
 mod cover;
 mod effort;
 mod error;
 mod exact;
 mod find;
-mod flat;
+mod flat_parts;
 mod flips;
 mod flood;
 mod free_edge;
 mod free_vertex;
 mod grow;
-mod kernel;
+mod inscribed_ball;
+mod insert_exact;
 mod map;
 mod nearness;
 mod patch;
@@ -37,10 +39,8 @@ mod polygon;
 mod recover;
 mod regions;
 mod report;
+mod round_points;
 mod seeds;
-mod settle;
-mod space;
-mod star;
 mod suppress;
 mod target;
 mod tidy;
@@ -52,8 +52,8 @@ pub use error::{BoundaryError, FacetPlace};
 pub use nearness::{Nearness, NearnessKind};
 pub use policy::{Filled, RegionPolicy, Walls};
 pub use recover::recover;
-pub use recover::recover_watched;
-pub use regions::{RegionSummary, Regions, fill_regions};
+pub use recover::recover_with_progress;
+pub use regions::{RegionSummary, VolumeRegions, fill_regions};
 pub use report::RecoveryReport;
 pub use seeds::RegionRule;
 

@@ -1,10 +1,10 @@
 //! A piece of the mesh in memory, where points may be exact; it grows by what is asked of it.
 //!
-//! The mesh is only read until [`Patch::commit`] writes the result as one step.
+//! The mesh is only read until [`RecoveryPatch::commit`] writes the result as one step.
 
+use super::complex::{TetComplex, edge_key, sorted};
 use super::effort::Effort;
-use super::exact::{ExactPoint, Placed, orient_exact, orient_filtered, orient_in_pairs};
-use super::space::{Space, edge_key, sorted};
+use super::exact::{ExactPoint, PlacedPoint, orient_exact, orient_filtered, orient_in_pairs};
 use crate::mesh::{FaceRef, Mesh, Tet, VertexTag};
 use tetdb_base::geom::{Dyadic, IdMap, IdSet, Point, orient};
 use tetdb_base::storage::Pages;
@@ -35,7 +35,7 @@ struct Border {
 }
 
 /// Tetrahedra copied from `mesh`, with ids and vertex ids of their own.
-pub(super) struct Patch<'m, P: Pages> {
+pub(super) struct RecoveryPatch<'m, P: Pages> {
     mesh: &'m mut Mesh<P>,
     protected: &'m IdSet<u64>,
     tets: Vec<Tet>,
@@ -57,7 +57,7 @@ pub(super) struct Patch<'m, P: Pages> {
 
 const FREE: Tet = Tet { node: [NONE; 4], neighbor: [FaceRef::NONE; 4] };
 
-impl<'m, P: Pages> Patch<'m, P> {
+impl<'m, P: Pages> RecoveryPatch<'m, P> {
     /// An empty patch.
     pub(super) fn new(mesh: &'m mut Mesh<P>, protected: &'m IdSet<u64>, effort: Effort) -> Self {
         Self {
@@ -247,9 +247,9 @@ impl<'m, P: Pages> Patch<'m, P> {
         self.vertices[v as usize].point
     }
 
-    fn placed(&self, v: u32) -> Placed<'_> {
+    fn placed(&self, v: u32) -> PlacedPoint<'_> {
         let v = &self.vertices[v as usize];
-        Placed { point: v.point, exact: v.exact.as_ref() }
+        PlacedPoint { point: v.point, exact: v.exact.as_ref() }
     }
 
     /// Six times the signed volume, without rounding.
@@ -289,7 +289,7 @@ impl<'m, P: Pages> Patch<'m, P> {
 
     /// Writes the patch in place of what was brought in; returns the number of vertices added less those removed.
     ///
-    /// Must be [`Patch::is_sound`]. Effects: new vertices are tagged as Steiner points.
+    /// Must be [`RecoveryPatch::is_sound`]. Effects: new vertices are tagged as Steiner points.
     pub(super) fn commit(self) -> i64 {
         let live: Vec<u32> = self.live().collect();
         let mut used = vec![false; self.vertices.len()];
@@ -346,7 +346,7 @@ impl<'m, P: Pages> Patch<'m, P> {
     }
 }
 
-impl<P: Pages> Space for Patch<'_, P> {
+impl<P: Pages> TetComplex for RecoveryPatch<'_, P> {
     fn tet(&mut self, t: u32) -> Tet {
         self.tets[t as usize]
     }

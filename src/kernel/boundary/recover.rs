@@ -2,7 +2,8 @@
 
 use std::time::Instant;
 
-use super::chain::Trouble;
+use super::chain::PatchFailure;
+use super::complex::{PagedComplex, TetComplex, edge_key};
 use super::error::{BoundaryError, FacetPlace};
 use super::find::{Outcome, SearchResult, find_face};
 use super::flips::{CROSSINGS_MAX, Flipper};
@@ -10,7 +11,6 @@ use super::map::{MissingFacets, map};
 use super::nearness::narrowest;
 use super::points::recover_by_points;
 use super::report::{RecoveryReport, RecoveryWatcher};
-use super::space::{PagedSpace, Space, edge_key};
 use super::target::RecoveryTarget;
 use super::tidy::tidy;
 use super::turn::{from_hubs, turn_segment};
@@ -31,11 +31,11 @@ const CROSSINGS_FIRST: usize = 8;
 ///
 /// Errors: [`BoundaryError`] names the facets; the mesh is then valid but without them.
 pub fn recover<P: Pages>(mesh: &mut Mesh<P>) -> Result<RecoveryReport, BoundaryError> {
-    recover_watched(mesh, &|_, _| {})
+    recover_with_progress(mesh, &|_, _| {})
 }
 
 /// As [`recover`]; `watch` gets the segments and facets that are there, of those that were missing.
-pub fn recover_watched<P: Pages>(
+pub fn recover_with_progress<P: Pages>(
     mesh: &mut Mesh<P>,
     watch: &RecoveryWatcher,
 ) -> Result<RecoveryReport, BoundaryError> {
@@ -55,35 +55,35 @@ pub fn recover_watched<P: Pages>(
     flip_facets(mesh, &mut missing, &mut report, watch);
     report.flip_time = clock.elapsed();
     let clock = Instant::now();
-    let troubles = recover_by_points(mesh, &mut missing, &mut report, watch);
+    let failures = recover_by_points(mesh, &mut missing, &mut report, watch);
     tidy(mesh, &mut report);
     report.point_time = clock.elapsed();
-    match troubles.first() {
+    match failures.first() {
         None => Ok(report),
-        Some(&(n, trouble)) => Err(explain(mesh, n, trouble, &troubles)),
+        Some(&(n, failure)) => Err(explain(mesh, n, failure, &failures)),
     }
 }
 
 fn explain<P: Pages>(
     mesh: &mut Mesh<P>,
     n: u32,
-    trouble: Trouble,
-    troubles: &[(u32, Trouble)],
+    failure: PatchFailure,
+    failures: &[(u32, PatchFailure)],
 ) -> BoundaryError {
-    let reason = match trouble {
-        Trouble::Vertex(v) => {
+    let reason = match failure {
+        PatchFailure::Vertex(v) => {
             return BoundaryError::VertexOnFacet {
                 owner: mesh.vertex_attribute(v).1,
                 point: mesh.point(v),
                 facet: Box::new(place(mesh, n)),
             };
         }
-        Trouble::Crossed(_) => "another triangle crosses it",
-        Trouble::Precision(what) => what,
-        Trouble::TooMuch => "it crosses too many edges",
-        Trouble::Broken(what) => what,
+        PatchFailure::Crossed(_) => "another triangle crosses it",
+        PatchFailure::Precision(what) => what,
+        PatchFailure::TooMuch => "it crosses too many edges",
+        PatchFailure::Broken(what) => what,
     };
-    let facets: Vec<u32> = troubles.iter().map(|&(n, _)| n).collect();
+    let facets: Vec<u32> = failures.iter().map(|&(n, _)| n).collect();
     BoundaryError::NotRecovered {
         nearness: narrowest(mesh, &facets),
         facets: facets.into_iter().map(|n| place(mesh, n)).collect(),
@@ -131,7 +131,7 @@ fn flip_segments<P: Pages>(
             for (a, b) in std::mem::take(&mut missing.segments) {
                 check_cancelled();
                 report.notify(watch);
-                let mut s = PagedSpace(mesh, &missing.protected);
+                let mut s = PagedComplex(mesh, &missing.protected);
                 let mut flipper = Flipper::new(&mut s, RecoveryTarget::Edge(a, b));
                 flipper.work = work;
                 flipper.crossings_max = crossings_max;
@@ -170,7 +170,7 @@ fn flip_facets<P: Pages>(
                 check_cancelled();
                 report.notify(watch);
                 let f = mesh.facet(n).vertices;
-                let mut s = PagedSpace(mesh, &missing.protected);
+                let mut s = PagedComplex(mesh, &missing.protected);
                 let mut flipper = Flipper::new(&mut s, RecoveryTarget::Face(f));
                 flipper.work = work;
                 let outcome = flipper.recover_face(f, level);

@@ -1,9 +1,9 @@
 //! Steiner points at the end of recovery: those nobody needs go, the others move away from the planes they were put beside.
 
+use super::complex::{PagedComplex, TetComplex};
 use super::free_vertex::{ball_flatness, remove_free};
-use super::kernel::{HalfSpace, center, room};
+use super::inscribed_ball::{HalfSpace, ball_center, clearance};
 use super::report::RecoveryReport;
-use super::space::{PagedSpace, Space};
 use super::suppress::half_space;
 use super::walk::ball;
 use crate::mesh::{Mesh, VertexTag};
@@ -39,7 +39,7 @@ pub(super) fn tidy<P: Pages>(mesh: &mut Mesh<P>, report: &mut RecoveryReport) {
                 return true;
             }
             check_cancelled();
-            let mut s = PagedSpace(mesh, &none);
+            let mut s = PagedComplex(mesh, &none);
             let ball = ball(&mut s, v);
             let near: Vec<u32> = ball.iter().flat_map(|&t| s.tet(t).vertices()).collect();
             let flatness = ball_flatness(&mut s, v);
@@ -48,7 +48,7 @@ pub(super) fn tidy<P: Pages>(mesh: &mut Mesh<P>, report: &mut RecoveryReport) {
                 s.drop_steiner(v);
                 report.steiner = report.steiner.saturating_sub(1);
             }
-            if is_gone || rise(&mut s, v) {
+            if is_gone || raise(&mut s, v) {
                 beside.extend(near);
             }
             !is_gone
@@ -60,7 +60,7 @@ pub(super) fn tidy<P: Pages>(mesh: &mut Mesh<P>, report: &mut RecoveryReport) {
 }
 
 /// Moves a free vertex to where it sees its ball best, if that gives it more room.
-pub(super) fn rise<P: Pages>(s: &mut PagedSpace<'_, P>, v: u32) -> bool {
+pub(super) fn raise<P: Pages>(s: &mut PagedComplex<'_, P>, v: u32) -> bool {
     let old = s.position(v);
     let ball = ball(s, v);
     let mut reach = 0.0f64;
@@ -72,13 +72,13 @@ pub(super) fn rise<P: Pages>(s: &mut PagedSpace<'_, P>, v: u32) -> bool {
         reach = corners.iter().map(|c| c.length()).fold(reach, f64::max);
         planes.extend(half_space(corners));
     }
-    let Some(way) = center(&planes, reach) else {
+    let Some(way) = ball_center(&planes, reach) else {
         return false;
     };
-    let now = room(&planes, Point::ZERO);
+    let now = clearance(&planes, Point::ZERO);
     // Where doubles see the best place too dimly, one on the way there may do.
     for share in SHARES {
-        if room(&planes, way * share) <= GAIN_MIN * now.max(0.0) {
+        if clearance(&planes, way * share) <= GAIN_MIN * now.max(0.0) {
             continue;
         }
         s.0.set_point(v, old + way * share);

@@ -15,14 +15,14 @@
 
 use std::collections::VecDeque;
 
+use super::complex::{PagedComplex, TetComplex, edge_key};
 use super::free_vertex::remove_free;
 use super::grow::grow;
-use super::kernel::{HalfSpace, center, room};
+use super::inscribed_ball::{HalfSpace, ball_center, clearance};
 use super::map::MissingFacets;
 use super::report::RecoveryReport;
-use super::space::{PagedSpace, Space, edge_key};
 use super::suppress::half_space;
-use super::tidy::rise;
+use super::tidy::raise;
 use super::walk::{EdgeRing, Exit, crossings, edge_at, shell};
 use crate::mesh::Mesh;
 use tetdb_base::geom::{IdMap, IdSet, Point, orient};
@@ -41,7 +41,7 @@ const HALVES_MAX: i32 = 50;
 const GROWN_MAX: i32 = 24;
 
 /// A place with less room than this, in units of the tetrahedra around it, is second choice.
-const ROOM_MIN: f64 = 1e-4;
+const CLEARANCE_MIN: f64 = 1e-4;
 
 /// The segments, each from the end where more of them meet.
 ///
@@ -69,7 +69,7 @@ pub(super) fn turn_segment<P: Pages>(
     a: u32,
     b: u32,
 ) -> bool {
-    let mut s = PagedSpace(mesh, &missing.protected);
+    let mut s = PagedComplex(mesh, &missing.protected);
     let mut turner = Turner { s: &mut s, added: Vec::new(), balance: 0, turns: 0 };
     let recovered = turner.recover(a, b);
     turner.clear();
@@ -83,7 +83,7 @@ pub(super) fn turn_segment<P: Pages>(
 
 /// Turns edges for one segment after the other.
 struct Turner<'s, 'm, P: Pages> {
-    s: &'s mut PagedSpace<'m, P>,
+    s: &'s mut PagedComplex<'m, P>,
     /// Vertices added and still there.
     added: Vec<u32>,
     /// Vertices added less those taken away, which others may have added.
@@ -99,7 +99,7 @@ type Crossed = (u32, u32, u32);
 type Turned = (Crossed, bool);
 
 /// One side of the plane at an edge that turns.
-struct Side {
+struct PlaneSide {
     /// From one new corner to the other.
     ring: Vec<u32>,
     tets: Vec<u32>,
@@ -128,7 +128,7 @@ enum Reach {
 }
 
 /// An edge `c d` with its tetrahedra, as it turns to `x y`.
-struct Turn {
+struct EdgeTurn {
     around: EdgeRing,
     c: u32,
     d: u32,
@@ -140,15 +140,15 @@ struct Turn {
     crosses: bool,
 }
 
-impl Turn {
+impl EdgeTurn {
     /// What lies above the plane, then below.
-    fn sides(&self) -> [Side; 2] {
+    fn sides(&self) -> [PlaneSide; 2] {
         let n = self.around.ring.len();
         let from_to = [(self.at_x, self.to_y), (self.at_x + self.to_y, n - self.to_y)];
         let tets = from_to.map(|(from, len)| -> Vec<u32> {
             (0..len).map(|k| self.around.tets[(from + k) % n]).collect()
         });
-        [0, 1].map(|i| Side {
+        [0, 1].map(|i| PlaneSide {
             ring: (0..=from_to[i].1).map(|k| self.around.ring[(from_to[i].0 + k) % n]).collect(),
             tets: tets[i].clone(),
             others: tets[1 - i].iter().copied().collect(),
@@ -174,21 +174,21 @@ impl<P: Pages> Turner<'_, '_, P> {
             queue.push_back((tet, c, d));
         }
         let mut turns_left = TURNS_MAX * queue.len();
-        let mut in_vain = 0;
+        let mut n_failed = 0;
         while let Some(edge) = queue.pop_front() {
             if turns_left == 0 {
                 return false;
             }
             let Some((new, crosses)) = self.turn(edge, a, b) else {
-                in_vain += 1;
+                n_failed += 1;
                 queue.push_back(edge);
-                if in_vain == queue.len() {
+                if n_failed == queue.len() {
                     return false;
                 }
                 continue;
             };
             turns_left -= 1;
-            in_vain = 0;
+            n_failed = 0;
             if crosses {
                 queue.push_back(new);
             }
@@ -216,7 +216,7 @@ impl<P: Pages> Turner<'_, '_, P> {
         free.retain(|&v| self.s.is_steiner(v));
         for v in free {
             if !self.remove(v) {
-                rise(self.s, v);
+                raise(self.s, v);
             }
         }
         let turn = self.plan(edge, a, b)?;
@@ -240,7 +240,7 @@ impl<P: Pages> Turner<'_, '_, P> {
     }
 
     /// Which edge `c d` becomes; `None` where it has to stay, or the four corners are not convex.
-    fn plan(&mut self, (t, c, d): Crossed, a: u32, b: u32) -> Option<Turn> {
+    fn plan(&mut self, (t, c, d): Crossed, a: u32, b: u32) -> Option<EdgeTurn> {
         if self.s.protects(c, d) {
             return None;
         }
@@ -258,7 +258,7 @@ impl<P: Pages> Turner<'_, '_, P> {
         let (x, y) = (around.ring[at_x], around.ring[at_y]);
         // No tetrahedron is flat: the next of the ring is off the plane.
         let above = around.ring[(at_x + 1) % n];
-        let opposite = |s: &mut PagedSpace<'_, P>, [p, q]: [u32; 2], [u, v]: [u32; 2]| {
+        let opposite = |s: &mut PagedComplex<'_, P>, [p, q]: [u32; 2], [u, v]: [u32; 2]| {
             let (at_u, at_v) = (s.orient([p, q, u, above]), s.orient([p, q, v, above]));
             (at_u > 0.0 && at_v < 0.0) || (at_u < 0.0 && at_v > 0.0)
         };
@@ -266,11 +266,11 @@ impl<P: Pages> Turner<'_, '_, P> {
             return None;
         }
         let crosses = opposite(self.s, [a, b], [x, y]);
-        Some(Turn { around, c, d, at_x, to_y: at_y - at_x, crosses })
+        Some(EdgeTurn { around, c, d, at_x, to_y: at_y - at_x, crosses })
     }
 
     /// Replaces the tetrahedra around the edge; `None`, and nothing changed, where there is no room.
-    fn carry_out(&mut self, turn: &Turn, reach: Reach) -> Option<Turned> {
+    fn carry_out(&mut self, turn: &EdgeTurn, reach: Reach) -> Option<Turned> {
         let [above, mut below] = turn.sides();
         let over = self.half(turn, &above, reach)?;
         below.others.extend(&over.old);
@@ -297,7 +297,7 @@ impl<P: Pages> Turner<'_, '_, P> {
     }
 
     /// What changes on one side.
-    fn half(&mut self, turn: &Turn, side: &Side, reach: Reach) -> Option<Half> {
+    fn half(&mut self, turn: &EdgeTurn, side: &PlaneSide, reach: Reach) -> Option<Half> {
         let ring = &side.ring;
         let mut best: Option<(f64, Vec<[u32; 4]>)> = None;
         for &p in &ring[1..ring.len() - 1] {
@@ -314,14 +314,14 @@ impl<P: Pages> Turner<'_, '_, P> {
     }
 
     /// The ring and the new triangles joined to a new vertex near the crossing.
-    fn join_to_new(&mut self, turn: &Turn, side: &Side, reach: Reach) -> Option<Half> {
+    fn join_to_new(&mut self, turn: &EdgeTurn, side: &PlaneSide, reach: Reach) -> Option<Half> {
         let (ring, c, d) = (&side.ring, turn.c, turn.d);
         let (x, y) = (ring[0], ring[ring.len() - 1]);
         let [pc, pd, px, py] = [c, d, x, y].map(|v| self.s.position(v));
         let origin = crossing([pc, pd], [px, py]);
         let mut size = 0.0f64;
         let mut planes: Vec<HalfSpace> = Vec::new();
-        let mut plane = |s: &mut PagedSpace<'_, P>, corners: [u32; 3]| {
+        let mut plane = |s: &mut PagedComplex<'_, P>, corners: [u32; 3]| {
             let corners = corners.map(|v| s.position(v) - origin);
             size = corners.iter().map(|c| c.length()).fold(size, f64::max);
             planes.extend(half_space(corners));
@@ -335,8 +335,8 @@ impl<P: Pages> Turner<'_, '_, P> {
         // Where all is seen best, or straight up from the crossing where that is too near for doubles to find.
         let up = (py - px).cross(pd - pc).normalize_or_zero() * size;
         let up = if orient(pc, py, px, origin + up) > 0.0 { up } else { -up };
-        let best = center(&planes, size);
-        let is_roomy = best.is_some_and(|way| room(&planes, way) > ROOM_MIN * size);
+        let best = ball_center(&planes, size);
+        let is_roomy = best.is_some_and(|way| clearance(&planes, way) > CLEARANCE_MIN * size);
         let p = self.s.add_steiner(origin);
         let mut found = None;
         if is_roomy || reach == Reach::Crowded {
@@ -369,8 +369,8 @@ impl<P: Pages> Turner<'_, '_, P> {
     /// vertices inside it go.
     fn join_grown(
         &mut self,
-        turn: &Turn,
-        side: &Side,
+        turn: &EdgeTurn,
+        side: &PlaneSide,
         p: u32,
         [origin, up]: [Point; 2],
     ) -> Option<Half> {

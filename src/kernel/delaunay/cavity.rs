@@ -7,7 +7,7 @@ use super::kernel::{CavityFace, Kernel, Located, Rejected};
 use crate::mesh::anatomy::mark::{IN_CAVITY, STAYS};
 use crate::mesh::anatomy::{FACES, MARK, REQUIRED, VERTEX_MASK};
 use crate::mesh::{FaceRef, Mesh, Tet};
-use tetdb_base::geom::{Point, Seen, in_sphere_perturbed, insphere_filtered, orient};
+use tetdb_base::geom::{Point, RelativePoint, in_sphere_perturbed, insphere_filtered, orient};
 use tetdb_base::storage::{Pages, check_cancelled};
 
 /// A larger cavity is refused: nothing a size field asks for is so large.
@@ -90,7 +90,12 @@ impl Kernel {
             let tet = mesh.tet(t);
             let corners = mesh.points(&tet);
             let [a, b, c, d] = corners;
-            let seen = [Seen::new(a, p), Seen::new(b, p), Seen::new(c, p), Seen::new(d, p)];
+            let seen = [
+                RelativePoint::new(a, p),
+                RelativePoint::new(b, p),
+                RelativePoint::new(c, p),
+                RelativePoint::new(d, p),
+            ];
             // What lies across the face of entry is in the cavity; the first tetrahedron was entered from nowhere.
             let n = if next == 0 { 4 } else { 3 };
             next += 1;
@@ -105,7 +110,7 @@ impl Kernel {
                     };
                     self.stats.sphere_tests += 1;
                     // The neighbor shares this face; only its apex is new.
-                    let apex = Seen::new(mesh.point(v), p);
+                    let apex = RelativePoint::new(mesh.point(v), p);
                     let det = insphere_filtered(&apex, &seen[f], &seen[h], &seen[g]);
                     if det > 0.0 || (det == 0.0 && in_conflict(mesh, across.tet(), p)) {
                         mesh.set_mark(across.tet(), IN_CAVITY, true);

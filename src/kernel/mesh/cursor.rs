@@ -4,7 +4,7 @@ use tetdb_schema::page::{NONE, RECORDS, SLOT_BITS, SLOT_MASK, SLOTS, Slot, u32_l
 
 use super::anatomy::mark::IN_CAVITY;
 use super::anatomy::{FaceRef, MARK, REQUIRED, Tet, VERTEX_MASK};
-use super::state::{Arena, MeshState, dense, next_id, sparse};
+use super::state::{IdPool, MeshState, dense, next_id, sparse};
 use tetdb_base::storage::{Pager, Pages, SharedPages, StorageError, kind, raise};
 
 /// Cursor over one sub-domain's paged arrays: tetrahedra, vertices, their attributes, facets.
@@ -109,23 +109,23 @@ impl<P: Pages> Mesh<P> {
     }
 
     #[inline]
-    pub(super) fn take<const K: usize>(
+    pub(super) fn take_id<const K: usize>(
         pages: &mut P,
-        arena: &mut Arena,
+        pool: &mut IdPool,
         what: &'static str,
     ) -> u32 {
-        arena.n_live += 1;
-        if arena.free_head != NONE {
-            let id = arena.free_head;
-            arena.free_head = pages.read::<K>(id)[1].to_native();
+        pool.n_live += 1;
+        if pool.free_head != NONE {
+            let id = pool.free_head;
+            pool.free_head = pages.read::<K>(id)[1].to_native();
             return id;
         }
-        let id = arena.fresh;
+        let id = pool.fresh;
         if id >= VERTEX_MASK - SLOTS as u32 {
             raise(StorageError::TooMany { what });
         }
         pages.append_up_to::<K>(id);
-        arena.fresh = next_id(id);
+        pool.fresh = next_id(id);
         id
     }
 
@@ -216,13 +216,13 @@ impl<P: Pages> Mesh<P> {
     /// An unused tetrahedron id; its record is whatever was there, its attribute too.
     #[inline]
     pub fn take_tet(&mut self) -> u32 {
-        Self::take::<{ kind::TETS }>(&mut self.pages, &mut self.state.tets, "tetrahedra")
+        Self::take_id::<{ kind::TETS }>(&mut self.pages, &mut self.state.tets, "tetrahedra")
     }
 
     /// Takes the ids of `n` tetrahedra of a mesh that has none; each is then to be placed once, in any order.
     pub fn take_tets(&mut self, n: u32) {
         debug_assert_eq!(self.state.tets.fresh, 0);
-        self.state.tets = Arena { fresh: sparse(n), free_head: NONE, n_live: n };
+        self.state.tets = IdPool { fresh: sparse(n), free_head: NONE, n_live: n };
     }
 
     /// Writes a tetrahedron whose id was taken by [`Mesh::take_tets`], or is to lie behind all.

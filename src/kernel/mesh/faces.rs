@@ -71,7 +71,7 @@ impl<P: Pages> Mesh<P> {
     /// Adds a facet after the others.
     pub fn add_facet(&mut self, f: Facet) -> u32 {
         let n = self.state.facets.n_live;
-        Self::take::<{ kind::FACETS }>(&mut self.pages, &mut self.state.facets, "facets");
+        Self::take_id::<{ kind::FACETS }>(&mut self.pages, &mut self.state.facets, "facets");
         self.set_facet(n, f);
         n
     }
@@ -99,7 +99,7 @@ impl<P: Pages> Mesh<P> {
     /// Adds an interface face after the others.
     pub fn add_interface_face(&mut self, f: InterfaceFace) -> u32 {
         let n = self.state.interface_faces.n_live;
-        Self::take::<{ kind::INTERFACE_FACES }>(
+        Self::take_id::<{ kind::INTERFACE_FACES }>(
             &mut self.pages,
             &mut self.state.interface_faces,
             "interface faces",

@@ -143,8 +143,11 @@ impl<P: Pages> Mesh<P> {
 
     /// Adds a vertex.
     pub fn add_vertex(&mut self, p: Point, h: f32) -> u32 {
-        let v =
-            Self::take::<{ kind::VERTICES }>(&mut self.pages, &mut self.state.vertices, "vertices");
+        let v = Self::take_id::<{ kind::VERTICES }>(
+            &mut self.pages,
+            &mut self.state.vertices,
+            "vertices",
+        );
         self.set_point(v, p);
         self.set_size(v, h);
         self.set_tet_of(v, NONE);

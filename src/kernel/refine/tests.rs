@@ -143,7 +143,7 @@ fn the_same_points_whatever_the_pool() {
         subdomain: 0,
         generation: 1,
         spill: dir.path().into(),
-        made: None,
+        output: None,
         base: None,
         cache_bytes: 1 << 20,
     };

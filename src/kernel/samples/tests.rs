@@ -1,8 +1,8 @@
 //! Closed, oriented, near the wanted edges, the same on every machine.
 
 mod divide;
-mod fins;
 mod sheets;
+mod support_triangles;
 
 use super::*;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};

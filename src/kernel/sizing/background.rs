@@ -37,12 +37,12 @@ pub struct BackgroundMesh {
 impl BackgroundMesh {
     /// Shape: `h` runs parallel to `points`, which `tets` index; sizes are above zero.
     pub fn new(points: Vec<Point>, tets: Vec<[u32; 4]>, h: Vec<f64>) -> Self {
-        let room = &ScratchSpace::boundless();
+        let scratch = &ScratchSpace::boundless();
         let bounds = Aabb::around(points.iter().copied());
         let around = |t: u32| Aabb::around(tets[t as usize].map(|v| points[v as usize]));
-        let tree = BoxTree::new(&bounds, tets.len() as u32, room, |_| true, around);
+        let tree = BoxTree::new(&bounds, tets.len() as u32, scratch, |_| true, around);
         let at = |v: u32| Aabb::around([points[v as usize]]);
-        let vertices = BoxTree::new(&bounds, points.len() as u32, room, |_| true, at);
+        let vertices = BoxTree::new(&bounds, points.len() as u32, scratch, |_| true, at);
         let join = |[a, b]: [f64; 2], [c, d]: [f64; 2]| [a.min(c), b.max(d)];
         let mut ranges: Vec<Vec<[f64; 2]>> = Vec::new();
         for (level, nodes) in vertices.levels.iter().enumerate() {

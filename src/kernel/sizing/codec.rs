@@ -121,7 +121,7 @@ impl SizeField {
     ///
     /// # Errors
     /// [`SizingError::Damaged`] names what is wrong. A scratch file that fails unwinds.
-    pub fn from_bytes_in(bytes: &[u8], room: &ScratchSpace) -> Result<Self, SizingError> {
+    pub fn from_bytes_in(bytes: &[u8], scratch: &ScratchSpace) -> Result<Self, SizingError> {
         if bytes.len() < HEADER_BYTES {
             return Err(damaged("length", bytes.len(), "at least 64"));
         }
@@ -149,7 +149,7 @@ impl SizeField {
         }
         let (cells, rest) = body.split_at(n_cells);
         let (news, values) = rest.split_at(n_leaves);
-        let leaves = room.list_within(Self::share_of(room.cap()));
+        let leaves = scratch.list_within(Self::share_of(scratch.cap()));
         let (tree, values) = read_tree(cells, news, values, leaves)?;
         Ok(Self::from_parts(OctreeFrame { low, side }, beta, tree, values))
     }

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use super::SizingError;
 use super::constraint::SizeConstraint;
-use super::corners::Corners;
+use super::corners::TreeCorners;
 use super::seeds::OctreeFrame;
 use super::tree::{DEPTH, LATTICE, Leaf, Tree};
 use tetdb_base::geom::{Aabb, Point};
@@ -152,7 +152,7 @@ impl SizeConstraints<'_> {
     pub(super) fn lower(
         &self,
         tree: &Tree,
-        corners: &mut Corners,
+        corners: &mut TreeCorners,
         h: &mut SpillVec<f32>,
     ) -> Result<(), SizingError> {
         if self.list.is_empty() {

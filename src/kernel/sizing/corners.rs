@@ -42,7 +42,7 @@ impl Hanging {
 }
 
 /// Corners of a tree.
-pub(super) struct Corners {
+pub(super) struct TreeCorners {
     /// Corner numbers of each leaf, in the octants' order.
     pub(super) of_leaf: SpillVec<[u32; 8]>,
     pub(super) n_corners: usize,
@@ -50,12 +50,12 @@ pub(super) struct Corners {
     pub(super) hanging: SpillVec<Hanging>,
 }
 
-impl Corners {
+impl TreeCorners {
     /// A disk that fails unwinds.
-    pub(super) fn of(tree: &Tree, room: &ScratchSpace) -> Self {
-        let numbered = number_corners(tree, room);
+    pub(super) fn of(tree: &Tree, scratch: &ScratchSpace) -> Self {
+        let numbered = number_corners(tree, scratch);
         let (mut of_leaf, n_corners) = numbered.unwrap_or_else(|e| raise(e));
-        let hanging = find_hanging(tree, &mut of_leaf, room).unwrap_or_else(|e| raise(e));
+        let hanging = find_hanging(tree, &mut of_leaf, scratch).unwrap_or_else(|e| raise(e));
         Self { of_leaf, n_corners, hanging }
     }
 }
@@ -63,9 +63,9 @@ impl Corners {
 /// Numbers corners along the Morton curve, so that near corners are near in memory.
 fn number_corners(
     tree: &Tree,
-    room: &ScratchSpace,
+    scratch: &ScratchSpace,
 ) -> Result<(SpillVec<[u32; 8]>, usize), StorageError> {
-    let mut keys = room.sorter::<Keyed>();
+    let mut keys = scratch.sorter::<Keyed>();
     let mut n_leaves = 0;
     for (i, leaf) in tree.leaves().enumerate() {
         n_leaves += 1;
@@ -74,7 +74,7 @@ fn number_corners(
         }
     }
     let keys = keys.finish()?;
-    let mut of_leaf = room.column(n_leaves, [0u32; 8]);
+    let mut of_leaf = scratch.column(n_leaves, [0u32; 8]);
     let mut n_corners = 0u32;
     let mut last = None;
     for key in keys {
@@ -106,9 +106,9 @@ fn morton(p: [u32; 3]) -> u64 {
 fn find_hanging(
     tree: &Tree,
     of_leaf: &mut SpillVec<[u32; 8]>,
-    room: &ScratchSpace,
+    scratch: &ScratchSpace,
 ) -> Result<SpillVec<Hanging>, StorageError> {
-    let mut found = room.sorter::<Hanging>();
+    let mut found = scratch.sorter::<Hanging>();
     for (i, leaf) in tree.leaves().enumerate() {
         let ids = of_leaf.get(i);
         for cell in leaf.outer_neighbors() {
@@ -123,7 +123,7 @@ fn find_hanging(
             }
         }
     }
-    let mut hanging = room.list();
+    let mut hanging = scratch.list();
     let mut last = None;
     for next in found.finish()? {
         let next = next?;

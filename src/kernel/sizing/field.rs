@@ -3,14 +3,14 @@
 use super::SizingError;
 use super::constraint::SizeConstraint;
 use super::constraints::{BEND_MAX, SizeConstraints};
-use super::corners::Corners;
-use super::gather::seeds_of;
+use super::corners::TreeCorners;
+use super::gather::surface_seeds;
 use super::options::SizeOptions;
-use super::seeds::{OctreeFrame, frame_of};
+use super::seeds::{OctreeFrame, octree_frame};
 use super::sources::ResolvedSource;
 use super::summary::SizeSummary;
 use super::tree::{CELLS_PER_SIZE, DEPTH, LATTICE, LEAF, Leaf, Tree, octant_of};
-use super::values::Maker;
+use super::values::CornerSizes;
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::{FrozenSpillVec, ScratchSpace, SpillVec};
 
@@ -55,7 +55,7 @@ pub struct SizeField {
 
 /// Sizes besides those of the surface's edges and the options.
 #[derive(Clone, Copy, Default)]
-pub struct Further<'a> {
+pub struct ExtraSizes<'a> {
     /// Wanted sizes as functions of position.
     pub constraints: &'a [&'a dyn SizeConstraint],
     /// One for each vertex of the surface.
@@ -81,8 +81,8 @@ impl SizeField {
         triangles: &[[u32; 3]],
         options: &SizeOptions,
     ) -> Result<Self, SizingError> {
-        let room = ScratchSpace::boundless();
-        Ok(Self::build_with(points, triangles, options, &Further::default(), &room)?.0)
+        let scratch = ScratchSpace::boundless();
+        Ok(Self::build_with(points, triangles, options, &ExtraSizes::default(), &scratch)?.0)
     }
 
     /// Builds the field with further sizes, and says where its sizes came from. The room changes nothing of it.
@@ -94,17 +94,18 @@ impl SizeField {
         points: &[Point],
         triangles: &[[u32; 3]],
         options: &SizeOptions,
-        further: &Further,
-        room: &ScratchSpace,
+        extra: &ExtraSizes,
+        scratch: &ScratchSpace,
     ) -> Result<(Self, SizeSummary), SizingError> {
-        let (frame, bounds) = frame_of(points, triangles);
+        let (frame, bounds) = octree_frame(points, triangles);
         let targets = options.resolve(bounds.diagonal())?;
         let scaled = targets.scaled(1.0 / frame.side);
-        let mut seeds = seeds_of(points, triangles, frame, &scaled, further.at_vertices, room)?;
-        for &(v, h) in further.at_points {
+        let mut seeds =
+            surface_seeds(points, triangles, frame, &scaled, extra.at_vertices, scratch)?;
+        for &(v, h) in extra.at_points {
             seeds.h[v as usize] = h * seeds.per_side;
         }
-        let mut list = further.constraints.to_vec();
+        let mut list = extra.constraints.to_vec();
         list.extend(options.formula.iter().map(|f| f as &dyn SizeConstraint));
         let constraints = SizeConstraints {
             list: &list,
@@ -116,21 +117,21 @@ impl SizeField {
             beside: 0.0,
         };
         let tree = Tree::build(&seeds, &scaled, |tree| constraints.refine(tree))?;
-        let _held = room.hold(seeds.bytes() + tree.bytes());
-        let mut corners = Corners::of(&tree, room);
-        let mut maker = Maker {
+        let _held = scratch.hold(seeds.bytes() + tree.bytes());
+        let mut corners = TreeCorners::of(&tree, scratch);
+        let mut sizes = CornerSizes {
             tree: &tree,
             corners: &mut corners,
             seeds: &seeds,
             beta: scaled.beta,
-            steeper: None,
-            room,
+            slope_factor: None,
+            scratch,
         };
-        maker.allow_steeper();
-        let h = maker.values(&scaled, &constraints)?;
-        let field = Self::of_corners(frame, targets.beta, tree, corners, h, room)
+        sizes.gather_slope_factors();
+        let h = sizes.values(&scaled, &constraints)?;
+        let field = Self::from_corners(frame, targets.beta, tree, corners, h, scratch)
             .with_sources(options, bounds.diagonal())?;
-        let summary = field.summary(&seeds, &targets, options, room);
+        let summary = field.summary(&seeds, &targets, options, scratch);
         Ok((field, summary))
     }
 
@@ -150,15 +151,15 @@ impl SizeField {
     }
 
     /// The field of these sizes at the corners of leaves.
-    pub(super) fn of_corners(
+    pub(super) fn from_corners(
         frame: OctreeFrame,
         beta: f64,
         tree: Tree,
-        mut corners: Corners,
+        mut corners: TreeCorners,
         mut h: SpillVec<f32>,
-        room: &ScratchSpace,
+        scratch: &ScratchSpace,
     ) -> Self {
-        let mut values = room.list_within(Self::share_of(room.cap()));
+        let mut values = scratch.list_within(Self::share_of(scratch.cap()));
         for i in 0..corners.of_leaf.len() {
             let mut at_corners = [0.0; 8];
             for (value, c) in at_corners.iter_mut().zip(corners.of_leaf.get(i)) {
@@ -273,9 +274,9 @@ impl SizeField {
     }
 
     /// Memory held when it was made in a room of so many bytes.
-    pub fn bytes_in(&self, room: u64) -> u64 {
+    pub fn bytes_in(&self, scratch: u64) -> u64 {
         let values = (self.values.len() * size_of::<[f32; 8]>()) as u64;
-        self.octree_bytes() as u64 + values.min(Self::share_of(room))
+        self.octree_bytes() as u64 + values.min(Self::share_of(scratch))
     }
 
     /// What is held in any room.

@@ -2,7 +2,7 @@
 
 use fixedbitset::FixedBitSet;
 
-use super::corners::{Corners, PAIRS};
+use super::corners::{PAIRS, TreeCorners};
 use super::tree::{Leaf, Tree};
 use tetdb_base::storage::{SpillVec, check_cancelled};
 
@@ -13,7 +13,7 @@ const GRADE_ROUNDS: u32 = 4;
 /// with more room, and at 1.001 every round finds something left to lower.
 const EXCESS_MAX: f32 = 1.01;
 /// Gives hanging corners their means, where these are known.
-pub(super) fn close_finite(corners: &mut Corners, h: &mut SpillVec<f32>) {
+pub(super) fn close_finite(corners: &mut TreeCorners, h: &mut SpillVec<f32>) {
     for k in 0..corners.hanging.len() {
         let hanging = corners.hanging.get(k);
         let mean = mean_on(hanging.on, h);
@@ -34,10 +34,10 @@ fn mean_on(on: [u32; 4], h: &mut SpillVec<f32>) -> f32 {
 /// The slope bound between corners of the same leaf.
 pub(super) struct Grading<'a> {
     pub tree: &'a Tree,
-    pub corners: &'a mut Corners,
+    pub corners: &'a mut TreeCorners,
     pub beta: f64,
     /// By leaf, how many times `beta` its slope may be; once where it is not given.
-    pub steeper: Option<&'a mut SpillVec<f32>>,
+    pub slope_factor: Option<&'a mut SpillVec<f32>>,
 }
 
 impl Grading<'_> {
@@ -55,7 +55,7 @@ impl Grading<'_> {
             check_cancelled();
             let mut sweep = Sweep {
                 of_leaf: &mut self.corners.of_leaf,
-                steeper: self.steeper.as_deref_mut(),
+                slope_factor: self.slope_factor.as_deref_mut(),
                 h,
                 changed: &mut changed,
                 next: &mut next,
@@ -105,7 +105,7 @@ impl Grading<'_> {
 /// One way through all leaves.
 struct Sweep<'a> {
     of_leaf: &'a mut SpillVec<[u32; 8]>,
-    steeper: Option<&'a mut SpillVec<f32>>,
+    slope_factor: Option<&'a mut SpillVec<f32>>,
     h: &'a mut SpillVec<f32>,
     changed: &'a mut FixedBitSet,
     next: &'a mut FixedBitSet,
@@ -125,11 +125,11 @@ impl Sweep<'_> {
             *h = self.h.get(id as usize);
         }
         let mut h = before;
-        let steeper = match &mut self.steeper {
+        let slope_factor = match &mut self.slope_factor {
             Some(by_leaf) => f64::from(by_leaf.get(number as usize)),
             None => 1.0,
         };
-        let step = self.beta * leaf.side() * steeper;
+        let step = self.beta * leaf.side() * slope_factor;
         // Largest differences, by squared distance of corners in sides.
         let steps = [0.0, step, step * 2f64.sqrt(), step * 3f64.sqrt()];
         while relax_once(&mut h, &steps) {}

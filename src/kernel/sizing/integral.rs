@@ -23,7 +23,7 @@ const CELLS_MIN: usize = 1 << 11;
 /// Wanted accuracy of the sum. What is unknown of cells at the surface has either sign and is added by squares.
 const TOLERANCE: f64 = 0.003;
 /// Cells whose parts are looked at together, where there are threads: most of the next in order are divided one after the other.
-const AHEAD: usize = 32;
+const BATCH_CELLS: usize = 32;
 /// Points drawn in the cells that the surface passes through, at least.
 const POINTS: usize = 1 << 14;
 /// Triangles a question to the surface may look at before fewer cells and points are asked about: ordinary surfaces have a tenth.
@@ -82,7 +82,7 @@ impl SizeField {
     /// Accuracy: about one part in a hundred. The same bits on every machine and for any number of threads.
     pub fn load(&self, domain: &Domain, skin: SurfaceSkin) -> f64 {
         let share = (EFFORT_ORDINARY / domain.seeker.effort()).clamp(SHARE_MIN, 1.0);
-        let mut sum = Sum {
+        let mut sum = LoadSum {
             field: self,
             share,
             domain,
@@ -96,7 +96,7 @@ impl SizeField {
             cut: 0.0,
             sizes: 0.0,
         };
-        sum.add(sum.looked(IntegrationCell {
+        sum.add(sum.examined(IntegrationCell {
             leaf: Leaf::ROOT,
             entry: self.tree.root,
             is_inside: false,
@@ -136,7 +136,7 @@ fn range(values: &[f32; 8]) -> [f32; 2] {
     all.fold([f32::INFINITY, 0.0], |[l, h], &x| [l.min(x), h.max(x)])
 }
 
-struct Sum<'a> {
+struct LoadSum<'a> {
     field: &'a SizeField,
     /// Of the ordinary number of cells and points.
     share: f64,
@@ -156,7 +156,7 @@ struct Sum<'a> {
     sizes: f64,
 }
 
-impl Sum<'_> {
+impl LoadSum<'_> {
     fn run(mut self) -> f64 {
         let [cells_min, cells_max] =
             [CELLS_MIN, CELLS_MAX].map(|n| (n as f64 * self.share) as usize);
@@ -179,7 +179,7 @@ impl Sum<'_> {
         }
         let mut rest: Vec<ByUnknown> = std::mem::take(&mut self.heap).into_vec();
         rest.sort_unstable();
-        self.known + self.of_rest(&rest)
+        self.known + self.load_of_rest(&rest)
     }
 
     /// The cell of which most is unknown, and its parts. With threads to spare those of the next cells in order are found
@@ -187,12 +187,12 @@ impl Sum<'_> {
     fn pop(&mut self) -> Option<(IntegrationCell, [IntegrationCell; 8])> {
         let mut first = self.heap.pop()?;
         if first.parts.is_none() {
-            let n = if spare_threads() > 1 { AHEAD } else { 1 };
+            let n = if spare_threads() > 1 { BATCH_CELLS } else { 1 };
             let mut batch = vec![first];
             batch.extend(std::iter::from_fn(|| self.heap.pop()).take(n - 1));
             for_each_mut(&mut batch, |next| {
                 if next.parts.is_none() {
-                    let part = |octant| self.looked(self.child(&next.cell, octant));
+                    let part = |octant| self.examined(self.child(&next.cell, octant));
                     next.parts = Some(Box::new(std::array::from_fn(part)));
                 }
             });
@@ -205,7 +205,7 @@ impl Sum<'_> {
     /// Load of the cells that are left. Those the surface passes through are looked at in points drawn within them: a plane at the
     /// distance of the middle would cut off too little where the surface bends, all around a ball, and makes no sense
     /// where a cell holds many parts of it. What the points tell is corrected by what they tell of the volume, which is known.
-    fn of_rest(&self, rest: &[ByUnknown]) -> f64 {
+    fn load_of_rest(&self, rest: &[ByUnknown]) -> f64 {
         let (mut load, mut volume) = (0.0, self.volume);
         let mut crossed: Vec<&IntegrationCell> = self.crossed.iter().collect();
         for ByUnknown { cell, .. } in rest {
@@ -218,9 +218,10 @@ impl Sum<'_> {
         }
         let points = (POINTS as f64 * self.share) as usize;
         let each = points.div_ceil(crossed.len().max(1)) as u64;
-        let drawn: Vec<[f64; 2]> =
-            parallel(|| crossed.into_par_iter().map(|cell| self.drawn(cell, each)).collect());
-        let [found, at_surface] = (drawn.iter()).fold([0.0; 2], |s, d| [s[0] + d[0], s[1] + d[1]]);
+        let sampled: Vec<[f64; 2]> =
+            parallel(|| crossed.into_par_iter().map(|cell| self.sampled(cell, each)).collect());
+        let [found, at_surface] =
+            (sampled.iter()).fold([0.0; 2], |s, d| [s[0] + d[0], s[1] + d[1]]);
         let expected = self.domain.volume() - volume;
         let factor = match found > 0.0 {
             true => (expected / found).clamp(1.0 / FACTOR_MAX, FACTOR_MAX),
@@ -230,7 +231,7 @@ impl Sum<'_> {
     }
 
     /// Volume and load of a cell's filled part by the mean of some points in it.
-    fn drawn(&self, cell: &IntegrationCell, points: u64) -> [f64; 2] {
+    fn sampled(&self, cell: &IntegrationCell, points: u64) -> [f64; 2] {
         let (field, skin) = (self.field, self.skin);
         let Domain { seeker, volumes, filled } = *self.domain;
         let side = field.frame.side;
@@ -299,13 +300,13 @@ impl Sum<'_> {
     }
 
     /// A cell whose place is set, with what is found out about it.
-    fn looked(&self, mut cell: IntegrationCell) -> IntegrationCell {
-        cell.is_counted = self.look(&mut cell);
+    fn examined(&self, mut cell: IntegrationCell) -> IntegrationCell {
+        cell.is_counted = self.examine(&mut cell);
         cell
     }
 
     /// Finds out about a cell; false when no vertices are added in it.
-    fn look(&self, cell: &mut IntegrationCell) -> bool {
+    fn examine(&self, cell: &mut IntegrationCell) -> bool {
         let field = self.field;
         let width = cell.leaf.side() * field.frame.side;
         let middle =

@@ -35,13 +35,13 @@ mod length;
 mod math;
 mod options;
 mod region;
+mod remesh;
 mod seeds;
 mod sources;
 mod summarize;
 mod summary;
 mod tree;
 mod values;
-mod within;
 
 #[cfg(test)]
 mod tests;
@@ -51,11 +51,11 @@ pub use closed::{TETS_PER_LOAD, load_of_tet, metric_length};
 pub use constraint::SizeConstraint;
 pub use count::TetCounts;
 pub use error::SizingError;
-pub use field::{Further, SizeField};
+pub use field::{ExtraSizes, SizeField};
 pub use formula::Formula;
 pub use integral::{Domain, SurfaceSkin};
 pub use length::Length;
 pub use options::{RegionSize, SizeOptions};
 pub use region::Region;
 pub use sources::{Shape, SizeSource};
-pub use summary::{Range, SizeSummary, SizeWarning};
+pub use summary::{SizeRange, SizeSummary, SizeWarning};

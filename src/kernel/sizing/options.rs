@@ -180,7 +180,7 @@ impl Targets {
     }
 
     /// How many times the slope bound is allowed at most.
-    pub(super) fn steeper_max(&self) -> f64 {
+    pub(super) fn slope_factor_max(&self) -> f64 {
         self.beta_needles / self.beta
     }
 

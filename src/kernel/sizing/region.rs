@@ -29,7 +29,7 @@ impl<'a> Region<'a> {
         is_here: Vec<bool>,
         h: f64,
         beta: f64,
-        room: &ScratchSpace,
+        scratch: &ScratchSpace,
     ) -> Self {
         let is_border = |t: u32| {
             let [front, back] = volumes.of_side[t as usize].map(|v| is_here[v as usize]);
@@ -38,7 +38,7 @@ impl<'a> Region<'a> {
         Self {
             seeker,
             volumes,
-            border: Seeker::of(seeker.surface(), room, is_border),
+            border: Seeker::of(seeker.surface(), scratch, is_border),
             is_here,
             h,
             beta,

@@ -38,7 +38,7 @@ pub(super) struct Seeds<'a> {
     /// By vertex; zero where no triangle has it.
     pub(super) h: Vec<f64>,
     /// By vertex, how many times the gradation's slope is allowed there; empty where it is once for all.
-    pub(super) steeper: Vec<f32>,
+    pub(super) slope_factor: Vec<f32>,
     /// What follows the vertices.
     pub(super) along: Option<FrozenSpillVec<EdgeSeed>>,
 }
@@ -86,21 +86,21 @@ impl<'a> Seeds<'a> {
     }
 
     /// How many times the gradation's slope is allowed at a seed.
-    pub(super) fn steeper(&self, seed: u32) -> f64 {
+    pub(super) fn slope_factor(&self, seed: u32) -> f64 {
         match self.along(seed) {
-            Some([.., steeper]) => f64::from(steeper),
-            None => (self.steeper.get(seed as usize)).map_or(1.0, |&s| f64::from(s)),
+            Some([.., slope_factor]) => f64::from(slope_factor),
+            None => (self.slope_factor.get(seed as usize)).map_or(1.0, |&s| f64::from(s)),
         }
     }
 
     /// Whether more than the gradation's slope is allowed anywhere.
-    pub(super) fn is_steeper(&self) -> bool {
-        !self.steeper.is_empty()
+    pub(super) fn has_slope_factors(&self) -> bool {
+        !self.slope_factor.is_empty()
     }
 
     /// Bytes of memory held for vertices; places along edges are in a room's arrays.
     pub(super) fn bytes(&self) -> usize {
-        size_of_val(&self.h[..]) + size_of_val(&self.steeper[..])
+        size_of_val(&self.h[..]) + size_of_val(&self.slope_factor[..])
     }
 
     /// The vertices that triangles use, with sizes that are known, in a cube that is.
@@ -120,12 +120,19 @@ impl<'a> Seeds<'a> {
         if triangles.is_empty() {
             return Err(SizingError::NoEdges);
         }
-        Ok(Self { points, frame, per_side: 1.0 / frame.side, h, steeper: Vec::new(), along: None })
+        Ok(Self {
+            points,
+            frame,
+            per_side: 1.0 / frame.side,
+            h,
+            slope_factor: Vec::new(),
+            along: None,
+        })
     }
 }
 
 /// The cube around the points that triangles use, and their box.
-pub(super) fn frame_of(points: &[Point], triangles: &[[u32; 3]]) -> (OctreeFrame, Aabb) {
+pub(super) fn octree_frame(points: &[Point], triangles: &[[u32; 3]]) -> (OctreeFrame, Aabb) {
     let corners = triangles.iter().flatten().map(|&v| points[v as usize]);
     let bounds = Aabb::around(corners);
     (OctreeFrame::around(&bounds), bounds)

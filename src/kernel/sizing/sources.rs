@@ -50,12 +50,12 @@ impl SizeSource {
     /// # Errors
     /// Names the option and the value.
     pub fn parse_box(text: &str) -> Result<Self, SizingError> {
-        let form = Form {
+        let text = SourceText {
             option: "size_box",
             expected: "X0,Y0,Z0,X1,Y1,Z1,H or X0,Y0,Z0,X1,Y1,Z1,H,OUTSIDE",
             text,
         };
-        let ([a, b, c, d, e, f], inside, outside) = form.read()?;
+        let ([a, b, c, d, e, f], inside, outside) = text.read()?;
         let (p, q) = (Point::new(a, b, c), Point::new(d, e, f));
         let shape = Shape::Box { low: p.min(q), high: p.max(q) };
         Ok(Self { shape, inside, outside })
@@ -66,14 +66,14 @@ impl SizeSource {
     /// # Errors
     /// Names the option and the value.
     pub fn parse_sphere(text: &str) -> Result<Self, SizingError> {
-        let form = Form {
+        let text = SourceText {
             option: "size_sphere",
             expected: "X,Y,Z,R,H or X,Y,Z,R,H,OUTSIDE with R not below zero",
             text,
         };
-        let ([x, y, z, radius], inside, outside) = form.read()?;
+        let ([x, y, z, radius], inside, outside) = text.read()?;
         if radius < 0.0 {
-            return Err(form.bad());
+            return Err(text.bad());
         }
         let center = Point::new(x, y, z);
         Ok(Self { shape: Shape::Sphere { center, radius }, inside, outside })
@@ -84,15 +84,15 @@ impl SizeSource {
     /// # Errors
     /// Names the option and the value.
     pub fn parse_cylinder(text: &str) -> Result<Self, SizingError> {
-        let form = Form {
+        let text = SourceText {
             option: "size_cylinder",
             expected: "X0,Y0,Z0,X1,Y1,Z1,R,H or X0,Y0,Z0,X1,Y1,Z1,R,H,OUTSIDE with two different ends",
             text,
         };
-        let ([a, b, c, d, e, f, radius], inside, outside) = form.read()?;
+        let ([a, b, c, d, e, f, radius], inside, outside) = text.read()?;
         let ends = [Point::new(a, b, c), Point::new(d, e, f)];
         if radius < 0.0 || ends[0] == ends[1] {
-            return Err(form.bad());
+            return Err(text.bad());
         }
         Ok(Self { shape: Shape::Cylinder { ends, radius }, inside, outside })
     }
@@ -108,13 +108,13 @@ impl SizeSource {
 }
 
 /// A text of numbers and one or two lengths.
-struct Form<'a> {
+struct SourceText<'a> {
     option: &'static str,
     expected: &'static str,
     text: &'a str,
 }
 
-impl Form<'_> {
+impl SourceText<'_> {
     fn bad(&self) -> SizingError {
         SizingError::BadValue {
             option: self.option,

@@ -6,7 +6,7 @@ use tetdb_base::geom::short;
 
 /// Lowest, median and highest of some lengths, in input units.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Range {
+pub struct SizeRange {
     /// The least length.
     pub low: f64,
     /// The median length.
@@ -21,9 +21,9 @@ pub struct SizeSummary {
     /// Options in effect, in words.
     pub source: String,
     /// Sizes of the surface's vertices: means of their edges' lengths.
-    pub surface: Range,
+    pub surface: SizeRange,
     /// Sizes of the field; the median is by volume of the surface's cube, not of the domain.
-    pub field: Range,
+    pub field: SizeRange,
     /// Slope bound, `ln(hgrad)`.
     pub beta: f64,
     /// Leaves of the octree.
@@ -83,7 +83,7 @@ impl fmt::Display for SizeWarning {
 
 impl fmt::Display for SizeSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Range { low, median, high } = self.surface;
+        let SizeRange { low, median, high } = self.surface;
         write!(
             f,
             "sizes from {}; surface median {} ({} to {}), wanted inside its box {} ({} to {})",

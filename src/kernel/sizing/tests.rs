@@ -155,16 +155,16 @@ fn interior_size_is_joined_to_the_surface() {
     }
 }
 
-fn seeds_of<'a>(
+fn surface_seeds<'a>(
     surface: &'a (Vec<Point>, Vec<[u32; 3]>),
     options: &SizeOptions,
 ) -> seeds::Seeds<'a> {
     let (points, triangles) = surface;
-    let (frame, bounds) = seeds::frame_of(points, triangles);
+    let (frame, bounds) = seeds::octree_frame(points, triangles);
     let targets = options.resolve(bounds.diagonal()).unwrap();
     let scaled = targets.scaled(1.0 / frame.side);
-    let room = ScratchSpace::boundless();
-    gather::seeds_of(points, triangles, frame, &scaled, None, &room).unwrap()
+    let scratch = ScratchSpace::boundless();
+    gather::surface_seeds(points, triangles, frame, &scaled, None, &scratch).unwrap()
 }
 
 fn sample(text: &str) -> (Vec<Point>, Vec<[u32; 3]>) {
@@ -197,8 +197,8 @@ fn a_low_step_asks_for_what_its_vertices_need_and_for_no_bands() {
 fn even_surfaces_have_no_sizes_but_their_vertices() {
     for text in ["box,h=0.1", "balls,count=20", "sphere", "knot"] {
         let surface = sample(text);
-        let seeds = seeds_of(&surface, &SizeOptions::default());
-        assert!(!seeds.is_steeper(), "{text}");
+        let seeds = surface_seeds(&surface, &SizeOptions::default());
+        assert!(!seeds.has_slope_factors(), "{text}");
         assert_eq!(seeds.all().count(), surface.0.len(), "{text}");
     }
 }
@@ -227,7 +227,7 @@ fn a_gradation_that_is_asked_for_is_kept_next_to_needles() {
 fn steep_surfaces_are_followed() {
     let steep = graded(50.0, 60);
     let field = build(&steep, &SizeOptions::default());
-    let seeds = seeds_of(&steep, &SizeOptions::default());
+    let seeds = surface_seeds(&steep, &SizeOptions::default());
     let all: Vec<u32> = seeds.vertices().collect();
     let side = field.frame.side;
     let (mut near, mut ratio_low, mut ratio_high) = (0, f64::INFINITY, 0.0f64);
@@ -303,10 +303,10 @@ fn equal_bits_in_a_room_too_small() {
         (&even, formula("0.02 + 0.1*abs(x - 0.4)")),
     ] {
         let [wide, narrow] = [ScratchSpace::boundless(), ScratchSpace::new(1 << 16, dir.path())]
-            .map(|room| {
+            .map(|scratch| {
                 let (points, triangles) = surface;
-                let further = Further::default();
-                SizeField::build_with(points, triangles, &options, &further, &room).unwrap()
+                let extra = ExtraSizes::default();
+                SizeField::build_with(points, triangles, &options, &extra, &scratch).unwrap()
             });
         assert!(narrow.0.bytes() > 0 && wide.1.n_leaves > 1000, "{}", wide.1.n_leaves);
         assert_eq!(wide.0.to_bytes(), narrow.0.to_bytes());
@@ -461,7 +461,7 @@ fn summaries_say_where_sizes_came_from() {
         &points,
         &triangles,
         &asked,
-        &Further::default(),
+        &ExtraSizes::default(),
         &ScratchSpace::boundless(),
     )
     .unwrap();

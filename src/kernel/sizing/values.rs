@@ -4,7 +4,7 @@ use fixedbitset::FixedBitSet;
 
 use super::SizingError;
 use super::constraints::SizeConstraints;
-use super::corners::Corners;
+use super::corners::TreeCorners;
 use super::grading::{Grading, bound, close_finite};
 use super::options::Targets;
 use super::seeds::Seeds;
@@ -33,17 +33,17 @@ sort_record! {
 }
 
 /// What sizes at corners are made from.
-pub(super) struct Maker<'a> {
+pub(super) struct CornerSizes<'a> {
     pub tree: &'a Tree,
-    pub corners: &'a mut Corners,
+    pub corners: &'a mut TreeCorners,
     pub seeds: &'a Seeds<'a>,
     pub beta: f64,
     /// By leaf, how many times `beta` its slope may be; once where it is not given.
-    pub steeper: Option<SpillVec<f32>>,
-    pub room: &'a ScratchSpace,
+    pub slope_factor: Option<SpillVec<f32>>,
+    pub scratch: &'a ScratchSpace,
 }
 
-impl Maker<'_> {
+impl CornerSizes<'_> {
     /// Sizes at all corners, in units of the root's side, no steeper than the gradation along any line
     /// between two corners of a leaf.
     pub(super) fn values(
@@ -69,19 +69,19 @@ impl Maker<'_> {
     }
 
     /// Lets leaves near needles be steeper, as the seeds allow it in the mean: gathered and filled in as sizes are.
-    pub(super) fn allow_steeper(&mut self) {
-        if !self.seeds.is_steeper() {
+    pub(super) fn gather_slope_factors(&mut self) {
+        if !self.seeds.has_slope_factors() {
             return;
         }
-        let (at_seeds, _) = self.gather(|seeds, v| seeds.steeper(v), false);
+        let (at_seeds, _) = self.gather(|seeds, v| seeds.slope_factor(v), false);
         let mut at_corners = self.fill(at_seeds);
-        let mut by_leaf = self.room.column(self.corners.of_leaf.len(), 1.0f32);
+        let mut by_leaf = self.scratch.column(self.corners.of_leaf.len(), 1.0f32);
         for i in 0..by_leaf.len() {
             let ids = self.corners.of_leaf.get(i);
             let sum: f64 = (ids.iter()).map(|&id| f64::from(at_corners.get(id as usize))).sum();
             by_leaf.set(i, (sum / 8.0) as f32);
         }
-        self.steeper = Some(by_leaf);
+        self.slope_factor = Some(by_leaf);
     }
 
     /// Weighted means of a value of the seeds at the corners of the leaves that hold them, infinite elsewhere;
@@ -94,15 +94,15 @@ impl Maker<'_> {
         with_nearest: bool,
     ) -> (SpillVec<f32>, Option<SpillVec<f64>>) {
         let (tree, seeds, n) = (self.tree, self.seeds, self.corners.n_corners);
-        let mut by_leaf = self.room.sorter::<LeafSeed>();
+        let mut by_leaf = self.scratch.sorter::<LeafSeed>();
         for v in seeds.all() {
             let (leaf, _) = tree.leaf_at(lattice_cell(seeds.at(v)));
             let pushed = by_leaf.push(LeafSeed { leaf, seed: v });
             pushed.unwrap_or_else(|e| raise(e));
         }
         let by_leaf = by_leaf.finish().unwrap_or_else(|e| raise(e));
-        let mut sums = self.room.column(n, [0.0f64; 2]);
-        let mut nearest = with_nearest.then(|| self.room.column(n, f64::INFINITY));
+        let mut sums = self.scratch.column(n, [0.0f64; 2]);
+        let mut nearest = with_nearest.then(|| self.scratch.column(n, f64::INFINITY));
         for next in by_leaf {
             let LeafSeed { seed, .. } = next.unwrap_or_else(|e| raise(e));
             let (at, h) = (seeds.at(seed), value(seeds, seed));
@@ -140,7 +140,7 @@ impl Maker<'_> {
                 }
             }
         }
-        let mut means = self.room.column(n, f32::INFINITY);
+        let mut means = self.scratch.column(n, f32::INFINITY);
         for i in 0..n {
             let [sum, weight] = sums.get(i);
             if weight > 0.0 {
@@ -161,7 +161,7 @@ impl Maker<'_> {
             }
         }
         // Leaves with a corner to fill, as (leaf, weight): a cell's edge conducts as its width.
-        let mut open = self.room.list::<[u32; 2]>();
+        let mut open = self.scratch.list::<[u32; 2]>();
         for (i, leaf) in self.tree.leaves().enumerate() {
             let ids = self.corners.of_leaf.get(i);
             if ids.iter().any(|&c| is_open.contains(c as usize)) {
@@ -172,9 +172,9 @@ impl Maker<'_> {
         if open.is_empty() {
             return h;
         }
-        let mut sums = self.room.column(h.len(), [0.0f32; 2]);
+        let mut sums = self.scratch.column(h.len(), [0.0f32; 2]);
         // Of the round before.
-        let mut before = self.room.column(h.len(), 0.0f32);
+        let mut before = self.scratch.column(h.len(), 0.0f32);
         let (mut smooth, mut over) = (0, 1.0);
         while smooth < FILL_ROUNDS {
             check_cancelled();
@@ -218,7 +218,7 @@ impl Maker<'_> {
             tree: self.tree,
             corners: self.corners,
             beta: self.beta,
-            steeper: self.steeper.as_mut(),
+            slope_factor: self.slope_factor.as_mut(),
         }
     }
 
@@ -229,7 +229,7 @@ impl Maker<'_> {
         mut nearest: SpillVec<f64>,
     ) -> [SpillVec<f32>; 2] {
         [-1.0f32, 1.0].map(|sign| {
-            let mut cone = self.room.column(gathered.len(), f32::INFINITY);
+            let mut cone = self.scratch.column(gathered.len(), f32::INFINITY);
             for i in 0..cone.len() {
                 let h = gathered.get(i);
                 if h.is_finite() {

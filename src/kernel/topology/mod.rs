@@ -46,24 +46,24 @@ impl Owners {
     }
 
     /// The faces of one part, and who has them on the other side.
-    pub fn across(&self, part: u32) -> FacesAcross {
+    pub fn across(&self, part: u32) -> OppositeOwners {
         let faces = (0..).zip(&self.faces);
         let other = |(index, &owners): (u32, &[u32; 2])| match owners {
             [a, b] if a == part => Some([index, b]),
             [a, b] if b == part => Some([index, a]),
             _ => None,
         };
-        FacesAcross { faces: faces.filter_map(other).collect() }
+        OppositeOwners { faces: faces.filter_map(other).collect() }
     }
 }
 
 /// The faces that one part has in a cut. Shape: `faces[i]` = the number of a face and the part on its other side, ascending.
 #[derive(Archive, Serialize, Deserialize, Clone, Debug, Default, PartialEq, Eq)]
-pub struct FacesAcross {
+pub struct OppositeOwners {
     faces: Vec<[u32; 2]>,
 }
 
-impl FacesAcross {
+impl OppositeOwners {
     /// Who has the face on the other side; `None` when the part has no such face.
     pub fn other(&self, index: u32) -> Option<u32> {
         let at = self.faces.binary_search_by_key(&index, |face| face[0]);

@@ -6,7 +6,7 @@ use crate::pipeline::progress::{Event, Watcher};
 use tetdb_base::geom::HilbertFrame;
 use tetdb_base::storage::{Keyed, Pages, ScratchSpace, raise};
 use tetdb_base::surface::Surface;
-use tetdb_kernel::boundary::{RecoveryReport, Regions, fill_regions, recover_watched};
+use tetdb_kernel::boundary::{RecoveryReport, VolumeRegions, fill_regions, recover_with_progress};
 use tetdb_kernel::delaunay::{Kernel, KernelStats, Rejected, enclose, insertion_key};
 use tetdb_kernel::mesh::{Facet, Mesh, SHEET, VertexTag};
 use tetdb_kernel::optimize;
@@ -19,7 +19,7 @@ pub struct CoarseReport {
     /// What boundary recovery did.
     pub recovery: RecoveryReport,
     /// The volumes and which of them are filled.
-    pub regions: Regions,
+    pub regions: VolumeRegions,
 }
 
 /// Points between two words to the watcher.
@@ -61,7 +61,7 @@ pub fn recovered<P: Pages>(
 ) -> Result<CoarseReport, PipelineError> {
     watch(stage("recover the surface"));
     mesh.refresh_tet_of();
-    let recovery = recover_watched(mesh, &|done, total| {
+    let recovery = recover_with_progress(mesh, &|done, total| {
         watch(Event {
             done,
             total: (total > 0).then_some(total),

@@ -12,7 +12,7 @@ use tetdb_base::surface::{OUTSIDE, Seeker, Surface, VOLUMES_TRIANGLE, Volumes};
 use tetdb_kernel::boundary::{BoundaryError, Filled, RegionPolicy};
 use tetdb_kernel::optimize::Mode;
 use tetdb_kernel::sizing::{
-    Background, Domain, Further, Region, SizeConstraint, SizeField, SizeSummary, TetCounts,
+    Background, Domain, ExtraSizes, Region, SizeConstraint, SizeField, SizeSummary, TetCounts,
 };
 use tetdb_store::sealed::Form;
 
@@ -151,7 +151,7 @@ fn prepare_in(
         return Err(PipelineError::SizeField { file: file.clone() });
     }
     let asked = options.sizes()?;
-    let lone_points = surface.lone_points();
+    let isolated_points = surface.isolated_points();
     let built = |regions: &[Region]| {
         let mut constraints: Vec<&dyn SizeConstraint> =
             regions.iter().map(|r| r as &dyn SizeConstraint).collect();
@@ -161,14 +161,15 @@ fn prepare_in(
             Some(Background::AtVertices(h)) => at_vertices = Some(&h[..]),
             None => {}
         }
-        let further = Further { constraints: &constraints, at_vertices, at_points: &lone_points };
+        let further =
+            ExtraSizes { constraints: &constraints, at_vertices, at_points: &isolated_points };
         SizeField::build_with(&surface.points, &surface.triangles, &asked, &further, scratch)
     };
     let enclosed = || {
         // Counted before the tree takes its share of what is left.
         let _held = scratch.hold(VOLUMES_TRIANGLE * surface.n_triangles());
         let seeker = Seeker::of(surface, scratch, |_| true);
-        let volumes = Volumes::of_in(&seeker, scratch);
+        let volumes = Volumes::new_in(&seeker, scratch);
         (seeker, volumes)
     };
     let has_room = scratch.available() >= (ROOM_FOR_BOTH * surface.n_triangles()) as u64;
@@ -433,7 +434,7 @@ pub fn n_subdomains(tets: f64, options: &Options) -> Result<(u32, Option<u32>), 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tetdb_base::surface::{orient_alike_in, validate_in};
+    use tetdb_base::surface::{orient_alike_with, validate_with};
     use tetdb_kernel::samples::SampleSpec;
 
     #[test]
@@ -444,8 +445,8 @@ mod tests {
         let options = Options { regions: Some("all".to_owned()), ..Options::default() };
         let wide = prepare(&surface, &options, None, &ScratchSpace::boundless())?;
         let narrow = ScratchSpace::new(surface.bytes() as u64 / 4, dir.path());
-        orient_alike_in(&mut surface, &narrow);
-        assert!(validate_in(&surface, &narrow).is_valid());
+        orient_alike_with(&mut surface, &narrow);
+        assert!(validate_with(&surface, &narrow).is_valid());
         let made = prepare(&surface, &options, None, &narrow)?;
         assert_eq!(made.estimate, wide.estimate);
         assert_eq!(made.sizes.to_string(), wide.sizes.to_string());

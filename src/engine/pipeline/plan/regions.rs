@@ -90,7 +90,7 @@ pub(super) fn refuse_outer_sheets(
         return Ok(());
     };
     let [a, b, c] = surface.corners(triangle);
-    if surface.is_fin(triangle) {
+    if surface.is_support_triangle(triangle) {
         return Err(PipelineError::WireOutside {
             what: "edges",
             label: surface.label_name(triangle).to_owned(),
@@ -113,7 +113,7 @@ pub(super) fn refuse_outer_points(
     volumes: &Volumes,
     chosen: &Filled,
 ) -> Result<(), PipelineError> {
-    let wires = &surface.wires;
+    let wires = &surface.embedded;
     let alone = (wires.points.iter().zip(&wires.sizes)).filter(|(_, size)| **size > 0.0);
     let is_outer =
         |&v: &u32| !(chosen.volumes).contains(&volumes.at(seeker, surface.points[v as usize]));

@@ -164,7 +164,7 @@ mod tests {
                 subdomain: 3,
                 generation: 8,
                 spill: scratch.clone(),
-                made: None,
+                output: None,
                 base: None,
                 cache_bytes: 1 << 20,
             };
@@ -214,7 +214,7 @@ mod tests {
                 subdomain: 0,
                 generation: 2,
                 spill: scratch.clone(),
-                made: None,
+                output: None,
                 base: None,
                 cache_bytes: 1 << 20,
             };

@@ -1,9 +1,9 @@
 //! Puts an exact point into a small cavity that sees it whole.
 
+use super::complex::TetComplex;
 use super::exact::ExactPoint;
-use super::grow::{Grown, grow};
-use super::patch::Patch;
-use super::space::Space;
+use super::grow::{GrownCavity, grow};
+use super::patch::RecoveryPatch;
 use super::walk::swapped;
 use crate::mesh::Tet;
 use tetdb_base::geom::IdSet;
@@ -12,7 +12,7 @@ use tetdb_base::storage::Pages;
 /// An outer face of a cavity, as a tetrahedron of the cavity and the vertex opposite the face.
 pub(super) type Outer = (Tet, usize);
 
-impl<P: Pages> Patch<'_, P> {
+impl<P: Pages> RecoveryPatch<'_, P> {
     /// The outer faces of a cavity.
     pub(super) fn outer_faces(&mut self, cavity: &[u32]) -> Vec<Outer> {
         let mut outer = Vec::new();
@@ -54,7 +54,7 @@ impl<P: Pages> Patch<'_, P> {
     ) -> Option<u32> {
         let x = self.add_vertex_on(on, exact);
         let grown = grow(self, seed, x, None, &[], &IdSet::default());
-        let Ok(grown) = grown.and_then(Grown::losing_none) else {
+        let Ok(grown) = grown.and_then(GrownCavity::without_lost_vertices) else {
             self.drop_vertex(x);
             return None;
         };

@@ -5,7 +5,7 @@ use crate::geom::{Point, orient};
 
 /// An edge with the numbers of its vertices; equal numbers mean equal points and the reverse.
 #[derive(Clone, Copy)]
-pub(super) struct Edge {
+pub(super) struct EmbeddedEdge {
     pub ids: [u32; 2],
     pub ends: [Point; 2],
 }
@@ -15,7 +15,7 @@ pub(super) enum EdgeAtTriangle {
     /// They share a vertex at most.
     Apart,
     /// It is one of the triangle's own.
-    Own,
+    Side,
     /// They touch where they should not.
     Touching(Contact),
 }
@@ -25,7 +25,7 @@ pub(super) fn has_area(t: &[Point; 3]) -> bool {
     Projection::of(t).turn(t[0], t[1], t[2]) != 0
 }
 
-impl Edge {
+impl EmbeddedEdge {
     /// The vertex shared with another set of vertices, as places in both, when there is one alone.
     fn shared(&self, others: &[u32]) -> Vec<(usize, usize)> {
         let places = self.ids.iter().enumerate();
@@ -42,7 +42,7 @@ impl Edge {
                 [at_a, at_b] => edge_meets(a, b, at_a, at_b, &t),
             },
             &[(i, k)] => leaves_into(self.ends[1 - i], [t[k], t[(k + 1) % 3], t[(k + 2) % 3]]),
-            _ => return EdgeAtTriangle::Own,
+            _ => return EdgeAtTriangle::Side,
         };
         touch.map_or(EdgeAtTriangle::Apart, EdgeAtTriangle::Touching)
     }
@@ -161,8 +161,10 @@ mod tests {
             let id = |i: usize| {
                 p.iter().position(|q| *q == p[i]).map(|at| at as u32).unwrap_or_default()
             };
-            let edge =
-                |i: usize, j: usize| Edge { ids: [id(i), id(j)], ends: [point(p[i]), point(p[j])] };
+            let edge = |i: usize, j: usize| EmbeddedEdge {
+                ids: [id(i), id(j)],
+                ends: [point(p[i]), point(p[j])],
+            };
             if p[0] == p[1] || p[2] == p[3] {
                 continue;
             }
@@ -198,7 +200,7 @@ mod tests {
         assert!(point_at_triangle(Point::new(1.0, 1.0, 1.000_000_1), &t).is_none());
         assert!(is_on_edge(Point::new(2.0, 0.0, 1.0), [t[0], t[1]]));
         assert!(!is_on_edge(Point::new(6.0, 0.0, 3.0), [t[0], t[1]]));
-        let edge = |a, b| Edge { ids: [0, 9], ends: [a, b] };
+        let edge = |a, b| EmbeddedEdge { ids: [0, 9], ends: [a, b] };
         let own = [0, 1, 2];
         let kind = |b: Point| match edge(t[0], b).at_triangle(t, own) {
             EdgeAtTriangle::Touching(c) => Some(c.kind),

@@ -19,11 +19,11 @@ pub(super) const FOUND_MAX: u64 = 1_000_000;
 /// A tree over the triangles that `keep` accepts.
 pub(super) fn tree_of(
     surface: &Surface,
-    room: &ScratchSpace,
+    scratch: &ScratchSpace,
     keep: impl Fn(u32) -> bool + Sync,
 ) -> BoxTree {
     let box_of = |t: u32| Aabb::around(surface.corners(t));
-    BoxTree::new(&surface.bounds(), surface.n_triangles() as u32, room, keep, box_of)
+    BoxTree::new(&surface.bounds(), surface.n_triangles() as u32, scratch, keep, box_of)
 }
 
 impl BoxTree {
@@ -67,8 +67,8 @@ impl BoxTree {
             let before = n_found;
             for (block, n) in found {
                 n_found += n;
-                let room = listed_max - listed.len();
-                listed.extend(block.into_iter().take(room));
+                let scratch = listed_max - listed.len();
+                listed.extend(block.into_iter().take(scratch));
             }
             if n_found > FOUND_MAX {
                 break;

@@ -7,9 +7,9 @@ use tetdb_base::storage::Pages;
 
 /// A tetrahedral complex whose parts can be replaced.
 ///
-/// Invariant kept by [`Space::replace`]: neighbors are mutual, and outer required faces stay required.
+/// Invariant kept by [`TetComplex::replace`]: neighbors are mutual, and outer required faces stay required.
 /// The caller answers for the volumes.
-pub(super) trait Space {
+pub(super) trait TetComplex {
     /// The record of `t`.
     fn tet(&mut self, t: u32) -> Tet;
     /// What lies across face `i` of `t`; loads it if need be.
@@ -35,7 +35,7 @@ pub(super) trait Space {
     /// what is left of them is freed last to first: replacing back restores the very ids. Required faces
     /// stay required if they are faces of the new tetrahedra.
     fn replace(&mut self, old: &[u32], new: &[[u32; 4]]) -> Vec<u32> {
-        let mut sides: Vec<Side> = Vec::with_capacity(4 * new.len() + 2 * old.len() + 4);
+        let mut sides: Vec<CavityFace> = Vec::with_capacity(4 * new.len() + 2 * old.len() + 4);
         // Required faces inside that are faces again afterwards stay required.
         let mut inner: Vec<[u32; 3]> = Vec::new();
         for &t in old {
@@ -47,7 +47,7 @@ pub(super) trait Space {
                         inner.push(sorted(tet.face(i)));
                     }
                 } else {
-                    sides.push(Side {
+                    sides.push(CavityFace {
                         key: sorted(tet.face(i)),
                         shapes: u32::MAX,
                         outside: across,
@@ -63,7 +63,7 @@ pub(super) trait Space {
         }
         for (k, quad) in new.iter().enumerate() {
             for (i, f) in FACES.iter().enumerate() {
-                sides.push(Side {
+                sides.push(CavityFace {
                     key: sorted(f.map(|j| quad[j])),
                     shapes: (k * 4 + i) as u32,
                     outside: FaceRef::NONE,
@@ -138,7 +138,7 @@ pub(super) trait Space {
 }
 
 /// A face of a replaced cavity, seen from outside (`shapes == MAX`) or from a new tetrahedron.
-struct Side {
+struct CavityFace {
     key: [u32; 3],
     shapes: u32,
     outside: FaceRef,
@@ -159,13 +159,13 @@ pub(super) fn edge_key(a: u32, b: u32) -> u64 {
 }
 
 /// The paged mesh as a space; all vertices are where their coordinates say.
-pub(super) struct PagedSpace<'m, P: Pages>(
+pub(super) struct PagedComplex<'m, P: Pages>(
     pub &'m mut Mesh<P>,
     /// Edges that must stay.
     pub &'m IdSet<u64>,
 );
 
-impl<P: Pages> PagedSpace<'_, P> {
+impl<P: Pages> PagedComplex<'_, P> {
     /// Adds a vertex in no tetrahedron, tagged as a Steiner point.
     pub(super) fn add_steiner(&mut self, point: Point) -> u32 {
         let v = self.0.add_vertex(point, 0.0);
@@ -196,7 +196,7 @@ impl<P: Pages> PagedSpace<'_, P> {
     }
 }
 
-impl<P: Pages> Space for PagedSpace<'_, P> {
+impl<P: Pages> TetComplex for PagedComplex<'_, P> {
     #[inline]
     fn tet(&mut self, t: u32) -> Tet {
         self.0.tet(t)

@@ -1,6 +1,6 @@
 //! The surface as seen from a point: how far it is, and which triangle lies above.
 
-use super::broad::tree_of;
+use super::box_pairs::tree_of;
 use super::{BoxTree, Surface};
 use crate::geom::{Aabb, Point, mix};
 use crate::storage::ScratchSpace;
@@ -47,10 +47,10 @@ impl<'a> Seeker<'a> {
     /// A scratch file that fails unwinds, here and later.
     pub fn of(
         surface: &'a Surface,
-        room: &ScratchSpace,
+        scratch: &ScratchSpace,
         keep: impl Fn(u32) -> bool + Sync,
     ) -> Self {
-        Self::with_tree(surface, tree_of(surface, room, keep))
+        Self::with_tree(surface, tree_of(surface, scratch, keep))
     }
 
     /// Sees the triangles that `tree` has.

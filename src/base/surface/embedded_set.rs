@@ -5,7 +5,7 @@ use crate::geom::Point;
 
 /// Edges and points of a surface that are no parts of its triangles, or are to be known by a name of their own.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Wires {
+pub struct Embedded {
     /// The vertices of each edge, and its label.
     pub edges: Vec<[u32; 3]>,
     /// The vertex of each point, and its label.
@@ -13,12 +13,12 @@ pub struct Wires {
     /// How long edges at each point should be, at most; 0 where the point is a vertex of triangles, which say it.
     pub sizes: Vec<f64>,
     /// The first triangle that is a fin, and the first vertex that belongs to fins alone.
-    pub fins: Option<[u32; 2]>,
+    pub first_support: Option<[u32; 2]>,
 }
 
 /// What a file says of edges and points.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct WireSet {
+pub struct EmbeddedSet {
     /// Positions of the vertices, equal ones among them.
     pub points: Vec<Point>,
     /// The vertices of each edge, and its label.
@@ -29,7 +29,7 @@ pub struct WireSet {
     pub label_names: Vec<String>,
 }
 
-impl WireSet {
+impl EmbeddedSet {
     /// Bytes of memory held, for the budget.
     pub fn bytes(&self) -> u64 {
         let names = self.label_names.len() * 2 * size_of::<String>();
@@ -41,7 +41,7 @@ impl WireSet {
 
 /// Why edges and points cannot be embedded.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum WireError {
+pub enum EmbedError {
     /// Both ends of an edge are one vertex.
     #[error("{edge} has no length")]
     NoLength {
@@ -99,7 +99,7 @@ fn far(distance: Option<f64>) -> String {
     distance.map_or(String::new(), |distance| format!(": {distance:.1e} from it"))
 }
 
-impl WireError {
+impl EmbedError {
     /// The word for this error.
     pub fn code(&self) -> &'static str {
         match self {

@@ -13,7 +13,7 @@ pub(super) struct HalfSpace {
 }
 
 /// The center of the largest ball inside all half-spaces and the cube of half side `reach` around the origin.
-pub(super) fn center(half_spaces: &[HalfSpace], reach: f64) -> Option<Point> {
+pub(super) fn ball_center(half_spaces: &[HalfSpace], reach: f64) -> Option<Point> {
     let mut rows: Vec<Row> = half_spaces
         .iter()
         .filter(|h| h.normal.is_finite() && h.offset.is_finite())
@@ -35,7 +35,7 @@ pub(super) fn center(half_spaces: &[HalfSpace], reach: f64) -> Option<Point> {
 }
 
 /// How far `at` is inside all half-spaces; negative outside.
-pub(super) fn room(half_spaces: &[HalfSpace], at: Point) -> f64 {
+pub(super) fn clearance(half_spaces: &[HalfSpace], at: Point) -> f64 {
     let rooms = half_spaces.iter().map(|h| h.offset - h.normal.dot(at));
     rooms.fold(f64::INFINITY, f64::min)
 }
@@ -115,13 +115,13 @@ mod tests {
     #[test]
     fn the_center_of_a_corner_is_as_far_as_the_cube_allows() {
         let walls = [Point::X, Point::Y, Point::Z].map(|n| HalfSpace { normal: -n, offset: 0.0 });
-        let p = center(&walls, 2.0).expect("a corner has room");
+        let p = ball_center(&walls, 2.0).expect("a corner has room");
         assert!(p.min_element() > 0.5, "{p}");
         let slab = [
             HalfSpace { normal: Point::X, offset: 1e-6 },
             HalfSpace { normal: -Point::X, offset: 0.0 },
         ];
-        let p = center(&slab, 1.0).expect("a slab has room");
+        let p = ball_center(&slab, 1.0).expect("a slab has room");
         assert!((p.x - 5e-7).abs() < 1e-12, "{p}");
     }
 }

@@ -12,7 +12,7 @@ use super::anatomy::VERTEX_MASK;
 use tetdb_base::storage::{DraftPages, Pages, check_cancelled, kind, parallel};
 
 /// Something to be tried on many items.
-pub trait Trial: Sync {
+pub trait Speculation: Sync {
     /// What it is tried on.
     type Item: Sync;
     /// What one thread uses again and again; must not have a say in what comes of it.
@@ -26,12 +26,12 @@ pub trait Trial: Sync {
         scratch: &mut Self::Scratch,
         mesh: &mut Mesh<P>,
         item: &Self::Item,
-    ) -> Option<(Self::Outcome, Draft)>;
+    ) -> Option<(Self::Outcome, DraftState)>;
 }
 
 /// What is left of a draft.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub enum Draft {
+pub enum DraftState {
     /// It is to be as the mesh: else what was found does not count.
     Unchanged,
     /// It may be anything.
@@ -39,7 +39,7 @@ pub enum Draft {
 }
 
 /// What was found, and what it rests on.
-pub struct Foreseen<F> {
+pub struct Evaluated<F> {
     /// What came of it.
     pub found: F,
     /// Vertices of all tetrahedra read, in ascending order. Where nothing has changed at them, the same comes of it still.
@@ -47,12 +47,12 @@ pub struct Foreseen<F> {
 }
 
 /// Tries all items, each on the mesh as it is, which stays so: one thread for each scratch. In the order of the items; nothing where not all of the mesh is in memory.
-pub fn look_ahead<P: Pages, T: Trial>(
+pub fn evaluate_speculatively<P: Pages, T: Speculation>(
     mesh: &mut Mesh<P>,
     items: &[T::Item],
     scratch: &mut [T::Scratch],
     trial: &T,
-) -> Vec<Option<Foreseen<T::Outcome>>> {
+) -> Vec<Option<Evaluated<T::Outcome>>> {
     let mut all = Vec::new();
     all.resize_with(items.len(), || None);
     let Some(shared) = mesh.shared() else {
@@ -76,9 +76,9 @@ pub fn look_ahead<P: Pages, T: Trial>(
             };
             // What took a number and gave it back has changed which one is next.
             let is_unchanged = || draft.state == state && draft.pages.is_unchanged();
-            if left == Draft::Used || is_unchanged() {
+            if left == DraftState::Used || is_unchanged() {
                 let vertices = vertices_met(&draft.pages);
-                done.push((at, Foreseen { found, vertices }));
+                done.push((at, Evaluated { found, vertices }));
             }
         }
     };

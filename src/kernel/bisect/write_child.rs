@@ -1,12 +1,12 @@
-//! Write a child: the host's tetrahedra of one side, those of the core with that label, joined at the rim.
+//! Write a child: the host's tetrahedra of one side, those of the core with that label, joined at the core boundary.
 //!
 //! Vertices and tetrahedra get their final numbers before they are written: those of vertices by sorting along the curve, those of
 //! tetrahedra by counting, for they follow that of their first vertex. Each record is then written once, at its place. What is read
 //! for it is read in page order, and of the host's tetrahedra those of the child alone: the scratch map says which.
 
-use super::child::Split;
+use super::child_builder::ChildBuilder;
 use super::inherit::inherit;
-use super::opened::Opened;
+use super::open_cut::OpenCut;
 use crate::mesh::{Mesh, Workspace, dense};
 use tetdb_base::geom::{Aabb, HilbertFrame};
 use tetdb_base::storage::{Pages, StorageError};
@@ -20,20 +20,20 @@ pub fn write_child<P: Pages, Q: Pages, R: Pages>(
     host: &mut Mesh<P>,
     core: &mut Mesh<Q>,
     child: &mut Mesh<R>,
-    opened: &Opened,
+    open_cut: &OpenCut,
     high: bool,
     bounds: &Aabb,
     space: &Workspace,
 ) -> Result<(), StorageError> {
-    let mut split = Split {
+    let mut split = ChildBuilder {
         host_base: dense(host.vertex_ids_end()),
         core_base: dense(core.vertex_ids_end()),
         host,
         core,
         child,
-        opened,
+        open_cut,
         high,
-        at_core: Vec::new(),
+        tets_at_core: Vec::new(),
     };
     split.add_vertices(&HilbertFrame::new(bounds), space)?;
     split.number_tets();
