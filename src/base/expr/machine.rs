@@ -1,4 +1,4 @@
-//! What operations do: postfix on a short stack of numbers. A truth is 1 or 0.
+//! Evaluation: operations in postfix on a short stack of numbers. A truth is 1 or 0.
 
 use super::op::{BinaryOp, Op, STACK_MAX, Unary};
 

@@ -1,4 +1,4 @@
-//! The small typed expression language of sizes and queries. This module knows no mesh.
+//! The small typed expression language of sizes and queries. It has no access to a mesh.
 //!
 //! | what | how |
 //! |---|---|
@@ -27,4 +27,4 @@ mod tests;
 mod words;
 
 pub use error::ExprError;
-pub use expression::{Expression, Kind};
+pub use expression::{ExprKind, Expression};

@@ -49,7 +49,7 @@ pub(super) enum Op {
     Variable(usize),
     Unary(Unary),
     BinaryOp(BinaryOp),
-    /// Whether the value is in the list of this number.
+    /// True if the value is in the list of this number.
     In(usize),
     /// Truth, number, number: the first of the numbers where the truth holds.
     If,

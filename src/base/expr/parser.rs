@@ -2,7 +2,7 @@
 
 use super::op::{BinaryOp, Op, Unary};
 use super::words::{Token, fault, next_word};
-use super::{ExprError, Expression, Kind};
+use super::{ExprError, ExprKind, Expression};
 
 /// How tightly operators bind, from the loosest.
 const OR: u8 = 1;
@@ -16,8 +16,8 @@ const POWER: u8 = 7;
 struct Infix {
     binds: u8,
     /// The kind of its operands.
-    takes: Kind,
-    gives: Kind,
+    takes: ExprKind,
+    gives: ExprKind,
     op: BinaryOp,
 }
 
@@ -39,14 +39,14 @@ fn infix(word: Token) -> Option<Infix> {
         _ => return None,
     };
     let (takes, gives) = match binds {
-        OR | AND => (Kind::Truth, Kind::Truth),
-        COMPARISON => (Kind::Number, Kind::Truth),
-        _ => (Kind::Number, Kind::Number),
+        OR | AND => (ExprKind::Truth, ExprKind::Truth),
+        COMPARISON => (ExprKind::Number, ExprKind::Truth),
+        _ => (ExprKind::Number, ExprKind::Number),
     };
     Some(Infix { binds, takes, gives, op })
 }
 
-/// What a name in front of a bracket does.
+/// The meaning of a name in front of a bracket.
 enum Function {
     One(Unary),
     Two(BinaryOp),
@@ -82,7 +82,7 @@ fn function(name: &str) -> Option<Function> {
 struct Parser<'a> {
     text: &'a str,
     variables: &'a [&'a str],
-    /// The word to be looked at, where it begins and ends.
+    /// The current token, its begin and its end.
     word: Token<'a>,
     start: usize,
     end: usize,
@@ -170,7 +170,7 @@ impl<'a> Parser<'a> {
     }
 
     /// Operators that bind at least as tightly as `least`, and their operands.
-    fn expression(&mut self, least: u8) -> Result<Kind, ExprError> {
+    fn expression(&mut self, least: u8) -> Result<ExprKind, ExprError> {
         self.depth += 1;
         if self.depth > Expression::STACK_MAX {
             return Err(self.too_deep());
@@ -181,7 +181,7 @@ impl<'a> Parser<'a> {
         loop {
             if self.word == Token::Name("in") && least <= COMPARISON {
                 self.not_chained(compared)?;
-                check(kind, Kind::Number, start, "in")?;
+                check(kind, ExprKind::Number, start, "in")?;
                 kind = self.list()?;
                 compared = true;
                 continue;
@@ -215,13 +215,13 @@ impl<'a> Parser<'a> {
         }
     }
 
-    fn operand(&mut self) -> Result<Kind, ExprError> {
+    fn operand(&mut self) -> Result<ExprKind, ExprError> {
         let (word, start) = (self.word, self.start);
         match word {
             Token::Number(value) => {
                 self.advance()?;
                 self.push(Op::Constant(value))?;
-                Ok(Kind::Number)
+                Ok(ExprKind::Number)
             }
             Token::Sign("(") => {
                 self.advance()?;
@@ -229,8 +229,8 @@ impl<'a> Parser<'a> {
                 self.expect(")")?;
                 Ok(kind)
             }
-            Token::Sign("-") => self.prefix(Unary::Negate, POWER, Kind::Number),
-            Token::Name("not") => self.prefix(Unary::Not, COMPARISON, Kind::Truth),
+            Token::Sign("-") => self.prefix(Unary::Negate, POWER, ExprKind::Number),
+            Token::Name("not") => self.prefix(Unary::Not, COMPARISON, ExprKind::Truth),
             Token::Name(name) if !matches!(name, "and" | "or" | "in") => self.name(name),
             _ => {
                 let found = self.found();
@@ -239,7 +239,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    fn prefix(&mut self, op: Unary, binds: u8, kind: Kind) -> Result<Kind, ExprError> {
+    fn prefix(&mut self, op: Unary, binds: u8, kind: ExprKind) -> Result<ExprKind, ExprError> {
         let name = &self.text[self.start..self.end];
         self.advance()?;
         let start = self.start;
@@ -249,17 +249,17 @@ impl<'a> Parser<'a> {
         Ok(kind)
     }
 
-    fn name(&mut self, name: &str) -> Result<Kind, ExprError> {
+    fn name(&mut self, name: &str) -> Result<ExprKind, ExprError> {
         let start = self.start;
         self.advance()?;
         if let Some(v) = self.variables.iter().position(|known| *known == name) {
             self.push(Op::Variable(v))?;
-            return Ok(Kind::Number);
+            return Ok(ExprKind::Number);
         }
         let (value, kind) = match name {
-            "pi" => (std::f64::consts::PI, Kind::Number),
-            "true" => (1.0, Kind::Truth),
-            "false" => (0.0, Kind::Truth),
+            "pi" => (std::f64::consts::PI, ExprKind::Number),
+            "true" => (1.0, ExprKind::Truth),
+            "false" => (0.0, ExprKind::Truth),
             _ => {
                 return match function(name) {
                     Some(function) => self.call(name, &function),
@@ -283,24 +283,24 @@ impl<'a> Parser<'a> {
         fault(start, message)
     }
 
-    fn call(&mut self, name: &str, function: &Function) -> Result<Kind, ExprError> {
+    fn call(&mut self, name: &str, function: &Function) -> Result<ExprKind, ExprError> {
         self.expect("(")?;
         match function {
             Function::One(op) => {
-                self.argument(name, Kind::Number)?;
+                self.argument(name, ExprKind::Number)?;
                 self.push(Op::Unary(*op))?;
             }
             Function::Two(op) => {
-                self.argument(name, Kind::Number)?;
+                self.argument(name, ExprKind::Number)?;
                 self.expect(",")?;
-                self.argument(name, Kind::Number)?;
+                self.argument(name, ExprKind::Number)?;
                 self.push(Op::BinaryOp(*op))?;
             }
             Function::Many(op) => {
-                self.argument(name, Kind::Number)?;
+                self.argument(name, ExprKind::Number)?;
                 loop {
                     self.expect(",")?;
-                    self.argument(name, Kind::Number)?;
+                    self.argument(name, ExprKind::Number)?;
                     self.push(Op::BinaryOp(*op))?;
                     if self.word == Token::Sign(")") {
                         break;
@@ -308,26 +308,26 @@ impl<'a> Parser<'a> {
                 }
             }
             Function::If => {
-                self.argument(name, Kind::Truth)?;
+                self.argument(name, ExprKind::Truth)?;
                 for _ in 0..2 {
                     self.expect(",")?;
-                    self.argument(name, Kind::Number)?;
+                    self.argument(name, ExprKind::Number)?;
                 }
                 self.push(Op::If)?;
             }
         }
         self.expect(")")?;
-        Ok(Kind::Number)
+        Ok(ExprKind::Number)
     }
 
-    fn argument(&mut self, name: &str, kind: Kind) -> Result<(), ExprError> {
+    fn argument(&mut self, name: &str, kind: ExprKind) -> Result<(), ExprError> {
         let start = self.start;
         let found = self.expression(OR)?;
         check(found, kind, start, name)
     }
 
     /// `in [number, ..]`.
-    fn list(&mut self) -> Result<Kind, ExprError> {
+    fn list(&mut self) -> Result<ExprKind, ExprError> {
         self.advance()?;
         self.expect("[")?;
         let mut list = Vec::new();
@@ -350,18 +350,18 @@ impl<'a> Parser<'a> {
         self.expect("]")?;
         self.push(Op::In(self.lists.len()))?;
         self.lists.push(list);
-        Ok(Kind::Truth)
+        Ok(ExprKind::Truth)
     }
 }
 
 /// An operand of another kind than its operator takes is a fault.
-fn check(found: Kind, expected: Kind, at: usize, name: &str) -> Result<(), ExprError> {
+fn check(found: ExprKind, expected: ExprKind, at: usize, name: &str) -> Result<(), ExprError> {
     match (expected, found) {
-        (Kind::Number, Kind::Truth) => {
+        (ExprKind::Number, ExprKind::Truth) => {
             let message = format!("`{name}` takes numbers, this is a truth");
             Err(fault(at, message))
         }
-        (Kind::Truth, Kind::Number) => {
+        (ExprKind::Truth, ExprKind::Number) => {
             let message = format!("`{name}` takes truths such as `x > 1`, this is a number");
             Err(fault(at, message))
         }

@@ -1,11 +1,11 @@
-//! What can come out when variables lie within ranges: the same operations on intervals.
+//! Interval evaluation: bounds of an expression while variables lie within ranges.
 //!
 //! Rounding is monotone, so the ends of the intervals of sums, products, quotients and roots, rounded as values are,
 //! hold all rounded values. Of the other functions nothing is claimed.
 
 use super::op::{BinaryOp, Op, STACK_MAX, Unary};
 
-/// The values that can occur: numbers from `low` to `high`, and NaN perhaps. Of a truth, 0 and 1 are such numbers.
+/// Bounds of a value: numbers from `low` to `high`, perhaps NaN. For a truth the numbers are 0 and 1.
 #[derive(Clone, Copy, Debug)]
 struct Interval {
     low: f64,

@@ -40,7 +40,7 @@ pub(super) fn next_word(text: &str, at: usize) -> Result<(Token<'_>, usize, usiz
     if first.is_ascii_digit() || first == '.' {
         let length = number_length(rest.as_bytes());
         let value = rest[..length].parse::<f64>();
-        // Beyond the greatest double a text reads as infinite, which nobody means.
+        // Beyond the greatest double a text reads as infinite, which is never intended.
         let value = value.ok().filter(|v| v.is_finite());
         return match value {
             Some(value) => Ok((Token::Number(value), start, start + length)),

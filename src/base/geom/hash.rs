@@ -1,4 +1,4 @@
-//! Numbers that look random, made of numbers: the same on every machine.
+//! Pseudo-random numbers from numbers, equal on every machine.
 
 use std::collections::{HashMap, HashSet};
 use std::hash::{BuildHasherDefault, Hasher};
@@ -14,7 +14,7 @@ pub fn mix(v: u64) -> u64 {
     z ^ z >> 31
 }
 
-/// What SplitMix64 adds to its state at each step.
+/// Increment of the state of SplitMix64.
 pub const STEP: u64 = 0x9E37_79B9_7F4A_7C15;
 
 /// Spreads numbers over the places of a table; they are the program's own, not an adversary's.

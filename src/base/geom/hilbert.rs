@@ -34,8 +34,8 @@ impl HilbertFrame {
 
 /// Index along the three-dimensional Hilbert curve of a cell with 21 bits per axis.
 ///
-/// Walks down the levels with the curve's turning as a state, two levels at a time: three times as fast as turning the lower bits
-/// themselves at each level, which is what the tables are made from.
+/// Walks down the levels, two at a time, with the curve's orientation as a state. Turning the lower bits at each level,
+/// from which the tables are computed, takes three times as long.
 ///
 /// Source: J. Skilling, "Programming the Hilbert curve", AIP Conference Proceedings 707 (2004).
 #[inline]

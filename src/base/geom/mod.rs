@@ -1,4 +1,4 @@
-//! Points, planes and exact signs. This module knows no mesh.
+//! Points, planes and exact signs. The module has no mesh.
 //!
 //! One convention holds everywhere (drawn in `shape`): a tetrahedron `a b c d` is positive
 //! when `det(b-a, c-a, d-a) > 0`, and [`insphere`] is positive inside the sphere of a positive one.

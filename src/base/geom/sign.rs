@@ -1,9 +1,9 @@
 //! Signs of the orientation and sphere determinants, never wrong.
 //!
-//! Each call first evaluates the determinant in doubles and compares it with a bound made from the
-//! largest coordinate differences of that very call (a semi-static filter: a bound for the whole
-//! bounding box never succeeds on small tetrahedra). What the filter cannot decide goes to whole numbers
-//! (`wide`, spheres only) where they fit, else to the expansions of the crate `robust`.
+//! Each call first evaluates the determinant in doubles. It compares the result with a bound from the largest
+//! coordinate differences of that very call. (Such a semi-static filter works on small tetrahedra, where a bound for
+//! the whole bounding box fails.) Undecided cases go to whole numbers (`wide`, spheres only) where they fit, else to
+//! the expansions of the crate `robust`.
 //!
 //! Zero sphere determinants are decided by raising the lift of the points symbolically, the
 //! lexicographically smallest point by most (Devillers and Teillaud, "Perturbations for Delaunay and
@@ -19,7 +19,7 @@ use super::wide::insphere_sign;
 /// Forward error of the filtered orientation determinant, relative to the product of the largest
 /// differences per axis (Meyer and Pion, "FPG: a code generator for fast and certified geometric predicates").
 const ORIENT_BOUND: f64 = 5.110_712_782_997_33e-15;
-/// The same for the sphere determinant, relative to that product times the largest squared difference.
+/// Forward error of the filtered sphere determinant, relative to that product times the largest squared difference.
 const INSPHERE_BOUND: f64 = 1.246_613_653_102_729_8e-13;
 /// Below this difference a product can underflow and the bounds stop being bounds.
 const DIFFERENCE_MIN: f64 = 1e-58;
@@ -83,7 +83,7 @@ fn orient_slow(a: Point, b: Point, c: Point, d: Point) -> f64 {
     if det == 0.0 {
         return 0.0;
     }
-    // Back in input units, for those who add volumes; a volume too small for a double keeps its sign.
+    // Back in input units, for callers that add volumes; a volume too small for a double keeps its sign.
     let volume = det * unit * unit * unit;
     volume.abs().clamp(f64::MIN_POSITIVE, f64::MAX).copysign(det)
 }
@@ -207,7 +207,7 @@ pub fn lex_cmp(a: Point, b: Point) -> Ordering {
     (a.x, a.y, a.z).partial_cmp(&(b.x, b.y, b.z)).expect("coordinates are finite")
 }
 
-/// Whether `e` is strictly inside the perturbed sphere of the positive tetrahedron `a b c d`.
+/// Returns whether `e` is strictly inside the perturbed sphere of the positive tetrahedron `a b c d`.
 ///
 /// The five points must be pairwise different. Never undecided.
 #[inline(always)]

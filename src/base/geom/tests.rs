@@ -1,7 +1,8 @@
-//! Signs against exact numbers, on points made to be hard.
+//! Signs compared with exact numbers, on points chosen to be hard.
 //!
-//! Why: one wrong sign is a wrong mesh. How: a hundred thousand cases of each kind ("TETDB_CASES" asks for more), among them
-//! points in one plane and on one sphere, one unit in the last place off, far from the origin, of mixed magnitudes.
+//! Why: one wrong sign is a wrong mesh. How: a hundred thousand cases of each kind ("TETDB_CASES" sets another number).
+//! They include points in one plane and on one sphere, off by one unit in the last place, far from the origin, of mixed
+//! magnitudes.
 
 use std::cmp::Ordering;
 

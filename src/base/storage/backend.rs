@@ -1,4 +1,5 @@
-//! What redb writes to: a file of a disk, whose commits reach the disk or, for a while, only the system.
+//! Backends of redb: a file of a disk whose commits are synced, one whose commits are not, and a private copy in
+//! memory.
 
 use std::collections::BTreeMap;
 use std::io::{self, ErrorKind};

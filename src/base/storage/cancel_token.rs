@@ -1,4 +1,4 @@
-//! How a run is asked to end.
+//! A token that asks a run to end.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -19,7 +19,7 @@ pub struct CancelToken {
 }
 
 impl CancelToken {
-    /// A token nobody has cancelled.
+    /// A token that is not cancelled.
     pub fn new() -> Self {
         Self::default()
     }
@@ -29,7 +29,7 @@ impl CancelToken {
         self.wanted.store(true, Ordering::Relaxed);
     }
 
-    /// Whether it was cancelled since the last [`CancelToken::reset`].
+    /// Returns whether the token was cancelled since the last [`CancelToken::reset`].
     pub fn is_cancelled(&self) -> bool {
         self.wanted.load(Ordering::Relaxed)
     }

@@ -12,17 +12,18 @@ use super::file_lock::{FileLock, Refused};
 
 /// Files and folders by path. Paths mean what they mean to the operating system.
 ///
-/// What is written counts after [`StorageBackend::sync_data`] or [`Disk::sync_file`]; that a file has a name, another name or none, after
-/// [`Disk::sync_dir`]. Errors: the system's, with its kinds ([`io::ErrorKind::StorageFull`] and so on).
+/// Written bytes last after [`StorageBackend::sync_data`] or [`Disk::sync_file`]. Names of created, renamed and removed
+/// files last after [`Disk::sync_dir`]. Errors: the system's, with its kinds ([`io::ErrorKind::StorageFull`] and so
+/// on).
 pub trait Disk: Debug + Send + Sync {
     /// Creates a database file, which must not exist.
     fn create(&self, path: &Path) -> io::Result<Box<dyn StorageBackend>>;
     /// Opens a database file for reading and writing.
     fn open(&self, path: &Path) -> io::Result<Box<dyn StorageBackend>>;
-    /// Opens a database file for reading, whoever has it.
+    /// Opens a database file for reading, even while another process has it open.
     fn open_read_only(&self, path: &Path) -> io::Result<Box<dyn StorageBackend>>;
-    /// Opens the database in a file for reading, beside other readers: redb does so for real files only, by their paths. `None`: this disk
-    /// has none.
+    /// Opens a database for reading together with other readers. redb can do so only for real files, by their paths.
+    /// `None`: this disk has none.
     fn open_shared(
         &self,
         path: &Path,
@@ -52,7 +53,7 @@ pub trait Disk: Debug + Send + Sync {
     fn lock(&self, path: &Path) -> Result<FileLock, Refused>;
     /// Names in a folder, in any order.
     fn list(&self, dir: &Path) -> io::Result<Vec<String>>;
-    /// What is at a path; `None`: nothing, or nothing that may be seen.
+    /// The kind of the entry at a path; `None` if there is none or it may not be read.
     fn entry(&self, path: &Path) -> Option<DiskEntry>;
     /// Which file has this name now; `None`: none.
     fn id(&self, path: &Path) -> Option<FileId>;
@@ -61,7 +62,7 @@ pub trait Disk: Debug + Send + Sync {
 /// Tells a file from any other that is there or open at the same time, whatever its name.
 pub type FileId = (u64, u64);
 
-/// What has a name on a disk.
+/// The kind of a directory entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DiskEntry {
     /// A folder.

@@ -42,23 +42,23 @@ impl DiskPath {
     pub fn folder(&self) -> Self {
         let parent = match self.path.parent() {
             Some(parent) if !parent.as_os_str().is_empty() => parent,
-            // A bare name is in the current folder, and so is that folder itself as far as anybody asks.
+            // A bare name is in the current folder. The current folder counts as its own folder here.
             _ => Path::new("."),
         };
         Self::on(self.disk.clone(), parent)
     }
 
-    /// Whether something is there.
+    /// Returns whether a file or folder exists here.
     pub fn exists(&self) -> bool {
         self.disk.entry(&self.path).is_some()
     }
 
-    /// Whether a file is there.
+    /// Returns whether a file exists here.
     pub fn is_file(&self) -> bool {
         matches!(self.disk.entry(&self.path), Some(DiskEntry::File(_)))
     }
 
-    /// Whether a folder is there.
+    /// Returns whether a folder exists here.
     pub fn is_dir(&self) -> bool {
         self.disk.entry(&self.path) == Some(DiskEntry::Folder)
     }
@@ -73,7 +73,7 @@ impl DiskPath {
         self.disk.lock(&self.path)
     }
 
-    /// Length of the file in bytes. Errors: there is none.
+    /// Length of the file in bytes. Errors: there is no such file.
     pub fn bytes(&self) -> Result<u64, StorageError> {
         match self.disk.entry(&self.path) {
             Some(DiskEntry::File(bytes)) => Ok(bytes),
@@ -143,7 +143,7 @@ impl DiskPath {
         self.at_path(self.disk.list(&self.path))
     }
 
-    /// What was done here, with the path in its error.
+    /// The result of an operation here, with the path in its error.
     pub(super) fn at_path<T>(&self, done: io::Result<T>) -> Result<T, StorageError> {
         done.map_err(|e| StorageError::io(&self.path, e))
     }

@@ -1,4 +1,4 @@
-//! Changes of one's own over pages that several threads read.
+//! Private changes over pages that several threads read.
 
 use std::collections::HashMap;
 
@@ -6,7 +6,7 @@ use tetdb_schema::page::{NONE, SLOT_BITS, Slot, u32_le};
 
 use super::pages::{Pages, SharedPages, kind};
 
-/// Shared pages with changes that nobody else sees, and a list of the tetrahedra that were read.
+/// Shared pages with private changes, and a list of the tetrahedra that were read.
 ///
 /// Is not: for many changes. Each access looks among them first, when there are any.
 pub struct DraftPages<'a> {
@@ -54,7 +54,7 @@ impl<'a> DraftPages<'a> {
         self.base
     }
 
-    /// Whether all records are what they were.
+    /// Returns whether all records are unchanged.
     pub fn is_unchanged(&self) -> bool {
         self.changed.iter().all(|(&(kind, id), slot)| {
             let base = &self.base;

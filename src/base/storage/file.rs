@@ -27,15 +27,15 @@ enum Handle {
 
 /// Values by key in one redb file.
 ///
-/// Invariant: every write is one commit, durable but in a file from [`StoreFile::create_unsynced`]. Is not: a cache of its own; redb's is
-/// bounded by the `cache_bytes` given at opening, which the caller has leased.
+/// Invariant: every write is one commit. It is durable, except in a file from [`StoreFile::create_unsynced`]. Is not: a
+/// cache. The cache is redb's and is bounded by the `cache_bytes` given at opening, which the caller has leased.
 pub struct StoreFile {
     path: DiskPath,
     /// Always there until it is dropped.
     handle: Option<Handle>,
     /// Kept between reads; dropped at each commit, because it shows the state before it.
     table: Option<ReadOnlyTable<u64, &'static [u8]>>,
-    /// What was found damaged: redb answers all further reads with an error that says nothing.
+    /// The damage found first. Afterwards redb answers all reads with an error that names no cause.
     damage: Option<String>,
 }
 
@@ -47,7 +47,8 @@ impl StoreFile {
         Self::fresh(path.into(), cache_bytes, Synced)
     }
 
-    /// Creates a file that must not exist, for one process, and does not sync its commits: who lists it in the catalog syncs it.
+    /// Creates a file that must not exist, for one process. Commits are not synced: the file is synced when the catalog
+    /// lists it.
     ///
     /// Errors: as [`StoreFile::create`].
     pub fn create_unsynced(
@@ -188,7 +189,7 @@ impl StoreFile {
         done.map_err(|e| self.failed(e))
     }
 
-    /// What a read that failed means: behind damage that was found, redb's refusal to go on is that damage.
+    /// The error of a failed read. Once damage was found, redb refuses all reads; the error is then that damage.
     fn failed(&mut self, failure: RedbFailure) -> StorageError {
         let path = self.path.path();
         match (failure, &self.damage) {
@@ -271,7 +272,7 @@ impl StoreFile {
         }
     }
 
-    /// The same file for another reader, as it was when this one opened it.
+    /// A handle for another reader, with the state that this handle shows.
     pub fn share(&self) -> Self {
         Self {
             path: self.path.clone(),
@@ -342,7 +343,8 @@ impl Drop for StoreFile {
     fn drop(&mut self) {
         self.table = None;
         let handle = self.handle.take();
-        // redb looks at its tree once more when it closes. What it may find was reported already, or is found by who opens the file next.
+        // redb checks its tree once more when it closes. Damage found there was reported before, or is found when the
+        // file is opened next.
         let _ = caught(|| drop(handle));
     }
 }
@@ -350,9 +352,9 @@ impl Drop for StoreFile {
 /// For what a file is opened.
 #[derive(Clone, Copy)]
 enum Access {
-    /// To be changed, by nobody else.
+    /// For writing, exclusively.
     Write,
-    /// To be read, beside other readers.
+    /// For reading, shared with other readers.
     Share,
     /// To be read, with what redb changes kept in memory.
     Private,
@@ -396,7 +398,7 @@ impl RedbFailure {
             Self::Error(redb::Error::Io(e)) if e.kind() == ErrorKind::NotFound => {
                 StorageError::Missing { path, what: "the file".to_owned() }
             }
-            // A foreign, cut or empty file: redb finds no header of its own, or not the pages it names.
+            // A foreign, truncated or empty file: redb does not find its header or its pages.
             Self::Error(redb::Error::Io(e))
                 if matches!(e.kind(), ErrorKind::InvalidData | ErrorKind::UnexpectedEof) =>
             {

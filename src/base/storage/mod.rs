@@ -1,4 +1,4 @@
-//! Pages, cache, budget, transactions. This module knows bytes and records, not geometry.
+//! Pages, cache, budget, transactions. The module handles bytes and records, not geometry.
 //!
 //! # How failure travels
 //! A record is read some twenty million times a second, and nearly always from a resident frame. The
@@ -60,5 +60,5 @@ pub use run_context::{
 };
 pub use sort::{Sorted, Sorter};
 pub use sort_record::sort_record;
-pub use sort_record::{Keyed, Payload, SortBytes, SortField, SortRecord, total_order};
+pub use sort_record::{KeyedId, Payload, SortBytes, SortField, SortRecord, total_order};
 pub use spill_vec::{FrozenSpillVec, ScratchSpace, SpillVec, SpillVecBuilder};

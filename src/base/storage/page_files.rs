@@ -8,7 +8,7 @@ use super::page_table::{IN_BASE, IN_SPILL};
 use super::spill::Spill;
 use super::{DiskPath, StorageError, StoreFile, kind};
 
-/// What a pool begins with, and what it is to make.
+/// The files a pool starts from and the file it writes.
 pub struct Backing {
     /// Rank of the sub-domain whose pages these are.
     pub subdomain: u32,
@@ -37,7 +37,7 @@ impl PageFiles {
         Self { backing, ..Self::default() }
     }
 
-    /// Whether there are any.
+    /// Returns whether the pool has files.
     pub fn exist(&self) -> bool {
         self.backing.is_some()
     }
@@ -46,7 +46,7 @@ impl PageFiles {
         self.backing.as_ref().map_or(0, |b| b.subdomain)
     }
 
-    /// Whether pages of this kind go to the output file.
+    /// Returns whether pages of this kind go to the output file.
     pub fn goes_to_output(&self, kind: usize) -> bool {
         kind != kind::SCRATCH && self.backing.as_ref().is_some_and(|b| b.output.is_some())
     }

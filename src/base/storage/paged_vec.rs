@@ -7,7 +7,7 @@ use bytemuck::Pod;
 use super::scratch::ScratchFile;
 use super::{DiskPath, Lease, check_cancelled, raise, reserve};
 
-/// Bytes of a page: small, for what is near in an array is near in space only mostly.
+/// Bytes of a page. Pages are small, because neighbors in an array are only mostly neighbors in space.
 pub(super) const PAGE_BYTES: usize = 1 << 14;
 /// Frames a paged array has at least: sweeps along a space-filling curve touch some dozens of pages at a time.
 pub(super) const FRAMES_MIN: usize = 32;

@@ -147,8 +147,8 @@ impl Pager {
 
     /// Ends a generation: writes all pages, wherever they are, to a file at `path` and goes on from it, as `generation`.
     ///
-    /// The file is closed when it is written: once it is listed it is not written to again, not even by redb when it is closed, for that would
-    /// not be synced, and a loss of power could leave it torn. Unwinds on errors.
+    /// The file is closed after writing: once the catalog lists it, it is never written again, not even by redb on
+    /// closing. Such a write would not be synced, and a loss of power could tear the file. Unwinds on errors.
     pub fn end_generation(&mut self, path: DiskPath, generation: u32) {
         self.files.begin_file(path);
         assert_eq!(self.tables[kind::SCRATCH].len(), 0, "a map of this step");
@@ -156,7 +156,7 @@ impl Pager {
         let mut batch = Vec::with_capacity(n_batch);
         for kind in 0..self.tables.len() {
             for page in 0..self.tables[kind].len() as u32 {
-                // What had to make room is written already.
+                // Evicted pages are written already.
                 if self.tables[kind].entry(page) == IN_OUTPUT {
                     continue;
                 }
@@ -254,7 +254,7 @@ impl Pager {
         frame | RESIDENT | REFERENCED
     }
 
-    /// A frame nobody owns: a free one, a fresh one, which is zero, or an evicted one.
+    /// A frame without a page: a free one, a fresh one (which is zero), or an evicted one.
     fn take_frame(&mut self) -> (u32, bool) {
         if let Some(frame) = self.free.pop() {
             return (frame, false);
@@ -292,13 +292,13 @@ impl Pager {
         frame
     }
 
-    /// Whether the page in `frame` belongs to the output file.
+    /// Returns whether the page in `frame` belongs to the output file.
     fn is_output(&self, frame: u32) -> bool {
         let owner = self.owners[frame as usize];
         owner != NO_OWNER && self.files.goes_to_output(usize::from(owner.0))
     }
 
-    /// The next victims that would have to be written, so that one commit serves many misses.
+    /// The next eviction candidates that must be written, so that one commit serves many misses.
     fn cold_dirty_frames(&self) -> Vec<u32> {
         let n = (self.frames_max / 4).clamp(1, BATCH_PAGES_MAX - 1);
         let cold = self.order.iter().rev().map(|(&frame, ())| frame);
@@ -448,7 +448,8 @@ impl Pages for Pager {
 }
 
 impl Pager {
-    /// Reads what is not in memory, such as what a mesh opened from its file has not asked for yet; `false` where there are not frames for all pages.
+    /// Loads all pages that are not in memory, such as pages of a newly opened mesh. `false` if there are too few
+    /// frames.
     fn load_all(&mut self) -> bool {
         let pages: usize = self.tables.iter().map(PageTable::len).sum();
         if pages > self.frames_max {
@@ -482,7 +483,7 @@ impl Pager {
     }
 }
 
-/// What was done with a file. Unwinds on errors.
+/// The value of a file operation. Unwinds on errors.
 fn or_raise<T>(done: Result<T, StorageError>) -> T {
     done.unwrap_or_else(|error| raise(error))
 }
@@ -504,7 +505,7 @@ mod tests {
         }
     }
 
-    /// Of a mesh opened from its file, threads may look at pages nobody has asked for yet, where all find room.
+    /// Threads may read all pages of a mesh opened from its file, if all pages fit.
     #[test]
     fn pages_of_a_file_are_shared_where_they_fit() -> Result<(), Box<dyn std::error::Error>> {
         const N: u32 = 24;

@@ -20,7 +20,7 @@ pub mod kind {
     pub const FACETS: usize = 4;
     /// Faces shared with other sub-domains.
     pub const INTERFACE_FACES: usize = 5;
-    /// A map for a step's own use; it is never stored in a result.
+    /// A scratch map of one step; it is never stored in a result.
     pub const SCRATCH: usize = 6;
     /// The page kinds in that order.
     pub const ALL: [PageKind; 7] = [

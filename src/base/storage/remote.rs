@@ -5,6 +5,6 @@
 pub struct RemoteFailure {
     /// The error code.
     pub code: String,
-    /// What happened, and where.
+    /// The failure and its place.
     pub message: String,
 }

@@ -1,7 +1,8 @@
-//! What belongs to one run and to no other in the process: its threads, its token, its panics.
+//! The context of one run in a process: its threads, its cancel token, its panics.
 //!
-//! The context is an attribute of a thread: the caller's while a call lasts, that of the run's own pool, and of the workers it starts.
-//! Parallel work goes through [`parallel`], which sends it to the pool of the run instead of the process's.
+//! The context is an attribute of a thread: of the caller's thread during a call, of the run's own pool, and of the
+//! workers it starts. Parallel work goes through [`parallel`], which sends it to the pool of the run instead of the
+//! process's.
 
 use std::cell::RefCell;
 use std::panic::PanicHookInfo;
@@ -24,14 +25,14 @@ thread_local! {
 #[derive(Clone)]
 pub struct RunContext {
     run: Arc<RunState>,
-    /// `None` on the pool's own threads, which are where parallel work belongs already.
+    /// `None` on the threads of the pool, where parallel work already runs.
     pool: Option<Arc<Pool>>,
 }
 
 struct RunState {
     cancel: CancelToken,
     panic: Mutex<Option<CaughtPanic>>,
-    /// Threads beside the pool that have work of their own.
+    /// Threads outside the pool that are busy.
     busy: AtomicUsize,
 }
 
@@ -53,7 +54,7 @@ struct Pool {
 }
 
 impl RunContext {
-    /// A run with `n_threads` threads of its own, which ends when `cancel` says so.
+    /// A run with a pool of `n_threads` threads, which ends when `cancel` is cancelled.
     pub fn new(n_threads: usize, cancel: CancelToken) -> Self {
         catch_messages();
         let run = Arc::new(RunState { cancel, panic: Mutex::new(None), busy: AtomicUsize::new(0) });
@@ -66,7 +67,7 @@ impl RunContext {
         Self { run, pool: Some(Arc::new(pool)) }
     }
 
-    /// The context of this thread, for a thread it starts.
+    /// The context of this thread, to be entered by a thread it starts.
     pub fn current() -> Option<Self> {
         CURRENT.with_borrow(Clone::clone)
     }
@@ -83,7 +84,7 @@ impl RunContext {
         work()
     }
 
-    /// Does `work`, while which others of this run know that this thread is busy.
+    /// Runs `work` with this thread counted as busy.
     pub fn busy<T>(work: impl FnOnce() -> T) -> T {
         struct Busy(Option<RunContext>);
         impl Drop for Busy {
@@ -107,7 +108,7 @@ impl RunContext {
         panic.take()
     }
 
-    /// Whether the run of this thread is to end.
+    /// Returns whether the run of this thread is cancelled.
     #[inline]
     pub fn is_current_cancelled() -> bool {
         CURRENT.with_borrow(|current| current.as_ref().is_some_and(|c| c.run.cancel.is_cancelled()))
@@ -179,7 +180,7 @@ pub fn for_each_mut<T: Send>(items: &mut [T], work: impl Fn(&mut T) + Sync + Sen
     }
 }
 
-/// What `found` makes of each item, in their order, in place of what `all` held: side by side where a thread is to spare.
+/// Replaces the content of `all` by the results of `found` for all items, in order; in parallel if a thread is free.
 pub fn map_into<T: Sync, U: Send>(
     items: &[T],
     all: &mut Vec<U>,
@@ -212,7 +213,8 @@ pub fn n_threads() -> usize {
     pool.map_or_else(rayon::current_num_threads, |pool| pool.n_threads)
 }
 
-/// Threads of this run that others who are busy leave to this one, itself among them. It changes from moment to moment: nothing that is made may depend on it.
+/// Number of threads of this run that are not busy, this thread included. The number changes at any moment: no result
+/// may depend on it.
 pub fn spare_threads() -> usize {
     let busy = RunContext::current().map_or(0, |context| context.run.busy.load(Ordering::Relaxed));
     n_threads().saturating_sub(busy.saturating_sub(1)).max(1)

@@ -1,4 +1,4 @@
-//! A file that nobody else sees and that is gone with the process.
+//! A private scratch file that disappears with the process.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 

@@ -1,7 +1,7 @@
 //! Sort more records than memory holds: sorted runs on disk, merged while read.
 //!
-//! All runs are in one file, for a process may open some hundreds only; and where there are more runs than memory has buffers for, they are
-//! merged to fewer first.
+//! All runs are in one file, because a process may open only some hundreds. If memory has too few buffers for all runs,
+//! some are merged first.
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, VecDeque};
@@ -17,7 +17,7 @@ const READ_BYTES_MIN: usize = 16 << 10;
 const READ_BYTES_MAX: usize = 1 << 20;
 /// A run is written through this much.
 const WRITE_BYTES: usize = 1 << 18;
-/// So many runs are merged at once however little memory there is.
+/// Runs merged at once, however little memory there is.
 const MERGED_MIN: usize = 8;
 
 /// Collects records; [`Sorter::finish`] gives them back in ascending order.
@@ -125,7 +125,7 @@ impl<R: SortRecord> Sorter<R> {
             check_cancelled();
             let n = at_once.min(self.runs.len() - at_once + 1);
             let oldest: VecDeque<SortedRun> = self.runs.drain(..n).collect();
-            // Each round has a file of its own, so that the one before goes when all its runs are read.
+            // Each round writes to a new file, so that the previous file is freed when all its runs are read.
             let is_read = |file| oldest.iter().any(|run| Arc::ptr_eq(&run.file, file));
             let beside = self.runs.back().filter(|last| !is_read(&last.file));
             let mut run = RunWriter::after(beside, &self.dir)?;
@@ -145,7 +145,7 @@ struct RunWriter {
 }
 
 impl RunWriter {
-    /// Behind another run in its file, or in a file of its own. Errors: the disk.
+    /// Starts a run after another one in its file, or in a new file. Errors: the disk.
     fn after(last: Option<&SortedRun>, dir: &DiskPath) -> Result<Self, StorageError> {
         let (file, at) = match last {
             Some(run) => (Arc::clone(&run.file), run.end),

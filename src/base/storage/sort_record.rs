@@ -120,7 +120,7 @@ impl<T: SortField, const N: usize> SortField for [T; N] {
     }
 }
 
-/// What a record carries along: its bytes as they are in memory, whose order means nothing but is always the same.
+/// Payload of a record: its bytes in memory order. Their order has no meaning, but is always the same.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Payload<T>(pub T);
 
@@ -185,8 +185,8 @@ pub use crate::sort_record;
 sort_record! {
     /// A number of something, and the key it is sorted by.
     #[derive(Eq)]
-    pub struct Keyed {
-        /// What comes first.
+    pub struct KeyedId {
+        /// The primary key.
         pub key: u64,
         /// Its number.
         pub id: u32,

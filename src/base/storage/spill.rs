@@ -1,4 +1,4 @@
-//! Pages that left memory in the middle of a step, in a file that nobody else sees and that ends with the pool.
+//! A private scratch file for pages that leave memory during a step; it ends with the pool.
 //!
 //! A step is done again from its beginning after a crash, so what it puts away meanwhile has no reader but itself: it needs neither a tree nor
 //! commits. A page goes from its frame to the file and back with one copy each way, where redb makes three.

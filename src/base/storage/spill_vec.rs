@@ -1,6 +1,6 @@
 //! Long arrays: in memory while they fit their share of it, else in a scratch file behind a few frames.
 //!
-//! What an algorithm makes of them does not depend on where they are. A disk that fails unwinds, as pages do.
+//! The results of an algorithm do not depend on where its arrays are. A failing disk unwinds, as in the pager.
 
 use std::fmt;
 use std::sync::Arc;
@@ -44,7 +44,7 @@ impl ScratchSpace {
         self.budget.available()
     }
 
-    /// Counts what is held beside the arrays made here, as far as there is anything left: they take shares of the rest.
+    /// Leases bytes held outside the arrays created here, at most the bytes left: arrays take shares of the rest.
     pub fn hold(&self, bytes: usize) -> Option<Lease> {
         let bytes = (bytes as u64).min(self.available());
         self.budget.lease(bytes, "what is held beside arrays").ok()
@@ -148,7 +148,7 @@ impl<T: Pod> SpillVec<T> {
         }
     }
 
-    /// Whether there is no element.
+    /// Returns whether there is no element.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -209,7 +209,7 @@ impl<T: Pod> SpillVecBuilder<T> {
         }
     }
 
-    /// Whether there is no element.
+    /// Returns whether there is no element.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -265,7 +265,7 @@ impl<T: Pod> FrozenSpillVec<T> {
         }
     }
 
-    /// Whether there is no element.
+    /// Returns whether there is no element.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

@@ -1,4 +1,4 @@
-//! Where an open surface is open: the rims of its holes, and vertices that lie on open edges.
+//! The open edges of a surface: boundary loops of its holes, and vertices that lie on open edges.
 
 use rayon::prelude::*;
 
@@ -14,7 +14,7 @@ use crate::storage::parallel;
 pub(super) const JUNCTION_SHARE: f64 = 1e-6;
 /// Vertices as near as this to an end of an edge are meant to be that end, as a share of the box diagonal.
 const GAP_SHARE: f64 = 1e-9;
-/// Open edges that hang together: the rim of a hole.
+/// A connected group of open edges: the boundary of a hole.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BoundaryLoop {
     /// Number of edges.
@@ -42,7 +42,7 @@ pub struct TJunction {
     pub distance: f64,
 }
 
-/// The rims of the holes, the longest first.
+/// The boundary loops of all holes, the longest first.
 pub fn boundary_loops(surface: &Surface, closedness: &Closedness) -> Vec<BoundaryLoop> {
     let groups = open_groups(&closedness.open);
     let n_groups = groups.iter().max().map_or(0, |&g| g as usize + 1);
@@ -68,7 +68,7 @@ pub fn boundary_loops(surface: &Surface, closedness: &Closedness) -> Vec<Boundar
 
 /// Vertices of open edges that lie on another open edge, not farther than `distance_max` from it, in order of the edges.
 ///
-/// A vertex as near to an end of the edge is no junction, only a gap. Of several on one edge each is told.
+/// A vertex near an end of the edge is a gap, not a junction. Several vertices on one edge are all listed.
 pub fn t_junctions(
     surface: &Surface,
     closedness: &Closedness,

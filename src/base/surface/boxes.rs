@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::geom::{Aabb, HilbertFrame, Point};
-use crate::storage::{FrozenSpillVec, Keyed, ScratchSpace, parallel, raise};
+use crate::storage::{FrozenSpillVec, KeyedId, ScratchSpace, parallel, raise};
 
 /// Things in one leaf.
 const LEAF: usize = 4;
@@ -15,7 +15,7 @@ const AT_ONCE: usize = 1 << 16;
 
 /// Boxes of things in Hilbert order of their middles, and of groups of groups of them.
 ///
-/// About 52 bytes per thing and a third of that for the tree: in memory, or in scratch files where the room is too small.
+/// Memory: about 52 bytes per item and a third of that for the tree, in memory or in scratch files.
 #[derive(Clone, Debug)]
 pub struct BoxTree {
     /// Numbers in curve order.
@@ -39,16 +39,16 @@ impl BoxTree {
         box_of: impl Fn(u32) -> Aabb + Sync,
     ) -> Self {
         let frame = HilbertFrame::new(bounds);
-        let mut sorter = scratch.sorter::<Keyed>();
+        let mut sorter = scratch.sorter::<KeyedId>();
         for first in (0..n).step_by(AT_ONCE) {
             let some = first..n.min(first.saturating_add(AT_ONCE as u32));
-            let keys: Vec<Keyed> = parallel(|| {
+            let keys: Vec<KeyedId> = parallel(|| {
                 some.into_par_iter()
                     .filter(|&i| keep(i))
                     .map(|i| {
                         let Aabb { low, high } = box_of(i);
                         let key = frame.index((low + high) * 0.5);
-                        Keyed { key, id: i }
+                        KeyedId { key, id: i }
                     })
                     .collect()
             });

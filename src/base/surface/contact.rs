@@ -6,7 +6,7 @@ use robust::Coord;
 
 use crate::geom::{Point, orient};
 
-/// What kind of contact two triangles have where they should have none.
+/// The kinds of contact between two triangles that should not touch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ContactKind {
     /// An edge of one goes through the inside of the other.
@@ -55,7 +55,7 @@ pub struct Contact {
     pub at: Point,
 }
 
-/// Whether triangles `p` and `q` touch elsewhere than in the vertices and the edge they share, and how.
+/// Returns whether triangles `p` and `q` touch elsewhere than in the vertices and the edge they share, and how.
 ///
 /// `p_ids` and `q_ids` are the vertices' ids; equal ids mean equal points and the reverse. Both triangles
 /// must have area. Triangles of the same three vertices give `None`: they are duplicates.
@@ -91,8 +91,8 @@ pub fn contact(p: [Point; 3], p_ids: [u32; 3], q: [Point; 3], q_ids: [u32; 3]) -
 #[inline]
 pub(super) fn side(t: &[Point; 3], x: Point) -> i8 {
     let [a, b, c] = *t;
-    // Four points of an axis plane are so common in made surfaces that they get a way past the
-    // expansions: they always end there, because the determinant is zero.
+    // Four points of an axis-parallel plane are common in generated surfaces. They skip the expansions, which would
+    // always be reached, because the determinant is zero.
     let flat = a.cmpeq(b) & b.cmpeq(c) & c.cmpeq(x);
     if flat.any() {
         return 0;
@@ -249,7 +249,7 @@ impl Projection {
         sign(robust::orient2d(self.flat(a), self.flat(b), self.flat(c)))
     }
 
-    /// Whether two triangles of one plane with the same first vertex share nothing else: no side of either's corner there is in the
+    /// Returns whether two triangles of one plane with the same first vertex share nothing else: no side of either's corner there is in the
     /// other's. Most that share a vertex in an even wall do not, and this costs a third of looking for contacts.
     fn are_corners_apart(self, p: &[Point; 3], q: &[Point; 3]) -> bool {
         let is_apart = |t: &[Point; 3], other: &[Point; 3]| {
@@ -279,7 +279,7 @@ impl Projection {
         found
     }
 
-    /// Turns of `x` about the edges of `t`, made positive inside.
+    /// Turns of `x` about the edges of `t`, positive inside.
     pub(super) fn turns_about(self, t: &[Point; 3], x: Point) -> [i8; 3] {
         let hand = self.turn(t[0], t[1], t[2]);
         [0, 1, 2].map(|k| hand * self.turn(t[k], t[(k + 1) % 3], x))

@@ -1,4 +1,4 @@
-//! What can be wrong with a surface, in words, with the place and the way out.
+//! Defects of a surface: message, place and suggestion.
 
 use super::contact::ContactKind;
 use super::embedded_set::EmbedError;
@@ -10,7 +10,7 @@ pub enum SurfaceError {
     /// There are too many vertices, triangles or labels to number.
     #[error("the surface has more than {limit} {what}")]
     TooLarge {
-        /// What there is too much of.
+        /// Kind of the items.
         what: &'static str,
         /// The most allowed.
         limit: usize,
@@ -55,7 +55,7 @@ pub enum SurfaceError {
         /// Its longest extent.
         extent: f64,
     },
-    /// Validation found defects; the first of the worst kind is told.
+    /// Validation found defects; the error has the first of the worst kind.
     #[error("{defect}")]
     Invalid {
         /// The first defect of the worst kind.
@@ -98,7 +98,7 @@ impl SurfaceError {
         }
     }
 
-    /// What to do about it.
+    /// A suggestion for the user.
     pub fn help(&self) -> &'static str {
         match self {
             Self::TooLarge { .. } => "split the surface into parts and mesh them one by one",
@@ -123,12 +123,12 @@ pub enum Defect {
     Degenerate {
         /// The triangle.
         triangle: u32,
-        /// Whether two corners are one vertex.
+        /// True if two corners are one vertex.
         repeated: bool,
         /// Its corners.
         corners: [Point; 3],
     },
-    /// The same three vertices twice in the same cyclic order.
+    /// Three vertices that occur twice in the same cyclic order.
     #[error("triangle {} repeats triangle {}", triangles[1], triangles[0])]
     Duplicate {
         /// The two triangles.
@@ -148,7 +148,7 @@ pub enum Defect {
         from: Point,
         /// Where the edge ends.
         to: Point,
-        /// A vertex that lies on the edge, or as good as: a T-junction.
+        /// A vertex that lies on the edge, or nearly: a T-junction.
         junction: Option<Point>,
     },
     /// Two triangles touch elsewhere than in the vertices and edges they share.
@@ -163,7 +163,7 @@ pub enum Defect {
     },
 }
 
-/// A position, for messages: the numbers as they are, very large and very small ones with a power of ten.
+/// A position for messages; very large and very small numbers have a power of ten.
 pub fn show(p: Point) -> String {
     let [x, y, z] = p.to_array().map(show_number);
     format!("({x}, {y}, {z})")
@@ -223,7 +223,7 @@ impl Defect {
         }
     }
 
-    /// What to do about it.
+    /// A suggestion for the user.
     pub fn help(&self) -> &'static str {
         match self {
             Self::Empty => "choose a file that holds triangles",

@@ -1,7 +1,8 @@
-//! Triangles divided where vertices of wires lie on them.
+//! Divides triangles at embedded vertices that lie on them.
 //!
-//! A vertex exactly inside a triangle divides it in three, one exactly on an edge divides each triangle that has the edge in two: the
-//! surface stays the same set of points. A vertex that is a rounding error beside would bend it, and divides nothing.
+//! A vertex exactly inside a triangle divides it in three. A vertex exactly on an edge divides each triangle at that
+//! edge in two. The surface stays the same set of points. A vertex off the triangle by a rounding error would bend the
+//! surface, so it divides nothing.
 
 use std::collections::HashMap;
 
@@ -16,8 +17,8 @@ use crate::storage::ScratchSpace;
 impl Surface {
     /// Divides triangles where vertices of `set` lie exactly on them; returns how many of these there are.
     ///
-    /// Labels and sheets stay; what holds wires that are there goes, see [`Surface::add_support_triangles`]. Triangles stand where the one was that
-    /// they are of. Memory: beside the tree some 200 bytes for each vertex.
+    /// Labels and sheets are kept; support triangles are dropped, see [`Surface::add_support_triangles`]. The parts of
+    /// a triangle stand at its place in the order. Memory: about 200 bytes for each vertex and the tree.
     ///
     /// # Errors
     /// [`SurfaceError::TooLarge`].
@@ -49,7 +50,7 @@ impl Surface {
         }
         self.points = points;
         if n > 0 {
-            // Edges that the wires have among the new ones are not swapped.
+            // New edges that are embedded edges are not swapped.
             let own = self.embedded.edges.len();
             let edges = set.edges.iter();
             (self.embedded.edges).extend(edges.map(|[a, b, _]| [vertices[a], vertices[b], 0]));
@@ -82,7 +83,7 @@ impl Surface {
 /// Triangles, pieces of them and pieces of pieces.
 struct TrianglePieces {
     corners: Vec<[u32; 3]>,
-    /// What a triangle was divided into: so many from this one on.
+    /// The parts of a divided triangle: number of the first, and count.
     parts: HashMap<u32, (u32, u32)>,
 }
 

@@ -7,7 +7,7 @@ use super::Surface;
 use crate::geom::Point;
 use crate::storage::{ScratchSpace, SpillVec, parallel, raise, sort_record};
 
-/// What edges alone tell about a surface.
+/// Properties of a surface that follow from its edges.
 ///
 /// A facet given twice with opposite orientation is one two-sided facet and counts once at its edges.
 /// Lists are sorted by triangle.
@@ -19,11 +19,11 @@ pub struct Closedness {
     pub open: Vec<(u32, [u32; 2])>,
     /// Edges with one triangle that is part of a sheet, where the sheet ends inside.
     pub n_free: usize,
-    /// Connected groups of open edges: the rims of the holes.
+    /// Connected groups of open edges: boundary loops of the holes.
     pub n_open_loops: usize,
     /// Edges with three or more facets.
     pub n_nonmanifold: usize,
-    /// Of those, the ones with an odd number: walls that divide a volume.
+    /// Non-manifold edges with an odd number of facets: walls that divide a volume.
     pub n_odd: usize,
     /// Edges of two triangles that run along them in the same direction.
     pub n_inconsistent: usize,
@@ -38,7 +38,7 @@ pub struct Closedness {
 }
 
 impl Closedness {
-    /// Whether every edge has a second facet.
+    /// Returns whether every edge has a second facet.
     pub fn is_closed(&self) -> bool {
         self.open.is_empty()
     }
@@ -103,7 +103,7 @@ impl TriangleAtEdge {
     }
 }
 
-/// Whether two uses of one edge run along it in the same direction.
+/// Returns whether two uses of one edge run along it in the same direction.
 pub(super) fn same_direction(surface: &Surface, a: TriangleAtEdge, b: TriangleAtEdge) -> bool {
     a.is_forward(surface) == b.is_forward(surface)
 }
@@ -201,7 +201,7 @@ impl Facets {
     }
 }
 
-/// Whether triangle `t` has no area, exactly: `Some(true)` when a vertex is repeated.
+/// Returns whether triangle `t` has no area, exactly: `Some(true)` when a vertex is repeated.
 fn collapse(surface: &Surface, t: u32) -> Option<bool> {
     let [a, b, c] = surface.triangles[t as usize];
     if a == b || b == c || c == a {
@@ -253,7 +253,7 @@ fn repetitions(
     (duplicates, two_sided)
 }
 
-/// Whether sorting the vertices takes an odd number of exchanges.
+/// Returns whether sorting the vertices takes an odd number of exchanges.
 fn is_odd([a, b, c]: [u32; 3]) -> bool {
     (a < b) ^ (b < c) ^ (c < a)
 }
@@ -324,7 +324,7 @@ pub(super) fn ends(open: &[(u32, [u32; 2])]) -> Vec<u32> {
     vertices
 }
 
-/// Whether three points lie on a line, exactly.
+/// Returns whether three points lie on a line, exactly.
 pub(super) fn in_line(a: Point, b: Point, c: Point) -> bool {
     let flat = |axis: fn(Point) -> Coord<f64>| robust::orient2d(axis(a), axis(b), axis(c)) == 0.0;
     flat(|p| Coord { x: p.x, y: p.y })

@@ -1,6 +1,7 @@
-//! A surface with wires in it: they are added, checked and held.
+//! Embedded edges and points of a surface: adding, checking, supporting.
 //!
-//! A point is a vertex that no triangle uses. An edge that no triangle has is held by a fin: a triangle of its own beside it, see `fins`.
+//! An embedded point is a vertex that no triangle uses. An embedded edge that no triangle has gets a support triangle
+//! (`support_triangles`).
 
 use std::collections::HashMap;
 
@@ -14,15 +15,15 @@ use super::{BoxTree, Surface, SurfaceError};
 use crate::geom::{Aabb, Point};
 use crate::storage::ScratchSpace;
 
-/// An edge or a point this near to something else, as a share of the box diagonal, is refused: a vertex beside it is rounded to some 1e-16
-/// of the diagonal, and directions must stay known to several digits.
+/// Edges and points nearer to another part than this share of the box diagonal are refused. A vertex next to them is
+/// rounded to about 1e-16 of the diagonal, and directions need several correct digits.
 pub(super) const NEAR_SHARE: f64 = 1e-10;
 
 /// Bytes it takes to embed an edge or a point.
 const BYTES_EACH: u64 = 256;
 
 impl Surface {
-    /// Whether it has embedded edges or points.
+    /// Returns whether it has embedded edges or points.
     pub fn has_embedded(&self) -> bool {
         !self.embedded.edges.is_empty() || !self.embedded.points.is_empty()
     }
@@ -34,18 +35,18 @@ impl Surface {
         alone.map(|(&[v, _], &size)| (v, size)).collect()
     }
 
-    /// Whether triangle `t` is not of the input, but holds an edge of a wire.
+    /// Returns whether triangle `t` is not part of the input, but supports an embedded edge.
     #[inline]
     pub fn is_support_triangle(&self, t: u32) -> bool {
         self.embedded.first_support.is_some_and(|[first, _]| t >= first)
     }
 
-    /// Number of triangles, without those that hold edges of wires.
+    /// Number of triangles, without support triangles.
     pub fn n_input_triangles(&self) -> usize {
         self.embedded.first_support.map_or(self.n_triangles(), |[first, _]| first as usize)
     }
 
-    /// Number of vertices, without those that only hold edges of wires.
+    /// Number of vertices, without those of support triangles alone.
     pub fn n_input_vertices(&self) -> usize {
         self.embedded.first_support.map_or(self.n_vertices(), |[_, first]| first as usize)
     }
@@ -150,7 +151,7 @@ impl Surface {
         SurfaceError::check_size("triangles", self.n_triangles() + self.embedded.edges.len())
     }
 
-    /// Without the triangles that hold edges of wires, and their vertices.
+    /// Removes support triangles and their vertices.
     pub(super) fn drop_support_triangles(&mut self) {
         if let Some([triangle, vertex]) = self.embedded.first_support.take() {
             self.triangles.truncate(triangle as usize);
@@ -163,7 +164,7 @@ impl Surface {
         }
     }
 
-    /// The same without edges and points.
+    /// A copy without embedded edges and points.
     pub fn without_embedded(&self) -> Self {
         let mut plain = self.clone();
         plain.drop_support_triangles();
@@ -173,7 +174,7 @@ impl Surface {
         plain
     }
 
-    /// Checks edges and points, adds fins, and finds the sizes at points.
+    /// Checks edges and points, adds support triangles, and finds the sizes at points.
     ///
     /// # Errors
     /// As [`Surface::embed_set`].
@@ -191,14 +192,14 @@ impl Surface {
         self.set_point_sizes(scratch)
     }
 
-    /// Edge `e` of the wires.
+    /// Embedded edge `e`.
     pub(super) fn embedded_edge(&self, e: u32) -> EmbeddedEdge {
         let [a, b, _] = self.embedded.edges[e as usize];
         let ids = [a, b];
         EmbeddedEdge { ids, ends: ids.map(|v| self.points[v as usize]) }
     }
 
-    /// A tree over those edges of wires that `keep` accepts.
+    /// A tree over the embedded edges that `keep` accepts.
     pub(super) fn embedded_edge_tree(
         &self,
         scratch: &ScratchSpace,
@@ -208,19 +209,19 @@ impl Surface {
         BoxTree::new(&self.bounds(), self.embedded.edges.len() as u32, scratch, keep, box_of)
     }
 
-    /// What edge `e` is called in messages: its number among those of its label.
+    /// Name of edge `e` in messages: its number among the edges of its label.
     pub fn edge_name(&self, e: usize) -> String {
         let labels = self.embedded.edges[..=e].iter().map(|edge| edge[2]);
         self.name_of("edge", labels)
     }
 
-    /// The same of point `p`.
+    /// Name of point `p` in messages: its number among the points of its label.
     pub fn point_name(&self, p: usize) -> String {
         let labels = self.embedded.points[..=p].iter().map(|point| point[1]);
         self.name_of("point", labels)
     }
 
-    /// `labels`: of the wires up to the one to be named.
+    /// `labels`: labels of all edges (or points) up to the one to be named.
     fn name_of(&self, kind: &str, labels: impl DoubleEndedIterator<Item = u32>) -> String {
         let mut labels = labels.rev();
         let label = labels.next().unwrap_or_default();
@@ -250,7 +251,8 @@ impl Surface {
         Ok(())
     }
 
-    /// Of each edge whether no triangle has it. Errors: what touches triangles and edges elsewhere than in common vertices.
+    /// Returns for each edge whether no triangle has it. Errors: contacts of edges and points with triangles or edges
+    /// outside common vertices.
     fn refuse_contacts(
         &self,
         triangles: &BoxTree,

@@ -1,4 +1,4 @@
-//! How an edge or a point of a wire touches triangles and other edges, by exact signs.
+//! Contacts of embedded edges and points with triangles and other edges, by exact signs.
 
 use super::contact::{Contact, ContactKind, Projection, edge_meets, segment_in_plane, side};
 use crate::geom::{Point, orient};
@@ -10,7 +10,7 @@ pub(super) struct EmbeddedEdge {
     pub ends: [Point; 2],
 }
 
-/// What an edge is to a triangle.
+/// Relation of an edge to a triangle.
 pub(super) enum EdgeAtTriangle {
     /// They share a vertex at most.
     Apart,
@@ -20,7 +20,7 @@ pub(super) enum EdgeAtTriangle {
     Touching(Contact),
 }
 
-/// Whether `t` has an area, without which the signs below mean nothing.
+/// Returns whether `t` has an area, without which the signs below mean nothing.
 pub(super) fn has_area(t: &[Point; 3]) -> bool {
     Projection::of(t).turn(t[0], t[1], t[2]) != 0
 }
@@ -33,7 +33,7 @@ impl EmbeddedEdge {
         places.filter_map(place).collect()
     }
 
-    /// What it is to triangle `t`, which has an area.
+    /// Relation of the edge to triangle `t`, which must have an area.
     pub fn at_triangle(&self, t: [Point; 3], t_ids: [u32; 3]) -> EdgeAtTriangle {
         let [a, b] = self.ends;
         let touch = match self.shared(&t_ids).as_slice() {
@@ -89,7 +89,7 @@ impl EmbeddedEdge {
     }
 }
 
-/// Whether the edge from the first corner of `t` to `x` lies in the plane of `t` and goes into it, or along its side.
+/// Returns whether the edge from the first corner of `t` to `x` lies in the plane of `t` and goes into it, or along its side.
 fn leaves_into(x: Point, t: [Point; 3]) -> Option<Contact> {
     if side(&t, x) != 0 {
         return None;
@@ -113,7 +113,7 @@ pub(super) fn point_at_triangle(p: Point, t: &[Point; 3]) -> Option<Contact> {
     }
 }
 
-/// Whether `p`, which is no end of it, lies on an edge.
+/// Returns whether `p`, which is no end of it, lies on an edge.
 pub(super) fn is_on_edge(p: Point, [a, b]: [Point; 2]) -> bool {
     a.min(b).cmple(p).all() && p.cmple(a.max(b)).all() && !has_area(&[a, b, p])
 }
@@ -137,7 +137,7 @@ mod tests {
         [0, 1, 2].map(|i| a[i] - b[i])
     }
 
-    /// Whether two closed edges between whole points share a point, by solving for it.
+    /// Returns whether two closed edges between whole points share a point, by solving for it.
     fn share_a_point([p, a]: [Whole; 2], [q, b]: [Whole; 2]) -> bool {
         let (u, v, w) = (less(a, p), less(b, q), less(q, p));
         let n = cross(u, v);

@@ -3,7 +3,7 @@
 use super::contact::ContactKind;
 use crate::geom::Point;
 
-/// Edges and points of a surface that are no parts of its triangles, or are to be known by a name of their own.
+/// Embedded edges and points: not parts of triangles, or parts with a name of their own.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Embedded {
     /// The vertices of each edge, and its label.
@@ -12,11 +12,11 @@ pub struct Embedded {
     pub points: Vec<[u32; 2]>,
     /// How long edges at each point should be, at most; 0 where the point is a vertex of triangles, which say it.
     pub sizes: Vec<f64>,
-    /// The first triangle that is a fin, and the first vertex that belongs to fins alone.
+    /// The first support triangle, and the first vertex that only support triangles have.
     pub first_support: Option<[u32; 2]>,
 }
 
-/// What a file says of edges and points.
+/// Edges and points read from a file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct EmbeddedSet {
     /// Positions of the vertices, equal ones among them.
@@ -74,7 +74,7 @@ pub enum EmbedError {
         /// How many such pairs there are.
         n: usize,
     },
-    /// There is no room for a tetrahedron of computable size.
+    /// A tetrahedron there would be too small to compute.
     #[error("{what} is nearer to something else than can be meshed{}{}", far(*distance), more(*n))]
     TooNear {
         /// The first of them, and at most nine others.
@@ -120,7 +120,7 @@ impl EmbedError {
         }
     }
 
-    /// What to do about it.
+    /// A suggestion for the user.
     pub fn help(&self) -> &'static str {
         match self {
             Self::NoLength { .. } | Self::Repeated { .. } => {

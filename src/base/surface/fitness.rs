@@ -31,13 +31,13 @@ pub struct Fitness {
     pub edge_max: f64,
     /// Triangles on which every tetrahedron has quality 2 or worse.
     pub forcing_triangles: u64,
-    /// The same with quality 10 or worse.
+    /// Triangles on which every tetrahedron has quality 10 or worse.
     pub hopeless_triangles: u64,
     /// The triangle with the smallest inscribed circle for its longest edge, the first of equal ones: it allows the worst quality.
     pub worst_triangle: u32,
     /// Area of the surface, in squared input units.
     pub area: f64,
-    /// What the surface encloses, each part counted positive; none when it is open.
+    /// Enclosed volume, each part counted positive; `None` if the surface is open.
     pub volume: Option<f64>,
 }
 

@@ -1,13 +1,13 @@
 //! The input: a closed surface of triangles with labels, welded and validated exactly.
 //!
-//! Reading order: [`triangles`](Surface) (what a surface is), `weld` (how readers build one),
-//! `edges` (which triangles meet where), `orientation` (turning triangles the same way), `contact`
-//! (how two triangles touch), `boxes`, `broad` and `stars` (which pairs to look at), `validate` (all of it together),
-//! `defect` (what can be wrong and what to do about it), `boundary_loops` (where it is open), `near` and `repair`
-//! (mending on demand), `fitness` (what mesh its triangles allow), `split` (finer triangles of the same surface),
-//! `seek` (distances and what lies above), `volumes` (what is enclosed), `seeds` (what points say of volumes), `sheets` (embedded triangles with volume on both sides),
-//! `embedded_set` and `wires` (embedded edges and points), `wire_contact` (how they touch), `divide` (triangles divided where they lie
-//! on them), `fins` (what holds edges), `point_sizes`.
+//! Reading order: [`triangles`](Surface) (the surface), `weld` (building one), `edges` (triangles at each edge),
+//! `orientation` (turning triangles alike), `contact` (how two triangles touch), `boxes`, `box_pairs` and `stars`
+//! (pairs that may touch), `validate` (all checks), `defect` (errors and suggestions), `boundary_loops` (open edges),
+//! `weld_near` and `repair` (repair on demand), `fitness` (mesh quality that the triangles allow), `split` (finer
+//! triangles), `seeker` (distances, triangles above a point), `volumes` (enclosed volumes), `seeds` (points that name
+//! volumes), `sheets` (embedded triangles), `embedded_set` and `embedded` (embedded edges and points),
+//! `embedded_contact` (their contacts), `divide` (triangles divided at embedded vertices), `support_triangles` (which
+//! keep embedded edges), `point_sizes`.
 //!
 //! Is not: file formats (`io`), which volumes are filled (`boundary`).
 

@@ -5,7 +5,7 @@ use super::edges::{Facets, Groups, same_direction};
 use super::sheets::each_pair;
 use crate::storage::ScratchSpace;
 
-/// What [`orient_alike`] did.
+/// Result of [`orient_alike`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Orientation {
     /// Triangles turned round, in increasing order.
@@ -26,7 +26,7 @@ pub fn orient_alike(surface: &mut Surface) -> Orientation {
     orient_alike_with(surface, &ScratchSpace::boundless())
 }
 
-/// [`orient_alike`] in a room: of a surface that has nothing to be turned, 5 bytes a triangle are held beside it.
+/// [`orient_alike`] within scratch space. A surface that needs no turning takes 5 bytes a triangle of memory.
 ///
 /// A scratch file that fails unwinds.
 pub fn orient_alike_with(surface: &mut Surface, scratch: &ScratchSpace) -> Orientation {
@@ -112,7 +112,7 @@ impl NeighborLink {
         self.0 >> 1
     }
 
-    /// Whether the two run along their edge in the same direction.
+    /// Returns whether the two run along their edge in the same direction.
     fn is_unlike(self) -> bool {
         self.0 & 1 == 1
     }

@@ -1,4 +1,4 @@
-//! How long edges at embedded points may be, and which wires are nearer to something else than can be meshed.
+//! Edge lengths at embedded points; refusal of edges and points that are too near to something else.
 
 use std::collections::HashMap;
 
@@ -61,7 +61,8 @@ impl Surface {
         .into())
     }
 
-    /// Refuses edges with an end that is no vertex of a triangle but too near to one. To be called without fins.
+    /// Refuses edges with an end that no triangle has but that is too near to a triangle. Call without support
+    /// triangles.
     pub(super) fn refuse_near_ends(&self, seeker: &Seeker) -> Result<(), EmbedError> {
         let least = NEAR_SHARE * self.bounds().diagonal();
         let is_used = self.used_vertices(&self.triangles);
@@ -77,7 +78,7 @@ impl Surface {
         self.refuse_near(&edges, near.first().map(|&(_, distance)| distance))
     }
 
-    /// The error for edges without room, if there are any, and how near the first one is to something else.
+    /// The error for edges that are too near to something else, if there are any; `distance` is that of the first one.
     pub(super) fn refuse_near(
         &self,
         edges: &[usize],

@@ -9,11 +9,11 @@ use crate::geom::Point;
 pub struct Seed {
     /// Where it is.
     pub point: Point,
-    /// What it says.
+    /// Region or hole.
     pub kind: SeedKind,
 }
 
-/// What a [`Seed`] says of the volume around it.
+/// Meaning of a [`Seed`] for the volume around it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum SeedKind {
     /// It is filled, and called so.

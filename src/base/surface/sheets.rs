@@ -6,13 +6,13 @@ use super::{SourceFile, Surface, SurfaceError};
 use crate::storage::ScratchSpace;
 
 impl Surface {
-    /// Whether triangle `t` is part of an embedded sheet.
+    /// Returns whether triangle `t` is part of an embedded sheet.
     #[inline]
     pub fn is_sheet(&self, t: u32) -> bool {
         self.sheets.get(t as usize).is_some_and(|&is_sheet| is_sheet)
     }
 
-    /// Whether it has embedded sheets.
+    /// Returns whether it has embedded sheets.
     pub fn has_sheets(&self) -> bool {
         !self.sheets.is_empty()
     }
@@ -120,7 +120,7 @@ impl Surface {
 
 /// Edges of shells with the number of their triangles, while triangles go.
 struct OpenEdges {
-    /// Of each triangle; those left out have none.
+    /// Edges of each triangle; triangles that are left out have none.
     edges: Vec<[u32; 3]>,
     /// How many triangles an edge has, and their numbers added bit by bit: of one triangle, its number.
     uses: Vec<(u32, u32)>,

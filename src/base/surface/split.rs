@@ -20,14 +20,14 @@ const LONG: f64 = std::f64::consts::SQRT_2;
 const INSIDE: f64 = 0.7;
 /// Passes of swaps end after this many even if they still gain.
 const SWAP_PASSES: u32 = 12;
-/// Triangles have 32-bit numbers; a wanted length that asks for more is refused before memory is.
+/// Triangles have 32-bit numbers; a wanted length that needs more is refused before memory runs out.
 const TRIANGLES_MAX: usize = 1 << 30;
 
 /// Bytes held for a triangle: itself, its input triangle, and one and a half edges in a table that doubles. Measured with the sizes it is divided by:
 /// 226 to 235.
 const BYTES_TRIANGLE: u64 = 240;
 
-/// What was done.
+/// Counts of a split.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct SplitReport {
     /// Edges divided.
@@ -45,11 +45,12 @@ fn edge(a: u32, b: u32) -> EdgeKey {
     (a.min(b), a.max(b))
 }
 
-/// Divides the triangles of `surface`; `h` tells the wanted edge length at a position.
+/// Divides the triangles of `surface`; `h` is the wanted edge length at a position.
 ///
-/// New triangles keep label and orientation; they stand in the place of the triangle they came from and behind the others. Edges of wires
-/// are divided with those of triangles; what holds them goes, see [`Surface::add_support_triangles`].
-/// Memory: `bytes_max` at most. Errors: more triangles than fit it, or than can be numbered.
+/// New triangles keep label and orientation. They stand in the place of the triangle they came from and behind the
+/// others. Embedded edges are divided with the triangles at them; support triangles are dropped, see
+/// [`Surface::add_support_triangles`]. Memory: `bytes_max` at most. Errors: more triangles than fit, or than can be
+/// numbered.
 pub fn split(
     surface: &Surface,
     h: &dyn Fn(Point) -> f64,
@@ -90,8 +91,8 @@ pub fn split(
     Ok((splitter.surface, splitter.report))
 }
 
-/// Swaps edges inside the triangles that `is_divided` where that makes the least angle larger; `parent`: of each triangle the one it is a
-/// part of. Those of wires stay.
+/// Swaps edges inside the triangles for which `is_divided` holds, if that raises the least angle. `parent`: the
+/// triangle that each triangle is a part of. Embedded edges stay.
 pub(super) fn swap_inside(
     surface: Surface,
     parent: Vec<u32>,
@@ -107,12 +108,12 @@ struct Splitter {
     /// Input triangle of each triangle.
     parent: Vec<u32>,
     around: IdMap<EdgeKey, Vec<u32>>,
-    /// Edges of wires, by their places among these. They are not swapped, and divided with the triangles they are edges of.
+    /// Embedded edges, with their positions in the list. They are not swapped, and are divided with their triangles.
     embedded: IdMap<EdgeKey, usize>,
     report: SplitReport,
 }
 
-/// Lengths as bits, which order as they do, for positive numbers.
+/// Length as bits, which order like the positive numbers they represent.
 type Ordered = (u64, Reverse<EdgeKey>);
 
 impl Splitter {
@@ -148,7 +149,7 @@ impl Splitter {
         }
     }
 
-    /// Whether the triangles at an edge are parts of one input triangle.
+    /// Returns whether the triangles at an edge are parts of one input triangle.
     fn is_inside(&self, e: EdgeKey) -> bool {
         match self.around.get(&e).map(Vec::as_slice) {
             Some(&[x, y]) => self.parent[x as usize] == self.parent[y as usize],
@@ -274,7 +275,7 @@ impl Splitter {
             let angles = triangles.map(|t| self.least_sine(t));
             angles[0].min(angles[1])
         };
-        // Of the quadrilateral a d b c, the other diagonal; both triangles must turn as the old ones do.
+        // The other diagonal of the quadrilateral a d b c; both new triangles must turn as the old ones do.
         let (old, new) = ([[a, b, c], [b, a, d]], [[a, d, c], [d, b, c]]);
         let normal = self.normal([a, b, c]);
         if new.iter().any(|&t| self.normal(t).dot(normal) <= 0.0)

@@ -19,7 +19,8 @@ use super::{BoxTree, Surface};
 use crate::geom::{Aabb, Point};
 use crate::storage::ScratchSpace;
 
-/// Triangles at a vertex or an edge that make a star: some ten thousand pairs are looked at as before. Not tuned.
+/// Triangles at a vertex or an edge that make a star. Below it some ten thousand pairs are tested one by one. Not
+/// tuned.
 const STAR_MIN: u32 = 256;
 /// Beyond the error of a direction's three roundings.
 const PAD: f64 = 1e-14;
@@ -29,10 +30,10 @@ const ROUNDED: f64 = 1e-10;
 const NEAR_TURN: f64 = 0.05;
 /// A direction this near to the end of an arc counts as on it.
 const NEAR_END: f64 = 1e-9;
-/// Triangles beside a star that are looked at between two looks at how much was found.
+/// Triangles near a star that are tested between two checks of the number found.
 const AT_ONCE: usize = 1 << 14;
 
-/// What the triangles of a star share.
+/// The common vertex or edge of a star.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum Center {
     Vertex(u32),
@@ -41,14 +42,14 @@ enum Center {
 
 /// Triangles with a center in common.
 struct TriangleStar {
-    /// Of the edge they share, or the vertex twice.
+    /// Ends of the common edge, or the common vertex twice.
     ends: [Point; 2],
     /// Direction of the edge, if it is one.
     axis: Option<Point>,
     members: Vec<u32>,
     /// Around its triangles.
     bounds: Aabb,
-    /// Of their directions, numbered as `members`.
+    /// Tree over their directions, numbered as `members`.
     tree: BoxTree,
 }
 
@@ -176,7 +177,7 @@ impl TriangleStar {
                 None => away,
             };
             let length = across.length();
-            // What rounding leaves of a point on the axis has no direction.
+            // A point on the axis has no direction beyond rounding.
             if length <= ROUNDED * away.length() {
                 return EVERYWHERE;
             }
@@ -229,12 +230,12 @@ fn angle(u: Point, v: Point) -> f64 {
     u.dot(v).clamp(-1.0, 1.0).acos()
 }
 
-/// Whether the arc between two directions is well below half a turn.
+/// Returns whether the arc between two directions is well below half a turn.
 fn is_short(u: Point, v: Point) -> bool {
     angle(u, v) < PI - NEAR_TURN
 }
 
-/// Whether three directions do not surround the center.
+/// Returns whether three directions do not surround the center.
 fn is_in_sight([u, v, w]: [Point; 3]) -> bool {
     let angles = [angle(u, v), angle(v, w), angle(w, u)];
     angles.iter().all(|a| *a < PI - NEAR_TURN) && angles.iter().sum::<f64>() < TAU - NEAR_TURN
@@ -305,7 +306,7 @@ mod tests {
         builder.finish()
     }
 
-    /// Pairs that touch as far as they are listed, how many there are, and how many were looked at.
+    /// Pairs that touch and are listed, their total, and the number of pairs tested.
     fn found(surface: &Surface) -> (Vec<[u32; 2]>, u64, u64) {
         let looked = AtomicU64::new(0);
         let mut is_left_out = vec![false; surface.n_triangles()];
@@ -359,7 +360,7 @@ mod tests {
         (0..n).map(|i| [a, b, on_circle(i, n, 0.5)]).collect()
     }
 
-    /// Two cones with a common rim, each around its tip.
+    /// Two cones with a common base circle, each a star around its tip.
     fn cones(n: usize) -> Vec<[Point; 3]> {
         let tips = [Point::Z, Point::Z * -0.5];
         let rim = |i: usize| on_circle(i % n, n, 0.0);

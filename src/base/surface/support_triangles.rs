@@ -1,4 +1,4 @@
-//! Fins: what holds the edges of wires.
+//! Support triangles: sheets of one triangle that keep embedded edges.
 //!
 //! ```text
 //!            c           Every step of the mesher keeps triangles, and none of them edges. So an edge a b that no triangle has
@@ -23,9 +23,9 @@ use std::f64::consts::FRAC_1_SQRT_2;
 const EQUILATERAL: f64 = 0.866;
 /// Heights are at most this share of what is left to others: below one half two of them do not meet, and a tetrahedron fits between.
 const DISTANCE_SHARE: f64 = 0.4;
-/// The same of the tangent of half an angle, which is what is left where two edges meet.
+/// Heights are at most this share of the tangent of half the angle where two edges meet.
 const ANGLE_SHARE: f64 = 0.8;
-/// A vertex of a fin is at least this share of the fin's height away from triangles, or there is no room for good tetrahedra between.
+/// Distance of an apex from other triangles, as a share of its height, at least. Nearer apexes force bad tetrahedra.
 const CLEAR_SHARE: f64 = 0.35;
 /// Around an edge, as cosine and sine.
 const DIRECTIONS: [[f64; 2]; 8] = {
@@ -34,7 +34,7 @@ const DIRECTIONS: [[f64; 2]; 8] = {
 };
 
 impl Surface {
-    /// Adds a fin for each edge that `is_free`. Errors: edges too near to something else.
+    /// Adds a support triangle for each edge with `is_free`. Errors: edges too near to something else.
     pub(super) fn push_support_triangles(
         &mut self,
         is_free: &[bool],
@@ -69,7 +69,7 @@ impl Surface {
         Ok(())
     }
 
-    /// How high the fin of each edge may be, for the other edges and the points.
+    /// Greatest height of the support triangle of each edge, limited by other edges and points.
     fn heights_max(&self, is_free: &[bool], scratch: &ScratchSpace) -> Vec<f64> {
         let edges = self.embedded_edge_tree(scratch, |e| is_free[e as usize]);
         let marks = self.embedded.points.iter().map(|&[v, _]| (v, self.points[v as usize]));
@@ -80,7 +80,7 @@ impl Surface {
             let [a, b] = edge.ends;
             let length = a.distance(b);
             *height = EQUILATERAL * length;
-            // What is farther leaves room enough.
+            // Parts farther away do not limit the height.
             let reach = Point::splat(*height / DISTANCE_SHARE);
             let around = Aabb { low: a.min(b) - reach, high: a.max(b) + reach };
             edges.meeting(&around, |f| {
@@ -107,7 +107,7 @@ impl Surface {
         heights_max
     }
 
-    /// The vertex beside edge `e`, `height` away or less, that leaves most room to the triangles; none below `least`.
+    /// The apex at edge `e`, at `height` or less, with the largest distance from other triangles; `None` below `least`.
     fn apex(&self, e: u32, mut height: f64, least: f64, seeker: &Seeker) -> Option<Point> {
         let edge = self.embedded_edge(e);
         let [a, b] = edge.ends;

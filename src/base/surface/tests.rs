@@ -306,7 +306,7 @@ fn a_t_junction_is_divided() {
     assert_eq!((done.divided, done.turned), (1, 0));
     assert!(validate(&surface).is_valid());
     assert_eq!(surface.n_triangles(), 16);
-    // The same seam closed by triangles without area: dropping them opens it, dividing closes it.
+    // The seam closed by triangles without area: dropping them opens it, dividing closes it.
     triangles.extend([[b, middles[1], middles[0]], [b, c, middles[1]]]);
     let mut surface = build(triangles);
     assert_eq!(codes(&surface)[0], "degenerate-triangle");

@@ -9,11 +9,11 @@ use crate::geom::{Aabb, Point};
 
 /// An indexed triangle surface with a label on each triangle.
 ///
-/// Shape: `labels` runs parallel to `triangles` and indexes `label_names`; a triangle's position is
-/// its input id: file order, polygons fanned from their first vertex, files one after the other.
-/// Invariant (when made by [`SurfaceBuilder`](super::SurfaceBuilder)): points are finite, pairwise
-/// different, free of −0.0, each used by a triangle or a wire, in order of first appearance in the files.
-/// Is not: validated. A triangle may be degenerate, the surface open; see [`validate`](super::validate).
+/// Shape: `labels` runs parallel to `triangles` and indexes `label_names`; a triangle's position is its input id: file
+/// order, polygons fanned from their first vertex, files one after the other. Invariant (of a surface from
+/// [`SurfaceBuilder`](super::SurfaceBuilder)): points are finite, pairwise different and free of −0.0. Each is used by
+/// a triangle or an embedded part. They are in order of first appearance in the files. Is not: validated. A triangle
+/// may be degenerate, the surface open; see [`validate`](super::validate).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Surface {
     /// Positions of the vertices.
@@ -26,13 +26,13 @@ pub struct Surface {
     pub label_names: Vec<String>,
     /// The files read, in order.
     pub files: Vec<SourceFile>,
-    /// Whether each triangle is part of an embedded sheet; empty where none is.
+    /// True if each triangle is part of an embedded sheet; empty where none is.
     pub sheets: Vec<bool>,
     /// Embedded edges and points, and what holds them.
     pub embedded: Embedded,
-    /// What a reader found worth telling, in order.
+    /// Notes of the readers, in order.
     pub notes: Vec<Note>,
-    /// What the files say of volumes, in order.
+    /// Seeds from the files, in order.
     pub seeds: Vec<Seed>,
 }
 
@@ -101,16 +101,16 @@ impl Surface {
     }
 }
 
-/// Something the reader did or left out that the user may want to know; not an error.
+/// An action or omission of a reader that the user should see; not an error.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Note {
     /// The file it is about.
     pub file: String,
-    /// What was done or left out.
+    /// The action or omission.
     pub kind: NoteKind,
 }
 
-/// The things a [`Note`] can tell.
+/// Kinds of a [`Note`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum NoteKind {
     /// A text STL ended without `endsolid`.
@@ -142,7 +142,7 @@ pub enum NoteKind {
     },
     /// Points that mark holes or regions of the volume.
     VolumePoints {
-        /// What they mark.
+        /// Holes or regions.
         points: VolumePoints,
         /// How many.
         n: u64,
@@ -154,7 +154,7 @@ pub enum NoteKind {
     },
 }
 
-/// What points inside the volume mark.
+/// Meaning of points inside the volume.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum VolumePoints {
     /// Volumes to leave empty.

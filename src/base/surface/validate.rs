@@ -12,7 +12,7 @@ use crate::storage::ScratchSpace;
 /// Self-intersections listed at most; all are counted.
 const LISTED_MAX: usize = 100_000;
 
-/// What validation found.
+/// Result of a validation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Validation {
     /// Edges, parts, two-sided facets.
@@ -28,7 +28,7 @@ pub struct Validation {
 }
 
 impl Validation {
-    /// Whether the surface may be meshed.
+    /// Returns whether the surface may be meshed.
     pub fn is_valid(&self) -> bool {
         self.n_defects == 0
     }
@@ -64,7 +64,7 @@ pub fn validate(surface: &Surface) -> Validation {
     validate_with(surface, &ScratchSpace::boundless())
 }
 
-/// [`validate`] in a room: 8 bytes a triangle are held beside the surface and 60 for each around a vertex of hundreds, the rest goes to scratch files where the room is too small.
+/// [`validate`] within scratch space. Memory outside it: 8 bytes a triangle, and 60 for each triangle of a star.
 ///
 /// A scratch file that fails unwinds ([`attempt`](crate::storage::attempt)).
 pub fn validate_with(surface: &Surface, scratch: &ScratchSpace) -> Validation {

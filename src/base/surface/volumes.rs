@@ -1,4 +1,4 @@
-//! The volumes a surface encloses, told from its triangles alone.
+//! The volumes that a surface encloses, found from its triangles alone.
 //!
 //! ```text
 //!        \   t2        Around an edge the triangles follow each other by exact signs; between two of them
@@ -37,11 +37,11 @@ pub struct Wall {
 /// Two triangles that are the two sides of one wall are both listed, with the same volumes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Volumes {
-    /// Of each triangle: the volume in front, the volume behind.
+    /// For each triangle: the volume in front, the volume behind.
     pub of_side: Vec<[u32; 2]>,
     /// Number of volumes, the unbounded one included.
     pub n_volumes: u32,
-    /// Of each volume: the sum of its angles at edges, in radians, known to a hundredth each.
+    /// For each volume: the sum of its angles at edges in radians; each angle is correct to a hundredth.
     pub angles: Vec<f64>,
 }
 
@@ -51,8 +51,9 @@ impl Volumes {
         Self::new_in(seeker, &ScratchSpace::boundless())
     }
 
-    /// Sides at open edges are joined, so an open surface encloses nothing. Beside the room's arrays [`VOLUMES_TRIANGLE`] bytes a triangle are held at
-    /// most, which the caller counts; a scratch file that fails unwinds.
+    /// Identifies the volumes within scratch space. Sides at open edges are joined, so an open surface encloses
+    /// nothing. Memory outside the scratch space: [`VOLUMES_TRIANGLE`] bytes a triangle, which the caller leases. A
+    /// scratch file that fails unwinds.
     pub fn new_in(seeker: &Seeker, scratch: &ScratchSpace) -> Self {
         let surface = seeker.surface();
         let n = surface.n_triangles();
@@ -85,7 +86,8 @@ impl Volumes {
                 below = up;
             }
             sides.join(below, outside);
-            // A sheet that is upright, or as good as, is on no line along z; what it lies in is what lies above its middle.
+            // A sheet that is upright, or nearly, is on no line along z. It lies in the volume of whatever is above its
+            // middle.
             if surface.is_sheet(t) && crossings.iter().all(|c| c.triangle != t) {
                 let above = crossings.iter().find(|c| c.z > line.z);
                 sides.join(2 * t, above.map_or(outside, |c| c.sides()[0]));
@@ -264,7 +266,8 @@ fn numbered(surface: &Surface, sides: Groups) -> Volumes {
     let mut of_side = sides.into_roots();
     let outside = of_side.pop().unwrap_or(OUTSIDE);
     let mut numbers = BTreeMap::from([(outside, OUTSIDE)]);
-    // Of one triangle the volume in front comes first, as the mesh's regions do; sheets bound none.
+    // The volume in front of a triangle is numbered before that behind it, like the mesh's regions; sheets bound no
+    // volume.
     for (side, &root) in (0u32..).zip(&of_side) {
         if !surface.is_sheet(side / 2) {
             let next = numbers.len() as u32;

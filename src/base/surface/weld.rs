@@ -47,7 +47,7 @@ impl SurfaceBuilder {
         (self.surface.bytes() + ids * size_of::<u32>()) as u64
     }
 
-    /// Refuses more than fits; to be asked when something is about to grow.
+    /// Refuses to exceed the memory cap; called before an array grows.
     fn check_bytes(&self) -> Result<(), SurfaceError> {
         match self.bytes_max.filter(|&most| self.bytes() > most) {
             None => Ok(()),
@@ -103,7 +103,7 @@ impl SurfaceBuilder {
         Ok(self.table.find_or_add(p, &mut self.surface.points))
     }
 
-    /// The id of the label called `name`, made when it is new.
+    /// The id of the label `name`, which is added if new.
     pub fn label(&mut self, name: &str) -> u32 {
         if let Some(&id) = self.label_ids.get(name) {
             return id;
@@ -279,7 +279,7 @@ pub(super) struct PointTable {
 }
 
 impl PointTable {
-    /// Of points that are all different.
+    /// A table of `points`, which are all different.
     pub(super) fn of(points: &[Point]) -> Self {
         // Half of what it grows to.
         let len = (points.len() + 1).next_power_of_two();

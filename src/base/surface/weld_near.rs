@@ -1,4 +1,4 @@
-//! Joining points that are near each other, for surfaces whose seams do not quite meet.
+//! Joins points that are near each other, for surfaces whose seams do not quite meet.
 
 use std::collections::HashMap;
 

@@ -5,7 +5,7 @@ use super::interface_faces::for_each_interface_face;
 use super::open_cut::OpenCut;
 use super::surface::CuttingSurface;
 use crate::mesh::anatomy::{FROZEN, REQUIRED};
-use crate::mesh::{FaceRef, InterfaceFace, Mesh, Workspace, dense, sparse};
+use crate::mesh::{FaceRef, Mesh, MeshInterfaceFace, Workspace, dense, sparse};
 use tetdb_base::geom::HilbertFrame;
 use tetdb_base::storage::{Pages, Sorter, StorageError, check_cancelled, sort_record};
 use tetdb_schema::page::NONE;
@@ -30,13 +30,13 @@ impl<P: Pages, Q: Pages, R: Pages> ChildBuilder<'_, P, Q, R> {
         if self.high { placement::HIGH } else { 0 }
     }
 
-    /// Whether a vertex of the host that the core does not have is on this side.
+    /// Returns whether a vertex of the host that the core does not have is on this side.
     pub fn is_on_side(&mut self, v: u32) -> bool {
         let p = self.host.point(v);
         (self.open_cut.zone.surface.distance(p) >= 0.0) == self.high
     }
 
-    /// Adds all vertices of the child's tetrahedra; both scratch maps tell their numbers.
+    /// Adds all vertices of the child's tetrahedra. Afterwards both scratch maps have their numbers.
     pub fn add_vertices(
         &mut self,
         order: &HilbertFrame,
@@ -149,7 +149,7 @@ impl<P: Pages, Q: Pages, R: Pages> ChildBuilder<'_, P, Q, R> {
         number
     }
 
-    /// Whether the host's tetrahedron at position `n` goes to this child; then the number in the scratch map.
+    /// Returns whether the host's tetrahedron at position `n` goes to this child; then the number in the scratch map.
     #[inline]
     fn child_tet_of_host(&mut self, n: u32) -> Option<u32> {
         let word = self.host.scratch(self.host_base + n);
@@ -310,7 +310,12 @@ impl<P: Pages, Q: Pages, R: Pages> ChildBuilder<'_, P, Q, R> {
             if high {
                 vertices.swap(1, 2);
             }
-            child.add_interface_face(InterfaceFace { vertices, cut, index, side: u32::from(high) });
+            child.add_interface_face(MeshInterfaceFace {
+                vertices,
+                cut,
+                index,
+                side: u32::from(high),
+            });
             index += 1;
         });
     }
@@ -328,7 +333,8 @@ sort_record! {
     }
 }
 
-/// Of a vertex met in the host alone: after those of the core. Of a source: in the host.
+/// Bit of `met` for a vertex met in the host alone: such vertices come after those of the core. Bit of `source` for an
+/// id of the host.
 const IN_HOST: u32 = 1 << 31;
 
 #[inline]

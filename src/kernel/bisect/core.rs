@@ -22,7 +22,7 @@ pub(super) const SHARED: u32 = 1 << 31;
 pub(super) mod placement {
     use tetdb_schema::page::NONE;
 
-    /// Of neither side and not in the core: its id is not in use.
+    /// On neither side and not in the core: the id is not in use.
     pub(in super::super) const UNUSED: u32 = NONE;
     /// In the core, with its id there.
     pub(in super::super) const IN_CORE: u32 = 1 << 30;
@@ -40,7 +40,7 @@ pub(super) struct Sides {
 }
 
 impl Sides {
-    /// Whether vertices lie on both sides.
+    /// Returns whether vertices lie on both sides.
     pub(super) fn crosses(self) -> bool {
         self.low && self.high
     }
@@ -88,13 +88,13 @@ impl CoreBoundary {
     }
 }
 
-/// Whether `t` was copied into the core, as the scratch map of [`extract`] tells.
+/// Returns whether `t` was copied into the core, by the scratch map of [`extract`].
 pub(super) fn is_in_core<P: Pages>(host: &mut Mesh<P>, t: u32) -> bool {
     let base = dense(host.vertex_ids_end());
     host.scratch(base + dense(t)) & placement::BITS == placement::IN_CORE
 }
 
-/// Copies the core of `host` into the empty `core`; tells the core boundary.
+/// Copies the core of `host` into the empty `core`; returns its boundary.
 ///
 /// Effects: the host's scratch map holds for each vertex the number in the core with [`SHARED`], or else how many were met before it in
 /// tetrahedra out of the core, or [`NONE`]; behind that the [`placement`] of each tetrahedron.
@@ -192,7 +192,7 @@ fn copy_vertex<P: Pages, Q: Pages>(host: &mut Mesh<P>, core: &mut Mesh<Q>, v: u3
     copy
 }
 
-/// Whether a vertex of the core is fixed only because it lies on the core boundary.
+/// Returns whether a vertex of the core is fixed only because it lies on the core boundary.
 pub(super) fn is_held<P: Pages>(core: &mut Mesh<P>, v: u32) -> bool {
     core.vertex_attribute(v).0 == VertexTag::Interface && core.interface_vertex(v).0 == 0
 }

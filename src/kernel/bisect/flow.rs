@@ -23,7 +23,7 @@ enum Root {
 const TERMINAL: u8 = 4;
 const ORPHAN: u8 = 5;
 
-/// What a node is in its tree.
+/// Position of a node in its tree.
 #[derive(Clone, Copy)]
 struct TreePlace {
     root: Root,
@@ -67,9 +67,9 @@ impl FlowArc {
 #[repr(align(64))]
 struct FlowNode {
     arcs: [FlowArc; 4],
-    /// What still fits through each arc, towards the neighbor.
+    /// Residual capacity of each arc, towards the neighbor.
     residual: [u32; 4],
-    /// What still fits from the source and to the sink.
+    /// Residual capacity from the source and to the sink.
     terminal: [u32; 2],
     tree: TreePlace,
 }
@@ -92,7 +92,7 @@ impl Graph {
         self.nodes.clear();
     }
 
-    /// Bytes it has room for.
+    /// Bytes allocated.
     pub(super) fn bytes(&self) -> u64 {
         let queues = (self.active.capacity() + self.orphans.capacity()) * size_of::<u32>();
         (queues + self.nodes.capacity() * size_of::<FlowNode>()) as u64
@@ -112,7 +112,8 @@ impl Graph {
         self.nodes[node as usize].residual[k]
     }
 
-    /// Runs the flow and returns its value, the capacity of the cut. Afterwards [`Graph::is_source_side`] tells the sides.
+    /// Runs the flow and returns its value, the capacity of the cut. Afterwards [`Graph::is_source_side`] returns the
+    /// sides.
     pub(super) fn cut(&mut self) -> u64 {
         self.active.clear();
         self.time = 1;
@@ -136,7 +137,7 @@ impl Graph {
         }
         while let Some(node) = self.active.pop_front() {
             self.tree_mut(node).active = false;
-            // The same node goes on until nothing grows from it.
+            // The same node continues until nothing grows from it.
             while let Some((from, arc)) = self.grow(node) {
                 value += u64::from(self.augment(from, arc));
                 self.adopt_all();
@@ -145,7 +146,7 @@ impl Graph {
         value
     }
 
-    /// Whether the node is on the source's side of the cut nearest to the source.
+    /// Returns whether the node is on the source's side of the cut nearest to the source.
     pub(super) fn is_source_side(&self, node: u32) -> bool {
         self.tree(node).root == Root::Source
     }
@@ -165,7 +166,7 @@ impl Graph {
         self.nodes[node as usize].arcs[k]
     }
 
-    /// What still fits through the arc that leads back along `arc`.
+    /// Residual capacity of the reverse of `arc`.
     #[inline]
     fn inward(&self, arc: FlowArc) -> u32 {
         self.nodes[arc.node() as usize].residual[arc.back()]
@@ -191,7 +192,7 @@ impl Graph {
             if arc == FlowArc::NONE {
                 continue;
             }
-            // What fits away from the terminal of the tree.
+            // Residual capacity away from the terminal of the tree.
             let outward = match tree.root {
                 Root::Source => node.residual[k],
                 _ => self.inward(arc),
@@ -292,7 +293,7 @@ impl Graph {
     fn adopt(&mut self, number: u32) {
         let node = self.nodes[number as usize];
         let root = node.tree.root;
-        // What fits through arc `k` from the neighbor, seen from the terminal of the tree.
+        // Residual capacity through arc `k` from the neighbor, seen from the terminal of the tree.
         let fits = |graph: &Self, k: usize| match root {
             Root::Source => graph.inward(node.arcs[k]) > 0,
             _ => node.residual[k] > 0,

@@ -1,4 +1,4 @@
-//! What a child takes over of facets and interface faces.
+//! Facets and interface faces that a child inherits.
 //!
 //! A facet with a vertex that only one child has lies in that child, with all its tetrahedra. Only those at the core, whose vertices both
 //! may have, are looked up among the required faces there.
@@ -22,7 +22,7 @@ sort_record! {
 
 sort_record! {
     /// A facet or interface face of the host.
-    struct InheritedFace {
+    struct CarriedFace {
         /// In the child, ascending.
         vertices: [u32; 3],
         /// [`FACET`] or [`INTERFACE`].
@@ -109,7 +109,7 @@ impl<P: Pages, Q: Pages, R: Pages> ChildBuilder<'_, P, Q, R> {
 
     fn candidate(
         &mut self,
-        inherited: &mut Sorter<InheritedFace>,
+        inherited: &mut Sorter<CarriedFace>,
         vertices: [u32; 3],
         kind: u8,
         number: u32,
@@ -118,10 +118,10 @@ impl<P: Pages, Q: Pages, R: Pages> ChildBuilder<'_, P, Q, R> {
             return Ok(());
         };
         vertices.sort_unstable();
-        inherited.push(InheritedFace { vertices, kind, number, in_core })
+        inherited.push(CarriedFace { vertices, kind, number, in_core })
     }
 
-    /// Makes room behind the host's scratch map for the numbers of vertices without tetrahedra; returns where.
+    /// Extends the host's scratch map for the numbers of vertices without tetrahedra; returns the begin of that part.
     fn loose_vertices(&mut self) -> u32 {
         let base = self.host_base + dense(self.host.tet_ids_end());
         for n in 0..self.host_base {
@@ -171,8 +171,8 @@ impl<P: Pages, Q: Pages, R: Pages> ChildBuilder<'_, P, Q, R> {
         Ok(())
     }
 
-    /// Takes a facet or interface face over; `face` is where it is, for one that was at the core.
-    fn inherit_face(&mut self, candidate: InheritedFace, face: Option<FaceRef>) {
+    /// Copies a facet or interface face to the child; `face` is its place if it was at the core.
+    fn inherit_face(&mut self, candidate: CarriedFace, face: Option<FaceRef>) {
         let listed = "listed with its vertices";
         if candidate.kind == FACET {
             let mut facet = self.host.facet(candidate.number);
@@ -183,7 +183,7 @@ impl<P: Pages, Q: Pages, R: Pages> ChildBuilder<'_, P, Q, R> {
         let mut kept = self.host.interface_face(candidate.number);
         kept.vertices = self.child_face(kept.vertices).expect(listed).0;
         self.child.add_interface_face(kept);
-        // What was copied out of the host is frozen already.
+        // Tetrahedra copied from the host are frozen already.
         if let Some(face) = face {
             let (region, _) = self.child.tet_attribute(face.tet());
             self.child.set_tet_attribute(face.tet(), region, FROZEN);

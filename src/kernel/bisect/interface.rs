@@ -23,9 +23,9 @@ use tetdb_schema::page::NONE;
 const STRIP: usize = 100_000;
 /// Share of a strip on each side of a border that is cut again, because each was cut without the other.
 const BORDER: usize = 8;
-/// Cost of a tetrahedron of volume h³ on the other side than its middle, for each h that this lies beside the plane. Without, the least cut is as a whole anywhere
-/// between the limits: 0.15 to 0.4 h off, so that a box in 64 had parts of 0.85 to 1.18 of the mean, and not of 0.98 to 1.02; it had 1 % fewer faces, of walls between balls
-/// 6 %.
+/// Cost of a tetrahedron of volume h³ on the other side than its middle, for each h between the middle and the plane.
+/// Without this cost the least cut as a whole lies anywhere between the limits, 0.15 to 0.4 h off: the parts of a box
+/// in 64 had 0.85 to 1.18 of the mean, with it 0.98 to 1.02. It had 1 % fewer faces; for walls between balls 6 %.
 const CENTERED: f64 = 1.0;
 /// Most that costs, as much as several faces: a tetrahedron on a long triangle of the input may be much larger than h³.
 const CENTERED_MOST: f64 = 4.0;
@@ -35,7 +35,7 @@ const SCALE: f64 = 256.0;
 /// How the interface came about.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct InterfaceReport {
-    /// Most bytes the choice held beside the core.
+    /// Most bytes held besides the core.
     pub bytes: u64,
     /// Tetrahedra of the cutting zone.
     pub free_tets: u64,
@@ -49,7 +49,8 @@ pub struct InterfaceReport {
     pub moves: u64,
 }
 
-/// Chooses sides; tells the faces of the natural interface where they are wanted. Effects: its scratch map is used up; `tet_of` must be right.
+/// Chooses sides, and stores the faces of the natural interface in `natural`. Effects: uses up the core's scratch map;
+/// `tet_of` must be right.
 pub(super) fn choose<P: Pages>(
     core: &mut Mesh<P>,
     surface: &impl CuttingSurface,
@@ -207,7 +208,7 @@ fn read_strip<P: Pages>(
     }
 }
 
-/// What it costs to have `tet` on the other side than its middle: where it is no source or sink, that much fits from the one it belongs to.
+/// Cost of `tet` on the other side than its middle, as capacities from the source and to the sink.
 fn pull<P: Pages>(core: &mut Mesh<P>, tet: &Tet, surface: &impl CuttingSurface) -> [u32; 2] {
     let ends = core.ends(tet);
     let [a, b, c, d] = ends.map(|end| end.point);

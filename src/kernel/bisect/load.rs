@@ -37,7 +37,7 @@ const LANES: usize = 2;
 const BLOCK: usize = 64;
 const BLOCKS: usize = 32;
 
-/// A wanted length at each point, asked from several threads.
+/// A wanted length at each point, called from several threads.
 pub type SizeFn<'a> = dyn Fn(Point) -> f64 + Sync + 'a;
 
 /// Corners of a tetrahedron and the sizes there.

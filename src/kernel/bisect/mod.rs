@@ -6,8 +6,8 @@
 //! 4. `interface`: faces of these final tetrahedra are chosen, by a minimum cut and moves; from then on they are required.
 //! 5. `split`: each side becomes a mesh of its own.
 //!
-//! What later vertices could destroy of the tetrahedra at the interface (Z) is frozen, so that what is valid stays valid; whether
-//! they ever wanted to is counted. When they did not, the interface has cost the Delaunay property nothing.
+//! Tetrahedra at the interface (Z) that later vertices could destroy are frozen, so that valid ones stay valid. Hits on
+//! them are counted; if there are none, the interface has cost the Delaunay property nothing.
 //!
 //! Source: the paper, section 1.1.
 
@@ -49,7 +49,7 @@ use crate::refine::{Field, Lengths, RefineReport, saturate};
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::{Pages, StorageError};
 
-/// Ways to go, for comparing what each part of the method brings; the default is the method.
+/// Variants of the method, for comparisons; the default is the method.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Method {
     /// How the wanted length of an edge is found.
@@ -58,7 +58,7 @@ pub struct Method {
     pub plane: PlaneChoice,
 }
 
-/// What a cut is to do.
+/// Parameters of a cut.
 #[derive(Clone, Copy)]
 pub struct CutPlan<'a> {
     /// Number of the cut, from 1.

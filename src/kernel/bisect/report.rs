@@ -1,4 +1,4 @@
-//! What a cut did.
+//! The report of a cut.
 
 use super::interface::InterfaceReport;
 use super::load_profile::ChosenPlane;
@@ -9,9 +9,9 @@ use crate::refine::RefineReport;
 pub struct CutReport {
     /// The plane and the load on its sides.
     pub plane: ChosenPlane,
-    /// What the saturation of the zone did.
+    /// Report of the saturation of the zone.
     pub refine: RefineReport,
-    /// What the choice of the interface did.
+    /// Report of the choice of the interface.
     pub interface: InterfaceReport,
     /// Interface vertices of the cut, which bear its number.
     pub vertices: u32,

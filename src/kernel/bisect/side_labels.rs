@@ -49,7 +49,7 @@ impl SideLabels {
                 }
             }
             if !sides.crosses() {
-                // A middle that rounds to the other side must not tell another side than its vertices.
+                // A middle that rounds to the other side must not contradict its vertices.
                 high = sides.high;
             }
             if may_change {
@@ -75,7 +75,7 @@ impl SideLabels {
         self.by_tet[t as usize] & HIGH != 0
     }
 
-    /// Whether `t` may go to either side.
+    /// Returns whether `t` may go to either side.
     #[inline]
     pub(super) fn is_free(&self, t: u32) -> bool {
         self.by_tet[t as usize] & MAY_CHANGE != 0
@@ -119,7 +119,7 @@ pub(super) fn face_cost(corners: [Point; 3], surface: &impl CuttingSurface) -> f
     1.0 + 0.5 * shape + 0.5 * (1.0 - normal.dot(surface.normal(a)).abs())
 }
 
-/// What an interface is like.
+/// Measures of an interface.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct InterfaceMeasures {
     /// Number of faces.
@@ -176,12 +176,12 @@ pub(super) fn measure<P: Pages>(
     measures
 }
 
-/// Whether face `i` is required for ever, not only as a part of the core boundary.
+/// Returns whether face `i` is required for ever, not only as a part of the core boundary.
 pub(super) fn is_constrained(tet: &Tet, i: usize, core_boundary: &CoreBoundary) -> bool {
     tet.is_required(i) && (tet.neighbor[i].exists() || core_boundary.find(tet.face(i)).is_none())
 }
 
-/// Layers beyond which nobody counts: two are asked for.
+/// Layers counted, at most: two are required.
 const LAYERS_MAX: u32 = 3;
 
 /// The least number of tetrahedra, from face to face, between the interface and the first with a vertex out of the refined zone;
@@ -253,7 +253,7 @@ pub(super) fn layers_least<P: Pages, Q: Pages>(
     Some(LAYERS_MAX)
 }
 
-/// Whether all vertices of `tet` lie in the refined zone at its narrowest.
+/// Returns whether all vertices of `tet` lie in the refined zone at its narrowest.
 fn is_in_zone<P: Pages>(mesh: &mut Mesh<P>, tet: &Tet, surface: &impl CuttingSurface) -> bool {
     tet.vertices().into_iter().all(|v| {
         let (p, h) = mesh.point_and_size(v);

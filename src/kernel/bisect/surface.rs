@@ -1,8 +1,8 @@
-//! What divides space in two.
+//! Surfaces that divide space in two.
 
 use tetdb_base::geom::Point;
 
-/// A surface that cuts a sub-domain. Everything but the choice of a plane asks only this of it.
+/// A surface that cuts a sub-domain. Everything but the choice of a plane uses only this trait.
 pub trait CuttingSurface {
     /// Signed distance of `p`, in input units: negative on the low side.
     fn distance(&self, p: Point) -> f64;

@@ -1,8 +1,8 @@
 //! Write a child: the host's tetrahedra of one side, those of the core with that label, joined at the core boundary.
 //!
-//! Vertices and tetrahedra get their final numbers before they are written: those of vertices by sorting along the curve, those of
-//! tetrahedra by counting, for they follow that of their first vertex. Each record is then written once, at its place. What is read
-//! for it is read in page order, and of the host's tetrahedra those of the child alone: the scratch map says which.
+//! Vertices and tetrahedra get their final numbers before they are written. Vertices are sorted along the curve;
+//! tetrahedra are counted, since they follow their first vertex. Each record is then written once, at its place. Input
+//! is read in page order, and only the child's tetrahedra of the host are read, by the scratch map.
 
 use super::child_builder::ChildBuilder;
 use super::inherit::inherit;

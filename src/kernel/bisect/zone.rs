@@ -36,14 +36,14 @@ impl Zone {
         WIDTH_MIN + WIDTH_NOISE * noise(foot / cell, seed)
     }
 
-    /// Whether no vertex may be added at `p` after the cut. At its noisy limit the zone still has holes that
+    /// Returns whether no vertex may be added at `p` after the cut. At its noisy limit the zone still has holes that
     /// only its surroundings, once refined, let one fill; a tetrahedron at the interface reaches nowhere near there.
     #[inline]
     pub fn is_final(&self, p: Point, h: f64) -> bool {
         self.surface.distance(p).abs() <= WIDTH_MIN * h
     }
 
-    /// Whether `p`, where the wanted length is `h`, lies in the zone.
+    /// Returns whether `p`, where the wanted length is `h`, lies in the zone.
     #[inline]
     pub fn holds(&self, p: Point, h: f64) -> bool {
         let s = self.surface.distance(p).abs();
@@ -51,15 +51,15 @@ impl Zone {
     }
 }
 
-/// The zone of the cut at hand, without what earlier cuts have settled.
+/// The zone of the current cut, without the zones of earlier cuts.
 pub(super) struct InZone<'a> {
     pub zone: &'a Zone,
     pub earlier: &'a [Zone],
     pub h: &'a (dyn Fn(Point) -> f64 + Sync),
 }
 
-/// How far from the surface a zone can reach, in units of h at a point not yet in it: by a third wider than it is, for
-/// the size may grow on the way.
+/// Reach of a zone from the surface, in units of h at a point not yet in it: a third more than its width, because the
+/// size may grow on the way.
 const REACH: f64 = 1.3 * (WIDTH_MIN + WIDTH_NOISE);
 
 impl PlacementRule for InZone<'_> {
@@ -97,9 +97,9 @@ impl PlacementRule for InZone<'_> {
     }
 }
 
-/// Whether one zone holds both ends of an edge: it was saturated there, and what optimization made of it since is final.
+/// Returns whether one zone holds both ends of an edge: the edge was saturated there, and its optimized form is final.
 ///
-/// Rounded sizes tell most edges that are not without asking for those of the field.
+/// Rounded sizes rule out most edges without a call of the field.
 fn both_in_one(
     zones: &[Zone],
     h: &dyn Fn(Point) -> f64,

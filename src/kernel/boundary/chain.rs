@@ -30,7 +30,7 @@ pub(super) enum PatchFailure {
     Vertex(u32),
     /// A required face is crossed.
     Crossed([u32; 3]),
-    /// No double (or exact combination) lies in the room left.
+    /// No double (or exact combination) lies in the open region left.
     Precision(&'static str),
     /// More points or steps than allowed.
     TooMuch,
@@ -84,8 +84,9 @@ impl<P: Pages> RecoveryPatch<'_, P> {
 
     /// Puts a point of the segment `a b` into the cavity, near the middle of the piece that sees all of it.
     ///
-    /// Where that piece is shorter than the effort says, a point farther on is tried first, in a cavity that grows to be
-    /// seen: what has no room here has none either when it leaves the surface.
+    /// If that piece is shorter than the effort's limit, a point farther on is tried first, in a cavity that grows
+    /// until the point sees all of it: a point with too little clearance here would have none either when it leaves the
+    /// surface.
     fn split(&mut self, a: u32, b: u32, cavity: &[u32]) -> Result<u32, PatchFailure> {
         let outer = self.outer_faces(cavity);
         let at: Vec<[Dyadic; 2]> = outer

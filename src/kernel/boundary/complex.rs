@@ -12,7 +12,7 @@ use tetdb_base::storage::Pages;
 pub(super) trait TetComplex {
     /// The record of `t`.
     fn tet(&mut self, t: u32) -> Tet;
-    /// What lies across face `i` of `t`; loads it if need be.
+    /// The face across face `i` of `t`; loads it if need be.
     fn across(&mut self, t: u32, i: usize) -> FaceRef;
     /// A tetrahedron that has `v`.
     fn tet_of(&mut self, v: u32) -> u32;
@@ -26,10 +26,10 @@ pub(super) trait TetComplex {
     /// Tells `face` its neighbor.
     fn set_across(&mut self, face: FaceRef, to: FaceRef);
     fn set_tet_of(&mut self, v: u32, t: u32);
-    /// Whether the edge `a b` must stay although no required face may have it yet.
+    /// Returns whether the edge `a b` must stay although no required face may have it yet.
     fn protects(&self, a: u32, b: u32) -> bool;
 
-    /// Replaces the tetrahedra `old` by tetrahedra with the vertices `new`, which fill the same room.
+    /// Replaces the tetrahedra `old` by tetrahedra with the vertices `new`, which fill the same volume.
     ///
     /// Returns the ids of the new ones, parallel to `new`. Effects: ids of `old` are used again first, in order, and
     /// what is left of them is freed last to first: replacing back restores the very ids. Required faces
@@ -145,7 +145,7 @@ struct CavityFace {
     required: bool,
 }
 
-/// The same three vertices, ascending.
+/// The three vertices, ascending.
 #[inline]
 pub(super) fn sorted(mut face: [u32; 3]) -> [u32; 3] {
     face.sort_unstable();
@@ -184,7 +184,7 @@ impl<P: Pages> PagedComplex<'_, P> {
         }
     }
 
-    /// Whether `v` is not from the input.
+    /// Returns whether `v` is not from the input.
     pub(super) fn is_steiner(&mut self, v: u32) -> bool {
         self.0.vertex_attribute(v).0 == VertexTag::Steiner
     }

@@ -1,4 +1,4 @@
-//! A flat part whose rim is chains becomes a set of faces, through points that lie in it exactly.
+//! Covers a flat part whose outline consists of chains by faces, through points that lie exactly in it.
 //!
 //! From each directed edge with the facet on its left, the shell shows what lies there: a face in the facet's
 //! plane, or a tetrahedron that the plane cuts. The latter has an edge with its ends on both sides, and that edge
@@ -19,7 +19,7 @@ use tetdb_base::storage::Pages;
 /// Points in one facet.
 const POINTS_MAX: usize = 5000;
 
-/// What lies on the left of a directed edge.
+/// The face or crossing on the left of a directed edge.
 enum Left {
     /// The face to this vertex.
     Face(u32),
@@ -28,7 +28,7 @@ enum Left {
 }
 
 impl<P: Pages> RecoveryPatch<'_, P> {
-    /// Covers a flat part by faces; `rim` are the edges of its boundary, in its direction.
+    /// Covers a flat part by faces; `outline` are the edges of its boundary, in its direction.
     ///
     /// Returns the faces, each in the direction of the part.
     pub(super) fn cover(
@@ -97,7 +97,7 @@ impl<P: Pages> RecoveryPatch<'_, P> {
             let j = (i + 1) % n;
             let (x, y) = (around.ring[i], around.ring[j]);
             if side[i] == 0.0 {
-                // A reference off the plane tells left from right.
+                // A reference off the plane distinguishes left from right.
                 let k = (0..n)
                     .find(|&k| side[k] != 0.0)
                     .ok_or(PatchFailure::Broken("a shell is flat"))?;

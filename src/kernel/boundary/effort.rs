@@ -1,7 +1,7 @@
-//! The same patch tried in several ways.
+//! Several attempts at the same patch.
 //!
-//! Where doubles leave little room, it depends on what was flipped before and where the first points went whether the last
-//! one finds a place. Nothing of a failed attempt is written, so others can follow.
+//! Where doubles leave little clearance, success depends on earlier flips and on the places of the first points. A
+//! failed attempt writes nothing, so others can follow.
 
 /// One way to work on a patch.
 #[derive(Clone, Copy, Debug)]

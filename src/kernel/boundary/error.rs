@@ -24,7 +24,7 @@ impl fmt::Display for FacetPlace {
 /// Why a surface did not become the boundary of volumes.
 #[derive(Debug, Error)]
 pub enum BoundaryError {
-    /// These triangles could not be made faces of the mesh.
+    /// Triangles that could not be made faces of the mesh.
     #[error("{} triangles could not be recovered, the first is {}: {reason}{}", facets.len(), facets[0], nearness.map_or(String::new(), |s| format!("; {s}")))]
     NotRecovered {
         /// Never empty.
@@ -52,10 +52,10 @@ pub enum BoundaryError {
         /// Where it is.
         point: Point,
     },
-    /// VolumeRegions are to be filled by seeds, and there is none.
+    /// Regions are to be filled by seeds, but there is no seed.
     #[error("neither a region seed nor a hole is given, and regions are filled by seeds")]
     NoSeed,
-    /// What triangles point out of cannot be decided.
+    /// The outside of the triangles cannot be decided.
     #[error("the triangles do not point out of the same volumes: {what}")]
     Orientation {
         /// Which triangles contradict each other.

@@ -10,7 +10,7 @@ use tetdb_base::geom::{DoublePair, Dyadic, Point, orient};
 #[derive(Clone, Debug)]
 pub(super) struct ExactPoint {
     exact: [Dyadic; 3],
-    /// What the exact one rounds to, and what the rest rounds to.
+    /// The exact point, rounded; and the remainder, rounded.
     rounded: Point,
     rest: Point,
 }
@@ -68,7 +68,7 @@ pub(super) struct PlacedPoint<'a> {
 /// Forward error of the determinant in doubles, as in `geom`.
 const ORIENT_BOUND: f64 = 5.2e-15;
 const EPSILON: f64 = f64::EPSILON;
-/// Forward error of the determinant in pairs of doubles: nine products of 2^-102 and their sums of 2^-104, with room to spare.
+/// Forward error of the determinant in pairs of doubles: nine products of 2^-102 and their sums of 2^-104, with slack.
 const PAIR_BOUND: f64 = EPSILON * EPSILON * 1024.0;
 /// How far a coordinate's difference is off in pairs, as a share of the coordinates: the rests are at most 2^-53 of them, and rounded a few times.
 const PAIR_OFF: f64 = EPSILON * EPSILON * 4.0;

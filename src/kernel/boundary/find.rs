@@ -99,7 +99,7 @@ pub(super) enum Outcome {
     Touches(u32),
 }
 
-/// Ring searches a segment may cost beyond its share, for each edge it crosses.
+/// Additional ring searches that a segment may cost for each edge it crosses.
 ///
 /// With 10 a disc of 200 corners, cut as a fan, is left to 9,800 points; with 40 surfaces with large flat parts spend
 /// twice as long on flips.

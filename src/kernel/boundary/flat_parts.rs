@@ -1,14 +1,14 @@
 //! Missing facets that lie in one plane and meet in missing segments: recovered as one, their own segments afterwards.
 //!
-//! What pierces a flat part of the surface pierces it once, however many narrow facets it is made of: so points are put
-//! where edges pierce the part, not where its segments cross faces, and its segments are reached by turning edges.
+//! An edge pierces a flat part of the surface once, even if the part has many narrow facets. So points are put where
+//! edges pierce the part, not where its segments cross faces. Its segments are recovered by turning edges.
 
 use std::collections::BTreeMap;
 
 use super::complex::TetComplex;
 use super::walk::find_edge;
 
-/// Facets in one plane, each beside the next.
+/// Facets in one plane that share missing segments.
 #[derive(Clone, Debug, Default)]
 pub(super) struct FlatPart {
     /// All turn the same way.
@@ -24,12 +24,12 @@ impl FlatPart {
         Self { facets: vec![f], outline: sides(f).to_vec(), inner: Vec::new() }
     }
 
-    /// Whether `v` is a corner of one of its facets.
+    /// Returns whether `v` is a corner of one of its facets.
     pub(super) fn has(&self, v: u32) -> bool {
         self.facets.iter().any(|f| f.contains(&v))
     }
 
-    /// The same part, each vertex by another name.
+    /// The same part with renamed vertices.
     pub(super) fn renamed(&self, mut name: impl FnMut(u32) -> u32) -> Self {
         let facets = self.facets.iter().map(|f| f.map(&mut name)).collect();
         let mut pairs = |all: &[(u32, u32)]| all.iter().map(|&(a, b)| (name(a), name(b))).collect();
@@ -55,7 +55,7 @@ pub(super) fn flat_parts<S: TetComplex>(s: &mut S, facets: &[[u32; 3]]) -> Vec<F
             at.entry((a.min(b), a.max(b))).or_default().push(i);
         }
     }
-    // Two facets in one plane share the segment, nobody else has it, and it is missing.
+    // Two facets in one plane share the segment, no other facet has it, and it is missing.
     let opposite = |i: usize, (a, b): (u32, u32)| facets[i].into_iter().find(|&v| v != a && v != b);
     at.retain(|&(a, b), owners| {
         let &[i, j] = owners.as_slice() else {

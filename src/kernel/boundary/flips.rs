@@ -1,4 +1,4 @@
-//! Flips that make room for a target: 2-3 flips and edge removal, one inside the other.
+//! Flips towards a target: 2-3 flips and edge removal, one inside the other.
 //!
 //! ```text
 //!         d                   Edge removal: the tetrahedra around c d are replaced by the triangles of
@@ -170,7 +170,7 @@ impl<'a, S: TetComplex> Flipper<'a, S> {
         found
     }
 
-    /// Whether two corners of the ring, not side by side, can be cut off, as every triangulation of four or more does.
+    /// Returns whether two corners of the ring, not side by side, can be cut off, as every triangulation of four or more does.
     ///
     /// Most rings have none: looking at `n` triangles saves the search over `n` cubed.
     fn has_two_ears(&mut self, ring: &[u32], c: u32, d: u32) -> bool {
@@ -181,7 +181,7 @@ impl<'a, S: TetComplex> Flipper<'a, S> {
             if self.s.orient([x, y, z, d]) > 0.0 && self.s.orient([y, x, z, c]) > 0.0 {
                 ears.push(i);
             }
-            // Of three in a ring of four or more, two are not side by side.
+            // Among three ears in a ring of four or more, two are not adjacent.
             if n == 3 || ears.len() == 3 {
                 break;
             }

@@ -14,7 +14,7 @@ use tetdb_base::storage::{Pages, kind};
 /// The component that has the enclosing box.
 pub(super) const OUTSIDE: u32 = 1;
 
-/// What is known of one component.
+/// Measures of one component.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Component {
     pub volume: f64,
@@ -28,11 +28,11 @@ pub(super) struct Component {
 /// Components by number; 0 is none, 1 the outside.
 pub(super) struct Flood {
     pub components: Vec<Component>,
-    /// Of each component one of a lower number that is the same volume, or itself.
+    /// For each component one of a lower number that is the same volume, or itself.
     same: Vec<u32>,
 }
 
-/// Pages looked at before what was found in them is written: a megabyte.
+/// Pages scanned before their results are written: a megabyte.
 const BATCH: usize = 64;
 
 impl Flood {
@@ -65,7 +65,7 @@ impl Flood {
         let mut components = vec![Component::default(); 2];
         let outside = root_of(mesh, part);
         for part in 0..n_parts {
-            // What it hangs on comes before it, and has its component's number already.
+            // Its parent comes before it and already has the component's number.
             let on = mesh.scratch(part);
             let component = if part == outside {
                 OUTSIDE
@@ -151,7 +151,7 @@ fn root_of<P: Pages>(mesh: &mut Mesh<P>, mut part: u32) -> u32 {
     }
 }
 
-/// Tetrahedra before `t` that lie in its component, for no required face is between.
+/// Tetrahedra before `t` in its component: no required face lies between.
 fn before(t: u32, tet: &Tet) -> impl Iterator<Item = u32> {
     let open = (0..4).filter(|&i| tet.neighbor[i].exists() && !tet.is_required(i));
     let across = open.map(|i| tet.neighbor[i].tet());
@@ -239,7 +239,7 @@ struct SumsByComponent;
 struct PageSums {
     /// Tetrahedron, component.
     tets: Vec<(u32, u32)>,
-    /// Component, volume, tetrahedra, for some that follow each other.
+    /// Component, volume, tetrahedra, for a run of consecutive tetrahedra.
     sums: Vec<(u32, f64, u32)>,
 }
 

@@ -36,7 +36,8 @@ pub(super) fn remove_free<S: TetComplex>(s: &mut S, x: u32, least: f64) -> bool 
 
 /// The ball with `x` moved to its neighbor `u`, if all volumes stay positive.
 ///
-/// `blocking` is a place in the ball and is looked at first: what ruled one neighbor out often rules out the next.
+/// `blocking` is a position in the ball and is tested first: the tetrahedron that ruled one neighbor out often rules
+/// out the next.
 pub(super) fn moved<S: TetComplex>(
     s: &mut S,
     x: u32,

@@ -1,8 +1,8 @@
 //! A cavity that grows until a given point sees all its outer faces.
 //!
-//! Flat tetrahedra between nearly coplanar input points leave a point no room in doubles. Across a face the point is
-//! behind, the next tetrahedron joins the cavity, until everything is seen: the opposite of shrinking a cavity, and
-//! like it bounded by required faces.
+//! Flat tetrahedra between nearly coplanar input points leave a point no clearance in doubles. If the point is behind a
+//! face, the tetrahedron across that face joins the cavity, until all faces are seen. This is the opposite of shrinking
+//! a cavity, and like it bounded by required faces.
 
 use super::complex::{TetComplex, edge_key};
 use super::walk::swapped;
@@ -29,7 +29,7 @@ pub(super) enum Obstacle {
 }
 
 impl GrownCavity {
-    /// The same, where no vertex may be lost.
+    /// The cavity, unless it would lose a vertex.
     pub(super) fn without_lost_vertices(self) -> Result<Self, Obstacle> {
         match self.lost.is_empty() {
             true => Ok(self),
@@ -40,8 +40,8 @@ impl GrownCavity {
 
 /// Grows the cavity `seed` for vertex `x`, which is in no tetrahedron yet.
 ///
-/// Faces with vertex `open` are left to the caller, who will close the cavity there with the triangles `walls`.
-/// Errors: [`Obstacle`], when a required face, a kept edge or one of the `taken` tetrahedra would be swallowed.
+/// Faces with vertex `open` are left to the caller, which closes the cavity there with the triangles `walls`. Errors:
+/// [`Obstacle`], if a required face, a kept edge or one of the `taken` tetrahedra would be swallowed.
 pub(super) fn grow<S: TetComplex>(
     s: &mut S,
     seed: &[u32],

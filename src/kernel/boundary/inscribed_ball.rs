@@ -1,7 +1,7 @@
 //! The center of the largest ball inside half-spaces: where a vertex sees everything best.
 //!
 //! Source: R. Seidel, "Small-dimensional linear programming and convex hulls made easy" (1991), on four unknowns: the
-//! center and the radius. Doubles are enough: the answer is a proposal that exact signs accept or refuse.
+//! center and the radius. Doubles suffice: the result is a proposal that exact signs accept or reject.
 
 use tetdb_base::geom::Point;
 
@@ -40,7 +40,7 @@ pub(super) fn clearance(half_spaces: &[HalfSpace], at: Point) -> f64 {
     rooms.fold(f64::INFINITY, f64::min)
 }
 
-/// Factors of the unknowns, their bound behind them; what follows is not looked at.
+/// Factors of the unknowns, followed by their bound; the rest is unused.
 type Row = [f64; 5];
 
 /// Maximizes `goal · x` under `row · x <= bound` and `-1 <= x <= 1`. Of the answer as many numbers count as `goal` has; `deeper` is space for

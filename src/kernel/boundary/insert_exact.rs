@@ -45,7 +45,7 @@ impl<P: Pages> RecoveryPatch<'_, P> {
         Some(x)
     }
 
-    /// The same, where the cavity may grow to be seen whole.
+    /// Like [`Self::star`], but the cavity may grow until the point sees all of it.
     pub(super) fn star_grown(
         &mut self,
         seed: &[u32],

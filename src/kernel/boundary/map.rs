@@ -5,11 +5,11 @@ use std::ops::Range;
 use super::complex::{PagedComplex, TetComplex, edge_key, sorted};
 use super::find::{SearchResult, find_face};
 use super::walk::find_edge;
-use crate::mesh::{FaceRef, Facet, Mesh, Scan, scan_parts};
+use crate::mesh::{FaceRef, Mesh, MeshFacet, Scan, scan_parts};
 use tetdb_base::geom::IdSet;
 use tetdb_base::storage::Pages;
 
-/// What the mesh lacks.
+/// Segments and facets that the mesh lacks.
 ///
 /// Held in memory: a few dozen bytes per missing facet. Order: that of the facets.
 #[derive(Debug, Default)]
@@ -61,7 +61,7 @@ pub(super) fn map<P: Pages>(mesh: &mut Mesh<P>) -> MissingFacets {
             let mut s = PagedComplex(mesh, &none);
             if let Some(face) = face {
                 s.require(face);
-                // No region is known yet: the place serves whoever looks for the facet next.
+                // Regions are not set yet: the field stores the face, for the next search of the facet.
                 facet.regions[0] = face.0;
                 mesh.set_facet(n, facet);
                 continue;
@@ -83,7 +83,7 @@ pub(super) fn map<P: Pages>(mesh: &mut Mesh<P>) -> MissingFacets {
 }
 
 /// The face of a facet that [`map`] has found, where flips have left it.
-pub(super) fn face_at<P: Pages>(mesh: &mut Mesh<P>, facet: &Facet) -> Option<FaceRef> {
+pub(super) fn face_at<P: Pages>(mesh: &mut Mesh<P>, facet: &MeshFacet) -> Option<FaceRef> {
     let face = FaceRef(facet.regions[0]);
     let tet = mesh.tet(face.tet());
     let is_there = tet.is_live()

@@ -1,4 +1,4 @@
-//! A piece of the mesh in memory, where points may be exact; it grows by what is asked of it.
+//! A part of the mesh in memory, where points may be exact; it grows with the tetrahedra requested.
 //!
 //! The mesh is only read until [`RecoveryPatch::commit`] writes the result as one step.
 
@@ -152,7 +152,7 @@ impl<'m, P: Pages> RecoveryPatch<'m, P> {
         v
     }
 
-    /// Whether it is known, without looking at their exact places, that a plane holds the four.
+    /// Returns whether it is known, without looking at their exact places, that a plane holds the four.
     ///
     /// While facets are covered nearly all exact signs are zero for this reason, and would take long to compute.
     fn in_one_plane(&self, v: [u32; 4]) -> bool {
@@ -188,18 +188,18 @@ impl<'m, P: Pages> RecoveryPatch<'m, P> {
         self.vertices.len() as u32
     }
 
-    /// Whether `v` is not from the input.
+    /// Returns whether `v` is not from the input.
     pub(super) fn is_steiner(&self, v: u32) -> bool {
         self.vertices[v as usize].steiner
     }
 
-    /// Whether some tetrahedron has `v`.
+    /// Returns whether some tetrahedron has `v`.
     pub(super) fn is_in_use(&self, v: u32) -> bool {
         let t = self.vertices[v as usize].tet_of;
         t != NONE && self.tets[t as usize].local(v).is_some()
     }
 
-    /// Whether `v` was added here.
+    /// Returns whether `v` was added here.
     pub(super) fn is_new(&self, v: u32) -> bool {
         self.vertices[v as usize].id == NONE
     }
@@ -209,7 +209,7 @@ impl<'m, P: Pages> RecoveryPatch<'m, P> {
         self.vertices[v as usize].id
     }
 
-    /// Whether the position of `v` is more than its rounded one.
+    /// Returns whether the position of `v` is more than its rounded one.
     pub(super) fn is_exact(&self, v: u32) -> bool {
         self.vertices[v as usize].exact.is_some()
     }
@@ -267,7 +267,7 @@ impl<'m, P: Pages> RecoveryPatch<'m, P> {
         (0..self.tets.len() as u32).filter(|&t| self.tets[t as usize].is_live())
     }
 
-    /// Whether the patch may be written: no exact point is in use, and all volumes are positive as rounded.
+    /// Returns whether the patch may be written: no exact point is in use, and all volumes are positive as rounded.
     pub(super) fn is_sound(&self) -> bool {
         self.live().all(|t| {
             let v = self.tets[t as usize].vertices().map(|v| &self.vertices[v as usize]);
@@ -276,7 +276,7 @@ impl<'m, P: Pages> RecoveryPatch<'m, P> {
         })
     }
 
-    /// Whether every required face brought in is still there and required.
+    /// Returns whether every required face brought in is still there and required.
     pub(super) fn keeps_required(&self) -> bool {
         let mut now: IdSet<[u32; 3]> = IdSet::default();
         for t in self.live() {

@@ -157,7 +157,7 @@ fn groups<P: Pages>(
 
 /// Tries one effort after the other until the parts are sets of faces.
 ///
-/// Of a part of several facets the faces are not required: they are not yet those of the surface.
+/// Faces of a part with several facets are not required: they are not yet those of the surface.
 fn attempt<P: Pages>(
     mesh: &mut Mesh<P>,
     missing: &MissingFacets,
@@ -230,7 +230,7 @@ fn try_parts<P: Pages>(
     Ok(())
 }
 
-/// Whether none of the vertices has left the surface or, of many, less than one in [`FEW`].
+/// Returns whether none of the vertices has left the surface or, of many, less than one in [`FEW`].
 fn is_slow(before: usize, after: usize) -> bool {
     before == after || before > MANY && (before - after) * FEW < before
 }
@@ -289,14 +289,14 @@ fn build<P: Pages>(
                 .iter()
                 .position(|&v| v == r)
                 .ok_or(PatchFailure::Broken("a face was lost"))?;
-            // tets[i] has p, q, r and the next of the ring: the face is opposite that one.
+            // tets[i] has p, q, r and the next vertex of the ring: the face is opposite that vertex.
             let t = around.tets[i];
             let next = around.ring[(i + 1) % around.ring.len()];
             let l = patch.tet(t).local(next).expect("a vertex of the shell");
             patch.require(FaceRef::new(t, l));
         }
         points += inside.len() as u32;
-        // What has no room now may have some when others are gone.
+        // A vertex without clearance now may have some after others are gone.
         for v in inside {
             if patch.suppress(skin, v).is_err() {
                 late.push(v);
@@ -319,8 +319,9 @@ fn build<P: Pages>(
         }
         late = left;
         match failure {
-            // Mostly a few of thousands have no room: they alone go where no double is, all else is as good as it was. Each try in vain takes
-            // milliseconds, and when one finds room now and then, hundreds of others are tried again.
+            // Usually a few of thousands have no clearance. They alone go to exact places; all others are already fine.
+            // A failed try takes milliseconds, and if one vertex succeeds now and then, hundreds of others are tried
+            // again.
             Some(_) if is_slow(before, late.len()) && !patch.effort.exact => {
                 patch.effort.exact = true;
             }

@@ -11,13 +11,13 @@ pub type Walls = BTreeMap<(u32, u32), Wall>;
 /// Which bounded volumes get tetrahedra.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RegionPolicy {
-    /// What an odd number of shells separates from the outside; all where that is contradictory.
+    /// Volumes that an odd number of shells separates from the outside; all volumes if that is contradictory.
     Parity,
     /// Every bounded volume.
     All,
-    /// What lies directly behind the outside.
+    /// Volumes directly behind the outside.
     Outer,
-    /// What the normals point out of.
+    /// Volumes that the normals point out of.
     ByOrientation,
     /// The volumes of seeds; where only holes are given, all others.
     Seeds,
@@ -28,7 +28,7 @@ pub enum RegionPolicy {
 pub struct Filled {
     /// Numbers of the chosen volumes.
     pub volumes: BTreeSet<u32>,
-    /// What some of them are called.
+    /// Names of chosen volumes, if they have one.
     pub names: BTreeMap<u32, String>,
     /// Parity was contradictory (shared walls), so all were chosen.
     pub all_instead_of_parity: bool,

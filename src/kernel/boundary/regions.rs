@@ -20,7 +20,7 @@ use tetdb_schema::page::NONE;
 pub struct RegionSummary {
     /// Number of the region, from 1; 0 for one that stays empty.
     pub region: u32,
-    /// What it is called.
+    /// Name of the region, if it has one.
     pub name: Option<String>,
     /// In cubed input units.
     pub volume: f64,

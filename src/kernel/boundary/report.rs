@@ -3,7 +3,7 @@ use std::time::Duration;
 /// Gets how much is done and how much there is to do.
 pub type RecoveryWatcher<'a> = dyn Fn(u64, u64) + 'a;
 
-/// What recovery found and did.
+/// Counts and times of a recovery.
 #[derive(Clone, Debug, Default)]
 pub struct RecoveryReport {
     /// Facets of the input.

@@ -1,4 +1,4 @@
-//! Vertices that left the surface are exact where doubles had no room; now they move apart until doubles have some.
+//! Moves vertices that left the surface apart, until exact positions can be rounded to doubles.
 //!
 //! ```text
 //!      a'---X---b'        A vertex that replaces X lies in a wedge near X, and the next one, which replaces a neighbor of X,
@@ -19,13 +19,13 @@ use super::walk::ball;
 use tetdb_base::geom::{Dyadic, IdSet, Point};
 use tetdb_base::storage::Pages;
 
-/// Times all vertices are moved: room grows by a factor each time.
+/// Rounds over all vertices: the clearance grows by a factor each time.
 const ROUNDS_MAX: usize = 60;
 
-/// A move that gives less room than this many times the old is not worth it.
+/// Least factor by which a move must raise the clearance.
 const GAIN_MIN: f64 = 1.25;
 
-/// Where the room is narrowest, as a share of what doubles could hold: coordinates keep so many bits below it.
+/// Precision at the narrowest place, as a share of the clearance: coordinates keep so many bits below it.
 const FINE: f64 = 1.0 / 1024.0;
 
 impl<P: Pages> RecoveryPatch<'_, P> {

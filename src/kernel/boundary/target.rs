@@ -1,4 +1,4 @@
-//! What is being recovered, and whether a new edge or face would stand in its way.
+//! The target of a recovery, and whether a new edge or face would cross it.
 
 use super::complex::TetComplex;
 
@@ -14,7 +14,7 @@ pub(super) enum RecoveryTarget {
 }
 
 impl RecoveryTarget {
-    /// Whether the new edge `x y`, with its faces to `c` and `d`, keeps clear of the target.
+    /// Returns whether the new edge `x y`, with its faces to `c` and `d`, keeps clear of the target.
     pub(super) fn allows_edge<S: TetComplex>(
         self,
         s: &mut S,
@@ -28,7 +28,7 @@ impl RecoveryTarget {
             }
             Self::Free => true,
             Self::Face(f) => {
-                // An edge with an end in the plane, which is on the facet or beside it, stays on its side.
+                // An edge with an end in the plane, on or off the facet, stays on its side.
                 let (sx, sy) = (s.orient([f[0], f[1], f[2], x]), s.orient([f[0], f[1], f[2], y]));
                 sx == 0.0 || sy == 0.0 || (sx > 0.0) == (sy > 0.0) || !edge_meets_face(s, x, y, f)
             }
@@ -39,7 +39,7 @@ impl RecoveryTarget {
         }
     }
 
-    /// Whether the new face keeps clear of the target, its edges being known to.
+    /// Returns whether the new face keeps clear of the target, its edges being known to.
     pub(super) fn allows_face<S: TetComplex>(self, s: &mut S, face: [u32; 3]) -> bool {
         match self {
             Self::Edge(a, b) => !edge_meets_face(s, a, b, face),
@@ -48,7 +48,7 @@ impl RecoveryTarget {
     }
 }
 
-/// Whether the segment `a b` meets the closed triangle elsewhere than in shared vertices.
+/// Returns whether the segment `a b` meets the closed triangle elsewhere than in shared vertices.
 ///
 /// Exact when it says no; a coplanar neighborhood may say yes without contact.
 pub(super) fn edge_meets_face<S: TetComplex>(s: &mut S, a: u32, b: u32, f: [u32; 3]) -> bool {

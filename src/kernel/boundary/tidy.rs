@@ -1,4 +1,5 @@
-//! Steiner points at the end of recovery: those nobody needs go, the others move away from the planes they were put beside.
+//! Steiner points at the end of recovery: removes unneeded ones, and moves the others away from the planes next to
+//! them.
 
 use super::complex::{PagedComplex, TetComplex};
 use super::free_vertex::{ball_flatness, remove_free};
@@ -10,10 +11,10 @@ use crate::mesh::{Mesh, VertexTag};
 use tetdb_base::geom::{IdSet, Point};
 use tetdb_base::storage::{Pages, check_cancelled};
 
-/// Times all are visited: room grows by a factor each time.
+/// Rounds over all points: the clearance grows by a factor each time.
 const ROUNDS_MAX: usize = 8;
 
-/// A move that gives less room than this many times the old is not worth it.
+/// Least factor by which a move must raise the clearance.
 const GAIN_MIN: f64 = 1.25;
 
 /// Shares of the way to the best place that are tried.
@@ -59,7 +60,7 @@ pub(super) fn tidy<P: Pages>(mesh: &mut Mesh<P>, report: &mut RecoveryReport) {
     }
 }
 
-/// Moves a free vertex to where it sees its ball best, if that gives it more room.
+/// Moves a free vertex to the place of the largest clearance in its ball, if that gains enough.
 pub(super) fn raise<P: Pages>(s: &mut PagedComplex<'_, P>, v: u32) -> bool {
     let old = s.position(v);
     let ball = ball(s, v);

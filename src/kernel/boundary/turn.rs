@@ -7,11 +7,12 @@
 //!      \ | /             \   /      the crossing sees all their other faces, and both new triangles. A vertex of the ring may do
 //!        d                 d        as well; where none does, one is put there. The same below.
 //! ```
-//! A segment in the plane is reached by turning each edge it crosses, those that cannot turn yet after the others. New vertices crowd
-//! the plane: where that leaves no room, the tetrahedra above the edge grow to a cavity that swallows the ones before.
+//! A segment in the plane is recovered by turning each edge it crosses; edges that cannot turn yet are tried again
+//! later. New vertices crowd the plane. Where they leave too little clearance, the tetrahedra above the edge grow to a
+//! cavity that swallows earlier ones.
 //!
-//! Source: S. W. Sloan, "A fast algorithm for generating constrained Delaunay triangulations", Computers & Structures 47
-//! (1993), for the plane; the vertices above and below are our own.
+//! Source: S. W. Sloan, "A fast algorithm for generating constrained Delaunay triangulations", Computers & Structures
+//! 47 (1993), for the plane. The vertices above and below are not from it.
 
 use std::collections::VecDeque;
 
@@ -40,13 +41,13 @@ const HALVES_MAX: i32 = 50;
 /// Times a place half as far from the crossing is tried for a cavity that grows.
 const GROWN_MAX: i32 = 24;
 
-/// A place with less room than this, in units of the tetrahedra around it, is second choice.
+/// A place with less clearance than this, in units of the tetrahedra around it, is second choice.
 const CLEARANCE_MIN: f64 = 1e-4;
 
 /// The segments, each from the end where more of them meet.
 ///
-/// Turned from there on, edges that cross one segment become edges of that end and are out of the way of all others: of a fan each is
-/// turned once or twice, from its rim a hundred times.
+/// Turned from that end, edges that cross one segment become edges of the end and are out of the way of all other
+/// segments. In a fan each edge is turned once or twice; starting from its outline, a hundred times.
 pub(super) fn from_hubs(segments: &[(u32, u32)]) -> Vec<(u32, u32)> {
     let mut meeting: IdMap<u32, u32> = IdMap::default();
     for v in segments.iter().flat_map(|&(a, b)| [a, b]) {
@@ -107,7 +108,7 @@ struct PlaneSide {
     others: IdSet<u32>,
 }
 
-/// What changes on one side of the plane.
+/// The changes on one side of the plane.
 struct Half {
     old: Vec<u32>,
     new: Vec<[u32; 4]>,
@@ -119,7 +120,7 @@ struct Half {
 /// How much a turn may do to find a place for a new vertex.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Reach {
-    /// Where there is room.
+    /// At a place with enough clearance.
     Roomy,
     /// In a cavity that grows until it is seen, and swallows added vertices.
     Grown,
@@ -136,12 +137,12 @@ struct EdgeTurn {
     at_x: usize,
     /// Place of `y` in the ring, counted from `x`.
     to_y: usize,
-    /// Whether the segment crosses `x y` as well.
+    /// True if the segment crosses `x y` as well.
     crosses: bool,
 }
 
 impl EdgeTurn {
-    /// What lies above the plane, then below.
+    /// The sides above and below the plane.
     fn sides(&self) -> [PlaneSide; 2] {
         let n = self.around.ring.len();
         let from_to = [(self.at_x, self.to_y), (self.at_x + self.to_y, n - self.to_y)];
@@ -205,8 +206,8 @@ impl<P: Pages> Turner<'_, '_, P> {
 
     /// Turns `c d`, which the segment `a b` crosses, if that makes a new edge in the plane.
     ///
-    /// Added vertices lie the nearer to the plane the more of them there are: where they leave little room, one new vertex replaces them,
-    /// or those around the edge go or rise first.
+    /// The more added vertices there are, the nearer they lie to the plane. Where they leave little clearance, one new
+    /// vertex replaces them, or the vertices around the edge are removed or raised first.
     fn turn(&mut self, edge: Crossed, a: u32, b: u32) -> Option<Turned> {
         let turn = self.plan(edge, a, b)?;
         if let Some(turned) = self.carry_out(&turn, Reach::Roomy) {
@@ -269,7 +270,7 @@ impl<P: Pages> Turner<'_, '_, P> {
         Some(EdgeTurn { around, c, d, at_x, to_y: at_y - at_x, crosses })
     }
 
-    /// Replaces the tetrahedra around the edge; `None`, and nothing changed, where there is no room.
+    /// Replaces the tetrahedra around the edge; `None`, with nothing changed, if there is no clearance.
     fn carry_out(&mut self, turn: &EdgeTurn, reach: Reach) -> Option<Turned> {
         let [above, mut below] = turn.sides();
         let over = self.half(turn, &above, reach)?;
@@ -296,7 +297,7 @@ impl<P: Pages> Turner<'_, '_, P> {
         Some(((ids[at], x, y), turn.crosses))
     }
 
-    /// What changes on one side.
+    /// The changes on one side.
     fn half(&mut self, turn: &EdgeTurn, side: &PlaneSide, reach: Reach) -> Option<Half> {
         let ring = &side.ring;
         let mut best: Option<(f64, Vec<[u32; 4]>)> = None;
@@ -385,7 +386,7 @@ impl<P: Pages> Turner<'_, '_, P> {
             let Ok(grown) = grow(self.s, &side.tets, p, None, &[], &side.others) else {
                 continue;
             };
-            // Around the rim of a flat part it could come to its other side.
+            // Around the outline of a flat part the cavity could reach its other side.
             let is_beside = |&t: &u32| {
                 let corners = self.s.tet(t).vertices();
                 corners.iter().all(|&v| self.s.orient([c, y, x, v]) >= 0.0)

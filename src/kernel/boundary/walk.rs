@@ -8,7 +8,7 @@ use tetdb_base::storage::check_cancelled;
 /// Steps towards a direction inside one ball before all of it is searched.
 const TURNS_MAX: u32 = 400;
 
-/// What a straight line meets next.
+/// The next part that a straight line meets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Exit {
     /// The goal: it is a vertex of this tetrahedron.
@@ -101,7 +101,7 @@ pub(super) fn find_edge<S: TetComplex>(s: &mut S, a: u32, b: u32) -> Option<u32>
     s.tet(t).local(b).map(|_| t)
 }
 
-/// The same, where `t` had the edge when it was last looked at.
+/// A tetrahedron that has the edge `a b`, where `t` had it before.
 pub(super) fn edge_at<S: TetComplex>(s: &mut S, t: u32, a: u32, b: u32) -> Option<u32> {
     let tet = s.tet(t);
     let still = tet.is_live() && tet.local(a).is_some() && tet.local(b).is_some();
@@ -115,11 +115,11 @@ pub(super) fn edge_at<S: TetComplex>(s: &mut S, t: u32, a: u32, b: u32) -> Optio
 pub(super) struct EdgeRing {
     pub tets: Vec<u32>,
     pub ring: Vec<u32>,
-    /// Whether a required face has the edge.
+    /// True if a required face has the edge.
     pub required: bool,
 }
 
-/// The two vertices beside `c` and `d`, so that `c d x y` is positive.
+/// The two vertices other than `c` and `d`, so that `c d x y` is positive.
 pub(super) fn opposite(tet: &Tet, c: u32, d: u32) -> Option<(usize, usize)> {
     let (i, j) = (tet.local(c)?, tet.local(d)?);
     let mut rest = (0..4).filter(|&k| k != i && k != j);
@@ -154,7 +154,7 @@ pub(super) fn shell<S: TetComplex>(s: &mut S, t: u32, c: u32, d: u32) -> Option<
     }
 }
 
-/// What the line from vertex `h` to `b` meets first.
+/// The first part that the line from vertex `h` to `b` meets.
 pub(super) fn exit_vertex<S: TetComplex>(s: &mut S, h: u32, b: u32) -> Exit {
     let Some(t) = cone(s, h, b) else {
         return Exit::Lost;
@@ -181,7 +181,7 @@ pub(super) fn exit_vertex<S: TetComplex>(s: &mut S, h: u32, b: u32) -> Exit {
     }
 }
 
-/// What the line `a b` meets after it crossed the inside of `face`.
+/// The part that the line `a b` meets after the inside of `face`.
 pub(super) fn exit_face<S: TetComplex>(s: &mut S, a: u32, b: u32, face: FaceRef) -> Exit {
     let across = s.across(face.tet(), face.face());
     if !across.exists() {
@@ -208,7 +208,7 @@ pub(super) fn exit_face<S: TetComplex>(s: &mut S, a: u32, b: u32, face: FaceRef)
     Exit::Vertex(e)
 }
 
-/// What the line `a b` meets after it crossed the inside of the edge `c d` of `t`.
+/// The part that the line `a b` meets after the inside of the edge `c d` of `t`.
 pub(super) fn exit_edge<S: TetComplex>(s: &mut S, a: u32, b: u32, t: u32, c: u32, d: u32) -> Exit {
     let Some(shell) = shell(s, t, c, d) else {
         return Exit::Lost;

@@ -229,7 +229,7 @@ impl<P: Pages> RecoveryPatch<'_, P> {
     ) -> Option<GrownCavity> {
         let from = self.exact_place(x);
         for _ in 0..HALVES_MAX {
-            // Half of what is seen leaves room on both sides.
+            // Half of the visible distance leaves clearance on both sides.
             way *= 0.5;
             let exact = from.moved(way, &Dyadic::from(way.length() * FINE));
             let p = self.add_vertex(exact.rounded(), Some(exact));

@@ -30,7 +30,7 @@ pub struct CavityFace {
     pub outside: FaceRef,
     /// The face from the inside: a tetrahedron of the cavity.
     pub inside: FaceRef,
-    /// Whether the face is required.
+    /// True if the face is required.
     pub required: bool,
 }
 
@@ -47,7 +47,7 @@ pub struct KernelStats {
     pub cavity_largest: u64,
     /// Insphere tests.
     pub sphere_tests: u64,
-    /// Cavities that had to be made smaller to be star-shaped.
+    /// Cavities that had to shrink to be star-shaped.
     pub shrunk: u64,
 }
 
@@ -95,7 +95,7 @@ impl Default for Kernel {
 
 /// Where a walk ended.
 #[derive(Clone, Copy, Debug)]
-pub struct Located {
+pub struct PointLocation {
     /// Index of the tetrahedron.
     pub tet: u32,
     /// Its vertices and neighbors.

@@ -75,7 +75,7 @@ impl Links {
         Some(self.n_local as u8 - 1)
     }
 
-    /// Whether `v` has a local number in this surface.
+    /// Returns whether `v` has a local number in this surface.
     #[inline]
     pub(super) fn knows(&self, v: u32) -> bool {
         self.find(v).2

@@ -1,6 +1,6 @@
 //! Find the tetrahedron of a point by walking through faces.
 
-use super::kernel::{Kernel, Located, Rejected};
+use super::kernel::{Kernel, PointLocation, Rejected};
 use crate::mesh::Mesh;
 use crate::mesh::anatomy::FACES;
 use tetdb_base::geom::{Point, orient};
@@ -21,7 +21,7 @@ impl Kernel {
         mesh: &mut Mesh<P>,
         p: Point,
         hint: u32,
-    ) -> Result<Located, Rejected> {
+    ) -> Result<PointLocation, Rejected> {
         let mut tet = hint;
         let mut record = mesh.tet(tet);
         if !record.is_live() {
@@ -46,7 +46,7 @@ impl Kernel {
             }
             self.turn = self.turn.wrapping_mul(1_664_525).wrapping_add(1_013_904_223) ^ (step >> 3);
             let Some(i) = exit else {
-                return Ok(Located { tet, record, points });
+                return Ok(PointLocation { tet, record, points });
             };
             let across = record.neighbor[i];
             if !across.exists() {

@@ -17,5 +17,5 @@ mod order;
 mod tests;
 
 pub use enclosing::enclose;
-pub use kernel::{CavityFace, Kernel, KernelStats, Located, Rejected};
+pub use kernel::{CavityFace, Kernel, KernelStats, PointLocation, Rejected};
 pub use order::insertion_key;

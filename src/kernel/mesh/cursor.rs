@@ -37,7 +37,7 @@ impl<P: Pages> Mesh<P> {
         Self { pages, state }
     }
 
-    /// The counts to keep beside the pages.
+    /// The counts to store with the pages.
     pub fn state(&self) -> MeshState {
         self.state
     }
@@ -98,7 +98,7 @@ impl<P: Pages> Mesh<P> {
         &self.pages
     }
 
-    /// The pages themselves, for what is not tetrahedra, vertices or facets.
+    /// The pages themselves, for data other than tetrahedra, vertices or facets.
     pub fn pages_mut(&mut self) -> &mut P {
         &mut self.pages
     }

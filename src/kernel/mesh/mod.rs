@@ -12,7 +12,7 @@ mod vertices;
 
 pub use anatomy::{FaceRef, Tet};
 pub use cursor::Mesh;
-pub use faces::{Facet, InterfaceFace, SHEET};
+pub use faces::{MeshFacet, MeshInterfaceFace, SHEET};
 pub use renumber::{Workspace, renumber};
 pub use scan::{Scan, scan_parts, tets_of_page};
 pub use speculation::{DraftState, Evaluated, Speculation, evaluate_speculatively};

@@ -13,11 +13,11 @@ use tetdb_base::storage::{DraftPages, Pages, check_cancelled, kind, parallel};
 
 /// Something to be tried on many items.
 pub trait Speculation: Sync {
-    /// What it is tried on.
+    /// An item to evaluate.
     type Item: Sync;
-    /// What one thread uses again and again; must not have a say in what comes of it.
+    /// Scratch of one thread; it must not influence outcomes.
     type Scratch: Send;
-    /// What comes of it.
+    /// Outcome of an evaluation.
     type Outcome: Send;
 
     /// Tries it on a draft, which may be left changed where that is part of what is found.
@@ -29,7 +29,7 @@ pub trait Speculation: Sync {
     ) -> Option<(Self::Outcome, DraftState)>;
 }
 
-/// What is left of a draft.
+/// State of the draft after an evaluation.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum DraftState {
     /// It is to be as the mesh: else what was found does not count.
@@ -38,9 +38,9 @@ pub enum DraftState {
     Used,
 }
 
-/// What was found, and what it rests on.
+/// An outcome, and the vertices it depends on.
 pub struct Evaluated<F> {
-    /// What came of it.
+    /// The outcome.
     pub found: F,
     /// Vertices of all tetrahedra read, in ascending order. Where nothing has changed at them, the same comes of it still.
     pub vertices: Vec<u32>,
@@ -74,7 +74,7 @@ pub fn evaluate_speculatively<P: Pages, T: Speculation>(
             let Some((found, left)) = trial.attempt(scratch, &mut draft, item) else {
                 continue;
             };
-            // What took a number and gave it back has changed which one is next.
+            // Taking a number and giving it back may change which number is next.
             let is_unchanged = || draft.state == state && draft.pages.is_unchanged();
             if left == DraftState::Used || is_unchanged() {
                 let vertices = vertices_met(&draft.pages);
@@ -92,7 +92,7 @@ pub fn evaluate_speculatively<P: Pages, T: Speculation>(
 fn vertices_met(pages: &DraftPages) -> Vec<u32> {
     let (mut base, mut vertices) = (pages.base(), Vec::new());
     let end = base.n_pages::<{ kind::TETS }>() << SLOT_BITS;
-    // What lies beyond was made in the draft.
+    // Tetrahedra beyond were added in the draft.
     for &t in pages.tets_met().iter().filter(|&&t| t < end) {
         let slot = base.read::<{ kind::TETS }>(t);
         vertices.extend(slot[..4].iter().map(|node| node.to_native() & VERTEX_MASK));

@@ -47,7 +47,8 @@ impl MeshState {
         }
     }
 
-    /// Whether so many pages of tetrahedra, vertices, facets and interface faces have room for the ids counted here: false only for damage.
+    /// Returns whether so many pages of tetrahedra, vertices, facets and interface faces contain the ids counted here:
+    /// false only for damage.
     pub fn fits(&self, n_pages: [u32; 4]) -> bool {
         let arenas = [self.tets, self.vertices, self.facets, self.interface_faces];
         arenas.iter().zip(n_pages).all(|(pool, n)| {
@@ -62,7 +63,7 @@ impl MeshState {
         self.tets.n_live
     }
 
-    /// The counts as numbers, for storing beside the pages.
+    /// The counts as numbers, to store with the pages.
     pub fn to_words(self) -> [u32; MESH_STATE_WORDS] {
         let [t, v, f, i] = [self.tets, self.vertices, self.facets, self.interface_faces];
         [

@@ -31,7 +31,7 @@ pub struct End {
     pub point: Point,
     /// Wanted edge length.
     pub h: f32,
-    /// Whether it may never move; see [`Mesh::is_fixed`].
+    /// True if it may never move; see [`Mesh::is_fixed`].
     pub fixed: bool,
 }
 
@@ -123,7 +123,7 @@ impl<P: Pages> Mesh<P> {
         *word = u32_le::from_native(word.to_native() & FIXED | h.to_bits() & !FIXED);
     }
 
-    /// Whether `v` may never move: it belongs to a facet, an interface or the enclosing box.
+    /// Returns whether `v` may never move: it belongs to a facet, an interface or the enclosing box.
     #[inline(always)]
     pub fn is_fixed(&mut self, v: u32) -> bool {
         self.pages.read::<{ kind::VERTICES }>(v)[6].to_native() & FIXED != 0

@@ -5,13 +5,12 @@
 //! the new tetrahedra and a quality the caller gives. What applies: [`remove_edge`], [`FaceSwap::apply`],
 //! [`Replacement::apply`].
 //!
-//! What every operation keeps: neighbors are mutual; required bits stay on the outer faces; required-edge
-//! flags follow their edges; the new tetrahedra inherit region and the other flags; `tet_of` of every
-//! vertex involved names a new tetrahedron; ids are used again in the order gathered, so the result depends on
-//! the call alone. No operation changes a required face; a required edge is
-//! seen by [`Shell::required`] through a required face that has it and by [`Shell::edge_is_required`] through its
-//! flag. [`remove_edge`] asserts the first. The second costs the attribute page, so only callers that work
-//! while edges are required without faces (boundary recovery) need to ask.
+//! Invariants of every operation: neighbors are mutual; required bits stay on the outer faces; required-edge flags
+//! follow their edges; the new tetrahedra inherit region and the other flags; `tet_of` of every vertex involved names a
+//! new tetrahedron; ids are used again in the order gathered, so the result depends on the call alone. No operation
+//! changes a required face. A required edge shows in [`Shell::required`] if a required face has it, and in
+//! [`Shell::edge_is_required`] by its flag. [`remove_edge`] asserts the first. The second costs the attribute page.
+//! Only callers that work while edges are required without faces (boundary recovery) need it.
 
 mod attribute;
 mod ball;

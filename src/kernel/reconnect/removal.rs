@@ -10,8 +10,9 @@ use tetdb_base::storage::Pages;
 
 /// Replaces the closed `shell` by the tetrahedra of `triangulation`, listed in `new_tets`: first those with b, then those with a.
 ///
-/// Requires a shell as it is in the mesh now, no required face in it, and triangles whose cones are exactly positive.
-/// Effects: ids of the shell are used again in its order, one is freed for a ring of three; see the room for what is kept.
+/// Requires the current shell of the mesh, no required face in it, and triangles whose cones are exactly positive.
+/// Effects: ids of the shell are used again in its order, one is freed for a ring of three; the module's docs list the
+/// invariants.
 pub fn remove_edge<P: Pages>(
     mesh: &mut Mesh<P>,
     shell: &Shell,
@@ -75,7 +76,7 @@ pub fn remove_edge<P: Pages>(
     mesh.set_tet_of(shell.a, new_tets[n_new]);
 }
 
-/// What is on the other side of a directed edge of a ring triangle.
+/// The other side of a directed edge of a ring triangle.
 enum Side {
     /// Tetrahedron of the shell whose outer faces these are.
     Outer(usize),

@@ -24,8 +24,9 @@ const OLD: u32 = 1 << 31;
 impl Replacement {
     /// Replaces the tetrahedra `old` (ids and records as they are in the mesh now) by those with the vertices `new`.
     ///
-    /// `false`, with nothing changed, when the outer faces differ or an inner face of `old` is required. The caller has made
-    /// sure that `new` are exactly positive. A vertex that only `old` has keeps a dangling `tet_of`; it is the caller's to free.
+    /// `false`, with nothing changed, if the outer faces differ or an inner face of `old` is required. The caller
+    /// guarantees that `new` are exactly positive. A vertex that only `old` has keeps a dangling `tet_of`; the caller
+    /// must free it.
     pub fn apply<P: Pages>(
         &mut self,
         mesh: &mut Mesh<P>,

@@ -39,9 +39,9 @@ pub struct Shell {
     pub locals: Vec<[u8; 4]>,
     /// Ids of the vertices around the edge, in order.
     pub ring: Vec<u32>,
-    /// Whether the tetrahedra go all the way around.
+    /// True if the tetrahedra go all the way around.
     pub closed: bool,
-    /// Whether some face a b `ring[i]` is required.
+    /// True if some face a b `ring[i]` is required.
     pub required: bool,
 }
 
@@ -61,7 +61,7 @@ impl Shell {
         self.gather_from(mesh, t, &record, e, tets_max)
     }
 
-    /// [`Shell::gather`] for a caller who already has the record of `t`.
+    /// [`Shell::gather`] for a caller with the record of `t`.
     pub fn gather_from<P: Pages>(
         &mut self,
         mesh: &mut Mesh<P>,
@@ -156,7 +156,7 @@ impl Shell {
         self.ring.len()
     }
 
-    /// Whether the edge itself is flagged as required; reads one attribute.
+    /// Returns whether the edge itself is flagged as required; reads one attribute.
     pub fn edge_is_required<P: Pages>(&self, mesh: &mut Mesh<P>) -> bool {
         let (_, flags) = mesh.tet_attribute(self.tets[0]);
         let [i, j, ..] = self.locals[0];

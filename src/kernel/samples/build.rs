@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use tetdb_base::geom::Point;
 use tetdb_base::storage::{filled, push, reserve};
 
-/// A surface being made.
+/// A surface under construction.
 #[derive(Default)]
 pub(super) struct Builder {
     sample: Sample,
@@ -20,7 +20,7 @@ impl Builder {
         (self.sample.label_names.len() - 1) as u32
     }
 
-    /// A new point; the caller knows that it is not there yet.
+    /// A new point, which must not exist yet.
     pub(super) fn point(&mut self, p: Point) -> u32 {
         // Adding zero turns -0.0 into 0.0.
         push(&mut self.sample.points, p + Point::ZERO);
@@ -28,7 +28,7 @@ impl Builder {
         (self.sample.points.len() - 1) as u32
     }
 
-    /// The point on a seam with these very coordinates, made when it is not there yet.
+    /// The point on a seam with exactly these coordinates, added if new.
     pub(super) fn seam_point(&mut self, p: Point) -> u32 {
         let key = (p + Point::ZERO).to_array().map(f64::to_bits);
         if let Some(&id) = self.seam.get(&key) {
@@ -97,7 +97,7 @@ impl Builder {
     }
 }
 
-/// Refuses a surface too large to be made in memory.
+/// Refuses a surface too large to build in memory.
 pub(super) fn triangles_checked(
     name: &'static str,
     n_triangles: f64,
@@ -115,5 +115,6 @@ pub(super) fn triangles_checked(
 
 /// Above this a sample is refused.
 const TRIANGLES_MAX: u64 = 100_000_000;
-/// Bytes held for a triangle while a sample is made: half a point and another half while points are numbered, corners, a label, growth.
+/// Bytes per triangle while a sample is built: half a point and another half while points are numbered, corners, a
+/// label, growth.
 const BYTES_TRIANGLE: u64 = 50;

@@ -1,4 +1,4 @@
-//! Flat polygons, cut into triangles by whoever asks, and the walls between two of them.
+//! Flat polygons, cut into triangles by their callers, and the walls between two of them.
 
 use std::collections::HashSet;
 

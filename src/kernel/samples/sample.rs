@@ -18,7 +18,7 @@ pub struct Sample {
     pub labels: Vec<u32>,
     /// Names of the labels.
     pub label_names: Vec<String>,
-    /// Whether each triangle is part of a sheet in it; empty where none is.
+    /// True if each triangle is part of a sheet in it; empty where none is.
     pub sheets: Vec<bool>,
     /// The vertices of each edge inside, and its label.
     pub edges: Vec<[u32; 3]>,
@@ -27,7 +27,7 @@ pub struct Sample {
 }
 
 impl From<Sample> for Surface {
-    /// The same surface, from no file; what holds its edges is added by [`Surface::add_support_triangles`].
+    /// The surface of the sample, from no file; [`Surface::add_support_triangles`] completes its embedded edges.
     fn from(sample: Sample) -> Self {
         Self {
             points: sample.points,

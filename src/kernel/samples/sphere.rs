@@ -32,8 +32,7 @@ pub(super) fn make_sphere(radius: f64, h: f64, bytes_max: u64) -> Result<Sample,
     Ok(build.finish())
 }
 
-/// Pieces of each edge of the icosahedron, so that they are arcs of about `h`, or shorter where the
-/// curvature asks for it.
+/// Pieces of each edge of the icosahedron: arcs of about `h`, or shorter if the curvature requires it.
 pub(super) fn sphere_pieces(radius: f64, h: f64) -> f64 {
     (ICOSAHEDRON_ARC * radius / h + 0.5).floor().max(PIECES_MIN)
 }
@@ -64,7 +63,7 @@ impl Ball {
     }
 }
 
-/// Unit spheres already made, by number of pieces.
+/// Unit spheres built so far, by number of pieces.
 #[derive(Default)]
 pub(super) struct Spheres {
     made: BTreeMap<u32, (Vec<Point>, Vec<[u32; 3]>)>,
@@ -121,7 +120,7 @@ fn unit_sphere(n: u32) -> (Vec<Point>, Vec<[u32; 3]>) {
     (points, triangles)
 }
 
-/// Point ids of a face, row by row from its first corner; inner points are made here.
+/// Point ids of a face, row by row from its first corner; inner points are added here.
 fn face_rows(
     face: [u32; 3],
     n: u32,

@@ -124,7 +124,8 @@ impl SizeConstraint for BackgroundMesh {
         Ok(self.at(p).unwrap_or(f64::INFINITY))
     }
 
-    /// Linear pieces have their extremes at vertices: what is in the cell tells, besides its corners and middle.
+    /// Linear pieces have their extremes at vertices. So the vertices in the cell are examined besides its corners and
+    /// middle.
     fn divides(&self, middle: Point, width: f64) -> Option<bool> {
         let half = Point::splat(0.5 * width);
         let cell = Aabb { low: middle - half, high: middle + half };
@@ -147,7 +148,7 @@ impl SizeConstraint for BackgroundMesh {
         if !low.is_finite() || width <= CELLS_PER_SIZE * low {
             return Some(false);
         }
-        // Where the mesh ends the cell's outer corners tell nothing.
+        // At the end of the mesh the cell's outer corners have no sizes.
         if is_outside {
             return Some(true);
         }

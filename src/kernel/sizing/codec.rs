@@ -12,9 +12,10 @@
 //! | 60 | 4 | zero |
 //! | 64 | … | zstd frame of C + L + 4 V bytes |
 //!
-//! In the frame: of each cell, depth first and octants in order, 1 for a leaf and 0 for one with children; of each leaf a byte whose bit
-//! `i` says that the value at corner `i` is new; the new values, f32. A value that is not new is that of the last leaf with this corner, as
-//! far as a table of [`REMEMBERED`] corners knows it: neighbors have corners in common, so that a leaf takes about 5 bytes instead of 37.
+//! In the frame: for each cell, depth first and octants in order, 1 for a leaf and 0 for one with children; for each
+//! leaf a byte whose bit `i` says that the value at corner `i` is new; the new values, f32. A value that is not new
+//! equals that of the last leaf with this corner, if a table of [`REMEMBERED`] corners still has it. Neighbors have
+//! corners in common, so that a leaf takes about 5 bytes instead of 37.
 
 use std::fmt::Display;
 use std::io::{Read, Write};
@@ -117,7 +118,8 @@ impl SizeField {
         Self::from_bytes_in(bytes, &ScratchSpace::boundless())
     }
 
-    /// Reads what [`SizeField::to_bytes`] wrote, checking all of it; values go to a scratch file where their share of `room` is too small.
+    /// Reads the output of [`SizeField::to_bytes`] and checks all of it. Values go to a scratch file if their share of
+    /// `scratch` is too small.
     ///
     /// # Errors
     /// [`SizingError::Damaged`] names what is wrong. A scratch file that fails unwinds.
@@ -219,7 +221,7 @@ fn damaged(what: &'static str, found: impl Display, expected: impl Display) -> S
     SizingError::Damaged { what, found: found.to_string(), expected: expected.to_string() }
 }
 
-/// The first bytes; the caller knows that they are there.
+/// The first bytes, which must exist.
 fn array<const N: usize>(bytes: &[u8]) -> [u8; N] {
     std::array::from_fn(|i| bytes[i])
 }

@@ -19,9 +19,9 @@ use super::tree::{DEPTH, LATTICE, Leaf, Tree};
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::{SpillVec, parallel};
 
-/// Levels down to which every cell is asked.
+/// Levels down to which every cell is sampled.
 const LEVELS_ASKED: u32 = 5;
-/// Cells and corners asked about side by side.
+/// Cells and corners sampled in one batch.
 const CELLS_AT_ONCE: usize = 1 << 16;
 /// Cells at most: as many leaves as can be numbered.
 const CELLS_MAX: usize = 1 << 28;
@@ -33,18 +33,19 @@ pub(super) struct SizeConstraints<'a> {
     pub list: &'a [&'a dyn SizeConstraint],
     pub frame: OctreeFrame,
     pub bounds: Aabb,
-    /// No wish goes below this, in units of the cube's side.
+    /// Lower bound of all constraints, in units of the cube's side.
     pub least: f64,
-    /// What lies between corners may be off what their values tell by this share.
+    /// Values between corners may differ from the interpolated ones by this share.
     pub bend_max: f64,
-    /// Cells are no wider than this many of the least wished lengths in them, where wishes bend.
+    /// Where a constraint is not linear, cells are no wider than this many of its least lengths in them.
     pub cells_per_size: f64,
     /// Cells are divided that far outside the box, in their own widths.
     pub beside: f64,
 }
 
 impl SizeConstraints<'_> {
-    /// The least wish at a lattice position in units of the cube's side. Outside the surface's box that of its nearest point.
+    /// The least constraint at a lattice position, in units of the cube's side. Outside the surface's box it is that of
+    /// the nearest point.
     fn h(&self, at: [u32; 3]) -> Result<f64, SizingError> {
         let mut least = f64::INFINITY;
         for constraint in self.list {
@@ -59,7 +60,7 @@ impl SizeConstraints<'_> {
         p.clamp(self.bounds.low, self.bounds.high)
     }
 
-    /// Divides leaves of `tree` where wishes ask for it.
+    /// Divides leaves of `tree` where constraints require it.
     pub(super) fn refine(&self, tree: &mut Tree) -> Result<(), SizingError> {
         if self.list.is_empty() {
             return Ok(());
@@ -119,7 +120,7 @@ impl SizeConstraints<'_> {
         self.bounds.meets(&Aabb { low, high })
     }
 
-    /// Whether a cell is divided, and whether values were asked to tell.
+    /// Returns whether a cell is divided, and whether values were sampled to decide that.
     fn is_divided(&self, cell: Leaf) -> Result<(bool, bool), SizingError> {
         let half = cell.width() / 2;
         if half == 0 {
@@ -148,7 +149,7 @@ impl SizeConstraints<'_> {
         Ok((!is_fine && bends(&h, self.bend_max), true))
     }
 
-    /// Lowers values at the corners of leaves to what is wished there.
+    /// Lowers values at the corners of leaves to the constraints there.
     pub(super) fn lower(
         &self,
         tree: &Tree,
@@ -187,7 +188,7 @@ impl SizeConstraints<'_> {
     }
 }
 
-/// Whether some of 27 values is far from the mean of the corners around it.
+/// Returns whether some of 27 values is far from the mean of the corners around it.
 fn bends(h: &[f64; 27], most: f64) -> bool {
     (0..27).any(|i| {
         let at = [i % 3, i / 3 % 3, i / 9];

@@ -9,7 +9,7 @@
 //! ```
 
 use super::tree::{LATTICE, Leaf, Tree};
-use tetdb_base::storage::{Keyed, ScratchSpace, SpillVec, StorageError, raise, sort_record};
+use tetdb_base::storage::{KeyedId, ScratchSpace, SpillVec, StorageError, raise, sort_record};
 
 sort_record! {
     /// A hanging corner and the four corners (an edge's two, twice) whose mean it takes.
@@ -24,7 +24,7 @@ sort_record! {
 }
 
 impl Hanging {
-    /// Whether it is in the middle of an edge; else of a face.
+    /// Returns whether it is in the middle of an edge; else of a face.
     fn on_edge(&self) -> bool {
         self.on[0] == self.on[2]
     }
@@ -65,12 +65,12 @@ fn number_corners(
     tree: &Tree,
     scratch: &ScratchSpace,
 ) -> Result<(SpillVec<[u32; 8]>, usize), StorageError> {
-    let mut keys = scratch.sorter::<Keyed>();
+    let mut keys = scratch.sorter::<KeyedId>();
     let mut n_leaves = 0;
     for (i, leaf) in tree.leaves().enumerate() {
         n_leaves += 1;
         for c in 0..8 {
-            keys.push(Keyed { key: morton(leaf.corner(c)), id: (8 * i + c) as u32 })?;
+            keys.push(KeyedId { key: morton(leaf.corner(c)), id: (8 * i + c) as u32 })?;
         }
     }
     let keys = keys.finish()?;
@@ -78,7 +78,7 @@ fn number_corners(
     let mut n_corners = 0u32;
     let mut last = None;
     for key in keys {
-        let Keyed { key: corner, id: slot } = key?;
+        let KeyedId { key: corner, id: slot } = key?;
         if last != Some(corner) {
             n_corners += 1;
             last = Some(corner);

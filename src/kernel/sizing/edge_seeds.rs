@@ -8,8 +8,8 @@ use tetdb_base::storage::{FrozenSpillVec, ScratchSpace, SpillVecBuilder};
 /// An edge gets seeds when it is longer than this many of its ends' sizes. Edges of even surfaces are shorter, and their meshes stay the same;
 /// other values were not tried.
 const LONG_FROM: f64 = 2.0;
-/// Seeds from one end of an edge to its middle at most, beside the one there. At the steepest slope sizes grow 1.7 times from one to the
-/// next: sixteen reach 5,000 times the end's size, what is beyond is left to the averages between.
+/// Seeds from one end of an edge to its middle at most, besides the seed there. At the steepest slope sizes grow 1.7
+/// times from one to the next: sixteen reach 5,000 times the end's size. Beyond that, the averages between fill in.
 const STEPS_MAX: u32 = 16;
 /// So many seeds are kept whatever the surface; beyond, as many as it has vertices. Where there would be more their steps are doubled.
 const SEEDS_MIN: usize = 1 << 17;

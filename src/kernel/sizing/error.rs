@@ -1,4 +1,4 @@
-//! What can be wrong with wanted sizes.
+//! Errors of wanted sizes.
 
 /// Why there is no size field.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -28,7 +28,7 @@ pub enum SizingError {
         text: String,
         /// Byte of the text.
         at: usize,
-        /// What is wrong with it.
+        /// The error.
         message: String,
     },
     /// An expression gives no length at some point.
@@ -49,7 +49,7 @@ pub enum SizingError {
     BadRegion {
         /// The region and size found.
         found: String,
-        /// What was expected, as a sentence.
+        /// The expected value, as a sentence.
         expected: String,
     },
     /// A file of sizes has another number of them than the surface has vertices.

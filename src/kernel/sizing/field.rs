@@ -14,10 +14,10 @@ use super::values::CornerSizes;
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::{FrozenSpillVec, ScratchSpace, SpillVec};
 
-/// Levels that one look into the jump table replaces: 32,768 entries of 8 bytes stay in cache.
+/// Levels that one access to the jump table replaces: 32,768 entries of 8 bytes stay in cache.
 const JUMP: u32 = 5;
 
-/// Share of a room that values take at most, and what they may take of any.
+/// Largest share of the scratch space that values take, and the bytes they may take of any.
 const SHARE: u64 = 8;
 const SHARE_MIN: u64 = 512 << 10;
 
@@ -60,11 +60,11 @@ pub struct ExtraSizes<'a> {
     pub constraints: &'a [&'a dyn SizeConstraint],
     /// One for each vertex of the surface.
     pub at_vertices: Option<&'a [f64]>,
-    /// Of vertices that no triangle uses: vertex and size.
+    /// Vertices that no triangle uses, with their sizes.
     pub at_points: &'a [(u32, f64)],
 }
 
-/// Where the descent begins: the entry and its level, for each cell of a regular grid.
+/// Start of the descent: the entry and its level, for each cell of a regular grid.
 #[derive(Clone, Debug, PartialEq)]
 struct Jump {
     level: u32,
@@ -85,11 +85,12 @@ impl SizeField {
         Ok(Self::build_with(points, triangles, options, &ExtraSizes::default(), &scratch)?.0)
     }
 
-    /// Builds the field with further sizes, and says where its sizes came from. The room changes nothing of it.
+    /// Builds the field with extra sizes, and summarizes the origin of its sizes. The result does not depend on
+    /// `scratch`.
     ///
     /// # Errors
-    /// As [`SizeField::build`]; a wish that is no size somewhere in the surface's box. A scratch file that fails unwinds
-    /// ([`attempt`](tetdb_base::storage::attempt)).
+    /// As [`SizeField::build`]; a constraint without a size somewhere in the surface's box. A scratch file that fails
+    /// unwinds ([`attempt`](tetdb_base::storage::attempt)).
     pub fn build_with(
         points: &[Point],
         triangles: &[[u32; 3]],
@@ -171,7 +172,7 @@ impl SizeField {
         Self::from_parts(frame, beta, tree, values.done().fixed())
     }
 
-    /// Bytes that values take of a room of `bytes`, at most.
+    /// Bytes that values take of a scratch space of `bytes`, at most.
     pub fn share_of(bytes: u64) -> u64 {
         (bytes / SHARE).max(SHARE_MIN)
     }
@@ -198,7 +199,7 @@ impl SizeField {
     #[inline]
     pub fn h(&self, p: Point) -> f64 {
         let at = self.on_lattice(p);
-        // Spelled out, here and below: `map` on arrays is not always inlined, and this is asked ten million times.
+        // Spelled out, here and below: `map` on arrays is not always inlined, and this is called ten million times.
         let of = |x: f64| (x as u32).min(LATTICE - 1);
         let cell = [of(at[0]), of(at[1]), of(at[2])];
         let (mut entry, mut level) = self.jump.at(cell);
@@ -217,7 +218,7 @@ impl SizeField {
         h
     }
 
-    /// Whether the octree is finer than a cube of that width somewhere near its middle.
+    /// Returns whether the octree is finer than a cube of that width somewhere near its middle.
     fn is_finer_in(&self, middle: Point, width: f64) -> bool {
         let is_finer = |p: Point| {
             let cell = self.on_lattice(p).map(|x| (x as u32).min(LATTICE - 1));
@@ -273,19 +274,19 @@ impl SizeField {
         self.octree_bytes() + self.values.bytes()
     }
 
-    /// Memory held when it was made in a room of so many bytes.
+    /// Memory held by a field built in a scratch space of that many bytes.
     pub fn bytes_in(&self, scratch: u64) -> u64 {
         let values = (self.values.len() * size_of::<[f32; 8]>()) as u64;
         self.octree_bytes() as u64 + values.min(Self::share_of(scratch))
     }
 
-    /// What is held in any room.
+    /// Bytes held in any scratch space.
     pub fn octree_bytes(&self) -> usize {
         size_of::<Self>() + self.tree.bytes() + self.jump.cells.capacity() * size_of::<(u32, u32)>()
     }
 }
 
-/// Where the octree is divided, so is what takes its sizes; shapes beside it are known by their values only.
+/// A field that uses these sizes is divided where their octree is; shapes beside the octree are sampled only.
 impl SizeConstraint for SizeField {
     fn h(&self, p: Point) -> Result<f64, SizingError> {
         Ok(Self::h(self, p))

@@ -2,7 +2,7 @@
 
 use super::SizingError;
 use super::constraint::SizeConstraint;
-use tetdb_base::expr::{Expression, Kind};
+use tetdb_base::expr::{ExprKind, Expression};
 use tetdb_base::geom::Point;
 
 /// An expression for the wanted length, in input units.
@@ -22,8 +22,8 @@ impl Formula {
         let expression =
             Expression::parse(text, &["x", "y", "z"]).map_err(|e| bad(e.at, e.message))?;
         match expression.kind() {
-            Kind::Number => Ok(Self { text: text.to_owned(), expression }),
-            Kind::Truth => Err(bad(0, "it is true or false, not a length".to_owned())),
+            ExprKind::Number => Ok(Self { text: text.to_owned(), expression }),
+            ExprKind::Truth => Err(bad(0, "it is true or false, not a length".to_owned())),
         }
     }
 }

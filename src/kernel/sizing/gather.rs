@@ -19,7 +19,8 @@ const NEEDLE_FROM: f64 = 3.0;
 /// A vertex's size is the geometric mean of the arithmetic and the harmonic mean of its edges' lengths: equal to both where
 /// lengths are similar. With either alone, one needle's short edge would be ignored, or one would rule all its long neighbors.
 ///
-/// Memory: 8 bytes a vertex, 4 more where there are needles, and a quarter of the room: for so many vertices at a time the triangles are gone through.
+/// Memory: 8 bytes a vertex, 4 more with needles, and a quarter of the scratch space, which decides how many vertices
+/// are handled in one pass over the triangles.
 pub(super) fn surface_seeds<'a>(
     points: &'a [Point],
     triangles: &[[u32; 3]],
@@ -58,7 +59,8 @@ pub(super) fn surface_seeds<'a>(
     Ok(seeds)
 }
 
-/// Of a vertex: the number of its edges' ends, their lengths' sum, their inverse lengths' sum, the longest.
+/// For a vertex: the number of its edges' ends, the sum of their lengths, the sum of their inverse lengths, the
+/// longest.
 type WeightedSums = [f64; 4];
 
 /// Sums of the vertices from `first` on.

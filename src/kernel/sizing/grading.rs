@@ -9,8 +9,8 @@ use tetdb_base::storage::{SpillVec, check_cancelled};
 /// Rounds of grading and closing hanging corners. The last ones change little; each costs as much as
 /// the first.
 const GRADE_ROUNDS: u32 = 4;
-/// A hanging corner's mean may exceed its graded value by this factor: the bound on slopes is stated
-/// with more room, and at 1.001 every round finds something left to lower.
+/// A hanging corner's mean may exceed its graded value by this factor. The slope bound is stated with more slack; at
+/// 1.001 every round finds something left to lower.
 const EXCESS_MAX: f32 = 1.01;
 /// Gives hanging corners their means, where these are known.
 pub(super) fn close_finite(corners: &mut TreeCorners, h: &mut SpillVec<f32>) {
@@ -43,10 +43,10 @@ pub(super) struct Grading<'a> {
 impl Grading<'_> {
     /// Lowers values until no two corners of a leaf differ by more than the slope allows.
     ///
-    /// The result is the largest such function below the given values, whatever the order. Sweeps go forward and backward by turns, for
-    /// what is lowered is carried along by the sweep that goes its way.
+    /// The result is the largest such function below the given values, in any order. Sweeps go forward and backward by
+    /// turns, because a lowered value travels along with the sweep of its direction.
     pub(super) fn grade(&mut self, h: &mut SpillVec<f32>) {
-        // Corners whose neighbors have not been looked at since they were lowered.
+        // Corners that were lowered since their neighbors were last checked.
         let mut changed = FixedBitSet::with_capacity(h.len());
         changed.insert_range(..);
         let mut next = FixedBitSet::with_capacity(h.len());

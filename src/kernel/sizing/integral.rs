@@ -1,9 +1,9 @@
 //! The load ∫ h⁻³ over the filled volumes, as far as vertices will be added there.
 //!
-//! Cells of the octree, and parts of its leaves, are taken in the order of what is not known of them: a cell is divided
-//! while the sizes in it differ, or the surface may pass through it. Inside and outside are told by the
-//! triangle above a cell's middle; a cell nearer to its middle than the surface has one answer for all its parts.
-//! In the cells that are left at the surface points are drawn; their volume as a whole is known from the triangles.
+//! Cells of the octree, and parts of its leaves, are taken in the order of their uncertainty. A cell is divided while
+//! the sizes in it differ, or the surface may pass through it. The triangle above a cell's middle decides between
+//! inside and outside; a cell nearer to its middle than the surface has one answer for all its parts. In the remaining
+//! cells at the surface points are sampled; their total volume follows from the triangles.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -16,25 +16,28 @@ use tetdb_base::geom::{Point, mix};
 use tetdb_base::storage::{for_each_mut, parallel, spare_threads};
 use tetdb_base::surface::{Seeker, Volumes};
 
-/// Cells looked at, at most. Eight times as many move the sum by 0.2 %, and took half of the time of small runs.
+/// Cells examined, at most. Eight times as many change the sum by 0.2 %, and took half of the time of small runs.
 const CELLS_MAX: usize = 1 << 13;
-/// Cells looked at, at least: the estimate of what is not known needs some.
+/// Cells examined, at least: the estimate of the uncertainty needs some.
 const CELLS_MIN: usize = 1 << 11;
 /// Wanted accuracy of the sum. What is unknown of cells at the surface has either sign and is added by squares.
 const TOLERANCE: f64 = 0.003;
-/// Cells whose parts are looked at together, where there are threads: most of the next in order are divided one after the other.
+/// Cells whose parts are examined in one batch, if there are threads: most of the next cells in order are divided
+/// anyway.
 const BATCH_CELLS: usize = 32;
 /// Points drawn in the cells that the surface passes through, at least.
 const POINTS: usize = 1 << 14;
-/// Triangles a question to the surface may look at before fewer cells and points are asked about: ordinary surfaces have a tenth.
+/// Triangles that one search on the surface may test before fewer cells and points are examined: ordinary surfaces have
+/// a tenth.
 const EFFORT_ORDINARY: f64 = 500.0;
 /// Cells and points are no fewer than this share: the sum then is good to a tenth.
 const SHARE_MIN: f64 = 0.0625;
-/// What they tell of the volume is believed to be wrong by no more than this factor.
+/// Greatest factor by which the sampled volume is believed to be wrong.
 const FACTOR_MAX: f64 = 2.0;
 /// Share of a cell's uncertain part that is wrong in the mean, when cut by the surface.
 const SHARE_CUT: f64 = 0.3;
-/// The same for sizes that differ within part of a leaf, where they are read at eight points.
+/// Share of the uncertain part that is wrong in the mean, for sizes that differ within part of a leaf and are read at
+/// eight points.
 const SHARE_SIZES: f64 = 0.02;
 
 /// How near to the surface no vertex comes, in units of h.
@@ -61,25 +64,25 @@ struct IntegrationCell {
     leaf: Leaf,
     /// The octree's entry at this cell or above it.
     entry: u32,
-    /// Whether it is all in a filled volume.
+    /// True if it is all in a filled volume.
     is_inside: bool,
-    /// Whether it is also farther from the surface than what is left out.
+    /// True if it is also farther from the surface than what is left out.
     is_deep: bool,
     load: f64,
-    /// Of its filled part, where the surface does not pass through it.
+    /// Volume of its filled part, if the surface does not pass through it.
     volume: f64,
     unknown: f64,
-    /// Whether what is left out may begin or end in it; whether the surface may pass through it.
+    /// True if what is left out may begin or end in it; whether the surface may pass through it.
     is_cut: bool,
     is_crossed: bool,
-    /// Whether vertices are added in it.
+    /// True if vertices are added in it.
     is_counted: bool,
 }
 
 impl SizeField {
     /// Load of the points of `domain` that are outside the skin of its surface.
     ///
-    /// Accuracy: about one part in a hundred. The same bits on every machine and for any number of threads.
+    /// Accuracy: about one part in a hundred. The bits are the same on every machine and for any number of threads.
     pub fn load(&self, domain: &Domain, skin: SurfaceSkin) -> f64 {
         let share = (EFFORT_ORDINARY / domain.seeker.effort()).clamp(SHARE_MIN, 1.0);
         let mut sum = LoadSum {
@@ -138,7 +141,7 @@ fn range(values: &[f32; 8]) -> [f32; 2] {
 
 struct LoadSum<'a> {
     field: &'a SizeField,
-    /// Of the ordinary number of cells and points.
+    /// Share of the ordinary number of cells and points.
     share: f64,
     domain: &'a Domain<'a>,
     skin: SurfaceSkin,
@@ -202,9 +205,9 @@ impl LoadSum<'_> {
         Some((first.cell, *first.parts?))
     }
 
-    /// Load of the cells that are left. Those the surface passes through are looked at in points drawn within them: a plane at the
-    /// distance of the middle would cut off too little where the surface bends, all around a ball, and makes no sense
-    /// where a cell holds many parts of it. What the points tell is corrected by what they tell of the volume, which is known.
+    /// Load of the cells that are left. In cells that the surface passes through, points are sampled. A plane at the
+    /// distance of the middle would cut off too little where the surface bends, and is useless where a cell contains
+    /// many parts of it. The sampled load is scaled by the ratio of exact to sampled volume.
     fn load_of_rest(&self, rest: &[ByUnknown]) -> f64 {
         let (mut load, mut volume) = (0.0, self.volume);
         let mut crossed: Vec<&IntegrationCell> = self.crossed.iter().collect();
@@ -272,7 +275,7 @@ impl LoadSum<'_> {
         IntegrationCell { leaf, entry, ..*cell }
     }
 
-    /// Keeps a cell that was looked at. Returns the load that went into the heap.
+    /// Keeps an examined cell. Returns the load that went into the heap.
     fn add(&mut self, cell: IntegrationCell) -> f64 {
         if !cell.is_counted {
             self.volume += cell.volume;
@@ -387,8 +390,8 @@ impl LoadSum<'_> {
         [low, high.max(low)]
     }
 
-    /// h⁻³, of no length below the side of the octree's finest cells: where vertices touch but for a bit, sizes next to nothing
-    /// stand for a point, and a cell cannot tell how fast they grow around it.
+    /// h⁻³, for no length below the side of the octree's finest cells. Where vertices nearly coincide, tiny sizes stand
+    /// for a point, and a cell cannot resolve how fast they grow around it.
     fn inverse_cube(&self, h: f64) -> f64 {
         let h = h.max(self.least);
         1.0 / (h * h * h)
@@ -409,7 +412,7 @@ impl LoadSum<'_> {
 /// Cells by what is unknown of them, then by place.
 struct ByUnknown {
     cell: IntegrationCell,
-    /// Its parts, if they were looked at already.
+    /// The parts of the cell, if they were examined already.
     parts: Option<Box<[IntegrationCell; 8]>>,
 }
 

@@ -1,4 +1,4 @@
-//! What the user asks of sizes.
+//! Size options of the user.
 
 use super::SizingError;
 use super::closed::slope_of_gradation;
@@ -43,7 +43,8 @@ pub struct SizeOptions {
     /// Largest ratio of the lengths of two edges that follow each other. The field's slope is at
     /// most `beta = ln(hgrad)`: in a field of that slope, steps of one h grow by `exp(beta)` each.
     pub hgrad: f64,
-    /// The same where the surface has needles; no less than `hgrad`, and just that where the user asks for one.
+    /// Largest ratio of neighboring edge lengths where the surface has needles; no less than `hgrad`, and equal to it
+    /// if the user gives one.
     pub hgrad_needles: f64,
     /// Shapes with sizes of their own; `hmin` bounds them too.
     pub sources: Vec<SizeSource>,
@@ -104,7 +105,7 @@ impl SizeOptions {
         slope_of_gradation(self.hgrad)
     }
 
-    /// The same next to needles.
+    /// Slope bound next to needles.
     pub(super) fn beta_needles(&self) -> f64 {
         slope_of_gradation(self.hgrad_needles.max(self.hgrad))
     }
@@ -184,7 +185,7 @@ impl Targets {
         self.beta_needles / self.beta
     }
 
-    /// Whether anything but the surface's edges was asked for.
+    /// Returns whether anything but the surface's edges was asked for.
     pub(super) fn any(&self) -> bool {
         self.hsiz.is_some() || self.hmin.is_some() || self.hmax.is_some()
     }

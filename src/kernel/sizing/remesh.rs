@@ -29,26 +29,26 @@ use tetdb_base::storage::{ScratchSpace, SpillVec};
 
 /// Wanted lengths that are off what the part has by no more than this share are the same: the octree is not divided for them.
 const SAME: f64 = 0.01;
-/// Shapes beside the octree are brought into it up to this share. At a tenth, what suffices for a formula, lengths
-/// around a sphere come out up to a tenth larger than they were.
+/// Sizes of shapes next to the octree are sampled into it up to this error. At a tenth, which suffices for a formula,
+/// lengths around a sphere come out up to a tenth larger than they were.
 const BEND_MAX: f64 = 0.02;
-/// Where a shape ends sizes have a kink, in cells this many sizes wide. With two, a ball of a tenth of the length around it has 2.3 % fewer
-/// tetrahedra when it is made again with the same lengths.
+/// Where a shape ends, sizes have a kink; cells there are this many sizes wide. With two, a ball of a tenth of the
+/// length around it has 2.3 % fewer tetrahedra after remeshing with the same lengths.
 const CELLS_PER_SIZE: f64 = 1.0;
-/// Corners asked about side by side.
+/// Corners sampled in one batch.
 const CORNERS_AT_ONCE: usize = 1 << 16;
 
 impl SizeField {
     /// The field of `constraint` inside a skin that stays, of a part that has the lengths of this field: triangles index points.
     /// `None`: nothing else is wanted than what the part has.
     ///
-    /// Near the skin lengths are those of this field, away from it they tend to the wish as the slope `beta` allows, to smaller ones as
-    /// well as to larger ones. Where the wish is infinite (outside of what it knows) sizes are those around it, and those of
-    /// this field where nothing at all is wished. `room` changes nothing of it.
+    /// Near the skin lengths are those of this field. Away from it they approach the constraint as fast as the slope
+    /// `beta` allows, to smaller ones as well as to larger ones. Where the constraint is infinite, sizes are those
+    /// around it, or those of this field if no constraint is finite anywhere. The result does not depend on `scratch`.
     ///
-    /// Memory: beside the room 40 bytes a point and 16 a leaf.
+    /// Memory: besides the scratch space 40 bytes a point and 16 a leaf.
     /// # Errors
-    /// A skin without edges; a wish that is no size somewhere; more leaves than can be numbered.
+    /// A skin without edges; a constraint without a size somewhere; more leaves than can be numbered.
     pub fn within(
         &self,
         points: &[Point],
@@ -111,7 +111,8 @@ impl SizeField {
         Ok(Some(Self::from_corners(frame, beta, tree, corners, h, scratch)))
     }
 
-    /// As fine as this field and the wish are in the skin's box, and along the skin where they differ: there cones begin.
+    /// As fine as this field and the constraint in the skin's box, and along the skin where they differ: there the
+    /// slopes begin.
     fn tree_within(
         &self,
         points: &[Point],
@@ -138,7 +139,7 @@ impl SizeField {
     }
 }
 
-/// A size at each corner, in units of the cube's side; `size` is asked in those, and answers in input units.
+/// A size at each corner, in units of the cube's side; `size` takes positions in those units and returns input units.
 fn at_corners(
     tree: &Tree,
     corners: &mut TreeCorners,
@@ -171,7 +172,7 @@ fn at_corners(
     Ok(h)
 }
 
-/// Whether two lists of sizes are equal wherever leaves meet the box of the skin: the octree is as fine as either needs there.
+/// Returns whether two lists of sizes are equal wherever leaves meet the box of the skin: the octree is as fine as either needs there.
 fn is_same(
     tree: &Tree,
     corners: &mut TreeCorners,

@@ -39,7 +39,7 @@ pub(super) struct Seeds<'a> {
     pub(super) h: Vec<f64>,
     /// By vertex, how many times the gradation's slope is allowed there; empty where it is once for all.
     pub(super) slope_factor: Vec<f32>,
-    /// What follows the vertices.
+    /// Seeds along edges, numbered after the vertices.
     pub(super) along: Option<FrozenSpillVec<EdgeSeed>>,
 }
 
@@ -56,7 +56,7 @@ impl<'a> Seeds<'a> {
         self.vertices().chain(first..first + n)
     }
 
-    /// What follows the vertices, if it is not one of them.
+    /// The seed along an edge; `None` if `seed` is a vertex.
     #[inline]
     fn along(&self, seed: u32) -> Option<EdgeSeed> {
         let behind = (seed as usize).checked_sub(self.points.len())?;
@@ -93,12 +93,12 @@ impl<'a> Seeds<'a> {
         }
     }
 
-    /// Whether more than the gradation's slope is allowed anywhere.
+    /// Returns whether more than the gradation's slope is allowed anywhere.
     pub(super) fn has_slope_factors(&self) -> bool {
         !self.slope_factor.is_empty()
     }
 
-    /// Bytes of memory held for vertices; places along edges are in a room's arrays.
+    /// Bytes of memory held for vertices; seeds along edges are in arrays of the scratch space.
     pub(super) fn bytes(&self) -> usize {
         size_of_val(&self.h[..]) + size_of_val(&self.slope_factor[..])
     }

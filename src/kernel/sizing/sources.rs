@@ -1,4 +1,4 @@
-//! Sizes asked for in a box, a sphere or a cylinder, graded outwards by formula.
+//! Sizes in a box, a sphere or a cylinder, graded outwards by formula.
 //!
 //! Inside the shape the size is `inside`, away from it at most `outside` (no bound when it is not given), and
 //! between the two it changes with the slope of the gradation: the minimum with the octree keeps that slope.
@@ -9,7 +9,7 @@ use tetdb_base::geom::Point;
 
 /// A convex region, closed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Shape {
+pub enum SourceShape {
     /// A box along the axes.
     Box {
         /// Least coordinates.
@@ -33,14 +33,14 @@ pub enum Shape {
     },
 }
 
-/// Sizes inside and outside a shape, as asked for.
+/// Sizes inside and outside a shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SizeSource {
     /// Where the sizes hold.
-    pub shape: Shape,
+    pub shape: SourceShape,
     /// Size inside the shape.
     pub inside: Length,
-    /// Size outside it, if one was asked for.
+    /// Size outside it, if one was given.
     pub outside: Option<Length>,
 }
 
@@ -57,7 +57,7 @@ impl SizeSource {
         };
         let ([a, b, c, d, e, f], inside, outside) = text.read()?;
         let (p, q) = (Point::new(a, b, c), Point::new(d, e, f));
-        let shape = Shape::Box { low: p.min(q), high: p.max(q) };
+        let shape = SourceShape::Box { low: p.min(q), high: p.max(q) };
         Ok(Self { shape, inside, outside })
     }
 
@@ -76,7 +76,7 @@ impl SizeSource {
             return Err(text.bad());
         }
         let center = Point::new(x, y, z);
-        Ok(Self { shape: Shape::Sphere { center, radius }, inside, outside })
+        Ok(Self { shape: SourceShape::Sphere { center, radius }, inside, outside })
     }
 
     /// Reads `X0,Y0,Z0,X1,Y1,Z1,R,H[,OUTSIDE]`: the ends of the axis, which differ, and the radius.
@@ -94,7 +94,7 @@ impl SizeSource {
         if radius < 0.0 || ends[0] == ends[1] {
             return Err(text.bad());
         }
-        Ok(Self { shape: Shape::Cylinder { ends, radius }, inside, outside })
+        Ok(Self { shape: SourceShape::Cylinder { ends, radius }, inside, outside })
     }
 
     /// The source for a surface whose box has that diagonal; no size below `least`.
@@ -142,13 +142,13 @@ impl SourceText<'_> {
 /// A source in input units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ResolvedSource {
-    shape: Shape,
+    shape: SourceShape,
     inside: f64,
     outside: f64,
 }
 
 impl ResolvedSource {
-    /// The smallest size it asks for.
+    /// The smallest size of the source.
     pub(super) fn least(&self) -> f64 {
         self.inside.min(self.outside)
     }
@@ -166,7 +166,7 @@ impl ResolvedSource {
     }
 }
 
-impl Shape {
+impl SourceShape {
     /// Distance to the boundary, positive inside. Inside a box and a cylinder it is that to the nearest wall.
     fn depth(&self, p: Point) -> f64 {
         match *self {

@@ -9,7 +9,7 @@ use tetdb_base::geom::short;
 use tetdb_base::storage::{ScratchSpace, raise, sort_record};
 
 impl SizeField {
-    /// What the field is like, and where its sizes came from. A scratch file that fails unwinds.
+    /// Summary of the field and the origin of its sizes. A scratch file that fails unwinds.
     pub(super) fn summary(
         &self,
         seeds: &Seeds,
@@ -89,7 +89,8 @@ fn weighted_range(list: impl Iterator<Item = (f64, f64)>, scratch: &ScratchSpace
 /// not divided, so that large triangles would stand against small tetrahedra.
 const FAR_BELOW: f64 = 0.4;
 
-/// Above this multiple of the longest length that the field has, a wanted one is warned about: it is as good as none, and often in another unit.
+/// A wanted size above this multiple of the field's longest length is warned about: it has no effect, and is often in
+/// another unit.
 const FAR_ABOVE: f64 = 4.0;
 
 fn plural(n: usize, what: &str) -> String {

@@ -1,4 +1,4 @@
-//! What a user is told about sizes.
+//! The summary of sizes for the user.
 
 use std::fmt;
 
@@ -30,18 +30,18 @@ pub struct SizeSummary {
     pub n_leaves: usize,
     /// Memory of the field in bytes.
     pub bytes: usize,
-    /// What the user may not expect.
+    /// Surprising consequences of the options.
     pub warnings: Vec<SizeWarning>,
 }
 
-/// What will not come out as the user may expect.
+/// A consequence of the options that may surprise the user.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SizeWarning {
     /// The wanted interior size is far below the surface's edges, which are kept.
     FarBelowSurface {
-        /// The option that asks for the size.
+        /// The option that sets the size.
         option: &'static str,
-        /// The size it asks for.
+        /// The size it sets.
         wanted: f64,
         /// Median size of the surface.
         surface_median: f64,
@@ -50,9 +50,9 @@ pub enum SizeWarning {
     },
     /// The wanted interior size is longer than the gradation lets sizes grow within the surface.
     NeverReached {
-        /// The option that asks for the size.
+        /// The option that sets the size.
         option: &'static str,
-        /// The size it asks for.
+        /// The size it sets.
         wanted: f64,
         /// The longest that comes out.
         most: f64,

@@ -281,7 +281,7 @@ fn formulas_that_give_no_size_are_refused() {
         assert!(matches!(found, SizingError::NoSize { .. }), "{text} {found}");
         assert!(found.to_string().contains(text), "{found}");
     }
-    // Outside the surface's box nothing is asked.
+    // Outside the surface's box the constraint is not sampled.
     let inside = "if(min(x,min(y,z))<-1e-9 or max(x,max(y,z))>1.000000001,0/0,0.1)";
     assert!(SizeField::build(&even.0, &even.1, &formula(inside)).is_ok());
     for text in ["x +", "w", "x > 0", ""] {
@@ -356,7 +356,7 @@ fn bytes_are_read_back_and_damage_is_named() {
     }
 }
 
-/// The cube's surface with what is asked of it.
+/// The cube's surface with its size options.
 fn with_domain<T>(surface: &(Vec<Point>, Vec<[u32; 3]>), ask: impl FnOnce(&Domain) -> T) -> T {
     // Walls are welded: each grid has its own points.
     let mut welded = Surface::default();
@@ -413,7 +413,7 @@ fn loads_are_integrals() {
 
 #[test]
 fn vertices_that_nearly_touch_have_a_bounded_load() {
-    // A triangle divided at a point as near to one of its corners as doubles can tell, in the middle of a wall.
+    // A triangle divided at a point next to one of its corners, at the limit of doubles, in the middle of a wall.
     let whole = cube(4, |i| i as f64 / 4.0);
     let mut twin = whole.clone();
     let t = twin.1.len() / 2;

@@ -1,5 +1,5 @@
-//! The octree: where sizes differ, and beside small bodies far from all others, cells of about the local size; elsewhere, cells as
-//! large as may be.
+//! The octree. Cells have about the local size where sizes differ, and near small bodies far from all others; elsewhere
+//! they are as large as possible.
 //!
 //! Two leaves that share as much as a corner differ by one level at most. Cells are addressed on an
 //! integer lattice of 2^20 per axis; octants and corners are numbered x + 2y + 4z.
@@ -331,14 +331,14 @@ fn near_child(cell: Leaf, near: &[u32], seeds: &Seeds) -> Option<Vec<u32>> {
         let p = seeds.at(*s);
         p.cmpge(low).all() && p.cmple(high).all()
     };
-    // Room for all is asked for and next to none of it touched: a list that grows takes up to three times its bytes.
+    // The capacity covers all seeds, and most of it stays untouched: a growing list takes up to three times its bytes.
     let mut list = Vec::with_capacity(near.len());
     list.extend(near.iter().copied().filter(is_near));
     list.shrink_to_fit();
     (list.len() < near.len()).then_some(list)
 }
 
-/// Whether sizes in and around a cell ask for smaller cells.
+/// Returns whether sizes in and around a cell ask for smaller cells.
 fn is_divided(cell: Leaf, near: &[u32], n_around: usize, seeds: &Seeds, targets: &Targets) -> bool {
     if cell.level == DEPTH || near.is_empty() {
         return false;

@@ -15,12 +15,12 @@ use tetdb_base::storage::{ScratchSpace, SpillVec, check_cancelled, raise, sort_r
 /// Rounds of averaging that smooth what was filled in. The graph is shallow (cells grow with the distance to the surface): after these, the number of
 /// tetrahedra expected of a scanned skull is within 0.4 % of that of the limit.
 const FILL_ROUNDS: u32 = 18;
-/// What a round leaves of the slowest part of the error, were it mere averaging: sixty such rounds would do no better than these, which look back
-/// at the round before (the Chebyshev semi-iteration: Golub, Varga 1961).
+/// Share of the slowest part of the error that plain averaging leaves after a round. Sixty rounds of plain averaging
+/// would do no better than these, which use the round before as well (the Chebyshev semi-iteration: Golub, Varga 1961).
 const SLOWEST: f32 = 0.98;
 /// How far from the mean of its neighbors a value may be, as a factor.
 const REACH: f32 = 2.0;
-/// Of each of a cell's corners the three that its edges lead to.
+/// For each corner of a cell, the three corners at the other ends of its edges.
 const ALONG_EDGES: [[u8; 3]; 8] =
     [[1, 2, 4], [0, 3, 5], [0, 3, 6], [1, 2, 7], [0, 5, 6], [1, 4, 7], [2, 4, 7], [3, 5, 6]];
 
@@ -32,7 +32,7 @@ sort_record! {
     }
 }
 
-/// What sizes at corners are made from.
+/// Computes sizes at corners from these parts.
 pub(super) struct CornerSizes<'a> {
     pub tree: &'a Tree,
     pub corners: &'a mut TreeCorners,
@@ -84,8 +84,8 @@ impl CornerSizes<'_> {
         self.slope_factor = Some(by_leaf);
     }
 
-    /// Weighted means of a value of the seeds at the corners of the leaves that hold them, infinite elsewhere;
-    /// and, when asked for, distances from there to the nearest of these seeds.
+    /// Weighted means of a value of the seeds at the corners of the leaves that hold them, infinite elsewhere; and,
+    /// with `with_nearest`, distances from there to the nearest of these seeds.
     ///
     /// Seeds are taken leaf by leaf, those of a leaf in their order. What falls on a hanging corner is handed to the corners it hangs on.
     pub(super) fn gather(
@@ -173,7 +173,7 @@ impl CornerSizes<'_> {
             return h;
         }
         let mut sums = self.scratch.column(h.len(), [0.0f32; 2]);
-        // Of the round before.
+        // Values of the round before.
         let mut before = self.scratch.column(h.len(), 0.0f32);
         let (mut smooth, mut over) = (0, 1.0);
         while smooth < FILL_ROUNDS {
@@ -222,7 +222,8 @@ impl CornerSizes<'_> {
         }
     }
 
-    /// What the gradation allows beside sizes at some corners, each at a distance from where it holds: the least, the most.
+    /// Lower and upper bounds that the gradation sets around corners with sizes; `nearest` is the distance of each
+    /// corner from the place of its size.
     pub(super) fn cones(
         &mut self,
         gathered: &mut SpillVec<f32>,

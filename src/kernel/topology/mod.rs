@@ -1,4 +1,4 @@
-//! Who neighbors whom: owners of interface faces, kept up at every bisection.
+//! Neighbors of sub-domains: owners of interface faces, updated at every bisection.
 //!
 //! A cut's faces have numbers; for each, the table of the cut says which part has it on the low side and which on the
 //! high side. A part is named by the rank of its first sub-domain. When a part is bisected, its low child keeps the name, so that
@@ -45,7 +45,7 @@ impl Owners {
         Some(owners[1 - (side as usize & 1)])
     }
 
-    /// The faces of one part, and who has them on the other side.
+    /// The faces of one sub-domain, with the owner on the other side of each.
     pub fn across(&self, part: u32) -> OppositeOwners {
         let faces = (0..).zip(&self.faces);
         let other = |(index, &owners): (u32, &[u32; 2])| match owners {
@@ -57,7 +57,8 @@ impl Owners {
     }
 }
 
-/// The faces that one part has in a cut. Shape: `faces[i]` = the number of a face and the part on its other side, ascending.
+/// The faces that one sub-domain has in a cut. Shape: `faces[i]` = the number of a face and the sub-domain on its other
+/// side, ascending.
 #[derive(Archive, Serialize, Deserialize, Clone, Debug, Default, PartialEq, Eq)]
 pub struct OppositeOwners {
     faces: Vec<[u32; 2]>,
@@ -73,11 +74,11 @@ impl OppositeOwners {
 
 /// Shared faces of each pair of parts, the lower name first.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Neighbors {
+pub struct NeighborCounts {
     pairs: BTreeMap<(u32, u32), u64>,
 }
 
-impl Neighbors {
+impl NeighborCounts {
     /// Sets what a pair shares.
     pub fn set(&mut self, a: u32, b: u32, faces: u64) {
         self.pairs.insert((a.min(b), a.max(b)), faces);
@@ -120,7 +121,7 @@ mod tests {
     #[test]
     fn faces_change_owner_and_tables_stay_symmetric() {
         let mut owners = Owners::new(5, 0, 2);
-        let mut neighbors = Neighbors::default();
+        let mut neighbors = NeighborCounts::default();
         neighbors.set(0, 2, 5);
         // The high part is bisected: faces 3 and 4 go to part 3.
         for index in [3, 4] {

@@ -4,11 +4,11 @@ use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::Options;
 use crate::pipeline::progress::{Event, Watcher};
 use tetdb_base::geom::HilbertFrame;
-use tetdb_base::storage::{Keyed, Pages, ScratchSpace, raise};
+use tetdb_base::storage::{KeyedId, Pages, ScratchSpace, raise};
 use tetdb_base::surface::Surface;
 use tetdb_kernel::boundary::{RecoveryReport, VolumeRegions, fill_regions, recover_with_progress};
 use tetdb_kernel::delaunay::{Kernel, KernelStats, Rejected, enclose, insertion_key};
-use tetdb_kernel::mesh::{Facet, Mesh, SHEET, VertexTag};
+use tetdb_kernel::mesh::{Mesh, MeshFacet, SHEET, VertexTag};
 use tetdb_kernel::optimize;
 
 /// What the coarse step did.
@@ -99,10 +99,10 @@ pub fn triangulate<P: Pages>(
 ) -> Result<KernelStats, (u32, Rejected)> {
     let bounds = surface.bounds();
     let frame = HilbertFrame::new(&bounds);
-    let mut order = scratch.sorter::<Keyed>();
+    let mut order = scratch.sorter::<KeyedId>();
     for (i, &p) in (0u32..).zip(&surface.points) {
         let key = insertion_key(&frame, p);
-        let pushed = order.push(Keyed { key, id: i });
+        let pushed = order.push(KeyedId { key, id: i });
         pushed.unwrap_or_else(|e| raise(e));
     }
     let order = order.finish().unwrap_or_else(|e| raise(e));
@@ -127,7 +127,7 @@ pub fn triangulate<P: Pages>(
         }
     }
     for (n, (corners, &label)) in surface.triangles.iter().zip(&surface.labels).enumerate() {
-        mesh.add_facet(Facet {
+        mesh.add_facet(MeshFacet {
             vertices: corners.map(|c| number.get(c as usize)),
             label,
             input: n as u64,

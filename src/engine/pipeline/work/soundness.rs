@@ -109,10 +109,10 @@ mod tests {
     use tetdb_base::geom::{Aabb, Point};
     use tetdb_base::storage::FlatPages;
     use tetdb_kernel::delaunay::enclose;
-    use tetdb_kernel::mesh::InterfaceFace;
+    use tetdb_kernel::mesh::MeshInterfaceFace;
 
-    fn face(vertices: [u32; 3]) -> InterfaceFace {
-        InterfaceFace { vertices, cut: 2, index: 43, side: 0 }
+    fn face(vertices: [u32; 3]) -> MeshInterfaceFace {
+        MeshInterfaceFace { vertices, cut: 2, index: 43, side: 0 }
     }
 
     #[test]

@@ -67,7 +67,7 @@ fn vertices_on_triangles_become_theirs_and_the_surface_stays() {
     let names = |s: &Surface| s.label_names[..whole.label_names.len()].to_vec();
     assert_eq!(names(&surface), names(&whole));
     assert!(orient_alike(&mut surface.clone()).flipped.is_empty());
-    // What is read again from a store is the same to the last number.
+    // A surface read again from a store is identical.
     let again = in_order(&surface);
     assert_eq!(in_order(&again), again);
     assert_eq!(again.embedded.points.len(), points.len());
