@@ -3,7 +3,7 @@
 use super::op::{BinaryOp, Op, STACK_MAX, Unary};
 
 impl Unary {
-    pub(super) fn of(self, x: f64) -> f64 {
+    pub(super) fn apply(self, x: f64) -> f64 {
         match self {
             Self::Abs => x.abs(),
             Self::Ceil => x.ceil(),
@@ -24,7 +24,7 @@ impl Unary {
 }
 
 impl BinaryOp {
-    pub(super) fn of(self, a: f64, b: f64) -> f64 {
+    pub(super) fn apply(self, a: f64, b: f64) -> f64 {
         match self {
             Self::Add => a + b,
             Self::And => truth(a != 0.0 && b != 0.0),
@@ -65,10 +65,10 @@ pub(super) fn run(ops: &[Op], lists: &[Vec<f64>], values: &[f64]) -> f64 {
                 stack[n] = values[v];
                 n += 1;
             }
-            Op::Unary(f) => stack[n - 1] = f.of(stack[n - 1]),
+            Op::Unary(f) => stack[n - 1] = f.apply(stack[n - 1]),
             Op::BinaryOp(f) => {
                 n -= 1;
-                stack[n - 1] = f.of(stack[n - 1], stack[n]);
+                stack[n - 1] = f.apply(stack[n - 1], stack[n]);
             }
             Op::In(list) => stack[n - 1] = truth(lists[list].contains(&stack[n - 1])),
             Op::If => {

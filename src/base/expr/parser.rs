@@ -1,4 +1,4 @@
-//! Words to operations: precedence climbing, kinds checked on the way.
+//! Parses tokens to operations by precedence climbing, and checks their types.
 
 use super::op::{BinaryOp, Op, Unary};
 use super::words::{Token, fault, next_word};

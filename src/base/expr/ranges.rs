@@ -17,7 +17,7 @@ const ANY: Interval = Interval { low: f64::NEG_INFINITY, high: f64::INFINITY, na
 
 impl Interval {
     /// From values that are its ends; anything when one is not a number.
-    fn of(ends: &[f64], nan: bool) -> Self {
+    fn around(ends: &[f64], nan: bool) -> Self {
         if ends.iter().any(|e| e.is_nan()) {
             return ANY;
         }
@@ -52,11 +52,11 @@ pub(super) fn may_hold(ops: &[Op], lists: &[Vec<f64>], ranges: &[[f64; 2]]) -> b
     for op in ops {
         match *op {
             Op::Constant(value) => {
-                stack[n] = Interval::of(&[value], false);
+                stack[n] = Interval::around(&[value], false);
                 n += 1;
             }
             Op::Variable(v) => {
-                stack[n] = Interval::of(&ranges[v], false);
+                stack[n] = Interval::around(&ranges[v], false);
                 n += 1;
             }
             Op::Unary(f) => stack[n - 1] = unary(f, stack[n - 1]),
@@ -75,7 +75,7 @@ pub(super) fn may_hold(ops: &[Op], lists: &[Vec<f64>], ranges: &[[f64; 2]]) -> b
                 stack[n - 1] = match (condition.low > 0.0, condition.high > 0.0) {
                     (true, _) => yes,
                     (_, false) => no,
-                    _ => Interval::of(&[yes.low, yes.high, no.low, no.high], yes.nan || no.nan),
+                    _ => Interval::around(&[yes.low, yes.high, no.low, no.high], yes.nan || no.nan),
                 };
             }
         }
@@ -86,13 +86,13 @@ pub(super) fn may_hold(ops: &[Op], lists: &[Vec<f64>], ranges: &[[f64; 2]]) -> b
 fn unary(f: Unary, x: Interval) -> Interval {
     match f {
         Unary::Negate | Unary::Ceil | Unary::Floor | Unary::Round | Unary::Sign => {
-            Interval::of(&[f.of(x.low), f.of(x.high)], x.nan)
+            Interval::around(&[f.apply(x.low), f.apply(x.high)], x.nan)
         }
-        Unary::Abs if x.holds_zero() => Interval::of(&[0.0, x.low.abs(), x.high.abs()], x.nan),
-        Unary::Abs => Interval::of(&[x.low.abs(), x.high.abs()], x.nan),
-        Unary::Sqrt if x.low >= 0.0 => Interval::of(&[x.low.sqrt(), x.high.sqrt()], x.nan),
+        Unary::Abs if x.holds_zero() => Interval::around(&[0.0, x.low.abs(), x.high.abs()], x.nan),
+        Unary::Abs => Interval::around(&[x.low.abs(), x.high.abs()], x.nan),
+        Unary::Sqrt if x.low >= 0.0 => Interval::around(&[x.low.sqrt(), x.high.sqrt()], x.nan),
         Unary::Not => Interval::truth(x.high > 0.0, x.low <= 0.0),
-        Unary::Sin | Unary::Cos if x.is_bounded() => Interval::of(&[-1.0, 1.0], x.nan),
+        Unary::Sin | Unary::Cos if x.is_bounded() => Interval::around(&[-1.0, 1.0], x.nan),
         Unary::Cos | Unary::Exp | Unary::Log | Unary::Sin | Unary::Sqrt | Unary::Tan => ANY,
     }
 }
@@ -101,16 +101,16 @@ fn binary(f: BinaryOp, a: Interval, b: Interval) -> Interval {
     let nan = a.nan || b.nan;
     let ends = |f: BinaryOp| {
         let pairs = [(a.low, b.low), (a.low, b.high), (a.high, b.low), (a.high, b.high)];
-        pairs.map(|(a, b)| f.of(a, b))
+        pairs.map(|(a, b)| f.apply(a, b))
     };
-    // Infinite ends meet only where a range is unbounded: what is between them need not come near.
+    // Infinite ends meet only in an unbounded range, whose inner values need not come near.
     let bounded = a.is_bounded() && b.is_bounded();
     match f {
         BinaryOp::Add | BinaryOp::Subtract | BinaryOp::Multiply if bounded => {
-            Interval::of(&ends(f), nan)
+            Interval::around(&ends(f), nan)
         }
-        BinaryOp::Divide if bounded && !b.holds_zero() => Interval::of(&ends(f), nan),
-        BinaryOp::Max | BinaryOp::Min => Interval::of(&ends(f), nan),
+        BinaryOp::Divide if bounded && !b.holds_zero() => Interval::around(&ends(f), nan),
+        BinaryOp::Max | BinaryOp::Min => Interval::around(&ends(f), nan),
         BinaryOp::Add
         | BinaryOp::Subtract
         | BinaryOp::Multiply

@@ -1,4 +1,4 @@
-//! Text to words with their places.
+//! Splits text into tokens with their places.
 
 use super::ExprError;
 
@@ -16,7 +16,7 @@ pub(super) enum Token<'a> {
 const SIGNS: [&str; 17] =
     ["==", "!=", "<=", ">=", "=", "<", ">", "+", "-", "*", "/", "^", "(", ")", "[", "]", ","];
 
-/// Signs of other languages, and what to write here.
+/// Operators of other languages, and their replacement here.
 const FOREIGN: [(&str, &str); 7] = [
     ("&&", "`and`"),
     ("||", "`or`"),

@@ -1,4 +1,4 @@
-//! Whole numbers times powers of two: sums and products of doubles, without rounding and without a range to leave.
+//! Whole numbers times powers of two: exact sums and products of doubles, of any size.
 
 use std::cmp::Ordering;
 

@@ -1,4 +1,4 @@
-//! Numbers `m · 2^e` without rounding: the slow truth that signs are tested against.
+//! Exact numbers `m · 2^e`: a slow reference for the signs.
 //!
 //! On a library's whole numbers, so that it shares nothing with the exact numbers of recovery, which it tests.
 

@@ -1,4 +1,4 @@
-//! Sums of two doubles, some 106 bits: enough for most signs that doubles leave open.
+//! Sums of two doubles, some 106 bits: enough for most signs that doubles cannot decide.
 //!
 //! Source: T. J. Dekker, "A floating-point technique for extending the available precision" (1971); error bounds of sums and products:
 //! M. Joldes, J.-M. Muller and V. Popescu, "Tight and rigorous error bounds for basic building blocks of double-word arithmetic" (2017).
@@ -42,12 +42,12 @@ fn product(a: f64, b: f64) -> DoublePair {
 }
 
 impl DoublePair {
-    /// `a - b + rest`, off by at most 2^-52 of the larger of `rest` and what rounding `a - b` leaves.
+    /// `a - b + rest`, off by at most 2^-52 of the larger of `rest` and the rounding error of `a - b`.
     #[inline]
     pub fn difference(a: f64, b: f64, rest: f64) -> Self {
         let Self(high, low) = sum(a, -b);
         let Self(high, more) = sum(high, rest);
-        // The rest may cancel what is before it.
+        // The rest may cancel the leading part.
         sum(high, low + more)
     }
 

@@ -1,4 +1,4 @@
-//! Signs of the orientation and sphere determinants, never wrong.
+//! Exact signs of the orientation and sphere determinants.
 //!
 //! Each call first evaluates the determinant in doubles. It compares the result with a bound from the largest
 //! coordinate differences of that very call. (Such a semi-static filter works on small tetrahedra, where a bound for

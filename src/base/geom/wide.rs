@@ -22,7 +22,8 @@ pub(super) fn insphere_sign(a: Point, b: Point, c: Point, d: Point, e: Point) ->
 
 /// The differences where doubles hold them exactly, as they do for points near each other and not too near zero.
 ///
-/// The unit is as small as the largest difference allows: what it is does not matter, if all are whole numbers of it.
+/// The unit is as small as the largest difference allows. Its value does not matter, if all coordinates are whole
+/// numbers of it.
 fn rounded_differences(points: [Point; 4], e: Point) -> Option<[[i64; 3]; 4]> {
     let mut seen = [Point::ZERO; 4];
     let mut largest = Point::ZERO;

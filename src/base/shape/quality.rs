@@ -74,7 +74,7 @@ pub fn face_bound([a, b, c]: [Point; 3]) -> f64 {
     radius / (ALPHA * longest)
 }
 
-/// Returns whether every tetrahedron on a face has q of 2 or more, whatever its fourth vertex.
+/// Returns whether every tetrahedron on a face has q of 2 or more, for any fourth vertex.
 pub fn is_forcing(corners: [Point; 3]) -> bool {
     face_bound(corners) <= INVERSE_QUALITY_WANTED
 }

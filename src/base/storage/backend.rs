@@ -14,9 +14,9 @@ pub(super) struct Synced(pub Box<dyn StorageBackend>);
 
 /// A redb file that is not synced at its commits.
 ///
-/// A file that the catalog does not list yet is worth nothing after a crash, whatever reached the disk; the commit that lists it syncs
-/// it as a whole first. Syncing each batch instead was most of the time of a cut with very few frames. Is not: for files that are
-/// changed in place once they are listed, nor for several processes; it takes no lock.
+/// A file that the catalog does not list yet is worthless after a crash; the commit that lists it first syncs it as a
+/// whole. Syncing each batch instead was most of the time of a cut with very few frames. Is not: for files that change
+/// in place once they are listed, nor for several processes; it takes no lock.
 #[derive(Debug)]
 pub(super) struct Unsynced(pub Box<dyn StorageBackend>);
 
@@ -102,7 +102,7 @@ const BLOCK: u64 = 4096;
 
 /// A file as it would be if it were written to: changes stay in memory.
 ///
-/// For a database that may not be changed, which redb opens only to change it. Memory: what is written.
+/// For a database that must not change, which redb can open only for writing. Memory: the bytes written.
 #[derive(Debug)]
 pub(super) struct Private {
     file: Box<dyn StorageBackend>,
@@ -112,7 +112,7 @@ pub(super) struct Private {
 #[derive(Debug)]
 struct PrivateChanges {
     len: u64,
-    /// The file counts up to here; what is beyond it and in no block is zero.
+    /// Length of the valid part of the file; bytes beyond it that are in no block are zero.
     len_of_file: u64,
     blocks: BTreeMap<u64, [u8; BLOCK as usize]>,
 }

@@ -1,6 +1,6 @@
-//! The one door to the disk: whatever a store does with files and folders goes through a [`Disk`].
+//! The interface to the disk: all operations of a store on files and folders go through a [`Disk`].
 //!
-//! Why a door: what a crash, a full disk or a failing one leaves behind can only be tested on a disk that does these things on demand.
+//! Why: the state after a crash, on a full disk or on a failing one can be tested only on a disk that fails on demand.
 
 use std::fmt::Debug;
 use std::io::{self, Read, Write};
@@ -10,7 +10,7 @@ use redb::{Builder, DatabaseError, ReadOnlyDatabase, StorageBackend};
 
 use super::file_lock::{FileLock, Refused};
 
-/// Files and folders by path. Paths mean what they mean to the operating system.
+/// Files and folders by path. Paths have the meaning of the operating system.
 ///
 /// Written bytes last after [`StorageBackend::sync_data`] or [`Disk::sync_file`]. Names of created, renamed and removed
 /// files last after [`Disk::sync_dir`]. Errors: the system's, with its kinds ([`io::ErrorKind::StorageFull`] and so
@@ -43,7 +43,7 @@ pub trait Disk: Debug + Send + Sync {
     fn remove_dir_all(&self, dir: &Path) -> io::Result<()>;
     /// Removes a file.
     fn remove_file(&self, path: &Path) -> io::Result<()>;
-    /// Gives a file another name on the same disk, replacing what had it.
+    /// Renames a file on the same disk, replacing a file of the new name.
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()>;
     /// Gives a file a second name on the same disk. Errors: there are none on this disk; the name is taken.
     fn link(&self, _from: &Path, _to: &Path) -> io::Result<()> {
@@ -59,7 +59,7 @@ pub trait Disk: Debug + Send + Sync {
     fn id(&self, path: &Path) -> Option<FileId>;
 }
 
-/// Tells a file from any other that is there or open at the same time, whatever its name.
+/// Identifies a file among all that exist or are open at the same time, by any name.
 pub type FileId = (u64, u64);
 
 /// The kind of a directory entry.

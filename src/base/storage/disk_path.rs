@@ -1,4 +1,4 @@
-//! A place on a disk, and what a store does there.
+//! A path on a disk, and the operations of a store there.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -109,13 +109,13 @@ impl DiskPath {
         self.at_path(self.disk.remove_dir_all(&self.path))
     }
 
-    /// Gives what is here another name in the same folder, to last.
+    /// Renames the file or folder within its folder, durably.
     pub fn rename(&self, to: &Self) -> Result<(), StorageError> {
         to.at_path(self.disk.rename(&self.path, &to.path))?;
         to.folder().sync_dir()
     }
 
-    /// Gives what is here a second name. Errors: this disk has none; the name is taken.
+    /// Adds a second name. Errors: the disk does not support it; the name exists.
     pub fn link(&self, to: &Self) -> Result<(), StorageError> {
         to.at_path(self.disk.link(&self.path, &to.path))
     }

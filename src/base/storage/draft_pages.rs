@@ -21,7 +21,7 @@ pub struct DraftPages<'a> {
 }
 
 const ZERO: Slot = [u32_le::from_native(0); 8];
-/// Places of those met last: most of what is read again is among them.
+/// Slots for the ids read last: most repeated reads are among them.
 const PLACES: usize = 1 << 10;
 
 impl<'a> DraftPages<'a> {
@@ -36,7 +36,7 @@ impl<'a> DraftPages<'a> {
         }
     }
 
-    /// Forgets changes and what was read.
+    /// Drops all changes and the list of reads.
     pub fn restart(&mut self) {
         self.changed.clear();
         self.appended = [0; kind::ALL.len()];

@@ -36,7 +36,7 @@ pub enum StorageError {
         /// The damage found.
         reason: String,
     },
-    /// A page is not what its address says.
+    /// A page does not match its address.
     #[error("{path} is damaged: {source}")]
     Page {
         /// The file or folder.

@@ -110,8 +110,8 @@ impl StoreFile {
             table: None,
             damage: None,
         };
-        // redb writes once more when it closes what it opened for writing. On a damaged tree it panics meanwhile, and again in what that
-        // unwinds, which ends the process: so a damaged file is never closed.
+        // redb writes once more when it closes a database opened for writing. On a damaged tree it panics then, and
+        // panics again while unwinding, which ends the process. So a damaged file is never closed.
         if matches!(file.handle, Some(Handle::Writer(_)))
             && let Err(damage) = file.check()
         {
@@ -142,7 +142,7 @@ impl StoreFile {
         }
     }
 
-    /// Gives the file another name in its folder, to last, replacing what had it; readers see the old name or the new.
+    /// Renames the file within its folder, durably, replacing a file of that name; readers see the old name or the new.
     ///
     /// Errors: the system refuses.
     pub fn rename(&mut self, name: &str) -> Result<(), StorageError> {
@@ -246,8 +246,8 @@ impl StoreFile {
         committed.map_err(|e| e.at(self.path.path()))
     }
 
-    /// Reads the whole file and compares every page of redb's tree with its checksum, which nothing else does: what is read by key is right or
-    /// missing, but a range of keys may silently lack some.
+    /// Reads the whole file and compares every page of redb's tree with its checksum. Nothing else does: a value read
+    /// by key is right or missing, but a range of keys may silently lack some.
     ///
     /// Effects: none on the file. Errors: [`StorageError::Damaged`].
     pub fn check(&self) -> Result<(), StorageError> {
@@ -313,7 +313,7 @@ impl StoreFile {
         to.sync_file()
     }
 
-    /// Shrinks the file to what it holds, and closes it.
+    /// Shrinks the file to its content, and closes it.
     pub fn compact(mut self) -> Result<(), StorageError> {
         self.table = None;
         if let Some(Handle::Writer(db)) = &mut self.handle {
@@ -349,25 +349,25 @@ impl Drop for StoreFile {
     }
 }
 
-/// For what a file is opened.
+/// The purpose of opening a file.
 #[derive(Clone, Copy)]
 enum Access {
     /// For writing, exclusively.
     Write,
     /// For reading, shared with other readers.
     Share,
-    /// To be read, with what redb changes kept in memory.
+    /// For reading, with redb's changes kept in memory.
     Private,
 }
 
-/// Opens what is there; an empty file is none of redb's, which would begin a database in it.
+/// Opens an existing file. An empty file is refused: redb would create a database in it.
 fn open_writable(path: &DiskPath, builder: &redb::Builder) -> Result<Database, DatabaseError> {
     let file = path.disk().open(path.path()).map_err(redb::StorageError::Io)?;
     refuse_empty(&*file)?;
     builder.create_with_backend(Synced(file))
 }
 
-/// Opens what is there, changing nothing.
+/// Opens an existing file without changing it.
 fn open_private(path: &DiskPath, builder: &redb::Builder) -> Result<Database, DatabaseError> {
     let file = path.disk().open_read_only(path.path());
     let file = file.map_err(redb::StorageError::Io)?;
@@ -419,7 +419,7 @@ impl RedbFailure {
     }
 }
 
-/// Runs a call into redb and makes what it returns one kind of failure.
+/// Calls redb and converts its failures to one type.
 fn guarded<T, E: Into<redb::Error>>(call: impl FnOnce() -> Result<T, E>) -> Result<T, RedbFailure> {
     match caught(call) {
         Ok(result) => result.map_err(|e| RedbFailure::Error(e.into())),

@@ -1,4 +1,4 @@
-//! A file that stands for a right only one process has at a time.
+//! A lock file: one process at a time holds it.
 //!
 //! The system's lock on the file decides; it ends with the process. On a file system without locks, the existence of
 //! the file decides: the process that creates the file holds the lock. A file left by a dead process of this host is
@@ -26,7 +26,8 @@ const SETTLED_AFTER: Duration = Duration::from_millis(200);
 
 /// Between two times that a holder renews its file.
 const RENEWED_EVERY: Duration = Duration::from_millis(500);
-/// A holder on another host that has not renewed its file for so long is gone: six times what it takes, so that a slow disk is no death.
+/// A holder on another host that has not renewed its file for this long is considered gone: six renewal intervals, so
+/// that a slow disk does not count as death.
 const RENEWED_WITHIN: Duration = Duration::from_secs(3);
 
 /// A right that is held; it ends when this is dropped.
@@ -140,7 +141,8 @@ impl FileLock {
             if is_taken_over {
                 std::thread::sleep(SETTLED_AFTER);
             }
-            // Whoever had it may have removed the file meanwhile: then this one has no name, and another may be locked in its place.
+            // The previous holder may have removed the file meanwhile. Then this one has no name, and another process
+            // may lock a new one.
             if fs::read_to_string(path).is_ok_and(|found| found == text) {
                 return Ok(Self {
                     held: Some(Renewed::new(file)),

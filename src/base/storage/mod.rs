@@ -1,11 +1,11 @@
 //! Pages, cache, budget, transactions. The module handles bytes and records, not geometry.
 //!
 //! # How failure travels
-//! A record is read some twenty million times a second, and nearly always from a resident frame. The
-//! accessors of [`Pages`] therefore return records, not results: when a page cannot be loaded, the
-//! pager unwinds with the [`StorageError`] as its payload, and [`attempt`], which surrounds each step,
-//! turns that back into a value. A step is atomic, so what it leaves half-done in memory is dropped
-//! with it. Nothing but [`attempt`] may catch such an unwinding. A request to stop travels the same way.
+//! A record is read some twenty million times a second, and nearly always from a resident frame. The accessors of
+//! [`Pages`] therefore return records, not results. If a page cannot be loaded, the pager unwinds with the
+//! [`StorageError`] as its payload; [`attempt`], which surrounds each step, turns that back into a value. A step is
+//! atomic, so its unfinished state in memory is dropped with it. Nothing but [`attempt`] may catch such an unwinding. A
+//! request to stop travels the same way.
 
 #![warn(missing_docs)]
 

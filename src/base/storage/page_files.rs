@@ -1,4 +1,4 @@
-//! The files behind a pool: where pages come from, and where they go that leave memory.
+//! The files of a pool: the base that pages are read from, the output, and the scratch file for evicted pages.
 
 use tetdb_schema::page::{
     PageAddress, Slot, check_page, open_page, page_key, seal_page, stored_bytes,
@@ -123,7 +123,7 @@ impl PageFiles {
         self.spill.as_ref().map_or(0, |spill| spill.end)
     }
 
-    /// Makes a frame what is written of it.
+    /// Prepares a frame for writing.
     pub fn seal(&self, address: PageAddress, frame: &mut [Slot]) {
         seal_page(frame, address, self.backing().generation);
     }

@@ -1,4 +1,4 @@
-//! Where the pages of one kind are: in a frame, or in which file.
+//! The place of each page of one kind: a frame or a file.
 
 use tetdb_schema::page::{SLOT_BITS, SLOT_MASK};
 
@@ -20,7 +20,7 @@ pub(super) const FRAMES_LIMIT: usize = (BEYOND >> SLOT_BITS) as usize;
 /// Low bit of a quick word whose page must not be changed yet.
 const CLEAN: u32 = 1;
 
-/// One entry per page, and what the hot path needs of it.
+/// One entry per page, and the quick words of the hot path.
 #[derive(Default)]
 pub(super) struct PageTable {
     /// Resident frame with flags, or where the page is.

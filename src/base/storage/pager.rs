@@ -15,7 +15,7 @@ use super::page_table::{
 };
 use super::{DiskPath, Pages, SharedPages, StorageError, check_cancelled, kind, raise};
 
-/// Dirty pages written in one commit; a quarter of what redb's cache should hold.
+/// Dirty pages written in one commit; a quarter of redb's cache.
 const BATCH_PAGES_MAX: usize = 256;
 /// Owner of a frame that holds no page.
 const NO_OWNER: (u8, u32) = (u8::MAX, u32::MAX);
@@ -52,7 +52,7 @@ pub struct Pager {
     tables: [PageTable; kind::ALL.len()],
     /// Number in the file of each kind's first page; grows when pages are dropped from the front.
     first: [u32; kind::ALL.len()],
-    /// Kind and page of each frame, or [`NOBODY`].
+    /// Kind and page of each frame, or [`NO_OWNER`].
     owners: Vec<(u8, u32)>,
     order: LruCache<u32, ()>,
     files: PageFiles,
@@ -87,7 +87,7 @@ impl Pager {
         }
     }
 
-    /// Uses no more than `bytes` for frames from now on, which must hold what it has; never more than it was created with.
+    /// Limits the frames to `bytes`, which must suffice for the frames in use and cannot exceed the initial size.
     pub fn limit(&mut self, bytes: u64) {
         let limit = frames_of(bytes).min(self.frames.len() / SLOTS);
         assert!(self.owners.len() <= limit, "more frames than it may use");
@@ -111,7 +111,7 @@ impl Pager {
         self.owners.len()
     }
 
-    /// Declares what the base file holds: [`Pager::extents`] of the pager that wrote it.
+    /// Sets the pages of the base file: [`Pager::extents`] of the pager that wrote it.
     pub fn adopt(&mut self, extents: [[u32; 2]; kind::ALL.len()]) {
         for (kind, [first, n]) in extents.into_iter().enumerate() {
             self.first[kind] = first;

@@ -1,4 +1,4 @@
-//! Records by kind and id, whatever holds their pages.
+//! Records by kind and id, on any storage of their pages.
 
 use tetdb_schema::page::{SLOT_BITS, Slot};
 
@@ -34,7 +34,7 @@ pub mod kind {
     ];
 }
 
-/// Random access to records by id, whatever holds them.
+/// Random access to records by id.
 ///
 /// The borrow ends before the next access: no reference into a page survives it.
 pub trait Pages {

@@ -1,4 +1,4 @@
-//! The disk the operating system shows.
+//! The disk of the operating system.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read, Write};

@@ -1,4 +1,4 @@
-//! Failures of work that another process did.
+//! Failures of work in another process.
 
 /// Why another process did not do its share of the work.
 #[derive(Clone, Debug)]

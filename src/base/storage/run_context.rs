@@ -41,7 +41,7 @@ struct RunState {
 pub struct CaughtPanic {
     /// The message and where it came from.
     pub message: String,
-    /// redb asserts what it reads: a damaged tree ends there.
+    /// True if the panic came from an assertion of redb, which means a damaged tree.
     pub is_in_redb: bool,
 }
 

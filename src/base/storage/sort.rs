@@ -22,8 +22,8 @@ const MERGED_MIN: usize = 8;
 
 /// Collects records; [`Sorter::finish`] gives them back in ascending order.
 ///
-/// Memory: `memory_bytes`, whatever is pushed, but 128 KiB at least, and 256 KiB while a run is written. Equal records stay as many as they
-/// were. The result does not depend on the memory, nor on threads.
+/// Memory: `memory_bytes` for any number of records, but 128 KiB at least, and 256 KiB while a run is written. Equal
+/// records are all kept. The result does not depend on the memory, nor on threads.
 pub struct Sorter<R: SortRecord> {
     records: Vec<R::Bytes>,
     records_max: usize,
@@ -41,7 +41,7 @@ struct SortedRun {
     end: u64,
 }
 
-/// Compares records by their bytes: the first sixteen, or eight, as one number, which is what nearly always decides.
+/// Compares records by their bytes: the first sixteen, or eight, as one number, which nearly always decides.
 #[inline(always)]
 fn order<B: SortBytes>(a: &B, b: &B) -> std::cmp::Ordering {
     let (a, b) = (a.as_ref(), b.as_ref());
@@ -116,7 +116,7 @@ impl<R: SortRecord> Sorter<R> {
         self.records = Vec::new();
         let at_once = (self.memory_bytes / READ_BYTES_MIN).max(MERGED_MIN);
         self.merge_down_to(at_once)?;
-        Sorted::of(self.runs, self.memory_bytes)
+        Sorted::new(self.runs, self.memory_bytes)
     }
 
     /// Merges the oldest runs, which are the shortest, until so many are left.
@@ -129,7 +129,7 @@ impl<R: SortRecord> Sorter<R> {
             let is_read = |file| oldest.iter().any(|run| Arc::ptr_eq(&run.file, file));
             let beside = self.runs.back().filter(|last| !is_read(&last.file));
             let mut run = RunWriter::after(beside, &self.dir)?;
-            for record in Sorted::<R>::of(oldest, self.memory_bytes)? {
+            for record in Sorted::<R>::new(oldest, self.memory_bytes)? {
                 run.push(&record?.to_bytes())?;
             }
             self.runs.push_back(run.done()?);
@@ -216,7 +216,7 @@ pub struct Sorted<R: SortRecord> {
 
 impl<R: SortRecord> Sorted<R> {
     /// Merges runs while they are read, each through its share of so much memory.
-    fn of(runs: VecDeque<SortedRun>, memory_bytes: usize) -> Result<Self, StorageError> {
+    fn new(runs: VecDeque<SortedRun>, memory_bytes: usize) -> Result<Self, StorageError> {
         let share = (memory_bytes / runs.len()).clamp(READ_BYTES_MIN, READ_BYTES_MAX);
         let mut sorted = Self {
             memory: Vec::new().into_iter(),

@@ -1,4 +1,4 @@
-//! Records that sort as their bytes do.
+//! Records whose bytes have the order of the records.
 
 /// A record of an external sort: its bytes, compared one after the other, have its order.
 ///

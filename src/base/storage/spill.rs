@@ -1,7 +1,7 @@
 //! A private scratch file for pages that leave memory during a step; it ends with the pool.
 //!
-//! A step is done again from its beginning after a crash, so what it puts away meanwhile has no reader but itself: it needs neither a tree nor
-//! commits. A page goes from its frame to the file and back with one copy each way, where redb makes three.
+//! After a crash a step is repeated from its beginning, so the pages it spills are read by that step alone: they need
+//! neither a tree nor commits. A page takes one copy between its frame and the file, where redb takes three.
 
 use tetdb_schema::page::{FRAME_BYTES, Slot};
 
@@ -30,7 +30,7 @@ impl Spill {
         })
     }
 
-    /// Forgets what is at `place`, which may be written over.
+    /// Frees a slot, which may be overwritten.
     pub fn forget(&mut self, place: u32) {
         self.free.push(place);
     }

@@ -50,14 +50,14 @@ impl ScratchSpace {
         self.budget.lease(bytes, "what is held beside arrays").ok()
     }
 
-    /// `n` times `value`. A quarter of what is left is the most an array takes.
+    /// `n` copies of `value`. An array in memory takes a quarter of the free bytes at most.
     pub fn column<T: Pod>(&self, n: usize, value: T) -> SpillVec<T> {
         let bytes = (n * size_of::<T>()) as u64;
         match &self.dir {
             Some(dir) if bytes > self.available() / 4 => {
                 let bytes = self.available() / 16;
                 let lease = self.budget.lease(bytes, "frames").ok();
-                // The least number of frames is taken whatever is left: half a megabyte.
+                // The least number of frames is always taken: half a megabyte.
                 let frames = ((bytes / PAGE_BYTES as u64) as usize).max(FRAMES_MIN);
                 let mut paged = PagedVec::new(dir, value, frames);
                 paged.resize(n);
@@ -90,7 +90,7 @@ impl ScratchSpace {
         }
     }
 
-    /// Sorts in a quarter of what is left.
+    /// A sorter with a quarter of the free bytes.
     pub fn sorter<R: SortRecord>(&self) -> Sorter<R> {
         match &self.dir {
             Some(dir) => Sorter::new(dir, self.available() / 4),
@@ -214,7 +214,7 @@ impl<T: Pod> SpillVecBuilder<T> {
         self.len() == 0
     }
 
-    /// Moves what is there to a scratch file.
+    /// Moves the elements to a scratch file.
     fn spill(&mut self) {
         let Some(dir) = &self.dir else { return };
         let all = std::mem::take(&mut self.memory);

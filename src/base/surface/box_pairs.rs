@@ -1,4 +1,4 @@
-//! Which pairs of triangles are near enough to look at.
+//! Pairs of triangles whose boxes share a point.
 
 use rayon::prelude::*;
 
@@ -27,7 +27,7 @@ pub(super) fn tree_of(
 }
 
 impl BoxTree {
-    /// Calls `test` on each pair of triangles whose boxes share a point and collects what it returns.
+    /// Calls `test` on each pair of triangles whose boxes share a point and collects its results.
     ///
     /// At most `listed_max` results are kept, of all that are counted; which ones does not depend on
     /// the number of threads. The search ends after a round with more than a million in all.

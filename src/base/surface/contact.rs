@@ -57,12 +57,11 @@ pub struct Contact {
 
 /// Returns whether triangles `p` and `q` touch elsewhere than in the vertices and the edge they share, and how.
 ///
-/// `p_ids` and `q_ids` are the vertices' ids; equal ids mean equal points and the reverse. Both triangles
-/// must have area. Triangles of the same three vertices give `None`: they are duplicates.
-/// The answer is exact; when several kinds apply the first in the order of [`ContactKind`] is given.
-/// What suffices for each number of shared vertices: none, every edge against the other triangle; one,
-/// the edge opposite to it, because the two cuts with the common line both begin at that vertex; two,
-/// whether the triangles lie in one plane on one side of the edge.
+/// `p_ids` and `q_ids` are the vertices' ids; equal ids mean equal points and the reverse. Both triangles must have
+/// area. Triangles of the same three vertices give `None`: they are duplicates. The answer is exact; if several kinds
+/// apply, the first in the order of [`ContactKind`] is given. The tests depend on the number of shared vertices. None:
+/// every edge against the other triangle. One: the edge opposite to it, because the two cuts with the common line both
+/// begin at that vertex. Two: whether the triangles lie in one plane on one side of the edge.
 pub fn contact(p: [Point; 3], p_ids: [u32; 3], q: [Point; 3], q_ids: [u32; 3]) -> Option<Contact> {
     let mut shared = [(0, 0); 3];
     let mut n = 0;
@@ -145,7 +144,7 @@ fn at_vertex(p: [Point; 3], q: [Point; 3]) -> Option<Contact> {
         return None;
     }
     if (c, d) == (0, 0) {
-        let plane = Projection::of(&p);
+        let plane = Projection::new(&p);
         if plane.are_corners_apart(&p, &q) {
             return None;
         }
@@ -167,7 +166,7 @@ fn at_edge(p: [Point; 3], y: Point) -> Option<Contact> {
     if side(&p, y) != 0 {
         return None;
     }
-    let plane = Projection::of(&p);
+    let plane = Projection::new(&p);
     let [u, v, x] = p;
     let overlap = plane.turn(u, v, x) * plane.turn(u, v, y) > 0;
     overlap.then(|| Contact { kind: ContactKind::CoplanarOverlap, at: (u + v + y) / 3.0 })
@@ -229,7 +228,7 @@ pub(super) struct Projection {
 
 impl Projection {
     /// A projection for the plane of `t`, which must have area.
-    pub(super) fn of(t: &[Point; 3]) -> Self {
+    pub(super) fn new(t: &[Point; 3]) -> Self {
         let normal = (t[1] - t[0]).cross(t[2] - t[0]).abs().to_array();
         let best = (0..3).max_by(|&i, &j| normal[i].total_cmp(&normal[j])).unwrap_or(2);
         let mut axes = [best, (best + 1) % 3, (best + 2) % 3].into_iter().map(|axis| Self { axis });
@@ -288,7 +287,7 @@ impl Projection {
 
 /// Two triangles of one plane without a shared vertex.
 fn in_plane(p: &[Point; 3], q: &[Point; 3]) -> Option<Contact> {
-    let separation = Projection::of(p).separation(p, q);
+    let separation = Projection::new(p).separation(p, q);
     if separation == Separation::Strict {
         return None;
     }
@@ -308,7 +307,7 @@ fn in_plane(p: &[Point; 3], q: &[Point; 3]) -> Option<Contact> {
 
 /// The closed segment `a b` in the plane of `t` against the closed `t`.
 pub(super) fn segment_in_plane(a: Point, b: Point, t: &[Point; 3]) -> Option<Contact> {
-    let plane = Projection::of(t);
+    let plane = Projection::new(t);
     let (about_a, about_b) = (plane.turns_about(t, a), plane.turns_about(t, b));
     let mut found = None;
     for (x, about) in [(a, about_a), (b, about_b)] {
@@ -361,7 +360,7 @@ mod tests {
                 continue;
             }
             let touch = worse(segment_in_plane(q[1], q[2], &p), segment_in_plane(p[1], p[2], &q));
-            let apart = Projection::of(&p).are_corners_apart(&p, &q);
+            let apart = Projection::new(&p).are_corners_apart(&p, &q);
             assert_eq!(apart, touch.is_none(), "{p:?} {q:?}");
             n_apart += u32::from(apart);
         }

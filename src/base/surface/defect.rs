@@ -78,7 +78,7 @@ impl From<EmbedError> for SurfaceError {
 const COUNT_MAX: usize = 1 << 30;
 
 impl SurfaceError {
-    /// Refuses more of `what` than can be numbered.
+    /// Refuses more items of kind `what` than can be numbered.
     pub(super) fn check_size(what: &'static str, n: usize) -> Result<(), Self> {
         match n <= COUNT_MAX {
             true => Ok(()),

@@ -29,9 +29,9 @@ impl Surface {
     ) -> Result<usize, SurfaceError> {
         self.drop_support_triangles();
         let tree = tree_of(self, scratch, |t| has_area(&self.corners(t)));
-        let mut table = PointTable::of(&self.points);
+        let mut table = PointTable::new(&self.points);
         let mut points = std::mem::take(&mut self.points);
-        let mut pieces = TrianglePieces::of(&self.triangles);
+        let mut pieces = TrianglePieces::new(&self.triangles);
         let mut vertices = HashMap::new();
         let mut n = 0;
         let ends = set.edges.iter().flat_map(|&[a, b, _]| [a, b]);
@@ -60,7 +60,7 @@ impl Surface {
         Ok(n)
     }
 
-    /// Puts the pieces in the place of what they are of.
+    /// Replaces each divided triangle by its pieces.
     fn take(&mut self, pieces: &TrianglePieces) {
         let n = self.triangles.len() as u32;
         let mut whole = std::mem::take(self);
@@ -88,7 +88,7 @@ struct TrianglePieces {
 }
 
 impl TrianglePieces {
-    fn of(triangles: &[[u32; 3]]) -> Self {
+    fn new(triangles: &[[u32; 3]]) -> Self {
         Self { corners: triangles.to_vec(), parts: HashMap::new() }
     }
 

@@ -1,4 +1,4 @@
-//! Which triangles meet at which edges: holes, repeated and collapsed triangles, parts.
+//! Triangles at each edge: open edges, repeated and collapsed triangles, connected parts.
 
 use rayon::prelude::*;
 use robust::Coord;
@@ -46,7 +46,7 @@ impl Closedness {
 
 /// Looks at the edges of a surface. Near-linear: two sorts; memory 16 bytes per triangle and 12 per edge use.
 pub fn closedness(surface: &Surface) -> Closedness {
-    Facets::of(surface, &ScratchSpace::boundless()).closedness(surface)
+    Facets::new(surface, &ScratchSpace::boundless()).closedness(surface)
 }
 
 /// The triangles that count: collapsed ones and repetitions set apart.
@@ -110,7 +110,7 @@ pub(super) fn same_direction(surface: &Surface, a: TriangleAtEdge, b: TriangleAt
 
 impl Facets {
     /// A scratch file that fails unwinds.
-    pub fn of(surface: &Surface, scratch: &ScratchSpace) -> Self {
+    pub fn new(surface: &Surface, scratch: &ScratchSpace) -> Self {
         let degenerate: Vec<(u32, bool)> = parallel(|| {
             (0..surface.n_triangles() as u32)
                 .into_par_iter()

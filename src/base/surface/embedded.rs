@@ -51,7 +51,7 @@ impl Surface {
         self.embedded.first_support.map_or(self.n_vertices(), |[_, first]| first as usize)
     }
 
-    /// Adds edges and points, and what holds them; vertices with the same coordinates become one.
+    /// Adds edges and points with their support triangles; vertices with the same coordinates become one.
     ///
     /// Labels are called as those of sheets: see [`Surface::embed`].
     ///
@@ -135,7 +135,7 @@ impl Surface {
             });
         }
         self.drop_support_triangles();
-        let mut table = PointTable::of(&self.points);
+        let mut table = PointTable::new(&self.points);
         let mut vert = |points: &mut Vec<Point>, v: u32| {
             table.find_or_add(other.points[v as usize] + Point::ZERO, points)
         };

@@ -22,7 +22,7 @@ pub(super) enum EdgeAtTriangle {
 
 /// Returns whether `t` has an area, without which the signs below mean nothing.
 pub(super) fn has_area(t: &[Point; 3]) -> bool {
-    Projection::of(t).turn(t[0], t[1], t[2]) != 0
+    Projection::new(t).turn(t[0], t[1], t[2]) != 0
 }
 
 impl EmbeddedEdge {
@@ -75,7 +75,7 @@ impl EmbeddedEdge {
             let at = [c, d].into_iter().find(|&x| is_on(x));
             return at.or(covered.then_some(a)).and_then(|at| found(ContactKind::EdgeOnEdge, at));
         };
-        let plane = Projection::of(&[a, b, third]);
+        let plane = Projection::new(&[a, b, third]);
         let [of_c, of_d] = [c, d].map(|x| plane.turn(a, b, x));
         let [of_a, of_b] = [a, b].map(|x| plane.turn(c, d, x));
         if of_c * of_d > 0 || of_a * of_b > 0 {
@@ -94,7 +94,7 @@ fn leaves_into(x: Point, t: [Point; 3]) -> Option<Contact> {
     if side(&t, x) != 0 {
         return None;
     }
-    let plane = Projection::of(&t);
+    let plane = Projection::new(&t);
     let hand = plane.turn(t[0], t[1], t[2]);
     let turns = [plane.turn(t[0], t[1], x), plane.turn(t[0], x, t[2])].map(|turn| hand * turn);
     let kind = match turns.contains(&0) {

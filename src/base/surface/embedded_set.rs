@@ -1,4 +1,4 @@
-//! Wires: edges and points inside a volume that the mesh has as its edges and vertices.
+//! Embedded edges and points: edges and vertices that the mesh must have inside a volume.
 
 use super::contact::ContactKind;
 use crate::geom::Point;

@@ -1,4 +1,4 @@
-//! How well the triangles of a surface are shaped: every input triangle stays, and a needle makes bad tetrahedra.
+//! Shapes of the triangles: every input triangle stays, and a needle forces bad tetrahedra.
 
 use std::cmp::Ordering;
 
@@ -14,7 +14,7 @@ const SMALL_ANGLE_DEGREES: f64 = 5.0;
 const FORCED_QUALITY: f64 = 2.0;
 /// √6/12, the inradius of the regular tetrahedron of edge length 1.
 const ALPHA: f64 = 0.204_124_145_231_931_5;
-/// Shapes of the triangles and what follows for the tetrahedra on them.
+/// Shapes of the triangles, and their consequences for the tetrahedra on them.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Fitness {
     /// Triangles with an angle below 5 degrees; those without area are among them.

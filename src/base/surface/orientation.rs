@@ -1,4 +1,4 @@
-//! Turning triangles the same way, from neighbor to neighbor.
+//! Turns triangles the same way, from neighbor to neighbor.
 
 use super::Surface;
 use super::edges::{Facets, Groups, same_direction};
@@ -18,10 +18,9 @@ pub struct Orientation {
 
 /// Turns triangles so that the two at each manifold edge run along it in opposite directions.
 ///
-/// Orientation passes only through edges with exactly two facets. In each patch the fewer triangles are
-/// turned (on a tie those unlike the first), so one inverted triangle is what changes. A two-sided
-/// facet's second triangle turns with its first. Effects: exchanges two corners of a turned triangle;
-/// ids, labels and vertices stay.
+/// Orientation passes only through edges with exactly two facets. In each patch the smaller group of triangles is
+/// turned (on a tie those unlike the first), so that one inverted triangle is turned alone. A two-sided facet's second
+/// triangle turns with its first. Effects: exchanges two corners of a turned triangle; ids, labels and vertices stay.
 pub fn orient_alike(surface: &mut Surface) -> Orientation {
     orient_alike_with(surface, &ScratchSpace::boundless())
 }
@@ -30,7 +29,7 @@ pub fn orient_alike(surface: &mut Surface) -> Orientation {
 ///
 /// A scratch file that fails unwinds.
 pub fn orient_alike_with(surface: &mut Surface, scratch: &ScratchSpace) -> Orientation {
-    let mut facets = Facets::of(surface, scratch);
+    let mut facets = Facets::new(surface, scratch);
     if let Some(n_patches) = patches_of_one_way(surface, &mut facets) {
         return Orientation { n_patches, ..Orientation::default() };
     }

@@ -19,7 +19,7 @@ impl Surface {
         let alone: Vec<(u32, Point)> = points.filter(|(v, _)| !is_used[*v as usize]).collect();
         let diagonal = self.bounds().diagonal();
         let tree = PointTree::new(alone.clone());
-        let seeker = Seeker::of(self, scratch, |_| true);
+        let seeker = Seeker::with_filter(self, scratch, |_| true);
         let mean = diagonal / (alone.len().max(1) as f64).cbrt();
         let size = |(v, p): (u32, Point)| {
             let to_triangles = seeker.distance(p, f64::INFINITY).min(diagonal);

@@ -38,7 +38,7 @@ pub fn repair_bytes(surface: &Surface) -> u64 {
     TRIANGLE * surface.n_triangles() as u64
 }
 
-/// Mends what can be mended without a guess.
+/// Repairs everything that needs no guess.
 ///
 /// Joins points not farther apart than `weld` (when given, in input units), drops triangles without area and repeated ones,
 /// divides triangles at vertices that lie on their open edges (exactly, or as near as `weld`), turns neighbors alike.
@@ -68,7 +68,7 @@ fn mend(surface: &mut Surface, weld: Option<f64>, to_close: bool) -> Repair {
 
 /// Drops triangles without area and repeated ones.
 fn drop_useless(surface: &mut Surface, done: &mut Repair) {
-    let facets = Facets::of(surface, &ScratchSpace::boundless());
+    let facets = Facets::new(surface, &ScratchSpace::boundless());
     let mut drop = vec![false; surface.n_triangles()];
     for &(t, _) in &facets.degenerate {
         drop[t as usize] = true;
@@ -147,7 +147,7 @@ fn may_close(found: &Closedness, junctions: &[TJunction]) -> bool {
     })
 }
 
-/// Puts what `pieces` gives in the place of each triangle; labels and files follow.
+/// Replaces each triangle by the output of `pieces`; labels and files follow.
 fn replace(surface: &mut Surface, pieces: impl Fn(u32, [u32; 3], &mut Vec<[u32; 3]>)) {
     let old = std::mem::take(&mut surface.triangles);
     let old_labels = std::mem::take(&mut surface.labels);

@@ -1,10 +1,10 @@
-//! Points that say what the volume around them is: a region with a name, or a hole.
+//! Points that mark the volume around them as a region with a name, or as a hole.
 
 use std::fmt;
 
 use crate::geom::Point;
 
-/// A point inside a volume, and what it says of it.
+/// A point inside a volume, and its meaning for the volume.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Seed {
     /// Where it is.

@@ -1,11 +1,11 @@
-//! The surface as seen from a point: how far it is, and which triangle lies above.
+//! Distances from points to a surface, and the triangle above a point.
 
 use super::box_pairs::tree_of;
 use super::{BoxTree, Surface};
 use crate::geom::{Aabb, Point, mix};
 use crate::storage::ScratchSpace;
 
-/// Room on the stack of a walk through the tree: enough for most, so that it does not grow step by step.
+/// Initial capacity of the stack of a tree walk: enough for most, so that it does not grow step by step.
 const STACK: usize = 64;
 
 /// A triangle met by a line along z.
@@ -40,13 +40,13 @@ pub struct Seeker<'a> {
 impl<'a> Seeker<'a> {
     /// Sees all triangles of the surface.
     pub fn new(surface: &'a Surface) -> Self {
-        Self::of(surface, &ScratchSpace::boundless(), |_| true)
+        Self::with_filter(surface, &ScratchSpace::boundless(), |_| true)
     }
 
     /// Sees the triangles that `keep` accepts alone.
     ///
     /// A scratch file that fails unwinds, here and later.
-    pub fn of(
+    pub fn with_filter(
         surface: &'a Surface,
         scratch: &ScratchSpace,
         keep: impl Fn(u32) -> bool + Sync,

@@ -1,4 +1,4 @@
-//! Embedded sheets: triangles that become faces of the mesh with volume on both sides, and part nothing.
+//! Embedded sheets: triangles that become faces of the mesh with the same volume on both sides.
 
 use super::edges::{Facets, TriangleAtEdge};
 use super::weld::{PointTable, drop_unused_labels, drop_unused_points};
@@ -23,7 +23,7 @@ impl Surface {
         own.filter(|&&is_sheet| is_sheet).count()
     }
 
-    /// The sheets alone, as triangles like others, or what they are in.
+    /// A surface of the sheets alone, as ordinary triangles, or of the other triangles.
     pub fn part(&self, sheets: bool) -> Self {
         let mut part = self.without_embedded();
         let flags = std::mem::take(&mut part.sheets);
@@ -61,7 +61,7 @@ impl Surface {
     /// [`SurfaceError::TooLarge`] beyond 2^30 vertices or triangles.
     pub fn embed(&mut self, other: &Self, name: &str) -> Result<(), SurfaceError> {
         let first = self.n_triangles();
-        let mut table = PointTable::of(&self.points);
+        let mut table = PointTable::new(&self.points);
         let mut verts = Vec::with_capacity(other.points.len());
         for &p in &other.points {
             verts.push(table.find_or_add(p, &mut self.points));
@@ -100,11 +100,11 @@ impl Surface {
         first
     }
 
-    /// Takes for sheets what is not closed: triangles at an open edge, then those that are at one without them, and so on.
+    /// Turns triangles at open edges into sheets, then those at the edges that are open without them, and so on.
     ///
     /// Returns how many. Memory: 24 bytes a triangle. A scratch file that fails unwinds.
     pub fn open_parts_to_sheets(&mut self, scratch: &ScratchSpace) -> usize {
-        let mut edges = OpenEdges::of(self, scratch);
+        let mut edges = OpenEdges::new(self, scratch);
         let mut n = 0;
         while let Some(t) = edges.next() {
             if self.sheets.is_empty() {
@@ -130,10 +130,10 @@ struct OpenEdges {
 const NO_EDGE: u32 = u32::MAX;
 
 impl OpenEdges {
-    fn of(surface: &Surface, scratch: &ScratchSpace) -> Self {
+    fn new(surface: &Surface, scratch: &ScratchSpace) -> Self {
         let mut edges = vec![[NO_EDGE; 3]; surface.n_triangles()];
         let mut uses = Vec::new();
-        Facets::of(surface, scratch).each_edge(|all| {
+        Facets::new(surface, scratch).each_edge(|all| {
             let mut here = (0, 0);
             for use_ in all.iter().filter(|u| !surface.is_sheet(u.triangle())) {
                 edges[use_.triangle() as usize][use_.corner()] = uses.len() as u32;

@@ -1,4 +1,4 @@
-//! Triangles around one vertex or one edge that are too many to look at in pairs.
+//! Triangles at one vertex or one edge, if they are too many to test in pairs.
 //!
 //! ```text
 //!        \ | /         All boxes around the middle of a fan overlap, but seen from the middle each triangle takes up a
@@ -53,7 +53,7 @@ struct TriangleStar {
     tree: BoxTree,
 }
 
-/// Calls `test` on each pair of triangles that may touch, the lower number first, and collects what it returns.
+/// Calls `test` on each pair of triangles that may touch, the lower number first, and collects its results.
 ///
 /// `is_left_out`: triangles that do not count; those of stars are added. As [`BoxTree::pairs`] else. Memory: 4 bytes a vertex, and 60 bytes for
 /// each triangle of a star.
@@ -167,7 +167,8 @@ impl TriangleStar {
 
     /// In which directions a triangle is seen.
     ///
-    /// A corner in the center has none, and needs none: what is between it and the others is seen as they are.
+    /// A corner in the center has no direction and needs none: points between it and the other corners have their
+    /// directions.
     fn directions(&self, corners: [Point; 3]) -> Aabb {
         let (mut seen, mut n, mut pad) = ([Point::ZERO; 3], 0, PAD);
         for p in corners.into_iter().filter(|p| !self.ends.contains(p)) {
@@ -265,7 +266,7 @@ fn around_arc(u: Point, v: Point) -> Aabb {
     bounds
 }
 
-/// The box around what is between three directions.
+/// The box around the region between three directions.
 fn around_triangle([u, v, w]: [Point; 3]) -> Aabb {
     let arcs = [around_arc(u, v), around_arc(v, w), around_arc(w, u)];
     let mut bounds = arcs.into_iter().fold(Aabb::EMPTY, |a, b| a.union(b));

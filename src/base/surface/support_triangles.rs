@@ -1,13 +1,14 @@
 //! Support triangles: sheets of one triangle that keep embedded edges.
 //!
 //! ```text
-//!            c           Every step of the mesher keeps triangles, and none of them edges. So an edge a b that no triangle has
-//!          /   \         gets one of its own, with a vertex c beside its middle that nothing else uses: a sheet of one
-//!    a --/-------\-- b   triangle. What keeps sheets keeps it whole, and with it the edge, bit for bit and undivided.
+//!            c           Every step of the mesher keeps triangles, but no step keeps edges. So an edge a b without a triangle
+//!          /   \         gets one, with a vertex c near its middle that nothing else uses: a sheet of one triangle.
+//!    a --/-------\-- b   Sheets stay whole, and with them the edge, bit for bit and undivided.
 //! ```
 //!
-//! Fins of two edges stay apart by their height alone: it is below half of the distance of edges that share no vertex, and below half the
-//! angle of those that do. What they are to triangles is tried, by exact signs, in eight directions around the edge.
+//! Support triangles of two edges stay apart by their height alone. It is below half of the distance of edges that
+//! share no vertex, and below half the angle of those that do. Their contacts with other triangles are tested, by exact
+//! signs, in eight directions around the edge.
 
 use super::contact::contact;
 use super::embedded::NEAR_SHARE;
@@ -21,7 +22,8 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 /// Height of an equilateral triangle.
 const EQUILATERAL: f64 = 0.866;
-/// Heights are at most this share of what is left to others: below one half two of them do not meet, and a tetrahedron fits between.
+/// Heights are at most this share of the distance to other edges and points: below one half, two support triangles do
+/// not meet, and a tetrahedron fits between.
 const DISTANCE_SHARE: f64 = 0.4;
 /// Heights are at most this share of the tangent of half the angle where two edges meet.
 const ANGLE_SHARE: f64 = 0.8;

@@ -1,4 +1,4 @@
-//! Cubes that touch, cross, lack a face: what is accepted and what is not.
+//! Cubes that touch, cross, or lack a face: accepted and refused surfaces.
 
 use super::*;
 use crate::geom::Point;
@@ -417,9 +417,9 @@ fn a_room_too_small_changes_nothing() {
         let (mut a, mut b) = (surface.clone(), surface);
         assert_eq!(orient_alike(&mut a), orient_alike_with(&mut b, &narrow));
         assert_eq!(a, b);
-        let seeker = Seeker::of(&a, &narrow, |_| true);
+        let seeker = Seeker::with_filter(&a, &narrow, |_| true);
         let wide = Seeker::new(&a);
-        assert_eq!(Volumes::new_in(&seeker, &narrow), Volumes::of(&wide));
+        assert_eq!(Volumes::new_in(&seeker, &narrow), Volumes::new(&wide));
         for k in 0..500 {
             let p = Point::new(f64::from(k * 7 % 61), f64::from(k * 11 % 61), 0.3);
             assert_eq!(seeker.distance(p, 9.0), wide.distance(p, 9.0));

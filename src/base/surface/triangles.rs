@@ -28,7 +28,7 @@ pub struct Surface {
     pub files: Vec<SourceFile>,
     /// True if each triangle is part of an embedded sheet; empty where none is.
     pub sheets: Vec<bool>,
-    /// Embedded edges and points, and what holds them.
+    /// Embedded edges and points, and their support triangles.
     pub embedded: Embedded,
     /// Notes of the readers, in order.
     pub notes: Vec<Note>,

@@ -1,4 +1,4 @@
-//! Exact validation: everything that keeps a surface from bounding volumes, found and listed.
+//! Exact validation: lists everything that keeps a surface from bounding volumes.
 
 use super::boundary_loops::{JUNCTION_SHARE, TJunction, t_junctions};
 #[cfg(test)]
@@ -68,7 +68,7 @@ pub fn validate(surface: &Surface) -> Validation {
 ///
 /// A scratch file that fails unwinds ([`attempt`](crate::storage::attempt)).
 pub fn validate_with(surface: &Surface, scratch: &ScratchSpace) -> Validation {
-    let mut facets = Facets::of(surface, scratch);
+    let mut facets = Facets::new(surface, scratch);
     let closedness = facets.closedness(surface);
     let t_junctions = match closedness.is_closed() {
         true => Vec::new(),

@@ -47,7 +47,7 @@ pub struct Volumes {
 
 impl Volumes {
     /// [`Volumes::new_in`] in memory.
-    pub fn of(seeker: &Seeker) -> Self {
+    pub fn new(seeker: &Seeker) -> Self {
         Self::new_in(seeker, &ScratchSpace::boundless())
     }
 
@@ -57,7 +57,7 @@ impl Volumes {
     pub fn new_in(seeker: &Seeker, scratch: &ScratchSpace) -> Self {
         let surface = seeker.surface();
         let n = surface.n_triangles();
-        let mut facets = Facets::of(surface, scratch);
+        let mut facets = Facets::new(surface, scratch);
         let mut sides = Groups::new(2 * n + 1);
         let mut shells = Groups::new(n);
         facets.each_edge(|uses| {
@@ -86,8 +86,8 @@ impl Volumes {
                 below = up;
             }
             sides.join(below, outside);
-            // A sheet that is upright, or nearly, is on no line along z. It lies in the volume of whatever is above its
-            // middle.
+            // A sheet that is upright, or nearly, is on no line along z. It lies in the volume below the crossing above
+            // its middle.
             if surface.is_sheet(t) && crossings.iter().all(|c| c.triangle != t) {
                 let above = crossings.iter().find(|c| c.z > line.z);
                 sides.join(2 * t, above.map_or(outside, |c| c.sides()[0]));
@@ -330,7 +330,7 @@ mod tests {
         for inward in [false, true] {
             let surface = cubes(&[([0.0; 3], 3.0, false), ([1.0; 3], 1.0, inward)]);
             let seeker = Seeker::new(&surface);
-            let volumes = Volumes::of(&seeker);
+            let volumes = Volumes::new(&seeker);
             assert_eq!(volumes.n_volumes, 3);
             assert!(volumes.of_side[..12].iter().all(|v| *v == [0, 1]));
             let inner = if inward { [2, 1] } else { [1, 2] };
@@ -357,7 +357,7 @@ mod tests {
         single.triangles.drain(12..14);
         for surface in [whole, single] {
             let seeker = Seeker::new(&surface);
-            let volumes = Volumes::of(&seeker);
+            let volumes = Volumes::new(&seeker);
             assert_eq!(volumes.n_volumes, 3);
             let walls = volumes.walls();
             let pairs: Vec<(u32, u32)> = walls.keys().copied().collect();
@@ -383,7 +383,7 @@ mod tests {
             surface.labels.push(0);
         }
         surface.sheets_from(n as usize);
-        let volumes = Volumes::of(&Seeker::new(&surface));
+        let volumes = Volumes::new(&Seeker::new(&surface));
         assert_eq!(volumes.n_volumes, 3);
         assert_eq!(volumes.of_side[n as usize..], [[2; 2], [1; 2], [0; 2]]);
     }
@@ -392,7 +392,7 @@ mod tests {
     fn an_open_surface_encloses_nothing() {
         let mut surface = cubes(&[([0.0; 3], 1.0, false)]);
         surface.triangles.pop();
-        assert_eq!(Volumes::of(&Seeker::new(&surface)).n_volumes, 1);
+        assert_eq!(Volumes::new(&Seeker::new(&surface)).n_volumes, 1);
     }
 
     #[test]

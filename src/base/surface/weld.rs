@@ -1,4 +1,4 @@
-//! Building a surface while files are read: welding, labels, fans.
+//! Builds a surface while files are read: welding, labels, fans.
 
 use std::collections::HashMap;
 
@@ -36,12 +36,12 @@ impl SurfaceBuilder {
         Self::default()
     }
 
-    /// A builder that refuses what it cannot hold in so many bytes.
+    /// A builder that holds at most that many bytes.
     pub fn within(bytes_max: u64) -> Self {
         Self { bytes_max: Some(bytes_max), ..Self::default() }
     }
 
-    /// Bytes held: the surface, and what finds its vertices.
+    /// Bytes held: the surface and the table of its vertices.
     fn bytes(&self) -> u64 {
         let ids = self.file2vert.capacity() + self.table.slots.len();
         (self.surface.bytes() + ids * size_of::<u32>()) as u64
@@ -280,8 +280,8 @@ pub(super) struct PointTable {
 
 impl PointTable {
     /// A table of `points`, which are all different.
-    pub(super) fn of(points: &[Point]) -> Self {
-        // Half of what it grows to.
+    pub(super) fn new(points: &[Point]) -> Self {
+        // Half of the final size.
         let len = (points.len() + 1).next_power_of_two();
         let mut table = Self { slots: filled(len, 0) };
         table.grow(points);

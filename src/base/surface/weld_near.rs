@@ -41,7 +41,8 @@ fn count_joined(new_ids: &[u32]) -> usize {
     (0u32..).zip(new_ids).filter(|(v, id)| *v != **id).count()
 }
 
-/// The points kept so far, in cubes [`CUBE`] times as wide as the distance: what is near lies in at most eight of them, mostly in one.
+/// The points kept so far, in cubes [`CUBE`] times as wide as the distance: near points lie in at most eight of them,
+/// mostly in one.
 struct Retained {
     low: Point,
     distance: f64,

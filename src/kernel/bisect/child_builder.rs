@@ -1,4 +1,4 @@
-//! A child on its way: its vertices and tetrahedra get their numbers, then they are written.
+//! Builds a child: numbers its vertices and tetrahedra, then writes them.
 
 use super::core::{SHARED, copy_attribute, is_held, placement, tet_ids};
 use super::interface_faces::for_each_interface_face;

@@ -11,14 +11,15 @@ use tetdb_base::geom::Point;
 use tetdb_base::storage::{Pages, check_cancelled};
 use tetdb_schema::page::NONE;
 
-/// Tetrahedra with a vertex nearer than this, in units of its h, belong to the core: wider than the cutting zone, so that
-/// what the interface is chosen from is optimized, narrower than the refined zone, so that all of it is final.
+/// Tetrahedra with a vertex nearer than this, in units of its h, belong to the core. It is wider than the cutting zone,
+/// so that all candidates for the interface are optimized, and narrower than the refined zone, so that all of it is
+/// final.
 const CORE: f64 = 2.2;
 /// In the host's scratch map, at a vertex: it has this number in the core.
 pub(super) const SHARED: u32 = 1 << 31;
 
-/// The host's scratch map from the extraction of the core to the end of the split, behind one word a vertex: what became of each
-/// tetrahedron, in the two highest bits, with a number.
+/// The host's scratch map from the extraction of the core to the end of the split, after one word per vertex: the new
+/// place of each tetrahedron in the two highest bits, with a number.
 pub(super) mod placement {
     use tetdb_schema::page::NONE;
 

@@ -1,9 +1,9 @@
 //! Minimum cut of a graph whose nodes have at most four neighbors: tetrahedra and their faces.
 //!
-//! Two trees grow from source and sink until they touch; a path is filled, what it cut off is adopted again or let go. Here
-//! source and sink are a few tetrahedra apart wherever one looks, so paths are short and all work is local: fourteen times as fast as
-//! blocking flows over the whole graph, which took a hundred rounds. Capacities are whole numbers, and the cut that is returned is
-//! the one nearest to the source: the same everywhere.
+//! Two trees grow from source and sink until they touch. Then a path is filled, and nodes cut off from their tree are
+//! adopted again or let go. Here source and sink are always a few tetrahedra apart, so paths are short and all work is
+//! local: fourteen times as fast as blocking flows over the whole graph, which took a hundred rounds. Capacities are
+//! whole numbers, and the cut returned is the one nearest to the source: the same on every machine.
 //!
 //! Source: Y. Boykov and V. Kolmogorov, "An experimental comparison of min-cut/max-flow algorithms for energy minimization
 //! in vision" (2004).
@@ -102,7 +102,7 @@ impl Graph {
         self.nodes.len()
     }
 
-    /// Adds a node: its arcs (the other of each pair has the same capacity) and what fits from source and to sink.
+    /// Adds a node: its arcs (both of a pair have the same capacity) and its capacities from source and to sink.
     pub(super) fn push(&mut self, arcs: [FlowArc; 4], capacity: [u32; 4], terminal: [u32; 2]) {
         self.nodes.push(FlowNode { arcs, residual: capacity, terminal, tree: IN_NO_TREE });
     }
@@ -218,7 +218,7 @@ impl Graph {
         None
     }
 
-    /// Fills the path through arc `arc` of `from`; what it saturates loses its parent.
+    /// Fills the path through arc `arc` of `from`; nodes behind saturated arcs lose their parent.
     fn augment(&mut self, from: u32, arc: usize) -> u32 {
         let to = self.arc(from, arc).node();
         let mut pushed = self.nodes[from as usize].residual[arc];
@@ -266,7 +266,7 @@ impl Graph {
         pushed
     }
 
-    /// Returns what still fits.
+    /// Returns the residual capacity.
     #[inline]
     fn push_through(&mut self, from: u32, k: usize, amount: u32) -> u32 {
         let node = &mut self.nodes[from as usize];

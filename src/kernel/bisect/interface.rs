@@ -1,4 +1,4 @@
-//! The interface: a minimum cut of the cutting zone, then moves that no sum over faces can see.
+//! The interface: a minimum cut of the cutting zone, then moves with costs that are no sums over faces.
 //!
 //! SideLabels by the side of the middle give 3.85 faces per h² of the plane, many tetrahedra with two or three of them and pinched
 //! vertices. The minimum cut of the dual graph is the best of all interfaces for any cost that is a sum over faces:
@@ -97,7 +97,8 @@ fn minimum_cut<P: Pages>(
     }
     let length = free.len().div_ceil(strips).max(1);
     let half = length / BORDER;
-    // First every other strip, then those between, then what lies around the borders: those of one kind do not touch.
+    // First every other strip, then the strips between, then the regions around the borders: those of one kind do not
+    // touch.
     let mut kinds: [Vec<&[u32]>; 3] = [Vec::new(), Vec::new(), Vec::new()];
     for (k, strip) in order.chunks(length).enumerate() {
         kinds[k % 2].push(strip);
@@ -110,7 +111,8 @@ fn minimum_cut<P: Pages>(
     for strips in kinds.iter().flat_map(|kind| kind.chunks(AT_ONCE)) {
         for (&strip, (tets, graph)) in strips.iter().zip(&mut cuts) {
             check_cancelled();
-            // In id order, which follows the curve: what is near in space is near in the graph's memory. The least cut is one and the same.
+            // In id order, which follows the curve: neighbors in space are near in the graph's memory. The least cut
+            // does not depend on the order.
             tets.clear();
             tets.extend_from_slice(strip);
             tets.sort_unstable();
@@ -165,7 +167,7 @@ fn sort_along<P: Pages>(
     size_of_val(&keyed[..]) as u64
 }
 
-/// Makes the graph of a strip; what lies around it is source or sink.
+/// Builds the graph of a strip; tetrahedra around it are source or sink.
 fn read_strip<P: Pages>(
     core: &mut Mesh<P>,
     labels: &SideLabels,

@@ -1,4 +1,4 @@
-//! The faces of a chosen interface, in the order that gives them and their vertices their numbers.
+//! The faces of a chosen interface, in the order that numbers them and their vertices.
 
 use super::core::{is_held, tet_ids};
 use super::side_labels::SideLabels;

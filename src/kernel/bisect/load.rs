@@ -1,4 +1,4 @@
-//! The load ∫ h⁻³ of a mesh in pieces small enough for h to be known in them.
+//! The load ∫ h⁻³ of a mesh, summed over pieces in which h varies little.
 //!
 //! A coarse tetrahedron may span the whole domain while h varies tenfold within: its corners say nothing of its
 //! middle. It is divided along its longest edge until h varies little between the corners and the edge is a bounded number of

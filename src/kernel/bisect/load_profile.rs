@@ -1,4 +1,4 @@
-//! Load and section along an axis, and what a plane across it promises.
+//! Load and section along an axis, and their values for a plane across it.
 
 use super::load::{SizeFn, tally};
 use super::surface::Plane;
@@ -9,7 +9,7 @@ use tetdb_base::storage::Pages;
 /// Bins of a histogram along an axis.
 const BINS: usize = 4096;
 
-/// A chosen plane, and what it promises.
+/// A chosen plane, with its predicted load and area.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChosenPlane {
     /// The cutting plane.
@@ -142,7 +142,7 @@ impl LoadProfile {
         self.low + BINS as f64 * self.width
     }
 
-    /// The plane at `offset`, and what it promises.
+    /// The plane at `offset`, with its predicted load and area.
     pub(super) fn at(&self, offset: f64) -> ChosenPlane {
         let place = ((offset - self.low) / self.width).clamp(0.0, BINS as f64 - 1.0);
         let bin = place as usize;

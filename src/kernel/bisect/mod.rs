@@ -136,7 +136,8 @@ pub fn refine<P: Pages>(
     Ok(RefinedZone { zone, plane, refine, seconds })
 }
 
-/// The second part of [`open`]: the interface is chosen in `core`, which must be empty; `faces` learns what it was and is.
+/// The second part of [`open`]: chooses the interface in `core`, which must be empty; `faces` receives the natural and
+/// the chosen faces.
 pub fn choose<P: Pages, Q: Pages>(
     host: &mut Mesh<P>,
     core: &mut Mesh<Q>,

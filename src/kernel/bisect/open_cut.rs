@@ -1,4 +1,4 @@
-//! A sub-domain between the choice of its interface and its two children.
+//! A sub-domain with a chosen interface, before its two children are written.
 
 use super::core::CoreBoundary;
 use super::report::CutReport;

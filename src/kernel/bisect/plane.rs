@@ -1,4 +1,4 @@
-//! The plane of a cut: across the longest axis of inertia, where the load to come is shared as wanted.
+//! The plane of a cut: across the longest axis of inertia, where it divides the predicted load as wanted.
 //!
 //! The paper takes the axis of inertia of the centroids of the coarse mesh. Here every piece weighs its load, so that
 //! the axis is that of the mesh to come; the two other axes and those of the coordinates are candidates as well, and the one whose

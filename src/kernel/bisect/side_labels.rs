@@ -1,4 +1,4 @@
-//! Which side of the cut each tetrahedron of the core is on, and what that costs.
+//! The side of the cut that each tetrahedron of the core is on, and the cost of the interface.
 
 use std::collections::BTreeSet;
 
@@ -108,7 +108,7 @@ pub(super) fn triangle_quality([a, b, c]: [Point; 3]) -> f64 {
     x.max(y).max(z) / (2.0 * 3f64.sqrt() * inradius.max(f64::MIN_POSITIVE))
 }
 
-/// Greatest shape term of a face: what is worse than this is all the same.
+/// Greatest shape term of a face; worse shapes cost the same.
 const SHAPE_MAX: f64 = 20.0;
 
 /// Cost of a face on the interface: 1, and more for a bad shape or a slope.
@@ -263,8 +263,8 @@ fn is_in_zone<P: Pages>(mesh: &mut Mesh<P>, tet: &Tet, surface: &impl CuttingSur
 
 /// Tetrahedra with a face on the interface, and how many of them have their circumsphere within the refined zone.
 ///
-/// The zone is taken at its narrowest, with h as it is at the center. That is the whole condition where h is uniform; where it falls
-/// towards the zone's limit, a sphere may count that is not wholly within, and `frozen_hits` is what proves.
+/// The zone is taken at its narrowest, with h as at the center. That is the whole condition if h is uniform. Where h
+/// falls towards the zone's limit, a sphere may count that is not wholly within; `frozen_hits` is the proof.
 pub(super) fn enclosed<P: Pages>(
     core: &mut Mesh<P>,
     labels: &SideLabels,

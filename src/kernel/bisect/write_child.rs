@@ -1,4 +1,4 @@
-//! Write a child: the host's tetrahedra of one side, those of the core with that label, joined at the core boundary.
+//! Writes a child: the host's tetrahedra of one side and the core's of that label, joined at the core's boundary.
 //!
 //! Vertices and tetrahedra get their final numbers before they are written. Vertices are sorted along the curve;
 //! tetrahedra are counted, since they follow their first vertex. Each record is then written once, at its place. Input
@@ -14,8 +14,8 @@ use tetdb_base::storage::{Pages, StorageError};
 /// Writes one side into the empty `child`, numbered along the curve: vertices in the order of their positions, tetrahedra in that of
 /// their first vertex, those of the core before others.
 ///
-/// Effects: the core's scratch map is used up, that of the host holds the child's numbers in place of what led to them. Errors: the
-/// disk, while sorting.
+/// Effects: the core's scratch map is used up; the host's has the child's numbers in place of those from the
+/// extraction. Errors: the disk, while sorting.
 pub fn write_child<P: Pages, Q: Pages, R: Pages>(
     host: &mut Mesh<P>,
     core: &mut Mesh<Q>,

@@ -116,7 +116,7 @@ fn both_in_one(
     (zones.iter()).any(|zone| zone.is_final(a, ha) && zone.is_final(b, hb))
 }
 
-/// Makes a size that was rounded to `f32` at least what it was.
+/// Factor that undoes rounding to `f32` downwards.
 const ROUNDED_UP: f64 = 1.0 + 1e-6;
 
 /// Everywhere but in the zones of earlier cuts.

@@ -1,4 +1,4 @@
-//! One face for the two places where recovery works: the paged mesh, and a patch held in memory.
+//! One trait for the two complexes that recovery changes: the paged mesh, and a patch in memory.
 
 use crate::mesh::anatomy::{FACES, REQUIRED};
 use crate::mesh::{FaceRef, Mesh, Tet, VertexTag};
@@ -31,8 +31,8 @@ pub(super) trait TetComplex {
 
     /// Replaces the tetrahedra `old` by tetrahedra with the vertices `new`, which fill the same volume.
     ///
-    /// Returns the ids of the new ones, parallel to `new`. Effects: ids of `old` are used again first, in order, and
-    /// what is left of them is freed last to first: replacing back restores the very ids. Required faces
+    /// Returns the ids of the new tetrahedra, parallel to `new`. Effects: ids of `old` are used again first, in order,
+    /// and the remaining ones are freed last to first, so that replacing back restores the same ids. Required faces
     /// stay required if they are faces of the new tetrahedra.
     fn replace(&mut self, old: &[u32], new: &[[u32; 4]]) -> Vec<u32> {
         let mut sides: Vec<CavityFace> = Vec::with_capacity(4 * new.len() + 2 * old.len() + 4);
@@ -152,7 +152,7 @@ pub(super) fn sorted(mut face: [u32; 3]) -> [u32; 3] {
     face
 }
 
-/// Key of an edge, whatever its direction.
+/// Key of an edge in either direction.
 #[inline]
 pub(super) fn edge_key(a: u32, b: u32) -> u64 {
     u64::from(a.min(b)) << 32 | u64::from(a.max(b))

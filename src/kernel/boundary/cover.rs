@@ -1,9 +1,9 @@
 //! Covers a flat part whose outline consists of chains by faces, through points that lie exactly in it.
 //!
-//! From each directed edge with the facet on its left, the shell shows what lies there: a face in the facet's
-//! plane, or a tetrahedron that the plane cuts. The latter has an edge with its ends on both sides, and that edge
-//! crosses the facet; a point of the facet near the crossing, joined to the shell of that edge, takes it away and
-//! adds no edge with ends on both sides.
+//! From each directed edge with the facet on its left, the shell shows the next part: a face in the facet's plane, or a
+//! tetrahedron that the plane cuts. The latter has an edge with its ends on both sides, and that edge crosses the
+//! facet. A point of the facet near the crossing, joined to the shell of that edge, removes the edge and adds no edge
+//! with ends on both sides.
 
 use super::chain::{PatchFailure, TERMS};
 use super::complex::{TetComplex, edge_key};
@@ -154,7 +154,7 @@ impl<P: Pages> RecoveryPatch<'_, P> {
         let sum = over_a.plus(&over_b).plus(&over_c);
         let share = |terms| Some((over_b.over(&sum, terms)?, over_c.over(&sum, terms)?));
         let (s, t) = share(TERMS[0]).ok_or(PatchFailure::Broken("an edge crosses no facet"))?;
-        // Room around the crossing: a fraction of the distance to the ring.
+        // Clearance around the crossing: a fraction of the distance to the ring.
         let (u, v) = (b - a, c - a);
         let crossing = a + u * s.estimate() + v * t.estimate();
         let room = around

@@ -19,8 +19,8 @@ pub(super) struct Effort {
     pub exact: bool,
 }
 
-/// From the cheapest on. The first ones recover all but a few of a hundred thousand random cuts, the exact ones what is left
-/// where doubles have an answer at all.
+/// From the cheapest on. The first ones recover all but a few of a hundred thousand random cuts. The exact ones recover
+/// the rest, where doubles have an answer at all.
 pub(super) const EFFORTS: [Effort; 13] = {
     let first = Effort {
         flip_level: 1,

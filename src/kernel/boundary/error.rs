@@ -47,7 +47,7 @@ pub enum BoundaryError {
     /// A seed says something that cannot be.
     #[error("{message}")]
     Seed {
-        /// Which seed, and what it contradicts.
+        /// The seed, and its contradiction.
         message: String,
         /// Where it is.
         point: Point,

@@ -1,4 +1,4 @@
-//! Which segments and facets the mesh has, and recovery of one that is missing.
+//! Finds segments and facets in the mesh, and recovers a missing one.
 
 use super::complex::TetComplex;
 use super::flips::{CROSSINGS_MAX, Flipper};
@@ -235,7 +235,7 @@ impl<S: TetComplex> Flipper<'_, S> {
         }
     }
 
-    /// Removes the edge `c d` whatever is crossed afterwards, if `good` then says so.
+    /// Removes the edge `c d` without regard to crossings, if `good` accepts the result.
     fn try_neutral(&mut self, t: u32, c: u32, d: u32, good: impl Fn(&mut S) -> bool) -> bool {
         let Some(t) = edge_at(self.s, t, c, d) else {
             return false;

@@ -1,4 +1,4 @@
-//! Missing facets that lie in one plane and meet in missing segments: recovered as one, their own segments afterwards.
+//! Missing facets in one plane that meet in missing segments: recovered as one part, their own segments afterwards.
 //!
 //! An edge pierces a flat part of the surface once, even if the part has many narrow facets. So points are put where
 //! edges pierce the part, not where its segments cross faces. Its segments are recovered by turning edges.

@@ -7,8 +7,8 @@
 //!        \|/                  "Minimal triangulations of polygonal domains", 1980) over the exact
 //!         c                   condition that every new tetrahedron is positive.
 //! ```
-//! When no triangulation of a ring is valid, an edge that joins it to `c` or `d` and stands in the way is
-//! removed first, down to a given level; what does not lead to success is undone.
+//! If no triangulation of a ring is valid, an edge that joins it to `c` or `d` and stands in the way is removed first,
+//! down to a given level. Steps without success are undone.
 
 use super::complex::TetComplex;
 use super::polygon::triangulate;
@@ -23,7 +23,7 @@ const RING_MAX: usize = 20;
 /// A line that crosses more than this is not worth flipping for.
 pub(super) const CROSSINGS_MAX: usize = 400;
 
-/// One replacement, with what undoing needs.
+/// One replacement, with the data to undo it.
 struct Done {
     old: Vec<u32>,
     quads: Vec<[u32; 4]>,
@@ -65,7 +65,7 @@ impl<'a, S: TetComplex> Flipper<'a, S> {
         self.log.push(Done { old, quads, shapes });
     }
 
-    /// Takes back what was done after `mark`, ids included.
+    /// Undoes the replacements after `mark`, ids included.
     pub(super) fn undo(&mut self, mark: usize) {
         while self.log.len() > mark {
             let done = self.log.pop().expect("longer than the mark");

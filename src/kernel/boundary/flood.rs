@@ -1,7 +1,8 @@
 //! Components of tetrahedra between required faces.
 //!
-//! A flood from tetrahedron to tetrahedron goes to and fro between pages. So pages are taken one after the other, three times: parts of
-//! components within each; which of them meet parts of other pages; what the tetrahedra of each component are together.
+//! A flood from tetrahedron to tetrahedron would go to and fro between pages. So pages are scanned in order, three
+//! times: for parts of components within each page; for contacts with parts of other pages; for sums over each
+//! component.
 
 use std::collections::BTreeSet;
 
@@ -233,7 +234,7 @@ impl Scan for AdjacentParts {
     }
 }
 
-/// Components of a page's tetrahedra, and what these are together.
+/// Components of a page's tetrahedra, and their sums.
 struct SumsByComponent;
 
 struct PageSums {

@@ -1,4 +1,4 @@
-//! The end of a sheet inside a volume, while a vertex on its segment is taken away.
+//! The end of a sheet inside a volume, while a vertex on its segment is removed.
 //!
 //! ```text
 //!        p1--p2             The facet's faces at X make half a turn around its segment a' b'; a vertex in the ball beyond the

@@ -1,4 +1,4 @@
-//! Taking away a vertex that is on no facet.
+//! Removes a vertex that is on no facet.
 
 use super::complex::TetComplex;
 use super::walk::{ball, swapped};

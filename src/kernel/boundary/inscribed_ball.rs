@@ -1,4 +1,4 @@
-//! The center of the largest ball inside half-spaces: where a vertex sees everything best.
+//! The center of the largest ball inside half-spaces: the place of a vertex with the largest clearance.
 //!
 //! Source: R. Seidel, "Small-dimensional linear programming and convex hulls made easy" (1991), on four unknowns: the
 //! center and the radius. Doubles suffice: the result is a proposal that exact signs accept or reject.

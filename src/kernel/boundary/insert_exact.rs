@@ -1,4 +1,4 @@
-//! Puts an exact point into a small cavity that sees it whole.
+//! Inserts an exact point into a small cavity, all of whose faces it sees.
 
 use super::complex::TetComplex;
 use super::exact::ExactPoint;
@@ -27,7 +27,7 @@ impl<P: Pages> RecoveryPatch<'_, P> {
 
     /// Replaces the cavity by the point joined to its outer faces, if the point sees them all from inside.
     ///
-    /// `on` are the corners of what the point lies on.
+    /// `on` are the corners of the segment or facet with the point.
     pub(super) fn star(
         &mut self,
         cavity: &[u32],

@@ -1,4 +1,4 @@
-//! Which facets are faces already: those become required, the others are listed.
+//! Marks the facets that are faces already as required, and lists the others.
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! How near triangles come to each other where recovery gave up: what a user has to look at.
+//! The narrowest place between triangles where recovery gave up, for the user.
 
 use std::fmt;
 
@@ -101,7 +101,7 @@ fn length(p: &[Point; 3], i: usize) -> f64 {
     p[i].distance(p[(i + 1) % 3])
 }
 
-/// The angle of two facets with a common edge, else their distance outside what they share.
+/// The angle of two facets with a common edge, else their distance outside shared parts.
 fn between((f, p): &(MeshFacet, [Point; 3]), (g, q): &(MeshFacet, [Point; 3])) -> Option<Nearness> {
     let shared = |v: u32| g.vertices.contains(&v);
     let inputs = [g.input, f.input];

@@ -233,7 +233,7 @@ impl<'m, P: Pages> RecoveryPatch<'m, P> {
         (v.point, v.exact) = (point, exact);
     }
 
-    /// From `x` to `v`: the difference of what they are, not of what they round to.
+    /// From `x` to `v`: the difference of their exact positions.
     pub(super) fn offset(&self, x: u32, v: u32) -> Point {
         let (from, to) = (&self.vertices[x as usize], &self.vertices[v as usize]);
         if from.exact.is_none() && to.exact.is_none() {
@@ -287,7 +287,7 @@ impl<'m, P: Pages> RecoveryPatch<'m, P> {
         self.required.is_subset(&now)
     }
 
-    /// Writes the patch in place of what was brought in; returns the number of vertices added less those removed.
+    /// Writes the patch in place of the loaded tetrahedra; returns the number of vertices added less those removed.
     ///
     /// Must be [`RecoveryPatch::is_sound`]. Effects: new vertices are tagged as Steiner points.
     pub(super) fn commit(self) -> i64 {

@@ -1,4 +1,4 @@
-//! Which volumes are filled, from how they meet.
+//! Policies that choose filled volumes by the walls between them.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 

@@ -1,4 +1,4 @@
-//! Triangulation of a polygon by dynamic programming: the best worst triangle.
+//! Triangulates a polygon by dynamic programming, so that the worst triangle is best.
 //!
 //! Source: G. T. Klincsek, "Minimal triangulations of polygonal domains", Annals of Discrete Mathematics 9 (1980).
 

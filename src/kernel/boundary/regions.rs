@@ -1,4 +1,4 @@
-//! Which volumes are filled: components between required faces, those kept that the policy chooses.
+//! Fills the volumes that the policy chooses among the components between required faces.
 
 use std::collections::BTreeMap;
 
@@ -185,7 +185,7 @@ fn choose<P: Pages>(
     })
 }
 
-/// Deletes what is not filled and writes the numbers of what is.
+/// Deletes unfilled components and writes the region numbers of the others.
 fn apply<P: Pages>(mesh: &mut Mesh<P>, number: &[u32], regions: &mut VolumeRegions) {
     use crate::mesh::FaceRef;
     let mut from = 0;

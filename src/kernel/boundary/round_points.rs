@@ -56,7 +56,7 @@ impl<P: Pages> RecoveryPatch<'_, P> {
         Err(PatchFailure::Precision("doubles leave no place beside its neighbors"))
     }
 
-    /// Moves free vertex `v` to the middle of what sees its ball, to a double if one sees it.
+    /// Moves free vertex `v` to the middle of the region that sees its ball, to a double if one sees it.
     fn move_apart(&mut self, v: u32) -> bool {
         let ball = ball(self, v);
         let mut reach = 0.0f64;

@@ -7,7 +7,7 @@ use super::policy::{Filled, RegionPolicy};
 use tetdb_base::geom::Point;
 use tetdb_base::surface::{Seed, SeedKind};
 
-/// Which regions are filled, and what they are called.
+/// The rule that fills and names regions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RegionRule {
     /// The policy that fills volumes.

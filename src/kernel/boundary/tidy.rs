@@ -31,7 +31,7 @@ pub(super) fn tidy<P: Pages>(mesh: &mut Mesh<P>, report: &mut RecoveryReport) {
     };
     let mut left: Vec<u32> = (0..mesh.n_vertices()).filter(|&v| steiner(mesh, v)).collect();
     let none = IdSet::default();
-    // Beside what changed: for all others the answer is as it was.
+    // Only points next to a change are visited again.
     let mut beside: IdSet<u32> = left.iter().copied().collect();
     for _ in 0..ROUNDS_MAX {
         let due = std::mem::take(&mut beside);

@@ -1,4 +1,4 @@
-//! Edges of a flat part of the surface, turned in their plane.
+//! Turns edges of a flat part of the surface in its plane.
 //!
 //! ```text
 //!        c                 c        The Delaunay mesh triangulates a flat part of the surface in its own way. It becomes the
@@ -60,7 +60,7 @@ pub(super) fn from_hubs(segments: &[(u32, u32)]) -> Vec<(u32, u32)> {
     segments.iter().map(from_hub).collect()
 }
 
-/// Turns edges until the segment `a b` is there, and protects it; takes away again what was added and is not needed.
+/// Turns edges until the segment `a b` is there, and protects it; removes unneeded added vertices again.
 ///
 /// `false` when it does not run within one plane, or an edge cannot turn.
 pub(super) fn turn_segment<P: Pages>(

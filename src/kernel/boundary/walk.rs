@@ -248,7 +248,7 @@ pub(super) fn exit_edge<S: TetComplex>(s: &mut S, a: u32, b: u32, t: u32, c: u32
     Exit::Lost
 }
 
-/// Everything the missing edge `a b` crosses, from `a` on; `Err` names what ends the walk early.
+/// All parts that the missing edge `a b` crosses, from `a` on; `Err` is the part that ends the walk early.
 pub(super) fn crossings<S: TetComplex>(
     s: &mut S,
     a: u32,

@@ -1,4 +1,4 @@
-//! The wedges of a ball between facets, and places in them for a vertex that sees all around.
+//! Wedges of a ball between facets, and places in them for a vertex that sees all faces.
 
 use std::collections::BTreeSet;
 
@@ -123,7 +123,7 @@ impl<P: Pages> RecoveryPatch<'_, P> {
         None
     }
 
-    /// The wedge and its walls joined to a new vertex inside; `taken` holds the ball and what other wedges took.
+    /// The wedge and its walls joined to a new vertex inside; `taken` has the ball and the tetrahedra of other wedges.
     pub(super) fn join_to_new(
         &mut self,
         x: u32,

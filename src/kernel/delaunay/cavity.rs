@@ -147,7 +147,7 @@ impl Kernel {
 
     /// Takes tetrahedra out of the cavity until `p` sees all its faces from inside.
     ///
-    /// Those with a blind face go, and what they alone connected goes with them.
+    /// Tetrahedra with a blind face are removed, and so are those that they alone connect.
     fn correct<P: Pages>(
         &mut self,
         mesh: &mut Mesh<P>,
@@ -238,7 +238,7 @@ impl Kernel {
         if self.numbered { self.links.n_local() } else { self.outer.len() }
     }
 
-    /// Keeps what is still connected to `seed` through marked tetrahedra; lists the outer faces anew.
+    /// Keeps the tetrahedra still connected to `seed` through marked ones; lists the outer faces again.
     fn reflood<P: Pages>(&mut self, mesh: &mut Mesh<P>, seed: u32) {
         let before = std::mem::take(&mut self.cavity);
         self.faces.clear();

@@ -1,4 +1,4 @@
-//! The insertion kernel: its scratch, and what walking, gathering and filling report.
+//! The insertion kernel: its scratch data and its results.
 
 use super::links::Links;
 use crate::mesh::{FaceRef, Tet};

@@ -43,7 +43,7 @@ impl Links {
         }
     }
 
-    /// Where `v` is, or the empty place where it would be put; and what is there.
+    /// The slot of `v` or the empty slot for it, its value, and whether `v` is in it.
     #[inline(always)]
     fn find(&self, v: u32) -> (usize, u64, bool) {
         let key = self.epoch << 32 | u64::from(v);

@@ -1,4 +1,4 @@
-//! Find the tetrahedron of a point by walking through faces.
+//! Finds the tetrahedron of a point by walking through faces.
 
 use super::kernel::{Kernel, PointLocation, Rejected};
 use crate::mesh::Mesh;

@@ -13,7 +13,7 @@ pub const MARK: u32 = 1 << 30;
 /// Flag of a tetrahedron's attribute: it has a face on an interface, and no later vertex may destroy it.
 pub const FROZEN: u32 = 1;
 
-/// Which node's [`MARK`] means what: four notes about a tetrahedron, one owner each.
+/// Meaning of the [`MARK`] of each node: four notes about a tetrahedron, one owner each.
 pub mod mark {
     /// It is in the cavity being gathered. Owner: the Delaunay kernel, down between its calls.
     pub const IN_CAVITY: usize = 0;

@@ -64,7 +64,7 @@ impl<P: Pages> Mesh<P> {
     pub(super) fn attribute_before<const K: usize>(&mut self, id: u32, first: u32) -> (u32, u32) {
         match attribute_place(id).0 >> SLOT_BITS < first {
             true => self.attribute::<K>(id),
-            // Never set: what is there by now belongs to the new array.
+            // Never set: the page there belongs to the new array by now.
             false => (0, 0),
         }
     }
@@ -213,7 +213,7 @@ impl<P: Pages> Mesh<P> {
         *word = u32_le::from_native(if marked { bits | MARK } else { bits & !MARK });
     }
 
-    /// An unused tetrahedron id; its record is whatever was there, its attribute too.
+    /// An unused tetrahedron id; its record and attribute are arbitrary.
     #[inline]
     pub fn take_tet(&mut self) -> u32 {
         Self::take_id::<{ kind::TETS }>(&mut self.pages, &mut self.state.tets, "tetrahedra")

@@ -6,7 +6,7 @@ use super::cursor::Mesh;
 use super::state::sparse;
 use tetdb_base::storage::{Pages, kind};
 
-/// A triangle of the input (or of an interface) and what lies on its two sides.
+/// A triangle of the input (or of an interface) and the regions on its two sides.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct MeshFacet {
     /// Vertex ids; their order gives the normal.

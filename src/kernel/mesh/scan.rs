@@ -18,7 +18,7 @@ pub trait Scan: Sync {
 
 /// Scans parts; results come in the order of the parts.
 ///
-/// Memory: what is found in all parts: give few at a time where that is much.
+/// Memory: the results of all parts; pass few parts at a time if results are large.
 pub fn scan_parts<P: Pages, S: Scan>(
     mesh: &mut Mesh<P>,
     parts: &[S::Part],

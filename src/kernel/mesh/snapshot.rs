@@ -1,4 +1,4 @@
-//! A working mesh as records to keep: all of it in its own order, less what follows from the rest.
+//! A working mesh as records to store, in its own order, without derived data.
 //!
 //! Left out are neighbors, which are matched again, and wanted lengths and `tet_of`, which are set anew by the next
 //! step.
@@ -25,7 +25,7 @@ sort_record! {
 }
 
 impl SortedFace {
-    fn of(tet: &Tet, place: FaceRef) -> Self {
+    fn new(tet: &Tet, place: FaceRef) -> Self {
         let [a, b, c] = tet.face(place.face());
         let mut vertices = [a, b, c];
         vertices.sort_unstable();
@@ -144,7 +144,7 @@ impl<P: Pages> Mesh<P> {
                 return Ok(false);
             }
             for i in 0..4 {
-                faces.push(SortedFace::of(&tet, FaceRef::new(t, i)))?;
+                faces.push(SortedFace::new(&tet, FaceRef::new(t, i)))?;
             }
             if t & 1023 == 0 {
                 check_cancelled();

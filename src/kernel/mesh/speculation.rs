@@ -1,6 +1,7 @@
-//! Looking ahead: what would come of changes to a mesh, tried on all threads of the run before their turn.
+//! Speculative evaluation: threads evaluate the next operations on a mesh before their turn.
 //!
-//! Each try has a draft of the mesh for itself. What came of it holds as long as nothing changed at the vertices of the tetrahedra that it has read.
+//! Each evaluation has a private draft of the mesh. Its outcome holds as long as nothing changes at the vertices of the
+//! tetrahedra that it has read.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -20,7 +21,7 @@ pub trait Speculation: Sync {
     /// Outcome of an evaluation.
     type Outcome: Send;
 
-    /// Tries it on a draft, which may be left changed where that is part of what is found.
+    /// Evaluates an item on a draft, which may stay changed.
     fn attempt<P: Pages>(
         &self,
         scratch: &mut Self::Scratch,
@@ -32,7 +33,7 @@ pub trait Speculation: Sync {
 /// State of the draft after an evaluation.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum DraftState {
-    /// It is to be as the mesh: else what was found does not count.
+    /// The draft must equal the mesh; else the outcome does not count.
     Unchanged,
     /// It may be anything.
     Used,

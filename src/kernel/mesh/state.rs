@@ -1,4 +1,4 @@
-//! Ids of records, and how many of each kind there are.
+//! Ids of records, and the number of records of each kind.
 
 use rkyv::{Archive, Deserialize, Serialize};
 use tetdb_schema::page::{NONE, RECORDS, SLOT_BITS, SLOT_MASK};

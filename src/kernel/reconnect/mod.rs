@@ -1,9 +1,8 @@
-//! Local changes of connection: faces and edges swapped for others inside a small fixed polyhedron.
+//! Local reconnection: faces and edges are swapped for others inside a small fixed polyhedron.
 //!
-//! Gather first (may load pages), then decide on copies, then apply. What is gathered: the [`Shell`] of an
-//! edge, the [`Ball`] of a vertex, the two tetrahedra of a face ([`FaceSwap`]). What decides: exact signs of
-//! the new tetrahedra and a quality the caller gives. What applies: [`remove_edge`], [`FaceSwap::apply`],
-//! [`Replacement::apply`].
+//! Gather first (may load pages), then decide on copies, then apply. Gathered are the [`Shell`] of an edge, the
+//! [`Ball`] of a vertex, the two tetrahedra of a face ([`FaceSwap`]). Decisions rest on exact signs of the new
+//! tetrahedra and on a quality from the caller. [`remove_edge`], [`FaceSwap::apply`] and [`Replacement::apply`] apply.
 //!
 //! Invariants of every operation: neighbors are mutual; required bits stay on the outer faces; required-edge flags
 //! follow their edges; the new tetrahedra inherit region and the other flags; `tet_of` of every vertex involved names a

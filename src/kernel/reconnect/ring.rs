@@ -18,7 +18,7 @@ pub enum Forced {
 }
 
 impl Forced {
-    /// Returns whether the chord `i j` may occur: it may not cross what is forced.
+    /// Returns whether the chord `i j` may occur: it must not cross forced chords.
     fn allows(self, i: usize, j: usize) -> bool {
         let crosses = |p: usize, q: usize| {
             let inside = |x: usize| p.min(q) < x && x < p.max(q);
@@ -75,7 +75,7 @@ impl RingTriangulation {
         self.solve_by(n, floor, Forced::Nothing, 0.0, |a, b| a + b, cone)
     }
 
-    /// The triangulation of largest value above `floor`, where `join` makes one value of two and leaves what it joins with `nothing`.
+    /// The triangulation of largest value above `floor`. `join` combines two values; `nothing` is its neutral element.
     #[inline(always)]
     fn solve_by(
         &mut self,

@@ -1,4 +1,4 @@
-//! Random flips on small meshes: whatever was done, the mesh must still be one.
+//! Random flips on small meshes: after any of them, the mesh must be valid.
 
 use super::*;
 use crate::delaunay::{Kernel, enclose};

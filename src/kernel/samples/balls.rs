@@ -78,7 +78,7 @@ impl Balls {
                 shrink *= SHRINK;
             }
             let radii = self.radii(shrink, random);
-            result = BallPacking::of(&radii, GAP * Self::scale(self.count), random);
+            result = BallPacking::place(&radii, GAP * Self::scale(self.count), random);
             if result.is_ok() {
                 break;
             }
@@ -118,7 +118,11 @@ struct BallPacking {
 
 impl BallPacking {
     /// Places balls of the radii given, largest first; on failure the number placed and the radius.
-    fn of(radii: &[f64], gap: f64, random: &mut Random) -> Result<Vec<(Point, f64)>, (usize, f64)> {
+    fn place(
+        radii: &[f64],
+        gap: f64,
+        random: &mut Random,
+    ) -> Result<Vec<(Point, f64)>, (usize, f64)> {
         let largest = radii.first().copied().unwrap_or(0.5);
         let n = ((1.0 / (2.0 * largest + gap)) as usize).clamp(1, 256);
         let mut packing = Self {

@@ -1,4 +1,4 @@
-//! Collecting points and triangles, welding the points that two patches share.
+//! Collects points and triangles, and welds the points that two patches share.
 
 use super::{Sample, SampleError};
 use std::collections::HashMap;

@@ -1,4 +1,4 @@
-//! Seeded makers of closed surfaces, the paper's cases among them, and kinds of what CAD programs write.
+//! Seeded generators of closed surfaces: the paper's cases, and typical output of CAD programs.
 //!
 //! A sample is named by one word without characters special to a shell, such as `balls,count=1000,seed=1,h=0.02`. The
 //! same word gives the same bits on every machine: only IEEE basic operations and square roots are used, and random

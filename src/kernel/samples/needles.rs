@@ -1,4 +1,4 @@
-//! Three parts as CAD programs write them: a fan, slats and a perforated plate.
+//! Three typical parts from CAD programs: a fan, slats and a perforated plate.
 //!
 //! ```text
 //!    .--.         |||||       *---------*    A flat disk is a fan of triangles around one of its corners; a long

@@ -1,4 +1,4 @@
-//! The surface that a maker returns.
+//! The surface that a generator returns.
 
 use tetdb_base::geom::Point;
 use tetdb_base::surface::{Embedded, Surface};

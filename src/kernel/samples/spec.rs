@@ -27,7 +27,7 @@ pub struct SampleSpec {
     kind: SampleKind,
 }
 
-/// The makers and what they are given; lengths in the sample's own units.
+/// The generators and their parameters; lengths in the sample's own units.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SampleKind {
     /// Balls inside a box.

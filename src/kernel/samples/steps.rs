@@ -1,4 +1,4 @@
-//! A slab with low steps, as rounded offsets leave them in parts from CAD programs.
+//! A slab with low steps, like those from rounded offsets in CAD parts.
 //!
 //! ```text
 //!          _______            Each column ends at a height of its own, a share `step` of the slab's length off its

@@ -1,4 +1,4 @@
-//! Sizes from a background mesh: linear in its tetrahedra, nothing wanted outside of it.
+//! Sizes from a background mesh: linear in its tetrahedra, none outside of it.
 
 use super::SizingError;
 use super::constraint::SizeConstraint;

@@ -1,4 +1,4 @@
-//! A size field as bytes, so that a store can keep it.
+//! A size field as bytes, for storing.
 //!
 //! | offset | bytes | content, little endian |
 //! |---|---|---|
@@ -66,7 +66,7 @@ impl SizeField {
         for n in [n_cells, self.values.len() as u32, n_values, 0] {
             bytes.extend(n.to_le_bytes());
         }
-        // Three ways through the octree, so that only what is packed is held.
+        // Three passes through the octree, so that only packed data is held.
         let packed = (|| {
             let mut frame = zstd::Encoder::new(bytes, 1)?;
             for (number, _) in self.tree.cells() {
@@ -122,7 +122,7 @@ impl SizeField {
     /// `scratch` is too small.
     ///
     /// # Errors
-    /// [`SizingError::Damaged`] names what is wrong. A scratch file that fails unwinds.
+    /// [`SizingError::Damaged`] names the damage. A scratch file that fails unwinds.
     pub fn from_bytes_in(bytes: &[u8], scratch: &ScratchSpace) -> Result<Self, SizingError> {
         if bytes.len() < HEADER_BYTES {
             return Err(damaged("length", bytes.len(), "at least 64"));
@@ -143,7 +143,7 @@ impl SizeField {
         let [n_cells, n_leaves, n_values] = [0, 1, 2].map(count);
         let expected = n_cells + n_leaves + 4 * n_values;
         let mut body = Vec::new();
-        // Grows with what is there, not with what a damaged header promises.
+        // Grows with the data read, not with the number in a damaged header.
         let read = zstd::Decoder::with_buffer(&bytes[HEADER_BYTES..])
             .and_then(|frame| frame.take(expected as u64 + 1).read_to_end(&mut body));
         if read.is_err() || body.len() != expected {

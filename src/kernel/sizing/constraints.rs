@@ -1,4 +1,4 @@
-//! Sizes wanted by position, brought into the octree once: it is divided where they change, and takes the least at its corners.
+//! Samples sizes given by position into the octree once: cells are divided where sizes change, corners take the least.
 //!
 //! ```text
 //!   +---+---+   27 places of a cell are asked: where what lies between the corners does not follow from
@@ -25,10 +25,10 @@ const LEVELS_ASKED: u32 = 5;
 const CELLS_AT_ONCE: usize = 1 << 16;
 /// Cells at most: as many leaves as can be numbered.
 const CELLS_MAX: usize = 1 << 28;
-/// Wishes between corners may be off what lies between their values by this share.
+/// Constraints between corners may differ from interpolated values by this share.
 pub(super) const BEND_MAX: f64 = 0.1;
 
-/// Wishes for one surface, in its box.
+/// Constraints for one surface, in its box.
 pub(super) struct SizeConstraints<'a> {
     pub list: &'a [&'a dyn SizeConstraint],
     pub frame: OctreeFrame,

@@ -1,4 +1,4 @@
-//! Corners of the octree's leaves, numbered once each, and those that hang.
+//! Corners of the octree's leaves, numbered once each, and hanging corners.
 //!
 //! ```text
 //!   p-------+---+      A corner in the middle of a larger leaf's edge or face hangs: its value
@@ -52,7 +52,7 @@ pub(super) struct TreeCorners {
 
 impl TreeCorners {
     /// A disk that fails unwinds.
-    pub(super) fn of(tree: &Tree, scratch: &ScratchSpace) -> Self {
+    pub(super) fn new(tree: &Tree, scratch: &ScratchSpace) -> Self {
         let numbered = number_corners(tree, scratch);
         let (mut of_leaf, n_corners) = numbered.unwrap_or_else(|e| raise(e));
         let hanging = find_hanging(tree, &mut of_leaf, scratch).unwrap_or_else(|e| raise(e));

@@ -1,7 +1,7 @@
-//! How many tetrahedra to expect, before there is one.
+//! Expected number of tetrahedra, before meshing.
 //!
-//! Away from the surface they follow the load. At it they follow its own triangles: where it is flat three tetrahedra stand on two
-//! triangles, in the edges of a thin rod two, and where needles lie the edges of what is above cross them.
+//! Away from the surface they follow the load. At the surface they follow its triangles: three tetrahedra stand on two
+//! triangles of a flat part, and two in the edges of a thin rod. The edges above needles cross them.
 
 use rayon::prelude::*;
 
@@ -67,7 +67,7 @@ impl SizeField {
         }
     }
 
-    /// Wanted lengths along the surface's edges beyond what an edge of ordinary length has, per filled side.
+    /// Wanted lengths along the surface's edges beyond an ordinary edge, per filled side.
     fn needles(&self, domain: &Domain) -> f64 {
         let surface = domain.seeker.surface();
         let h: Vec<f64> = parallel(|| surface.points.par_iter().map(|&p| self.h(p)).collect());

@@ -11,7 +11,8 @@ const LONG_FROM: f64 = 2.0;
 /// Seeds from one end of an edge to its middle at most, besides the seed there. At the steepest slope sizes grow 1.7
 /// times from one to the next: sixteen reach 5,000 times the end's size. Beyond that, the averages between fill in.
 const STEPS_MAX: u32 = 16;
-/// So many seeds are kept whatever the surface; beyond, as many as it has vertices. Where there would be more their steps are doubled.
+/// Seeds kept for any surface; at most as many as it has vertices are added. If there would be more, their steps are
+/// doubled.
 const SEEDS_MIN: usize = 1 << 17;
 /// Steps are not stretched further: each long edge has its middle then, and next to nothing else.
 const STRETCH_MAX: f64 = 64.0;
@@ -58,8 +59,8 @@ impl Span {
 
 /// Seeds of the edges and triangles that are long for the sizes at their corners; none on even surfaces.
 ///
-/// `at_vertices`, in input units: no seed is above what lies between them. Source of the rule: an experiment of ours with eleven surfaces from
-/// CAD programs, in which it left even surfaces as they were.
+/// `at_vertices`, in input units: no seed is above the interpolated values. Source of the rule: an experiment with
+/// eleven surfaces from CAD programs; it left even surfaces unchanged.
 pub(super) fn edge_seeds(
     seeds: &Seeds,
     triangles: &[[u32; 3]],

@@ -119,7 +119,7 @@ impl SizeField {
         };
         let tree = Tree::build(&seeds, &scaled, |tree| constraints.refine(tree))?;
         let _held = scratch.hold(seeds.bytes() + tree.bytes());
-        let mut corners = TreeCorners::of(&tree, scratch);
+        let mut corners = TreeCorners::new(&tree, scratch);
         let mut sizes = CornerSizes {
             tree: &tree,
             corners: &mut corners,
@@ -286,7 +286,7 @@ impl SizeField {
     }
 }
 
-/// A field that uses these sizes is divided where their octree is; shapes beside the octree are sampled only.
+/// A field built with these sizes is divided where their octree is; its shapes are sampled only.
 impl SizeConstraint for SizeField {
     fn h(&self, p: Point) -> Result<f64, SizingError> {
         Ok(Self::h(self, p))

@@ -13,7 +13,7 @@ pub struct Formula {
 }
 
 impl Formula {
-    /// Reads a number made of `x`, `y`, `z` and what the language of [`expr`](tetdb_base::expr) has.
+    /// Parses a number of `x`, `y`, `z` in the language of [`expr`](tetdb_base::expr).
     ///
     /// # Errors
     /// The fault and its place in the text.

@@ -77,8 +77,8 @@ impl Grading<'_> {
 
     /// Grades, and gives hanging corners their means: lowering only, so that both hold in the end.
     ///
-    /// A mean above its graded value lowers the largest of the corners it is taken from, none of them
-    /// below that value: so the smallest value of all stays what it is.
+    /// A mean above its graded value lowers the largest corners of its four, none of them below that value: so the
+    /// smallest value of all is unchanged.
     pub(super) fn grade_closed(&mut self, h: &mut SpillVec<f32>) {
         for _ in 0..GRADE_ROUNDS {
             self.grade(h);
@@ -147,7 +147,7 @@ impl Sweep<'_> {
     }
 }
 
-/// Lowers each of a leaf's values to what the others allow; says whether one changed.
+/// Lowers each of a leaf's values to the bound of the others; returns whether one changed.
 #[inline]
 fn relax_once(h: &mut [f32; 8], steps: &[f64; 4]) -> bool {
     let (low, high) =

@@ -1,4 +1,4 @@
-//! The load ∫ h⁻³ over the filled volumes, as far as vertices will be added there.
+//! The load ∫ h⁻³ over the filled volumes, without the skin at the surface in which no vertices are added.
 //!
 //! Cells of the octree, and parts of its leaves, are taken in the order of their uncertainty. A cell is divided while
 //! the sizes in it differ, or the surface may pass through it. The triangle above a cell's middle decides between
@@ -20,7 +20,7 @@ use tetdb_base::surface::{Seeker, Volumes};
 const CELLS_MAX: usize = 1 << 13;
 /// Cells examined, at least: the estimate of the uncertainty needs some.
 const CELLS_MIN: usize = 1 << 11;
-/// Wanted accuracy of the sum. What is unknown of cells at the surface has either sign and is added by squares.
+/// Wanted accuracy of the sum. Errors of cells at the surface have either sign and are added by squares.
 const TOLERANCE: f64 = 0.003;
 /// Cells whose parts are examined in one batch, if there are threads: most of the next cells in order are divided
 /// anyway.
@@ -66,13 +66,13 @@ struct IntegrationCell {
     entry: u32,
     /// True if it is all in a filled volume.
     is_inside: bool,
-    /// True if it is also farther from the surface than what is left out.
+    /// True if it is also farther from the surface than the skin.
     is_deep: bool,
     load: f64,
     /// Volume of its filled part, if the surface does not pass through it.
     volume: f64,
     unknown: f64,
-    /// True if what is left out may begin or end in it; whether the surface may pass through it.
+    /// True if the skin's limit may pass through it; true if the surface may pass through it.
     is_cut: bool,
     is_crossed: bool,
     /// True if vertices are added in it.
@@ -154,7 +154,7 @@ struct LoadSum<'a> {
     /// Load and volume of cells of which all is known.
     known: f64,
     volume: f64,
-    /// Squares of what is unknown at the surface; sum of what is unknown elsewhere.
+    /// Squares of the uncertainty at the surface; sum of the uncertainty elsewhere.
     cut: f64,
     sizes: f64,
 }
@@ -185,8 +185,8 @@ impl LoadSum<'_> {
         self.known + self.load_of_rest(&rest)
     }
 
-    /// The cell of which most is unknown, and its parts. With threads to spare those of the next cells in order are found
-    /// with them: what is found of a cell depends on nothing but the cell.
+    /// The cell of greatest uncertainty, and its parts. If threads are free, the parts of the next cells in order are
+    /// examined in the same batch; the result depends on nothing but the cell.
     fn pop(&mut self) -> Option<(IntegrationCell, [IntegrationCell; 8])> {
         let mut first = self.heap.pop()?;
         if first.parts.is_none() {
@@ -302,7 +302,7 @@ impl LoadSum<'_> {
         }
     }
 
-    /// A cell whose place is set, with what is found out about it.
+    /// Examines a cell with a given place.
     fn examined(&self, mut cell: IntegrationCell) -> IntegrationCell {
         cell.is_counted = self.examine(&mut cell);
         cell
@@ -409,7 +409,7 @@ impl LoadSum<'_> {
     }
 }
 
-/// Cells by what is unknown of them, then by place.
+/// Cells ordered by uncertainty, then by place.
 struct ByUnknown {
     cell: IntegrationCell,
     /// The parts of the cell, if they were examined already.

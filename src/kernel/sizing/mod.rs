@@ -1,4 +1,4 @@
-//! Wanted edge length h(x), the load it implies, the estimate.
+//! Wanted edge length h(x), its load, the predicted mesh.
 //!
 //! The field is a pure function of position: it does not depend on the order of insertion, the decomposition or the
 //! number of threads. It is built once from the surface. An octree (`tree`) is fine only where sizes differ. Values on
@@ -8,8 +8,8 @@
 //! (`region`) and of background meshes (`background`) are sampled into the octree when it is built (`constraints`). The
 //! least of all sizes counts.
 //!
-//! How much there is to mesh follows from the field and the surface: the load of what is inside (`integral`), tetrahedra and
-//! vertices to expect (`count`).
+//! The expected mesh follows from the field and the surface: the load inside (`integral`), the numbers of tetrahedra
+//! and vertices (`count`).
 //!
 //! Lengths along edges and loads of tetrahedra are closed forms for h linear between vertices (`closed`).
 //! Only IEEE basic operations and square roots are used: results are equal on every machine.

@@ -50,7 +50,7 @@ pub struct SizeOptions {
     pub sources: Vec<SizeSource>,
     /// A length by position; `hmin` bounds it too.
     pub formula: Option<Formula>,
-    /// Lengths of regions; `hmin` bounds them too. Whoever builds the field makes [`Region`](super::Region)s of them.
+    /// Lengths of regions; `hmin` bounds them too. The builder of the field turns them into [`Region`](super::Region)s.
     pub regions: Vec<RegionSize>,
 }
 

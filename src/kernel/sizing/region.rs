@@ -1,4 +1,4 @@
-//! One size for some of the volumes a surface encloses.
+//! One size for some of the enclosed volumes.
 
 use super::SizingError;
 use super::constraint::SizeConstraint;
@@ -38,7 +38,7 @@ impl<'a> Region<'a> {
         Self {
             seeker,
             volumes,
-            border: Seeker::of(seeker.surface(), scratch, is_border),
+            border: Seeker::with_filter(seeker.surface(), scratch, is_border),
             is_here,
             h,
             beta,

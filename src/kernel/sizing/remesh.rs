@@ -1,16 +1,18 @@
-//! Sizes of a part that is meshed again: wanted lengths inside, what it has along the faces that stay.
+//! Sizes of a sub-domain that is meshed again: wanted lengths inside, current lengths along its skin.
 //!
 //! ```text
-//!   h  had ----.            .---- had     The faces of the skin stay as they are, and so do lengths at them. Away from
-//!               `.        .'              them lengths go to the wanted ones as the slope allows: no lower than the
-//!      wanted     `------'                cones below what the part has at its skin, no higher than those above it.
+//!   h  current -.           .-- current   The faces of the skin stay, and so do lengths at them. Away from them lengths
+//!                `.       .'              approach the wanted ones as fast as the slope allows: they stay between the
+//!      wanted      `-----'                cones below and above the current lengths at the skin.
 //!      skin                  skin
 //! ```
 //!
-//! Where the wanted length is what the part has, the result is what the part has, but for rounding: it has the same octree there, and a
-//! leaf may be as steep as it was. Where vertices go hangs on the last digits of lengths (of 20,000 tetrahedra in a steep field, a
-//! hundredth more or fewer), so a part of which nothing else is wanted keeps its field to the bit. Sizes from the skin's edges would not do: vertices next to each other differ far more than the slope
-//! allows on a surface of small and large triangles, and the large ones' cones reach over the zones of the small ones.
+//! Where the wanted length is the current one, the result equals the current field, except for rounding: it has the
+//! same octree there, and a leaf may be as steep as before. The positions of vertices depend on the last digits of
+//! lengths (of 20,000 tetrahedra in a steep field, a hundredth more or fewer). So a part without a changed constraint
+//! keeps its field to the bit. Sizes from the skin's edges would not do. On a surface of small and large triangles,
+//! adjacent vertices differ far more than the slope allows, and the slopes of large ones reach over the zones of small
+//! ones.
 
 use fixedbitset::FixedBitSet;
 use rayon::prelude::*;
@@ -27,7 +29,8 @@ use super::values::CornerSizes;
 use tetdb_base::geom::{Aabb, Point};
 use tetdb_base::storage::{ScratchSpace, SpillVec};
 
-/// Wanted lengths that are off what the part has by no more than this share are the same: the octree is not divided for them.
+/// Wanted lengths that differ from the current ones by no more than this share are the same: the octree is not divided
+/// for them.
 const SAME: f64 = 0.01;
 /// Sizes of shapes next to the octree are sampled into it up to this error. At a tenth, which suffices for a formula,
 /// lengths around a sphere come out up to a tenth larger than they were.
@@ -39,8 +42,8 @@ const CELLS_PER_SIZE: f64 = 1.0;
 const CORNERS_AT_ONCE: usize = 1 << 16;
 
 impl SizeField {
-    /// The field of `constraint` inside a skin that stays, of a part that has the lengths of this field: triangles index points.
-    /// `None`: nothing else is wanted than what the part has.
+    /// The field of `constraint` inside a fixed skin, for a part with the lengths of this field; triangles index
+    /// points. `None`: the constraint equals the current lengths.
     ///
     /// Near the skin lengths are those of this field. Away from it they approach the constraint as fast as the slope
     /// `beta` allows, to smaller ones as well as to larger ones. Where the constraint is infinite, sizes are those
@@ -71,7 +74,7 @@ impl SizeField {
             beside: 1.0,
         };
         let tree = self.tree_within(points, &seeds, &constraints)?;
-        let mut corners = TreeCorners::of(&tree, scratch);
+        let mut corners = TreeCorners::new(&tree, scratch);
         let mut current = at_corners(&tree, &mut corners, frame.side, scratch, &|p| {
             Ok(self.h(frame.low + p * frame.side))
         })?;
@@ -102,7 +105,7 @@ impl SizeField {
             for i in 0..h.len() {
                 let current = current.get(i);
                 let wanted = Some(h.get(i)).filter(|h| h.is_finite()).unwrap_or(current);
-                // Rounded slopes are not to move what the part has.
+                // Rounded slopes must not change the current lengths.
                 let (low, high) = (lower.get(i).min(current), upper.get(i).max(current));
                 h.set(i, wanted.max(low).min(high));
             }
@@ -127,7 +130,7 @@ impl SizeField {
                 moved.push(v);
             }
         }
-        // A wanted length of nothing differs from any: cells along the skin are as fine as what is there.
+        // A wanted length of zero differs from any: cells along the skin are as fine as the seeds.
         let along_skin = Targets {
             hsiz: Some(0.0),
             hmin: None,
@@ -187,7 +190,7 @@ fn is_same(
     })
 }
 
-/// By leaf, the slope of what the part has between its corners, over `beta`; at least one.
+/// For each leaf, the slope of the current sizes between its corners, over `beta`; at least one.
 fn slope_factor(
     tree: &Tree,
     corners: &mut TreeCorners,

@@ -1,4 +1,4 @@
-//! Summing up a field.
+//! Summarizes a field.
 
 use super::field::SizeField;
 use super::length::Length;

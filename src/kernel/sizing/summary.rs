@@ -15,7 +15,7 @@ pub struct SizeRange {
     pub high: f64,
 }
 
-/// Where sizes came from and what they are.
+/// Origin and range of sizes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SizeSummary {
     /// Options in effect, in words.

@@ -6,7 +6,7 @@ use tetdb_base::geom::Point;
 use tetdb_base::storage::ScratchSpace;
 use tetdb_base::surface::{Seeker, Surface, Volumes};
 
-/// A small generator for test points; the seed is printed by what fails.
+/// A small generator for test points; failures print the seed.
 struct Dice(u64);
 
 impl Dice {
@@ -147,7 +147,7 @@ fn interior_size_is_joined_to_the_surface() {
         assert!((center / inside - 1.0).abs() < 0.02, "{center}");
         let wall = field.h(Point::new(0.0, 0.5, 0.5));
         assert!((wall / surface_h - 1.0).abs() < 0.2, "{wall} {surface_h}");
-        // Half way of the ramp, within what one cell can smear.
+        // Half way of the ramp, within the smear of one cell.
         let depth = 0.5 * (inside - surface_h).abs() / field.beta();
         let ramp = field.h(Point::new(depth, 0.5, 0.5));
         let wanted = 0.5 * (inside + surface_h);
@@ -176,8 +176,8 @@ fn sample(text: &str) -> (Vec<Point>, Vec<[u32; 3]>) {
 fn expected(surface: &(Vec<Point>, Vec<[u32; 3]>), field: &SizeField) -> f64 {
     let surface =
         Surface { points: surface.0.clone(), triangles: surface.1.clone(), ..Surface::default() };
-    let seeker = Seeker::of(&surface, &ScratchSpace::boundless(), |_| true);
-    let volumes = Volumes::of(&seeker);
+    let seeker = Seeker::with_filter(&surface, &ScratchSpace::boundless(), |_| true);
+    let volumes = Volumes::new(&seeker);
     let mut filled = vec![true; volumes.n_volumes as usize];
     filled[tetdb_base::surface::OUTSIDE as usize] = false;
     let domain = Domain { seeker: &seeker, volumes: &volumes, filled: &filled };
@@ -374,7 +374,7 @@ fn with_domain<T>(surface: &(Vec<Point>, Vec<[u32; 3]>), ask: impl FnOnce(&Domai
         .collect();
     welded.triangles = surface.1.iter().map(|t| t.map(|v| ids[v as usize])).collect();
     let seeker = Seeker::new(&welded);
-    let volumes = Volumes::of(&seeker);
+    let volumes = Volumes::new(&seeker);
     let filled: Vec<bool> = (0..volumes.n_volumes).map(|v| v > 0).collect();
     assert_eq!(filled, [false, true]);
     ask(&Domain { seeker: &seeker, volumes: &volumes, filled: &filled })

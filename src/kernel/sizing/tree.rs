@@ -35,7 +35,8 @@ const SPARSE_FROM: f64 = 4.0;
 const TARGET_MAX: f64 = 1.15;
 /// Lists at least this long are divided in parallel.
 const PARALLEL_SEEDS: usize = 8192;
-/// Parts of longer ones are gone through one after the other, each in parallel within: what all parts together would hold is 14 times a list.
+/// The parts of longer lists are handled one after the other, each in parallel within: all parts together would hold 14
+/// times a list.
 const PARALLEL_SEEDS_MAX: usize = 1 << 18;
 
 /// Where a leaf is on the lattice; its side is `2^(DEPTH - level)`.
@@ -194,7 +195,7 @@ impl Tree {
         Ok(())
     }
 
-    /// Divides what is next to a leaf and larger than twice its width.
+    /// Divides neighbors of a leaf that are larger than twice its width.
     fn divide_around(&mut self, leaf: Leaf) -> Result<(), SizingError> {
         for cell in leaf.outer_neighbors() {
             while let (Some((block, octant)), found) = self.find(cell) {

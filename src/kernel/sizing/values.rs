@@ -12,8 +12,8 @@ use super::tree::{LATTICE, Leaf, Tree};
 use tetdb_base::geom::Point;
 use tetdb_base::storage::{ScratchSpace, SpillVec, check_cancelled, raise, sort_record};
 
-/// Rounds of averaging that smooth what was filled in. The graph is shallow (cells grow with the distance to the surface): after these, the number of
-/// tetrahedra expected of a scanned skull is within 0.4 % of that of the limit.
+/// Rounds of averaging that smooth filled values. The graph is shallow (cells grow with the distance to the surface).
+/// After these rounds, the number of tetrahedra expected of a scanned skull is within 0.4 % of the limit.
 const FILL_ROUNDS: u32 = 18;
 /// Share of the slowest part of the error that plain averaging leaves after a round. Sixty rounds of plain averaging
 /// would do no better than these, which use the round before as well (the Chebyshev semi-iteration: Golub, Varga 1961).
@@ -87,7 +87,8 @@ impl CornerSizes<'_> {
     /// Weighted means of a value of the seeds at the corners of the leaves that hold them, infinite elsewhere; and,
     /// with `with_nearest`, distances from there to the nearest of these seeds.
     ///
-    /// Seeds are taken leaf by leaf, those of a leaf in their order. What falls on a hanging corner is handed to the corners it hangs on.
+    /// Seeds are taken leaf by leaf, those of a leaf in their order. The share of a hanging corner goes to the corners
+    /// it hangs on.
     pub(super) fn gather(
         &mut self,
         value: impl Fn(&Seeds, u32) -> f64,
@@ -198,7 +199,8 @@ impl CornerSizes<'_> {
                         complete &= old.is_finite();
                         before.set(i, old);
                         let mean = sum / weight;
-                        // Beside steep steps, and where corners hang between others, what looks back would run away, even below zero.
+                        // Next to steep steps, and at corners that hang between others, extrapolation would run away,
+                        // even below zero.
                         let next = match over > 1.0 {
                             true => older + over * (mean - older),
                             false => mean,
@@ -246,7 +248,7 @@ impl CornerSizes<'_> {
     }
 }
 
-/// Adds to the sums at a leaf's open corners what its twelve edges bring there.
+/// Adds the contributions of a leaf's twelve edges to the sums at its open corners.
 #[inline(always)]
 fn average(
     ids: &[u32; 8],

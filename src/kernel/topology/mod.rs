@@ -79,7 +79,7 @@ pub struct NeighborCounts {
 }
 
 impl NeighborCounts {
-    /// Sets what a pair shares.
+    /// Sets the number of faces that a pair shares.
     pub fn set(&mut self, a: u32, b: u32, faces: u64) {
         self.pairs.insert((a.min(b), a.max(b)), faces);
     }
@@ -100,8 +100,8 @@ impl NeighborCounts {
         }
     }
 
-    /// The neighbors of a part by name, and what is shared with each.
-    pub fn of(&self, part: u32) -> Vec<(u32, u64)> {
+    /// The neighbors of a sub-domain by name, and the number of faces shared with each.
+    pub fn list(&self, part: u32) -> Vec<(u32, u64)> {
         let mut found: Vec<(u32, u64)> = (self.pairs.iter())
             .filter_map(|(&(a, b), &n)| match part {
                 p if p == a => Some((b, n)),
@@ -130,8 +130,8 @@ mod tests {
             neighbors.remove(2, other);
             neighbors.add(3, other);
         }
-        assert_eq!(neighbors.of(0), [(2, 3), (3, 2)]);
-        assert_eq!(neighbors.of(3), [(0, 2)]);
+        assert_eq!(neighbors.list(0), [(2, 3), (3, 2)]);
+        assert_eq!(neighbors.list(3), [(0, 2)]);
         assert_eq!(owners.other(4, 0), Some(3));
         let [two, three] = [2, 3].map(|part| owners.across(part));
         assert_eq!((two.other(2), two.other(3)), (Some(0), None));

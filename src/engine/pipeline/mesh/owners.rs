@@ -64,7 +64,7 @@ impl TopologyChange {
             neighbors.add(high, other);
         }
         // Who was a neighbor of the parent is one of a child: no other row changes.
-        let beside = [low, high].into_iter().flat_map(|name| neighbors.of(name));
+        let beside = [low, high].into_iter().flat_map(|name| neighbors.list(name));
         self.names.extend(beside.map(|n| n.0).chain([low, high]));
         Ok(())
     }
@@ -103,7 +103,7 @@ fn neighbors_of(rows: &[TopologyRow]) -> NeighborCounts {
 }
 
 fn topology_row(neighbors: &NeighborCounts, name: u32) -> TopologyRow {
-    let of = neighbors.of(name).into_iter();
+    let of = neighbors.list(name).into_iter();
     TopologyRow {
         subdomain: name,
         neighbors: of.map(|(subdomain, faces)| NeighborRow { subdomain, faces }).collect(),

@@ -168,7 +168,7 @@ fn prepare_in(
     let enclosed = || {
         // Counted before the tree takes its share of what is left.
         let _held = scratch.hold(VOLUMES_TRIANGLE * surface.n_triangles());
-        let seeker = Seeker::of(surface, scratch, |_| true);
+        let seeker = Seeker::with_filter(surface, scratch, |_| true);
         let volumes = Volumes::new_in(&seeker, scratch);
         (seeker, volumes)
     };

@@ -23,7 +23,7 @@ fn a_large_surface_with_sheets_embedded_is_the_sample_it_was_taken_from() {
     let found = validate(&again);
     assert!(found.is_valid() && found.closedness.n_free > 0);
     // Sheets part nothing.
-    assert_eq!(Volumes::of(&Seeker::new(&again)).n_volumes, 2);
+    assert_eq!(Volumes::new(&Seeker::new(&again)).n_volumes, 2);
 }
 
 #[test]
