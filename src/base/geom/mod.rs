@@ -13,8 +13,6 @@ mod sign;
 mod wide;
 
 #[cfg(test)]
-mod oracle;
-#[cfg(test)]
 mod tests;
 
 pub use dyadic::Dyadic;

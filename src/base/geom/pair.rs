@@ -82,7 +82,7 @@ impl DoublePair {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geom::oracle::RandomNumbers;
+    use crate::geom::tests::oracle::RandomNumbers;
     use dashu::rational::RBig;
 
     #[test]

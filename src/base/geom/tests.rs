@@ -4,10 +4,12 @@
 //! They include points in one plane and on one sphere, off by one unit in the last place, far from the origin, of mixed
 //! magnitudes.
 
+pub(super) mod oracle;
+
 use std::cmp::Ordering;
 
-use super::oracle::{RandomNumbers, cases, exact, insphere_truth, orient_truth};
 use super::{Point, in_sphere_perturbed, insphere, orient};
+use oracle::{RandomNumbers, cases, exact, insphere_truth, orient_truth};
 
 impl RandomNumbers {
     /// One unit in the last place up, down, or none, on each axis.

@@ -196,8 +196,8 @@ impl DigitColumns {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geom::oracle::RandomNumbers;
-    use crate::geom::oracle::{exact, insphere_truth};
+    use crate::geom::tests::oracle::RandomNumbers;
+    use crate::geom::tests::oracle::{exact, insphere_truth};
 
     #[test]
     fn nearly_all_points_of_one_sphere_fit_and_get_their_sign() {

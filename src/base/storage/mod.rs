@@ -38,7 +38,7 @@ mod spill;
 mod spill_vec;
 
 pub use budget::{Budget, Lease};
-pub use cancel::{attempt, check_cancelled, raise};
+pub use cancel::{OrRaise, attempt, check_cancelled, raise};
 pub use cancel_token::CancelToken;
 pub use disk::{Disk, DiskEntry, FileId};
 pub use disk_path::DiskPath;

@@ -13,7 +13,7 @@ use super::page_files::{Backing, PageFiles};
 use super::page_table::{
     DIRTY, FRAMES_LIMIT, IN_BASE, IN_OUTPUT, PageTable, REFERENCED, RESIDENT, frame_of,
 };
-use super::{DiskPath, Pages, SharedPages, StorageError, check_cancelled, kind, raise};
+use super::{DiskPath, OrRaise, Pages, SharedPages, StorageError, check_cancelled, kind, raise};
 
 /// Dirty pages written in one commit; a quarter of redb's cache.
 const BATCH_PAGES_MAX: usize = 256;
@@ -168,7 +168,7 @@ impl Pager {
             }
         }
         self.write_back(&batch);
-        or_raise(self.files.end_file(generation));
+        self.files.end_file(generation).or_raise();
         for table in &mut self.tables {
             for page in 0..table.len() as u32 {
                 if table.entry(page) & RESIDENT == 0 {
@@ -246,7 +246,7 @@ impl Pager {
         let address = self.address(kind, page);
         let at = frame as usize * SLOTS;
         let slots = &mut self.frames[at..at + SLOTS];
-        or_raise(self.files.read(place, address, slots));
+        self.files.read(place, address, slots).or_raise();
         self.stats.pages_read += 1;
         self.set_place(frame, place);
         self.owners[frame as usize] = (kind as u8, page);
@@ -321,7 +321,7 @@ impl Pager {
         let (address, place) = (self.address_of(frame), self.place(frame));
         let at = frame as usize * SLOTS;
         let slots = &mut self.frames[at..at + SLOTS];
-        let place = or_raise(self.files.spill(place, address, slots));
+        let place = self.files.spill(place, address, slots).or_raise();
         self.stats.pages_written += 1;
         self.mark_clean_at(frame, place);
     }
@@ -339,7 +339,7 @@ impl Pager {
             let at = frame as usize * SLOTS;
             (address, &frames[at..at + SLOTS])
         });
-        or_raise(self.files.write(pages));
+        self.files.write(pages).or_raise();
         self.stats.pages_written += batch.len() as u64;
         self.stats.commits += 1;
         for &frame in batch {
@@ -481,11 +481,6 @@ impl Pager {
             self.free.push(frame);
         }
     }
-}
-
-/// The value of a file operation. Unwinds on errors.
-fn or_raise<T>(done: Result<T, StorageError>) -> T {
-    done.unwrap_or_else(|error| raise(error))
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::geom::{Aabb, HilbertFrame, Point};
-use crate::storage::{FrozenSpillVec, KeyedId, ScratchSpace, parallel, raise};
+use crate::storage::{FrozenSpillVec, KeyedId, OrRaise, ScratchSpace, parallel};
 
 /// Things in one leaf.
 const LEAF: usize = 4;
@@ -53,17 +53,14 @@ impl BoxTree {
                     .collect()
             });
             for key in keys {
-                sorter.push(key).unwrap_or_else(|e| raise(e));
+                sorter.push(key).or_raise();
             }
         }
-        let mut sorted = sorter.finish().unwrap_or_else(|e| raise(e));
+        let mut sorted = sorter.finish().or_raise();
         let (mut order, mut boxes) = (scratch.list(), scratch.list());
         loop {
-            let some: Vec<u32> = sorted
-                .by_ref()
-                .take(AT_ONCE)
-                .map(|keyed| keyed.unwrap_or_else(|e| raise(e)).id)
-                .collect();
+            let some: Vec<u32> =
+                sorted.by_ref().take(AT_ONCE).map(|keyed| keyed.or_raise().id).collect();
             if some.is_empty() {
                 break;
             }

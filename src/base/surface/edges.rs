@@ -5,7 +5,7 @@ use robust::Coord;
 
 use super::Surface;
 use crate::geom::Point;
-use crate::storage::{ScratchSpace, SpillVec, parallel, raise, sort_record};
+use crate::storage::{OrRaise, ScratchSpace, SpillVec, parallel, sort_record};
 
 /// Properties of a surface that follow from its edges.
 ///
@@ -130,13 +130,12 @@ impl Facets {
             for k in 0..3 {
                 let (a, b) = (triangle[k as usize], triangle[(k as usize + 1) % 3]);
                 let edge_use = TriangleAtEdge { edge: [a.min(b), a.max(b)], half: 4 * t + k };
-                let pushed = sorter.push(edge_use);
-                pushed.unwrap_or_else(|e| raise(e));
+                sorter.push(edge_use).or_raise();
             }
         }
         let mut uses = scratch.list();
-        for edge_use in sorter.finish().unwrap_or_else(|e| raise(e)) {
-            uses.push(edge_use.unwrap_or_else(|e| raise(e)));
+        for edge_use in sorter.finish().or_raise() {
+            uses.push(edge_use.or_raise());
         }
         let uses = uses.done();
         Self { degenerate, duplicates, two_sided, uses, is_left_out }
@@ -222,16 +221,15 @@ fn repetitions(
         if !is_left_out[t as usize] {
             let mut vertices = *triangle;
             vertices.sort_unstable();
-            let pushed = sorter.push(SortedTriangle { vertices, triangle: t });
-            pushed.unwrap_or_else(|e| raise(e));
+            sorter.push(SortedTriangle { vertices, triangle: t }).or_raise();
         }
     }
     let (mut duplicates, mut two_sided) = (Vec::new(), Vec::new());
     // A wall may be given from both sides, a sheet is given once, and not where a shell is.
     // Of the set at hand: its vertices, the first triangle, the first one of the other orientation.
     let mut set = None::<([u32; 3], u32, Option<u32>)>;
-    for key in sorter.finish().unwrap_or_else(|e| raise(e)) {
-        let SortedTriangle { vertices, triangle: t } = key.unwrap_or_else(|e| raise(e));
+    for key in sorter.finish().or_raise() {
+        let SortedTriangle { vertices, triangle: t } = key.or_raise();
         let Some((_, first, opposite)) = set.as_mut().filter(|set| set.0 == vertices) else {
             set = Some((vertices, t, None));
             continue;

@@ -117,35 +117,28 @@ fn turn_segments<P: Pages>(
     missing.segments = left;
 }
 
-fn flip_segments<P: Pages>(
+/// Tries to recover missing parts by flips, level by level, while that recovers enough of them.
+///
+/// `parts` selects the list of missing parts; `recover` tries one with a level and a limit of ring searches.
+fn flip_missing<P: Pages, T: Copy>(
     mesh: &mut Mesh<P>,
     missing: &mut MissingFacets,
     report: &mut RecoveryReport,
-    crossings_max: usize,
     watch: &RecoveryWatcher,
+    parts: impl Fn(&mut MissingFacets) -> &mut Vec<T>,
+    recover: impl Fn(&mut Mesh<P>, &mut MissingFacets, &mut RecoveryReport, T, (u32, u32)) -> bool,
 ) {
-    for (level, work) in LEVELS {
+    for level in LEVELS {
         loop {
-            let before = missing.segments.len();
-            let mut left = Vec::new();
-            for (a, b) in std::mem::take(&mut missing.segments) {
+            let mut left = std::mem::take(parts(missing));
+            let before = left.len();
+            left.retain(|&part| {
                 check_cancelled();
                 report.notify(watch);
-                let mut s = PagedComplex(mesh, &missing.protected);
-                let mut flipper = Flipper::new(&mut s, RecoveryTarget::Edge(a, b));
-                flipper.work = work;
-                flipper.crossings_max = crossings_max;
-                let outcome = flipper.recover_edge(a, b, level);
-                report.flips += flipper.flips;
-                if outcome == Outcome::Recovered {
-                    report.segments_by_flips += 1;
-                    missing.protected.insert(edge_key(a, b));
-                } else {
-                    left.push((a, b));
-                }
-            }
-            missing.segments = left;
-            let after = missing.segments.len();
+                !recover(mesh, missing, report, part, level)
+            });
+            let after = left.len();
+            *parts(missing) = left;
             if after == 0 {
                 return;
             }
@@ -156,41 +149,58 @@ fn flip_segments<P: Pages>(
     }
 }
 
+fn flip_segments<P: Pages>(
+    mesh: &mut Mesh<P>,
+    missing: &mut MissingFacets,
+    report: &mut RecoveryReport,
+    crossings_max: usize,
+    watch: &RecoveryWatcher,
+) {
+    let recover = |mesh: &mut Mesh<P>,
+                   missing: &mut MissingFacets,
+                   report: &mut RecoveryReport,
+                   (a, b): (u32, u32),
+                   (level, work)| {
+        let mut s = PagedComplex(mesh, &missing.protected);
+        let mut flipper = Flipper::new(&mut s, RecoveryTarget::Edge(a, b));
+        flipper.work = work;
+        flipper.crossings_max = crossings_max;
+        let is_recovered = flipper.recover_edge(a, b, level) == Outcome::Recovered;
+        report.flips += flipper.flips;
+        if is_recovered {
+            report.segments_by_flips += 1;
+            missing.protected.insert(edge_key(a, b));
+        }
+        is_recovered
+    };
+    flip_missing(mesh, missing, report, watch, |missing| &mut missing.segments, recover);
+}
+
 fn flip_facets<P: Pages>(
     mesh: &mut Mesh<P>,
     missing: &mut MissingFacets,
     report: &mut RecoveryReport,
     watch: &RecoveryWatcher,
 ) {
-    for (level, work) in LEVELS {
-        loop {
-            let before = missing.facets.len();
-            let mut left = Vec::new();
-            for n in std::mem::take(&mut missing.facets) {
-                check_cancelled();
-                report.notify(watch);
-                let f = mesh.facet(n).vertices;
-                let mut s = PagedComplex(mesh, &missing.protected);
-                let mut flipper = Flipper::new(&mut s, RecoveryTarget::Face(f));
-                flipper.work = work;
-                let outcome = flipper.recover_face(f, level);
-                report.flips += flipper.flips;
-                match find_face(&mut s, f) {
-                    SearchResult::Face(face) if outcome == Outcome::Recovered => {
-                        s.require(face);
-                        report.facets_by_flips += 1;
-                    }
-                    _ => left.push(n),
-                }
+    let recover = |mesh: &mut Mesh<P>,
+                   missing: &mut MissingFacets,
+                   report: &mut RecoveryReport,
+                   n: u32,
+                   (level, work)| {
+        let f = mesh.facet(n).vertices;
+        let mut s = PagedComplex(mesh, &missing.protected);
+        let mut flipper = Flipper::new(&mut s, RecoveryTarget::Face(f));
+        flipper.work = work;
+        let outcome = flipper.recover_face(f, level);
+        report.flips += flipper.flips;
+        match find_face(&mut s, f) {
+            SearchResult::Face(face) if outcome == Outcome::Recovered => {
+                s.require(face);
+                report.facets_by_flips += 1;
+                true
             }
-            missing.facets = left;
-            let after = missing.facets.len();
-            if after == 0 {
-                return;
-            }
-            if after + after / 16 >= before {
-                break;
-            }
+            _ => false,
         }
-    }
+    };
+    flip_missing(mesh, missing, report, watch, |missing| &mut missing.facets, recover);
 }

@@ -49,7 +49,7 @@ pub(super) fn tidy<P: Pages>(mesh: &mut Mesh<P>, report: &mut RecoveryReport) {
                 s.drop_steiner(v);
                 report.steiner = report.steiner.saturating_sub(1);
             }
-            if is_gone || raise(&mut s, v) {
+            if is_gone || gain_clearance(&mut s, v) {
                 beside.extend(near);
             }
             !is_gone
@@ -61,7 +61,7 @@ pub(super) fn tidy<P: Pages>(mesh: &mut Mesh<P>, report: &mut RecoveryReport) {
 }
 
 /// Moves a free vertex to the place of the largest clearance in its ball, if that gains enough.
-pub(super) fn raise<P: Pages>(s: &mut PagedComplex<'_, P>, v: u32) -> bool {
+pub(super) fn gain_clearance<P: Pages>(s: &mut PagedComplex<'_, P>, v: u32) -> bool {
     let old = s.position(v);
     let ball = ball(s, v);
     let mut reach = 0.0f64;

@@ -23,7 +23,7 @@ use super::inscribed_ball::{HalfSpace, ball_center, clearance};
 use super::map::MissingFacets;
 use super::report::RecoveryReport;
 use super::suppress::half_space;
-use super::tidy::raise;
+use super::tidy::gain_clearance;
 use super::walk::{EdgeRing, Exit, crossings, edge_at, shell};
 use crate::mesh::Mesh;
 use tetdb_base::geom::{IdMap, IdSet, Point, orient};
@@ -217,7 +217,7 @@ impl<P: Pages> Turner<'_, '_, P> {
         free.retain(|&v| self.s.is_steiner(v));
         for v in free {
             if !self.remove(v) {
-                raise(self.s, v);
+                gain_clearance(self.s, v);
             }
         }
         let turn = self.plan(edge, a, b)?;

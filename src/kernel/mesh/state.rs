@@ -65,21 +65,12 @@ impl MeshState {
 
     /// The counts as numbers, to store with the pages.
     pub fn to_words(self) -> [u32; MESH_STATE_WORDS] {
-        let [t, v, f, i] = [self.tets, self.vertices, self.facets, self.interface_faces];
-        [
-            t.fresh,
-            t.free_head,
-            t.n_live,
-            v.fresh,
-            v.free_head,
-            v.n_live,
-            f.fresh,
-            f.free_head,
-            f.n_live,
-            i.fresh,
-            i.free_head,
-            i.n_live,
-        ]
+        let mut words = [0; MESH_STATE_WORDS];
+        let pools = [self.tets, self.vertices, self.facets, self.interface_faces];
+        for (words, pool) in words.chunks_exact_mut(3).zip(pools) {
+            words.copy_from_slice(&[pool.fresh, pool.free_head, pool.n_live]);
+        }
+        words
     }
 
     /// The inverse of [`MeshState::to_words`].

@@ -8,7 +8,6 @@
 //!   +---+---+
 //! ```
 
-use fixedbitset::FixedBitSet;
 use rayon::prelude::*;
 
 use super::SizingError;
@@ -21,7 +20,7 @@ use tetdb_base::storage::{SpillVec, parallel};
 
 /// Levels down to which every cell is sampled.
 const LEVELS_ASKED: u32 = 5;
-/// Cells and corners sampled in one batch.
+/// Cells sampled in one batch.
 const CELLS_AT_ONCE: usize = 1 << 16;
 /// Cells at most: as many leaves as can be numbered.
 const CELLS_MAX: usize = 1 << 28;
@@ -159,32 +158,9 @@ impl SizeConstraints<'_> {
         if self.list.is_empty() {
             return Ok(());
         }
-        let mut is_known = FixedBitSet::with_capacity(corners.n_corners);
-        let mut places: Vec<(u32, [u32; 3])> = Vec::with_capacity(CELLS_AT_ONCE + 8);
-        for (i, leaf) in tree.leaves().enumerate() {
-            for (c, id) in corners.of_leaf.get(i).into_iter().enumerate() {
-                if !is_known.put(id as usize) {
-                    places.push((id, leaf.corner(c)));
-                }
-            }
-            if places.len() >= CELLS_AT_ONCE {
-                self.lower_at(&mut places, h)?;
-            }
-        }
-        self.lower_at(&mut places, h)
-    }
-
-    fn lower_at(
-        &self,
-        places: &mut Vec<(u32, [u32; 3])>,
-        h: &mut SpillVec<f32>,
-    ) -> Result<(), SizingError> {
-        let constrained: Result<Vec<f64>, _> =
-            parallel(|| places.par_iter().map(|&(_, at)| self.h(at)).collect());
-        for ((id, _), constrained) in places.drain(..).zip(constrained?) {
-            h.change(id as usize, |h| *h = h.min(constrained as f32));
-        }
-        Ok(())
+        corners.sample(tree, &|at| self.h(at), |id, wanted| {
+            h.change(id, |h| *h = h.min(wanted as f32));
+        })
     }
 }
 

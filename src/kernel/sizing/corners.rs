@@ -8,8 +8,17 @@
 //!   +-------q---+      at a corner that is free.
 //! ```
 
+use fixedbitset::FixedBitSet;
+use rayon::prelude::*;
+
+use super::SizingError;
 use super::tree::{LATTICE, Leaf, Tree};
-use tetdb_base::storage::{KeyedId, ScratchSpace, SpillVec, StorageError, raise, sort_record};
+use tetdb_base::storage::{
+    KeyedId, OrRaise, ScratchSpace, SpillVec, StorageError, parallel, sort_record,
+};
+
+/// Corners sampled in one batch.
+const CORNERS_AT_ONCE: usize = 1 << 16;
 
 sort_record! {
     /// A hanging corner and the four corners (an edge's two, twice) whose mean it takes.
@@ -54,9 +63,40 @@ impl TreeCorners {
     /// A disk that fails unwinds.
     pub(super) fn new(tree: &Tree, scratch: &ScratchSpace) -> Self {
         let numbered = number_corners(tree, scratch);
-        let (mut of_leaf, n_corners) = numbered.unwrap_or_else(|e| raise(e));
-        let hanging = find_hanging(tree, &mut of_leaf, scratch).unwrap_or_else(|e| raise(e));
+        let (mut of_leaf, n_corners) = numbered.or_raise();
+        let hanging = find_hanging(tree, &mut of_leaf, scratch).or_raise();
         Self { of_leaf, n_corners, hanging }
+    }
+
+    /// Calls `size` once for the lattice position of each corner, on all threads, and `store` with the corner and its
+    /// size.
+    pub(super) fn sample(
+        &mut self,
+        tree: &Tree,
+        size: &(dyn Fn([u32; 3]) -> Result<f64, SizingError> + Sync),
+        mut store: impl FnMut(usize, f64),
+    ) -> Result<(), SizingError> {
+        let mut is_sampled = FixedBitSet::with_capacity(self.n_corners);
+        let mut batch: Vec<(u32, [u32; 3])> = Vec::with_capacity(CORNERS_AT_ONCE + 8);
+        let mut sample_batch = |batch: &mut Vec<(u32, [u32; 3])>| {
+            let sizes: Result<Vec<f64>, _> =
+                parallel(|| batch.par_iter().map(|&(_, at)| size(at)).collect());
+            for ((id, _), size) in batch.drain(..).zip(sizes?) {
+                store(id as usize, size);
+            }
+            Ok(())
+        };
+        for (i, leaf) in tree.leaves().enumerate() {
+            for (c, id) in self.of_leaf.get(i).into_iter().enumerate() {
+                if !is_sampled.put(id as usize) {
+                    batch.push((id, leaf.corner(c)));
+                }
+            }
+            if batch.len() >= CORNERS_AT_ONCE {
+                sample_batch(&mut batch)?;
+            }
+        }
+        sample_batch(&mut batch)
     }
 }
 

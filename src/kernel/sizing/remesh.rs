@@ -14,9 +14,6 @@
 //! adjacent vertices differ far more than the slope allows, and the slopes of large ones reach over the zones of small
 //! ones.
 
-use fixedbitset::FixedBitSet;
-use rayon::prelude::*;
-
 use super::SizingError;
 use super::constraint::SizeConstraint;
 use super::constraints::SizeConstraints;
@@ -38,8 +35,6 @@ const BEND_MAX: f64 = 0.02;
 /// Where a shape ends, sizes have a kink; cells there are this many sizes wide. With two, a ball of a tenth of the
 /// length around it has 2.3 % fewer tetrahedra after remeshing with the same lengths.
 const CELLS_PER_SIZE: f64 = 1.0;
-/// Corners sampled in one batch.
-const CORNERS_AT_ONCE: usize = 1 << 16;
 
 impl SizeField {
     /// The field of `constraint` inside a fixed skin, for a part with the lengths of this field; triangles index
@@ -151,27 +146,11 @@ fn at_corners(
     size: &(dyn Fn(Point) -> Result<f64, SizingError> + Sync),
 ) -> Result<SpillVec<f32>, SizingError> {
     let mut h = scratch.column(corners.n_corners, 0.0f32);
-    let mut is_known = FixedBitSet::with_capacity(corners.n_corners);
-    let mut places: Vec<(u32, Point)> = Vec::new();
-    let mut ask = |places: &mut Vec<(u32, Point)>| {
-        let asked: Result<Vec<f64>, _> = places.par_iter().map(|&(_, p)| size(p)).collect();
-        for ((id, _), size) in places.drain(..).zip(asked?) {
-            h.set(id as usize, (size / side) as f32);
-        }
-        Ok(())
+    let size_at = |at: [u32; 3]| {
+        let [x, y, z] = at.map(f64::from);
+        size(Point::new(x, y, z) * (1.0 / f64::from(LATTICE)))
     };
-    for (i, leaf) in tree.leaves().enumerate() {
-        for (c, id) in corners.of_leaf.get(i).into_iter().enumerate() {
-            if !is_known.put(id as usize) {
-                let [x, y, z] = leaf.corner(c).map(f64::from);
-                places.push((id, Point::new(x, y, z) * (1.0 / f64::from(LATTICE))));
-            }
-        }
-        if places.len() >= CORNERS_AT_ONCE {
-            ask(&mut places)?;
-        }
-    }
-    ask(&mut places)?;
+    corners.sample(tree, &size_at, |id, size| h.set(id, (size / side) as f32))?;
     Ok(h)
 }
 

@@ -6,7 +6,7 @@ use super::options::{SizeOptions, Targets};
 use super::seeds::Seeds;
 use super::summary::{SizeRange, SizeSummary, SizeWarning};
 use tetdb_base::geom::short;
-use tetdb_base::storage::{ScratchSpace, raise, sort_record};
+use tetdb_base::storage::{OrRaise, ScratchSpace, sort_record};
 
 impl SizeField {
     /// Summary of the field and the origin of its sizes. A scratch file that fails unwinds.
@@ -68,13 +68,12 @@ fn weighted_range(list: impl Iterator<Item = (f64, f64)>, scratch: &ScratchSpace
     let mut total = 0.0;
     for (x, weight) in list {
         total += weight;
-        let pushed = sorter.push(Weighted { x, weight });
-        pushed.unwrap_or_else(|e| raise(e));
+        sorter.push(Weighted { x, weight }).or_raise();
     }
     let mut sum = 0.0;
     let mut range = SizeRange { low: f64::INFINITY, median: f64::NAN, high: 0.0 };
-    for next in sorter.finish().unwrap_or_else(|e| raise(e)) {
-        let Weighted { x, weight } = next.unwrap_or_else(|e| raise(e));
+    for next in sorter.finish().or_raise() {
+        let Weighted { x, weight } = next.or_raise();
         let is_below = sum < 0.5 * total;
         sum += weight;
         if is_below && sum >= 0.5 * total {

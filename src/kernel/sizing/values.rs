@@ -10,7 +10,7 @@ use super::options::Targets;
 use super::seeds::Seeds;
 use super::tree::{LATTICE, Leaf, Tree};
 use tetdb_base::geom::Point;
-use tetdb_base::storage::{ScratchSpace, SpillVec, check_cancelled, raise, sort_record};
+use tetdb_base::storage::{OrRaise, ScratchSpace, SpillVec, check_cancelled, sort_record};
 
 /// Rounds of averaging that smooth filled values. The graph is shallow (cells grow with the distance to the surface).
 /// After these rounds, the number of tetrahedra expected of a scanned skull is within 0.4 % of the limit.
@@ -98,14 +98,13 @@ impl CornerSizes<'_> {
         let mut by_leaf = self.scratch.sorter::<LeafSeed>();
         for v in seeds.all() {
             let (leaf, _) = tree.leaf_at(lattice_cell(seeds.at(v)));
-            let pushed = by_leaf.push(LeafSeed { leaf, seed: v });
-            pushed.unwrap_or_else(|e| raise(e));
+            by_leaf.push(LeafSeed { leaf, seed: v }).or_raise();
         }
-        let by_leaf = by_leaf.finish().unwrap_or_else(|e| raise(e));
+        let by_leaf = by_leaf.finish().or_raise();
         let mut sums = self.scratch.column(n, [0.0f64; 2]);
         let mut nearest = with_nearest.then(|| self.scratch.column(n, f64::INFINITY));
         for next in by_leaf {
-            let LeafSeed { seed, .. } = next.unwrap_or_else(|e| raise(e));
+            let LeafSeed { seed, .. } = next.or_raise();
             let (at, h) = (seeds.at(seed), value(seeds, seed));
             let cell = lattice_cell(at);
             let (number, level) = tree.leaf_at(cell);

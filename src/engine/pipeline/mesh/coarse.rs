@@ -4,7 +4,7 @@ use crate::pipeline::error::PipelineError;
 use crate::pipeline::plan::Options;
 use crate::pipeline::progress::{Event, Watcher};
 use tetdb_base::geom::HilbertFrame;
-use tetdb_base::storage::{KeyedId, Pages, ScratchSpace, raise};
+use tetdb_base::storage::{KeyedId, OrRaise, Pages, ScratchSpace};
 use tetdb_base::surface::Surface;
 use tetdb_kernel::boundary::{RecoveryReport, VolumeRegions, fill_regions, recover_with_progress};
 use tetdb_kernel::delaunay::{Kernel, KernelStats, Rejected, enclose, insertion_key};
@@ -102,16 +102,15 @@ pub fn triangulate<P: Pages>(
     let mut order = scratch.sorter::<KeyedId>();
     for (i, &p) in (0u32..).zip(&surface.points) {
         let key = insertion_key(&frame, p);
-        let pushed = order.push(KeyedId { key, id: i });
-        pushed.unwrap_or_else(|e| raise(e));
+        order.push(KeyedId { key, id: i }).or_raise();
     }
-    let order = order.finish().unwrap_or_else(|e| raise(e));
+    let order = order.finish().or_raise();
     let mut kernel = Kernel::default();
     let mut hint = enclose(mesh, &bounds);
     let total = surface.points.len();
     let mut number = scratch.column(total, 0u32);
     for (k, record) in order.enumerate() {
-        let i = record.unwrap_or_else(|e| raise(e)).id;
+        let i = record.or_raise().id;
         let p = surface.points[i as usize];
         let v = mesh.add_vertex(p, 0.0);
         mesh.set_vertex_attribute(v, VertexTag::Surface, i);

@@ -14,7 +14,7 @@ use truth::{Exact, RandomNumbers, Truth, cases, exact, orient_truth};
 
 /// The exact numbers that the signs of the crate below are tested against.
 #[allow(dead_code, reason = "spheres are tested in the crate below")]
-#[path = "../../../base/geom/oracle.rs"]
+#[path = "../../../base/geom/tests/oracle.rs"]
 mod truth;
 
 /// `base + Σ share · (to - base)`.
