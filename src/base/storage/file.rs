@@ -10,7 +10,7 @@ use redb::{
     StorageBackend, TableDefinition,
 };
 
-use super::backend::{Private, Synced, Unsynced};
+use super::backend::{DiskFile, Private};
 use super::{DiskPath, StorageError};
 
 /// A check goes through a file once, so that a cache brings nothing.
@@ -44,7 +44,7 @@ impl StoreFile {
     ///
     /// Errors: [`StorageError::Io`] when it exists or its folder cannot be written.
     pub fn create(path: impl Into<DiskPath>, cache_bytes: usize) -> Result<Self, StorageError> {
-        Self::fresh(path.into(), cache_bytes, Synced)
+        Self::fresh(path.into(), cache_bytes, true)
     }
 
     /// Creates a file that must not exist, for one process. Commits are not synced: the file is synced when the catalog
@@ -55,18 +55,14 @@ impl StoreFile {
         path: impl Into<DiskPath>,
         cache_bytes: usize,
     ) -> Result<Self, StorageError> {
-        Self::fresh(path.into(), cache_bytes, Unsynced)
+        Self::fresh(path.into(), cache_bytes, false)
     }
 
-    fn fresh<B: StorageBackend>(
-        path: DiskPath,
-        cache_bytes: usize,
-        backend: fn(Box<dyn StorageBackend>) -> B,
-    ) -> Result<Self, StorageError> {
+    fn fresh(path: DiskPath, cache_bytes: usize, is_synced: bool) -> Result<Self, StorageError> {
         let mut builder = Database::builder();
         builder.set_cache_size(cache_bytes);
         let file = path.at_path(path.disk().create(path.path()))?;
-        let db = guarded(|| builder.create_with_backend(backend(file)));
+        let db = guarded(|| builder.create_with_backend(DiskFile { file, is_synced }));
         let mut file = Self {
             handle: Some(Handle::Writer(Arc::new(db.map_err(|e| e.at(path.path()))?))),
             path,
@@ -364,7 +360,7 @@ enum Access {
 fn open_writable(path: &DiskPath, builder: &redb::Builder) -> Result<Database, DatabaseError> {
     let file = path.disk().open(path.path()).map_err(redb::StorageError::Io)?;
     refuse_empty(&*file)?;
-    builder.create_with_backend(Synced(file))
+    builder.create_with_backend(DiskFile { file, is_synced: true })
 }
 
 /// Opens an existing file without changing it.

@@ -32,24 +32,24 @@ pub(super) struct PageTable {
 
 impl PageTable {
     /// `n` pages in the base file.
-    pub(super) fn in_base(n: usize) -> Self {
+    pub fn in_base(n: usize) -> Self {
         Self { entries: vec![IN_BASE; n], quick: vec![BEYOND | CLEAN; n] }
     }
 
-    pub(super) fn len(&self) -> usize {
+    pub fn len(&self) -> usize {
         self.entries.len()
     }
 
     /// Position in the pool of record `id`, beyond it when its page may not be read at once.
     #[inline(always)]
-    pub(super) fn to_read(&self, id: u32) -> usize {
+    pub fn to_read(&self, id: u32) -> usize {
         let quick = self.quick[(id >> SLOT_BITS) as usize];
         (quick & !SLOT_MASK | id & SLOT_MASK) as usize
     }
 
     /// Position in the pool of record `id`, beyond it when its page may not be changed at once.
     #[inline(always)]
-    pub(super) fn to_write(&self, id: u32) -> usize {
+    pub fn to_write(&self, id: u32) -> usize {
         let quick = self.quick[(id >> SLOT_BITS) as usize];
         if quick & CLEAN != 0 {
             return usize::MAX;
@@ -57,11 +57,11 @@ impl PageTable {
         (quick | id & SLOT_MASK) as usize
     }
 
-    pub(super) fn entry(&self, page: u32) -> u32 {
+    pub fn entry(&self, page: u32) -> u32 {
         self.entries[page as usize]
     }
 
-    pub(super) fn set(&mut self, page: u32, entry: u32) {
+    pub fn set(&mut self, page: u32, entry: u32) {
         let first = match entry & READABLE {
             READABLE => (entry & FRAME_MASK) << SLOT_BITS,
             _ => BEYOND,
@@ -72,7 +72,7 @@ impl PageTable {
     }
 
     /// Lets every page be read at once; `false` when one is not in memory.
-    pub(super) fn make_readable(&mut self) -> bool {
+    pub fn make_readable(&mut self) -> bool {
         for page in 0..self.entries.len() {
             let entry = self.entries[page];
             if entry & RESIDENT == 0 {
@@ -86,20 +86,20 @@ impl PageTable {
     }
 
     /// Adds a page at the end.
-    pub(super) fn push(&mut self, entry: u32) {
+    pub fn push(&mut self, entry: u32) {
         self.entries.push(IN_BASE);
         self.quick.push(BEYOND | CLEAN);
         self.set(self.entries.len() as u32 - 1, entry);
     }
 
     /// Forgets the first `n` pages; returns their frames.
-    pub(super) fn drop_front(&mut self, n: usize) -> Vec<u32> {
+    pub fn drop_front(&mut self, n: usize) -> Vec<u32> {
         self.quick.drain(..n);
         self.entries.drain(..n).filter_map(frame_of).collect()
     }
 
     /// The frames of all resident pages.
-    pub(super) fn frames(&self) -> Vec<u32> {
+    pub fn frames(&self) -> Vec<u32> {
         self.entries.iter().copied().filter_map(frame_of).collect()
     }
 }

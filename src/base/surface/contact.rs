@@ -228,7 +228,7 @@ pub(super) struct Projection {
 
 impl Projection {
     /// A projection for the plane of `t`, which must have area.
-    pub(super) fn new(t: &[Point; 3]) -> Self {
+    pub fn new(t: &[Point; 3]) -> Self {
         let normal = (t[1] - t[0]).cross(t[2] - t[0]).abs().to_array();
         let best = (0..3).max_by(|&i, &j| normal[i].total_cmp(&normal[j])).unwrap_or(2);
         let mut axes = [best, (best + 1) % 3, (best + 2) % 3].into_iter().map(|axis| Self { axis });
@@ -244,7 +244,7 @@ impl Projection {
     }
 
     /// 1 when `a b c` turn to the left, exactly.
-    pub(super) fn turn(self, a: Point, b: Point, c: Point) -> i8 {
+    pub fn turn(self, a: Point, b: Point, c: Point) -> i8 {
         sign(robust::orient2d(self.flat(a), self.flat(b), self.flat(c)))
     }
 
@@ -279,7 +279,7 @@ impl Projection {
     }
 
     /// Turns of `x` about the edges of `t`, positive inside.
-    pub(super) fn turns_about(self, t: &[Point; 3], x: Point) -> [i8; 3] {
+    pub fn turns_about(self, t: &[Point; 3], x: Point) -> [i8; 3] {
         let hand = self.turn(t[0], t[1], t[2]);
         [0, 1, 2].map(|k| hand * self.turn(t[k], t[(k + 1) % 3], x))
     }
@@ -336,7 +336,7 @@ pub(super) fn segment_in_plane(a: Point, b: Point, t: &[Point; 3]) -> Option<Con
 
 impl Projection {
     /// The rounded point where `a b` crosses the line `c d`.
-    pub(super) fn crossing(self, a: Point, b: Point, c: Point, d: Point) -> Point {
+    pub fn crossing(self, a: Point, b: Point, c: Point, d: Point) -> Point {
         let area = |x| robust::orient2d(self.flat(c), self.flat(d), self.flat(x)).abs();
         let (x, y) = (area(a), area(b));
         a + (b - a) * (x / (x + y))

@@ -280,7 +280,7 @@ pub(super) struct PointTable {
 
 impl PointTable {
     /// A table of `points`, which are all different.
-    pub(super) fn new(points: &[Point]) -> Self {
+    pub fn new(points: &[Point]) -> Self {
         // Half of the final size.
         let len = (points.len() + 1).next_power_of_two();
         let mut table = Self { slots: filled(len, 0) };
@@ -288,7 +288,7 @@ impl PointTable {
         table
     }
 
-    pub(super) fn find_or_add(&mut self, p: Point, points: &mut Vec<Point>) -> u32 {
+    pub fn find_or_add(&mut self, p: Point, points: &mut Vec<Point>) -> u32 {
         if points.len() * 2 >= self.slots.len() {
             self.grow(points);
         }

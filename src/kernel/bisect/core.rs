@@ -42,7 +42,7 @@ pub(super) struct Sides {
 
 impl Sides {
     /// Returns whether vertices lie on both sides.
-    pub(super) fn crosses(self) -> bool {
+    pub fn crosses(self) -> bool {
         self.low && self.high
     }
 }
@@ -82,7 +82,7 @@ pub(super) struct CoreBoundary {
 
 impl CoreBoundary {
     /// The host's face at the core's face with these vertices, if it is one of the core boundary.
-    pub(super) fn find(&self, mut vertices: [u32; 3]) -> Option<FaceRef> {
+    pub fn find(&self, mut vertices: [u32; 3]) -> Option<FaceRef> {
         vertices.sort_unstable();
         let at = self.faces.binary_search_by_key(&vertices, |f| f.vertices);
         at.ok().map(|at| self.faces[at].host)

@@ -44,10 +44,10 @@ pub(super) struct FlowArc(u32);
 
 impl FlowArc {
     /// No arc.
-    pub(super) const NONE: Self = Self(u32::MAX);
+    pub const NONE: Self = Self(u32::MAX);
 
     /// The arc to `node`, whose arc `back` leads the other way.
-    pub(super) fn new(node: u32, back: usize) -> Self {
+    pub fn new(node: u32, back: usize) -> Self {
         Self(node << 2 | back as u32)
     }
 
@@ -88,33 +88,33 @@ pub(super) struct Graph {
 }
 
 impl Graph {
-    pub(super) fn clear(&mut self) {
+    pub fn clear(&mut self) {
         self.nodes.clear();
     }
 
     /// Bytes allocated.
-    pub(super) fn bytes(&self) -> u64 {
+    pub fn bytes(&self) -> u64 {
         let queues = (self.active.capacity() + self.orphans.capacity()) * size_of::<u32>();
         (queues + self.nodes.capacity() * size_of::<FlowNode>()) as u64
     }
 
-    pub(super) fn n_nodes(&self) -> usize {
+    pub fn n_nodes(&self) -> usize {
         self.nodes.len()
     }
 
     /// Adds a node: its arcs (both of a pair have the same capacity) and its capacities from source and to sink.
-    pub(super) fn push(&mut self, arcs: [FlowArc; 4], capacity: [u32; 4], terminal: [u32; 2]) {
+    pub fn push(&mut self, arcs: [FlowArc; 4], capacity: [u32; 4], terminal: [u32; 2]) {
         self.nodes.push(FlowNode { arcs, residual: capacity, terminal, tree: IN_NO_TREE });
     }
 
     /// The capacity of arc `k` of a node, before [`Graph::cut`].
-    pub(super) fn capacity(&self, node: u32, k: usize) -> u32 {
+    pub fn capacity(&self, node: u32, k: usize) -> u32 {
         self.nodes[node as usize].residual[k]
     }
 
     /// Runs the flow and returns its value, the capacity of the cut. Afterwards [`Graph::is_source_side`] returns the
     /// sides.
-    pub(super) fn cut(&mut self) -> u64 {
+    pub fn cut(&mut self) -> u64 {
         self.active.clear();
         self.time = 1;
         let mut value = 0;
@@ -147,7 +147,7 @@ impl Graph {
     }
 
     /// Returns whether the node is on the source's side of the cut nearest to the source.
-    pub(super) fn is_source_side(&self, node: u32) -> bool {
+    pub fn is_source_side(&self, node: u32) -> bool {
         self.tree(node).root == Root::Source
     }
 

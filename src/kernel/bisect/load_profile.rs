@@ -48,12 +48,12 @@ pub(super) struct ProfileBuilder {
 }
 
 impl ProfileBuilder {
-    pub(super) fn new(axis: Point, [low, high]: [f64; 2]) -> Self {
+    pub fn new(axis: Point, [low, high]: [f64; 2]) -> Self {
         Self { axis, low, width: (high - low) / BINS as f64, steps: vec![[0.0; 2]; BINS + 2] }
     }
 
     /// Spreads a body evenly over the bins between its ends.
-    pub(super) fn add(&mut self, low: f64, high: f64, load: f64, section: f64) {
+    pub fn add(&mut self, low: f64, high: f64, load: f64, section: f64) {
         let low = ((low - self.low) / self.width).max(0.0);
         let high = ((high - self.low) / self.width).min(BINS as f64);
         let first = (low as usize).min(BINS - 1);
@@ -75,13 +75,13 @@ impl ProfileBuilder {
         step(last + 1, -rate * tail);
     }
 
-    pub(super) fn add_all(&mut self, other: &Self) {
+    pub fn add_all(&mut self, other: &Self) {
         for (step, more) in self.steps.iter_mut().zip(&other.steps) {
             *step = [step[0] + more[0], step[1] + more[1]];
         }
     }
 
-    pub(super) fn sum_up(self) -> LoadProfile {
+    pub fn sum_up(self) -> LoadProfile {
         let (mut load, mut section) = (Vec::with_capacity(BINS), Vec::with_capacity(BINS));
         let mut sum = [0.0; 2];
         for step in &self.steps[..BINS] {
@@ -95,7 +95,7 @@ impl ProfileBuilder {
 }
 
 impl LoadProfile {
-    pub(super) fn gather<P: Pages>(mesh: &mut Mesh<P>, h: &SizeFn, axis: Point) -> Self {
+    pub fn gather<P: Pages>(mesh: &mut Mesh<P>, h: &SizeFn, axis: Point) -> Self {
         let mut all_ends = NO_POSITION;
         for v in mesh.vertex_ids() {
             all_ends = with(all_ends, axis.dot(mesh.point(v)));
@@ -129,7 +129,7 @@ impl LoadProfile {
     }
 
     /// Position below which the share `low` of the load lies.
-    pub(super) fn quantile(&self, low: f64) -> f64 {
+    pub fn quantile(&self, low: f64) -> f64 {
         let wanted = low * self.load.iter().sum::<f64>();
         let mut sum = 0.0;
         for (bin, &load) in self.load.iter().enumerate() {
@@ -143,7 +143,7 @@ impl LoadProfile {
     }
 
     /// The plane at `offset`, with its predicted load and area.
-    pub(super) fn at(&self, offset: f64) -> ChosenPlane {
+    pub fn at(&self, offset: f64) -> ChosenPlane {
         let place = ((offset - self.low) / self.width).clamp(0.0, BINS as f64 - 1.0);
         let bin = place as usize;
         let below: f64 =

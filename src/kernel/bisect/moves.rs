@@ -28,7 +28,7 @@ const MOVED: u8 = 2;
 /// Scratch of the moves. Memory: one byte for each vertex of the core, three for each tetrahedron.
 pub(super) struct Moves<'a, S> {
     /// The current sides.
-    pub(super) labels: SideLabels,
+    pub labels: SideLabels,
     surface: &'a S,
     boundary: &'a CoreBoundary,
     ball: Ball,
@@ -48,7 +48,7 @@ pub(super) struct Moves<'a, S> {
 
 impl<'a, S: CuttingSurface> Moves<'a, S> {
     /// `core` must not change while this value is in use; only sides may.
-    pub(super) fn new<P: Pages>(
+    pub fn new<P: Pages>(
         core: &Mesh<P>,
         labels: SideLabels,
         surface: &'a S,
@@ -72,12 +72,12 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
     }
 
     /// Bytes of the notes.
-    pub(super) fn bytes(&self) -> u64 {
+    pub fn bytes(&self) -> u64 {
         (self.notes_of_vertices.len() + 3 * self.notes_of_tets.len()) as u64
     }
 
     /// Moves tetrahedra until no move gains; returns the number of moves.
-    pub(super) fn run<P: Pages>(&mut self, core: &mut Mesh<P>, free: &[u32]) -> u64 {
+    pub fn run<P: Pages>(&mut self, core: &mut Mesh<P>, free: &[u32]) -> u64 {
         let mut total = 0;
         for _ in 0..PASSES_MAX {
             let moves = self.move_balls(core, free) + self.move_tets(core, free);
@@ -372,7 +372,7 @@ impl<'a, S: CuttingSurface> Moves<'a, S> {
     }
 
     /// Notes and counts the vertices around which a side has several parts.
-    pub(super) fn count_pinched<P: Pages>(&mut self, core: &mut Mesh<P>, free: &[u32]) -> u64 {
+    pub fn count_pinched<P: Pages>(&mut self, core: &mut Mesh<P>, free: &[u32]) -> u64 {
         self.notes_of_vertices.iter_mut().for_each(|n| *n &= !PINCHED);
         let mut pinched = 0;
         for v in self.interface_vertices(core, free) {

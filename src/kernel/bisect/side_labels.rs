@@ -27,7 +27,7 @@ impl SideLabels {
     /// SideLabels every tetrahedron by the side of its middle; lists those of the cutting zone, in id order.
     ///
     /// At the core boundary the side is that of the core boundary face: the tetrahedron beyond has all its vertices there.
-    pub(super) fn new<P: Pages>(
+    pub fn new<P: Pages>(
         core: &mut Mesh<P>,
         surface: &impl CuttingSurface,
         core_boundary: &CoreBoundary,
@@ -65,32 +65,32 @@ impl SideLabels {
     }
 
     /// Bytes held.
-    pub(super) fn bytes(&self) -> u64 {
+    pub fn bytes(&self) -> u64 {
         self.by_tet.len() as u64
     }
 
     /// Which side `t` is on: `true` for the high one.
     #[inline]
-    pub(super) fn is_high(&self, t: u32) -> bool {
+    pub fn is_high(&self, t: u32) -> bool {
         self.by_tet[t as usize] & HIGH != 0
     }
 
     /// Returns whether `t` may go to either side.
     #[inline]
-    pub(super) fn is_free(&self, t: u32) -> bool {
+    pub fn is_free(&self, t: u32) -> bool {
         self.by_tet[t as usize] & MAY_CHANGE != 0
     }
 
     /// Puts `t` on a side.
     #[inline]
-    pub(super) fn set_high(&mut self, t: u32, high: bool) {
+    pub fn set_high(&mut self, t: u32, high: bool) {
         let label = &mut self.by_tet[t as usize];
         *label = if high { *label | HIGH } else { *label & !HIGH };
     }
 
     /// Faces of the interface at `tet`: local numbers.
     #[inline]
-    pub(super) fn interface_faces(&self, t: u32, tet: &Tet) -> impl Iterator<Item = usize> + use<> {
+    pub fn interface_faces(&self, t: u32, tet: &Tet) -> impl Iterator<Item = usize> + use<> {
         let high = self.is_high(t);
         let mut found = [false; 4];
         for (i, across) in tet.neighbor.into_iter().enumerate() {

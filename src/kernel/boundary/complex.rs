@@ -167,14 +167,14 @@ pub(super) struct PagedComplex<'m, P: Pages>(
 
 impl<P: Pages> PagedComplex<'_, P> {
     /// Adds a vertex in no tetrahedron, tagged as a Steiner point.
-    pub(super) fn add_steiner(&mut self, point: Point) -> u32 {
+    pub fn add_steiner(&mut self, point: Point) -> u32 {
         let v = self.0.add_vertex(point, 0.0);
         self.0.set_vertex_attribute(v, VertexTag::Steiner, 0);
         v
     }
 
     /// The face and its other side are required no longer.
-    pub(super) fn release(&mut self, face: FaceRef) {
+    pub fn release(&mut self, face: FaceRef) {
         for f in [face, self.0.tet(face.tet()).neighbor[face.face()]] {
             if f.exists() {
                 let mut tet = self.0.tet(f.tet());
@@ -185,12 +185,12 @@ impl<P: Pages> PagedComplex<'_, P> {
     }
 
     /// Returns whether `v` is not from the input.
-    pub(super) fn is_steiner(&mut self, v: u32) -> bool {
+    pub fn is_steiner(&mut self, v: u32) -> bool {
         self.0.vertex_attribute(v).0 == VertexTag::Steiner
     }
 
     /// Takes back a vertex no tetrahedron has any more.
-    pub(super) fn drop_steiner(&mut self, v: u32) {
+    pub fn drop_steiner(&mut self, v: u32) {
         self.0.free_vertex(v);
         self.0.set_vertex_attribute(v, VertexTag::Free, 0);
     }

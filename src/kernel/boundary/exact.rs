@@ -24,12 +24,12 @@ impl ExactPoint {
     }
 
     /// A point as it is.
-    pub(super) fn explicit(p: Point) -> Self {
+    pub fn explicit(p: Point) -> Self {
         Self { exact: p.to_array().map(Dyadic::from), rounded: p, rest: Point::ZERO }
     }
 
     /// `base + Σ share · (to - base)`.
-    pub(super) fn combination(base: Point, shares: &[(Point, &Dyadic)]) -> Self {
+    pub fn combination(base: Point, shares: &[(Point, &Dyadic)]) -> Self {
         let from = base.to_array().map(Dyadic::from);
         let mut sum = from.clone();
         for (to, share) in shares {
@@ -42,18 +42,18 @@ impl ExactPoint {
     }
 
     /// `self + by`, of few bits: each coordinate is off by less than `slack`.
-    pub(super) fn moved(&self, by: Point, slack: &Dyadic) -> Self {
+    pub fn moved(&self, by: Point, slack: &Dyadic) -> Self {
         let by = by.to_array().map(Dyadic::from);
         Self::new([0, 1, 2].map(|i| self.exact[i].plus(&by[i]).shortened(slack)))
     }
 
     /// From `self` to `other`, rounded after the subtraction.
-    pub(super) fn offset(&self, other: &Self) -> Point {
+    pub fn offset(&self, other: &Self) -> Point {
         Point::from_array([0, 1, 2].map(|i| other.exact[i].minus(&self.exact[i]).estimate()))
     }
 
     /// Rounded to the nearest doubles or nearly so.
-    pub(super) fn rounded(&self) -> Point {
+    pub fn rounded(&self) -> Point {
         self.rounded
     }
 }

@@ -25,12 +25,12 @@ impl FlatPart {
     }
 
     /// Returns whether `v` is a corner of one of its facets.
-    pub(super) fn has(&self, v: u32) -> bool {
+    pub fn has(&self, v: u32) -> bool {
         self.facets.iter().any(|f| f.contains(&v))
     }
 
     /// The same part with renamed vertices.
-    pub(super) fn renamed(&self, mut name: impl FnMut(u32) -> u32) -> Self {
+    pub fn renamed(&self, mut name: impl FnMut(u32) -> u32) -> Self {
         let facets = self.facets.iter().map(|f| f.map(&mut name)).collect();
         let mut pairs = |all: &[(u32, u32)]| all.iter().map(|&(a, b)| (name(a), name(b))).collect();
         Self { facets, outline: pairs(&self.outline), inner: pairs(&self.inner) }

@@ -44,18 +44,18 @@ pub(super) struct Flipper<'a, S: TetComplex> {
 }
 
 impl<'a, S: TetComplex> Flipper<'a, S> {
-    pub(super) fn new(s: &'a mut S, target: RecoveryTarget) -> Self {
+    pub fn new(s: &'a mut S, target: RecoveryTarget) -> Self {
         Self { s, target, log: Vec::new(), work: 0, crossings_max: CROSSINGS_MAX, flips: 0 }
     }
 
     /// Makes everything done so far final.
-    pub(super) fn keep(&mut self) {
+    pub fn keep(&mut self) {
         self.flips += self.log.len() as u64;
         self.log.clear();
     }
 
     /// A mark for [`Flipper::undo`].
-    pub(super) fn mark(&self) -> usize {
+    pub fn mark(&self) -> usize {
         self.log.len()
     }
 
@@ -66,7 +66,7 @@ impl<'a, S: TetComplex> Flipper<'a, S> {
     }
 
     /// Undoes the replacements after `mark`, ids included.
-    pub(super) fn undo(&mut self, mark: usize) {
+    pub fn undo(&mut self, mark: usize) {
         while self.log.len() > mark {
             let done = self.log.pop().expect("longer than the mark");
             let back = self.s.replace(&done.shapes, &done.quads);
@@ -75,7 +75,7 @@ impl<'a, S: TetComplex> Flipper<'a, S> {
     }
 
     /// Replaces a face by the edge between its two apexes, where that is valid and allowed.
-    pub(super) fn flip_face(&mut self, face: FaceRef) -> bool {
+    pub fn flip_face(&mut self, face: FaceRef) -> bool {
         let (t, across) = (face.tet(), self.s.across(face.tet(), face.face()));
         let tet = self.s.tet(t);
         if !across.exists() || tet.is_required(face.face()) {
@@ -97,7 +97,7 @@ impl<'a, S: TetComplex> Flipper<'a, S> {
     }
 
     /// Removes the edge `c d` of `t`, with help from edges around it down to `level`.
-    pub(super) fn remove_edge(&mut self, t: u32, c: u32, d: u32, level: u32) -> bool {
+    pub fn remove_edge(&mut self, t: u32, c: u32, d: u32, level: u32) -> bool {
         if self.work == 0 || self.s.protects(c, d) {
             return false;
         }

@@ -38,7 +38,7 @@ const BATCH: usize = 64;
 
 impl Flood {
     /// Numbers every tetrahedron's component in its region attribute: the outside, then the others in the order of their first tetrahedra.
-    pub(super) fn run<P: Pages>(mesh: &mut Mesh<P>) -> Self {
+    pub fn run<P: Pages>(mesh: &mut Mesh<P>) -> Self {
         mesh.clear_scratch();
         let pages: Vec<u32> = (0..mesh.pages().n_pages::<{ kind::TETS }>()).collect();
         let mut n_parts = 0;
@@ -100,7 +100,7 @@ impl Flood {
     }
 
     /// Two components on the sides of a sheet are one volume.
-    pub(super) fn join(&mut self, a: u32, b: u32) {
+    pub fn join(&mut self, a: u32, b: u32) {
         let (a, b) = (self.volume(a), self.volume(b));
         let (low, high) = (a.min(b), a.max(b));
         if low == high {
@@ -117,7 +117,7 @@ impl Flood {
     }
 
     /// The component that stands for the volume of component `c`.
-    pub(super) fn volume(&self, mut c: u32) -> u32 {
+    pub fn volume(&self, mut c: u32) -> u32 {
         while self.same[c as usize] != c {
             c = self.same[c as usize];
         }
@@ -125,12 +125,12 @@ impl Flood {
     }
 
     /// The components that stand for a volume, but for the outside.
-    pub(super) fn volumes(&self) -> impl Iterator<Item = u32> {
+    pub fn volumes(&self) -> impl Iterator<Item = u32> {
         (OUTSIDE + 1..self.components.len() as u32).filter(|&c| self.volume(c) == c)
     }
 
     /// Facet `n` bounds component `c`.
-    pub(super) fn touch(&mut self, c: u32, side: u64, label: u32) {
+    pub fn touch(&mut self, c: u32, side: u64, label: u32) {
         let volume = self.volume(c);
         let component = &mut self.components[volume as usize];
         component.facets += 1;

@@ -30,7 +30,7 @@ pub(super) enum Obstacle {
 
 impl GrownCavity {
     /// The cavity, unless it would lose a vertex.
-    pub(super) fn without_lost_vertices(self) -> Result<Self, Obstacle> {
+    pub fn without_lost_vertices(self) -> Result<Self, Obstacle> {
         match self.lost.is_empty() {
             true => Ok(self),
             false => Err(Obstacle::Other),

@@ -59,7 +59,7 @@ const FREE: Tet = Tet { node: [NONE; 4], neighbor: [FaceRef::NONE; 4] };
 
 impl<'m, P: Pages> RecoveryPatch<'m, P> {
     /// An empty patch.
-    pub(super) fn new(mesh: &'m mut Mesh<P>, protected: &'m IdSet<u64>, effort: Effort) -> Self {
+    pub fn new(mesh: &'m mut Mesh<P>, protected: &'m IdSet<u64>, effort: Effort) -> Self {
         Self {
             mesh,
             protected,
@@ -77,7 +77,7 @@ impl<'m, P: Pages> RecoveryPatch<'m, P> {
     }
 
     /// Brings in a tetrahedron of mesh vertex `v` and returns the vertex's id here.
-    pub(super) fn vertex(&mut self, v: u32) -> u32 {
+    pub fn vertex(&mut self, v: u32) -> u32 {
         if let Some(&l) = self.local.get(&v) {
             return l;
         }
@@ -132,7 +132,7 @@ impl<'m, P: Pages> RecoveryPatch<'m, P> {
     }
 
     /// Adds a vertex in no tetrahedron.
-    pub(super) fn add_vertex(&mut self, point: Point, exact: Option<ExactPoint>) -> u32 {
+    pub fn add_vertex(&mut self, point: Point, exact: Option<ExactPoint>) -> u32 {
         let l = self.vertices.len() as u32;
         self.vertices.push(PatchVertex {
             id: NONE,
@@ -146,7 +146,7 @@ impl<'m, P: Pages> RecoveryPatch<'m, P> {
     }
 
     /// Adds a vertex in no tetrahedron that is a combination of the vertices `on`, from the input.
-    pub(super) fn add_vertex_on(&mut self, on: [u32; 3], exact: ExactPoint) -> u32 {
+    pub fn add_vertex_on(&mut self, on: [u32; 3], exact: ExactPoint) -> u32 {
         let v = self.add_vertex(exact.rounded(), Some(exact));
         self.vertices[v as usize].on = on;
         v
@@ -177,64 +177,64 @@ impl<'m, P: Pages> RecoveryPatch<'m, P> {
     }
 
     /// Takes a vertex back that was added and is in no tetrahedron.
-    pub(super) fn drop_vertex(&mut self, v: u32) {
+    pub fn drop_vertex(&mut self, v: u32) {
         if v as usize + 1 == self.vertices.len() {
             self.vertices.pop();
         }
     }
 
     /// Number of vertices ever here.
-    pub(super) fn n_vertices(&self) -> u32 {
+    pub fn n_vertices(&self) -> u32 {
         self.vertices.len() as u32
     }
 
     /// Returns whether `v` is not from the input.
-    pub(super) fn is_steiner(&self, v: u32) -> bool {
+    pub fn is_steiner(&self, v: u32) -> bool {
         self.vertices[v as usize].steiner
     }
 
     /// Returns whether some tetrahedron has `v`.
-    pub(super) fn is_in_use(&self, v: u32) -> bool {
+    pub fn is_in_use(&self, v: u32) -> bool {
         let t = self.vertices[v as usize].tet_of;
         t != NONE && self.tets[t as usize].local(v).is_some()
     }
 
     /// Returns whether `v` was added here.
-    pub(super) fn is_new(&self, v: u32) -> bool {
+    pub fn is_new(&self, v: u32) -> bool {
         self.vertices[v as usize].id == NONE
     }
 
     /// Id of `v` in the mesh, [`NONE`] if it was added here.
-    pub(super) fn mesh_id(&self, v: u32) -> u32 {
+    pub fn mesh_id(&self, v: u32) -> u32 {
         self.vertices[v as usize].id
     }
 
     /// Returns whether the position of `v` is more than its rounded one.
-    pub(super) fn is_exact(&self, v: u32) -> bool {
+    pub fn is_exact(&self, v: u32) -> bool {
         self.vertices[v as usize].exact.is_some()
     }
 
     /// Where `v` is, without rounding.
-    pub(super) fn exact_place(&self, v: u32) -> ExactPoint {
+    pub fn exact_place(&self, v: u32) -> ExactPoint {
         let v = &self.vertices[v as usize];
         let explicit = || ExactPoint::explicit(v.point);
         v.exact.clone().unwrap_or_else(explicit)
     }
 
     /// Position of `v`, rounded, and the exact one if it differs.
-    pub(super) fn placement(&self, v: u32) -> (Point, Option<ExactPoint>) {
+    pub fn placement(&self, v: u32) -> (Point, Option<ExactPoint>) {
         let v = &self.vertices[v as usize];
         (v.point, v.exact.clone())
     }
 
     /// Moves `v`; the caller answers for the volumes around it.
-    pub(super) fn place(&mut self, v: u32, (point, exact): (Point, Option<ExactPoint>)) {
+    pub fn place(&mut self, v: u32, (point, exact): (Point, Option<ExactPoint>)) {
         let v = &mut self.vertices[v as usize];
         (v.point, v.exact) = (point, exact);
     }
 
     /// From `x` to `v`: the difference of their exact positions.
-    pub(super) fn offset(&self, x: u32, v: u32) -> Point {
+    pub fn offset(&self, x: u32, v: u32) -> Point {
         let (from, to) = (&self.vertices[x as usize], &self.vertices[v as usize]);
         if from.exact.is_none() && to.exact.is_none() {
             return to.point - from.point;
@@ -243,7 +243,7 @@ impl<'m, P: Pages> RecoveryPatch<'m, P> {
     }
 
     /// Position of `v`, rounded.
-    pub(super) fn position_of(&self, v: u32) -> Point {
+    pub fn position_of(&self, v: u32) -> Point {
         self.vertices[v as usize].point
     }
 
@@ -253,12 +253,12 @@ impl<'m, P: Pages> RecoveryPatch<'m, P> {
     }
 
     /// Six times the signed volume, without rounding.
-    pub(super) fn orient_exact(&self, v: [u32; 4]) -> Dyadic {
+    pub fn orient_exact(&self, v: [u32; 4]) -> Dyadic {
         orient_exact(v.map(|v| self.placed(v)))
     }
 
     /// Tetrahedron `t` as it is.
-    pub(super) fn tet_now(&self, t: u32) -> Tet {
+    pub fn tet_now(&self, t: u32) -> Tet {
         self.tets[t as usize]
     }
 
@@ -268,7 +268,7 @@ impl<'m, P: Pages> RecoveryPatch<'m, P> {
     }
 
     /// Returns whether the patch may be written: no exact point is in use, and all volumes are positive as rounded.
-    pub(super) fn is_sound(&self) -> bool {
+    pub fn is_sound(&self) -> bool {
         self.live().all(|t| {
             let v = self.tets[t as usize].vertices().map(|v| &self.vertices[v as usize]);
             v.iter().all(|v| v.exact.is_none())
@@ -277,7 +277,7 @@ impl<'m, P: Pages> RecoveryPatch<'m, P> {
     }
 
     /// Returns whether every required face brought in is still there and required.
-    pub(super) fn keeps_required(&self) -> bool {
+    pub fn keeps_required(&self) -> bool {
         let mut now: IdSet<[u32; 3]> = IdSet::default();
         for t in self.live() {
             let tet = &self.tets[t as usize];
@@ -290,7 +290,7 @@ impl<'m, P: Pages> RecoveryPatch<'m, P> {
     /// Writes the patch in place of the loaded tetrahedra; returns the number of vertices added less those removed.
     ///
     /// Must be [`RecoveryPatch::is_sound`]. Effects: new vertices are tagged as Steiner points.
-    pub(super) fn commit(self) -> i64 {
+    pub fn commit(self) -> i64 {
         let live: Vec<u32> = self.live().collect();
         let mut used = vec![false; self.vertices.len()];
         for &t in &live {

@@ -39,10 +39,10 @@ pub(super) struct CavitySkin {
 
 /// The fan of one facet around the vertex.
 pub(super) struct Fan {
-    pub(super) facet: usize,
+    pub facet: usize,
     /// In the facet's direction; open at the vertex if it lies on a segment.
-    pub(super) polygon: Vec<u32>,
-    pub(super) closed: bool,
+    pub polygon: Vec<u32>,
+    pub closed: bool,
 }
 
 /// The half-space behind a triangle; `None` when doubles see no normal.

@@ -15,13 +15,7 @@ pub(super) enum RecoveryTarget {
 
 impl RecoveryTarget {
     /// Returns whether the new edge `x y`, with its faces to `c` and `d`, keeps clear of the target.
-    pub(super) fn allows_edge<S: TetComplex>(
-        self,
-        s: &mut S,
-        x: u32,
-        y: u32,
-        [c, d]: [u32; 2],
-    ) -> bool {
+    pub fn allows_edge<S: TetComplex>(self, s: &mut S, x: u32, y: u32, [c, d]: [u32; 2]) -> bool {
         match self {
             Self::Edge(a, b) => {
                 !edge_meets_face(s, a, b, [x, y, c]) && !edge_meets_face(s, a, b, [x, y, d])
@@ -40,7 +34,7 @@ impl RecoveryTarget {
     }
 
     /// Returns whether the new face keeps clear of the target, its edges being known to.
-    pub(super) fn allows_face<S: TetComplex>(self, s: &mut S, face: [u32; 3]) -> bool {
+    pub fn allows_face<S: TetComplex>(self, s: &mut S, face: [u32; 3]) -> bool {
         match self {
             Self::Edge(a, b) => !edge_meets_face(s, a, b, face),
             Self::Face(_) | Self::Plane(_) | Self::Free => true,

@@ -33,9 +33,9 @@ const FINE: f64 = 1.0 / 65536.0;
 
 /// Tetrahedra of the ball between the same facets.
 pub(super) struct Wedge {
-    pub(super) tets: Vec<u32>,
+    pub tets: Vec<u32>,
     /// Fans that bound it, and the sign of the side it is on.
-    pub(super) walls: Vec<(usize, bool)>,
+    pub walls: Vec<(usize, bool)>,
 }
 
 impl<P: Pages> RecoveryPatch<'_, P> {

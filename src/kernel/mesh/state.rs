@@ -7,9 +7,9 @@ use tetdb_schema::page::{NONE, RECORDS, SLOT_BITS, SLOT_MASK};
 #[derive(Archive, Serialize, Deserialize, Clone, Copy, Debug, PartialEq)]
 pub(super) struct IdPool {
     /// The next id never used.
-    pub(super) fresh: u32,
-    pub(super) free_head: u32,
-    pub(super) n_live: u32,
+    pub fresh: u32,
+    pub free_head: u32,
+    pub n_live: u32,
 }
 
 impl Default for IdPool {

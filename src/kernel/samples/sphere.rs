@@ -44,20 +44,20 @@ pub(super) fn sphere_triangles(pieces: f64) -> f64 {
 
 /// A sphere's place and turn.
 pub(super) struct Ball {
-    pub(super) center: Point,
-    pub(super) radius: f64,
+    pub center: Point,
+    pub radius: f64,
     /// Columns of a rotation.
-    pub(super) turn: [Point; 3],
+    pub turn: [Point; 3],
 }
 
 impl Ball {
     /// Around the origin, not turned.
-    pub(super) fn unturned(radius: f64) -> Self {
+    pub fn unturned(radius: f64) -> Self {
         Self { center: Point::ZERO, radius, turn: [Point::X, Point::Y, Point::Z] }
     }
 
     /// Turned at random, so that many balls do not share directions.
-    pub(super) fn turned(center: Point, radius: f64, random: &mut Random) -> Self {
+    pub fn turned(center: Point, radius: f64, random: &mut Random) -> Self {
         let turn = random.rotation();
         Self { center, radius, turn }
     }
@@ -71,14 +71,7 @@ pub(super) struct Spheres {
 
 impl Spheres {
     /// Adds the surface of `ball` with edges of about `h`.
-    pub(super) fn push(
-        &mut self,
-        build: &mut Builder,
-        ball: &Ball,
-        h: f64,
-        inward: bool,
-        label: u32,
-    ) {
+    pub fn push(&mut self, build: &mut Builder, ball: &Ball, h: f64, inward: bool, label: u32) {
         let pieces = sphere_pieces(ball.radius, h) as u32;
         let (points, triangles) = self.made.entry(pieces).or_insert_with(|| unit_sphere(pieces));
         let [x, y, z] = ball.turn;

@@ -60,7 +60,7 @@ impl SizeConstraints<'_> {
     }
 
     /// Divides leaves of `tree` where constraints require it.
-    pub(super) fn refine(&self, tree: &mut Tree) -> Result<(), SizingError> {
+    pub fn refine(&self, tree: &mut Tree) -> Result<(), SizingError> {
         if self.list.is_empty() {
             return Ok(());
         }
@@ -149,7 +149,7 @@ impl SizeConstraints<'_> {
     }
 
     /// Lowers values at the corners of leaves to the constraints there.
-    pub(super) fn lower(
+    pub fn lower(
         &self,
         tree: &Tree,
         corners: &mut TreeCorners,

@@ -39,12 +39,12 @@ impl Hanging {
     }
 
     /// The two or four corners, once each.
-    pub(super) fn distinct(&self) -> &[u32] {
+    pub fn distinct(&self) -> &[u32] {
         if self.on_edge() { &self.on[..2] } else { &self.on }
     }
 
     /// Distance to the corners it hangs on, in units of the root's side.
-    pub(super) fn distance(&self) -> f64 {
+    pub fn distance(&self) -> f64 {
         let side = 1.0 / f64::from(1u32 << self.level);
         if self.on_edge() { side } else { side * 2f64.sqrt() }
     }
@@ -53,15 +53,15 @@ impl Hanging {
 /// Corners of a tree.
 pub(super) struct TreeCorners {
     /// Corner numbers of each leaf, in the octants' order.
-    pub(super) of_leaf: SpillVec<[u32; 8]>,
-    pub(super) n_corners: usize,
+    pub of_leaf: SpillVec<[u32; 8]>,
+    pub n_corners: usize,
     /// Sorted by level, each corner once.
-    pub(super) hanging: SpillVec<Hanging>,
+    pub hanging: SpillVec<Hanging>,
 }
 
 impl TreeCorners {
     /// A disk that fails unwinds.
-    pub(super) fn new(tree: &Tree, scratch: &ScratchSpace) -> Self {
+    pub fn new(tree: &Tree, scratch: &ScratchSpace) -> Self {
         let numbered = number_corners(tree, scratch);
         let (mut of_leaf, n_corners) = numbered.or_raise();
         let hanging = find_hanging(tree, &mut of_leaf, scratch).or_raise();
@@ -70,7 +70,7 @@ impl TreeCorners {
 
     /// Calls `size` once for the lattice position of each corner, on all threads, and `store` with the corner and its
     /// size.
-    pub(super) fn sample(
+    pub fn sample(
         &mut self,
         tree: &Tree,
         size: &(dyn Fn([u32; 3]) -> Result<f64, SizingError> + Sync),

@@ -45,7 +45,7 @@ impl Grading<'_> {
     ///
     /// The result is the largest such function below the given values, in any order. Sweeps go forward and backward by
     /// turns, because a lowered value travels along with the sweep of its direction.
-    pub(super) fn grade(&mut self, h: &mut SpillVec<f32>) {
+    pub fn grade(&mut self, h: &mut SpillVec<f32>) {
         // Corners that were lowered since their neighbors were last checked.
         let mut changed = FixedBitSet::with_capacity(h.len());
         changed.insert_range(..);
@@ -79,7 +79,7 @@ impl Grading<'_> {
     ///
     /// A mean above its graded value lowers the largest corners of its four, none of them below that value: so the
     /// smallest value of all is unchanged.
-    pub(super) fn grade_closed(&mut self, h: &mut SpillVec<f32>) {
+    pub fn grade_closed(&mut self, h: &mut SpillVec<f32>) {
         for _ in 0..GRADE_ROUNDS {
             self.grade(h);
             let mut changed = false;

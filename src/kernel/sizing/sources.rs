@@ -149,13 +149,13 @@ pub(super) struct ResolvedSource {
 
 impl ResolvedSource {
     /// The smallest size of the source.
-    pub(super) fn least(&self) -> f64 {
+    pub fn least(&self) -> f64 {
         self.inside.min(self.outside)
     }
 
     /// The size wanted at `p` in a field of slope `beta`.
     #[inline]
-    pub(super) fn h(&self, p: Point, beta: f64) -> f64 {
+    pub fn h(&self, p: Point, beta: f64) -> f64 {
         let depth = self.shape.depth(p);
         // Both branches are the smaller of the two sizes on the shape's boundary.
         if depth >= 0.0 {

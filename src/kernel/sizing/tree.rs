@@ -42,35 +42,35 @@ const PARALLEL_SEEDS_MAX: usize = 1 << 18;
 /// Where a leaf is on the lattice; its side is `2^(DEPTH - level)`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Leaf {
-    pub(super) anchor: [u32; 3],
-    pub(super) level: u32,
+    pub anchor: [u32; 3],
+    pub level: u32,
 }
 
 impl Leaf {
-    pub(super) const ROOT: Self = Self { anchor: [0; 3], level: 0 };
+    pub const ROOT: Self = Self { anchor: [0; 3], level: 0 };
 
     /// Side in lattice units.
-    pub(super) fn width(&self) -> u32 {
+    pub fn width(&self) -> u32 {
         LATTICE >> self.level
     }
 
     /// Side in units of the root's.
-    pub(super) fn side(&self) -> f64 {
+    pub fn side(&self) -> f64 {
         1.0 / f64::from(1u32 << self.level)
     }
 
-    pub(super) fn low(&self) -> Point {
+    pub fn low(&self) -> Point {
         let [x, y, z] = self.anchor.map(f64::from);
         Point::new(x, y, z) * (1.0 / f64::from(LATTICE))
     }
 
-    pub(super) fn child(&self, octant: usize) -> Self {
+    pub fn child(&self, octant: usize) -> Self {
         let level = self.level + 1;
         Self { anchor: shift(self.anchor, octant, LATTICE >> level), level }
     }
 
     /// Lattice position of a corner.
-    pub(super) fn corner(&self, corner: usize) -> [u32; 3] {
+    pub fn corner(&self, corner: usize) -> [u32; 3] {
         shift(self.anchor, corner, self.width())
     }
 }
@@ -84,13 +84,13 @@ fn shift(p: [u32; 3], octant: usize, by: u32) -> [u32; 3] {
 /// Invariant once numbered: blocks and leaves in depth-first order, so that near cells are near in memory.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Tree {
-    pub(super) root: u32,
-    pub(super) blocks: Vec<[u32; 8]>,
+    pub root: u32,
+    pub blocks: Vec<[u32; 8]>,
 }
 
 impl Tree {
     /// The balanced octree for these seeds and wanted sizes (all in units of the root's side), divided further before it is balanced.
-    pub(super) fn build(
+    pub fn build(
         seeds: &Seeds,
         targets: &Targets,
         divide_further: impl FnOnce(&mut Self) -> Result<(), SizingError>,
@@ -100,7 +100,7 @@ impl Tree {
     }
 
     /// The same, for some of the seeds.
-    pub(super) fn build_near(
+    pub fn build_near(
         some: &[u32],
         seeds: &Seeds,
         targets: &Targets,
@@ -115,12 +115,12 @@ impl Tree {
     }
 
     /// Bytes of memory held.
-    pub(super) fn bytes(&self) -> usize {
+    pub fn bytes(&self) -> usize {
         self.blocks.capacity() * size_of::<[u32; 8]>()
     }
 
     /// From the depth-first list of "is divided".
-    pub(super) fn from_shape(shape: &[bool]) -> Self {
+    pub fn from_shape(shape: &[bool]) -> Self {
         fn entry(shape: &mut impl Iterator<Item = bool>, blocks: &mut Vec<[u32; 8]>) -> u32 {
             if shape.next() != Some(true) {
                 return LEAF;
@@ -150,7 +150,7 @@ impl Tree {
     }
 
     /// Number and level of the leaf that holds a lattice cell.
-    pub(super) fn leaf_at(&self, cell: [u32; 3]) -> (u32, u32) {
+    pub fn leaf_at(&self, cell: [u32; 3]) -> (u32, u32) {
         let (mut entry, mut level) = (self.root, 0);
         while entry & LEAF == 0 {
             entry = self.blocks[entry as usize][octant_of(cell, level)];
@@ -160,17 +160,17 @@ impl Tree {
     }
 
     /// All cells, depth first, each before its children; of a leaf its number.
-    pub(super) fn cells(&self) -> Cells<'_> {
+    pub fn cells(&self) -> Cells<'_> {
         Cells { tree: self, stack: vec![(self.root, Leaf::ROOT)], is_backward: false }
     }
 
     /// All leaves, depth first: in the order of their numbers, once they are numbered.
-    pub(super) fn leaves(&self) -> impl Iterator<Item = Leaf> {
+    pub fn leaves(&self) -> impl Iterator<Item = Leaf> {
         self.cells().filter_map(|(number, leaf)| number.map(|_| leaf))
     }
 
     /// All leaves with their numbers, from the last to the first.
-    pub(super) fn leaves_backward(&self) -> impl Iterator<Item = (u32, Leaf)> {
+    pub fn leaves_backward(&self) -> impl Iterator<Item = (u32, Leaf)> {
         let cells = Cells { is_backward: true, ..self.cells() };
         cells.filter_map(|(number, leaf)| Some((number?, leaf)))
     }
@@ -275,7 +275,7 @@ pub(super) fn octant_of(cell: [u32; 3], level: u32) -> usize {
 impl Leaf {
     /// Lattice cells next to this leaf outside its parent: up to seven, across the faces, edges and
     /// corner that it shares with its parent.
-    pub(super) fn outer_neighbors(&self) -> impl Iterator<Item = [u32; 3]> + use<> {
+    pub fn outer_neighbors(&self) -> impl Iterator<Item = [u32; 3]> + use<> {
         let (anchor, width) = (self.anchor, self.width());
         (1..8usize).filter_map(move |across| {
             let mut cell = anchor;

@@ -46,7 +46,7 @@ pub(super) struct CornerSizes<'a> {
 impl CornerSizes<'_> {
     /// Sizes at all corners, in units of the root's side, no steeper than the gradation along any line
     /// between two corners of a leaf.
-    pub(super) fn values(
+    pub fn values(
         &mut self,
         targets: &Targets,
         constraints: &SizeConstraints,
@@ -69,7 +69,7 @@ impl CornerSizes<'_> {
     }
 
     /// Lets leaves near needles be steeper, as the seeds allow it in the mean: gathered and filled in as sizes are.
-    pub(super) fn gather_slope_factors(&mut self) {
+    pub fn gather_slope_factors(&mut self) {
         if !self.seeds.has_slope_factors() {
             return;
         }
@@ -89,7 +89,7 @@ impl CornerSizes<'_> {
     ///
     /// Seeds are taken leaf by leaf, those of a leaf in their order. The share of a hanging corner goes to the corners
     /// it hangs on.
-    pub(super) fn gather(
+    pub fn gather(
         &mut self,
         value: impl Fn(&Seeds, u32) -> f64,
         with_nearest: bool,
@@ -152,7 +152,7 @@ impl CornerSizes<'_> {
 
     /// Fills the corners that have no value: fronts of averages of their neighbors, then averaging of all
     /// filled ones among themselves, which tends to the harmonic interpolation.
-    pub(super) fn fill(&mut self, gathered: SpillVec<f32>) -> SpillVec<f32> {
+    pub fn fill(&mut self, gathered: SpillVec<f32>) -> SpillVec<f32> {
         let mut h = gathered;
         let mut is_open = FixedBitSet::with_capacity(h.len());
         for i in 0..h.len() {
@@ -214,7 +214,7 @@ impl CornerSizes<'_> {
         h
     }
 
-    pub(super) fn grading(&mut self) -> Grading<'_> {
+    pub fn grading(&mut self) -> Grading<'_> {
         Grading {
             tree: self.tree,
             corners: self.corners,
@@ -225,7 +225,7 @@ impl CornerSizes<'_> {
 
     /// Lower and upper bounds that the gradation sets around corners with sizes; `nearest` is the distance of each
     /// corner from the place of its size.
-    pub(super) fn cones(
+    pub fn cones(
         &mut self,
         gathered: &mut SpillVec<f32>,
         mut nearest: SpillVec<f64>,
