@@ -4,7 +4,7 @@ use super::op::{BinaryOp, Op, Unary};
 use super::words::{Token, fault, next_word};
 use super::{ExprError, ExprKind, Expression};
 
-/// How tightly operators bind, from the loosest.
+/// Binding strength of operators, from the loosest.
 const OR: u8 = 1;
 const AND: u8 = 2;
 const COMPARISON: u8 = 4;

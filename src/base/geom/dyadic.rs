@@ -137,7 +137,7 @@ impl Dyadic {
         }
     }
 
-    /// How `self` stands to `other`.
+    /// Order of `self` and `other`.
     pub fn compare(&self, other: &Self) -> Ordering {
         self.minus(other).sign().cmp(&0)
     }

@@ -57,7 +57,8 @@ pub fn hilbert_index(cell: [u32; 3]) -> u64 {
     index
 }
 
-/// How the curve is turned at a level: which axis each of its axes is, which of them run backward, and whether its digits do.
+/// Orientation of the curve at a level: the axis that each of its axes is, the axes that run backward, and whether its
+/// digits do.
 #[derive(Clone, Copy)]
 struct CurveTurn {
     axis: [u8; 3],

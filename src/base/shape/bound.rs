@@ -9,10 +9,10 @@
 //! found by search (`climb`) from two starts. No tetrahedron is better than α ℓ / ρ (ℓ the longest edge of T, ρ the radius of its
 //! inscribed circle), and a needle comes near that: [`face_floor`] is cheap and never above the minimum.
 //!
-//! **Two required faces** and more. Between two triangles that meet at angle θ, a tetrahedron that stands on one of them has a
-//! dihedral angle of at most θ at their common edge, whatever lies between them. The bound of a face is then the least q of apexes within
-//! that angle: the minimum above where that lies within, else the least one on the plane at angle θ. The tetrahedron that
-//! has both faces is not forced to be what it is by having both: an inner vertex can divide it.
+//! **Two required faces** and more. Let two triangles meet at angle θ. A tetrahedron on one of them has a dihedral
+//! angle of at most θ at their common edge. The bound of a face is then the least q of apexes within that angle: the
+//! minimum above, if it lies within, else the least one on the plane at angle θ. Having both faces does not force the
+//! tetrahedron: an inner vertex can divide it.
 //!
 //! The bound of a tetrahedron is the largest of those of its required faces, 1 without any. Four vertices on the surface
 //! force nothing. *Excess* is q over the bound.

@@ -16,7 +16,7 @@ const SHORTER: f64 = 0.8;
 const BEND: f64 = 0.4;
 const BEND_LEFT: f64 = 0.5;
 
-/// Where a search begins and ends.
+/// Begin and end of a search.
 #[derive(Clone, Copy, Debug)]
 pub struct Climb {
     /// The first place.

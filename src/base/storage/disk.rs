@@ -55,7 +55,7 @@ pub trait Disk: Debug + Send + Sync {
     fn list(&self, dir: &Path) -> io::Result<Vec<String>>;
     /// The kind of the entry at a path; `None` if there is none or it may not be read.
     fn entry(&self, path: &Path) -> Option<DiskEntry>;
-    /// Which file has this name now; `None`: none.
+    /// Identity of the file at a path; `None` if there is none.
     fn id(&self, path: &Path) -> Option<FileId>;
 }
 

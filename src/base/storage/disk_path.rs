@@ -63,7 +63,7 @@ impl DiskPath {
         self.disk.entry(&self.path) == Some(DiskEntry::Folder)
     }
 
-    /// Which file has this name now.
+    /// Identity of the file here.
     pub fn id(&self) -> Option<FileId> {
         self.disk.id(&self.path)
     }

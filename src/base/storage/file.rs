@@ -148,7 +148,7 @@ impl StoreFile {
         Ok(())
     }
 
-    /// Where the file is.
+    /// Path of the file.
     pub fn path(&self) -> &Path {
         self.path.path()
     }

@@ -40,7 +40,7 @@ pub struct FileLock {
     is_by_name: bool,
 }
 
-/// Why the right is not given.
+/// Reasons to refuse the lock.
 #[derive(Debug)]
 pub enum Refused {
     /// Another process holds the lock; its description, as far as the file gives one.
@@ -265,7 +265,7 @@ fn is_held_all_the_same(path: &Path) -> bool {
     holder.lives(path)
 }
 
-/// When a process of this host began; 0 where the system does not say.
+/// Start time of a process of this host; 0 if the system does not report it.
 fn began(process: u32) -> u64 {
     /// Place of the number in the line, counted behind the name, which may hold anything.
     const BEGAN: usize = 19;

@@ -12,7 +12,7 @@ const READABLE: u32 = RESIDENT | REFERENCED;
 pub(super) const IN_BASE: u32 = 0;
 pub(super) const IN_OUTPUT: u32 = 1;
 pub(super) const IN_SPILL: u32 = 2;
-/// Where the frame of a page seems to begin that cannot be accessed at once: beyond every pool.
+/// Begin of the frame of a page that cannot be accessed at once: beyond every pool.
 const BEYOND: u32 = !SLOT_MASK;
 /// Frames whose slots all have a position below [`BEYOND`]: 128 GiB.
 pub(super) const FRAMES_LIMIT: usize = (BEYOND >> SLOT_BITS) as usize;

@@ -124,7 +124,7 @@ impl Pager {
         std::array::from_fn(|kind| [self.first[kind], self.tables[kind].len() as u32])
     }
 
-    /// Where a page is stored.
+    /// Address of a page.
     fn address(&self, kind: usize, page: u32) -> PageAddress {
         PageAddress {
             kind: kind::ALL[kind],
@@ -347,7 +347,7 @@ impl Pager {
         }
     }
 
-    /// Where the page in `frame` is stored.
+    /// Address of the page in `frame`.
     fn address_of(&self, frame: u32) -> PageAddress {
         let (kind, page) = self.owners[frame as usize];
         self.address(usize::from(kind), page)

@@ -1,6 +1,6 @@
 //! Failures of work in another process.
 
-/// Why another process did not do its share of the work.
+/// The failure of work in another process.
 #[derive(Clone, Debug)]
 pub struct RemoteFailure {
     /// The error code.

@@ -13,7 +13,7 @@ use super::{DiskPath, StorageError, check_cancelled, reserve, sort_unstable_by};
 
 /// A run is read through at least this much buffer.
 const READ_BYTES_MIN: usize = 16 << 10;
-/// It is read through no more.
+/// Largest read buffer of a run.
 const READ_BYTES_MAX: usize = 1 << 20;
 /// A run is written through this much.
 const WRITE_BYTES: usize = 1 << 18;

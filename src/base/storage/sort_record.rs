@@ -38,7 +38,7 @@ impl<const N: usize> SortRecord for [u8; N] {
 
 /// A field of a [`SortRecord`].
 pub trait SortField: Copy {
-    /// How many bytes it takes.
+    /// Number of bytes.
     const BYTES: usize;
     /// Writes it into exactly so many bytes.
     fn put(self, bytes: &mut [u8]);
@@ -188,7 +188,7 @@ sort_record! {
     pub struct KeyedId {
         /// The primary key.
         pub key: u64,
-        /// Its number.
+        /// The number of the item.
         pub id: u32,
     }
 }

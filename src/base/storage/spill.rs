@@ -47,7 +47,7 @@ impl Spill {
         self.file.read(at, bytemuck::cast_slice_mut(frame))
     }
 
-    /// Where the file was created.
+    /// Path of the file.
     pub fn path(&self) -> &DiskPath {
         self.file.path()
     }

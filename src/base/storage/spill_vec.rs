@@ -140,7 +140,7 @@ impl<T: Pod> SpillVec<T> {
         }
     }
 
-    /// How many elements there are.
+    /// Number of elements.
     pub fn len(&self) -> usize {
         match &self.place {
             Residence::Memory(all) => all.len(),
@@ -201,7 +201,7 @@ impl<T: Pod> SpillVecBuilder<T> {
         self.memory.push(value);
     }
 
-    /// How many elements there are.
+    /// Number of elements.
     pub fn len(&self) -> usize {
         match &self.paged {
             Some(paged) => paged.len,
@@ -257,7 +257,7 @@ impl<T: Pod> FrozenSpillVec<T> {
         }
     }
 
-    /// How many elements there are.
+    /// Number of elements.
     pub fn len(&self) -> usize {
         match self {
             Self::Memory(all) => all.len(),

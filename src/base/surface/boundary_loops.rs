@@ -136,7 +136,7 @@ pub(super) fn has_near_junctions(
     parallel(|| open.map(beside).reduce(|| vec![false; distances.len()], either))
 }
 
-/// How far `p` is from the inside of the segment, unless it is farther than `distance_max`, or as near to an end.
+/// Distance of `p` from the inside of the segment; `None` beyond `distance_max`, or near an end.
 ///
 /// Exactly in line, only `gap` counts as near to an end.
 fn on_edge(p: Point, [a, b]: [Point; 2], distance_max: f64, gap: f64) -> Option<f64> {
@@ -151,7 +151,7 @@ fn on_edge(p: Point, [a, b]: [Point; 2], distance_max: f64, gap: f64) -> Option<
     to_inside([a, b], p).filter(|&distance| distance <= distance_max)
 }
 
-/// How far `p` is from the segment, if that is nearest to it between its ends.
+/// Distance of `p` from the segment, if the nearest point lies between its ends.
 fn to_inside([a, b]: [Point; 2], p: Point) -> Option<f64> {
     let share = (p - a).dot(b - a) / (b - a).length_squared();
     (share > 0.0 && share < 1.0).then(|| p.distance(a + (b - a) * share))

@@ -1,4 +1,4 @@
-//! How two triangles touch, by exact signs.
+//! Contacts of two triangles, by exact signs.
 
 use std::fmt;
 
@@ -46,10 +46,10 @@ impl fmt::Display for ContactKind {
     }
 }
 
-/// Where and how two triangles touch.
+/// A contact of two triangles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
-    /// How they touch.
+    /// Kind of the contact.
     pub kind: ContactKind,
     /// A point of the contact; rounded, unless it is a vertex.
     pub at: Point,
@@ -210,7 +210,7 @@ pub(super) fn edge_meets(
     Some(Contact { kind, at })
 }
 
-/// How two coplanar triangles are kept apart by a line through an edge of one.
+/// Separation of two coplanar triangles by a line through an edge of one.
 #[derive(Clone, Copy, PartialEq)]
 enum Separation {
     /// With nothing on the line.

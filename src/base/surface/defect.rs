@@ -15,7 +15,7 @@ pub enum SurfaceError {
         /// The most allowed.
         limit: usize,
     },
-    /// It does not fit the memory allowed.
+    /// The surface exceeds the memory allowed.
     #[error(
         "{triangles} triangles and {vertices} vertices, and there are more, take more than the {bytes_max} bytes of memory allowed"
     )]
@@ -144,9 +144,9 @@ pub enum Defect {
         triangle: u32,
         /// Vertices of the edge.
         vertices: [u32; 2],
-        /// Where the edge begins.
+        /// Begin of the edge.
         from: Point,
-        /// Where the edge ends.
+        /// End of the edge.
         to: Point,
         /// A vertex that lies on the edge, or nearly: a T-junction.
         junction: Option<Point>,
@@ -156,7 +156,7 @@ pub enum Defect {
     SelfIntersection {
         /// The two triangles.
         triangles: [u32; 2],
-        /// How they touch.
+        /// Kind of the contact.
         kind: ContactKind,
         /// A point where they touch.
         at: Point,

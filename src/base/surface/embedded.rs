@@ -68,7 +68,7 @@ impl Surface {
         self.add_support_triangles(scratch)
     }
 
-    /// Its edges and points by themselves, numbered in the order in which they first appear.
+    /// The embedded edges and points alone, numbered in the order in which they first appear.
     pub fn embedded_set(&self) -> EmbeddedSet {
         let mut set = EmbeddedSet::default();
         let (mut verts, mut labels) = (HashMap::new(), HashMap::new());

@@ -12,11 +12,11 @@ pub(super) struct EmbeddedEdge {
 
 /// Relation of an edge to a triangle.
 pub(super) enum EdgeAtTriangle {
-    /// They share a vertex at most.
+    /// They share at most a vertex.
     Apart,
-    /// It is one of the triangle's own.
+    /// The edge is a side of the triangle.
     Side,
-    /// They touch where they should not.
+    /// They have a forbidden contact.
     Touching(Contact),
 }
 
@@ -47,7 +47,7 @@ impl EmbeddedEdge {
         touch.map_or(EdgeAtTriangle::Apart, EdgeAtTriangle::Touching)
     }
 
-    /// Where it touches another edge elsewhere than in a vertex of both. Edges of the same vertices give none.
+    /// A contact with another edge outside a common vertex. Edges of the same vertices give none.
     pub fn at_edge(&self, other: &Self) -> Option<Contact> {
         let ([a, b], [c, d]) = (self.ends, other.ends);
         let found = |kind, at| Some(Contact { kind, at });
@@ -105,7 +105,7 @@ fn leaves_into(x: Point, t: [Point; 3]) -> Option<Contact> {
     turns.iter().all(|&turn| turn >= 0).then_some(Contact { kind, at })
 }
 
-/// How `p`, which is no corner of `t`, lies on `t`.
+/// The contact of `p`, which is no corner of `t`, with `t`.
 pub(super) fn point_at_triangle(p: Point, t: &[Point; 3]) -> Option<Contact> {
     match side(t, p) {
         0 => segment_in_plane(p, p, t),

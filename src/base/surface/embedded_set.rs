@@ -10,7 +10,7 @@ pub struct Embedded {
     pub edges: Vec<[u32; 3]>,
     /// The vertex of each point, and its label.
     pub points: Vec<[u32; 2]>,
-    /// How long edges at each point should be, at most; 0 where the point is a vertex of triangles, which say it.
+    /// Largest edge length at each point; 0 for a vertex of triangles, which define it.
     pub sizes: Vec<f64>,
     /// The first support triangle, and the first vertex that only support triangles have.
     pub first_support: Option<[u32; 2]>,
@@ -39,7 +39,7 @@ impl EmbeddedSet {
     }
 }
 
-/// Why edges and points cannot be embedded.
+/// Reasons why edges and points cannot be embedded.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum EmbedError {
     /// Both ends of an edge are one vertex.
@@ -60,18 +60,18 @@ pub enum EmbedError {
         /// Where.
         at: Point,
     },
-    /// It touches something elsewhere than in common vertices.
+    /// A contact outside common vertices.
     #[error("{what} and {other} meet where they should not: {kind}{}", more(*n))]
     Touching {
         /// The edge or the point.
         what: String,
         /// The triangle or the edge.
         other: String,
-        /// How they touch.
+        /// Kind of the contact.
         kind: ContactKind,
         /// Where.
         at: Point,
-        /// How many such pairs there are.
+        /// Number of such pairs.
         n: usize,
     },
     /// A tetrahedron there would be too small to compute.
@@ -81,9 +81,9 @@ pub enum EmbedError {
         what: String,
         /// Where.
         at: Point,
-        /// How far the first one is from it, if that is known.
+        /// Distance of the first one, if known.
         distance: Option<f64>,
-        /// How many there are.
+        /// Number of such edges or points.
         n: usize,
     },
 }
@@ -110,7 +110,7 @@ impl EmbedError {
         }
     }
 
-    /// Where it is.
+    /// Position of the error.
     pub fn at(&self) -> Point {
         match self {
             Self::NoLength { at, .. }

@@ -7,7 +7,7 @@ use crate::geom::Point;
 /// A point inside a volume, and its meaning for the volume.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Seed {
-    /// Where it is.
+    /// Position of the seed.
     pub point: Point,
     /// Region or hole.
     pub kind: SeedKind,
@@ -16,9 +16,9 @@ pub struct Seed {
 /// Meaning of a [`Seed`] for the volume around it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum SeedKind {
-    /// It is filled, and called so.
+    /// A filled volume, with its name.
     Region(Option<String>),
-    /// It stays empty.
+    /// A hole: the volume stays empty.
     Hole,
 }
 

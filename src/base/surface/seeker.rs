@@ -139,7 +139,8 @@ impl<'a> Seeker<'a> {
         all
     }
 
-    /// How many triangles a question looks at, in the mean of some points: half of them where long thin ones fan out, some tens else.
+    /// Mean number of triangles tested per search, from some points: half of all for fans of long thin triangles,
+    /// otherwise tens.
     pub fn effort(&self) -> f64 {
         /// Enough probes to distinguish tens from thousands.
         const PROBES: u64 = 64;

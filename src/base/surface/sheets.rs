@@ -122,7 +122,7 @@ impl Surface {
 struct OpenEdges {
     /// Edges of each triangle; triangles that are left out have none.
     edges: Vec<[u32; 3]>,
-    /// How many triangles an edge has, and their numbers added bit by bit: of one triangle, its number.
+    /// For each edge the number of its triangles, and the XOR of their numbers: for one triangle, its number.
     uses: Vec<(u32, u32)>,
     open: Vec<u32>,
 }

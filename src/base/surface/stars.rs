@@ -249,7 +249,7 @@ fn around_arc(u: Point, v: Point) -> Aabb {
         return bounds;
     };
     for axis in [Point::X, Point::Y, Point::Z] {
-        // Where the whole circle is farthest along the axis, which may be between the two.
+        // Point of the whole circle that is farthest along the axis; it may lie between the two.
         let top = axis - normal * axis.dot(normal);
         let Some(top) = top.try_normalize().filter(|_| top.length() > NEAR_END) else {
             // Nowhere is it off zero by more; the direction would be rounding.

@@ -125,31 +125,31 @@ pub enum NoteKind {
     },
     /// Vertices that no triangle uses were left out.
     UnusedVertices {
-        /// How many.
+        /// Number of vertices.
         n: u64,
     },
     /// Polygons with more than three corners were cut into fans.
     FannedPolygons {
-        /// How many.
+        /// Number of polygons.
         n: u64,
     },
     /// Elements that are no part of a surface (tetrahedra, lines, …) were left out.
     SkippedElements {
         /// The kind of element.
         what: &'static str,
-        /// How many.
+        /// Number of elements.
         n: u64,
     },
     /// Points that mark holes or regions of the volume.
     VolumePoints {
         /// Holes or regions.
         points: VolumePoints,
-        /// How many.
+        /// Number of points.
         n: u64,
     },
     /// A planar facet of several polygons or with holes was taken polygon by polygon.
     SplitFacets {
-        /// How many.
+        /// Number of facets.
         n: u64,
     },
 }

@@ -47,7 +47,7 @@ impl Validation {
         }
     }
 
-    /// How many listed self-intersections are of this kind.
+    /// Number of listed self-intersections of this kind.
     #[cfg(test)]
     pub fn n_of_kind(&self, kind: ContactKind) -> usize {
         let is_kind =
@@ -132,7 +132,7 @@ fn edge_defects(
             Defect::OpenEdge { triangle, vertices, from, to, junction }
         })
         .collect();
-    // Where the reason is known comes first.
+    // Edges with a known reason come first.
     open.sort_by_key(|d| !matches!(d, Defect::OpenEdge { junction: Some(_), .. }));
     defects.extend(open);
     defects

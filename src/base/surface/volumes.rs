@@ -22,7 +22,7 @@ pub const VOLUMES_TRIANGLE: usize = 13;
 /// The number of the unbounded volume.
 pub const OUTSIDE: u32 = 0;
 
-/// How two volumes meet: triangles whose front looks into the lower-numbered one, and the others.
+/// The wall between two volumes: triangles whose front faces the lower-numbered one, and the others.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Wall {
     /// Triangles whose front looks into the lower-numbered volume.
@@ -98,7 +98,7 @@ impl Volumes {
         volumes
     }
 
-    /// Which volumes meet, and by how many triangles; those with one volume on both sides are no walls.
+    /// Pairs of volumes with a common wall, and its triangles; triangles with one volume on both sides are no wall.
     pub fn walls(&self) -> BTreeMap<(u32, u32), Wall> {
         let mut walls: BTreeMap<(u32, u32), Wall> = BTreeMap::new();
         for &[front, back] in self.of_side.iter().filter(|[f, b]| f != b) {
@@ -112,7 +112,7 @@ impl Volumes {
         walls
     }
 
-    /// How many triangles must be crossed from the outside to each volume.
+    /// Number of walls between the outside and each volume.
     pub fn depths(&self) -> Vec<u32> {
         let mut depths = vec![u32::MAX; self.n_volumes as usize];
         depths[OUTSIDE as usize] = 0;

@@ -25,7 +25,7 @@ pub fn weld_near(surface: &mut Surface, distance: f64) -> usize {
     count_joined(&new_ids)
 }
 
-/// How many points [`weld_near`] would join to another.
+/// Number of points that [`weld_near`] would join to another.
 pub(super) fn n_near(surface: &Surface, distance: f64) -> usize {
     count_joined(&new_ids(surface, distance))
 }

@@ -17,7 +17,7 @@ pub(super) struct ChildBuilder<'a, P: Pages, Q: Pages, R: Pages> {
     pub child: &'a mut Mesh<R>,
     pub open_cut: &'a OpenCut,
     pub high: bool,
-    /// Where the map of tetrahedra begins in each scratch map, behind that of vertices.
+    /// Begin of the map of tetrahedra in each scratch map, after that of vertices.
     pub host_base: u32,
     pub core_base: u32,
     /// Tetrahedra out of the core with a required face whose vertices may all be in it.
@@ -326,9 +326,9 @@ sort_record! {
     struct ChildVertex {
         /// Its place along the curve.
         key: u64,
-        /// When it was met; [`IN_HOST`] when in the host alone.
+        /// Order of the first visit, with [`IN_HOST`] for a vertex in the host alone.
         met: u32,
-        /// Where it comes from: its id, [`IN_HOST`] when that is one of the host.
+        /// Id of the source, with [`IN_HOST`] for one of the host.
         source: u32,
     }
 }

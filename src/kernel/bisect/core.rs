@@ -33,7 +33,7 @@ pub(super) mod placement {
     pub(in super::super) const BITS: u32 = IN_CORE | HIGH;
 }
 
-/// Where a tetrahedron lies.
+/// Sides of the plane on which a tetrahedron has vertices.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Sides {
     pub low: bool,
@@ -74,7 +74,7 @@ pub(super) struct BoundaryFace {
     pub host: FaceRef,
 }
 
-/// Where the core was cut out, ascending by vertices.
+/// Boundary of the core, ascending by vertices.
 #[derive(Default)]
 pub(super) struct CoreBoundary {
     pub faces: Vec<BoundaryFace>,
@@ -97,8 +97,9 @@ pub(super) fn is_in_core<P: Pages>(host: &mut Mesh<P>, t: u32) -> bool {
 
 /// Copies the core of `host` into the empty `core`; returns its boundary.
 ///
-/// Effects: the host's scratch map holds for each vertex the number in the core with [`SHARED`], or else how many were met before it in
-/// tetrahedra out of the core, or [`NONE`]; behind that the [`placement`] of each tetrahedron.
+/// Effects: the host's scratch map has for each vertex its number in the core with [`SHARED`]; for others the order in
+/// which they were met in tetrahedra outside the core, or [`NONE`]. After that it has the [`placement`] of each
+/// tetrahedron.
 pub(super) fn extract<P: Pages, Q: Pages>(
     host: &mut Mesh<P>,
     core: &mut Mesh<Q>,

@@ -10,7 +10,7 @@
 
 use std::collections::VecDeque;
 
-/// Which tree a node is in.
+/// The tree of a node.
 #[derive(Clone, Copy, PartialEq, Eq, Default)]
 enum Root {
     #[default]

@@ -32,7 +32,7 @@ const CENTERED_MOST: f64 = 4.0;
 /// Capacities are costs in this fraction.
 const SCALE: f64 = 256.0;
 
-/// How the interface came about.
+/// Report of the choice of an interface.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct InterfaceReport {
     /// Most bytes held besides the core.
@@ -190,7 +190,7 @@ fn read_strip<P: Pages>(
             }
             let node = core.scratch(dense(across.tet()));
             if node != NONE && (node as usize) < graph.n_nodes() {
-                // Its own cost was found from the other side.
+                // The cost was found from the other side.
                 arcs[i] = FlowArc::new(node, across.face());
                 capacity[i] = graph.capacity(node, across.face());
                 continue;

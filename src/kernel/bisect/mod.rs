@@ -52,9 +52,9 @@ use tetdb_base::storage::{Pages, StorageError};
 /// Variants of the method, for comparisons; the default is the method.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Method {
-    /// How the wanted length of an edge is found.
+    /// Lengths of edges: from the field or from the ends.
     pub lengths: Lengths,
-    /// How the cutting plane is chosen.
+    /// Choice of the cutting plane.
     pub plane: PlaneChoice,
 }
 
@@ -65,7 +65,7 @@ pub struct CutPlan<'a> {
     pub cut: u32,
     /// Share of the load that belongs on the low side.
     pub low: f64,
-    /// Which variant of the method is used.
+    /// Variant of the method.
     pub method: Method,
     /// Zones of the cuts above it.
     pub earlier: &'a [Zone],

@@ -9,7 +9,7 @@ use super::zone::Zone;
 pub struct OpenCut {
     /// The refined zone of the cut.
     pub zone: Zone,
-    /// How the cut went.
+    /// Report of the cut.
     pub report: CutReport,
     pub(super) core_boundary: CoreBoundary,
     pub(super) labels: SideLabels,

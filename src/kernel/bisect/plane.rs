@@ -25,7 +25,7 @@ const TOLERANCE: f64 = 0.003;
 /// Least gain in grazed vertices that a shift away from the balanced position must bring, as a share.
 const GAIN: f64 = 0.1;
 
-/// How the plane is chosen.
+/// Choices of the plane.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum PlaneChoice {
     /// As the head of this module says.
@@ -33,7 +33,7 @@ pub enum PlaneChoice {
     Load,
     /// As the paper says: centroids of the mesh, unweighted; the axis of the largest moment; placed by load.
     Centroids,
-    /// This one, as it is.
+    /// The given plane.
     Given(Plane),
 }
 

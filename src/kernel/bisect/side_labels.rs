@@ -17,7 +17,7 @@ const FREE: f64 = 1.4;
 const HIGH: u8 = 1;
 const MAY_CHANGE: u8 = 2;
 
-/// Which side each tetrahedron of the core is on, and whether it may go to the other. Memory: a byte for each.
+/// The side of each tetrahedron of the core, and whether it may change. Memory: one byte each.
 pub(super) struct SideLabels {
     /// By id.
     by_tet: Vec<u8>,
@@ -69,7 +69,7 @@ impl SideLabels {
         self.by_tet.len() as u64
     }
 
-    /// Which side `t` is on: `true` for the high one.
+    /// Side of `t`: `true` for the high one.
     #[inline]
     pub fn is_high(&self, t: u32) -> bool {
         self.by_tet[t as usize] & HIGH != 0

@@ -11,7 +11,7 @@ use tetdb_base::geom::{Point, mix};
 /// Half the width of the zone at its narrowest, in units of the wanted length. Circumspheres of a saturated mesh have radii below
 /// 1.03 h, and interface vertices stay within 1.4 h: from 3.5 on no later vertex reaches a tetrahedron at the interface.
 pub const WIDTH_MIN: f64 = 4.0;
-/// How much wider the noise makes it at most.
+/// Largest additional width from the noise.
 pub const WIDTH_NOISE: f64 = 2.0;
 /// Wavelength of the noise in units of h.
 const WAVELENGTH: f64 = 1.5;

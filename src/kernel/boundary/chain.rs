@@ -23,7 +23,7 @@ const POINTS_MAX: usize = 2000;
 /// Fineness of places, in terms of some 50 bits: coordinates of doubles, divided, can differ by less than one term shows.
 pub(super) const TERMS: [u32; 4] = [2, 4, 8, 16];
 
-/// Why a patch could not be finished.
+/// Reasons why a patch could not be finished.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum PatchFailure {
     /// A vertex of the surface lies on the segment or facet.
@@ -134,7 +134,7 @@ impl<P: Pages> RecoveryPatch<'_, P> {
     }
 }
 
-/// Where the segment sees all faces from inside, as its start and length in shares of the segment.
+/// The part of the segment that sees all faces from inside, as start and length in shares of the segment.
 ///
 /// `at` has the volumes of each face with both ends; `terms` says how finely they are divided.
 fn seen_piece(at: &[[Dyadic; 2]], terms: u32) -> Option<(Dyadic, Dyadic)> {

@@ -6,12 +6,12 @@
 /// One way to work on a patch.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Effort {
-    /// How deep flips nest before a point is put, and how many ring searches they may take.
+    /// Nesting depth of flips before a point is put, and the number of ring searches.
     pub flip_level: u32,
     pub flip_work: u32,
     /// A piece of a segment shorter than this share is used only when no other is found.
     pub piece_min: f64,
-    /// Where in its piece of a segment a point goes first.
+    /// First place of a point in its piece of a segment.
     pub lean: f64,
     /// Segments from their other ends, facets and vertices in the other order.
     pub reversed: bool,

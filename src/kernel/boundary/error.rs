@@ -21,7 +21,7 @@ impl fmt::Display for FacetPlace {
     }
 }
 
-/// Why a surface did not become the boundary of volumes.
+/// Reasons why a surface did not become the boundary of volumes.
 #[derive(Debug, Error)]
 pub enum BoundaryError {
     /// Triangles that could not be made faces of the mesh.
@@ -29,7 +29,7 @@ pub enum BoundaryError {
     NotRecovered {
         /// Never empty.
         facets: Vec<FacetPlace>,
-        /// Why they could not be, in a few words.
+        /// The reason, in a few words.
         reason: &'static str,
         /// The narrowest place around them.
         nearness: Option<Nearness>,
@@ -49,7 +49,7 @@ pub enum BoundaryError {
     Seed {
         /// The seed, and its contradiction.
         message: String,
-        /// Where it is.
+        /// Position of the seed.
         point: Point,
     },
     /// Regions are to be filled by seeds, but there is no seed.
@@ -58,7 +58,7 @@ pub enum BoundaryError {
     /// The outside of the triangles cannot be decided.
     #[error("the triangles do not point out of the same volumes: {what}")]
     Orientation {
-        /// Which triangles contradict each other.
+        /// The contradictory triangles.
         what: String,
     },
 }

@@ -70,7 +70,8 @@ const ORIENT_BOUND: f64 = 5.2e-15;
 const EPSILON: f64 = f64::EPSILON;
 /// Forward error of the determinant in pairs of doubles: nine products of 2^-102 and their sums of 2^-104, with slack.
 const PAIR_BOUND: f64 = EPSILON * EPSILON * 1024.0;
-/// How far a coordinate's difference is off in pairs, as a share of the coordinates: the rests are at most 2^-53 of them, and rounded a few times.
+/// Error of a coordinate difference in pairs, as a share of the coordinates: the rests are at most 2^-53 of them, and
+/// rounded a few times.
 const PAIR_OFF: f64 = EPSILON * EPSILON * 4.0;
 
 /// Six times the signed volume; the sign is exact.

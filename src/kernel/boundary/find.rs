@@ -7,10 +7,10 @@ use super::walk::{Exit, crossings, edge_at, find_edge, opposite, shell};
 use crate::mesh::FaceRef;
 use tetdb_base::geom::IdSet;
 
-/// Where facet `a b c` stands.
+/// State of facet `a b c` in the mesh.
 #[derive(Clone, Debug)]
 pub(super) enum SearchResult {
-    /// It is this face.
+    /// The facet is this face.
     Face(FaceRef),
     /// Edge `a b` is there, the face is not; the tetrahedron whose inside it enters from that edge, if one.
     Edge(Option<u32>),
@@ -90,7 +90,7 @@ pub(super) fn crossing_edges<S: TetComplex>(
     Some(edges)
 }
 
-/// How an attempt to recover one part ended.
+/// Outcome of an attempt to recover one part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Outcome {
     Recovered,

@@ -20,7 +20,7 @@ pub(super) struct GrownCavity {
     pub lost: Vec<u32>,
 }
 
-/// Why a cavity could not grow.
+/// The obstacle to a growing cavity.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Obstacle {
     /// The point is behind this required face, seen from the cavity.

@@ -34,7 +34,7 @@ pub(super) fn ball_center(half_spaces: &[HalfSpace], reach: f64) -> Option<Point
     Some(Point::new(x[0], x[1], x[2]) * reach)
 }
 
-/// How far `at` is inside all half-spaces; negative outside.
+/// Distance of `at` from the nearest plane; negative outside.
 pub(super) fn clearance(half_spaces: &[HalfSpace], at: Point) -> f64 {
     let rooms = half_spaces.iter().map(|h| h.offset - h.normal.dot(at));
     rooms.fold(f64::INFINITY, f64::min)

@@ -12,7 +12,7 @@ const LOOKED_AT_MAX: usize = 256;
 /// The narrowest place around facets that were not recovered.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Nearness {
-    /// Which distance was measured.
+    /// Kind of the distance.
     pub kind: NearnessKind,
     /// Numbers of the triangles in the input, equal for [`NearnessKind::Height`].
     pub inputs: [u64; 2],

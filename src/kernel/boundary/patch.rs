@@ -51,7 +51,7 @@ pub(super) struct RecoveryPatch<'m, P: Pages> {
     required: IdSet<[u32; 3]>,
     /// Edges of the patch that must stay, besides those of `protected`.
     pub kept: IdSet<u64>,
-    /// How hard and in which order to try.
+    /// Limits and order of the attempts.
     pub effort: Effort,
 }
 
@@ -214,7 +214,7 @@ impl<'m, P: Pages> RecoveryPatch<'m, P> {
         self.vertices[v as usize].exact.is_some()
     }
 
-    /// Where `v` is, without rounding.
+    /// Position of `v`, without rounding.
     pub fn exact_place(&self, v: u32) -> ExactPoint {
         let v = &self.vertices[v as usize];
         let explicit = || ExactPoint::explicit(v.point);

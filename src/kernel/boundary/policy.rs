@@ -5,10 +5,10 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use super::error::BoundaryError;
 use tetdb_base::surface::Wall;
 
-/// How pairs of volumes meet, the lower-numbered one first.
+/// Walls between pairs of volumes, the lower-numbered one first.
 pub type Walls = BTreeMap<(u32, u32), Wall>;
 
-/// Which bounded volumes get tetrahedra.
+/// Policies that choose the bounded volumes to be filled.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RegionPolicy {
     /// Volumes that an odd number of shells separates from the outside; all volumes if that is contradictory.

@@ -17,7 +17,7 @@ use super::turn::{from_hubs, turn_segment};
 use crate::mesh::Mesh;
 use tetdb_base::storage::{Pages, check_cancelled};
 
-/// How deep edge removals may nest, pass after pass, and the ring searches a target may cost then.
+/// Nesting depth of edge removals in each pass, and the number of ring searches per target.
 const LEVELS: [(u32, u32); 3] = [(0, 40), (1, 80), (2, 160)];
 
 /// Parts a segment may cross to be flipped for before edges are turned. Flips cost the square of this: where a fan of slats lies across

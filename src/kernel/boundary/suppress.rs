@@ -80,7 +80,7 @@ impl<P: Pages> RecoveryPatch<'_, P> {
 
     /// Takes vertex `x` off the surface. Returns the number of vertices that replace it.
     ///
-    /// Where a sheet ends at `x`, a triangle on the other side of its segment stands in for the facet that is not there.
+    /// If a sheet ends at `x`, a triangle on the other side of its segment replaces the missing facet.
     pub(super) fn suppress(&mut self, skin: &mut CavitySkin, x: u32) -> Result<u32, PatchFailure> {
         self.thin_out(x);
         let ball = ball(self, x);

@@ -77,7 +77,7 @@ pub(super) fn gain_clearance<P: Pages>(s: &mut PagedComplex<'_, P>, v: u32) -> b
         return false;
     };
     let now = clearance(&planes, Point::ZERO);
-    // Where doubles see the best place too dimly, one on the way there may do.
+    // If rounding rules out the best place, one on the way there may do.
     for share in SHARES {
         if clearance(&planes, way * share) <= GAIN_MIN * now.max(0.0) {
             continue;

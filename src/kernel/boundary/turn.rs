@@ -117,7 +117,7 @@ struct Half {
     lost: Vec<u32>,
 }
 
-/// How much a turn may do to find a place for a new vertex.
+/// Means of a turn to find a place for a new vertex.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Reach {
     /// At a place with enough clearance.
@@ -240,7 +240,7 @@ impl<P: Pages> Turner<'_, '_, P> {
         self.added.retain(|&a| a != v);
     }
 
-    /// Which edge `c d` becomes; `None` where it has to stay, or the four corners are not convex.
+    /// The new edge of `c d`; `None` if the edge is fixed, or the four corners are not convex.
     fn plan(&mut self, (t, c, d): Crossed, a: u32, b: u32) -> Option<EdgeTurn> {
         if self.s.protects(c, d) {
             return None;
@@ -333,7 +333,7 @@ impl<P: Pages> Turner<'_, '_, P> {
         }
         plane(self.s, [y, c, x]);
         plane(self.s, [d, y, x]);
-        // Where all is seen best, or straight up from the crossing where that is too near for doubles to find.
+        // The place of largest clearance, or straight up from the crossing if that is too near for doubles.
         let up = (py - px).cross(pd - pc).normalize_or_zero() * size;
         let up = if orient(pc, py, px, origin + up) > 0.0 { up } else { -up };
         let best = ball_center(&planes, size);
@@ -431,7 +431,7 @@ fn joined(ring: &[u32], c: u32, d: u32, p: u32) -> Vec<[u32; 4]> {
     quads
 }
 
-/// Where the line through two points passes the line through two others, nearly.
+/// Nearest point of the line through two points to the line through two others, nearly.
 fn crossing([c, d]: [Point; 2], [x, y]: [Point; 2]) -> Point {
     let normal = (d - c).cross(y - x);
     let across = normal.cross(y - x);

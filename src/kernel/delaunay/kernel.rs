@@ -4,7 +4,7 @@ use super::links::Links;
 use crate::mesh::{FaceRef, Tet};
 use tetdb_base::geom::Point;
 
-/// Why a point was not inserted; the mesh is as before.
+/// Reasons why a point was not inserted; the mesh is unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rejected {
     /// The walk left the mesh or started nowhere.
@@ -93,7 +93,7 @@ impl Default for Kernel {
     }
 }
 
-/// Where a walk ended.
+/// End of a walk.
 #[derive(Clone, Copy, Debug)]
 pub struct PointLocation {
     /// Index of the tetrahedron.

@@ -12,8 +12,8 @@ const STEPS_MAX: u32 = 100_000;
 impl Kernel {
     /// The tetrahedron that holds `p` (in its interior or on its boundary), walking from `hint`.
     ///
-    /// Each step leaves through a face that strictly separates the tetrahedron from `p`, the first
-    /// one found in an order that changes from step to step, so that no cycle is walked for ever.
+    /// Each step leaves through a face that strictly separates the tetrahedron from `p`. The order in which faces are
+    /// tested changes from step to step, so that no cycle is walked for ever.
     ///
     /// Errors: [`Rejected::Outside`] when the walk leaves the mesh, or `hint` is not in use.
     pub fn locate<P: Pages>(

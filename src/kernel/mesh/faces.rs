@@ -34,7 +34,7 @@ pub struct MeshInterfaceFace {
     pub cut: u32,
     /// Number of the face within its cut.
     pub index: u32,
-    /// Which side of the cut the sub-domain is on: 0 low, 1 high.
+    /// Side of the cut with the sub-domain: 0 low, 1 high.
     pub side: u32,
 }
 

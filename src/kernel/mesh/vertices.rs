@@ -8,7 +8,7 @@ use super::state::{dense, sparse};
 use tetdb_base::geom::Point;
 use tetdb_base::storage::{Pages, kind};
 
-/// Where a vertex comes from; the numbers are stored.
+/// Origin of a vertex; the numbers are stored.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u32)]
 pub enum VertexTag {

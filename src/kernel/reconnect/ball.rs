@@ -123,7 +123,7 @@ impl Ball {
         u64::from(self.turn) << 32 | u64::from(t)
     }
 
-    /// Where `t` is in the table, or would be.
+    /// Slot of `t` in the table, used or empty.
     #[inline]
     fn place(&self, t: u32) -> usize {
         let (mask, entry) = (self.table.len() - 1, self.entry(t));

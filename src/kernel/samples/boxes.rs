@@ -112,7 +112,7 @@ impl BoxFace<'_> {
 
 /// Place of the `i`-th inner point of a shifted row of `n` steps.
 fn shifted_place(i: u32, n: u32) -> f64 {
-    /// How far the first points move away from the side; both are tuned by eye on edge lengths.
+    /// Distances by which the first points move away from the side; both are tuned by eye on edge lengths.
     const MOVES: [f64; 2] = [0.12, 0.04];
     let middle = f64::from(i) + 0.5;
     if n < 4 {

@@ -90,7 +90,7 @@ fn push_grain(build: &mut Builder, room: &Aabb, random: &mut Random, label: u32)
     let mut axis = || AXIS_LEAST + (1.0 - AXIS_LEAST) * random.unit();
     let axes = [1.0, axis(), axis()];
     let columns = [0, 1, 2].map(|i| turn[i] * axes[i]);
-    // How far the ellipsoid reaches along each coordinate.
+    // Extent of the ellipsoid along each coordinate.
     let square = columns.iter().fold(Point::ZERO, |sum, &c| sum + c * c);
     let extent = Point::from(square.to_array().map(f64::sqrt));
     let half = (room.high - room.low) * (0.5 * REACH);

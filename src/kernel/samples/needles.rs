@@ -22,7 +22,7 @@ const QUARTER_MIN: usize = 2;
 const THICKNESS: f64 = 0.1;
 const LENGTH: f64 = 10.0;
 const RADIUS: f64 = 0.5;
-/// Where the parts stand along x: none is near another.
+/// Positions of the parts along x: none is near another.
 const PLACES: [f64; 3] = [0.0, 2.0, 4.0];
 
 /// `needles,count=64,holes=9,seed=1`: segments of each circle, a multiple of four, and holes of the plate.

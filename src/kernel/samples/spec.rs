@@ -56,7 +56,7 @@ pub enum SampleKind {
     Needles(Needles),
     /// Surfaces within each other.
     Shells {
-        /// How many.
+        /// Number of shells.
         count: usize,
         /// Their shape.
         kind: ShellKind,

@@ -63,7 +63,7 @@ fn side(widths: &[f64], heights: &[f64]) -> Flat {
     let mut left = chain(&mut flat, x, &heights[..1]);
     for (i, &width) in widths.iter().enumerate() {
         x += width;
-        // Where two columns meet the lower one's corner is on the higher one's side.
+        // Where two columns meet, the lower one's corner is on the higher one's side.
         let next = heights.get(i + 1).copied();
         let mut ends: Vec<f64> = [Some(heights[i]), next].into_iter().flatten().collect();
         ends.sort_unstable_by(f64::total_cmp);

@@ -88,7 +88,7 @@ impl SizeConstraints<'_> {
         Ok(())
     }
 
-    /// Which cells are divided in a cell, depth first.
+    /// Subdivision of a cell, depth first: true for divided cells.
     fn shape_of(&self, cell: Leaf) -> Result<Vec<bool>, SizingError> {
         if cell.level == DEPTH || !self.is_in_bounds(cell) {
             return Ok(vec![false]);

@@ -183,7 +183,7 @@ fn larger_leaf(tree: &Tree, leaf: &Leaf, cell: [u32; 3]) -> Option<(Leaf, u32)> 
     (level < leaf.level).then_some((Leaf { anchor, level }, number))
 }
 
-/// How a corner of a leaf hangs on a leaf twice as large, if it does.
+/// The hanging corner of a leaf on a leaf twice as large, if it hangs.
 fn hangs(
     leaf: &Leaf,
     corner: usize,

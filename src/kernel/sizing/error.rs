@@ -1,6 +1,6 @@
 //! Errors of wanted sizes.
 
-/// Why there is no size field.
+/// Reasons why there is no size field.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SizingError {
     /// A value of an option is not usable. Messages name options by their keys in a file of options.

@@ -40,7 +40,7 @@ const SHARE_CUT: f64 = 0.3;
 /// eight points.
 const SHARE_SIZES: f64 = 0.02;
 
-/// How near to the surface no vertex comes, in units of h.
+/// Layer at the surface without vertices, in units of h.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceSkin {
     /// To triangles, and to vertices.

@@ -180,7 +180,7 @@ impl Targets {
         }
     }
 
-    /// How many times the slope bound is allowed at most.
+    /// Largest factor on the slope bound.
     pub fn slope_factor_max(&self) -> f64 {
         self.beta_needles / self.beta
     }

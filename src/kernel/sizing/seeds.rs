@@ -85,7 +85,7 @@ impl<'a> Seeds<'a> {
         }
     }
 
-    /// How many times the gradation's slope is allowed at a seed.
+    /// Factor on the gradation's slope that is allowed at a seed.
     pub fn slope_factor(&self, seed: u32) -> f64 {
         match self.along(seed) {
             Some([.., slope_factor]) => f64::from(slope_factor),

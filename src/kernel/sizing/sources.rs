@@ -1,7 +1,7 @@
 //! Sizes in a box, a sphere or a cylinder, graded outwards by formula.
 //!
-//! Inside the shape the size is `inside`, away from it at most `outside` (no bound when it is not given), and
-//! between the two it changes with the slope of the gradation: the minimum with the octree keeps that slope.
+//! Inside the shape the size is `inside`, away from it at most `outside` (unbounded if not given). Between the two it
+//! changes with the slope of the gradation; the minimum with the octree keeps that slope.
 
 use super::SizingError;
 use super::length::Length;
@@ -36,7 +36,7 @@ pub enum SourceShape {
 /// Sizes inside and outside a shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SizeSource {
-    /// Where the sizes hold.
+    /// The shape in which the sizes hold.
     pub shape: SourceShape,
     /// Size inside the shape.
     pub inside: Length,

@@ -45,7 +45,7 @@ pub enum SizeWarning {
         wanted: f64,
         /// Median size of the surface.
         surface_median: f64,
-        /// How far from edges of that length the gradation lets sizes come down to it.
+        /// Distance from edges of that length at which the gradation lets sizes come down to it.
         away: f64,
     },
     /// The wanted interior size is longer than the gradation lets sizes grow within the surface.

@@ -27,9 +27,10 @@ const SPREAD_MAX: f64 = 2.0;
 /// The means of its eight parts may differ this much, if each has at least `TREND_SEEDS`.
 const TREND_MAX: f64 = 1.2;
 const TREND_SEEDS: u32 = 4;
-/// A cell wider than this many of its smallest size, times the root of the number of seeds in and around the cell that it is part of, lies
-/// far from all but a small body. A surface of even edges that comes near it has fourteen times as many seeds, a straight rod enough for 48 sizes.
-/// With 8 a body alone in a cube takes up to twice as many tetrahedra; with 2 a tenth fewer, and rods count less.
+/// A cell wider than this many of its smallest size, times the root of the number of seeds in and around its parent,
+/// lies far from all but a small body. A surface of even edges that comes near has fourteen times as many seeds, a
+/// straight rod enough for 48 sizes. With 8 a body alone in a cube takes up to twice as many tetrahedra; with 2 a tenth
+/// fewer, and rods count less.
 const SPARSE_FROM: f64 = 4.0;
 /// Interior sizes within this ratio of the surface's need no transition.
 const TARGET_MAX: f64 = 1.15;
@@ -39,7 +40,7 @@ const PARALLEL_SEEDS: usize = 8192;
 /// times a list.
 const PARALLEL_SEEDS_MAX: usize = 1 << 18;
 
-/// Where a leaf is on the lattice; its side is `2^(DEPTH - level)`.
+/// Position of a leaf on the lattice; its side is `2^(DEPTH - level)`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Leaf {
     pub anchor: [u32; 3],
@@ -294,8 +295,8 @@ impl Leaf {
     }
 }
 
-/// Which cells are divided, depth first, `near` being the seeds in the cell or half its side around it, `n_around` the number of those
-/// of the cell it is part of.
+/// Subdivision of a cell, depth first. `near`: the seeds in the cell or half its side around it; `n_around`: their
+/// number for the parent cell.
 fn shape_of(
     cell: Leaf,
     near: &[u32],

@@ -18,7 +18,7 @@ const FILL_ROUNDS: u32 = 18;
 /// Share of the slowest part of the error that plain averaging leaves after a round. Sixty rounds of plain averaging
 /// would do no better than these, which use the round before as well (the Chebyshev semi-iteration: Golub, Varga 1961).
 const SLOWEST: f32 = 0.98;
-/// How far from the mean of its neighbors a value may be, as a factor.
+/// Largest factor between a value and the mean of its neighbors.
 const REACH: f32 = 2.0;
 /// For each corner of a cell, the three corners at the other ends of its edges.
 const ALONG_EDGES: [[u8; 3]; 8] =

@@ -1,8 +1,8 @@
 //! Neighbors of sub-domains: owners of interface faces, updated at every bisection.
 //!
-//! A cut's faces have numbers; for each, the table of the cut says which part has it on the low side and which on the
-//! high side. A part is named by the rank of its first sub-domain. When a part is bisected, its low child keeps the name, so that
-//! only the faces that go to the high child change owner, and neither the neighbor nor its files are read.
+//! A cut's faces are numbered. For each face, the table of the cut has the sub-domains on the low side and on the high
+//! side. A sub-domain is named by the rank of its first final sub-domain. When it is bisected, its low child keeps the
+//! name. So only the faces of the high child change owner, and neither the neighbor nor its files are read.
 //!
 //! Source: the paper, section 1.3.
 

@@ -122,7 +122,7 @@ impl RandomNumbers {
     }
 }
 
-/// How many cases a test tries.
+/// Number of cases in a test.
 pub fn cases() -> usize {
     let asked = std::env::var("TETDB_CASES").ok();
     asked.and_then(|n| n.parse().ok()).unwrap_or(100_000)
