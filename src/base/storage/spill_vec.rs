@@ -19,7 +19,7 @@ pub struct ScratchSpace {
 
 impl fmt::Debug for ScratchSpace {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Room({} bytes, {:?})", self.budget.cap(), self.dir)
+        write!(f, "ScratchSpace({} bytes, {:?})", self.budget.cap(), self.dir)
     }
 }
 
@@ -45,13 +45,13 @@ impl ScratchSpace {
     }
 
     /// Leases bytes held outside the arrays created here, at most the bytes left: arrays take shares of the rest.
-    pub fn hold(&self, bytes: usize) -> Option<Lease> {
+    pub fn lease(&self, bytes: usize) -> Option<Lease> {
         let bytes = (bytes as u64).min(self.available());
         self.budget.lease(bytes, "what is held beside arrays").ok()
     }
 
     /// `n` copies of `value`. An array in memory takes a quarter of the free bytes at most.
-    pub fn column<T: Pod>(&self, n: usize, value: T) -> SpillVec<T> {
+    pub fn vec<T: Pod>(&self, n: usize, value: T) -> SpillVec<T> {
         let bytes = (n * size_of::<T>()) as u64;
         match &self.dir {
             Some(dir) if bytes > self.available() / 4 => {
@@ -71,12 +71,12 @@ impl ScratchSpace {
     }
 
     /// An empty array that grows.
-    pub fn list<T: Pod>(&self) -> SpillVecBuilder<T> {
-        self.list_within(self.available() / 8)
+    pub fn builder<T: Pod>(&self) -> SpillVecBuilder<T> {
+        self.builder_within(self.available() / 8)
     }
 
     /// An empty array that grows and takes at most `bytes`, in memory or as frames.
-    pub fn list_within<T: Pod>(&self, bytes: u64) -> SpillVecBuilder<T> {
+    pub fn builder_within<T: Pod>(&self, bytes: u64) -> SpillVecBuilder<T> {
         let frames = ((bytes / PAGE_BYTES as u64) as usize).max(FRAMES_MIN);
         SpillVecBuilder {
             memory: Vec::new(),
@@ -162,7 +162,7 @@ impl<T: Pod> SpillVec<T> {
     }
 
     /// The array for reading by many threads.
-    pub fn fixed(self) -> FrozenSpillVec<T> {
+    pub fn freeze(self) -> FrozenSpillVec<T> {
         match self.place {
             Residence::Memory(all) => FrozenSpillVec::Memory(all),
             Residence::Disk(paged) => {
@@ -226,7 +226,7 @@ impl<T: Pod> SpillVecBuilder<T> {
     }
 
     /// The array, as long as it is now.
-    pub fn done(mut self) -> SpillVec<T> {
+    pub fn finish(mut self) -> SpillVec<T> {
         let place = match self.paged {
             Some(paged) => Residence::Disk(paged),
             None => {
@@ -304,26 +304,26 @@ mod tests {
         let n = 300_000;
         let mut found = Vec::new();
         for scratch in [ScratchSpace::boundless(), ScratchSpace::new(1 << 20, dir.path())] {
-            let mut column = scratch.column(n, [7u32, 0]);
-            let is_paged = matches!(column.place, Residence::Disk(_));
+            let mut array = scratch.vec(n, [7u32, 0]);
+            let is_paged = matches!(array.place, Residence::Disk(_));
             assert_eq!(is_paged, scratch.dir.is_some());
             for i in places(n) {
-                let [a, b] = column.get(i);
-                column.set(i, [a.wrapping_mul(3), b + 1]);
+                let [a, b] = array.get(i);
+                array.set(i, [a.wrapping_mul(3), b + 1]);
             }
-            let mut list = scratch.list();
+            let mut builder = scratch.builder();
             for i in 0..n {
-                list.push(column.get(i));
+                builder.push(array.get(i));
             }
-            let fixed = list.done().fixed();
+            let fixed = builder.finish().freeze();
             assert_eq!(fixed.len(), n);
             let sums: Vec<u64> =
                 rayon::iter::ParallelIterator::collect(rayon::iter::ParallelIterator::map(
                     rayon::iter::IntoParallelIterator::into_par_iter(0..n),
                     |i| fixed.get(i).map(u64::from).iter().sum(),
                 ));
-            column.fill([1, 2]);
-            assert!((0..n).all(|i| column.get(i) == [1, 2]));
+            array.fill([1, 2]);
+            assert!((0..n).all(|i| array.get(i) == [1, 2]));
             found.push(sums);
         }
         assert!(found[0] == found[1]);
@@ -335,7 +335,7 @@ mod tests {
     fn a_folder_that_is_not_there_is_an_error() {
         let dir = tempfile::tempdir().expect("a folder");
         let scratch = ScratchSpace::new(1 << 20, dir.path().join("missing"));
-        let output = attempt(|| drop(scratch.column(1 << 20, 0u64)));
+        let output = attempt(|| drop(scratch.vec(1 << 20, 0u64)));
         assert!(matches!(output, Err(crate::storage::StorageError::Io { .. })), "{output:?}");
     }
 }

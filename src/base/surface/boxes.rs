@@ -57,7 +57,7 @@ impl BoxTree {
             }
         }
         let mut sorted = sorter.finish().or_raise();
-        let (mut order, mut boxes) = (scratch.list(), scratch.list());
+        let (mut order, mut boxes) = (scratch.builder(), scratch.builder());
         loop {
             let some: Vec<u32> =
                 sorted.by_ref().take(AT_ONCE).map(|keyed| keyed.or_raise().id).collect();
@@ -68,14 +68,14 @@ impl BoxTree {
             some.into_iter().for_each(|i| order.push(i));
             around.into_iter().for_each(|b| boxes.push(b));
         }
-        let boxes = boxes.done().fixed();
+        let boxes = boxes.finish().freeze();
         let mut levels = vec![enclose(&boxes, LEAF, scratch)];
         while let Some(last) = levels.last()
             && last.len() > 1
         {
             levels.push(enclose(last, ARITY, scratch));
         }
-        Self { order: order.done().fixed(), boxes, levels }
+        Self { order: order.finish().freeze(), boxes, levels }
     }
 
     /// Calls `visit` with the items whose boxes contain `p`, in curve order, until it returns true.
@@ -134,10 +134,10 @@ fn enclose(
     group: usize,
     scratch: &ScratchSpace,
 ) -> FrozenSpillVec<Aabb> {
-    let mut around = scratch.list();
+    let mut around = scratch.builder();
     for first in (0..boxes.len()).step_by(group) {
         let group = first..(first + group).min(boxes.len());
         around.push(group.fold(Aabb::EMPTY, |a, i| a.union(boxes.get(i))));
     }
-    around.done().fixed()
+    around.finish().freeze()
 }

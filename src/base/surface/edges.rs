@@ -133,11 +133,11 @@ impl Facets {
                 sorter.push(edge_use).or_raise();
             }
         }
-        let mut uses = scratch.list();
+        let mut uses = scratch.builder();
         for edge_use in sorter.finish().or_raise() {
             uses.push(edge_use.or_raise());
         }
-        let uses = uses.done();
+        let uses = uses.finish();
         Self { degenerate, duplicates, two_sided, uses, is_left_out }
     }
 

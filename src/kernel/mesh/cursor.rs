@@ -83,8 +83,8 @@ impl<P: Pages> Mesh<P> {
         let record = record + (first << SLOT_BITS);
         self.pages.append_up_to::<K>(record);
         let slot = self.pages.write::<K>(record);
-        slot[word] = u32_le::from_native(a);
-        slot[word + 1] = u32_le::from_native(b);
+        slot[word] = a.into();
+        slot[word + 1] = b.into();
     }
 
     /// The mesh as several threads may read it, when all of it is in memory.
@@ -172,13 +172,13 @@ impl<P: Pages> Mesh<P> {
     /// Replaces one node word, flags included.
     #[inline(always)]
     pub fn set_node(&mut self, t: u32, i: usize, node: u32) {
-        self.pages.write::<{ kind::TETS }>(t)[i] = u32_le::from_native(node);
+        self.pages.write::<{ kind::TETS }>(t)[i] = node.into();
     }
 
     /// Replaces one neighbor.
     #[inline(always)]
     pub fn set_neighbor(&mut self, face: FaceRef, to: FaceRef) {
-        self.pages.write::<{ kind::TETS }>(face.tet())[4 + face.face()] = u32_le::from_native(to.0);
+        self.pages.write::<{ kind::TETS }>(face.tet())[4 + face.face()] = to.0.into();
     }
 
     /// Makes two faces neighbors of each other; either may be [`FaceRef::NONE`].
@@ -236,8 +236,8 @@ impl<P: Pages> Mesh<P> {
     pub fn free_tet(&mut self, t: u32) {
         let slot = self.pages.write::<{ kind::TETS }>(t);
         *slot = [WORD_ZERO; 8];
-        slot[0] = u32_le::from_native(NONE);
-        slot[1] = u32_le::from_native(self.state.tets.free_head);
+        slot[0] = NONE.into();
+        slot[1] = self.state.tets.free_head.into();
         self.state.tets.free_head = t;
         self.state.tets.n_live -= 1;
     }
@@ -281,8 +281,8 @@ impl<P: Pages> Mesh<P> {
         let (record, word) = attribute_place(id);
         self.pages.append_up_to::<K>(record);
         let slot = self.pages.write::<K>(record);
-        slot[word] = u32_le::from_native(first);
-        slot[word + 1] = u32_le::from_native(second);
+        slot[word] = first.into();
+        slot[word + 1] = second.into();
     }
 
     /// Points `tet_of` of every vertex to its tetrahedron of smallest id: one pass in page order.
@@ -315,7 +315,7 @@ impl<P: Pages> Mesh<P> {
     pub fn set_scratch(&mut self, n: u32, word: u32) {
         let slot = sparse(n >> 3);
         self.pages.append_up_to::<{ kind::SCRATCH }>(slot);
-        self.pages.write::<{ kind::SCRATCH }>(slot)[n as usize & 7] = u32_le::from_native(word);
+        self.pages.write::<{ kind::SCRATCH }>(slot)[n as usize & 7] = word.into();
     }
 
     /// Forgets the scratch map.

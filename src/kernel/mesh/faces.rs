@@ -65,7 +65,7 @@ impl<P: Pages> Mesh<P> {
         let words = [a, b, c, f.label, input, (f.input >> 32) as u32, f.regions[0], f.regions[1]];
         let slot = self.pages.write::<{ kind::FACETS }>(sparse(n));
         for (to, word) in slot.iter_mut().zip(words) {
-            *to = u32_le::from_native(word);
+            *to = word.into();
         }
     }
 

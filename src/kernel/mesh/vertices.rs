@@ -138,7 +138,7 @@ impl<P: Pages> Mesh<P> {
     /// Tells a tetrahedron that has `v`. Insertion does not keep this up; flips do.
     #[inline]
     pub fn set_tet_of(&mut self, v: u32, t: u32) {
-        self.pages.write::<{ kind::VERTICES }>(v)[7] = u32_le::from_native(t);
+        self.pages.write::<{ kind::VERTICES }>(v)[7] = t.into();
     }
 
     /// Adds a vertex.
@@ -158,9 +158,9 @@ impl<P: Pages> Mesh<P> {
     pub fn free_vertex(&mut self, v: u32) {
         let slot = self.pages.write::<{ kind::VERTICES }>(v);
         *slot = [WORD_ZERO; 8];
-        slot[0] = u32_le::from_native(NONE);
-        slot[1] = u32_le::from_native(self.state.vertices.free_head);
-        slot[7] = u32_le::from_native(NONE);
+        slot[0] = NONE.into();
+        slot[1] = self.state.vertices.free_head.into();
+        slot[7] = NONE.into();
         self.state.vertices.free_head = v;
         self.state.vertices.n_live -= 1;
     }

@@ -151,7 +151,7 @@ impl SizeField {
         }
         let (cells, rest) = body.split_at(n_cells);
         let (news, values) = rest.split_at(n_leaves);
-        let leaves = scratch.list_within(Self::share_of(scratch.cap()));
+        let leaves = scratch.builder_within(Self::share_of(scratch.cap()));
         let (tree, values) = read_tree(cells, news, values, leaves)?;
         Ok(Self::from_parts(OctreeFrame { low, side }, beta, tree, values))
     }
@@ -214,7 +214,7 @@ fn read_tree(
     if !stack.is_empty() || leaves.len() != news.len() || values.next().is_some() {
         return Err(damaged("number of leaves", leaves.len(), news.len()));
     }
-    Ok((tree, leaves.done().fixed()))
+    Ok((tree, leaves.finish().freeze()))
 }
 
 fn damaged(what: &'static str, found: impl Display, expected: impl Display) -> SizingError {

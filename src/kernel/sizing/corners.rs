@@ -114,7 +114,7 @@ fn number_corners(
         }
     }
     let keys = keys.finish()?;
-    let mut of_leaf = scratch.column(n_leaves, [0u32; 8]);
+    let mut of_leaf = scratch.vec(n_leaves, [0u32; 8]);
     let mut n_corners = 0u32;
     let mut last = None;
     for key in keys {
@@ -163,7 +163,7 @@ fn find_hanging(
             }
         }
     }
-    let mut hanging = scratch.list();
+    let mut hanging = scratch.builder();
     let mut last = None;
     for next in found.finish()? {
         let next = next?;
@@ -172,7 +172,7 @@ fn find_hanging(
             last = Some(next.corner);
         }
     }
-    Ok(hanging.done())
+    Ok(hanging.finish())
 }
 
 /// The leaf at a neighboring cell, when it is larger.

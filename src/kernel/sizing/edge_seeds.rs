@@ -74,13 +74,13 @@ pub(super) fn edge_seeds(
     while stretch < STRETCH_MAX && along.count(triangles, stretch) > most {
         stretch *= 2.0;
     }
-    let mut list = scratch.list::<EdgeSeed>();
+    let mut list = scratch.builder::<EdgeSeed>();
     for triangle in triangles {
         along.take(triangle, stretch, &mut list);
     }
     match list.is_empty() {
         true => None,
-        false => Some(list.done().fixed()),
+        false => Some(list.finish().freeze()),
     }
 }
 

@@ -118,7 +118,7 @@ impl SizeField {
             beside: 0.0,
         };
         let tree = Tree::build(&seeds, &scaled, |tree| constraints.refine(tree))?;
-        let _held = scratch.hold(seeds.bytes() + tree.bytes());
+        let _held = scratch.lease(seeds.bytes() + tree.bytes());
         let mut corners = TreeCorners::new(&tree, scratch);
         let mut sizes = CornerSizes {
             tree: &tree,
@@ -160,7 +160,7 @@ impl SizeField {
         mut h: SpillVec<f32>,
         scratch: &ScratchSpace,
     ) -> Self {
-        let mut values = scratch.list_within(Self::share_of(scratch.cap()));
+        let mut values = scratch.builder_within(Self::share_of(scratch.cap()));
         for i in 0..corners.of_leaf.len() {
             let mut at_corners = [0.0; 8];
             for (value, c) in at_corners.iter_mut().zip(corners.of_leaf.get(i)) {
@@ -169,7 +169,7 @@ impl SizeField {
             values.push(at_corners);
         }
         drop((corners, h));
-        Self::from_parts(frame, beta, tree, values.done().fixed())
+        Self::from_parts(frame, beta, tree, values.finish().freeze())
     }
 
     /// Bytes that values take of a scratch space of `bytes`, at most.

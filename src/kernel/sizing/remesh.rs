@@ -145,7 +145,7 @@ fn at_corners(
     scratch: &ScratchSpace,
     size: &(dyn Fn(Point) -> Result<f64, SizingError> + Sync),
 ) -> Result<SpillVec<f32>, SizingError> {
-    let mut h = scratch.column(corners.n_corners, 0.0f32);
+    let mut h = scratch.vec(corners.n_corners, 0.0f32);
     let size_at = |at: [u32; 3]| {
         let [x, y, z] = at.map(f64::from);
         size(Point::new(x, y, z) * (1.0 / f64::from(LATTICE)))
@@ -177,7 +177,7 @@ fn slope_factor(
     beta: f64,
     scratch: &ScratchSpace,
 ) -> SpillVec<f32> {
-    let mut slope_factor = scratch.column(corners.of_leaf.len(), 1.0f32);
+    let mut slope_factor = scratch.vec(corners.of_leaf.len(), 1.0f32);
     for (i, leaf) in tree.leaves().enumerate() {
         let h = corners.of_leaf.get(i).map(|id| f64::from(current.get(id as usize)));
         let slope = PAIRS.iter().fold(0.0f64, |most, &(a, b, distance2)| {

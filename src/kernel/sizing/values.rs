@@ -75,7 +75,7 @@ impl CornerSizes<'_> {
         }
         let (at_seeds, _) = self.gather(|seeds, v| seeds.slope_factor(v), false);
         let mut at_corners = self.fill(at_seeds);
-        let mut by_leaf = self.scratch.column(self.corners.of_leaf.len(), 1.0f32);
+        let mut by_leaf = self.scratch.vec(self.corners.of_leaf.len(), 1.0f32);
         for i in 0..by_leaf.len() {
             let ids = self.corners.of_leaf.get(i);
             let sum: f64 = (ids.iter()).map(|&id| f64::from(at_corners.get(id as usize))).sum();
@@ -101,8 +101,8 @@ impl CornerSizes<'_> {
             by_leaf.push(LeafSeed { leaf, seed: v }).or_raise();
         }
         let by_leaf = by_leaf.finish().or_raise();
-        let mut sums = self.scratch.column(n, [0.0f64; 2]);
-        let mut nearest = with_nearest.then(|| self.scratch.column(n, f64::INFINITY));
+        let mut sums = self.scratch.vec(n, [0.0f64; 2]);
+        let mut nearest = with_nearest.then(|| self.scratch.vec(n, f64::INFINITY));
         for next in by_leaf {
             let LeafSeed { seed, .. } = next.or_raise();
             let (at, h) = (seeds.at(seed), value(seeds, seed));
@@ -140,7 +140,7 @@ impl CornerSizes<'_> {
                 }
             }
         }
-        let mut means = self.scratch.column(n, f32::INFINITY);
+        let mut means = self.scratch.vec(n, f32::INFINITY);
         for i in 0..n {
             let [sum, weight] = sums.get(i);
             if weight > 0.0 {
@@ -161,20 +161,20 @@ impl CornerSizes<'_> {
             }
         }
         // Leaves with a corner to fill, as (leaf, weight): a cell's edge conducts as its width.
-        let mut open = self.scratch.list::<[u32; 2]>();
+        let mut open = self.scratch.builder::<[u32; 2]>();
         for (i, leaf) in self.tree.leaves().enumerate() {
             let ids = self.corners.of_leaf.get(i);
             if ids.iter().any(|&c| is_open.contains(c as usize)) {
                 open.push([i as u32, (leaf.side() as f32).to_bits()]);
             }
         }
-        let mut open = open.done();
+        let mut open = open.finish();
         if open.is_empty() {
             return h;
         }
-        let mut sums = self.scratch.column(h.len(), [0.0f32; 2]);
+        let mut sums = self.scratch.vec(h.len(), [0.0f32; 2]);
         // Values of the round before.
-        let mut before = self.scratch.column(h.len(), 0.0f32);
+        let mut before = self.scratch.vec(h.len(), 0.0f32);
         let (mut smooth, mut over) = (0, 1.0);
         while smooth < FILL_ROUNDS {
             check_cancelled();
@@ -231,7 +231,7 @@ impl CornerSizes<'_> {
         mut nearest: SpillVec<f64>,
     ) -> [SpillVec<f32>; 2] {
         [-1.0f32, 1.0].map(|sign| {
-            let mut cone = self.scratch.column(gathered.len(), f32::INFINITY);
+            let mut cone = self.scratch.vec(gathered.len(), f32::INFINITY);
             for i in 0..cone.len() {
                 let h = gathered.get(i);
                 if h.is_finite() {

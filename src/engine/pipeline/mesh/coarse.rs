@@ -108,7 +108,7 @@ pub fn triangulate<P: Pages>(
     let mut kernel = Kernel::default();
     let mut hint = enclose(mesh, &bounds);
     let total = surface.points.len();
-    let mut number = scratch.column(total, 0u32);
+    let mut number = scratch.vec(total, 0u32);
     for (k, record) in order.enumerate() {
         let i = record.or_raise().id;
         let p = surface.points[i as usize];

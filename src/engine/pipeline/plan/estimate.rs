@@ -167,7 +167,7 @@ fn prepare_in(
     };
     let enclosed = || {
         // Counted before the tree takes its share of what is left.
-        let _held = scratch.hold(VOLUMES_TRIANGLE * surface.n_triangles());
+        let _held = scratch.lease(VOLUMES_TRIANGLE * surface.n_triangles());
         let seeker = Seeker::with_filter(surface, scratch, |_| true);
         let volumes = Volumes::new_in(&seeker, scratch);
         (seeker, volumes)
@@ -181,11 +181,11 @@ fn prepare_in(
     } else {
         // What building takes is given back before the surface's tree is built.
         let early = built(&[])?;
-        let _early = scratch.hold(early.0.octree_bytes());
+        let _early = scratch.lease(early.0.octree_bytes());
         (Some(early), enclosed())
     };
-    let _early = (early.as_ref()).map(|(field, _)| scratch.hold(field.octree_bytes()));
-    let _volumes = scratch.hold(OF_SIDE * surface.n_triangles());
+    let _early = (early.as_ref()).map(|(field, _)| scratch.lease(field.octree_bytes()));
+    let _volumes = scratch.lease(OF_SIDE * surface.n_triangles());
     let chosen = chosen(&seeker, &volumes, options)?;
     refuse_outer_sheets(surface, &volumes, &chosen)?;
     refuse_outer_points(surface, &seeker, &volumes, &chosen)?;
