@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Asks the runs it was given to, and no others, to end soon. Clones are the same token; [`CancelToken::reset`] makes it usable again.
 ///
 /// ```
+/// # use tetdb_base::storage as tetdb;
 /// let token = tetdb::CancelToken::new();
 /// let other = token.clone();
 /// std::thread::spawn(move || other.cancel()).join().unwrap();
