@@ -56,6 +56,6 @@ pub use seeker::{Crossing, Seeker};
 pub use split::{SplitReport, split};
 pub use triangles::{Note, NoteKind, SourceFile, Surface, VolumePoints};
 pub use validate::{Validation, validate, validate_with};
-pub use volumes::{OUTSIDE, VOLUMES_TRIANGLE, Volumes, Wall};
+pub use volumes::{EnclosedVolumes, OUTSIDE, VOLUMES_TRIANGLE, Wall};
 pub use weld::SurfaceBuilder;
 pub use weld_near::weld_near;

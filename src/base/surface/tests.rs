@@ -419,7 +419,7 @@ fn a_room_too_small_changes_nothing() {
         assert_eq!(a, b);
         let seeker = Seeker::with_filter(&a, &narrow, |_| true);
         let wide = Seeker::new(&a);
-        assert_eq!(Volumes::new_in(&seeker, &narrow), Volumes::new(&wide));
+        assert_eq!(EnclosedVolumes::new_in(&seeker, &narrow), EnclosedVolumes::new(&wide));
         for k in 0..500 {
             let p = Point::new(f64::from(k * 7 % 61), f64::from(k * 11 % 61), 0.3);
             assert_eq!(seeker.distance(p, 9.0), wide.distance(p, 9.0));

@@ -36,7 +36,7 @@ pub struct Wall {
 /// Invariant: volume 0 is the unbounded one; the others are numbered by the first triangle at each, as the regions of the mesh are.
 /// Two triangles that are the two sides of one wall are both listed, with the same volumes.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Volumes {
+pub struct EnclosedVolumes {
     /// For each triangle: the volume in front, the volume behind.
     pub of_side: Vec<[u32; 2]>,
     /// Number of volumes, the unbounded one included.
@@ -45,8 +45,8 @@ pub struct Volumes {
     pub angles: Vec<f64>,
 }
 
-impl Volumes {
-    /// [`Volumes::new_in`] in memory.
+impl EnclosedVolumes {
+    /// [`EnclosedVolumes::new_in`] in memory.
     pub fn new(seeker: &Seeker) -> Self {
         Self::new_in(seeker, &ScratchSpace::boundless())
     }
@@ -262,7 +262,7 @@ fn lines(surface: &Surface, facets: &Facets, shells: &mut Groups) -> Vec<(Point,
 }
 
 /// The groups of sides with numbers, in the place of their roots: both at once would be the most that is held.
-fn numbered(surface: &Surface, sides: Groups) -> Volumes {
+fn numbered(surface: &Surface, sides: Groups) -> EnclosedVolumes {
     let mut of_side = sides.into_roots();
     let outside = of_side.pop().unwrap_or(OUTSIDE);
     let mut numbers = BTreeMap::from([(outside, OUTSIDE)]);
@@ -279,7 +279,7 @@ fn numbered(surface: &Surface, sides: Groups) -> Volumes {
     }
     let of_side = bytemuck::allocation::cast_slice_box(of_side.into_boxed_slice());
     let n_volumes = numbers.len();
-    Volumes {
+    EnclosedVolumes {
         of_side: of_side.into_vec(),
         n_volumes: n_volumes as u32,
         angles: vec![0.0; n_volumes],
@@ -330,7 +330,7 @@ mod tests {
         for inward in [false, true] {
             let surface = cubes(&[([0.0; 3], 3.0, false), ([1.0; 3], 1.0, inward)]);
             let seeker = Seeker::new(&surface);
-            let volumes = Volumes::new(&seeker);
+            let volumes = EnclosedVolumes::new(&seeker);
             assert_eq!(volumes.n_volumes, 3);
             assert!(volumes.of_side[..12].iter().all(|v| *v == [0, 1]));
             let inner = if inward { [2, 1] } else { [1, 2] };
@@ -357,7 +357,7 @@ mod tests {
         single.triangles.drain(12..14);
         for surface in [whole, single] {
             let seeker = Seeker::new(&surface);
-            let volumes = Volumes::new(&seeker);
+            let volumes = EnclosedVolumes::new(&seeker);
             assert_eq!(volumes.n_volumes, 3);
             let walls = volumes.walls();
             let pairs: Vec<(u32, u32)> = walls.keys().copied().collect();
@@ -383,7 +383,7 @@ mod tests {
             surface.labels.push(0);
         }
         surface.sheets_from(n as usize);
-        let volumes = Volumes::new(&Seeker::new(&surface));
+        let volumes = EnclosedVolumes::new(&Seeker::new(&surface));
         assert_eq!(volumes.n_volumes, 3);
         assert_eq!(volumes.of_side[n as usize..], [[2; 2], [1; 2], [0; 2]]);
     }
@@ -392,7 +392,7 @@ mod tests {
     fn an_open_surface_encloses_nothing() {
         let mut surface = cubes(&[([0.0; 3], 1.0, false)]);
         surface.triangles.pop();
-        assert_eq!(Volumes::new(&Seeker::new(&surface)).n_volumes, 1);
+        assert_eq!(EnclosedVolumes::new(&Seeker::new(&surface)).n_volumes, 1);
     }
 
     #[test]

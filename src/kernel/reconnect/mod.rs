@@ -7,9 +7,8 @@
 //! Invariants of every operation: neighbors are mutual; required bits stay on the outer faces; required-edge flags
 //! follow their edges; the new tetrahedra inherit region and the other flags; `tet_of` of every vertex involved names a
 //! new tetrahedron; ids are used again in the order gathered, so the result depends on the call alone. No operation
-//! changes a required face. A required edge shows in [`Shell::required`] if a required face has it, and in
-//! [`Shell::edge_is_required`] by its flag. [`remove_edge`] asserts the first. The second costs the attribute page.
-//! Only callers that work while edges are required without faces (boundary recovery) need it.
+//! changes a required face. A required edge shows in [`Shell::required`] if a required face has it, which [`remove_edge`]
+//! asserts; an edge that is required without faces has a flag in the attribute of its tetrahedra.
 
 mod attribute;
 mod ball;

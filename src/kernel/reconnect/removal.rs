@@ -52,12 +52,12 @@ pub fn remove_edge<P: Pages>(
             // The lower tetrahedron (i l j a) has the faces of l i and i j the other way around.
             let face_low = (3 - face) % 3;
             match edge {
-                Side::Triangle(other, other_face) => {
+                RingSide::Triangle(other, other_face) => {
                     upper.neighbor[face] = FaceRef::new(new_tets[other], other_face);
                     let other_low = (3 - other_face) % 3;
                     lower.neighbor[face_low] = FaceRef::new(new_tets[n_new + other], other_low);
                 }
-                Side::Outer(m) => {
+                RingSide::Outer(m) => {
                     let (record, [a, b, ..]) = (&shell.records[m], shell.locals[m]);
                     outer(mesh, record, a.into(), &mut upper, face, up);
                     outer(mesh, record, b.into(), &mut lower, face_low, low);
@@ -77,16 +77,16 @@ pub fn remove_edge<P: Pages>(
 }
 
 /// The other side of a directed edge of a ring triangle.
-enum Side {
+enum RingSide {
     /// Tetrahedron of the shell whose outer faces these are.
     Outer(usize),
     /// Another triangle, and the number of its upper face there.
     Triangle(usize, usize),
 }
 
-fn side(shell: &Shell, triangles: &[[u8; 3]], x: usize, y: usize) -> Side {
+fn side(shell: &Shell, triangles: &[[u8; 3]], x: usize, y: usize) -> RingSide {
     if (x + 1) % shell.n_ring() == y {
-        return Side::Outer(x);
+        return RingSide::Outer(x);
     }
     let found = triangles.iter().enumerate().find_map(|(k, t)| {
         let [i, j, l] = t.map(usize::from);
@@ -95,7 +95,7 @@ fn side(shell: &Shell, triangles: &[[u8; 3]], x: usize, y: usize) -> Side {
     });
     let (k, face) =
         found.unwrap_or_else(|| panic!("ring of {:?}: chord {x} {y} has one triangle", shell.ring));
-    Side::Triangle(k, face)
+    RingSide::Triangle(k, face)
 }
 
 /// Puts the outer face `old` of a shell tetrahedron on face `face` of the new one.

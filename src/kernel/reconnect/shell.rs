@@ -1,6 +1,5 @@
 //! All tetrahedra around an edge.
 
-use super::attribute::EDGE_FLAGS;
 use crate::mesh::anatomy::EDGES;
 use crate::mesh::{Mesh, Tet};
 use tetdb_base::geom::Point;
@@ -154,13 +153,6 @@ impl Shell {
     #[inline]
     pub fn n_ring(&self) -> usize {
         self.ring.len()
-    }
-
-    /// Returns whether the edge itself is flagged as required; reads one attribute.
-    pub fn edge_is_required<P: Pages>(&self, mesh: &mut Mesh<P>) -> bool {
-        let (_, flags) = mesh.tet_attribute(self.tets[0]);
-        let [i, j, ..] = self.locals[0];
-        flags & EDGE_FLAGS & 1 << crate::mesh::anatomy::EDGE_OF[usize::from(i)][usize::from(j)] != 0
     }
 
     /// Positions of a, b and of the ring's vertices (in `ring_points`).

@@ -14,7 +14,7 @@ use super::field::SizeField;
 use super::tree::{DEPTH, LEAF, Leaf, octant_of};
 use tetdb_base::geom::{Point, mix};
 use tetdb_base::storage::{for_each_mut, parallel, spare_threads};
-use tetdb_base::surface::{Seeker, Volumes};
+use tetdb_base::surface::{EnclosedVolumes, Seeker};
 
 /// Cells examined, at most. Eight times as many change the sum by 0.2 %, and took half of the time of small runs.
 const CELLS_MAX: usize = 1 << 13;
@@ -54,7 +54,7 @@ pub struct Domain<'a> {
     /// Finds where points lie relative to the surface.
     pub seeker: &'a Seeker<'a>,
     /// The volumes of the surface.
-    pub volumes: &'a Volumes,
+    pub volumes: &'a EnclosedVolumes,
     /// By volume.
     pub filled: &'a [bool],
 }

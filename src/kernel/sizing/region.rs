@@ -4,7 +4,7 @@ use super::SizingError;
 use super::constraint::SizeConstraint;
 use tetdb_base::geom::Point;
 use tetdb_base::storage::ScratchSpace;
-use tetdb_base::surface::{Seeker, Volumes};
+use tetdb_base::surface::{EnclosedVolumes, Seeker};
 
 /// Cells at the border of a region are at most this many of its lengths wide.
 const BORDER_CELLS: f64 = 2.0;
@@ -12,7 +12,7 @@ const BORDER_CELLS: f64 = 2.0;
 /// A length inside a region; away from it lengths grow as the gradation allows.
 pub struct Region<'a> {
     seeker: &'a Seeker<'a>,
-    volumes: &'a Volumes,
+    volumes: &'a EnclosedVolumes,
     /// By volume.
     is_here: Vec<bool>,
     /// Sees the triangles around the region.
@@ -25,7 +25,7 @@ impl<'a> Region<'a> {
     /// Length `h` in the volumes that `is_here` names, for a field of slope `beta`. A scratch file that fails unwinds.
     pub fn new(
         seeker: &'a Seeker<'a>,
-        volumes: &'a Volumes,
+        volumes: &'a EnclosedVolumes,
         is_here: Vec<bool>,
         h: f64,
         beta: f64,

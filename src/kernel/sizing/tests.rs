@@ -4,7 +4,7 @@ use super::*;
 use crate::samples::SampleSpec;
 use tetdb_base::geom::Point;
 use tetdb_base::storage::ScratchSpace;
-use tetdb_base::surface::{Seeker, Surface, Volumes};
+use tetdb_base::surface::{EnclosedVolumes, Seeker, Surface};
 
 /// A small generator for test points; failures print the seed.
 struct Dice(u64);
@@ -177,7 +177,7 @@ fn expected(surface: &(Vec<Point>, Vec<[u32; 3]>), field: &SizeField) -> f64 {
     let surface =
         Surface { points: surface.0.clone(), triangles: surface.1.clone(), ..Surface::default() };
     let seeker = Seeker::with_filter(&surface, &ScratchSpace::boundless(), |_| true);
-    let volumes = Volumes::new(&seeker);
+    let volumes = EnclosedVolumes::new(&seeker);
     let mut filled = vec![true; volumes.n_volumes as usize];
     filled[tetdb_base::surface::OUTSIDE as usize] = false;
     let domain = Domain { seeker: &seeker, volumes: &volumes, filled: &filled };
@@ -374,7 +374,7 @@ fn with_domain<T>(surface: &(Vec<Point>, Vec<[u32; 3]>), ask: impl FnOnce(&Domai
         .collect();
     welded.triangles = surface.1.iter().map(|t| t.map(|v| ids[v as usize])).collect();
     let seeker = Seeker::new(&welded);
-    let volumes = Volumes::new(&seeker);
+    let volumes = EnclosedVolumes::new(&seeker);
     let filled: Vec<bool> = (0..volumes.n_volumes).map(|v| v > 0).collect();
     assert_eq!(filled, [false, true]);
     ask(&Domain { seeker: &seeker, volumes: &volumes, filled: &filled })

@@ -8,7 +8,7 @@ use super::regions::{refuse_outer_points, refuse_outer_sheets, region_sizes};
 use super::{MEMORY_MIN, Options, Plan};
 use crate::pipeline::error::PipelineError;
 use tetdb_base::storage::{ScratchSpace, attempt, join};
-use tetdb_base::surface::{OUTSIDE, Seeker, Surface, VOLUMES_TRIANGLE, Volumes};
+use tetdb_base::surface::{EnclosedVolumes, OUTSIDE, Seeker, Surface, VOLUMES_TRIANGLE};
 use tetdb_kernel::boundary::{BoundaryError, Filled, RegionPolicy};
 use tetdb_kernel::optimize::Mode;
 use tetdb_kernel::sizing::{
@@ -169,7 +169,7 @@ fn prepare_in(
         // Counted before the tree takes its share of what is left.
         let _held = scratch.lease(VOLUMES_TRIANGLE * surface.n_triangles());
         let seeker = Seeker::with_filter(surface, scratch, |_| true);
-        let volumes = Volumes::new_in(&seeker, scratch);
+        let volumes = EnclosedVolumes::new_in(&seeker, scratch);
         (seeker, volumes)
     };
     let has_room = scratch.available() >= (ROOM_FOR_BOTH * surface.n_triangles()) as u64;
@@ -203,7 +203,11 @@ fn prepare_in(
 }
 
 /// The volumes that are filled. Errors: seeds that say what cannot be.
-fn chosen(seeker: &Seeker, volumes: &Volumes, options: &Options) -> Result<Filled, PipelineError> {
+fn chosen(
+    seeker: &Seeker,
+    volumes: &EnclosedVolumes,
+    options: &Options,
+) -> Result<Filled, PipelineError> {
     let rule = options.region_rule()?;
     let reach = ON_SURFACE * seeker.surface().bounds().diagonal();
     for seed in &rule.seeds {

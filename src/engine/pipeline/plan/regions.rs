@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::pipeline::error::PipelineError;
 use tetdb_base::storage::ScratchSpace;
-use tetdb_base::surface::{Seeker, Surface, Volumes};
+use tetdb_base::surface::{EnclosedVolumes, Seeker, Surface};
 use tetdb_kernel::boundary::Filled;
 use tetdb_kernel::sizing::{Domain, Region, RegionSize, SizeOptions, SizingError};
 
@@ -80,7 +80,7 @@ fn unknown(which: &str, surface: &Surface, n_regions: usize) -> SizingError {
 /// Errors: a sheet, or an edge of a wire, where nothing is filled.
 pub(super) fn refuse_outer_sheets(
     surface: &Surface,
-    volumes: &Volumes,
+    volumes: &EnclosedVolumes,
     chosen: &Filled,
 ) -> Result<(), PipelineError> {
     let is_outer =
@@ -110,7 +110,7 @@ pub(super) fn refuse_outer_sheets(
 pub(super) fn refuse_outer_points(
     surface: &Surface,
     seeker: &Seeker,
-    volumes: &Volumes,
+    volumes: &EnclosedVolumes,
     chosen: &Filled,
 ) -> Result<(), PipelineError> {
     let wires = &surface.embedded;
