@@ -17,7 +17,7 @@ pub fn mix(v: u64) -> u64 {
 /// Increment of the state of SplitMix64.
 pub const STEP: u64 = 0x9E37_79B9_7F4A_7C15;
 
-/// Spreads numbers over the places of a table; they are the program's own, not an adversary's.
+/// A hasher for the program's own numbers, such as ids; it does not resist an adversary.
 #[derive(Default)]
 pub struct IdHasher(u64);
 

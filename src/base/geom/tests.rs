@@ -30,13 +30,13 @@ fn hard_points(numbers: &mut RandomNumbers, k: usize) -> [Point; 5] {
     let mut p = match k % 8 {
         // On a small grid: exact ties of all kinds.
         0 => [0; 5].map(|_| (numbers.point() * 4.0).round()),
-        // In the plane of the first three, as well as doubles can say.
+        // In the plane of the first three, up to rounding.
         1 | 2 => {
             let mut mix = || a + (b - a) * numbers.next() + (c - a) * numbers.next();
             let (d, e) = (mix(), mix());
             [a, b, c, d, e]
         }
-        // On one sphere, as well as doubles can say.
+        // On one sphere, up to rounding.
         3 | 4 => [0; 5].map(|_| a + numbers.point().normalize_or_zero() * 0.7),
         // On a line.
         5 => [0; 5].map(|_| a + (b - a) * numbers.next()),
@@ -71,7 +71,7 @@ fn signs_are_those_of_exact_numbers() {
         assert_eq!(sign(insphere(a, b, c, d, e)), truth, "{p:?}");
         seen[1][(truth as i8 + 1) as usize] += 1;
     }
-    // All answers were asked for.
+    // All cases were tested.
     let least = cases() as u32 / 50;
     assert!(seen.iter().flatten().all(|&n| n > least), "{seen:?}");
 }

@@ -1,6 +1,6 @@
 //! The shape of one tetrahedron: its quality q, and the least q that its required faces allow.
 //!
-//! Knows four points, no mesh.
+//! Uses four points, no mesh.
 
 mod anatomy;
 mod bound;

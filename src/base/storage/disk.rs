@@ -33,11 +33,11 @@ pub trait Disk: Debug + Send + Sync {
     fn create_stream(&self, path: &Path) -> io::Result<Box<dyn Write>>;
     /// Opens a file to be read once from its beginning.
     fn open_stream(&self, path: &Path) -> io::Result<Box<dyn Read + Send + Sync>>;
-    /// Makes the content of a closed file last.
+    /// Syncs the content of a closed file.
     fn sync_file(&self, path: &Path) -> io::Result<()>;
-    /// Makes names in a folder last: of files that were created, renamed and removed.
+    /// Syncs the names in a folder: of files that were created, renamed and removed.
     fn sync_dir(&self, dir: &Path) -> io::Result<()>;
-    /// Makes a folder. Errors: its parent is missing, or it is there already.
+    /// Creates a folder. Errors: its parent is missing, or it exists.
     fn create_dir(&self, dir: &Path) -> io::Result<()>;
     /// Removes a folder with all that is in it.
     fn remove_dir_all(&self, dir: &Path) -> io::Result<()>;

@@ -81,7 +81,7 @@ impl DiskPath {
         }
     }
 
-    /// Makes the folder, and those above it that are missing, to last.
+    /// Creates the folder and its missing parents, durably.
     pub fn create_dir_all(&self) -> Result<(), StorageError> {
         self.at_path(self.create_dirs())
     }
@@ -128,12 +128,12 @@ impl DiskPath {
         }
     }
 
-    /// Makes the content of the closed file last.
+    /// Syncs the content of the closed file.
     pub fn sync_file(&self) -> Result<(), StorageError> {
         self.at_path(self.disk.sync_file(&self.path))
     }
 
-    /// Makes the names in the folder last.
+    /// Syncs the names in the folder.
     pub fn sync_dir(&self) -> Result<(), StorageError> {
         self.at_path(self.disk.sync_dir(&self.path))
     }

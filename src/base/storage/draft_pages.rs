@@ -16,7 +16,7 @@ pub struct DraftPages<'a> {
     /// Pages appended to each kind.
     appended: [u32; kind::ALL.len()],
     met: Vec<u32>,
-    /// Tetrahedra met last, each at a place its id says.
+    /// Tetrahedra met last, each in the slot of its id.
     met_last: Vec<u32>,
 }
 

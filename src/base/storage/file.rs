@@ -461,7 +461,7 @@ mod tests {
         Ok(())
     }
 
-    /// Of a damaged tree every read says that it is damaged, not only the first one.
+    /// Every read of a damaged tree reports the damage, not only the first one.
     #[test]
     fn damage_stays_damage() -> Result<(), Box<dyn std::error::Error>> {
         let dir = tempfile::tempdir()?;

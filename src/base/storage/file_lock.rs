@@ -21,7 +21,8 @@ use serde::{Deserialize, Serialize};
 
 /// Others that come and go with their file while it is opened; each costs one attempt.
 const ATTEMPTS: u32 = 100;
-/// Without locks two may take over a dead process's file at once: after this time the file says which of them has it.
+/// Without locks two processes may take over a dead process's file at once: after this time the file names the one that
+/// has it.
 const SETTLED_AFTER: Duration = Duration::from_millis(200);
 
 /// Between two times that a holder renews its file.
@@ -76,7 +77,7 @@ impl Renewed {
         // The file, and with it its lock, is closed when the thread ends.
         let renew = move || {
             while stopped.recv_timeout(RENEWED_EVERY) == Err(RecvTimeoutError::Timeout) {
-                // Who cannot say that it lives still does.
+                // A failure to renew does not end the lock.
                 let _ = file.set_modified(SystemTime::now());
             }
         };

@@ -8,7 +8,7 @@ pub(super) const DIRTY: u32 = 1 << 29;
 const FRAME_MASK: u32 = DIRTY - 1;
 /// An entry with these flags can be read at once, and with [`DIRTY`] changed at once.
 const READABLE: u32 = RESIDENT | REFERENCED;
-/// Entries of pages that are not resident: in the file the step began with, in the file it makes, or from here on in the spill.
+/// Entries of pages that are not resident: in the base file, in the output file, or from here on in the scratch file.
 pub(super) const IN_BASE: u32 = 0;
 pub(super) const IN_OUTPUT: u32 = 1;
 pub(super) const IN_SPILL: u32 = 2;

@@ -122,7 +122,7 @@ impl<T: Pod> SpillVec<T> {
         }
     }
 
-    /// Makes `value` element `i`.
+    /// Sets element `i` to `value`.
     #[inline(always)]
     pub fn set(&mut self, i: usize, value: T) {
         match &mut self.place {

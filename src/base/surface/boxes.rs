@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use crate::geom::{Aabb, HilbertFrame, Point};
 use crate::storage::{FrozenSpillVec, KeyedId, OrRaise, ScratchSpace, parallel};
 
-/// Things in one leaf.
+/// Items in one leaf.
 const LEAF: usize = 4;
 /// Children of one node.
 const ARITY: usize = 4;
@@ -13,7 +13,7 @@ const ARITY: usize = 4;
 /// Keys and boxes found side by side.
 const AT_ONCE: usize = 1 << 16;
 
-/// Boxes of things in Hilbert order of their middles, and of groups of groups of them.
+/// Boxes of items in Hilbert order of their middles, and of nested groups of them.
 ///
 /// Memory: about 52 bytes per item and a third of that for the tree, in memory or in scratch files.
 #[derive(Clone, Debug)]
@@ -30,7 +30,7 @@ impl BoxTree {
     /// Children of a node.
     pub const ARITY: usize = ARITY;
 
-    /// A tree over those of `n` things within `bounds` that `keep` accepts. A scratch file that fails unwinds.
+    /// A tree over the items of `0..n` within `bounds` that `keep` accepts. A scratch file that fails unwinds.
     pub fn new(
         bounds: &Aabb,
         n: u32,
@@ -123,7 +123,7 @@ impl BoxTree {
         node * ARITY..((node + 1) * ARITY).min(self.levels[level - 1].len())
     }
 
-    /// Places of a leaf's things in curve order.
+    /// Positions of a leaf's items in curve order.
     pub fn members(&self, leaf: usize) -> std::ops::Range<usize> {
         leaf * LEAF..((leaf + 1) * LEAF).min(self.boxes.len())
     }

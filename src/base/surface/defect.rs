@@ -112,7 +112,7 @@ impl SurfaceError {
     }
 }
 
-/// One thing that makes a surface unfit to bound volumes, with the triangles (input ids) it is about.
+/// A defect that makes a surface unfit to bound volumes, with its triangles (input ids).
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Defect {
     /// The surface has no triangle.

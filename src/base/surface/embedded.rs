@@ -53,7 +53,7 @@ impl Surface {
 
     /// Adds edges and points with their support triangles; vertices with the same coordinates become one.
     ///
-    /// Labels are called as those of sheets: see [`Surface::embed`].
+    /// Labels are named as those of sheets: see [`Surface::embed`].
     ///
     /// # Errors
     /// [`SurfaceError::Embed`] with the place; [`SurfaceError::TooLarge`].

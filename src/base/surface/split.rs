@@ -117,7 +117,7 @@ struct Splitter {
 type Ordered = (u64, Reverse<EdgeKey>);
 
 impl Splitter {
-    /// Knows the edges of those triangles whose parents `is_meant`.
+    /// A splitter over the edges of the triangles whose parents `is_meant` accepts.
     fn new(surface: Surface, parent: Vec<u32>, is_meant: impl Fn(u32) -> bool) -> Self {
         let mut around: IdMap<EdgeKey, Vec<u32>> = IdMap::default();
         let triangles = (0u32..).zip(&surface.triangles);

@@ -154,7 +154,7 @@ impl SurfaceBuilder {
         self.triangle(ids, label)
     }
 
-    /// Says something of the volume around a point.
+    /// Adds a seed of the volume around a point.
     pub fn seed(&mut self, seed: Seed) {
         self.surface.seeds.push(seed);
     }

@@ -10,7 +10,7 @@ use tetdb_base::geom::HilbertFrame;
 use tetdb_base::storage::{Pages, Sorter, StorageError, check_cancelled, sort_record};
 use tetdb_schema::page::NONE;
 
-/// A child on its way.
+/// A child under construction.
 pub(super) struct ChildBuilder<'a, P: Pages, Q: Pages, R: Pages> {
     pub host: &'a mut Mesh<P>,
     pub core: &'a mut Mesh<Q>,

@@ -1,6 +1,6 @@
 //! The interface: a minimum cut of the cutting zone, then moves with costs that are no sums over faces.
 //!
-//! SideLabels by the side of the middle give 3.85 faces per h² of the plane, many tetrahedra with two or three of them and pinched
+//! Labels by the side of the middle give 3.85 faces per h² of the plane, many tetrahedra with two or three of them and pinched
 //! vertices. The minimum cut of the dual graph is the best of all interfaces for any cost that is a sum over faces:
 //! 2.8 faces per h². Over-constrained tetrahedra and pinched vertices depend on several faces at once; they are reduced by
 //! moving all free tetrahedra around an interface vertex to one side, or a single tetrahedron, as long as that gains.
@@ -222,7 +222,7 @@ fn pull<P: Pages>(core: &mut Mesh<P>, tet: &Tet, surface: &impl CuttingSurface) 
     if away < 0.0 { [cost, 0] } else { [0, cost] }
 }
 
-/// SideLabels a strip as its graph was cut.
+/// Labels a strip by the sides of its cut graph.
 fn label_strip(labels: &mut SideLabels, strip: &[u32], graph: &Graph) {
     for (node, &t) in strip.iter().enumerate() {
         debug_assert!(labels.is_free(t));

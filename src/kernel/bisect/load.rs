@@ -43,7 +43,7 @@ pub type SizeFn<'a> = dyn Fn(Point) -> f64 + Sync + 'a;
 /// Corners of a tetrahedron and the sizes there.
 type Sized4 = ([Point; 4], [f64; 4]);
 
-/// Adds every piece of every tetrahedron to the sum of its lane; `empty` makes a sum.
+/// Adds every piece of every tetrahedron to the sum of its lane; `empty` creates a sum.
 ///
 /// `see` is shown the corners of all tetrahedra. Which lane a tetrahedron goes to, and in which order, depends on the mesh alone; the caller adds the lanes up in order.
 pub fn tally<P: Pages, T: Send>(

@@ -28,10 +28,10 @@ const GAIN: f64 = 0.1;
 /// Choices of the plane.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum PlaneChoice {
-    /// As the head of this module says.
+    /// As described at the head of this module.
     #[default]
     Load,
-    /// As the paper says: centroids of the mesh, unweighted; the axis of the largest moment; placed by load.
+    /// As in the paper: centroids of the mesh, unweighted; the axis of the largest moment; placed by load.
     Centroids,
     /// The given plane.
     Given(Plane),

@@ -24,7 +24,7 @@ pub(super) struct SideLabels {
 }
 
 impl SideLabels {
-    /// SideLabels every tetrahedron by the side of its middle; lists those of the cutting zone, in id order.
+    /// Labels every tetrahedron by the side of its middle; lists those of the cutting zone, in id order.
     ///
     /// At the core boundary the side is that of the core boundary face: the tetrahedron beyond has all its vertices there.
     pub fn new<P: Pages>(
@@ -187,8 +187,8 @@ const LAYERS_MAX: u32 = 3;
 /// The least number of tetrahedra, from face to face, between the interface and the first with a vertex out of the refined zone;
 /// [`LAYERS_MAX`] stands for more.
 ///
-/// The way leads through the core and over its core boundary into the host. Effects: uses the core's scratch map. Where no interface is, there is no
-/// such number: `None`.
+/// The walk leads through the core and over its boundary into the host. Effects: uses the core's scratch map. `None` if
+/// there is no interface.
 pub(super) fn layers_least<P: Pages, Q: Pages>(
     host: &mut Mesh<P>,
     core: &mut Mesh<Q>,
@@ -211,7 +211,7 @@ pub(super) fn layers_least<P: Pages, Q: Pages>(
     if layer.is_empty() {
         return None;
     }
-    // Tetrahedra of the host in the layer at hand and the one before: a way never leads farther back.
+    // Tetrahedra of the host in the current layer and the one before: a walk never leads farther back.
     let (mut beyond, mut before) = (BTreeSet::new(), BTreeSet::new());
     for n in 1..=LAYERS_MAX {
         check_cancelled();
@@ -237,7 +237,7 @@ pub(super) fn layers_least<P: Pages, Q: Pages>(
                 return Some(n - 1);
             }
             let onward = tet.neighbor.into_iter().filter(|across| across.exists());
-            // Back into the core the way is shorter.
+            // Back into the core the walk is shorter.
             for across in onward.map(FaceRef::tet) {
                 if !beyond.contains(&across)
                     && !before.contains(&across)

@@ -10,10 +10,10 @@ pub trait CuttingSurface {
     /// Unit normal at `p`, pointing to the high side.
     fn normal(&self, p: Point) -> Point;
 
-    /// The parameters between which the way from `a` to `b` may be nearer than `width`; `None` when it nowhere is.
+    /// The parameters between which the segment from `a` to `b` may be nearer than `width`; `None` if it never is.
     fn band(&self, a: Point, b: Point, width: f64) -> Option<[f64; 2]>;
 
-    /// The parameter at which the way from `a` to `b` is nearest.
+    /// The parameter at which the segment from `a` to `b` is nearest.
     fn nearest(&self, a: Point, b: Point) -> f64;
 }
 

@@ -19,7 +19,7 @@ const WAVELENGTH: f64 = 1.5;
 /// A refined zone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Zone {
-    /// Number of the cut: makes its noise its own.
+    /// Number of the cut, which seeds its noise.
     pub cut: u32,
     /// The plane in the middle of the zone.
     pub surface: Plane,

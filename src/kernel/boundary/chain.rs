@@ -136,7 +136,7 @@ impl<P: Pages> RecoveryPatch<'_, P> {
 
 /// The part of the segment that sees all faces from inside, as start and length in shares of the segment.
 ///
-/// `at` has the volumes of each face with both ends; `terms` says how finely they are divided.
+/// `at` has the volumes of each face with both ends; `terms` is the precision of divisions.
 fn seen_piece(at: &[[Dyadic; 2]], terms: u32) -> Option<(Dyadic, Dyadic)> {
     let (mut low, mut high) = (Dyadic::from(0.0), Dyadic::from(1.0));
     for [at_a, at_b] in at {

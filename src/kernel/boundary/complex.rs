@@ -23,7 +23,7 @@ pub(super) trait TetComplex {
     fn take_tet(&mut self) -> u32;
     fn free_tet(&mut self, t: u32);
     fn set_tet(&mut self, t: u32, tet: Tet);
-    /// Tells `face` its neighbor.
+    /// Sets the neighbor of `face`.
     fn set_across(&mut self, face: FaceRef, to: FaceRef);
     fn set_tet_of(&mut self, v: u32, t: u32);
     /// Returns whether the edge `a b` must stay although no required face may have it yet.
@@ -158,7 +158,7 @@ pub(super) fn edge_key(a: u32, b: u32) -> u64 {
     u64::from(a.min(b)) << 32 | u64::from(a.max(b))
 }
 
-/// The paged mesh as a space; all vertices are where their coordinates say.
+/// The paged mesh as a complex; all vertices are at their coordinates.
 pub(super) struct PagedComplex<'m, P: Pages>(
     pub &'m mut Mesh<P>,
     /// Edges that must stay.

@@ -3,7 +3,7 @@
 //! Where doubles leave little clearance, success depends on earlier flips and on the places of the first points. A
 //! failed attempt writes nothing, so others can follow.
 
-/// One way to work on a patch.
+/// Parameters of one attempt at a patch.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Effort {
     /// Nesting depth of flips before a point is put, and the number of ring searches.

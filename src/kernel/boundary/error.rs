@@ -44,7 +44,7 @@ pub enum BoundaryError {
         /// The triangle it lies on.
         facet: Box<FacetPlace>,
     },
-    /// A seed says something that cannot be.
+    /// A seed with an impossible meaning.
     #[error("{message}")]
     Seed {
         /// The seed, and its contradiction.

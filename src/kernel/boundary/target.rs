@@ -9,7 +9,7 @@ pub(super) enum RecoveryTarget {
     Face([u32; 3]),
     /// The plane of these three: no edge may cross it anywhere.
     Plane([u32; 3]),
-    /// Nothing is in the way of anything.
+    /// No edge or face is forbidden.
     Free,
 }
 
@@ -44,7 +44,7 @@ impl RecoveryTarget {
 
 /// Returns whether the segment `a b` meets the closed triangle elsewhere than in shared vertices.
 ///
-/// Exact when it says no; a coplanar neighborhood may say yes without contact.
+/// Exact if false; true may also occur in a coplanar neighborhood without contact.
 pub(super) fn edge_meets_face<S: TetComplex>(s: &mut S, a: u32, b: u32, f: [u32; 3]) -> bool {
     let (has_a, has_b) = (f.contains(&a), f.contains(&b));
     if has_a && has_b {

@@ -234,7 +234,7 @@ impl<P: Pages> RecoveryPatch<'_, P> {
             let exact = from.moved(way, &Dyadic::from(way.length() * FINE));
             let p = self.add_vertex(exact.rounded(), Some(exact));
             let mut quads: Vec<[u32; 4]> = walls.iter().map(|&[a, b, c]| [a, b, c, p]).collect();
-            // The walls lie in planes through `x`: a way behind one of them is behind it everywhere.
+            // The walls lie in planes through `x`: a direction behind one of them is behind it everywhere.
             let between_walls = quads.iter().all(|&q| self.orient(q) > 0.0);
             let grown = between_walls.then(|| self.join_all(x, wedge, p));
             if let Some(Some(mut grown)) = grown {

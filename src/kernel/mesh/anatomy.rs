@@ -109,7 +109,7 @@ impl Tet {
             neighbor: [FaceRef(w(4)), FaceRef(w(5)), FaceRef(w(6)), FaceRef(w(7))],
         }
     }
-    /// Makes a record.
+    /// Packs the record.
     #[inline(always)]
     pub fn to_slot(self) -> Slot {
         let (n, m) = (self.node, self.neighbor);

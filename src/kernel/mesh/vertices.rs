@@ -135,7 +135,7 @@ impl<P: Pages> Mesh<P> {
         self.pages.read::<{ kind::VERTICES }>(v)[7].to_native()
     }
 
-    /// Tells a tetrahedron that has `v`. Insertion does not keep this up; flips do.
+    /// Sets a tetrahedron that has `v`. Insertion does not keep this up; flips do.
     #[inline]
     pub fn set_tet_of(&mut self, v: u32, t: u32) {
         self.pages.write::<{ kind::VERTICES }>(v)[7] = t.into();
@@ -209,7 +209,7 @@ impl<P: Pages> Mesh<P> {
         self.attribute::<{ kind::VERTEX_ATTRIBUTES }>(v)
     }
 
-    /// Sets the words of the attribute of `v`; the tag in them says whether it is fixed.
+    /// Sets the words of the attribute of `v`; the tag in them decides whether it is fixed.
     pub(super) fn set_vertex_words(&mut self, v: u32, tag: u32, owner: u32) {
         let free = [VertexTag::Free, VertexTag::Steiner].map(|tag| tag as u32);
         self.set_fixed(v, !free.contains(&(tag & TAG_MASK)));

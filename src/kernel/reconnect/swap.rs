@@ -67,7 +67,7 @@ impl FaceSwap {
         orient(p, q, x, y) > 0.0 && orient(p, q, y, z) > 0.0 && orient(p, q, z, x) > 0.0
     }
 
-    /// Makes the change; returns the new tetrahedra `(p q x y) (p q y z) (p q z x)`.
+    /// Applies the swap; returns the new tetrahedra `(p q x y) (p q y z) (p q z x)`.
     ///
     /// Requires [`FaceSwap::is_positive`] and the two records as they are in the mesh now.
     pub fn apply<P: Pages>(&self, mesh: &mut Mesh<P>) -> [u32; 3] {

@@ -48,7 +48,7 @@ impl Balls {
         H_DEFAULT * Self::scale(count)
     }
 
-    /// Makes the surface: labels `walls` and `balls`.
+    /// Builds the surface: labels `walls` and `balls`.
     pub(super) fn make(&self, bytes_max: u64) -> Result<Sample, SampleError> {
         let mut random = Random::new(self.seed);
         let placed = self.place(&mut random)?;
@@ -189,7 +189,7 @@ impl BallPacking {
 
     /// Returns whether a ball there keeps the gap to all others but itself.
     fn is_free(&self, ball: u32, center: Point, radius: f64) -> bool {
-        // Asked millions of times, and refused most of them, by a ball of the same cell most often.
+        // Called millions of times and usually refused, most often by a ball of the same cell.
         let [x, y, z] = self.coordinates(center);
         let cell_is_free = |cell: usize| {
             for &(other, at, r) in &self.cells[cell] {

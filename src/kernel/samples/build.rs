@@ -24,7 +24,7 @@ impl Builder {
     pub fn point(&mut self, p: Point) -> u32 {
         // Adding zero turns -0.0 into 0.0.
         push(&mut self.sample.points, p + Point::ZERO);
-        // Makers refuse surfaces of more triangles than u32 can number before they begin.
+        // Generators refuse surfaces of more triangles than u32 can number before they begin.
         (self.sample.points.len() - 1) as u32
     }
 

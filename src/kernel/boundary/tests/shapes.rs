@@ -1,4 +1,4 @@
-//! Made surfaces with known difficulties.
+//! Generated surfaces with known difficulties.
 
 use super::build::{check, check_facets, delaunay};
 use crate::boundary::{RecoveryReport, recover};
