@@ -93,10 +93,7 @@ impl<P: Pages, Q: Pages, R: Pages> ChildBuilder<'_, P, Q, R> {
 
     /// Numbers the core's vertices as they are met in tetrahedra of this side; in its scratch map others have [`NONE`].
     fn meet_core_vertices(&mut self) {
-        self.core.clear_scratch();
-        for n in 0..self.core_base {
-            self.core.set_scratch(n, NONE);
-        }
+        self.core.reset_scratch(self.core_base, NONE);
         let mut met = 0;
         for t in tet_ids(self.core) {
             let tet = self.core.tet(t);
@@ -159,9 +156,7 @@ impl<P: Pages, Q: Pages, R: Pages> ChildBuilder<'_, P, Q, R> {
     /// Puts into the scratch maps the child's number of each of its tetrahedra.
     pub fn number_tets(&mut self) {
         let side = self.side_bits();
-        for n in 0..dense(self.child.vertex_ids_end()) {
-            self.child.set_scratch(n, 0);
-        }
+        self.child.reset_scratch(dense(self.child.vertex_ids_end()), 0);
         // First the smallest number of a vertex, which is counted in the child's scratch map.
         for t in tet_ids(self.core) {
             let place = self.core_base + dense(t);

@@ -105,11 +105,8 @@ pub(super) fn extract<P: Pages, Q: Pages>(
     core: &mut Mesh<Q>,
     surface: &impl CuttingSurface,
 ) -> CoreBoundary {
-    host.clear_scratch();
     let base = dense(host.vertex_ids_end());
-    for n in 0..base {
-        host.set_scratch(n, NONE);
-    }
+    host.reset_scratch(base, NONE);
     let (mut at, mut met) = (base, 0);
     let mut t = 0;
     while t < host.tet_ids_end() {

@@ -85,10 +85,7 @@ fn minimum_cut<P: Pages>(
     surface: &impl CuttingSurface,
     free: &[u32],
 ) -> u64 {
-    core.clear_scratch();
-    for n in 0..dense(core.tet_ids_end()) {
-        core.set_scratch(n, NONE);
-    }
+    core.reset_scratch(dense(core.tet_ids_end()), NONE);
     let mut order = free.to_vec();
     let strips = free.len().div_ceil(STRIP).max(1);
     let mut sorting = 0;

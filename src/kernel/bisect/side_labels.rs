@@ -196,10 +196,7 @@ pub(super) fn layers_least<P: Pages, Q: Pages>(
     core_boundary: &CoreBoundary,
     surface: &impl CuttingSurface,
 ) -> Option<u32> {
-    core.clear_scratch();
-    for n in 0..dense(core.tet_ids_end()) {
-        core.set_scratch(n, NONE);
-    }
+    core.reset_scratch(dense(core.tet_ids_end()), NONE);
     let mut layer = Vec::new();
     for t in tet_ids(core) {
         let tet = core.tet(t);

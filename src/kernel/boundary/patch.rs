@@ -5,6 +5,7 @@
 use super::complex::{TetComplex, edge_key, sorted};
 use super::effort::Effort;
 use super::exact::{ExactPoint, PlacedPoint, orient_exact, orient_filtered, orient_in_pairs};
+use crate::mesh::anatomy::REQUIRED;
 use crate::mesh::{FaceRef, Mesh, Tet, VertexTag};
 use tetdb_base::geom::{Dyadic, IdMap, IdSet, Point, orient};
 use tetdb_base::storage::Pages;
@@ -93,7 +94,7 @@ impl<'m, P: Pages> RecoveryPatch<'m, P> {
         for i in 0..4 {
             let v = record.vertex(i);
             let l = self.local_vertex(v, t);
-            tet.node[i] = l | (record.node[i] & crate::mesh::anatomy::REQUIRED);
+            tet.node[i] = l | (record.node[i] & REQUIRED);
             let outside = record.neighbor[i];
             if let Some(k) = self.border_of.remove(&FaceRef::new(id, i).0) {
                 let inside = self.borders[k as usize].inside;
@@ -118,31 +119,28 @@ impl<'m, P: Pages> RecoveryPatch<'m, P> {
         }
         let point = self.mesh.point(v);
         let steiner = self.mesh.vertex_attribute(v).0 == VertexTag::Steiner;
-        let l = self.vertices.len() as u32;
-        self.vertices.push(PatchVertex {
-            id: v,
-            steiner,
-            point,
-            exact: None,
-            on: [l; 3],
-            tet_of: t,
-        });
+        let l = self.push_vertex(v, steiner, point, None, t);
         self.local.insert(v, l);
+        l
+    }
+
+    /// Adds a vertex that lies on no segment or facet.
+    fn push_vertex(
+        &mut self,
+        id: u32,
+        steiner: bool,
+        point: Point,
+        exact: Option<ExactPoint>,
+        tet_of: u32,
+    ) -> u32 {
+        let l = self.vertices.len() as u32;
+        self.vertices.push(PatchVertex { id, steiner, point, exact, on: [l; 3], tet_of });
         l
     }
 
     /// Adds a vertex in no tetrahedron.
     pub fn add_vertex(&mut self, point: Point, exact: Option<ExactPoint>) -> u32 {
-        let l = self.vertices.len() as u32;
-        self.vertices.push(PatchVertex {
-            id: NONE,
-            steiner: true,
-            point,
-            exact,
-            on: [l; 3],
-            tet_of: NONE,
-        });
-        l
+        self.push_vertex(NONE, true, point, exact, NONE)
     }
 
     /// Adds a vertex in no tetrahedron that is a combination of the vertices `on`, from the input.
@@ -322,7 +320,7 @@ impl<'m, P: Pages> RecoveryPatch<'m, P> {
             let id = tet_id[t as usize];
             for i in 0..4 {
                 let v = vertex_id[tet.vertex(i) as usize];
-                tet.node[i] = v | (tet.node[i] & crate::mesh::anatomy::REQUIRED);
+                tet.node[i] = v | (tet.node[i] & REQUIRED);
                 let n = tet.neighbor[i];
                 if n.exists() && n.0 & BORDER != 0 {
                     let outside = self.borders[(n.0 & !BORDER) as usize].outside;

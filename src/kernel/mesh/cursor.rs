@@ -318,7 +318,13 @@ impl<P: Pages> Mesh<P> {
         self.pages.write::<{ kind::SCRATCH }>(slot)[n as usize & 7] = word.into();
     }
 
-    /// Forgets the scratch map.
+    /// Clears the scratch map and sets its first `n` words.
+    pub fn reset_scratch(&mut self, n: u32, word: u32) {
+        self.clear_scratch();
+        (0..n).for_each(|k| self.set_scratch(k, word));
+    }
+
+    /// Clears the scratch map.
     pub fn clear_scratch(&mut self) {
         self.pages.clear::<{ kind::SCRATCH }>();
     }
